@@ -185,7 +185,8 @@ def test_a_flight_of_what_was_and_was_not_seen(tmp_path: Path):
     import_flight(DATA / "recipes" / "autoferry-2.toml", small(tmp_path), tmp_path / "flight")
     flight = load_flight(tmp_path / "flight")
     frames, detections = flight.table("frames"), flight.table("detections")
-    assert (flight.name, flight.manifest.kind, list(flight.nav)) == ("autoferry-2", "logged", ["ownship"])
+    assert (flight.manifest.name, flight.manifest.kind) == ("autoferry-2", "logged")
+    assert list(flight.nav) == ["ownship"]
     assert list(frames["sensor"]) == ["eo", "ir", "lidar", "radar", "lidar", "ir"]
     np.testing.assert_allclose(frames["time_s"], [0, 0.2, 0.5, 1.0, 1.5, 2.0])
     assert detections.groupby("source", sort=False)["kind"].first().to_dict() == {
@@ -215,6 +216,7 @@ def scenarios(
     return {number: load_flight(into / str(number)) for number in SCENARIOS}
 
 
+@pytest.mark.slow
 def test_the_published_scenarios(scenarios: dict[int, Flight]):
     for number, flight in scenarios.items():
         assert set(flight.table("frames")["sensor"]) == set(SENSORS.values())

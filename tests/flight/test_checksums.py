@@ -71,12 +71,12 @@ def test_every_flipped_bit_of_the_manifest_is_an_error_or_is_said(folder: Path) 
             assert str(folder) in str(error.file)
             continue
         worst = [
-            one.level for one in findings if one.table == "flight.toml" and "another one" in one.sentence
+            one.level
+            for one in findings
+            if one.table == "flight.toml" and ("another one" in one.sentence or one.field == "locations")
         ]
         # Blank lines at the seam of the two parts say nothing.
-        assert worst == ["warning"] or bytes(damaged).split() == whole.split(), damaged[
-            place - 20 : place + 20
-        ]
+        assert "warning" in worst or bytes(damaged).split() == whole.split(), damaged[place - 20 : place + 20]
 
 
 def test_a_missing_and_an_added_table_are_named(folder: Path) -> None:

@@ -185,9 +185,9 @@ def test_no_false_alarm(name: str, request: pytest.FixtureRequest) -> None:
         (
             "thor",
             lambda f: _scaled(f, (*FORCE[:2], *RATE[:2]), -1),
-            "x goes with minus x, y goes with minus y",
+            "x is minus x, y is minus y",
         ),
-        ("x8", lambda f: _scaled(f, (*FORCE[:2], *RATE[:2]), -1), "x goes with minus x, y goes with minus y"),
+        ("x8", lambda f: _scaled(f, (*FORCE[:2], *RATE[:2]), -1), "x is minus x, y is minus y"),
         ("thor", lambda f: f.tables["gnss"].update(f.tables["gnss"]["time_s"] + 1), "stamps seem to be 1."),
         ("x8", lambda f: f.tables["gnss"].update(f.tables["gnss"]["time_s"] - 1), "stamps seem to be 1."),
     ],

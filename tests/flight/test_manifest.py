@@ -189,3 +189,35 @@ def test_sensors_are_kept_and_checked(manifest_data: dict[str, Any], tmp_path: P
     ):
         with pytest.raises(WildlabError, match=rf"{part}\.{key}"):
             replace_in_manifest(manifest, {part: {key: value}})
+
+
+def test_roll_pitch_and_yaw_of_older_files_are_a_tilt_and_a_heading(manifest_data: dict[str, Any]) -> None:
+    older = {"roll_deg": 1.0, "pitch_deg": 7.0, "yaw_deg": 3.0}
+    for stated, tilt, heading in (
+        (older, 5.0, 3.0),
+        ({"pitch_deg": 2.0}, 2.0, None),
+        ({"roll_deg": None, "yaw_deg": 4.0}, None, 4.0),
+        ({"tilt_deg": 0.5, "yaw_deg": 4.0}, 0.5, 4.0),
+    ):
+        found = make_manifest(manifest_data | {"uncertainty": stated})
+        assert (found.uncertainty.tilt_deg, found.uncertainty.heading_deg) == (tilt, heading)
+        written = tomllib.loads(manifest_toml(found))["uncertainty"]
+        assert not written.keys() & older.keys()
+        assert make_manifest(tomllib.loads(manifest_toml(found))) == found
+
+
+@pytest.mark.parametrize(
+    ("stated", "says"),
+    [
+        ({"tilt_deg": 1.0, "roll_deg": 1.0}, "state the same"),
+        ({"heading_deg": 1.0, "yaw_deg": 1.0}, "state the same"),
+        ({"roll_deg": 0.0, "pitch_deg": 1.0}, "greater than 0"),
+        ({"yaw_deg": "three"}, "greater than 0"),
+        ({"yaw_deg": float("nan")}, "greater than 0"),
+    ],
+)
+def test_spreads_of_older_files_that_make_no_sense_are_refused(
+    manifest_data: dict[str, Any], stated: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(WildlabError, match=says):
+        make_manifest(manifest_data | {"uncertainty": stated})

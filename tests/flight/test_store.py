@@ -272,8 +272,9 @@ def test_choice_of_pose_source(make_flight: Callable[..., Flight]) -> None:
     assert flight.pose_source()[0] == "autopilot"
     flight.nav["observer"] = flight.nav["autopilot"]
     assert flight.pose_source("observer")[0] == "observer"
-    with pytest.raises(WildlabError, match="Name one of those there are as source: autopilot, observer"):
-        flight.pose_source()
+    assert flight.pose_source()[0] == "observer", "the best of them"
+    flight.nav["a-tracker"] = flight.nav["autopilot"]
+    assert flight.estimated_sources == ["observer", "autopilot", "a-tracker"]
     flight.nav["logged"] = flight.nav["autopilot"]
     assert flight.pose_source()[0] == "logged"
     with pytest.raises(WildlabError, match="no nav source 'mekf'"):
@@ -285,7 +286,9 @@ def test_the_truth_is_no_choice_of_poses(make_flight: Callable[..., Flight]) -> 
     flight.nav["truth"] = flight.nav["truth-payload"] = flight.nav["autopilot"]
     assert flight.pose_source()[0] == "autopilot"
     del flight.nav["truth-payload"], flight.nav["autopilot"]
-    assert flight.pose_source()[0] == "truth", "where there is nothing else"
+    with pytest.raises(WildlabError, match="this flight has no estimated poses"):
+        flight.pose_source()
+    assert flight.pose_source("truth")[0] == "truth", "where it is named"
 
 
 def test_a_table_that_is_not_there(make_flight: Callable[..., Flight]) -> None:

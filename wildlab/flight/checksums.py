@@ -10,13 +10,17 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterator, Mapping
+from itertools import product
 from pathlib import Path
+from typing import get_args
 
 from wildlab.errors import WildlabError
 from wildlab.files import sha256, write_atomic
 from wildlab.flight.files import TOML_LIMIT, inside, read_regular
 from wildlab.flight.manifest import FILE_NAME, parse_manifest, read_manifest
+from wildlab.flight.manifest_parts import LocationsPart, Sensitivity
 from wildlab.flight.schema import TABLES
 from wildlab.flight.toml import dump_toml
 
@@ -25,7 +29,8 @@ TERRAIN = "terrain.tif"
 CALIBRATION = "calibration.toml"
 #: The part of `flight.toml`, and its line.
 PART = "checksums"
-#: The part on how sensitive places are: stated by hand whenever that is known, so its change is no damage.
+#: The part on how sensitive places are: stated by hand whenever that is known, so its change is no damage. It
+#: has a checksum of its own, of what was confirmed last.
 STATED = "locations"
 _HEADERS = {part: re.compile(rf"^[ \t]*\[[ \t]*{part}[ \t]*\].*$", re.MULTILINE) for part in (PART, STATED)}
 _NEXT = re.compile(r"^[ \t]*\[", re.MULTILINE)
@@ -80,7 +85,7 @@ def verify(folder: Path, stated: Mapping[str, str]) -> None:
         return
     meant = f'if it is meant: wildlab check --accept "{folder}"'
     found = checksums_of(folder)
-    for name in sorted({*stated, *found} - {FILE_NAME}):
+    for name in sorted({*stated, *found} - {FILE_NAME, STATED}):
         if name not in found:
             raise WildlabError(
                 "this file is missing, and flight.toml has a checksum of it",
@@ -122,7 +127,7 @@ def accept_changes(folder: Path) -> list[str]:
     path = inside(folder, FILE_NAME, file=folder, field=FILE_NAME)
     before, tables = read_manifest(path).checksums, checksums_of(folder)
     text = _text(path)
-    now = tables | {FILE_NAME: _of_text(text)}
+    now = tables | {FILE_NAME: _of_text(text), STATED: _of_places(read_manifest(path).locations)}
     changed = [name for name in sorted({*before, *now}) if before.get(name) != now.get(name)]
     if changed:
         new = with_checksums(text, tables)
@@ -149,6 +154,44 @@ def manifest_changed(folder: Path) -> bool | None:
     stated = read_manifest(path).checksums.get(FILE_NAME)
     text = _text(path)
     return None if stated is None else stated not in (_of_text(text), _of_whole_text(text))
+
+
+def confirmed_locations(folder: Path) -> LocationsPart:
+    """How sensitive the places of a flight are by what was written or accepted last.
+
+    Only its checksum is kept, and every ``[locations]`` that there can be is held against it; where none
+    fits, or there is no checksum, nothing was confirmed and places are withheld.
+
+    Raises
+    ------
+    WildlabError
+        Where `flight.toml` cannot be read.
+    """
+    stated = read_manifest(inside(folder, FILE_NAME, file=folder, field=FILE_NAME)).checksums.get(STATED)
+    return next((one for one in _every_locations() if _of_places(one) == stated), LocationsPart())
+
+
+def locations_confirmed(folder: Path) -> bool:
+    """Whether ``[locations]`` is as it was written or accepted last; true of a flight without that checksum
+    that states nothing.
+
+    Raises
+    ------
+    WildlabError
+        Where `flight.toml` cannot be read.
+    """
+    manifest = read_manifest(inside(folder, FILE_NAME, file=folder, field=FILE_NAME))
+    return manifest.checksums.get(STATED, _of_places(LocationsPart())) == _of_places(manifest.locations)
+
+
+def _every_locations() -> Iterator[LocationsPart]:
+    categories = (None, 1, 2, 3, 4)
+    for sensitivity, own, agreed in product(get_args(Sensitivity), categories, categories):
+        yield LocationsPart(sensitivity=sensitivity, category=own, agreed_category=agreed)
+
+
+def _of_places(locations: LocationsPart) -> str:
+    return hashlib.sha256(locations.model_dump_json().encode()).hexdigest()
 
 
 def _text(path: Path) -> str:
@@ -195,4 +238,6 @@ def with_checksums(text: str, tables: Mapping[str, str]) -> str:
     >>> with_checksums(text, {"frames.parquet": "00"}) == text
     True
     """
-    return _without(text) + "\n" + dump_toml({PART: {FILE_NAME: _of_text(text), **tables}})
+    places = LocationsPart.model_validate(tomllib.loads(text).get(STATED, {}))
+    own = {FILE_NAME: _of_text(text), STATED: _of_places(places)}
+    return _without(text) + "\n" + dump_toml({PART: {**own, **tables}})

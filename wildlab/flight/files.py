@@ -70,6 +70,18 @@ def is_safe_name(name: str) -> bool:
     return SAFE_NAME.fullmatch(name) is not None
 
 
+def flight_name(folder: Path, stated: str) -> str:
+    """What a flight and its reports are called: as its folder, or as stated where that is no safe name.
+
+    Examples
+    --------
+    >>> flight_name(Path("flights/trial"), "slow-vessel-1"), flight_name(Path("flights/my day"), "my-day")
+    ('trial', 'my-day')
+    """
+    name = folder.resolve().name
+    return name if is_safe_name(name) else stated
+
+
 def leaves_folder(name: str) -> bool:
     """Whether a relative file name is absolute or climbs out, read as POSIX and as Windows would read it."""
     windows = PureWindowsPath(name)

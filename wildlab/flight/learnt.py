@@ -13,7 +13,7 @@ from wildlab.errors import WildlabError, system_error
 from wildlab.files import write_atomic
 from wildlab.flight.files import Strict, check_model, read_toml
 from wildlab.flight.manifest import Manifest
-from wildlab.flight.manifest_parts import CameraPart, MountPart, Spread
+from wildlab.flight.manifest_parts import AttitudeSpreads, CameraPart, MountPart, Spread
 from wildlab.flight.toml import dump_toml
 
 #: Focal lengths and principal points that differ by no more than this share of the focal length are the same.
@@ -21,8 +21,9 @@ SAME_CAMERA = 1e-3
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 #: Units of the parameters, by name; the file is for people, so angles are in degrees and shares in percent.
 UNITS: dict[str, str] = {
-    "roll": "deg", "tilt": "deg", "pan": "deg", "clock": "s", "down": "m", "north": "m", "east": "m",
-    "focal": "%", "aspect": "%", "centre_u": "px", "centre_v": "px",
+    "roll": "deg", "tilt": "deg", "pan": "deg", "heading": "deg", "clock": "s",
+    "down": "m", "north": "m", "east": "m", "focal": "%", "aspect": "%", "centre_u": "px", "centre_v": "px",
+    "radial": "1",
 }  # fmt: skip
 
 
@@ -71,15 +72,14 @@ class LearntParameter(Strict):
         return self
 
 
-class LearntNoise(Strict):
+class LearntNoise(AttitudeSpreads):
     """Standard deviations of poses and pixels, learnt with the corrections taken off."""
 
     pixel_px: Spread
     position_horizontal_m: Spread
     position_vertical_m: Spread
-    roll_deg: Spread
-    pitch_deg: Spread
-    yaw_deg: Spread
+    tilt_deg: Spread
+    heading_deg: Spread
 
 
 class Learnt(Strict):

@@ -11,11 +11,15 @@ from typing import Annotated, Any, Literal
 from pydantic import AwareDatetime, Field, field_validator, model_validator
 
 from wildlab.flight.files import Strict, leaves_folder
+from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 Spread = Annotated[float, Field(gt=0, le=1e6)]
 Vector = tuple[float, float, float]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+Sensitivity = Literal["open", "generalised", "withheld"]
 
 
 class LocationsPart(Strict):
@@ -26,7 +30,7 @@ class LocationsPart(Strict):
     was agreed for partners. Left out, ``data/sharing/tiers.toml`` says what is assumed.
     """
 
-    sensitivity: Literal["open", "generalised", "withheld"] = "withheld"
+    sensitivity: Sensitivity = "withheld"
     category: Annotated[int, Field(ge=1, le=4)] | None = None
     agreed_category: Annotated[int, Field(ge=1, le=4)] | None = None
 
@@ -205,17 +209,44 @@ class VerticalPart(Strict):
     note: str = ""
 
 
-class UncertaintyPart(Strict):
-    """Standard deviations to assume where the log has none. Absent = not assumed."""
+class AttitudeSpreads(Strict):
+    """Reads standard deviations of roll, pitch and yaw in older files as those of tilt and heading.
+
+    The rule is that of `wildlab.geometry.attitude_uncertainty`; of roll and pitch one may be missing.
+    """
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_roll_pitch_yaw(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        found = dict(data)
+        for name, older in (("tilt_deg", ("roll_deg", "pitch_deg")), ("heading_deg", ("yaw_deg",))):
+            stated = {key: found.pop(key, None) for key in older}
+            given = {key: value for key, value in stated.items() if value is not None}
+            if given and found.get(name) is not None:
+                raise ValueError(f"{name} and {', '.join(given)} state the same; take out {', '.join(given)}")
+            for key, value in given.items():
+                if not isinstance(value, int | float) or not value > 0:
+                    raise ValueError(f"{key} is a standard deviation; give a number greater than 0")
+            if given:
+                found[name] = float(tilt_from_roll_pitch(*given.values()))
+        return found
+
+
+class UncertaintyPart(AttitudeSpreads):
+    """Standard deviations to assume where the log has none. Absent = not assumed.
+
+    ``tilt_deg`` and ``heading_deg``: see `wildlab.geometry.attitude_uncertainty`.
+    """
 
     pixel_px: Spread | None = None
     position_horizontal_m: Spread | None = None
     position_vertical_m: Spread | None = None
     velocity_horizontal_m_s: Spread | None = None
     velocity_vertical_m_s: Spread | None = None
-    roll_deg: Spread | None = None
-    pitch_deg: Spread | None = None
-    yaw_deg: Spread | None = None
+    tilt_deg: Spread | None = None
+    heading_deg: Spread | None = None
     misalignment_deg: Spread | None = None
     plane_height_m: Spread | None = None
     note: str = ""

@@ -19,7 +19,7 @@ import pyarrow.parquet
 from wildlab.brief import Brief, Summary
 from wildlab.errors import WildlabError
 from wildlab.flight.checksums import CALIBRATION, TERRAIN, checksums_of, verify, with_checksums
-from wildlab.flight.files import inside, is_safe_name, regular_size
+from wildlab.flight.files import flight_name, inside, is_safe_name, regular_size
 from wildlab.flight.learnt import Learnt, write_learnt
 from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_manifest
 from wildlab.flight.schema import NAV, TABLES, Table, conform
@@ -27,6 +27,9 @@ from wildlab.flight.terrain_file import read_terrain, write_terrain
 from wildlab.geometry.terrain import Terrain
 
 # pyarrow carries no types.
+#: Estimated poses, best first: as logged, by RTK, by the filters of `wildlab.navigation`, found on board.
+PREFERRED = ("logged", "rtk", "mekf", "observer", "onboard", "autopilot")
+
 arrow: Any = pyarrow
 parquet: Any = pyarrow.parquet
 
@@ -57,7 +60,8 @@ class Flight(Brief):
 
     @property
     def name(self) -> str:
-        return self.manifest.name
+        """That of its folder, which reports have too; of one in memory, what its manifest states."""
+        return self.manifest.name if self.folder is None else flight_name(self.folder, self.manifest.name)
 
     @property
     def frames(self) -> pd.DataFrame | None:
@@ -106,7 +110,7 @@ class Flight(Brief):
             ("targets", str(targets)),
             ("locations", m.locations.sensitivity),
         ]
-        return Summary(f"Flight {m.name}", rows)
+        return Summary(f"Flight {self.name}", rows)
 
     def table(self, name: str) -> pd.DataFrame:
         """A table that must be there.
@@ -123,30 +127,34 @@ class Flight(Brief):
         return self.tables[name]
 
     def pose_source(self, name: str | None = None) -> tuple[str, pd.DataFrame]:
-        """Name and table of a nav source; without a name, the only one beside those of the truth (or
-        ``logged``, where there are more).
+        """Name and table of a nav source; without a name, of the best of `estimated_sources`.
 
         Raises
         ------
         WildlabError
-            Where there is none of that name, or the choice is not clear.
+            Where there is none of that name, or no estimated one.
         """
-        # A twin's truth, or a reference that is called so, is what poses are held against.
-        found = [one for one in self.nav if not one.startswith("truth")] or list(self.nav)
-        if name is None and len(found) == 1:
-            return found[0], self.nav[found[0]]
-        wanted = "logged" if name is None else name
-        if wanted in self.nav:
+        known = self.estimated_sources
+        wanted = next(iter(known), None) if name is None else name
+        if wanted is not None and wanted in self.nav:
             return wanted, self.nav[wanted]
-        known = ", ".join(sorted(self.nav)) or "none"
         raise WildlabError(
-            f"there is no nav source {wanted!r}" if name else "it is not clear which nav source to use",
-            f"name one of those there are as source: {known}"
-            if self.nav
-            else "add the poses as nav/<source>.parquet",
+            f"there is no nav source {name!r}" if name else "this flight has no estimated poses",
+            f"choose one: --source {' or '.join(known)}" if known else "add them as nav/<source>.parquet",
             file=self.folder,
             field="nav",
         )
+
+    @property
+    def estimated_sources(self) -> list[str]:
+        """Nav sources that have rows, best first: `PREFERRED`, then others by name.
+
+        The truth of a twin, or a reference that is called so, is what poses are held against: it is named or
+        not taken.
+        """
+        found = [name for name, nav in self.nav.items() if len(nav) and not name.startswith("truth")]
+        rank = {name: place for place, name in enumerate(PREFERRED)}
+        return sorted(found, key=lambda name: (rank.get(name, len(rank)), name))
 
 
 def _counts(tables: Mapping[str, pd.DataFrame]) -> str:

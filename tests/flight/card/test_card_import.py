@@ -335,3 +335,17 @@ def test_the_command_line_is_there_as_a_module():
     command = [sys.executable, "-m", "wildlab", "--version"]
     run = subprocess.run(command, capture_output=True, text=True, check=True)
     assert run.stdout.startswith("wildlab")
+
+
+def test_a_track_copied_twice_is_one_target(tmp_path: Path):
+    card = tmp_path / "card"
+    write_card(card)
+    track = [(i, 0.5 * i, 1.0, 40.0) for i in range(40)]
+    for name, part in (("fox.gpx", track), ("fox (1).gpx", track), ("fox cut.gpx", track[:25])):
+        (card / name).write_text(gpx(part))
+    arguments = ["import", str(card), "--into", str(tmp_path / "flight"), "--zone", "UTC", "--geoid", "0"]
+    result = CliRunner().invoke(wildlab, arguments)
+    assert result.exit_code == 0, result.output
+    truth = load_flight(tmp_path / "flight").table("truth")
+    assert truth.loc[truth["time_s"].notna(), "target_id"].nunique() == 1
+    assert result.output.count("all that is in it is in") == 2

@@ -69,7 +69,7 @@ def test_a_boat_right_below_is_a_target():
 
 
 def test_a_second_attitude_on_board_rides_on_the_camera():
-    found = roles(log("gimbal", attitude=True, seconds=60), log("drone", attitude=True))
+    found = roles(log("gimbal", north=1.0, attitude=True, seconds=60), log("drone", attitude=True))
     assert found == {"gimbal": "camera", "drone": "own"}
 
 
@@ -157,3 +157,17 @@ def test_a_track_of_another_day_is_no_target_of_images():
     choices = choose_roles([images, log("today"), log("yesterday", begin=-30 * 3600.0)], {})
     assert [one.role for one in choices] == ["images", "target", "nothing"]
     assert "or a clock is wrong: 30 h lie between it and the images" in choices[2].why
+
+
+def test_a_copy_of_a_log_is_not_used_even_where_it_is_cut_shorter():
+    whole, copy, part = log("boat", north=80.0), log("boat (1)", north=80.0), log("b", north=80.0, seconds=40)
+    choices = choose_roles([part, log("drone", attitude=True), whole, copy], {})
+    assert [one.role for one in choices] == ["nothing", "own", "target", "nothing"]
+    assert all("all that is in it is in boat too" in choices[i].why for i in (0, 3))
+    assert roles(log("drone", attitude=True), log("copy", attitude=True))["copy"] == "nothing"
+
+
+def test_another_log_of_the_same_place_is_no_copy():
+    own = log("drone", attitude=True)
+    assert roles(own, log("rtk", north=1e-6))["rtk"] == "receiver"
+    assert roles(own, log("copy", north=80.0), log("same", north=80.0), copy="target")["same"] == "target"

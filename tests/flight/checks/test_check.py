@@ -21,9 +21,8 @@ ASSUMED = {
     "pixel_px": 3.0,
     "position_horizontal_m": 2.0,
     "position_vertical_m": 2.0,
-    "roll_deg": 1.0,
-    "pitch_deg": 1.0,
-    "yaw_deg": 2.0,
+    "tilt_deg": 1.0,
+    "heading_deg": 2.0,
 }
 
 

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.flight.checks.check import Finding, check_flight, usable_for
+from wildlab.flight.checks.check import Finding, find, usable_for
+from wildlab.flight.checks.findings import whole
 from wildlab.flight.checks.inertial_data import FORCE, RATE
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
@@ -89,7 +90,7 @@ def _copy(flight: Flight, nav: bool = True) -> Flight:
 
 
 def _found(flight: Flight) -> list[Finding]:
-    return [one for one in check_flight(flight) if one.table in ("imu", "gnss")]
+    return [whole(one) for one in find(flight, meaning=False) if one.table in ("imu", "gnss")]
 
 
 def _circle() -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from wildlab.flight.checks.inertial_data import POSITION, QUATERNION
 from wildlab.flight.checks.sense.heading import follows, headed, heading
+from wildlab.flight.manifest_parts import MountPart
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
 
 T = np.arange(0, 300, 0.5)
@@ -23,7 +25,8 @@ class _Flight:
         table[list(POSITION)] = np.cumsum(step, axis=0)
         R = euler_to_matrix(0.1 + 0 * T, 0.02 + 0 * T, yaw)
         table[list(QUATERNION)] = matrix_to_quaternion(R)
-        self.nav = {"log": table}
+        self.nav, self.gimbal = {"log": table}, None
+        self.manifest = SimpleNamespace(mount=MountPart())
 
 
 def causes(flight: _Flight) -> list[str]:
@@ -78,4 +81,4 @@ def test_the_mean_cosine_is_that_of_a_known_angle() -> None:
     given = headed(_Flight(COURSE + 0.3).nav["log"])
     assert given is not None
     # The course over two seconds is that of their middle, but for the half step the positions lie late.
-    np.testing.assert_allclose(follows(*given), np.cos(0.3), atol=0.02)
+    np.testing.assert_allclose(follows(*given[:2]), np.cos(0.3), atol=0.02)

@@ -56,6 +56,7 @@ def with_others(flight: Flight) -> Flight:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [25, 12, 6, 2, 1])
 def test_what_is_right_is_not_accused_however_few_are_known(flown: Flight, count: int) -> None:
     assert told(few(flown, count)) == []
@@ -80,6 +81,7 @@ def test_what_meets_targets_often_enough_needs_no_explanation(
     assert bool(list(nameless.nameless(flown, given))) is accused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -19,9 +19,8 @@ STATED = {
     "pixel_px": 2.0,
     "position_horizontal_m": 1.0,
     "position_vertical_m": 1.0,
-    "roll_deg": 1.0,
-    "pitch_deg": 1.0,
-    "yaw_deg": 3.0,
+    "tilt_deg": 1.0,
+    "heading_deg": 3.0,
 }
 CAMERA = {"name": "wide", "width_px": 640, "height_px": 512, "fx_px": 400.0, "fy_px": 400.0}
 PHOTOS = 50

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,6 +30,7 @@ from wildlab.flight.checks.sense.felt import Felt, axes_words, felt_mistakes, ot
 from wildlab.flight.checks.sense.field import Seen, field_mistakes
 from wildlab.flight.checks.sense.places import place_mistakes
 from wildlab.flight.checks.sense.sightings import Look, Sightings, metres, missed, sightings
+from wildlab.flight.checks.sense.trial import Mistake, Named
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
@@ -323,9 +326,26 @@ def test_axes_are_undone_as_the_words_say() -> None:
         assert np.array_equal(said_of(words), M)
         read = right @ said_of(words)  # row by row: right = M read, and M has its transpose for inverse
         (mistake,) = [one for one in felt_mistakes("log") if one.cause == f"axes of [imu.rate]: {words}"]
-        undone = mistake.undo(Felt(turns, turns, np.ones(5), read, read, turns, right))
+        undone = mistake.undo(Felt(turns, turns, np.ones(5), read, read, turns, right, np.arange(5.0)))
         assert undone is not None
         assert np.allclose(undone.rate, right) and np.array_equal(undone.force, read)
         (mistake,) = [one for one in field_mistakes("log") if one.cause.endswith(f"magnetometer: {words}")]
         seen = mistake.undo(Seen(read, read, turns, turns, None))
         assert seen is not None and np.allclose(seen.before, right) and np.allclose(seen.after, right)
+
+
+def test_what_leaves_ten_times_the_distance_is_no_explanation_as_good(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def named(cause: str, left_m: float) -> Named[Any]:
+        mistake: Mistake[Any] = Mistake(
+            cause, cause, f"write {cause}", lambda one: one, corrections=(lambda flight: flight,)
+        )
+        return Named(mistake, SimpleNamespace(left=left_m), 9.0, 1.0)
+
+    monkeypatch.setattr(seen, "metres", lambda one: one.left)
+    given: Any = SimpleNamespace(left=100.0, source="log")
+    causes = [named("feet", 2.7), named("focal length", 31.0), named("yards", 3.0)]
+    for order in (causes, causes[::-1]):
+        found = seen._finding(given, order)
+        assert set(found.causes) == {"feet", "yards"} and "31" not in found.sentence

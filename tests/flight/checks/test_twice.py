@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pandas as pd
+import pytest
 
+from tests.flight.conftest import Raw
+from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
+from wildlab.flight.checks.twice import twice
+from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
 
 Make = Callable[..., Flight]
@@ -71,3 +77,50 @@ def test_one_among_hundreds_is_a_note(make_flight: Make) -> None:
     flight.tables["detections"] = pd.concat([many, many.iloc[:1].assign(detection_id="x")], ignore_index=True)
     found = [one for one in check_flight(flight) if one.field == "detection_id"]
     assert [one.level for one in found] == ["note"] and "1 of 151 detections" in found[0].sentence
+
+
+def scans_of(make: Make, n: int = 20) -> Flight:
+    """One detection of a radar in each of `n` looks."""
+    flight = make()
+    looks = [f"L{k}" for k in range(n)]
+    flight.tables["frames"] = pd.DataFrame({"frame_id": looks, "time_s": np.linspace(1, 8, n)})
+    flight.tables["detections"] = pd.DataFrame(
+        {"detection_id": looks, "frame_id": looks, "source": "radar", "kind": "position", "target_id": ""}
+    ).assign(north_m=np.random.default_rng(1).normal(0, 50, n), east_m=3.0, down_m=0.0)
+    return flight
+
+
+def read_again(flight: Flight, source: str, rows: int, later: float = 0.0) -> Flight:
+    """The first looks once more, under another name, as from a copy of the log that ends earlier."""
+    frames, seen = (flight.table(name).iloc[:rows] for name in ("frames", "detections"))
+    more = frames.assign(frame_id="again " + frames["frame_id"], time_s=frames["time_s"] + later)
+    frames = pd.concat([flight.table("frames"), more]).sort_values("time_s", kind="stable")
+    flight.tables["frames"] = frames.reset_index(drop=True)
+    doubles = seen.assign(frame_id="again " + seen["frame_id"], source=source)
+    flight.tables["detections"] = pd.concat([flight.table("detections"), doubles], ignore_index=True)
+    return flight
+
+
+@pytest.mark.parametrize(("source", "rows"), [("radar", 20), ("radar-2", 20), ("radar-2", 12)])
+def test_a_log_that_was_read_twice_is_a_problem(make_flight: Make, source: str, rows: int) -> None:
+    (found,) = twice(read_again(scans_of(make_flight), source, rows))
+    assert found.level == "problem" and f"{rows} of {rows}" in found.sentence
+
+
+@pytest.mark.parametrize(("rows", "later"), [(0, 0.0), (5, 0.0), (20, 0.05)])
+def test_few_that_are_alike_and_those_of_other_times_are_no_copy(
+    make_flight: Make, rows: int, later: float
+) -> None:
+    assert list(twice(read_again(scans_of(make_flight), "radar-2", rows, later))) == []
+
+
+def test_two_copies_of_one_table_are_not_imported(raw: Raw) -> None:
+    clicks = "photo,x,y,what\n" + "".join(f"A,{10 + k},{20 + 3 * k},\n" for k in range(20))
+    shorter = clicks[: len(clicks) * 2 // 3].rsplit("\n", 1)[0] + "\n"
+    raw.tables |= {"clicks.csv": clicks, "copy.csv": shorter}
+    assert len(raw.run().table("detections")) == 20
+    (block,) = raw.recipe["detections"]
+    for source in ("click", "other"):
+        raw.recipe["detections"] = [block, {**block, "file": "copy.csv", "source": source}]
+        with pytest.raises(WildlabError, match=r"exactly|more than once"):
+            import_flight(raw.write(), raw.folder / "raw", raw.folder / source)

@@ -213,8 +213,8 @@ def test_poses_from_the_local_frame_alone() -> None:
     columns = {name: values[poses.used] for name, values in poses.columns.items()}
     assert np.allclose(columns["height_sea_m"], 105)
     assert np.allclose(columns["v_north_m_s"], 10)
-    assert np.allclose(columns["sd_yaw_deg"], np.degrees(0.1), atol=1e-4)
-    assert np.allclose(columns["sd_roll_deg"], np.degrees(0.01), atol=1e-4)
+    assert np.allclose(columns["sd_heading_deg"], np.degrees(0.1), atol=1e-4)
+    assert np.allclose(columns["sd_tilt_deg"], np.degrees(0.01), atol=1e-4)
     metres = (columns["latitude_deg"] - LAT) * np.pi / 180 * 6371000
     assert np.allclose(metres, np.arange(1, 50) - 4e-3, atol=1e-5)
 

@@ -48,8 +48,8 @@ def uncertainty_of(streams: Mapping[tuple[str, str], Stream]) -> tuple[dict[str,
             + found["note"]
         )
     said = (
-        f"Assumed, since no log states it: pixels to {found['pixel_px']:g} px, roll and pitch to "
-        f"{found['roll_deg']:g} deg, yaw to {found['yaw_deg']:g} deg"
+        f"Assumed, since no log states it: pixels to {found['pixel_px']:g} px, tilt to "
+        f"{found['tilt_deg']:g} deg, heading to {found['heading_deg']:g} deg"
     )
     if "position horizontal" not in stated:
         level, height = found["position_horizontal_m"], found["position_vertical_m"]

@@ -84,7 +84,7 @@ def spreads(stream: Stream) -> dict[str, Any]:
     names = {
         "horizontal": ("sd_horizontal_m", "m"),
         "vertical": ("sd_vertical_m", "m"),
-        **{axis: (f"sd_{axis}_deg", "deg") for axis in ("roll", "pitch", "yaw")},
+        **{axis: (f"sd_{axis}_deg", "deg") for axis in ("tilt", "heading")},
     }
     for column, _ in names.values():
         values = stream.columns.get(column)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
@@ -34,6 +35,8 @@ ROLES: dict[str, str] = {
 #: A receiver on board is within this of the vehicle's own log half of the time, m, level and in height: five
 #: times the standard deviation of a single-frequency receiver. A target under the camera is below that.
 ON_BOARD_M = 15.0
+#: Parts of logs of which a copy is told, and the share of its rows that are in the other log.
+COPIED, COPY = {"poses", "gnss", "marks", "clicks"}, 0.99
 #: Two logs meet where they share this time, s.
 SHARED_S = 1.0
 
@@ -80,6 +83,8 @@ def choose_roles(found: Sequence[Found], stated: Mapping[str, str]) -> list[Choi
     """
     given = _stated(found, stated)
     choices = {one.name + one.format: _first(one, given.get(one.name)) for one in found}
+    for one, whole in _copies([one for one in found if one.name not in given]):
+        choices[one.name + one.format] = Choice(one, "nothing", f"all that is in it is in {whole.shown} too")
     open_ = [one for one in found if one.name not in given and choices[one.name + one.format].role == ""]
     own = next((one.found for one in choices.values() if one.role == "own"), None)
     images = _images(found, choices)
@@ -91,6 +96,35 @@ def choose_roles(found: Sequence[Found], stated: Mapping[str, str]) -> list[Choi
         if one is not own:
             choices[one.name + one.format] = _other(one, own, images)
     return _named([choices[one.name + one.format] for one in found])
+
+
+def _copies(found: Sequence[Found]) -> Iterator[tuple[Found, Found]]:
+    """Files whose every row is in another one of the same format, a copy or a part of it; and that other."""
+    logs = [one for one in found if one.log is not None and one.log.parts.keys() & COPIED]
+    logs.sort(key=_rows, reverse=True)
+    for number, one in enumerate(logs):
+        whole = next((other for other in logs[:number] if _within(one, other)), None)
+        if whole is not None:
+            yield one, whole
+
+
+def _rows(one: Found) -> int:
+    return sum(len(part) for part in one.log.parts.values()) if one.log else 0
+
+
+def _within(one: Found, other: Found) -> bool:
+    if one.format != other.format or one.log is None or other.log is None:
+        return False
+    for name, part in one.log.parts.items():
+        whole = other.log.parts.get(name)
+        if whole is None or set(whole.columns) != set(part.columns):
+            return False
+        # Stamps are fitted to a whole log, and differ where a part of it is fitted by itself.
+        names = [key for key in part.columns if not key.startswith("time")]
+        both = pd.concat([pd.DataFrame({key: log.columns[key] for key in names}) for log in (whole, part)])
+        if not both.duplicated().to_numpy()[len(whole) :].mean() >= COPY:
+            return False
+    return True
 
 
 def _stated(found: Sequence[Found], stated: Mapping[str, str]) -> dict[str, tuple[str, str]]:

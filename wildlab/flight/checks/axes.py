@@ -10,8 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from wildlab.flight.checks.corrections import Correction, change_columns
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.inertial_data import Array, Inertial, Moves, attitudes_near, turns
+from wildlab.flight.checks.inertial_data import FORCE, RATE, Array, Inertial, Moves, attitudes_near, turns
 from wildlab.flight.store import Flight
 from wildlab.geometry.gravity import USUAL_GRAVITY
 
@@ -29,6 +30,8 @@ TURNING, SLOWEST = 0.05, 5.0  # rad/s, m/s
 ENOUGH = 10
 #: Axes are judged where they were moved (rad/s, m/s^2), over so many intervals, by so clear a correlation.
 MOVED_RATE, MOVED_FORCE, INTERVALS, CLEAR = 0.02, 0.7, 30, 0.6
+#: So closely the rate about z follows the course where the nose points where it goes.
+FOLLOWS = 0.9
 #: The mean force points within 45 deg of where it should, or away from it.
 ALONG = 0.7
 
@@ -66,7 +69,9 @@ def units(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Findin
             fix = "use the raw samples of the accelerometer, and check the unit in [imu.force] of the recipe"
         else:
             fix = "check the unit in [imu.force] of the recipe"
-        yield Finding("problem", "imu", "f_z_m_s2", felt, fix)
+        scale = np.sqrt(low * high) / size
+        correct = change_columns("imu", FORCE, lambda f: scale * f)
+        yield Finding("problem", "imu", "f_z_m_s2", felt, fix, corrections=(correct,))
     yield from _rate_unit(flight, imu, moved)
 
 
@@ -79,11 +84,14 @@ def _rate_unit(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[F
         good = np.isfinite(rate).all(axis=1) & (size > TURNING)
         if good.sum() >= ENOUGH:
             ratio = float(np.median(np.linalg.norm(rate[good], axis=1) / size[good]))
-            if not 1 / FACTOR < ratio < FACTOR:
+            # Another unit leaves the direction as it was; another clock, or another attitude, does not.
+            if not 1 / FACTOR < ratio < FACTOR and _together(rate[good], turn.rate[good]) > CLEAR:
                 said = f"the angular rate is {ratio:.2g} times that of the attitude in nav/{turn.source}"
                 said += ": it is in deg/s" if ratio > FACTOR else ": it is far too small"
                 fix = degrees if ratio > FACTOR else radians
-                yield Finding("problem", "imu", "w_z_rad_s", said, fix)
+                unit = np.radians(1.0) if ratio > FACTOR else np.degrees(1.0)
+                correct = change_columns("imu", RATE, lambda w, unit=unit: unit * w)  # type: ignore[misc]
+                yield Finding("problem", "imu", "w_z_rad_s", said, fix, corrections=(correct,))
                 return
     if moved is not None:
         rate = np.linalg.norm(imu.mean_rate(moved.start, moved.end), axis=1)
@@ -93,7 +101,10 @@ def _rate_unit(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[F
             ratio = float(np.median(rate[good] / course[good]))
             if ratio > FACTOR:
                 said = f"the angular rate is {ratio:.2g} times as fast as the course over ground turns"
-                yield Finding("problem", "imu", "w_z_rad_s", f"{said}: it is in deg/s", degrees)
+                correct = change_columns("imu", RATE, np.radians)
+                yield Finding(
+                    "problem", "imu", "w_z_rad_s", f"{said}: it is in deg/s", degrees, corrections=(correct,)
+                )
                 return
             if ratio < 1 / FACTOR:
                 said = f"the angular rate is only {ratio:.2g} times as fast as the course over ground turns"
@@ -126,6 +137,7 @@ def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     )
     said = f"the mean specific force is ({where}) m/s^2, and has to point along -z"
     axis = int(np.argmax(np.abs(mean)))
+    corrections: tuple[Correction, ...] = ()
     name = f"{'-' if mean[axis] > 0 else ''}{AXES[axis]}"
     if axis != 2 and abs(mean[axis]) > ALONG * size:
         fix = f"exchange the axes in [imu.force] and [imu.rate] of the recipe: down is along {name} here"
@@ -134,6 +146,10 @@ def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
             "if z points up in the log, as in forward-left-up, set negate for y and z of [imu.force] and "
             "[imu.rate]; if z points down, the log counts gravity instead of what is felt: set negate for x, "
             "y and z of [imu.force] alone"
+        )
+        corrections = (
+            change_columns("imu", (*FORCE, *RATE), lambda x: x * [1, -1, -1, 1, -1, -1]),
+            change_columns("imu", FORCE, lambda f: -f),
         )
         told = _z_follows_course(imu, moved)
         if told is not None and abs(told) > CLEAR:
@@ -144,7 +160,7 @@ def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
             )
     else:
         fix = "check how the sensor sits in the airframe: x is forward, y right, z down"
-    yield Finding("problem", "imu", f"f_{AXES[axis]}_m_s2", said, fix)
+    yield Finding("problem", "imu", f"f_{AXES[axis]}_m_s2", said, fix, corrections=corrections)
 
 
 def _against_attitude(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
@@ -222,7 +238,8 @@ def _against_course(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     rate, course = both
     turning = np.abs(course) > TURNING
     about_z = _together(rate[:, 2], course)
-    if about_z < -CLEAR:
+    # Who flies sideways turns as the course does by chance alone, and never as closely.
+    if about_z < -FOLLOWS:
         yield Finding(
             "warning",
             "imu",
@@ -233,7 +250,7 @@ def _against_course(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
         )
         return
     about_y = _together(rate[turning, 1], np.abs(course[turning]))
-    if about_z > CLEAR and about_y < -CLEAR:
+    if about_z > FOLLOWS and about_y < -CLEAR:
         yield Finding(
             "warning",
             "imu",

@@ -11,21 +11,22 @@ import pandas as pd
 from wildlab.flight.checks import camera as findings_seen
 from wildlab.flight.checks import findings
 from wildlab.flight.checks import inertial as findings_inertial
+from wildlab.flight.checks.corrections import report_alone
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.flown import why_no_start
-from wildlab.flight.checks.sense.sense import sense
+from wildlab.flight.checks.sense.sense import contradictions
 from wildlab.flight.checks.sensors import sensors
 from wildlab.flight.checks.terrain import terrain_findings
 from wildlab.flight.checks.times import gaps, overlap
 from wildlab.flight.checks.twice import twice
-from wildlab.flight.checksums import manifest_changed
+from wildlab.flight.checksums import locations_confirmed, manifest_changed
 from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight
 
 __all__ = ["Finding", "Use", "check_flight", "find", "usable_for"]
 
 #: Parts of [uncertainty] without which a detection on the ground has no error ellipse.
-ASSUMED = ("pixel_px", "position_horizontal_m", "position_vertical_m", "roll_deg", "pitch_deg", "yaw_deg")
+ASSUMED = ("pixel_px", "position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg")
 
 
 @dataclass(frozen=True)
@@ -64,25 +65,30 @@ def check_flight(flight: Flight) -> list[Finding]:
 def find(flight: Flight, *, meaning: bool = True) -> list[Finding]:
     """The same in clauses, for those who make sentences of their own; without `meaning`, whether a flight can
     be read, and not whether it makes sense."""
-    found = [
-        *findings.values(flight),
-        *findings.order(flight),
-        *overlap(flight),
-        *gaps(flight),
-        *findings_seen.truth_place(flight),
-        *findings_seen.identity(flight),
-        *sensors(flight),
-        *twice(flight),
-        *findings_seen.image(flight),
-        *findings_inertial.inertial(flight),
-        *terrain_findings(flight),
-        *_missing(flight),
-        *_uncertainty(flight),
-        *_clocks(flight),
-        *_checksums(flight),
-        *(sense(flight) if meaning else ()),
-    ]
+    found = list(_all(flight, meaning))
+    if meaning:
+        found = report_alone(flight, found, lambda one: list(_all(one, True)))
     return sorted(found, key=lambda finding: ("problem", "warning", "note").index(finding.level))
+
+
+def _all(flight: Flight, meaning: bool) -> Iterator[Finding]:
+    yield from findings.values(flight)
+    yield from findings.order(flight)
+    yield from overlap(flight)
+    yield from gaps(flight)
+    yield from findings_seen.truth_place(flight)
+    yield from findings_seen.identity(flight)
+    yield from sensors(flight)
+    yield from twice(flight)
+    yield from findings_seen.image(flight)
+    yield from findings_inertial.inertial(flight)
+    yield from terrain_findings(flight)
+    yield from _missing(flight)
+    yield from _uncertainty(flight)
+    yield from _clocks(flight)
+    yield from _checksums(flight)
+    if meaning:
+        yield from contradictions(flight)
 
 
 def usable_for(flight: Flight) -> list[Use]:
@@ -105,7 +111,7 @@ def usable_for(flight: Flight) -> list[Use]:
     [True, True, False]
     """
     broken = {finding.table for finding in find(flight, meaning=False) if finding.level == "problem"}
-    good_nav = [name for name in flight.nav if f"nav/{name}" not in broken and len(flight.nav[name])]
+    good_nav = [name for name in flight.estimated_sources if f"nav/{name}" not in broken]
     kinds = _kinds(flight)
     scored = flight.truth is not None and len(flight.truth) > 0
 
@@ -280,7 +286,7 @@ def _uncertainty(flight: Flight) -> Iterator[Finding]:
                 f"nav/{name}",
                 "cov_00",
                 "the poses have no covariance, and the manifest assumes nothing for "
-                f"{_and(lacking)}: there will be no error ellipses, or too small ones",
+                f"{_and(lacking)}: the usual values are taken, and error ellipses rest on them",
                 "state in [uncertainty] what the data sheets promise",
             )
         else:
@@ -374,6 +380,14 @@ def _checksums(flight: Flight) -> Iterator[Finding]:
             "flight.toml",
             "",
             "its text is another one than was written: it was changed by hand, or damaged",
+            "if the change is meant: wildlab check --accept",
+        )
+    if changed is not None and not locations_confirmed(flight.folder):
+        yield Finding(
+            "warning",
+            "flight.toml",
+            "locations",
+            "how sensitive its places are is not what was written; in copies the more careful counts",
             "if the change is meant: wildlab check --accept",
         )
 

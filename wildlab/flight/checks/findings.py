@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -31,7 +32,8 @@ class Finding:
 
     ``problem``: what it concerns cannot be used. ``warning``: it can, but look. ``note``: good to know.
     `table` is ``nav/<source>``, the name of a table, or ``flight.toml``. What `check_flight` returns are
-    whole sentences, which name table and field. `causes`: the usual mistakes that explain it.
+    whole sentences, which name table and field. `causes`: the usual mistakes that explain it; `corrections`
+    undo them in a flight, or give None where they cannot (`wildlab.flight.checks.corrections`).
     """
 
     level: Level
@@ -40,6 +42,9 @@ class Finding:
     sentence: str
     fix: str
     causes: tuple[str, ...] = ()
+    corrections: tuple[Callable[[Flight], Flight | None], ...] = dataclasses.field(
+        default=(), compare=False, repr=False
+    )
 
 
 def whole(one: Finding) -> Finding:

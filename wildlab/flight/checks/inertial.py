@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.flight.checks import axes as findings_axes
+from wildlab.flight.checks.corrections import APART, shift_clock
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.inertial_data import STEP_S, Array, Inertial, Moves, fixes, moves, samples
 from wildlab.flight.store import Flight
@@ -111,6 +112,7 @@ def _overlap(imu: Inertial, table: pd.DataFrame | None) -> Iterator[Finding]:
             + ("they do not overlap in time" if common <= 0 else f"only {common:.0f} s are common to both"),
             "take both stamps from one clock, or state gnss_offset_s in [clocks]; GPS time is ahead of UTC "
             "by the leap seconds",
+            (APART,),
         )
 
 
@@ -165,4 +167,5 @@ def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
             f"inertial sensor (correlation of the forces {most:.2f} then, {here:.2f} as it is)",
             f"take both stamps from one clock, or set gnss_offset_s = {offset:.1f} in [clocks] (latency_s in "
             "[gnss] if it is the receiver's delay)",
+            corrections=(shift_clock("gnss_offset_s", best),),
         )

@@ -30,6 +30,8 @@ STEP_S = 1.0
 LONGEST_S = 2.5
 #: More intervals than this say nothing new.
 MOST = 3000
+#: Sine of the angle below the horizon from which x is no nose: 45 deg.
+STEEP = 0.7
 #: Turns further than this between two attitudes could as well be the other way round.
 TURN = 2.5
 
@@ -172,11 +174,30 @@ def moves(table: pd.DataFrame | None) -> Moves | None:
     return Moves(times[first], times[last], velocity[first], velocity[last], measured)
 
 
+def airframe_sources(flight: Flight) -> list[str]:
+    """Nav sources by time that sensors on board, and the course, can be held against.
+
+    Not those of a camera: where the lens lies along x of the poses, and these point down, or are one of
+    several sources and the mount is said to be on them. Nor a twin's truth.
+    """
+    logs = [
+        name for name, nav in flight.nav.items() if not name.startswith("truth") and "frame_id" not in nav
+    ]
+    mount = flight.manifest.mount
+    along_x = mount.looks == "forward" and mount.pan_deg == mount.tilt_deg == 0 and flight.gimbal is None
+
+    def of_camera(name: str) -> bool:
+        w, x, y, z = flight.nav[name][list(QUATERNION)].to_numpy(float).T
+        steep = len(w) > 0 and float(np.nanmedian(2 * (x * z - w * y))) > STEEP
+        return along_x and (steep or (name == mount.poses and len(logs) > 1))
+
+    return [name for name in logs if not of_camera(name)]
+
+
 def turns(flight: Flight) -> Iterator[Turns]:
-    """Intervals of each nav source whose poses follow each other closely enough."""
-    for name, nav in flight.nav.items():
-        if "frame_id" in nav:
-            continue
+    """Intervals of each nav source of the airframe whose poses follow each other closely enough."""
+    for name in airframe_sources(flight):
+        nav = flight.nav[name]
         values = nav[["time_s", *QUATERNION]].to_numpy(float)
         values = values[np.isfinite(values).all(axis=1) & (np.abs(values[:, 1:]).sum(axis=1) > 0.5)]
         times = values[:, 0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import re
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.files import read_csv
 from wildlab.flight.files import printable
 from wildlab.flight.readers.marked import Marked
 
@@ -63,7 +65,7 @@ def read_table_boxes(data: bytes, path: Path, *, group: str | None = None) -> Ma
     WildlabError
         Where the table cannot be read, lacks a column, has no row, or has one that cannot be used.
     """
-    table = _table(data, path)
+    table = _table(data, path, group)
     columns = {_plain(one): one for one in reversed(table.columns)}
     name = next(
         (columns[_plain(one)] for one in (*IMAGE_COLUMNS, *NUMBER_COLUMNS) if _plain(one) in columns), None
@@ -153,7 +155,7 @@ def _shown(table: pd.DataFrame) -> str:
     return ", ".join(printable(str(one)) for one in table.columns[:MOST_SHOWN])
 
 
-def _table(data: bytes, path: Path) -> pd.DataFrame:
+def _table(data: bytes, path: Path, group: str | None) -> pd.DataFrame:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -170,9 +172,13 @@ def _table(data: bytes, path: Path) -> pd.DataFrame:
     sign = max(",;\t", key=head.count)
     # Where a semicolon divides, a comma is what others write as a point.
     decimal = "," if sign == ";" else "."
+    words = {_plain(one) for one in (*IMAGE_COLUMNS, *CLASS_COLUMNS)}
+    named = [one for one in next(csv.reader([head], delimiter=sign, skipinitialspace=True))]
+    named = [one for one in named if _plain(one) in words or one == group]
     try:
-        table = pd.read_csv(
+        table = read_csv(
             io.StringIO(text),
+            named,
             sep=sign,
             skiprows=before,
             skipinitialspace=True,

@@ -242,10 +242,26 @@ class Attitude(Strict):
 
 
 class Spreads(Strict):
-    """Standard deviations of each pose, as the log has them."""
+    """Standard deviations of each pose, as the log has them.
+
+    Of the attitude a tilt and a heading, or roll, pitch and yaw, which are read as such by the rule of
+    `wildlab.geometry.attitude_uncertainty`.
+    """
 
     horizontal: Length
     vertical: Length
-    roll: Angle
-    pitch: Angle
-    yaw: Angle
+    tilt: Angle | None = None
+    heading: Angle | None = None
+    roll: Angle | None = None
+    pitch: Angle | None = None
+    yaw: Angle | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        names = ("tilt", "heading", "roll", "pitch", "yaw")
+        given = tuple(name for name in names if getattr(self, name) is not None)
+        if given not in (names[:2], names[2:]):
+            raise ValueError(
+                "spreads of an attitude are tilt and heading, or roll, pitch and yaw; give all of one kind"
+            )
+        return self

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from wildlab.flight.checks.findings import NORM_TOLERANCE
 from wildlab.flight.clocks import between, covariance_columns
 from wildlab.flight.recipe.model import Poses, Recipe
-from wildlab.flight.recipe.parts import Attitude, Position, Velocity, YawFromBearing
+from wildlab.flight.recipe.parts import Attitude, Position, Quantity, Spreads, Velocity, YawFromBearing
 from wildlab.flight.recipe.raw import Array, Nanoseconds, RawTable, Text, numbers, plain_numbers, times
+from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
 from wildlab.geometry.flodell import metres_per_degree
 from wildlab.geometry.frames import (
     R_NED_ENU,
@@ -27,6 +28,11 @@ from wildlab.geometry.frames import (
 
 #: Takes a vector from forward-left-up to forward-right-down, and back.
 FLIP = np.diag([1.0, -1.0, -1.0])
+
+#: What became of standard deviations of angles, for the flight's description.
+AS_TILT_AND_HEADING = (
+    "The tilt of nav/{} is the root mean square of the SDs of roll and pitch, the heading that of yaw."
+)
 
 #: Rows that say the same of one frame agree to this, in metres or radians.
 SAME = 1e-9
@@ -194,10 +200,7 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
     if block.velocity is not None:
         velocity = read_velocity(table, block.velocity, f"{part}.velocity")
     if block.spreads is not None:
-        s = block.spreads
-        lengths = [numbers(table, q, "length", f"{part}.spreads") for q in (s.horizontal, s.vertical)]
-        angles = [numbers(table, q, "angle", f"{part}.spreads") for q in (s.roll, s.pitch, s.yaw)]
-        spreads = np.column_stack([*lengths, *angles])
+        spreads = _read_spreads(table, block.spreads, f"{part}.spreads")
     if block.time is not None:
         stamps = times(table, block.time, f"{part}.time", recipe.time.zone, recipe.time.epoch)
     attitude = _read_attitude(table, block.attitude, f"{part}.attitude")
@@ -219,7 +222,12 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         velocity = None if velocity is None else velocity[first]
         spreads = None if spreads is None else spreads[first]
     rotation = _rotation(attitude, block.attitude)
-    covariance = None if spreads is None else _covariance(spreads, rotation)
+    covariance = None
+    if spreads is not None:
+        horizontal, vertical, tilt, heading = spreads.T
+        covariance = pose_covariance(horizontal, vertical, tilt, heading, rotation)
+    if block.spreads is not None and block.spreads.tilt is None:
+        note = f"{note} {AS_TILT_AND_HEADING.format(part.removeprefix('poses.'))}".strip()
     return PoseRows(position, rotation, velocity, covariance, stamps, ids, note)
 
 
@@ -253,21 +261,17 @@ def _rotation(values: Array, attitude: Attitude) -> Array:
     return np.asarray(R_NED_ENU @ R @ FLIP if attitude.axes == "flu-enu" else R)
 
 
-def _covariance(spreads: Array, R: Array) -> Array:
-    """(N, 6, 6) from the SDs of horizontal and vertical position, roll, pitch and yaw, all independent."""
-    roll = np.arctan2(R[:, 2, 1], R[:, 2, 2])
-    sin_pitch = -R[:, 2, 0]
-    cos_pitch = np.sqrt(np.maximum(0, 1 - sin_pitch**2))
-    # What small changes of the three angles are as a rotation vector in b.
-    J = np.zeros((len(R), 3, 3))
-    J[:, 0, 0], J[:, 0, 2] = 1, -sin_pitch
-    J[:, 1, 1], J[:, 1, 2] = np.cos(roll), np.sin(roll) * cos_pitch
-    J[:, 2, 1], J[:, 2, 2] = -np.sin(roll), np.cos(roll) * cos_pitch
-    P = np.zeros((len(R), 6, 6))
-    P[:, 0, 0] = P[:, 1, 1] = spreads[:, 0] ** 2
-    P[:, 2, 2] = spreads[:, 1] ** 2
-    P[:, 3:, 3:] = (J * spreads[:, None, 2:] ** 2) @ J.transpose(0, 2, 1)
-    return P
+def _read_spreads(table: RawTable, spreads: Spreads, part: str) -> Array:
+    """(N, 4) standard deviations: horizontal and vertical position, tilt and heading."""
+
+    def angle(quantity: Quantity | None) -> Array:
+        return np.zeros(0) if quantity is None else numbers(table, quantity, "angle", part)
+
+    tilt, heading = angle(spreads.tilt), angle(spreads.heading)
+    if spreads.tilt is None:
+        tilt, heading = tilt_from_roll_pitch(angle(spreads.roll), angle(spreads.pitch)), angle(spreads.yaw)
+    lengths = [numbers(table, q, "length", part) for q in (spreads.horizontal, spreads.vertical)]
+    return np.column_stack([*lengths, tilt, heading])
 
 
 def _rows_of_frames(ids: Text) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from wildlab.flight.checks.sense import words
+from wildlab.flight.checks.sense.trial import Mistake
 from wildlab.geometry.frames import (
     R_NED_ENU,
     Array,
@@ -23,18 +23,8 @@ AXES = ("roll", "pitch", "yaw")
 DEGREES = float(np.degrees(1.0))
 
 
-@dataclass(frozen=True)
-class AttitudeMistake:
-    """A mistake about attitudes: see `trial.Mistake`; `undo` takes and gives (N, 3, 3), or None."""
-
-    cause: str
-    said: str
-    write: str
-    undo: Callable[[Array], Array | None]
-
-
-def attitude_mistakes(part: str) -> Iterator[AttitudeMistake]:
-    """Mistakes about the attitudes of one nav source, as they are undone; `part` as ``"poses.logged"``."""
+def attitude_mistakes(part: str) -> Iterator[Mistake[Array]]:
+    """Mistakes about the attitudes (N, 3, 3) of one nav source; `part` as ``"poses.logged"``."""
     where = f"{part}.attitude"
 
     def angles(change: Callable[[Array], Array | None]) -> Callable[[Array], Array | None]:
@@ -48,21 +38,21 @@ def attitude_mistakes(part: str) -> Iterator[AttitudeMistake]:
         for some in combinations(range(3), n):
             key = words.joined([AXES[i] for i in some], "and")
             flip = np.where(np.isin(np.arange(3), some), -1.0, 1.0)
-            yield AttitudeMistake(
+            yield Mistake(
                 f"sign of {key}",
                 f"{key} {'has' if n == 1 else 'have'} the wrong sign",
                 words.negate(key, where),
                 angles(lambda e, s=flip: e * s),  # type: ignore[misc]
             )
     for turn, what in ((90.0, "a quarter turn"), (-90.0, "minus a quarter turn"), (180.0, "half a turn")):
-        yield AttitudeMistake(
+        yield Mistake(
             f"yaw off by {turn:g} deg",
             f"the yaw is off by {what}",
             f"the yaw plus {turn:g} deg in [{where}], counted from true north towards east",
             angles(lambda e, t=turn: e + np.radians([0.0, 0.0, t])),  # type: ignore[misc]
         )
     for turn, what in ((90.0, "east"), (-90.0, "west"), (180.0, "south")):
-        yield AttitudeMistake(
+        yield Mistake(
             f"yaw counted from {what} towards north" if turn == 90 else f"yaw negated and from {what}",
             f"the yaw counts to the left from {what}",
             f"{turn:g} deg minus the yaw in [{where}], so that it counts from true north towards east",
@@ -70,7 +60,7 @@ def attitude_mistakes(part: str) -> Iterator[AttitudeMistake]:
         )
     for axis, key in enumerate(AXES[:2]):
         for turn in (90.0, -90.0, 180.0):
-            yield AttitudeMistake(
+            yield Mistake(
                 f"{key} off by {turn:g} deg",
                 f"the {key} is off by {turn:g} deg",
                 f"the {key} plus {turn:g} deg in [{where}]: both are zero where the airframe is level",
@@ -78,7 +68,7 @@ def attitude_mistakes(part: str) -> Iterator[AttitudeMistake]:
             )
     # A pitch that counts from straight down.
     for sign, turn in ((-1, 90.0), (-1, -90.0)):
-        yield AttitudeMistake(
+        yield Mistake(
             f"pitch counted from the vertical ({turn:g} deg minus pitch)",
             "the pitch counts from the vertical",
             f"{turn:g} deg minus the pitch in [{where}], so that it is zero at the horizon",
@@ -88,7 +78,7 @@ def attitude_mistakes(part: str) -> Iterator[AttitudeMistake]:
         for some in combinations(range(3), n):
             key = words.joined([AXES[i] for i in some], "and")
             scale = np.where(np.isin(np.arange(3), some), DEGREES, 1.0)
-            yield AttitudeMistake(
+            yield Mistake(
                 f"{key} in radians, read as degrees",
                 f"{key} {'is' if n == 1 else 'are'} in radians, and the recipe says degrees",
                 words.unit(key, where, "rad"),
@@ -97,7 +87,7 @@ def attitude_mistakes(part: str) -> Iterator[AttitudeMistake]:
     for some in ((0,), (1,), (0, 1)):
         key = words.joined([AXES[i] for i in some], "and")
         scale = np.where(np.isin(np.arange(3), some), 1 / DEGREES, 1.0)
-        yield AttitudeMistake(
+        yield Mistake(
             f"{key} in degrees, read as radians",
             f"{key} {'is' if len(some) == 1 else 'are'} in degrees, and the recipe says radians",
             words.unit(key, where, "deg"),
@@ -106,26 +96,26 @@ def attitude_mistakes(part: str) -> Iterator[AttitudeMistake]:
     for one, other in ((0, 1), (0, 2), (1, 2)):
         order = [0, 1, 2]
         order[one], order[other] = order[other], order[one]
-        yield AttitudeMistake(
+        yield Mistake(
             f"{AXES[one]} and {AXES[other]} exchanged",
             f"{AXES[one]} and {AXES[other]} are exchanged",
             words.exchange(AXES[one], AXES[other], where),
             angles(lambda e, o=tuple(order): _lower(e[..., list(o)], _other(e)[..., list(o)])),  # type: ignore[misc]
         )
-    yield AttitudeMistake(
+    yield Mistake(
         "attitude the other way round",
         "the attitude takes vectors from the world to the body",
         f"turn `inverse` of the quaternion in [{where}]",
         lambda R: np.swapaxes(R, -1, -2),
     )
-    yield AttitudeMistake(
+    yield Mistake(
         "axes flu-enu",
         "the attitude is between forward-left-up and east-north-up",
         f'`axes = "flu-enu"` in [{where}] (or take it out, where it stands there)',
         lambda R: np.asarray(R_NED_ENU @ R @ FLIP),
     )
     for order_of, rolled in (("xyzw", [3, 0, 1, 2]), ("wxyz", [1, 2, 3, 0])):
-        yield AttitudeMistake(
+        yield Mistake(
             f"quaternion in the order {order_of}",
             f"the quaternion is in the order {order_of}",
             f'`order = "{order_of}"` in [{where}]',

@@ -7,16 +7,21 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from wildlab.flight.checks.corrections import change_place, shift_clock, shift_poses
 from wildlab.flight.checks.sense.sightings import Sightings, finite, glance, missed
 from wildlab.flight.checks.sense.trial import Mistake
 from wildlab.geometry.frames import Array
+from wildlab.geometry.mount import camera_pose
 
 #: Heights are looked for this far (m) and clocks this far (s); finer steps near zero.
 HEIGHTS = np.sinh(np.linspace(-7.5, 7.5, 41)) * 2.0
 CLOCKS = np.sinh(np.linspace(-5.0, 5.0, 41)) * 0.8
 HOURS = tuple(h for h in np.arange(-14.0, 14.25, 0.25) if h)
 LEAP_S = (18.0, -18.0, 19.0, -19.0, 37.0, -37.0)
+#: A mount is off by a few degrees and no wrong meaning; beyond the second, a turn is one of the usual ones.
+TURNED_DEG, LARGEST_TURN_DEG, ROUNDS = 5.0, 40.0, 6
 #: Over which misses are differentiated by the clock, either way, s.
 STEP_S = 0.05
 #: Beyond this correlation a clock and a turn of the camera are hard to tell apart.
@@ -68,7 +73,46 @@ def height_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
         f"[{part}.position]",
         lambda x: raised(x, by),
         fitted=True,
+        corrections=(change_place(f"nav/{s.source}", lambda p: p - np.array([0.0, 0.0, by])),),
     )
+
+
+def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
+    """A camera that is turned against its mount by a constant, as a tilt that was not stated."""
+    e = constant_turn(s)
+    size = float(np.degrees(np.linalg.norm(e)))
+    if not TURNED_DEG < size < LARGEST_TURN_DEG:
+        return
+    tilt, pan, roll = np.degrees(e)
+    yield Mistake(
+        "camera turned",
+        f"the camera is turned by {size:.0f} deg against what is stated (about the image's axes: right "
+        f"{tilt:.0f}, down {pan:.0f}, optical axis {roll:.0f} deg)",
+        "the right angles of [mount], or the misalignment that `wildlab calibrate` estimates",
+        lambda x: turned_camera(x, e),
+        fitted=True,
+    )
+
+
+def constant_turn(s: Sightings) -> Array:
+    """The rotation vector (3,) in c, rad, from known points to rays that all sightings share; robust."""
+    m = missed(s)
+    rows = finite(m)
+    e = np.zeros(3)
+    across = (np.eye(3) - m.towards[:, :, None] * m.towards[:, None, :])[rows]
+    for _ in range(ROUNDS):
+        size = np.linalg.norm(m.turn[rows] - across @ e, axis=1)
+        weight = 1 / (1 + (size / (2 * max(float(np.median(size)), 1e-9))) ** 2)
+        A = np.einsum("nij,n->ij", across, weight) + 1e-9 * np.eye(3)
+        e = np.linalg.solve(A, np.einsum("n,ni->i", weight, m.turn[rows]))
+    return np.asarray(e)
+
+
+def turned_camera(s: Sightings, e: Array) -> Sightings:
+    """The sightings of a camera turned back by a rotation vector (3,) in c, by the attitude of the poses."""
+    _, R_nc = camera_pose(s.mount, s.p_nb, s.R_nb, s.pan, s.tilt)
+    R_cb = np.swapaxes(R_nc, 1, 2) @ s.R_nb
+    return replace(s, R_nb=R_nc @ Rotation.from_rotvec(-e).as_matrix() @ R_cb)
 
 
 class ClockFit(NamedTuple):
@@ -142,6 +186,7 @@ def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]
             "flatter it then",
             lambda x: shifted(x, by),
             fitted=True,
+            corrections=(shift_clock("camera_offset_s", by), shift_poses(s.source, -by)),
         )
     for seconds in LEAP_S:
         yield Mistake(
@@ -150,6 +195,7 @@ def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]
             "stamps say, as between GPS time and UTC",
             f"`camera_offset_s = {offset_s + seconds:g}` in [clocks]",
             lambda x, t=seconds: shifted(x, t),  # type: ignore[misc]
+            corrections=(shift_clock("camera_offset_s", seconds), shift_poses(s.source, -seconds)),
         )
     for hours in HOURS:
         yield Mistake(

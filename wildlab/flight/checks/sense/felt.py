@@ -5,24 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import permutations, product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wildlab.flight.checks.corrections import Correction, change_attitude, change_columns
 from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.inertial_data import FORCE as FORCES
 from wildlab.flight.checks.inertial_data import (
     POSITION,
     QUATERNION,
     VELOCITY,
     Inertial,
+    airframe_sources,
     attitudes_near,
     fixes,
     moves,
     samples,
 )
+from wildlab.flight.checks.inertial_data import RATE as RATES
 from wildlab.flight.checks.sense import words
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
-from wildlab.flight.checks.sense.trial import Misfit, Mistake, Named, explain
+from wildlab.flight.checks.sense.trial import Misfit, Mistake, Named, corrections_of, explain
 from wildlab.flight.store import Flight
 from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array
@@ -36,14 +41,23 @@ STEP_S, MOST, ENOUGH = 0.5, 600, 30
 COUNTED = 0.97
 #: A correlation beyond this in either half is a sign, where so many intervals spread by so much (m/s^2).
 AGAINST, AGAINST_ENOUGH, LIVELY = 0.4, 100, 0.1
+#: Cosine between rates and turns of the attitude, over all, below which no unit makes one of the other.
+ALONG = 0.5
 #: Without a known mistake, this many times what is usual is said.
 UNEXPLAINED = 5.0
+#: A heading off by less (rad) is a compass; so many standard deviations beyond it is no chance.
+HEADING_OFF, SURE = np.radians(5.0), 3.0
+#: Accelerations (m/s^2, root mean square) that tell a heading, the correlation with the forces that takes,
+#: the share of what a heading does that nothing else may do, and the blocks in time that its standard
+#: deviation is from.
+MOVED, TOGETHER, OWN, BLOCKS = 0.5, 0.7, 0.25, 10
 
 
 @dataclass(frozen=True)
 class Felt:
     """Intervals: attitudes before and after (K, 3, 3), length (K,), mean rate (K, 3) of the sensor; and
-    (J, 3) forces with the attitudes (J, 3, 3) and the accelerations in n (J, 3) they should follow from."""
+    (J, 3) forces with the attitudes (J, 3, 3) and the accelerations in n (J, 3) they should follow from, at
+    moments (J,)."""
 
     before: Array
     after: Array
@@ -52,12 +66,13 @@ class Felt:
     force: Array
     R_force: Array
     acceleration: Array
+    moments: Array
 
 
 def felt(flight: Flight, source: str, imu: Inertial) -> Felt | None:
     """One nav source and the sensor; None where they have too little in common."""
     nav = flight.nav[source]
-    if "frame_id" in nav or len(nav) < ENOUGH:
+    if len(nav) < ENOUGH:
         return None
     values = nav[["time_s", *QUATERNION, *POSITION]].to_numpy(float)
     values = values[np.isfinite(values[:, :5]).all(axis=1)]
@@ -106,6 +121,7 @@ def felt(flight: Flight, source: str, imu: Inertial) -> Felt | None:
         force[known],
         R_force[known],
         acceleration[known],
+        middle[rows][known],
     )
 
 
@@ -152,8 +168,8 @@ def forces(flight: Flight) -> Iterator[Finding]:
     if imu is None:
         return
     found: list[tuple[str, Felt, list[Named[Felt]]]] = []
-    for source in flight.nav:
-        given = None if source.startswith("truth") else felt(flight, source, imu)
+    for source in airframe_sources(flight):
+        given = felt(flight, source, imu)
         if given is not None:
             found.append((source, given, explain(misfit, given, felt_mistakes(source))))
     for source, given, named in found:
@@ -171,8 +187,10 @@ def forces(flight: Flight) -> Iterator[Finding]:
                 f"it is {words.number(after[0])} and {words.number(after[1])}",
                 words.fixes([one.mistake.write for one in named]),
                 tuple(one.mistake.cause for one in named),
+                corrections_of(named),
             )
-        elif axes := against(given):
+        # Where the turns do not fit either, the sign of a force is none of the causes.
+        elif before[0] <= UNEXPLAINED and (axes := against(given)):
             key = " and ".join("xyz"[axis] for axis in axes)
             yield Finding(
                 "warning",
@@ -183,6 +201,8 @@ def forces(flight: Flight) -> Iterator[Finding]:
                 f"{words.negate(key, 'imu.force')}, or look for the fault in [poses.{source}.attitude]",
                 (f"sign of force {key}",),
             )
+        elif (turned := heading_error(given)) is not None:
+            yield _turned_finding(source, turned)
         elif before.max() > UNEXPLAINED:
             yield Finding(
                 "warning",
@@ -196,6 +216,71 @@ def forces(flight: Flight) -> Iterator[Finding]:
                 f"check units and axes of [poses.{source}.attitude], [imu.force] and [imu.rate], and "
                 "the stamps",
             )
+
+
+class HeadingError(NamedTuple):
+    """A heading that is too large by a constant, and its standard deviation, rad."""
+
+    by: float
+    sd: float
+
+
+def heading_error(f: Felt) -> HeadingError | None:
+    """By how much the level forces, put into n by the attitude, are turned against the accelerations.
+
+    Fitted along are a sensor that is tilted on the airframe, since on a circle gravity would pass for a
+    heading, and a receiver whose stamps are late, since in a steady turn that is a heading. Standard
+    deviation by leaving out blocks of the flight in turn, since errors of an attitude last. None where it is
+    not known to be larger than `HEADING_OFF`, the two do not go together, or all but less than `OWN` of what
+    a heading does is as well done by what is fitted along, as on steady circles.
+    """
+
+    def level(v: Array) -> Array:
+        n = np.einsum("nij,nj->in", f.R_force, v)
+        return np.concatenate([n[0], n[1]])
+
+    north, east = f.acceleration[:, 0], f.acceleration[:, 1]
+    if np.sqrt(np.mean(north**2 + east**2)) < MOVED:
+        return None
+    moved, turned = np.r_[north, east], np.r_[-east, north]
+    late = np.concatenate([np.gradient(one, f.moments) for one in (north, east)])
+    # Unknown: a turn and a scale of the accelerations, two tilts in the body, and a delay.
+    A = np.stack([turned, moved, *(level(np.cross(axis, f.force)) for axis in np.eye(3)[:2]), late], axis=1)
+    b = level(f.force)
+    own = turned - A[:, 1:] @ np.linalg.lstsq(A[:, 1:], turned, rcond=None)[0]
+    if own @ own < OWN * (turned @ turned):
+        return None
+    blocks = np.array_split(np.arange(len(north)), BLOCKS)
+    rows = [np.r_[block, block + len(north)] for block in blocks]
+    normal, right = np.array([A[r].T @ A[r] for r in rows]), np.array([A[r].T @ b[r] for r in rows])
+    solved = [
+        np.linalg.lstsq(normal[kept].sum(axis=0), right[kept].sum(axis=0), rcond=None)[0]
+        for kept in (np.ones(BLOCKS, bool), *~np.eye(BLOCKS, dtype=bool))
+    ]
+    left = b - A[:, 2:] @ solved[0][2:]
+    if np.hypot(moved @ left, turned @ left) < TOGETHER * np.sqrt((moved @ moved) * (left @ left)):
+        return None
+    by, *without = (float(np.arctan2(x[0], x[1])) for x in solved)
+    off = np.angle(np.exp(1j * (np.array(without) - by)))
+    sd = float(np.sqrt((BLOCKS - 1) * np.mean((off - off.mean()) ** 2)))
+    return HeadingError(by, sd) if HEADING_OFF + SURE * sd < abs(by) < np.pi / 4 else None
+
+
+def _turned_finding(source: str, error: HeadingError) -> Finding:
+    by, sd = np.degrees(error)
+    low, high = sorted((abs(by) - 1.96 * sd, abs(by) + 1.96 * sd))
+    back = Rotation.from_euler("z", -error.by).as_matrix()
+    return Finding(
+        "warning",
+        f"nav/{source}",
+        "",
+        f"the heading of nav/{source} is {abs(by):.0f} deg too {'large' if by > 0 else 'small'} "
+        f"({low:.0f} to {high:.0f}, 95 %), as the forces and the accelerations of the receiver have it",
+        f"count the yaw in [poses.{source}.attitude] from true north: from magnetic north it is off by the "
+        "declination; else check the compass",
+        ("heading off",),
+        (change_attitude(source, lambda R: np.asarray(back @ R)),),
+    )
 
 
 def against(f: Felt) -> list[int]:
@@ -222,7 +307,7 @@ def against(f: Felt) -> list[int]:
 def felt_mistakes(source: str) -> Iterator[Mistake[Felt]]:
     """Mistakes about the attitude, and about axes and units of the sensor."""
     for a in attitude_mistakes(f"poses.{source}"):
-        yield Mistake(f"attitude: {a.cause}", f"attitude: {a.said}", a.write, _attitude(a.undo))
+        yield a.within("attitude", _attitude(a.undo), change_attitude(source, a.undo))
     for M in other_axes():
         for key in ("rate", "force", "both"):
             if key == "both" and np.linalg.det(M) < 0 and not np.diag(M).all():
@@ -238,6 +323,7 @@ def felt_mistakes(source: str) -> Iterator[Mistake[Felt]]:
                     rate=f.rate @ M.T if key != "force" else f.rate,
                     force=f.force @ M.T if key != "rate" else f.force,
                 ),
+                corrections=(_columns({"rate": RATES, "force": FORCES, "both": RATES + FORCES}[key], M),),
             )
     for key, factors in (
         ("rate", other_units("rate")),
@@ -254,14 +340,28 @@ def felt_mistakes(source: str) -> Iterator[Mistake[Felt]]:
                     said,
                     f'`unit = "{write}"` in [imu.{key}]',
                     lambda f, k=scale, key=key: _scaled(f, key, k),  # type: ignore[misc]
+                    corrections=(_columns(RATES if key == "rate" else FORCES, scale * np.eye(3)),),
                 )
 
 
+def _columns(names: tuple[str, ...], M: Array) -> Correction:
+    """Other axes or another unit (3, 3) of rate, force or both."""
+    return change_columns(
+        "imu", names, lambda x: np.hstack([part @ M.T for part in np.split(x, len(names) // 3, 1)])
+    )
+
+
 def _scaled(f: Felt, key: str, by: float) -> Felt | None:
-    """Another unit; of rates only where something turned, since without all that is compared is noise."""
+    """Another unit; of rates only where something turned, since without all that is compared is noise, and
+    in the directions of the attitude, which no unit changes."""
     if key == "force":
         return replace(f, force=by * f.force)
-    return None if _rms(_turns(f)) < RATE else replace(f, rate=by * f.rate)
+    turned = _turns(f)
+    good = np.isfinite(f.rate).all(axis=1)
+    size = np.sqrt(np.sum(f.rate[good] ** 2) * np.sum(turned[good] ** 2))
+    if _rms(turned) < RATE or np.sum(f.rate[good] * turned[good]) < ALONG * size:
+        return None
+    return replace(f, rate=by * f.rate)
 
 
 def _turns(f: Felt) -> Array:

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.flight.checks.corrections import change_attitude
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.inertial_data import attitudes_near
+from wildlab.flight.checks.inertial_data import airframe_sources, attitudes_near
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
 from wildlab.flight.checks.sense.felt import axes_words, other_axes
-from wildlab.flight.checks.sense.trial import Misfit, Mistake, explain
+from wildlab.flight.checks.sense.trial import Misfit, Mistake, corrections_of, explain
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 
@@ -95,10 +96,8 @@ def field(flight: Flight) -> Iterator[Finding]:
             tuple(f"magnetometer in {unit}" for unit in ways + inverse),
         )
         return
-    for source, nav in flight.nav.items():
-        if source.startswith("truth") or "frame_id" in nav:
-            continue
-        given = seen_by(values, nav, _earth(flight))
+    for source in airframe_sources(flight):
+        given = seen_by(values, flight.nav[source], _earth(flight))
         if given is None:
             continue
         named = explain(misfit, given, field_mistakes(source))
@@ -116,6 +115,7 @@ def field(flight: Flight) -> Iterator[Finding]:
                 f"{after:.0f} %",
                 " or ".join(f"write {one.mistake.write}" for one in named) + ", and import again",
                 tuple(one.mistake.cause for one in named),
+                corrections_of(named),
             )
 
 
@@ -145,7 +145,7 @@ def _earth(flight: Flight) -> Array | None:
 def field_mistakes(source: str) -> Iterator[Mistake[Seen]]:
     """Axes of the magnetometer that are exchanged or count the other way, and a yaw from elsewhere."""
     for a in attitude_mistakes(f"poses.{source}"):
-        yield Mistake(f"attitude: {a.cause}", f"attitude: {a.said}", a.write, _attitude(a.undo))
+        yield a.within("attitude", _attitude(a.undo), change_attitude(source, a.undo))
     for M in other_axes():
         yield Mistake(
             f"axes of the magnetometer: {axes_words(M)}",

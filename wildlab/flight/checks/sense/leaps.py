@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from wildlab.flight.checks.corrections import LEAP
 from wildlab.flight.checks.findings import POSITION, Finding
 from wildlab.flight.checks.inertial_data import VELOCITY
 from wildlab.flight.checks.sense import words
@@ -164,5 +165,5 @@ def _finding(one: Leap) -> Finding:
         "the fix jumped, or the filter began anew",
         "use the part of the flight before the leap or the one behind it, or another source of positions; no "
         "offset of a clock mends it",
-        ("leap of the position",),
+        (LEAP,),
     )

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from wildlab.flight.checks.corrections import change_columns, change_place
 from wildlab.flight.checks.findings import POSITION, Finding
 from wildlab.flight.checks.inertial_data import VELOCITY
 from wildlab.flight.checks.sense import words
 from wildlab.flight.checks.sense.places import place_mistakes
-from wildlab.flight.checks.sense.trial import Misfit, Mistake, explain
+from wildlab.flight.checks.sense.trial import Misfit, Mistake, corrections_of, explain
 from wildlab.flight.store import Flight
 from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array, Origin
@@ -92,7 +93,7 @@ def motion(flight: Flight) -> Iterator[Finding]:
         if given is None:
             continue
         before = misfit(given)[0, 0]
-        mistakes = motion_mistakes(words.part_of(name), flight.manifest.origin_tuple())
+        mistakes = motion_mistakes(name, flight.manifest.origin_tuple())
         named = explain(misfit, given, map(_still_moving, mistakes))
         if not named:
             if before > 10.0:
@@ -115,6 +116,7 @@ def motion(flight: Flight) -> Iterator[Finding]:
             + f"; then it is {words.number(_apart(named[0].undone))} m/s",
             words.fixes([one.mistake.write for one in named]),
             tuple(one.mistake.cause for one in named),
+            corrections_of(named),
         )
 
 
@@ -135,12 +137,19 @@ def _still_moving(mistake: Mistake[Moved]) -> Mistake[Moved]:
     return replace(mistake, undo=undo)
 
 
-def motion_mistakes(part: str, origin: Origin) -> Iterator[Mistake[Moved]]:
+def motion_mistakes(table: str, origin: Origin) -> Iterator[Mistake[Moved]]:
     """Mistakes about velocities, and about positions."""
+    part = words.part_of(table)
     where = f"{part}.velocity"
 
-    def of(change: Callable[[Array], Array]) -> Callable[[Moved], Moved]:
-        return lambda m: replace(m, velocity=change(m.velocity))
+    def mistake(cause: str, said: str, write: str, change: Callable[[Array], Array]) -> Mistake[Moved]:
+        return Mistake(
+            cause,
+            said,
+            write,
+            lambda m: replace(m, velocity=change(m.velocity)),
+            corrections=(change_columns(table, VELOCITY, change),),
+        )
 
     for key, keys in (
         ("velocity", [1, 1, 1]),
@@ -149,17 +158,17 @@ def motion_mistakes(part: str, origin: Origin) -> Iterator[Mistake[Moved]]:
     ):
         for unit, factor in SPEEDS.items():
             one = np.where(keys, factor, 1.0)
-            yield Mistake(
+            yield mistake(
                 f"{key} in {unit}, read as m/s",
                 f"the velocity ({key}) is in {unit}, and the recipe says m/s",
                 words.unit(key, where, unit),
-                of(lambda v, k=one: v * k),  # type: ignore[misc]
+                lambda v, k=one: v * k,  # type: ignore[misc]
             )
-            yield Mistake(
+            yield mistake(
                 f"{key} in m/s, read as {unit}",
                 f"the velocity ({key}) is in m/s, and the recipe says {unit}",
                 words.unit(key, where, "m/s"),
-                of(lambda v, k=one: v / k),  # type: ignore[misc]
+                lambda v, k=one: v / k,  # type: ignore[misc]
             )
     for key, sign in (
         ("north", [-1, 1, 1]),
@@ -167,23 +176,23 @@ def motion_mistakes(part: str, origin: Origin) -> Iterator[Mistake[Moved]]:
         ("north and east", [-1, -1, 1]),
         ("down (or up)", [1, 1, -1]),
     ):
-        yield Mistake(
+        yield mistake(
             f"sign of {key}",
             f"the velocity {key} has the wrong sign",
             words.negate(key, where),
-            of(lambda v, s=np.array(sign): v * s),  # type: ignore[misc]  # noqa: B008
+            lambda v, s=np.array(sign): v * s,  # type: ignore[misc]  # noqa: B008
         )
-    yield Mistake(
+    yield mistake(
         "velocity north and east exchanged",
         "the velocities north and east are exchanged",
         words.exchange("north", "east", where),
-        of(lambda v: v[:, [1, 0, 2]]),
+        lambda v: v[:, [1, 0, 2]],
     )
-    yield Mistake(
+    yield mistake(
         "course in radians, read as degrees",
         "the course is in radians, and the recipe says degrees",
         words.unit("course", where, "rad"),
-        of(lambda v: _course(v, np.degrees(np.arctan2(v[:, 1], v[:, 0])))),
+        lambda v: _course(v, np.degrees(np.arctan2(v[:, 1], v[:, 0]))),
     )
     yield Mistake(
         "course in degrees, read as radians",
@@ -193,7 +202,7 @@ def motion_mistakes(part: str, origin: Origin) -> Iterator[Mistake[Moved]]:
         fitted=True,
     )
     for place in place_mistakes(part, origin):
-        yield Mistake(f"position: {place.cause}", f"position: {place.said}", place.write, _places(place.undo))
+        yield place.within("position", _places(place.undo), change_place(table, place.undo))
 
 
 def _course(v: Array, course: Array) -> Array:

@@ -91,7 +91,7 @@ def nameless(flight: Flight, given: Sightings) -> Iterator[Finding]:
 def _mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]]:
     yield from mount_mistakes(s)
     for one in attitude_mistakes(f"poses.{s.source}"):
-        yield Mistake(one.cause, one.said, one.write, with_attitude(one.undo))
+        yield one.within("", with_attitude(one.undo))
     yield from pixel_mistakes(s)
     by = best_of(lambda t: -float(shares(shifted(s, t)).min()), CLOCKS)
     if flight.manifest.time.kind == "utc" and abs(by) >= 1.0:

@@ -138,7 +138,7 @@ def _nearer(name: str, at: Array, other: Array, flight: Flight) -> list[tuple[st
     undo: Callable[[Array], Array | None]
     for mistake in place_mistakes(words.part_of(name), flight.manifest.origin_tuple(), local=False):
         undo = mistake.undo
-        if mistake.about != "level":
+        if mistake.about == "height":
             continue
         moved = undo(at[None])
         if moved is not None and float(np.hypot(*(moved[0] - other)[:2])) < APART:

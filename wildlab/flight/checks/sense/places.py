@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from wildlab.flight.checks.sense import words
+from wildlab.flight.checks.sense.trial import Mistake
 from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array, Origin, geodetic_to_ned, ned_to_geodetic
 
@@ -15,19 +15,7 @@ from wildlab.geometry.frames import Array, Origin, geodetic_to_ned, ned_to_geode
 LENGTHS = other_units("length")
 
 
-@dataclass(frozen=True)
-class PlaceMistake:
-    """A mistake about positions: see `trial.Mistake`; `undo` takes and gives (N, 3) in n, or None."""
-
-    cause: str
-    said: str
-    write: str
-    undo: Callable[[Array], Array | None]
-    #: What it is about: "level", "height".
-    about: str = "level"
-
-
-def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[PlaceMistake]:
+def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[Mistake[Array]]:
     """Mistakes about one table of positions, as they are undone.
 
     Parameters
@@ -58,20 +46,20 @@ def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[Pl
     def linear(matrix: list[list[float]]) -> Callable[[Array], Array | None]:
         return lambda p: np.asarray(p @ np.array(matrix).T)
 
-    yield PlaceMistake(
+    yield Mistake(
         "latitude and longitude exchanged",
         "latitude and longitude are exchanged",
         words.exchange("latitude", "longitude", where),
         geodetic(lambda lat, lon, h: (lon, lat, h)),
     )
     for key, signs in (("latitude", (-1, 1)), ("longitude", (1, -1))):
-        yield PlaceMistake(
+        yield Mistake(
             f"{key} negated",
             f"the {key} has the wrong sign",
             words.negate(key, where),
             geodetic(lambda lat, lon, h, s=signs: (s[0] * lat, s[1] * lon, h)),  # type: ignore[misc]
         )
-    yield PlaceMistake(
+    yield Mistake(
         "latitude and longitude negated",
         "latitude and longitude have the wrong sign",
         words.negate("latitude and longitude", where),
@@ -83,40 +71,40 @@ def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[Pl
         ("longitude", (0, 1)),
     ):
         scale = [np.degrees(1.0) if one else 1.0 for one in factors]
-        yield PlaceMistake(
+        yield Mistake(
             f"{key} in radians, read as degrees",
             f"{key} {'are' if all(factors) else 'is'} in radians, and the recipe says degrees",
             words.unit(key, where, "rad"),
             geodetic(lambda lat, lon, h, s=scale: (s[0] * lat, s[1] * lon, h)),  # type: ignore[misc]
         )
     if local:
-        yield PlaceMistake(
+        yield Mistake(
             "north and east exchanged",
             "north and east are exchanged",
             words.exchange("north", "east", where),
             linear([[0, 1, 0], [1, 0, 0], [0, 0, 1]]),
         )
         for axis, key in enumerate(("north", "east")):
-            yield PlaceMistake(
+            yield Mistake(
                 f"{key} negated",
                 f"{key} has the wrong sign",
                 words.negate(key, where),
                 linear(np.diag(np.where(np.arange(3) == axis, -1.0, 1.0)).tolist()),
             )
-        yield PlaceMistake(
+        yield Mistake(
             "north and east negated",
             "north and east have the wrong sign",
             words.negate("north and east", where),
             linear(np.diag([-1.0, -1.0, 1.0]).tolist()),
         )
         for name, factor in LENGTHS.items():
-            yield PlaceMistake(
+            yield Mistake(
                 f"north and east in {name}, read as m",
                 f"north and east are in {name}, and the recipe says m",
                 words.unit("north and east", where, name),
                 linear(np.diag([factor, factor, 1.0]).tolist()),
             )
-            yield PlaceMistake(
+            yield Mistake(
                 f"north and east in m, read as {name}",
                 f"north and east are in m, and the recipe says {name}",
                 words.unit("north and east", where, "m"),
@@ -127,34 +115,34 @@ def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[Pl
 
 def _heights(
     part: str, origin: Origin, geodetic: Callable[..., Callable[[Array], Array | None]]
-) -> Iterator[PlaceMistake]:
+) -> Iterator[Mistake[Array]]:
     where = f"{part}.position"
     for name, factor in LENGTHS.items():
-        yield PlaceMistake(
+        yield Mistake(
             f"height in {name}, read as m",
             f"the height is in {name}, and the recipe says m",
             words.unit("height", where, name),
             geodetic(lambda lat, lon, h, f=factor: (lat, lon, f * h)),
-            "height",
+            about="height",
         )
-        yield PlaceMistake(
+        yield Mistake(
             f"height in m, read as {name}",
             f"the height is in m, and the recipe says {name}",
             words.unit("height", where, "m"),
             geodetic(lambda lat, lon, h, f=factor: (lat, lon, h / f)),
-            "height",
+            about="height",
         )
-    yield PlaceMistake(
+    yield Mistake(
         "height negated",
         "the height has the wrong sign",
         words.negate("height", where),
         geodetic(lambda lat, lon, h: (lat, lon, -h)),
-        "height",
+        about="height",
     )
-    yield PlaceMistake(
+    yield Mistake(
         "down counted upwards",
         "down about the origin has the wrong sign: it counts upwards",
         f"`up` in place of `down` in [{where}], or the other way round",
         lambda p: p * np.array([1.0, 1.0, -1.0]),
-        "height",
+        about="height",
     )

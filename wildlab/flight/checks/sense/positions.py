@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wildlab.errors import WildlabError
+from wildlab.flight.checks.corrections import change_place, shift_clock, shift_poses
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.inertial_data import fixes
 from wildlab.flight.checks.sense import words
 from wildlab.flight.checks.sense.constants import best_of
 from wildlab.flight.checks.sense.places import place_mistakes
-from wildlab.flight.checks.sense.trial import Misfit, Mistake, explain
+from wildlab.flight.checks.sense.trial import Misfit, Mistake, corrections_of, explain
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
@@ -109,6 +110,7 @@ def positions(flight: Flight) -> Iterator[Finding]:
                 f"{_apart(named[0].undone)} apart",
                 words.fixes([one.mistake.write for one in named]),
                 tuple(one.mistake.cause for one in named),
+                corrections_of(named),
             )
         elif now[1, 0] > 6.0:
             yield Finding(
@@ -141,9 +143,8 @@ def position_mistakes(flight: Flight, source: str, pair: Pair) -> Iterator[Mista
 
     for part, which in ((f"poses.{source}", "nav"), ("gnss", "gnss")):
         for place in place_mistakes(part, origin):
-            yield Mistake(
-                f"{part}: {place.cause}", f"{part}: {place.said}", place.write, of(which, place.undo)
-            )
+            correct = change_place(part.replace("poses.", "nav/"), place.undo)
+            yield place.within(part, of(which, place.undo), correct)
     left = pair.gnss - pair.nav
     up = float(np.nanmedian(-left[:, 2]))
     yield Mistake(
@@ -155,6 +156,10 @@ def position_mistakes(flight: Flight, source: str, pair: Pair) -> Iterator[Mista
         'with `["poses"]`',
         lambda p: replace(p, gnss=p.gnss + np.array([0.0, 0.0, up])),
         fitted=True,
+        corrections=(
+            change_place("gnss", lambda p: p + np.array([0.0, 0.0, up])),
+            change_place(f"nav/{source}", lambda p: p - np.array([0.0, 0.0, up])),
+        ),
     )
     if np.abs(pair.lever).max() > 5:
         for unit, factor in (("mm", 1e-3), ("cm", 1e-2)):
@@ -175,6 +180,7 @@ def position_mistakes(flight: Flight, source: str, pair: Pair) -> Iterator[Mista
             f"the time in [poses.{source}]",
             lambda p: _shifted(p, by),
             fitted=True,
+            corrections=(shift_clock("gnss_offset_s", by), shift_poses(source, -by)),
         )
 
 

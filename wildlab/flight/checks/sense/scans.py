@@ -85,10 +85,8 @@ def common_mistakes(flight: Flight) -> Iterator[Mistake[Scans]]:
 
     for part, which in (("truth", "targets"), (f"poses.{next(iter(flight.nav))}", "own")):
         for place in place_mistakes(part, origin):
-            if place.about == "level":
-                yield Mistake(
-                    f"{part}: {place.cause}", f"{part}: {place.said}", place.write, of(which, place.undo)
-                )
+            if place.about != "height":
+                yield place.within(part, of(which, place.undo))
     for seconds in CLOCKS:
         if seconds == 0:
             continue

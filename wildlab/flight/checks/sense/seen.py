@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
+from scipy.special import bdtrc
 
+from wildlab.flight.checks.corrections import change_attitude, change_camera, change_place
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense import words
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
-from wildlab.flight.checks.sense.constants import clock_mistakes, height_mistakes
+from wildlab.flight.checks.sense.constants import clock_mistakes, height_mistakes, turn_mistakes
 from wildlab.flight.checks.sense.lens import calibration_mistakes, mount_mistakes, pixel_mistakes
 from wildlab.flight.checks.sense.nameless import nameless
 from wildlab.flight.checks.sense.places import place_mistakes
@@ -30,7 +31,7 @@ from wildlab.flight.checks.sense.sightings import (
     sightings,
     with_attitude,
 )
-from wildlab.flight.checks.sense.trial import FAR_BETTER, Mistake, Named, explain
+from wildlab.flight.checks.sense.trial import ALIKE, FAR_BETTER, Mistake, Named, explain
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 
@@ -39,6 +40,8 @@ UNEXPLAINED, UNEXPLAINED_DEG = 4.0, 8.0
 #: A single photo or mark is named where most of its misses are so many times those of all, by at least so
 #: many points, and so many times what is expected.
 SINGLE, SINGLE_POINTS, SINGLE_EXPECTED = 6.0, 2, 5.0
+#: Rays that pass known points by less than this (m) are not told apart.
+CLOSE_M = 0.1
 #: So many photos of a flight in which all is as stated may be named, in the mean.
 BY_CHANCE = 0.05
 
@@ -100,14 +103,15 @@ def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]
     part = f"poses.{s.source}"
     yield from mount_mistakes(s)
     for b in attitude_mistakes(part):
-        yield Mistake(b.cause, b.said, b.write, with_attitude(b.undo))
+        yield b.within("", with_attitude(b.undo), change_attitude(s.source, b.undo))
     yield from pixel_mistakes(s)
     yield from calibration_mistakes(s)
     for a in place_mistakes(part, s.origin):
-        yield Mistake(f"poses: {a.cause}", f"poses: {a.said}", a.write, _position(a.undo))
+        yield a.within("poses", _position(a.undo), change_place(f"nav/{s.source}", a.undo))
     for a in place_mistakes("truth", s.origin):
-        yield Mistake(f"truth: {a.cause}", f"truth: {a.said}", a.write, _points(a.undo))
+        yield a.within("truth", _points(a.undo), change_place("truth", a.undo))
     yield from height_mistakes(s)
+    yield from turn_mistakes(s)
     if flight.manifest.time.kind == "utc":
         yield from clock_mistakes(s, flight.manifest.clocks.camera_offset_s)
 
@@ -139,10 +143,13 @@ def _nearer(given: Sightings, undone: Sightings) -> bool:
 
 
 def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
-    first, *others = named
     # Where other small errors hide what is gained, it is the distance without these that shows it.
-    plain = _plain(given, first.undone)
+    plain = _plain(given, named[0].undone)
     far = metres if plain else metres_left
+    # What is as good in angles and leaves ten times the distance explains it less.
+    left = np.nan_to_num([far(one.undone) for one in named], nan=np.inf)
+    named = [one for one, off in zip(named, left, strict=True) if off <= ALIKE * max(left.min(), CLOSE_M)]
+    first, *others = named
     said = (
         f"{first.mistake.said}: that brings the distance by which rays pass known points"
         f"{'' if plain else ', small constant errors of mount and position taken off,'} from "
@@ -158,6 +165,11 @@ def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
         said,
         words.fixes([one.mistake.write for one in named]),
         tuple(one.mistake.cause for one in named),
+        tuple(
+            correct
+            for one in named
+            for correct in one.mistake.corrections or (change_camera(one.undone.camera, one.undone.mount),)
+        ),
     )
 
 
@@ -218,6 +230,6 @@ def _off(far: NDArray[np.bool_], names: NDArray[np.object_], good: NDArray[np.bo
     # As if there had been half a far one more, so that none seen is not none ever.
     share = (far[others].sum() + 0.5) / (others.sum() + 1)
     by_chance = {
-        name: len(rows) * float(binom.sf(far[rows[name]].sum() - 1, rows[name].sum(), share)) for name in off
+        name: len(rows) * float(bdtrc(far[rows[name]].sum() - 1, rows[name].sum(), share)) for name in off
     }
     return [name for name in off if by_chance[name] < BY_CHANCE]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from wildlab.flight.checks.corrections import report_alone
 from wildlab.flight.checks.findings import Finding, whole
 from wildlab.flight.checks.sense.bounds import bounds
 from wildlab.flight.checks.sense.camera import lens
@@ -21,10 +22,10 @@ from wildlab.flight.checks.sense.stamps import stamps
 from wildlab.flight.checks.sense.targets import targets
 from wildlab.flight.store import Flight
 
-__all__ = ["sense", "sense_sentences"]
+__all__ = ["contradictions", "sense", "sense_sentences"]
 
 
-def sense(flight: Flight) -> Iterator[Finding]:
+def sense(flight: Flight) -> list[Finding]:
     """Everything in which a flight contradicts itself, and the mistake that explains it.
 
     Parameters
@@ -32,11 +33,16 @@ def sense(flight: Flight) -> Iterator[Finding]:
     flight
         The flight; nothing in it is changed.
 
-    Yields
-    ------
-    Finding
-        In clauses, as from `wildlab.flight.checks.check.find`.
+    Returns
+    -------
+    list of Finding
+        In clauses, as from `wildlab.flight.checks.check.find`; of mistakes that explain others, these alone.
     """
+    return report_alone(flight, list(contradictions(flight)), lambda one: list(contradictions(one)))
+
+
+def contradictions(flight: Flight) -> Iterator[Finding]:
+    """The same with what follows from another one."""
     yield from bounds(flight)
     apart = [*origin(flight), *together(flight)]
     yield from apart

@@ -245,7 +245,7 @@ def _expected(flight: Flight, P: Array | None, n: int) -> Array:
     stated = flight.manifest.uncertainty
     level = stated.position_horizontal_m or USUAL_HORIZONTAL
     vertical = stated.position_vertical_m or USUAL_VERTICAL
-    angles = [getattr(stated, f"{axis}_deg") for axis in ("roll", "pitch", "yaw")]
+    angles = [stated.tilt_deg, stated.tilt_deg, stated.heading_deg]
     turn = float(np.mean([USUAL_ATTITUDE if a is None else np.radians(a) for a in angles]))
     least = max(USUAL_ATTITUDE if a is None else np.radians(a) for a in angles)
     place = np.hypot(level, vertical) / np.sqrt(2)

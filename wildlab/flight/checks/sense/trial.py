@@ -14,8 +14,11 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.flight.store import Flight
+
 Array = NDArray[np.float64]
 T = TypeVar("T")
+S = TypeVar("S")
 
 #: A mistake is named where undoing it divides a misfit by this, on the whole and on either half. Of twenty
 #: values, the median of the size moves by a fifth from one half to the other: chance does not halve it twice.
@@ -55,6 +58,10 @@ class Mistake(Generic[T]):
         Gives the same as it would be without the mistake; None where it cannot be that mistake.
     fitted
         Whether a number was chosen to make it fit.
+    corrections
+        What undoes it in a flight, the likeliest first; see `Finding`.
+    about
+        ``height`` where positions are wrong in that alone.
     """
 
     cause: str
@@ -62,11 +69,25 @@ class Mistake(Generic[T]):
     write: str
     undo: Callable[[T], T | None]
     fitted: bool = False
+    corrections: tuple[Callable[[Flight], Flight | None], ...] = ()
+    about: str = ""
+
+    def within(
+        self, part: str, undo: Callable[[S], S | None], *corrections: Callable[[Flight], Flight | None]
+    ) -> Mistake[S]:
+        """The same mistake in a part of something larger, which ``undo`` takes; "" names no part."""
+        of = f"{part}: " if part else ""
+        return Mistake(f"{of}{self.cause}", f"{of}{self.said}", self.write, undo, corrections=corrections)
 
 
 #: Misfits of the whole and of each half, (2, 3), in units of what noise is expected: with small constant
 #: errors allowed for, as every flight has them, and (second row) without. NaN where a half is too small.
 Misfit = Array
+
+
+def corrections_of(named: Iterable[Named[T]]) -> tuple[Callable[[Flight], Flight | None], ...]:
+    """All corrections of mistakes that are named together."""
+    return tuple(correct for one in named for correct in one.mistake.corrections)
 
 
 class Named(NamedTuple, Generic[T]):
@@ -132,6 +153,8 @@ def explain(
         The best first, with those as good as it; empty where none is far better.
     """
     before = misfit(given)
+    if not (before[:, 0] > EXPECTED).any():
+        return []  # what is like noise needs no explanation, see `far_better`
     found: list[Named[T]] = []
     for mistake in mistakes:
         undone = mistake.undo(given)

@@ -35,7 +35,6 @@ from wildlab.flight.readers.marks.text_table import (
     read_text_table,
     said_of_short,
     to_number,
-    unguarded,
 )
 
 Array = NDArray[np.float64]
@@ -230,11 +229,11 @@ def _table(data: bytes, path: Path) -> RawLog:
             "the boxes are shares of the image: none is wider or farther than 1", "give pixels", file=path
         )
     found: dict[str, Any] = {
-        "image": [unguarded(table.rows[row][image]) for row in keep],
+        "image": [table.rows[row][image] for row in keep],
         **_of_boxes(boxes[keep]),
     }
     who = next((names.index(_plain(one)) for one in NAME_COLUMNS if _plain(one) in names), None)
-    found["name"] = ["" if who is None else unguarded(table.rows[row][who]) for row in keep]
+    found["name"] = ["" if who is None else table.rows[row][who] for row in keep]
     sure = next((names.index(_plain(one)) for one in SCORE_COLUMNS if _plain(one) in names), None)
     if sure is not None:
         found["score"] = [to_number(table.rows[row][sure], table.comma) for row in keep]

@@ -36,7 +36,7 @@ PARTS: dict[str, tuple[str, ...]] = {
         *_PLACE,
         *_VELOCITY,
         *("roll_deg", "pitch_deg", "yaw_deg", "q_w", "q_x", "q_y", "q_z"),
-        *("sd_horizontal_m", "sd_vertical_m", "sd_roll_deg", "sd_pitch_deg", "sd_yaw_deg"),
+        *("sd_horizontal_m", "sd_vertical_m", "sd_tilt_deg", "sd_heading_deg"),
     ),
     # Satellite positions, of the first receiver; `fix` as NMEA and MAVLink number kinds: 3 is in space.
     "gnss": (*_PLACE, *_VELOCITY, *_SPREADS, "satellites", "fix", "hdop"),

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wildlab.errors import WildlabError
+from wildlab.names import from_csv_cell
 
 #: Rows, and columns of one, at most; letters of a value that are kept.
 MOST_ROWS, MOST_COLUMNS, MOST_LETTERS = 1_000_000, 200, 200
@@ -108,9 +109,10 @@ def read_text_table(data: bytes, path: Path) -> TextTable:
 
     def values(line: str) -> list[str]:
         try:
-            return [one.strip() for one in next(csv.reader(io.StringIO(line), delimiter=sign), [])]
+            cells = next(csv.reader(io.StringIO(line), delimiter=sign), [])
         except csv.Error:
             return []
+        return [from_csv_cell(one.strip()) for one in cells]
 
     header = values(told[0][1])
     if len(header) > MOST_COLUMNS:
@@ -163,32 +165,3 @@ def said_of_short(table: TextTable) -> list[str]:
     count = len(table.short)
     lines = "1 line" if count == 1 else f"{count:,} lines"
     return [f"{lines} without {len(table.header)} values, the first is line {table.short[0]}"]
-
-
-#: With what a program of tables takes a value for a formula.
-_FORMULA = ("=", "+", "-", "@", "\t", "'")
-
-
-def guarded(text: str) -> str:
-    """Text as a value of a table that no program of tables takes for a formula; `unguarded` gives it back.
-
-    Parameters
-    ----------
-    text
-        Of one value.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> guarded("=2+2"), unguarded(guarded("=2+2")), guarded("A-1")
-    ("'=2+2", '=2+2', 'A-1')
-    """
-    return f"'{text}" if text.startswith(_FORMULA) else text
-
-
-def unguarded(text: str) -> str:
-    """What `guarded` was given."""
-    return text[1:] if text.startswith("'") and text[1:].startswith(_FORMULA) else text

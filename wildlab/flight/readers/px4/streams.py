@@ -131,15 +131,14 @@ def _from_local(local: Topic) -> dict[str, Array]:
 
 def _local_motion(local: Topic) -> dict[str, Array]:
     with np.errstate(invalid="ignore"):
-        # The variance of the tilt is that of both angles together.
-        tilt, yaw = np.sqrt(local.get("tilt_var") / 2), np.sqrt(local.get("heading_var"))
+        # The variance of the tilt is that of both axes together.
+        tilt, heading = np.sqrt(local.get("tilt_var") / 2), np.sqrt(local.get("heading_var"))
     return {
         "v_north_m_s": local.get("vx"),
         "v_east_m_s": local.get("vy"),
         "v_down_m_s": local.get("vz"),
-        "sd_roll_deg": np.degrees(tilt),
-        "sd_pitch_deg": np.degrees(tilt),
-        "sd_yaw_deg": np.degrees(yaw),
+        "sd_tilt_deg": np.degrees(tilt),
+        "sd_heading_deg": np.degrees(heading),
     }
 
 

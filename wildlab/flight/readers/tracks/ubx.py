@@ -20,6 +20,7 @@ from wildlab.flight.readers.tracks.judging import Mask, gaps, judge, plural
 from wildlab.flight.readers.tracks.ubx_frames import Frames, Rows, between, frames, rows
 from wildlab.flight.time.fitting import fit_clock
 from wildlab.flight.time.leap_seconds import WEEK_S, week_to_utc
+from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 Index = NDArray[np.int64]
 _PVT, _POSLLH, _HPPOSLLH, _VELNED = (0x01, 0x07), (0x01, 0x02), (0x01, 0x14), (0x01, 0x12)
@@ -281,7 +282,9 @@ def _poses(data: bytes, found: Frames, gnss: Stream) -> Stream | None:
         # Without an accuracy there is no angle.
         angle = np.where(row[f"{field}_acc"] > 0, row[field] * 1e-5, np.nan)
         columns[f"{name}_deg"] = _at(own, times, angle)
-        columns[f"sd_{name}_deg"] = _at(own, times, row[f"{field}_acc"] * 1e-5)
+    roll, pitch, heading = (row[f"{field}_acc"] * 1e-5 for field in ("roll", "pitch", "heading"))
+    columns["sd_tilt_deg"] = _at(own, times, tilt_from_roll_pitch(roll, pitch))
+    columns["sd_heading_deg"] = _at(own, times, heading)
     angles = np.column_stack([columns[f"{name}_deg"] for name in ("roll", "pitch", "yaw")])
     why = place.columns["why"]
     reasons = {str(reason): why == reason for reason in dict.fromkeys(why) if reason}

@@ -1,0 +1,171 @@
+"""Sound flights are accused of nothing, and a mistake made in one is named, alone."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.flight.checks import sabotage
+from tests.flight.checks.injected import injected_mistakes
+from tests.sound_flights import simulate_sound_flight, sound_flights
+from wildlab.flight.checks.check import find
+from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.sense.felt import Felt, heading_error
+from wildlab.flight.store import Flight
+
+#: Those that fly sideways, look straight down along their course, or have a camera's attitude beside an
+#: airframe's inertial sensor; and one of each other kind.
+FEW = [("multirotor", 7), ("gimbal oblique", 4), ("gimbal oblique", 10), ("nadir", 6), ("nadir", 10),
+       ("fixed wing", 1), ("gondola", 3), ("boat", 2), ("boat", 9)]  # fmt: skip
+
+
+def accusations(flight: Flight) -> list[Finding]:
+    return [one for one in find(flight) if one.level != "note"]
+
+
+@pytest.mark.parametrize(("kind", "seed"), FEW)
+def test_a_sound_flight_is_not_accused(kind: str, seed: int) -> None:
+    assert accusations(simulate_sound_flight(kind, seed)) == []
+
+
+@pytest.mark.slow
+def test_no_sound_flight_is_accused() -> None:
+    accused = {(kind, seed): accusations(flight) for kind, seed, flight in sound_flights()}
+    assert len(accused) >= 12
+    assert {which: found for which, found in accused.items() if found} == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "seed", "mistake"),
+    [
+        ("fixed wing", 2, "poses 18 s late"),
+        ("fixed wing", 2, "poses: north negated"),
+        ("fixed wing", 2, "focal length x 1000"),
+        ("multirotor", 2, "roll and pitch exchanged"),
+        ("nadir", 2, "images 18 s late"),
+    ],
+)
+def test_a_mistake_that_explains_others_is_named_alone(kind: str, seed: int, mistake: str) -> None:
+    flight = simulate_sound_flight(kind, seed)
+    (wrong,) = [one for one in injected_mistakes(flight) if one.name == mistake]
+    (found,) = accusations(wrong.apply(flight))
+    assert re.search(wrong.named, f"{found.sentence} {found.fix}", re.DOTALL)
+
+
+def circling(
+    pitch_deg: float,
+    heading_deg: float,
+    swings: bool,
+    noise: float = 0.1,
+    roll_deg: float = 0.0,
+    seed: int = 1,
+) -> Felt:
+    """What a sensor feels that is tilted and whose heading is off, on a circle, or on a way that swings."""
+    t = np.arange(0.0, 120.0, 0.2)
+    course = 1.2 * np.sin(0.15 * t) + 0.4 * np.sin(0.4 * t) if swings else 0.2 * t
+    v = 15 * np.stack([np.cos(course), np.sin(course), np.zeros(len(t))], axis=1)
+    v *= 1 + swings * 0.3 * np.sin(0.23 * t)[:, None]
+    a = np.gradient(v, t, axis=0)
+    true = Rotation.from_euler("Z", course[:, None])
+    force = true.inv().apply(a - [0.0, 0.0, 9.81])
+    a = a + np.random.default_rng(seed).normal(0, noise, v.shape)
+    logged = Rotation.from_euler("z", heading_deg, degrees=True) * true
+    logged = logged * Rotation.from_euler("yx", [pitch_deg, roll_deg], degrees=True)
+    R = logged.as_matrix()
+    return Felt(R[:-1], R[1:], np.diff(t), np.zeros((len(t) - 1, 3)), force, R, a, t)
+
+
+def test_gravity_in_a_tilted_sensor_on_a_circle_is_no_heading() -> None:
+    assert heading_error(circling(5.6, 0.0, swings=False)) is None
+
+
+@pytest.mark.parametrize("late_s", [0.2, 0.35])
+@pytest.mark.parametrize("turn", [0.25, 0.6])
+def test_a_late_receiver_in_steady_turns_is_no_heading(turn: float, late_s: float) -> None:
+    """The nose stays where it is; attitude and accelerometer are wrong by what they usually are."""
+    t, rng = np.arange(300.0), np.random.default_rng(3)
+
+    def acceleration(t: np.ndarray) -> np.ndarray:
+        return 10 * turn * np.stack([-np.sin(turn * t), np.cos(turn * t), 0 * t], axis=1)
+
+    true = Rotation.from_rotvec(rng.normal(0, np.radians(1.5), (300, 3)))
+    force = acceleration(t) - [0.0, 0.0, 9.81] + rng.normal(0, 1.0, 3) + rng.normal(0, 0.1, (300, 3))
+    a = acceleration(t - late_s) + rng.normal(0, 0.1, (300, 3))
+    R = true.as_matrix()
+    assert heading_error(Felt(R[:-1], R[1:], np.ones(299), 0 * R[1:, 0], force, R, a, t)) is None
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_heading_is_told_from_steady_coordinated_turns(seed: int) -> None:
+    t, rng, turn = np.arange(0.0, 1200.0), np.random.default_rng(seed), 0.25
+    course = turn * t
+    v = 12 * np.stack([np.cos(course), np.sin(course), 0 * t], axis=1)
+    a = turn * np.stack([-v[:, 1], v[:, 0], 0 * t], axis=1)
+    true = Rotation.from_euler("Z", course[:, None]) * Rotation.from_euler("X", np.arctan(turn * 12 / 9.81))
+    force = true.inv().apply(a - [0.0, 0.0, 9.81]) + rng.normal(0, 1.0, 3) + rng.normal(0, 0.1, v.shape)
+    R = (true * Rotation.from_rotvec(rng.normal(0, np.radians(1.5), v.shape))).as_matrix()
+    a = a + rng.normal(0, 0.1, v.shape)
+    assert heading_error(Felt(R[:-1], R[1:], np.diff(t), 0 * v[1:], force, R, a, t)) is None
+
+
+@pytest.mark.parametrize(("pitch_deg", "roll_deg"), [(5.6, 0.0), (15.0, 0.0), (-3.0, 8.0)])
+def test_a_heading_is_told_from_a_tilt_where_the_way_swings(pitch_deg: float, roll_deg: float) -> None:
+    assert heading_error(circling(pitch_deg, 0.0, swings=True, roll_deg=roll_deg)) is None
+    found = heading_error(circling(pitch_deg, 12.0, swings=True, noise=0.0, roll_deg=roll_deg))
+    assert found is not None and np.degrees(found.by) == pytest.approx(12.0, abs=0.5)
+
+
+def test_a_heading_is_as_sure_as_it_says() -> None:
+    found = [heading_error(circling(3.0, 20.0, swings=True, noise=1.0, seed=seed)) for seed in range(60)]
+    off = [(np.degrees(one.by) - 20.0) / np.degrees(one.sd) for one in found if one is not None]
+    assert len(off) == 60 and 0.6 < np.sqrt(np.mean(np.square(off))) < 1.6
+
+
+def turned(flight: Flight, axis: str, deg: float) -> Flight:
+    """The attitudes as logged with an error about an axis of n (z) or of b (y)."""
+    turn = Rotation.from_euler(axis, deg, degrees=True)
+
+    def rows(nav):  # type: ignore[no-untyped-def]
+        R = Rotation.from_quat(nav[sabotage.QUATERNION].to_numpy(float), scalar_first=True)
+        R = turn * R if axis == "z" else R * turn
+        return nav.assign(**dict(zip(sabotage.QUATERNION, R.as_quat(scalar_first=True).T, strict=True)))
+
+    return sabotage.with_table(flight, f"nav/{next(iter(flight.nav))}", rows)
+
+
+def test_a_heading_from_magnetic_north_is_named() -> None:
+    (found,) = accusations(turned(simulate_sound_flight("fixed wing", 3), "z", 12.0))
+    assert "heading off" in found.causes and "declination" in found.fix
+
+
+def test_the_heading_error_is_the_turn_between_forces_and_accelerations() -> None:
+    """Without noise the angle itself, whatever the airframe does."""
+    rng = np.random.default_rng(1)
+    R = Rotation.random(200, random_state=2)
+    moved = rng.normal(0, 2, (200, 3))
+    force = R.inv().apply(moved - [0.0, 0.0, 9.80665])
+    logged = (Rotation.from_euler("z", 0.21) * R).as_matrix()
+    still = np.zeros((200, 3))
+    error = heading_error(Felt(logged, logged, np.ones(200), still, force, logged, moved, np.arange(200.0)))
+    assert error is not None
+    assert error.by == pytest.approx(0.21, abs=1e-3) and error.sd < 1e-3
+
+
+def test_a_camera_tilted_by_nine_degrees_is_named() -> None:
+    flight = simulate_sound_flight("multirotor", 4)
+    tilt = flight.manifest.mount.tilt_deg
+    (found,) = accusations(sabotage.manifest_of(flight, mount={"tilt_deg": tilt + 9.0}))
+    assert found.causes == ("camera turned",)
+    assert re.search(r"turned by (8|9|10) deg", found.sentence)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_height_is_no_certain_cause_where_a_tilt_explains_it_too(seed: int) -> None:
+    flight = simulate_sound_flight("boat", 2 * seed - 1)
+    wrong = sabotage.manifest_of(flight, mount={"tilt_deg": 8.0})
+    for one in accusations(wrong):
+        assert "constant height" not in one.causes or "camera turned" in one.causes
