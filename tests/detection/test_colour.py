@@ -95,6 +95,7 @@ def test_red_goes_through_zero() -> None:
     assert len(find_coloured(image, all_of(image))) == 0
 
 
+@pytest.mark.slow
 def test_centres_lie_in_their_ellipses_as_often_as_they_say() -> None:
     rng = np.random.default_rng(5)
     squares, apart = [], []

@@ -22,11 +22,11 @@ from wildlab.detection.flow import (
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.flow import CameraMotion, flow_between, motion_between
 from wildlab.geometry.flow_uncertainty import FlowErrors, mean_velocity
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.mount import Mount
-from wildlab.geometry.uncertainty import inside_ellipse
 
 SHAPE = (160, 200)
 

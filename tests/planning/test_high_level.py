@@ -62,6 +62,15 @@ def test_the_measure_sends_back_for_what_is_known_badly_and_on_where_much_can_be
     assert two == 1
 
 
+@pytest.mark.parametrize("alpha", [0.001, 0.05, 1.0])
+def test_going_back_gains_only_where_an_animal_is_known_worse_than_a_look_would_make_it(alpha):
+    """Animals that stand still: one as well known as one just seen, a little worse, a little better."""
+    given = {"alpha": alpha, "speed": 5.0, "walk": 0.0, "horizon": 60.0, "found_variance": 2.0}
+    for variance, goal in ((2.0, SEARCH), (2.1, 0), (1.9, SEARCH)):
+        known = [variance * np.eye(2)]
+        assert best_by_measure([[0.0, 50.0]], known, [0, 0], finds=1e-6, **given) == goal
+
+
 def test_an_enclosure_is_done_when_all_are_known_at_once():
     assert all_positioned([5, 4, 0], [5, 5, 0]).tolist() == [True, False, True]
 

@@ -47,6 +47,7 @@ def flight(runs, seed=0):
     return times, z, CameraPoses.at_lens(CAMERA, p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2)), truth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gate", [1.0, 0.99])
 @pytest.mark.parametrize("runs", [1, 3, 64, 70])
 def test_positions(runs, gate):

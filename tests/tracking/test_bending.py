@@ -106,6 +106,7 @@ def test_within_the_bound_the_posterior_is_right_up_to_what_is_left_out(tilt: fl
     assert 1.8 < nees < 1.1 * (2 + 2 * share)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [0.3, 0.7])
 @pytest.mark.parametrize("share", [3.0, 30.0])
 def test_beyond_the_bound_the_posterior_is_wrong_and_a_new_start_is_nearer(tilt: float, share: float) -> None:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import logging
+import subprocess
+import sys
+from pathlib import Path
 
 import numba
 import pytest
 
 from wildlab.geometry.compilation import announced, compiled
+from wildlab.paths import ROOT
 from wildlab.tracking import batch_kernels
 
 
@@ -31,6 +35,34 @@ def test_the_first_use_is_announced_once(caplog):
     with announced("the doubling"):
         four_times(1)  # another type
     assert len(caplog.records) == 2
+
+
+INNER = "from wildlab.geometry.compilation import compiled\n\n\n@compiled\ndef inner(x):\n    return {} * x\n"
+OUTER = (
+    "from inner import inner\nfrom wildlab.geometry.compilation import compiled\n\n\n"
+    "@compiled\ndef outer(x):\n    return inner(x) + 1\n"
+)
+PROGRAM = (
+    "from numba.core import event\nimport outer\n"
+    "with event.install_recorder('numba:compile') as seen:\n    print(outer.outer(2.0), bool(seen.buffer))"
+)
+
+
+@pytest.mark.slow
+def test_copies_share_what_is_compiled_and_a_change_below_compiles_anew(tmp_path: Path) -> None:
+    def run(folder: str, factor: int) -> str:
+        (tmp_path / folder).mkdir(exist_ok=True)
+        (tmp_path / folder / "inner.py").write_text(INNER.format(factor))
+        (tmp_path / folder / "outer.py").write_text(OUTER)
+        environment = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": f"{tmp_path / folder}:{ROOT}"}
+        command = [sys.executable, "-c", PROGRAM]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    assert run("one", 3) == "7.0 True"
+    assert run("other", 3) == "7.0 False"
+    assert run("other", 5) == "11.0 True"
+    assert run("one", 3) == "7.0 False"
 
 
 @pytest.mark.slow

@@ -179,6 +179,7 @@ def test_without_memory_it_is_the_inflated_filter():
         assert np.allclose(track.S[row], done.S)
 
 
+@pytest.mark.slow
 def test_a_standing_error_of_the_pose_is_owned_up_to():
     """One bias of the attitude per flight: the plain filter is sure of itself and wrong, this one is not."""
     covariance = np.diag(UNITS / 2) ** 2

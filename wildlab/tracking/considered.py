@@ -7,7 +7,8 @@ measurement depends on it. The names:
 ``platform_north``, ``platform_east``, ``platform_down``
     m, of the platform's position in n.
 ``roll``, ``pitch``, ``heading``
-    rad, of its attitude about the axes of b. ``attitude`` is all three.
+    rad, of its attitude about the axes of b, or those that the sensor's derivatives are for. ``attitude`` is
+    all three, ``tilt`` the first two.
 ``<element>_bias``
     Of what a sensor measures, in the element's own unit: ``range_bias``, ``bearing_bias``, ``u_bias``.
 ``clock``
@@ -39,7 +40,7 @@ from wildlab.tracking.schmidt import Change, PoseUncertainty
 from wildlab.tracking.sensors import Sensor
 
 #: One name for several.
-TOGETHER = {"attitude": POSE[3:], "platform_position": POSE[:3]}
+TOGETHER = {"attitude": POSE[3:], "tilt": POSE[3:5], "platform_position": POSE[:3]}
 
 
 class Considered(NamedTuple):
@@ -84,7 +85,7 @@ def consider(
     ----------
     sds
         Standard deviation of each error by name, in its own unit: a number, or (N,). ``attitude`` and
-        ``platform_position`` stand for three.
+        ``platform_position`` stand for three, ``tilt`` for two.
     correlation_time
         s, one for all, or by name; those that are not named last for ever.
     change

@@ -234,6 +234,7 @@ def test_what_is_refused(looks, rule, words):
         run_bank(looks, TUNING, rule)
 
 
+@pytest.mark.slow
 def test_a_veto_lets_through_as_many_of_a_targets_own_looks_as_it_says():
     """Over many tracks: what each keeps is the mean of two detections, and as uncertain as half of one."""
     rng, image = np.random.default_rng(3), np.r_[0, np.arange(1, 40, 2)]

@@ -94,6 +94,7 @@ def test_no_hull_is_ruled_out_and_a_motion_may_be() -> None:
     assert of_hulls(np.zeros((0, 4)), targets).shape == (0, 2)
 
 
+@pytest.mark.slow
 def test_what_turns_now_and_then_is_followed_nearer() -> None:
     """Calm for most of the time, with short turns: two motions have smaller errors than either alone."""
     errors: dict[float, list[float]] = {1.0: [], 0.1: []}

@@ -56,6 +56,7 @@ def test_one_target_without_clutter_is_the_kalman_filter(seed: int) -> None:
         assert np.allclose(tracks.x[0, 0], x) and np.allclose(tracks.P[0, 0], P)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("density", [0.1, 0.3])
 def test_two_that_cross_keep_their_names(density: float) -> None:
     """Also where velocities are known badly: then both are still seen, each by its own measurement."""

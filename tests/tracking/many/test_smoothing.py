@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tracking.many.test_together import OPEN, SURE, moved
+from tests.tracking.many.test_together import OPEN, SURE
+from wildlab.evaluation.consistency import chi_square_interval, nees
 from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many.beliefs import POINT, Scan, SensorBeliefs, TargetBeliefs
+from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs, own_lasting
 from wildlab.tracking.many.run import Shown, run_many
 from wildlab.tracking.many.smoothing import smooth_considering, smooth_many
 from wildlab.tracking.maritime import white_acceleration
@@ -125,53 +126,81 @@ def test_smoothed_tracks_of_many_are_closer_to_the_truth() -> None:
     assert np.mean(off["smoothed"]) < 0.75 * np.mean(off["filter"])
 
 
-def test_what_fades_is_less_common_with_what_was_before() -> None:
-    """Three looks, an error that fades by a fifth, gains as one likes: all from sources of size one.
-
-    The second look moves the other way than the first by just so much that the estimate then has nothing in
-    common with the error: so what is approximated where errors fade is exact here.
-    """
-    left, shares = 0.8, np.array([1.0, -0.8, 1.5])
-    F, Q = white_acceleration(1.0, 0.3)
-    gains = np.vstack([np.eye(2) / 2, np.zeros((2, 2))]), np.vstack([np.eye(2) / 2, 0.3 * np.eye(2)])
-    # One row for each of o, its two changes, v, and of noise n and process noise w at each look.
-    o, *changes, v, n, n1, n2, w1, w2 = np.split(np.eye(19), [1, 2, 3, 5, 7, 9, 11, 15])
-    root, J = np.linalg.cholesky(Q), np.array([[2.0], [1.0]])
-    truth, shared = [np.zeros((4, 19))], [o]
-    e = [np.vstack([-(n + shares[0] * J @ o), v])]
-    for k, (gain, noise, w) in enumerate(zip(gains, (n1, n2), (w1, w2), strict=True)):
-        truth.append(F @ truth[-1] + root @ w)
-        shared.append(left * shared[-1] + np.sqrt(1 - left**2) * changes[k])
-        ahead = F @ e[-1] + root @ w
-        e.append(ahead - gain @ (H @ ahead + noise + shares[k + 1] * J @ shared[-1]))
-    assert np.allclose(e[1] @ shared[1].T, 0) and not np.allclose(e[0] @ o.T, 0)
-    P = np.array([one @ one.T for one in e])
-    C = np.array([one @ other.T for one, other in zip(e, shared, strict=True)])
-    lasting, x = [-1 / np.log(left)], np.array(truth) - np.array(e)
-    after = [smooth_considering([0.0, 1.0, 2.0], x[..., k], P, C, 0.3, lasting) for k in range(19)]
-    off = np.array(truth) - np.stack([mean for mean, _ in after], axis=-1)
+@given(st.integers(0, 10_000))
+@settings(max_examples=8, deadline=None)
+def test_covariances_are_those_of_the_errors_of_smoothed_tracks(seed: int) -> None:
+    """Errors that fade, each at its own rate: everything is a sum of sources of variance one, and exact."""
+    rng = np.random.default_rng(seed)
+    looks, k = 6, 2
+    lasting = rng.choice([0.0, 1.0, 5.0, 40.0, np.inf], k)
+    times = np.cumsum(rng.uniform(0.2, 3.0, looks))
+    # A row of sources for each element: of the state 4, then at each look errors k, noise 2 and motion 4.
+    unit = np.eye(4 + looks * (k + 6))
+    start, rest = unit[:4], unit[4:].reshape(looks, k + 6, -1)
+    truth, e, o = np.zeros((4, unit.shape[1])), 5 * start, rest[0, :k]
+    truths, filtered, P, C = [], [], [], []
+    for row in range(looks):
+        if row:
+            dt = float(times[row] - times[row - 1])
+            F, Q = white_acceleration(dt, 0.3)
+            w = np.linalg.cholesky(Q) @ rest[row, k + 2 :]
+            truth, e = F @ truth + w, F @ e + w
+            left = np.array([np.exp(-dt / one) if one else 0.0 for one in lasting])[:, None]
+            o = left * o + np.sqrt(1 - left**2) * rest[row, :k]
+        # An innovation is H e + J o + n, and the gain is the best one for the state alone.
+        nu = H @ e + rng.normal(size=(2, k)) @ o + rng.uniform(0.3, 2.0) * rest[row, k : k + 2]
+        e = e - e @ nu.T @ np.linalg.inv(nu @ nu.T) @ nu
+        truths.append(truth)
+        filtered.append(truth - e)
+        P.append(e @ e.T)
+        C.append(e @ o.T)
+    x = np.array(filtered)
+    after = [
+        smooth_considering(times.tolist(), x[..., source], np.array(P), np.array(C), 0.3, lasting.tolist())
+        for source in range(unit.shape[1])
+    ]
+    off = np.array(truths) - np.stack([mean for mean, _ in after], axis=-1)
     assert np.allclose(after[0][1], off @ np.swapaxes(off, 1, 2))
 
 
-@pytest.mark.parametrize("lasting", [0.0, 5.0, 40.0, np.inf])
-def test_errors_are_as_large_as_smoothed_tracks_say(lasting: float) -> None:
-    """Errors that measurements share are in the covariance, and what is learnt later lowers it."""
-    density, nees, lower = 0.3, [], []
-    for seed in range(100):
-        rng = np.random.default_rng(seed)
-        state, way = np.array([0.0, 0.0, *rng.normal(0, OPEN.start_speed_m_s, 2)]), []
-        F, Q = white_acceleration(1.0, density)
-        for _ in range(20):
-            way.append(state[:2])
-            state = F @ state + rng.multivariate_normal(np.zeros(4), Q)
-        scans = moved(np.array(way)[:, None], lasting, 2.0, 0.5, rng)
-        found = run_many(scans, [SURE], OPEN._replace(density=density, hits=1, confirmed=0.0), [lasting] * 2)
-        after = smooth_many(found, density, [lasting] * 2)
-        for k in range(2, 20, 6):
-            e, P = way[k] - after[k][0][0, :2], after[k][1][0, :2, :2]
-            nees.append(e @ np.linalg.solve(P, e) / 2)
-            # What lasts for ever, 2 m in each axis, no smoothing lowers.
-            ever = 2 * 2.0**2 if lasting == np.inf else 0.0
-            lower.append((np.trace(P) - ever) / (np.trace(found[k].P[0, :2, :2]) - ever))
-    assert 0.8 < np.mean(nees) < 1.2
-    assert np.mean(lower) < 0.97 and max(lower) < 1.001
+@pytest.mark.slow
+def test_errors_are_as_large_as_tracks_of_two_sensors_say() -> None:
+    """Which part of a hull is seen lasts, another one of each sensor: before and after smoothing."""
+    boat, share, lasting, own, rough = Hull("boat", 6.0, 2.0), 0.8, (20.0, 60.0), (0.7, 1.5), (2.0, 1.0)
+    eyes = [
+        SURE._replace(rough_m=(size,), correlation=share, lasting_s=one)
+        for size, one in zip(rough, lasting, strict=True)
+    ]
+    targets = OPEN._replace(hulls=(boat,), density=0.3, hits=1, confirmed=0.0)
+    # A hundred boats, far apart.
+    rng, count = np.random.default_rng(4), 100
+    state = np.zeros((count, 4))
+    state[:, 0], state[:, 2:] = 5e3 * np.arange(count), rng.normal(0, 3.0, (count, 2))
+    lasts, way, scans = rng.normal(size=(2, count, 2)), [], []
+    for t in range(28):
+        which = t % 2
+        left = np.exp(-0.5 / np.array(lasting))[:, None, None]
+        lasts = left * lasts + np.sqrt(1 - left**2) * rng.normal(size=lasts.shape)
+        error = np.sqrt(share) * lasts[which] + np.sqrt(1 - share) * rng.normal(size=(count, 2))
+        z, R = state[:, :2] + np.hypot(own[which], rough[which]) * error, own[which] ** 2 * np.eye(2)
+        scans.append(Scan(t / 2, which, np.array([0.0, -500.0]), z, np.tile(R, (count, 1, 1))))
+        way.append(state[:, :2])
+        F, Q = white_acceleration(0.5, targets.density)
+        state = state @ F.T + rng.multivariate_normal(np.zeros(4), Q, count)
+    found = run_many(scans, eyes, targets)
+    white = run_many(scans, [one._replace(correlation=0.0) for one in eyes], targets)
+    given = {
+        "filter": [(one.x, one.P) for one in found],
+        "smoothed": smooth_many(found, targets.density, own_lasting(eyes)),
+        "white": smooth_many(white, targets.density),
+    }
+    low, high = chi_square_interval(2, runs=count)
+    means: dict[str, list[float]] = {name: [] for name in given}
+    for name, states in given.items():
+        for k in range(3, 28, 12):
+            assert found[k].identity.tolist() == list(range(count))
+            e, P = way[k] - states[k][0][:, :2], states[k][1][:, :2, :2]
+            means[name].append(float(nees(e, P).mean()))
+        # Errors of one boat are correlated: the band is of as many values as there are boats.
+    assert all(low < np.mean(means[name]) < high for name in ("filter", "smoothed")), means
+    assert np.mean(means["white"]) > 2 * high

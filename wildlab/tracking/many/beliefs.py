@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +60,10 @@ class SensorBeliefs(NamedTuple):
         sightings that one is shown for.
     near_end_m
         (K,) as ``near_side_m``, of a hull that heads for the platform or away from it; empty: the same.
+    correlation, lasting_s
+        Share of the variance of a measurement, the hull's part included, that stays with its target from scan
+        to scan, a first-order process of that correlation time: the same part of a hull is seen. It is
+        considered and not estimated. Not of bearings.
     """
 
     name: str
@@ -74,6 +78,8 @@ class SensorBeliefs(NamedTuple):
     several: bool = False
     bearings: bool = False
     near_end_m: tuple[float, ...] = ()
+    correlation: float = 0.0
+    lasting_s: float = 0.0
 
 
 class TargetBeliefs(NamedTuple):
@@ -132,6 +138,28 @@ class TargetBeliefs(NamedTuple):
     apart_m: float
     calm: float = 1.0
     stay_s: float = 30.0
+
+
+def own_lasting(sensors: Sequence[SensorBeliefs]) -> tuple[float, ...]:
+    """For how long errors last that each target has of its own.
+
+    Parameters
+    ----------
+    sensors
+        In the order in which the tracker has them.
+
+    Returns
+    -------
+    tuple of float
+        s, of two axes of each sensor with ``correlation``; they stand behind errors that measurements share.
+    """
+    return tuple(one.lasting_s for one in sensors if one.correlation > 0 for _ in range(2))
+
+
+def own_columns(sensors: Sequence[SensorBeliefs], sensor: int, errors: int) -> slice:
+    """Which of so many errors are a target's own by this sensor; the first sensor's are behind all shared."""
+    first = errors - len(own_lasting(sensors[sensor:]))
+    return slice(first, first + len(own_lasting(sensors[sensor : sensor + 1])))
 
 
 #: Places (N, 2) in n to whether they are in view, (N,).

@@ -68,6 +68,18 @@ def hull_noise(x: ArrayLike, sensor: SensorBeliefs) -> Array:
     return np.asarray(rough[:, None, None] ** 2 * np.eye(2) + length[:, None, None] ** 2 * along)
 
 
+def lasting_part(noise: Array, correlation: float) -> Array:
+    """What one standard deviation of the lasting error of each axis moves a measurement by (..., 2, 2), m.
+
+    ``noise`` (..., 2, 2) m^2: its whole covariance, of which ``correlation`` lasts. The symmetric root, which
+    turns with the covariance.
+    """
+    det = noise[..., 0, 0] * noise[..., 1, 1] - noise[..., 0, 1] * noise[..., 1, 0]
+    root = np.sqrt(np.maximum(det, 0.0))[..., None, None]
+    scale = np.sqrt(np.trace(noise, axis1=-2, axis2=-1)[..., None, None] + 2 * root)
+    return np.asarray(np.sqrt(correlation) * (noise + root * np.eye(2)) / scale)
+
+
 class Gathered(NamedTuple):
     """Measurements with those of one hull merged.
 

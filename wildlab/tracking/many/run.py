@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from wildlab.errors import WildlabError
-from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs
+from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs, own_columns, own_lasting
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
 from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
 from wildlab.tracking.many.motions import at_least, each_motion, largest_of, of_hulls
@@ -49,7 +49,7 @@ class Shown(NamedTuple):
     """What is believed after a scan: N confirmed targets that move and were seen not long ago.
 
     ``identity`` (N,), ``x`` (N, 4), ``P`` (N, 4, 4), ``existence`` (N,) and ``kinds`` (N, K); ``C`` (N, 4, k)
-    what each error has in common with the errors that measurements share, as in `Tracks`.
+    what each error has in common with those that last, as in `Tracks`.
     """
 
     time: float
@@ -134,6 +134,7 @@ def follow_many(
             )  # fmt: skip
     if not all(one >= 0 for one in lasting_s):
         raise WildlabError("a shared error lasts for less than nothing", "give seconds", field="lasting_s")
+    lasting_s = (*lasting_s, *own_lasting(eyes))
     tracks, first, before = no_tracks(len(targets.hulls), len(eyes), len(lasting_s)), 0, None
     looked: dict[int, float] = {}
     for scan in sorted(scans, key=lambda one: one.time):
@@ -167,7 +168,7 @@ def step(
     # A target gets older while it is looked at: since any sensor did, or this one could have.
     aged = np.minimum(scan.time - watched.looked.max(axis=1, initial=-np.inf), own_dt)
     watched = watched._replace(existence=still_there(watched.existence, aged, targets.lifetime_s))
-    watched, seen, taken = _corrected(watched, seen, scan, sensor, targets)
+    watched, seen, taken = _corrected(watched, seen, scan, sensors, targets)
     if sensor.bearings:
         return alive(both(watched, rest), targets), first
     new = (taken < TAKEN) & ~_on_a_known_one(seen.z, watched, targets)
@@ -179,13 +180,15 @@ def step(
 
 
 def _corrected(
-    tracks: Tracks, seen: Measured, scan: Scan, sensor: SensorBeliefs, targets: TargetBeliefs
+    tracks: Tracks, seen: Measured, scan: Scan, sensors: tuple[SensorBeliefs, ...], targets: TargetBeliefs
 ) -> tuple[Tracks, Measured, Array]:
     """Tracks after the measurements, these with those of one hull merged, and how much of each is taken."""
     if not tracks.number:
         return tracks, seen, np.zeros(len(seen.z))
+    sensor, errors = sensors[scan.sensor], seen.shared.shape[-1]
+    own, shared = (own_columns(sensors, which, errors) for which in (scan.sensor, 0))
     offset, noise = near_side(tracks.x, scan.platform, sensor), hull_noise(tracks.x, sensor)
-    compared, near, likely = _compared(tracks, offset, noise, seen, scan, sensor, targets.gate)
+    compared, near, likely = _compared(tracks, offset, noise, seen, scan, sensor, targets.gate, own)
     largest = largest_of(targets.hulls)
     of_largest = tracks.kinds[:, largest] + np.finfo(float).tiny
     middle = np.einsum("tk,tki->ti", of_largest, tracks.x[:, largest, :2]) / of_largest.sum(axis=1)[:, None]
@@ -193,7 +196,7 @@ def _corrected(
     gathered = gather(*seen, middle, tracks.kinds, established, likely, sensor, targets.hulls)
     if len(gathered.z) != len(seen.z):
         seen = Measured(gathered.z, gathered.R, gathered.shared)
-        compared, near, likely = _compared(tracks, offset, noise, seen, scan, sensor, targets.gate)
+        compared, near, likely = _compared(tracks, offset, noise, seen, scan, sensor, targets.gate, own)
     kinds = gathered.kinds
     which = scan.sensor
     visible = visible_later(
@@ -206,17 +209,19 @@ def _corrected(
         return association_probabilities(pairs, none)
 
     p = probable(likely)
-    if seen.shared.shape[-1] and not sensor.bearings:
-        compared, p = moved_together(compared, near, kinds, p, targets.gate, probable)
-    existence, visible, own = after_scan(tracks.existence, visible, sensor.detection, p)
-    mine = np.where(near >= 0, np.take_along_axis(own, near + 1, axis=1), 0.0)
+    if shared.start and not sensor.bearings:
+        common = compared._replace(G=compared.G[..., : shared.start])
+        together, p = moved_together(common, near, kinds, p, targets.gate, probable)
+        compared = compared._replace(likelihood=together.likelihood)
+    existence, visible, taken = after_scan(tracks.existence, visible, sensor.detection, p)
+    mine = np.where(near >= 0, np.take_along_axis(taken, near + 1, axis=1), 0.0)
     if sensor.bearings:
         # Nobody knows where a camera looked that only tells bearings: what it did not see may be there.
         existence, visible = tracks.existence, tracks.visible[:, which]
-    own_here = np.concatenate([own[:, :1], mine], axis=1)
+    own_here = np.concatenate([taken[:, :1], mine], axis=1)
     x, P, kinds, C = update(tracks.x, tracks.P, kinds, own_here, compared, tracks.C)
     kinds = at_least(kinds, LEAST_KIND, targets)
-    hit = (own[:, 1:].sum(axis=1) > 0.5) & (not sensor.bearings)
+    hit = (taken[:, 1:].sum(axis=1) > 0.5) & (not sensor.bearings)
     all_visible, looked = tracks.visible.copy(), tracks.looked.copy()
     all_visible[:, which], looked[:, which] = visible, scan.time
     existence, hits = np.minimum(existence, CERTAIN), tracks.hits + hit
@@ -250,6 +255,7 @@ def _compared(
     scan: Scan,
     sensor: SensorBeliefs,
     gate: float,
+    own: slice,
 ) -> tuple[Compared, NDArray[np.intp], Array]:
     """Every track beside the G measurements that may lie in its gate: of thousands in a scan it is few.
 
@@ -267,8 +273,9 @@ def _compared(
         return nothing, np.zeros((T, 0), np.intp), np.zeros((T, K, 0))
     spread = np.trace(tracks.P[..., :2, :2] + noise, axis1=-2, axis2=-1).max(axis=1)
     # Of what track and look have in common no more than twice the sum of both can be in an innovation.
-    noises = np.trace(R, axis1=-2, axis2=-1) + 2 * (shared**2).sum(axis=(-2, -1))
-    widest = gate * np.sqrt((2 if shared.any() else 1) * spread + noises.max())
+    common = 2 if sensor.correlation or shared.any() else 1
+    noises = np.trace(R, axis1=-2, axis2=-1) + (shared**2).sum(axis=(-2, -1))
+    widest = gate * np.sqrt(common * (spread + noises.max()))
     expected = tracks.x[..., :2] + offset
     middle = expected.mean(axis=1)
     widest += np.linalg.norm(expected - middle[:, None], axis=2).max(axis=1)
@@ -277,7 +284,8 @@ def _compared(
     for row, rows in enumerate(within):
         near[row, : len(rows)] = rows
     compared = compare(
-        tracks.x, tracks.P, offset, noise, z[near], R[near], gate, tracks.C, shared[near]
+        tracks.x, tracks.P, offset, noise, z[near], R[near], gate, tracks.C, shared[near], sensor.correlation,
+        own,
     )  # fmt: skip
     compared = compared._replace(likelihood=np.where((near >= 0)[:, None], compared.likelihood, 0.0))
     return compared, near, of_all(compared.likelihood, near, M)
@@ -290,7 +298,9 @@ def _within_reach(scan: Scan, sensor: SensorBeliefs, errors: int) -> Measured:
         good = np.isfinite(z[:, 0])
     else:
         good = in_reach(z, scan.platform, sensor.near_m, sensor.far_m)
-    shared = np.zeros((len(z), size, errors)) if scan.shared is None else np.asarray(scan.shared, float)
+    shared = np.zeros((len(z), size, errors))
+    if scan.shared is not None:
+        shared[..., : scan.shared.shape[-1]] = scan.shared
     return Measured(z[good], R[good], shared[good])
 
 

@@ -4,12 +4,11 @@ Which measurements were of which target stays as it was taken at the time, and t
 of what was taken wrongly: among many false measurements it is too small. Kinds of hull stay merged; targets
 that may also go calmly are smoothed by the lively motion.
 
-Errors that measurements share stay considered and are not estimated. With ``e`` for truth minus estimate and
-``o`` for these errors, ``e_k = G e_k+1|k + B o_k+1 + r``, and what is left, ``r``, has nothing to do with any
-later error: so ``e^s_k = G e^s_k+1 + B o_k+1 + r``, whose covariance follows from one row back, whatever
-gains the filter had. Of errors that fade, what the smoothed estimate at the next row has in common with them
-is taken to fade as they do: where they fade within some tens of looks the squared errors were up to a third
-larger than stated.
+Errors that last, ``o``, stay considered and are not estimated. An estimate is corrected by what the smoother
+changed at the next row, ``x^s_k = x_k + G (x^s_k+1 - x_k+1|k)``, with the ``G`` of Rauch, Tung and Striebel's
+for the joint state. With ``e`` for truth minus estimate, the smoothed error is ``A e_k + B o_k`` and what is
+new, of covariance ``N``, and the three follow one row back: as in `wildlab.tracking.smoothing`, but from the
+moments before and after a measurement in place of its gain.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from wildlab.tracking.many.run import Shown
 from wildlab.tracking.maritime import white_acceleration
@@ -41,7 +41,7 @@ def smooth_many(
     density
         `TargetBeliefs.density` that it was run with.
     lasting_s
-        As `run_many` was told.
+        As `run_many` was given, and behind it `wildlab.tracking.many.beliefs.own_lasting` of its sensors.
 
     Returns
     -------
@@ -86,22 +86,40 @@ def smooth_considering(
     x, P
         With all measurements. Without shared errors those of Rauch, Tung and Striebel.
     """
-    after, spread, common = x.copy(), P.copy(), C[-1]
+    after, spread = x.copy(), P.copy()
+    # The smoothed error is A e + B o and what later measurements and motion add, of covariance N.
+    A, B, N = np.eye(4), np.zeros_like(C[-1]), np.zeros((4, 4))
     for row in range(len(times) - 2, -1, -1):
         dt = times[row + 1] - times[row]
         F, Q = white_acceleration(dt, density)
-        left = np.diag([fade(dt, float(one)) for one in lasting_s])
-        ahead, P_ahead, C_ahead = F @ x[row], F @ P[row] @ F.T + Q, F @ C[row] @ left
-        # Of e_k with what is ahead and with the errors then; given these, with what is ahead alone.
-        by_errors = C[row] @ left
-        own = P_ahead - C_ahead @ C_ahead.T
-        G = np.linalg.solve(own, (P[row] @ F.T - by_errors @ C_ahead.T).T).T
-        B = by_errors - G @ C_ahead
-        rest = P[row] - G @ P_ahead @ G.T - G @ C_ahead @ B.T - B @ C_ahead.T @ G.T - B @ B.T
-        later_x, later_P = after[row + 1], spread[row + 1]
-        after[row] = x[row] + G @ (later_x - ahead)
-        both = G @ common @ B.T
-        smoothed = rest + G @ later_P @ G.T + both + both.T + B @ B.T
+        left = np.array([fade(dt, float(one)) for one in lasting_s])
+        P_ahead, C_ahead = F @ P[row] @ F.T + Q, F @ C[row] * left
+        # The best gain leaves the error after a measurement uncorrelated with the innovation, so with the
+        # error before it has its own covariance in common; no more than there was, where mixtures grow.
+        size, axes = eigh(P[row + 1], P_ahead)
+        axes = P_ahead @ axes
+        common = (axes * np.minimum(size, 1)) @ axes.T
+        of_state, of_errors = _regress(common, C[row + 1], P_ahead, C_ahead)
+        N = N + A @ _positive(P[row + 1] - of_state @ common - of_errors @ C[row + 1].T) @ A.T
+        G, _ = _regress(P[row] @ F.T, C[row] * left, P_ahead, C_ahead)
+        after[row] = x[row] + G @ (after[row + 1] - F @ x[row])
+        by_motion, by_change = G @ (A @ of_state - np.eye(4)), G @ (A @ of_errors + B)
+        N = G @ N @ G.T + by_motion @ Q @ by_motion.T + (by_change * (1 - left**2)) @ by_change.T
+        A, B = np.eye(4) + by_motion @ F, by_change * left
+        both = A @ C[row] @ B.T
+        smoothed = A @ P[row] @ A.T + both + both.T + B @ B.T + N
         spread[row] = (smoothed + smoothed.T) / 2
-        common = C[row] - G @ F @ C[row] - B @ left + (B + G @ common) @ left
     return after, spread
+
+
+def _positive(covariance: Array) -> Array:
+    """Without the directions in which it is below zero."""
+    values, axes = np.linalg.eigh((covariance + covariance.T) / 2)
+    return np.asarray((axes * np.maximum(values, 0.0)) @ axes.T)
+
+
+def _regress(by_state: Array, by_errors: Array, P: Array, C: Array) -> tuple[Array, Array]:
+    """Coefficients (n, 4) and (n, k) of a state's error and of errors of variance one, with covariances
+    ``P`` and ``C`` of their own, from the covariances (n, 4) and (n, k) with both."""
+    of_state = np.asarray(np.linalg.solve(P - C @ C.T, (by_state - by_errors @ C.T).T).T, float)
+    return of_state, by_errors - of_state @ C

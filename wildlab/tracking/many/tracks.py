@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from wildlab.tracking.many.beliefs import SensorBeliefs, TargetBeliefs
-from wildlab.tracking.many.hulls import near_side, on_one_hull
+from wildlab.tracking.many.beliefs import SensorBeliefs, TargetBeliefs, own_columns
+from wildlab.tracking.many.hulls import lasting_part, near_side, on_one_hull
 from wildlab.tracking.many.motions import densities_of, interact, largest_of
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.schmidt import fade
@@ -36,8 +36,9 @@ class Tracks(NamedTuple):
     x, P
         (T, K, 4) north, east and their velocities, and (T, K, 4, 4); m and s.
     C
-        (T, K, 4, k) covariance of a track's error, truth minus estimate, with each of k errors of the sensors
-        that all measurements of a look share, in their standard deviations (`Scan.shared`).
+        (T, K, 4, k) covariance of a track's error, truth minus estimate, with each of k errors of sensors, in
+        their standard deviations: those that all measurements of a look share (`Scan.shared`), and behind
+        them those that each target has of its own (`wildlab.tracking.many.beliefs.own_lasting`).
     kinds
         (T, K) probabilities.
     existence
@@ -138,8 +139,10 @@ def begin(
     rough, along = np.asarray(mine.rough_m), np.asarray(mine.along_m)
     P, C = np.zeros((count, K, 4, 4)), np.zeros((count, K, 4, shared.shape[-1]))
     C[..., :2, :] = -shared[:, None]
-    whole = R + shared @ np.swapaxes(shared, -1, -2)
-    P[..., :2, :2] = whole[:, None] + (rough**2 + along**2 / 2)[:, None, None] * np.eye(2)
+    alone = R[:, None] + (rough**2 + along**2 / 2)[:, None, None] * np.eye(2)
+    P[..., :2, :2] = alone + (shared @ np.swapaxes(shared, -1, -2))[:, None]
+    if mine.correlation:
+        C[..., :2, own_columns(sensors, sensor, C.shape[-1])] = -lasting_part(alone, mine.correlation)
     P[..., [2, 3], [2, 3]] = targets.start_speed_m_s**2
     share = np.array([hull.share for hull in targets.hulls])
     lasting = targets.visible_s / (targets.visible_s + targets.hidden_s)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.geometry.frames import wrap
 from wildlab.tracking.bending import left_out
+from wildlab.tracking.many.hulls import lasting_part
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,8 @@ def compare(
     gate: float,
     C: ArrayLike | None = None,
     shared: ArrayLike | None = None,
+    correlation: float = 0.0,
+    own: slice = slice(0),
 ) -> Compared:
     """How far every measurement is from where every track expects one.
 
@@ -56,6 +59,8 @@ def compare(
         How many standard deviations it may be.
     C, shared
         (T, K, 4, k) of `Tracks` and (M, 2, k) or (T, M, 2, k) of `Scan`; left out: no error is shared.
+    correlation, own
+        Share of the variance of the rest that lasts, and which two of the k errors it is, each target's own.
     """
     x, P = np.asarray(x, float), np.asarray(P, float)
     places, noises = np.asarray(z, float), np.asarray(R, float)
@@ -65,8 +70,12 @@ def compare(
     if places.ndim == 2:
         places, noises, moved = places[None], noises[None], moved[None]
     innovation = places[:, None] - (x[..., :2] + np.asarray(offset, float))[:, :, None]
-    S = (P[..., :2, :2] + np.asarray(noise, float))[:, :, None] + noises[:, None]
+    alone = np.asarray(noise, float)[:, :, None] + noises[:, None]
     G = C[..., None, :2, :] + moved[:, None]
+    if correlation:
+        G[..., own] += lasting_part(alone, correlation)
+        alone = (1 - correlation) * alone
+    S = P[..., None, :2, :2] + alone
     if G.shape[-1]:
         # H (7.34) with both halves of what track and look have in common.
         S = S + G @ np.swapaxes(G, -1, -2) - (C[..., :2, :] @ np.swapaxes(C[..., :2, :], -1, -2))[:, :, None]
