@@ -35,7 +35,7 @@ def test_long_ones_begin_first_and_the_overview_waits_for_all(
     told = [one.name for one in evaluate.evaluate_flight(tmp_path / "flight", reports=tmp_path / "reports")]
     assert ran[0][0][0] == "navigation" and set(ran[0][0][1:]) >= {"tracking"}
     assert ran[1:] == [(["overview"], 2)] and ran[0][1] == 2
-    assert told[0] == "robot-overview" and told[-1] == "robot-tracking"
+    assert told[0] == "flight-overview" and told[-1] == "flight-tracking"
 
 
 def test_every_notebook_of_a_flight_has_its_place() -> None:

@@ -76,7 +76,7 @@ def test_a_first_look_may_take_less_of_what_is_no_whole_number(tmp_path: Path) -
     given = {"parameters": {"rate": 7.5}, "first_look": {"rate": 4}}
     study = STUDIES["uav-coverage"].model_copy(update=given)
     assert type(study)(**study.model_dump()).reductions()["rate"] == (4, 7.5)
-    assert look_words({"rate": (4, 7.5), "seeds": (5, 200)}) == "4 of 7.5 rate, 5 of 200 flights"
+    assert look_words({"rate": (4, 7.5), "seeds": (5, 200)}) == "4 of 7.5 images a second, 5 of 200 flights"
     with pytest.raises(ValidationError, match="a first look takes 8 of 'rate'"):
         type(study)(**study.model_dump() | {"first_look": {"rate": 8}})
 
@@ -93,9 +93,13 @@ def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp
 def test_first_looks_in_words() -> None:
     assert look_words({"seeds": (5, 200)}) == "5 of 200 flights"
     assert look_words({"runs": [500, 10000], "varied_runs": [50, 500]}) == (
-        "500 of 10000 runs, 50 of 500 varied runs"
+        "500 of 10000 runs, 50 of 500 runs with one part changed"
     )
     assert look_words({}) == ""
+    lap = STUDIES["gondola-coverage"].reductions()
+    assert look_words(lap).endswith("3 of 7.5 images a second, 25 of 100 % of the lap")
+    # No name of a parameter reaches a reader as it is.
+    assert not [one for study in STUDIES.values() if "_" in (one := look_words(study.reductions()))]
     notice = first_look_notice("5 of <b>", "wildlab run a")
     assert "5 of &lt;b&gt;" in notice and "<code>wildlab run a</code>" in notice
 
@@ -403,3 +407,16 @@ def test_what_a_process_says_is_shown() -> None:
     tally.note("one", "start", None)
     tally.note("one", "note", "compiling [b]")
     assert Text.from_markup(tally.now()).plain == "one compiling [b]"
+
+
+def test_with_a_number_of_flights_the_rest_is_reduced_too() -> None:
+    study = load_studies()["vessel-detection"]
+    asked = make_job(study, seeds=2, first_look=True)
+    few = {"seeds": (2, study.seeds)} | {
+        name: (n, study.parameters[name]) for name, n in study.first_look.items()
+    }
+    assert asked.first_look == few and {name: asked.parameters[name] for name in few} == {
+        name: n for name, (n, _) in few.items()
+    }
+    assert make_job(study, seeds=2).first_look == {"seeds": (2, study.seeds)}
+    assert "seeds" not in make_job(study, seeds=study.seeds, first_look=True).first_look

@@ -12,12 +12,14 @@ import pytest
 from tests.flight.conftest import make_flight
 from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
+from wildlab.files import write_json
 from wildlab.flight.checks.check import usable_for
 from wildlab.flight.checks.flown import why_no_start
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.runner import flights
-from wildlab.runner.evaluate import evaluate_flight, lacking_for_navigation
+from wildlab.runner.evaluate import evaluate_flight, lacking_for_navigation, refuse_other_flight
+from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.runner.run import run_studies
 from wildlab.simulation.twins import simulate_twin
 
@@ -43,12 +45,12 @@ def simulated(monkeypatch: pytest.MonkeyPatch, make_flight: Callable[..., Flight
 
 def test_a_twin_is_simulated_once_per_seed(tmp_path: Path, simulated: list[tuple[str, int]]) -> None:
     one = flights.twin_flight("antenna", 1, tmp_path)
-    assert flights.twin_flight("antenna", 1, tmp_path) == one == tmp_path / ".flights" / "antenna-seed1"
+    assert flights.twin_flight("antenna", 1, tmp_path) == one == tmp_path / ".flights" / "antenna-1"
     flights.twin_flight("antenna", 2, tmp_path)
     assert simulated == [("antenna", 1), ("antenna", 2)]
-    assert load_flight(one).name == "small-flight"
+    assert load_flight(one).name == "antenna-1"
     assert {path.name for path in one.parent.iterdir()} == {
-        *("antenna-seed1", "antenna-seed1.key", "antenna-seed2", "antenna-seed2.key")
+        *("antenna-1", "antenna-1.key", "antenna-2", "antenna-2.key")
     }
 
 
@@ -106,18 +108,18 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
     where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
     overview, outcome = evaluate_flight(folder, **where)
     assert overview.state == outcome.state == "done", (overview.reason, outcome.reason)
-    assert overview.folder == (tmp_path / "reports" / "small-flight-overview").resolve()
-    assert outcome.folder == (tmp_path / "reports" / "small-flight").resolve()
+    assert overview.folder == (tmp_path / "reports" / "tuesday-overview").resolve()
+    assert outcome.folder == (tmp_path / "reports" / "tuesday").resolve()
     content = json.loads((outcome.folder / "metrics.json").read_text())
     assert content["metrics"][0]["value"] == 3
-    assert "small-flight/report.html" in (tmp_path / "reports" / "index.html").read_text(encoding="utf-8")
+    assert "tuesday/report.html" in (tmp_path / "reports" / "index.html").read_text(encoding="utf-8")
     origin = json.loads((outcome.folder / "provenance.json").read_text())["flight"]
-    assert origin["name"] == "small-flight" and "flight.toml" in origin["files"]
+    assert origin["name"] == "tuesday" and "flight.toml" in origin["files"]
     # The place of a flight whose locations are withheld gets into nothing that is written.
     for path in outcome.folder.rglob("*"):
         assert not path.is_file() or b"63.4" not in path.read_bytes()
     (outcome,) = run_studies(["s"], flight=folder, **where)
-    assert outcome.state == "done" and outcome.name == "s-small-flight"
+    assert outcome.state == "done" and outcome.name == "s-tuesday"
 
 
 @pytest.mark.parametrize(
@@ -133,6 +135,7 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
 def test_no_folder_of_a_flight_gets_into_a_report(
     tmp_path: Path, make_flight: Callable[..., Flight], cell: str
 ) -> None:
+    """Of where it lies only its own folder's name, by which it and its reports are called."""
     folder = tmp_path / "north-gate" / "october"
     save_flight(make_flight(), folder)
     show = f'from wildlab.flight.store import load_flight\nprint(flight)\nreport.head("A")\n{cell}'
@@ -141,26 +144,27 @@ def test_no_folder_of_a_flight_gets_into_a_report(
     (tmp_path / "notebooks" / "studies.toml").write_text('[s]\ntitle = "S"\nnotebook = "n.ipynb"\n')
     (outcome,) = run_studies(["s"], flight=folder, notebooks=tmp_path / "notebooks", reports=tmp_path / "out")
     assert (outcome.state == "done") == (cell == "report.save()"), outcome.reason
+    assert outcome.folder == (tmp_path / "out" / "s-october").resolve()
     left = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
     assert {"status.json", "notebook.ipynb", "report.html"} <= {path.name for path in left}
     for path in left:
         content = path.read_bytes()
-        assert b"north-gate" not in content and b"october" not in content, path
+        assert b"north-gate" not in content and bytes(tmp_path) not in content, path
+        # One name, also where the flight is printed: not a second one out of its manifest.
+        assert b"small-flight" not in content, path
 
 
-def test_which_poses_are_meant_is_asked_before_anything_runs(
+def test_poses_that_are_not_there_are_told_before_anything_runs(
     tmp_path: Path, make_flight: Callable[..., Flight]
 ) -> None:
     flight = make_flight()
     first = next(iter(flight.nav.values()))
-    flight.nav = {"autopilot": first, "observer": first}
+    flight.nav = {"autopilot": first, "observer": first, "truth": first}
     save_flight(flight, tmp_path / "flight")
     where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
-    with pytest.raises(WildlabError, match="not clear which nav source") as caught:
-        evaluate_flight(tmp_path / "flight", **where)
-    assert "autopilot, observer" in caught.value.fix
-    with pytest.raises(WildlabError, match="no nav source 'mekf'"):
+    with pytest.raises(WildlabError, match="no nav source 'mekf'") as caught:
         evaluate_flight(tmp_path / "flight", source="mekf", **where)
+    assert caught.value.fix == "choose one: --source observer or autopilot"
     assert not (tmp_path / "reports").exists()
 
 
@@ -179,7 +183,7 @@ def test_a_flight_of_which_nothing_can_be_judged_has_its_overview(
         evaluate_flight(tmp_path / "flight", source="mekf", **where)
     assert not (tmp_path / "reports").exists()
     (outcome,) = evaluate_flight(tmp_path / "flight", **where)
-    assert outcome.state == "done" and outcome.name == "small-flight-overview"
+    assert outcome.state == "done" and outcome.name == "flight-overview"
     said = json.loads((tmp_path / "reports" / outcome.name / "provenance.json").read_text())["parameters"]
     assert said["beside"] == []
     first, second, third = said["lacking"]
@@ -208,6 +212,7 @@ def test_what_a_flight_lacks_for_its_navigation_is_said() -> None:
     assert "inertial measurements" in lacking(Flight(logged, {}, {"gnss": tables["gnss"]}))
 
 
+@pytest.mark.slow
 def test_a_flight_too_slow_for_its_course_to_tell_the_heading_is_not_judged() -> None:
     """The fastest fix decides, logged or from positions, within the inertial samples; or two antennas do."""
     twin = simulate_twin("fast-vessel", 1)
@@ -241,60 +246,63 @@ def test_a_flight_too_slow_for_its_course_to_tell_the_heading_is_not_judged() ->
 def test_a_flight_named_like_a_study_would_replace_its_report(
     tmp_path: Path, make_flight: Callable[..., Flight]
 ) -> None:
-    save_flight(make_flight(name="s"), tmp_path / "flight")
+    save_flight(make_flight(), tmp_path / "s")
     with pytest.raises(WildlabError, match="named 's' like a study"):
-        evaluate_flight(
-            tmp_path / "flight", notebooks=studies(tmp_path / "notebooks"), reports=tmp_path / "out"
-        )
+        evaluate_flight(tmp_path / "s", notebooks=studies(tmp_path / "notebooks"), reports=tmp_path / "out")
+
+
+def left_report(flight: Path, reports: Path) -> None:
+    """What a report on a flight is told by, as a run leaves it."""
+    refuse_other_flight(flight, reports / "tuesday")
+    write_json(reports / "tuesday" / "provenance.json", {"flight": provenance_of_flight(flight)})
+
+
+def shifted(flight: Flight, *, but: str = "") -> Flight:
+    """Another flight: all numbers of its tables differ."""
+    for name, table in (*flight.nav.items(), *flight.tables.items()):
+        if name != but:
+            numbers = [one for one in map(str, table) if table[one].dtype == float and one[:2] != "q_"]
+            table[numbers] = table[numbers] + 0.25
+    return flight
 
 
 def test_the_report_of_another_flight_of_the_same_name_is_not_replaced(
     tmp_path: Path, make_flight: Callable[..., Flight]
 ) -> None:
-    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
-    first = make_flight()
-    save_flight(first, tmp_path / "monday")
-    evaluate_flight(tmp_path / "monday", **where)
+    reports, one, other = tmp_path / "reports", tmp_path / "may" / "tuesday", tmp_path / "june" / "tuesday"
+    (reports / "tuesday").mkdir(parents=True)
+    save_flight(make_flight(), one)
+    left_report(one, reports)
     # The same flight, corrected: its clock, and one table of several.
     again = make_flight(clocks={"camera_offset_s": 0.1})
     again.tables["frames"]["time_s"] += 0.5
-    save_flight(again, tmp_path / "monday", overwrite=True)
-    _, outcome = evaluate_flight(tmp_path / "monday", **where)
-    assert outcome.state == "done"
+    save_flight(again, one, overwrite=True)
+    left_report(one, reports)
 
-    other = make_flight()
-    for table in (*other.nav.values(), *other.tables.values()):
-        numbers = [name for name in table if table[name].dtype == float and name[:2] != "q_"]
-        table[numbers] = table[numbers] + 0.25
-    save_flight(other, tmp_path / "tuesday")
-    with pytest.raises(WildlabError, match="a report of another flight named 'small-flight'"):
-        evaluate_flight(tmp_path / "tuesday", **where)
-    _, outcome = evaluate_flight(tmp_path / "tuesday", **where | {"reports": tmp_path / "elsewhere"})
-    assert outcome.state == "done"
+    save_flight(shifted(make_flight()), other)
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": reports}
+    with pytest.raises(WildlabError, match="a report of another flight named 'tuesday'"):
+        evaluate_flight(other, **where)
+    refuse_other_flight(other, tmp_path / "elsewhere" / "tuesday")
 
 
 def test_flights_that_share_marks_and_terrain_alone_are_two(
     tmp_path: Path, make_flight: Callable[..., Flight]
 ) -> None:
-    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    reports, one, other = tmp_path / "reports", tmp_path / "may" / "tuesday", tmp_path / "june" / "tuesday"
+    (reports / "tuesday").mkdir(parents=True)
     raw = {name: {"file": f"{name}.bin", "sha256": name * 64} for name in "abc"}
-    save_flight(make_flight(sources=[raw["a"], raw["b"]]), tmp_path / "monday")
-    evaluate_flight(tmp_path / "monday", **where)
-    # On Tuesday another log, with the same true places of the same marks, and their file.
-    other = make_flight(sources=[raw["b"], raw["c"]])
-    for name, table in (*other.nav.items(), *other.tables.items()):
-        if name != "truth":
-            numbers = [one for one in table if table[one].dtype == float and one[:2] != "q_"]
-            table[numbers] = table[numbers] + 0.25
-    save_flight(other, tmp_path / "tuesday")
+    save_flight(make_flight(sources=[raw["a"], raw["b"]]), one)
+    left_report(one, reports)
+    # Another log, with the same true places of the same marks, and their file.
+    save_flight(shifted(make_flight(sources=[raw["b"], raw["c"]]), but="truth"), other)
     with pytest.raises(WildlabError, match="share none of the aircraft's tables, and have other raw files"):
-        evaluate_flight(tmp_path / "tuesday", **where)
+        refuse_other_flight(other, reports / "tuesday")
     # Imported again with one file more it is the same flight, whatever its tables are now.
-    again = load_flight(tmp_path / "tuesday")
     more = make_flight(sources=list(raw.values()))
-    save_flight(Flight(more.manifest, again.nav, again.tables), tmp_path / "again")
-    _, outcome = evaluate_flight(tmp_path / "again", **where)
-    assert outcome.state == "done"
+    again = load_flight(other)
+    save_flight(Flight(more.manifest, again.nav, again.tables), other, overwrite=True)
+    left_report(other, reports)
 
 
 def several(folder: Path, **more: str) -> Path:

@@ -13,6 +13,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.reporting import html, metrics
 from wildlab.reporting.cases import load_cases
+from wildlab.reporting.counts import tally
 from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.ledger_tables import place, strip
 from wildlab.reporting.published import load_claims, load_published
@@ -82,7 +83,7 @@ def test_the_shipped_files_are_in_order() -> None:
 def test_published_numbers_keep_the_digits_they_are_printed_with(tmp_path: Path) -> None:
     frame = load_published("s", published(tmp_path))
     assert frame["value"].tolist() == [7.9, 5.0] and frame["digits"].tolist() == [2, 0]
-    assert frame["within"].tolist()[0] == 0.15 and frame["within"].isna().tolist() == [False, True]
+    assert frame["rounding"].tolist() == [0.15, 0.5]
     assert len(load_published("other", tmp_path)) == 0
     assert load_claims("s", tmp_path)[0]["id"] == "c1"
 
@@ -188,7 +189,7 @@ def test_only_what_holds_counts_as_holding(tmp_path: Path) -> None:
     statuses = [study_status(a_study(name=name), tmp_path, folder) for name in ("s", "t")]
     whole = ledger_page(statuses)
     assert "<b>1 / 2</b><span>studies done, 1 failed</span>" in whole
-    assert "<b>2 / 4</b><span>claims of the theses hold, on nearly all flights or on most; 1 without" in whole
+    assert "<b>1 / 4</b><span>claims of the theses hold; 1 more on most flights; 1 without" in whole
     assert "5 claims were decided by the share" in whole and "4 of the theses and 1 of ours" in whole
     assert "50 % (40 to 60) of 200 runs" in whole and "50 of 200 runs meet the premise" in whole
 
@@ -196,13 +197,17 @@ def test_only_what_holds_counts_as_holding(tmp_path: Path) -> None:
 def test_without_tolerance_or_spread_no_difference_is_claimed(tmp_path: Path) -> None:
     ran(tmp_path / "reports", metrics.metric("error", "observer/all", 5.0, "m"))
     one = study_status(a_study(), tmp_path / "reports", published(tmp_path / "published"))
-    assert one.numbers[1].verdict == "agrees" and one.numbers[1].difference == 0.0
+    assert one.numbers[1].answers == ("cannot tell", "too few flights")
+    assert one.numbers[1].difference == 0.0
     ran(tmp_path / "reports", metrics.metric("error", "observer/all", 50.0, "m"))
     one = study_status(a_study(), tmp_path / "reports", published(tmp_path / "published"))
-    assert one.numbers[1].verdict == "not judged" and "one flight here" in ledger_page([one])
+    assert one.numbers[1].answers == ("cannot tell", "too few flights")
     folder = published(tmp_path / "calculated", f'kind = "calculated"\n{PUBLISHED}')
     # What rounding leaves open needs no statement.
-    assert study_status(a_study(), tmp_path / "reports", folder).numbers[1].verdict == "differs"
+    assert study_status(a_study(), tmp_path / "reports", folder).numbers[1].answers == (
+        "not close",
+        "not judged",
+    )
 
 
 def test_what_is_missing_says_why(tmp_path: Path) -> None:
@@ -245,7 +250,7 @@ def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[P
     whole = ledger_page(statuses)
     assert "<script" not in whole and "It &lt;b&gt;broke" in whole and failed.is_dir()
     assert "25 % of 20 flights" in whole
-    assert "published 7.90, here 21.900, ratio 2.77, lowest to highest 5.000 to 23.000" in whole
+    assert "published 7.90, here 21.900, ratio 2.77, middle 90 percent 5.000 to 23.000" in whole
     html.examine(whole, "ledger", alone=False)
     path = tmp_path / "index.html"
     path.write_text(whole, encoding="utf-8")
@@ -258,7 +263,7 @@ def test_long_tables_fold_behind_a_line_that_sums_them_up(tmp_path: Path) -> Non
     folder = published(tmp_path / "published", "".join(entries))
     ran(tmp_path, *(metrics.metric("error", f"a/{i}", 1.1 + (i == 3), "m") for i in range(42)))
     status = study_status(a_study(), tmp_path, folder)
-    assert "<summary>42 published numbers: 41 agree, 1 differ</summary>" in ledger_page([status])
+    assert "<summary>42 published numbers: 41 close, 1 not close</summary>" in ledger_page([status])
 
 
 def test_build_ledger_works_before_anything_has_run(tmp_path: Path) -> None:
@@ -278,9 +283,9 @@ def test_a_spread_without_width_can_be_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "seeds", "n", "words"),
     [
-        ("twin", 29, 500, "lowest to highest"),
-        ("twin", 30, 5, "middle 90 %"),
-        ("twin", None, 29, "lowest to highest"),
+        ("twin", 18, 500, "lowest to highest"),
+        ("twin", 19, 5, "middle 90 %"),
+        ("twin", None, 18, "lowest to highest"),
         ("twin", None, 500, "middle 90 %"),
         ("logged", None, 7, "middle 90 %"),  # draws with replacement from seven points: not flights
     ],
@@ -317,14 +322,13 @@ def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
     first_look(tmp_path)
     one = study_status(a_study(), tmp_path, folder)
     assert (one.state, one.first_look, one.has_report) == ("first look", "5 of 200 flights", True)
-    assert [number.verdict for number in one.numbers] == ["first look", "not reproduced yet"]
-    assert one.numbers[0].here == 7.9 and one.count("agrees") == 0
+    assert [number.answers[0] for number in one.numbers] == ["first look", "not reproduced yet"]
+    assert one.numbers[0].here == 7.9 and tally(one.counted).waiting == 2
     assert (one.claims[0].verdict, one.claims[0].fraction) == ("first look", 1.0)
     whole = ledger_page([one])
     for words in (
         "<b>0 / 1</b><span>studies done, 1 at a first look</span>",
-        "<b>0 / 0</b><span>published numbers agree; 2 without a verdict</span>",
-        "<b>0 / 0</b><span>claims of the theses hold, on nearly all flights or on most; 1 without a verdict<",
+        "<b>0 / 0</b><span>claims of the theses hold; 0 more on most flights; 1 without a verdict<",
         "5 of 200 flights.",
         "<code>wildlab run s</code>",
         "Open the report",
@@ -332,13 +336,13 @@ def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
         '<span class="pill part">first look</span></td>',
     ):
         assert words in whole
-    for words in (">agrees</span></td>", ">holds</span>", "not run yet"):
+    for words in ("are close", ">close</span></td>", ">holds</span>", "not run yet"):
         assert words not in whole
     html.examine(whole, "ledger", alone=False)
     assert as_plain(one)["first_look"] == "5 of 200 flights"
     first_look(tmp_path, first_look={})
     whole = ledger_page([study_status(a_study(), tmp_path, folder)])
-    assert "<b>1 / 1</b><span>published numbers agree; 1 without a verdict</span>" in whole
+    assert "<b>0 / 1</b><span>sizes, NEES and NIS, predicted, are close; 1 without a verdict</span>" in whole
     assert "<b>1 / 1</b><span>claims of the theses hold" in whole and "first look</span>" not in whole
 
 

@@ -78,13 +78,13 @@ def test_as_long_as_files_move_there_is_no_status(tmp_path: Path, monkeypatch: p
 
 def test_ctrl_c_waits_for_the_move(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = work_folder(tmp_path, "report.html")
-    real = outputs.write_json
+    real = outputs.seal
 
-    def interrupted(path: Path, content: Any) -> None:
+    def interrupted(*given: Any) -> None:
         os.kill(os.getpid(), signal.SIGINT)
-        real(path, content)
+        real(*given)
 
-    monkeypatch.setattr(outputs, "write_json", interrupted)
+    monkeypatch.setattr(outputs, "seal", interrupted)
     with pytest.raises(KeyboardInterrupt):
         outputs.install(folder, tmp_path / "s", DONE)
     assert set(contents(tmp_path / "s")) == {"report.html", "status.json"}

@@ -91,7 +91,7 @@ def kept(folder: Path, out: str, study: str = "walks") -> dict[str, bytes]:
     return {f"{path.parent.name}/{path.stem}": path.read_bytes() for path in sorted(store.glob("*/*.json"))}
 
 
-def wait_for(true: Callable[[], bool], seconds: float = 60.0) -> None:
+def wait_for(true: Callable[[], bool], seconds: float = 180.0) -> None:
     deadline = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < deadline, "it never came"
@@ -301,8 +301,9 @@ def test_a_scheduler_that_goes_away_is_a_sentence(tmp_path: Path, cluster: Clust
     folder = make(tmp_path, seconds=0.4, seeds=50)
     cluster.add_worker()
     cluster.wait_for_workers(1)
-    program = start(folder, "walks", "--scheduler", cluster.address, "--timeout", "8")
-    wait_for(lambda: len(kept(folder, "reports")) >= 2)
+    program = start(folder, "walks", "--scheduler", cluster.address, "--timeout", "60")
+    wait_for(lambda: len(kept(folder, "reports")) >= 2 or program.poll() is not None)
+    assert program.poll() is None, program.communicate()[0]
     cluster.end()
     text = program.communicate(timeout=120)[0]
     assert program.returncode == 1 and "--scheduler" in text and "run it again" in text, text

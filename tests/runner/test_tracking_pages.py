@@ -31,6 +31,6 @@ def test_what_a_flight_lacks_for_tracking_is_said() -> None:
 def test_evaluate_writes_the_tracks_too(tmp_path: Path) -> None:
     save_flight(robot_flight(1, heading_sd_deg=1.0), tmp_path / "flight")
     outcomes = evaluate_flight(tmp_path / "flight", reports=tmp_path / "reports")
-    assert {one.name: one.state for one in outcomes}["robot-tracking"] == "done"
-    folder = tmp_path / "reports" / "robot-tracking"
+    assert {one.name: one.state for one in outcomes}["flight-tracking"] == "done"
+    folder = tmp_path / "reports" / "flight-tracking"
     assert (folder / "estimates.parquet").is_file() and (folder / "report.html").is_file()

@@ -42,7 +42,7 @@ def test_paths_are_from_here_and_what_was_left_out_is_left_out(
 def test_a_report_that_failed_is_asked_for_again_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The flight's name, no folder, and every option."""
+    """The flight's folder from here, and every option."""
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "flights" / "my boat"
     save_flight(robot_flight(), folder)
@@ -63,9 +63,9 @@ def test_a_report_that_failed_is_asked_for_again_as_it_was(
     track.track_flight(folder, filters=("ekf", "ukf"), smooth=True, **told)
     track_many.track_many(folder, **told)
     evaluate.evaluate_flight(folder, reports=tmp_path / "reports")
-    start = "wildlab track robot"
+    start = "wildlab track 'flights/my boat'"
     assert jobs[0].again == (
         f"{start} --filter ekf --filter ukf --sensor radar --settings s.toml --smooth --into out"
     )
     assert jobs[1].again == f"{start} --many --sensor radar --settings s.toml --into out"
-    assert {job.again for job in jobs[2:]} == {"wildlab evaluate robot --out reports"}
+    assert {job.again for job in jobs[2:]} == {"wildlab evaluate 'flights/my boat' --out reports"}

@@ -39,7 +39,7 @@ from wildlab.paths import NOTEBOOKS
 from wildlab.studies.protocol import Study, case_names, find_case
 
 #: What the runner gives to every notebook; a study's own parameters may not use these names.
-STANDARD_PARAMETERS = ("study", "flight", "seed", "out", "expected_prefix")
+STANDARD_PARAMETERS = ("study", "flight", "seed", "out")
 
 #: What a study with further flights gets besides: a list of their folders, in the order of `beside`.
 OTHERS = "others"

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv
+from wildlab.flight.files import flight_name
 from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.comparison import comparison_page, flights_table
@@ -16,6 +17,7 @@ from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.record.beside import finished_metrics
+from wildlab.runner.record.digests import read_status
 from wildlab.runner.record.front_page import COMPARISON, build_ledger
 from wildlab.runner.record.own_flights import own_flights
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
@@ -67,10 +69,13 @@ def compare_flights(
     chosen: list[OwnFlight] = []
     for folder in folders:
         if (folder / FILE_NAME).is_file():
-            name, where = read_manifest(folder / FILE_NAME).name, reports
+            name, where = flight_name(folder, read_manifest(folder / FILE_NAME).name), reports
             if not _is_current(folder, reports / f"{name}-overview"):
                 evaluate_flight(folder, reports=reports, notebooks=notebooks, console=console)
         else:
+            status = read_status(folder)
+            if status.get("state") == "damaged":
+                raise WildlabError(str(status["reason"]), "make the report again", file=folder)
             where = folder.resolve().parent
             flight = read_provenance(folder).get("flight")
             name = str(flight.get("name")) if isinstance(flight, dict) else ""
@@ -84,6 +89,10 @@ def compare_flights(
                 f"the flight {found.name!r} is named twice", "name each flight once", file=folder
             )
         chosen.append(found)
+        damaged = [one.folder for one in found.reports if one.state == "damaged"]
+        if damaged and console is not None:
+            what = f"left out, not as written: {', '.join(damaged)} (see: wildlab verify)"
+            console.print(what, markup=False, highlight=False, soft_wrap=True)
     target = reports / COMPARISON if into is None else into
     target.mkdir(parents=True, exist_ok=True)
     page = comparison_page(chosen)

@@ -54,8 +54,7 @@ def evaluate_flight(
     Parameters
     ----------
     source
-        Which of the flight's poses to judge the georeferencing of; not needed where it has one navigation
-        source, or one named ``logged``.
+        Which of the flight's poses to judge; left out, the best of `Flight.estimated_sources`.
     calibration
         A ``calibration.toml`` of another flight, applied before the georeferencing is judged; left out, the
         one that the flight was imported with, if any.
@@ -69,7 +68,7 @@ def evaluate_flight(
     Raises
     ------
     WildlabError
-        If the folder is not a flight, it is not clear which poses are meant, its name is that of a study, the
+        If the folder is not a flight, there are no such poses, its name is that of a study, the
         report of another flight of this name would be replaced, or the calibration is of another camera.
     """
     flight = load_flight(folder)
@@ -82,7 +81,7 @@ def evaluate_flight(
         if name in studies:
             raise WildlabError(
                 f"the flight is named {flight.name!r} like a study, whose report it would replace",
-                "give the flight another name in flight.toml, or the report another folder with --out",
+                "rename the flight's folder, or give the report another folder with --out",
             )
         refuse_other_flight(folder, reports / name)
         study = StudyEntry(name="evaluate", title=f"Flight {name}", notebook=notebook, parameters=parameters)
@@ -100,13 +99,15 @@ def evaluate_flight(
 
     places = uses["georeferencing accuracy"]
     out = other_reports(reports)
-    again = typed_in_report("wildlab evaluate", flight.name, out=out)
-    again_source = typed_in_report("wildlab evaluate", flight.name, source=source, out=out)
+    again = typed_in_report("wildlab evaluate", folder, out=out)
+    again_source = typed_in_report("wildlab evaluate", folder, source=source, out=out)
+    # One choice for all reports; a flight without poses, such as a radar's, has none.
+    found = flight.pose_source(source)[0] if source or flight.estimated_sources else ""
+    tell_source(flight, source, console)
     if places.usable:
-        found, _ = flight.pose_source(source)
         parameters = {"source": found}
         again_with = typed_in_report(
-            "wildlab evaluate", flight.name, source=found, calibration=calibration, out=out
+            "wildlab evaluate", folder, source=found, calibration=calibration, out=out
         )
         applied = calibration or flight.calibration
         if applied is not None:
@@ -116,12 +117,11 @@ def evaluate_flight(
             parameters["calibration"] = learnt_toml(learnt)
         prepare(flight.name, "georeferencing.ipynb", parameters, again_with)
     elif lacks_only_truth(flight) and calibration is None:
-        found, _ = flight.pose_source(source)
         prepare(
             flight.name,
             "repeat-sightings.ipynb",
             {"source": found},
-            typed_in_report("wildlab evaluate", flight.name, source=found, out=out),
+            typed_in_report("wildlab evaluate", folder, source=found, out=out),
         )
     elif calibration is not None:
         raise WildlabError(
@@ -130,8 +130,6 @@ def evaluate_flight(
             file=folder,
             field="--calibration",
         )
-    elif source is not None:
-        flight.pose_source(source)
     lacking = lacking_for_navigation(flight, uses["navigation"])
     if not lacking:
         prepare(f"{flight.name}-navigation", "navigation.ipynb", {}, again)
@@ -139,18 +137,26 @@ def evaluate_flight(
         skipped.append(Outcome(f"{flight.name}-navigation", "skipped", 0.0, lacking))
     untracked = lacking_for_tracking(flight, uses["tracking"], source)
     if not untracked:
-        prepare(f"{flight.name}-tracking", "tracking.ipynb", {"source": source or ""}, again_source)
+        prepare(f"{flight.name}-tracking", "tracking.ipynb", {"source": found}, again_source)
     # The last to be run, since it lists what the others measured, and the first to be read.
     beside = [job.name for job in jobs]
     reasons = [] if beside[:1] == [flight.name] else [f"georeferencing ({places.why})"]
     reasons += [f"navigation ({lacking})"] if lacking else []
     reasons += [f"tracking ({untracked})"] if untracked else []
-    about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": source or ""}
+    about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": found}
     prepare(f"{flight.name}-overview", "overview.ipynb", about, again_source)
     passes = [longest_first(jobs[:-1]), jobs[-1:]]
     outcomes = run_all(passes, skipped, studies, reports, console, parallel=cores())
     order = [jobs[-1].name, *beside]
     return sorted(outcomes, key=lambda one: order.index(one.name) if one.name in order else len(order))
+
+
+def tell_source(flight: Flight, source: str | None, console: Console | None) -> None:
+    """Name the poses that are taken where there are several and nobody chose."""
+    known = flight.estimated_sources
+    if console is not None and source is None and len(known) > 1:
+        others = ", ".join(known[1:])
+        console.print(f"Poses: {known[0]} (--source takes another: {others}).", markup=False, highlight=False)
 
 
 def longest_first(jobs: Sequence[Job]) -> list[Job]:
@@ -188,8 +194,8 @@ def refuse_other_flight(folder: Path, report: Path) -> None:
         raise WildlabError(
             f"there is a report of another flight named {mine['name']!r}: they share none of the aircraft's "
             "tables, and have other raw files",
-            "give this flight another name in flight.toml, the report another folder with --out, or move the "
-            "old report away",
+            "rename this flight's folder, give the report another folder with --out, or move the old report "
+            "away",
             file=report,
         )
 
@@ -251,7 +257,7 @@ def lacking_for_tracking(flight: Flight, use: Use, source: str | None = None) ->
 def lacks_only_truth(flight: Flight) -> bool:
     """Whether truth is all that the georeferencing lacks, and things are seen that have names."""
     detections, frames, truth = flight.detections, flight.frames, flight.truth
-    if detections is None or frames is None or not len(frames) or not flight.nav:
+    if detections is None or frames is None or not len(frames) or not flight.estimated_sources:
         return False
     pixels = detections[detections["kind"] == "pixel"]
     named = "target_id" in pixels and bool(pixels["target_id"].fillna("").ne("").any())

@@ -7,14 +7,14 @@ that the first one had. Whichever moment it is broken off, every page that is th
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.record.digests import read_status
 from wildlab.runner.seeds.kept import missing_seeds
 
 #: Guessed seconds of a study that has not been run here yet. Only their order matters.
@@ -80,12 +80,3 @@ def quick_first(studies: Sequence[StudyEntry], reports: Path) -> list[StudyEntry
         return float(seconds) if isinstance(seconds, (int, float)) else GUESSED_S[study.kind]
 
     return sorted(studies, key=cost)
-
-
-def read_status(folder: Path) -> dict[str, Any]:
-    """``status.json`` of a report's folder; nothing where there is none, or none that can be read."""
-    try:
-        status = json.loads((folder / "status.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return status if isinstance(status, dict) else {}

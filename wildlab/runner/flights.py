@@ -29,7 +29,7 @@ def twin_flight(twin: str, seed: int, reports: Path) -> Path:
 
     # Twins share parts, so a change of any of their files may be a change of this one.
     key = _fingerprint([f"{twin} {seed}"], sorted((DATA / "twins").rglob("*.toml")))
-    return _kept(reports, f"{twin}-seed{seed}", key, lambda _: simulate_twin(twin, seed))
+    return _kept(reports, f"{twin}-{seed}", key, lambda _: simulate_twin(twin, seed))
 
 
 def dataset_flight(dataset: str | None, recipe: str, reports: Path) -> Path:

@@ -25,6 +25,7 @@ from wildlab.replay.recording import narrow_layout, save_recording
 from wildlab.replay.scene import Scene
 from wildlab.replay.shots import Shot, read_shots
 from wildlab.replay.viewer import read_viewer
+from wildlab.runner.evaluate import tell_source
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 
 RECORDING, PAGE, ESTIMATES = "replay.rrd", "replay.html", "estimates.parquet"
@@ -51,7 +52,7 @@ def replay(
     images
         A folder of the flight's images, or a video; left out, ``images`` in the flight folder where that is.
     source
-        Name of the ``nav`` table; left out, the best known one.
+        Name of the ``nav`` table; left out, the best of `Flight.estimated_sources`.
     html
         Whether to write the page that has the viewer inside, too.
     reports
@@ -75,6 +76,7 @@ def replay(
     flight = load_flight(place)
     with _progress(console) as tell:
         tell("reading the flight", None, None)
+        tell_source(flight, source, console)
         scene = scene_of(flight, source, estimates_of(flight, report, reports))
         scene, shots = _with_images(scene, place, images, tell)
         target = into or report or reports / f"{flight.name}-replay"
@@ -153,16 +155,22 @@ def flight_of(report: Path, reports: Path) -> Path:
             "name the folder of a flight: wildlab replay flights/mine",
             file=report,
         )
-    for place in _places(report, reports):
-        for manifest in sorted(place.glob(f"*/{FILE_NAME}")):
-            if provenance_of_flight(manifest.parent)["files"] == theirs["files"]:
-                return manifest.parent
+    for folder, found in flights_around(report, reports):
+        if found["files"] == theirs["files"]:
+            return folder
     raise WildlabError(
         f"the flight {json.dumps(str(theirs.get('name', '')))} that this report was made from is not among "
         "the flights here, or was changed since",
         "name its folder: wildlab replay flights/mine --into REPORT",
         file=report,
     )
+
+
+def flights_around(report: Path, reports: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Flight folders where flights usually are, as seen from a report, and what provenance says of each."""
+    for place in _places(report, reports):
+        for manifest in sorted(place.glob(f"*/{FILE_NAME}")):
+            yield manifest.parent, provenance_of_flight(manifest.parent)
 
 
 def _places(report: Path, reports: Path) -> Iterator[Path]:

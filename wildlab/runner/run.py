@@ -17,6 +17,7 @@ from typing import Any
 from rich.console import Console
 
 from wildlab.errors import WildlabError
+from wildlab.flight.files import flight_name
 from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import OTHERS, STANDARD_PARAMETERS, StudyEntry, find_studies, load_studies
@@ -69,19 +70,19 @@ def make_job(
     notebook = notebooks / study.notebook
     parameters = plain_parameters(study.parameters)
     flight_name = "" if flight is None else _flight_name(flight)
-    reductions = study.reductions() if first_look and seeds is None else {}
+    reductions = study.reductions() if first_look else {}
     if study.seeds is not None:
         parameters["seeds"] = study.seeds if seeds is None else seeds
-        if seeds is not None and seeds < study.seeds:
+    if study.seeds is not None and seeds is not None:
+        reductions.pop("seeds", None)
+        if seeds < study.seeds:
             # Whoever asks for fewer flights gets a first look as well: the page and the ledger say so.
-            reductions = {"seeds": (seeds, study.seeds)}
+            reductions["seeds"] = (seeds, study.seeds)
     if again is None:
         more = str(seeds) if seeds is not None and "seeds" not in reductions else None
         own_seed = None if seed is None or seed == study.seed else str(seed)
         out = None if reductions else other_reports(reports)
-        again = typed_in_report(
-            "wildlab run", study.name, flight=flight_name, seeds=more, seed=own_seed, out=out
-        )
+        again = typed_in_report("wildlab run", study.name, flight=flight, seeds=more, seed=own_seed, out=out)
     parameters |= {parameter: few for parameter, (few, _) in reductions.items()}
     others = [OTHERS] if study.beside else []
     cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])
@@ -296,7 +297,7 @@ def run_all(
 
 
 def _flight_name(folder: Path) -> str:
-    return read_manifest(folder / FILE_NAME).name
+    return flight_name(folder, read_manifest(folder / FILE_NAME).name)
 
 
 def _twin_of(folder: Path) -> str | None:

@@ -17,7 +17,7 @@ from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.pipeline.following.follow import refuse_unusable, sensors_with_detections
 from wildlab.pipeline.following.tuned import Against, Tuned, refuse_same, tune_flight, tuned_text
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.runner.evaluate import refuse_other_flight
+from wildlab.runner.evaluate import refuse_other_flight, tell_source
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.progress import shown
 from wildlab.runner.processes.scheduling import Outcome, run_jobs
@@ -91,6 +91,7 @@ def track_flight(
             )
         its_source = source if source in other.nav else None
         tuned = tune_flight(other, wanted, stated, cast(Against | None, against), its_source)
+    tell_source(flight, source, console)
     studies = load_studies(notebooks / "studies.toml")
     place = place_of(flight, folder, "tracking", into, reports, studies)
     job = tracking_job(
@@ -107,7 +108,7 @@ def track_flight(
         smooth=smooth,
         again=typed_in_report(
             "wildlab track",
-            flight.name,
+            folder,
             tune=tune,
             against=against,
             filter=filters,
@@ -141,7 +142,7 @@ def place_of(
     if place.name in studies and into is None:
         raise WildlabError(
             f"the flight is named {flight.name!r} like a study, whose report it would replace",
-            "give the flight another name in flight.toml, or the report another folder with --into",
+            "rename the flight's folder, or give the report another folder with --into",
         )
     refuse_other_flight(folder, place)
     place.parent.mkdir(parents=True, exist_ok=True)

@@ -18,6 +18,7 @@ from wildlab.pipeline.following.follow import refuse_unusable
 from wildlab.pipeline.many.beliefs import refuse_unfit as refuse_unfit_settings
 from wildlab.pipeline.scans import sensors_of
 from wildlab.runner.catalogue import StudyEntry, load_studies
+from wildlab.runner.evaluate import tell_source
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.run import make_job
 from wildlab.runner.track import place_of, run_alone
@@ -82,6 +83,7 @@ def track_many(
             f"note: the settings speak of {', '.join(map(repr, unknown))}, which this flight does not have."
         )
         console.print(text, markup=False, highlight=False)
+    tell_source(flight, source, console)
     studies = load_studies(notebooks / "studies.toml")
     place = place_of(flight, folder, "many", into, reports, studies)
     parameters: dict[str, Any] = {
@@ -101,7 +103,7 @@ def track_many(
         name=place.name,
         again=typed_in_report(
             "wildlab track",
-            flight.name,
+            folder,
             many=True,
             sensor=sensors,
             settings=settings,

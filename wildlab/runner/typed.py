@@ -40,17 +40,20 @@ def typed(command: str, *arguments: str | Path, **options: str | Path | bool | S
 def typed_in_report(
     command: str, *arguments: str | Path, **options: str | Path | bool | Sequence[str | Path] | None
 ) -> str:
-    """As `typed`, and of paths only the last name: a report may be passed on, and names no folder.
+    """As `typed`; of a path that does not lie below the folder this is run in only the last name.
+
+    A report may be passed on, and does not say where on which machine something lies.
 
     Examples
     --------
-    >>> typed_in_report("wildlab track", "tuesday", settings=Path("/home/me/settings.toml"))
-    'wildlab track tuesday --settings settings.toml'
+    >>> typed_in_report("wildlab track", Path("flights/tuesday"), settings=Path("/home/me/settings.toml"))
+    'wildlab track flights/tuesday --settings settings.toml'
     """
 
     def named(value: Any) -> Any:
         if isinstance(value, Path):
-            return value.name
+            written = Path(_written(value))
+            return written.name if written.is_absolute() else str(written)
         return [named(one) for one in value] if isinstance(value, list | tuple) else value
 
     return typed(command, *map(named, arguments), **{name: named(one) for name, one in options.items()})

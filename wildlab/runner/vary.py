@@ -259,7 +259,7 @@ def _verdicts(study: StudyEntry, case: Study, work: SeedWork, told: dict[str, An
         decide_claims(report, study.name, case.check_claims(spread, **told))
         found = {claim["id"]: claim["verdict"] for claim in report.claims}
     for row in published_rows(study.name):
-        compared = judge(row, report.recorded, report.published)
+        compared = judge(row, report.recorded)
         if compared is not None:
-            found[f"{row['name']} of {row['subject']}"] = compared.verdict
+            found[f"{row['name']} of {row['subject']}"] = compared.words
     return found

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -11,15 +9,16 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, NamedTuple
 
+import pandas as pd
+
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic
+from wildlab.files import csv_text, write_atomic
 from wildlab.flight.files import printable, read_regular, unreadable
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.readers.clicks import clicks as click_files
 from wildlab.flight.readers.frames.below import images_below
 from wildlab.flight.readers.frames.frame import file_name
 from wildlab.flight.readers.frames.image import SUFFIXES
-from wildlab.flight.readers.marks.text_table import guarded
 from wildlab.flight.readers.photos.folder import is_photos, natural_key
 from wildlab.flight.store import load_flight
 
@@ -119,13 +118,9 @@ class Session:
             return revision + 1
 
     def _text(self) -> str:
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for image in sorted(self.points, key=lambda one: (natural_key(one), one)):
-            for one in self.points[image]:
-                writer.writerow([guarded(image), guarded(one.name), f"{one.u:.2f}", f"{one.v:.2f}"])
-        return stream.getvalue()
+        images = sorted(self.points, key=lambda one: (natural_key(one), one))
+        rows = [(image, *one) for image in images for one in self.points[image]]
+        return csv_text(pd.DataFrame(rows, columns=COLUMNS), "%.2f")
 
 
 def open_session(folder: Path, images: Path | None = None) -> Session:

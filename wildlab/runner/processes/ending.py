@@ -1,13 +1,17 @@
-"""Ending processes for certain, starting them on one thread each, and where their sockets lie."""
+"""Starting processes, on one thread each and with what is large loaded, and ending them for certain."""
 
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import os
 import signal
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from multiprocessing import resource_tracker
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 #: What makes numpy, scipy, numba, OpenCV and Arrow compute on one thread; read when they are imported.
 ONE_THREAD = dict.fromkeys(
@@ -21,6 +25,56 @@ ONE_THREAD = dict.fromkeys(
     ),
     "1",
 )
+
+
+#: What a process has loaded at its start, where the system can fork: packages, which take most of that time.
+#: The rooms of wildlab are read anew by each process, for they may have been changed meanwhile.
+_PRELOADED = (
+    "wildlab",
+    "pandas",
+    "scipy.optimize",
+    "scipy.spatial.transform",
+    "numba",
+    "matplotlib.figure",
+    "nbconvert",
+    "papermill",
+    "IPython.core.interactiveshell",
+)
+
+
+def start_process(name: str, target: Callable[..., None], *arguments: Any) -> BaseProcess:
+    """Start a process on one thread, with this one's environment, and nothing else of its memory."""
+    fork = "forkserver" in multiprocessing.get_all_start_methods()
+    context: Any = multiprocessing.get_context("forkserver" if fork else "spawn")
+    if fork:
+        context.set_forkserver_preload(list(_PRELOADED))
+    with one_thread(), _uninterrupted():
+        given = (dict(os.environ), target, *arguments)
+        process: BaseProcess = context.Process(target=_begin, args=given, name=name)
+        process.start()
+    return process
+
+
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """What is started meanwhile is deaf to Ctrl-C, which is for the one that ends it: neither it nor the
+    server that it is forked from has anything to say to the terminal."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # it hears Ctrl-C again once it has started its own process
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin(environment: dict[str, str], target: Callable[..., None], *arguments: Any) -> None:
+    """Body of the process: the one it is forked from has the environment of its own start."""
+    os.environ.clear()
+    os.environ.update(environment)
+    target(*arguments)
 
 
 @contextlib.contextmanager

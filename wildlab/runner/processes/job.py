@@ -23,7 +23,7 @@ class Job:
     #: The page's main heading; "" leaves the notebook's.
     heading: str = ""
     flight: str = ""
-    #: What it calls itself: its folder's name may tell more than it wants to.
+    #: As its folder, of which nothing else is told.
     flight_name: str = ""
     twin: str | None = None
     dataset: str | None = None

@@ -12,7 +12,6 @@ import json
 import os
 import shutil
 import signal
-import sys
 import threading
 import time
 from multiprocessing import connection, parent_process
@@ -24,9 +23,6 @@ from wildlab.paths import ROOT
 from wildlab.runner.processes.ending import end_below
 from wildlab.runner.processes.job import Failure, Job
 
-#: ZeroMQ's limit for the path of a socket is 107 characters on Linux and 103 on macOS.
-_LONGEST_SOCKET_FOLDER = 95
-
 #: The cells begun in this process, in order.
 _STARTED: list[int] = []
 
@@ -35,24 +31,40 @@ def run_notebook(pipe: connection.Connection, job: Job) -> None:
     """Body of the process. Sends ``("stage", text)``, ``("cell", index, count)`` and at last ``("done",)`` or
     ``("failed", Failure)``."""
     os.setsid()
-    threading.Thread(target=_end_with_parent, args=(job,), daemon=True).start()
-    _keep_to_ourselves(job)
+    tidying = threading.Thread(target=_end_with_parent, args=(job,), daemon=True)
+    tidying.start()
     try:
+        pipe.send(_outcome(pipe, job))
+    except OSError:
+        if not _parent_is_gone(timeout_s=1.0):
+            raise
+        tidying.join()  # it ends this process when nothing is left of the work
+
+
+def _outcome(pipe: connection.Connection, job: Job) -> tuple[str] | tuple[str, Failure]:
+    try:
+        _keep_to_ourselves(job)
         (_tutorial if job.tutorial else _work)(pipe, job)
     except BaseException as error:  # whatever it is, the runner must hear of it
-        pipe.send(("failed", _explain(error, job)))
-    else:
-        pipe.send(("done",))
+        return ("failed", _explain(error, job))
+    return ("done",)
+
+
+def _parent_is_gone(timeout_s: float | None) -> bool:
+    parent = parent_process()
+    return parent is not None and bool(connection.wait([parent.sentinel], timeout_s))
 
 
 def _end_with_parent(job: Job) -> None:
-    """A runner that was killed outright must leave neither kernels nor folders behind."""
-    parent = parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
+    """A runner that was killed outright must leave neither processes nor folders behind."""
+    if _parent_is_gone(timeout_s=None):
         end_below(os.getpid())
-        for folder in (job.work, job.runtime):
-            shutil.rmtree(folder, ignore_errors=True)
+        for _ in range(100):  # the notebook may write into them until it finds them gone
+            for folder in (job.work, job.runtime):
+                shutil.rmtree(folder, ignore_errors=True)
+            if not any(Path(folder).exists() for folder in (job.work, job.runtime)):
+                break
+            time.sleep(0.01)
         os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -62,13 +74,6 @@ def _keep_to_ourselves(job: Job) -> None:
 
     runtime = Path(job.runtime)
     os.environ.update(
-        # First place to look for the kernel `python3`: this environment, whatever else is installed.
-        JUPYTER_PATH=str(Path(sys.prefix) / "share" / "jupyter"),
-        JUPYTER_PREFER_ENV_PATH="1",
-        JUPYTER_NO_CONFIG="1",
-        JUPYTER_RUNTIME_DIR=str(runtime),
-        JUPYTER_CONFIG_DIR=str(runtime / "config"),
-        JUPYTER_DATA_DIR=str(runtime / "data"),
         JUPYTER_PLATFORM_DIRS="1",
         IPYTHONDIR=str(runtime / "ipython"),
         # Figures are shown by Report, with alt text, and not a second time by pyplot.
@@ -113,7 +118,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
         origin["seeds"] = job.seeds.provenance()
     write_json(folder / "provenance.json", origin)
     pipe.send(("stage", "notebook"))
-    shown = {**given, "flight": _relative(flight, job), "out": ".", "expected_prefix": ""}
+    shown = {**given, "flight": _relative(flight, job), "out": "."}
     if others:
         given[OTHERS] = [str(other) for other in others]
         shown[OTHERS] = [_relative(other, job) for other in others]
@@ -122,7 +127,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
         _papermill(
             pipe,
             job,
-            {**given, "flight": str(flight or ""), "out": str(folder), "expected_prefix": sys.prefix},
+            {**given, "flight": str(flight or ""), "out": str(folder)},
             executed,
         )
     finally:
@@ -147,6 +152,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
         study=job.name,
         footer=provenance.footer(origin),
         notice=notice,
+        alert=provenance.changed_notice(origin),
         title=job.heading,
         made=str(origin["made"]),
     )
@@ -206,20 +212,12 @@ def _relative(flight: Path | None, job: Job) -> str:
 
 def _papermill(pipe: connection.Connection, job: Job, parameters: dict[str, Any], executed: Path) -> None:
     import papermill
-    from traitlets.config import Config
 
     from wildlab.reporting.notebook_file import read_notebook
+    from wildlab.runner.processes.shell import IN_PROCESS
 
-    config = Config()
-    if len(job.runtime) <= _LONGEST_SOCKET_FOLDER and sys.platform != "win32":
-        # Sockets in a folder of our own instead of ports that another kernel may take at the same moment.
-        # They are named here: left to itself, Jupyter puts them into the working directory, under the same
-        # names for every kernel.
-        config.KernelManager.transport = "ipc"
-        config.KernelManager.ip = str(Path(job.runtime) / "k")
-    config.KernelManager.connection_file = str(Path(job.runtime) / "kernel.json")
     notebook = read_notebook(Path(job.notebook))
-    # Whatever kernel the notebook was last saved with: this one is meant.
+    # Whatever kernel the notebook was last saved with: its cells run in this process.
     notebook.metadata["kernelspec"] = {"name": "python3", "language": "python", "display_name": "Python 3"}
     count = len(notebook.cells) + bool(parameters)  # papermill adds a cell with them
 
@@ -234,9 +232,9 @@ def _papermill(pipe: connection.Connection, job: Job, parameters: dict[str, Any]
         parameters=parameters,
         kernel_name="python3",
         language="python",
+        engine_name=IN_PROCESS,
         progress_bar=False,
         cwd=str(Path(job.notebook).parent),
-        config=config,
         on_cell_execute=on_cell,
     )
 
@@ -263,16 +261,6 @@ def _explain(error: BaseException, job: Job) -> Failure:
         )
     elif isinstance(error, WildlabError):
         reason = str(error)
-    elif kind == "DeadKernelError":
-        reason = (
-            "The process that ran the notebook crashed or was ended from outside; the usual cause is too "
-            "little memory. Close other programs, or run with `--jobs 1`."
-        )
-    elif kind == "NoSuchKernel":
-        reason = (
-            "This environment has no Jupyter kernel named python3. Register it: "
-            "python -m ipykernel install --sys-prefix."
-        )
     else:
         reason = f"It ended with {kind}: {error}"
     step, folder = "", Path(job.work)

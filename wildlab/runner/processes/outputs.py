@@ -15,11 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic, write_json
+from wildlab.files import write_atomic
 from wildlab.reporting.failure import failure_page, step_of
 from wildlab.reporting.notebook_file import nbformat, read_notebook
 from wildlab.reporting.privacy import clean_notebook, clean_text
 from wildlab.runner.processes.job import Failure, Job
+from wildlab.runner.record.digests import seal
 
 #: What a run may leave in a report's folder, besides ``figures/``. Anything else there is not ours, and
 #: stays.
@@ -43,7 +44,7 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
             notebook = read_notebook(executed)
             # A process that was ended could not clean its notebook itself.
             shown = {**job.parameters, "study": job.name, "seed": job.seed}
-            shown |= {"flight": job.flight_name, "out": ".", "expected_prefix": ""}
+            shown |= {"flight": job.flight_name, "out": "."}
             write_notebook(executed, clean_notebook(notebook, shown, job.hidden() | {str(folder): "."}))
             step = step or step_of(notebook, cell)
         except WildlabError:
@@ -89,7 +90,7 @@ def install(folder: Path, target: Path, status: dict[str, Any]) -> None:
                 (folder / name).replace(target / name)
             else:
                 (target / name).unlink(missing_ok=True)
-        write_json(target / "status.json", status)
+        seal(target, status, FILES)
 
 
 @contextlib.contextmanager
@@ -123,11 +124,12 @@ def sweep(folder: Path) -> None:
     """
     for path in folder.glob(".*.part"):
         match = _PART.fullmatch(path.name)
-        if match and not _alive(int(match["pid"])) and time.time() - path.stat().st_mtime > 86_400:
+        if match and not alive(int(match["pid"])) and time.time() - path.stat().st_mtime > 86_400:
             clear_folder(path)
 
 
-def _alive(pid: int) -> bool:
+def alive(pid: int) -> bool:
+    """Whether there is a process of this number."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -121,7 +121,8 @@ def _in_lines(console: Console) -> Callable[[str, str, Any], None]:
             say(f"start {escape(name)}")
         elif event == "seeds":
             missing, count = what
-            say(f"seeds {escape(name)}: {missing} to compute, {count - missing} are there")
+            if count:
+                say(f"seeds {escape(name)}: {missing} to compute, {count - missing} are there")
         elif event == "seed":
             done, count = what
             if 4 * done // count > 4 * (done - 1) // count:

@@ -6,19 +6,18 @@ has computed seeds ends where a notebook needs its place.
 
 from __future__ import annotations
 
-import multiprocessing
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from multiprocessing import connection
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 from wildlab.runner.processes.cluster import Cluster
-from wildlab.runner.processes.ending import end_tree, one_thread
+from wildlab.runner.processes.ending import end_tree, start_process
 from wildlab.runner.processes.job import Failure, Job
 from wildlab.runner.processes.notebook_process import run_notebook
 from wildlab.runner.processes.outputs import clear, install, leave_failure, log_of, sweep
@@ -237,7 +236,7 @@ class _Scheduler:
 @dataclass
 class _Running:
     job: Job
-    process: SpawnProcess
+    process: BaseProcess
     pipe: connection.Connection
     #: When the study began, its seeds included, and when this process did.
     started: float
@@ -266,7 +265,8 @@ class _Running:
             if gone:
                 self.process.join(5)
                 self.failure = self._failure(
-                    f"Its process ended without a word (exit code {self.process.exitcode})"
+                    f"Its process crashed or was ended from outside (exit code {self.process.exitcode}); "
+                    "the usual cause is too little memory: close other programs, or run with `--jobs 1`"
                 )
             elif time.monotonic() - self.alone > self.job.timeout_s:
                 self.failure = self._failure(
@@ -296,11 +296,8 @@ def _start(waiting: _Waiting) -> _Running:
     clear(job)
     Path(job.work).mkdir(parents=True)
     Path(job.runtime).mkdir(parents=True, mode=0o700)
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=run_notebook, args=(theirs, job), name=f"wildlab {job.name}")
-    with one_thread():
-        process.start()
+    ours, theirs = connection.Pipe(duplex=False)
+    process = start_process(f"wildlab {job.name}", run_notebook, theirs, job)
     theirs.close()
     now = time.monotonic()
     return _Running(job, process, ours, waiting.started or now, waiting.began, now)

@@ -10,19 +10,18 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import multiprocessing
 import os
 import threading
 import time
 import traceback
 from dataclasses import dataclass
 from multiprocessing import connection, parent_process
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
-from wildlab.runner.processes.ending import end_tree, one_thread
+from wildlab.runner.processes.ending import end_tree, start_process
 from wildlab.runner.processes.job import Failure
 from wildlab.runner.seeds.fingerprint import code_key
 from wildlab.runner.seeds.kept import SeedWork, write_seed
@@ -112,7 +111,7 @@ def _end_with_parent() -> None:
 
 @dataclass
 class _Worker:
-    process: SpawnProcess
+    process: BaseProcess
     pipe: connection.Connection
     work: SeedWork | None = None
     seed: int = 0
@@ -179,11 +178,8 @@ class WorkerPool:
             worker.end()
 
     def _start(self) -> _Worker:
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(target=serve, args=(theirs,), name="wildlab seeds")
-        with one_thread():
-            process.start()
+        ours, theirs = connection.Pipe()
+        process = start_process("wildlab seeds", serve, theirs)
         theirs.close()
         self._workers.append(_Worker(process, ours))
         return self._workers[-1]

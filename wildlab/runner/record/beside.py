@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,21 +10,14 @@ from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.paths import REPORTS
 from wildlab.reporting.metrics import read_metrics
+from wildlab.runner.record.digests import read_status
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 
 
-def state_of(folder: Path) -> dict[str, Any]:
-    """What ``status.json`` of a report's folder says; nothing where it cannot be read."""
-    try:
-        status = json.loads((folder / "status.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return status if isinstance(status, dict) else {}
-
-
 def finished_metrics(folder: Path) -> dict[str, Any] | None:
-    """``metrics.json`` of a report that is done; None where it failed, is not there, or cannot be read."""
-    if state_of(folder).get("state") != "done":
+    """``metrics.json`` of a report that is done; None where it failed, is not there, is not as it was
+    written, or cannot be read."""
+    if read_status(folder).get("state") != "done":
         return None
     try:
         return read_metrics(folder / "metrics.json")

@@ -9,7 +9,8 @@ from typing import Any
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.pipeline.overviews.worth_fixing import numbers_of
 from wildlab.reporting.own_flights import OwnFlight, OwnReport
-from wildlab.runner.record.beside import finished_metrics, state_of
+from wildlab.runner.record.beside import finished_metrics
+from wildlab.runner.record.digests import read_status
 from wildlab.runner.record.provenance import read_provenance
 
 #: What the end of a report's name says it is about; without one of them it is the georeferencing.
@@ -45,6 +46,9 @@ def own_flights(reports: Path, studies: Collection[str]) -> list[OwnFlight]:
         if folder.name in studies or folder.name.startswith(".") or not (folder / "report.html").is_file():
             continue
         provenance = read_provenance(folder)
+        if not provenance and read_status(folder).get("state") == "damaged":
+            end = next(end for end in ABOUT if folder.name.endswith(end))
+            provenance = {"flight": {"name": folder.name.removesuffix(end)}}
         flight = provenance.get("flight")
         if not isinstance(flight, dict) or not isinstance(flight.get("name"), str):
             continue
@@ -101,7 +105,7 @@ def _tables(provenance: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _report(folder: Path, flight: str, provenance: dict[str, Any]) -> OwnReport:
-    status = state_of(folder)
+    status = read_status(folder)
     ends = {f"{flight}{end}": about for end, about in ABOUT.items()}
     metrics = finished_metrics(folder)
     parameters = provenance.get("parameters")

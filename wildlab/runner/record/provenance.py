@@ -15,8 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from wildlab import __version__
+from wildlab.errors import WildlabError
 from wildlab.files import sha256
+from wildlab.flight.checksums import manifest_changed
+from wildlab.flight.files import flight_name
 from wildlab.paths import LOCK, ROOT
+from wildlab.reporting.arrange import ALERT
 from wildlab.reporting.text import escape
 
 #: The packages whose version can move a number.
@@ -123,13 +127,31 @@ def provenance_of_flight(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         manifest = {}
     files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
+    try:
+        changed = manifest_changed(folder)
+    except WildlabError:
+        changed = None
     return {
-        "name": str(manifest.get("name", folder.name)),
+        "name": flight_name(folder, str(manifest.get("name", folder.name))),
+        "manifest_changed": changed,
         "kind": str(manifest.get("kind", "unknown")),
         "locations": str(manifest.get("locations", {}).get("sensitivity", "withheld")),
         "files": {path.relative_to(folder).as_posix(): sha256(path) for path in files},
         "sources": [str(one.get("sha256")) for one in manifest.get("sources", []) if isinstance(one, dict)],
     }
+
+
+def changed_notice(provenance: dict[str, Any]) -> str:
+    """HTML of what a page says where the manifest of a flight is not as it was written; or nothing."""
+    flights = [provenance["flight"], *provenance.get("others", ())] if provenance["flight"] else []
+    changed = ", ".join(one["name"] for one in flights if one.get("manifest_changed"))
+    if not changed:
+        return ""
+    return (
+        f'<section class="alert" data-part="{ALERT}" aria-label="Changed flight.toml"><p><b>flight.toml of '
+        f"{escape(changed)} is not as it was written: changed by hand, or damaged.</b> This report uses it "
+        "as it is. If the change is meant: <code>wildlab check --accept</code></p></section>"
+    )
 
 
 def _version(package: str) -> str | None:
@@ -155,6 +177,8 @@ def footer(
         files = one["files"]
         hashes = ", ".join(f"{escape(name)} <code>{digest[:8]}</code>" for name, digest in files.items())
         parts.append(f"flight {escape(one['name'])}: {hashes}" if files else "flight without files")
+        if one.get("manifest_changed"):
+            parts.append("<b>flight.toml changed since it was written</b>")
     lock = provenance["lock"]["sha256"]
     parts.append(f"lock <code>{lock[:8]}</code>" if lock else "no lock file")
     parts.append(f"notebook <code>{provenance['notebook']['sha256'][:8]}</code>")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict
 from fnmatch import fnmatchcase
@@ -15,6 +14,7 @@ from wildlab.reporting.published import FOLDER, load_claims, published_rows
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus, look_words
 from wildlab.reporting.verdicts import judge, recorded_for
 from wildlab.runner.catalogue import StudyEntry
+from wildlab.runner.record.digests import BEFORE_DIGESTS, STATUS, has_digests, read_status
 
 
 def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> StudyStatus:
@@ -36,6 +36,8 @@ def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> 
         # What cannot be read, or is of another study, must not count as this one's full numbers.
         if metrics is None or metrics["study"] != study.name or (status.get("first_look") and not look):
             state, reason, metrics = "broken off", "", None
+    if state == "done" and not has_digests(status):
+        reason = BEFORE_DIGESTS
     if state == "done" and look:
         state = FIRST_LOOK
     return StudyStatus(
@@ -65,37 +67,40 @@ def as_plain(one: StudyStatus) -> dict[str, Any]:
         "reason": one.reason,
         "seconds": one.seconds,
         "finished": one.finished or None,
-        "published": [asdict(number) | {"difference": number.difference} for number in one.numbers],
+        "published": [_plain(number) for number in one.numbers],
         "claims": [asdict(claim) for claim in one.claims],
     }
 
 
+def _plain(number: Number) -> dict[str, Any]:
+    closeness, compatibility = number.answers
+    told = {"closeness": closeness, "compatibility": compatibility}
+    plain = {key: value for key, value in asdict(number).items() if key not in ("compared", "waiting")}
+    return plain | told | {"difference": number.difference}
+
+
 def _status(folder: Path) -> dict[str, Any]:
-    path = folder / "status.json"
-    if not path.is_file():
+    if not (folder / STATUS).is_file():
         # A report without a status was being replaced when the machine stopped.
         return {"state": "broken off" if (folder / "report.html").exists() else "not run"}
-    try:
-        status = json.loads(path.read_text(encoding="utf-8"))
-        seconds = status.get("seconds")
-        if status["state"] not in ("done", "failed") or not math.isfinite(seconds):
-            raise ValueError
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    status = read_status(folder)
+    seconds = status.get("seconds")
+    known = status.get("state") in ("done", "failed", "damaged")
+    if not known or not isinstance(seconds, int | float) or not math.isfinite(seconds):
         return {"state": "broken off"}
-    return dict(status)
+    return status
 
 
 def _numbers(study: StudyEntry, metrics: dict[str, Any] | None, state: str, published: Path) -> list[Number]:
     ours = {(entry["name"], entry["subject"]): entry for entry in metrics["metrics"]} if metrics else {}
     rows = published_rows(study.name, published)
-    printed = {(row["name"], row["subject"]): float(row["value"]) for row in rows}
     numbers = []
     for row in rows:
-        found, compared = recorded_for(row, ours), judge(row, ours, printed)
+        found, compared = recorded_for(row, ours), judge(row, ours)
         if compared is None:
-            verdict, reason = MISSING, _reason(study, row["name"], row["subject"], state)
+            waiting, reason = MISSING, _reason(study, row["name"], row["subject"], state)
         else:
-            verdict, reason = compared.verdict, compared.reason
+            waiting, reason = FIRST_LOOK if state == FIRST_LOOK else "", compared.reason
         numbers.append(
             Number(
                 name=row["name"],
@@ -107,15 +112,16 @@ def _numbers(study: StudyEntry, metrics: dict[str, Any] | None, state: str, publ
                 here=found.get("value"),
                 low=found.get("low"),
                 high=found.get("high"),
-                within=None if math.isnan(row["within"]) else float(row["within"]),
-                verdict=FIRST_LOOK if state == FIRST_LOOK and verdict != MISSING else verdict,
+                compared=compared,
+                waiting=waiting,
                 reason=reason,
                 kind=row["kind"],
                 ratio=None if compared is None else compared.ratio,
                 below=found.get("below"),
-                spread=None if compared is None else compared.spread,
+                power=found.get("power"),
                 by_size=bool(row["by_size"]),
                 again=bool(row["again"]),
+                fitted=row["fitted"],
                 over=_over(metrics, dict(found)),
             )
         )
@@ -126,7 +132,7 @@ def _over(metrics: dict[str, Any] | None, found: dict[str, Any]) -> int | None:
     """Over how many flights, or runs of one, the bounds of a number are; None where they are none such."""
     if metrics is None or found.get("low") is None:
         return None
-    return metrics["seeds"] or (found["n"] if metrics["kind"] == "twin" else None)
+    return found["flights"] or metrics["seeds"] or (found["n"] if metrics["kind"] == "twin" else None)
 
 
 def _reason(study: StudyEntry, name: str, subject: str, state: str) -> str:

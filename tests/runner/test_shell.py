@@ -1,0 +1,115 @@
+"""Cells that run in this process leave what a kernel of Jupyter would have left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing import connection
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import papermill
+import pytest
+from IPython.core.getipython import get_ipython
+from papermill.exceptions import PapermillExecutionError
+
+from wildlab.runner.processes.ending import ONE_THREAD, start_process
+from wildlab.runner.processes.shell import IN_PROCESS
+
+CELLS = [
+    "print('one')\nprint('two')",
+    "import sys\nprint('a warning', file=sys.stderr)",
+    "from IPython.display import HTML, Image, clear_output, display\ndisplay(HTML('<b>bold</b>'))\n1 + 1",
+    "display(Image(data=b'\\x89PNG', format='png'))",
+    "print('gone'); clear_output(); print('left'); None",
+    "print('kept'); clear_output(wait=True)",
+    "print('gone'); clear_output(wait=True); print('left')",
+    "shown = display('first', display_id='one')\nprint('between')",
+    "shown.update('second')",
+    "for k in range(20): print('x' * 70)",
+    "x = 5",
+    "_ + 1",
+    "class Dot:\n    __repr__ = lambda self: 'a dot'\n    _repr_png_ = lambda self: b'\\x89PNG'\nDot()",
+    "import asyncio\nawait asyncio.sleep(0)\nx;",
+    "# only words",
+]
+
+
+def execute(cells: list[str], where: Path, engine: str | None, **parameters: Any) -> Any:
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    notebook.cells.insert(1, nbformat.v4.new_markdown_cell("# Words"))
+    return papermill.execute_notebook(
+        notebook,
+        str(where / f"{engine}.ipynb"),
+        parameters=parameters,
+        kernel_name="python3",
+        language="python",
+        engine_name=engine,
+        progress_bar=False,
+        cwd=where,
+    )
+
+
+def outputs(notebook: Any) -> list[Any]:
+    return [(cell.get("outputs"), cell.get("execution_count")) for cell in notebook.cells]
+
+
+@pytest.mark.slow
+def test_outputs_are_those_of_a_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
+    # In a thread of their own: a browser's tests may have left a loop running in this one.
+    with ThreadPoolExecutor(1) as thread:
+        ours, theirs = (thread.submit(execute, CELLS, tmp_path, one).result() for one in (IN_PROCESS, None))
+    assert outputs(ours) == outputs(theirs)
+
+
+def test_a_cell_that_raises_is_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
+    with pytest.raises(PapermillExecutionError) as raised:
+        execute(["y = 1", "y / 0", "print('not reached')"], tmp_path, IN_PROCESS)
+    assert raised.value.ename == "ZeroDivisionError" and "y / 0" in "".join(raised.value.traceback)
+    kept = nbformat.read(tmp_path / f"{IN_PROCESS}.ipynb", as_version=4)
+    assert "not reached" not in str([cell.get("outputs") for cell in kept.cells])
+
+
+def test_what_fails_to_show_itself_is_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
+    with pytest.raises(PapermillExecutionError, match="ZeroDivisionError"):
+        execute(
+            ["class A:\n    _repr_html_ = lambda self: 1 / 0\nA()", "open('late', 'w')"], tmp_path, IN_PROCESS
+        )
+    assert not (tmp_path / "late").exists()
+
+
+def test_parameters_and_the_folder_are_the_notebooks_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
+    cells = ["import os\nprint(speed, os.getcwd())"]
+    main = sys.modules["__main__"]
+    notebook = execute(cells, tmp_path, IN_PROCESS, speed=7)
+    assert sys.modules["__main__"] is main and get_ipython() is None
+    assert f"7 {tmp_path}" in str(outputs(notebook))
+    # Another notebook in the same process knows nothing of the first.
+    with pytest.raises(PapermillExecutionError, match="NameError"):
+        execute(["print(speed)"], tmp_path, IN_PROCESS)
+
+
+def tell(pipe: connection.Connection, names: list[str]) -> None:
+    """Body of a process: what it has in its environment, and whether Ctrl-C would interrupt it."""
+    deaf = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    pipe.send({"deaf": str(deaf)} | {name: os.environ.get(name) for name in names})
+
+
+@pytest.mark.parametrize("value", ["first", "second"])
+def test_a_process_has_the_environment_of_its_own_start(value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TOLD_TO_IT", value)
+    ours, theirs = connection.Pipe(duplex=False)
+    process = start_process("tells", tell, theirs, ["TOLD_TO_IT", *ONE_THREAD])
+    assert ours.poll(60) and ours.recv() == {"deaf": "True", "TOLD_TO_IT": value, **ONE_THREAD}
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    process.join(20)
+    assert process.exitcode == 0

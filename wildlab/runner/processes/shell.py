@@ -1,0 +1,193 @@
+"""A papermill engine that runs a notebook's cells in this process, in a shell of IPython's, without a kernel.
+
+A kernel is a second process that imports everything once more, which took most of the time of a short page.
+What cells print, show and raise is kept as a kernel would have sent it.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import io
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from IPython.core.displayhook import DisplayHook
+from IPython.core.displaypub import DisplayPublisher
+from IPython.core.interactiveshell import InteractiveShell
+from papermill.engines import Engine, NotebookExecutionManager, papermill_engines
+from traitlets.config import Config
+
+from wildlab.reporting.notebook_file import nbformat
+
+#: Its name among papermill's engines.
+IN_PROCESS = "wildlab-in-process"
+
+
+class ShellEngine(Engine):  # type: ignore[misc]
+    """Cells one after the other, until one raises; see papermill on engines."""
+
+    @classmethod
+    def execute_managed_notebook(
+        cls,
+        nb_man: NotebookExecutionManager,
+        kernel_name: str,
+        *,
+        on_cell_execute: Callable[..., None] | None = None,
+        **_: Any,
+    ) -> None:
+        outputs = _Outputs()
+        shell = _shell(outputs)
+        try:
+            _run_cells(shell, outputs, nb_man, on_cell_execute)
+        finally:
+            # Whatever else this process does, it is no notebook any more.
+            shell.restore_sys_module_state()
+            type(shell).clear_instance()
+
+
+def _run_cells(
+    shell: InteractiveShell,
+    outputs: _Outputs,
+    nb_man: NotebookExecutionManager,
+    on_cell_execute: Callable[..., None] | None,
+) -> None:
+    for index, cell in enumerate(nb_man.nb.cells):
+        nb_man.cell_start(cell, index)
+        if on_cell_execute is not None:
+            on_cell_execute(cell=cell, cell_index=index)
+        if cell.cell_type == "code":
+            with _streams_into(outputs):
+                result = shell.run_cell(cell.source, store_history=True)
+            cell.outputs, cell.execution_count = outputs.take(), shell.execution_count - 1
+            # What fails to show itself is an error, though the cell goes on.
+            if not result.success or any(one.output_type == "error" for one in cell.outputs):
+                nb_man.cell_exception(cell, cell_index=index)
+        nb_man.cell_complete(cell, cell_index=index)
+        if nb_man.nb.metadata.papermill["exception"]:
+            return
+
+
+papermill_engines.register(IN_PROCESS, ShellEngine)
+
+
+class _Outputs:
+    """What the cell that runs has left so far, and what earlier ones have left under a name."""
+
+    def __init__(self) -> None:
+        self._nodes: list[Any] = []
+        self._named: dict[str, list[Any]] = {}
+        self._clear_before_next = False
+
+    def add(self, node: Any, name: str | None = None) -> None:
+        if self._clear_before_next:
+            self.clear()
+        self._nodes.append(node)
+        if name is not None:
+            self._named.setdefault(name, []).append(node)
+
+    def write(self, stream: str, text: str) -> None:
+        """Text written to one stream in one go is one output; it is put together by `take`."""
+        last = self._nodes[-1] if self._nodes and not self._clear_before_next else None
+        if last is not None and last.output_type == "stream" and last.name == stream:
+            last.text.append(text)
+        elif text:
+            self.add(nbformat.v4.new_output("stream", name=stream, text=[text]))
+
+    def update(self, name: str, data: dict[str, Any], metadata: dict[str, Any]) -> None:
+        """Put something else where what has that name was shown."""
+        for node in self._named.get(name, []):
+            node.data, node.metadata = data, metadata
+
+    def clear(self, wait: bool = False) -> None:
+        self._clear_before_next = wait
+        if not wait:
+            self._nodes.clear()
+
+    def take(self) -> list[Any]:
+        """All of them, and begin anew for the next cell."""
+        found, self._nodes, self._clear_before_next = self._nodes, [], False
+        for node in found:
+            if node.output_type == "stream":
+                node.text = "".join(node.text)
+        return found
+
+
+def _shell(outputs: _Outputs) -> InteractiveShell:
+    """A new shell whose ``outputs`` are what is shown and raised."""
+
+    class Publisher(DisplayPublisher):
+        def publish(
+            self,
+            data: Any,
+            metadata: Any = None,
+            *_: Any,
+            transient: Any = None,
+            update: bool = False,
+            **__: Any,
+        ) -> None:
+            shown, name = _plain(data), (transient or {}).get("display_id")
+            if update and name is not None:
+                outputs.update(name, shown, metadata or {})
+            else:
+                node = nbformat.v4.new_output("display_data", data=shown, metadata=metadata or {})
+                outputs.add(node, name)
+
+        def clear_output(self, wait: bool = False) -> None:
+            outputs.clear(wait)
+
+    class Hook(DisplayHook):
+        def write_output_prompt(self) -> None:
+            """A notebook shows none."""
+
+        def finish_displayhook(self) -> None:
+            """Nor an empty line."""
+
+        def write_format_data(self, format_dict: Any, md_dict: Any = None) -> None:
+            outputs.add(
+                nbformat.v4.new_output(
+                    "execute_result",
+                    data=_plain(format_dict),
+                    metadata=md_dict or {},
+                    execution_count=self.prompt_count,
+                )
+            )
+
+    class Shell(InteractiveShell):
+        def _showtraceback(self, etype: Any, evalue: Any, stb: list[str]) -> None:
+            outputs.add(
+                nbformat.v4.new_output("error", ename=etype.__name__, evalue=str(evalue), traceback=stb)
+            )
+
+    # No history of commands on the reader's disk, and tracebacks without the escapes of a terminal.
+    config = Config({"HistoryManager": {"enabled": False}, "InteractiveShell": {"colors": "nocolor"}})
+    return Shell.instance(config=config, display_pub_class=Publisher, displayhook_class=Hook)
+
+
+def _plain(data: dict[str, Any]) -> dict[str, Any]:
+    """By kind; bytes as base64."""
+    return {
+        kind: base64.b64encode(value).decode("ascii") if isinstance(value, bytes) else value
+        for kind, value in data.items()
+    }
+
+
+class _Stream(io.TextIOBase):
+    """Text that is written becomes outputs."""
+
+    def __init__(self, name: str, outputs: _Outputs) -> None:
+        self.name, self.outputs = name, outputs
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        self.outputs.write(self.name, text)
+        return len(text)
+
+
+@contextlib.contextmanager
+def _streams_into(outputs: _Outputs) -> Iterator[None]:
+    stdout, stderr = _Stream("stdout", outputs), _Stream("stderr", outputs)
+    with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
+        yield
