@@ -12,6 +12,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.estimates import COLUMNS
+from wildlab.pipeline.following.judged import LEADING
 from wildlab.replay.gather import scene_of
 from wildlab.replay.moving import MOST_BYTES, alt, moving_flight, said, show_moving
 from wildlab.reporting.report import open_report
@@ -23,8 +24,10 @@ def ship() -> Flight:
     return simulate_twin("large-ship", 1)
 
 
-def report_of(flight: Flight, out: str = "") -> str:
+def report_of(flight: Flight, out: str = "", leading: str = "") -> str:
     report = open_report(study="overview", kind="twin", flight=flight.name, out=out)
+    if leading:
+        report.metric(LEADING, leading, 1, "1")
     show_moving(report, flight)
     return "".join(report.parts)
 
@@ -59,6 +62,7 @@ def test_a_table_of_tracks_gives_ellipses_of_one_filter(ship: Flight, tmp_path: 
     rows |= {"p_00": [4.0] * 6, "p_01": [0.0] * 6, "p_11": [4.0] * 6}
     pd.DataFrame(rows).to_parquet(tmp_path / "estimates.parquet")
     assert "the filter schmidt" in report_of(ship, str(tmp_path)) and "the filter" not in report_of(ship)
+    assert "the filter ekf" in report_of(ship, str(tmp_path), leading="ekf")
     scene = scene_of(ship, estimates=pd.DataFrame(rows), ellipses=False)
     assert len(moving_flight(scene).ellipses) == 1
     pd.DataFrame(rows).drop(columns="nees").to_parquet(tmp_path / "estimates.parquet")

@@ -185,7 +185,7 @@ def test_on_a_phone_the_map_is_as_wide_as_the_screen_and_the_rest_is_below(
     opened.wait_for_selector("html[data-shown=yes]", state="attached", timeout=180_000)
     opened.wait_for_timeout(8000)
     assert opened.evaluate("document.getElementById('canvas').getBoundingClientRect().top") == TOP
-    assert opened.is_visible("#narrow") and "Replay of large-ship-1" in opened.inner_text("#narrow")
+    assert opened.is_visible("#narrow") and "Replay of flight" in opened.inner_text("#narrow")
     notice = opened.locator("#narrow")
     assert notice.evaluate("one => one.scrollHeight <= one.clientHeight"), "its words are cut off"
     picture = _pixels(opened.screenshot())

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from tests.figure_text import figures_of_notebook, overlapping
+from tests.figure_text import overlapping
 from tests.reporting.test_page import contrast
-from wildlab.paths import NOTEBOOKS
 from wildlab.reporting import figures
 from wildlab.reporting.charts import comparison, georeferencing, navigation, tracks
 from wildlab.reporting.figure_text import LEAST_TEXT, least_size
@@ -121,6 +119,16 @@ def test_a_legend_and_names_at_ends_are_moved_until_they_fit() -> None:
     assert heights == sorted(heights)  # in the order of the lines
 
 
+@pytest.mark.parametrize("unit", ["s", "m/s", "%", "°"])
+def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit: str) -> None:
+    for much in range(0, 24, 2):
+        figure, ax = figures.new_figure()
+        ax.set_title(f"{'x' * much} pauses, of which the longest one, of all of the frames: 37.4 {unit}")
+        figures.png_bytes(figure)
+        lines = ax.get_title(loc="left").split("\n")
+        assert len(lines) > 1 and lines[-1].endswith(f"37.4 {unit}")
+
+
 def test_letters_have_their_size_also_where_some_are_small() -> None:
     figure, ax = figures.new_figure(6.0)
     ax.plot([0, 1])
@@ -136,21 +144,3 @@ def test_every_line_stands_out_from_white() -> None:
     cycle = [str(one["color"]) for one in figures._STYLE["axes.prop_cycle"]]
     for colour in {*figures.COLOURS.values(), *cycle}:
         assert contrast(colour, "#ffffff") >= 3.0, colour
-
-
-def notebooks() -> Iterator[tuple[str, dict[str, object]]]:
-    yield "printed-numbers", {}
-    yield "sensitivity", {}
-    yield "consistency-bounds", {"runs": 60, "steps": 60}
-    yield "wildlife-camera", {"runs": 3}
-    yield "static-point", {"seed": 47, "seeds": 1}
-    yield "slow-vessel", {"seed": 83, "seeds": 1}
-    yield "gating", {"runs": 200, "varied_runs": 5}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "given"), notebooks())
-def test_figures_of_real_notebooks(name: str, given: dict[str, object], tmp_path: Path) -> None:
-    given = {"study": name, "out": str(tmp_path)} | given
-    found = figures_of_notebook(NOTEBOOKS / f"{name}.ipynb", given)
-    assert found and {figure: faults for figure, faults in found.items() if faults} == {}

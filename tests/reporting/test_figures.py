@@ -64,6 +64,11 @@ def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path: Path) -> None:
 
     one, two = draw(tmp_path / "1"), draw(tmp_path / "2")
     assert one == two
+    fig, ax = figures.new_figure(4, 3)
+    ax.plot([1, 2, 3], label="ü")
+    engine = fig.get_layout_engine()
+    assert figures.save_figure(fig, tmp_path / "3", "a") == one[0]
+    assert fig.get_layout_engine() is engine, "it can be added to, and saved once more"
     assert b"Date" not in one[1] and b"matplotlib" not in one[0].lower()
 
 
@@ -80,6 +85,7 @@ def test_subjects_that_share_a_figure_have_different_colours() -> None:
 
 
 def test_a_first_look_draws_letters_as_shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(figures.QUICK, raising=False)
     figure, axes = figures.new_figure()
     axes.set_title("Error in metres")
     figures.save_figure(figure, tmp_path, "whole")

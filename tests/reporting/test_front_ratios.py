@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 import re
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import cv2
@@ -14,22 +14,31 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildlab.evaluation.printed import AGREES, DIFFERS, NOT_JUDGED, POSSIBLE, TOO_VAGUE
+from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.reporting.front import ratios
 from wildlab.reporting.front.glimpse import MOST_PIXELS, WIDE, read_glimpse, smaller
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Number
 
-VERDICTS = (AGREES, POSSIBLE, TOO_VAGUE, DIFFERS, NOT_JUDGED, FIRST_LOOK)
+CLOSE, NOT_CLOSE = Closeness.CLOSE, Closeness.NOT_CLOSE
+WITHIN, OUTSIDE = Compatibility.WITHIN, Compatibility.OUTSIDE
+VERDICTS = (*Closeness, FIRST_LOOK)
 
 
-def number(ratio: float | None, verdict: str = AGREES) -> Number:
-    return Number("error", "kf", "m", "H", 1.0, 1, ratio, None, None, None, verdict, ratio=ratio)
+def number(
+    ratio: float | None, verdict: str = CLOSE, inside: Compatibility = WITHIN, fitted: str = ""
+) -> Number:
+    waiting = verdict if verdict in (FIRST_LOOK, MISSING) else ""
+    near = CLOSE if waiting else Closeness(verdict)
+    compared = Comparison(near, inside, ratio, 0.0, fitted=fitted)
+    return Number(
+        "error", "kf", "m", "H", 1.0, 1, ratio, None, None, compared, waiting, ratio=ratio, fitted=fitted
+    )
 
 
 def on_axis(ratio: float, width: float) -> float:
     """A logarithmic axis from an eighth to eight, with room for half a mark at its ends."""
     share = (math.log2(min(max(ratio, 1 / 8), 8)) + 3) / 6
-    return 4.6 + share * (width - 9.2)
+    return 6.0 + share * (width - 12.0)
 
 
 @settings(max_examples=60)
@@ -39,10 +48,10 @@ def on_axis(ratio: float, width: float) -> float:
 )
 def test_every_number_is_drawn_where_its_ratio_lies(given_: list[tuple[float, str]], levels: int) -> None:
     marks = ratios.arranged([number(*one) for one in given_], 320.0, levels)
-    assert sorted((round(one.x, 6), one.verdict, one.beyond) for one in marks) == sorted(
+    assert sorted((round(one.x, 6), one.closeness, one.beyond) for one in marks) == sorted(
         (round(on_axis(ratio, 320.0), 6), verdict, (ratio > 8) - (ratio < 1 / 8)) for ratio, verdict in given_
     )
-    assert {one.y for one in marks} <= {8.2 * k for k in range(-(levels // 2), levels // 2 + 1)}
+    assert {one.y for one in marks} <= {8.6 * k for k in range(-(levels // 2), levels // 2 + 1)}
 
 
 @settings(max_examples=60)
@@ -57,12 +66,12 @@ def test_no_mark_hides_another_where_there_is_room(given_: list[float]) -> None:
 
 
 def test_the_plot_shows_what_has_a_ratio_and_nothing_else() -> None:
-    numbers = [number(2.0), number(0.01, DIFFERS), number(None), number(1.0, MISSING), number(-1.0)]
+    numbers = [number(2.0), number(0.01, NOT_CLOSE), number(None), number(1.0, MISSING), number(-1.0)]
     drawn = ratios.plot(numbers, alt="<two>", width=320.0)
-    at = dict(re.findall(r'class="(same|off|maybe|vague|none|look)" transform="translate\(([\d.]+) ', drawn))
-    assert {name: float(x) for name, x in at.items()} == {
+    at = dict(re.findall(r'translate\(([\d.]+) [^>]*><g class="mark \w*"><path class="(\w+)"', drawn))
+    assert {name: float(x) for x, name in at.items()} == {
         "same": pytest.approx(on_axis(2.0, 320.0), abs=0.06),
-        "off": pytest.approx(4.6, abs=0.06),
+        "off": pytest.approx(6.0, abs=0.06),
     }
     assert drawn.count('class="far"') == 1 and 'aria-label="&lt;two&gt;"' in drawn
     # The shaded margin ends where a ratio of 1.25 lies.
@@ -73,18 +82,24 @@ def test_the_plot_shows_what_has_a_ratio_and_nothing_else() -> None:
     )
 
 
-def test_verdicts_differ_in_shape_as_well_as_in_colour() -> None:
+def test_both_answers_show_without_colour() -> None:
     names, paths = zip(*ratios.SHAPES.values(), strict=True)
-    assert set(ratios.SHAPES) == set(VERDICTS) and len(set(names)) == len(set(paths)) == 6
-    for name in names:
-        assert re.search(rf"\.{name}[,{{]", ratios.STYLE)
-    said = ratios.legend([AGREES, DIFFERS])
-    assert AGREES in said and DIFFERS in said and POSSIBLE not in said and ratios.legend([]) == ""
+    assert set(ratios.SHAPES) == set(VERDICTS) and len(set(names)) == len(set(paths)) == 5
+    numbers = [number(1.0, *both, how) for both in product(Closeness, Compatibility) for how in ("", "x")]
+    drawn: dict[str, set[object]] = {}
+    for one in numbers:
+        symbol = ratios.symbol(*one.answers, bool(one.fitted))
+        bare = re.sub(r'class="mark \w*"', "", symbol)
+        drawn.setdefault(bare, set()).add((one.answers[0], one.answers[1] == OUTSIDE, bool(one.fitted)))
+    assert len(drawn) == 16 and all(len(one) == 1 for one in drawn.values())
+    said = ratios.legend([number(1.0), number(2.0, NOT_CLOSE, OUTSIDE)])
+    assert CLOSE in said and NOT_CLOSE in said and "outside" in said and "cannot tell" not in said
+    assert "fitted" not in said and ratios.legend([]) == ""
 
 
 def test_the_words_below_stand_at_their_ratios() -> None:
     for left, words in re.findall(r'left:([\d.]+)%">([^<]+)<', ratios.ticks()):
-        ratio = {"⅛": 1 / 8, "¼": 1 / 4, "½": 1 / 2, "as printed": 1, "2×": 2, "4×": 4, "8×": 8}[words]
+        ratio = {"⅛": 1 / 8, "¼": 1 / 4, "½": 1 / 2, "published": 1, "2×": 2, "4×": 4, "8×": 8}[words]
         assert float(left) * 3.2 == pytest.approx(on_axis(ratio, 320), abs=0.02)
 
 

@@ -40,12 +40,12 @@ def test_noise_is_shown_in_degrees():
     stated = {
         "position_horizontal_m": 1,
         "position_vertical_m": 1,
-        "roll_deg": 1,
-        "yaw_deg": 1,
+        "tilt_deg": 1,
+        "heading_deg": 1,
         "pixel_px": 1,
     }
     table = georeferencing.noise_table(noise, stated).set_index("what")
-    assert table.loc["yaw", "estimated"] == pytest.approx(2.0)
+    assert table.loc["heading", "estimated"] == pytest.approx(2.0)
     assert len(table) == len(KINDS)
 
 

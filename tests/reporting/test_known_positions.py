@@ -9,12 +9,13 @@ import pytest
 from wildlab.evaluation.blocks import Neighbours
 from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
+from wildlab.evaluation.runs import Interval
 from wildlab.reporting import georeferencing as words
 from wildlab.reporting import georeferencing_left as left
 from wildlab.reporting.georeferencing_sections import summary_section
 from wildlab.reporting.known_positions import EXACT, known_positions, offset_sentence
 
-SCATTER = Scatter(0.1, 0.3, 0.6, *(np.array([a, a]) for a in (0.6, 3.0, 1.2)))
+SCATTER = Scatter(0.1, 0.3, 0.6, *(np.array([a, a]) for a in (0.6, 3.0, 1.2)), 4.7)
 
 
 def flown(kind="logged", **columns):
@@ -59,7 +60,7 @@ def test_what_known_positions_err_by_is_said_of_marks_and_tracks_apart():
 
 def test_clicks_and_lens_are_not_blamed_for_the_target_s_receiver():
     noise = PoseNoise(dict.fromkeys(KINDS, 0.1), dict.fromkeys(KINDS, 1.5))
-    assumed = dict.fromkeys(("position_horizontal_m", "position_vertical_m", "roll_deg", "yaw_deg"), 1.0)
+    assumed = dict.fromkeys(("position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg"), 1.0)
     for known in (WALK, MARKS, EXACT):
         table = words.noise_table(noise, {**assumed, "pixel_px": 1.0}, known)
         parts = " ".join(left.remaining_parts(SCATTER, known))
@@ -88,7 +89,7 @@ def corrected(offset, kind="logged"):
 
 def test_an_offset_of_the_camera_s_clock_is_said_to_flatter():
     assert "corrected by +1.58 s beside a zone of -12.75 h" in corrected(-45898.42)
-    assert "corrected by -0.40 s, and nothing says" in corrected(-0.4) and "flatter" in corrected(-0.4)
+    assert "corrected by -0.40 s, and flight.toml" in corrected(-0.4) and "flatter" in corrected(-0.4)
     # A zone is read from the hours of the flight, and no point is fitted.
     assert corrected(0.0) == corrected(-45900.0) == corrected(0.4, "twin") == ""
 
@@ -97,9 +98,11 @@ def test_an_offset_of_the_camera_s_clock_is_said_to_flatter():
 def test_the_first_sentences_have_the_offset(clock):
     found = SimpleNamespace(
         summary=summarise(np.ones((20, 2))), scored=range(20), diagnosis=None, lost=0,
-        ellipses=SimpleNamespace(word="honest"),
+        ellipses=SimpleNamespace(word="honest", factor=Interval(1.0, 0.9, 1.1)),
     )  # fmt: skip
     said = []
-    report = SimpleNamespace(summary=lambda sentences, **_: said.extend(sentences))
+    report = SimpleNamespace(
+        summary=lambda sentences, **_: said.extend(sentences), metric=lambda *_, **__: None
+    )
     summary_section(report, found, clock=clock)
     assert said[1:] == [one for one in [clock] if one]

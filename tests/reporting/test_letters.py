@@ -8,12 +8,13 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+import pytest
 from fontTools.pens.recordingPen import DecomposingRecordingPen
 from fontTools.subset import Options
 from fontTools.ttLib import TTFont
 from matplotlib.font_manager import findfont
 
-from wildlab.reporting.figures import new_figure, save_figure
+from wildlab.reporting.figures import QUICK, new_figure, save_figure
 
 
 def fonts_in(pdf: bytes) -> list[TTFont]:
@@ -35,7 +36,10 @@ def outline(font: TTFont, name: str) -> list[object]:
     return list(pen.value)
 
 
-def test_an_embedded_font_has_the_letters_and_not_what_sets_them(tmp_path: Path) -> None:
+def test_an_embedded_font_has_the_letters_and_not_what_sets_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(QUICK, raising=False)
     usual = list(Options._drop_tables_default)
     figure, ax = new_figure()
     ax.plot(np.arange(3))

@@ -47,7 +47,7 @@ def lives(**changes: Any) -> Identities:
         "breaks": 0,
         "false_tracks_per_minute": 0.0,
         "targets": {"a": TargetLife(61, 1.0, 0.0, 0, 0), "b": TargetLife(61, 0.95, 2.0, 0, 0)},
-        "tracks": {0: TrackLife(61, 61, 2.0, False), 1: TrackLife(61, 61, 2.2, False)},
+        "tracks": {0: TrackLife(61, 61, 2.0, False, 61), 1: TrackLife(61, 61, 2.2, False, 61)},
     }
     return Identities(**(base | changes))
 
@@ -68,7 +68,7 @@ def test_all_followed_by_one_track_each_is_sound() -> None:
     assert "a track is on nothing at 0 % of the looks" in text
 
 
-FALSE = {0: TrackLife(9, 9, 2.0, False), 1: TrackLife(9, 0, np.nan, True)}
+FALSE = {0: TrackLife(9, 9, 2.0, False, 9), 1: TrackLife(9, 0, np.nan, True)}
 SHORT, NEVER = TargetLife(61, 0.7, 0.0, 0, 0), TargetLife(61, 0.0, np.nan, 0, 0)
 
 
@@ -84,16 +84,22 @@ SHORT, NEVER = TargetLife(61, 0.7, 0.0, 0, 0), TargetLife(61, 0.0, np.nan, 0, 0)
             "Tracks mostly on nothing: 1 of 2",
         ),
         (
-            {"tracks": {0: TrackLife(9, 9, 9.0, False)}},
+            {"tracks": {0: TrackLife(9, 9, 9.0, False, 9)}},
             "warn",
             "look closer",
             "Tracks farther off than they say: 1 of 1",
         ),
         (
-            {"tracks": {0: TrackLife(9, 9, 0.5, False)}},
+            {"tracks": {0: TrackLife(9, 9, 0.5, False, 9)}},
             "warn",
             "look closer",
             "Tracks nearer than they say: 1 of 1",
+        ),
+        (
+            {"tracks": {0: TrackLife(9, 4, 9.0, False, 4), 1: TrackLife(9, 9, np.nan, False, 0)}},
+            "warn",
+            "look closer",
+            "No track was on a target at 5 looks: its covariance is not judged",
         ),
         ({"targets": {"a": SHORT}}, "warn", "look closer", "Targets without a track at more than a tenth"),
         ({"targets": {"a": NEVER}}, "bad", "targets lost", "Targets never followed: 1 of 1"),
@@ -142,7 +148,7 @@ def test_a_track_that_goes_on_without_its_target_is_seen() -> None:
     gone = lives(
         gospa=[on] * 60 + [off] * 40,
         targets={"a": TargetLife(60, 1.0, 0.0, 0, 0)},
-        tracks={0: TrackLife(100, 60, 2.0, False)},
+        tracks={0: TrackLife(100, 60, 2.0, False, 60)},
     )
     text, level, verdict = said(followed(looks=100), gone)
     assert level == "warn" and verdict[1] == "A track is on nothing at 40 % of the looks."

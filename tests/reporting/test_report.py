@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +17,6 @@ from wildlab.reporting.report import Report, open_report
 
 def report(out: Path | None = None, study: str = "consistency-bounds") -> Report:
     return open_report(study=study, kind="computed", seed=1, out=str(out or ""))
-
-
-def test_another_environment_is_refused() -> None:
-    with pytest.raises(WildlabError, match="another Python environment"):
-        open_report(study="s", kind="twin", expected_prefix="/somewhere/else")
-    open_report(study="s", kind="twin", expected_prefix=sys.prefix)
 
 
 def test_only_the_name_of_a_flight_folder_is_shown() -> None:
@@ -105,3 +98,19 @@ def test_mistakes_are_sentences() -> None:
         report().summary([])
     with pytest.raises(WildlabError, match="kind 'dream'"):
         open_report(study="s", kind="dream")
+
+
+def test_a_number_that_is_not_known_is_nowhere_on_a_page(tmp_path: Path) -> None:
+    one, nan = report(tmp_path), float("nan")
+    fig, ax = new_figure(5, 3)
+    ax.set_title(f"It is {nan:.1f} m off")
+    one.summary([f"It is {nan:.1f} m off.", "Two flights."])
+    one.tiles([(f"{nan:.1f} m", "off"), ("2", "flights")])
+    one.section("How far off", f"By {nan:.0f} m. There are two.")
+    one.points([f"{nan:.2f} m", "It is so."])
+    one.table(pd.DataFrame({"a": [f"{nan:.1f} to {nan:.1f}", "1 to 2"]}), caption=f"Of {nan:.0f} flights.")
+    one.figure(fig, name="off", alt=f"{nan:.1f} m", caption=f"{nan:.1f} m.")
+    page = BeautifulSoup("".join(one.parts), "html.parser")
+    assert "nan" not in page.get_text() and page.img is not None and page.img["alt"]
+    assert ax.get_title(loc="left") == "" == ax.get_title()
+    assert {"Two flights.", "2", "There are two.", "It is so.", "1 to 2", "–"} <= set(page.stripped_strings)

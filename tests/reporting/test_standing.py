@@ -2,47 +2,77 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.evaluation.printed import AGREES, DIFFERS, NOT_JUDGED, POSSIBLE, TOO_VAGUE
+from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, UNDECIDED
-from wildlab.reporting.standing import ALONE, AS_PRINTED, IN_PART, LEVELS, NOT_AS_PRINTED, OPEN, standing
+from wildlab.reporting.standing import (
+    ALONE,
+    AS_PUBLISHED,
+    IN_PART,
+    LEVELS,
+    NOT_AS_PUBLISHED,
+    OPEN,
+    standing,
+)
 
-NUMBERS = st.lists(st.sampled_from([AGREES, POSSIBLE, DIFFERS, TOO_VAGUE, NOT_JUDGED]))
+
+def number(closeness: Closeness, compatibility: Compatibility, fitted: str = "") -> Comparison:
+    return Comparison(closeness, compatibility, 1.0, 0.0, fitted=fitted)
+
+
+GOOD = number(Closeness.CLOSE, Compatibility.WITHIN)
+BAD = number(Closeness.NOT_CLOSE, Compatibility.OUTSIDE)
+VAGUE = number(Closeness.CANNOT_TELL, Compatibility.NO_POWER)
+POSSIBLE = number(Closeness.NOT_CLOSE, Compatibility.WITHIN)
+UNJUDGED = number(Closeness.NOT_JUDGED, Compatibility.NOT_JUDGED)
+MISSED = number(Closeness.NOT_CLOSE, Compatibility.OUTSIDE, "chosen by it")
+NUMBERS = st.lists(st.sampled_from([GOOD, BAD, VAGUE, POSSIBLE, UNJUDGED, MISSED]))
 CLAIMS = st.lists(st.sampled_from([HOLDS, MOSTLY, FAILS, MOSTLY_NOT, UNDECIDED, NO_PREMISE]))
 
 
 @pytest.mark.parametrize(
     ("numbers", "claims", "word"),
     [
-        ([AGREES], [HOLDS], AS_PRINTED),
-        ([AGREES, NOT_JUDGED], [UNDECIDED], AS_PRINTED),
-        ([AGREES, DIFFERS], [], IN_PART),
-        ([AGREES], [FAILS, MOSTLY_NOT], NOT_AS_PRINTED),
-        ([TOO_VAGUE], [], OPEN),
-        ([NOT_JUDGED], [NO_PREMISE], ALONE),
+        ([GOOD], [HOLDS], AS_PUBLISHED),
+        ([GOOD, UNJUDGED], [UNDECIDED], AS_PUBLISHED),
+        ([GOOD, BAD], [], IN_PART),
+        ([GOOD], [FAILS, MOSTLY_NOT], NOT_AS_PUBLISHED),
+        ([], [HOLDS, MOSTLY], IN_PART),
+        ([POSSIBLE] * 5, [], OPEN),
+        ([VAGUE] * 9 + [GOOD], [], OPEN),
+        ([UNJUDGED], [NO_PREMISE], ALONE),
+        ([MISSED], [], ALONE),
     ],
 )
-def test_words(numbers: list[str], claims: list[str], word: str) -> None:
+def test_words(numbers: list[Comparison], claims: list[str], word: str) -> None:
     found = standing(numbers, claims)
     assert found.word == word and found.level == LEVELS[word]
 
 
 @given(NUMBERS, CLAIMS)
-def test_what_tells_nothing_changes_no_word(numbers: list[str], claims: list[str]) -> None:
-    found = standing(numbers, claims)
-    if found.word not in (OPEN, ALONE):
-        assert (
-            standing([*numbers, TOO_VAGUE, NOT_JUDGED], [*claims, UNDECIDED, NO_PREMISE]).word == found.word
-        )
+def test_counts_add_up_to_their_totals(numbers: list[Comparison], claims: list[str]) -> None:
+    totals = {"number": 0, "fitted number": 0, "claim": 0}
+    for part in standing(numbers, claims).reason.rstrip(".").split("; "):
+        if found := re.fullmatch(r"(\d+) (.*?)s?: (.*)", part):
+            totals[found[2]] = int(found[1])
+            assert int(found[1]) == sum(int(one) for one in re.findall(r"(?:^|, )(\d+) ", found[3]))
+    fitted = sum(bool(one.fitted) for one in numbers)
+    assert list(totals.values()) == [len(numbers) - fitted, fitted, len(claims)]
 
 
 @given(NUMBERS, CLAIMS)
-def test_one_more_that_differs_never_betters_the_word(numbers: list[str], claims: list[str]) -> None:
-    order = [NOT_AS_PRINTED, IN_PART, AS_PRINTED]
-    before, after = standing(numbers, claims).word, standing([*numbers, DIFFERS], claims).word
-    assert after in order[:2]
-    if before in order:
-        assert order.index(after) <= order.index(before)
+def test_one_more_that_is_contradicted_or_open_never_betters_the_word(
+    numbers: list[Comparison], claims: list[str]
+) -> None:
+    order = [NOT_AS_PUBLISHED, IN_PART, AS_PUBLISHED]
+    before = standing(numbers, claims).word
+    after = standing([*numbers, BAD], claims).word
+    assert after != AS_PUBLISHED and (before not in order or after not in order or
+                                      order.index(after) <= order.index(before))  # fmt: skip
+    assert standing([*numbers, VAGUE], claims).word in (before, OPEN)
+    assert standing([*numbers, UNJUDGED, MISSED], [*claims, NO_PREMISE]).word == before

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.reporting.text import escape, inline, maths, number, prose, slug
+from wildlab.reporting.text import escape, inline, known, maths, number, percent, percent_between, prose, slug
 
 
 @given(st.text())
@@ -61,3 +61,20 @@ def test_numbers(value: object, digits: int | None, shown: str) -> None:
 def test_slug() -> None:
     assert slug("What most limits it?") == "what-most-limits-it"
     assert slug("<>") == "part"
+
+
+@given(st.floats(1e-8, 1 - 1e-8), st.integers(0, 2))
+def test_a_share_is_rounded_by_less_than_itself_and_never_to_all_or_none(share: float, digits: int) -> None:
+    shown = float(percent(share, digits).removesuffix(" %")) / 100
+    assert 0 < shown < 1
+    assert abs(shown - share) <= max(0.5 * 10.0 ** -(digits + 2), min(share, 1 - share)) + 1e-12
+
+
+def test_what_is_not_known_is_not_said() -> None:
+    assert percent(0.004, 0) == "0.4 %"
+    for words in (percent(math.nan), percent(math.inf), percent_between([math.nan] * 3), f"{math.nan:.1f} m"):
+        assert known(words) == "" and known(f"Two. It is {words} off; 3 m are left. H (5.1) is kept.") == (
+            "Two. H (5.1) is kept."
+        )
+    for said in ("Tirza Nan-Ek and nana-nan5", "", "It is 3.1 m."):
+        assert known(said) == said

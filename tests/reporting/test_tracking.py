@@ -8,7 +8,7 @@ import pytest
 
 from wildlab.evaluation.consistency import Average
 from wildlab.pipeline.following.beliefs import Said
-from wildlab.pipeline.following.judged import Apart
+from wildlab.pipeline.following.judged import Apart, leading_filter
 from wildlab.reporting import tracking as words
 
 
@@ -27,15 +27,32 @@ def rows(**changes: object) -> pd.DataFrame:
     return pd.DataFrame([white, schmidt])
 
 
-def test_the_asked_filter_leads_whatever_came_out() -> None:
-    said, level = words.summary(rows(), [], None)
-    assert level == "good"
+def test_the_best_consistent_filter_leads() -> None:
+    said, verdict = words.summary(rows(), [], None)
+    assert verdict.colour == "good"
     assert said[0].startswith("The track of the filter with considered errors (Schmidt) is off by 4.0 m")
     assert "about as large as stated: consistent" in said[0]
     assert "6.3 times as large as stated: overconfident; both are about as far off" in said[1]
-    worse, level = words.summary(rows(nees=50.0, verdict="overconfident", rmse=8.0), [], None)
-    assert level == "bad" and "5.0 times as large as stated: overconfident" in worse[0]
-    assert "it is 0.50 times as far off" in worse[1]
+    # However much larger its error is than that of one which is not consistent.
+    assert leading_filter(rows(rmse=8.0)) == "schmidt"
+    both = rows().assign(verdict="consistent", nees=2.0, rmse=[3.9, 4.0])
+    assert leading_filter(both) == "ekf" == leading_filter(both.iloc[::-1])
+
+
+def test_where_no_filter_is_consistent_it_is_said_and_the_least_error_leads() -> None:
+    worse, verdict = words.summary(rows(nees=50.0, verdict="overconfident", rmse=8.0), [], None)
+    assert verdict.value == "look closer" and worse[0] == words.NONE_CONSISTENT
+    assert worse[1].startswith("The track of the filter with white noise (EKF) is off by 4.0 m")
+    assert leading_filter(rows(nees=50.0, verdict="overconfident", rmse=2.0)) == "schmidt"
+    lost = rows(rmse=np.nan, nees=np.nan, verdict="not judged")
+    assert leading_filter(lost) == "ekf"
+
+
+def test_without_truth_the_filter_leads_whose_innovations_are_as_it_expects() -> None:
+    blind = rows().assign(compared=0, rmse=np.nan, nees=np.nan, verdict="not judged", nis=[1.99, 9.0])
+    assert leading_filter(blind.assign(nis_verdict=["consistent", "overconfident"])) == "ekf"
+    assert leading_filter(blind.assign(nis_verdict=["overconfident", "consistent"])) == "schmidt"
+    assert leading_filter(blind.assign(nis_verdict="overconfident", nis=[9.0, 1.0])) == "schmidt"
 
 
 def test_a_smoothed_track_without_innovations_is_not_a_lost_one() -> None:
@@ -53,7 +70,7 @@ def test_without_truth_surprises_and_sensors_are_spoken_of() -> None:
     blind = rows().assign(compared=0, nees=np.nan, verdict="not judged")
     pair = Apart("boat", "schmidt", "radar", "lidar", 3.0, 90, Average(8.0, 1.5, 2.5, 90, 60.0))
     said, level = words.summary(blind, [pair], None)
-    assert level == "warn" and "cannot be said without" in said[1]
+    assert level.colour == "warn" and "cannot be said without" in said[1]
     assert (
         said[2]
         == "radar and lidar put boat 3.0 m apart (root mean square), 2.0 times as far as their tracks state."
@@ -76,9 +93,9 @@ def test_what_is_assumed_is_counted() -> None:
 
 def test_what_few_values_say_is_neither_green_nor_red() -> None:
     said, level = words.summary(rows(nees_worth=4.0), [], None)
-    assert "consistent, on few independent values." in said[0] and level == "neutral"
+    assert "consistent, on few independent values." in said[0] and level.colour == "neutral"
     said, level = words.summary(rows(nees=5.3, verdict="overconfident"), [], None)
-    assert "overconfident, on few independent values." in said[0] and level == "warn"
+    assert "overconfident, on few independent values." in said[1] and level.colour == "warn"
 
 
 def test_time_without_the_target_is_a_number_of_its_own() -> None:
@@ -106,7 +123,7 @@ def test_all_sensors_together_stand_beside_the_best_one(rmse: float, level: str,
     both = pd.concat([rows(), rows(rmse=rmse, nees=900.0, verdict="overconfident").assign(
         sensor="together", kind="together")])  # fmt: skip
     said, found = words.summary(both, [], None)
-    assert said[0].startswith("The track of") and "is off by 4.0 m" in said[0] and found == level
+    assert said[0].startswith("The track of") and "is off by 4.0 m" in said[0] and found.colour == level
     assert said[1].startswith(
         f"All sensors together are off by {words.length(rmse)} from boat, radar alone by"
     )
@@ -119,9 +136,9 @@ def test_a_verdict_on_little_says_how_little() -> None:
         compared=0, nees=np.nan, verdict="not judged", nis=2.42, nis_verdict="overconfident"
     )
     said, level = words.summary(blind[blind["filter"] == "ekf"], [], None)
-    assert level == "warn"
+    assert level.colour == "warn"
     assert "as it states (1.10 times; more than by chance all the same): overconfident" in said[0]
     fine = blind.assign(nis_verdict="consistent")
     assert "times" not in words.summary(fine[fine["filter"] == "ekf"], [], None)[0][0]
     near, _ = words.summary(rows(nees=2.4, verdict="overconfident"), [], None)
-    assert "about as large as stated (1.10 times; more than by chance all the same): overconfident" in near[0]
+    assert "about as large as stated (1.10 times; more than by chance all the same): overconfident" in near[1]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from wildlab.reporting.verdicts import Comparison, comparison_words
+from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
+from wildlab.reporting.verdicts import comparison_words
 
 
 @pytest.mark.parametrize(
@@ -18,4 +19,5 @@ from wildlab.reporting.verdicts import Comparison, comparison_words
     ],
 )
 def test_a_small_difference_is_not_said_as_none(ratio: float | None, difference: float, words: str) -> None:
-    assert comparison_words(Comparison("agrees", ratio, difference)) == words
+    compared = Comparison(Closeness.CLOSE, Compatibility.WITHIN, ratio, difference)
+    assert comparison_words(compared) == words

@@ -18,13 +18,12 @@ from tests.sharing.canary import EPOCH, HASH, HERE, START, canary, place, veloci
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.manifest_parts import LocationsPart
-from wildlab.flight.store import Flight, save_flight
+from wildlab.flight.store import PREFERRED, Flight, save_flight
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.strapdown import integrate_strapdown
 from wildlab.navigation.timeline import ImuSamples
 from wildlab.pipeline.georeference import observe
 from wildlab.pipeline.navigation_errors import REFERENCES, reference_of
-from wildlab.pipeline.overviews.overview import PREFERRED
 from wildlab.sharing.generalise import NOWHERE, QUARTER, Generalised, first_stamp, generalise, new_origin
 from wildlab.sharing.tiers import treatment_of
 

@@ -8,6 +8,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
+from wildlab.runner.record.digests import seal
 from wildlab.runner.track_many import NOTEBOOK
 from wildlab.sharing.reports import sources_of
 
@@ -16,10 +17,10 @@ def report(folder: Path, *, notebook: str = "overview.ipynb", tables: str = "x")
     """One that is done, on a flight of this name."""
     folder.mkdir(parents=True)
     (folder / "report.html").write_text("<p>x</p>", encoding="utf-8")
-    write_json(folder / "status.json", {"state": "done"})
     flight = {"name": "kifaru-ridge", "kind": "logged", "files": {"nav": tables}}
     told = {"flight": flight, "parameters": {"source": folder.name}, "notebook": {"file": notebook}}
     write_json(folder / "provenance.json", told)
+    seal(folder, {"state": "done"}, ("provenance.json",))
 
 
 def advice(folder: Path) -> str:

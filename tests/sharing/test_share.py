@@ -61,7 +61,7 @@ def everything(flight: Path) -> str:
 def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a flight and a report on it; reports on copies are made by a stand-in."""
     monkeypatch.chdir(tmp_path)
-    flight = tmp_path / "flights" / "mine"
+    flight = tmp_path / "flights" / "kifaru-ridge"
     save_flight(canary(locations={"category": 2}), flight)
     write_report(tmp_path / "reports" / "kifaru-ridge", flight, everything(flight))
 
@@ -109,6 +109,7 @@ def test_the_sender_is_told_in_a_file_that_others_cannot_read(made: Path) -> Non
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_made_twice_it_is_the_same_to_the_byte(made: Path) -> None:
     one = share(made / "reports" / "kifaru-ridge", out=made / "a.html").file.read_bytes()
     assert share(made / "reports" / "kifaru-ridge", out=made / "b.html").file.read_bytes() == one
@@ -161,6 +162,11 @@ def test_a_name_of_the_file_that_gives_the_place_away_is_refused(made: Path) -> 
         share(made / "reports" / "kifaru-ridge", out=made / "kifaru-ridge.html")
     with pytest.raises(RunFailed, match="the name of the file"):
         share(made / "reports" / "kifaru-ridge", out=made / "olifants.zip", zipped=True)
+    # That of its folder, by which reports are called, is a secret beside the one that it states.
+    flight = (made / "flights" / "kifaru-ridge").rename(made / "flights" / "mopani")
+    write_report(made / "reports" / "mopani", flight, "")
+    with pytest.raises(RunFailed, match="the name of the file"):
+        share(made / "reports" / "mopani", out=made / "mopani.html")
     assert not list(made.glob("*.html")) and not list(made.glob("*.zip"))
 
 
@@ -201,7 +207,7 @@ def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(
     assert "half a report" not in text and "Letaba" not in text
     assert "There is no report on navigation in the copy, as there is none here." in "\n".join(copy.lines)
     here = made / "reports" / "kifaru-ridge"
-    write_report(made / "reports" / "kifaru-ridge-navigation", made / "flights" / "mine", "x")
+    write_report(made / "reports" / "kifaru-ridge-navigation", made / "flights" / "kifaru-ridge", "x")
     with pytest.raises(RunFailed, match="flight-navigation could not be made from generalised data"):
         share(here, overwrite=True)
 
@@ -210,7 +216,7 @@ def test_without_its_flight_a_report_is_refused_with_what_to_type(made: Path) ->
     (made / "flights").rename(made / "elsewhere")
     with pytest.raises(WildlabError, match=r"wildlab share .*kifaru-ridge --flight FOLDER"):
         share(made / "reports" / "kifaru-ridge")
-    assert share(made / "reports" / "kifaru-ridge", flight=made / "elsewhere" / "mine").file.is_file()
+    assert share(made / "reports" / "kifaru-ridge", flight=made / "elsewhere" / "kifaru-ridge").file.is_file()
 
 
 def test_another_flight_is_refused(made: Path) -> None:
@@ -224,7 +230,7 @@ def test_another_flight_is_refused(made: Path) -> None:
 
 def test_a_category_that_was_stated_later_counts(made: Path) -> None:
     """`flight.toml` may change without another evaluation; tables may not."""
-    path = made / "flights" / "mine" / "flight.toml"
+    path = made / "flights" / "kifaru-ridge" / "flight.toml"
     path.write_text(
         path.read_text(encoding="utf-8").replace("category = 2", "category = 1"), encoding="utf-8"
     )
@@ -242,6 +248,7 @@ def test_numbers_that_differ_are_said(made: Path) -> None:
     assert any("error of logged-pose is 3.315, in the copy 3.25" in line for line in copy.lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("original", "against", "said"),
     [
@@ -347,9 +354,11 @@ def test_a_twin_that_does_not_come_with_wildlab_is_hidden_like_a_flight(made: Pa
     own = canary(locations={"category": 2})
     data = own.manifest.model_dump() | {"kind": "twin", "twin": {"name": "Olifants-patrol", "seed": 873165}}
     save_flight(
-        replace(own, manifest=Manifest.model_validate(data)), made / "flights" / "mine", overwrite=True
+        replace(own, manifest=Manifest.model_validate(data)),
+        made / "flights" / "kifaru-ridge",
+        overwrite=True,
     )
-    write_report(made / "more" / "kifaru-ridge", made / "flights" / "mine", "")
+    write_report(made / "more" / "kifaru-ridge", made / "flights" / "kifaru-ridge", "")
     text = share(made / "more" / "kifaru-ridge").file.read_text(encoding="utf-8")
     assert all(secret not in text for secret in SECRETS) and "24.9° S" in text
 
@@ -404,7 +413,7 @@ def test_a_flight_is_named_for_one_flights_report_alone(made: Path) -> None:
     write_json(folder / "provenance.json", {"flight": None, "parameters": {}})
     write_json(folder / "status.json", {"state": "done"})
     with pytest.raises(WildlabError, match="Leave --flight out"):
-        share(folder, flight=made / "flights" / "mine")
+        share(folder, flight=made / "flights" / "kifaru-ridge")
 
 
 def test_names_that_are_neutral_already_are_no_leak(
@@ -415,8 +424,8 @@ def test_names_that_are_neutral_already_are_no_leak(
         table["target_id"] = table["target_id"].map(
             {"Sarah": "target-2", "Thandi": "target-3", "7": "target-1"}
         )
-    save_flight(flight, made / "flights" / "mine", overwrite=True)
-    write_report(made / "more" / "kifaru-ridge", made / "flights" / "mine", "")
+    save_flight(flight, made / "flights" / "kifaru-ridge", overwrite=True)
+    write_report(made / "more" / "kifaru-ridge", made / "flights" / "kifaru-ridge", "")
     text = share(made / "more" / "kifaru-ridge").file.read_text(encoding="utf-8")
     assert "target-3" in text
 
@@ -426,8 +435,8 @@ def test_the_true_reports_of_a_canary(tmp_path: Path, monkeypatch: pytest.Monkey
     """Through the notebooks, twice: the numbers of the sender's own report, no secret, the same bytes."""
     monkeypatch.chdir(tmp_path)
     flight = canary(locations={"category": 3}, imu=False)
-    save_flight(flight, tmp_path / "flights" / "mine")
-    redrawn.evaluate_flight(tmp_path / "flights" / "mine", reports=tmp_path / "reports")
+    save_flight(flight, tmp_path / "flights" / "kifaru-ridge")
+    redrawn.evaluate_flight(tmp_path / "flights" / "kifaru-ridge", reports=tmp_path / "reports")
     one = share(tmp_path / "reports" / "kifaru-ridge", out=tmp_path / "a.html")
     other = share(tmp_path / "reports" / "kifaru-ridge", out=tmp_path / "b.html")
     text = one.file.read_text(encoding="utf-8")

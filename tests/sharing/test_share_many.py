@@ -110,7 +110,7 @@ def write_report(folder: Path, flight: Path, body: str, told: dict[str, Any], no
 def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a flight, an overview and a report on many targets; stand-ins make them on copies."""
     monkeypatch.chdir(tmp_path)
-    flight = tmp_path / "flights" / "mine"
+    flight = tmp_path / "flights" / "kifaru-drift"
     save_flight(telling(), flight)
     reports = tmp_path / "reports"
     write_report(reports / "kifaru-drift-overview", flight, everything(flight), {}, "overview.ipynb")
@@ -241,7 +241,7 @@ def test_one_that_is_refused_on_the_copy_stops_it_with_what_to_do(
 
 def test_one_that_was_made_from_other_tables_is_told_to_the_sender(made: Path) -> None:
     """Followed, then imported and evaluated anew: the flight that is there is the one that is shared."""
-    flight = made / "flights" / "mine"
+    flight = made / "flights" / "kifaru-drift"
     save_flight(telling(seconds=11.0), flight, overwrite=True)
     for folder in (made / "reports").iterdir():
         if folder.name.endswith("-overview"):
@@ -278,7 +278,7 @@ def unpacked(data: bytes) -> bytes:
 def test_the_true_report_on_many_targets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Through the notebooks, twice: the sender's own numbers, no secret in any byte, the same bytes."""
     monkeypatch.chdir(tmp_path)
-    flight = tmp_path / "flights" / "mine"
+    flight = tmp_path / "flights" / "kifaru-drift"
     save_flight(telling(40.0), flight)
     file = tmp_path / "settings.toml"
     file.write_text(TOLD, encoding="utf-8")

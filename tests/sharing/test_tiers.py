@@ -10,11 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
 
+from tests.sharing.canary import canary
 from wildlab.errors import WildlabError
+from wildlab.flight.checksums import accept_changes, confirmed_locations, with_checksums
+from wildlab.flight.manifest import FILE_NAME, manifest_toml, read_manifest
 from wildlab.flight.manifest_parts import LocationsPart
 from wildlab.sharing import tiers
 from wildlab.sharing.cells import Cell, cell_of, generalisation_words, half_diagonal, place_words, round_up
-from wildlab.sharing.tiers import TIERS, load_tiers, treatment_of
+from wildlab.sharing.tiers import TIERS, Treatment, confirmed_treatment, load_tiers, treatment_of
 
 GEOD = Geod(ellps="WGS84")
 
@@ -155,3 +158,49 @@ def test_only_heights_above_the_sea_are_said_to_be_withheld() -> None:
     """Heights above ground are shown in every copy."""
     said = generalisation_words(cell_of(-24.9, 31.5, 0.1, 500.0), 2), generalisation_words(None, 1)
     assert all("heights above sea level" in one and "terrain withheld" in one for one in said)
+
+
+@pytest.fixture(scope="module")
+def careful(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A flight folder whose manifest states category 1; nothing else of it is read here."""
+    folder = tmp_path_factory.mktemp("careful")
+    text = manifest_toml(canary(locations={"category": 1}).manifest)
+    (folder / FILE_NAME).write_text(with_checksums(text, {}))
+    return folder
+
+
+def public(folder: Path) -> Treatment:
+    stated = read_manifest(folder / FILE_NAME).locations
+    return confirmed_treatment(stated, confirmed_locations(folder), "public")
+
+
+def test_a_less_careful_category_counts_once_it_is_confirmed(careful: Path, tmp_path: Path) -> None:
+    path = tmp_path / FILE_NAME
+    path.write_text((careful / FILE_NAME).read_text())
+    assert (public(tmp_path).category, public(tmp_path).unconfirmed) == (1, None)
+    path.write_text(path.read_text().replace("category = 1", "category = 3"))
+    assert (public(tmp_path).category, public(tmp_path).unconfirmed) == (1, 3)
+    assert accept_changes(tmp_path) == ["locations"]
+    assert (public(tmp_path).category, public(tmp_path).unconfirmed) == (3, None)
+    # More careful counts at once.
+    path.write_text(path.read_text().replace("category = 3", "category = 2"))
+    assert (public(tmp_path).category, public(tmp_path).unconfirmed) == (2, None)
+
+
+def test_no_turned_bit_names_a_place_that_was_withheld(careful: Path, tmp_path: Path) -> None:
+    whole = (careful / FILE_NAME).read_bytes()
+    begin = whole.index(b"[locations]")
+    checksum = whole.index(b"locations =", begin)
+    places = [*range(begin, begin + 60), *range(checksum, checksum + 40, 3)]
+    read = 0
+    for place in places:
+        for bit in range(8):
+            damaged = bytearray(whole)
+            damaged[place] ^= 1 << bit
+            (tmp_path / FILE_NAME).write_bytes(damaged)
+            try:
+                assert public(tmp_path).category == 1, damaged[place - 20 : place + 20]
+                read += 1
+            except WildlabError:
+                continue
+    assert read > 20

@@ -4,6 +4,13 @@
 puts that and the viewer itself into one file that opens from disk.
 """
 
-from wildlab.replay.notebook import show_replay
+from typing import TYPE_CHECKING
+
+from wildlab.lazy import offer
+
+if TYPE_CHECKING:
+    from wildlab.replay.notebook import show_replay
+else:
+    __getattr__, __dir__ = offer(__name__, {"notebook": ("show_replay",)})
 
 __all__ = ["show_replay"]

@@ -17,7 +17,6 @@ from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import Observations, covariances_of, georeference, observe
 from wildlab.pipeline.overviews.image_coverage import FLATTEST, ground_height
 from wildlab.pipeline.overviews.lost import POSITION, ordered
-from wildlab.pipeline.overviews.overview import best_source
 from wildlab.replay.scene import Array, Estimates, Path, Points, Scene, Sightings, Target, Views
 
 #: More are not shown: a picture on a screen does not have them, and files grow.
@@ -59,7 +58,7 @@ def scene_of(
     """
     if source is not None:
         flight.pose_source(source)
-    source = source or best_source(flight)
+    source = source or next(iter(flight.estimated_sources), None)
     lacks: list[str] = []
     path = _path(flight, source, lacks)
     views = _views(flight, source, lacks)

@@ -7,6 +7,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.estimates import read_estimates
+from wildlab.pipeline.following.judged import LEADING
 from wildlab.replay.gather import scene_of
 from wildlab.replay.scene import Estimates, Scene
 from wildlab.replay.words import minutes, plain
@@ -32,6 +33,10 @@ def show_moving(report: Report, flight: Flight, source: str | None = None) -> No
     estimates = None
     if report.out is not None and (report.out / "estimates.parquet").is_file():
         estimates = read_estimates(report.out / "estimates.parquet")
+        # The filter that the page speaks of, where it names one.
+        leading = {who for name, who in report.recorded if name == LEADING}
+        if estimates["filter"].isin(leading).any():
+            estimates = estimates[estimates["filter"].isin(leading)]
     try:
         scene = scene_of(flight, source if source in flight.nav else None, estimates, ellipses=False)
         shown = moving_flight(scene)

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LEVELS, LOOK, MEND, SOUND, UNJUDGED
+from wildlab.pipeline.following.judged import LEADING
+from wildlab.pipeline.overviews.verdict import Verdict
 from wildlab.reporting.arrange import LIMITS, arranged
 from wildlab.reporting.charts.comparison import dots_chart
 from wildlab.reporting.georeferencing_cause import listed, metres
@@ -190,10 +191,10 @@ QUANTITIES = (
     ),
     Quantity(
         "track_rmse_m",
-        "track error, EKF",
+        "track error",
         "tracking",
         "rmse",
-        "ekf",
+        "leading filter",
         "m",
         _unit("m"),
         "comparisons",
@@ -205,7 +206,7 @@ QUANTITIES = (
         "NEES of the track inside its 95 % band",
         "tracking",
         "fraction_nees_inside",
-        "ekf",
+        "leading filter",
         "%",
         _share,
         "comparisons",
@@ -216,7 +217,7 @@ QUANTITIES = (
 
 
 def entry_of(flight: OwnFlight, quantity: Quantity) -> Mapping[str, Any] | None:
-    """The number of a flight; of tracks the one whose filter it names, where there is one of it alone.
+    """The number of a flight; of tracks that of the leading filter, where there is one of it alone.
 
     Parameters
     ----------
@@ -237,11 +238,12 @@ def entry_of(flight: OwnFlight, quantity: Quantity) -> Mapping[str, Any] | None:
     if quantity.subject == "mekf":
         # What the page on the navigation speaks of, where the receiver's noise was found.
         entry = report.numbers.get((quantity.name, "mekf-receiver"), entry)
-    if entry is None and quantity.about == "tracking":
+    if quantity.about == "tracking":
+        best = next((subject for name, subject in report.numbers if name == LEADING), "ekf")
         alike = [
             one
             for (name, subject), one in report.numbers.items()
-            if name == quantity.name and subject.endswith(f"/{quantity.subject}")
+            if name == quantity.name and subject.endswith(f"/{best}")
         ]
         entry = alike[0] if len(alike) == 1 else None
     return None if entry is None or entry["value"] is None else entry
@@ -346,16 +348,13 @@ def comparison_page(flights: Sequence[OwnFlight]) -> str:
     return whole
 
 
-#: Verdicts, the one that presses most first.
-_PRESSING = (ALARM, MEND, FIX, LOOK, UNJUDGED, SOUND)
-
-
 def _worst(flights: Sequence[OwnFlight]) -> tuple[tuple[str, str], str]:
     """The verdict that presses most, whose it is, and its colour."""
-    words = [flight.verdict or UNJUDGED for flight in flights]
-    word = min(words, key=_PRESSING.index)
+    words = [flight.verdict or Verdict.UNJUDGED for flight in flights]
+    # A flight that could not be judged may be worse than a sound one.
+    word = max(words, key=lambda one: 0.5 if one == Verdict.UNJUDGED else one.level)
     whose = [flight.name for flight, one in zip(flights, words, strict=True) if one == word]
-    return (word, f"So is {listed(whose)}, and nothing here presses more."), LEVELS[word]
+    return (word, f"So is {listed(whose)}, and nothing here presses more."), word.colour
 
 
 def _counted(flights: Sequence[OwnFlight]) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
+from wildlab.names import figure_name
 from wildlab.pipeline.detecting.judged import rate_words
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure, png_bytes
 from wildlab.reporting.text import NOTHING, escape
@@ -85,7 +86,7 @@ def curves_shown(compared: Sequence[Mapping[str, Any]], curves: pd.DataFrame) ->
         if own.empty:
             continue
         colour = _COLOURS[number % len(_COLOURS)]
-        ax.plot(own["recall"], own["precision"], "-", color=colour, label=one["name"])
+        ax.plot(own["recall"], own["precision"], "-", color=colour, label=figure_name(one["name"]))
         ax.plot(own["recall"].iloc[-1], own["precision"].iloc[-1], "o", color=colour, ms=7)
         area = one["average_precision"]
         if area is not None and area["estimate"] is not None:

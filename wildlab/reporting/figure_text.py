@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from itertools import pairwise
 from typing import Any
@@ -11,6 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Annotation, Text
+from matplotlib.ticker import LogFormatter, LogFormatterMathtext
+
+from wildlab.names import visible
+from wildlab.reporting.text import known
 
 #: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
 FULL_SIZE, LEAST_SIZE = 128, 80
@@ -24,6 +29,8 @@ _ROUNDS = 4
 _FEWEST = 10
 #: What stands beside a title, points.
 _BESIDE = 60.0
+#: The space between a number and its unit.
+_UNITS = re.compile(r"(?<=\d) (?=[^\W\d]{1,3}(?:/\w+)?\b|[%°])")
 #: What marks a line's name at its end.
 END_LABEL = "end-label"
 #: Width of a usual letter of a title as a share of its height: what is shorter than that is not measured.
@@ -55,18 +62,57 @@ def _is_seen(artist: Artist) -> bool:
 def fit_text(figure: Figure) -> None:
     """Make a figure's letters fit, whatever its data are: legends, titles, names at the ends of lines.
 
+    Letters that give a number which is not known are left out. The figure is laid out.
+
     Parameters
     ----------
     figure
         With everything on it.
     """
+    _harmless(figure)
     fit_legends(figure)
     fit_titles(figure)
     for axes in figure.get_axes():
         names = [text for text in axes.texts if text.get_gid() == END_LABEL and isinstance(text, Annotation)]
         if len(names) > 1:
-            figure.draw_without_rendering()
             _apart(names, 72.0 / figure.dpi)
+
+
+def _harmless(figure: Figure) -> None:
+    """Names of strangers turn no text around, what matplotlib itself writes is no maths either, and what is
+    not known is not written."""
+    for text in figure.findobj(Text):
+        if isinstance(text, Text):
+            text.set_text(visible(text.get_text()) if known(text.get_text()) else "")
+    for axes in figure.get_axes():
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+                axis.set_major_formatter(Powers())
+            minor = axis.get_minor_formatter()
+            if isinstance(minor, LogFormatterMathtext):
+                axis.set_minor_formatter(Powers(labelOnlyBase=minor.labelOnlyBase))
+
+
+class Powers(LogFormatter):
+    """Numbers beside a logarithmic axis, without maths.
+
+    Examples
+    --------
+    >>> Powers.text(-2e6), Powers.text(30.0), Powers.text(0.0)
+    ('−2·10⁶', '30', '0')
+    """
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return self.text(x) if super().__call__(x, pos) else ""
+
+    @staticmethod
+    def text(value: float) -> str:
+        """A number over many powers of ten, short."""
+        if abs(value) < 1e4:
+            return f"{value:g}".replace("-", "−")
+        factor, power = f"{value:.0e}".split("e")
+        raised = str(int(power)).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return f"{factor}·10{raised}".replace("-", "−")
 
 
 def _apart(names: list[Annotation], points: float) -> None:
@@ -105,10 +151,7 @@ def fit_legends(figure: Figure) -> None:
     for legend in list(figure.legends):
         columns = legend._ncols  # type: ignore[attr-defined]
         outside = getattr(legend, "_outside_loc", None)
-        while columns > 1:
-            figure.draw_without_rendering()
-            if legend.get_window_extent().width <= figure.bbox.width:
-                break
+        while columns > 1 and legend.get_window_extent().width > figure.bbox.width:
             columns -= 1
             place = places[legend._loc_real]  # type: ignore[attr-defined]
             texts = [text.get_text() for text in legend.get_texts()]
@@ -132,8 +175,8 @@ def fit_titles(figure: Figure) -> None:
     Parameters
     ----------
     figure
-        With everything on it. A title may go on to the figure's edge, or, where another panel stands to the
-        right, to the end of its own.
+        With everything on it; it is laid out. A title may go on to the figure's edge, or, where another
+        panel stands to the right, to the end of its own.
     """
     wide = 72 * figure.get_size_inches()[0]
     long: list[tuple[Axes, Text]] = []
@@ -152,6 +195,7 @@ def fit_titles(figure: Figure) -> None:
     for text in filter(None, over_all):
         _break(text, figure.bbox.width - 2 * _EDGE)
     if not long:
+        figure.draw_without_rendering()
         return
     for _, text in long:
         text.set_visible(False)  # else the axes shrink to make room for their middle
@@ -197,16 +241,19 @@ def _inside(figure: Figure) -> None:
                 _break(label, box.height - 2 * (over + _EDGE / 2), upwards=True)
         if not off:
             return
+    figure.draw_without_rendering()
 
 
 def _break(text: Text, room: float, *, upwards: bool = False) -> None:
-    """Set a text on as many lines as it needs to be no longer than ``room``, pixels, along its lines."""
-    words = text.get_text()
+    """Set a text on as many lines as it needs to be no longer than ``room``, pixels, along its lines; a
+    number stays with its unit."""
+    words = _UNITS.sub("\u00a0", text.get_text())
     letters = max(map(len, words.split("\n")))
     side = "height" if upwards else "width"
     while getattr(text.get_window_extent(), side) > room and letters > _FEWEST:
         letters -= 1
-        text.set_text("\n".join(textwrap.wrap(words, letters, break_long_words=False)))
+        lines = textwrap.wrap(words, letters, break_long_words=False)
+        text.set_text("\n".join(lines).replace("\u00a0", " "))
 
 
 def _columns(axes: Axes) -> int:

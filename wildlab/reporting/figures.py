@@ -11,6 +11,8 @@ from __future__ import annotations
 import io
 import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -103,6 +105,8 @@ _STYLE: dict[str, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 10.0,
     "pdf.compression": 9,
+    # What things are called comes from files of strangers: a dollar sign is no maths.
+    "text.parse_math": False,
 }
 
 
@@ -350,8 +354,20 @@ def png_bytes(figure: Figure) -> bytes:
     """
     buffer = io.BytesIO()
     fit_text(figure)
-    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    with _laid_out(figure):
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
+
+
+@contextmanager
+def _laid_out(figure: Figure) -> Iterator[None]:
+    """Within it a figure that is laid out is saved as it is: once is enough."""
+    engine = figure.get_layout_engine()
+    figure.set_layout_engine("none")
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
 
 
 def with_alt(figure: Figure, alt: str) -> Figure:
@@ -413,7 +429,11 @@ def save_figure(figure: Figure, folder: Path, name: str) -> bytes:
     png = png_bytes(figure)
     (folder / f"{name}.png").write_bytes(png)
     # Letters as a font that journals take cost more than the rest of a figure, as drawn shapes a tenth of it.
-    with shapes_alone(), mpl.rc_context({"pdf.fonttype": 3 if os.environ.get(QUICK) else 42}):
+    with (
+        _laid_out(figure),
+        shapes_alone(),
+        mpl.rc_context({"pdf.fonttype": 3 if os.environ.get(QUICK) else 42}),
+    ):
         figure.savefig(
             folder / f"{name}.pdf", metadata={"CreationDate": None, "Producer": None, "Creator": "wildlab"}
         )

@@ -13,11 +13,12 @@ from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.pose_noise import PoseNoise
 from wildlab.pipeline.accuracy import Accuracy
 from wildlab.pipeline.evaluate import errors_of
+from wildlab.pipeline.overviews.verdict import FEW_POINTS
 from wildlab.reporting import known_positions as truths
 from wildlab.reporting.report import Report
 
 #: Fewer points than this say little about a flight.
-FEW = 10
+FEW = FEW_POINTS
 #: Headings of the table of errors, by the fields of an error summary.
 ERROR_COLUMNS = {
     "n": "points",
@@ -39,22 +40,23 @@ $\mathbf{R}_c^n = \mathbf{R}_b^n\mathbf{R}_m^b\mathbf{R}_c^m$ from the logged at
 Blocks: points of neighbouring images, in time order; a minute where the images have times and last for six,
 otherwise three images where that leaves six blocks. Errors of one block are not taken for independent.
 
-Cause: constant errors of position, height, boresight, clock and lens, and their sums, are fitted by nonlinear
-least squares under Student's t with four degrees of freedom, on errors whitened with their ellipses (after H
-5.15 to 5.17). Blocks are put into five folds, ten times over; each model predicts the fold that it was not
-fitted to. Models are compared point by point, and the standard error of a difference comes from the blocks:
-rounds share most of their data, and their spread would flatter. The simplest model within one standard error
-of the best wins. Its gain counts where its 90 % interval (Student's, by the number of blocks) is above zero;
-then it is tried once more with only those of its parameters that are told from zero.
-Where images that follow each other are correlated with it taken off, blocks are not independent; it is said.
-A sum of which the data cannot tell the parts (correlation beyond 0.99, or known no better than one would
-guess) is not tried. Intervals of parameters: 95 %, from leaving out one block at a time.
+Cause: constant errors of position, height, boresight, clock and lens, and their sums, are fitted by
+generalised least squares (after H 5.15 to 5.17). The covariance of the errors has white noise of each point
+and pose errors of each image, part of which is a Gauss-Markov process; their sizes, that part and its time
+constants maximise the restricted likelihood, with a broad prior about what was stated. Models are ordered by
+Schwarz's criterion; the simplest one within odds of 19 to 1 of the best wins, and others within them that
+have no more parameters and do not hold it are not separable from it. It is certain where none of these is
+left, where its gain on blocks of images that it was not fitted to has a 90 % interval (Student's, by the
+number of blocks) above zero, and where its estimate would be chance in less than 0.1 % (Wald's test with
+Satterthwaite's degrees of freedom, times the number of parameters tried). Corrections beyond what is
+plausible are not offered. A sum of which the data cannot tell the parts (correlation beyond 0.99, or known no
+better than one would guess) is not tried. Intervals of parameters: 95 %, under that covariance.
 
-Far out: more than 4.5 times the robust spread of its like, marks first, then photos, then clicks. It is
-looked for before the cause, with every parameter taken off that the data determine, and kept out of what
-models are fitted to and ranked by; then once more with the cause taken off, and where other points are far
-out then, the search is repeated without these. Where more than a quarter of the points is far out no cause is
-certain.
+Far out: so many times the robust spread of its like that the largest of as many normal errors is as far with
+probability 0.001; marks first, then photos, then clicks. It is looked for before the cause, with every
+parameter taken off that the data determine, and kept out of what models are fitted to and ranked by; then
+once more with the cause taken off, and where other points are far out then, the search is repeated without
+these. Where more than a quarter of the points is far out no cause is certain.
 
 Ellipses: the factor is the root of the 90 % quantile of the normalised squared error over that of chi-square;
 its interval from drawing blocks with replacement. No draw holds a larger error than was seen, so its high end
@@ -86,8 +88,8 @@ What follows looks for causes and noise on level ground as high as each point on
 _NOISE = {
     "position_horizontal": ("position_horizontal_m", "position, horizontal", "m"),
     "position_vertical": ("position_vertical_m", "position, vertical", "m"),
-    "roll_pitch": ("roll_deg", "roll and pitch", "deg"),
-    "yaw": ("yaw_deg", "yaw", "deg"),
+    "tilt": ("tilt_deg", "tilt, each level axis", "deg"),
+    "heading": ("heading_deg", "heading", "deg"),
     "pixel": ("pixel_px", "pixel (marking and lens)", "px"),
 }
 _ELLIPSES = {
@@ -319,8 +321,9 @@ def method_words(*, terrain: bool) -> str:
 def assumed_words(stated: Mapping[str, float]) -> str:
     """The assumed standard deviations in words."""
     return (
-        f"{stated['roll_deg']:g}° in roll, {stated['pitch_deg']:g}° in pitch, {stated['yaw_deg']:g}° in yaw, "
-        f"{stated['position_horizontal_m']:g} m horizontally and {stated['position_vertical_m']:g} m "
+        f"{stated['tilt_deg']:.3g}° in tilt (about each level axis), "
+        f"{stated['heading_deg']:.3g}° in heading, "
+        f"{stated['position_horizontal_m']:.3g} m horizontally and {stated['position_vertical_m']:.3g} m "
         "vertically"
     )
 

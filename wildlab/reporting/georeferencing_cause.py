@@ -13,14 +13,13 @@ from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary
 from wildlab.geometry.calibration import BORESIGHT, PARAMETERS, Calibration
-from wildlab.pipeline.diagnose import CAUSES, Diagnosis
+from wildlab.pipeline.diagnosis import CAUSES, Diagnosis
+from wildlab.pipeline.overviews.verdict import MANY_LOST, WORTH, Evidence
 from wildlab.pipeline.overviews.worth_fixing import is_possible
 from wildlab.reporting.report import Report
 
-#: Beyond this share of lost points the verdict is bad.
-MANY_LOST = 0.2
 #: A gain below this share of the error is called small, and above half of it most of the error.
-SMALL, MOST = 0.1, 0.5
+SMALL, MOST = WORTH, 0.5
 #: Rows of the table of models.
 SHOWN = 8
 #: Of each parameter: what it is called, its unit and how many of that are one.
@@ -28,6 +27,7 @@ _PARAMETERS = {
     "roll": ("camera's roll", "deg", 180 / np.pi),
     "tilt": ("camera's tilt", "deg", 180 / np.pi),
     "pan": ("camera's pan", "deg", 180 / np.pi),
+    "heading": ("heading", "deg", 180 / np.pi),
     "clock": ("camera's clock", "s", 1.0),
     "down": ("position, down", "m", 1.0),
     "north": ("position, north", "m", 1.0),
@@ -36,18 +36,21 @@ _PARAMETERS = {
     "aspect": ("ratio of the focal lengths", "%", 100.0),
     "centre_u": ("principal point, right", "px", 1.0),
     "centre_v": ("principal point, down", "px", 1.0),
+    "radial": ("radial distortion k1", "1", 1.0),
 }
 _CAUSES = {
     "position": "the position (north and east)",
     "height": "the height",
     "boresight": "the boresight (how the camera sits on the airframe)",
+    "heading": "the heading",
     "clock": "the camera's clock",
     "focal length": "the focal length",
     "focal lengths": "the focal lengths",
     "lens": "the lens (focal lengths and principal point)",
+    "distortion": "the radial distortion",
 }
 #: What a list of all that was tried calls them.
-_SHORT = {"focal length": "lens", "focal lengths": "lens", "clock": "camera's clock"}
+_SHORT = {"focal length": "lens", "focal lengths": "lens", "distortion": "lens", "clock": "camera's clock"}
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
@@ -84,22 +87,45 @@ def metres(value: float, low: float | None = None, high: float | None = None) ->
     return f"{value:.{digits}f} m ({low:.{digits}f} to {high:.{digits}f})"
 
 
-def verdict_level(
-    logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None, few: int
-) -> str:
-    """Colour of the summary: ``bad`` where many points are lost, ``warn`` where something is to be done.
+def evidence_of(
+    logged: ErrorSummary,
+    lost: int,
+    ellipses: EllipseVerdict,
+    diagnosis: Diagnosis | None,
+    amiss: Sequence[str] = (),
+) -> Evidence:
+    """What the verdict on the georeferencing follows from.
 
-    Never ``good`` where nobody could look for a cause.
+    Parameters
+    ----------
+    logged, lost
+        Errors of the points that have a position, and how many have none.
+    ellipses, diagnosis
+        As `wildlab.pipeline.accuracy.judge_accuracy` found them; None: nobody could look for a cause.
+    amiss
+        What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
+
+    Returns
+    -------
+    Evidence
     """
     total = logged.n + lost
-    if not logged.n or lost > MANY_LOST * total:
-        return "bad"
-    amiss = diagnosis is not None and (
-        bool(diagnosis.outliers) or (diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL)
+    gains = []
+    if diagnosis is not None and diagnosis.counts:
+        gains.append(gained_share(diagnosis.winner.gain))
+    if diagnosis is not None and diagnosis.outliers and diagnosis.inliers.any():
+        whole, kept = diagnosis.held_summary().mean, diagnosis.held_summary(diagnosis.inliers).mean
+        gains.append((whole - kept) / whole if whole > 0 else float("nan"))
+    return Evidence(
+        problems=sum(one.startswith("problem") for one in amiss),
+        lost=lost / total if total else float("nan"),
+        gain=max((gain for gain in gains if gain == gain), default=float("nan")),
+        possible=possible_share(logged, diagnosis),
+        troubled=len(diagnosis.outliers) if diagnosis is not None else 0,
+        points=logged.n,
+        excess=(ellipses.factor,),
+        judged=int(diagnosis is not None),
     )
-    if amiss or possible_share(logged, diagnosis) or ellipses.word == "too small" or logged.n < few:
-        return "warn"
-    return "good" if diagnosis is not None else "neutral"
 
 
 def possible_share(logged: ErrorSummary, diagnosis: Diagnosis | None) -> float:
@@ -155,8 +181,7 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
             some = f"{least.gain.gain.low:.2f} to {least.gain.gain.high:.2f} m"
             return (
                 f"No constant error stands out: {causes_in_words(least.causes)} taken off gains {some} on "
-                "images that it was not estimated from, and the best of all that was tried "
-                "is within one standard error of taking nothing off."
+                "images that it was not estimated from, which errors that wander explain as well."
             )
         causes = {_SHORT.get(one, one) for model in diagnosis.models for one in model.causes}
         if not causes:
@@ -174,12 +199,17 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     digits = 1 if min(gain.without, gain.with_) >= 0.95 and abs(gain.gain.estimate) >= 0.95 else 2
     low, high = f"{gain.gain.low:.{digits}f}", f"{gain.gain.high:.{digits}f}"
     figures = (
-        f"with {it} taken off, the mean error goes from {gain.without:.{digits}f} to "
+        f"with {it} taken off, the {_measure(diagnosis)} goes from {gain.without:.{digits}f} to "
         f"{gain.with_:.{digits}f} m on images that it was not estimated from (gain {low} to {high} m"
         f"{_with_far_out(diagnosis)})"
     )
     if unsure := [cause for cause in winner.causes if cause not in told]:
         figures += f"; fitted with it, {causes_in_words(unsure)} could not be told from zero"
+    if diagnosis.implausible:
+        figures += (
+            f"; {causes_in_words(diagnosis.implausible[0].causes)} would fit better, with a correction "
+            "larger than is plausible: look at camera, mount and heights"
+        )
     if not diagnosis.counts and gained_share(gain) < SMALL:
         return f"No constant error is certain to explain it. The nearest is one of {what}: {figures}."
     if not diagnosis.counts:
@@ -190,6 +220,12 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     if share >= SMALL:
         return f"Part of it is a constant error of {what}: {figures}."
     return f"A constant error of {what} is certain and small: {figures}."
+
+
+def _measure(diagnosis: Diagnosis) -> str:
+    """What is gained in: the error, or, where places are not known, how far apart sightings are."""
+    known = diagnosis.places_known
+    return "mean error" if known else "mean distance of a sighting to the others of the same thing"
 
 
 def _with_far_out(diagnosis: Diagnosis) -> str:
@@ -221,8 +257,7 @@ def neighbours_sentence(neighbours: Neighbours) -> str:
         return ""
     return (
         "Images that follow each other are still wrong alike with it taken off (correlation "
-        f"{neighbours.correlation:.2f} of {neighbours.images} images): they are worth about "
-        f"{neighbours.worth:.0f}, which the intervals allow for, "
+        f"{neighbours.correlation:.2f} of {neighbours.images} images), "
         "and the gain may be that of this flight alone."
     )
 
@@ -237,11 +272,16 @@ def size_sentence(calibration: Calibration, counts: bool) -> str:
         label, unit, scale = _PARAMETERS[name]
         low, high = (scale * end for end in calibration.interval(name))
         if low > 0 or high < 0:
-            digits = 2 if unit in ("deg", "s", "%") else 1
-            size = f"{scale * calibration.value(name):+.{digits}f} {unit.replace('deg', '°')}"
+            digits = {"1": 3, "deg": 2, "s": 2, "%": 2}.get(unit, 1)
+            size = _with_unit(f"{scale * calibration.value(name):+.{digits}f}", unit)
             parts.append(f"{label} {size} ({low:+.{digits}f} to {high:+.{digits}f})")
     said = "What is to be added" if counts else "Not to be added unless another flight confirms it"
     return f"{said}: {listed(parts)}." if parts else ""
+
+
+def _with_unit(number: str, unit: str) -> str:
+    """``-5.00 °``; a number without a unit stands alone."""
+    return number if unit == "1" else f"{number} {unit.replace('deg', '°')}"
 
 
 def ambiguity_sentence(diagnosis: Diagnosis, unambiguous: Diagnosis | None) -> str:
@@ -263,16 +303,15 @@ def advice(diagnosis: Diagnosis, learnt_here: bool) -> str:
         said.append(f"Look at {what} first: it is {metres(first.off_m)} off where the others are not.")
     if diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL:
         said.append(
-            "Images from other heights, speeds and directions would tell which of these it is; there the "
-            "wrong one, taken off, does harm."
-            if learnt_here and _others(diagnosis)
-            else "Images from other heights, speeds and directions would tell what else has a part in it: "
-            "what these do not tell from zero, taken off there, may do harm."
-            if learnt_here and simplest_rivals(diagnosis)
-            else "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
+            "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
             if learnt_here
             else "The calibration that was applied leaves this in: it has no correction of it, or does not "
             "hold for this flight. Look for what changed."
+        )
+    elif diagnosis.rivals and diagnosis.winner.gain.counts and learnt_here:
+        said.append(
+            "Images from other heights, speeds and directions would tell which of these it is; there the "
+            "wrong one, taken off, does harm."
         )
     elif diagnosis.counts and not said:
         said.append("It hardly matters: other things limit this flight.")
@@ -283,7 +322,7 @@ def alike_sentences(diagnosis: Diagnosis) -> list[str]:
     """Which causes the data cannot tell from the one that won, or from each other."""
     winner = set(diagnosis.winner.causes)
     said = [
-        f"Explains it as well, within one standard error: {causes_in_words(rival.causes)} "
+        f"Explains it as well: {causes_in_words(rival.causes)} "
         f"({rival.gain.with_:.2f} m on images that it was not estimated from)."
         for rival in diagnosis.rivals
         if rival.causes
@@ -302,7 +341,7 @@ def alike_sentences(diagnosis: Diagnosis) -> list[str]:
             said.append(f"These images cannot tell the {label} from the {others}; it was left as it is.")
         else:
             _, unit, scale = _PARAMETERS[name]
-            usual = f"{scale * PARAMETERS[name]:g} {unit.replace('deg', '°')}"
+            usual = _with_unit(f"{scale * PARAMETERS[name]:g}", unit)
             said.append(
                 f"An error of the {label} of {usual} would not show in these images; it was left as it is."
             )
@@ -310,9 +349,8 @@ def alike_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """The best models, and nothing, by their held-out error."""
-    means = diagnosis.ranked.means
-    shown = [m for m in np.argsort(means, kind="stable")][:SHOWN]
+    """The most likely models, and nothing."""
+    shown = [m for m in np.argsort(diagnosis.ranked.scores, kind="stable")][:SHOWN]
     shown += [m for m in (diagnosis.ranked.winner, 0) if m not in shown]
     rows = []
     for m in shown:
@@ -322,7 +360,7 @@ def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
             {
                 "what": f"**{model.name}**" if m == diagnosis.ranked.winner else model.name,
                 "parameters": len(model.fit.names),
-                "error": means[m],
+                "error": model.gain.with_,
                 "gain": gain.estimate if model.causes else np.nan,
                 "interval": f"{gain.low:.2f} to {gain.high:.2f}" if model.causes else "",
             }
@@ -338,12 +376,12 @@ def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
         value, (low, high) = scale * calibration.value(name), (scale * x for x in calibration.interval(name))
         metric = f"boresight_{name}" if name in BORESIGHT else f"{name}_offset"
         report.metric(metric, "calibration", value, unit, n=calibration.n_images, low=low, high=high)
-        zero = low <= 0 <= high
+        zero, digits = low <= 0 <= high, 3 if unit == "1" else 2
         rows.append(
             {
-                "what": f"{label} ({unit})",
+                "what": label if unit == "1" else f"{label} ({unit})",
                 "value": value,
-                "interval": f"{low:+.2f} to {high:+.2f}",
+                "interval": f"{low:+.{digits}f} to {high:+.{digits}f}",
                 "verdict": "not told from zero" if zero else "differs from zero",
             }
         )

@@ -82,7 +82,7 @@ def remaining_sentence(scatter: Scatter, taken_off: Sequence[str]) -> str:
     off = f" with {causes_in_words(taken_off)} taken off" if taken_off else ""
     return (
         f"Points are off by {metres(scatter.whole_m)} (root mean square){off}. The parts are root mean "
-        "squares in metres too, and their squares add up to its square."
+        "squares in metres too; their squares, which are estimates, add up to about its square."
     )
 
 
@@ -122,9 +122,15 @@ def _next_image(neighbours: Neighbours | None) -> str:
     return " and the next image does not"
 
 
+def coverage_words(verdict: EllipseVerdict) -> str:
+    """Share of the ellipses that hold the truth, with its interval: ``88 % (83 to 92)``."""
+    share, low, high = (100 * one for one in verdict.coverage[:3])
+    return f"{share:.0f} %" + (f" ({low:.0f} to {high:.0f})" if np.isfinite(low + high) else "")
+
+
 def ellipse_sentence(verdict: EllipseVerdict) -> str:
     """Whether the ellipses are honest, and how much larger they should be."""
-    stated, inside = f"{100 * verdict.stated:.0f} %", f"{100 * verdict.coverage.estimate:.0f} %"
+    stated, inside = f"{100 * verdict.stated:.0f} %", coverage_words(verdict)
     f = verdict.factor
     held = f"The {stated} ellipses hold the truth in {inside} of {verdict.n} cases"
     span = f"{f.low:.1f} to {f.high:.1f}"
@@ -135,9 +141,6 @@ def ellipse_sentence(verdict: EllipseVerdict) -> str:
         )
     if verdict.word == "too large":
         return f"**Too large**: {held}; axes {f.estimate:.1f} times as long ({span}) would do."
-    if verdict.word == "honest" and not f.low <= 1 <= f.high:
-        near = f"{f.estimate:.2f} times as long ({f.low:.2f} to {f.high:.2f})"
-        return f"**Nearly honest**: {held}; axes {near} would do."
     if verdict.word == "honest":
         return (
             f"**Honest**: {held}; the right length of their axes is {f.estimate:.1f} times theirs ({span})."

@@ -9,8 +9,8 @@ import numpy as np
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary
 from wildlab.pipeline.accuracy import Accuracy
-from wildlab.pipeline.diagnose import Diagnosis
-from wildlab.pipeline.overviews.worth_fixing import FIX, LOOK, MEND, SOUND, UNJUDGED
+from wildlab.pipeline.diagnosis import Diagnosis
+from wildlab.pipeline.overviews.verdict import MANY_LOST, VERDICT_LEVEL, Verdict, verdict_of
 from wildlab.reporting import georeferencing as words
 from wildlab.reporting import georeferencing_cause as cause
 from wildlab.reporting import georeferencing_left as left
@@ -41,7 +41,7 @@ def summary_section(
     """
     logged, total, diagnosis = found.summary, len(found.scored), found.diagnosis
     said, lost = words.headline(logged, total), cause.lost_sentence(found.lost, total)
-    said = [lost, *said] if found.lost > cause.MANY_LOST * total else [*said, lost]
+    said = [lost, *said] if found.lost > MANY_LOST * total else [*said, lost]
     if logged.n:
         said.append(clock)
     if diagnosis is not None and logged.n >= words.FEW:
@@ -50,12 +50,11 @@ def summary_section(
         if diagnosis.counts:
             said.append(cause.neighbours_sentence(diagnosis.neighbours()))
         said += [unsure or cause.advice(diagnosis, not applied)]
-    level = cause.verdict_level(logged, found.lost, found.ellipses, diagnosis, words.FEW)
-    first = cause.amiss_sentence(amiss)
-    if first:
-        said, level = [first, *said], "bad"
-    verdict = verdict_words(logged, found.lost, found.ellipses, diagnosis, amiss)
-    report.summary([one for one in said if one], level=level, verdict=verdict)
+    said = [cause.amiss_sentence(amiss), *said]
+    verdict, reason = verdict_words(logged, found.lost, found.ellipses, diagnosis, amiss)
+    shown = [one for one in said if one]
+    report.summary(shown, level=verdict.colour, verdict=(verdict.value, reason))
+    report.metric(VERDICT_LEVEL, "georeferencing", verdict.level, "1")
     if applied:
         report.text(applied)
 
@@ -63,24 +62,15 @@ def summary_section(
 def verdict_words(
     logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None,
     amiss: Sequence[str] = (),
-) -> tuple[str, str]:  # fmt: skip
-    """The word that goes with `wildlab.reporting.georeferencing_cause.verdict_level`, and its reason.
-
-    Parameters
-    ----------
-    logged, lost, ellipses, diagnosis
-        As there.
-    amiss
-        As for `summary_section`.
-    """
-    total, contradictions = logged.n + lost, sum(one.startswith("problem") for one in amiss)
-    if contradictions:
-        count = "1 finding" if contradictions == 1 else f"{contradictions} findings"
-        return MEND, f"The logs contradict each other: {count}."
-    if not logged.n:
-        return "no positions", f"None of the {total} points has one."
-    if lost > cause.MANY_LOST * total:
-        return "too many lost", f"{lost} of {total} points have no position."
+) -> tuple[Verdict, str]:  # fmt: skip
+    """What the georeferencing comes to, and why: parameters of `cause.evidence_of`."""
+    evidence = cause.evidence_of(logged, lost, ellipses, diagnosis, amiss)
+    verdict, total = verdict_of(evidence), logged.n + lost
+    if evidence.problems:
+        count = "1 finding" if evidence.problems == 1 else f"{evidence.problems} findings"
+        return verdict, f"The logs contradict each other: {count}."
+    if lost > MANY_LOST * total or not logged.n:
+        return verdict, f"{lost} of {total} points have no position."
     said = []
     gain = cause.gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
     if gain >= cause.SMALL:
@@ -96,10 +86,11 @@ def verdict_words(
         said.append(f"{logged.n} points are few")
     if said:
         reason = "; ".join(said)
-        return FIX if gain >= cause.SMALL else LOOK, f"{reason[0].upper()}{reason[1:]}."
+        return verdict, f"{reason[0].upper()}{reason[1:]}."
     if diagnosis is None:
-        return UNJUDGED, "Nobody could look for a cause: there are too few images with known points."
-    return SOUND, f"{_small(diagnosis)}, nothing far out; the ellipses are {ellipses.word}."
+        return verdict, "Nobody could look for a cause: there are too few images with known points."
+    held = f"; {left.coverage_words(ellipses)} of the 90 % ellipses hold the truth" if ellipses.n else ""
+    return verdict, f"{_small(diagnosis)}, nothing far out{held}."
 
 
 def _small(diagnosis: Diagnosis) -> str:
@@ -121,13 +112,15 @@ def amiss_section(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
     report.alert("What does not fit together", said)
 
 
-def cause_section(report: Report, found: Accuracy) -> None:
-    """Models, parameters, axes, what is far out, and what the nearest mark hides; nothing if undiagnosed."""
-    diagnosis = found.diagnosis
-    if diagnosis is None:
-        return
-    said = [cause.size_sentence(diagnosis.calibration, diagnosis.counts), left.halves_sentence(found.halves)]
-    report.section("The cause", " ".join(filter(None, said)))
+def models_section(report: Report, diagnosis: Diagnosis) -> None:
+    """Models, parameters, and what the data do not separate, where places are not known."""
+    report.section("The cause", cause.size_sentence(diagnosis.calibration, diagnosis.counts))
+    _models(report, diagnosis)
+    if alike := cause.alike_sentences(diagnosis):
+        report.points(alike)
+
+
+def _models(report: Report, diagnosis: Diagnosis) -> None:
     report.table(
         cause.models_table(diagnosis),
         columns={
@@ -138,10 +131,10 @@ def cause_section(report: Report, found: Accuracy) -> None:
             "interval": "90 % interval",
         },
         digits={"parameters": 0, "error": 2, "gain": 2},
-        caption="Mean error on images that the parameters were not estimated from, over "
-        f"{len(diagnosis.winner.held)} rounds of {diagnosis.blocks.max() + 1} blocks"
-        f"{', without what is far out' if diagnosis.outliers else ''}. Bold: the simplest "
-        "within one standard error of the best.",
+        caption="Mean error on images that the parameters were not estimated from, "
+        f"{diagnosis.blocks.max() + 1} blocks left out in turn"
+        f"{', without what is far out' if diagnosis.outliers else ''}; the most likely first. Bold: the "
+        "simplest within odds of 19 to 1 of the best.",
     )
     if diagnosis.winner.causes:
         report.table(
@@ -152,11 +145,21 @@ def cause_section(report: Report, found: Accuracy) -> None:
                 "interval": "95 % interval",
                 "verdict": "verdict",
             },
-            digits={"value": 2},
+            digits={"value": 3 if "radial" in diagnosis.calibration.names else 2},
             caption=f"From {diagnosis.calibration.n_points} points in {diagnosis.calibration.n_images} images"
             f"{', without what is far out' if diagnosis.outliers else ''}. The intervals hold where the "
             "error is of these kinds alone; one of another kind is taken for them.",
         )
+
+
+def cause_section(report: Report, found: Accuracy) -> None:
+    """Models, parameters, axes, what is far out, and what the nearest mark hides; nothing if undiagnosed."""
+    diagnosis = found.diagnosis
+    if diagnosis is None:
+        return
+    said = [cause.size_sentence(diagnosis.calibration, diagnosis.counts), left.halves_sentence(found.halves)]
+    report.section("The cause", " ".join(filter(None, said)))
+    _models(report, diagnosis)
     if alike := cause.alike_sentences(diagnosis):
         report.points(alike)
     report.table(
@@ -227,7 +230,7 @@ def ellipse_section(
         return
     own = found.observations.poses.covariance is not None and not learnt_elsewhere
     pose = (
-        "the log's own, on average"
+        "that of the log (root mean square)"
         if own
         else "learnt with the calibration"
         if learnt_elsewhere
@@ -284,6 +287,5 @@ def tiles(found: Accuracy, others: dict[str, ErrorSummary]) -> list[tuple[str, s
         shown.append((m(diagnosis.held_summary().mean), "mean error of unseen images, the cause taken off"))
     shown += [(m(s.mean), f"mean error of the answers recorded by {name}") for name, s in others.items()]
     if np.isfinite(found.ellipses.coverage.estimate):
-        held = 100 * found.ellipses.coverage.estimate
-        shown.append((f"{held:.0f} %", "of the 90 % ellipses hold the truth"))
+        shown.append((left.coverage_words(found.ellipses), "of the 90 % ellipses hold the truth"))
     return [*shown, (f"{found.lost} of {len(found.scored)}", "points have no position")]

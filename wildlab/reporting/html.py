@@ -152,6 +152,7 @@ def report_page(
     study: str,
     footer: str = "",
     notice: str = "",
+    alert: str = "",
     title: str = "",
     made: str = "",
 ) -> str:
@@ -164,6 +165,8 @@ def report_page(
     notice
         HTML of a paragraph that says that this is a first look. Nothing is claimed of one: it takes the place
         of the verdict.
+    alert
+        HTML of a section that stands below the heading.
     title
         Of the study, in place of the heading that the notebook has.
     made
@@ -179,6 +182,8 @@ def report_page(
         soup.h1.string = title
     if notice:
         _first_look(soup, notice)
+    if alert and soup.header is not None:
+        soup.header.insert_after(BeautifulSoup(alert, "html.parser"))
     cited = cited_theses(soup.get_text(" "))
     body = with_glossary(arranged(str(soup)))
     heading = soup.h1

@@ -132,7 +132,7 @@ def offset_sentence(flight: Flight) -> str:
         return ""
     beside = f" beside a zone of {zone / 3600:+g} h" if zone else ""
     return (
-        f"The camera's clock was corrected by {offset - zone:+.2f} s{beside}, and nothing says where that "
-        "came from. If it was fitted on these same points, these figures flatter: another flight would "
+        f"The camera's clock was corrected by {offset - zone:+.2f} s{beside}, and flight.toml does not say "
+        "from what. If it was fitted on these same points, these figures flatter: another flight would "
         "tell. What `wildlab check` proposes is fitted on them."
     )

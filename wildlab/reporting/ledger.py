@@ -2,43 +2,39 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
+from functools import lru_cache
 from urllib.parse import quote
 
-from wildlab.evaluation.printed import (
-    AGREES,
-    BY_DEVIATION,
-    DIFFERS,
-    MARGINS,
-    NOT_JUDGED,
-    POSSIBLE,
-    TOO_VAGUE,
-    WIDEST_FACTOR,
-)
+from wildlab.evaluation.characteristics import operating_characteristics
+from wildlab.evaluation.replication import KINDS
 from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wrong
 from wildlab.reporting.cases import Case
+from wildlab.reporting.counts import PREDICTED, counted, groups_table
 from wildlab.reporting.ledger_tables import claims_table, flights_of, numbers_table, summed_up
 from wildlab.reporting.page import TAGS, first_look_notice, page
-from wildlab.reporting.published import CALCULATED
-from wildlab.reporting.status import FIRST_LOOK, MISSING, Number, StudyStatus
-from wildlab.reporting.text import NOTHING, escape, inline, prose
+from wildlab.reporting.status import FIRST_LOOK, StudyStatus
+from wildlab.reporting.tables import table_html
+from wildlab.reporting.text import escape, inline, prose
 
 EXPLANATION = """
-A printed number is one of four. An exact **calculation** agrees within what rounding leaves open. A **mean
-of runs** is compared with our mean, by both standard errors and a stated tolerance. A **share of images** is
-compared with the share of all our images: it agrees where the whole 95 % interval of ours is within the
-margin of a rate, differs where none of it is, and is too vague to tell where a part is. **One flight's**
-figure is a single draw, which our simulated flights are held against:
+Two questions are asked of a published number. **Close?** The 90 % confidence interval of the median of our
+flights lies within the margin of it (**close**), beside it (**not close**), or across its border (**cannot
+tell**). The margins are the same for all studies: {margins}. Of a signed mean this is not asked.
 
-**agrees** when the median of our flights is within the margin of it; **possible** when it is not, and the
-printed number lies in the middle 90 % of our flights (of fewer than 30: between the lowest and the highest);
-**too vague to tell** when that is so, and this middle is wider than a factor of {widest:g}; **differs** when
-it lies outside. The margins are the same for all studies: {margins}. A signed mean whose sign the thesis does
-not define is compared by its size. A number that is listed beside several tunings is counted once. What a
-simulated flight was fitted to is **not judged** by it, number or claim; nor is a number that says nothing
-without what the thesis leaves out.
+**Within 90 %?** The published flight's number lies in the 90 % prediction interval of one more flight like
+ours (**within**) or not (**outside**), after Patil, Peng and Leek (2016). Fewer than 19 flights have no
+such interval (**too few flights**). Where the interval would as likely as not hold a flight with errors
+half as large as ours, "within" would say nothing (**no power**). One true twin in ten is outside by chance.
+
+An exact **calculation** is close where it is within what the rounding of the published result and of its
+published inputs leaves open; else it is said by how much it is off. The tables of a thesis that contradict
+themselves where they are rounded to nearest are granted one in the last digit. A **mean of runs** is judged
+by both standard errors, a **share of images** by the interval of all our images. A signed mean whose sign
+the thesis does not define is compared by its size. **Fitted**: something of our twin was chosen by that
+number; it is compared, and counted apart. A number that is published twice for one flight is counted once.
+A number that says nothing without what the thesis leaves out is **not judged**.
 
 A **claim** is a sentence of a thesis. It **holds** when the 95 % interval of the share of flights on which it
 is true lies at or above 90 %, **holds on most flights** above 50 %, and **fails on most flights** or **does
@@ -58,8 +54,6 @@ prints about the real one; a **logged** flight is a real one from a public sourc
 _STYLE = """.contents{columns:2 22rem;column-gap:2.4rem;max-width:none;font-size:.92rem}
 .contents li{break-inside:avoid}.contents span{display:block;font-size:.85rem}
 @media print{.contents{columns:2}}"""
-_JUDGED = (AGREES, POSSIBLE, TOO_VAGUE, DIFFERS)
-_ORDER = (*_JUDGED, NOT_JUDGED)
 
 
 def ledger_page(studies: Iterable[StudyStatus], *, code: str = "", cases: Sequence[Case] = ()) -> str:
@@ -84,6 +78,7 @@ def ledger_page(studies: Iterable[StudyStatus], *, code: str = "", cases: Sequen
         _coverage(studies, cases),
         *(_section(one) for one in studies),
         _explanation(),
+        _characteristics(),
     ]
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     made += f", {code}" if code else ""
@@ -122,17 +117,22 @@ def _tiles(studies: list[StudyStatus]) -> str:
     studied += f", {failed} failed" if failed else ""
     tiles = [(f"{len(done)} / {len(studies)}", studied)]
     # What waits for its study is in no denominator.
-    numbers = [one for study in done for one in study.counted if one.verdict in _JUDGED]
-    waiting = sum(len(study.counted) for study in studies) - len(numbers)
-    if numbers or waiting:
-        agree = sum(one.verdict == AGREES for one in numbers)
-        tiles.append((f"{agree} / {len(numbers)}", f"published numbers agree{_waiting(waiting)}"))
+    counts = counted(studies)
+    if counts.of:
+        found = counts.groups[PREDICTED]
+        words = f"{PREDICTED}, are close{_waiting(found.all - counts.of)}"
+        tiles.append((f"{found.close['close']} / {counts.of}", words))
+        outside = found.compatible["outside"]
+        asked = sum(found.compatible.values()) - found.compatible["too few flights"]
+        tiles.append(
+            (f"{outside} / {asked}", f"of them outside of 90 %; {found.chance:.1f} expected by chance")
+        )
     claims = [one for study in done for one in study.claims if one.verdict in SHARE_VERDICTS]
     theirs = [one for one in claims if not one.own]
     waiting = sum(not one.own for study in studies for one in study.claims) - len(theirs)
     if theirs or waiting:
-        holding = sum(one.verdict in (HOLDS, MOSTLY) for one in theirs)
-        words = f"claims of the theses hold, on nearly all flights or on most{_waiting(waiting)}"
+        holding, mostly = (sum(one.verdict == verdict for one in theirs) for verdict in (HOLDS, MOSTLY))
+        words = f"claims of the theses hold; {mostly} more on most flights{_waiting(waiting)}"
         tiles.append((f"{holding} / {len(theirs)}", words))
     if any(study.study.kind == "logged" for study in studies):
         logged = sum(study.study.kind == "logged" for study in done)
@@ -165,25 +165,7 @@ def _coverage(studies: list[StudyStatus], cases: Sequence[Case]) -> str:
                 f'<details class="plain"><summary>{len(open_ones)} without one</summary>'
                 f"<ul>{items}</ul></details>"
             )
-    rows = [
-        (kind, Counter(one.verdict for one in numbers))
-        for kind, numbers in _by_kind(studies).items()
-        if numbers
-    ]
-    if rows:
-        columns = [v for v in (*_ORDER, MISSING, FIRST_LOOK) if any(counts[v] for _, counts in rows)]
-        heads = "".join(f'<th scope="col">{escape(column)}</th>' for column in ("all", *columns))
-        body = "".join(
-            f'<tr><th scope="row" class="text">{escape(kind)}</th><td>{sum(counts.values())}</td>'
-            + "".join(f"<td>{counts[column] or NOTHING}</td>" for column in columns)
-            + "</tr>"
-            for kind, counts in rows
-        )
-        parts.append(
-            '<div class="scroll" role="region" tabindex="0" aria-label="Published numbers by kind"><table>'
-            f'<thead><tr><th scope="col" class="text">published numbers</th>{heads}</tr></thead>'
-            f"<tbody>{body}</tbody></table></div>"
-        )
+    parts.append(groups_table(counted(studies)))
     claims = [one for study in studies if study.state == "done" for one in study.claims]
     decided = [one for one in claims if one.verdict in SHARE_VERDICTS and one.fraction is not None]
     if decided:
@@ -195,18 +177,7 @@ def _coverage(studies: list[StudyStatus], cases: Sequence[Case]) -> str:
             f"{expected_wrong(len(decided)):.1f} of these verdicts wrong on average; most lie further from "
             "it. Claims of one study share their flights.</p>"
         )
-    return f"<section><h2>What this covers</h2>{''.join(parts)}</section>" if parts else ""
-
-
-def _by_kind(studies: list[StudyStatus]) -> dict[str, list[Number]]:
-    """Counted numbers by what they are, and by what they are held against."""
-    found: dict[str, list[Number]] = {}
-    for study in studies:
-        for one in study.counted:
-            on = {"twin": ", on simulated flights", "logged": ", on logged flights"}.get(study.study.kind, "")
-            words = one.kind if one.kind == CALCULATED else f"{one.kind}{on}"
-            found.setdefault(words, []).append(one)
-    return found
+    return f"<section><h2>What this covers</h2>{''.join(parts)}</section>" if any(parts) else ""
 
 
 def _section(one: StudyStatus) -> str:
@@ -240,6 +211,9 @@ def _state(one: StudyStatus) -> str:
     run = f"`wildlab run {one.study.name}`"
     if one.state == "failed":
         return f'<p><span class="pill no">failed</span> {inline(one.reason)}</p>'
+    if one.state == "damaged":
+        words = f"{inline(one.reason)}. {inline(f'Run it again: {run}')}"
+        return f'<p><span class="pill no">damaged</span> {words}</p>'
     if one.state == "broken off":
         return f'<p><span class="pill part">broken off</span> {inline(f"Run it again: {run}")}</p>'
     if one.state == FIRST_LOOK:
@@ -255,16 +229,24 @@ def _state(one: StudyStatus) -> str:
 
 
 def _explanation() -> str:
-    margins = "; ".join(_margin_words(kind, *margin) for kind, margin in MARGINS.items())
-    text = EXPLANATION.format(margins=margins, widest=WIDEST_FACTOR)
-    return f"<details><summary>How to read this</summary>{prose(text)}</details>"
+    margins = "; ".join(
+        f"{kind}, a factor of {one.factor:.2f}" + (" of the odds" if one.odds else "")
+        for kind, one in KINDS.items()
+        if one.factor
+    )
+    text = EXPLANATION.format(margins=margins)
+    return f'<details id="rule"><summary>How to read this</summary>{prose(text)}</details>'
 
 
-def _margin_words(kind: str, factor: float | None, difference: float | None) -> str:
-    if factor is not None:
-        return f"{kind}, a factor of {factor:g}"
-    return f"{kind}, {difference:g}" + (
-        f" of the size of the errors, or {BY_DEVIATION:g} of their standard deviation where that is printed"
-        if kind == "signed mean"
-        else ""
+@lru_cache(maxsize=1)
+def _characteristics() -> str:
+    """How often the rule gives each answer, folded away."""
+    frame = operating_characteristics(trials=200)
+    body = table_html(frame, {"factor": "our errors (times)"}, 2)
+    return (
+        '<details id="characteristics"><summary>How often each answer is right</summary><p>Probability of '
+        "each answer where the errors of our 200 flights are so many times those of the published flight, by "
+        "simulation of the rule; a flight has 20 independent errors. <code>wildlab list --rule</code> gives "
+        'it.</p><div class="scroll" role="region" tabindex="0" aria-label="Operating characteristics">'
+        f"{body}</div></details>"
     )

@@ -4,40 +4,29 @@ from __future__ import annotations
 
 import math
 
-from wildlab.evaluation.printed import AGREES, DIFFERS, NOT_JUDGED, POSSIBLE, TOO_VAGUE
-from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, UNDECIDABLE, UNDECIDED
-from wildlab.reporting.published import ONE_FLIGHT, SHARE_OF_IMAGES
+from wildlab.evaluation.replication import Closeness, Compatibility
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
+from wildlab.reporting.counts import tally
+from wildlab.reporting.published import SHARE_OF_IMAGES
 from wildlab.reporting.spread import MANY, spread_words
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus
 from wildlab.reporting.text import NOTHING, escape, number
 
 #: A longer table is folded away behind a line that sums it up.
 LONGEST_TABLE = 12
-#: Verdicts and the colour of each: in agreement, open, against.
+#: Answers and verdicts, and the colour of each: for, in part, against; what is not here decides nothing.
 PILLS = {
-    AGREES: "yes",
-    POSSIBLE: "part",
-    TOO_VAGUE: "",
-    DIFFERS: "no",
-    NOT_JUDGED: "",
+    Closeness.CLOSE: "yes",
+    Closeness.NOT_CLOSE: "no",
+    Compatibility.WITHIN: "yes",
+    Compatibility.OUTSIDE: "no",
     HOLDS: "yes",
-    MOSTLY: "yes",
+    MOSTLY: "part",
     UNDECIDED: "part",
     MOSTLY_NOT: "no",
     FAILS: "no",
-    NO_PREMISE: "",
-    UNDECIDABLE: "",
     FIRST_LOOK: "part",
 }
-#: What is said of several numbers with a verdict, in this order.
-_COUNTED = (
-    (AGREES, "agree"),
-    (POSSIBLE, "possible"),
-    (TOO_VAGUE, "too vague to tell"),
-    (DIFFERS, "differ"),
-    (NOT_JUDGED, "not judged"),
-    (MISSING, "not reproduced yet"),
-)
 #: The axis of every strip: ratios to the printed number from 1/8 to 8, logarithmic, and its width in pixels.
 WIDEST, WIDTH = 8.0, 160.0
 _MARGIN = 8.0
@@ -50,7 +39,7 @@ def numbers_table(one: StudyStatus) -> str:
     ran = one.ran
     head = ["quantity", "published"]
     if ran:
-        head += ["here", "ratio, or difference", _strip_heading(one), "flights below the print", ""]
+        head += ["here", "ratio, or difference", _strip_heading(one), "flights below", "close? within 90 %?"]
     heads = "".join(
         f'<th scope="col"{_text(i == 0)}>{h}</th>' if h else '<td class="text"></td>'
         for i, h in enumerate(head)
@@ -74,10 +63,12 @@ def summed_up(one: StudyStatus) -> str:
         return f"{numbers} beside a first look"
     if one.state != "done":
         return f"{numbers} waiting for it"
-    parts = [f"{one.count(verdict)} {words}" for verdict, words in _COUNTED if one.count(verdict)]
+    fitted = [n for n in one.counted if n.fitted]
+    parts = [tally(n for n in one.counted if not n.fitted).words]
+    parts += [f"{len(fitted)} fitted: {tally(fitted).words}"] if fitted else []
     again = len(one.numbers) - count
-    beside = f"; {again} beside other tunings, not counted again" if again else ""
-    return f"{numbers}: {', '.join(parts)}{beside}"
+    parts += [f"{again} more, not counted again"] if again else []
+    return f"{numbers}: {'; '.join(part for part in parts if part)}"
 
 
 def _strip_heading(one: StudyStatus) -> str:
@@ -118,7 +109,7 @@ def _row(n: Number, *, ran: bool) -> str:
             f"<td>{_ratio(n, unit)}</td>",
             f"<td>{strip(n)}</td>",
             f"<td>{below}</td>",
-            f'<td class="text">{_pill(n.verdict)}{_why(n)}</td>',
+            f'<td class="text">{_answers(n)} <span class="dim">{escape(_why(n))}</span></td>',
         ]
     return f"<tr>{''.join(cells)}</tr>"
 
@@ -130,16 +121,20 @@ def _ratio(n: Number, unit: str) -> str:
     return f"{'+' if off > 0 else '−' if off < 0 else ''}{number(abs(off), n.digits + 1)}{unit}"
 
 
+def _answers(n: Number) -> str:
+    """Both answers, or once what a number waits for; what is not asked of it is left out."""
+    near, inside = n.answers
+    return (
+        " ".join(_pill(one) for one in (near, inside) if one != "not judged")
+        if near != inside
+        else _pill(near)
+    )
+
+
 def _why(n: Number) -> str:
-    """The reason of a verdict that does not explain itself, or that it is not counted."""
-    parts = []
-    if n.verdict == NOT_JUDGED and n.reason:
-        parts.append(n.reason)
-    if n.again:
-        parts.append("counted once")
-    if n.kind != ONE_FLIGHT and n.reason and n.verdict in (AGREES, DIFFERS, TOO_VAGUE):
-        parts.append(n.reason)
-    return f' <span class="dim">{escape("; ".join(parts))}</span>' if parts else ""
+    """What the answers rest on, and whether the number is fitted or counted elsewhere."""
+    parts = ["fitted: " + n.fitted if n.fitted else "", n.reason, "counted once" if n.again else ""]
+    return "; ".join(part for part in parts if part)
 
 
 def _pill(verdict: str) -> str:

@@ -8,7 +8,6 @@ from wildlab.pipeline.many.follow import Followed
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.georeferencing_cause import listed
-from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
 from wildlab.reporting.report import Report
 
 
@@ -18,7 +17,6 @@ def head_section(report: Report, followed: Followed, lives: Identities | None) -
     report.head("Who is where, and who is who?", f"All targets at once, by {by}")
     said, level = words.summary(followed, lives)
     report.summary(said, level=level, verdict=words.verdict_of(followed, lives, level))
-    report.metric(VERDICT_LEVEL, "tracking-many", VERDICT_LEVELS[level], "1")
     if followed.notes:
         report.points(followed.notes)
 
@@ -63,11 +61,12 @@ def tables_section(report: Report, followed: Followed, lives: Identities | None)
     report.table(
         table,
         columns={name: heading for name, heading in words.TRACKS.items() if name in table},
-        digits={"from": 1, "to": 1, "looks": 0, "on": 0, "nees": 2},
+        digits={"from": 1, "to": 1, "looks": 0, "on": 0, "nees": 2, "alone": 2},
         caption="Seconds since the first look."
         + (
             " On a target: of the looks at which the track is judged. Mean NEES / 2: 1 where errors are as "
-            "large as the track says, more where they are larger."
+            "large as the track says, more where they are larger; with the truth's own error, and with the "
+            "truth taken for exact."
             if lives is not None
             else ""
         ),
@@ -84,11 +83,31 @@ def told_section(report: Report, followed: Followed) -> None:
 
 def _truth_words(followed: Followed) -> str:
     """Whose errors the truth's are."""
-    known = [sd for sd in followed.truth_sd.values() if sd > 0]
-    if len(known) == len(followed.truth):
-        return "The standard deviation of the truth itself is counted beside that of the tracks."
-    some = "" if not known else f"of {len(followed.truth) - len(known)} of {len(followed.truth)} targets "
-    return f"The truth {some}has no standard deviation of its own: its error counts as the tracks'."
+    words = []
+    known = {name: sd for name, sd in followed.truth_sd.items() if sd > 0}
+    if estimated := [sd for name, sd in known.items() if name in followed.truth_estimated]:
+        words.append(
+            f"Nothing states how wrong the truth is. From one to the next its positions are wrong by up to "
+            f"{max(estimated):.2g} m (SD of each axis); slower errors are not in it and count as the tracks'."
+        )
+    elif known:
+        words.append("The stated standard deviation of the truth is counted beside that of the tracks.")
+    if left := len(followed.truth) - len(known):
+        some = f"of {left} of {len(followed.truth)} targets " if known else ""
+        words.append(
+            f"The truth {some}has no standard deviation of its own: its error counts as the tracks'."
+        )
+    return " ".join(words)
+
+
+def _smoothed_words(followed: Followed) -> list[str]:
+    """Why smoothed places have no covariance, where they have none."""
+    if not followed.unknown_lasting:
+        return []
+    return [
+        f"How long errors of {listed(list(followed.unknown_lasting))} last is not stated: smoothed places "
+        "have no covariance, which would leave out what lasts."
+    ]
 
 
 def pose_limits(followed: Followed) -> list[str]:
@@ -145,6 +164,7 @@ def end_section(report: Report, followed: Followed) -> None:
         [
             *(judged if followed.truth else []),
             "A target that comes back after its track ended has another one: tracks are no count of targets.",
+            *_smoothed_words(followed),
             *pose_limits(followed),
         ]
     )

@@ -10,6 +10,7 @@ import pandas as pd
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
 from wildlab.pipeline.following.beliefs import Said
+from wildlab.pipeline.following.judged import FEWEST
 from wildlab.pipeline.many.beliefs import HERE
 from wildlab.pipeline.many.follow import CUTOFF_M, Followed
 from wildlab.reporting.report import Report
@@ -150,11 +151,16 @@ def _false_words(lives: Identities) -> str:
     return f"{of}; a track is on nothing at {_share(false_share(lives))} of the looks"
 
 
+def judged_nees(lives: Identities) -> list[float]:
+    """Mean NEES / 2 of the tracks that have enough of them to be judged."""
+    return [one.anees / 2 for one in lives.tracks.values() if one.compared >= FEWEST]
+
+
 def _level(lives: Identities, shares: dict[object, float]) -> str:
     if lives.swaps or min(shares.values()) < 0.5:
         return "bad"
-    nees = [track.anees / 2 for track in lives.tracks.values() if np.isfinite(track.anees)]
-    doubtful = [one for one in nees if not SMALLEST <= one <= LARGEST]
+    nees = judged_nees(lives)
+    doubtful = not nees or any(not SMALLEST <= one <= LARGEST for one in nees)
     false = any(track.false for track in lives.tracks.values()) or false_share(lives) > 1 - FOLLOWED
     if lives.breaks or false or min(shares.values()) < FOLLOWED or doubtful:
         return "warn"
@@ -187,7 +193,9 @@ def verdict_of(followed: Followed, lives: Identities | None, level: str) -> tupl
             "targets without a track at more than a tenth of the looks, those before it is confirmed "
             f"counted too: {short} of {len(seen)}"
         )
-    nees = [track.anees / 2 for track in lives.tracks.values() if np.isfinite(track.anees)]
+    nees = judged_nees(lives)
+    if not nees:
+        reasons.append(f"no track was on a target at {FEWEST} looks: its covariance is not judged")
     if over := sum(value > LARGEST for value in nees):
         reasons.append(f"tracks farther off than they say: {over} of {len(nees)}")
     if under := sum(value < SMALLEST for value in nees):
@@ -255,13 +263,14 @@ def tracks_table(followed: Followed, lives: Identities | None) -> pd.DataFrame:
             life = lives.tracks.get(identity)
             row["on"] = 100 * life.on_target / life.scans if life and life.scans else np.nan
             row["nees"] = life.anees / 2 if life else np.nan
+            row["alone"] = life.anees_alone / 2 if life else np.nan
         rows.append(row)
     return pd.DataFrame(rows)
 
 
 TRACKS = {
     "track": "track", "from": "from (s)", "to": "to (s)", "looks": "looks", "kind": "mostly a",
-    "on": "on a target (%)", "nees": "mean NEES / 2",
+    "on": "on a target (%)", "nees": "mean NEES / 2", "alone": "truth exact",
 }  # fmt: skip
 
 

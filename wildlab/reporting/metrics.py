@@ -3,18 +3,22 @@
 ::
 
     {"study", "flight", "kind": "logged"|"twin"|"computed", "seed", "seeds",
-     "metrics": [{"name", "subject", "value", "unit", "n", "published", "source", "low", "high", "below"}],
+     "metrics": [{"name", "subject", "value", "unit", "n", "published", "source", "low", "high", "below",
+                 "flights", "centre_low", "centre_high", "power"}],
      "claims":  [{"id", "text", "verdict", "fraction", "seeds", "low", "high", "met", "half", "twice",
                   "difference", "difference_low", "difference_high"}]}
 
 A value that could not be computed is ``null``. ``low`` and ``high`` bound the spread over ``seeds`` flights
-(or over ``n`` runs of one): the middle 90 % of 30 or more, the lowest and the highest of fewer, ``null`` for
-one. Where there are no flights to go over they bound the middle 90 % of draws with replacement. ``below`` is
-the share of the flights that lie below the published number. Of a claim, ``fraction`` is the share of the
-``met`` flights that meet its premise, ``low`` and ``high`` its 95 % interval; ``half`` and ``twice`` the
-verdicts at other thresholds; ``difference`` the paired mean difference with its interval. ``seeds`` is
-how many flights the numbers come from; ``first_look`` in ``status.json`` beside it says where those are fewer
-than the study's own.
+(or over ``n`` runs of one): the 90 % prediction interval of one more, from 19 on, the lowest and the
+highest of fewer, ``null`` for one. Of a calculation they bound what rounded inputs leave open; where there
+are no flights to go over, the middle 90 % of draws with replacement. ``below`` is the share of the flights
+that lie below the published number, ``flights`` how many have a value, ``centre_low`` and ``centre_high``
+the 90 % confidence interval of their median, and ``power`` the probability that a published flight with
+errors half as large would lie outside (`wildlab.evaluation.replication`). Of a claim, ``fraction`` is the
+share of the ``met`` flights that meet its premise, ``low`` and ``high`` its 95 % interval; ``half`` and
+``twice`` the verdicts at other thresholds; ``difference`` the paired mean difference with its interval.
+``seeds`` is how many flights the numbers come from; ``first_look`` in ``status.json`` beside it says where
+those are fewer than the study's own.
 """
 
 from __future__ import annotations
@@ -36,10 +40,6 @@ NUMBERS = ("value", "published", "low", "high", "fraction", "below")
 
 #: The metric that tells by its subject which poses others were held against; its value is at how many times.
 AGAINST = "compared_with"
-#: The metric of what a report on a flight comes to, by what the report is about: of `VERDICT_LEVELS`.
-VERDICT_LEVEL = "verdict_level"
-#: The colours of a summary as numbers: from 1 on, the report asks for a closer look.
-VERDICT_LEVELS = {"good": 0, "neutral": 0, "warn": 1, "bad": 2}
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _SUBJECT = re.compile(r"\S+")
@@ -82,6 +82,10 @@ def metric(
     low: Any = None,
     high: Any = None,
     below: Any = None,
+    flights: Any = None,
+    centre_low: Any = None,
+    centre_high: Any = None,
+    power: Any = None,
 ) -> dict[str, Any]:
     """One entry of ``metrics``, checked.
 
@@ -103,6 +107,12 @@ def metric(
         Bounds of the value.
     below
         Share of the flights that lie below the printed number.
+    flights
+        How many of them have a value.
+    centre_low, centre_high
+        90 % confidence interval of the value, as the centre of what all such flights give.
+    power
+        Of "outside", for a published flight with errors half as large.
 
     Returns
     -------
@@ -138,6 +148,10 @@ def metric(
         "low": plain_number(low, f"the low bound of {what}"),
         "high": plain_number(high, f"the high bound of {what}"),
         "below": plain_number(below, f"the share below the published value of {what}"),
+        "flights": None if flights is None else int(flights),
+        "centre_low": plain_number(centre_low, f"the low bound of the centre of {what}"),
+        "centre_high": plain_number(centre_high, f"the high bound of the centre of {what}"),
+        "power": plain_number(power, f"the power of {what}"),
     }
     if entry["low"] is not None and entry["high"] is not None and entry["low"] > entry["high"]:
         raise WildlabError(f"the low bound of {what} is above the high one", "swap them", field="metrics")

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
-# nbformat checks notebooks with jsonschema, which builds a grammar of internationalised addresses when it is
-# imported. That takes seconds, in every process that reads a notebook; no notebook's schema asks for such an
-# address, and jsonschema does without the package where it is not installed.
-sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
+import nbformat
 
-import nbformat  # noqa: E402
-
-from wildlab.errors import WildlabError  # noqa: E402
+from wildlab.errors import WildlabError
 
 __all__ = ["nbformat", "read_notebook"]
 

@@ -11,17 +11,14 @@ from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
 from wildlab.pipeline.overviews.alarms import APART_M, APART_SD, APART_SHARE, JUMP, JUMP_M, LEANT_DEG
 from wildlab.pipeline.overviews.image_coverage import FLATTEST
 from wildlab.pipeline.overviews.overview import Overview, troubled_for
+from wildlab.pipeline.overviews.verdict import WORTH, Numbers, evidence_of, verdict_of
 from wildlab.pipeline.overviews.worth_fixing import (
-    LEVELS,
     LISTED,
     MOST,
-    WORTH,
     Gain,
-    Numbers,
     doubted,
     error_measured,
     possible_gain,
-    verdict_of,
 )
 from wildlab.reporting import overview_sections as sections
 from wildlab.reporting import overview_words as words
@@ -58,13 +55,14 @@ def show_overview(
     problems = overview.problems + sum(one.startswith("problem") for one in amiss)
     possible = possible_gain(numbers)
     doubts = doubted(numbers)
-    counts = counts_of(overview, gains, problems, judged, possible, doubts)
-    word = verdict_of(**counts)
+    counts = counts_of(overview, gains, problems, judged, possible)
+    word = verdict_of(evidence_of(counts, numbers))
     shown = overview.flight.manifest.locations.sensitivity == "open"
     report.head("What happened on this flight, and what is worth fixing?", words.subtitle(overview))
     measured = error_measured(numbers)
     said = words.summary_sentences(overview, word, gains, problems, lacking, measured, possible, doubts)
-    report.summary(said, level=LEVELS[word], verdict=(word, words.reason_words(**counts, possible=possible)))
+    reason = words.reason_words(**counts, possible=possible, doubts=doubts)
+    report.summary(said, level=word.colour, verdict=(word.value, reason))
     report.tiles(sections.tiles(overview))
     report.section("Most worth fixing", words.first_of(gains, possible), part=ADVICE)
     if gains:
@@ -92,15 +90,14 @@ def counts_of(
     problems: int,
     judged: int,
     possible: Gain | None,
-    doubts: Sequence[str] = (),
 ) -> dict[str, int]:
-    """What the verdict follows from: the arguments of `verdict_of`."""
+    """What is counted on the flight beside the verdicts of its reports, and recorded."""
     long = troubled_for(overview, WORTH)
     paused = [one for one in overview.troubles if one.what == "no poses" and one not in long]
     return {
         "problems": problems,
         "worth": sum(gain.share >= WORTH for gain in gains),
-        "troubled": len(long) + len(paused) + (possible is not None) + len(doubts),
+        "troubled": len(long) + len(paused) + (possible is not None),
         "judged": judged,
         "broken": sum(one.broken for one in overview.alarms),
         "alarmed": sum(not one.broken for one in overview.alarms),

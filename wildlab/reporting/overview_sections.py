@@ -9,7 +9,7 @@ from wildlab.evaluation.vibration import FINE, HARMFUL
 from wildlab.flight.clocks import gnss_times
 from wildlab.pipeline.overviews.alarms import beside_satellites
 from wildlab.pipeline.overviews.overview import Overview
-from wildlab.pipeline.overviews.worth_fixing import Numbers
+from wildlab.pipeline.overviews.verdict import Numbers
 from wildlab.reporting import overview_words as words
 from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.report import Report

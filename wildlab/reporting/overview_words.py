@@ -11,7 +11,8 @@ from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
 from wildlab.pipeline.overviews.alarms import Alarm
 from wildlab.pipeline.overviews.image_coverage import Coverage
 from wildlab.pipeline.overviews.overview import Overview, Trouble, troubled_for
-from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LOOK, MEND, MOST, SOUND, WORTH, Gain
+from wildlab.pipeline.overviews.verdict import WORTH, Verdict
+from wildlab.pipeline.overviews.worth_fixing import MOST, Gain
 from wildlab.reporting.georeferencing_cause import listed, metres
 from wildlab.reporting.text import percent
 
@@ -19,6 +20,7 @@ _CAUSES = {
     "position": "the position (north and east)",
     "height": "the height",
     "boresight": "the boresight (how the camera sits on the airframe)",
+    "heading": "the heading",
     "camera's clock": "the camera's clock",
     "lens": "the lens",
 }
@@ -115,11 +117,12 @@ def gain_sentence(gain: Gain) -> str:
 
 def reason_words(
     problems: int, worth: int, troubled: int, judged: int, broken: int, alarmed: int,
-    possible: Gain | None = None,
+    possible: Gain | None = None, doubts: Sequence[str] = (),
 ) -> str:  # fmt: skip
-    """Why the verdict is what it is: what was counted, most pressing first; parameters of `verdict_of`.
+    """Why the verdict is what it is: what was counted, most pressing first.
 
-    ``possible``: a gain that is not certain, one of those that are ``troubled``.
+    ``possible``: a gain that is not certain, one of those that are ``troubled``; ``doubts``: from
+    `wildlab.pipeline.overviews.worth_fixing.doubted`.
     """
     troubled -= possible is not None
     said = [
@@ -135,10 +138,12 @@ def reason_words(
     ]
     if possible is not None:
         said.append(f"georeferencing: a constant error may be {percent(possible.share, 0)} of the mean error")
+    if doubts:
+        said.append(f"look closer at {listed(list(doubts))}")
     if said:
         return f"{', '.join(said)}."
     if not judged:
-        return "No other report could be made of this flight."
+        return "No other report could judge this flight."
     return f"{judged} other {'report' if judged == 1 else 'reports'} on it, and nothing in them worth fixing."
 
 
@@ -174,7 +179,7 @@ def length_words_fine(metres: float) -> str:
 
 def headline(
     overview: Overview,
-    word: str,
+    word: Verdict,
     gains: Sequence[Gain],
     problems: int,
     measured: bool = True,
@@ -182,19 +187,23 @@ def headline(
     doubts: Sequence[str] = (),
 ) -> str:
     """The first sentence: what the flight comes to."""
-    if word == ALARM:
+    if word == Verdict.ALARM:
         return f"Something went wrong on this flight: {alarm_words(overview.alarms[0], overview)}."
-    if word == MEND:
+    if word == Verdict.MEND and not problems:
+        return f"Mend this flight first: {doubt_words(doubts)}."
+    if word == Verdict.MEND:
         some = _problem_words(problems)
         return f"Mend this flight first: {some} in it cannot be used or contradict each other."
-    if word == FIX:
-        worth = [gain for gain in gains if gain.share >= WORTH]
+    worth = [gain for gain in gains if gain.share >= WORTH]
+    if word == Verdict.FIX and not worth:
+        return "Something is worth fixing: the report on the georeferencing says what."
+    if word == Verdict.FIX:
         first = _lower(gain_title(worth[0]))
         more = f", and {len(worth) - 1} more" if len(worth) > 1 else ""
         return f"Something is worth fixing: {first}{more}."
-    if word == LOOK and overview.alarms:
+    if word == Verdict.LOOK and overview.alarms:
         return f"Look closer: {alarm_words(overview.alarms[0], overview)}."
-    if word == LOOK:
+    if word == Verdict.LOOK:
         longest = [
             *troubled_for(overview, WORTH),
             *(one for one in overview.troubles if one.what == "no poses"),
@@ -204,14 +213,14 @@ def headline(
         if possible:
             return f"Look closer: {_possible_words(possible)}."
         return f"Look closer: {doubt_words(doubts)}." if doubts else "Look closer."
-    if word == SOUND and not measured:
+    if word == Verdict.SOUND and not measured:
         return (
             f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its data; how far off "
             "its positions are was not measured."
         )
-    if word == SOUND:
+    if word == Verdict.SOUND:
         return f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its error or data."
-    return "This flight is shown, not judged: none of the other reports could be made of it."
+    return "This flight is shown, not judged: none of the other reports could judge it."
 
 
 def doubt_words(doubts: Sequence[str]) -> str:
@@ -245,7 +254,7 @@ def _lower(text: str) -> str:
 
 def summary_sentences(
     overview: Overview,
-    word: str,
+    word: Verdict,
     gains: Sequence[Gain],
     problems: int,
     lacking: Sequence[str],
@@ -263,22 +272,15 @@ def summary_sentences(
     more = [clause for one in overview.alarms if (clause := alarm_words(one, overview)) not in first]
     if more:
         said.append(f"Also: {'; '.join(more)}.")
-    if problems and word != MEND:
-        said.append(f"Besides, {_problem_words(problems)} in it cannot be used or contradict each other.")
     if gains:
-        what = "" if word == FIX else f"The most to gain: {_lower(gain_title(gains[0]))}. "
+        what = "" if word == Verdict.FIX else f"The most to gain: {_lower(gain_title(gains[0]))}. "
         said.append(f"{what}{gain_measured(gains[0])}")
-    elif word != SOUND and not possible:
+    elif word != Verdict.SOUND and not possible:
         said.append("No gain was measured that mending anything would bring.")
-    if possible and _possible_words(possible) not in first:
-        said.append(f"Possible: {_possible_words(possible)}.")
     # Jumps are instants and have been said.
     lasting = [one for one in overview.troubles if one.seconds >= 1 and one.what not in first]
     if lasting:
         said.append(f"Along the path: {_lasting(overview, max(lasting, key=lambda one: one.seconds))}.")
-    if doubts and doubt_words(doubts) not in first:
-        what = "report" if len(doubts) == 1 else "reports"
-        said.append(f"Look at the {what} on {listed(list(doubts))} too: not all is well there.")
     if lacking:
         said.append(f"Not judged: {'; '.join(lacking)}.")
     return said
@@ -320,7 +322,7 @@ def path_title(overview: Overview) -> str:
     if overview.alarms and not overview.troubles:
         return f"Along the path: {_SHORT[overview.alarms[0].what]}"
     if not overview.troubles:
-        return f"Nothing wrong was found in {listed(list(overview.searched))}"
+        return f"No gaps, jumps or shaking were found in {listed(list(overview.searched))}"
     worst = max(overview.troubles, key=lambda one: one.seconds)
     if not np.isfinite(overview.length_s) or overview.length_s <= 0 or worst.seconds < 1:
         return f"Along the path: {worst.what}"

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
-from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LOOK, MEND, SOUND, UNJUDGED, verdict_of
+from wildlab.pipeline.overviews.verdict import Verdict, evidence_of, verdict_of
 from wildlab.reporting.overview_words import duration_words
 from wildlab.reporting.page import TAGS, page
 from wildlab.reporting.text import NOTHING, escape
@@ -21,8 +21,8 @@ BEGIN = (
     "<code>wildlab evaluate flights/tuesday</code> writes its reports, and they are shown here."
 )
 #: What the verdict follows from, of the overview.
-COUNTS = ("problems", "worth_fixing", "troubled", "reports_beside")
-_PILLS = {ALARM: "no", MEND: "no", FIX: "part", LOOK: "part", SOUND: "yes", UNJUDGED: ""}
+COUNTS = {"problems": "problems", "worth": "worth_fixing", "troubled": "troubled", "judged": "reports_beside"}
+_PILLS = {"bad": "no", "warn": "part", "good": "yes", "neutral": ""}
 
 
 class OwnReport(NamedTuple):
@@ -36,7 +36,7 @@ class OwnReport(NamedTuple):
         ``overview``, ``georeferencing``, ``navigation``, ``tracking``, ``many targets``, or the
         folder's name.
     state
-        ``done``, ``failed`` or ``broken off``.
+        ``done``, ``failed``, ``broken off`` or ``damaged``.
     finished
         When, as ISO 8601; "" where that is not known.
     numbers
@@ -82,15 +82,20 @@ class OwnFlight(NamedTuple):
         return None if entry is None else float(entry["value"])
 
     @property
-    def verdict(self) -> str | None:
+    def numbers(self) -> dict[tuple[str, str], Mapping[str, Any]]:
+        """Those of all its reports; of equal ones that of the first report."""
+        return {key: entry for one in reversed(self.reports) for key, entry in one.numbers.items()}
+
+    @property
+    def verdict(self) -> Verdict | None:
         """What it comes to; None without an overview that is done."""
-        counts = [self.value(name, "flight") for name in COUNTS]
-        if any(count is None for count in counts):
-            return None
-        problems, worth, troubled, judged = (int(count or 0) for count in counts)
+        counts = {key: self.value(name, "flight") for key, name in COUNTS.items()}
         # Overviews of before these were computed do not have them.
-        broken, alarmed = (int(self.value(name, "flight") or 0) for name in ("broken", "alarmed"))
-        return verdict_of(problems, worth, troubled, judged, broken, alarmed)
+        counts |= {name: self.value(name, "flight") or 0 for name in ("broken", "alarmed")}
+        known = {key: count for key, count in counts.items() if count is not None}
+        if len(known) < len(counts):
+            return None
+        return verdict_of(evidence_of(known, self.numbers))
 
     @property
     def finished(self) -> str:
@@ -115,7 +120,7 @@ def verdict_pill(flight: OwnFlight) -> str:
     word = flight.verdict
     if word is None:
         return '<span class="pill">no overview</span>'
-    return f'<span class="pill {_PILLS[word]}">{escape(word)}</span>'
+    return f'<span class="pill {_PILLS[word.colour]}">{escape(word)}</span>'
 
 
 def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
@@ -138,7 +143,7 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
         f'<th scope="col" class="text">{title}</th>'
         for title in ("flight", "verdict", "kind", "length", "reports", "evaluated")
     )
-    judged = sum(flight.verdict not in (None, UNJUDGED) for flight in flights)
+    judged = sum(flight.verdict not in (None, Verdict.UNJUDGED) for flight in flights)
     parts = [
         "<header><h1>Flights evaluated here</h1>",
         f'<p class="sub">{len(flights)} flight{"s" * (len(flights) != 1)}, {judged} of them judged. '
@@ -153,13 +158,24 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
         parts.append(f"<p>{BEGIN}</p>")
     if comparison:
         parts.append(f'<p><a href="{escape(comparison)}">Flights compared on one page</a></p>')
+    damaged = [
+        one.folder
+        for flight in flights
+        for one in (*flight.reports, *flight.earlier)
+        if one.state == "damaged"
+    ]
+    if damaged:
+        parts.append(
+            f"<p>{len(damaged)} report{'s' * (len(damaged) != 1)} not as written, and not used: "
+            f"{escape(', '.join(damaged))}. What does not fit: <code>wildlab verify</code>.</p>"
+        )
     meanings = {
-        ALARM: "its position jumps, or it leans as nobody flies on purpose",
-        MEND: "something in its tables cannot be used or contradicts itself",
-        FIX: "a gain was measured that is worth it",
-        LOOK: "something is wrong along the path, and what mending it gains was not measured for certain",
-        SOUND: "it was judged, and none of these is so",
-        UNJUDGED: "no other report could be made of it",
+        Verdict.ALARM: "its position jumps, or it leans as nobody flies on purpose",
+        Verdict.MEND: "something in its tables cannot be used or contradicts itself",
+        Verdict.FIX: "a gain was measured that is worth it",
+        Verdict.LOOK: "something is wrong, and what mending it gains was not measured for certain",
+        Verdict.SOUND: "it was judged, and none of these is so",
+        Verdict.UNJUDGED: "no report could judge its errors",
     }
     legend = "; ".join(f"<b>{word}</b>: {meaning}" for word, meaning in meanings.items())
     parts.append(f'<p class="note">{legend}.</p>')

@@ -16,6 +16,7 @@ from matplotlib.path import Path as Outline
 from wildlab.flight.readers.area import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
+from wildlab.names import figure_name
 from wildlab.pipeline.plans.coverage import Covered
 from wildlab.pipeline.plans.files import origin_text
 from wildlab.pipeline.plans.plan import Plan
@@ -134,7 +135,9 @@ def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> t
     many = len(plan.sorties) > NAMED
     for k, one in enumerate(plan.sorties):
         points, colour = one.course.points, FLIGHTS[k % len(FLIGHTS)]
-        ax.plot(points[:, 1], points[:, 0], color=colour, lw=1.0, label=None if many else one.name)
+        ax.plot(
+            points[:, 1], points[:, 0], color=colour, lw=1.0, label=None if many else figure_name(one.name)
+        )
         for row in one.rows:
             _arrow(ax, plan.pattern.rows[row], colour)
     ax.plot(plan.home[1], plan.home[0], "^", color=INK, ms=8, label="take-off", zorder=5)
@@ -150,7 +153,9 @@ def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> t
     handles, _ = ax.get_legend_handles_labels()
     shown = np.any(there, axis=0)
     handles += [
-        Patch(color=c, label=what) for (what, c), some in zip(GROUND.items(), shown, strict=True) if some
+        Patch(color=c, label=figure_name(what))
+        for (what, c), some in zip(GROUND.items(), shown, strict=True)
+        if some
     ]
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     spread = _extent(plan)

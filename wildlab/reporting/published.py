@@ -4,6 +4,7 @@
 
     kind = "one flight"         # what the file's numbers are; a number may say otherwise
     signs = "undefined"         # signed means are compared by size: nobody says which way round they are
+    last_digit = "within one"   # of all tables: the print contradicts itself if rounded to nearest
 
     [[number]]
     study = "sensitivity"
@@ -12,10 +13,10 @@
     value = 5.3                 # as printed: 5.30 would mean two decimals
     unit = "m"
     source = "H table 5.1"
-    within = 0.15               # optional: what rounding leaves open
-    runs = 10000                # of a mean of runs: how many
-    again = true                # the same printed number as another entry: shown, and counted there
-    fitted = "..."              # why ours may not be judged by it: something of ours was chosen by it
+    within = 0.15               # optional: what the source leaves open besides the last digit
+    runs = 10000                # of a mean of runs, or a share of images: how many
+    again = true                # the same published number as another entry: shown, and counted there
+    fitted = "..."              # what of ours was chosen by it: compared, and counted apart
     unjudged = "..."            # why it cannot be held against ours at all: what the thesis leaves out
 
     [[claim]]
@@ -29,7 +30,7 @@
     own = true                  # optional: a sentence of ours, not of a thesis
 
 A number's ``kind`` is "calculated", "mean of runs", "one flight" or "share of images":
-`wildlab.evaluation.printed` compares each in its own way, one flight's by what the quantity is
+`wildlab.evaluation.replication` compares each in its own way, one flight's by what the quantity is
 (`quantity_kind`).
 """
 
@@ -81,21 +82,20 @@ SHARE_OF_IMAGES = "share of images"
 _OF_FILE = {
     "kind": (ONE_FLIGHT, CALCULATED, MEAN_OF_RUNS, SHARE_OF_IMAGES),
     "signs": ("defined", "undefined"),
+    "last_digit": ("rounded", "within one"),
 }
 _COLUMNS = [
-    *("name", "subject", "value", "digits", "unit", "source", "within"),
+    *("name", "subject", "value", "digits", "unit", "source", "rounding"),
     *("kind", "by_size", "runs", "again", "fitted", "unjudged"),
 ]
 #: What a quantity is, by its name; the first pattern that fits.
 _QUANTITIES = (
     (re.compile(r"(mean_)?sd_\w+"), "standard deviation"),
     (re.compile(r"(nees|nis)(_\w+)?"), "NEES or NIS"),
-    (re.compile(r"mean_(north|east|down|ahead|right)"), "signed mean"),
+    (re.compile(r"(size_of_)?mean_(north|east|down|ahead|right)"), "signed mean"),
     (re.compile(r"(\w+_)?(rate|fraction|share)(_\w+)?"), "rate"),
     (re.compile(r"(mae|rmse|\w*error)(_\w+)?"), "error size"),
 )
-#: Names of the size that a signed mean is compared with, the first that is printed for the same subject.
-SIZES = ("mae", "mean_error", "rmse")
 
 
 def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
@@ -112,9 +112,9 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     -------
     DataFrame
         ``name``, ``subject``, ``value`` (float), ``digits`` (decimals printed in the source), ``unit``,
-        ``source``, ``within`` (of a calculation at least what rounding leaves open) and ``runs`` (NaN where
-        none is stated), ``kind``, ``by_size`` (a signed mean
-        that is compared by its size), ``again``, ``fitted``, ``unjudged``; no rows where the study has none.
+        ``source``, ``rounding`` (what the print leaves open to each side), ``runs`` (NaN where none is
+        stated), ``kind``, ``by_size`` (a signed mean that is compared by its size), ``again``, ``fitted``,
+        ``unjudged``; no rows where the study has none.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
             **{key: entry[key] for key in ("name", "subject", "unit", "source")},
             "value": float(entry["value"]),
             "digits": _decimals(entry["value"]),
-            "within": _within(entry),
+            "rounding": _rounding(entry),
             "kind": entry["kind"],
             "by_size": entry["signs"] == "undefined" and quantity_kind(entry["name"]) == "signed mean",
             "runs": float(entry.get("runs", math.nan)),
@@ -153,7 +153,7 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
 
 
 def quantity_kind(name: str) -> str:
-    """What the quantity of that name is: a key of `wildlab.evaluation.printed.MARGINS`.
+    """What the quantity of that name is: a key of `wildlab.evaluation.replication.KINDS`.
 
     Parameters
     ----------
@@ -222,6 +222,10 @@ def _entries(kind: str, folder: Path) -> list[dict[str, Any]]:
         of_file = {key: content.get(key, words[0]) for key, words in _OF_FILE.items()}
         for key, value in of_file.items():
             _check_word(key, value, path.name, key)
+        values = [entry.get("value", 0) for entry in content.get("number", [])]
+        of_file["digits"] = max(
+            (_decimals(one) for one in values if isinstance(one, (Decimal, int))), default=0
+        )
         for index, entry in enumerate(content.get(kind, []), 1):
             _check_entry(entry, kind, f"[[{kind}]] {index}", path.name)
             entries.append(of_file | entry if kind == "number" else dict(entry))
@@ -267,11 +271,16 @@ def _check_entry(entry: dict[str, Any], kind: str, where: str, file: str) -> Non
         metric(entry["name"], entry["subject"], float(entry["value"]), entry["unit"])
 
 
-def _within(entry: Mapping[str, Any]) -> float:
-    """What is stated; else, of a calculation, what rounding to the printed digits leaves open."""
+def _rounding(entry: Mapping[str, Any]) -> float:
+    """What the print leaves open to each side: half of the last digit, or of one of so many images."""
     if "within" in entry:
         return float(entry["within"])
-    return 0.5 * 10.0 ** -_decimals(entry["value"]) if entry["kind"] == CALCULATED else math.nan
+    if entry["last_digit"] == "within one":
+        # One table, one last digit: 21 stands beside 21.2, its zero left out.
+        return float(10.0 ** -entry["digits"])
+    if "runs" in entry and entry["kind"] != MEAN_OF_RUNS:
+        return 0.5 / float(entry["runs"])
+    return float(0.5 * 10.0 ** -_decimals(entry["value"]))
 
 
 def _decimals(value: Decimal | int) -> int:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wildlab.pipeline.overviews.worth_fixing import MEND, UNJUDGED
+from wildlab.pipeline.overviews.verdict import MANY_LOST, Evidence, Verdict, verdict_of
 from wildlab.pipeline.repeats import Repeats
 from wildlab.reporting.georeferencing import short_length
-from wildlab.reporting.georeferencing_cause import MANY_LOST, amiss_sentence, lost_sentence
+from wildlab.reporting.georeferencing_cause import amiss_sentence, cause_sentence, lost_sentence
 
 #: Ellipses whose size is off by less than this factor fit the spread.
 CLOSE = 1.25
@@ -51,6 +51,8 @@ def _found_sentences(found: Repeats) -> list[str]:
     ]
     if np.isfinite(s.consistent):
         said.append(consistency_sentence(s.consistent))
+    if found.diagnosis is not None:
+        said.append(cause_sentence(found.diagnosis))
     return [lost, *said] if found.lost > MANY_LOST * len(found.points) else [*said, *([lost] if lost else [])]
 
 
@@ -69,23 +71,16 @@ def consistency_sentence(ratio: float) -> str:
     return "The scatter fits the ellipses, as far as images differ."
 
 
-def level(found: Repeats, amiss: Sequence[str] = ()) -> str:
-    """Colour of the summary: never good, for the errors themselves are not known.
-
-    Bad where many points are lost, or where the flight contradicts itself (``amiss``).
-    """
-    return "bad" if found.lost > MANY_LOST * len(found.points) or amiss_sentence(amiss) else "neutral"
-
-
-def verdict(found: Repeats, amiss: Sequence[str] = ()) -> tuple[str, str]:
-    """The word that goes with `level`, and its reason."""
+def verdict(found: Repeats, amiss: Sequence[str] = ()) -> tuple[Verdict, str]:
+    """What it comes to, and why: never sound, for the errors themselves are not known."""
     contradictions, total = sum(one.startswith("problem") for one in amiss), len(found.points)
+    word = verdict_of(Evidence(problems=contradictions, lost=found.lost / total if total else np.nan))
     if contradictions:
         count = "1 finding" if contradictions == 1 else f"{contradictions} findings"
-        return MEND, f"The logs contradict each other: {count}."
-    if found.lost > MANY_LOST * total:
-        return "too many lost", f"{found.lost} of {total} points have no position."
-    return UNJUDGED, "Without points whose place is known, errors stay unknown."
+        return word, f"The logs contradict each other: {count}."
+    if word == Verdict.MEND:
+        return word, f"{found.lost} of {total} points have no position."
+    return word, "Without points whose place is known, errors stay unknown."
 
 
 def limits(found: Repeats) -> list[str]:
@@ -93,7 +88,6 @@ def limits(found: Repeats) -> list[str]:
     said = [
         "How far off the positions are: an error that all images share (height, clock, boresight seen from "
         "one side) moves all sightings together and does not show.",
-        "Which cause is behind it: that takes points whose position is known.",
         "How far a thing moved between its sightings: that counts as scatter, and makes the ellipses look "
         "too small.",
     ]

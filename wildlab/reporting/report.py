@@ -1,7 +1,8 @@
 """`Report`: what a notebook writes its report with.
 
-Each method shows one part of the page as HTML and collects the numbers for ``metrics.json``. All text is
-escaped; ``**bold**`` and a code span in backquotes are the only marks (`wildlab.reporting.text`)::
+Each method shows one part of the page as HTML and collects the numbers for ``metrics.json``. What gives a
+number that is not known is left out (`wildlab.reporting.text.known`). All text is escaped; ``**bold**`` and a
+code span in backquotes are the only marks::
 
     report = open_report(study=study, kind="twin", flight=flight, seed=seed, out=out)
     report.head("How far off is a position read from one photo?", "29 photos from 55 m")
@@ -35,12 +36,14 @@ from wildlab.reporting.pictures import figure_html
 from wildlab.reporting.published import load_claims, published_rows
 from wildlab.reporting.standing import Standing, standing
 from wildlab.reporting.tables import csv_link, table_html
-from wildlab.reporting.text import escape, inline, maths, prose, slug
+from wildlab.reporting.text import escape, inline, known, maths, prose, slug
 from wildlab.reporting.verdicts import judge
 
 LEVELS = ("good", "warn", "bad", "neutral")
 #: The pill that goes with a bar's colour.
 PILLS = {"good": "yes", "warn": "part", "bad": "no", "neutral": ""}
+#: What is said where no number is known that anything could be said by.
+NOTHING_KNOWN = "Not known: there are too few observations."
 #: Points of an alert that are shown at once: what comes below must not leave the screen.
 ALERTS_SHOWN = 3
 
@@ -57,7 +60,6 @@ def open_report(
     seed: int | None = None,
     seeds: int | None = None,
     out: str = "",
-    expected_prefix: str = "",
 ) -> Report:
     """Begin a report.
 
@@ -75,8 +77,6 @@ def open_report(
         How many simulated flights the numbers come from, where it is more than one.
     out
         Folder for ``metrics.json`` and ``figures/``; "" (a notebook opened by hand) writes nothing.
-    expected_prefix
-        ``sys.prefix`` of whoever runs the notebook; "" does not look.
 
     Returns
     -------
@@ -85,14 +85,8 @@ def open_report(
     Raises
     ------
     WildlabError
-        If this kernel runs in another environment than the caller's.
+        If there is no such kind.
     """
-    here = Path(sys.prefix).resolve()
-    if expected_prefix and here != Path(expected_prefix).resolve():
-        raise WildlabError(
-            f"the notebook's kernel runs in another Python environment ({here.name}) than wildlab",
-            "register the kernel again: python -m ipykernel install --sys-prefix",
-        )
     if kind not in TAGS:
         raise WildlabError(f"the kind {kind!r} is unknown", f"use one of: {', '.join(TAGS)}", field="kind")
     return Report(
@@ -162,7 +156,7 @@ class Report:
             raise WildlabError(f"the colour {level!r} has no word", "give the verdict and its reason")
         if not sentences:
             raise WildlabError("the summary is empty", "give it a sentence")
-        first, *others = [inline(sentence) for sentence in sentences]
+        first, *others = [inline(one) for one in map(known, sentences) if one] or [NOTHING_KNOWN]
         text = " ".join([f"<b>{first.replace('<b>', '').replace('</b>', '')}</b>", *others])
         self._show(f'<section class="summary {level}" aria-label="Summary"><p>{text}</p></section>')
         self._judged = verdict is not None
@@ -171,6 +165,7 @@ class Report:
 
     def alert(self, title: str, points: Sequence[str]) -> None:
         """What must be known before anything else; beyond `ALERTS_SHOWN` points, the others are folded."""
+        points = [one for one in map(known, points) if one]
         first, others = points[:ALERTS_SHOWN], points[ALERTS_SHOWN:]
         html = f"<p><b>{inline(title)}</b></p>{_list(first)}"
         if others:
@@ -180,7 +175,11 @@ class Report:
 
     def tiles(self, tiles: Sequence[tuple[str, str]]) -> None:
         """The few numbers to remember: ``[("2.9 m", "mean error"), ...]``."""
-        items = [f"<li><b>{inline(value)}</b><span>{inline(label)}</span></li>" for value, label in tiles]
+        items = [
+            f"<li><b>{inline(value)}</b><span>{inline(label)}</span></li>"
+            for value, label in tiles
+            if known(value) and known(label)
+        ]
         self._show(f'<ul class="tiles">{"".join(items)}</ul>')
 
     def section(self, title: str, intro: str = "", part: str = "") -> None:
@@ -188,15 +187,17 @@ class Report:
         (`ADVICE`) stands before all other sections, wherever it was shown."""
         marked = f' data-part="{part}"' if part else ""
         heading = f'<h2 id="{slug(title)}"{marked}>{inline(title)}</h2>'
+        intro = known(intro)
         self._show(heading, f"<p>{inline(intro)}</p>" if intro else "")
 
     def subsection(self, title: str, intro: str = "") -> None:
         """``<h3>`` and, if given, a paragraph."""
+        intro = known(intro)
         self._show(f"<h3>{inline(title)}</h3>", f"<p>{inline(intro)}</p>" if intro else "")
 
     def text(self, paragraphs: str) -> None:
         """Paragraphs, split at blank lines, with ``$latex$`` set as maths. Not for text out of data."""
-        self._show(prose(paragraphs))
+        self._show(prose(known(paragraphs)))
 
     def points(self, points: Iterable[str], *, ordered: bool = False) -> None:
         """A list."""
@@ -264,7 +265,7 @@ class Report:
                 )
             frame = frame[list(columns)]
         self._tables += 1
-        body = table_html(frame, columns or {}, digits)
+        body, caption = table_html(frame, columns or {}, digits), known(caption)
         label = f"<b>Table {self._tables}.</b> {inline(caption)}" if caption else ""
         if link := csv_link(frame, f"{self.study}-table-{self._tables}", f"Table {self._tables} as CSV"):
             label += f' <span class="get">{link}</span>'
@@ -311,8 +312,10 @@ class Report:
         low: float | None = None,
         high: float | None = None,
         below: float | None = None,
+        **flights: float | None,
     ) -> None:
-        """Record a number. ``published`` and ``source`` are looked up in ``data/published`` where not given.
+        """Record a number. ``published`` and ``source`` are looked up in ``data/published`` where not given;
+        ``flights`` is what `metrics.metric` has besides.
 
         Raises
         ------
@@ -340,6 +343,7 @@ class Report:
                 low=low,
                 high=high,
                 below=below,
+                **flights,
             )
         )
 
@@ -357,11 +361,6 @@ class Report:
         """The numbers recorded so far, by name and subject."""
         return {(entry["name"], entry["subject"]): entry for entry in self._metrics}
 
-    @property
-    def published(self) -> dict[tuple[str, str], float]:
-        """What is published for the study, by name and subject."""
-        return {key: float(row["value"]) for key, row in self._published.items()}
-
     def printed(self, name: str, subject: str) -> dict[str, Any] | None:
         """What is published for a number: a row of `wildlab.reporting.published.load_published`, or None."""
         return self._published.get((name, subject))
@@ -369,13 +368,12 @@ class Report:
     @property
     def standing(self) -> Standing:
         """How the numbers and claims recorded so far stand to those that are printed."""
-        recorded, printed = self.recorded, self.published
+        recorded = self.recorded
         rows = [row for row in self._published.values() if not row["again"]]
-        compared = [judge(row, recorded, printed) for row in rows]
         # What is a sentence of ours is no word of the thesis.
         own = {claim["id"] for claim in load_claims(self.study) if claim.get("own")}
         claims = [one["verdict"] for one in self._claims if one["id"] not in own]
-        return standing([one.verdict for one in compared if one is not None], claims)
+        return standing([one for row in rows if (one := judge(row, recorded)) is not None], claims)
 
     def save(self) -> None:
         """Say how the numbers stand, unless the summary did, and write ``metrics.json`` into the report's
@@ -410,6 +408,7 @@ class Report:
         if not alt.strip():
             raise WildlabError(f"the figure {name!r} has no alt text", "say in words what it shows")
         self._figures.add(name)
+        alt, caption = known(alt) or NOTHING_KNOWN, known(caption)
         ordinal = len(self._figures)
         png = save_figure(fig, self.out / "figures", name) if self.out is not None else png_bytes(fig)
         html = figure_html(fig, png, ordinal=ordinal, alt=alt, caption=caption, main=main)
@@ -429,7 +428,8 @@ class Report:
 
 
 def _list(points: Iterable[str], tag: str = "ul") -> str:
-    return f"<{tag}>{''.join(f'<li>{inline(point)}</li>' for point in points)}</{tag}>"
+    items = [f"<li>{inline(point)}</li>" for point in map(known, points) if point]
+    return f"<{tag}>{''.join(items)}</{tag}>" if items else ""
 
 
 def _close(fig: Figure) -> None:

@@ -1,8 +1,7 @@
 """How far simulated flights spread, and what that is called.
 
-Of many flights the middle 90 % is shown. The quantiles that bound it say little about few: of fewer than 20
-they lie between the two outermost flights, and depend on how one interpolates. There the lowest and the
-highest are shown, which need no interpolation. One flight has no spread at all.
+Of many flights the 90 % prediction interval of one more is shown (`wildlab.evaluation.replication`). Fewer
+than 19 have none: there the lowest and the highest are shown. One flight has no spread at all.
 """
 
 from __future__ import annotations
@@ -13,8 +12,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-#: From how many flights on the middle 90 % is shown.
-MANY = 30
+from wildlab.evaluation.order_statistics import prediction_interval
+
+#: From how many flights on there is a 90 % prediction interval of one more.
+MANY = 19
 
 
 class SpreadWords(NamedTuple):
@@ -62,14 +63,13 @@ def spread_words(n: int, one: str = "flight") -> SpreadWords:
 def bounds_of(values: pd.Series) -> tuple[float, float]:
     """Lower and upper bound of what is shown as the spread over flights, one row for each.
 
-    NaN for one flight. Rows that are NaN are left out, but it is the number of flights that decides which
-    bounds are meant.
+    NaN for one flight. Rows that are NaN are left out.
     """
     if len(values) < 2:
         return np.nan, np.nan
-    if len(values) < MANY:
+    if values.notna().sum() < MANY:
         return float(values.min()), float(values.max())
-    return float(values.quantile(0.05)), float(values.quantile(0.95))
+    return prediction_interval(values)
 
 
 def share_below(values: pd.Series, printed: float) -> float:

@@ -1,6 +1,6 @@
 """What became of a study: every published number and claim beside what came out here.
 
-The verdicts on numbers are those of `wildlab.evaluation.printed`, on claims those of
+The verdicts on numbers are those of `wildlab.evaluation.replication`, on claims those of
 `wildlab.evaluation.shares`. Nothing is claimed of a first look, whose numbers come from fewer flights than
 the study's own.
 """
@@ -10,7 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-#: The verdict on a number that no run has given yet.
+from wildlab.evaluation.replication import Comparison
+
+#: Of a number that no run has given yet.
 MISSING = "not reproduced yet"
 #: The state of a study of which only a first look is there, and the verdict on whatever it has a number for.
 FIRST_LOOK = "first look"
@@ -41,6 +43,9 @@ class ListedStudy(Protocol):
 class Number:
     """A published number and ours.
 
+    ``compared`` is None where no run has given ours. ``waiting`` is `MISSING` then, `FIRST_LOOK` where ours
+    are of a first look, and else "".
+
     Where it is compared by its size, ``published``, ``here`` and the bounds are sizes. ``difference`` is ours
     minus theirs, ``ratio`` ours to theirs; None where we have none, or where one is not above zero.
     """
@@ -54,16 +59,19 @@ class Number:
     here: float | None
     low: float | None
     high: float | None
-    within: float | None
-    verdict: str
+    compared: Comparison | None
+    waiting: str = ""
     reason: str = ""
     #: "calculated", "mean of runs", "one flight" or "share of images".
     kind: str = "one flight"
     ratio: float | None = None
-    #: The share of our flights that are below the published number, and the upper bound of ours to the lower.
+    #: The share of our flights that are below the published number.
     below: float | None = None
-    spread: float | None = None
+    #: The probability of "outside" for a published flight with errors half as large.
+    power: float | None = None
     by_size: bool = False
+    #: What of ours was chosen by it; "" where nothing was.
+    fitted: str = ""
     #: The same printed number as another entry: counted there.
     again: bool = False
     #: Over how many flights ``low`` and ``high`` are; None where they are of another kind.
@@ -72,6 +80,13 @@ class Number:
     @property
     def difference(self) -> float | None:
         return None if self.here is None else self.here - self.published
+
+    @property
+    def answers(self) -> tuple[str, str]:
+        """Close? and compatible?, or twice what it waits for."""
+        if self.compared is None or self.waiting:
+            return self.waiting, self.waiting
+        return self.compared.closeness.value, self.compared.compatibility.value
 
 
 @dataclass(frozen=True)
@@ -95,8 +110,9 @@ class Claim:
 
 @dataclass(frozen=True)
 class StudyStatus:
-    """One study: ``state`` is "done", `FIRST_LOOK`, "failed", "not run" or "broken off"; ``reason`` says why
-    it failed, ``first_look`` what a first look shows of what ("5 of 200 flights")."""
+    """One study: ``state`` is "done", `FIRST_LOOK`, "failed", "not run", "broken off" or "damaged";
+    ``reason`` says why it failed, what does not fit, or that the report has no digests; ``first_look`` what a
+    first look shows of what ("5 of 200 flights")."""
 
     study: ListedStudy
     state: str
@@ -120,10 +136,6 @@ class StudyStatus:
         """The numbers that are counted here: each printed number once."""
         return [number for number in self.numbers if not number.again]
 
-    def count(self, verdict: str) -> int:
-        """How many of the counted numbers have that verdict."""
-        return sum(number.verdict == verdict for number in self.counted)
-
 
 def _count(value: Any) -> str:
     """A number as it is written, 200 or 7.5; no number at all raises a ValueError or TypeError."""
@@ -131,11 +143,24 @@ def _count(value: Any) -> str:
     return str(whole) if whole == value or not isinstance(value, float) else f"{value:g}"
 
 
+#: What the numbers count that a first look takes fewer of, where their names do not say it.
+LOOK_WORDS = {
+    "seeds": "flights",
+    "varied_runs": "runs with one part changed",
+    "pairs": "pairs of images",
+    "fields": "enclosures",
+    "rate": "images a second",
+    "percent_of_lap": "% of the lap",
+    "frames": "rendered images",
+    "rendered": "rendered flights",
+}
+
+
 def look_words(first_look: Any) -> str:
     """What is shown of what: "5 of 200 flights"; nothing for a full report, or what is none of ours."""
     try:
         parts = [
-            f"{int(few)} of {_count(whole)} {'flights' if name == 'seeds' else str(name).replace('_', ' ')}"
+            f"{int(few)} of {_count(whole)} {LOOK_WORDS.get(name, name)}"
             for name, (few, whole) in first_look.items()
         ]
     except (AttributeError, TypeError, ValueError):

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from wildlab.files import csv_text
-from wildlab.reporting.text import NOTHING, escape, inline, number, slug
+from wildlab.reporting.text import NOTHING, escape, inline, known, number, slug
 
 #: Bytes of a file that is put into a link; larger ones are not embedded.
 MOST_BYTES = 500_000
@@ -127,4 +127,4 @@ def _words(value: object) -> str:
         return "yes" if value else "no"
     if value is None or (isinstance(value, float) and value != value) or value is pd.NaT or value is pd.NA:
         return NOTHING
-    return inline(value)
+    return inline(known(str(value))) or (NOTHING if str(value) else "")

@@ -9,26 +9,28 @@ from __future__ import annotations
 import html
 import math
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from latex2mathml.converter import convert as latex_to_mathml
 
 from wildlab.errors import WildlabError
+from wildlab.names import visible
 
 _BOLD = re.compile(r"\*\*(.+?)\*\*", re.S)
 _CODE = re.compile(r"`([^`\n]+)`")
 _MATHS = re.compile(r"(?<!\\)\$\$(.+?)\$\$|(?<!\\)\$([^$\n]+?)\$", re.S)
 _MATHML_TAG = re.compile(r"</?m[a-z]+(?: [a-zA-Z:]+=\"[^\"<>]*\")*\s*/?>")
-#: Control characters that HTML forbids; a log may hold any of them.
-_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 
+#: A number that is not known, and where one sentence ends and another begins.
+_NAN, _SENTENCE = re.compile(r"(?<![\w-])nan(?![\w-])"), re.compile(r"(?<=[.!?])\s+(?=[^a-z])")
 #: What a number that could not be computed looks like.
 NOTHING = "–"
 
 
 def escape(text: object) -> str:
     """``text`` with everything HTML gives a meaning to made harmless, quotes included."""
-    return html.escape(_CONTROL.sub("\N{REPLACEMENT CHARACTER}", str(text)), quote=True)
+    return html.escape(visible(text), quote=True)
 
 
 def inline(text: object) -> str:
@@ -111,7 +113,7 @@ def number(value: Any, digits: int | None = None) -> str:
 
 
 def percent(share: float, digits: int = 1) -> str:
-    """A share in per cent; never rounded to all or to none.
+    """A share in per cent; with more digits where it would be rounded to all or to none.
 
     Parameters
     ----------
@@ -123,18 +125,47 @@ def percent(share: float, digits: int = 1) -> str:
     Returns
     -------
     str
+        "nan %" where it is not known; see `known`.
 
     Examples
     --------
-    >>> percent(0.9999), percent(1.0), percent(0.004, 0), percent(float("nan"))
-    ('99.9 %', '100 %', '1 %', 'none')
+    >>> percent(0.9999), percent(1.0), percent(0.004, 0), percent(0.0004)
+    ('99.99 %', '100 %', '0.4 %', '0.04 %')
     """
     if not math.isfinite(share):
-        return "none"
-    if min(share, 1 - share) < 1e-9:
+        return "nan %"
+    least = min(share, 1 - share)
+    if least < 1e-9:
         return f"{100 * share:.0f} %"
-    least = 10.0**-digits
-    return f"{min(max(100 * share, least), 100 - least):.{digits}f} %"
+    digits = max(digits, math.ceil(-math.log10(199 * least)))
+    return f"{100 * share:.{digits}f} %"
+
+
+def percent_between(share: Sequence[float], digits: int = 1) -> str:
+    """A share in per cent with its interval, where it has one: estimate, low and high end, from 0 to 1.
+
+    Examples
+    --------
+    >>> percent_between((0.5, 0.25, 0.75)), percent_between((0.5, math.nan, math.nan))
+    ('50.0 % (25.0 % to 75.0 %)', '50.0 %')
+    """
+    estimate, low, high = (percent(one, digits) for one in share)
+    return estimate if math.isnan(share[1]) or low == high else f"{estimate} ({low} to {high})"
+
+
+def known(text: str) -> str:
+    """``text`` without the sentences that give a number which is not known.
+
+    Whatever a page says goes through this: Python writes NaN as "nan", and what has one in it says nothing.
+
+    Examples
+    --------
+    >>> known("It is 3.0 m off. By 2 flights it is nan m. Two are left.")
+    'It is 3.0 m off. Two are left.'
+    """
+    if not _NAN.search(text):
+        return text
+    return " ".join(one for one in _SENTENCE.split(text) if not _NAN.search(one))
 
 
 def slug(text: str) -> str:

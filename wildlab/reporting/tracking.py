@@ -14,12 +14,15 @@ from wildlab.pipeline.following.judged import (
     CONSISTENT,
     FEW_INDEPENDENT,
     FEWEST,
+    LEADING,
     OVERCONFIDENT,
     UNKNOWN,
     Apart,
+    leading_filter,
     verdict,
 )
 from wildlab.pipeline.following.tuned import Tuned
+from wildlab.pipeline.overviews.verdict import Evidence, Verdict, verdict_of
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import NOTHING
 from wildlab.reporting.tracking_anew import summary_sentences
@@ -84,6 +87,8 @@ def size_words(nees: float) -> str:
     return "about as large as stated"
 
 
+#: Where no filter is consistent.
+NONE_CONSISTENT = "No filter is consistent; that of the least error leads."
 #: What is said of a verdict by a mean of few independent values.
 FEW = "on few independent values"
 
@@ -105,17 +110,17 @@ def verdict_words(row: pd.Series, what: str = "nees") -> str:
     return said + (f", {FEW}" if on_few(row, what) else "")
 
 
-def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> tuple[list[str], str]:
-    """The first sentences of the page, and its level."""
+def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> tuple[list[str], Verdict]:
+    """The first sentences of the page, and its verdict."""
     if not (rows["detections"] > 0).any() and (rows["used"] > 0).any():
-        return ["One detection started a track, and none followed: nothing can be judged."], "bad"
+        return ["One detection started a track, and none followed: nothing can be judged."], Verdict.MEND
     if not (rows["detections"] > 0).any():
         return (
             ["No track was started: no detection gives a place to start from near a target."],
-            "bad",
+            Verdict.MEND,
         )
     known = rows[rows["compared"] > 0]
-    said, level = _with_truth(known) if len(known) else _without_truth(rows[rows["detections"] > 0], pairs)
+    said, word = _with_truth(known) if len(known) else _without_truth(rows[rows["detections"] > 0], pairs)
     pairs_of = [group for _, group in rows.groupby(["sensor", "target"], sort=False)]
     unseen = [group for group in pairs_of if not (group["detections"] > 0).any()]
     never = [f"{group['target'].iloc[0]} by {group['sensor'].iloc[0]}" for group in unseen]
@@ -125,52 +130,47 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
     if tuned is not None:
         how = "its truth" if tuned.against == "truth" else "the likelihood of its innovations"
         said.append(f"Tuned on the flight {tuned.flight} by {how}, judged on this one.")
-    return said, level
+    return said, word
 
 
-#: What the colour of the summary means.
-_WORDS = {"good": "consistent", "bad": "overconfident", "warn": "look closer", "neutral": "undecided"}
-
-
-def verdict_of(rows: pd.DataFrame, level: str) -> tuple[str, str]:
-    """The word that goes with the level of `summary`, and its reason: what the tracks were found to be.
+def reason_of(rows: pd.DataFrame) -> str:
+    """Why the verdict of `summary` is what it is: what the tracks of the leading filter were found to be.
 
     Parameters
     ----------
     rows
         As for `summary`.
-    level
-        From it.
 
     Returns
     -------
-    (str, str)
+    str
     """
     followed = rows[rows["detections"] > 0]
     if not len(followed):
-        return "no track", "No detection was followed by a second one."
+        return "No detection was followed by a second one."
     known = followed[followed["compared"] > 0]
     mine = known if len(known) else followed
-    mine = mine[mine["filter"] == leading(list(dict.fromkeys(mine["filter"])))]
+    mine = mine[mine["filter"] == leading_filter(mine)]
     column, of = (
         ("verdict", "errors") if len(known) else ("nis_verdict", "distances from where it was expected")
     )
     what = "track" if len(mine) == 1 else "tracks"
-    return _WORDS[level], f"{len(mine)} {what}, by the size of their {of}: {_counts(mine, column)}."
+    return f"{len(mine)} {what}, by the size of their {of}: {_counts(mine, column)}."
 
 
-def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
+def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
     alone = rows[rows["kind"] != TOGETHER]
     together, rows = rows[rows["kind"] == TOGETHER], alone if len(alone) else rows
     filters = list(dict.fromkeys(rows["filter"]))
-    said = []
     by_name = {name: rows[rows["filter"] == name] for name in filters}
-    best = leading(filters)
+    best = leading_filter(rows)
     mine, white = by_name[best], by_name.get("ekf")
     what = "The track" if len(mine) == 1 else f"The {len(mine)} tracks"
     are = "is" if len(mine) == 1 else "are"
     looks = int(mine["compared"].sum() + mine["without"].sum())
     size = float(mine["nees"].median())
+    none = not mine["verdict"].isin([CONSISTENT, UNKNOWN]).any()
+    said = [NONE_CONSISTENT] if none else []
     said.append(
         f"{what} of the filter with {filter_words(best)} {are} off by {_far(mine)} where the target is seen, "
         f"at {int(mine['compared'].sum())} of {looks} looks, and the errors there are "
@@ -203,13 +203,11 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
             f"These are {len(mine)} of {pairs_in_all} tracks: the others' detections cannot go through it."
         )
     few = mine.apply(on_few, axis=1)
-    good = (mine["verdict"] == CONSISTENT).all()
-    bad = (mine["verdict"] == OVERCONFIDENT).all()
-    if worse:
-        return said, "bad" if bad and not few.any() else "warn"
-    if good or (mine["verdict"] == UNKNOWN).all():
-        return said, "neutral" if few.any() or not good else "good"
-    return said, "bad" if bad and not few.any() else "warn"
+    consistent = mine["verdict"] == CONSISTENT
+    against = int((mine["verdict"].isin([OVERCONFIDENT, CAUTIOUS])).sum())
+    return said, verdict_of(
+        Evidence(troubled=against + bool(worse), judged=int(consistent.any() and not few.any()))
+    )
 
 
 def _smoothed(mine: pd.DataFrame, smoothed: pd.DataFrame | None) -> list[str]:
@@ -238,11 +236,6 @@ def _together(together: pd.DataFrame, alone: pd.DataFrame) -> tuple[str, bool]:
         f"{best.loc[target, 'sensor']} alone by {length(float(least[worst]))}"
     )
     return said + ("; do not use them together as they are told of." if worse else "."), worse
-
-
-def leading(filters: Sequence[str]) -> str:
-    """The filter that is spoken of: the first that is not the white one, whatever came out."""
-    return next((name for name in filters if name != "ekf" and not name.endswith("-smoothed")), "ekf")
 
 
 def _far(rows: pd.DataFrame, column: str = "rmse") -> str:
@@ -275,11 +268,9 @@ def _counts(rows: pd.DataFrame, column: str = "verdict") -> str:
     return ", ".join(said)
 
 
-def _without_truth(rows: pd.DataFrame, pairs: Sequence[Apart]) -> tuple[list[str], str]:
-    filters = list(dict.fromkeys(rows["filter"]))
-    by_name = {name: rows[rows["filter"] == name] for name in filters}
-    name = leading(filters)
-    mine = by_name[name]
+def _without_truth(rows: pd.DataFrame, pairs: Sequence[Apart]) -> tuple[list[str], Verdict]:
+    name = leading_filter(rows)
+    mine = rows[rows["filter"] == name]
     factor = float(np.sqrt((mine["nis"] / mine["dof"]).mean()))
     said = [
         f"Detections fall {_off(factor)} from where the filter with {filter_words(name)} expects them as it "
@@ -290,8 +281,9 @@ def _without_truth(rows: pd.DataFrame, pairs: Sequence[Apart]) -> tuple[list[str
     for one in used[:2]:
         said.append(apart_sentence(one))
     agree = all(verdict(one.squares) == CONSISTENT for one in used)
-    good = (mine["nis_verdict"] == CONSISTENT).all() and agree
-    return said, "neutral" if good else "warn"
+    against = int(mine["nis_verdict"].isin([OVERCONFIDENT, CAUTIOUS]).sum())
+    # Consistent innovations do not show an error that lasts: never sound.
+    return said, verdict_of(Evidence(troubled=against + (not agree)))
 
 
 def _off(factor: float) -> str:
@@ -414,7 +406,9 @@ def band_name(name: str, end: str) -> str:
 
 
 def record(report: Report, rows: pd.DataFrame) -> None:
-    """The numbers of every track, for ``metrics.json``."""
+    """The numbers of every track, for ``metrics.json``, and which filter the page speaks of."""
+    if len(rows):
+        report.metric(LEADING, leading_filter(rows), 1, "1")
     for _, row in rows.iterrows():
         subject = f"{row['sensor']}/{row['target']}/{row['filter']}".replace(" ", "-")
         for name, unit, low, high, n in (

@@ -7,13 +7,13 @@ import pandas as pd
 
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.follow import Followed
-from wildlab.pipeline.following.judged import Apart, verdict
+from wildlab.pipeline.following.judged import Apart, leading_filter, verdict
 from wildlab.pipeline.following.tuned import Tuned
+from wildlab.pipeline.overviews.verdict import VERDICT_LEVEL
 from wildlab.reporting import tracking as words
 from wildlab.reporting import tracking_anew as anew
 from wildlab.reporting.charts import following as charts
 from wildlab.reporting.charts.beside import beside_plain_shown
-from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
 from wildlab.reporting.report import Report
 
 #: Targets by sensors that are drawn; the table has all.
@@ -32,9 +32,9 @@ def head_section(
     by = "1 sensor" if sensors == 1 else f"{sensors} sensors"
     ways = "" if sensors == 1 else ", each alone and all together"
     report.head(title, f"{of} followed by {by}{ways}")
-    said, level = words.summary(rows, pairs, tuned)
-    report.summary(said, level=level, verdict=words.verdict_of(rows, level))
-    report.metric(VERDICT_LEVEL, "tracking", VERDICT_LEVELS[level], "1")
+    said, verdict = words.summary(rows, pairs, tuned)
+    report.summary(said, level=verdict.colour, verdict=(verdict.value, words.reason_of(rows)))
+    report.metric(VERDICT_LEVEL, "tracking", verdict.level, "1")
     if followed.notes:
         report.points(followed.notes)
 
@@ -86,8 +86,7 @@ def pictures_section(
     shown = rows[rows["detections"] > 0]
     if not len(shown):
         return
-    filters = list(dict.fromkeys(rows["filter"]))
-    name = words.leading(filters)
+    name = leading_filter(rows)
     name_of_nav, nav = flight.pose_source(source)
     platforms = {name_of_nav: nav[["north_m", "east_m"]].to_numpy(float)}
     report.section("Where it went", f"Tracks with {words.filter_words(name)}.")

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-from wildlab.evaluation.printed import (
-    NOT_JUDGED,
+from wildlab.evaluation.order_statistics import LEVEL, prediction_rank
+from wildlab.evaluation.replication import (
     Comparison,
     compare_calculation,
     compare_flight,
     compare_mean,
-    compare_share,
+    not_judged,
 )
-from wildlab.reporting.published import CALCULATED, MEAN_OF_RUNS, SHARE_OF_IMAGES, SIZES, quantity_kind
+from wildlab.evaluation.runs import share_interval
+from wildlab.reporting.published import CALCULATED, MEAN_OF_RUNS, SHARE_OF_IMAGES, quantity_kind
 
 #: What a run recorded, by name and subject: entries of ``metrics.json``.
 Recorded = Mapping[tuple[str, str], Mapping[str, Any]]
@@ -59,12 +61,11 @@ def recorded_for(row: Mapping[str, Any], ours: Recorded) -> Mapping[str, Any]:
     if sizes is not None:
         return sizes
     # One flight has no spread, and its size needs no record of its own.
-    return {**found, "value": abs(found["value"]), "low": None, "high": None, "below": None}
+    spread = dict.fromkeys(("low", "high", "below", "flights", "centre_low", "centre_high", "power"))
+    return {**found, **spread, "value": abs(found["value"])}
 
 
-def judge(
-    row: Mapping[str, Any], ours: Recorded, printed: Mapping[tuple[str, str], float]
-) -> Comparison | None:
+def judge(row: Mapping[str, Any], ours: Recorded) -> Comparison | None:
     """Compare a published number with what a run recorded.
 
     Parameters
@@ -73,13 +74,11 @@ def judge(
         A row of `wildlab.reporting.published.load_published`.
     ours
         What the run recorded.
-    printed
-        All published numbers of the study: the sizes of errors that signed means are compared with.
 
     Returns
     -------
     Comparison or None
-        None where the run has no number for it.
+        None where the run has no number for it. A difference is in the unit of the number.
     """
     name, subject = str(row["name"]), str(row["subject"])
     found = recorded_for(row, ours)
@@ -88,41 +87,50 @@ def judge(
         return None
     value = abs(float(row["value"])) if row["by_size"] else float(row["value"])
     if row["unjudged"]:
-        return Comparison(NOT_JUDGED, None, here - value, None, str(row["unjudged"]))
-    within = None if math.isnan(row["within"]) else float(row["within"])
+        return not_judged(here, value, str(row["unjudged"]))
+    rounding, known = float(row["rounding"]), ours.get((error_name(name), subject), {})
+    error = known.get("value")
+    if row["kind"] == CALCULATED and known and error is None:
+        return not_judged(here, value, "a standard error is not known")
     if row["kind"] == CALCULATED:
-        return compare_calculation(here, value, within)
+        compared = compare_calculation(here, value, rounding, inputs=_pair(found, "low", "high"), error=error)
+        return replace(compared, fitted=str(row["fitted"]))
+    kind = "rate" if row["kind"] in (SHARE_OF_IMAGES, MEAN_OF_RUNS) else quantity_kind(name)
+    if not kind:
+        return not_judged(here, value, "no margin is fixed for this quantity")
+    # A rate's margin is of odds.
+    unit = 100.0 if kind == "rate" and row["unit"] == "%" else 1.0
     if row["kind"] == MEAN_OF_RUNS:
-        error = ours.get((error_name(name), subject), {}).get("value")
         theirs = None
         if error is not None and found.get("n") and not math.isnan(row["runs"]):
             # Nobody prints it: single runs are taken to vary there as they do here.
-            theirs = error * math.sqrt(found["n"] / row["runs"])
-        return compare_mean(here, value, error, theirs, within or 0.0)
-    if row["fitted"]:
-        # Of a signed mean near zero a ratio says nothing.
-        ratio = here / value if here > 0 and value > 0 and quantity_kind(name) != "signed mean" else None
-        return Comparison(NOT_JUDGED, ratio, here - value, None, str(row["fitted"]))
-    if row["kind"] == SHARE_OF_IMAGES:
-        return compare_share(here, value, found.get("low"), found.get("high"))
-    kind = quantity_kind(name)
-    if not kind:
-        return Comparison(NOT_JUDGED, None, here - value, None, "no margin is fixed for this quantity")
-    # A rate's margin is a share of one.
-    unit = 100.0 if kind == "rate" and row["unit"] == "%" else 1.0
-    low, high = found.get("low"), found.get("high")
-    size = next((printed[key] for one in SIZES if (key := (one, subject)) in printed), None)
-    deviation = printed.get((name.replace("mean_", "sd_", 1), subject)) if kind == "signed mean" else None
-    compared = compare_flight(
-        kind,
-        here / unit,
-        value / unit,
-        None if low is None else low / unit,
-        None if high is None else high / unit,
-        size=size,
-        deviation=deviation,
-    )
-    return Comparison(compared.verdict, compared.ratio, here - value, compared.spread, compared.reason)
+            theirs = error / unit * math.sqrt(found["n"] / row["runs"])
+        error = None if error is None else error / unit
+        compared = compare_mean(here / unit, value / unit, rounding / unit, error, theirs)
+    else:
+        flights = found.get("flights") or 0
+        # Of a share of images the bounds are those of its interval, not of flights.
+        alone = row["kind"] == SHARE_OF_IMAGES or prediction_rank(flights) < 1
+        share = None
+        if kind == "rate" and not math.isnan(row["runs"]):
+            share = share_interval(round(value / unit * row["runs"]), row["runs"], LEVEL)[1:]
+        compared = compare_flight(
+            kind,
+            here / unit,
+            value / unit,
+            rounding / unit,
+            share=share,
+            centre=_pair(found, "centre_low", "centre_high", unit),
+            predicted=None if alone else _pair(found, "low", "high", unit),
+            power=found.get("power"),
+        )
+    return replace(compared, difference=here - value, fitted=str(row["fitted"]))
+
+
+def _pair(found: Mapping[str, Any], low: str, high: str, unit: float = 1.0) -> tuple[float, float] | None:
+    """Two bounds that were recorded; None where one is not known."""
+    ends = found.get(low), found.get(high)
+    return None if ends[0] is None or ends[1] is None else (ends[0] / unit, ends[1] / unit)
 
 
 def comparison_words(compared: Comparison) -> str:

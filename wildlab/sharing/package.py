@@ -1,8 +1,10 @@
-"""One file out: written aside, looked through, and only then named; a zip whose listing says nothing."""
+"""One file out, made in memory and looked through before it is written; a zip whose listing says nothing."""
 
 from __future__ import annotations
 
 import contextlib
+import glob
+import io
 import os
 import shutil
 import tempfile
@@ -12,6 +14,8 @@ from pathlib import Path
 import pyzipper
 
 from wildlab.errors import WildlabError
+from wildlab.files import write_atomic
+from wildlab.runner.processes.outputs import alive
 
 #: Of every file in a zip: no zip can be older, and this one says nothing of when it was made.
 _TIME = (1980, 1, 1, 0, 0, 0)
@@ -21,18 +25,32 @@ OPENED_WITH = (
     'Windows or macOS has built in, and `unzip` says "unsupported compression method 99". Tell those who get '
     "it, and send them the password by another way than the file."
 )
+#: How the private folders are called; the number of their process comes after it.
+_PRIVATE = "wildlab-share-"
 #: A password is tried offline, as often as whoever has the file can pay for.
 SHORTEST = 12
 
 
 @contextlib.contextmanager
-def aside(target: Path) -> Iterator[Path]:
-    """A folder beside ``target`` for what is being made; gone afterwards, however it ends."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix=".share.", suffix=".part", dir=target.parent))
-    try:
-        yield folder
-    finally:
+def private_folder() -> Iterator[Path]:
+    """A folder among the system's temporary ones that nobody else may open; gone afterwards, however it ends,
+    or, where this process was killed, when the next copy is made."""
+    for left in Path(tempfile.gettempdir()).glob(f"{_PRIVATE}*"):
+        pid = left.name.removeprefix(_PRIVATE).partition("-")[0]
+        own = not left.is_symlink() and left.is_dir() and left.stat().st_uid == os.getuid()
+        if own and pid.isdecimal() and not alive(int(pid)):
+            shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=f"{_PRIVATE}{os.getpid()}-") as folder:
+        yield Path(folder)
+
+
+def sweep_beside(target: Path) -> None:
+    """Remove what a killed run has left beside ``target``: files under way, and folders of pages, which
+    were once made there."""
+    for left in target.parent.glob(f".{glob.escape(target.name)}.????????"):
+        if not left.is_dir():
+            left.unlink(missing_ok=True)
+    for folder in target.parent.glob(".share.*.part"):
         shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -66,19 +84,18 @@ def check_password(password: str) -> None:
         )
 
 
-def write_zip(path: Path, files: Mapping[str, bytes], password: str | None = None) -> None:
-    """Files as a zip; the same files without a password give the same bytes.
+def zip_bytes(files: Mapping[str, bytes], password: str | None = None) -> bytes:
+    """Files as a zip, which lies nowhere yet; the same files without a password give the same bytes.
 
     Parameters
     ----------
-    path
-        Of the zip.
     files
         Content by name.
     password
         With it, what is inside is encrypted with AES-256; the names are not.
     """
-    with pyzipper.AESZipFile(path, "w", compression=pyzipper.ZIP_DEFLATED) as zipped:
+    whole = io.BytesIO()
+    with pyzipper.AESZipFile(whole, "w", compression=pyzipper.ZIP_DEFLATED) as zipped:
         if password is not None:
             zipped.setpassword(password.encode("utf-8"))
             # Version 2: the first one writes a checksum of what is inside where everybody can read it.
@@ -88,10 +105,11 @@ def write_zip(path: Path, files: Mapping[str, bytes], password: str | None = Non
             info.compress_type = pyzipper.ZIP_DEFLATED
             info.create_system, info.external_attr = 3, 0o644 << 16
             zipped.writestr(info, content)
+    return whole.getvalue()
 
 
-def put(made: Path, target: Path, overwrite: bool) -> None:
-    """Give a finished file its name.
+def put(content: bytes, target: Path, overwrite: bool) -> None:
+    """Write a finished file, whole or not at all.
 
     Raises
     ------
@@ -99,5 +117,5 @@ def put(made: Path, target: Path, overwrite: bool) -> None:
         Where something came into its place meanwhile.
     """
     refuse_existing(target, overwrite)
-    made.chmod(0o644)
-    made.replace(target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_atomic(target, content)

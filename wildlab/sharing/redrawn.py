@@ -22,10 +22,9 @@ from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.own_flights import ABOUT, own_flights
 from wildlab.runner.track_many import track_many
 from wildlab.sharing.agreement import Agreement, compare
-from wildlab.sharing.generalise import Generalised, generalise, neutral_learnt
+from wildlab.sharing.generalise import Generalised, neutral_learnt
 from wildlab.sharing.reports import ENDS, MANY, Source
 from wildlab.sharing.settings import neutral_settings
-from wildlab.sharing.tiers import Treatment
 
 #: What `wildlab evaluate` does not set of these, `wildlab track` was told.
 _TOLD = ("filters", "targets", "sensors", "settings", "tuned", "smooth")
@@ -60,11 +59,10 @@ class Redrawn(NamedTuple):
 
 def redraw(
     flight: Flight,
+    made: Generalised,
     source: Source,
-    treatment: Treatment,
     work: Path,
     *,
-    name: str = "flight",
     notebooks: Path = NOTEBOOKS,
     console: Console | None = None,
 ) -> Redrawn:
@@ -72,16 +70,12 @@ def redraw(
 
     Parameters
     ----------
-    flight
-        The true one, from its folder.
+    flight, made
+        The true one, from its folder, and its generalised copy.
     source
         Its reports here, whose parameters are used again.
-    treatment
-        What becomes of the flight.
     work
         A folder to work in, which is gone afterwards.
-    name
-        What the copy is called.
     notebooks, console
         As for `evaluate_flight`.
 
@@ -94,7 +88,7 @@ def redraw(
     RunFailed
         Where a report could not be made again that is done here.
     """
-    made = generalise(flight, treatment, name)
+    name = made.flight.name
     copy, reports = work / name, work / "reports"
     kept = None if flight.calibration is None else neutral_learnt(read_learnt(flight.calibration))
     save_flight(made.flight, copy, calibration=kept)

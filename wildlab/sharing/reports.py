@@ -9,9 +9,9 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import FILE_NAME, read_manifest
-from wildlab.paths import ROOT
+from wildlab.paths import REPORTS, ROOT
 from wildlab.runner.catalogue import StudyEntry
-from wildlab.runner.record.beside import state_of
+from wildlab.runner.record.digests import BEFORE_DIGESTS, has_digests, read_status
 from wildlab.runner.record.own_flights import ABOUT
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.track_many import NOTEBOOK as MANY_NOTEBOOK
@@ -49,15 +49,19 @@ class Source:
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source], list[str]]:
+def sources_of(
+    path: Path, studies: dict[str, StudyEntry], reports: Path = REPORTS
+) -> tuple[list[Source], list[str]]:
     """What a report's folder, or a folder of reports, is made from.
 
     Parameters
     ----------
     path
-        ``reports/NAME``, its ``report.html``, or ``reports``.
+        ``reports/NAME``, its ``report.html``, ``reports``, or the folder of a flight.
     studies
         By name.
+    reports
+        Where those of a flight's folder are.
 
     Returns
     -------
@@ -71,6 +75,17 @@ def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source]
     WildlabError
         Where there is no report, or the one that is meant cannot be shared, with the reason.
     """
+    if (path / FILE_NAME).is_file():
+        mine = provenance_of_flight(path)
+        ours = [
+            one
+            for one in _made(reports, mine["name"])
+            if same_flight(read_provenance(one).get("flight") or {}, mine)
+        ]
+        if not ours:
+            fix = f"evaluate it, then share it: {typed('wildlab evaluate', path)}"
+            raise WildlabError("there is no report on this flight as it is", fix, file=path)
+        path = ours[0]
     folder = path.parent if path.name == "report.html" else path
     if not folder.is_dir():
         fix = "name the folder of a report, reports/NAME, or the folder of all of them"
@@ -103,11 +118,14 @@ def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source]
         raise WildlabError(
             f"no report here can be shared{why}", "name a folder with reports that are done", file=path
         )
-    return list(found.values()), left_out
+    return list(found.values()), list(dict.fromkeys(left_out))
 
 
 def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
-    if state_of(folder).get("state") != "done":
+    status = read_status(folder)
+    if status.get("state") == "damaged":
+        raise WildlabError(str(status["reason"]), "make the report again, then share it", file=folder)
+    if status.get("state") != "done":
         raise WildlabError("this report is not done", "make it again, then share it", file=folder)
     provenance = read_provenance(folder)
     if not provenance:
@@ -151,7 +169,9 @@ def _made(reports: Path, name: str) -> list[Path]:
     """The reports that there are on a flight of this name, are made again, and are done."""
     found = [reports / f"{name}{end}" for end in ENDS]
     found = [one for one in found if _drawn_again(one, name, read_provenance(one))]
-    return [one for one in found if (one / "report.html").is_file() and state_of(one).get("state") == "done"]
+    return [
+        one for one in found if (one / "report.html").is_file() and read_status(one).get("state") == "done"
+    ]
 
 
 def _instead(there: Sequence[Path]) -> str:
@@ -176,7 +196,7 @@ def of_a_study(flight: dict[str, Any], reports: Path) -> bool:
             continue
         # Of one that is called so and lies elsewhere, it may be the one that is meant.
         if (
-            manifest.name == name
+            name in (folder.name, manifest.name)
             and (manifest.origin.latitude_deg, manifest.origin.longitude_deg) != packaged
         ):
             return False
@@ -202,7 +222,8 @@ def _with_siblings(source: Source, reports: Path, studies: dict[str, StudyEntry]
 
 
 def _of_other_tables(source: Source, reports: Path, studies: dict[str, StudyEntry]) -> list[str]:
-    """Sentences on reports on a flight of this name that do not go along: they are of other tables."""
+    """Sentences on reports on a flight of this name that do not go along: they are of other tables,
+    or not as they were written; and on those that nothing tells it of."""
     left_out = []
     for end in ENDS:
         folder = reports / f"{source.name}{end}"
@@ -210,11 +231,13 @@ def _of_other_tables(source: Source, reports: Path, studies: dict[str, StudyEntr
             continue
         try:
             one = _source(folder, studies)
-        except WildlabError:
+        except WildlabError as error:
+            left_out += [str(error)] if read_status(folder).get("state") == "damaged" else []
             continue
         if one.logged and one.name == source.name:
             left_out.append(f"{folder}: this report was made from other tables than the flight's others.")
-    return left_out
+    old = [folder.name for folder in source.folders if not has_digests(read_status(folder))]
+    return [*left_out, *([f"{', '.join(old)}: {BEFORE_DIGESTS}."] if old else [])]
 
 
 def same_flight(one: dict[str, Any], other: dict[str, Any]) -> bool:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -12,8 +11,10 @@ from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_atomic
-from wildlab.flight.store import load_flight
-from wildlab.paths import NOTEBOOKS
+from wildlab.flight.checksums import confirmed_locations
+from wildlab.flight.manifest import FILE_NAME
+from wildlab.flight.store import Flight, load_flight
+from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import load_studies
 from wildlab.sharing.agreement import agreement_words
 from wildlab.sharing.cells import generalisation_words, place_words
@@ -23,12 +24,21 @@ from wildlab.sharing.edition.facts import facts_of
 from wildlab.sharing.edition.flight_map import map_of
 from wildlab.sharing.edition.language import Language, load_language
 from wildlab.sharing.edition.said import Day
-from wildlab.sharing.package import OPENED_WITH, aside, check_password, put, refuse_existing, write_zip
+from wildlab.sharing.generalise import Generalised, generalise
+from wildlab.sharing.package import (
+    OPENED_WITH,
+    check_password,
+    private_folder,
+    put,
+    refuse_existing,
+    sweep_beside,
+    zip_bytes,
+)
 from wildlab.sharing.redrawn import Redrawn, redraw
 from wildlab.sharing.reports import Source, flight_folder, sources_of
-from wildlab.sharing.scan import Secrets, not_searched, scan
+from wildlab.sharing.scan import Secrets, not_searched, scan_contents
 from wildlab.sharing.secrets import all_of, flight_secrets, machine_secrets
-from wildlab.sharing.tiers import Tier, Treatment, load_tiers, treatment_of
+from wildlab.sharing.tiers import Tier, Treatment, confirmed_treatment, load_tiers
 from wildlab.sharing.told import removed_lines, sender_list
 
 #: Of what the scan found, so many are named.
@@ -59,6 +69,17 @@ class Shared:
     lines: tuple[str, ...]
 
 
+class _Prepared(NamedTuple):
+    """A flight that is to be drawn again: where it lies, it and its generalised copy, and what must not be
+    in the copy."""
+
+    folder: Path
+    flight: Flight
+    made: Generalised
+    treatment: Treatment
+    secrets: Secrets
+
+
 class _Document(NamedTuple):
     """What is said of one flight or study: to those who get the copy, to the scan, and to the sender."""
 
@@ -79,6 +100,7 @@ def share(
     password: str | None = None,
     edition: str | Path | None = None,
     overwrite: bool = False,
+    reports: Path = REPORTS,
     notebooks: Path = NOTEBOOKS,
     console: Console | None = None,
 ) -> Shared:
@@ -87,7 +109,7 @@ def share(
     Parameters
     ----------
     report
-        ``reports/NAME``, its ``report.html``, or a folder of reports.
+        ``reports/NAME``, its ``report.html``, a folder of reports, or of a flight with reports.
     tier
         For whom.
     flight
@@ -103,8 +125,8 @@ def share(
         reports, otherwise it is the copy.
     overwrite
         Whether a file that is there may be replaced.
-    notebooks, console
-        Where the notebooks are, and where progress is shown.
+    reports, notebooks, console
+        Where reports on a flight's folder and the notebooks are, and where progress is shown.
 
     Returns
     -------
@@ -122,7 +144,9 @@ def share(
     if password is not None:
         check_password(password)
     studies = load_studies(notebooks / "studies.toml")
-    sources, left_out = sources_of(report, studies)
+    sources, left_out = sources_of(report, studies, reports)
+    if flight is None and (report / FILE_NAME).is_file():
+        flight = report
     if flight is not None and sum(source.logged for source in sources) != 1:
         raise WildlabError(
             "a flight is named, and this is not one flight's report", "leave --flight out", field="--flight"
@@ -135,40 +159,33 @@ def share(
     told = target.with_name(f"{target.name}.for-the-sender.txt")
     refuse_existing(target, overwrite)
     refuse_existing(told, overwrite)
+    sweep_beside(target)
     around = [source.folders[0].resolve().parent.parent / "flights" for source in flights]
-    # All are found before the first is computed.
+    # All are found, and the copy's name is looked through, before the first is computed, which takes minutes.
     folders = [
         None if exact or not source.logged else flight_folder(source, flight, around) for source in sources
     ]
+    prepared = [
+        None if folder is None else _prepare(folder, source, tier, name)
+        for source, name, folder in zip(sources, calls, folders, strict=True)
+    ]
+    secrets = all_of([machine_secrets() if one is None else one.secrets for one in prepared])
+    _refuse_leaks({target.name: b""}, target.name, secrets)
     documents: list[_Document] = []
-    for source, name, folder in zip(sources, calls, folders, strict=True):
+    for source, name, one in zip(sources, calls, prepared, strict=True):
         first = 1 + sum(len(document.chapter.parts) for document in documents)
-        if folder is not None:
-            documents.append(_generalised(folder, source, tier, name, first, words, notebooks, console))
+        if one is not None:
+            documents.append(_generalised(one, source, tier, first, words, notebooks, console))
         else:
             documents.append(_copied(source, tier, name, first))
-    secrets = all_of([document.secrets for document in documents])
-    with aside(target) as work:
-        pages = work / "pages"
-        pages.mkdir()
-        files = {name: page.encode("utf-8") for name, page in _pages(documents, target, zipped).items()}
-        for name, content in files.items():
-            (pages / name).write_bytes(content)
-        # Of a zip the name alone; what is inside is looked through before it may be encrypted.
-        called = work / "called" / target.name
-        called.parent.mkdir()
-        called.touch()
-        _refuse_leaks([*sorted(pages.iterdir()), called], target.name, secrets)
-        made = work / "made"
-        if zipped:
-            write_zip(made, files, password)
-        else:
-            (pages / target.name).replace(made)
-        notes = [*left_out, *not_searched(secrets), *([] if password is None else [OPENED_WITH])]
-        lines = sender_list(
-            target.name, [document.told for document in documents], notes, generalised=any(folders)
-        )
-        put(made, target, overwrite)
+    files = {name: page.encode("utf-8") for name, page in _pages(documents, target, zipped).items()}
+    # What is inside of a zip is looked through before it may be encrypted.
+    _refuse_leaks(files, target.name, secrets)
+    notes = [*left_out, *not_searched(secrets), *([] if password is None else [OPENED_WITH])]
+    lines = sender_list(
+        target.name, [document.told for document in documents], notes, generalised=any(folders)
+    )
+    put(zip_bytes(files, password) if zipped else files[target.name], target, overwrite)
     write_atomic(told, "\n".join(lines) + "\n")
     told.chmod(0o600)
     return Shared(target, told, tuple(lines))
@@ -214,29 +231,34 @@ def _pages(documents: Sequence[_Document], target: Path, zipped: bool) -> dict[s
 _PLURAL = {"flight": "flights", "study": "studies"}
 
 
+def _prepare(folder: Path, source: Source, tier: Tier, name: str) -> _Prepared:
+    flight = load_flight(folder)
+    treatment = confirmed_treatment(flight.manifest.locations, confirmed_locations(folder), tier)
+    made = generalise(flight, treatment, name)
+    secrets = flight_secrets(flight, made, treatment, source, folder)
+    return _Prepared(folder, flight, made, treatment, secrets)
+
+
 def _generalised(
-    folder: Path,
+    one: _Prepared,
     source: Source,
     tier: Tier,
-    name: str,
     first: int,
     words: Language | None,
     notebooks: Path,
     console: Console | None,
 ) -> _Document:
     """A flight's reports, drawn again."""
-    flight = load_flight(folder)
-    treatment = treatment_of(flight.manifest.locations, tier)
-    with tempfile.TemporaryDirectory(prefix="wildlab-share-") as work:
-        drawn = redraw(flight, source, treatment, Path(work), name=name, notebooks=notebooks, console=console)
+    made, treatment, name = one.made, one.treatment, one.made.flight.name
+    with private_folder() as work:
+        drawn = redraw(one.flight, made, source, work, notebooks=notebooks, console=console)
         parts = [
-            read_part(one / "report.html", number, exact=False)
-            for number, one in enumerate(drawn.folders.values(), first)
+            read_part(folder / "report.html", number, exact=False)
+            for number, folder in enumerate(drawn.folders.values(), first)
         ]
-    made = drawn.made
     when = f" Flown {'on' if treatment.date == 'day' else 'in'} {made.when}." if made.when else ""
     about = [
-        *(f"There is no report on {one}: it could not be made." for one in drawn.missing),
+        *(f"There is no report on {what}: it could not be made." for what in drawn.missing),
         "Times count from the first sample, heights from the ground of the flight.",
         "Names of the flight, of targets, files and sensors are replaced by neutral ones, and photographs "
         "are left out.",
@@ -253,11 +275,10 @@ def _generalised(
             file=source.folders[0],
         )
     lead = " ".join([*([BEWARE, *otherwise] if otherwise else []), place_words(made.cell) + when])
-    chapter = Chapter(heading, lead, tuple(one.strip() for one in about), tuple(parts))
-    secrets = flight_secrets(flight, made, treatment, source, folder)
+    chapter = Chapter(heading, lead, tuple(line.strip() for line in about), tuple(parts))
     told = f"Flight {source.name}", tuple(_told(drawn, treatment))
     return _Document(
-        name, chapter, secrets, told, "" if words is None else _sheet(drawn, name, treatment, words)
+        name, chapter, one.secrets, told, "" if words is None else _sheet(drawn, name, treatment, words)
     )
 
 
@@ -290,7 +311,13 @@ def _language(edition: str | Path | None, sources: Sequence[Source], exact: bool
 
 def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:
     how = "as flight.toml states" if treatment.stated else "assumed: flight.toml states no category"
+    how = how if treatment.unconfirmed is None else "the more careful one"
     yield f"category {treatment.category} of GBIF's guide ({how}), dates to the {treatment.date}"
+    if treatment.unconfirmed is not None:
+        yield (
+            f"flight.toml states category {treatment.unconfirmed}, and it was not confirmed: the more "
+            "careful one counts. If it is meant: wildlab check --accept"
+        )
     yield from removed_lines(drawn.made.removed)
     a = drawn.agreement
     if a.compared:
@@ -316,7 +343,7 @@ def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
     return _Document(name, chapter, machine_secrets(), (heading, (removed,)))
 
 
-def _refuse_leaks(files: Sequence[Path], name: str, secrets: Secrets) -> None:
+def _refuse_leaks(files: Mapping[str, bytes], name: str, secrets: Secrets) -> None:
     """Look through all that is to be sent, and refuse it where something must not be in it.
 
     Raises
@@ -324,7 +351,7 @@ def _refuse_leaks(files: Sequence[Path], name: str, secrets: Secrets) -> None:
     RunFailed
         Naming what was found, how it is written, and where.
     """
-    found = list(dict.fromkeys(scan(files, secrets)))
+    found = list(dict.fromkeys(scan_contents(files.items(), secrets)))
     if not found:
         return
     several = "; ".join(f"{one} ({one.found!r})" if one.found else str(one) for one in found[:_MOST])

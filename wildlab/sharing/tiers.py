@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal
@@ -74,6 +74,8 @@ class Treatment:
         What dates are cut down to.
     exact
         Whether the flight stays as it is.
+    unconfirmed
+        A less careful category that the manifest states and nobody has confirmed; None where there is none.
     """
 
     tier: Tier
@@ -82,6 +84,7 @@ class Treatment:
     cell_deg: float | None
     date: Date
     exact: bool
+    unconfirmed: int | None = None
 
 
 @cache
@@ -94,6 +97,34 @@ def load_tiers(path: Path = FILE) -> Table:
         Where the file is missing, or a key is unknown, missing or wrong.
     """
     return check_model(Table, read_toml(path, "the table of tiers"), path)
+
+
+def confirmed_treatment(locations: LocationsPart, confirmed: LocationsPart, tier: Tier) -> Treatment:
+    """As `treatment_of`, by the more careful of what is stated and what was confirmed.
+
+    Parameters
+    ----------
+    locations
+        As the manifest states them.
+    confirmed
+        As they were written, or accepted last.
+    tier
+        For whom the copy is.
+
+    Returns
+    -------
+    Treatment
+
+    Examples
+    --------
+    >>> found = confirmed_treatment(LocationsPart(category=3), LocationsPart(category=1), "public")
+    >>> found.category, found.unconfirmed
+    (1, 3)
+    """
+    stated, before = (treatment_of(one, tier) for one in (locations, confirmed))
+    if before.category >= stated.category:
+        return stated
+    return replace(before, unconfirmed=stated.category)
 
 
 def treatment_of(locations: LocationsPart, tier: Tier) -> Treatment:

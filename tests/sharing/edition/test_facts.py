@@ -80,7 +80,7 @@ def test_what_failed_is_told_apart_from_what_is_not_there() -> None:
 
 
 def test_tracks_of_the_filter_that_is_spoken_of() -> None:
-    """Of two filters the first that is not the white one; the median over its tracks."""
+    """Of two filters the one that its page leads with; the median over its tracks."""
 
     def track(sensor: str, name: str, rmse: float, nees: float) -> dict[tuple[str, str], dict[str, float]]:
         subject = f"{sensor}/boat/{name}"
@@ -92,7 +92,7 @@ def test_tracks_of_the_filter_that_is_spoken_of() -> None:
 
     tracking = report("tracking", {
         **track("a", "ekf", 99.0, 99.0), **track("a", "schmidt", 2.0, 2.0),
-        **track("b", "schmidt", 6.0, 20.0),
+        **track("b", "schmidt", 6.0, 20.0), ("leading_filter", "schmidt"): {"value": 1},
     })  # fmt: skip
     facts = facts_of(flight(overview(), tracking))
     assert (facts.tracks, facts.track_error, facts.track_worst) == (2, 4.0, 6.0)
@@ -114,8 +114,8 @@ def test_the_page_says_what_the_tracking_report_found_of_a_filter(off_deg: float
     rows = judged(followed)
     tracking.record(made, rows)
     made.head("Tracks")
-    said, level = tracking.summary(rows, [], None)
-    made.summary(said, level=level, verdict=tracking.verdict_of(rows, level))
+    said, verdict = tracking.summary(rows, [], None)
+    made.summary(said, level=verdict.colour, verdict=(verdict.value, tracking.reason_of(rows)))
     made.save()
     numbers = numbers_of([read_metrics(tmp_path / "metrics.json")])
     there = report("tracking")._replace(numbers=numbers)

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from wildlab.pipeline.overviews.alarms import ALARMS
-from wildlab.pipeline.overviews.worth_fixing import CAUSES, LEVELS
+from wildlab.pipeline.overviews.verdict import PARTS, Verdict
+from wildlab.pipeline.overviews.worth_fixing import CAUSES
 from wildlab.sharing.edition.edition import Place, edition_html
-from wildlab.sharing.edition.facts import _TROUBLES, PARTS, Alarm, Facts, Gain
+from wildlab.sharing.edition.facts import _TROUBLES, Alarm, Facts, Gain
 from wildlab.sharing.edition.language import languages, load_language, say
 from wildlab.sharing.edition.said import Said
 from wildlab.sharing.edition.sentences import STEP_M, Story, steps_of, tell
@@ -202,7 +203,7 @@ gains = st.builds(
 alarms = st.builds(Alarm, st.sampled_from(list(ALARMS)), st.floats(1, 99), st.integers(1, 3))
 troubles = st.tuples(st.sampled_from(list(_TROUBLES.values())), st.floats(0, 1e4))
 facts = st.builds(
-    Facts, twin=st.booleans(), verdict=st.sampled_from([*LEVELS, None]), problems=st.integers(0, 3),
+    Facts, twin=st.booleans(), verdict=st.sampled_from([*Verdict, None]), problems=st.integers(0, 3),
     length_s=maybe, height_m=maybe, area_m2=maybe, seen=maybe, things=maybe, placed=maybe, error_median=maybe,
     error_p90=maybe, compared=st.integers(0, 30), scatter=maybe, sightings=st.integers(0, 9),
     tracks=st.integers(0, 3), track_error=maybe, track_sure=maybe,
@@ -210,7 +211,7 @@ facts = st.builds(
     gains=st.lists(gains, max_size=4).map(tuple),
     possible=st.one_of(st.none(), gains.filter(lambda one: one.value == one.value)),
     failed=st.lists(st.sampled_from(["overview", *PARTS]), unique=True).map(tuple), lacking=st.just(()),
-    doubted=st.lists(st.sampled_from(["tracking", "navigation"]), unique=True).map(tuple),
+    doubted=st.lists(st.sampled_from(PARTS), unique=True).map(tuple),
     pictured=st.one_of(maybe, st.just(0.0)), track_worst=maybe,
 )  # fmt: skip
 

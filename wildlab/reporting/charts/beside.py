@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.filters import SMOOTHED
 from wildlab.pipeline.following.judged import seen_of
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
-from wildlab.reporting.charts.following import UNEVEN, Shown, few, signed, slug
+from wildlab.reporting.charts.following import UNEVEN, Shown, few, slug
+from wildlab.reporting.figure_text import Powers
 from wildlab.reporting.figures import INK, colour, new_figure, thinned
 from wildlab.reporting.tracking import filter_words, length, short_words
 
@@ -124,7 +125,7 @@ def beside_plain_shown(tracks: Sequence[SensorTrack]) -> Shown | None:
         ax.set_yscale("symlog", linthresh=even)
         ax.set_yticks(_ticks(even, largest), minor=False)
         ax.yaxis.set_minor_locator(NullLocator())
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: signed(value)))
+        ax.yaxis.set_major_formatter(Powers())
     fig.supylabel(f"nearer than {short_words(plain)} by (m)", fontsize=10)
     strips[-1, 0].set_xlabel("time (s)")
     brief = [f"{short_words(one.filter)} {_percent(one.nearer)}" for one in shown]

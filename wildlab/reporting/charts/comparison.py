@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREY, new_figure
 
 
@@ -50,7 +51,7 @@ def dots_chart(
         if np.isfinite(a + b):
             ax.plot([a, b], [row, row], color=BLUE, lw=2.2)
     ax.plot(x, rows, "o", color=BLUE, ms=7)
-    ax.set_yticks(rows, [name if len(name) <= 24 else f"{name[:22]}…" for name in names])
+    ax.set_yticks(rows, [figure_name(name if len(name) <= 24 else f"{name[:22]}…") for name in names])
     ax.set_ylim(len(names) - 0.4, -0.8)
     everything = np.concatenate([x, left[np.isfinite(left)], right[np.isfinite(right)], [goal or 0.0]])
     span = float(np.nanmax(everything) - min(0.0, np.nanmin(everything))) or 1.0

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
 from wildlab.geometry.frames import Array
+from wildlab.names import figure_name
 from wildlab.pipeline.following.filters import SMOOTHED
 from wildlab.pipeline.following.follow import Followed
 from wildlab.pipeline.following.judged import whitened
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.reporting.charts.tracks import innovation_correlations
+from wildlab.reporting.figure_text import Powers
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -48,9 +50,17 @@ PAUSE = 5.0
 
 
 def slug(*words: str) -> str:
-    """A name of a figure."""
+    """A name of a figure; where letters of the words cannot stand in it, a digest tells it from others.
+
+    Examples
+    --------
+    >>> slug("map", "boat 1"), slug("map", "$") == slug("map", "å")
+    ('map-boat-1', False)
+    """
     text = "-".join(words).lower()
-    return "".join(c if c.isalnum() and c.isascii() else "-" for c in text)
+    plain = "".join(c if c.isalnum() and c.isascii() else "-" for c in text)
+    strange = any(c not in " _-" for c in text if not (c.isalnum() and c.isascii()))
+    return f"{plain}-{hashlib.sha256(text.encode()).hexdigest()[:6]}" if strange else plain
 
 
 def map_shown(followed: Followed, target: str, name: str, truth: Array, platforms: dict[str, Array]) -> Shown:
@@ -67,14 +77,14 @@ def map_shown(followed: Followed, target: str, name: str, truth: Array, platform
     fig, ax = new_figure(5.6, 5.0)
     for words, way in platforms.items():
         if np.ptp(way, axis=0).max() > 0:
-            ax.plot(way[:, 1], way[:, 0], color=GREY, lw=1.4, label=words)
+            ax.plot(way[:, 1], way[:, 0], color=GREY, lw=1.4, label=figure_name(words))
         else:
-            ax.plot(way[:1, 1], way[:1, 0], "^", color=GREY, ms=8, label=words)
+            ax.plot(way[:1, 1], way[:1, 0], "^", color=GREY, ms=8, label=figure_name(words))
     shown = [truth] if len(truth) else []
     for one, tint in zip(mine, SENSOR_COLOURS * len(mine), strict=False):
         x = one.estimate[np.isfinite(one.estimate[:, 0])][:, :2]
         if len(x):
-            ax.plot(one.estimate[:, 1], one.estimate[:, 0], color=tint, lw=1.6, label=one.sensor)
+            ax.plot(one.estimate[:, 1], one.estimate[:, 0], color=tint, lw=1.6, label=figure_name(one.sensor))
             shown.append(_middle(x))
     if len(truth):
         ax.plot(truth[:, 1], truth[:, 0], color="black", lw=1.2, ls=(0, (4, 2)), label="truth")
@@ -114,7 +124,10 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
             continue
         t, y = _lines(one, values)
         y = np.maximum(y, 1e-4)
-        look = {"color": colour(one.filter.removesuffix(SMOOTHED)), "label": filter_words(one.filter)}
+        look = {
+            "color": colour(one.filter.removesuffix(SMOOTHED)),
+            "label": figure_name(filter_words(one.filter)),
+        }
         dashes = "--" if one.filter.endswith(SMOOTHED) else "-"
         if what == "nees":
             ax.plot(t, y, lw=1.4, ls=dashes, **look)
@@ -167,7 +180,7 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
             continue
         stated = np.sqrt(np.trace(one.covariance[:, :2, :2], axis1=1, axis2=2))
         tint = colour(one.filter.removesuffix(SMOOTHED))
-        ax.plot(*_lines(one, away), color=tint, lw=1.5, label=filter_words(one.filter))
+        ax.plot(*_lines(one, away), color=tint, lw=1.5, label=figure_name(filter_words(one.filter)))
         ax.plot(*_lines(one, np.where(there, stated, np.nan)), color=tint, lw=1.0, ls=":")
         far = length(float(mine["rmse"].to_dict()[one.filter]))
         said.append(f"{filter_words(one.filter)} {far}")
@@ -178,7 +191,7 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
     if len(sizes) > 1 and max(map(np.max, sizes)) > UNEVEN * min(map(np.max, sizes)):
         ax.set_yscale("log")
         ax.set_ylim(bottom=max(float(np.quantile(np.concatenate(sizes), 0.01)), 1e-3))
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: signed(value)))
+        ax.yaxis.set_major_formatter(Powers())
     else:
         ax.set_ylim(bottom=0)
     ax.set(xlabel="time (s)", ylabel="distance from the truth (m)")
@@ -194,21 +207,6 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
         alt,
         "Dotted: the standard deviation stated. Means: of looks with the target seen.",
     )
-
-
-def signed(metres: float) -> str:
-    """Metres beside an axis over many powers of ten.
-
-    Examples
-    --------
-    >>> signed(-2e6), signed(30.0), signed(0.0)
-    ('−2·10⁶', '30', '0')
-    """
-    if abs(metres) < 1e4:
-        return f"{metres:g}".replace("-", "−")
-    factor, power = f"{metres:.0e}".split("e")
-    raised = str(int(power)).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{factor}·10{raised}".replace("-", "−")
 
 
 def whiteness_shown(tracks: Sequence[SensorTrack], elements: Sequence[str]) -> Shown | None:

@@ -7,6 +7,7 @@ from matplotlib.ticker import MaxNLocator
 
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
+from wildlab.names import figure_name
 from wildlab.pipeline.many.follow import Followed, known_looks
 from wildlab.reporting.charts.following import SENSOR_COLOURS, Shown
 from wildlab.reporting.figures import GREY, INK, VERMILLION, map_axes, mark_gaps, new_figure
@@ -74,7 +75,9 @@ def map_shown(followed: Followed) -> Shown:
         way = parted(way, [look.time for look in followed.shown])
         named = tints[identity] != INK
         label = f"track {identity}" if named else "other tracks"
-        ax.plot(way[:, 2], way[:, 1], color=tints[identity], lw=1.8 if named else 1.0, label=label)
+        ax.plot(
+            way[:, 2], way[:, 1], color=tints[identity], lw=1.8 if named else 1.0, label=figure_name(label)
+        )
         ax.plot(way[:1, 2], way[:1, 1], "o", color=tints[identity], ms=5)
     handles, labels = ax.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
@@ -100,7 +103,7 @@ def identities_shown(followed: Followed, lives: Identities) -> Shown:
         for identity in dict.fromkeys(one for one in on if one is not None):
             mine = np.array([one == identity for one in on])
             ax.plot(times[mine], np.full(int(mine.sum()), row), "|", color=tints[identity], ms=11, mew=1.6)
-    ax.set_yticks(range(len(names)), [short(name) for name in names], parse_math=False)
+    ax.set_yticks(range(len(names)), [figure_name(short(name)) for name in names])
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.set_xlabel("time since the first look (s)")
     changes = lives.swaps + lives.breaks
@@ -133,7 +136,7 @@ def wrong_shown(followed: Followed, lives: Identities) -> Shown:
         axes[1].step(
             np.insert(times, after, times[after]),
             np.insert(values.astype(float), after, np.nan),
-            where="mid", color=tint, lw=1.4, label=what,
+            where="mid", color=tint, lw=1.4, label=figure_name(what),
         )  # fmt: skip
     axes[1].set_ylabel("how many")
     axes[1].set_xlabel("time since the first look (s)")

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
+from wildlab.names import figure_name
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -73,7 +74,7 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
             y = np.array(quantities[label], float)[keep]
             y[1:][np.abs(np.diff(y)) > 180] = np.nan
             t = np.asarray(times, float)[keep]
-            ax.plot(t, y, lw=width, color=colour(name), label=NAMES.get(name, name))
+            ax.plot(t, y, lw=width, color=colour(name), label=figure_name(NAMES.get(name, name)))
         ax.set_ylabel(label)
     if len(sources) > 1:
         fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
@@ -147,13 +148,20 @@ def error_bands(
         for level, name in enumerate(order):
             e = shown[name]
             ax.plot(
-                t[keep], e, lw=0.9, color=colour(name), label=NAMES.get(name, name), zorder=2 + 0.1 * level
+                t[keep],
+                e,
+                lw=0.9,
+                color=colour(name),
+                label=figure_name(NAMES.get(name, name)),
+                zorder=2 + 0.1 * level,
             )
             reach = max(reach, float(np.nanmax(np.abs(e), initial=0.0)))
         for name, stated in bounds.items():
             two = 2 * np.asarray(stated, float)[keep, i]
             two_of = f"two SD of the {NAMES.get(name, name)}"
-            ax.fill_between(t[keep], -two, two, color=colour(name), alpha=0.2, lw=0, label=two_of, zorder=3)
+            ax.fill_between(
+                t[keep], -two, two, color=colour(name), alpha=0.2, lw=0, label=figure_name(two_of), zorder=3
+            )
             for edge in (-two, two):
                 ax.plot(t[keep], edge, color=INK, lw=0.8, ls=(0, (4, 2)), zorder=3.1)
             reach = max(reach, float(np.nanmax(two, initial=0.0)))
@@ -183,7 +191,7 @@ def deviation_chart(
         axes, (0, 3), (("north", "east", "down"), ("roll", "pitch", "yaw")), units, strict=True
     ):
         for i, (name, color) in enumerate(zip(names, LINES, strict=True)):
-            ax.plot(t[keep], values[keep, first + i], color=color, lw=1.2, label=name)
+            ax.plot(t[keep], values[keep, first + i], color=color, lw=1.2, label=figure_name(name))
             if printed is not None:
                 ax.axhline(printed[first + i], color=color, lw=1.0, ls=(0, (4, 3)), alpha=0.8)
         ax.set_yscale("log")
@@ -212,7 +220,7 @@ def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike, title: str) -
         reach = 0.0
         for i, (name, color) in enumerate(zip(("forward", "right", "down"), LINES, strict=True)):
             b, s = (scale * np.asarray(a, float)[keep, first + i] for a in (biases, sd))
-            ax.plot(t[keep], b, color=color, lw=1.1, label=name)
+            ax.plot(t[keep], b, color=color, lw=1.1, label=figure_name(name))
             ax.fill_between(t[keep], b - 2 * s, b + 2 * s, color=color, alpha=0.15, lw=0, zorder=3)
             late = slice(len(b) // 10, None)
             reach = max(reach, float(np.nanmax(np.abs(b[late]) + 2 * s[late], initial=0.0)))
@@ -255,7 +263,7 @@ def speed_chart(sources: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) 
             speed[keep],
             lw=1.0,
             color=colour(name),
-            label=NAMES.get(name, name),
+            label=figure_name(NAMES.get(name, name)),
         )
     ax.set_ylim(0, None)
     ax.set_ylabel("speed over ground (m/s)")
@@ -268,7 +276,7 @@ def correlation_strips(series: Mapping[str, ArrayLike], bounds: Mapping[str, flo
     for ax, (name, rows) in zip(axes[:, 0], series.items(), strict=True):
         ax.axhspan(-bounds[name], bounds[name], color=GREEN, alpha=0.2, lw=0)
         for row, color, axis in zip(np.asarray(rows, float), LINES, ("north", "east", "down"), strict=False):
-            ax.plot(np.arange(1, len(row)), row[1:], color=color, lw=1.1, label=axis)
+            ax.plot(np.arange(1, len(row)), row[1:], color=color, lw=1.1, label=figure_name(axis))
         top = max(0.2, 1.1 * float(np.nanmax(np.abs(np.asarray(rows, float)[:, 1:]))))
         ax.set_ylim(-top, top)
         ax.set_ylabel(_short(name))

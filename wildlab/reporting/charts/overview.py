@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.streams import Pace
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
+from wildlab.names import figure_name
 from wildlab.pipeline.overviews.image_coverage import Coverage
 from wildlab.pipeline.overviews.overview import TROUBLES, Path, Trouble
 from wildlab.reporting.figures import (
@@ -63,7 +64,11 @@ def path_chart(path: Path, troubles: Sequence[Trouble], title: str) -> Figure:
     keep = thinned(len(east))
     dots = len(east) < 3 or not path.timed
     ax.plot(east[keep], north[keep], "." if dots else "-", color=BLUE, lw=1.1, ms=4)
-    handles = [Line2D([], [], color=BLUE, lw=1.4, label="nothing found" if troubles else path_name(path))]
+    handles = [
+        Line2D(
+            [], [], color=BLUE, lw=1.4, label="nothing found" if troubles else figure_name(path_name(path))
+        )
+    ]
     for trouble in reversed(troubles):
         color = TROUBLE_COLOURS[trouble.what]
         pieces = []
@@ -87,7 +92,9 @@ def path_chart(path: Path, troubles: Sequence[Trouble], title: str) -> Figure:
                 mew=2.5, zorder=6,
             )  # fmt: skip
         label = f"{trouble.what}, {_spell_words(trouble)}"
-        handles.insert(0, Line2D([], [], color=color, lw=3, ls=":" if broken else "-", label=label))
+        handles.insert(
+            0, Line2D([], [], color=color, lw=3, ls=":" if broken else "-", label=figure_name(label))
+        )
     ax.plot(east[0], north[0], "o", mfc="white", mec=INK, ms=7, mew=1.5, zorder=4)
     ax.plot(east[-1], north[-1], "s", mfc=INK, mec=INK, ms=5, zorder=4)
     handles += [
@@ -164,7 +171,7 @@ def streams_chart(streams: Mapping[str, Pace], clock: Clock, title: str) -> Figu
             ax.plot([left, right], [row, row], color=VERMILLION, lw=3, solid_capstyle="butt")
             # Also where the pause is too short to be seen.
             ax.plot((left + right) / 2, row, "|", color=VERMILLION, ms=12, mew=1.6)
-    ax.set_yticks(range(len(named)), list(named))
+    ax.set_yticks(range(len(named)), [figure_name(name) for name in named])
     ax.set_ylim(len(named) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     ax.set_xlabel(clock.label)
@@ -189,7 +196,7 @@ def lines_chart(
         ax.plot(at, height, color="#8C6D00", lw=1.2, label="ground")
     for (name, (times, values)), color in zip(_truth_first(series), _colours(series), strict=True):
         keep = thinned(len(times))
-        ax.plot(clock(times[keep]), values[keep], color=color, lw=1.2, label=name)
+        ax.plot(clock(times[keep]), values[keep], color=color, lw=1.2, label=figure_name(name))
     if floor:
         ax.set_ylim(0, None)
     ax.set_xlabel(clock.label)
@@ -208,7 +215,7 @@ def attitude_chart(series: Mapping[str, tuple[Array, Array]], clock: Clock, titl
             keep = thinned(len(times))
             t, value = clock(times[keep]), angles[keep, row].copy()
             value[1:][np.abs(np.diff(value)) > 180] = np.nan
-            axes[row].plot(t, value, color=color, lw=1.1, label=name if row == 0 else None)
+            axes[row].plot(t, value, color=color, lw=1.1, label=figure_name(name) if row == 0 else None)
         axes[row].set_ylabel(axis)
     axes[0].set_title(title)
     axes[-1].set_xlabel(clock.label)
@@ -266,7 +273,7 @@ def satellites_chart(
         else:
             for (name, (times, values)), color in zip(sd.items(), LINES, strict=False):
                 keep = thinned(len(times))
-                ax.plot(clock(times[keep]), values[keep], color=color, lw=1.2, label=name)
+                ax.plot(clock(times[keep]), values[keep], color=color, lw=1.2, label=figure_name(name))
             ax.set_ylabel("stated SD (m)")
             ax.set_ylim(0, None)
             ax.legend(loc="upper right")

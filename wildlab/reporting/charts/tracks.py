@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.track_errors import SLOWEST_M_S
+from wildlab.names import figure_name
 from wildlab.reporting.figures import (
     GREEN,
     GREY,
@@ -68,7 +69,7 @@ def track_map(
         ax.plot(z[:, 1], z[:, 0], color=GREY, ms=4, alpha=0.5, label="single images", **_DOTS)
     for width, (subject, states) in zip(_WIDTHS, tracks.items(), strict=False):
         x = np.asarray(states, float)
-        ax.plot(x[:, 1], x[:, 0], color=colour(subject), lw=width, label=names[subject])
+        ax.plot(x[:, 1], x[:, 0], color=colour(subject), lw=width, label=figure_name(names[subject]))
     way = np.asarray(truth, float)
     ax.plot(way[:, 1], way[:, 0], **_TRUTH)
     _mark_start(ax, way[np.isfinite(way[:, :2]).all(axis=1)])
@@ -107,7 +108,7 @@ def error_over_time(
             z = _columns(measured)[:, i]
             ax.plot(t, z, color=GREY, ms=3, alpha=0.5, label="single images", **_DOTS)
         for width, (subject, e) in zip(_WIDTHS, columns.items(), strict=False):
-            ax.plot(t[keep], e[keep, i], color=colour(subject), lw=width, label=names[subject])
+            ax.plot(t[keep], e[keep, i], color=colour(subject), lw=width, label=figure_name(names[subject]))
         ax.axhline(0, color=GREY, lw=0.6)
         mark_gaps(ax, t[there], GAP_S)
         ax.set_ylabel(label)
@@ -132,7 +133,7 @@ def speed_and_course(
     fig, (fast, course) = new_figure(5.9, 4.8, rows=2, sharex=True)
     keep = thinned(len(t))
     looks = [
-        {"color": colour(subject), "lw": width, "label": names[subject]}
+        {"color": colour(subject), "lw": width, "label": figure_name(names[subject])}
         for width, subject in zip(_WIDTHS, tracks, strict=False)
     ]
     top, courses = 0.0, [course_of(states) for states in (*tracks.values(), truth)]
@@ -202,7 +203,7 @@ def squares_over_time(
         highest = high
         for width, (subject, v) in zip(_WIDTHS, series.items(), strict=False):
             y = np.asarray(v, float)
-            look = {"color": colour(subject), "label": names[subject]}
+            look = {"color": colour(subject), "label": figure_name(names[subject])}
             if np.isfinite(y[~there]).any():
                 ax.plot(t[keep], y[keep], lw=width, **look)
             else:
@@ -241,7 +242,7 @@ def nees_over_flights(
             ax.plot(published[name], place, "D", mfc="white", mec=INK, ms=8, mew=1.6, zorder=5)
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.set_yticks(range(len(names)), list(names.values()))
+    ax.set_yticks(range(len(names)), [figure_name(name) for name in names.values()])
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     ax.set_xlabel("NEES of the position, mean over a flight")
@@ -271,25 +272,26 @@ def innovation_correlations(
         ax.axhline(0, color=INK, lw=0.6)
         for width, (subject, r) in zip(_WIDTHS, series.items(), strict=False):
             y = np.asarray(r, float)[i]
-            ax.plot(np.arange(len(y)), y, color=colour(subject), lw=width, label=names[subject])
+            ax.plot(np.arange(len(y)), y, color=colour(subject), lw=width, label=figure_name(names[subject]))
         ax.set_ylabel(f"autocorrelation,\n{name}")
     return _finished(fig, strips[:, 0], title, "lag (detections)")
 
 
 def _mark_start(ax: Axes, way: Array) -> None:
-    """A dot where a way (N, 2 or more) begins, and its name on the side that the way turns away from."""
+    """A dot where a way (N, 2 or more) begins, and its name on the side that the way turns away from, but
+    below where all else is below: above is the title."""
     north, east = way[0, 0], way[0, 1]
-    northward = way[-1, 0] > north
-    # Room for the name between the dot and the title.
     ax.margins(0.1)
+    low, high = ax.dataLim.intervaly
+    below = way[-1, 0] > north or north > high - 0.1 * (high - low)
     ax.plot(east, north, "o", color=colour("truth"), ms=5)
     ax.annotate(
         "start",
         (east, north),
-        (0, -7 if northward else 7),
+        (0, -7 if below else 7),
         textcoords="offset points",
         ha="center",
-        va="top" if northward else "bottom",
+        va="top" if below else "bottom",
         fontsize=10,
         color=INK,
         bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},

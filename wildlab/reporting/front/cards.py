@@ -113,15 +113,18 @@ def verdict_words(one: StudyStatus) -> Standing:
     """What a study's numbers and claims come to, as its report says it; a first look comes to nothing yet."""
     if one.state == FIRST_LOOK:
         return Standing("first look", f"{one.first_look}: not counted yet.", "warn")
-    return standing((n.verdict for n in one.counted), (c.verdict for c in one.claims if not c.own))
+    compared = [n.compared for n in one.counted if n.compared is not None]
+    return standing(compared, (c.verdict for c in one.claims if not c.own))
 
 
 def _without_strip(one: StudyStatus) -> str:
     if drawable(one.counted):
         return ""
     if not one.counted:
-        return "No printed number of it is compared."
-    return "Its printed numbers have no ratio: they are signed, or zero."
+        return "No published number of it is compared."
+    if all(n.compared and n.compared.reproduction == "not judged" for n in one.counted):
+        return "Its published numbers are not judged."
+    return "Its published numbers have no ratio: they are signed, or zero."
 
 
 def flight_card(flight: OwnFlight, glimpse: Glimpse) -> Card:
@@ -135,7 +138,7 @@ def flight_card(flight: OwnFlight, glimpse: Glimpse) -> Card:
         folder=first.folder,
         verdict=verdict_pill(flight),
         tag=TAGS.get(flight.kind, flight.kind),
-        picture=glimpse.picture,
+        picture=glimpse.picture if first.state != "damaged" else "",
         alt=glimpse.alt,
         rest=_links(flight),
     )
@@ -152,7 +155,7 @@ def _links(flight: OwnFlight) -> str:
 
 
 def _state(state: str) -> str:
-    return "did not finish" if state == "failed" else "was broken off"
+    return {"failed": "did not finish", "damaged": "is not as it was written"}.get(state, "was broken off")
 
 
 def card_html(card: Card) -> str:
@@ -181,8 +184,8 @@ def _spoken(numbers: Sequence[Number]) -> str:
     ratios = sorted(one.ratio for one in numbers if one.ratio is not None)
     middle = ratios[len(ratios) // 2]
     if len(ratios) == 1:
-        return f"One number, ours {middle:.2f} times the printed one."
+        return f"One number, ours {middle:.2f} times the published one."
     return (
-        f"{len(ratios)} numbers, ours divided by the printed ones: from {ratios[0]:.2f} to {ratios[-1]:.2f}, "
+        f"{len(ratios)} numbers, ours over the published ones: from {ratios[0]:.2f} to {ratios[-1]:.2f}, "
         f"the middle one {middle:.2f}."
     )

@@ -74,7 +74,7 @@ class FrontFlight(NamedTuple):
     @property
     def held(self) -> float:
         """Share of the instants at which the ellipse holds the target."""
-        from wildlab.geometry.uncertainty import inside_ellipse
+        from wildlab.geometry.ellipses import inside_ellipse
 
         (ellipses,), (truth,) = self.shown.ellipses, self.shown.truth
         missed = _between(truth, ellipses.times) - ellipses.centres

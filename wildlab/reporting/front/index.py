@@ -140,6 +140,8 @@ def _doors(studies: Sequence[StudyStatus], flights: int, cases: int, learn: Sequ
     theses = f"{len(studies)} studies" + (f", for {cases} cases of two theses" if cases else "")
     ran = [f"{done} done"] if done or not looks else []
     ran += [f"{looks} at a first look"] if looks else []
+    damaged = sum(one.state == "damaged" for one in studies)
+    ran += [f"{damaged} damaged and not counted"] if damaged else []
     mine = f"{flights} flight{'s' * (flights > 1)} evaluated here" if flights else "none yet: how to begin"
     ready = sum(bool(one.address) for one in learn)
     pages = f"{ready} page{'s' * (ready != 1)} to read" if ready else "tutorials, the reference"
@@ -186,11 +188,11 @@ def _theses(studies: Sequence[StudyStatus], shown: Sequence[Card]) -> str:
     parts = ['<section><h2 id="theses">What the theses asked, and what came out here</h2>']
     if any(one.numbers for one in shown):
         parts.append(
-            "<p>Each card opens a report. Its strip shows our numbers divided by the printed ones: "
-            f"the shaded middle is within a factor of {ratios.CLOSE:g}. What is calculated must agree to the "
-            "last printed digit, and may differ there, too.</p>"
+            "<p>Each card opens a report. Its strip shows our numbers divided by the published ones: "
+            f"the shaded middle is within a factor of {ratios.CLOSE:g}. "
+            f'<a href="{LEDGER}#rule">What is close, and what within</a>.</p>'
         )
-        parts.append(ratios.legend(n.verdict for one in shown for n in one.numbers))
+        parts.append(ratios.legend(n for one in shown for n in one.numbers))
     if shown:
         parts.append(f'<div class="wall">{"".join(card_html(one) for one in shown)}</div>')
     if waiting:

@@ -1,4 +1,4 @@
-"""The printed numbers at once: a row of marks for each study, counts beside, and the same on one sheet."""
+"""The published numbers at once: a row of marks for each study, counts beside, and the same on one sheet."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from urllib.parse import quote
 
-from wildlab.evaluation.printed import NOT_JUDGED
+from wildlab.evaluation.replication import Closeness, Compatibility
+from wildlab.reporting.counts import PREDICTED, Counts, counted, groups_table, tally
 from wildlab.reporting.front import ratios
 from wildlab.reporting.front.cards import verdict_words
-from wildlab.reporting.front.counts import WORDS, Counts, counted
 from wildlab.reporting.page import page
-from wildlab.reporting.status import FIRST_LOOK, StudyStatus
+from wildlab.reporting.status import FIRST_LOOK, Number, StudyStatus
 from wildlab.reporting.text import escape
 
-_TALLY = WORDS | {NOT_JUDGED: "not judged"}
 #: The pages beside the front page.
 LEDGER, POSTER = "ledger.html", "numbers.html"
 
@@ -35,18 +34,18 @@ padding:.12rem 0}
 def numbers_section(studies: Sequence[StudyStatus]) -> str:
     """The section of the front page."""
     counts = counted(studies)
-    head = '<section><h2 id="numbers">The printed numbers at once</h2>'
+    head = '<section><h2 id="numbers">The published numbers at once</h2>'
     rows = number_rows(studies)
     if not rows:
         return (
-            f'{head}<p class="empty">{counts.all} printed numbers are kept here; no study of them was run '
+            f'{head}<p class="empty">{counts.all} published numbers are kept here; no study of them was run '
             f"yet.</p></section>"
         )
-    verdicts = [n.verdict for one in studies if one.ran for n in ratios.drawable(one.counted)]
+    shown = [n for one in studies if one.ran for n in one.counted]
     return (
         f"{head}<p>A mark is a number of one of the theses: ours divided by theirs, on one axis for all.</p>"
-        f"{count_list(counts)}{ratios.legend(verdicts)}"
-        f'<div class="all">{rows}</div>{aside(counts)}'
+        f"{count_list(counts)}{ratios.legend(shown)}"
+        f'<div class="all">{rows}</div>{groups_table(counts)}{aside(counts)}'
         f'<p><a href="{POSTER}">The same on one sheet, for the wall</a></p></section>'
     )
 
@@ -58,8 +57,7 @@ def number_rows(studies: Sequence[StudyStatus]) -> str:
         shown = ratios.drawable(one.counted) if one.ran else []
         if not shown:
             continue
-        undrawn = sum(n.here is not None for n in one.counted) - len(shown)
-        said = _tally(one) + (f"; {undrawn} without a ratio" if undrawn else "")
+        said = _tally(one)
         name = one.study.name.replace("-", " ")
         link = f'<a href="{LEDGER}#{escape(quote(one.study.name))}">{escape(name)}</a>'
         alt = f"{name}: {len(shown)} numbers; {_words(one)}"
@@ -74,40 +72,45 @@ def number_rows(studies: Sequence[StudyStatus]) -> str:
 
 
 def _tally(one: StudyStatus) -> str:
-    """Verdicts of a study in figures."""
+    """The answers on a study's numbers in few figures."""
     if one.state == FIRST_LOOK:
         return f"first look: {sum(n.here is not None for n in one.counted)}"
-    return ", ".join(f"{one.count(verdict)} {word}" for verdict, word in _TALLY.items() if one.count(verdict))
+    found = tally(one.counted)
+    outside = found.compatible[Compatibility.OUTSIDE]
+    close = f"{found.close[Closeness.CLOSE]} of {sum(found.close.values())} close"
+    return close + (f", {outside} outside" if outside else "")
 
 
 def count_list(counts: Counts) -> str:
-    """The verdicts in figures."""
+    """The headline: what was predicted for flights, in figures."""
     if not counts.of:
         return ""
-    items = "".join(f"<li><b>{n}</b>{WORDS[verdict]}</li>" for verdict, n in counts.judged.items() if n)
-    return f'<ul class="count">{items}<li>of {counts.of} that were judged</li></ul>'
+    items = "".join(f"<li><b>{n}</b>{escape(words)}</li>" for n, words in _headline(counts))
+    return f'<ul class="count">{items}</ul>'
+
+
+def _headline(counts: Counts) -> list[tuple[str, str]]:
+    found = counts.groups[PREDICTED]
+    flights = f"{counts.flights} flight{'s' * (counts.flights != 1)}"
+    return [
+        (f"{found.close['close']} of {counts.of}", f"{PREDICTED} for {flights}, are close"),
+        (str(found.compatible["within"]), "within 90 % of our flights"),
+        (str(found.compatible["outside"]), f"outside; chance alone gives {found.chance:.1f}"),
+    ]
 
 
 def aside(counts: Counts) -> str:
-    """What is not among the judged, and what is not drawn; as HTML, "" where nothing is to be said."""
+    """What has no answer; as HTML, "" where nothing is to be said."""
     said = _notes(counts)
     return f'<p class="note">{escape(" ".join(said))}</p>' if said else ""
 
 
 def _notes(counts: Counts) -> list[str]:
-    said = []
-    rest = counts.all - counts.of
-    if rest:
-        reasons = "; ".join(f"{n} {why}" for why, n in counts.others.items())
-        said.append(
-            f"{rest} of the {counts.all} printed numbers that are kept here are not among them: {reasons}."
-        )
-    if counts.undrawn:
-        said.append(
-            f"{counts.undrawn} of those judged cannot be drawn, being signed or zero without a ratio: "
-            "compared by their difference."
-        )
-    return said
+    rest = sum(counts.others.values())
+    if not rest:
+        return []
+    reasons = "; ".join(f"{n} {why}" for why, n in counts.others.items())
+    return [f"{rest} of the {counts.all} published numbers have no answer: {reasons}."]
 
 
 #: The sheet, mm: within the margins of A4, portrait; where names end, and where the axis does.
@@ -123,19 +126,19 @@ _POSTER_STYLE = """body{max-width:60rem}.sheet{display:block;width:100%;min-widt
 
 
 def poster_page(studies: Sequence[StudyStatus]) -> str:
-    """``numbers.html``: every printed number on one sheet of A4, in lines: it prints as large as wanted.
+    """``numbers.html``: every published number on one sheet of A4, in lines: it prints as large as wanted.
 
     Returns
     -------
     str
         HTML; it works with no study run.
     """
-    way = '<a href="index.html">wildlab</a> › the printed numbers'
-    body = f'<h1 class="unseen">The printed numbers at once</h1>{_sheet(studies)}'
+    way = '<a href="index.html">wildlab</a> › the published numbers'
+    body = f'<h1 class="unseen">The published numbers at once</h1>{_sheet(studies)}'
     style = f"{ratios.STYLE}\n{_POSTER_STYLE}\n.unseen{{position:absolute;left:-99rem}}"
     made = datetime.now(UTC).strftime("%Y-%m-%d")
     footer = f"<p>Put together {made}. Print it on A4, or larger: it is drawn in lines.</p>"
-    return page(title="The printed numbers at once", body=body, kicker=way, footer=footer, style=style)
+    return page(title="The published numbers at once", body=body, kicker=way, footer=footer, style=style)
 
 
 def _sheet(studies: Sequence[StudyStatus]) -> str:
@@ -143,7 +146,7 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
     rows = [(one, ratios.drawable(one.counted)) for one in studies if one.ran]
     rows = [(one, shown) for one, shown in rows if shown]
     if not rows:
-        return f"<p>{counts.all} printed numbers are kept here; no study of them was run yet.</p>"
+        return f"<p>{counts.all} published numbers are kept here; no study of them was run yet.</p>"
     scale = 0.36
     width = (AXIS_END - NAMES_END) / scale
     notes = [line for said in _notes(counts) for line in textwrap.wrap(said, 118)]
@@ -151,20 +154,21 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
     ranks = [ratios.levels_for(shown, width, 7) for _, shown in rows]
     levels = [max(one + 0.8, 2.2) for one in ranks]
     unit = min((bottom - top) / sum(levels), 5.2)
-    parts = [_text(0, 10, "Printed numbers of two theses, beside ours", 6.4, weight=650)]
-    judged = " · ".join(f"{n} {WORDS[verdict]}" for verdict, n in counts.judged.items() if n)
-    lead = f"{judged}, of {counts.of} that were judged." if counts.of else "None is judged yet."
-    parts.append(_text(0, 18.5, lead, 4.4))
+    parts = [_text(0, 10, "Published numbers of two theses, and ours", 6.4, weight=650)]
+    lead = (
+        " · ".join(f"{n} {words}" for n, words in _headline(counts)) if counts.of else "None is judged yet."
+    )
+    parts.append(_text(0, 18.5, lead, 3.6))
     parts.append(
         _text(
             0,
             25,
-            "A mark is one number: ours divided by the printed one, on one logarithmic axis.",
+            "A mark is one number: ours divided by the published one, on one logarithmic axis.",
             3.4,
             dim=True,
         )
     )
-    parts.append(_key([n.verdict for _, shown in rows for n in shown]))
+    parts.append(_key([n for _, shown in rows for n in shown]))
     parts += [_tick_words(width, scale, y) for y in (top - 2.2, top + unit * sum(levels) + 4.4)]
     y = top
     for (one, shown), rank, tall in zip(rows, ranks, levels, strict=True):
@@ -172,7 +176,7 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
         middle = y + high / 2
         parts.append(_text(NAMES_END - 3, middle + 1.1, one.study.name.replace("-", " "), 3.1, anchor="end"))
         marks = ratios.arranged(shown, width, rank)
-        squeeze = unit / (8.2 * scale)
+        squeeze = unit / (8.6 * scale)
         drawn = "".join(ratios.mark_svg(mark._replace(y=mark.y * squeeze), 0.0) for mark in marks)
         parts.append(
             f'<g transform="translate({NAMES_END} {y:.2f}) scale({scale})">'
@@ -184,7 +188,7 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
         parts.append(f'<path class="between" d="M0 {y:.2f}H{SHEET_WIDE}"/>')
     parts += [_text(0, bottom + 13 + 3.6 * k, line, 2.7, dim=True) for k, line in enumerate(notes)]
     alt = (
-        f"A row of marks for each of {len(rows)} studies: ours divided by the printed number. {lead} "
+        f"A row of marks for each of {len(rows)} studies: ours divided by the published number. {lead} "
         "The same numbers stand in tables on the ledger's page."
     )
     return (
@@ -200,16 +204,15 @@ def _words(one: StudyStatus) -> str:
     return f"{found.word}: {found.reason}"
 
 
-def _key(verdicts: Sequence[str]) -> str:
-    """The shapes and their words, in a row."""
+def _key(numbers: Sequence[Number]) -> str:
+    """The symbols and their words, in a row."""
     parts, x = [], 1.5
-    for verdict, (name, path) in reversed(ratios.SHAPES.items()):
-        if verdict in verdicts:
-            parts.append(f'<path class="{name}" transform="translate({x} 31.8) scale(.36)" d="{path}"/>')
-            parts.append(_text(x + 3, 33, verdict, 3.2, dim=True))
-            x += 8 + 1.75 * len(verdict)
+    for drawn, words in ratios.key_of(numbers):
+        parts.append(f'<g transform="translate({x} 31.8) scale(.36)">{drawn}</g>')
+        parts.append(_text(x + 3, 33, words, 3.0, dim=True))
+        x += 7.5 + 1.55 * len(words)
     parts.append(f'<path class="close" d="M{x:.1f} 30h5v3.6h-5z"/>')
-    parts.append(_text(x + 7, 33, f"within a factor of {ratios.CLOSE:g}", 3.2, dim=True))
+    parts.append(_text(x + 7, 33, f"factor {ratios.CLOSE:g}", 3.0, dim=True))
     return "".join(parts)
 
 

@@ -1,7 +1,9 @@
 """Published numbers as marks on one axis: ours divided by the printed one, logarithmic, the same everywhere.
 
-A verdict has a shape and a colour, so that neither eyes nor printers that see no colour miss it. What has no
-ratio (a signed mean, a zero) or was not run is not drawn; whoever draws says how many there are.
+Whether a number is close is a shape; whether it is within the prediction interval of our flights is a
+colour, and a ring around what is outside, so that neither eyes nor printers that see no colour miss it.
+What was fitted is underlined. What has no ratio (a signed mean, a zero) or was not run is not drawn;
+whoever draws says how many.
 """
 
 from __future__ import annotations
@@ -10,33 +12,36 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from wildlab.evaluation.printed import AGREES, DIFFERS, MARGINS, NOT_JUDGED, POSSIBLE, TOO_VAGUE
+from wildlab.evaluation.replication import KINDS, Closeness, Compatibility
 from wildlab.reporting.ledger_tables import WIDEST
 from wildlab.reporting.status import FIRST_LOOK, Number
 from wildlab.reporting.text import escape
 
-#: Verdicts in the order in which they are drawn, the last on top, and how each is drawn.
-SHAPES = {
+#: Answers to "close?" in the order in which they are drawn, the last on top, and how each is drawn.
+SHAPES: dict[str, tuple[str, str]] = {
     FIRST_LOOK: ("look", "M0-3.6 3.6 0 0 3.6-3.6 0Z"),
-    NOT_JUDGED: ("none", "M-3-3H3V3H-3Z"),
-    TOO_VAGUE: ("vague", "M0-3.6a3.6 3.6 0 1 1-.01 0Z"),
-    POSSIBLE: ("maybe", "M0-4.6 4.4 3.4H-4.4Z"),
-    DIFFERS: ("off", "M-3.6-3.6 3.6 3.6M3.6-3.6-3.6 3.6"),
-    AGREES: ("same", "M0-3.9a3.9 3.9 0 1 1-.01 0Z"),
+    Closeness.NOT_JUDGED: ("none", "M-3-3H3V3H-3Z"),
+    Closeness.CANNOT_TELL: ("vague", "M0-3.2a3.2 3.2 0 1 1-.01 0Z"),
+    Closeness.NOT_CLOSE: ("off", "M-3.6-3.6 3.6 3.6M3.6-3.6-3.6 3.6"),
+    Closeness.CLOSE: ("same", "M0-3.6a3.6 3.6 0 1 1-.01 0Z"),
 }
+#: Around what is outside; below what is fitted.
+RING, UNDERLINE = "M0-5.4a5.4 5.4 0 1 1-.01 0Z", "M-4 6.4H4"
 #: What the axis says, by ratio.
-TICKS = {1 / 8: "⅛", 1 / 4: "¼", 1 / 2: "½", 1.0: "as printed", 2.0: "2×", 4.0: "4×", 8.0: "8×"}
-#: The margin of most printed numbers, the size of an error; it is shaded.
-CLOSE = MARGINS["error size"].factor or 1.25
+TICKS = {1 / 8: "⅛", 1 / 4: "¼", 1 / 2: "½", 1.0: "published", 2.0: "2×", 4.0: "4×", 8.0: "8×"}
+#: The margin of most published numbers, the size of an error; it is shaded.
+CLOSE = KINDS["error size"].factor
 #: Half of a mark, and how far its neighbours are, in units of the drawing.
-_HALF, _APART = 4.6, 8.2
+_HALF, _APART = 6.0, 8.6
 
 # Colours are the page's own.
 STYLE = """.marks{display:block;width:100%;height:auto}.marks .axis{stroke:var(--line)}
 .marks .one{stroke:var(--ink)}
 .marks .close,.legend .close{fill:var(--good);opacity:.13}
-.same{fill:var(--good)}.off{fill:none;stroke:var(--bad);stroke-width:1.9}.maybe{fill:var(--blue)}
-.vague,.none,.look{fill:none;stroke:var(--dim);stroke-width:1.5}.marks .far{fill:none;stroke:var(--ink)}
+.mark path{fill:none;stroke:var(--dim);stroke-width:1.6}.mark .same{fill:var(--dim);stroke:none}
+.mark.within path{stroke:var(--good)}.mark.within .same{fill:var(--good);stroke:none}
+.mark.outside path{stroke:var(--bad)}.mark.outside .same{fill:var(--bad);stroke:none}
+.mark .ring{stroke-width:1}.marks .far{fill:none;stroke:var(--ink)}
 .ticks{position:relative;height:1.25em;font-size:.75rem;color:var(--dim)}
 .ticks span{position:absolute;transform:translateX(-50%);white-space:nowrap}
 .legend{display:flex;flex-wrap:wrap;gap:.15rem 1.2rem;margin:.5rem 0;padding:0;list-style:none;max-width:none;
@@ -46,12 +51,14 @@ vertical-align:-2px;overflow:visible}
 
 
 class Mark(NamedTuple):
-    """A number drawn: where (units from the left, and from the middle down), how, and whether the axis ends
-    before it (-1 left, 1 right, 0 not)."""
+    """A number drawn: where (units from the left, and from the middle down), both answers, whether it is
+    fitted, and whether the axis ends before it (-1 left, 1 right, 0 not)."""
 
     x: float
     y: float
-    verdict: str
+    closeness: str
+    compatibility: str
+    fitted: bool
     beyond: int
 
 
@@ -63,7 +70,7 @@ def place(ratio: float, width: float) -> float:
 
 def drawable(numbers: Iterable[Number]) -> list[Number]:
     """Those with a ratio and a shape."""
-    return [one for one in numbers if one.ratio is not None and one.ratio > 0 and one.verdict in SHAPES]
+    return [one for one in numbers if one.ratio is not None and one.ratio > 0 and one.answers[0] in SHAPES]
 
 
 def arranged(numbers: Sequence[Number], width: float, levels: int) -> list[Mark]:
@@ -87,14 +94,14 @@ def arranged(numbers: Sequence[Number], width: float, levels: int) -> list[Mark]
     taken: dict[int, list[float]] = {k: [] for k in range(levels)}
     order = list(SHAPES)
     marks = []
-    for one in sorted(numbers, key=lambda n: order.index(n.verdict), reverse=True):
+    for one in sorted(numbers, key=lambda n: order.index(n.answers[0]), reverse=True):
         ratio = one.ratio or 0.0  # `drawable` has left out those without
         x = place(ratio, width)
         crowd = {k: sum(abs(x - other) < _APART for other in taken[k]) for k in middle_first}
         level = min(middle_first, key=lambda k: crowd[k])
         taken[level].append(x)
         beyond = 1 if ratio > WIDEST else -1 if ratio < 1 / WIDEST else 0
-        marks.append(Mark(x, (level - levels // 2) * _APART, one.verdict, beyond))
+        marks.append(Mark(x, (level - levels // 2) * _APART, *one.answers, bool(one.fitted), beyond))
     return marks[::-1]
 
 
@@ -142,14 +149,25 @@ def backdrop(width: float, height: float) -> str:
 
 def mark_svg(one: Mark, middle: float) -> str:
     """A mark; with an arrow where the axis ends before it."""
-    name, path = SHAPES[one.verdict]
     x, y = f"{one.x:.1f}", f"{middle + one.y:.1f}"
-    drawn = f'<path class="{name}" transform="translate({x} {y})" d="{path}"/>'
+    drawn = f'<g transform="translate({x} {y})">{symbol(one.closeness, one.compatibility, one.fitted)}</g>'
     if one.beyond:
         tip = 8 * one.beyond
         at = one.x - tip * 1.5
         drawn += f'<path class="far" d="M{at:.1f} {y}h{tip}m{-tip / 2:g}-3 {tip / 2:g} 3 {-tip / 2:g} 3"/>'
     return drawn
+
+
+def symbol(closeness: str, compatibility: str, fitted: bool) -> str:
+    """The shape of both answers about the origin, an SVG group."""
+    name, path = SHAPES[closeness]
+    state = compatibility if compatibility in ("within", "outside") else ""
+    # A calculation has no flights to be within: its one answer has the colour as well.
+    if compatibility == Compatibility.NOT_JUDGED and closeness != Closeness.NOT_JUDGED:
+        state = {Closeness.CLOSE: "within", Closeness.NOT_CLOSE: "outside"}.get(Closeness(closeness), "")
+    ring = f'<path class="ring" d="{RING}"/>' if compatibility == Compatibility.OUTSIDE else ""
+    below = f'<path d="{UNDERLINE}"/>' if fitted else ""
+    return f'<g class="mark {state}"><path class="{name}" d="{path}"/>{ring}{below}</g>'
 
 
 def ticks(few: bool = False) -> str:
@@ -171,17 +189,35 @@ def ticks(few: bool = False) -> str:
     return f'<div class="ticks" aria-hidden="true">{spans}</div>'
 
 
-def legend(verdicts: Iterable[str]) -> str:
-    """What each shape means, of the verdicts that occur, and the shaded margin; as HTML."""
-    there = set(verdicts)
+def key_of(numbers: Iterable[Number]) -> list[tuple[str, str]]:
+    """The symbols that occur among some numbers, as SVG about the origin, and what each means."""
+    shown = drawable(numbers)
+    answers = [one.answers for one in shown]
+    key = [
+        (symbol(near, "", False), near) for near in reversed(SHAPES) if near in {one[0] for one in answers}
+    ]
+    inside = {one[1] for one in answers}
+    ringed = f'<g class="mark outside"><path class="ring" d="{RING}"/></g>'
+    if Compatibility.WITHIN in inside:
+        key.append(
+            (symbol(Closeness.CLOSE, Compatibility.WITHIN, False), "green: within 90 % of our flights")
+        )
+    if Compatibility.OUTSIDE in inside:
+        key.append((ringed, "red ring: outside"))
+    if any(one.fitted for one in shown):
+        key.append((f'<g class="mark"><path d="{UNDERLINE}" transform="translate(0 -6)"/></g>', "fitted"))
+    return key
+
+
+def legend(numbers: Iterable[Number]) -> str:
+    """What each symbol means, of those that occur, and the shaded margin; as HTML."""
+    key = key_of(numbers)
     items = "".join(
-        f'<li><svg viewBox="-6 -6 12 12" aria-hidden="true"><path class="{name}" d="{path}"/></svg>'
-        f"{escape(verdict)}</li>"
-        for verdict, (name, path) in reversed(SHAPES.items())
-        if verdict in there
+        f'<li><svg viewBox="-6 -6 12 12" aria-hidden="true">{drawn}</svg>{escape(words)}</li>'
+        for drawn, words in key
     )
     close = (
         '<li><svg viewBox="-6 -6 12 12" aria-hidden="true"><path class="close" d="M-6-6H6V6H-6Z"/></svg>'
         f"within a factor of {CLOSE:g}</li>"
     )
-    return f'<ul class="legend">{items}{close}</ul>' if there else ""
+    return f'<ul class="legend">{items}{close}</ul>' if key else ""

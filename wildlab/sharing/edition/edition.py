@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from wildlab.pipeline.overviews.worth_fixing import LEVELS, UNJUDGED
+from wildlab.pipeline.overviews.verdict import Verdict
 from wildlab.reporting.page import POLICY
 from wildlab.reporting.text import escape, inline
 from wildlab.sharing.edition.facts import Facts
@@ -83,7 +83,7 @@ def edition_html(
     words = language if isinstance(language, Language) else load_language(language)
     words = words if facts.flown else of_unflown(words)
     story = tell(facts)
-    level = LEVELS[facts.verdict or UNJUDGED]
+    level = Verdict(facts.verdict or Verdict.UNJUDGED).colour
 
     def said(one: Value) -> str:
         return inline(say(words, one))

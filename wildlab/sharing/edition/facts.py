@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from wildlab.pipeline.overviews.alarms import ALARMS
 from wildlab.pipeline.overviews.overview import TROUBLES
-from wildlab.pipeline.overviews.worth_fixing import WORTH, causes_told, doubted, possible_gain
+from wildlab.pipeline.overviews.verdict import WORTH
+from wildlab.pipeline.overviews.worth_fixing import causes_told, doubted, error_left, possible_gain
 from wildlab.reporting.own_flights import OwnFlight
 
 NAN = math.nan
@@ -51,7 +52,7 @@ class Facts(NamedTuple):
     twin
         Whether nobody flew it.
     verdict
-        A key of `wildlab.pipeline.overviews.worth_fixing.LEVELS`; None where the flight was not looked over.
+        A key of `wildlab.pipeline.overviews.verdict.Verdict`; None where the flight was not looked over.
     problems
         Things in its records that cannot be used or contradict each other.
     length_s, height_m, area_m2
@@ -75,7 +76,7 @@ class Facts(NamedTuple):
     possible
         A gain that is not certain.
     doubted
-        Reports that ask for a closer look themselves: ``tracking``, ``navigation``.
+        Reports that ask for a closer look themselves: ``georeferencing``, ``tracking``, ``navigation``.
     failed, lacking
         Those of `PARTS`, and ``overview``, that failed, and that the records do not allow.
     flown
@@ -128,7 +129,7 @@ def facts_of(flight: OwnFlight) -> Facts:
     -------
     Facts
     """
-    numbers = {key: entry for one in reversed(flight.reports) for key, entry in one.numbers.items()}
+    numbers = flight.numbers
 
     def value(name: str, subject: str = "flight") -> float:
         found = flight.value(name, subject)
@@ -186,7 +187,7 @@ def _lacking(flight: OwnFlight) -> set[str]:
 
 
 def _causes(flight: OwnFlight) -> tuple[str, ...]:
-    return causes_told({key: entry for one in flight.reports for key, entry in one.numbers.items()})
+    return causes_told(flight.numbers)
 
 
 def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
@@ -200,8 +201,8 @@ def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
             continue
         if key in ("cause", "far_out"):
             gained = flight.value("gain", "winner" if key == "cause" else "without-far-out")
-            after = "calibrated-pose" if key == "cause" else "without-far-out"
-            left = flight.value("horizontal_error_mean", after)
+            far_out = flight.value("horizontal_error_mean", "without-far-out")
+            left = error_left(flight.numbers) if key == "cause" else far_out
             value, of = (NAN, NAN) if gained is None or left is None else (gained, gained + left)
         else:
             lost = overview.numbers.get(("lost", key))
@@ -216,13 +217,11 @@ def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
     report = flight.report("tracking")
     if report is None:
         return []
-    from wildlab.reporting.tracking import band_name, leading
+    from wildlab.pipeline.following.judged import LEADING
+    from wildlab.reporting.tracking import band_name
 
     rows = [(subject, entry) for (name, subject), entry in report.numbers.items() if name == "rmse"]
-    filters = list(dict.fromkeys(subject.rsplit("/", 1)[-1] for subject, _ in rows))
-    if not rows:
-        return []
-    best = leading(filters)
+    best = next((subject for name, subject in report.numbers if name == LEADING), "ekf")
     found = []
     for subject, entry in rows:
         if subject.rsplit("/", 1)[-1] != best or entry["value"] is None:

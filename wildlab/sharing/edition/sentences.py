@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LOOK, MEND, MOST, SOUND, UNJUDGED, WORTH
+from wildlab.pipeline.overviews.verdict import WORTH, Verdict
+from wildlab.pipeline.overviews.worth_fixing import MOST
 from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.tracking import NEAR_THE_BAND
 from wildlab.sharing.edition.facts import Alarm, Facts, Gain
@@ -16,13 +17,13 @@ STEP_M, MOST_STEPS = 0.75, 200
 #: Of two normal errors of equal spread, the median distance from the middle over that spread.
 MEDIAN_DISTANCE = math.sqrt(2 * math.log(2))
 #: The verdicts by their texts.
-VERDICTS = {
-    ALARM: "went_wrong",
-    MEND: "mend",
-    FIX: "fix",
-    LOOK: "look",
-    SOUND: "sound",
-    UNJUDGED: "unjudged",
+VERDICTS: dict[str | None, str] = {
+    Verdict.ALARM: "went_wrong",
+    Verdict.MEND: "mend",
+    Verdict.FIX: "fix",
+    Verdict.LOOK: "look",
+    Verdict.SOUND: "sound",
+    Verdict.UNJUDGED: "unjudged",
     None: "unjudged",
 }
 
@@ -82,7 +83,7 @@ def tell(facts: Facts) -> Story:
         Said(f"verdict.{key}"),
         _why(facts),
         _next(facts, advice),
-        facts.verdict in (FIX, SOUND),
+        facts.verdict in (Verdict.FIX, Verdict.SOUND),
         _tiles(facts)[:4],
         _measured(facts)[:MOST],
         _cut(_wrong(facts)),
@@ -120,14 +121,16 @@ def steps_of(metres: float) -> Said | None:
 
 
 def _why(facts: Facts) -> Said:
-    if facts.verdict == ALARM or (facts.verdict == LOOK and facts.alarms):
+    if facts.verdict == Verdict.ALARM or (facts.verdict == Verdict.LOOK and facts.alarms):
         return _alarm(facts.alarms[0]) if facts.alarms else Said("why.alarm")
-    if facts.verdict == MEND:
+    if facts.verdict == Verdict.MEND and not facts.problems and facts.doubted:
+        return Said(f"why.doubt_{facts.doubted[0]}")
+    if facts.verdict == Verdict.MEND:
         return Said("wrong.problems", {}, facts.problems)
-    if facts.verdict == FIX:
+    if facts.verdict == Verdict.FIX:
         worth = [gain for gain in facts.gains if gain.share >= WORTH]
         return Said("why.fix", {"first": _gained(worth[0])}, len(worth)) if worth else Said("why.alarm")
-    if facts.verdict == LOOK:
+    if facts.verdict == Verdict.LOOK:
         for what, seconds in facts.troubles:
             lasting = facts.length_s > 0 and seconds >= WORTH * facts.length_s
             if lasting or what == "poses":
@@ -139,20 +142,20 @@ def _why(facts: Facts) -> Said:
         if _too_sure(facts):
             return Said("wrong.too_sure")
         return Said(f"why.doubt_{facts.doubted[0]}" if facts.doubted else "why.alarm")
-    if facts.verdict == SOUND:
+    if facts.verdict == Verdict.SOUND:
         measured = facts.compared > 0 or facts.tracks > 0
         return Said("why.sound" if measured else "why.sound_unmeasured", {"share": share(WORTH)})
     return Said("why.failed" if "overview" in facts.failed else "why.unjudged")
 
 
 def _next(facts: Facts, advice: tuple[Said, ...]) -> Said:
-    if facts.verdict in (ALARM, MEND, LOOK):
+    if facts.verdict in (Verdict.ALARM, Verdict.MEND, Verdict.LOOK):
         return Said(f"next.{VERDICTS[facts.verdict]}")
-    if facts.verdict == FIX and facts.gains:
+    if facts.verdict == Verdict.FIX and facts.gains:
         # The thing itself: the list stands far below.
         return _do(facts.gains[0])
     listed: dict[str, Value] = {"list": Said("heading.advice")}
-    if facts.verdict == SOUND:
+    if facts.verdict == Verdict.SOUND:
         return Said("next.sound_more", listed) if advice else Said("next.sound")
     return Said("next.unjudged", listed) if advice else Said("next.nothing")
 
@@ -259,6 +262,8 @@ def _wrong(facts: Facts) -> tuple[Said, ...]:
     found = [_alarm(one) for one in facts.alarms]
     if facts.problems:
         found.append(Said("wrong.problems", {}, facts.problems))
+    if "georeferencing" in facts.doubted:
+        found.append(Said("why.doubt_georeferencing"))
     if _too_sure(facts):
         found.append(Said("wrong.too_sure"))
     elif "tracking" in facts.doubted:
@@ -267,7 +272,7 @@ def _wrong(facts: Facts) -> tuple[Said, ...]:
         found.append(Said("why.doubt_navigation"))
     found += [_trouble(facts, what, seconds) for what, seconds in _lasting(facts)]
     # What the verdict says already is not said again, nor what the troubles say of time.
-    gains = facts.gains[1 if facts.verdict == FIX else 0 :]
+    gains = facts.gains[1 if facts.verdict == Verdict.FIX else 0 :]
     for gain in gains:
         counted = gain.key.startswith(("images", "detections"))
         if counted or (gain.key in ("cause", "far_out") and gain.share >= WORTH):
@@ -278,7 +283,7 @@ def _wrong(facts: Facts) -> tuple[Said, ...]:
         return tuple(found)
     if facts.verdict is None:
         return (Said("wrong.unlooked"),)
-    if facts.verdict in (FIX, LOOK, ALARM, MEND):
+    if facts.verdict in (Verdict.FIX, Verdict.LOOK, Verdict.ALARM, Verdict.MEND):
         return (Said("wrong.above"),)
     small = bool(facts.gains) or facts.possible is not None
     return (Said("wrong.small", {"share": share(WORTH)}),) if small else (Said("wrong.none"),)

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 from wildlab.lazy import offer
 
 if TYPE_CHECKING:
-    from wildlab.sharing.scan.files import not_searched, scan
+    from wildlab.sharing.scan.files import not_searched, scan, scan_contents
     from wildlab.sharing.scan.findings import Finding
     from wildlab.sharing.scan.secrets import Secrets
 
-__all__ = ["Finding", "Secrets", "not_searched", "scan"]
+__all__ = ["Finding", "Secrets", "not_searched", "scan", "scan_contents"]
 
 __getattr__, __dir__ = offer(
-    __name__, {"files": ("not_searched", "scan"), "findings": ("Finding",), "secrets": ("Secrets",)}
+    __name__,
+    {"files": ("not_searched", "scan", "scan_contents"), "findings": ("Finding",), "secrets": ("Secrets",)},
 )

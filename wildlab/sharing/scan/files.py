@@ -49,13 +49,26 @@ def scan(paths: Iterable[Path | str], secrets: Secrets) -> list[Finding]:
     ...     print(scan([page], Secrets(places=np.array([[60.12342, 10.25022, 40.0]])))[0])
     page.html: line 1: place: latitude and longitude, degrees, minutes and seconds
     """
+    return scan_contents(_contents(_files([Path(path) for path in paths])), secrets)
+
+
+def scan_contents(files: Iterable[tuple[str, bytes]], secrets: Secrets) -> list[Finding]:
+    """As :func:`scan`, of what is not written yet.
+
+    Parameters
+    ----------
+    files
+        Names and contents.
+    secrets
+        What is looked for.
+
+    Returns
+    -------
+    list
+    """
     look = Look(secrets)
     findings: list[Finding] = []
-    for path, name in _files([Path(path) for path in paths]):
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise system_error(error, path, cannot="be read") from error
+    for name, data in files:
         findings += _named(look, name)
         findings += _in_file(look, name, data)
     return findings
@@ -90,6 +103,14 @@ def _files(paths: list[Path]) -> Iterator[tuple[Path, str]]:
             yield path, path.name
         else:
             raise WildlabError("there is no such file or folder", "check the path", file=path)
+
+
+def _contents(files: Iterable[tuple[Path, str]]) -> Iterator[tuple[str, bytes]]:
+    for path, name in files:
+        try:
+            yield name, path.read_bytes()
+        except OSError as error:
+            raise system_error(error, path, cannot="be read") from error
 
 
 def _named(look: Look, name: str) -> list[Finding]:
