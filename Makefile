@@ -14,8 +14,9 @@ ARGS ?=
 
 BIN := .venv/bin
 
-# Set by other software (ROS does), these would slip foreign packages and kernels into the environment.
-unexport PYTHONPATH PYTHONHOME JUPYTER_PATH
+# Set by other software (ROS does), these would slip foreign packages and kernels into the environment; where
+# nothing compiled may be kept (as in containers), each process would compile every file again.
+unexport PYTHONPATH PYTHONHOME JUPYTER_PATH PYTHONDONTWRITEBYTECODE
 export PYTHONNOUSERSITE := 1
 export JUPYTER_PREFER_ENV_PATH := 1
 export PYTHON LOCK_UPGRADE
@@ -37,10 +38,10 @@ tutorials: environment ## run the tutorials of notebooks/tutorials, and say wher
 	@$(BIN)/python -m wildlab.runner.tutorials --jobs $(JOBS) $(ARGS)
 
 test: environment ## run the tests (where CI=true: the slow ones too)
-	@$(BIN)/python -m pytest -n $(TEST_JOBS) --dist loadfile $(ARGS)
+	@$(BIN)/python -m pytest -n $(TEST_JOBS) $(ARGS)
 
 test-all: environment ## run all tests, the slow ones too
-	@CI=true $(BIN)/python -m pytest -n $(TEST_JOBS) --dist loadfile $(ARGS)
+	@CI=true $(BIN)/python -m pytest -n $(TEST_JOBS) $(ARGS)
 
 style: environment ## ruff, mypy and the notebooks' state, as the tests check them
 	@$(BIN)/ruff check .

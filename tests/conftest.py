@@ -9,6 +9,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+from wildlab.runner.processes.ending import ONE_THREAD
+
+# Before numpy and OpenCV are imported: their threads take the cores of other test processes, and make small
+# matrices slower, not faster.
+os.environ.update(ONE_THREAD)
+# Letters of figures as shapes, not as a font: a third of the time of a page.
+os.environ.setdefault("WILDLAB_QUICK_FIGURES", "1")
+
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -26,14 +34,35 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave slow tests out, unless CI, ``--run-slow``, ``-m`` or a test named by ``::`` asks for them."""
+    """Leave slow tests out, unless CI, ``--run-slow``, ``-m`` or a test named by ``::`` asks for them; then
+    files with slow tests come first, so that no process is left with a long one at the end."""
     named = any("::" in argument for argument in config.args)
     if IN_CI or named or config.getoption("--run-slow") or config.getoption("markexpr"):
+        last = {item.path: 0 for item in items} | {item.path: -1 for item in items if "slow" in item.keywords}
+        items.sort(key=lambda item: last[item.path])
         return
     slow = [item for item in items if "slow" in item.keywords]
     if slow:
         config.hook.pytest_deselected(items=slow)
         items[:] = [item for item in items if "slow" not in item.keywords]
+
+
+#: Files whose tests share nothing and take long: each test goes to whichever process is free.
+APART = ("tests/runner/test_studies.py",)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Over several processes (``-n``), the tests of a file stay in one, which makes their flights once."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class ByFile(LoadFileScheduling):  # type: ignore[misc, unused-ignore]
+        def _split_scope(self, nodeid: str) -> str:
+            file: str = super()._split_scope(nodeid)
+            return nodeid if file in APART else file
+
+    config.option.loadscopereorder = False
+    return ByFile(config, log)
 
 
 def find_shared_data(*parts: str) -> Path | None:
@@ -96,13 +125,13 @@ def browser(chromium: Any) -> Iterator[Any]:
         context.close()
 
 
-#: The views that are held against the rules of axe, which take it longest.
-BY_RULES = ((1200, "light"), (390, "dark"))
+#: Both layouts and both schemes.
+VIEWS = ((1200, "light"), (360, "dark"))
 
 
 @pytest.fixture
 def faults(browser: Any) -> Callable[[Path], list[str]]:
-    """``faults(page.html)`` opens a page offline, wide and narrow, bright and dark, and lists its faults.
+    """``faults(page.html)`` opens a page offline, wide and bright, narrow and dark, and lists its faults.
 
     With ``axe=False`` without the rules for readers with other eyes, hands and ears: for pages whose look is
     another program's.
@@ -110,9 +139,8 @@ def faults(browser: Any) -> Callable[[Path], list[str]]:
 
     def look(path: Path, axe: bool = True) -> list[str]:
         found = [] if path.stat().st_size <= 5_000_000 else ["larger than 5 MB"]
-        for width, scheme in ((1200, "light"), (360, "light"), (1200, "dark"), (390, "dark")):
-            # Both layouts and both schemes are in two of the four.
-            found += _faults_at(browser, path, width, scheme, axe and (width, scheme) in BY_RULES)
+        for width, scheme in VIEWS:
+            found += _faults_at(browser, path, width, scheme, axe)
         return found
 
     return look
@@ -142,7 +170,7 @@ def _faults_at(browser: Any, path: Path, width: int, scheme: str, axe: bool) -> 
         found.append("no language")
     # A tutorial begins with words; who opens a report or the front page wants to see.
     invites = path.name in ("report.html", "index.html")
-    if width == 390 and invites and (top := page.evaluate(_FIRST_PICTURE)) > 2 * 844:
+    if width == 360 and invites and (top := page.evaluate(_FIRST_PICTURE)) > 2 * 844:
         found.append(f"the first picture is {top:.0f} px down on a phone")
     found += [
         f"a link to {to[:60]}, which is missing where the page is mailed alone" for to in _dead(page, path)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -89,18 +87,3 @@ def seen_figures(into: dict[str, list[str]]) -> Iterator[None]:
         yield
     finally:
         patch.undo()
-
-
-def figures_of_notebook(notebook: Path, given: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Faults of each figure of a notebook, run here with some of its parameters changed."""
-    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
-    names: dict[str, Any] = {"__name__": "__main__"}
-    found: dict[str, list[str]] = {}
-    with seen_figures(found):
-        for cell in cells:
-            if cell["cell_type"] != "code":
-                continue
-            exec(compile("".join(cell["source"]), notebook.name, "exec"), names)  # noqa: S102
-            if "parameters" in cell["metadata"].get("tags", []):
-                names |= given
-    return found

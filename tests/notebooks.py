@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import nbformat
+import papermill
 
+from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.report import Report
+from wildlab.runner.processes.shell import IN_PROCESS
 
-PARAMETERS = 'study = ""\nflight = ""\nseed = 0\nout = ""\nexpected_prefix = ""'
+PARAMETERS = 'study = ""\nflight = ""\nseed = 0\nout = ""'
 OPEN = (
     "from wildlab.reporting.report import open_report\n"
-    'report = open_report(study=study, kind="computed", flight=flight, seed=seed, out=out, '
-    "expected_prefix=expected_prefix)"
+    'report = open_report(study=study, kind="computed", flight=flight, seed=seed, out=out)'
 )
 Cell = str | tuple[str, ...]
 
@@ -44,3 +47,20 @@ def write(folder: Path, name: str, node: nbformat.NotebookNode) -> Path:
     path = folder / name
     nbformat.write(node, path)
     return path
+
+
+def run_here(name: str, **parameters: Any) -> list[dict[str, Any]]:
+    """The notebook of that name, run in this process with some of its parameters: what its cells show, by
+    kind (``text/html``, ``image/png``)."""
+    executed = papermill.execute_notebook(
+        nbformat.read(NOTEBOOKS / name, as_version=4),
+        None,
+        parameters,
+        kernel_name="python3",
+        language="python",
+        engine_name=IN_PROCESS,
+        progress_bar=False,
+        cwd=NOTEBOOKS,
+    )
+    outputs = [output for cell in executed.cells for output in cell.get("outputs", [])]
+    return [dict(output["data"]) for output in outputs if "data" in output]

@@ -51,12 +51,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "terminal": set(),
     "errors": set(),
     "files": set(),
+    "names": set(),
     "paths": set(),
     # For type checkers only: at run time names are imported when they are asked for (`wildlab.lazy`).
     "__init__": {"api", "flight"},
 }
 #: These know nothing about flights and may be used by all.
-FOR_ALL = {"brief", "errors", "files", "lazy", "paths", "__version__"}
+FOR_ALL = {"brief", "errors", "files", "lazy", "names", "paths", "__version__"}
 
 NOTEBOOK_PACKAGES = {
     "papermill", "nbconvert", "nbclient", "nbformat", "IPython", "ipykernel", "jupyter_client",
@@ -265,10 +266,12 @@ def left_undone(root: Path) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 def test_rooms_import_only_what_lies_below() -> None:
     assert violations(paths.ROOT) == []
 
 
+@pytest.mark.slow
 def test_nothing_imports_in_a_circle() -> None:
     graph = import_graph(paths.ROOT)
     assert "wildlab.geometry.frames" in graph["wildlab.geometry.flodell"]
@@ -276,6 +279,7 @@ def test_nothing_imports_in_a_circle() -> None:
     assert circles(folder_graph(graph)) == []
 
 
+@pytest.mark.slow
 def test_a_trial_imports_no_other_part_of_the_studies() -> None:
     """Kept numbers of a seed stay as long as the trials and what lies below them do."""
     for module, names in import_graph(paths.ROOT).items():
@@ -308,6 +312,7 @@ def test_a_circle_is_found(tmp_path: Path) -> None:
     assert ["wildlab.c.deep", "wildlab.c.seven"] in circles(folder_graph(graph))
 
 
+@pytest.mark.slow
 def test_what_is_imported_is_asked_for() -> None:
     assert undeclared(paths.ROOT) == []
 

@@ -70,14 +70,14 @@ def test_list_as_a_table_and_as_json(capsys: pytest.CaptureFixture[str], tmp_pat
         code == 0
         and "consistency-bounds" in out
         and "not run" in out
-        and "6 printed" in out
+        and "6 published" in out
         and "0 of" not in out
     )
     code, out, _ = call(capsys, "list", "--json", "--out", str(tmp_path))
     studies = {entry["study"]: entry for entry in json.loads(out)}
     assert code == 0 and studies["consistency-bounds"]["state"] == "not run"
     first = studies["consistency-bounds"]["published"][0]
-    assert (first["published"], first["here"], first["verdict"]) == (0.48, None, "not reproduced yet")
+    assert (first["published"], first["here"], first["closeness"]) == (0.48, None, "not reproduced yet")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ import pytest
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab import cli
 from wildlab.errors import WildlabError
-from wildlab.flight.learnt import LearntGain, LearntParameter, parse_learnt, read_learnt, write_learnt
+from wildlab.evaluation.runs import Interval
+from wildlab.flight.learnt import parse_learnt, read_learnt, write_learnt
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.paths import DATA
@@ -63,19 +64,29 @@ def test_as_json(capsys, folder, tmp_path):
     assert json.loads(out)["learnt_on"]["images"] == 18
 
 
-def test_a_cause_that_another_explains_as_well_is_not_kept_in_silence(capsys, folder, tmp_path, monkeypatch):
+def test_causes_that_are_inseparable_are_named_and_not_written(capsys, folder, tmp_path, monkeypatch):
     """A small tilt of a camera in level flight: position and clock explain it, too."""
-    one = LearntParameter(name="clock", value=0.2, low=0.1, high=0.3, unit="s")
-    gain = LearntGain(without_m=4.0, with_m=2.0, gain_m=2.0, low_m=1.0, high_m=3.0)
-    winner = SimpleNamespace(causes=("clock",), name="clock", gain=SimpleNamespace(with_=2.0))
-    rival = SimpleNamespace(causes=("boresight",), gain=SimpleNamespace(with_=2.1))
+    gain = SimpleNamespace(with_=2.0, counts=True, gain=Interval(1.0, 0.4, 1.6))
+    winner = SimpleNamespace(causes=("clock",), name="clock", gain=gain)
+    rival = SimpleNamespace(causes=("boresight",), gain=SimpleNamespace(with_=2.1, counts=True))
     for rivals in ((rival,), ()):
         found = SimpleNamespace(winner=winner, rivals=rivals, models=[winner, *rivals])
-        learnt = SimpleNamespace(gain=gain, parameter=(one,))
+        learnt = SimpleNamespace(gain=None, parameter=())
         monkeypatch.setattr("wildlab.pipeline.learn.learn_flight", lambda *_, f=(learnt, found): f)
         monkeypatch.setattr("wildlab.flight.learnt.write_learnt", lambda *_: None)
         code, out, _ = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
         assert code == 0 and ("the boresight (how" in " ".join(out.split())) == bool(rivals)
+        assert "Possible, not certain" in out and "0.40 to 1.60 m" in " ".join(out.split())
+
+
+def test_logs_that_contradict_each_other_teach_nothing(capsys, folder, tmp_path):
+    flight = load_flight(folder / "tilted")
+    nav = flight.nav["logged"]
+    nav["down_m"] *= 3.28084
+    save_flight(flight, tmp_path / "feet")
+    code, _, err = call(capsys, "calibrate", tmp_path / "feet", "--into", tmp_path / "c.toml")
+    assert code == 2 and "contradict each other" in err and "wildlab check" in err
+    assert not (tmp_path / "c.toml").exists()
 
 
 def test_too_few_images_and_files_that_are_not_there_are_sentences(capsys, folder, tmp_path):
@@ -155,12 +166,12 @@ def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(
 def test_nothing_is_not_said_to_gain_nothing_where_something_does(
     capsys, folder, tmp_path, monkeypatch, low, words
 ):
-    """The best may be within one standard error of nothing while some model gains for certain."""
+    """Nothing may be as likely as the best while some model gains for certain."""
     model = SimpleNamespace(causes=("height",), gain=SimpleNamespace(counts=low > 0))
     learnt = SimpleNamespace(gain=None, parameter=())
-    monkeypatch.setattr(
-        "wildlab.pipeline.learn.learn_flight", lambda *_: (learnt, SimpleNamespace(models=[model]))
-    )
+    nothing = SimpleNamespace(causes=(), gain=SimpleNamespace(gain=Interval(0.0, 0.0, 0.0)))
+    found = SimpleNamespace(models=[model], winner=nothing, rivals=())
+    monkeypatch.setattr("wildlab.pipeline.learn.learn_flight", lambda *_: (learnt, found))
     monkeypatch.setattr("wildlab.flight.learnt.write_learnt", lambda *_: None)
     code, out, _ = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
     assert code == 0 and f"No constant error {words} (1 models tried)" in out

@@ -63,6 +63,7 @@ def test_the_camera_comes_out_and_is_written(capsys, boards, tmp_path):
         assert abs(one.value - truth[one.name]) < 4 * one.sd
 
 
+@pytest.mark.slow
 def test_as_json_with_a_view_that_disagrees(capsys, copy):
     moved = cv2.imread(str(copy / "3.png"), 0)
     squeezed = np.full((256, 320), 120, np.uint8)

@@ -12,18 +12,19 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.clicking import HOSTILE, serving, write_images
+from tests.clicking import HOSTILE, ask, serving, write_images
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab import cli
 from wildlab.flight.readers.clicks import clicks as click_files
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.runner.clicking.server import ClickServer, open_server
+from wildlab.runner.clicking.server import HEADER_S, MOST_LINKS, ClickServer, open_server
 from wildlab.runner.clicking.session import Session, check_points, open_session, read_points, table_of
 
 
@@ -287,3 +288,32 @@ def test_taking_what_is_not_there(tmp_path: Path, images: Path, capsys: Any) -> 
     assert "leave one out" in err.lower()
     code, _, err = call(capsys, "click", images, "--take")
     assert code == 2
+
+
+def test_half_open_links_take_few_threads_and_a_click_is_still_served(tmp_path: Path) -> None:
+    session = open_session(write_images(tmp_path / "images", "a.png"))
+    with serving(session) as server:
+        before = threading.active_count()
+        links = []
+        try:
+            for number in range(100):
+                link = socket.create_connection(("127.0.0.1", server.server_port), timeout=5)
+                # Every other one begins a header and does not end it.
+                link.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n" if number % 2 else b"")
+                links.append(link)
+            began = time.monotonic()
+            status, _, _ = ask(
+                server, "POST", f"/{server.token}/clicks",
+                {"image": 0, "revision": 0, "points": [["buoy", 1.0, 2.0]]},
+            )  # fmt: skip
+            assert status == 200 and time.monotonic() - began < 2.0
+            assert threading.active_count() - before <= MOST_LINKS
+            assert "buoy" in session.table.read_text()
+            # None of them is kept for long.
+            until = time.monotonic() + HEADER_S + 2.0
+            while threading.active_count() > before and time.monotonic() < until:
+                time.sleep(0.05)
+            assert threading.active_count() <= before
+        finally:
+            for link in links:
+                link.close()

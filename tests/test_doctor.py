@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -43,10 +42,8 @@ def write_pyproject(folder: Path, *dependencies: str, extra: str = "affine") -> 
     return path
 
 
-def test_examines_this_checkout_quickly() -> None:
-    start = time.perf_counter()
+def test_examines_this_checkout() -> None:
     findings = doctor.examine()
-    assert time.perf_counter() - start < 2
     assert len({finding.name for finding in findings}) == len(findings) == 11
     for finding in findings:
         assert finding.found

@@ -139,9 +139,10 @@ def test_points_and_their_errors(ship: Flight) -> None:
     pd.testing.assert_frame_equal(points.table, again.table)
     assert f"{errors.summary.n} points" in repr(errors)
     two = replace(ship, nav=ship.nav | {"observer": ship.nav["autopilot"]})
-    with pytest.raises(wildlab.WildlabError, match="not clear which nav source") as caught:
-        wildlab.georeference(two)
-    assert caught.value.fix == "name one of those there are as source: autopilot, observer, truth"
+    pd.testing.assert_frame_equal(wildlab.georeference(two).table, points.table)
+    with pytest.raises(wildlab.WildlabError, match="no nav source 'other'") as caught:
+        wildlab.georeference(two, source="other")
+    assert caught.value.fix == "choose one: --source observer or autopilot"
 
 
 def test_a_track_says_what_it_was_told(ship: Flight) -> None:

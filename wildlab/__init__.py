@@ -15,6 +15,7 @@ C. Christensson (Linköping University, 2016); "H (7.35)" is an equation, "H 7.4
 ``docs/references.md`` has both in full, and every other text that is cited.
 """
 
+import sys
 from typing import TYPE_CHECKING
 
 from wildlab.errors import WildlabError
@@ -43,6 +44,11 @@ else:
             *("reporting", "studies"),
         ),
     )
+
+# Notebooks are checked with jsonschema, which builds a grammar of internationalised addresses when it is
+# imported: seconds in every process that reads or shows a notebook, whose schema has no such address.
+# jsonschema does without the package where it is not installed.
+sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
 
 __version__ = "0.1.0"
 

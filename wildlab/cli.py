@@ -32,6 +32,7 @@ from wildlab.commands.share import share
 from wildlab.commands.shared import FOLDER
 from wildlab.commands.terrain import terrain
 from wildlab.commands.track import track
+from wildlab.commands.verify import verify
 from wildlab.errors import WildlabError, system_error
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
@@ -90,6 +91,7 @@ for _command in (
     terrain,
     plan,
     share,
+    verify,
 ):
     wildlab.add_command(_command)
 
@@ -237,6 +239,8 @@ def _terminate(number: int, frame: FrameType | None) -> NoReturn:
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Entry point of ``wildlab``: turns every error into a sentence and an exit code."""
+    # Read when numpy is imported, which no command has done yet: on small matrices threads only wait.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Being asked to end is the same as Ctrl-C: children are ended, nothing half-written stays.
     signal.signal(signal.SIGTERM, _terminate)
     try:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
 import os
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from wildlab.names import csv_cell, from_csv_cell
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,7 +21,11 @@ if TYPE_CHECKING:
 def write_atomic(path: Path, content: str | bytes) -> None:
     """Write ``content`` beside ``path`` and rename it into place: readers see the old file or the new one."""
     data = content.encode("utf-8") if isinstance(content, str) else content
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    except OSError as error:
+        error.filename = str(path)  # nobody knows the part by name
+        raise
     part = Path(name)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -48,15 +57,44 @@ def write_csv(path: Path, table: pd.DataFrame, float_format: str | None = None) 
 
 
 def csv_text(table: pd.DataFrame, float_format: str | None = None) -> str:
-    """A table as CSV. Names that a spreadsheet would take for a formula begin with an apostrophe: what things
-    are called comes from files of strangers."""
-    safe = table.copy()
-    for name in safe.columns:
-        if safe[name].dtype == object:
-            safe[name] = [_no_formula(cell) for cell in safe[name]]
-    safe.columns = [_no_formula(name) for name in safe.columns]
-    return str(safe.to_csv(index=False, float_format=float_format))
+    """A table as CSV. Names that a spreadsheet would take for a formula begin with an apostrophe
+    (`wildlab.names`): what things are called comes from files of strangers."""
+    safe = table.rename(columns=_cell)
+    # By place: columns may share a name.
+    texts = [at for at in range(safe.shape[1]) if not _is_number(safe.iloc[:, at])]
+    for at in texts:
+        safe.isetitem(at, safe.iloc[:, at].astype(object).map(_cell).to_numpy())
+    # The csv module does not quote a lone carriage return, which ends a line for whoever reads it.
+    broken = any("\r" in cell for at in texts for cell in safe.iloc[:, at] if isinstance(cell, str))
+    how: dict[str, Any] = {"quoting": csv.QUOTE_NONNUMERIC if broken else csv.QUOTE_MINIMAL}
+    return str(safe.to_csv(index=False, float_format=float_format, **how))
 
 
-def _no_formula(cell: Any) -> Any:
-    return f"'{cell}" if isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell
+def read_csv(path: Path | io.StringIO, names: Collection[str], **how: Any) -> pd.DataFrame:
+    """A table as `write_csv` writes it.
+
+    Parameters
+    ----------
+    path
+        Of the file, or what pandas reads it from.
+    names
+        Columns of names: nothing in them is taken for a number or for missing.
+    **how
+        As `pandas.read_csv` takes it.
+
+    Returns
+    -------
+    pandas.DataFrame
+    """
+    import pandas as pd
+
+    table: pd.DataFrame = pd.read_csv(path, converters=dict.fromkeys(names, from_csv_cell), **how)
+    return table
+
+
+def _cell(cell: Any) -> Any:
+    return csv_cell(cell) if isinstance(cell, str) else cell
+
+
+def _is_number(column: pd.Series) -> bool:
+    return column.dtype.kind in "biufcmM"

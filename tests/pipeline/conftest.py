@@ -95,7 +95,7 @@ def build(
             "mount": {"looks": "down"},
             "time": {"kind": "utc", "epoch": "2024-01-01T00:00:00Z"},
             "uncertainty": {"pixel_px": 2.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
-                            "roll_deg": 1.0, "pitch_deg": 1.0, "yaw_deg": 1.0, "plane_height_m": 0.1},
+                            "tilt_deg": 1.0, "heading_deg": 1.0, "plane_height_m": 0.1},
             "scoring": {"rule": rule},
         }
     )  # fmt: skip

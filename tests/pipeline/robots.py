@@ -98,7 +98,7 @@ def robot_flight(
         "time": {"kind": "utc", "epoch": "2024-05-04T12:00:00Z"},
     }
     if heading_sd_deg is not None:
-        parts["uncertainty"] = {"yaw_deg": heading_sd_deg}
+        parts["uncertainty"] = {"heading_deg": heading_sd_deg}
     frames = pd.DataFrame(
         {"frame_id": [f"{sensor}-{k}" for k in range(len(t))], "time_s": t, "sensor": sensor}
     )

@@ -13,7 +13,7 @@ import pandas as pd
 from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_pose
 
@@ -29,12 +29,16 @@ class Survey:
     ``down_m`` and ``north_m`` are added to the logged position; ``focal`` is by how much the stated focal
     lengths are too large (a share). ``off`` moves what the survey says of a mark (metres, north-east),
     ``turned_deg`` the yaw that is logged while a photo is taken. ``mark_m`` is the spacing of the marks.
+    ``pan_deg`` stands in the log on top of the true heading. Attitude errors of photos are independent, or,
+    with ``wanders_s``, a Gauss-Markov process of that time constant. ``level_m`` is half the range of the
+    heights.
     """
 
     seed: int = 0
     images: int = 40
     every_s: float = 6.0
     tilt_deg: float = 0.0
+    pan_deg: float = 0.0
     clock_s: float = 0.0
     down_m: float = 0.0
     north_m: float = 0.0
@@ -42,13 +46,17 @@ class Survey:
     off: dict[str, tuple[float, float]] = field(default_factory=dict)
     turned_deg: dict[int, float] = field(default_factory=dict)
     attitude_deg: float = 0.7
+    heading_deg: float = 0.7
     position_m: float = 0.7
     pixel_px: float = 4.0
     stated_deg: float = 0.7
+    stated_heading_deg: float | None = None
     slant_deg: tuple[float, float] = (35.0, 80.0)
     rule: str = "labelled"
     mark_m: float = 18.0
     timed: bool = True
+    wanders_s: float = 0.0
+    level_m: float = 15.0
 
 
 def simulate(survey: Survey) -> Flight:
@@ -58,7 +66,9 @@ def simulate(survey: Survey) -> Flight:
     at = 5.0 + survey.every_s * np.arange(n)
     t = np.arange(0.0, at[-1] + 5.0, STEP_S)
     turn = 2 * np.pi * t / 47.0
-    way = np.column_stack([60 * np.sin(turn), 60 * np.sin(0.61 * turn + 0.3), -70 - 15 * np.sin(0.37 * turn)])
+    way = np.column_stack(
+        [60 * np.sin(turn), 60 * np.sin(0.61 * turn + 0.3), -70 - survey.level_m * np.sin(0.37 * turn)]
+    )
     # The gimbal dips while the photographs are taken from all sides of the field.
     low, high = survey.slant_deg
     slant = np.radians((low + high) / 2 + (high - low) / 2 * np.sin(2 * np.pi * t / 31.0))
@@ -66,15 +76,20 @@ def simulate(survey: Survey) -> Flight:
     roll = np.radians(3.0) * np.sin(2 * np.pi * t / 13.0)
 
     index = np.round(at / STEP_S).astype(int)
-    shared = np.radians(survey.attitude_deg) * rng.normal(size=(n, 3))
-    true = np.column_stack([roll, -slant, np.unwrap(yaw)])[index] + shared
+    tilt, heading = np.radians([survey.attitude_deg, survey.heading_deg])
+    shared = [tilt, tilt, heading] * rng.normal(size=(n, 3))
+    keep = np.exp(-survey.every_s / survey.wanders_s) if survey.wanders_s else 0.0
+    for i in range(1, n):
+        shared[i] = keep * shared[i - 1] + np.sqrt(1 - keep**2) * shared[i]
+    logged_then = euler_to_matrix(*np.column_stack([roll, -slant, np.unwrap(yaw)])[index].T)
+    true = rotation_vector_to_matrix(shared) @ logged_then
     where = way[index] + rng.normal(0, survey.position_m, (n, 3))
     marks = _marks(rng, survey.mark_m)
     names = np.array([f"M{i:02d}" for i in range(len(marks))])
     mount = Mount("forward")
     rows = []
     for i in range(n):
-        p, R = camera_pose(mount, where[i][None], euler_to_matrix(*true[i])[None])
+        p, R = camera_pose(mount, where[i][None], true[i][None])
         uv = ground_to_pixel(CAMERA, marks, np.repeat(p, len(marks), 0), np.repeat(R, len(marks), 0))
         seen = np.isfinite(uv).all(axis=1) & (uv > 40).all(axis=1) & (uv < [4016, 3000]).all(axis=1)
         for mark in rng.permutation(np.flatnonzero(seen))[:5]:
@@ -85,7 +100,8 @@ def simulate(survey: Survey) -> Flight:
     if survey.rule == "nearest":
         detections["target_id"] = ""
 
-    logged = np.column_stack([roll, -slant + np.radians(survey.tilt_deg), np.unwrap(yaw)])
+    heading = np.unwrap(yaw) + np.radians(survey.pan_deg)
+    logged = np.column_stack([roll, -slant + np.radians(survey.tilt_deg), heading])
     for image, degrees in survey.turned_deg.items():
         logged[np.abs(t - at[image]) < survey.every_s / 2, 2] += np.radians(degrees)
     q = matrix_to_quaternion(euler_to_matrix(*logged.T))
@@ -113,7 +129,7 @@ def simulate(survey: Survey) -> Flight:
                        "fy_px": f, "cx_px": CAMERA.cx, "cy_px": CAMERA.cy},
             "mount": {"looks": "forward"}, "time": time, "scoring": {"rule": survey.rule},
             "uncertainty": {"pixel_px": 4.0, "position_horizontal_m": 0.7, "position_vertical_m": 0.7,
-                            "roll_deg": stated, "pitch_deg": stated, "yaw_deg": stated,
+                            "tilt_deg": stated, "heading_deg": survey.stated_heading_deg or stated,
                             "plane_height_m": 0.1},
         }
     )  # fmt: skip

@@ -46,6 +46,7 @@ def antenna() -> Flight:
     return simulate_twin("static-antenna", 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.37, -14.05])
 def test_within_20_ms_from_known_points(tracking: Flight, shift: float) -> None:
     found = camera_clock_by_points(late(tracking, shift), "autopilot")
@@ -107,6 +108,7 @@ def over_land(flight: Flight, first: int, count: int) -> Iterator[Frame]:
         yield Frame(name, None, grey, "grey", "white-hot", np.ones(grey.shape, bool))
 
 
+@pytest.mark.slow
 def test_from_the_motion_of_images(antenna: Flight) -> None:
     shifted = late(antenna, 1.3)
     found = by_motion_in_words(shifted, over_land(antenna, 3000, 240), "autopilot")
@@ -145,6 +147,7 @@ def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna: Flight) ->
         by_motion_in_words(antenna, iter(()), "autopilot")
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_curve_and_sets_the_offset(tracking: Flight, tmp_path: Path) -> None:
     folder, curve = tmp_path / "flight", tmp_path / "curve.csv"
     save_flight(late(tracking, 0.25), folder)

@@ -2,16 +2,20 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from tests.pipeline.survey_twin import Survey, simulate
+from tests.pipeline.survey_twin import CAMERA, Survey, simulate
+from tests.sound_flights import KINDS, simulate_sound_flight
 from wildlab.errors import WildlabError
-from wildlab.evaluation.blocks import Neighbours
+from wildlab.evaluation.outliers import find_outliers
+from wildlab.geometry.corrections import BOUNDS, Calibration
 from wildlab.pipeline.diagnose import diagnose
-from wildlab.pipeline.evaluate import score_points
-from wildlab.pipeline.georeference import georeference, observe
+from wildlab.pipeline.diagnosis import find_implausible
+from wildlab.pipeline.evaluate import errors_of, score_points
+from wildlab.pipeline.georeference import covariances_of, georeference, observe
 
 #: Parameter and correction (degrees, seconds, metres) for what is put wrong.
 WRONG = {
@@ -24,7 +28,24 @@ WRONG = {
 def diagnosed(flight, seed=0):
     rng = np.random.default_rng(seed)
     observations = observe(flight)
-    return diagnose(flight, observations, score_points(flight, georeference(flight, observations, rng)), rng)
+    return diagnose(flight, observations, score_points(flight, georeference(flight, observations, rng)))
+
+
+SLOW = [pytest.param(one, marks=pytest.mark.slow) for one in KINDS if one != "gimbal oblique"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["gimbal oblique", *SLOW])
+def test_a_sound_flight_whose_poses_wander_has_no_certain_cause(kind):
+    """Attitudes that wander for 15 to 50 s and positions for minutes: in two minutes they look constant."""
+    for seed in (1,) if kind != "nadir" else (1, 2, 3):
+        flight = simulate_sound_flight(kind, seed)
+        source = "camera" if "camera" in flight.nav else None
+        observations = observe(flight, source)
+        scored = score_points(flight, georeference(flight, observations, np.random.default_rng(0)))
+        found = diagnose(flight, observations, scored, source)
+        assert not found.counts, found.winner.name
+        assert found.noise.share > 0.5
 
 
 @cache
@@ -65,36 +86,83 @@ def test_what_is_wrong_is_named_and_its_size_recovered(keys):
         low, high = found.calibration.interval(name)
         assert low <= correction <= high, name
         assert not low <= 0 <= high
-    # What was not put wrong is not told from zero.
+    # What was not put wrong is near zero: one of a dozen is beyond four errors once in a thousand times.
     for name in {"roll", "pan"} & set(found.calibration.names):
-        low, high = found.calibration.interval(name)
-        assert low <= 0 <= high
+        assert abs(found.calibration.value(name)) < 4 * found.calibration.sd(name), name
     assert found.winner.gain.with_ <= 1.1 * untouched().winner.gain.with_
     assert found.held_summary().mean == pytest.approx(found.winner.gain.with_)
 
 
-@pytest.mark.slow
-def test_intervals_allow_for_images_that_stay_wrong_alike(monkeypatch):
-    flight = simulate(Survey(tilt_deg=3.0))
-    found = []
-    for correlation in (0.0, 0.8):
-        alike = Neighbours(correlation, 40)
-        monkeypatch.setattr("wildlab.pipeline.diagnose._neighbours", lambda *_, alike=alike: alike)
-        found.append(diagnosed(flight))
-    wider = Neighbours(0.8, 40).widening(len(np.unique(found[0].blocks)))
-    assert wider > 2
-    plain, wide = (one.winner.gain.gain for one in found)
-    assert (wide.estimate, wide.high - wide.low) == pytest.approx(
-        (plain.estimate, wider * (plain.high - plain.low))
-    )
-    np.testing.assert_allclose(found[1].calibration.covariance, wider**2 * found[0].calibration.covariance)
-
-
-def test_a_wrong_focal_length_is_the_lens():
-    found = diagnosed(simulate(Survey(focal=0.08)))
+@pytest.mark.parametrize("focal", [0.08, pytest.param(0.05, marks=pytest.mark.slow)])
+def test_a_wrong_focal_length_is_the_lens(focal):
+    found = diagnosed(simulate(Survey(focal=focal)))
     assert found.counts and found.winner.causes == ("focal length",)
     low, high = found.calibration.interval("focal")
-    assert low <= -np.log(1.08) <= high
+    assert low <= -np.log(1 + focal) <= high
+
+
+def with_distortion(flight, k1):
+    """The flight with clicks of a lens with a k1 that the manifest does not state."""
+    clicks = flight.tables["detections"]
+    x, y = (clicks["u_px"] - CAMERA.cx) / CAMERA.fx, (clicks["v_px"] - CAMERA.cy) / CAMERA.fy
+    stretch = 1 + k1 * (x**2 + y**2)
+    clicks["u_px"], clicks["v_px"] = CAMERA.cx + CAMERA.fx * x * stretch, CAMERA.cy + CAMERA.fy * y * stretch
+    return flight
+
+
+SLOW_LENSES = [(0.1, 2), (0.1, 3), (-0.1, 1), (-0.1, 2), (-0.1, 3)]
+
+
+@pytest.mark.parametrize(
+    ("k1", "seed"), [(0.1, 1), *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW_LENSES)]
+)
+def test_distortion_that_is_not_stated_is_no_focal_length(k1, seed):
+    found = diagnosed(with_distortion(simulate(Survey(seed=seed)), k1))
+    assert found.counts and found.winner.causes == ("distortion",)
+    low, high = found.calibration.interval("radial")
+    assert low <= k1 <= high and high - low < 0.02
+
+
+@pytest.mark.slow
+def test_distortion_and_a_wrong_focal_length_are_both_named():
+    found = diagnosed(with_distortion(simulate(Survey(seed=2, focal=0.05)), -0.1))
+    assert found.counts and found.winner.causes == ("focal length", "distortion")
+    for name, true in (("focal", -np.log(1.05)), ("radial", -0.1)):
+        low, high = found.calibration.interval(name)
+        assert low <= true <= high, name
+
+
+@pytest.mark.parametrize("wrong", [{}, {"down_m": 6.0}, {"focal": 0.10}])
+def test_height_and_focal_length_from_one_height_are_inseparable(wrong):
+    """Straight down from one height either makes the image larger, and neither is offered."""
+    level = {"slant_deg": (89.0, 90.0), "level_m": 0.1, "mark_m": 8.0, "every_s": 2.0}
+    found = diagnosed(simulate(Survey(wanders_s=20.0, **level, **wrong)))
+    assert not found.counts
+    if wrong:
+        assert {"height", "focal length"} <= set(found.inseparable)
+
+
+def test_what_would_take_more_than_is_plausible_is_not_offered():
+    found = diagnosed(simulate(Survey(tilt_deg=20.0, images=20)))
+    assert any("boresight" in one.causes for one in found.implausible) and not found.counts
+    fits = [Calibration(m.fit.names, m.fit.values, m.covariance, {}, 1, 1) for m in found.models]
+    assert all(abs(one.value(name)) <= BOUNDS[name] for one in fits for name in one.names)
+
+
+@pytest.mark.parametrize(
+    ("lens", "lens_and_height", "blocks"),
+    [(90.0, None, True), (90.0, 90.0, True), (90.0, 84.0, True), (90.0, 60.0, False), (199.0, None, False)],
+)
+def test_a_lens_that_no_camera_has_blocks_a_height_that_it_makes_needless(lens, lens_and_height, blocks):
+    """By the deviances of both: with the height put right beside it, it has to explain clearly more."""
+
+    def model(deviance, *names):
+        return SimpleNamespace(deviance=deviance, fit=SimpleNamespace(names=names))
+
+    height, odd = model(200.0, "down"), [model(lens, "focal", "aspect")]
+    if lens_and_height is not None:
+        odd.append(model(lens_and_height, "down", "focal", "aspect"))
+    assert find_implausible(height, [model(300.0), height], odd, 29) == tuple(odd[:1] if blocks else ())
 
 
 @pytest.mark.slow
@@ -135,13 +203,13 @@ def test_too_few_images_are_refused():
 
 
 def with_wrong_clicks(flight, count, seed):
-    """The flight with so many clicks 300 pixels off, each in a direction of its own."""
+    """The flight with so many clicks 400 pixels off, beyond the limit of few photos, each its own way."""
     rng = np.random.default_rng(seed)
     clicks = flight.tables["detections"]
     rows = rng.choice(len(clicks), count, replace=False)
     turn = rng.uniform(0, 2 * np.pi, count)
-    clicks.loc[rows, "u_px"] += 300 * np.cos(turn)
-    clicks.loc[rows, "v_px"] += 300 * np.sin(turn)
+    clicks.loc[rows, "u_px"] += 400 * np.cos(turn)
+    clicks.loc[rows, "v_px"] += 400 * np.sin(turn)
     return flight, set(clicks["detection_id"][rows])
 
 
@@ -152,10 +220,8 @@ def test_wrong_clicks_are_kept_out_of_the_search_and_counted():
     assert found.counts and found.winner.causes == ("boresight",)
     assert found.calibration.n_points == found.inliers.sum()
     # What is quoted is the mean over the others, and that of all stands beside.
-    off = np.hypot(*found.winner.held.mean(axis=0).T)
-    assert found.winner.gain.with_ == pytest.approx(
-        np.hypot(found.winner.held[..., 0], found.winner.held[..., 1])[:, found.inliers].mean()
-    )
+    off = np.hypot(*found.winner.held.T)
+    assert found.winner.gain.with_ == pytest.approx(off[found.inliers].mean())
     assert found.winner.gain_of_all.with_ > found.winner.gain.with_ + 0.05 * off[~found.inliers].mean()
 
 
@@ -166,3 +232,33 @@ def test_nothing_is_certain_where_too_many_clicks_are_wrong():
     assert many.too_many_out and not many.counts
     few = replace(found, inliers=found.scored["frame_id"].isin(["I000", "I001"]).to_numpy())
     assert few.too_many_out and few.shown is few.models[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "views",
+    [
+        {"slant_deg": (90.0, 90.0)},
+        {"slant_deg": (85.0, 90.0), "heading_deg": 3.0, "stated_heading_deg": 3.0},
+        {"slant_deg": (35.0, 80.0)},
+    ],
+)
+def test_sound_flights_have_no_outliers(views):
+    """However steep the view: what is stated of the attitude, a tilt and a heading, explains the errors."""
+    inside, out = [], 0
+    for seed in range(50):
+        flight, rng = simulate(Survey(seed=seed, images=20, **views)), np.random.default_rng(seed)
+        scored = score_points(flight, georeference(flight, observe(flight), rng))
+        whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(scored)))
+        errors = errors_of(scored)
+        whitened = np.einsum("nij,nj->ni", whiten, errors)
+        out += len(find_outliers(whitened, errors, scored["frame_id"], scored["truth_id"])[0])
+        inside.append(scored["inside_90"].mean())
+    assert out == 0
+    assert 0.87 < np.mean(inside) < 0.93
+
+
+@pytest.mark.slow
+def test_clocks_that_are_far_apart_are_no_error_of_ours() -> None:
+    """What is tried on the way tips rays over the horizon, where they have no derivative."""
+    assert not diagnosed(simulate(Survey(clock_s=40.0, seed=2))).counts

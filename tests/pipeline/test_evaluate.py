@@ -7,8 +7,6 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import covariance_columns
 from wildlab.geometry.frames import (
-    euler_errors_to_body,
-    matrix_to_euler,
     matrix_to_quaternion,
     quaternion_to_matrix,
     rotation_vector_to_matrix,
@@ -88,9 +86,7 @@ def test_ellipses_from_estimated_noise_hold_what_they_say(make_flight):
     after = evaluate_with_estimated_noise(flight, observations, table, np.random.default_rng(1))
     assert len(after) == len(table)
     assert 0.84 < after["inside_90"].mean() < 0.95
-    assert estimate_noise(flight, observations, table).sd["roll_pitch"] == pytest.approx(
-        np.radians(0.3), rel=0.35
-    )
+    assert estimate_noise(flight, observations, table).sd["tilt"] == pytest.approx(np.radians(0.3), rel=0.35)
 
 
 def test_a_log_s_own_covariance_is_used_and_can_be_overridden(make_flight):
@@ -100,10 +96,11 @@ def test_a_log_s_own_covariance_is_used_and_can_be_overridden(make_flight):
     flight.nav["logged"] = nav.join(covariance_columns(np.tile(own, (len(nav), 1, 1))))
     observations = observe(flight)
     assert np.allclose(pose_errors(flight, observations).pose, own)
-    overridden = pose_errors(flight, observations, {"roll_deg": 2.0, "pitch_deg": 2.0, "yaw_deg": 2.0}).pose
-    # Errors of the angles are not those about the axes once the airframe is tilted.
-    E = euler_errors_to_body(*matrix_to_euler(observations.poses.R_nb)[:, :2].T)
-    assert np.allclose(overridden[:, 3:, 3:], E @ np.swapaxes(E, 1, 2) * np.radians(2.0) ** 2)
+    overridden = pose_errors(flight, observations, {"tilt_deg": 2.0, "heading_deg": 4.0}).pose
+    R = observations.poses.R_nb
+    assert np.allclose(
+        R @ overridden[:, 3:, 3:] @ np.swapaxes(R, 1, 2), np.diag(np.radians([2.0, 2.0, 4.0]) ** 2)
+    )
 
 
 def test_what_is_not_stated_is_the_usual(make_flight):

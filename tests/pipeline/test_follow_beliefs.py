@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.pipeline.robots import KNOWN, robot_flight, rows_of
+from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings
 from wildlab.flight.manifest import manifest_toml, parse_manifest
-from wildlab.geometry.frames import wrap
+from wildlab.geometry.attitude_uncertainty import pose_covariance
+from wildlab.geometry.frames import euler_to_matrix, wrap
 from wildlab.pipeline.following.beliefs import ASSUMED, ROUGH, STATED, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.considering import spread_of
+from wildlab.pipeline.following.expected import predict_scan
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.roughness import roughness
 from wildlab.pipeline.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
@@ -65,6 +71,44 @@ def test_settings_stand_in_the_manifest_too():
 def test_settings_that_make_no_sense_are_refused(text: str, said: str):
     with pytest.raises(WildlabError, match=said):
         parse_settings(text)
+
+
+def test_errors_of_roll_and_pitch_in_older_settings_are_one_of_the_tilt():
+    text = "[sensors.eye.considered.roll]\nsd_deg = 1.0\ncorrelation_time_s = 9.0\n"
+    both = text + "[sensors.eye.considered.pitch]\nsd_deg = 7.0\nshared = false\n"
+    for stated, sd, shared in ((text, 1.0, True), (both, 5.0, False)):
+        (name, found), *rest = parse_settings(stated).sensors["eye"].considered.items()
+        assert (name, rest, found.correlation_time_s, found.shared) == ("tilt", [], 9.0, shared)
+        assert found.sd == pytest.approx(sd)
+    with pytest.raises(WildlabError, match="tilt stands beside"):
+        parse_settings(text + "[sensors.eye.considered.tilt]\nsd_deg = 1.0\n")
+
+
+def test_errors_of_a_camera_that_looks_straight_down_are_tilts_and_a_heading():
+    """Against rotations of the camera; and all of them make the covariance of the pose."""
+    flight = simulate(Survey(images=6, slant_deg=(90.0, 90.0), stated_heading_deg=4.0))
+    scans = scans_of(flight, "click", 0.0, "logged")
+    assert scans.poses is not None
+    beliefs, said = of_sensor(flight, scans, of_flight(flight))
+    assert ("considered error: tilt", "0.7°, constant") in {(one.what, one.value) for one in said}
+    assert [one.name for one in beliefs.considered if one.sd == np.radians(0.7)] == ["roll", "pitch"]
+    place = scans.platform + np.array([7.0, -5.0])
+    still, small = np.zeros_like(place), 1e-5
+    H = predict_scan(scans, place, still).H_pose
+    R = scans.poses.R_nb
+    seen = []
+    for turn in (small, -small):
+        turned = replace(scans.poses, R_nb=euler_to_matrix(0.0, 0.0, turn) @ R)
+        seen.append(predict_scan(scans._replace(poses=turned), place, still).z)
+    np.testing.assert_allclose(H[..., 5], (seen[0] - seen[1]) / (2 * small), rtol=1e-4, atol=1e-2)
+    assumed = spread_of(scans, beliefs, H)
+    P = pose_covariance(0.7, 0.7, np.radians(0.7), np.radians(4.0), R)
+    own = scans._replace(poses=replace(scans.poses, covariance=P))
+    stated = spread_of(own, beliefs._replace(considered=()), predict_scan(own, place, still).H_pose)
+    assert assumed is not None and stated is not None
+    np.testing.assert_allclose(assumed, stated, rtol=1e-9)
+    across = np.array([scans.poses.camera.fx * np.radians(0.7)]) ** 2
+    assert (np.diagonal(assumed, axis1=1, axis2=2) > across).all()
 
 
 def test_noise_is_found_from_how_rough_detections_are():
@@ -126,7 +170,7 @@ def test_innovations_tell_noise_and_liveliness():
 def test_truth_tells_a_heading_and_the_other_flight_is_judged_by_it():
     found = tune_flight(robot_flight(8, name="first", heading_off_deg=2.0), ["radar"])
     assert found.against == "truth" and found.flight == "first"
-    assert np.degrees(found.sensors["radar"].yaw_sd_rad) == pytest.approx(2.0, rel=0.4)
+    assert np.degrees(found.sensors["radar"].heading_sd_rad) == pytest.approx(2.0, rel=0.4)
     followed = follow_targets(robot_flight(9, heading_off_deg=-2.0), tuned=found)
     assert any(one.source == "tuned on first" for one in followed.said)
     rows = rows_of(followed)

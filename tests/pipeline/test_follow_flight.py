@@ -11,6 +11,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.following import CONSIDERED, Settings, parse_settings
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
+from wildlab.pipeline.following.beliefs import errors_named
 from wildlab.pipeline.following.estimates import estimates_table, write_estimates
 from wildlab.pipeline.following.expected import SLOTS, predict_scan
 from wildlab.pipeline.following.follow import Followed, follow_targets
@@ -160,7 +161,8 @@ def test_derivatives_for_what_is_considered_are_those_of_the_measurement(kind: s
 
 def test_every_kind_has_its_errors_and_units():
     assert set(SLOTS) == set(KINDS)
-    assert {name for names in SLOTS.values() for name in names} <= set(CONSIDERED)
+    stated = {each for name in CONSIDERED for each in errors_named(name)}
+    assert {name for names in SLOTS.values() for name in names} == stated
 
 
 # --- whose detection it is ----------------------------------------------------------------------------------

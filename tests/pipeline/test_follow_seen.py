@@ -10,6 +10,7 @@ from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.judged import UNKNOWN, judged, used_of
+from wildlab.pipeline.overviews.verdict import Verdict
 from wildlab.reporting import tracking as words
 
 
@@ -51,7 +52,7 @@ def test_of_one_or_three_detections_nothing_is_judged(count: int) -> None:
     assert set(rows["verdict"]) == {UNKNOWN} and set(rows["nis_verdict"]) == {UNKNOWN}
     assert (rows["used"] == count).all()
     said, level = words.summary(judged(followed), [], None)
-    assert level in ("bad", "neutral") and "consistent" not in said[0]
+    assert level in (Verdict.MEND, Verdict.UNJUDGED) and "consistent" not in said[0]
     if count == 1:
         assert said == ["One detection started a track, and none followed: nothing can be judged."]
 

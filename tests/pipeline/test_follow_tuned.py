@@ -107,6 +107,7 @@ def test_part_of_the_flight_that_is_judged_teaches_nothing():
     refuse_same(flight, robot_flight(2))
 
 
+@pytest.mark.slow
 def test_a_clock_that_nothing_tells_of_is_not_said_to_be_tuned():
     other = robot_flight(2, name="other")
     by_truth = tune_flight(robot_flight(1), ["radar"])
@@ -117,6 +118,7 @@ def test_a_clock_that_nothing_tells_of_is_not_said_to_be_tuned():
         assert any(one.what == "to be added to its stamps" for one in told) is said
 
 
+@pytest.mark.slow
 def test_a_clock_further_off_than_is_looked_is_refused_and_not_tuned_at_the_edge():
     for off in (3.0, -6.0):
         with pytest.raises(WildlabError, match="further is not looked") as caught:
@@ -127,6 +129,7 @@ def test_a_clock_further_off_than_is_looked_is_refused_and_not_tuned_at_the_edge
     assert late.offset_s == pytest.approx(-1.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_stated_clock_holds_while_innovations_are_tuned():
     stated = parse_settings("[sensors.radar]\nclock_offset_s = 2.0\n")
     right = tune_flight(robot_flight(1), ["radar"], None, "innovations")

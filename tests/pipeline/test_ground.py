@@ -31,7 +31,7 @@ MANIFEST = {
                "cy_px": 256.0},
     "mount": {"looks": "down", "tilt_deg": 40.0},
     "uncertainty": {"pixel_px": 1.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
-                    "roll_deg": 0.5, "pitch_deg": 0.5, "yaw_deg": 1.0, "plane_height_m": 0.3},
+                    "tilt_deg": 0.5, "heading_deg": 1.0, "plane_height_m": 0.3},
 }  # fmt: skip
 
 

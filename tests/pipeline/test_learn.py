@@ -1,5 +1,6 @@
 """What is learnt on one flight is kept in a file, helps the next, and is refused where it does not belong."""
 
+import re
 from functools import cache
 
 import numpy as np
@@ -59,9 +60,16 @@ def test_a_corrected_flight_says_what_the_applied_calibration_says():
         georeference(flight, applied.observations, rng)[["north_m", "east_m"]],
         atol=1e-6,
     )
+    # So it does of the lens.
+    k1 = LearntParameter(name="radial", value=0.1, low=0.09, high=0.11, unit="1")
+    of_lens = learnt().model_copy(update={"parameter": (k1,), "covariance": ((2.5e-5,),)})
+    camera = apply_learnt(flight, None, observe(flight), of_lens).observations.poses.camera
+    assert camera == observe(corrected_flight(flight, None, of_lens)).poses.camera
+    assert camera.distortion == (0.1, 0.0, 0.0, 0.0, 0.0)
     # What the calibration takes off is no contradiction any more.
     late = simulate(Survey(seed=5, clock_s=1.0))
-    assert any("taken 1.00 s later" in one for one in sense_sentences(late))
+    (said,) = sense_sentences(late)
+    assert float(re.search(r"taken ([\d.]+) s later", said).group(1)) == pytest.approx(1.0, abs=0.05)
     clock = LearntParameter(name="clock", value=1.0, low=0.9, high=1.1, unit="s")
     of_clock = learnt().model_copy(update={"parameter": (clock,), "covariance": ((0.0025,),)})
     assert sense_sentences(corrected_flight(late, None, of_clock)) == []
@@ -137,7 +145,7 @@ def test_what_was_applied_is_not_found_again():
     assert {"east", "clock", "tilt"} <= {one.name for one in own.parameter}
     applied = apply_learnt(flight, None, observe(flight), own)
     scored = errors_of(flight, applied.observations)
-    again = diagnose(flight, applied.observations, scored, np.random.default_rng(0))
+    again = diagnose(flight, applied.observations, scored)
     assert not again.counts
     clock = next(model for model in again.models if model.causes == ("clock",))
     assert abs(clock.fit.values[0]) < 0.02
@@ -154,12 +162,21 @@ def test_where_nothing_gains_for_certain_the_noise_alone_is_kept():
     found, diagnosis = learn_flight(simulate(Survey(seed=1)), np.random.default_rng(0))
     assert not diagnosis.counts
     assert found.parameter == () and found.gain is None
-    assert 0.4 < found.noise.roll_deg < 1.1
+    assert 0.4 < found.noise.tilt_deg < 1.1
     assert parse_learnt(learnt_toml(found)) == found
     flight = named(tuesday(seed=5), "wednesday")
     applied = apply_learnt(flight, None, observe(flight), found)
     assert "no corrections" in applied.sentence
     assert np.allclose(applied.observations.poses.p_nb, observe(flight).poses.p_nb)
+
+
+def test_noise_of_roll_pitch_and_yaw_in_older_files_is_read_as_tilt_and_heading():
+    text = learnt_toml(learnt())
+    noise = learnt().noise
+    older = text.replace(f"tilt_deg = {noise.tilt_deg!r}", "roll_deg = 1.0\npitch_deg = 7.0")
+    older = older.replace(f"heading_deg = {noise.heading_deg!r}", "yaw_deg = 3.0")
+    found = parse_learnt(older).noise
+    assert (found.tilt_deg, found.heading_deg) == (pytest.approx(5.0), 3.0)
 
 
 @pytest.mark.parametrize(

@@ -104,6 +104,7 @@ def test_thinning_finds_how_long_errors_last():
     assert len(few.times) == 2000 and (np.isnan(few.uv).all(axis=1) == ~few.seen).all()
 
 
+@pytest.mark.slow
 def test_of_errors_that_last_the_thinned_filter_states_the_truth_and_the_other_does_not():
     """Two hundred targets; H example 3.1 on the last frame of each."""
     rng, quiet = np.random.default_rng(6), TUNING._replace(acceleration=1e-4, velocity_0=0.01)

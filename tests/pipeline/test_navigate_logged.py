@@ -15,7 +15,12 @@ import pytest
 from wildlab.flight.clocks import covariances, gnss_times, poses_at
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
-from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler, matrix_to_rotation_vector, wrap
+from wildlab.geometry.frames import (
+    matrix_to_euler,
+    matrix_to_rotation_vector,
+    rotation_vector_to_matrix,
+    wrap,
+)
 from wildlab.paths import DATA
 from wildlab.pipeline.navigate import Navigated, likelihoods_of_latency
 from wildlab.pipeline.navigation_errors import corrections, navigate_all
@@ -57,8 +62,9 @@ def euler_deviations(found: Navigated, begin: float, end: float) -> np.ndarray:
     nav = found.nav[found.nav["time_s"].between(begin, end)]
     P = covariances(nav)
     assert P is not None
-    angles = matrix_to_euler(poses_at(nav, nav["time_s"].to_numpy())[1])
-    to_euler = np.linalg.inv(euler_errors_to_body(angles[:, 0], angles[:, 1]))
+    R, h = poses_at(nav, nav["time_s"].to_numpy())[1], 1e-6
+    near = [matrix_to_euler(R @ rotation_vector_to_matrix(h * axis)) for axis in np.eye(3)]
+    to_euler = wrap(np.stack(near, axis=-1) - matrix_to_euler(R)[..., None]) / h
     spread = np.einsum("kij,kjl,kil->ki", to_euler, P[:, 3:, 3:], to_euler)
     return np.degrees(np.sqrt(spread)).mean(axis=0)
 

@@ -24,19 +24,8 @@ from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.judged import judged as judged_tracks
 from wildlab.pipeline.overviews.image_coverage import cover_images
-from wildlab.pipeline.overviews.overview import TROUBLES, best_source, look_over
-from wildlab.pipeline.overviews.worth_fixing import (
-    ALARM,
-    FIX,
-    LEVELS,
-    LOOK,
-    MEND,
-    SOUND,
-    UNJUDGED,
-    gains_of,
-    numbers_of,
-    verdict_of,
-)
+from wildlab.pipeline.overviews.overview import TROUBLES, look_over
+from wildlab.pipeline.overviews.worth_fixing import gains_of, numbers_of
 from wildlab.reporting.overview import show_overview
 from wildlab.reporting.overview_words import gain_measured
 from wildlab.reporting.report import open_report
@@ -276,14 +265,6 @@ def test_only_what_was_measured_is_a_gain(make_flight: Callable[..., Flight]) ->
     assert [one.key for one in uncertain] == [one.key for one in alone]
 
 
-def test_the_verdict_follows_from_what_was_counted() -> None:
-    assert verdict_of(1, 3, 1, 2) == MEND and verdict_of(0, 1, 1, 0) == FIX
-    assert verdict_of(0, 0, 2, 1) == LOOK
-    assert verdict_of(0, 0, 0, 1) == SOUND and verdict_of(0, 0, 0, 0) == UNJUDGED
-    assert verdict_of(1, 1, 1, 1, broken=1) == ALARM and verdict_of(0, 1, 0, 1, alarmed=1) == LOOK
-    assert set(LEVELS) == {ALARM, MEND, FIX, LOOK, SOUND, UNJUDGED}
-
-
 def test_the_page_says_first_what_is_most_worth_fixing(
     make_flight: Callable[..., Flight], tmp_path: Path
 ) -> None:
@@ -375,13 +356,26 @@ def test_no_page_gives_the_place_away(make_flight: Callable[..., Flight], tmp_pa
         assert f"{value:.3f}" not in html and f"{value:.2f}" not in html
 
 
-def test_the_best_known_poses_are_shown() -> None:
+def test_the_best_estimated_poses_are_taken_and_never_the_truth() -> None:
     table = pd.DataFrame({"time_s": [0.0]})
     manifest = simulate_twin("large-ship", 1).manifest
-    assert best_source(Flight(manifest, {"truth": table, "autopilot": table, "logged": table})) == "logged"
-    assert best_source(Flight(manifest, {"truth": table, "mine": table})) == "mine"
-    assert best_source(Flight(manifest, {"truth": table})) == "truth"
-    assert best_source(Flight(manifest, {})) is None
+
+    def flight(*names: str) -> Flight:
+        return Flight(manifest, dict.fromkeys(names, table))
+
+    twin = flight("autopilot-uncalibrated", "truth-payload", "truth", "autopilot")
+    assert twin.pose_source()[0] == "autopilot"
+    assert flight("truth", "observer", "autopilot", "rtk", "mekf").estimated_sources == [
+        *("rtk", "mekf", "observer", "autopilot"),
+    ]
+    assert flight("truth", "autopilot", "logged").pose_source()[0] == "logged"
+    assert flight("truth", "mine").pose_source()[0] == "mine"
+    assert twin.pose_source("truth")[0] == "truth"  # where somebody asks for it
+    for refused in (lambda: flight("truth").pose_source(), lambda: twin.pose_source("other")):
+        with pytest.raises(WildlabError) as error:
+            refused()
+        assert "truth" not in str(error.value)
+    assert flight("truth").estimated_sources == []
     with pytest.raises(WildlabError, match="no nav source 'other'"):
         look_over(Flight(manifest, {"mine": table}), "other")
 
@@ -437,4 +431,4 @@ def test_tracks_that_their_own_report_doubts_are_not_sound_here(
     html, content = page_of(make_flight(n_images=8), tmp_path / "overview", numbers=numbers, judged=1)
     assert ("Look closer: the report on tracking asks for it." in html) == doubted
     assert ("nothing in them worth fixing" in html) != doubted
-    assert values(content)["troubled", "flight"] == int(doubted)
+    assert values(content)["troubled", "flight"] == 0

@@ -130,6 +130,7 @@ def test_what_no_report_measured_is_not_said_to_be_small(
     assert "worth 10 % of its error or data." in html
 
 
+@pytest.mark.slow
 def test_a_gain_that_is_possible_is_not_sound(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
     flight = make_flight(n_images=20)
 
@@ -155,7 +156,7 @@ def test_where_nothing_was_looked_for_nothing_is_said_to_be_right() -> None:
     twin = simulate_twin("large-ship", 1)
     twin.tables.pop("imu", None)
     twin.tables.pop("gnss", None)
-    assert path_title(look_over(twin)) == "Nothing wrong was found in poses"
+    assert path_title(look_over(twin)) == "No gaps, jumps or shaking were found in poses"
 
 
 def test_no_mistake_is_named_that_makes_it_worse() -> None:

@@ -46,8 +46,8 @@ def test_errors_of_attitude_come_back_whatever_the_poses_state(
     flight: Flight, exact: Sighting, degrees: float
 ) -> None:
     found = estimate_from_sighting(flight, disturbed(exact, degrees))
-    assert np.degrees(found.sd["roll_pitch"]) == pytest.approx(degrees, rel=0.2)
-    assert found.factor["roll_pitch"] < 1.2
+    assert np.degrees(found.sd["tilt"]) == pytest.approx(degrees, rel=0.2)
+    assert found.factor["tilt"] < 1.2
 
 
 def test_what_a_target_cannot_tell_stays_where_the_poses_put_it(flight: Flight, exact: Sighting) -> None:

@@ -189,8 +189,8 @@ def test_a_heading_that_is_wrong_is_put_down_to_the_heading():
     seen["north_m"] = own[:, 0] + np.cos(turn) * offset[:, 0] - np.sin(turn) * offset[:, 1]
     seen["east_m"] = own[:, 1] + np.sin(turn) * offset[:, 0] + np.cos(turn) * offset[:, 1]
     found = tune_sensor(flight, "lidar")
-    assert np.degrees(found.yaw_sd_rad) == pytest.approx(3.0, rel=0.25)
-    assert found.range_m * found.yaw_sd_rad > 2 * found.position_sd_m
+    assert np.degrees(found.heading_sd_rad) == pytest.approx(3.0, rel=0.25)
+    assert found.range_m * found.heading_sd_rad > 2 * found.position_sd_m
 
 
 def test_too_few_errors_are_no_tuning():
@@ -311,6 +311,7 @@ def test_a_track_is_with_its_target_where_it_is_near_it_while_that_is_seen():
         nan,
         known,
         near,
+        np.tile(np.eye(4), (n, 1, 1)),
     )
     (row,) = table([one], BOATS.size_m).to_dict(orient="records")
     assert (row["seen"], row["share_with_target"]) == (30, pytest.approx(1 / 3))

@@ -13,6 +13,7 @@ from wildlab.api.tracks import Consistency, Navigation, Tracked
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.store import Flight
+from wildlab.names import figure_name
 from wildlab.pipeline.georeference import covariances_of
 from wildlab.reporting.charts.navigation import error_bands
 from wildlab.reporting.charts.tracks import track_map
@@ -89,7 +90,9 @@ def _flight(flight: Flight) -> Figure:
     fig, ax = new_figure(5.6, 5.2)
     for name, nav in flight.nav.items():
         keep = thinned(len(nav))
-        ax.plot(nav["east_m"][keep], nav["north_m"][keep], lw=1.0, color=colour(name), label=name)
+        ax.plot(
+            nav["east_m"][keep], nav["north_m"][keep], lw=1.0, color=colour(name), label=figure_name(name)
+        )
     if flight.truth is not None:
         _truth(ax, flight)
     ax.set_title(f"{flight.name}: paths of the aircraft")
@@ -116,8 +119,14 @@ def _points(points: Points) -> Figure:
 def _truth(ax: Axes, flight: Flight) -> None:
     for i, (_, rows) in enumerate(flight.table("truth").groupby("target_id", sort=False)):
         mark = "+" if len(rows) == 1 else ""
-        label = None if i else "truth"
-        ax.plot(rows["east_m"], rows["north_m"], marker=mark, color=colour("truth"), lw=1.1, label=label)
+        ax.plot(
+            rows["east_m"],
+            rows["north_m"],
+            marker=mark,
+            color=colour("truth"),
+            lw=1.1,
+            label=None if i else "truth",
+        )
 
 
 def _track(one: Tracked) -> Figure:

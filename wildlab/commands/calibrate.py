@@ -23,8 +23,10 @@ def calibrate(
 ) -> None:
     """Learn on the known points of FLIGHT what is constantly wrong with position, boresight, clock or lens.
 
-    Only what gained something for certain on images that it was not estimated from is written down, with its
-    covariance; how noisy the poses were always is. Judge it on another flight.
+    Without truth, things that several images show serve as well. Only what gained something for certain on
+    images that it was not estimated from, and nothing else explains as well, is written down, with its
+    covariance; how noisy the poses were always is. Judge it on another flight. A flight whose logs contradict
+    each other teaches nothing.
 
     \b
     Examples:
@@ -33,6 +35,7 @@ def calibrate(
     """
     import numpy as np
 
+    from wildlab.flight.checks.sense.sense import sense_sentences
     from wildlab.flight.learnt import write_learnt
     from wildlab.flight.store import load_flight
     from wildlab.pipeline.learn import learn_flight
@@ -40,18 +43,36 @@ def calibrate(
 
     if into.exists() and not overwrite:
         raise WildlabError("this file is there already", "name another, or add --overwrite", file=into)
-    learnt, diagnosis = learn_flight(load_flight(flight), np.random.default_rng(seed), source)
+    loaded = load_flight(flight)
+    if problems := [one for one in sense_sentences(loaded) if one.startswith("problem")]:
+        raise WildlabError(
+            f"its logs contradict each other ({len(problems)} problem{'s' * (len(problems) > 1)})",
+            "mend that first (wildlab check says what it is): what is learnt now would spoil other flights",
+            file=flight,
+        )
+    learnt, diagnosis = learn_flight(loaded, np.random.default_rng(seed), source)
     write_learnt(learnt, into)
     if as_json:
         print_json(learnt.model_dump())
         return
     gain = learnt.gain
-    if gain is None:
+    causes, possible = diagnosis.winner.causes, diagnosis.winner.gain.gain
+    if gain is None and causes and np.isfinite(possible.low):
+        click.echo(
+            f"Possible, not certain: {causes_in_words(causes)} taken off gains {possible.low:.2f} to "
+            f"{possible.high:.2f} m on images that it was not estimated from. The file holds the noise of "
+            "the poses alone."
+        )
+    elif gain is None:
         some = any(model.causes and model.gain.counts for model in diagnosis.models)
         click.echo(
             f"No constant error {'stands out' if some else 'gains anything for certain'} "
             f"({len(diagnosis.models)} models tried): the file holds the noise of the poses alone."
         )
+    if gain is None:
+        if others := simplest_rivals(diagnosis):
+            one, other = causes_in_words(diagnosis.winner.causes), causes_in_words(others[0])
+            click.echo(f"These images do not separate {one} from {other}.")
     else:
         click.echo(
             f"{diagnosis.winner.name}: mean error {gain.without_m:.2f} m as logged, {gain.with_m:.2f} m on "
@@ -62,9 +83,4 @@ def calibrate(
             for one in learnt.parameter
         ]
         print_table(["to be added to", "estimate", "95 % interval", "unit"], rows)
-        if others := simplest_rivals(diagnosis):
-            click.echo(
-                f"These images do not decide that it is this: {causes_in_words(others[0])} explains it as "
-                "well. Keep it for flights of the same height and speed alone."
-            )
     click.echo(shown(into))

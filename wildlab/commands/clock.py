@@ -45,6 +45,7 @@ def clock(
       wildlab clock flights/tuesday --images card/DCIM --curve curve.csv --set
       wildlab clock flights/tuesday --offset 0.42 --set
     """
+    from wildlab.files import write_csv
     from wildlab.flight.store import load_flight
 
     loaded = load_flight(flight)
@@ -57,7 +58,7 @@ def clock(
     else:
         found = _estimate(loaded, images, source)
         if curve is not None:
-            found.curve.to_csv(curve, index=False)
+            write_csv(curve, found.curve)
         said = {**found.numbers, "sentence": found.sentence}
     if as_json:
         print_json(said)

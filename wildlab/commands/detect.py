@@ -159,18 +159,16 @@ def write_page(into: Path, name: str, result: dict[str, Any]) -> None:
     """
     import json
 
-    import pandas as pd
-
-    from wildlab.files import write_atomic
+    from wildlab.files import read_csv, write_atomic
     from wildlab.reporting.detections import SHEETS, detections_page
 
-    frames = pd.read_csv(into / "frames.csv", dtype={"frame_id": str, "problem": str})
+    frames = read_csv(into / "frames.csv", ("frame_id", "problem"))
     sheets = {key: (into / f"{key}.jpg").read_bytes() for key in SHEETS if key in result["pictures"]}
     # In the order of their names, which is that of the frames; a few, evenly over the run.
     drawn = sorted((into / "overlays").glob("*.jpg"))
     step = max(1, -(-len(drawn) // ON_PAGE))
     overlays = [(one.stem, one.read_bytes()) for one in drawn[::step]]
     thresholds = json.loads((into / "thresholds.json").read_text(encoding="utf-8"))["thresholds"]
-    curves = pd.read_csv(into / "compared.csv", dtype={"detector": str}) if "compared" in result else None
+    curves = read_csv(into / "compared.csv", ("detector",)) if "compared" in result else None
     page = detections_page(name, result, frames, sheets, overlays, thresholds, curves)
     write_atomic(into / "report.html", page)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from wildlab.commands.shared import FILE, FOLDER
+from wildlab.commands.shared import FILE, FOLDER, terminal_console
 from wildlab.errors import WildlabError
 from wildlab.terminal import shown, stopped
 
@@ -40,6 +40,7 @@ def georeference(flight: Path, into: Path, overwrite: bool, source: str | None, 
     from wildlab.pipeline.georeference import observe
     from wildlab.pipeline.ground import ground_sentences
     from wildlab.pipeline.ground_file import SUFFIXES, write_points
+    from wildlab.runner.evaluate import tell_source
 
     if into.suffix not in SUFFIXES:
         raise WildlabError(
@@ -49,6 +50,7 @@ def georeference(flight: Path, into: Path, overwrite: bool, source: str | None, 
         raise WildlabError("this file is there already", "name another, or add --overwrite", file=into)
     data = load_flight(flight)
     name, _ = data.pose_source(source)
+    tell_source(data, source, terminal_console())
     observations = observe(data, name)
     points = to_ground(data, observations, np.random.default_rng(seed))
     write_points(data, points, into, name)

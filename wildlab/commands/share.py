@@ -47,7 +47,7 @@ def share(
     edition: str | None,
     overwrite: bool,
 ) -> None:
-    """Make one file of REPORT that can be mailed: a report, or a folder of reports.
+    """Make one file of REPORT that can be mailed: a report, a folder of reports, or a flight with reports.
 
     All reports on a flight go together: those of `wildlab evaluate`, and that of `wildlab track --many`.
 
@@ -64,7 +64,7 @@ def share(
 
     \b
     Examples:
-      wildlab share reports/tuesday
+      wildlab share flights/tuesday
       wildlab share reports/tuesday --for partner --edition en
       wildlab share reports/tuesday --for partner --encrypt
       wildlab share reports --for team --zip

@@ -9,25 +9,35 @@ from pathlib import Path
 import click
 
 from wildlab.commands.shared import FILE, FOLDER, Minutes, reports_folder, terminal_console
-from wildlab.terminal import print_json, print_table, shown
+from wildlab.terminal import count, print_json, print_table, shown
 
 
 @click.command("list", short_help="The studies, and where each stands.")
 @click.option("--out", type=FOLDER, help="Where the reports are.  [default: reports]")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, with every published number and ours.")
-def list_(out: Path | None, as_json: bool) -> None:
-    """The studies, and where each stands: published numbers, and how many agree.
+@click.option("--rule", is_flag=True, help="How often each answer is right, by simulation of the rule.")
+def list_(out: Path | None, as_json: bool, rule: bool) -> None:
+    """The studies, and where each stands: published numbers that are close, and within 90 % of our flights.
 
     \b
     Example:
       wildlab list
     """
-    from wildlab.evaluation.printed import AGREES
-    from wildlab.evaluation.shares import HOLDS, MOSTLY
+    from wildlab.evaluation.characteristics import operating_characteristics
+    from wildlab.evaluation.shares import HOLDS
     from wildlab.flight.catalog import is_fetched
+    from wildlab.reporting.counts import tally
     from wildlab.runner.catalogue import load_studies
     from wildlab.runner.record.status import as_plain, study_status
 
+    if rule:
+        table = operating_characteristics(trials=1000)
+        if as_json:
+            print_json(table.to_dict(orient="records"))
+            return
+        rows = [[kind, *(f"{value:.2f}" for value in row)] for kind, *row in table.itertuples(index=False)]
+        print_table(["kind", "our errors, times", *table.columns[2:]], rows)
+        return
     statuses = [study_status(study, reports_folder(out)) for study in load_studies().values()]
     if as_json:
         print_json([as_plain(one) for one in statuses])
@@ -35,24 +45,33 @@ def list_(out: Path | None, as_json: bool) -> None:
     rows = []
     for one in statuses:
         done, data = one.state == "done", one.study.dataset
-        holding = sum(claim.verdict in (HOLDS, MOSTLY) for claim in one.claims)
+        holding = sum(claim.verdict == HOLDS for claim in one.claims)
         # What has not been run has neither come out nor failed to.
-        count = len(one.counted)
-        numbers = f"{one.count(AGREES)} of {count}" if done else f"{count} printed"
-        claims = f"{holding} of {len(one.claims)}" if done else f"{len(one.claims)} printed"
+        printed = len(one.counted)
+        found = tally(one.counted)
+        close = f"{found.close['close']} of {printed}" if done else f"{printed} published"
+        within = f"{found.compatible['within']} of {printed}" if done else ""
+        claims = f"{holding} of {len(one.claims)}" if done else f"{len(one.claims)} published"
         first = f"; first: wildlab fetch {data}" if data and not done and not is_fetched(data) else ""
-        state = f"{one.state}{first}"
+        unsealed = f" ({one.reason})" if one.ran and one.reason else ""
+        state = f"{one.state}{unsealed}{first}"
         rows.append(
             [
                 one.study.name,
                 one.study.kind,
                 state,
-                numbers if one.numbers else "-",
+                close if one.numbers else "-",
+                within if one.numbers else "-",
                 claims if one.claims else "-",
                 one.study.title,
             ]
         )
-    print_table(["study", "kind", "state", "numbers agree", "claims hold", "question"], rows)
+    print_table(["study", "kind", "state", "close", "within 90 %", "claims hold", "question"], rows)
+    damaged = [one for one in statuses if one.state == "damaged"]
+    if damaged:
+        click.echo(f"{count(len(damaged), 'report')} not as written, and not counted:", err=True)
+    for one in damaged:
+        click.echo(f"  {one.study.name}: {one.reason}", err=True)
 
 
 @click.command(short_help="Run studies; each leaves a report.")
@@ -204,7 +223,7 @@ def vary(study: str, by: str, seeds: int, jobs: int, out: Path | None) -> None:
 def evaluate(
     flight: Path, source: str | None, calibration: Path | None, out: Path | None, timeout: float | None
 ) -> None:
-    """What is a flight worth? FLIGHT is a folder made by `wildlab import`.
+    """What is a flight worth? FLIGHT is a folder made by `wildlab import` or `wildlab simulate`.
 
     First an overview, whatever the flight lacks: where it flew and what is wrong on the way, what was
     recorded and where it pauses, what the images showed, and the three things most worth fixing, each with

@@ -21,7 +21,8 @@ from wildlab.evaluation.errors import (
 from wildlab.evaluation.pose_noise import PoseNoise
 from wildlab.evaluation.sightings import Averaged, try_averaging
 from wildlab.flight.store import Flight
-from wildlab.pipeline.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
+from wildlab.pipeline.diagnose import diagnose
+from wildlab.pipeline.diagnosis import FEWEST_IMAGES, Diagnosis
 from wildlab.pipeline.error_axes import NearestRule, axes_of, look_at_nearest_rule
 from wildlab.pipeline.evaluate import blocks_of, errors_of, score_points
 from wildlab.pipeline.georeference import (
@@ -114,7 +115,7 @@ def judge_accuracy(
     observations
         From `observe`, with a calibration applied or not.
     rng
-        Draws folds, halves, blocks, and samples of flat rays.
+        Draws halves, blocks, and samples of flat rays.
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
     deviations
@@ -136,7 +137,7 @@ def judge_accuracy(
     summary = summarise(errors)
     located = np.isfinite(scored["error_m"]) & np.isfinite(scored["cov_nn"])
     enough = scored.loc[located, "frame_id"].nunique() >= FEWEST_IMAGES
-    diagnosis = diagnose(flight, observations, scored, rng, source) if enough else None
+    diagnosis = diagnose(flight, observations, scored, source) if enough else None
     intervals = {}
     if enough:
         figures = {
@@ -147,7 +148,7 @@ def judge_accuracy(
         intervals = {name: bootstrap_interval(f, errors, blocks, rng) for name, f in figures.items()}
     left, of = errors, scored
     if diagnosis is not None and diagnosis.counts:
-        left, of = diagnosis.winner.held.mean(axis=0), diagnosis.scored
+        left, of = diagnosis.winner.held, diagnosis.scored
     elif diagnosis is not None:
         left, of = errors_of(diagnosis.scored), diagnosis.scored
     if diagnosis is not None:
@@ -159,7 +160,7 @@ def judge_accuracy(
     if nearest is not None and nearest.ambiguous.any():
         clear = scored[~nearest.ambiguous & located]
         if clear["frame_id"].nunique() >= FEWEST_IMAGES:
-            unambiguous = diagnose(flight, observations, clear, rng, source)
+            unambiguous = diagnose(flight, observations, clear, source)
     return Accuracy(
         observations=observations,
         points=points,

@@ -1,4 +1,4 @@
-"""What to add to the stamps of a flight's images: from known points, or from the motion of the images."""
+"""What to add to the stamps of a flight's images: from points that were seen, or from their motion."""
 
 from __future__ import annotations
 
@@ -21,9 +21,11 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.clock_by_motion import FEWEST, ClockByMotion, clock_by_motion
 from wildlab.geometry.clock_by_points import ClockByPoints, clock_by_points
 from wildlab.geometry.frames import matrix_to_rotation_vector
+from wildlab.pipeline.diagnosis import nonzero
 from wildlab.pipeline.evaluate import blocks_of
 from wildlab.pipeline.flow import Reading, camera_poses_at
-from wildlab.pipeline.georeference import truth_of
+from wildlab.pipeline.georeference import georeference, observe, truth_of
+from wildlab.pipeline.repeats import compare_sightings, judge_repeats
 
 Array = NDArray[np.float64]
 
@@ -283,19 +285,79 @@ class CameraClock(NamedTuple):
 
 
 def by_points_in_words(flight: Flight, source: str | None = None) -> CameraClock:
-    """`camera_clock_by_points` with its words.
+    """`camera_clock_by_points` with its words; without truth, from things that several images show.
 
     Raises
     ------
     WildlabError
-        As that.
+        As that, or where neither truth nor names of things are there.
     """
+    refuse_without_clock(flight, source)
+    if flight.truth is None and flight.detections is not None:
+        return _by_sightings(flight, source)
     found = camera_clock_by_points(flight, source)
     rests = {"points": found.points, "images": found.images, "blocks": found.draws}
     numbers = {**_numbers(found, "known points"), **rests}
     by = f"{found.points} sightings of known points in {found.images} images"
     curve = pd.DataFrame({"offset_s": found.offsets, "cost": found.cost})
     return CameraClock(numbers, curve, _sentence(found, by))
+
+
+def _by_sightings(flight: Flight, source: str | None) -> CameraClock:
+    """The clock under which sightings of the same things from different images lie closest together.
+
+    It is certain where the search for a constant error finds it so: see `wildlab.pipeline.diagnose`.
+    """
+    observations, rng = observe(flight, source), np.random.default_rng(0)
+    diagnosis = judge_repeats(flight, observations, rng, source).diagnosis
+    if diagnosis is None:
+        raise WildlabError(
+            "fewer than six images show a thing that another image shows too",
+            "name the targets of more detections, or give the images with --images",
+            file=flight.folder,
+            field="detections",
+        )
+    alone = next((one for one in diagnosis.models if one.causes == ("clock",)), None)
+    best = diagnosis.winner if "clock" in diagnosis.winner.fit.names else alone
+    if best is None:
+        raise WildlabError(
+            "an offset of the camera's clock would not show in these sightings",
+            "give the images with --images, or state the offset",
+            file=flight.folder,
+            field="detections",
+        )
+    place, stated = best.fit.names.index("clock"), flight.manifest.clocks.camera_offset_s
+    offset = float(best.fit.values[place])
+    certain = diagnosis.counts and best is diagnosis.winner and "clock" in nonzero(diagnosis.calibration)
+    numbers: dict[str, object] = {
+        "offset_s": offset + stated,
+        "sd_s": float(np.sqrt(best.covariance[place, place])),
+        "certain": certain,
+        "method": "repeated sightings",
+        "inseparable": list(diagnosis.inseparable),
+        "points": diagnosis.calibration.n_points,
+        "images": diagnosis.calibration.n_images,
+        "apart_without_m": best.gain.without,
+        "apart_m": best.gain.with_,
+    }
+    tried = offset + np.arange(-1.0, 1.01, 0.1)
+    apart = [
+        compare_sightings(georeference(flight, observe(flight, source, clock_shift=float(one)), rng))[
+            "error_m"
+        ]
+        for one in tried
+    ]
+    curve = pd.DataFrame({"offset_s": tried + stated, "cost": [one.mean() for one in apart]})
+    by = f"{len(diagnosis.scored)} sightings of things whose places are not known"
+    if certain:
+        sentence = (
+            f"The stamps of the images get {offset + stated:+.3f} s (SD {numbers['sd_s']:.3f} s), by {by}."
+        )
+    else:
+        sentence = (
+            f"The offset of the camera's clock cannot be told by {by}: {offset + stated:+.3f} s fits best."
+        )
+    return CameraClock(numbers, curve, sentence)
 
 
 def by_motion_in_words(

@@ -10,7 +10,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.blocks import time_blocks
 from wildlab.flight.clocks import truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.pipeline.georeference import Observations, covariances_of, truth_of
 
 Array = NDArray[np.float64]

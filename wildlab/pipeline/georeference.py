@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times, gimbal_angles, pose_finder, poses_at, truth_at
 from wildlab.flight.store import Flight
+from wildlab.geometry.attitude_uncertainty import pose_covariance
 from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.ray_ends import BECAME
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
@@ -23,14 +23,14 @@ from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
 Array = NDArray[np.float64]
 
-#: Standard deviations assumed where neither the log nor the manifest states one.
+#: Standard deviations assumed where neither the log nor the manifest states one; those of the attitude as in
+#: `wildlab.geometry.attitude_uncertainty`.
 USUAL = {
     "pixel_px": 2.0,
     "position_horizontal_m": 2.0,
     "position_vertical_m": 3.0,
-    "roll_deg": 1.0,
-    "pitch_deg": 1.0,
-    "yaw_deg": 2.0,
+    "tilt_deg": 1.0,
+    "heading_deg": 2.0,
     "misalignment_deg": 0.0,
     "plane_height_m": 1.0,
 }
@@ -209,7 +209,7 @@ def heights_left_in(flight: Flight, observations: Observations) -> Observations:
 def calibrated(
     flight: Flight, source: str | None, observations: Observations, calibration: Calibration
 ) -> Observations:
-    """The observations with an estimated calibration applied to mount, camera, position, and their times."""
+    """The observations with an estimated calibration applied to mount, camera, pose and times."""
     poses = calibrated_poses(calibration, shifting_poses(flight, source, observations))
     times = observations.table["time_s"] + calibration.value("clock")
     return _grounded(replace(observations, table=observations.table.assign(time_s=times), poses=poses))
@@ -253,26 +253,17 @@ def pose_errors(
 
 
 def assumed_pose_covariance(R_nb: Array, sd: dict[str, float]) -> Array:
-    """Covariance of poses whose log has none, from standard deviations along north, east, down and of angles.
+    """Covariance of poses whose log has none: (6, 6) or (N, 6, 6), see `pose_covariance`.
 
     Parameters
     ----------
     R_nb
-        (3, 3) or (N, 3, 3): which way the airframe lies.
+        (3, 3) or (N, 3, 3): which way the body lies.
     sd
         By the names of :data:`USUAL`.
-
-    Returns
-    -------
-    (6, 6) or (N, 6, 6): position in n, m^2, and rotation vector in b, rad^2.
     """
-    roll, pitch, _ = np.moveaxis(matrix_to_euler(R_nb), -1, 0)
-    E = euler_errors_to_body(roll, pitch)
-    angles = np.radians([sd["roll_deg"], sd["pitch_deg"], sd["yaw_deg"]])
-    pose = np.zeros((*np.shape(R_nb)[:-2], 6, 6))
-    pose[..., :3, :3] = np.diag([sd["position_horizontal_m"]] * 2 + [sd["position_vertical_m"]]) ** 2
-    pose[..., 3:, 3:] = E * angles**2 @ np.swapaxes(E, -1, -2)
-    return pose
+    tilt, heading = np.radians([sd["tilt_deg"], sd["heading_deg"]])
+    return pose_covariance(sd["position_horizontal_m"], sd["position_vertical_m"], tilt, heading, R_nb)
 
 
 def assumed_deviations(flight: Flight) -> dict[str, float]:

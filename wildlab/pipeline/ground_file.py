@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.store import Flight
+from wildlab.geometry.ellipses import ellipse_axes
 from wildlab.geometry.frames import ned_to_geodetic
-from wildlab.geometry.uncertainty import ellipse_axes
 from wildlab.pipeline.geopackage import Layer, write_geopackage
 from wildlab.pipeline.georeference import covariances_of
 

@@ -23,31 +23,35 @@ from wildlab.flight.learnt import (
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, quaternion_to_matrix
 from wildlab.pipeline.accuracy import noise_without
-from wildlab.pipeline.diagnose import Diagnosis, diagnose
+from wildlab.pipeline.diagnose import diagnose
+from wildlab.pipeline.diagnosis import Diagnosis
 from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import Observations, calibrated, georeference, observe
 from wildlab.pipeline.pose_noise import as_deviations
+from wildlab.pipeline.repeats import compare_sightings
 
 __all__ = ["Applied", "apply_learnt", "corrected_flight", "learn_flight", "learn_from", "parse_learnt"]
 
 #: Heights that differ by more than this factor weigh angles and positions otherwise.
 OTHER_HEIGHT = 1.25
 _PLACE = ("north", "east", "down")
+_TURN = ("q_w", "q_x", "q_y", "q_z")
 _SCALES = {"deg": 180 / np.pi, "%": 100.0}
 
 
 def learn_flight(
     flight: Flight, rng: np.random.Generator, source: str | None = None
 ) -> tuple[Learnt, Diagnosis]:
-    """Learn on a flight's known points what is constantly wrong, and how noisy its poses are.
+    """Learn on a flight's points what is constantly wrong, and how noisy its poses are.
 
     Parameters
     ----------
     flight
-        With pixel detections, poses and truth.
+        With pixel detections and poses, and with truth, or with things that several images show.
     rng
-        Draws the folds.
+        Draws samples of flat rays.
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
@@ -59,11 +63,14 @@ def learn_flight(
     Raises
     ------
     WildlabError
-        Where fewer than six images show a known point, or poses are not clear.
+        Where fewer than six images show a known point, or one that another image shows too, or poses are not
+        clear.
     """
     observations = observe(flight, source)
-    scored = score_points(flight, georeference(flight, observations, rng))
-    diagnosis = diagnose(flight, observations, scored, rng, source)
+    points = georeference(flight, observations, rng)
+    known = flight.truth is not None
+    scored = score_points(flight, points) if known else compare_sightings(points)
+    diagnosis = diagnose(flight, observations, scored, source, places_known=known)
     return learn_from(flight, observations, diagnosis, rng, source), diagnosis
 
 
@@ -112,7 +119,8 @@ def learn_from(
         )
         scales.append(scale)
     covariance = calibration.covariance * np.outer(scales, scales) if scales else np.zeros((0, 0))
-    noise = as_deviations(noise_without(flight, observations, diagnosis, rng, source))
+    learnt = diagnosis.noise if diagnosis.noise is not None and not diagnosis.places_known else None
+    noise = as_deviations(learnt or noise_without(flight, observations, diagnosis, rng, source))
     return Learnt(
         learnt_on=LearntOn(
             flight=flight.name,
@@ -210,7 +218,7 @@ def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flig
     Returns
     -------
     Flight
-        With other clock, mount, camera and positions of that source.
+        With other clock, mount, camera, positions and heading of that source.
     """
     calibration, m = _calibration(learnt), flight.manifest
     name, nav = flight.pose_source(source)
@@ -222,7 +230,13 @@ def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flig
         m,
         {
             "clocks": {"camera_offset_s": m.clocks.camera_offset_s + calibration.value("clock")},
-            "camera": {"fx_px": camera.fx, "fy_px": camera.fy, "cx_px": camera.cx, "cy_px": camera.cy},
+            "camera": {
+                "fx_px": camera.fx,
+                "fy_px": camera.fy,
+                "cx_px": camera.cx,
+                "cy_px": camera.cy,
+                "k1": camera.distortion[0],
+            },
             "mount": {
                 "misalignment_roll_deg": float(roll),
                 "misalignment_tilt_deg": float(tilt),
@@ -231,6 +245,8 @@ def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flig
         },
     )
     moved = nav.assign(**{f"{axis}_m": nav[f"{axis}_m"] + calibration.value(axis) for axis in _PLACE})
+    turned = euler_to_matrix(0.0, 0.0, calibration.value("heading")) @ quaternion_to_matrix(nav[[*_TURN]])
+    moved[[*_TURN]] = matrix_to_quaternion(turned)
     return replace(flight, manifest=changed, nav={**flight.nav, name: moved})
 
 

@@ -72,7 +72,9 @@ class Errors(NamedTuple):
 class Studied(NamedTuple):
     """A flight, navigated and scored at certain times (K,) against one of its nav sources.
 
-    ``receiver`` is how the receiver of a logged flight errs, or None where ``refusal`` says why not.
+    ``receiver`` is how the receiver of a logged flight errs, or None where ``refusal`` says why not. What is
+    judged first is ``mekf``, with what is stated of the sensors: ``mekf-receiver``, where there is one, has a
+    noise that was found on the flight itself.
     """
 
     flight: Flight
@@ -82,11 +84,6 @@ class Studied(NamedTuple):
     scored: dict[str, Errors]
     receiver: Receiver | None = None
     refusal: str = ""
-
-    @property
-    def filter(self) -> str:
-        """Subject of the filter that is to be believed: with the receiver's noise as found, where it was."""
-        return "mekf-receiver" if "mekf-receiver" in self.found else "mekf"
 
 
 def reference_of(flight: Flight) -> str:
@@ -328,7 +325,9 @@ def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tupl
         for name, value in summarise(errors, begin, end).items()
         if np.isfinite(value) and not name.startswith(tuple(hidden))
     }
-    for subject in dict.fromkeys(["mekf", studied.filter]):
+    for subject in ("mekf", "mekf-receiver"):
+        if subject not in studied.found:
+            continue
         for row in summarise_innovations(studied.found[subject], begin, end).to_dict(orient="records"):
             source = row["source"].replace(" ", "_")
             numbers[subject, f"nis_{source}"] = row["nis"]

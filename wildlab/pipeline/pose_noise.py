@@ -7,10 +7,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
 from wildlab.flight.store import Flight
+from wildlab.geometry.attitude_uncertainty import level_axes, tilt_and_heading
 from wildlab.geometry.calibration import split_images
-from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.uncertainty import ground_jacobians
 from wildlab.pipeline.calibrate import fit_flight
 from wildlab.pipeline.evaluate import blocks_of, errors_of, known_points, score_points
@@ -60,16 +61,15 @@ def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFr
     o, _ = known_points(flight, observations, scored)
     errors = errors_of(scored.set_index("detection_id").loc[o.table["detection_id"]])
     J = ground_jacobians(o.poses, o.uv, o.plane_down)
-    roll, pitch, _ = matrix_to_euler(o.poses.R_nb).T
     derivatives = J.pose.copy()
-    derivatives[:, :, 3:] = J.pose[:, :, 3:] @ euler_errors_to_body(roll, pitch)
+    derivatives[:, :, 3:] = J.pose[:, :, 3:] @ level_axes(o.poses.R_nb)
     sd = used_deviations(flight, o)
     plane = sd["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
     assumed = {
         "position_horizontal": sd["position_horizontal_m"],
         "position_vertical": sd["position_vertical_m"],
-        "roll_pitch": float(np.radians((sd["roll_deg"] + sd["pitch_deg"]) / 2)),
-        "yaw": float(np.radians(sd["yaw_deg"])),
+        "tilt": float(np.radians(sd["tilt_deg"])),
+        "heading": float(np.radians(sd["heading_deg"])),
         "pixel": sd["pixel_px"],
     }
     images = o.table["frame_id"].to_numpy()
@@ -100,15 +100,13 @@ def used_deviations(
     covariance = observations.poses.covariance
     if covariance is None or assumed is not None or not np.isfinite(covariance).any():
         return sd
-    roll, pitch, _ = matrix_to_euler(observations.poses.R_nb).T
-    to_euler = np.linalg.inv(euler_errors_to_body(roll, pitch))
-    attitude = to_euler @ covariance[:, 3:, 3:] @ np.swapaxes(to_euler, 1, 2)
     own = np.sqrt(np.nanmean(np.diagonal(covariance, axis1=1, axis2=2), axis=0))
-    angles = np.degrees(np.sqrt(np.nanmean(np.diagonal(attitude, axis1=1, axis2=2), axis=0)))
+    tilt, heading = tilt_and_heading(covariance[:, 3:, 3:], observations.poses.R_nb)
     return sd | {
         "position_horizontal_m": float(np.sqrt((own[:2] ** 2).mean())),
         "position_vertical_m": float(own[2]),
-        **{f"{name}_deg": float(angle) for name, angle in zip(("roll", "pitch", "yaw"), angles, strict=True)},
+        "tilt_deg": float(np.degrees(np.sqrt(np.nanmean(tilt**2)))),
+        "heading_deg": float(np.degrees(np.sqrt(np.nanmean(heading**2)))),
     }
 
 
@@ -152,8 +150,8 @@ def estimate_from_sighting(flight: Flight, seen: Sighting) -> PoseNoise:
     assumed = {
         "position_horizontal": float(stated[:2].mean()),
         "position_vertical": float(stated[2]),
-        "roll_pitch": float(stated[3:5].mean()),
-        "yaw": float(stated[5]),
+        "tilt": float(stated[3:5].mean()),
+        "heading": float(stated[5]),
         "pixel": usual["pixel_px"],
     }
     plane = usual["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
@@ -163,20 +161,18 @@ def estimate_from_sighting(flight: Flight, seen: Sighting) -> PoseNoise:
 
 def covariance_of(noise: PoseNoise) -> Array:
     """The covariance (6, 6) of a pose with estimated deviations, H (7.39): position in n, attitude in b."""
-    level, angle = noise.sd["position_horizontal"], noise.sd["roll_pitch"]
-    sd = [level, level, noise.sd["position_vertical"], angle, angle, noise.sd["yaw"]]
+    level, angle = noise.sd["position_horizontal"], noise.sd["tilt"]
+    sd = [level, level, noise.sd["position_vertical"], angle, angle, noise.sd["heading"]]
     return np.diag(np.square(sd))
 
 
-def as_deviations(noise: PoseNoise) -> dict[str, float]:
+def as_deviations(noise: PoseNoise | WanderNoise) -> dict[str, float]:
     """Estimated deviations under the names that ``pose_errors`` takes."""
-    roll_pitch = float(np.degrees(noise.sd["roll_pitch"]))
     return {
         "position_horizontal_m": noise.sd["position_horizontal"],
         "position_vertical_m": noise.sd["position_vertical"],
-        "roll_deg": roll_pitch,
-        "pitch_deg": roll_pitch,
-        "yaw_deg": float(np.degrees(noise.sd["yaw"])),
+        "tilt_deg": float(np.degrees(noise.sd["tilt"])),
+        "heading_deg": float(np.degrees(noise.sd["heading"])),
         "pixel_px": noise.sd["pixel"],
     }
 

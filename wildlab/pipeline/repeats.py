@@ -1,4 +1,4 @@
-"""A flight without truth: how far apart sightings of the same thing lie, and what that cannot tell."""
+"""A flight without truth: how far apart sightings of the same thing lie, and which constant error is why."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
+from wildlab.evaluation.causes import mean_of_others
 from wildlab.evaluation.sightings import Spread, spread_of_sightings
 from wildlab.flight.store import Flight
+from wildlab.pipeline.diagnose import diagnose
+from wildlab.pipeline.diagnosis import FEWEST_IMAGES, Diagnosis
 from wildlab.pipeline.georeference import Observations, covariances_of, georeference
 
 
@@ -26,15 +29,46 @@ class Repeats(NamedTuple):
         Of the sightings of things that were seen in two images or more; None where there are none.
     things
         Names of the things, most seen first, with their sightings, images and spread (m per axis).
+    diagnosis
+        Which constant error makes sightings of the same thing lie apart; None where fewer than six images
+        show a thing that another image shows too.
     """
 
     points: pd.DataFrame
     lost: int
     spread: Spread | None
     things: pd.DataFrame
+    diagnosis: Diagnosis | None = None
 
 
-def judge_repeats(flight: Flight, observations: Observations, rng: np.random.Generator) -> Repeats:
+def compare_sightings(points: pd.DataFrame) -> pd.DataFrame:
+    """Distance of each sighting to the mean of those of the same thing in other images.
+
+    Parameters
+    ----------
+    points
+        From `wildlab.pipeline.georeference.georeference`.
+
+    Returns
+    -------
+    DataFrame
+        The points that name a thing, with ``truth_id`` (its name), ``error_north_m``, ``error_east_m`` and
+        ``error_m``, as from `wildlab.pipeline.evaluate.score_points`; NaN where no other image shows it.
+    """
+    named = points[points["target_id"].astype(str) != ""].reset_index(drop=True)
+    xy, things = named[["north_m", "east_m"]].to_numpy(float), named["target_id"].to_numpy(str)
+    images, error = named["frame_id"].to_numpy(str), np.full((len(named), 2), np.nan)
+    for image in np.unique(images):
+        own = images == image
+        error[own] = (xy - mean_of_others(xy, things, ~own))[own]
+    return named.assign(
+        truth_id=things, error_north_m=error[:, 0], error_east_m=error[:, 1], error_m=np.hypot(*error.T)
+    )
+
+
+def judge_repeats(
+    flight: Flight, observations: Observations, rng: np.random.Generator, source: str | None = None
+) -> Repeats:
     """Place a flight's detections and compare the sightings of each thing with each other.
 
     Parameters
@@ -45,6 +79,8 @@ def judge_repeats(flight: Flight, observations: Observations, rng: np.random.Gen
         From `observe`.
     rng
         Draws samples of flat rays.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Returns
     -------
@@ -81,4 +117,8 @@ def judge_repeats(flight: Flight, observations: Observations, rng: np.random.Gen
     things = (
         pd.DataFrame(rows).sort_values("sightings", ascending=False, kind="stable").reset_index(drop=True)
     )
-    return Repeats(points, int(np.isnan(xy[:, 0]).sum()), spread, things)
+    compared = compare_sightings(points)
+    located = np.isfinite(compared["error_m"]) & np.isfinite(compared["cov_nn"])
+    enough = compared.loc[located, "frame_id"].nunique() >= FEWEST_IMAGES
+    diagnosis = diagnose(flight, observations, compared, source, places_known=False) if enough else None
+    return Repeats(points, int(np.isnan(xy[:, 0]).sum()), spread, things, diagnosis)

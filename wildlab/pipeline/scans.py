@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.evaluation.position_noise import estimate_position_noise
 from wildlab.flight.checks.sensors import looks_of_others
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
@@ -324,6 +325,24 @@ def truths_at(flight: Flight, times: ArrayLike) -> list[Truth]:
         Truth(name, p[:, :2], (a - b)[:, :2] / OVER_S, float(np.nan_to_num(sd.get(name, 0.0))))
         for name, p, a, b in zip(names, position, ahead, behind, strict=True)
     ]
+
+
+def truth_deviations(flight: Flight) -> tuple[dict[str, float], list[str]]:
+    """Standard deviations of the true places by target, m, each axis: stated, else estimated, else zero; and
+    for which targets it is estimated."""
+    found: dict[str, float] = {}
+    estimated: list[str] = []
+    for name, own in flight.table("truth").groupby("target_id"):
+        named = own["sd_horizontal_m"] if "sd_horizontal_m" in own else pd.Series(dtype=float)
+        stated = named.dropna()
+        if len(stated):
+            sd = float(stated.median())
+        else:
+            times, places = own["time_s"].to_numpy(float), own[["north_m", "east_m"]].to_numpy(float)
+            sd = float(np.sqrt(np.mean(estimate_position_noise(times, places) ** 2)))
+            estimated += [str(name)] * bool(np.isfinite(sd))
+        found[str(name)] = sd if np.isfinite(sd) else 0.0
+    return found, estimated
 
 
 def _inside(nav: pd.DataFrame, times: Array) -> Array:

@@ -95,7 +95,7 @@ def test_without_errors_detections_are_where_the_animals_are() -> None:
 
 
 @pytest.mark.parametrize("heading", [0.6, 2.5])
-@pytest.mark.parametrize("errors", [SOME, ROLLS, PITCHES])
+@pytest.mark.parametrize("errors", [SOME, ROLLS, PITCHES, NONE])
 def test_covariances_are_those_of_many_flights(heading: float, errors: ExecutionErrors) -> None:
     rng = np.random.default_rng(2)
     count = 6000

@@ -198,8 +198,11 @@ def test_what_is_considered_of_a_camera_is_in_its_pose() -> None:
     own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
     known = replace(observed, poses=replace(observed.poses, covariance=own))
     on_top = told_errors(flight, known, belief).pose - own
-    expected = np.diag([0, 16.0, 0, 0, 0, np.radians(9.0) ** 2])
-    assert np.allclose(on_top, expected)
+    R = observed.poses.R_nb
+    assert np.allclose(on_top[:, :3, :3], np.diag([0, 16.0, 0]))
+    in_n = R @ on_top[:, 3:, 3:] @ np.swapaxes(R, 1, 2)
+    seen = np.isfinite(R).all(axis=(1, 2))
+    assert np.allclose(in_n[seen], np.diag([0, 0, np.radians(9.0) ** 2]), atol=1e-12)
 
 
 @pytest.mark.slow
@@ -208,7 +211,7 @@ def test_what_is_believed_of_poses_is_said_with_its_source() -> None:
     name = str(flight.table("detections")["source"].iloc[0])
     scans = scans_of(flight, name, 0.0, "autopilot")
     none = flight.manifest.uncertainty.model_copy(update=dict.fromkeys(
-        ("position_horizontal_m", "position_vertical_m", "roll_deg", "pitch_deg", "yaw_deg", "plane_height_m")
+        ("position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg", "plane_height_m")
     ))  # fmt: skip
     bare = replace(flight, manifest=flight.manifest.model_copy(update={"uncertainty": none}))
     said = {one.what: (one.value, one.source) for one in said_of_pixels(bare, scans, None)}
@@ -219,11 +222,14 @@ def test_what_is_believed_of_poses_is_said_with_its_source() -> None:
     part = parse_settings(text).sensors[name]
     _, told = of_sensor(bare, scans, of_flight(bare, parse_settings(text)))
     said = {one.what: (one.value, one.source) for one in said_of_pixels(bare, scans, part)}
-    assert "error of the heading, SD" not in said and "error of the roll, SD" in said
+    assert "error of the heading, SD" not in said and "error of the tilt, SD of each level axis" in said
     assert "considered error: heading" in {one.what for one in told}
     poses = replace(scans.poses, covariance=np.tile(np.eye(6), (len(scans.times), 1, 1)))
     said = {one.what: one.source for one in said_of_pixels(bare, scans._replace(poses=poses), None)}
-    assert said["errors of the pose"] == "the poses' own" and "error of the roll, SD" not in said
+    assert (
+        said["errors of the pose"] == "the poses' own"
+        and "error of the tilt, SD of each level axis" not in said
+    )
     assert "error of the ground's height, SD" in said
 
 
@@ -278,21 +284,30 @@ def test_tables_of_tracks_are_smoothed_by_what_lasts() -> None:
     assert not np.allclose(x, np.concatenate([x[:, 0] for x, _ in forever]))
 
 
-def test_an_angle_that_is_off_stays_one_whichever_way_the_airframe_lies() -> None:
-    """Against the rotations themselves; and the whole is the covariance that poses without one are given."""
-    rng = np.random.default_rng(5)
-    angles = rng.uniform(-1, 1, (50, 3)) * [np.pi, 1.4, np.pi]
+def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_last() -> None:
+    told = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
+    flight = robot_flight(labelled=False, seconds=30.0)
+    covariances = []
+    for more in ("", "[sensors.radar]\ncorrelation = 0.0\n", "[sensors.radar]\ncorrelation = 0.8\n"):
+        table = tracks_table(follow_all(flight, settings=parse_settings(more + told)))
+        assert np.isfinite(table["smoothed_north_m"]).all()
+        covariances.append(float(table["smoothed_p_00"].mean()) if "smoothed_p_00" in table else np.nan)
+    assert np.isnan(covariances[0]) and covariances[2] > 1.5 * covariances[1]
+
+
+def test_an_error_of_the_heading_stays_one_whichever_way_the_body_lies() -> None:
+    """A turn about the vertical; and the whole is the covariance that poses without one are given."""
+    angles = np.random.default_rng(5).uniform(-1, 1, (50, 3)) * np.pi
+    angles[:5, 1] = -np.pi / 2
     R = euler_to_matrix(*angles.T)
-    sd = np.array([2.0, 2.0, 3.0, *np.radians([1.0, 1.5, 4.0])])
+    sd = np.array([2.0, 2.0, 3.0, *np.radians([1.5, 1.5, 4.0])])
     roots = stated_roots(R, sd)
-    usual = dict(zip(("position_horizontal_m", "position_vertical_m"), (2.0, 3.0), strict=True))
-    usual |= dict(zip(("roll_deg", "pitch_deg", "yaw_deg"), (1.0, 1.5, 4.0), strict=True))
+    usual = {"position_horizontal_m": 2.0, "position_vertical_m": 3.0, "tilt_deg": 1.5, "heading_deg": 4.0}
     assert np.allclose(roots @ np.swapaxes(roots, 1, 2), assumed_pose_covariance(R, usual))
-    for i in range(3):
-        off = angles.copy()
-        off[:, i] += 1e-6
-        turn = matrix_to_rotation_vector(np.swapaxes(R, 1, 2) @ euler_to_matrix(*off.T)) / 1e-6
-        assert np.allclose(roots[:, 3:, 3 + i], turn * sd[3 + i], atol=1e-5)
+    h = 1e-6
+    turned = euler_to_matrix(0.0, 0.0, h) @ R
+    by_hand = matrix_to_rotation_vector(np.swapaxes(R, 1, 2) @ turned) / h
+    assert np.allclose(roots[:, 3:, 5], by_hand * sd[5], atol=1e-6)
 
 
 @pytest.mark.slow
@@ -311,7 +326,7 @@ def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places() -> None:
     assert known.sum() > 100
     assert np.allclose(shared[known][..., 0], [-sd.position_horizontal_m, 0.0])
     assert np.allclose(shared[known][..., 1], [0.0, -sd.position_horizontal_m])
-    turned = -np.radians(sd.yaw_deg) * np.stack([-away[:, 1], away[:, 0]], axis=-1)
+    turned = -np.radians(sd.heading_deg) * np.stack([-away[:, 1], away[:, 0]], axis=-1)
     assert np.allclose(shared[known][..., 5], turned[known], rtol=1e-6, atol=1e-6)
 
 

@@ -223,18 +223,24 @@ def test_calm_motions_are_told_where_there_are_any() -> None:
 
 
 def test_what_the_truth_may_be_off_is_beside_the_tracks_own() -> None:
-    """Fixes of a receiver that is wrong by metres: without its own error tracks would be called wrong."""
+    """Fixes of a receiver that is wrong by metres: without its own error tracks would be called wrong.
+
+    Where nobody states it, it is estimated from how rough they are.
+    """
     flight = robot_flight(kind="position", seconds=200.0)
     truth = flight.table("truth").copy()
     rng = np.random.default_rng(0)
     truth[["north_m", "east_m"]] += rng.normal(0, 5.0, (len(truth), 2))
     found = []
-    for sd in (0.0, 5.0):
+    for sd in (0.0, 5.0, np.nan):
         off = replace(flight, tables={**flight.tables, "truth": truth.assign(sd_horizontal_m=sd)})
-        lives = judged(follow_all(off))
+        followed = follow_all(off)
+        lives = judged(followed)
         assert lives is not None
         found.append(max(one.anees / 2 for one in lives.tracks.values()))
-    assert found[0] > 5 and found[1] < 1.5
+        assert max(one.anees_alone / 2 for one in lives.tracks.values()) > 5
+    assert found[0] > 5 and found[1] < 1.5 and found[2] < 1.5
+    assert followed.truth_estimated == ["boat"] and followed.truth_sd["boat"] == pytest.approx(5.0, rel=0.1)
 
 
 def test_how_near_a_track_counts_and_whether_others_are_about_is_stated() -> None:

@@ -17,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from wildlab.detection.detections import PART
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic, write_json
+from wildlab.files import write_csv, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import printable, read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
@@ -198,7 +198,7 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
         compared = compare_detectors(ours, detected.detections, others, detected.frames, labels)
         result["compared"] = [one.as_plain() for one in compared]
         result["sentences"] += [line for one in compared for line in compared_sentences(one, compared[0])]
-        write_atomic(wanted.into / "compared.csv", curve_table(compared).to_csv(index=False))
+        write_csv(wanted.into / "compared.csv", curve_table(compared))
     write_json(wanted.into / "result.json", result)
     return result
 

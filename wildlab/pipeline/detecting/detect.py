@@ -16,7 +16,7 @@ import pandas as pd
 from wildlab.detection.detections import Detections, no_detections
 from wildlab.detection.warm import to_grey
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic, write_json
+from wildlab.files import write_atomic, write_csv, write_json
 from wildlab.flight.readers.frames import Frame, Frames
 from wildlab.pipeline.detecting.methods import METHODS
 
@@ -202,8 +202,8 @@ def run_detection(
     detections = _joined(tables, TABLE_COLUMNS)
     of_frames = _joined(rows, FRAME_COLUMNS)
     write_atomic(into / "detections.parquet", _parquet(detections))
-    write_atomic(into / "detections.csv", detections.to_csv(index=False))
-    write_atomic(into / "frames.csv", of_frames.to_csv(index=False))
+    write_csv(into / "detections.csv", detections)
+    write_csv(into / "frames.csv", of_frames)
     return Detected(detections, of_frames, kept)
 
 

@@ -14,7 +14,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.flight.readers.labels import Labels
-from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.geometry.ellipses import inside_ellipse
 
 #: Probability of the ellipses that are held against labels.
 ELLIPSE = 0.9

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.matching import Rule, match
 from wildlab.evaluation.runs import Interval, share_interval
-from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.pipeline.detecting.detect import detect_frame
 from wildlab.pipeline.detecting.fit import Array, Sample
 from wildlab.pipeline.detecting.judged import ELLIPSE

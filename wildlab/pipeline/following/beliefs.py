@@ -21,6 +21,7 @@ from wildlab.pipeline.following.roughness import roughness
 from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.pipeline.georeference import assumed_deviations
 from wildlab.pipeline.scans import Scans
+from wildlab.tracking.considered import TOGETHER
 
 #: Of which noise each element of a measurement has its standard deviation, and in what the file has it.
 NOISE_OF = {
@@ -33,9 +34,8 @@ _OF_PLATFORM = {
     "platform_north": "position_horizontal_m",
     "platform_east": "position_horizontal_m",
     "platform_down": "position_vertical_m",
-    "roll": "roll_deg",
-    "pitch": "pitch_deg",
-    "heading": "yaw_deg",
+    "tilt": "tilt_deg",
+    "heading": "heading_deg",
 }  # fmt: skip
 #: H 7.2.2: measurements further apart than this (s) are taken for independent; but the next look of a slow
 #: sensor is no gap, so it is one and a half looks at least.
@@ -221,9 +221,13 @@ def of_sensor(
         tell(*one)
     stated_noise = part is not None and any(source == STATED for source in sources)
     considered, source = _considered(flight, scans, settings, found, by_tuning)
+    errors = {}
     for error in considered:
+        name = "tilt" if error.name in TOGETHER["tilt"] else error.name.replace("_", " ")
         lasts = "constant" if np.isinf(error.correlation_time_s) else f"for {error.correlation_time_s:.3g} s"
-        tell(f"considered error: {error.name.replace('_', ' ')}", f"{_in_unit(error)}, {lasts}", source)
+        errors[name] = f"{_in_unit(error)}, {lasts}"
+    for name, value in errors.items():
+        tell(f"considered error: {name}", value, source)
     offset = part.clock_offset_s if part is not None else 0.0
     stated_clock = part is not None and "clock_offset_s" in part.model_fields_set
     if tuned is not None and tuned.clock_tuned and not stated_clock:
@@ -309,8 +313,8 @@ def _considered(
     if part is not None and part.considered:
         stated = []
         for name, one in part.considered.items():
-            if name not in SLOTS[scans.kind]:
-                known = ", ".join(slot for slot in SLOTS[scans.kind] if slot)
+            if not _considers(scans, name):
+                known = ", ".join(slot for slot in CONSIDERED if _considers(scans, slot))
                 raise WildlabError(
                     f"the error {name!r} cannot be considered for detections of kind {scans.kind!r}",
                     f"use one of {known}",
@@ -318,7 +322,7 @@ def _considered(
                 )
             sd = np.radians(one.sd) if CONSIDERED[name] == "deg" else one.sd
             time = np.inf if one.correlation_time_s is None else one.correlation_time_s
-            stated.append(Considered(name, float(sd), float(time), one.shared))
+            stated += [Considered(each, float(sd), float(time), one.shared) for each in errors_named(name)]
         return tuple(stated), STATED
     if found is not None and found.considered:
         return found.considered, by_tuning
@@ -326,13 +330,22 @@ def _considered(
         return (), ""
     errors = []
     for name, key in _OF_PLATFORM.items():
-        if name not in SLOTS[scans.kind]:
+        if not _considers(scans, name):
             continue
         assumed = getattr(flight.manifest.uncertainty, key)
         if assumed is not None:
             sd = float(np.radians(assumed)) if key.endswith("deg") else float(assumed)
-            errors.append(Considered(name, sd, np.inf, True))
+            errors += [Considered(each, sd, np.inf, True) for each in errors_named(name)]
     return tuple(errors), "[uncertainty] of flight.toml"
+
+
+def errors_named(name: str) -> tuple[str, ...]:
+    """The errors of `SLOTS` that one of `CONSIDERED` stands for: a tilt is one about each level axis."""
+    return TOGETHER.get(name, (name,))
+
+
+def _considers(scans: Scans, name: str) -> bool:
+    return set(errors_named(name)) <= set(SLOTS[scans.kind])
 
 
 def _noise_words(element: str) -> str:
@@ -349,5 +362,5 @@ def _amount(element: str, value: float) -> str:
 
 
 def _in_unit(error: Considered) -> str:
-    unit = CONSIDERED[error.name]
+    unit = "deg" if error.name in TOGETHER["attitude"] else CONSIDERED[error.name]
     return f"{np.degrees(error.sd):.2g}°" if unit == "deg" else f"{error.sd:.2g} {unit}"

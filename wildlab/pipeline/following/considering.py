@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.following.expected import SLOTS
@@ -15,12 +16,14 @@ from wildlab.tracking.predictions import POSE
 def errors_of(scans: Scans, beliefs: Beliefs) -> Considered | None:
     """Those considered; of poses that have a covariance, that and what is considered beside it."""
     names, blocks, times, shared = [], [], [], []
-    P = None if scans.poses is None else scans.poses.covariance
-    own = P is not None and bool(np.isfinite(P).any())
+    poses = scans.poses
+    own = poses is not None and poses.covariance is not None and bool(np.isfinite(poses.covariance).any())
     n = len(scans.times)
-    if own:
+    if own and poses is not None:
         names += list(POSE)
-        blocks.append(np.array(P, float))
+        turn = np.tile(np.eye(6), (n, 1, 1))
+        turn[:, 3:, 3:] = level_axes(poses.R_nb)
+        blocks.append(np.swapaxes(turn, 1, 2) @ np.asarray(poses.covariance, float) @ turn)
         times += [np.inf] * len(POSE)
         shared += [True] * len(POSE)
     for one in beliefs.considered:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.scans import Scans, Truth
 from wildlab.tracking.measurement import Prediction, Sensor, difference, predict_pixel, predict_range_bearing
 from wildlab.tracking.predictions import POSE, predict_position
 
 _LEVEL = ("platform_north", "platform_east", "heading", "clock")
-#: Errors that may be considered, by kind of detection: the columns of ``H_pose``, in this order.
+#: Errors that may be considered, by kind of detection: the columns of ``H_pose``, in this order. Those of a
+#: camera's attitude are about level axes and the vertical, see `wildlab.geometry.attitude_uncertainty`.
 SLOTS: dict[str, tuple[str, ...]] = {
     "position": _LEVEL,
     "range-bearing": (*_LEVEL, "range_bias"),
@@ -59,7 +61,9 @@ def _predict(scans: Scans, rows: int | slice, p: Array, v: Array, drift: Array) 
             raise AssertionError("pixels have poses")
         taken = scans.poses.take(rows) if isinstance(rows, int) else scans.poses
         seen = predict_pixel(p, taken, scans.plane_down[rows])
-        return _with(seen, seen.H_pose, seen.z, seen.H_position, drift)
+        pose = seen.H_pose.copy()
+        pose[..., 3:] = pose[..., 3:] @ level_axes(taken.R_nb)
+        return _with(seen, pose, seen.z, seen.H_position, drift)
     platform = scans.platform[rows]
     if scans.kind == "position":
         seen = predict_position(p, platform)

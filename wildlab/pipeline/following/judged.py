@@ -29,6 +29,8 @@ from wildlab.pipeline.following.sensor_tracks import SensorTrack
 FEW_INDEPENDENT = 30.0
 #: Of fewer values than this nothing is judged: nearly any filter would pass.
 FEWEST = 5
+#: The metric whose subject is the filter that a page speaks of.
+LEADING = "leading_filter"
 CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN = "consistent", "overconfident", "too cautious", "not judged"
 
 
@@ -86,6 +88,38 @@ def judged(followed: Followed) -> pd.DataFrame:
     the target in sight.
     """
     return pd.DataFrame([_row(one, kind_of(followed, one.sensor)) for one in followed.tracks])
+
+
+def leading_filter(rows: pd.DataFrame) -> str:
+    """The filter that is spoken of: of those with most consistent tracks the one of least error.
+
+    Parameters
+    ----------
+    rows
+        From `judged`. Without truth NIS takes the place of errors and of
+        NEES; smoothed tracks, and those of all sensors together where there are others, do not count.
+
+    Returns
+    -------
+    str
+    """
+    alone = rows[~rows["filter"].str.endswith(SMOOTHED)]
+    alone = alone if (alone["kind"] == TOGETHER).all() else alone[alone["kind"] != TOGETHER]
+    truth = bool((alone["compared"] > 0).any())
+    ratio = (alone["nis"] / alone["dof"]).where(alone["nis"] > 0)
+    off = alone["rmse"] if truth else pd.Series(np.abs(np.log(ratio)), alone.index)
+    # Beside the best filter on the same target: filters need not have the same tracks.
+    least = off.groupby([alone["sensor"], alone["target"]]).transform("min")
+    of = alone["filter"]
+    consistent = (alone["verdict" if truth else "nis_verdict"] == CONSISTENT).groupby(of).sum()
+    worse = (off - least if not truth else off / least).groupby(of).median().fillna(np.inf)
+
+    def order(name: str) -> tuple[int, bool, float, bool]:
+        # Innovations do not show an error that lasts: without truth the white filter comes after its equals.
+        white = name == "ekf"
+        return -consistent[name], white and not truth and consistent[name] > 0, worse[name], white
+
+    return str(min(dict.fromkeys(of), key=order))
 
 
 def kind_of(followed: Followed, sensor: str) -> str:

@@ -295,6 +295,7 @@ COLUMNS = {
     "rmse": "m",
     "mae": "m",
     "anees": "1",
+    "anees_alone": "1",
     "anis": "1",
     "lag1_autocorrelation_north": "1",
     "lag1_autocorrelation_east": "1",
@@ -311,7 +312,8 @@ def table(followed: Sequence[SensorTrack], size_m: float = float("nan")) -> pd.D
     ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used; ``compared``, scans with a track and
     truth; ``nees_low`` and ``nees_high``, the 95 % interval of the mean NEES of a consistent filter, for as
     many values as the correlated ones are worth; ``nis_low`` and ``nis_high`` likewise. ``anees`` is of the
-    position, 2 is right; ``anis`` is of the detections that were let in, 2 or 1 is right, by the elements of
+    position, 2 is right, with the truth's own error where it is stated, and ``anees_alone`` with the truth
+    taken for exact; ``anis`` is of the detections that were let in, 2 or 1 is right, by the elements of
     a measurement. ``share_followed``: of the scans with truth, those that have a track. ``seen``: scans in
     which the sensor saw something near the target's true place, and ``share_with_target``: in how many of
     them a track is nearer to it than ``size_m``; NaN where that is.
@@ -325,6 +327,7 @@ def _row(one: SensorTrack, size_m: float) -> dict[str, object]:
     used = one.innovation[np.isfinite(one.nis)]
     lag1 = [_lag1(column) for column in used.T]
     nees, nis = average(one.nees, 2, _worth(one.nees)), average(one.nis, m, _worth(one.nis))
+    alone = position_nees(one.error[:, :2], one.covariance[:, :2, :2])
     on = np.isfinite(one.error[:, 0])
     there = np.hypot(*one.error[:, :2].T) < size_m  # NaN, where there is no track, is not there
     return {
@@ -337,6 +340,7 @@ def _row(one: SensorTrack, size_m: float) -> dict[str, object]:
         "rmse": summary.rmse,
         "mae": summary.mae,
         "anees": nees.mean,
+        "anees_alone": average(alone, 2, _worth(alone)).mean,
         "nees_low": nees.low,
         "nees_high": nees.high,
         "anis": nis.mean,

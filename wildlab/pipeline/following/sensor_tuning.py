@@ -47,7 +47,7 @@ class SensorTuning(NamedTuple):
         Of the error of each element, m or rad, standing part included.
     share, correlation_time_s
         The autocorrelation of the errors: ``share * exp(-lag / correlation_time_s)`` beyond lag zero.
-    position_sd_m, clock_sd_s, yaw_sd_rad
+    position_sd_m, clock_sd_s, heading_sd_rad
         What the part of the variance that stays from scan to scan is put down to.
     range_m, range_sd_m
         How far away what the sensor saw was: all that is known of the distance at a first bearing.
@@ -57,8 +57,8 @@ class SensorTuning(NamedTuple):
         Errors it is from.
     own_sds
         Of each element, where they are of several units; ``sd`` is then in metres across the line of sight.
-    range_bias_sd_m, roll_pitch_sd_rad
-        As ``yaw_sd_rad``, for sensors that measure ranges, and for cameras.
+    range_bias_sd_m, tilt_sd_rad
+        As ``heading_sd_rad``, for sensors that measure ranges, and for cameras (about each level axis).
     """
 
     sensor: str
@@ -71,14 +71,14 @@ class SensorTuning(NamedTuple):
     correlation_time_s: float
     position_sd_m: float
     clock_sd_s: float
-    yaw_sd_rad: float
+    heading_sd_rad: float
     range_m: float
     range_sd_m: float
     interval_s: float
     n: int
     own_sds: tuple[float, ...] = ()
     range_bias_sd_m: float = 0.0
-    roll_pitch_sd_rad: float = 0.0
+    tilt_sd_rad: float = 0.0
 
     @property
     def clock_tuned(self) -> bool:
@@ -93,8 +93,8 @@ class SensorTuning(NamedTuple):
     @property
     def considered(self) -> dict[str, float]:
         """Standard deviations of errors that last, by name, m, s or rad; those that are zero too."""
-        sds = (self.position_sd_m, self.clock_sd_s, self.yaw_sd_rad, self.range_bias_sd_m,
-               self.roll_pitch_sd_rad)  # fmt: skip
+        sds = (self.position_sd_m, self.clock_sd_s, self.heading_sd_rad, self.range_bias_sd_m,
+               self.tilt_sd_rad)  # fmt: skip
         return {name: sd for group, sd in zip(GROUPS, sds, strict=True) for name in group}
 
     @property
@@ -203,7 +203,7 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
         low, high = float(near.min()), float(near.max())
     share, correlation_time = _autocorrelation(errors, sds if own else np.ones(1), scans.interval_s)
     lasting = _considered(errors, sds, share * np.exp(-scans.interval_s / correlation_time))
-    position, clock, yaw, range_bias, roll_pitch = lasting
+    position, clock, heading, range_bias, tilt = lasting
     distance = np.concatenate(
         [np.hypot(*(one.truth.position - scans.platform).T)[np.isfinite(one.error[:, 0])] for one in errors]
     )
@@ -218,14 +218,14 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
         correlation_time,
         position,
         clock,
-        yaw,
+        heading,
         float(distance.mean()),
         float(distance.std()),
         scans.interval_s,
         n,
         own,
         range_bias,
-        roll_pitch,
+        tilt,
     )
 
 

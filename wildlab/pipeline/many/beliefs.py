@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.following import HullPart, ManyTargetsPart, Settings, read_settings
+from wildlab.flight.following import HullPart, ManyTargetsPart, SensorPart, Settings, read_settings
 from wildlab.paths import DATA
 from wildlab.pipeline.following.beliefs import ASSUMED, STATED, Said
 from wildlab.pipeline.following.beliefs import TargetBeliefs as Following
-from wildlab.pipeline.many.places import Places
+from wildlab.pipeline.many.places import PLACED, Places
 from wildlab.tracking.many import Hull, SensorBeliefs, TargetBeliefs
 
 Array = NDArray[np.float64]
@@ -181,6 +182,12 @@ def _of_sensor(
         looks.bearings,
         hull_values["near_end_m"],
     )
+    if looks.kind in PLACED and looks.kind != "pixel":
+        share, lasts = lasting_share(part)
+        words = f"{share:.2g}, for {lasts:.3g} s" if share else "0"
+        source = ASSUMED if part is None or part.correlation is None else STATED
+        said.append(Said(looks.sensor, "share of the errors' variance that lasts", words, source))
+        found = found._replace(correlation=share, lasting_s=lasts)
     for name, what in _HULLS.items():
         own = stated is not None and bool(getattr(stated, name))
         values = ", ".join(f"{value:.3g}" for value in hull_values[name])
@@ -194,6 +201,28 @@ def _of_sensor(
         )
     )
     return found, said
+
+
+def lasting_share(part: SensorPart | None) -> tuple[float, float]:
+    """Share of the variance of a sensor's errors that lasts, and for how long, s; zero where nobody says."""
+    if part is None or not part.correlation:
+        return 0.0, 0.0
+    return part.correlation, part.correlation_time_s or np.inf
+
+
+def unknown_lasting(settings: Settings, places: Mapping[str, Places]) -> list[str]:
+    """Sensors of which nobody says how long their errors last.
+
+    It is said by ``correlation``, zero too, or considered errors; of a camera's pixels by
+    ``correlation_time_s`` or considered errors, of bearings by ``thinning_s``.
+    """
+    found = []
+    for name, one in places.items():
+        part = settings.sensors.get(name)
+        key = {"pixel": "correlation_time_s", "bearing": "thinning_s"}.get(one.kind, "correlation")
+        if part is None or (getattr(part, key) is None and (one.bearings or not part.considered)):
+            found.append(name)
+    return found
 
 
 def _usual() -> ManyTargetsPart:

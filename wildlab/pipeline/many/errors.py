@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from wildlab.flight.following import SensorPart
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
+from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.terrain import pixels_to_terrain
 from wildlab.geometry.terrain_uncertainty import terrain_jacobians
 from wildlab.geometry.uncertainty import PoseErrors, ground_jacobians
-from wildlab.pipeline.following.beliefs import ASSUMED, STATED, Beliefs, Said
+from wildlab.pipeline.following.beliefs import ASSUMED, STATED, Beliefs, Said, errors_named
 from wildlab.pipeline.following.considering import errors_of
 from wildlab.pipeline.following.expected import SLOTS, predict_scan
 from wildlab.pipeline.georeference import (
@@ -45,7 +45,7 @@ class Errors(NamedTuple):
 
 
 #: Angles of `wildlab.pipeline.georeference.USUAL`.
-_DEGREES = {"roll": "roll_deg", "pitch": "pitch_deg", "heading": "yaw_deg"}
+_DEGREES = {"roll": "tilt_deg", "pitch": "tilt_deg", "heading": "heading_deg"}
 _METRES = {
     "platform_north": "position_horizontal_m",
     "platform_east": "position_horizontal_m",
@@ -55,9 +55,8 @@ _OF_PLATFORM = _METRES | _DEGREES
 _SHARED = {
     "position_horizontal_m": "error of the camera's position, SD of north and of east",
     "position_vertical_m": "error of the camera's height, SD",
-    "roll_deg": "error of the roll, SD",
-    "pitch_deg": "error of the pitch, SD",
-    "yaw_deg": "error of the heading, SD",
+    "tilt_deg": "error of the tilt, SD of each level axis",
+    "heading_deg": "error of the heading, SD",
     "misalignment_deg": "error of the mount, SD of each axis",
     "plane_height_m": "error of the ground's height, SD",
 }
@@ -80,10 +79,9 @@ def told_errors(flight: Flight, observed: Observations, beliefs: Beliefs) -> Pos
         return errors._replace(pose=roots @ np.swapaxes(roots, 1, 2))
     pose = np.array(np.broadcast_to(errors.pose, (len(observed.uv), 6, 6)))
     unknown = ~np.isfinite(pose).all(axis=(1, 2))
-    for one in beliefs.considered:
-        if one.name in POSE:
-            place = POSE.index(one.name)
-            pose[:, place, place] += one.sd**2
+    on_top = {one.name: one.sd for one in beliefs.considered}
+    roots = stated_roots(observed.poses.R_nb, np.array([on_top.get(name, 0.0) for name in POSE]))
+    pose += roots @ np.swapaxes(roots, 1, 2)
     if unknown.any():
         # Where the log says nothing for a while, what is stated or usual is taken.
         pose[unknown] = assumed_pose_covariance(observed.poses.R_nb, assumed_deviations(flight))[unknown]
@@ -113,19 +111,20 @@ def stated_roots(R_nb: Array, sd: Array) -> Array:
     -------
     (N, 6, 6)
         A column for each error: position in n, m, and rotation vector in b, rad. Times its transpose it is
-        the covariance; and an error of roll, pitch or heading stays one, whichever way the airframe lies.
+        the covariance. Errors of the attitude are about the axes of `level_axes`: one of the heading stays
+        one, whichever way the body lies.
     """
-    roll, pitch, _ = np.moveaxis(matrix_to_euler(R_nb), -1, 0)
     roots = np.zeros((len(R_nb), 6, 6))
     roots[:, :3, :3] = np.diag(sd[:3])
-    roots[:, 3:, 3:] = euler_errors_to_body(roll, pitch) * sd[3:]
+    roots[:, 3:, 3:] = level_axes(R_nb) * sd[3:]
     return roots
 
 
 def said_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> list[Said]:
     """What is believed of the errors that all pixels of an image share, and who says so."""
     said, stated = [], flight.manifest.uncertainty
-    taken = {_OF_PLATFORM.get(name) for name in ({} if part is None else part.considered)}
+    stated_names = {} if part is None else part.considered
+    taken = {_OF_PLATFORM.get(each) for name in stated_names for each in errors_named(name)}
     own = scans.poses is not None and scans.poses.covariance is not None
     if own:
         said.append(Said(scans.sensor, "errors of the pose", "as the poses say", "the poses' own"))
@@ -265,7 +264,8 @@ def lasting_of(part: SensorPart | None) -> float:
         return 0.0
     if part.correlation_time_s is not None:
         return float(part.correlation_time_s)
-    times = [one.correlation_time_s for name, one in part.considered.items() if name in POSE]
+    of_pose = [one for name, one in part.considered.items() if set(errors_named(name)) <= set(POSE)]
+    times = [one.correlation_time_s for one in of_pose]
     return min((np.inf if one is None else float(one) for one in times), default=0.0)
 
 

@@ -22,11 +22,19 @@ from wildlab.pipeline.following.follow import (
     refuse_without_times,
     sensors_with_detections,
 )
-from wildlab.pipeline.many.beliefs import of_many
+from wildlab.pipeline.many.beliefs import of_many, unknown_lasting
 from wildlab.pipeline.many.errors import UNKNOWN_EFFECT, laid_out, lasting_of, said_of_pixels
 from wildlab.pipeline.many.places import ABLE, Places, places_of, thinned
-from wildlab.pipeline.scans import scans_of, truths_at
-from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many, smooth_many
+from wildlab.pipeline.scans import scans_of, truth_deviations, truths_at
+from wildlab.tracking.many import (
+    Scan,
+    SensorBeliefs,
+    Shown,
+    TargetBeliefs,
+    own_lasting,
+    run_many,
+    smooth_many,
+)
 
 Array = NDArray[np.float64]
 
@@ -58,9 +66,15 @@ class Followed(NamedTuple):
     cutoff_m
         From this distance a track is on no target: what is believed of how near detections are.
     truth_sd
-        By target's name, m: how well its true place is known, each axis; zero where nobody says.
+        By target's name, m: how well its true place is known, each axis, as stated, else as its positions
+        tell (`wildlab.evaluation.position_noise`): errors that last for longer than from one to the next are
+        not in it. Zero where they do not tell.
+    truth_estimated
+        Names of the targets for which it is estimated.
     others
         Whether targets are about of which no true place is known.
+    unknown_lasting
+        Sensors of which nobody says how long their errors last.
     """
 
     scans: list[Scan]
@@ -76,6 +90,8 @@ class Followed(NamedTuple):
     cutoff_m: float = CUTOFF_M
     truth_sd: Mapping[str, float] = {}
     others: bool = False
+    unknown_lasting: Sequence[str] = ()
+    truth_estimated: Sequence[str] = ()
 
     @property
     def minutes(self) -> float:
@@ -164,12 +180,14 @@ def follow_all(
     pairs.sort(key=lambda pair: pair[0].time)
     scans = [scan for scan, _ in pairs]
     shown = run_many(scans, beliefs.sensors, beliefs.targets, lasting_s)
-    truth, truth_sd = {}, {}
+    truth: dict[str, Array] = {}
+    truth_sd: dict[str, float] = {}
+    estimated: list[str] = []
     if flight.truth is not None and len(flight.truth):
         times = np.array([scan.time for scan in scans])
         known = truths_at(flight, times)
         truth = {one.target: one.position for one in known}
-        truth_sd = {one.target: one.sd_m for one in known}
+        truth_sd, estimated = truth_deviations(flight)
     return Followed(
         scans,
         [names for _, names in pairs],
@@ -184,6 +202,8 @@ def follow_all(
         following.reach_m if np.isfinite(following.reach_m) else CUTOFF_M,
         truth_sd,
         bool(told.targets.many is not None and told.targets.many.others),
+        unknown_lasting(told, places),
+        estimated,
     )
 
 
@@ -274,11 +294,14 @@ def tracks_table(followed: Followed) -> pd.DataFrame:
     DataFrame
         ``time_s``, ``sensor`` of the look, ``track``; the state in metres and m/s in n, ``p_ij`` its
         covariance, the upper triangle; ``existence``; the probability of each kind of hull; and the place
-        with its covariance once the flight is over (`smooth_many`), ``smoothed_``.
+        once the flight is over (`smooth_many`), ``smoothed_``. Its covariance is left out where nobody says
+        of a sensor how long its errors last: an error that lasts is averaged by no smoother, which would take
+        it for noise and report a third of the error that is there.
     """
     names = [one.name for one in followed.sensors]
     rows = []
-    after = smooth_many(followed.shown, followed.targets.density, followed.lasting_s)
+    lasting_s = (*followed.lasting_s, *own_lasting(followed.sensors))
+    after = smooth_many(followed.shown, followed.targets.density, lasting_s)
     for shown, (later_x, later_P) in zip(followed.shown, after, strict=True):
         for i, identity in enumerate(shown.identity):
             row: dict[str, object] = {
@@ -291,7 +314,8 @@ def tracks_table(followed: Followed) -> pd.DataFrame:
             kinds = zip(followed.targets.hulls, shown.kinds[i], strict=True)
             row |= {f"kind_{number}": share for number, (_, share) in enumerate(kinds, start=1)}
             row |= {"smoothed_north_m": later_x[i, 0], "smoothed_east_m": later_x[i, 1]}
-            row |= {f"smoothed_p_{a}{b}": later_P[i, a, b] for a in range(2) for b in range(a, 2)}
+            if not followed.unknown_lasting:
+                row |= {f"smoothed_p_{a}{b}": later_P[i, a, b] for a in range(2) for b in range(a, 2)}
             rows.append(row)
     columns = ["time_s", "sensor", "track", "north_m", "east_m"]
     return pd.DataFrame(rows, columns=None if rows else columns)

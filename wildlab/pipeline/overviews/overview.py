@@ -25,8 +25,6 @@ Array = NDArray[np.float64]
 
 FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
 RATE = ["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
-#: Poses that are shown where nobody names some, best first; any other before the truth of a twin.
-PREFERRED = ("logged", "onboard", "autopilot")
 #: Four satellites give a place, five show that one of them is wrong, and six which.
 FEW_SATELLITES = 6
 #: A position that is this many times as uncertain as it usually is.
@@ -179,7 +177,7 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
     """
     if source is not None:
         flight.pose_source(source)
-    source = source or best_source(flight)
+    source = source or next(iter(flight.estimated_sources), None)
     streams = paces(flight)
     timed = flight.manifest.time.kind == "utc"
     carried = [pace for name, pace in streams.items() if pace.n and name != "truth"] or [
@@ -210,14 +208,6 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
         problems=findings.count("problem"),
         warnings=findings.count("warning"),
     )
-
-
-def best_source(flight: Flight) -> str | None:
-    """The poses that are shown where nobody names some; None where there are none."""
-    named = [name for name, nav in flight.nav.items() if len(nav)]
-    known = [name for name in PREFERRED if name in named]
-    others = [name for name in named if not name.startswith("truth")]
-    return next(iter([*known, *others, *named]), None)
 
 
 def paces(flight: Flight) -> dict[str, Pace]:

@@ -13,28 +13,22 @@ from typing import Any, NamedTuple
 
 from wildlab.pipeline.overviews.lost import Recovered
 from wildlab.pipeline.overviews.overview import Overview
+from wildlab.pipeline.overviews.verdict import WORTH, Numbers, Verdict, parts_of
 
-#: Shares below which a gain is not listed, and from which on it is said to be worth fixing.
-LISTED, WORTH = 0.005, 0.1
+#: Share below which a gain is not listed.
+LISTED = 0.005
 #: How many are listed.
 MOST = 3
-
-#: What a flight comes to, and the colour of it.
-ALARM, MEND, FIX, LOOK = "went wrong", "mend first", "worth fixing", "look closer"
-SOUND, UNJUDGED = "sound", "not judged"
-LEVELS = {ALARM: "bad", MEND: "bad", FIX: "warn", LOOK: "warn", SOUND: "good", UNJUDGED: "neutral"}
 
 #: Which parameters of a calibration tell which cause, by the names of their metrics.
 CAUSES = {
     "position": ("north_offset", "east_offset"),
     "height": ("down_offset",),
     "boresight": ("boresight_roll", "boresight_tilt", "boresight_pan"),
+    "heading": ("heading_offset",),
     "camera's clock": ("clock_offset",),
-    "lens": ("focal_offset", "aspect_offset", "centre_u_offset", "centre_v_offset"),
+    "lens": ("focal_offset", "aspect_offset", "centre_u_offset", "centre_v_offset", "radial_offset"),
 }
-
-#: Numbers of reports by name and subject, as ``metrics.json`` has them.
-Numbers = Mapping[tuple[str, str], Mapping[str, Any]]
 
 
 class Gain(NamedTuple):
@@ -137,22 +131,41 @@ def gains_of(overview: Overview, numbers: Numbers) -> list[Gain]:
 
 
 def _metres(numbers: Numbers) -> Iterable[Gain]:
-    gain, after = numbers.get(("gain", "winner")), numbers.get(("horizontal_error_mean", "calibrated-pose"))
-    # The mean error afterwards is only recorded where the gain is certain.
-    if gain is not None and after is not None and _known(gain["value"], after["value"]):
-        before = gain["value"] + after["value"]
+    gain, left = numbers.get(("gain", "winner")), error_left(numbers)
+    if gain is not None and left is not None and _known(gain["value"]):
+        before = gain["value"] + left
         causes = causes_told(numbers)
         low, high = (math.nan if gain[end] is None else float(gain[end]) for end in ("low", "high"))
         share = gain["value"] / before if before > 0 else 0.0
         yield Gain("cause", causes, gain["value"], low, high, "m", before, "mean error", share, "")
     far = numbers.get(("gain", "without-far-out"))
-    left = numbers.get(("horizontal_error_mean", "without-far-out"))
+    rest = numbers.get(("horizontal_error_mean", "without-far-out"))
     points = numbers.get(("points_far_out", "winner"))
-    if far and left and points and _known(far["value"], left["value"], points["value"]):
-        before = far["value"] + left["value"]
+    if far and rest and points and _known(far["value"], rest["value"], points["value"]):
+        before = far["value"] + rest["value"]
         share = far["value"] / before if before > 0 else 0.0
         why = f"{points['value']:.0f} of {points['n']} points"
         yield Gain("far_out", (), far["value"], math.nan, math.nan, "m", before, "mean error", share, why)
+
+
+def error_left(numbers: Numbers) -> float | None:
+    """The mean error with a cause taken off whose gain is certain, m; None where none is.
+
+    Of the points that the gain is of: without those that are far out, where some are.
+
+    Parameters
+    ----------
+    numbers
+        From `numbers_of`.
+
+    Returns
+    -------
+    float or None
+    """
+    left = numbers.get(("horizontal_error_mean", "calibrated-pose"))
+    if left is not None:
+        left = numbers.get(("horizontal_error_mean", "without-far-out"), left)
+    return None if left is None or not _known(left["value"]) else float(left["value"])
 
 
 def _known(*values: Any) -> bool:
@@ -220,63 +233,22 @@ def possible_gain(numbers: Numbers) -> Gain | None:
 
 
 def doubted(numbers: Numbers) -> tuple[str, ...]:
-    """Which of the other reports ask for a closer look themselves: ``tracking``, ``navigation``.
+    """Which of the other reports ask for something that is not among the gains.
 
     Parameters
     ----------
     numbers
-        From `numbers_of`. What a report comes to is a number there from 1 on where it is not at ease.
+        From `numbers_of`.
 
     Returns
     -------
     tuple of str
+        Of `wildlab.pipeline.overviews.verdict.PARTS`.
     """
+    told = possible_gain(numbers) is not None
     return tuple(
         about
-        for about in ("tracking", "navigation")
-        if (numbers.get(("verdict_level", about), {}).get("value") or 0) >= 1
+        for about, verdict in parts_of(numbers).items()
+        if verdict.level >= Verdict.LOOK.level
+        and not (about == "georeferencing" and (verdict == Verdict.FIX or (verdict == Verdict.LOOK and told)))
     )
-
-
-def verdict_of(
-    problems: int, worth: int, troubled: int, judged: int, broken: int = 0, alarmed: int = 0
-) -> str:
-    """What a flight comes to, in a word or two.
-
-    Parameters
-    ----------
-    problems
-        Things in its tables that cannot be used or contradict each other.
-    worth
-        Gains of `WORTH` or more.
-    troubled
-        Things that ask for a closer look: wrong along the path for that share of the time or more, poses
-        that pause, gains that are possible and not certain, other reports that ask for it (`doubted`).
-    judged
-        Its other reports.
-    broken, alarmed
-        Alarms by which the flight or its poses went wrong for certain, and others.
-
-    Returns
-    -------
-    str
-        A key of `LEVELS`.
-
-    Examples
-    --------
-    >>> verdict_of(0, 2, 0, 1), verdict_of(1, 0, 0, 0), verdict_of(0, 0, 0, 0)
-    ('worth fixing', 'mend first', 'not judged')
-    >>> verdict_of(1, 2, 0, 1, broken=1), verdict_of(0, 2, 0, 1, alarmed=1)
-    ('went wrong', 'look closer')
-    """
-    if broken:
-        return ALARM
-    if problems:
-        return MEND
-    if alarmed:
-        return LOOK
-    if worth:
-        return FIX
-    if troubled:
-        return LOOK
-    return SOUND if judged else UNJUDGED
