@@ -48,6 +48,13 @@ def test_where_no_filter_is_consistent_it_is_said_and_the_least_error_leads() ->
     assert leading_filter(lost) == "ekf"
 
 
+@pytest.mark.parametrize(("nis", "level"), [(4.0, "good"), (5.0, "warn"), (20.0, "warn")])
+def test_a_filter_that_its_detections_surprise_is_looked_at(nis: float, level: str) -> None:
+    odd = {"nis": nis, "nis_verdict": "overconfident"}  # of two elements: 1.5 times is 4.5
+    said, verdict = words.summary(rows(**odd), [], None)
+    assert verdict.colour == level and ("from where it expects" in " ".join(said)) == (level == "warn")
+
+
 def test_without_truth_the_filter_leads_whose_innovations_are_as_it_expects() -> None:
     blind = rows().assign(compared=0, rmse=np.nan, nees=np.nan, verdict="not judged", nis=[1.99, 9.0])
     assert leading_filter(blind.assign(nis_verdict=["consistent", "overconfident"])) == "ekf"

@@ -89,6 +89,8 @@ def size_words(nees: float) -> str:
 
 #: Where no filter is consistent.
 NONE_CONSISTENT = "No filter is consistent; that of the least error leads."
+#: How many times as far from where a filter expects them as it states detections fall, before that troubles.
+SURPRISED = 1.5
 #: What is said of a verdict by a mean of few independent values.
 FEW = "on few independent values"
 
@@ -176,6 +178,10 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
         f"at {int(mine['compared'].sum())} of {looks} looks, and the errors there are "
         f"{size_words(size)}{_by_little(float(np.sqrt(size / 2)), mine['verdict'])}: {_counts(mine)}."
     )
+    surprised = _surprised(mine)
+    if len(surprised):
+        factor = float(np.sqrt(surprised["nis"] / surprised["dof"]).median())
+        said.append(f"Detections fall {factor:.1f} times as far from where it expects them as it states.")
     unseen = mine[mine["without"] > 0]
     if len(unseen):
         wait = f"; the longest wait is {unseen['wait'].max():.1f} s" if unseen["wait"].notna().any() else ""
@@ -205,9 +211,14 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
     few = mine.apply(on_few, axis=1)
     consistent = mine["verdict"] == CONSISTENT
     against = int((mine["verdict"].isin([OVERCONFIDENT, CAUTIOUS])).sum())
-    return said, verdict_of(
-        Evidence(troubled=against + bool(worse), judged=int(consistent.any() and not few.any()))
-    )
+    troubled = against + len(surprised) + bool(worse)
+    return said, verdict_of(Evidence(troubled=troubled, judged=int(consistent.any() and not few.any())))
+
+
+def _surprised(rows: pd.DataFrame) -> pd.DataFrame:
+    """Tracks whose errors are as stated, and whose detections are not where they expect them."""
+    beyond = np.sqrt(rows["nis"] / rows["dof"]) > SURPRISED
+    return rows[(rows["verdict"] == CONSISTENT) & (rows["nis_verdict"] == OVERCONFIDENT) & beyond]
 
 
 def _smoothed(mine: pd.DataFrame, smoothed: pd.DataFrame | None) -> list[str]:

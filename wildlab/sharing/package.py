@@ -55,13 +55,16 @@ def sweep_beside(target: Path) -> None:
 
 
 def refuse_existing(target: Path, overwrite: bool) -> None:
-    """Nothing is overwritten without being asked.
+    """Nothing is overwritten without being asked; and what nothing can be written into is no place.
 
     Raises
     ------
     WildlabError
-        Where there is something that may not be replaced.
+        Where there is something that may not be replaced, or no folder that can be written to.
     """
+    folder = next(one for one in target.absolute().parents if os.path.lexists(one))
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise WildlabError("nothing can be written here", "name a file elsewhere with --out", file=folder)
     if target.is_dir():
         raise WildlabError("is a folder, and a copy is one file", "name a file with --out", file=target)
     if os.path.lexists(target) and not overwrite:
