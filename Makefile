@@ -3,7 +3,7 @@
 # Every path here is relative, so that a checkout may lie in a folder with blanks in its name.
 
 .DEFAULT_GOAL := help
-.PHONY: help environment reports first-look tutorials test test-all style docs strip lab lock audit bench doctor clean
+.PHONY: help environment reports first-look tutorials test test-all style docs strip lab lock audit bench mutants doctor clean
 
 # How many notebooks or test processes at once.
 JOBS ?= 2
@@ -66,6 +66,9 @@ audit: environment ## known faults of the packages in environment.lock (asks the
 
 bench: environment ## compare speed with other packages, as ratios
 	@$(BIN)/python -m benchmarks $(ARGS)
+
+mutants: environment ## break lines of the code one at a time, and see that a test notices each
+	@$(BIN)/python tools/mutants.py $(ARGS)
 
 doctor: environment ## what is wrong with this installation, and the fix
 	@$(BIN)/wildlab doctor

@@ -11,21 +11,22 @@ from typing import Any
 #: Rooms that import what they offer when it is asked for.
 LAZY = (
     "wildlab",
+    "wildlab.evaluation",
     "wildlab.flight",
     "wildlab.flight.checks",
     "wildlab.flight.recipe",
+    "wildlab.geometry",
     "wildlab.pipeline",
     "wildlab.reporting",
 )
 #: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
 DOCUMENTED = (
     *LAZY,
-    *("wildlab.geometry", "wildlab.navigation", "wildlab.simulation"),
+    *("wildlab.navigation", "wildlab.simulation"),
     *(
         "wildlab.tracking",
         "wildlab.tracking.many",
         "wildlab.tracking.particles",
-        "wildlab.evaluation",
         "wildlab.detection",
         "wildlab.planning",
     ),

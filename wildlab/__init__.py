@@ -31,14 +31,6 @@ if TYPE_CHECKING:
 else:
     __getattr__, __dir__ = offer(
         __name__,
-        {
-            "flight.store": ("Flight", "load_flight", "save_flight"),
-            "flight.recipe.importing": ("import_flight",),
-            "api.flights": ("check", "simulate"),
-            "api.points": ("evaluate_points", "georeference"),
-            "api.tracks": ("consistency", "navigate", "track"),
-            "api.plot": ("plot",),
-        },
         folders=(
             *("geometry", "flight", "navigation", "tracking", "simulation", "evaluation", "pipeline"),
             *("reporting", "studies"),

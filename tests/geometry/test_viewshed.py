@@ -15,7 +15,7 @@ from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.ray_ends import HIT
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
-from wildlab.geometry.viewshed import footprint, ground_per_pixel, hidden_by, viewshed
+from wildlab.geometry.viewsheds import footprint, ground_per_pixel, hidden_by, viewshed
 from wildlab.geometry.visibility import lines_clear
 
 CAMERA = Camera(160, 128, 250.0, 220.0, 83.0, 60.0, 0.4, (0.1, 0.0, 0.0, 0.0, 0.0))

@@ -23,7 +23,6 @@ def list_(out: Path | None, as_json: bool, rule: bool) -> None:
     Example:
       wildlab list
     """
-    from wildlab.evaluation.characteristics import operating_characteristics
     from wildlab.evaluation.shares import HOLDS
     from wildlab.flight.catalog import is_fetched
     from wildlab.reporting.counts import tally
@@ -31,6 +30,8 @@ def list_(out: Path | None, as_json: bool, rule: bool) -> None:
     from wildlab.runner.record.status import as_plain, study_status
 
     if rule:
+        from wildlab.evaluation.characteristics import operating_characteristics
+
         table = operating_characteristics(trials=1000)
         if as_json:
             print_json(table.to_dict(orient="records"))

@@ -19,53 +19,60 @@ that
 - `judge_ellipses`, `try_averaging`, `spread_of_sightings`, `ambiguous`: what they are worth.
 """
 
-from wildlab.evaluation.ambiguity import ambiguous, largest_visible
-from wildlab.evaluation.axes import AlongAxis, split_along
-from wildlab.evaluation.blocks import (
-    Halves,
-    Neighbours,
-    block_mean,
-    compare_halves,
-    compare_neighbours,
-    time_blocks,
-)
-from wildlab.evaluation.causes import Gain, Linear, Ranked, gain_of, held_out, rank_models
-from wildlab.evaluation.consistency import (
-    ERROR_CONVENTION,
-    Average,
-    average,
-    chi_square_interval,
-    nees,
-    nis,
-    position_nees,
-    share_inside,
-    whiten,
-)
-from wildlab.evaluation.correlated_errors import WanderNoise, estimate_wander
-from wildlab.evaluation.ellipses import EllipseVerdict, judge_ellipses
-from wildlab.evaluation.errors import (
-    ErrorSummary,
-    Scatter,
-    bootstrap_interval,
-    scatter_by_image,
-    summarise,
-)
-from wildlab.evaluation.identities import Identities, Scan, compare_identities, scan_gospa
-from wildlab.evaluation.outliers import Outlier, find_outliers
-from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
-from wildlab.evaluation.position_noise import estimate_position_noise
-from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
-from wildlab.evaluation.sets import Gospa, Ospa, gospa, ospa
-from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
-from wildlab.evaluation.track_errors import TrackErrors, TrackSummary, summarise_track
-from wildlab.evaluation.whiteness import (
-    Whiteness,
-    autocorrelation,
-    effective_sample_size,
-    innovation_whiteness,
-    portmanteau,
-    white_bound,
-)
+from typing import TYPE_CHECKING
+
+from wildlab.lazy import offer
+
+if TYPE_CHECKING:
+    from wildlab.evaluation.ambiguity import ambiguous, largest_visible
+    from wildlab.evaluation.axes import AlongAxis, split_along
+    from wildlab.evaluation.blocks import (
+        Halves,
+        Neighbours,
+        block_mean,
+        compare_halves,
+        compare_neighbours,
+        time_blocks,
+    )
+    from wildlab.evaluation.causes import Gain, Linear, Ranked, gain_of, held_out, rank_models
+    from wildlab.evaluation.consistency import (
+        ERROR_CONVENTION,
+        Average,
+        average,
+        chi_square_interval,
+        nees,
+        nis,
+        position_nees,
+        share_inside,
+        whiten,
+    )
+    from wildlab.evaluation.correlated_errors import WanderNoise, estimate_wander
+    from wildlab.evaluation.ellipses import EllipseVerdict, judge_ellipses
+    from wildlab.evaluation.errors import (
+        ErrorSummary,
+        Scatter,
+        bootstrap_interval,
+        scatter_by_image,
+        summarise,
+    )
+    from wildlab.evaluation.identities import Identities, Scan, compare_identities, scan_gospa
+    from wildlab.evaluation.outliers import Outlier, find_outliers
+    from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
+    from wildlab.evaluation.position_noise import estimate_position_noise
+    from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
+    from wildlab.evaluation.sets import Gospa, Ospa, gospa, ospa
+    from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
+    from wildlab.evaluation.track_errors import TrackErrors, TrackSummary, summarise_track
+    from wildlab.evaluation.whiteness import (
+        Whiteness,
+        autocorrelation,
+        effective_sample_size,
+        innovation_whiteness,
+        portmanteau,
+        white_bound,
+    )
+else:
+    __getattr__, __dir__ = offer(__name__)
 
 __all__ = [
     "ERROR_CONVENTION",

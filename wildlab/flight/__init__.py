@@ -30,29 +30,7 @@ if TYPE_CHECKING:
     from wildlab.flight.schema import NAV, TABLES, conform
     from wildlab.flight.store import Flight, load_flight, save_flight
 else:
-    __getattr__, __dir__ = offer(
-        __name__,
-        {
-            "catalog": ("fetch", "is_fetched", "read_catalog"),
-            "checks.check": ("Use", "check_flight", "usable_for"),
-            "checks.findings": ("Finding",),
-            "clocks": (
-                "covariance_columns",
-                "covariances",
-                "frame_poses",
-                "frame_times",
-                "gimbal_angles",
-                "gnss_times",
-                "poses_at",
-                "truth_at",
-            ),
-            "manifest": ("Manifest", "make_manifest", "manifest_toml", "replace_in_manifest"),
-            "recipe.importing": ("import_flight",),
-            "schema": ("NAV", "TABLES", "conform"),
-            "store": ("Flight", "load_flight", "save_flight"),
-        },
-        folders=("checks", "readers", "recipe", "terrain"),
-    )
+    __getattr__, __dir__ = offer(__name__, folders=("checks", "readers", "recipe", "terrain"))
 
 __all__ = [
     "NAV",

@@ -22,185 +22,192 @@ takes a vector from b to n; ``p_nc`` is the position of c relative to n, in n.
  [173.2   0.    0. ]]
 """
 
-from wildlab.geometry.attitude_uncertainty import (
-    attitude_covariance,
-    level_axes,
-    pose_covariance,
-    tilt_and_heading,
-    tilt_from_roll_pitch,
-)
-from wildlab.geometry.board_views import (
-    INTRINSICS,
-    Projected,
-    Views,
-    camera_of,
-    homography,
-    parameters_of,
-    project_board,
-    start_camera,
-    start_views,
-)
-from wildlab.geometry.calibration import (
-    BORESIGHT,
-    BOUNDS,
-    PARAMETERS,
-    Calibration,
-    Fit,
-    PosesAt,
-    apply_calibration,
-    calibrate,
-    calibrated_camera,
-    calibrated_poses,
-    differentiate,
-    fit_points,
-    georeference_calibrated,
-    split_images,
-    undetermined_parameter,
-    with_covariance,
-)
-from wildlab.geometry.camera import (
-    NO_DISTORTION,
-    Camera,
-    camera_from_data_sheet,
-    camera_from_matrix,
-    distort,
-    distortion_jacobian,
-    in_image,
-    normalise,
-    normalise_jacobian,
-    project,
-    undistort,
-    undistort_approximately,
-)
-from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.directions import direction_differences, direction_sd, image_raster
-from wildlab.geometry.ellipses import ellipse_axes, inside_ellipse
-from wildlab.geometry.flodell import geodetic_to_enu_linear, linear_enu_error, metres_per_degree
-from wildlab.geometry.flow import (
-    CameraMotion,
-    Twist,
-    camera_flow,
-    camera_rates,
-    camera_twist,
-    flow_between,
-    flow_matrix,
-    gimbal_axes,
-    lens_velocity,
-    motion_between,
-    target_velocity,
-    velocity_from_pair,
-)
-from wildlab.geometry.flow_uncertainty import (
-    FlowErrors,
-    FlowJacobians,
-    Velocity,
-    flow_jacobians,
-    mean_velocity,
-    velocity_covariance,
-)
-from wildlab.geometry.frames import (
-    Array,
-    Origin,
-    ecef_to_geodetic,
-    enu_to_ned,
-    euler_to_matrix,
-    geodetic_to_ecef,
-    geodetic_to_ned,
-    matrix_to_euler,
-    matrix_to_quaternion,
-    matrix_to_rotation_vector,
-    ned_to_enu,
-    ned_to_geodetic,
-    quaternion_to_matrix,
-    rotation_vector_to_matrix,
-    skew,
-    wrap,
-)
-from wildlab.geometry.georeference import (
-    georeference_pixels,
-    ground_to_pixel,
-    intersect_plane,
-    pixel_rays,
-    pixel_to_plane,
-)
-from wildlab.geometry.gravity import (
-    EARTH_RATE,
-    Earth,
-    attraction,
-    flat_earth,
-    local_earth,
-    normal_gravity,
-)
-from wildlab.geometry.intrinsics import (
-    ESTIMATED,
-    LENSES,
-    PINHOLE,
-    Intrinsics,
-    calibrate_camera,
-    confused,
-    free_columns,
-    view_errors,
-)
-from wildlab.geometry.lens_choice import LensChoice, choose_lens
-from wildlab.geometry.line_of_sight import (
-    Looked,
-    cast_rays,
-    compare_angles,
-    field_of_view,
-    in_field_of_view,
-)
-from wildlab.geometry.mount import (
-    Mount,
-    camera_pose,
-    camera_rotation,
-    helgesen_misalignment,
-    mount_rotation,
-)
-from wildlab.geometry.mounting import Mounting, mounting_from_points
-from wildlab.geometry.ray_ends import BECAME
-from wildlab.geometry.robust import (
-    RobustFit,
-    fit_linear,
-    student_cost,
-    student_scale,
-    student_weights,
-)
-from wildlab.geometry.terrain import (
-    Met,
-    Terrain,
-    intersect_terrain,
-    pixels_to_terrain,
-)
-from wildlab.geometry.terrain_uncertainty import (
-    TerrainCovariance,
-    TerrainJacobians,
-    sample_terrain,
-    terrain_covariance,
-    terrain_flatness,
-    terrain_jacobians,
-)
-from wildlab.geometry.uncertainty import (
-    GroundCovariance,
-    GroundJacobians,
-    PoseErrors,
-    arc_bend,
-    ground_covariance,
-    ground_jacobians,
-    ray_flatness,
-    ray_heading_sd,
-    sample_ground,
-    sample_rays,
-)
-from wildlab.geometry.viewshed import (
-    Footprint,
-    Hidden,
-    Viewshed,
-    footprint,
-    ground_per_pixel,
-    hidden_by,
-    viewshed,
-)
-from wildlab.geometry.visibility import Seen, image_border, lines_clear, visible_nodes, widest_view
+from typing import TYPE_CHECKING
+
+from wildlab.lazy import offer
+
+if TYPE_CHECKING:
+    from wildlab.geometry.attitude_uncertainty import (
+        attitude_covariance,
+        level_axes,
+        pose_covariance,
+        tilt_and_heading,
+        tilt_from_roll_pitch,
+    )
+    from wildlab.geometry.board_views import (
+        INTRINSICS,
+        Projected,
+        Views,
+        camera_of,
+        homography,
+        parameters_of,
+        project_board,
+        start_camera,
+        start_views,
+    )
+    from wildlab.geometry.calibration import (
+        BORESIGHT,
+        BOUNDS,
+        PARAMETERS,
+        Calibration,
+        Fit,
+        PosesAt,
+        apply_calibration,
+        calibrate,
+        calibrated_camera,
+        calibrated_poses,
+        differentiate,
+        fit_points,
+        georeference_calibrated,
+        split_images,
+        undetermined_parameter,
+        with_covariance,
+    )
+    from wildlab.geometry.camera import (
+        NO_DISTORTION,
+        Camera,
+        camera_from_data_sheet,
+        camera_from_matrix,
+        distort,
+        distortion_jacobian,
+        in_image,
+        normalise,
+        normalise_jacobian,
+        project,
+        undistort,
+        undistort_approximately,
+    )
+    from wildlab.geometry.camera_poses import CameraPoses
+    from wildlab.geometry.directions import direction_differences, direction_sd, image_raster
+    from wildlab.geometry.ellipses import ellipse_axes, inside_ellipse
+    from wildlab.geometry.flodell import geodetic_to_enu_linear, linear_enu_error, metres_per_degree
+    from wildlab.geometry.flow import (
+        CameraMotion,
+        Twist,
+        camera_flow,
+        camera_rates,
+        camera_twist,
+        flow_between,
+        flow_matrix,
+        gimbal_axes,
+        lens_velocity,
+        motion_between,
+        target_velocity,
+        velocity_from_pair,
+    )
+    from wildlab.geometry.flow_uncertainty import (
+        FlowErrors,
+        FlowJacobians,
+        Velocity,
+        flow_jacobians,
+        mean_velocity,
+        velocity_covariance,
+    )
+    from wildlab.geometry.frames import (
+        Array,
+        Origin,
+        ecef_to_geodetic,
+        enu_to_ned,
+        euler_to_matrix,
+        geodetic_to_ecef,
+        geodetic_to_ned,
+        matrix_to_euler,
+        matrix_to_quaternion,
+        matrix_to_rotation_vector,
+        ned_to_enu,
+        ned_to_geodetic,
+        quaternion_to_matrix,
+        rotation_vector_to_matrix,
+        skew,
+        wrap,
+    )
+    from wildlab.geometry.georeference import (
+        georeference_pixels,
+        ground_to_pixel,
+        intersect_plane,
+        pixel_rays,
+        pixel_to_plane,
+    )
+    from wildlab.geometry.gravity import (
+        EARTH_RATE,
+        Earth,
+        attraction,
+        flat_earth,
+        local_earth,
+        normal_gravity,
+    )
+    from wildlab.geometry.intrinsics import (
+        ESTIMATED,
+        LENSES,
+        PINHOLE,
+        Intrinsics,
+        calibrate_camera,
+        confused,
+        free_columns,
+        view_errors,
+    )
+    from wildlab.geometry.lens_choice import LensChoice, choose_lens
+    from wildlab.geometry.line_of_sight import (
+        Looked,
+        cast_rays,
+        compare_angles,
+        field_of_view,
+        in_field_of_view,
+    )
+    from wildlab.geometry.mount import (
+        Mount,
+        camera_pose,
+        camera_rotation,
+        helgesen_misalignment,
+        mount_rotation,
+    )
+    from wildlab.geometry.mounting import Mounting, mounting_from_points
+    from wildlab.geometry.ray_ends import BECAME
+    from wildlab.geometry.robust import (
+        RobustFit,
+        fit_linear,
+        student_cost,
+        student_scale,
+        student_weights,
+    )
+    from wildlab.geometry.terrain import (
+        Met,
+        Terrain,
+        intersect_terrain,
+        pixels_to_terrain,
+    )
+    from wildlab.geometry.terrain_uncertainty import (
+        TerrainCovariance,
+        TerrainJacobians,
+        sample_terrain,
+        terrain_covariance,
+        terrain_flatness,
+        terrain_jacobians,
+    )
+    from wildlab.geometry.uncertainty import (
+        GroundCovariance,
+        GroundJacobians,
+        PoseErrors,
+        arc_bend,
+        ground_covariance,
+        ground_jacobians,
+        ray_flatness,
+        ray_heading_sd,
+        sample_ground,
+        sample_rays,
+    )
+    from wildlab.geometry.viewsheds import (
+        Footprint,
+        Hidden,
+        Viewshed,
+        footprint,
+        ground_per_pixel,
+        hidden_by,
+        viewshed,
+    )
+    from wildlab.geometry.visibility import Seen, image_border, lines_clear, visible_nodes, widest_view
+else:
+    __getattr__, __dir__ = offer(__name__)
 
 __all__ = [
     "BECAME",

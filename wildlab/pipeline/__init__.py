@@ -51,33 +51,7 @@ if TYPE_CHECKING:
         sighting,
     )
 else:
-    __getattr__, __dir__ = offer(
-        __name__,
-        {
-            "accuracy": ("Accuracy", "judge_accuracy"),
-            "calibrate": ("Calibrated", "calibrate_flight"),
-            "consistency": ("Series", "mean_of_runs", "navigation_series", "worth"),
-            "evaluate": ("errors_of", "score_points", "recorded_answers", "unlabelled_programs"),
-            "follow": ("FILTERS", "usual_tuning"),
-            "georeference": ("Observations", "USUAL", "covariances_of", "observe", "pose_errors", "truth_of"),
-            "learn": ("Applied", "apply_learnt", "corrected_flight", "learn_flight"),
-            "navigate": ("Navigated", "PUBLISHED_LIKE", "MekfTuning", "navigate_mekf", "navigate_observer"),
-            "navigation_errors": ("Errors", "errors_against"),
-            "receiver": ("Placement", "Receiver", "place_receiver", "receiver_noise"),
-            "repeats": ("Repeats", "judge_repeats"),
-            "track": (
-                "CvTuning",
-                "Scored",
-                "Sighting",
-                "follow_pixels",
-                "follow_positions",
-                "follow_schmidt",
-                "evaluate_measurements",
-                "evaluate_track",
-                "sighting",
-            ),
-        },
-    )
+    __getattr__, __dir__ = offer(__name__)
 
 __all__ = [
     "FILTERS",

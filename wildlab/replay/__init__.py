@@ -11,6 +11,6 @@ from wildlab.lazy import offer
 if TYPE_CHECKING:
     from wildlab.replay.notebook import show_replay
 else:
-    __getattr__, __dir__ = offer(__name__, {"notebook": ("show_replay",)})
+    __getattr__, __dir__ = offer(__name__)
 
 __all__ = ["show_replay"]

@@ -24,25 +24,7 @@ if TYPE_CHECKING:
     from wildlab.reporting.published import load_claims, load_published
     from wildlab.reporting.report import Report, open_report
 else:
-    __getattr__, __dir__ = offer(
-        __name__,
-        {
-            "figures": (
-                "colour",
-                "ellipse",
-                "log_band",
-                "map_axes",
-                "new_figure",
-                "png_bytes",
-                "save_figure",
-                "with_alt",
-            ),
-            "metrics": ("claim", "metric", "read_metrics"),
-            "published": ("load_claims", "load_published"),
-            "report": ("Report", "open_report"),
-        },
-        folders=("animation", "charts", "front"),
-    )
+    __getattr__, __dir__ = offer(__name__, folders=("animation", "charts", "front"))
 
 __all__ = [
     "Report",

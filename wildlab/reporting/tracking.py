@@ -180,8 +180,8 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
     )
     surprised = _surprised(mine)
     if len(surprised):
-        factor = float(np.sqrt(surprised["nis"] / surprised["dof"]).median())
-        said.append(f"Detections fall {factor:.1f} times as far from where it expects them as it states.")
+        times = float(np.sqrt(surprised["nis"] / surprised["dof"]).median())
+        said.append(f"Detections fall {times:.1f} times as far from where it expects them as it states.")
     unseen = mine[mine["without"] > 0]
     if len(unseen):
         wait = f"; the longest wait is {unseen['wait'].max():.1f} s" if unseen["wait"].notna().any() else ""
@@ -203,11 +203,9 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
             f"{_counts(white)}; {_error_change(ratio)}."
         )
     said += _smoothed(mine, by_name.get(f"{best}-smoothed"))
-    pairs_in_all = len(rows.drop_duplicates(["sensor", "target"]))
-    if len(mine) < pairs_in_all:
-        said.append(
-            f"These are {len(mine)} of {pairs_in_all} tracks: the others' detections cannot go through it."
-        )
+    in_all = len(rows.drop_duplicates(["sensor", "target"]))
+    if len(mine) < in_all:
+        said.append(f"These are {len(mine)} of {in_all} tracks: the others' detections cannot go through it.")
     few = mine.apply(on_few, axis=1)
     consistent = mine["verdict"] == CONSISTENT
     against = int((mine["verdict"].isin([OVERCONFIDENT, CAUTIOUS])).sum())

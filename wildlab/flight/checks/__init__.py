@@ -13,13 +13,7 @@ if TYPE_CHECKING:
     from wildlab.flight.checks.check import Use, check_flight, usable_for
     from wildlab.flight.checks.findings import Finding
 else:
-    __getattr__, __dir__ = offer(
-        __name__,
-        {
-            "check": ("Use", "check_flight", "usable_for"),
-            "findings": ("Finding",),
-        },
-    )
+    __getattr__, __dir__ = offer(__name__)
 
 __all__ = [
     "Finding",

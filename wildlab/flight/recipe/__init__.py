@@ -12,13 +12,7 @@ if TYPE_CHECKING:
     from wildlab.flight.recipe.importing import import_flight
     from wildlab.flight.recipe.model import Recipe, read_recipe
 else:
-    __getattr__, __dir__ = offer(
-        __name__,
-        {
-            "importing": ("import_flight",),
-            "model": ("Recipe", "read_recipe"),
-        },
-    )
+    __getattr__, __dir__ = offer(__name__)
 
 __all__ = [
     "Recipe",

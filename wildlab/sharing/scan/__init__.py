@@ -16,7 +16,4 @@ if TYPE_CHECKING:
 
 __all__ = ["Finding", "Secrets", "not_searched", "scan", "scan_contents"]
 
-__getattr__, __dir__ = offer(
-    __name__,
-    {"files": ("not_searched", "scan", "scan_contents"), "findings": ("Finding",), "secrets": ("Secrets",)},
-)
+__getattr__, __dir__ = offer(__name__)
