@@ -18,9 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
+from wildlab.evaluation.correlated_kernels import weigh_chain
 from wildlab.evaluation.pose_noise import KINDS, PRIOR
 
 Array = NDArray[np.float64]
@@ -121,7 +122,7 @@ class WanderFit(NamedTuple):
 
 
 class Covariance:
-    """The covariance of the errors of N points, factorised; cost grows with the number of images.
+    """The covariance of the errors of N points; cost grows with the number of images.
 
     Parameters
     ----------
@@ -136,73 +137,55 @@ class Covariance:
     --------
     >>> points = PosePoints(np.zeros((1, 2, 6)), np.eye(2)[None], np.zeros((1, 2, 2)), np.zeros(1))
     >>> sd = {**dict.fromkeys(KINDS, 1.0), "pixel": 2.0}
-    >>> Covariance(points, WanderNoise(sd, 0.5, LASTS_S)).solve(np.ones((1, 2, 1))).ravel().tolist()
-    [0.25, 0.25]
+    >>> Covariance(points, WanderNoise(sd, 0.5, LASTS_S)).weigh(np.ones((1, 2, 1)))[0].tolist()
+    [[0.5]]
     """
 
     def __init__(self, points: PosePoints, noise: WanderNoise, places: Places | None = None) -> None:
-        when, self._image = np.unique(points.time, return_inverse=True)
-        self._count = len(when)
-        self._order = np.argsort(self._image, kind="stable")
-        self._first = np.searchsorted(self._image[self._order], np.arange(len(when)))
-        own = np.linalg.cholesky(points.own + noise.sd["pixel"] ** 2 * points.pixel)
-        self._own = np.linalg.inv(own)
+        when, image = np.unique(points.time, return_inverse=True)
+        self._order = np.argsort(image, kind="stable")
+        self._image = image[self._order]
         sd = np.array([noise.sd[kind] for kind, axes in KINDS.items() for _ in axes])
-        G = self._own @ (points.derivatives * sd)
-        self._H = np.concatenate([np.sqrt(1 - noise.share) * G, np.sqrt(noise.share) * G], axis=-1)
-        blocks = self._by_image(np.einsum("nij,nik->njk", self._H, self._H))
-        rho = np.minimum(np.exp(-np.diff(when)[:, None] / np.repeat(noise.lasts, 3)), 1 - 1e-6)
-        none = np.zeros((1, 6))
-        left, right = np.vstack([none, rho]), np.vstack([rho, none])
-        diagonal = 1 / (1 - left**2) + right**2 / (1 - right**2)
-        axes = np.arange(6)
-        blocks[:, axes, axes] += 1.0
-        blocks[:, axes + 6, axes + 6] += diagonal
-        band = np.zeros((13, self._count, 12))
-        row, column = np.tril_indices(12)
-        band[row - column, :, column] = blocks[:, row, column].T
-        band[12, :-1, 6:] = -rho / (1 - rho**2)
-        self._chain = cholesky_banded(band.reshape(13, -1), lower=True)
-        self.log_determinant = float(
-            2 * np.log(np.diagonal(own, axis1=1, axis2=2)).sum()
-            + np.log1p(-(rho**2)).sum()
-            + 2 * np.log(self._chain[0]).sum()
-        )
-        self._places: tuple[Array, Array] | None = None
-        if places is not None:
-            of = np.unique(places.of, return_inverse=True)[1]
-            Z = np.zeros((len(of), 2, int(of.max()) + 1, 2))
-            Z[np.arange(len(of)), 0, of, 0] = Z[np.arange(len(of)), 1, of, 1] = 1.0
-            solved = self.solve(Z.reshape(len(of), 2, -1))
-            information = _product(Z.reshape(len(of), 2, -1), solved)
-            if np.isfinite(places.sd):
-                information += np.eye(len(information)) / places.sd**2
-                self.log_determinant += 2 * len(information) * float(np.log(places.sd))
-            inner = np.asarray(np.linalg.cholesky(information), float)
-            self._places = inner, solved
-            self.log_determinant += float(2 * np.log(np.diagonal(inner)).sum())
+        self._G = points.derivatives[self._order] * sd
+        self._own = (points.own + noise.sd["pixel"] ** 2 * points.pixel)[self._order]
+        self._rho = np.minimum(np.exp(-np.diff(when)[:, None] / np.repeat(noise.lasts, 3)), 1 - 1e-6)
+        self._share = noise.share
+        self._places = None if places is None else (np.unique(places.of, return_inverse=True)[1], places.sd)
 
-    def solve(self, B: Array) -> Array:
-        """Inverse covariance times B (N, 2, K); with unknown places, of what they cannot explain."""
-        white = self._own @ B
-        states = self._by_image(np.einsum("nij,nik->njk", self._H, white))
-        found = cho_solve_banded((self._chain, True), states.reshape(12 * self._count, -1))
-        rest = white - self._H @ found.reshape(self._count, 12, -1)[self._image]
-        out = np.asarray(np.swapaxes(self._own, 1, 2) @ rest)
-        if self._places is not None:
-            inner, solved = self._places
-            part = solve_triangular(inner, _product(solved, B), lower=True)
-            out = out - solved @ solve_triangular(inner, part, lower=True, trans="T")
-        return out
+    def weigh(self, B: Array) -> tuple[Array, float]:
+        """Products of the columns of B by the inverse covariance; its logarithmic determinant.
 
-    def _by_image(self, values: Array) -> Array:
-        """Sums (K, ...) over the points of each of K images."""
-        return np.asarray(np.add.reduceat(values[self._order], self._first, axis=0))
+        Parameters
+        ----------
+        B
+            (N, 2, K); where places are not known, what they explain of it counts for nothing.
 
+        Returns
+        -------
+        (K, K), float
+        """
+        if self._places is None:
+            return self._weigh(B)
+        of, sd = self._places
+        Z = np.zeros((len(of), 2, int(of.max()) + 1, 2))
+        Z[np.arange(len(of)), 0, of, 0] = Z[np.arange(len(of)), 1, of, 1] = 1.0
+        inner, logarithm = self._weigh(np.concatenate([Z.reshape(len(of), 2, -1), B], axis=-1))
+        n = len(inner) - B.shape[-1]
+        information, across = inner[:n, :n], inner[:n, n:]
+        if np.isfinite(sd):
+            information += np.eye(n) / sd**2
+            logarithm += 2 * n * float(np.log(sd))
+        factor = np.linalg.cholesky(information)
+        explained = solve_triangular(factor, across, lower=True)
+        logarithm += float(2 * np.log(np.diagonal(factor)).sum())
+        return np.asarray(inner[n:, n:] - explained.T @ explained), logarithm
 
-def _product(A: Array, B: Array) -> Array:
-    """(P, Q) of A (N, 2, P), transposed, and B (N, 2, Q)."""
-    return np.asarray(A.reshape(-1, A.shape[-1]).T @ B.reshape(-1, B.shape[-1]))
+    def _weigh(self, B: Array) -> tuple[Array, float]:
+        """The same with places that are known."""
+        columns = np.ascontiguousarray(B[self._order])
+        W, T, logarithm = weigh_chain(self._G, self._own, columns, self._image, self._rho, self._share)
+        W, T = W.reshape(-1, B.shape[-1]), T.reshape(-1, B.shape[-1])
+        return np.asarray(W.T @ W - T.T @ T), logarithm
 
 
 class LinearFit(NamedTuple):
@@ -238,7 +221,7 @@ def fit_generalised(J: Array, r: Array, covariance: Covariance) -> LinearFit:
     LinearFit
     """
     both = np.concatenate([J, r[..., None]], axis=-1)
-    inner = _product(both, covariance.solve(both))
+    inner, _ = covariance.weigh(both)
     information, gradient = inner[:-1, :-1], inner[:-1, -1]
     if not len(gradient):
         return LinearFit(gradient, information, float(inner[-1, -1]))
@@ -279,13 +262,12 @@ def estimate_wander(
     start = np.log([*(assumed[kind] for kind in KINDS), *lasts])
 
     def negative_log_posterior(x: Array) -> float:
-        covariance = Covariance(points, WanderNoise.from_logarithms(x), places)
-        inner = _product(both, covariance.solve(both))
+        inner, logarithm = Covariance(points, WanderNoise.from_logarithms(x), places).weigh(both)
         information = inner[:-1, :-1] + np.eye(len(inner) - 1)
         deviance = inner[-1, -1] - inner[-1, :-1] @ np.linalg.solve(information, inner[:-1, -1])
         prior = (((x[:-1] - start) / PRIOR) ** 2).sum() + (x[-1] / PRIOR_SHARE) ** 2
         freed = np.linalg.slogdet(information)[1]
-        return float(0.5 * (covariance.log_determinant + freed + deviance + prior))
+        return float(0.5 * (logarithm + freed + deviance + prior))
 
     first = np.append(start, 0.0)
     bounds = [(value - 3 * PRIOR, value + 3 * PRIOR) for value in start] + [(-4.0, 4.0)]
@@ -319,8 +301,8 @@ def degrees_of_freedom(
     moved = (J @ x)[..., None]
 
     def logarithm(at: Array) -> float:
-        covariance = Covariance(points, WanderNoise.from_logarithms(at), places)
-        return float(np.log((moved * covariance.solve(moved)).sum()))
+        inner, _ = Covariance(points, WanderNoise.from_logarithms(at), places).weigh(moved)
+        return float(np.log(inner[0, 0]))
 
     at, step = found.noise.logarithms, 0.05
     uncertainty = np.linalg.inv(_second_derivatives(found.posterior, at))

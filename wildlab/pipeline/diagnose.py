@@ -295,7 +295,8 @@ class _Search:
             for _ in range(_STEPS):
                 J = derivatives(of, scaled)
                 fit = fit_generalised(J, r, covariance)
-                gained, here = here - _deviance(r, covariance), _deviance(r, covariance)
+                now = _deviance(r, covariance)
+                gained, here = here - now, now
                 # Steps that the deviance does not show are not taken.
                 if gained < SETTLED or here - fit.deviance < SETTLED:
                     break
@@ -411,7 +412,7 @@ def _root(information: Array) -> Array:
 
 
 def _deviance(r: Array, covariance: Covariance) -> float:
-    return float((r[..., None] * covariance.solve(r[..., None])).sum())
+    return float(covariance.weigh(r[..., None])[0][0, 0])
 
 
 def _poses(

@@ -180,7 +180,7 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
     )
     surprised = _surprised(mine)
     if len(surprised):
-        times = float(np.sqrt(surprised["nis"] / surprised["dof"]).median())
+        times = float(np.sqrt((surprised["nis"] / surprised["dof"]).median()))
         said.append(f"Detections fall {times:.1f} times as far from where it expects them as it states.")
     unseen = mine[mine["without"] > 0]
     if len(unseen):
