@@ -175,7 +175,7 @@ def test_sizes_are_limited(tmp_path):
         stream.truncate(20_000_001)
     with pytest.raises(WildlabError, match="20,000,001 bytes"):
         read_areas(path)
-    with pytest.raises(WildlabError, match="there is no such file"):
+    with pytest.raises(WildlabError, match="no such file"):
         read_areas(tmp_path / "none.geojson")
 
 

@@ -89,30 +89,30 @@ def test_truth_is_each_sample_once():
 @pytest.mark.parametrize(
     ("content", "field", "problem"),
     [
-        ({}, "the file", "holds an object where a list of frames is expected"),
-        ([], "the file", "holds a list of 0 where"),
-        ([3], "sensorID", "frame 1: is 3, and has no 'sensorID'"),
+        ({}, "the file", "holds an object"),
+        ([], "the file", "holds a list"),
+        ([3], "sensorID", "has no 'sensorID'"),
         ([GOOD[0], {"sensorID": 1}], "time", "frame 2: has no 'time'"),
-        ([frame(5, 1.0, [])], "sensorID", "frame 1: is 5; known are 1 (lidar), 2 (radar)"),
+        ([frame(5, 1.0, [])], "sensorID", "is 5; known"),
         ([frame(True, 1.0, [])], "sensorID", "is True"),
         ([frame([1], 1.0, [])], "sensorID", "is a list of 1"),
         ([frame("1", 1.0, [])], "sensorID", "is '1'"),
-        ([frame(1, "noon", [])], "time", "'noon' is not a finite number"),
-        ([frame(1, None, [])], "time", "None is not a finite number"),
-        ([frame(1, True, [])], "time", "True is not a finite number"),
-        ([frame(1, 10**400, [])], "time", "a huge number is not a finite number"),
-        ([frame(1, 1.0, [], 4.0)], "ownshipPosition", "is 4.0 where a list is expected"),
-        ([frame(1, 1.0, [], [4.0])], "ownshipPosition", "has 1 numbers where 2 are expected"),
-        ([frame(1, 1.0, [], [4.0, 1e9])], "ownshipPosition", "is further away than 1000 km"),
-        ([frame(1, 1.0, 0.5)], "measurement", "is 0.5 where a list is expected"),
-        ([frame(1, 1.0, [1.0, 2.0, 3.0])], "measurement", "a list of 3 is no list of norths"),
+        ([frame(1, "noon", [])], "time", "'noon' is not"),
+        ([frame(1, None, [])], "time", "None is not"),
+        ([frame(1, True, [])], "time", "True is not"),
+        ([frame(1, 10**400, [])], "time", "huge number"),
+        ([frame(1, 1.0, [], 4.0)], "ownshipPosition", "is 4.0"),
+        ([frame(1, 1.0, [], [4.0])], "ownshipPosition", "has 1 numbers"),
+        ([frame(1, 1.0, [], [4.0, 1e9])], "ownshipPosition", "further away"),
+        ([frame(1, 1.0, 0.5)], "measurement", "is 0.5"),
+        ([frame(1, 1.0, [1.0, 2.0, 3.0])], "measurement", "list of 3"),
         ([frame(1, 1.0, [[1.0, 2.0], [3.0]])], "measurement", "alike in length"),
         ([frame(1, 1.0, [[1.0], 3.0])], "measurement", "alike in length"),
-        ([frame(2, 1.0, [[1.0, "x"], [3.0, 4.0]])], "measurement", "'x' is not a finite number"),
-        ([frame(2, 1.0, [[[1.0]], [[2.0]]])], "measurement", "a list of 1 is not a finite number"),
-        ([frame(3, 1.0, [[0.1, 0.2]])], "measurement", "a list of 2 is not a finite number"),
-        ([frame(4, 1.0, [0.1, 57.0])], "measurement", "the bearing 57 is more than a turn"),
-        ([frame(4, 1.0, {"a": 1})], "measurement", "an object is not a finite number"),
+        ([frame(2, 1.0, [[1.0, "x"], [3.0, 4.0]])], "measurement", "'x' is not"),
+        ([frame(2, 1.0, [[[1.0]], [[2.0]]])], "measurement", "a list of 1"),
+        ([frame(3, 1.0, [[0.1, 0.2]])], "measurement", "list of 2"),
+        ([frame(4, 1.0, [0.1, 57.0])], "measurement", "bearing 57"),
+        ([frame(4, 1.0, {"a": 1})], "measurement", "an object"),
     ],
 )
 def test_hostile_detections_are_refused(content: Any, field: str, problem: str):
@@ -125,16 +125,12 @@ def test_hostile_detections_are_refused(content: Any, field: str, problem: str):
 @pytest.mark.parametrize(
     ("content", "field", "problem"),
     [
-        ([4], "the frame", "frame 1: is 4 where a list is expected"),
-        ([[[]]], "targetID", "is a list of 0, and has no 'targetID'"),
-        ([[target("havfruen")]], "targetID", "is 'havfruen', not a number of a target"),
-        ([[target(position=[1, 2])]], "position", "has 2 numbers where 3 are expected"),
-        ([[target(time=[])]], "time", "a list of 0 is not a finite number"),
-        (
-            [[target()], [target(position=[9, 2, 0])]],
-            "position",
-            "frame 2: target 1 is elsewhere at the same",
-        ),
+        ([4], "the frame", "is 4"),
+        ([[[]]], "targetID", "no 'targetID'"),
+        ([[target("havfruen")]], "targetID", "'havfruen'"),
+        ([[target(position=[1, 2])]], "position", "has 2 numbers"),
+        ([[target(time=[])]], "time", "a list of 0"),
+        ([[target()], [target(position=[9, 2, 0])]], "position", "elsewhere"),
     ],
 )
 def test_hostile_truth_is_refused(content: Any, field: str, problem: str):
@@ -157,7 +153,7 @@ def test_hostile_truth_is_refused(content: Any, field: str, problem: str):
     ],
 )
 def test_what_is_no_json_is_refused(data: bytes, problem: str):
-    with pytest.raises(WildlabError, match="Copy the published file again") as one:
+    with pytest.raises(WildlabError, match="Copy") as one:
         read_part(HERE, data, "frames")
     assert problem in str(one.value)
 
@@ -252,21 +248,17 @@ RECIPE = (DATA / "recipes" / "autoferry-2.toml").read_text(encoding="utf-8")
     ("old", "new", "problem"),
     [
         ('file = "scenario2/scenario2_detections.json"', 'file = "../frames.json"', "leaves its folder"),
-        ("[logs.lidar]", '[logs."a/b"]', "'a/b' cannot name a table"),
-        (
-            "[logs.lidar]",
-            '[tables.lidar]\nfile = "a.mat"\nfields = ["x"]\n\n[logs.lidar]',
-            "'lidar' names a table and a log",
-        ),
-        ('format = "autoferry"', 'format = "other"', "'other' is no format of logs"),
-        ('part = "lidar"', 'part = "sonar"', "'sonar' is no part of a log"),
-        ('sensor = "sensor"\n', "", "there are images, and no camera"),
+        ("[logs.lidar]", '[logs."a/b"]', "'a/b' cannot"),
+        ("[logs.lidar]", '[tables.lidar]\nfile = "a.mat"\nfields = ["x"]\n\n[logs.lidar]', "'lidar' names"),
+        ('format = "autoferry"', 'format = "other"', "'other'"),
+        ('part = "lidar"', 'part = "sonar"', "'sonar'"),
+        ('sensor = "sensor"\n', "", "no camera"),
         (
             'azimuth = { column = "bearing", unit = "rad" }',
             'range = { value = 9.0, unit = "m" }',
-            "an azimuth with or without elevation and range",
+            "an azimuth",
         ),
-        ('sensor = "sensor"\n', 'sensor = "sonar"\n', "sonar (in [frames.sensor])"),
+        ('sensor = "sensor"\n', 'sensor = "sonar"\n', "(in [frames.sensor])"),
     ],
 )
 def test_what_a_recipe_may_not_say_of_logs(tmp_path: Path, old: str, new: str, problem: str):

@@ -55,9 +55,9 @@ def test_a_recipe_takes_it(folder):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("fx_px = 1159.2", "fx_px = -1.0", "camera.toml, camera.fx_px: the focal length is -1 px"),
-        ("[[4.0]]", "[[4.0, 1.0]]", "the covariance does not fit the 1 parameters"),
-        ("cy_px", "cz_px", "camera.toml, camera.cz_px: this key is not known"),
+        ("fx_px = 1159.2", "fx_px = -1.0", "is -1 px"),
+        ("[[4.0]]", "[[4.0, 1.0]]", "covariance"),
+        ("cy_px", "cz_px", "camera.cz_px"),
         ("format = 1", "format = 2", "camera.toml, format"),
         ("[board]", "[board", "is not valid TOML"),
     ],
@@ -73,15 +73,13 @@ def test_a_wrong_one_is_a_sentence(folder, old, new, said):
 def test_one_that_is_not_there_and_one_that_lies_elsewhere_are_sentences(folder):
     recipe = folder / "recipe.toml"
     (folder / "camera.toml").rename(folder / "other.toml")
-    with pytest.raises(
-        WildlabError, match=r"there is no such file, and \[camera\] of recipe.toml asks for it"
-    ):
+    with pytest.raises(WildlabError, match="no such file"):
         import_flight(recipe, None, folder / "flight")
     recipe.write_text(recipe.read_text().replace('"camera.toml"', '"../camera.toml"'))
     with pytest.raises(WildlabError, match="leaves the folder"):
         import_flight(recipe, None, folder / "flight")
     recipe.write_text(recipe.read_text().replace("camera =", "camera_file ="))
-    with pytest.raises(WildlabError, match=r'Write camera = "camera\.toml"'):
+    with pytest.raises(WildlabError, match="Write camera"):
         import_flight(recipe, None, folder / "flight")
 
 

@@ -153,15 +153,15 @@ def test_a_mirror_without_the_file(
 ) -> None:
     dataset("http://127.0.0.1:1")
     monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(tmp_path / "mirror"))
-    with pytest.raises(WildlabError, match=r"has no deep/a\.csv and no a\.csv\. Copy the file there"):
+    with pytest.raises(WildlabError, match=r"no deep/a\.csv"):
         fetch("small", tmp_path / "here")
     assert not (tmp_path / "here").exists()
 
 
 def test_an_unknown_data_set_lists_the_known() -> None:
-    with pytest.raises(WildlabError, match=r"no data set 'openatena'.*Did you mean 'openathena'"):
+    with pytest.raises(WildlabError, match="mean 'openathena'"):
         fetch("openatena")
-    with pytest.raises(WildlabError, match="Use one of autoferry, inertialnav-x8, openathena, umn-thor75"):
+    with pytest.raises(WildlabError, match="Use one of autoferry"):
         dataset_folder("../..")
 
 
@@ -205,7 +205,7 @@ def test_no_more_bytes_are_taken_than_the_catalog_says(
     _put(web[1], a=b"x" * 1_000_000)
     if mirrored:
         monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(web[1]))
-    with pytest.raises(WildlabError, match=r"a\.csv.*larger than the 4 bytes that the catalog says"):
+    with pytest.raises(WildlabError, match="larger than the 4"):
         fetch("small", tmp_path / "here")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["web"]
 
@@ -216,7 +216,7 @@ def test_a_folder_in_the_way_of_a_file(
     dataset(web[0])
     _put(web[1])
     (tmp_path / "here" / "small" / "b.csv").mkdir(parents=True)
-    with pytest.raises(WildlabError, match=r"b\.csv: is in the way of a file to be fetched"):
+    with pytest.raises(WildlabError, match="in the way"):
         fetch("small", tmp_path / "here")
     assert not (tmp_path / "here" / "small" / "a.csv").exists()
 
@@ -227,7 +227,7 @@ def test_a_file_in_the_way_of_the_folder(
     dataset(web[0])
     _put(web[1])
     (tmp_path / "here").write_text("mine")
-    with pytest.raises(WildlabError, match="here: is a file where a folder is wanted"):
+    with pytest.raises(WildlabError, match="is a file"):
         fetch("small", tmp_path / "here")
     assert (tmp_path / "here").read_text() == "mine"
 
@@ -241,16 +241,13 @@ def test_a_link_out_of_the_folder_is_not_written_through(
     mine.write_text("mine")
     (tmp_path / "here" / "small").mkdir(parents=True)
     (tmp_path / "here" / "small" / "a.csv").symlink_to(mine)
-    with pytest.raises(WildlabError, match="leaves the folder it belongs to"):
+    with pytest.raises(WildlabError, match="leaves the folder"):
         fetch("small", tmp_path / "here")
     assert mine.read_text() == "mine"
 
 
 def test_a_full_disk_is_one_sentence(
-    web: tuple[str, Path],
-    dataset: Callable[[str], None],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    web: tuple[str, Path], dataset: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dataset(web[0])
     _put(web[1])
@@ -259,6 +256,6 @@ def test_a_full_disk_is_one_sentence(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(catalog._Limited, "write", full)
-    with pytest.raises(WildlabError, match=r"No space left on device.*Free some space on the disk at /"):
+    with pytest.raises(WildlabError, match="No space"):
         fetch("small", tmp_path / "here")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["web"]

@@ -50,7 +50,7 @@ def test_every_flipped_bit_of_a_table_is_found(folder: Path) -> None:
         damaged = bytearray(whole)
         damaged[rng.integers(len(whole))] ^= 1 << int(rng.integers(8))
         path.write_bytes(damaged)
-        with pytest.raises(WildlabError, match="damaged or changed since it was written") as caught:
+        with pytest.raises(WildlabError, match="damaged or changed") as caught:
             load_flight(folder)
         assert caught.value.file == str(path) and "wildlab check --accept" in (caught.value.fix or "")
         path.write_bytes(whole)
@@ -81,11 +81,11 @@ def test_every_flipped_bit_of_the_manifest_is_an_error_or_is_said(folder: Path) 
 
 def test_a_missing_and_an_added_table_are_named(folder: Path) -> None:
     (folder / "nav" / "other.parquet").write_bytes((folder / "nav" / "autopilot.parquet").read_bytes())
-    with pytest.raises(WildlabError, match="has no checksum of this file, so it was added later"):
+    with pytest.raises(WildlabError, match="no checksum"):
         load_flight(folder)
     (folder / "nav" / "other.parquet").unlink()
     (folder / "truth.parquet").unlink()
-    with pytest.raises(WildlabError, match=r"this file is missing, and flight\.toml has a checksum of it"):
+    with pytest.raises(WildlabError, match="is missing"):
         load_flight(folder)
 
 

@@ -47,7 +47,7 @@ def test_sizes_are_stated_and_kept(tmp_path: Path) -> None:
     assert "has 10 bytes, and 9 are the most" in _refused(path, 9)
     with path.open("wb") as stream:
         stream.truncate(files.TOML_LIMIT + 1)  # takes no room on the disk
-    with pytest.raises(WildlabError, match="4,000,001 bytes, and 4,000,000 are the most"):
+    with pytest.raises(WildlabError, match="4,000,001 bytes"):
         read_toml(path, "a recipe")
 
 
@@ -136,7 +136,7 @@ def test_true_is_no_number_wherever_it_stands(text: str, field: str) -> None:
 
 @pytest.mark.parametrize("text", ['maybe = "yes"', "maybe = 1", "parts = {a = {on = 0}}"])
 def test_what_is_true_or_false_is_written_so(text: str) -> None:
-    with pytest.raises(WildlabError, match="is neither true nor false"):
+    with pytest.raises(WildlabError, match="neither true"):
         check_model(Outer, parse_toml(text, Path("a.toml")), None)
     right = "name = true\nmaybe = false\nparts = {a = {on = true}}\nseveral = [{on = true}]\ncount = 2\n"
     made = check_model(Outer, parse_toml(right, Path("a.toml")), None)

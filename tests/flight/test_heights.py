@@ -121,9 +121,7 @@ def test_a_placeholder_is_no_geoid(nothing: dict[str, float]) -> None:
 
 def test_mixed_without_a_geoid_is_refused() -> None:
     streams = {"boat": positions(height_sea_m=2.0), "marks": positions(height_ellipsoid_m=44.0)}
-    with pytest.raises(
-        WildlabError, match="heights of boat count from sea level and those of marks from the ell"
-    ):
+    with pytest.raises(WildlabError, match="boat count from sea"):
         choose_reference(streams)
     assert choose_reference(streams, geoid_m=GEOID).reference == "ellipsoid"
 
@@ -145,7 +143,7 @@ def test_take_off_is_tied_by_the_first_used_fix() -> None:
 
 def test_another_vehicle_s_fix_ties_nothing() -> None:
     streams = {"drone": positions(height_home_m=50.0), "boat": positions(height_sea_m=1.0)}
-    with pytest.raises(WildlabError, match="heights of drone count from take-off, and nothing says how high"):
+    with pytest.raises(WildlabError, match="drone count from take-off"):
         choose_reference(streams, own=["drone"])
     plan = choose_reference(streams, own=["drone"], home_sea_m=12.0)
     assert plan.uses["drone"].add_m == 12.0 and plan.reference == "sea"

@@ -66,16 +66,16 @@ def test_numbers_of_a_clip_and_names_without_ending(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ("x,y,w,h\n1,2,3,4\n", "no column names the image"),
-        ("image,a\nb.png,3\n", "no columns say where things are"),
+        ("x,y,w,h\n1,2,3,4\n", "names the image"),
+        ("image,a\nb.png,3\n", "no columns"),
         ("image,x,y,w,h\n", "has no row"),
         ("image,x,y,w,h\na.png,1,2,3,4\na.png,1,2,-3,4\n", "line 3 has no box"),
         ("image,x,y,w,h\na.png,1,?,3,4\n", "line 2 has no box"),
         ("frame0,x,y,w,h\na,1,2,3,4\n", "line 2 has no number"),
         ("", "has no row"),
-        ("image,x,y,w,h\na.png,1,2,3,4,5,6\n", "line 2 has 7 values, and there are 5 columns"),
-        ("image,x,y,w,h\na.png,.1,.2,.3,.4\n", "x, y, w, h: the boxes are shares of the image"),
-        ("image,x_min,y_min,x_max,y_max\na.png,5,2,3,4\n", "line 2 has no box: x_min 5, y_min 2, x_max 3"),
+        ("image,x,y,w,h\na.png,1,2,3,4,5,6\n", "7 values"),
+        ("image,x,y,w,h\na.png,.1,.2,.3,.4\n", "shares"),
+        ("image,x_min,y_min,x_max,y_max\na.png,5,2,3,4\n", "x_min 5"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, text: str, word: str) -> None:
@@ -85,9 +85,9 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str, word: str) -> None:
 
 def test_unknown_class_group_and_file_are_named(tmp_path: Path) -> None:
     path = table(tmp_path / "l.csv", "image,x,y,w,h,class\na.png,1,2,3,4,deer\n")
-    with pytest.raises(WildlabError, match=r"class 'boar'\. There are deer"):
+    with pytest.raises(WildlabError, match="class 'boar'"):
         read_labels(path, classes=("boar",))
-    with pytest.raises(WildlabError, match="clip: there is no such column"):
+    with pytest.raises(WildlabError, match="no such column"):
         read_labels(path, group="clip")
     with pytest.raises(WildlabError, match="no such file"):
         read_labels(tmp_path / "none.csv")
@@ -115,7 +115,7 @@ def test_tables_as_other_programs_write_them(tmp_path: Path, text: str) -> None:
 def test_text_that_is_not_utf_8_is_named_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "l.csv"
     path.write_bytes("image,x,y,w,h\na.png,1,2,3,4\nr\u00f6d.png,1,2,3,4\n".encode("latin-1"))
-    with pytest.raises(WildlabError, match=r"line 3 is not text in UTF-8\. Save it as CSV in UTF-8"):
+    with pytest.raises(WildlabError, match="line 3 is not text"):
         read_labels(path)
 
 

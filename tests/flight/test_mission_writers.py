@@ -149,7 +149,7 @@ def test_kml_is_xml_whose_areas_read_back(tmp_path):
 
 
 def test_what_is_no_flight_is_refused():
-    with pytest.raises(WildlabError, match="one value for each way point"):
+    with pytest.raises(WildlabError, match="one value"):
         mission(above_ground=np.zeros(3))
     with pytest.raises(WildlabError, match="no place on the Earth"):
         mission(above_home=np.full(5, np.nan))

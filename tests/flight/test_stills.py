@@ -15,7 +15,7 @@ def test_folders_are_read_in_order_and_once(tmp_path):
 
 
 def test_what_is_not_there_and_an_empty_folder_are_sentences(tmp_path):
-    with pytest.raises(WildlabError, match="there is no such file or folder"):
+    with pytest.raises(WildlabError, match="no such file"):
         still_files([tmp_path / "none.png"])
-    with pytest.raises(WildlabError, match="there are no images in this folder"):
+    with pytest.raises(WildlabError, match="no images"):
         still_files([tmp_path])

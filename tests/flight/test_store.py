@@ -82,15 +82,15 @@ def test_whole_numbers_become_float_and_the_caller_keeps_his_table() -> None:
     ("table", "change", "field", "said"),
     [
         ("frames", lambda d: d.drop(columns="time_s"), "time_s", "is missing"),
-        ("frames", lambda d: d.assign(time_s="soon"), "time_s", "where numbers are expected"),
+        ("frames", lambda d: d.assign(time_s="soon"), "time_s", "numbers are expected"),
         ("frames", lambda d: d.assign(time_s=[True, False, True]), "time_s", "bool"),
         ("frames", lambda d: d.assign(time_s=1j), "time_s", "complex"),
-        ("frames", lambda d: d.assign(frame_id=[1, 2, 3]), "frame_id", "holds 1 where text is expected"),
-        ("frames", lambda d: d.assign(group=["a", None, "b"]), "group", "holds None where text is expected"),
-        ("frames", lambda d: d.assign(pan_rad=0.0), "tilt_rad", "'pan_rad' is there without it"),
+        ("frames", lambda d: d.assign(frame_id=[1, 2, 3]), "frame_id", "holds 1"),
+        ("frames", lambda d: d.assign(group=["a", None, "b"]), "group", "holds None"),
+        ("frames", lambda d: d.assign(pan_rad=0.0), "tilt_rad", "'pan_rad'"),
         ("detections", lambda d: d.drop(columns="u_px"), "u_px", "is missing"),
         ("detections", lambda d: d.assign(kind="bearing"), "azimuth_rad", "is missing"),
-        ("detections", lambda d: d.assign(kind="guess"), "kind", "'guess' is not a kind of detection"),
+        ("detections", lambda d: d.assign(kind="guess"), "kind", "not a kind"),
     ],
 )
 def test_a_table_that_does_not_fit_is_refused_and_nothing_written(
@@ -133,12 +133,12 @@ def test_partial_covariance_is_refused() -> None:
 
 
 def test_no_such_folder(tmp_path: Path) -> None:
-    with pytest.raises(WildlabError, match="there is no such folder"):
+    with pytest.raises(WildlabError, match="no such folder"):
         load_flight(tmp_path / "nothing")
 
 
 def test_folder_without_manifest(tmp_path: Path) -> None:
-    with pytest.raises(WildlabError, match=r"flight\.toml: there is no such file"):
+    with pytest.raises(WildlabError, match="no such file"):
         load_flight(tmp_path)
 
 
@@ -146,7 +146,7 @@ def test_broken_parquet(make_flight: Callable[..., Flight], tmp_path: Path) -> N
     save_flight(make_flight(), tmp_path / "flight")
     (tmp_path / "flight" / "truth.parquet").write_bytes(b"PAR1 rubbish")
     accept_changes(tmp_path / "flight")
-    with pytest.raises(WildlabError, match=r"truth\.parquet: is not a readable Parquet file"):
+    with pytest.raises(WildlabError, match="not a readable Parquet"):
         load_flight(tmp_path / "flight")
 
 
@@ -169,7 +169,7 @@ def test_a_link_out_of_the_folder_is_refused(
 def test_a_dangling_link_is_a_missing_file(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
     save_flight(make_flight(), tmp_path / "flight")
     (tmp_path / "flight" / "gnss.parquet").symlink_to("nowhere.parquet")
-    with pytest.raises(WildlabError, match=r"gnss\.parquet: this file is missing"):
+    with pytest.raises(WildlabError, match=r"gnss\.parquet"):
         load_flight(tmp_path / "flight")
 
 
@@ -179,7 +179,7 @@ def test_a_nav_source_cannot_leave_the_folder(
 ) -> None:
     flight = make_flight()
     flight.nav[source] = flight.nav["autopilot"]
-    with pytest.raises(WildlabError, match="cannot be the name of a nav source"):
+    with pytest.raises(WildlabError, match="nav source"):
         save_flight(flight, tmp_path / "flight")
     assert list(tmp_path.iterdir()) == []
 
@@ -191,14 +191,14 @@ def test_overwriting_only_when_asked_and_only_flights(
     folder.mkdir()
     save_flight(make_flight(), folder)  # an empty folder is as good as none
     changed = make_flight(description="second")
-    with pytest.raises(WildlabError, match="there is a flight in this folder already"):
+    with pytest.raises(WildlabError, match="already"):
         save_flight(changed, folder)
     save_flight(changed, folder, overwrite=True)
     assert load_flight(folder).manifest.description == "second"
     assert [path.name for path in tmp_path.iterdir()] == ["flight"]
 
     (folder / "notes.txt").write_text("mine")
-    with pytest.raises(WildlabError, match=r"notes\.txt' is no part of a flight"):
+    with pytest.raises(WildlabError, match="no part"):
         save_flight(changed, folder, overwrite=True)
     assert (folder / "notes.txt").read_text() == "mine"
 
@@ -263,7 +263,7 @@ def test_a_terrain_that_is_none_is_refused(
     else:
         path.write_bytes(whole[: len(whole) // 2] if damage == "cut" else b"II*")
     accept_changes(tmp_path / "one")
-    with pytest.raises(WildlabError, match=r"terrain\.tif: is not a .*Lay the terrain again"):
+    with pytest.raises(WildlabError, match="Lay the terrain"):
         load_flight(tmp_path / "one")
 
 
@@ -286,11 +286,11 @@ def test_the_truth_is_no_choice_of_poses(make_flight: Callable[..., Flight]) -> 
     flight.nav["truth"] = flight.nav["truth-payload"] = flight.nav["autopilot"]
     assert flight.pose_source()[0] == "autopilot"
     del flight.nav["truth-payload"], flight.nav["autopilot"]
-    with pytest.raises(WildlabError, match="this flight has no estimated poses"):
+    with pytest.raises(WildlabError, match="no estimated poses"):
         flight.pose_source()
     assert flight.pose_source("truth")[0] == "truth", "where it is named"
 
 
 def test_a_table_that_is_not_there(make_flight: Callable[..., Flight]) -> None:
-    with pytest.raises(WildlabError, match=r"no table 'imu'\. Add imu\.parquet: inertial"):
+    with pytest.raises(WildlabError, match="no table 'imu'"):
         make_flight().table("imu")

@@ -140,7 +140,7 @@ def test_holes_stay_holes_and_are_counted(tmp_path: Path, flown: Callable[..., F
     np.testing.assert_array_equal(np.isnan(heights), [True, False, False])
     assert flight.manifest.terrain.holes == np.isnan(flight.terrain.height).sum() > 0
     undeclared = write_map(tmp_path / "bare.tif", height=holed)
-    with pytest.raises(WildlabError, match=r"heights of -9999 m.*state it as nodata"):
+    with pytest.raises(WildlabError, match="heights of -9999"):
         lay(flown(), undeclared)
     again = lay(flown(), undeclared, nodata=-9999.0)
     assert again.terrain is not None
@@ -187,12 +187,12 @@ def test_heights_count_from_what_is_said(tmp_path: Path, flown: Callable[..., Fl
     same = lay(recorded, path, heights="flight")
     assert same.terrain is not None
     np.testing.assert_allclose(same.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 30.0, atol=1e-3)
-    with pytest.raises(WildlabError, match="does not say what its heights count from, and nobody guesses"):
+    with pytest.raises(WildlabError, match="heights count from"):
         lay(flown(), path, heights=None)
     egm = write_map(tmp_path / "egm.tif", crs="EPSG:32633+5773")
-    with pytest.raises(WildlabError, match=r"count from 'EGM96 height', as its CRS says"):
+    with pytest.raises(WildlabError, match="CRS says"):
         lay(flown(), egm)
-    with pytest.raises(WildlabError, match=r"'EGM96 height', and the grid of that is not on this machine"):
+    with pytest.raises(WildlabError, match="the grid"):
         lay(flown(), egm, heights=None)
     three = write_map(tmp_path / "three.tif", crs=4979, cell=4e-5)
     assert lay(flown(), three, heights=None).manifest.terrain.heights == "ellipsoid"  # type: ignore[union-attr]
@@ -217,7 +217,7 @@ def test_a_picture_as_f_has_it(tmp_path: Path, flown: Callable[..., Flight]) -> 
     assert flight.terrain is not None
     known = flight.terrain.height[np.isfinite(flight.terrain.height)]
     assert known.min() >= 71 + 100 / 5 - 100 - 0.1 and known.max() <= 71 + 109 / 5 - 100 + 0.01
-    with pytest.raises(WildlabError, match="does not say where its cells lie"):
+    with pytest.raises(WildlabError, match="cells lie"):
         lay(flown(height_m=100.0), path, crs=f"EPSG:{UTM}")
     with pytest.raises(WildlabError, match="states no CRS"):
         lay(flown(height_m=100.0), path, cell_m=3.0, corner=(x, y))
@@ -235,11 +235,11 @@ def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path: Path, flown: Callable[
 @pytest.mark.parametrize(
     ("origin", "written", "words"),
     [
-        ({"latitude_deg": 47.8}, {}, r"nearest cell is 110\.\d km away\. Give"),
-        ({"latitude_deg": -LATITUDE}, {}, "with the other sign of latitude it would"),
-        ({"longitude_deg": -LONGITUDE}, {}, "with the other sign of longitude it would"),
-        ({}, {"off": (0.0, 1e7)}, "with the zone of the other hemisphere"),
-        ({"height_m": 400.0}, {}, r"whole flight is below the ground of this map, 2\d\d m in the middle"),
+        ({"latitude_deg": 47.8}, {}, r"nearest cell is 110\."),
+        ({"latitude_deg": -LATITUDE}, {}, "sign of latitude"),
+        ({"longitude_deg": -LONGITUDE}, {}, "sign of longitude"),
+        ({}, {"off": (0.0, 1e7)}, "other hemisphere"),
+        ({"height_m": 400.0}, {}, "below the ground"),
     ],
 )
 def test_a_map_of_elsewhere_is_refused(
@@ -257,11 +257,11 @@ def test_a_map_of_elsewhere_is_refused(
     ("written", "words"),
     [
         ({"crs": None}, "states no CRS"),
-        ({"count": 2}, "has 2 bands, and a map of heights has one"),
-        ({"dtype": "complex64"}, "holds complex64, and heights are real numbers"),
-        ({"nodata": 5.0, "height": lambda x, y: np.full(x.shape, 5.0)}, "no height anywhere near the flight"),
-        ({"height": lambda x, y: 1e5 + x}, r"heights of 100\d\d\d m, and on Earth land lies between"),
-        ({"units": "fathom"}, "its heights are in 'fathom', which is no unit of length known here"),
+        ({"count": 2}, "2 bands"),
+        ({"dtype": "complex64"}, "holds complex64"),
+        ({"nodata": 5.0, "height": lambda x, y: np.full(x.shape, 5.0)}, "no height"),
+        ({"height": lambda x, y: 1e5 + x}, r"heights of 100\d"),
+        ({"units": "fathom"}, "'fathom'"),
     ],
 )
 def test_what_is_no_map_of_heights_is_refused(
@@ -284,21 +284,21 @@ def test_what_is_no_map_of_heights_is_refused(
 def test_what_is_no_file_or_damaged_is_refused(tmp_path: Path, flown: Callable[..., Flight]) -> None:
     path = write_map(tmp_path / "dem.tif", compress="deflate", tiled=True, blockxsize=64, blockysize=64)
     whole = path.read_bytes()
-    with pytest.raises(WildlabError, match=r"gone\.tif: there is no such file"):
+    with pytest.raises(WildlabError, match="no such file"):
         lay(flown(), tmp_path / "gone.tif")
     (tmp_path / "text.tif").write_text("no raster")
-    with pytest.raises(WildlabError, match="neither a TIFF nor a PNG"):
+    with pytest.raises(WildlabError, match="neither a TIFF"):
         lay(flown(), tmp_path / "text.tif")
     (tmp_path / "cut.tif").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(
         WildlabError, match=r"is not a GeoTIFF or PNG that can be read|breaks off or is damaged"
     ):
         lay(flown(), tmp_path / "cut.tif")
-    with pytest.raises(WildlabError, match="CRS nonsense is not known to PROJ"):
+    with pytest.raises(WildlabError, match="CRS nonsense"):
         lay(flown(), path, crs="nonsense")
-    with pytest.raises(WildlabError, match=r"states the CRS .*zone 33N, and .*zone 34N is said of it"):
+    with pytest.raises(WildlabError, match="zone 33N"):
         lay(flown(), path, crs="EPSG:32634")
-    with pytest.raises(WildlabError, match=r"CRS \(.*\) is not one of places on Earth"):
+    with pytest.raises(WildlabError, match="places on Earth"):
         lay(flown(), write_map(tmp_path / "site.tif", local='LOCAL_CS["site",UNIT["metre",1]]'))
 
 

@@ -7,8 +7,7 @@ checks undo mistakes with. `wrong_meanings` gives those that a flight has someth
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -24,16 +23,14 @@ QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
 FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
 RATE = ["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
 FIELD = ["field_x_ut", "field_y_ut", "field_z_ut"]
+EXCHANGE = [[0, 1, 0], [1, 0, 0], [0, 0, 1]]
+FOOT = 0.3048
 Change = Callable[[Flight], Flight]
 
 
-@dataclass(frozen=True)
-class WrongMeaning:
-    """A mistake: its name, what it does, and what a finding has to say to have named it (a pattern)."""
-
+class WrongMeaning(NamedTuple):
     name: str
     apply: Change
-    named: str
 
 
 def wrong_meanings(flight: Flight) -> list[WrongMeaning]:
@@ -55,7 +52,6 @@ def wrong_meanings(flight: Flight) -> list[WrongMeaning]:
         found += sensors.magnetometer_meanings()
     if flight.detections is not None and flight.manifest.camera is None:
         found += sensors.sensor_meanings(flight)
-        found += sensors.own_ship("truth")
     if flight.manifest.time.kind == "utc":
         found += sensors.clock_meanings(flight)
     return found
@@ -77,17 +73,12 @@ def manifest_of(flight: Flight, **parts: dict[str, Any]) -> Flight:
     return Flight(replace_in_manifest(flight.manifest, parts), flight.nav, flight.tables, None)
 
 
-def _llh(table: str, change: Callable[[Any, Any, Any], tuple[Any, Any, Any]]) -> Change:
-    """Latitude, longitude (degrees) and height as the recipe would have read them."""
+def of_columns(table: str, names: list[str], change: Callable[[np.ndarray], Any]) -> Change:
+    """Columns (N, K) of one table as the recipe would have read them."""
 
     def apply(flight: Flight) -> Flight:
-        o = flight.manifest.origin
-        place = (o.latitude_deg, o.longitude_deg, o.height_m)
-
         def rows(data: pd.DataFrame) -> pd.DataFrame:
-            lat, lon, h = pymap3d.ned2geodetic(*data[NED].to_numpy(float).T, *place)
-            lat, lon, h = change(np.asarray(lat), np.asarray(lon), np.asarray(h))
-            data[NED] = np.column_stack(pymap3d.geodetic2ned(np.clip(lat, -90, 90), lon, h, *place))
+            data[names] = change(data[names].to_numpy(float))
             return data
 
         return with_table(flight, table, rows)
@@ -96,200 +87,131 @@ def _llh(table: str, change: Callable[[Any, Any, Any], tuple[Any, Any, Any]]) ->
 
 
 def columns(table: str, names: list[str], matrix: Any) -> Change:
-    def apply(flight: Flight) -> Flight:
-        def rows(data: pd.DataFrame) -> pd.DataFrame:
-            data[names] = data[names].to_numpy(float) @ np.asarray(matrix, float).T
-            return data
+    return of_columns(table, names, lambda values: values @ np.asarray(matrix, float).T)
 
-        return with_table(flight, table, rows)
+
+def _llh(table: str, change: Callable[[Any, Any, Any], tuple[Any, Any, Any]]) -> Change:
+    """Latitude, longitude (degrees) and height as the recipe would have read them."""
+
+    def apply(flight: Flight) -> Flight:
+        o = flight.manifest.origin
+        place = (o.latitude_deg, o.longitude_deg, o.height_m)
+
+        def moved(p: np.ndarray) -> np.ndarray:
+            lat, lon, h = change(*(np.asarray(one) for one in pymap3d.ned2geodetic(*p.T, *place)))
+            return np.column_stack(pymap3d.geodetic2ned(np.clip(lat, -90, 90), lon, h, *place))
+
+        return of_columns(table, NED, moved)(flight)
 
     return apply
 
 
-def _euler(table: str, change: Callable[[np.ndarray], np.ndarray]) -> Change:
+def euler(table: str, change: Callable[[np.ndarray], np.ndarray]) -> Change:
     """Roll, pitch, yaw (degrees, (N, 3)) as the recipe would have read them."""
 
-    def apply(flight: Flight) -> Flight:
-        def rows(data: pd.DataFrame) -> pd.DataFrame:
-            q = Rotation.from_quat(data[QUATERNION].to_numpy(float), scalar_first=True)
-            angles = q.as_euler("ZYX", degrees=True)[:, ::-1]
-            read = change(angles)
-            q = Rotation.from_euler("ZYX", read[:, ::-1], degrees=True)
-            data[QUATERNION] = q.as_quat(scalar_first=True, canonical=True)
-            return data
+    def turned(q: np.ndarray) -> np.ndarray:
+        angles = Rotation.from_quat(q, scalar_first=True).as_euler("ZYX", degrees=True)[:, ::-1]
+        read = Rotation.from_euler("ZYX", change(angles)[:, ::-1], degrees=True)
+        return np.asarray(read.as_quat(scalar_first=True, canonical=True))
 
-        return with_table(flight, table, rows)
-
-    return apply
+    return of_columns(table, QUATERNION, turned)
 
 
-def _quaternion(table: str, change: Callable[[np.ndarray], np.ndarray]) -> Change:
-    def apply(flight: Flight) -> Flight:
-        def rows(data: pd.DataFrame) -> pd.DataFrame:
-            data[QUATERNION] = change(data[QUATERNION].to_numpy(float))
-            return data
-
-        return with_table(flight, table, rows)
-
-    return apply
-
-
-def shift(table: str, seconds: float, rows: Callable[[pd.DataFrame], Any] | None = None) -> Change:
-    def apply(flight: Flight) -> Flight:
-        def later(data: pd.DataFrame) -> pd.DataFrame:
-            which = slice(None) if rows is None else rows(data)
-            data.loc[which, "time_s"] = data.loc[which, "time_s"] + seconds
-            return data
-
-        return with_table(flight, table, later)
-
-    return apply
+def shift(table: str, seconds: float) -> Change:
+    return of_columns(table, ["time_s"], lambda t: t + seconds)
 
 
 # -- what is done to them
 
 
-def places(table: str, label: str, velocity: bool = False) -> Iterator[WrongMeaning]:
-    def one(name: str, change: Change, named: str) -> WrongMeaning:
-        return WrongMeaning(f"{label}: {name}", change, named)
-
+def places(table: str, label: str) -> Iterator[WrongMeaning]:
     R = np.degrees(1.0)
-    yield one(
-        "latitude and longitude exchanged",
-        _llh(table, lambda a, b, h: (b, a, h)),
-        "latitude and longitude are exchanged|north and east are exchanged",
-    )
-    yield one("latitude negated", _llh(table, lambda a, b, h: (-a, b, h)), "latitude has the wrong sign")
-    yield one("longitude negated", _llh(table, lambda a, b, h: (a, -b, h)), "longitude has the wrong sign")
-    yield one(
-        "radians read as degrees",
-        _llh(table, lambda a, b, h: (a / R, b / R, h)),
-        "latitude and longitude are in radians",
-    )
-    yield one(
-        "height in feet",
-        _llh(table, lambda a, b, h: (a, b, h / 0.3048)),
-        "height is in ft|constant height|vertical",
-    )
-    yield one(
-        "height in metres read as feet",
-        _llh(table, lambda a, b, h: (a, b, h * 0.3048)),
-        "says ft|constant height|vertical",
-    )
-    yield one("height above the geoid, 40 m", _llh(table, lambda a, b, h: (a, b, h - 40.0)), "vertical")
-    yield one(
-        "height negated",
-        _llh(table, lambda a, b, h: (a, b, -h)),
-        "height has the wrong sign|vertical|counts upwards",
-    )
-    yield one("height above home", _llh(table, lambda a, b, h: (a, b, h - h[0] + 0.0)), "vertical")
-    yield one(
-        "north and east exchanged",
-        columns(table, NED, [[0, 1, 0], [1, 0, 0], [0, 0, 1]]),
-        "north and east are exchanged|latitude and longitude are exchanged",
-    )
-    yield one("north negated", columns(table, NED, np.diag([-1, 1, 1])), "north has the wrong sign")
-    yield one("east negated", columns(table, NED, np.diag([1, -1, 1])), "east has the wrong sign")
-    yield one("down read from up", columns(table, NED, np.diag([1, 1, -1])), "upwards|wrong sign|vertical")
-    yield one("feet read as metres", columns(table, NED, np.diag([1 / 0.3048, 1 / 0.3048, 1])), "in ft")
+    for name, change in {
+        "latitude and longitude exchanged": lambda a, b, h: (b, a, h),
+        "latitude negated": lambda a, b, h: (-a, b, h),
+        "longitude negated": lambda a, b, h: (a, -b, h),
+        "radians read as degrees": lambda a, b, h: (a / R, b / R, h),
+        "height in feet": lambda a, b, h: (a, b, h / FOOT),
+        "height in metres read as feet": lambda a, b, h: (a, b, h * FOOT),
+        "height above the geoid, 40 m": lambda a, b, h: (a, b, h - 40.0),
+        "height negated": lambda a, b, h: (a, b, -h),
+        "height above home": lambda a, b, h: (a, b, h - h[0]),
+    }.items():
+        yield WrongMeaning(f"{label}: {name}", _llh(table, change))
+    for name, matrix in {
+        "north and east exchanged": EXCHANGE,
+        "north negated": np.diag([-1, 1, 1]),
+        "east negated": np.diag([1, -1, 1]),
+        "down read from up": np.diag([1, 1, -1]),
+        "feet read as metres": np.diag([1 / FOOT, 1 / FOOT, 1]),
+    }.items():
+        yield WrongMeaning(f"{label}: {name}", columns(table, NED, matrix))
 
 
 def velocities(table: str, label: str) -> Iterator[WrongMeaning]:
-    def one(name: str, matrix: Any, named: str) -> WrongMeaning:
-        return WrongMeaning(f"{label}: {name}", columns(table, VELOCITY, matrix), named)
-
-    yield one("velocity in knots", np.diag([1 / 0.514444] * 3), "in kn|knots")
-    yield one("velocity in km/h", np.diag([3.6] * 3), "km/h")
-    yield one("velocity in ft/s", np.diag([1 / 0.3048] * 3), "ft/s")
-    yield one("velocity in cm/s", np.diag([100.0] * 3), "cm/s")
-    yield one("velocity down from up", np.diag([1, 1, -1]), "down|up")
-    yield one("velocity north and east exchanged", [[0, 1, 0], [1, 0, 0], [0, 0, 1]], "exchange")
-    yield one("velocity north negated", np.diag([-1, 1, 1]), "north")
-    yield one("velocity east negated", np.diag([1, -1, 1]), "east")
+    for name, matrix in {
+        "in knots": np.eye(3) / 0.514444,
+        "in km/h": np.eye(3) * 3.6,
+        "in ft/s": np.eye(3) / FOOT,
+        "in cm/s": np.eye(3) * 100.0,
+        "down from up": np.diag([1, 1, -1]),
+        "north and east exchanged": EXCHANGE,
+        "north negated": np.diag([-1, 1, 1]),
+        "east negated": np.diag([1, -1, 1]),
+    }.items():
+        yield WrongMeaning(f"{label}: velocity {name}", columns(table, VELOCITY, matrix))
 
     def course(change: Callable[[np.ndarray], np.ndarray]) -> Change:
-        def apply(flight: Flight) -> Flight:
-            def rows(data: pd.DataFrame) -> pd.DataFrame:
-                v = data[VELOCITY].to_numpy(float)
-                speed, angle = np.hypot(v[:, 0], v[:, 1]), change(np.arctan2(v[:, 1], v[:, 0]) % (2 * np.pi))
-                data[VELOCITY] = np.column_stack([speed * np.cos(angle), speed * np.sin(angle), v[:, 2]])
-                return data
+        def turned(v: np.ndarray) -> np.ndarray:
+            speed, angle = np.hypot(v[:, 0], v[:, 1]), change(np.arctan2(v[:, 1], v[:, 0]) % (2 * np.pi))
+            return np.column_stack([speed * np.cos(angle), speed * np.sin(angle), v[:, 2]])
 
-            return with_table(flight, table, rows)
+        return of_columns(table, VELOCITY, turned)
 
-        return apply
-
-    yield WrongMeaning(f"{label}: course in degrees read as radians", course(np.degrees), "course.*deg")
-    yield WrongMeaning(f"{label}: course in radians read as degrees", course(np.radians), "course.*rad")
-    yield WrongMeaning(
-        f"{label}: course from which it comes", course(lambda a: a + np.pi), "north and east|half a turn|180"
-    )
+    yield WrongMeaning(f"{label}: course in degrees read as radians", course(np.degrees))
+    yield WrongMeaning(f"{label}: course in radians read as degrees", course(np.radians))
+    yield WrongMeaning(f"{label}: course from which it comes", course(lambda a: a + np.pi))
 
 
 def _poses(flight: Flight, source: str) -> Iterator[WrongMeaning]:
-    table = f"nav/{source}"
-    has = flight.nav[source]
+    table, has = f"nav/{source}", flight.nav[source]
     own_place = not (flight.gnss is not None and VELOCITY[0] not in has)  # else taken from the receiver
     if own_place:
         yield from places(table, "poses")
     if VELOCITY[0] in has:
         yield from velocities(table, "poses")
-    if np.ptp(has[QUATERNION].to_numpy(float), axis=0).max() == 0:
-        return  # no attitude but a stand-in
+    if np.ptp(has[QUATERNION].to_numpy(float), axis=0).max() > 0:  # else only a stand-in
+        yield from _attitudes(table)
 
-    def one(name: str, change: Change, named: str) -> WrongMeaning:
-        return WrongMeaning(f"attitude: {name}", change, named)
+
+def _attitudes(table: str) -> Iterator[WrongMeaning]:
+    def one(name: str, change: Callable[[np.ndarray], np.ndarray]) -> WrongMeaning:
+        return WrongMeaning(f"attitude: {name}", euler(table, change))
 
     for axis, key in enumerate(("roll", "pitch", "yaw")):
         sign = np.where(np.arange(3) == axis, -1.0, 1.0)
-        yield one(f"{key} negated", _euler(table, lambda e, s=sign: e * s), f"{key} has the wrong sign")
-    yield one(
-        "roll and pitch negated",
-        _euler(table, lambda e: e * [-1, -1, 1]),
-        "roll and pitch have the wrong sign|roll has|pitch has",
-    )
+        yield one(f"{key} negated", lambda e, s=sign: e * s)
+    yield one("roll and pitch negated", lambda e: e * [-1, -1, 1])
     for turn in (90.0, -90.0, 180.0):
-        yield one(
-            f"yaw off by {turn:g} deg",
-            _euler(table, lambda e, t=turn: e + np.array([0, 0, t])),
-            "yaw",
-        )
-    yield one(
-        "yaw from east, to the left",
-        _euler(table, lambda e: e * [1, 1, -1] + [0, 0, 90]),
-        "counts to the left from east|yaw",
-    )
+        yield one(f"yaw off by {turn:g} deg", lambda e, t=turn: e + np.array([0, 0, t]))
+    yield one("yaw from east, to the left", lambda e: e * [1, 1, -1] + [0, 0, 90])
     for some, key in (((0, 1, 2), "all angles"), ((0,), "roll"), ((1,), "pitch"), ((2,), "yaw")):
         chosen = np.isin(np.arange(3), some)
-        yield one(
-            f"{key} in radians read as degrees",
-            _euler(table, lambda e, c=chosen: np.where(c, np.radians(e), e)),
-            "radians",
-        )
-        yield one(
-            f"{key} in degrees read as radians",
-            _euler(table, lambda e, c=chosen: np.where(c, np.degrees(e), e)),
-            "degrees",
-        )
-    yield one(
-        "roll and pitch exchanged", _euler(table, lambda e: e[:, [1, 0, 2]]), "roll and pitch are exchanged"
-    )
-    yield one(
-        "pitch and yaw exchanged", _euler(table, lambda e: e[:, [0, 2, 1]]), "pitch and yaw are exchanged"
-    )
-    yield one(
-        "pitch from the vertical",
-        _euler(table, lambda e: np.column_stack([e[:, 0], 90 + e[:, 1], e[:, 2]])),
-        "pitch",
-    )
-    yield one("quaternion inverse", _quaternion(table, lambda q: q * [1, -1, -1, -1]), "inverse")
-    yield one("quaternion order", _quaternion(table, lambda q: q[:, [1, 2, 3, 0]]), "order")
+        yield one(f"{key} in radians read as degrees", lambda e, c=chosen: np.where(c, np.radians(e), e))
+        yield one(f"{key} in degrees read as radians", lambda e, c=chosen: np.where(c, np.degrees(e), e))
+    yield one("roll and pitch exchanged", lambda e: e[:, [1, 0, 2]])
+    yield one("pitch and yaw exchanged", lambda e: e[:, [0, 2, 1]])
+    yield one("pitch from the vertical", lambda e: e + np.array([0, 90, 0]))
     flip = Rotation.from_matrix(np.diag([1.0, -1, -1]))
     enu = Rotation.from_matrix(np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]))
 
     def flu(q: np.ndarray) -> np.ndarray:
-        return np.asarray(
-            (enu * Rotation.from_quat(q, scalar_first=True) * flip).as_quat(scalar_first=True, canonical=True)
-        )
+        turned = enu * Rotation.from_quat(q, scalar_first=True) * flip
+        return np.asarray(turned.as_quat(scalar_first=True, canonical=True))
 
-    yield one("axes flu-enu", _quaternion(table, flu), "flu-enu")
+    for name, change in {
+        "quaternion inverse": lambda q: q * [1, -1, -1, -1],
+        "quaternion order": lambda q: q[:, [1, 2, 3, 0]],
+        "axes flu-enu": flu,
+    }.items():
+        yield WrongMeaning(f"attitude: {name}", of_columns(table, QUATERNION, change))

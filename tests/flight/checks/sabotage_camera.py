@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,109 +15,82 @@ from wildlab.flight.store import Flight
 
 
 def camera_meanings(flight: Flight) -> Iterator[s.WrongMeaning]:
-    camera, mount = flight.manifest.camera, flight.manifest.mount
+    for name, change in {**_pixels(flight), **_calibration(flight), **_mount(flight)}.items():
+        yield s.WrongMeaning(f"camera: {name}", change)
+    yield s.WrongMeaning("camera: one photo off", _one_photo)
+    if flight.truth is not None:
+        yield s.WrongMeaning("camera: one mark off by 25 m", lambda f: s.with_table(f, "truth", _one_mark))
+        yield s.WrongMeaning("camera: marks named one along", lambda f: s.with_table(f, "truth", _along))
+    yield s.WrongMeaning("camera: ground heights 50 m up", _ground)
+    yield s.WrongMeaning("origin 200 km away", lambda f: _far(f, f.manifest.origin.latitude_deg + 1.8))
+
+
+def _pixels(flight: Flight) -> dict[str, s.Change]:
+    camera = flight.manifest.camera
     assert camera is not None
-    width, height = camera.width_px, camera.height_px
-
-    def one(name: str, change: s.Change, named: str) -> s.WrongMeaning:
-        return s.WrongMeaning(f"camera: {name}", change, named)
-
-    other = "forward" if mount.looks == "down" else "down"
-    yield one(
-        "looks the other way", lambda f: s.manifest_of(f, mount={"looks": other}), f'looks = "{mount.looks}"'
-    )
-    for key in ("pan", "tilt", "roll"):
-        for turn in (90.0, -90.0, 180.0):
-            yield one(
-                f"mount turned, {key} {turn:g} deg",
-                lambda f, k=key, t=turn: s.manifest_of(
-                    f, mount={f"misalignment_{k}_deg": t + getattr(mount, f"misalignment_{k}_deg")}
-                ),
-                r"\[mount\]|yaw is off|pitch|roll",
-            )
+    size = np.array([camera.width_px, camera.height_px])
 
     def pixels(change: Callable[[np.ndarray], np.ndarray]) -> s.Change:
-        def apply(f: Flight) -> Flight:
-            def rows(data: pd.DataFrame) -> pd.DataFrame:
-                of = (data["kind"] == "pixel").to_numpy()
-                data.loc[of, ["u_px", "v_px"]] = change(data.loc[of, ["u_px", "v_px"]].to_numpy(float))
-                return data
+        def rows(data: pd.DataFrame) -> pd.DataFrame:
+            of = (data["kind"] == "pixel").to_numpy()
+            data.loc[of, ["u_px", "v_px"]] = change(data.loc[of, ["u_px", "v_px"]].to_numpy(float))
+            return data
 
-            return s.with_table(f, "detections", rows)
+        return lambda f: s.with_table(f, "detections", rows)
 
-        return apply
+    return {
+        "v from the bottom": pixels(lambda uv: uv * [1, -1] + size * [0, 1]),
+        "u from the right": pixels(lambda uv: uv * [-1, 1] + size * [1, 0]),
+        "image upside down": pixels(lambda uv: size - uv),
+        "u and v exchanged": pixels(lambda uv: uv[:, ::-1]),
+        "pixels of a preview of half the size": pixels(lambda uv: uv / 2),
+        "pixels as proportions": pixels(lambda uv: uv / size),
+        "pixels from the centre": pixels(lambda uv: uv - size / 2),
+    }
 
-    yield one("v from the bottom", pixels(lambda uv: uv * [1, -1] + [0, height]), "v counts upwards")
-    yield one("u from the right", pixels(lambda uv: uv * [-1, 1] + [width, 0]), "u counts to the left")
-    yield one("image upside down", pixels(lambda uv: [width, height] - uv), "upside down|top of the image")
-    yield one("u and v exchanged", pixels(lambda uv: uv[:, ::-1]), "u and v are exchanged")
-    yield one(
-        "pixels of a preview of half the size", pixels(lambda uv: uv / 2), "of an image .* times as large"
-    )
-    yield one("pixels as proportions", pixels(lambda uv: uv / [width, height]), "proportion")
-    yield one("pixels from the centre", pixels(lambda uv: uv - [width / 2, height / 2]), "from the centre")
-    f_mm = 7.5
-    yield one(
-        "focal length in mm",
-        lambda f: s.manifest_of(f, camera={"fx_px": f_mm, "fy_px": f_mm}),
-        "millimetres|mm",
-    )
+
+def _calibration(flight: Flight) -> dict[str, s.Change]:
+    camera = flight.manifest.camera
+    assert camera is not None
+
+    def stated(**values: Any) -> s.Change:
+        return lambda f: s.manifest_of(f, camera=values)
+
+    def times(factor: float, *names: str) -> s.Change:
+        return stated(**{name: factor * getattr(camera, name) for name in names})
+
+    focal, centre, lens = ("fx_px", "fy_px"), ("cx_px", "cy_px"), ("k1", "k2", "p1", "p2", "k3")
+    found = {"focal length in mm": stated(fx_px=7.5, fy_px=7.5)}
     for factor in (0.5, 2.0):
-        yield one(
-            f"focal length times {factor:g}",
-            lambda f, k=factor: s.manifest_of(
-                f, camera={"fx_px": k * camera.fx_px, "fy_px": k * camera.fy_px}
-            ),
-            "focal length",
-        )
-        yield one(
-            f"calibration of another size, times {factor:g}",
-            lambda f, k=factor: s.manifest_of(
-                f, camera={n: k * getattr(camera, n) for n in ("fx_px", "fy_px", "cx_px", "cy_px")}
-            ),
-            "times as large",
-        )
-    yield one(
-        "cx and cy exchanged",
-        lambda f: s.manifest_of(f, camera={"cx_px": camera.cy_px, "cy_px": camera.cx_px}),
-        "cx and cy are exchanged|cx_px",
-    )
-    yield one("principal point 0", lambda f: s.manifest_of(f, camera={"cx_px": 0.0, "cy_px": 0.0}), "cx_px")
-    yield one(
-        "width and height exchanged",
-        lambda f: s.manifest_of(f, camera={"width_px": height, "height_px": width}),
-        "width|size of the image",
-    )
-    lens = ("k1", "k2", "p1", "p2", "k3")
-    if any(getattr(camera, n) for n in lens):
-        yield one(
-            "sign of the distortion",
-            lambda f: s.manifest_of(f, camera={n: -getattr(camera, n) for n in lens}),
-            "distortion",
-        )
-        yield one("sign of k1", lambda f: s.manifest_of(f, camera={"k1": -camera.k1}), "k1|distortion")
-        yield one(
-            "distortion left out", lambda f: s.manifest_of(f, camera={n: 0.0 for n in lens}), "distortion"
-        )
-        yield one(
-            "order k1, k2, k3, p1, p2",
-            lambda f: s.manifest_of(f, camera={"p1": camera.k3, "p2": camera.p1, "k3": camera.p2}),
-            "order|distortion",
-        )
-    else:
-        yield one(
-            "distortion of another lens", lambda f: s.manifest_of(f, camera={"k1": -0.4}), "k1|distortion"
-        )
-    yield one(
-        "lever arm in mm", lambda f: s.manifest_of(f, mount={"lever_arm_m": (120.0, 0.0, 80.0)}), "lever arm"
-    )
-    yield one("one photo off", _one_photo, "one photo off")
-    if flight.truth is not None:
-        yield one("one mark off by 25 m", _one_mark, "one mark off")
-        yield one("marks named one along", _marks_along, "names")
-    yield one("ground heights 50 m up", _ground, "ground")
-    origin = flight.manifest.origin
-    yield s.WrongMeaning("origin 200 km away", lambda f: _far(f, origin.latitude_deg + 1.8), "origin")
+        found[f"focal length times {factor:g}"] = times(factor, *focal)
+        found[f"calibration of another size, times {factor:g}"] = times(factor, *focal, *centre)
+    found["cx and cy exchanged"] = stated(cx_px=camera.cy_px, cy_px=camera.cx_px)
+    found["principal point 0"] = stated(cx_px=0.0, cy_px=0.0)
+    found["width and height exchanged"] = stated(width_px=camera.height_px, height_px=camera.width_px)
+    if not any(getattr(camera, name) for name in lens):
+        return {**found, "distortion of another lens": stated(k1=-0.4)}
+    return {
+        **found,
+        "sign of the distortion": times(-1.0, *lens),
+        "sign of k1": times(-1.0, "k1"),
+        "distortion left out": times(0.0, *lens),
+        "order k1, k2, k3, p1, p2": stated(p1=camera.k3, p2=camera.p1, k3=camera.p2),
+    }
+
+
+def _mount(flight: Flight) -> dict[str, s.Change]:
+    mount = flight.manifest.mount
+
+    def stated(**values: Any) -> s.Change:
+        return lambda f: s.manifest_of(f, mount=values)
+
+    found = {"looks the other way": stated(looks="forward" if mount.looks == "down" else "down")}
+    for key in ("pan", "tilt", "roll"):
+        name = f"misalignment_{key}_deg"
+        for turn in (90.0, -90.0, 180.0):
+            found[f"mount turned, {key} {turn:g} deg"] = stated(**{name: turn + getattr(mount, name)})
+    found["lever arm in mm"] = stated(lever_arm_m=(120.0, 0.0, 80.0))
+    return found
 
 
 def _far(flight: Flight, latitude: float) -> Flight:
@@ -124,21 +98,17 @@ def _far(flight: Flight, latitude: float) -> Flight:
     o = flight.manifest.origin
     old, new = (o.latitude_deg, o.longitude_deg, o.height_m), (latitude, o.longitude_deg, o.height_m)
 
-    def rows(data: pd.DataFrame) -> pd.DataFrame:
-        there = pymap3d.ned2geodetic(*data[s.NED].to_numpy(float).T, *old)
-        data[s.NED] = np.column_stack(pymap3d.geodetic2ned(*there, *new))
-        return data
+    def moved(p: np.ndarray) -> np.ndarray:
+        return np.column_stack(pymap3d.geodetic2ned(*pymap3d.ned2geodetic(*p.T, *old), *new))
 
-    for name in flight.nav:
-        flight = s.with_table(flight, f"nav/{name}", rows)
-    for name in ("gnss", "truth"):
-        if name in flight.tables:
-            flight = s.with_table(flight, name, rows)
+    tables = [f"nav/{name}" for name in flight.nav]
+    for table in tables + [name for name in ("gnss", "truth") if name in flight.tables]:
+        flight = s.of_columns(table, s.NED, moved)(flight)
     return s.manifest_of(flight, origin={"latitude_deg": latitude})
 
 
 def _one_photo(flight: Flight) -> Flight:
-    """A photo with marks gets the attitude of half a turn later."""
+    """The poses at a photo with marks are turned by 60 deg."""
     detections = flight.table("detections")
     marks = detections[detections["target_id"] != ""] if "target_id" in detections else detections
     frame = marks["frame_id"].value_counts().index[0]
@@ -148,9 +118,7 @@ def _one_photo(flight: Flight) -> Flight:
             which = (data["frame_id"] == frame).to_numpy()
         else:
             at = float(flight.table("frames").set_index("frame_id").loc[frame, "time_s"])
-            which = (
-                np.abs(data["time_s"] + flight.manifest.clocks.camera_offset_s * 0 - at) < 1.0
-            ).to_numpy()
+            which = (np.abs(data["time_s"] - at) < 1.0).to_numpy()
         q = Rotation.from_quat(data.loc[which, s.QUATERNION].to_numpy(float), scalar_first=True)
         turn = Rotation.from_euler("Z", 60, degrees=True)
         data.loc[which, s.QUATERNION] = (turn * q).as_quat(scalar_first=True, canonical=True)
@@ -161,32 +129,19 @@ def _one_photo(flight: Flight) -> Flight:
     return flight
 
 
-def _one_mark(flight: Flight) -> Flight:
-    detections = flight.table("detections")
-    names = detections.get("target_id", pd.Series(dtype=object))
-    counted = names[names != ""].value_counts()
-    mark = counted.index[0] if len(counted) else flight.table("truth")["target_id"].iloc[0]
-
-    def rows(data: pd.DataFrame) -> pd.DataFrame:
-        data.loc[data["target_id"] == mark, "north_m"] += 25.0
-        return data
-
-    return s.with_table(flight, "truth", rows)
+def _one_mark(truth: pd.DataFrame) -> pd.DataFrame:
+    truth.loc[truth["target_id"] == truth["target_id"].iloc[0], "north_m"] += 25.0
+    return truth
 
 
-def _marks_along(flight: Flight) -> Flight:
-    def rows(data: pd.DataFrame) -> pd.DataFrame:
-        names = list(dict.fromkeys(data["target_id"]))
-        data["target_id"] = data["target_id"].map(dict(zip(names, names[1:] + names[:1], strict=True)))
-        return data
-
-    return s.with_table(flight, "truth", rows)
+def _along(truth: pd.DataFrame) -> pd.DataFrame:
+    names = list(dict.fromkeys(truth["target_id"]))
+    return truth.assign(
+        target_id=truth["target_id"].map(dict(zip(names, names[1:] + names[:1], strict=True)))
+    )
 
 
 def _ground(flight: Flight) -> Flight:
-    def rows(data: pd.DataFrame) -> pd.DataFrame:
-        if "plane_down_m" in data:
-            data["plane_down_m"] = data["plane_down_m"] - 50.0
-        return data
-
-    return s.with_table(flight, "detections", rows)
+    if "plane_down_m" not in flight.table("detections"):
+        return flight
+    return s.of_columns("detections", ["plane_down_m"], lambda down: down - 50.0)(flight)

@@ -1,4 +1,4 @@
-"""How well an offset of the camera's clock is known, and whether a turn of the camera looks like it."""
+"""How well an offset of the camera's clock is known, and if a turn of the camera looks like it."""
 
 from __future__ import annotations
 
@@ -52,10 +52,7 @@ def test_the_interval_is_that_of_as_many_images() -> None:
 
 
 @pytest.mark.parametrize("late", [0.5, -0.5])
-def test_the_advice_has_the_interval_and_that_it_flatters(late: float) -> None:
+def test_the_advice_has_the_interval(late: float) -> None:
     first = next(clock_mistakes(flown(forward=False, late=late, off_m=4 * OFF_M), 0.0))
     low, high, alike = (float(x) for x in re.findall(r"\d\.\d+", first.said)[1:4])
     assert low < abs(late) < high and high - low < 0.1 and alike < HARD
-    assert "hard to tell" not in first.said and "flatter" in first.write
-    hard = next(clock_mistakes(flown(forward=True, late=late, off_m=4 * OFF_M), 0.0))
-    assert "hard to tell" in hard.said

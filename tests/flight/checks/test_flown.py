@@ -37,9 +37,7 @@ def test_the_speed_counts_whichever_way_it_goes(
         assert why == "" if fast else f"moves at {speed:.1f} m/s" in why
 
 
-def test_what_was_fast_before_the_inertial_samples_tells_nothing(
-    make_flight: Callable[..., Flight],
-) -> None:
+def test_what_was_fast_before_the_inertial_samples_tells_nothing(make_flight: Callable[..., Flight]) -> None:
     flight = flown(make_flight, 3.0, 0.0, velocities=True)
     flight.tables["gnss"].loc[:8, "v_east_m_s"] = 20.0
     assert "moves at 3.0 m/s" in why_no_start(flight)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -56,13 +57,8 @@ def watched(make: Make, seed: int, clutter: float = 0.0, leant: dict[int, float]
     flight.tables["truth"] = pd.DataFrame(
         {"target_id": list("abcd"), "time_s": np.nan, "north_m": animals[:, 0], "east_m": animals[:, 1]}
     ).assign(down_m=0.0)
-    where, R = camera_pose(
-        flight.manifest.geometry_mount(),
-        p,
-        euler_to_matrix(0 * t, 0 * t, yaw),
-        np.zeros(PHOTOS),
-        np.zeros(PHOTOS),
-    )
+    zero = np.zeros(PHOTOS)
+    where, R = camera_pose(flight.manifest.geometry_mount(), p, euler_to_matrix(zero, zero, yaw), zero, zero)
     seen_at = np.einsum("kji,kaj->kai", R, animals - where[:, None])
     uv = project(flight.manifest.geometry_camera(), seen_at) + rng.normal(0, 2.0, (PHOTOS, 4, 2))
     wrong = rng.random((PHOTOS, 4)) < clutter
@@ -96,8 +92,7 @@ def test_one_wrong_of_two_detections_is_no_wrong_photo(make_flight: Make) -> Non
 @pytest.mark.parametrize("clutter", [0.0, 0.1])
 def test_wrong_photos_are_still_named(make_flight: Make, clutter: float) -> None:
     (said,) = off(watched(make_flight, 1, clutter, {7: 35.0, 31: -30.0}))
-    assert said.startswith("some photos off") and "'P7' (" in said and "'P31' (" in said
-    assert said.count("'") == 4  # these two
+    assert re.findall(r"'(P\d+)'", said) == ["P7", "P31"]
 
 
 def named(far: list[tuple[int, int]]) -> list[str]:

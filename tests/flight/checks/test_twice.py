@@ -48,11 +48,8 @@ def test_rows_that_stand_there_again_are_counted(make_flight: Make) -> None:
     once = flight.table("detections")
     again = once.iloc[[0, 2, 3]].assign(detection_id=["x", "y", "z"], target_id="boat")
     flight.tables["detections"] = pd.concat([once, again], ignore_index=True)
-    first = once["frame_id"][0]
-    assert said(flight) == [
-        "detections, detection_id: 3 of 7 detections are exactly like another one of the same look, in 3 "
-        f"looks, first 'x' in {first!r}: a target would be seen twice there."
-    ]
+    (sentence,) = said(flight)
+    assert "3 of 7" in sentence and "3 looks, first 'x'" in sentence
 
 
 def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_flight: Make) -> None:
@@ -76,7 +73,7 @@ def test_one_among_hundreds_is_a_note(make_flight: Make) -> None:
     )
     flight.tables["detections"] = pd.concat([many, many.iloc[:1].assign(detection_id="x")], ignore_index=True)
     found = [one for one in check_flight(flight) if one.field == "detection_id"]
-    assert [one.level for one in found] == ["note"] and "1 of 151 detections" in found[0].sentence
+    assert [one.level for one in found] == ["note"] and "1 of 151" in found[0].sentence
 
 
 def scans_of(make: Make, n: int = 20) -> Flight:

@@ -150,10 +150,10 @@ def test_headers_that_cannot_be_are_refused(tmp_path: Path, content: bytes, said
 def test_what_is_not_packed_or_not_there_is_refused(tmp_path: Path) -> None:
     plain = tmp_path / "a.cptv"
     plain.write_bytes(header())
-    with pytest.raises(WildlabError, match="cut off or damaged inside its header"):
+    with pytest.raises(WildlabError, match="cut off"):
         open_frames(plain)
     (tmp_path / "d.cptv").mkdir()
-    with pytest.raises(WildlabError, match="this folder itself has no images"):
+    with pytest.raises(WildlabError, match="no images"):
         open_frames(tmp_path / "d.cptv")
     with pytest.raises(WildlabError, match="no such file"):
         next(read_cptv(tmp_path / "none.cptv"))

@@ -10,12 +10,7 @@ import numpy as np
 import pytest
 
 from wildlab.flight.readers.frames import Frame, open_frames
-from wildlab.flight.readers.frames.pixels import (
-    MOST_DEAD,
-    find_dead,
-    measure_vignetting,
-    without_vignetting,
-)
+from wildlab.flight.readers.frames.pixels import MOST_DEAD, find_dead, measure_vignetting, without_vignetting
 from wildlab.flight.readers.frames.shutter import is_shutter, mark_shutter
 from wildlab.simulation.scene.response import (
     CameraResponse,

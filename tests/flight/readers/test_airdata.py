@@ -175,11 +175,11 @@ def test_gimbal_heading_that_stands():
 
 
 def test_messages():
-    with pytest.raises(WildlabError, match=r"has no column 'latitude' and 'datetime\(utc\)'"):
+    with pytest.raises(WildlabError, match="column 'latitude'"):
         airdata.read(Path("x.csv"), b"time(millisecond),longitude\n1,2\n")
-    with pytest.raises(WildlabError, match="has no row under its header"):
+    with pytest.raises(WildlabError, match="row under"):
         airdata.read(Path("x.csv"), table([]).encode())
-    with pytest.raises(WildlabError, match="has the unit 'cubits', which is not known"):
+    with pytest.raises(WildlabError, match="unit 'cubits'"):
         airdata.read(Path("x.csv"), table(rows()).replace("takeoff(meters)", "takeoff(cubits)").encode())
     assert not airdata.recognise(b"time,x,y\n1,2,3\n", "x.csv")
 

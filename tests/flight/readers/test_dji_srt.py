@@ -159,9 +159,9 @@ def test_rows_that_cannot_be_true():
 
 
 def test_messages():
-    with pytest.raises(WildlabError, match="2 subtitles, and none with a place"):
+    with pytest.raises(WildlabError, match="2 subtitles"):
         dji_srt.read(Path("x"), subtitles("hello", "GPS(n/a, n/a, 0)").encode())
-    with pytest.raises(WildlabError, match="'Mars' is not a time zone"):
+    with pytest.raises(WildlabError, match="'Mars'"):
         dji_srt.read(Path("x"), subtitles(new(1)).encode(), "Mars")
     assert not dji_srt.recognise(subtitles("Hello there").encode(), "film.srt")
     log = dji_srt.read(Path("x"), subtitles(new(1), "hello").encode(), "UTC")

@@ -143,20 +143,20 @@ def test_entities_are_refused(codec):
         with pytest.raises(WildlabError):
             gpx.read(Path("x.gpx"), data)
         return
-    with pytest.raises(WildlabError, match="declares a document type or entities"):
+    with pytest.raises(WildlabError, match="document type"):
         gpx.read(Path("x.gpx"), data)
 
 
 def test_depth_is_bounded():
     data = document(point(0, inside="<a>" * 100000 + "</a>" * 100000))
-    with pytest.raises(WildlabError, match="nested more than 64 deep"):
+    with pytest.raises(WildlabError, match="more than 64"):
         gpx.read(Path("x.gpx"), data)
 
 
 def test_no_track():
-    with pytest.raises(WildlabError, match="has no point of a track"):
+    with pytest.raises(WildlabError, match="no point"):
         gpx.read(Path("x.gpx"), b'<gpx version="1.1"><wpt lat="1" lon="2"/></gpx>')
-    with pytest.raises(WildlabError, match="has no point of a track; 1 are broken"):
+    with pytest.raises(WildlabError, match="1 are broken"):
         gpx.read(Path("x.gpx"), b'<gpx version="1.1"><trk><trkseg><trkpt lat="1" lon="2">')
 
 

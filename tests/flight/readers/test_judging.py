@@ -40,12 +40,7 @@ ROW = st.tuples(
 @given(st.lists(ROW, min_size=1, max_size=40))
 def test_rows_of_use_hold_together(rows):
     time, latitude, longitude, height = np.array(rows, float).T
-    columns = {
-        "time_s": time,
-        "latitude_deg": latitude,
-        "longitude_deg": longitude,
-        "height_sea_m": height,
-    }
+    columns = {"time_s": time, "latitude_deg": latitude, "longitude_deg": longitude, "height_sea_m": height}
     use = ~np.logical_or.reduce(list(judge(columns).values()))
     assert np.isfinite(np.column_stack([latitude, longitude])[use]).all()
     assert np.isfinite(height[use]).all() or np.isnan(height[use]).all()

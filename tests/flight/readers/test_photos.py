@@ -200,7 +200,7 @@ def test_parrots_and_pix4ds_tags(tmp_path: Path) -> None:
     assert column(log, "sd_horizontal_m")[0] == 1.5
     assert "count from looking straight down" in said(log)
     assert "there are 2 cameras: " in said(log)
-    with pytest.raises(WildlabError, match="of 2 cameras: Parrot Anafi, Parrot Sequoia"):
+    with pytest.raises(WildlabError, match="2 cameras: Parrot"):
         camera_of(log)
 
 
@@ -314,7 +314,7 @@ def test_a_zoom_and_two_sizes_are_no_one_camera(tmp_path: Path) -> None:
             made.write(tmp_path / folder, f"{number}.jpg", size=(sizes[number], 30), exif=exif)
     with pytest.raises(WildlabError, match="the lens zooms"):
         camera_of(read_photos(tmp_path / "zoom"))
-    with pytest.raises(WildlabError, match="of 2 cameras: One, 40 x 30, One, 60 x 30"):
+    with pytest.raises(WildlabError, match="2 cameras: One"):
         camera_of(read_photos(tmp_path / "sizes"))
 
 
@@ -358,7 +358,7 @@ def test_no_image(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("x", encoding="utf-8")
     assert not is_photos(tmp_path)
     assert not is_photos(tmp_path / "none")
-    with pytest.raises(WildlabError, match="there are no images in this folder"):
+    with pytest.raises(WildlabError, match="no images"):
         read_photos(tmp_path)
     with pytest.raises(WildlabError, match="cannot be read"):
         read_photos(tmp_path / "none")

@@ -189,12 +189,12 @@ def test_repeated_rows():
 
 def test_baselines_are_refused():
     data = document("GPST", GPST, llh(), names="e-baseline(m) n-baseline(m) u-baseline(m)")
-    with pytest.raises(WildlabError, match="has baselines from its base station, and no places"):
+    with pytest.raises(WildlabError, match="baselines"):
         rtklib_pos.read(Path("x"), data.encode())
 
 
 def test_nothing_in_it():
-    with pytest.raises(WildlabError, match="has no position; 2 lines cannot be read"):
+    with pytest.raises(WildlabError, match="no position; 2 lines"):
         rtklib_pos.read(Path("x"), b"%  GPST latitude(deg) longitude(deg) height(m)\nhello\n1,2\n")
     # A baseline without a header cannot be told from a place but by its digits.
     assert not rtklib_pos.recognise(f"{GPST[0]} 12.3456 5.6789 1.2345 1 12\n".encode(), "x.pos")

@@ -308,10 +308,10 @@ def test_signed_frames_and_unknown_messages_are_passed() -> None:
 def test_what_is_no_log_is_refused() -> None:
     for data in (b"", b"\x00" * 500, b"\xfe" * 500, b"$GPGGA,1\n" * 100):
         assert not tlog.recognise(data[:8192], "a.tlog")
-        with pytest.raises(WildlabError, match="holds no sound MAVLink frame behind a time of receipt"):
+        with pytest.raises(WildlabError, match="no sound"):
             read(data)
     beat = frame(made("HEARTBEAT", type=6, autopilot=8), START_S, 255)
-    with pytest.raises(WildlabError, match="holds 5 messages, and none of attitude or position"):
+    with pytest.raises(WildlabError, match="holds 5 messages"):
         read(beat * 5)
     assert tlog.recognise(beat, "a.tlog")
     assert not tlog.recognise(beat, "a.bin")

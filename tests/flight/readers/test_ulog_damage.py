@@ -31,11 +31,11 @@ def test_appended_data_is_read() -> None:
 
 def test_what_cannot_be_read_is_refused() -> None:
     for data in (b"", b"ULog\x01\x12\x36" + bytes(100)):
-        with pytest.raises(WildlabError, match="does not begin as a ULog does"):
+        with pytest.raises(WildlabError, match="does not begin"):
             read(data)
-    with pytest.raises(WildlabError, match="holds no message of position, attitude or sensors"):
+    with pytest.raises(WildlabError, match="holds no message"):
         read(ulog({"battery_status": ("uint64_t timestamp;float voltage_v;", [(us(1), 12.0)])}))
-    with pytest.raises(WildlabError, match=r"is not known \(flags 0x4\)"):
+    with pytest.raises(WildlabError, match=r"\(flags 0x4\)"):
         read(ulog(flight(), flags=bytes(8) + b"\x04" + bytes(31)))
 
 

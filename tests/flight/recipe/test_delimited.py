@@ -51,13 +51,13 @@ def test_numbers_over_several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     some = table.rows(np.array([4, 0]))
     np.testing.assert_array_equal(plain_numbers(some, "x", "p"), [-8, 0.1])
     assert some.cell("x", 0) == "-8" and some.lines.tolist() == [6, 2]
-    with pytest.raises(WildlabError, match=r"x \(in \[p\]\): line 4: this cell is empty"):
+    with pytest.raises(WildlabError, match="line 4: this cell is empty"):
         plain_numbers(table, "x", "p")
 
 
 def test_the_line_of_a_wrong_byte_far_into_the_file() -> None:
     data = b"a,b\n" + b"1,2\n" * 50_000 + b"1,\xff\n"
-    with pytest.raises(WildlabError, match="line 50002 is not UTF-8 text"):
+    with pytest.raises(WildlabError, match="line 50002"):
         read_delimited(Path("t.csv"), data, ",")
 
 

@@ -91,18 +91,14 @@ def test_a_matrix_with_labels_and_a_struct(mat: Any) -> None:
 @pytest.mark.parametrize(
     ("dotted", "value", "said"),
     [
-        (
-            "fields",
-            ["photo", "whem"],
-            "whem (in [tables.photos]): there is no 'whem' in this file. Did you mean",
-        ),
-        ("struct", "lag", "there is no 'lag' in this file. Did you mean 'log'"),
-        ("struct", "log.naw", "there is no 'naw' in the struct 'log'. Did you mean 'nav'"),
-        ("struct", "POS.x", "'POS' is not a struct. Mend the path"),
+        ("fields", ["photo", "whem"], "whem"),
+        ("struct", "lag", "no 'lag'"),
+        ("struct", "log.naw", "no 'naw'"),
+        ("struct", "POS.x", "not a struct"),
         ("file", "../log.mat", "leaves its folder"),
-        ("file", "lag.mat", "there is no such file, and [tables.photos] of recipe.toml asks for it"),
-        ("labels", "POS_label", "made of fields, or of a matrix with columns or labels"),
-        ("matrix", "POS", "made of fields, or of a matrix with columns or labels"),
+        ("file", "lag.mat", "no such file"),
+        ("labels", "POS_label", "made of fields"),
+        ("matrix", "POS", "made of fields"),
     ],
 )
 def test_what_a_recipe_gets_wrong(mat: Any, dotted: str, value: Any, said: str) -> None:
@@ -116,18 +112,12 @@ def test_what_a_recipe_gets_wrong(mat: Any, dotted: str, value: Any, said: str) 
 @pytest.mark.parametrize(
     ("block", "said"),
     [
-        (
-            {"struct": "log.nav", "fields": ("t", "odd")},
-            "has 7 values, and 't' has 5. Put fields of one length",
-        ),
-        ({"struct": "log.nav", "fields": ("q",)}, "is 5 x 4 of float64, and a column is one row of real"),
-        (
-            {"struct": "log.nav", "fields": ("complex",)},
-            "is 5 of complex128, and a column is one row of real",
-        ),
-        ({"struct": "log", "fields": ("nav",)}, "of object, and a column is one row of real numbers"),
-        ({"matrix": "POS", "columns": ("a", "b")}, "'POS' is 5 x 3, and there are 2 names of columns"),
-        ({"matrix": "POS", "columns": ("a", "b", "b")}, "'POS' is 5 x 3, and there are 2 names of columns"),
+        ({"struct": "log.nav", "fields": ("t", "odd")}, "'t' has 5"),
+        ({"struct": "log.nav", "fields": ("q",)}, "5 x 4"),
+        ({"struct": "log.nav", "fields": ("complex",)}, "5 of complex128"),
+        ({"struct": "log", "fields": ("nav",)}, "of object"),
+        ({"matrix": "POS", "columns": ("a", "b")}, "2 names"),
+        ({"matrix": "POS", "columns": ("a", "b", "b")}, "2 names"),
     ],
 )
 def test_what_is_no_table(mat: Any, block: dict[str, Any], said: str) -> None:
@@ -140,7 +130,7 @@ def test_what_is_no_table(mat: Any, block: dict[str, Any], said: str) -> None:
 def test_a_cell_that_is_no_number_names_its_row(mat: Any) -> None:
     path = mat.folder / "raw" / "log.mat"
     scipy.io.savemat(path, {"photo": _cells("A", "B", "C"), "when": [1.0, np.nan, 3.0], "one": [1, 2, 3]})
-    with pytest.raises(WildlabError, match=r"row 2: 'nan' is not a finite number"):
+    with pytest.raises(WildlabError, match="row 2"):
         mat.run()
 
 
@@ -148,15 +138,13 @@ def test_a_cell_that_is_no_number_names_its_row(mat: Any) -> None:
     "start", [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n"]
 )
 def test_version_7_3_is_told(start: bytes) -> None:
-    with pytest.raises(
-        WildlabError, match=r"version 7\.3 \(HDF5\), which is not read\. Load it in MATLAB.*-v7"
-    ):
+    with pytest.raises(WildlabError, match=r"version 7\.3"):
         read_matlab(HERE, start + bytes(600))
 
 
 @pytest.mark.parametrize("data", [b"", b"time,lat\n1,2\n", b"MATLAB 5.0", bytes(200)])
 def test_other_files_are_told(data: bytes) -> None:
-    with pytest.raises(WildlabError, match="is not a MATLAB file of version 5 to 7"):
+    with pytest.raises(WildlabError, match="not a MATLAB"):
         read_matlab(HERE, data)
 
 
@@ -182,7 +170,7 @@ def test_a_small_file_that_unpacks_to_a_huge_one(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(matlab, "MOST_BYTES", 1 << 22)
     bomb = zlib.compress(bytes(1 << 24))
     assert len(bomb) < 1 << 15
-    with pytest.raises(WildlabError, match="holds more than 4 MiB once it is unpacked"):
+    with pytest.raises(WildlabError, match="than 4"):
         read_matlab(HERE, _header() + struct.pack("<II", 15, len(bomb)) + bomb)
 
 
@@ -201,7 +189,5 @@ def test_objects_and_functions_do_nothing(mat: Any) -> None:
     functions = np.array([(1, "disp('x')")], dtype=[("a", object), ("b", object)])
     path = mat.folder / "raw" / "log.mat"
     scipy.io.savemat(path, {"photo": functions, "when": np.arange(3.0), "one": np.arange(3)})
-    with pytest.raises(
-        WildlabError, match=r"photo \(in \[tables\.photos\]\): is .* a column is one row of real"
-    ):
+    with pytest.raises(WildlabError, match="one row of real"):
         mat.run()

@@ -219,7 +219,7 @@ def test_a_night_in_which_nothing_was_detected_is_imported(raw: Any) -> None:
     assert told.sentence == (
         "detections: nothing was detected in this flight: of 3 frames, none has a detection."
     )
-    with pytest.raises(WildlabError, match="there are no detections, so there is nothing to follow"):
+    with pytest.raises(WildlabError, match="no detections"):
         track_many(flight.folder)
 
 
@@ -241,10 +241,10 @@ def test_one_sensor_that_saw_nothing_leaves_the_others_alone(raw: Any) -> None:
 
 def test_a_column_is_missed_where_nothing_was_detected_too(raw: Any) -> None:
     raw.tables["clicks.csv"] = "photo,x,what\n"
-    with pytest.raises(WildlabError, match=r"y .*this column is missing"):
+    with pytest.raises(WildlabError, match="column is missing"):
         raw.run()
     raw.tables["clicks.csv"] = ""
-    with pytest.raises(WildlabError, match="there are no rows in it"):
+    with pytest.raises(WildlabError, match="no rows"):
         raw.run()
 
 
@@ -252,7 +252,7 @@ def test_a_file_without_rows_is_refused_where_rows_are_needed_after_all(tmp_path
     (tmp_path / "clicks.csv").write_text("photo,x\n")
     files = RawFiles(tmp_path, tmp_path / "recipe.toml")
     assert len(files.table("clicks.csv", ",", "detections", may_be_empty=True)) == 0
-    with pytest.raises(WildlabError, match="there are no rows in it"):
+    with pytest.raises(WildlabError, match="no rows"):
         files.table("clicks.csv", ",", "truth")
 
 
@@ -288,18 +288,16 @@ def test_bearings_from_the_bow_have_the_yaw_added(raw: Any) -> None:
 
 def test_a_bow_whose_heading_is_not_known_is_refused(raw: Any) -> None:
     raw.recipe["detections"] = _head_up(raw, [0, 0, 0], [1.0, 2.0, 3.0])
-    with pytest.raises(
-        WildlabError, match=r"line 4.*counts from the bow, and no pose says .* in frame 'C': 1 of 3"
-    ):
+    with pytest.raises(WildlabError, match="counts from the bow"):
         raw.run()
     del raw.recipe["detections"][0]["frame"]
-    with pytest.raises(WildlabError, match="nothing says when they were taken"):
+    with pytest.raises(WildlabError, match="says when they"):
         raw.run()
 
 
 def test_only_an_azimuth_counts_from_the_bow(raw: Any) -> None:
     raw.set("detections.0.counts_from", "bow")
-    with pytest.raises(WildlabError, match="only an azimuth counts from the bow"):
+    with pytest.raises(WildlabError, match="only an azimuth"):
         raw.run()
 
 
@@ -309,9 +307,7 @@ def test_detections_of_one_sensor_in_looks_of_another_are_refused(raw: Any) -> N
         f"{look},{who}" for look, who in zip(looks, ["who", "click", "click", "lidar"], strict=True)
     )
     raw.set("frames.sensor", "who")
-    with pytest.raises(
-        WildlabError, match=r"of the source 'click' are in looks of the sensor 'lidar'"
-    ) as caught:
+    with pytest.raises(WildlabError, match="source 'click'") as caught:
         raw.run()
     assert caught.value.file is not None and "clicks.csv" in str(caught.value.file)
 
@@ -327,10 +323,10 @@ def test_groups_by_edges(raw: Any) -> None:
     assert list(raw.run().table("frames")["group"]) == ["low", "mid", "high"]
     raw.replace("photos.csv", ",30", ",31")
     raw.into.rename(raw.folder / "old")
-    with pytest.raises(WildlabError, match=r"line 3: 31 is closer than 10 to the edge between two groups"):
+    with pytest.raises(WildlabError, match="line 3: 31 is closer"):
         raw.run()
     raw.set("frames.group.labels", ["low", "high"])
-    with pytest.raises(WildlabError, match="2 edges make 3 groups, and there are 2 labels"):
+    with pytest.raises(WildlabError, match="2 edges make 3"):
         raw.run()
 
 
@@ -376,7 +372,7 @@ def test_frames_made_of_rows_that_agree(raw: Any) -> None:
     assert list(flight.table("detections")["frame_id"]) == ["F0", "F0", "F1"]
     raw.into.rename(raw.folder / "old")
     raw.replace("all.csv", "0.1,2", "0.3,2")
-    with pytest.raises(WildlabError, match=r"line 3: this row of frame 'F0' says something else than line 2"):
+    with pytest.raises(WildlabError, match="says something else"):
         raw.run()
     assert not raw.into.exists()
 
@@ -427,7 +423,7 @@ def test_units_against_their_definitions() -> None:
 
 
 def test_a_time_has_some_column() -> None:
-    with pytest.raises(ValueError, match="either a column or several columns"):
+    with pytest.raises(ValueError, match="either a column"):
         Stamp()
 
 

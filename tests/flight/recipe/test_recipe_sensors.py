@@ -141,7 +141,7 @@ def test_no_images_and_no_poses(sensors: Any) -> None:
     assert flight.nav == {}
     assert set(flight.tables) == {"imu", "gnss"}
     np.testing.assert_allclose(flight.table("gnss")[NED].iloc[0], 0, atol=1e-9)
-    with pytest.raises(WildlabError, match=r"the flight small has no camera\. Add the part"):
+    with pytest.raises(WildlabError, match="no camera"):
         flight.manifest.geometry_camera()
     assert "for navigation only" in " ".join(one.sentence for one in check_flight(flight))
 
@@ -204,30 +204,30 @@ def test_magnetometer(sensors: Any) -> None:
     assert flight.manifest.magnetometer.inclination_deg == 70.0
     assert flight.manifest.magnetometer.name == "compass"
     sensors.set("magnetometer.field.x.unit", "m")
-    with pytest.raises(WildlabError, match="'m' is a unit of length, not of field"):
+    with pytest.raises(WildlabError, match="not of field"):
         sensors.run()
 
 
 @pytest.mark.parametrize(
     ("dotted", "value", "said"),
     [
-        ("imu.force.x.unit", "m/s", "'m/s' is a unit of speed, not of acceleration. Use one of m/s2, g"),
-        ("imu.rate.z.unit", "deg", "'deg' is a unit of angle, not of rate. Use one of rad/s, deg/s"),
-        ("imu.rate.z.plus", "bias2", "bias2 (in [imu.rate.z.plus]): this column is missing"),
-        ("imu.rate.z", {"value": 0.0, "unit": "rad/s", "plus": "bias"}, "plus is added to a column"),
-        ("imu.force.z", None, "imu.force.z: this key is missing"),
-        ("imu.force.z.column", "az2", "az2 (in [imu.force.z]): this column is missing"),
-        ("imu.lever_arm_m", [0, 0, 0], "imu.lever_arm_m: this key is not known"),
-        ("gnss.latency_s", -1.0, "gnss.latency_s: -1.0 does not fit"),
-        ("gnss.velocity.north", _q("kn", "kn"), "either north and east, or speed and course"),
+        ("imu.force.x.unit", "m/s", "not of acceleration"),
+        ("imu.rate.z.unit", "deg", "not of rate"),
+        ("imu.rate.z.plus", "bias2", "bias2 (in [imu.rate.z.plus])"),
+        ("imu.rate.z", {"value": 0.0, "unit": "rad/s", "plus": "bias"}, "plus is added"),
+        ("imu.force.z", None, "imu.force.z: this key"),
+        ("imu.force.z.column", "az2", "(in [imu.force.z])"),
+        ("imu.lever_arm_m", [0, 0, 0], "imu.lever_arm_m"),
+        ("gnss.latency_s", -1.0, "latency_s: -1.0"),
+        ("gnss.velocity.north", _q("kn", "kn"), "either north"),
         ("gnss.velocity.up", None, "either down or up"),
-        ("gnss.changed", ["fresh"], "fresh (in [gnss.changed]): this column is missing"),
-        ("gnss.where", [{"column": "tow"}], "a condition says nothing. Give it equals"),
-        ("gnss.where", [{"column": "tow", "above": 99}], "none of the 6 rows counts. Check the conditions"),
-        ("gnss.where", [{"column": "ok", "above": 99}], "ok (in [gnss.where[0]]): this column is missing"),
-        ("poses.log.position_from", "gnss", "either a position or position_from"),
-        ("camera", None, "there are images, and no camera. Add the part [camera]"),
-        ("gimbal", {"file": "imu.csv"}, "gimbal.time: this key is missing"),
+        ("gnss.changed", ["fresh"], "fresh"),
+        ("gnss.where", [{"column": "tow"}], "says nothing"),
+        ("gnss.where", [{"column": "tow", "above": 99}], "6 rows"),
+        ("gnss.where", [{"column": "ok", "above": 99}], "(in [gnss.where[0]])"),
+        ("poses.log.position_from", "gnss", "either a position"),
+        ("camera", None, "no camera"),
+        ("gimbal", {"file": "imu.csv"}, "gimbal.time"),
     ],
 )
 def test_one_thing_wrong(sensors: Any, dotted: str, value: Any, said: str) -> None:
@@ -242,18 +242,14 @@ def test_one_thing_wrong(sensors: Any, dotted: str, value: Any, said: str) -> No
 def test_positions_from_a_receiver_that_is_not_there(raw: Any) -> None:
     raw.set("poses.log.position", None)
     raw.set("poses.log.position_from", "gnss")
-    with pytest.raises(
-        WildlabError, match=r"\[poses\.log\] takes its positions from gnss, and there is none"
-    ):
+    with pytest.raises(WildlabError, match="positions from gnss"):
         raw.run()
 
 
 def test_a_wrong_unit_is_refused_on_import(sensors: Any) -> None:
     for axis in "xyz":
         sensors.set(f"imu.force.{axis}.unit", "m/s2")
-    with pytest.raises(
-        WildlabError, match=r'gravity alone is 9\.8.*[Ss]et unit = "g" in \[imu\.force\]'
-    ) as caught:
+    with pytest.raises(WildlabError, match="gravity alone") as caught:
         sensors.run()
     assert (caught.value.file or "").endswith("imu.csv")
     assert not sensors.into.exists()

@@ -50,7 +50,7 @@ def test_a_recipe_may_name_a_map(raw: Raw) -> None:
     content = bytearray(path.read_bytes())
     content[-1] ^= 1
     path.write_bytes(content)
-    with pytest.raises(WildlabError, match=r"terrain\.tif: its SHA-256 is not the one in flight\.toml"):
+    with pytest.raises(WildlabError, match="SHA-256"):
         load_flight(raw.into)
     assert accept_changes(raw.into) == ["terrain.tif"]
 
@@ -58,9 +58,9 @@ def test_a_recipe_may_name_a_map(raw: Raw) -> None:
 @pytest.mark.parametrize(
     ("part", "words"),
     [
-        ({"file": "../dem.tif", "heights": 0.0}, "the path '../dem.tif' leaves the folder it belongs to"),
-        ({"file": "gone.tif", "heights": 0.0}, r"gone\.tif: there is no such file"),
-        ({"file": "dem.tif"}, "does not say what its heights count from"),
+        ({"file": "../dem.tif", "heights": 0.0}, "leaves the folder"),
+        ({"file": "gone.tif", "heights": 0.0}, "no such file"),
+        ({"file": "dem.tif"}, "heights count from"),
         ({"file": "dem.tif", "height": 3.0}, "Did you mean .heights."),
         ({"file": "dem.tif", "heights": "geoid"}, r"terrain\.heights"),
     ],

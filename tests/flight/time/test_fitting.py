@@ -150,7 +150,7 @@ def test_missing_stamps_are_left_out() -> None:
     assert np.isnan(fit.residual).tolist() == [False, False, True, True, False, False]
     assert fit.used.tolist() == [True, True, False, False, True, True]
     assert fit.rate == pytest.approx(1.0)
-    with pytest.raises(WildlabError, match="no stamp of one clock goes with one of the other"):
+    with pytest.raises(WildlabError, match="no stamp"):
         fit_clock([np.nan], [1.0])
 
 

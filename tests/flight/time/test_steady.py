@@ -47,5 +47,5 @@ def test_early_receipts_of_a_short_log_are_outliers() -> None:
 def test_one_pair_gives_an_offset_and_none_an_error() -> None:
     fit = fit_steady([5.0], [UTC])
     assert (fit.rate, fit.offset_s) == (1.0, UTC - 5)
-    with pytest.raises(WildlabError, match="no stamp of one clock goes with one of the other"):
+    with pytest.raises(WildlabError, match="no stamp"):
         fit_steady([np.nan], [1.0], late=True)
