@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import tomllib
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,16 +16,21 @@ from tests.flight.card.cards import MARKS, TAKEN, geodetic, gpx, write_card, wri
 from wildlab.api.points import georeference
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
-from wildlab.flight.card.importing import import_card, read_card, recipe_beside
+from wildlab.flight.card.importing import Card, import_card, read_card, recipe_beside
 from wildlab.flight.card.proposal import Wishes
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import load_flight
 
 
+def read(folder: Path, roles: dict[str, str] | None = None, **wishes: Any) -> Card:
+    """The card in a folder, by a clock in UTC unless another zone is given."""
+    return read_card([folder / "card"], Wishes("card", **{"zone": "UTC", **wishes}), roles or {})
+
+
 def test_points_of_a_card_lie_where_they_were_surveyed(tmp_path: Path):
     write_card(tmp_path / "card")
-    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
+    card = read(tmp_path)
     flight = import_card(card, tmp_path / "flight")
     assert {one.role for one in card.choices} == {"images", "marks", "clicks"}
     assert flight.manifest.vertical.reference == "ellipsoid"
@@ -43,7 +47,7 @@ def test_points_of_a_card_lie_where_they_were_surveyed(tmp_path: Path):
 
 def test_the_recipe_beside_a_flight_makes_it_again(tmp_path: Path):
     write_card(tmp_path / "card")
-    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
+    card = read(tmp_path)
     first = import_card(card, tmp_path / "flight")
     again = import_flight(recipe_beside(tmp_path / "flight"), tmp_path / "card", tmp_path / "again")
     for name, table in first.tables.items():
@@ -56,7 +60,7 @@ def test_the_recipe_beside_a_flight_makes_it_again(tmp_path: Path):
 def test_a_track_beside_the_images_is_a_target(tmp_path: Path):
     write_card(tmp_path / "card")
     (tmp_path / "card" / "fox <b>.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(20)]))
-    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC", geoid_m=0.0), {})
+    card = read(tmp_path, geoid_m=0.0)
     target = next(one for one in card.choices if one.role == "target")
     assert target.target == "fox-b"
     flight = import_card(card, tmp_path / "flight")
@@ -69,10 +73,8 @@ def test_heights_that_cannot_be_compared_are_refused(tmp_path: Path):
     write_card(tmp_path / "card")
     (tmp_path / "card" / "fox.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(20)]))
     with pytest.raises(WildlabError) as caught:
-        read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
-    assert "count from sea level and those of" in str(caught.value)
-    assert "--geoid" in str(caught.value)
-    assert "fox.gpx" in str(caught.value)
+        read(tmp_path)
+    assert "--geoid" in str(caught.value) and "fox.gpx" in str(caught.value)
 
 
 def test_a_dry_run_writes_nothing_and_gives_a_recipe(tmp_path: Path):
@@ -102,7 +104,6 @@ def test_the_zone_of_a_wall_clock_by_the_flight(tmp_path: Path):
     track = [(-7200.0 + t, -30.0 + 1.6 * t, -8.0 + 2 * t, 100.0) for t in range(-20, 40)]
     (tmp_path / "card" / "own.gpx").write_text(gpx(track))
     card = read_card([tmp_path / "card"], Wishes("card", geoid_m=0.0), {"own.gpx": "own"})
-    assert any("2 h ahead of UTC" in one for one in card.proposal.said)
     flight = import_card(card, tmp_path / "flight")
     assert flight.manifest.clocks.camera_offset_s == -7200.0
 
@@ -114,14 +115,15 @@ def test_overwriting_takes_a_word(tmp_path: Path):
     recipe = recipe_beside(tmp_path / "flight").read_text(encoding="utf-8")
     second = CliRunner().invoke(wildlab, arguments)
     assert isinstance(second.exception, WildlabError)
-    assert "there is a recipe beside this flight already" in str(second.exception)
     assert CliRunner().invoke(wildlab, [*arguments, "--overwrite"]).exit_code == 0
     assert recipe_beside(tmp_path / "flight").read_text(encoding="utf-8") == recipe
     assert load_flight(tmp_path / "flight").name == "flight"
 
 
-def write_clamped(card: Path) -> None:
-    """The marks as most programs write placemarks: without a word on what their heights count from."""
+def test_marks_without_a_height_are_left_out(tmp_path: Path) -> None:
+    """As most programs write placemarks: without a word on what their heights count from."""
+    card = tmp_path / "card"
+    write_card(card)
     (card / "marks.csv").unlink()
     marks = "".join(
         f"<Placemark><name>{name}</name><Point><coordinates>{lon:.9f},{lat:.9f},12.0</coordinates></Point>"
@@ -131,22 +133,10 @@ def write_clamped(card: Path) -> None:
     (card / "marks.kml").write_text(
         f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{marks}</Document></kml>', encoding="utf-8"
     )
-
-
-def test_marks_without_a_height_are_left_out_with_a_sentence(tmp_path: Path) -> None:
-    write_card(tmp_path / "card")
-    write_clamped(tmp_path / "card")
-    arguments = ["import", str(tmp_path / "card"), "--dry-run", "--zone", "UTC"]
-    result = CliRunner().invoke(wildlab, arguments)
-    assert result.exit_code == 0, result.exception
-    said = " ".join(result.stderr.split())
-    assert f"{len(MARKS)} of {len(MARKS)} heights are not used" in said
-    assert "write <altitudeMode>absolute</altitudeMode>" in said
-    recipe = tomllib.loads(result.stdout)
+    recipe = tomllib.loads(read(tmp_path).recipe)
     assert "truth" not in recipe and len(recipe["detections"]) == 1
-    stated = CliRunner().invoke(wildlab, [*arguments, "--role", "marks.kml=marks"])
-    assert isinstance(stated.exception, WildlabError)
-    assert "marks.kml is to be 'marks', and has no points that can be used" in str(stated.exception)
+    with pytest.raises(WildlabError, match="no points that can be used"):
+        read(tmp_path, {"marks.kml": "marks"})
 
 
 @pytest.mark.parametrize(
@@ -167,40 +157,32 @@ def test_what_is_stated_wrongly(tmp_path: Path, arguments: list[str], said: str)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    "arguments",
     [
-        ([], "Name the folder"),
-        (["--into", "x", "--json"], "--json goes"),
-        (["--into", "x", "--source", "y"], "--source is"),
+        ["card"],
+        ["card", "--into", "x", "--json"],
+        ["card", "--into", "x", "--source", "y"],
+        ["r.toml", "--into", "x", "--zone", "UTC"],
     ],
 )
-def test_options_that_do_not_go_together(tmp_path: Path, arguments: list[str], said: str):
-    write_card(tmp_path / "card", 1)
-    result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), *arguments])
-    assert result.exit_code == 2
-    assert said in result.output
-
-
-def test_a_recipe_takes_no_roles(tmp_path: Path):
-    result = CliRunner().invoke(wildlab, ["import", "r.toml", "--into", "x", "--zone", "UTC"])
-    assert result.exit_code == 2
-    assert "--zone is for raw files" in result.output
+def test_options_that_do_not_go_together(arguments: list[str]):
+    assert CliRunner().invoke(wildlab, ["import", *arguments]).exit_code == 2
 
 
 def test_an_empty_card_and_one_that_says_nothing(tmp_path: Path):
     (tmp_path / "card").mkdir()
     with pytest.raises(WildlabError, match="nothing in it"):
-        read_card([tmp_path / "card"], Wishes("card"), {})
+        read(tmp_path, zone="")
     (tmp_path / "card" / "notes.bin").write_bytes(b"\x00" * 100)
     with pytest.raises(WildlabError, match="nothing here"):
-        read_card([tmp_path / "card"], Wishes("card"), {})
+        read(tmp_path, zone="")
     with pytest.raises(WildlabError, match="no such file"):
         read_card([tmp_path / "lost"], Wishes("card"), {})
 
 
 def test_taken_is_what_the_frames_say(tmp_path: Path):
     write_card(tmp_path / "card")
-    flight = import_card(read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {}), tmp_path / "flight")
+    flight = import_card(read(tmp_path), tmp_path / "flight")
     assert flight.frames is not None
     assert np.allclose(flight.frames["time_s"], [0.0, 2.5, 5.0, 7.5], atol=1e-6)
     assert flight.manifest.time.epoch == TAKEN
@@ -211,7 +193,7 @@ def test_several_folders_of_images_are_one_series(tmp_path: Path):
     second = tmp_path / "card" / "DCIM" / "101MEDIA"
     second.mkdir()
     (tmp_path / "card" / "DCIM" / "100MEDIA" / "DJI_0004.JPG").rename(second / "DJI_0004.JPG")
-    flight = import_card(read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {}), tmp_path / "flight")
+    flight = import_card(read(tmp_path), tmp_path / "flight")
     assert flight.table("frames")["frame_id"].tolist() == ["DJI_0001", "DJI_0002", "DJI_0003", "DJI_0004"]
     assert len(flight.nav["camera"]) == 4
 
@@ -226,8 +208,7 @@ def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(tmp_path: 
         angles = (0.0, -70.0, 0.0)
         write_photo(pictures / f"DJI_{i + 1:04d}_T.JPG", (0.0, i, 60.0), angles, when, (320, 256), 400.0)
     (tmp_path / "card" / "clicks.csv").unlink()
-    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
-    assert any("the thermal one; left out are 4 of" in one for one in card.proposal.said)
+    card = read(tmp_path)
     flight = import_card(card, tmp_path / "flight")
     assert flight.manifest.camera is not None
     assert (flight.manifest.camera.width_px, flight.manifest.camera.fx_px) == (320, 400.0)
@@ -243,10 +224,7 @@ def test_pixels_of_images_that_are_not_there_are_counted_and_left_out(tmp_path: 
     write_card(tmp_path / "card")
     with (tmp_path / "card" / "clicks.csv").open("a", encoding="utf-8") as clicks:
         clicks.write("DJI_0900.JPG,pole,10,20\n")
-    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
-    assert any(
-        "1 of" in one and "pixels are in images that are not here" in one for one in card.proposal.said
-    )
+    card = read(tmp_path)
     flight = import_card(card, tmp_path / "flight")
     assert set(flight.table("detections")["frame_id"]) <= set(flight.table("frames")["frame_id"])
 
@@ -256,13 +234,13 @@ def test_a_counter_that_begins_again_is_put_in_the_order_of_time(tmp_path: Path)
     pictures = tmp_path / "card" / "DCIM" / "100MEDIA"
     (pictures / "DJI_0001.JPG").rename(pictures / "DJI_0999.JPG")
     (tmp_path / "card" / "clicks.csv").unlink()
-    flight = import_card(read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {}), tmp_path / "flight")
+    flight = import_card(read(tmp_path), tmp_path / "flight")
     assert flight.table("frames")["frame_id"].tolist() == ["DJI_0999", "DJI_0002", "DJI_0003", "DJI_0004"]
 
 
 def test_a_focal_length_can_be_stated_alone(tmp_path: Path):
     write_card(tmp_path / "card")
-    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC", focal_px=750.0), {})
+    card = read(tmp_path, focal_px=750.0)
     flight = import_card(card, tmp_path / "flight")
     assert flight.manifest.camera is not None
     assert (flight.manifest.camera.fx_px, flight.manifest.camera.height_px) == (750.0, 512)
@@ -286,7 +264,6 @@ def test_a_boat_does_not_take_the_place_of_subtitles_without_a_zone(tmp_path: Pa
     (card / "boat.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(-30, 60)]))
     with pytest.raises(WildlabError) as caught:
         read_card([card], Wishes("card"), {})
-    assert "the clock of DJI_0001.SRT is local time" in str(caught.value)
     assert "--zone" in str(caught.value)
     with_zone = read_card([card], Wishes("card", zone="+02:00", geoid_m=0.0, take_off_m=40.0), {})
     roles = {one.found.name: one.role for one in with_zone.choices}
@@ -298,8 +275,7 @@ def test_one_track_and_one_clicked_name_that_are_left_over_are_the_same(tmp_path
     clicks = tmp_path / "card" / "clicks.csv"
     clicks.write_text(clicks.read_text(encoding="utf-8") + "DJI_0001.JPG,boat,300,200\n", encoding="utf-8")
     (tmp_path / "card" / "Boot Mörkö <b>.gpx").write_text(gpx([(i, 5.0, 2.0, 40.0) for i in range(-5, 20)]))
-    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC", geoid_m=0.0), {})
-    assert any("Boot-Mörkö-b is taken for what was clicked as boat" in one for one in card.proposal.said)
+    card = read(tmp_path, geoid_m=0.0)
     flight = import_card(card, tmp_path / "flight")
     assert flight.truth is not None
     assert "boat" in set(flight.truth["target_id"])
@@ -308,9 +284,8 @@ def test_one_track_and_one_clicked_name_that_are_left_over_are_the_same(tmp_path
 def test_a_stated_camera_of_another_size_is_not_laid_on_images(tmp_path: Path):
     write_card(tmp_path / "card", 1)
     camera = CameraPart(name="c", width_px=1000, height_px=750, fx_px=900, fy_px=900, cx_px=500, cy_px=375)
-    with pytest.raises(WildlabError) as caught:
-        read_card([tmp_path / "card"], Wishes("card", zone="UTC", camera=camera), {})
-    assert "the stated camera has 1000 x 750 px, and they have 640 x 512" in str(caught.value)
+    with pytest.raises(WildlabError, match="1000 x 750 px"):
+        read(tmp_path, camera=camera)
 
 
 def test_the_planes_uncertainty_is_that_of_the_surveyed_heights(tmp_path: Path):
@@ -319,22 +294,8 @@ def test_the_planes_uncertainty_is_that_of_the_surveyed_heights(tmp_path: Path):
     lines = marks.read_text(encoding="utf-8").splitlines()
     raised = [line.replace("40.000", f"{40 + 3 * i:.3f}") for i, line in enumerate(lines)]
     marks.write_text("\n".join(raised), encoding="utf-8")
-    flight = import_card(read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {}), tmp_path / "flight")
+    flight = import_card(read(tmp_path), tmp_path / "flight")
     assert flight.manifest.uncertainty.plane_height_m == pytest.approx(3.0)
-
-
-def test_what_is_not_looked_at_is_told(tmp_path: Path):
-    write_card(tmp_path / "card", 1)
-    for name in ("notes.txt", "DJI_0001.MP4"):
-        (tmp_path / "card" / name).write_text("not a log")
-    result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", "--zone", "UTC"])
-    assert "not looked at: DJI_0001.MP4, notes.txt" in result.stderr
-
-
-def test_the_command_line_is_there_as_a_module():
-    command = [sys.executable, "-m", "wildlab", "--version"]
-    run = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert run.stdout.startswith("wildlab")
 
 
 def test_a_track_copied_twice_is_one_target(tmp_path: Path):
@@ -348,4 +309,3 @@ def test_a_track_copied_twice_is_one_target(tmp_path: Path):
     assert result.exit_code == 0, result.output
     truth = load_flight(tmp_path / "flight").table("truth")
     assert truth.loc[truth["time_s"].notna(), "target_id"].nunique() == 1
-    assert result.output.count("all that is in it is in") == 2

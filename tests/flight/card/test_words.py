@@ -1,4 +1,4 @@
-"""What is said of clocks follows from their numbers, and stamps move by what is stated."""
+"""Clocks of logs: fast or slow by their rate, and stamps that move by what is stated."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.flight.card.test_roles import log
 from wildlab.flight.card.found import Found
-from wildlab.flight.card.proposal import Wishes
-from wildlab.flight.card.recipe import propose
-from wildlab.flight.card.roles import Choice, choose_roles
+from wildlab.flight.card.roles import Choice
 from wildlab.flight.card.said import sentences_of
 from wildlab.flight.readers.logs.log import Clock, RawLog, make_stream
 from wildlab.flight.readers.logs.parts import stream_of
@@ -40,11 +37,3 @@ def test_stamps_of_a_log_without_utc_count_from_what_is_stated():
     wanted = LogTable(file="a.srt", format="dji-srt", part="gnss", offset_s=1000.0)
     found = stream_of(RawLog("dji-srt", {"gnss": stream}), wanted, Path("a.srt"))
     assert found.columns["time_s"].tolist() == [1000.5, 1002.0]
-
-
-def test_a_second_receiver_is_not_left_out_in_silence():
-    choices = choose_roles(
-        [log("drone", attitude=True), log("one", north=1.0, seconds=90), log("two", north=2.0)], {}
-    )
-    said = propose(choices, Wishes("x")).said
-    assert any(one.startswith("one is left out: two has more rows") for one in said)

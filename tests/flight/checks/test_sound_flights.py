@@ -12,6 +12,7 @@ from wildlab.flight.checks.check import find
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense.felt import Felt, heading_error
 from wildlab.flight.store import Flight
+from wildlab.simulation.twins import simulate_twin
 
 #: Those that fly sideways, look straight down along their course, or have a camera's attitude beside an
 #: airframe's inertial sensor; and one of each other kind.
@@ -33,6 +34,12 @@ def test_no_sound_flight_is_accused() -> None:
     accused = {(kind, seed): accusations(flight) for kind, seed, flight in sound_flights()}
     assert len(accused) >= 12
     assert {which: found for which, found in accused.items() if found} == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("twin", ["crossing-vessels", "gondola", "large-ship", "uav-search-low"])
+def test_a_twin_is_not_accused(twin: str) -> None:
+    assert accusations(simulate_twin(twin, 3)) == []
 
 
 def focal_length(flight: Flight) -> Flight:
@@ -108,7 +115,7 @@ def test_a_late_receiver_in_steady_turns_is_no_heading(turn: float, late_s: floa
     assert heading_error(Felt(R[:-1], R[1:], np.ones(299), 0 * R[1:, 0], force, R, a, t)) is None
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_no_heading_is_told_from_steady_coordinated_turns(seed: int) -> None:
     t, rng, turn = np.arange(0.0, 1200.0), np.random.default_rng(seed), 0.25
     course = turn * t
@@ -129,9 +136,10 @@ def test_a_heading_is_told_from_a_tilt_where_the_way_swings(pitch_deg: float, ro
 
 
 def test_a_heading_is_as_sure_as_it_says() -> None:
-    found = [heading_error(circling(3.0, 20.0, swings=True, noise=1.0, seed=seed)) for seed in range(60)]
+    found = [heading_error(circling(3.0, 20.0, swings=True, noise=1.0, seed=seed)) for seed in range(30)]
     off = [(np.degrees(one.by) - 20.0) / np.degrees(one.sd) for one in found if one is not None]
-    assert len(off) == 60 and 0.6 < np.sqrt(np.mean(np.square(off))) < 1.6
+    # The root mean square of 30 has a standard deviation of 0.13.
+    assert len(off) == 30 and 0.6 < np.sqrt(np.mean(np.square(off))) < 1.5
 
 
 def test_a_heading_from_magnetic_north_is_named() -> None:

@@ -76,7 +76,7 @@ def said(flight: Flight) -> list[Finding]:
     return [one for one in check_flight(flight) if one.causes and one.causes != ("beyond bounds",)]
 
 
-@pytest.mark.parametrize("off_deg", [-10.0, -4.0, -3.0, 3.0, 4.0, 15.0])
+@pytest.mark.parametrize("off_deg", [-10.0, 3.0, 15.0])
 def test_a_heading_that_is_off_is_a_warning_with_the_angle_and_nothing_else(
     make_flight: Make, off_deg: float
 ) -> None:
@@ -90,7 +90,7 @@ def test_a_heading_that_is_right_is_no_finding(make_flight: Make) -> None:
     assert said(watched(make_flight)) == []
 
 
-@pytest.mark.parametrize("late_s", [-12.0, 15.0, 30.0])
+@pytest.mark.parametrize("late_s", [-12.0, 30.0])
 def test_a_clock_that_is_off_is_told_from_a_heading(make_flight: Make, late_s: float) -> None:
     (found,) = said(watched(make_flight, late_s=late_s))
     assert found.level == "problem" and all(cause.startswith("clock of the truth") for cause in found.causes)

@@ -113,10 +113,10 @@ def test_a_correction_by_the_files_own_clock_and_a_background_picture_are_no_exp
     found = list(read_cptv(written(tmp_path / "a.cptv", video(pictures(12), 12, **corrected))))
     # 111 ms apart from 5000 ms on: numbers 2 to 10 lie within a second of 5200 ms.
     assert [number for number, one in enumerate(found) if not one.usable] == list(range(2, 11))
-    assert found[3].problem == "A flat-field correction began 0.1 s before, by the file's clock."
+    assert "0.1 s before" in found[3].problem
     path = written(tmp_path / "b.cptv", video(pictures(2), 12, at0=[field("g", b"\1")]))
     first, second = read_cptv(path)
-    assert first.problem == "It is the recorder's picture of the background, and no exposure."
+    assert not first.usable and second.usable
     assert np.array_equal(second.image, pictures(2)[1])
 
 
@@ -132,19 +132,18 @@ def test_counts_run_over_as_numbers_of_sixteen_bits_do(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"RIFF", "does not begin as a CPTV video does"),
-        (b"CPTV\x03", "is CPTV of version 3, and 2 is read"),
-        (header()[:30], "is cut off or damaged inside its header"),
-        (header(70_000, 70_000), "claims pictures of 70,000 x 70,000 pixels"),
-        (header(0, 5), "claims pictures of 0 x 5 pixels"),
-        (header(compression=7), "has the compression 7, and 1 is read"),
-        (b"CPTV\x02F\x00", "it has a section b'F' where b'H' is due"),
+        (b"RIFF", "does not begin"),
+        (b"CPTV\x03", "version 3"),
+        (header()[:30], "cut off"),
+        (header(70_000, 70_000), "70,000 x 70,000"),
+        (header(0, 5), "0 x 5"),
+        (header(compression=7), "compression 7"),
+        (b"CPTV\x02F\x00", "b'F'"),
     ],
 )
 def test_headers_that_cannot_be_are_refused(tmp_path: Path, content: bytes, said: str) -> None:
-    with pytest.raises(WildlabError, match="Record it again") as raised:
+    with pytest.raises(WildlabError, match=said):
         open_frames(written(tmp_path / "a.cptv", content))
-    assert raised.value.problem == said
 
 
 def test_what_is_not_packed_or_not_there_is_refused(tmp_path: Path) -> None:
@@ -162,18 +161,18 @@ def test_what_is_not_packed_or_not_there_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda content: content[:-9], "The file is cut off or damaged here."),
-        (lambda content: content + b"Z", "It has a section b'Z' where b'F' is due."),
-        (lambda content: content.replace(b"\x01w\x0c", b"\x01w\x63"), "A frame has differences of 99 bits"),
+        (lambda content: content[:-9], "cut off"),
+        (lambda content: content + b"Z", "b'Z'"),
+        (lambda content: content.replace(b"\x01w\x0c", b"\x01w\x63"), "99 bits"),
         (
             lambda content: content.replace(b"\x04f" + struct.pack("<I", 4 + 287), b"\x04f\xff\xff\xff\x7f"),
-            "A frame claims 2,147,483,647 bytes, and its pixels take 291.",
+            "2,147,483,647 bytes",
         ),
     ],
 )
 def test_damage_further_on_is_a_last_frame_with_a_sentence(tmp_path: Path, change, said: str) -> None:  # type: ignore[no-untyped-def]
     found = list(read_cptv(written(tmp_path / "a.cptv", change(video(pictures(), 12)))))
-    assert found[-1].problem.startswith(said) and all(one.usable for one in found[:-1])
+    assert said in found[-1].problem and all(one.usable for one in found[:-1])
 
 
 def test_files_cut_anywhere_end_in_a_sentence_and_never_in_a_trace(tmp_path: Path) -> None:

@@ -200,22 +200,16 @@ def test_filling_at_the_end_is_no_loss_and_a_cut_message_is() -> None:
     for filling in (b"\0" * 5000, b"\xff" * 5000):
         assert dataflash.read(Path("x.bin"), data + filling).lost == ()
     (said,) = dataflash.read(Path("x.bin"), data[:-1]).lost
-    share = f"of {len(data) - 1} bytes"
-    assert share in said and "in one place belong to no message" in said
+    assert f"of {len(data) - 1} bytes" in said
 
 
 @pytest.mark.parametrize(
-    ("data", "problem"),
-    [
-        (b"", "holds no message"),
-        (b"\xa3", "holds no message"),
-        (fmt(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"), "holds no message"),
-        (b"\xa3\x95\x80" * 100_000, "holds no message"),
-    ],
+    "data",
+    [b"", b"\xa3", fmt(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"), b"\xa3\x95\x80" * 100_000],
 )
-def test_what_holds_nothing_is_refused(data: bytes, problem: str) -> None:
+def test_what_holds_nothing_is_refused(data: bytes) -> None:
     for reader in (dataflash, dataflash_text):
-        with pytest.raises(WildlabError, match=problem) as caught:
+        with pytest.raises(WildlabError, match="holds no message") as caught:
             reader.read(Path("flight.bin"), data)
         assert caught.value.file == "flight.bin"
 
@@ -263,9 +257,9 @@ def consistent(log: RawLog) -> None:
 
 
 def damaged(data: bytes, rng: np.random.Generator) -> list[bytes]:
-    cut = [data[: int(at)] for at in rng.integers(0, len(data), 50)]
+    cut = [data[: int(at)] for at in rng.integers(0, len(data), 10)]
     flipped = []
-    for _ in range(20):
+    for _ in range(6):
         other = bytearray(data)
         for at in rng.integers(0, len(data), 100):
             other[at] ^= int(rng.integers(1, 256))
@@ -296,7 +290,7 @@ def test_made_up_logs_damaged(make: Callable[..., Log], text: bool) -> None:
     read_damaged(log.text() if text else log.binary(), text)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.binary(max_size=2000))
 def test_any_bytes(data: bytes) -> None:
     for reader in (dataflash, dataflash_text):

@@ -83,14 +83,13 @@ def test_a_flight_comes_back(make: Callable[[Truth], Log], text: bool, year: int
 
 
 @ALL
-@FORMS
-def test_what_each_generation_calls_itself(make: Callable[[Truth], Log], text: bool) -> None:
+def test_what_each_generation_calls_itself(make: Callable[[Truth], Log]) -> None:
     said = {
         first_generation: "ArduCopter V3.1.3 (92cdd2a3)",
         second_generation: "ArduPlane V3.8.2-dev (8178ab40)",
         third_generation: "ArduPlane V4.2.3 (55685c43)",
     }
-    assert read(make(Truth(2025)), text).vehicle == said[make]
+    assert read(make(Truth(2025))).vehicle == said[make]
 
 
 @pytest.mark.parametrize("make", [first_generation, third_generation])
@@ -121,7 +120,6 @@ def test_early_rows_are_dated_by_the_first_true_fix() -> None:
     """No fix for 10 s, with week 0 and a place elsewhere; receiver 2 is the one that finds itself."""
     truth = Truth(2025)
     log = read(third_generation(truth))
-    assert any("it has 2 satellite receivers; receiver 2 is used" in one for one in log.notes)
     gnss = log.parts["gnss"]
     assert whys(gnss) == {"": 150, "no fix": 50}
     np.testing.assert_allclose(gnss.columns["time_s"], truth.utc(gnss.columns["time_log_s"]), atol=2e-3)
@@ -145,8 +143,6 @@ def test_gimbal_and_images() -> None:
     triggers = old.parts["triggers"].columns
     np.testing.assert_allclose(triggers["time_log_s"], [20.0 + 5 * i for i in range(8)], atol=0.1)
     assert "height_sea_m" not in triggers
-    assert any("messages CAM carry no stamps" in one for one in old.notes)
-    assert any("heights of its messages CAM are left out" in one for one in old.notes)
 
 
 def test_images_before_the_first_fix_were_taken() -> None:
@@ -167,11 +163,12 @@ def test_quaternions_where_there_is_no_attitude() -> None:
     np.testing.assert_allclose(yaw, [truth.attitude(one)[2] for one in columns["time_log_s"]], atol=1e-3)
 
 
-def test_an_origin_that_is_only_home_is_none() -> None:
-    with_origin = read(second_generation(Truth(2025)))
-    assert any("positions of poses are those of messages NKF1" in one for one in with_origin.notes)
-    without = read(second_generation(Truth(2025), origin=False))
-    assert any("positions of poses are those of messages GPS" in one for one in without.notes)
+def test_without_an_origin_positions_are_those_of_the_receiver() -> None:
+    poses = read(second_generation(Truth(2025), origin=False)).parts["poses"]
+    stamp = poses.columns["time_log_s"][poses.used]
+    np.testing.assert_allclose(
+        poses.columns["latitude_deg"][poses.used], Truth(2025).latitude(stamp), atol=2e-7
+    )
 
 
 def drop(log: Log, *names: str) -> Log:
@@ -182,10 +179,8 @@ def drop(log: Log, *names: str) -> Log:
 def test_what_a_log_does_not_have() -> None:
     log = read(drop(second_generation(Truth(2025)), "IMU", "IMU2"))
     assert "imu" not in log.parts
-    assert any("no messages of an IMU" in one for one in log.notes)
     log = read(drop(second_generation(Truth(2025)), "GPS"))
     assert log.clock is not None and log.clock.base == "" and "gnss" not in log.parts
-    assert any("stamps are not known in UTC" in one for one in log.notes)
     assert np.isnan(log.parts["poses"].columns["time_s"]).all() and log.parts["poses"].used.all()
     log = read(drop(second_generation(Truth(2025)), "GPS", "NKF1"))
     assert whys(log.parts["poses"]) == {"no position at that time": 400}
@@ -301,8 +296,7 @@ def test_a_board_that_was_switched_on_again() -> None:
     # The last message of the time before stands behind that time's last stamp that was looked at.
     assert poses.used.sum() == 600 and len(poses) <= 601
     assert poses.columns["time_log_s"][poses.used][0] == 5.0
-    (said,) = log.lost
-    assert "of 2 stretches the longest is used" in said
+    assert len(log.lost) == 1
     assert log.clock is not None and log.clock.largest_s < 2e-3
 
 
@@ -316,13 +310,7 @@ def test_text_with_holes() -> None:
     lines[imu[14]] = "XYZ, 1, 2, 3"
     lines[imu[15]] = "something else"
     log = dataflash_text.read(Path("x.log"), "\n".join(lines).encode())
-    count = len(lines) - 1
-    share = f"of {count} lines ({100 / count:.2g} %)"
-    assert log.lost == (
-        f"1 {share} have no line FMT that says what they hold: XYZ",
-        f"1 {share} have more or fewer values than their FMT says",
-        f"2 {share.replace(f'{100 / count:.2g}', f'{200 / count:.2g}')} are no messages",
-    )
+    assert [int(one.split()[0]) for one in log.lost] == [1, 1, 2]
     part = log.parts["imu"]
     assert whys(part) == {"": 394, "no value": 2}
     assert part.counted_in == "line" and part.rows[0] == imu[0] + 1
@@ -354,7 +342,6 @@ def test_a_log_with_a_bad_receiver(shared_data: Callable[..., Path]) -> None:
     path = shared_data("logs", "plane42_bench_badgps", "pilot_0004.BIN")
     log = read_log(path, path.read_bytes(), "dataflash")
     assert whys(log.parts["gnss"]) == {"": 85, "no fix": 376}
-    assert any("no messages of an IMU" in one for one in log.notes)
     # Its rows without a fix carry the receiver's own time from 19.4 s on: GPS week 2347, 481474 s.
     gnss = log.parts["gnss"].columns
     row = int(np.argmin(np.abs(gnss["time_log_s"] - 19.377493)))
@@ -379,7 +366,7 @@ def test_leap_seconds_of_2014(shared_data: Callable[..., Path]) -> None:
     }
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(st.integers(0, 30), max_size=25))
 def test_no_more_rows_can_be_kept(stamps: list[int]) -> None:
     kept = in_order(np.array(stamps, float))

@@ -36,7 +36,7 @@ ROW = st.tuples(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(ROW, min_size=1, max_size=40))
 def test_rows_of_use_hold_together(rows):
     time, latitude, longitude, height = np.array(rows, float).T
@@ -78,9 +78,7 @@ def test_two_tracks_of_which_one_cannot_be():
 
 def test_heights_and_gaps():
     columns = {"height_sea_m": np.array([1.0, np.nan, np.nan]), "undulation_m": np.ones(3)}
-    assert drop_rare_heights(columns) == ["only 1 row of 3 have a height: heights are left out"]
-    assert columns == {}
-    assert gaps(np.array([0.0, 1, 2, 3, 4, 50, 51]), np.ones(7)) == [
-        "1 gap in it, the longest of 46 s, where steps are usually 1 s"
-    ]
+    assert len(drop_rare_heights(columns)) == 1 and columns == {}
+    (said,) = gaps(np.array([0.0, 1, 2, 3, 4, 50, 51]), np.ones(7))
+    assert said.startswith("1 gap") and "46 s" in said
     assert gaps(np.array([0.0, 1, 2]), np.ones(3)) == []

@@ -51,7 +51,6 @@ def test_a_claim_of_ten_gigabytes_is_not_believed(tmp_path: Path) -> None:
     log = read_photos(tmp_path)
     assert column(log, "use") == [0.0] * 5
     assert column(log, "width_px")[2] == 100_000
-    assert "1 image: is empty" in log.lost
 
 
 def test_a_large_file_is_not_read_beyond_its_headers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,7 +122,7 @@ def test_real_images_cut_and_spoilt(tmp_path: Path, shared_data: Any) -> None:
                 continue
             data, place = path.read_bytes(), tmp_path / path.name
             place.mkdir()
-            for at in range(50):
+            for at in range(10):
                 # Most damage is done where the headers are.
                 end = len(data) if at % 2 else min(len(data), 20_000)
                 (place / f"cut{at}{path.suffix}").write_bytes(data[: random.integers(0, end)])
@@ -131,7 +130,7 @@ def test_real_images_cut_and_spoilt(tmp_path: Path, shared_data: Any) -> None:
                 spoilt[random.integers(0, end, 100)] = random.integers(0, 256, 100)
                 (place / f"flip{at}{path.suffix}").write_bytes(spoilt.tobytes())
             part = read_photos(place).parts["photos"]
-            assert len(part) == 100
+            assert len(part) == 20
             for name in ("latitude_deg", "longitude_deg"):
                 assert np.isfinite(part.columns[name][part.used]).all()
             for one in place.iterdir():

@@ -24,7 +24,7 @@ def flown(rng: np.random.Generator, lines: int = 6, each: int = 30, interval: fl
 @pytest.mark.parametrize("resolution", [0.0, 1.0])
 @pytest.mark.parametrize("interval", [0.7, 2.0, 5.0])
 def test_missing_and_extra_ones_and_hours_between(resolution: float, interval: float) -> None:
-    for seed in range(8):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         true = flown(rng, interval=interval)
         offset = rng.uniform(-12, 12) * 3600 + 1.7e9
@@ -55,7 +55,7 @@ def test_as_many_as_there_are_records() -> None:
     assert match.trigger.tolist() == list(range(50))
     assert match.certain
     assert match.fit.offset_s == pytest.approx(7200.0)
-    assert match.sentence == "50 of 50 images go with a record of their trigger"
+    assert (match.images_left, match.triggers_left) == (0, 0)
 
 
 def test_evenly_timed_with_one_missing_is_not_certain() -> None:
@@ -63,8 +63,7 @@ def test_evenly_timed_with_one_missing_is_not_certain() -> None:
     match = match_triggers(times[:-1] - 3600.0, times)
     assert not match.certain
     assert abs(match.rival_s) == pytest.approx(2.0)
-    assert "nearly as many do" in match.sentence
-    assert "49 of 49" in match.sentence and "1 records are left over" in match.sentence
+    assert (match.images_left, match.triggers_left) == (0, 1)
 
 
 def test_order_and_missing_stamps() -> None:

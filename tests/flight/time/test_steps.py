@@ -16,7 +16,7 @@ from wildlab.flight.time.steps import fit_stretches, step_sentences, unwrap_coun
 @pytest.mark.parametrize("jump", [-300.0, -1.0, 0.5, 3600.0])
 @pytest.mark.parametrize("rate", [0.92, 1.0, 1.08])
 def test_a_clock_set_anew_is_found_and_said(jump: float, rate: float) -> None:
-    for seed in range(10):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         true = np.sort(rng.uniform(0, 600, 1500))
         at = int(rng.integers(200, 1300))
@@ -36,7 +36,7 @@ def test_a_clock_set_anew_is_found_and_said(jump: float, rate: float) -> None:
 
 @pytest.mark.parametrize("noise", ["normal", "late", "outliers", "none"])
 def test_no_step_where_there_is_none(noise: str) -> None:
-    for seed in range(25):
+    for seed in range(6):
         rng = np.random.default_rng(seed)
         own = np.sort(rng.uniform(0, 600, 1200))
         y = 1.7e9 + rng.uniform(0.9, 1.1) * own
@@ -64,7 +64,7 @@ def test_two_steps_and_missing_stamps() -> None:
         fit_stretches([np.nan, 1.0], [1.0, np.nan])
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**31), st.sampled_from([2.0**16, 2.0**32, 604800.0]))
 def test_a_counter_that_begins_again_goes_on(seed: int, period: float) -> None:
     rng = np.random.default_rng(seed)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +10,6 @@ from tests.flight.card.test_images import START, TAKEN, images, own
 from tests.flight.card.test_roles import log
 from wildlab.flight.card.images import clock_of_images
 from wildlab.flight.card.roles import choose_roles
-from wildlab.flight.readers.logs.log import Clock
 from wildlab.flight.time.whole_hours import whole_hours
 
 
@@ -31,31 +28,19 @@ def test_what_several_steps_bring_together_is_not_guessed_and_what_meets_is_left
     assert whole_hours(None, (0.0, 600.0)) is None
 
 
-@pytest.mark.parametrize(
-    ("hours", "words"), [(1, "1 h ahead of"), (-1, "1 h behind"), (-5.5, "5 h 30 min behind")]
-)
-def test_images_a_zone_off_say_what_to_type(hours: float, words: str) -> None:
+@pytest.mark.parametrize("hours", [1, -1, -5.5])
+def test_images_a_zone_off_say_what_to_type(hours: float) -> None:
     stamps = TAKEN + 3600.0 * hours
     clock = clock_of_images(images(stamps, stamps), own(), None)
-    assert f"They are {words} the flight's log" in clock.said
     assert f"--camera-offset {-3600.0 * hours:g} " in clock.said
     assert clock.offset_s == 0.0  # whose clock it is nobody knows: it is said, and not done
-    assert "own stamps are in UTC" in clock.said and "one of the two clocks has another zone" in clock.said
-    zoned = images(stamps, stamps)
-    assert zoned.log is not None
-    told = Clock("local time of the zone +13:45")
-    said = clock_of_images(replace(zoned, log=replace(zoned.log, clock=told)), own(), None).said
-    assert "taken for local time of the zone that you gave, +13:45" in said
-    assert "that zone may be wrong (--zone)" in said and "in UTC" not in said
     after = clock_of_images(images(stamps, stamps), own(), -3600.0 * hours)
-    assert "another zone" not in after.said
-    assert "another zone" not in clock_of_images(images(TAKEN, TAKEN), own(), None).said
+    right = clock_of_images(images(TAKEN, TAKEN), own(), None)
+    assert "--camera-offset" not in after.said + right.said
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(3600.0, True), (-1800.0, True), (2500.0, False)])
 def test_another_log_a_zone_off_says_what_to_write(seconds: float, said: bool) -> None:
     boat, drone = log("boat", north=80.0, begin=seconds), log("drone", attitude=True)
     (why,) = (one.why for one in choose_roles((boat, drone), {}) if one.found.name == "boat")
-    assert "it is of another time, or a clock is wrong" in why
-    assert (f"offset_s = {-seconds:g} in its part [logs]" in why) is said
-    assert ("--role boat=target" in why) is said
+    assert (f"offset_s = {-seconds:g}" in why) is said
