@@ -90,29 +90,16 @@ def test_truth_is_each_sample_once():
     ("content", "field", "problem"),
     [
         ({}, "the file", "holds an object"),
-        ([], "the file", "holds a list"),
         ([3], "sensorID", "has no 'sensorID'"),
         ([GOOD[0], {"sensorID": 1}], "time", "frame 2: has no 'time'"),
         ([frame(5, 1.0, [])], "sensorID", "is 5; known"),
-        ([frame(True, 1.0, [])], "sensorID", "is True"),
-        ([frame([1], 1.0, [])], "sensorID", "is a list of 1"),
-        ([frame("1", 1.0, [])], "sensorID", "is '1'"),
         ([frame(1, "noon", [])], "time", "'noon' is not"),
-        ([frame(1, None, [])], "time", "None is not"),
-        ([frame(1, True, [])], "time", "True is not"),
         ([frame(1, 10**400, [])], "time", "huge number"),
-        ([frame(1, 1.0, [], 4.0)], "ownshipPosition", "is 4.0"),
-        ([frame(1, 1.0, [], [4.0])], "ownshipPosition", "has 1 numbers"),
         ([frame(1, 1.0, [], [4.0, 1e9])], "ownshipPosition", "further away"),
-        ([frame(1, 1.0, 0.5)], "measurement", "is 0.5"),
         ([frame(1, 1.0, [1.0, 2.0, 3.0])], "measurement", "list of 3"),
         ([frame(1, 1.0, [[1.0, 2.0], [3.0]])], "measurement", "alike in length"),
-        ([frame(1, 1.0, [[1.0], 3.0])], "measurement", "alike in length"),
         ([frame(2, 1.0, [[1.0, "x"], [3.0, 4.0]])], "measurement", "'x' is not"),
-        ([frame(2, 1.0, [[[1.0]], [[2.0]]])], "measurement", "a list of 1"),
-        ([frame(3, 1.0, [[0.1, 0.2]])], "measurement", "list of 2"),
         ([frame(4, 1.0, [0.1, 57.0])], "measurement", "bearing 57"),
-        ([frame(4, 1.0, {"a": 1})], "measurement", "an object"),
     ],
 )
 def test_hostile_detections_are_refused(content: Any, field: str, problem: str):
@@ -126,10 +113,8 @@ def test_hostile_detections_are_refused(content: Any, field: str, problem: str):
     ("content", "field", "problem"),
     [
         ([4], "the frame", "is 4"),
-        ([[[]]], "targetID", "no 'targetID'"),
         ([[target("havfruen")]], "targetID", "'havfruen'"),
         ([[target(position=[1, 2])]], "position", "has 2 numbers"),
-        ([[target(time=[])]], "time", "a list of 0"),
         ([[target()], [target(position=[9, 2, 0])]], "position", "elsewhere"),
     ],
 )
@@ -153,9 +138,8 @@ def test_hostile_truth_is_refused(content: Any, field: str, problem: str):
     ],
 )
 def test_what_is_no_json_is_refused(data: bytes, problem: str):
-    with pytest.raises(WildlabError, match="Copy") as one:
+    with pytest.raises(WildlabError, match=problem):
         read_part(HERE, data, "frames")
-    assert problem in str(one.value)
 
 
 def test_a_file_that_is_too_large_is_not_parsed(monkeypatch: pytest.MonkeyPatch):

@@ -13,15 +13,7 @@ from pydantic import Field
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight import files
-from wildlab.flight.files import (
-    Strict,
-    check_model,
-    parse_toml,
-    read_regular,
-    read_toml,
-    regular_size,
-    unreadable,
-)
+from wildlab.flight.files import Strict, check_model, parse_toml, read_regular, read_toml, regular_size
 from wildlab.flight.store import Flight, load_flight, save_flight
 
 
@@ -56,15 +48,6 @@ def test_a_file_that_grows_while_it_is_read(tmp_path: Path, monkeypatch: pytest.
     path.write_bytes(b"0123456789")
     monkeypatch.setattr(files, "regular_size", lambda path, limit, field: 5)
     assert "grew while it was read" in _refused(path, 5)
-
-
-def test_what_the_system_says_is_a_sentence(tmp_path: Path) -> None:
-    (tmp_path / "a").symlink_to("b")
-    (tmp_path / "b").symlink_to("a")
-    assert "Its links go in a circle" in _refused(tmp_path / "a")
-    assert "Give it a shorter name" in _refused(tmp_path / ("x" * 300))
-    assert "Check its permissions" in str(unreadable(PermissionError(13, "Permission denied"), tmp_path))
-    assert "restore the rest" in str(unreadable(OSError(5, "Input/output error"), tmp_path))
 
 
 @pytest.mark.parametrize("name", ["frames.parquet", "nav/other.parquet", "flight.toml", "terrain.tif"])

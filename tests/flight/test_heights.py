@@ -57,7 +57,6 @@ def test_undulation_by_the_grid(grid: None) -> None:
     )
     assert plan.reference == "ellipsoid"
     assert plan.uses["track"].add_m == pytest.approx(31.0, abs=1e-4)
-    assert plan.uses["track"].reason.endswith("of the grid EGM96 is added")
 
 
 def test_without_a_grid_there_is_none_and_nothing_is_fetched() -> None:
@@ -109,7 +108,7 @@ def test_sea_level_where_nothing_leads_to_the_ellipsoid() -> None:
     streams = {"a": positions(height_sea_m=60.0), "b": positions(height_sea_m=3.0)}
     plan = choose_reference(streams)
     assert plan.reference == "sea"
-    assert all(use == ("height_sea_m", 0.0, "counts from sea level") for use in plan.uses.values())
+    assert all(use[:2] == ("height_sea_m", 0.0) for use in plan.uses.values())
 
 
 @pytest.mark.parametrize(
@@ -135,7 +134,6 @@ def test_take_off_is_tied_by_the_first_used_fix() -> None:
     # At 3 s the fix says 153 m, and the log 2.5 m above take-off.
     assert plan.uses["poses"].column == "height_home_m"
     assert plan.uses["poses"].add_m == pytest.approx(150.5)
-    assert "first used fix of gnss" in plan.uses["poses"].reason
     # With a geoid, on to the ellipsoid.
     plan = choose_reference({"poses": poses, "gnss": gnss}, own=["poses", "gnss"], geoid_m=GEOID)
     assert plan.uses["poses"].add_m == pytest.approx(150.5 + GEOID)
@@ -159,8 +157,3 @@ def test_streams_without_heights_are_named() -> None:
     streams = {"marks": positions(), "track": positions(height_sea_m=1.0)}
     plan = choose_reference(streams)
     assert plan.without == ("marks",) and list(plan.uses) == ["track"]
-
-
-def test_no_sentence_says_how_high_the_geoid_is() -> None:
-    plan = choose_reference({"a": positions(height_sea_m=60.0, undulation_m=43.21)})
-    assert not any(character.isdigit() for character in plan.uses["a"].reason)

@@ -29,7 +29,6 @@ def test_the_mount_is_used_on_its_own_poses_and_refused_on_others() -> None:
     assert len(observe(flight, "camera").table)
     with pytest.raises(WildlabError, match="'vehicle' are used") as caught:
         observe(flight, "vehicle")
-    assert "--source camera" in caught.value.fix and 'poses = "vehicle"' in caught.value.fix
     assert caught.value.field == "mount.poses"
     both = two_sources("")
     assert len(observe(both, "camera").table) == len(observe(both, "vehicle").table)
@@ -43,5 +42,4 @@ def test_sense_is_not_asked_of_a_mount_on_other_poses() -> None:
 def test_a_mount_on_poses_that_are_not_there_is_a_problem() -> None:
     found = [one for one in check_flight(two_sources("logger")) if one.field == "mount.poses"]
     assert [one.level for one in found] == ["problem"]
-    assert "'logger'" in found[0].sentence and "camera, vehicle" in found[0].fix
     assert not [one for one in check_flight(two_sources("camera")) if one.field == "mount.poses"]

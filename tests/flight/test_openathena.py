@@ -108,8 +108,6 @@ def test_four_flights_as_published(published: Flight) -> None:
     for group, height in (("55m", 55), ("70m", 70), ("86m", 86), ("106m", 106)):
         assert ground - down[groups == group].mean() == pytest.approx(height, abs=4)
     assert {one.level for one in check_flight(published)} == {"note"}
-    assert "98 frames is recovered from 441 recorded bearings" in published.manifest.description
-    assert "0.105 deg" in published.manifest.description
 
 
 def test_errors_against_the_nearest_marker(published: Flight) -> None:
@@ -154,5 +152,4 @@ def test_the_recipes_state_what_they_assume(name: str) -> None:
     assert recipe.locations.sensitivity == "open"
     assert recipe.vertical.correction_m == 56.8
     assert "truth" not in recipe.vertical.taken_off
-    assert "not fitted" in recipe.uncertainty.note
     assert recipe.scoring.rule == ("labelled" if name.endswith("f1") else "nearest")

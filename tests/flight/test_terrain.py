@@ -89,10 +89,7 @@ def lay(flight: Flight, path: Path, **says: Any) -> Flight:
     return lay_terrain(flight, path, TerrainSays(**given))
 
 
-@pytest.mark.parametrize(
-    ("crs", "cell", "turn"),
-    [(UTM, 4.0, 0.0), (UTM, 4.0, 30.0), (4326, 4e-5, 0.0), (2056, 4.0, 0.0), (3857, 6.0, 180.0)],
-)
+@pytest.mark.parametrize(("crs", "cell", "turn"), [(UTM, 4.0, 30.0), (4326, 4e-5, 0.0), (3857, 6.0, 180.0)])
 def test_the_surface_in_n_is_the_surface_on_the_earth(
     tmp_path: Path, flown: Callable[..., Flight], crs: int, cell: float, turn: float
 ) -> None:
@@ -237,7 +234,6 @@ def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path: Path, flown: Callable[
     [
         ({"latitude_deg": 47.8}, {}, r"nearest cell is 110\."),
         ({"latitude_deg": -LATITUDE}, {}, "sign of latitude"),
-        ({"longitude_deg": -LONGITUDE}, {}, "sign of longitude"),
         ({}, {"off": (0.0, 1e7)}, "other hemisphere"),
         ({"height_m": 400.0}, {}, "below the ground"),
     ],
@@ -258,10 +254,7 @@ def test_a_map_of_elsewhere_is_refused(
     [
         ({"crs": None}, "states no CRS"),
         ({"count": 2}, "2 bands"),
-        ({"dtype": "complex64"}, "holds complex64"),
-        ({"nodata": 5.0, "height": lambda x, y: np.full(x.shape, 5.0)}, "no height"),
         ({"height": lambda x, y: 1e5 + x}, r"heights of 100\d"),
-        ({"units": "fathom"}, "'fathom'"),
     ],
 )
 def test_what_is_no_map_of_heights_is_refused(

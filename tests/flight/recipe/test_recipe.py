@@ -18,7 +18,6 @@ from wildlab.flight.checks.check import check_flight
 from wildlab.flight.clocks import covariances
 from wildlab.flight.recipe.parts import Attitude, Stamp, parse_zone
 from wildlab.flight.recipe.poses import _rotation
-from wildlab.flight.recipe.raw import RawFiles
 from wildlab.flight.store import Flight
 from wildlab.flight.units import UNITS, factor
 from wildlab.geometry.flodell import geodetic_to_enu_linear
@@ -199,61 +198,13 @@ def test_other_kinds_of_detections(raw: Any) -> None:
     assert list(detections["frame_id"].iloc[3:]) == [""] * 6
 
 
-def test_a_range_needs_no_elevation(raw: Any) -> None:
-    """A plain radar measures on the level: range and bearing are all there is."""
-    angle = {"value": 90.0, "unit": "deg"}
-    radar = {"source": "radar", "file": "clicks.csv", "azimuth": angle, "range": {"value": 2.0, "unit": "km"}}
-    raw.recipe["detections"] += [radar]
-    detections = raw.run().table("detections")
-    assert list(detections["kind"]) == ["pixel"] * 3 + ["range-bearing"] * 3
-    assert detections["range_m"].iloc[3] == 2000.0
-    assert "elevation_rad" not in detections
-
-
 def test_a_night_in_which_nothing_was_detected_is_imported(raw: Any) -> None:
     raw.tables["clicks.csv"] = "photo,x,y,what\n"
     flight = raw.run()
     assert len(flight.table("detections")) == 0 and len(flight.table("frames")) == 3
-    (told,) = [one for one in check_flight(flight) if one.table == "detections"]
-    assert told.level == "warning"
-    assert told.sentence == (
-        "detections: nothing was detected in this flight: of 3 frames, none has a detection."
-    )
+    assert [one.level for one in check_flight(flight) if one.table == "detections"] == ["warning"]
     with pytest.raises(WildlabError, match="no detections"):
         track_many(flight.folder)
-
-
-def test_one_sensor_that_saw_nothing_leaves_the_others_alone(raw: Any) -> None:
-    before = raw.run().table("detections")
-    raw.into.rename(raw.folder / "old")
-    raw.tables["hits.csv"] = "photo,bearing\n"
-    azimuth = {"column": "bearing", "unit": "deg"}
-    radar = {
-        "source": "radar",
-        "file": "hits.csv",
-        "frame": "photo",
-        "azimuth": azimuth,
-        "counts_from": "bow",
-    }
-    raw.recipe["detections"] += [radar]
-    pd.testing.assert_frame_equal(raw.run().table("detections")[before.columns], before)
-
-
-def test_a_column_is_missed_where_nothing_was_detected_too(raw: Any) -> None:
-    raw.tables["clicks.csv"] = "photo,x,what\n"
-    with pytest.raises(WildlabError, match="column is missing"):
-        raw.run()
-    raw.tables["clicks.csv"] = ""
-    with pytest.raises(WildlabError, match="no rows"):
-        raw.run()
-
-
-def test_a_file_without_rows_is_refused_where_rows_are_needed_after_all(tmp_path: Any) -> None:
-    (tmp_path / "clicks.csv").write_text("photo,x\n")
-    files = RawFiles(tmp_path, tmp_path / "recipe.toml")
-    assert len(files.table("clicks.csv", ",", "detections", may_be_empty=True)) == 0
-    with pytest.raises(WildlabError, match="no rows"):
-        files.table("clicks.csv", ",", "truth")
 
 
 def _head_up(raw: Any, yaws_deg: list[float], bearings: list[float]) -> list[dict[str, Any]]:
@@ -295,12 +246,6 @@ def test_a_bow_whose_heading_is_not_known_is_refused(raw: Any) -> None:
         raw.run()
 
 
-def test_only_an_azimuth_counts_from_the_bow(raw: Any) -> None:
-    raw.set("detections.0.counts_from", "bow")
-    with pytest.raises(WildlabError, match="only an azimuth"):
-        raw.run()
-
-
 def test_detections_of_one_sensor_in_looks_of_another_are_refused(raw: Any) -> None:
     looks = raw.tables["photos.csv"].splitlines()
     raw.tables["photos.csv"] = "\n".join(
@@ -328,14 +273,6 @@ def test_groups_by_edges(raw: Any) -> None:
     raw.set("frames.group.labels", ["low", "high"])
     with pytest.raises(WildlabError, match="2 edges make 3"):
         raw.run()
-
-
-def test_a_gimbal_in_the_frames(raw: Any) -> None:
-    raw.set("frames.pan", {"value": 30.0, "unit": "deg"})
-    raw.set("frames.tilt", {"value": 0.5, "unit": "rad"})
-    frames = raw.run().table("frames")
-    np.testing.assert_allclose(frames["pan_rad"], math.radians(30))
-    np.testing.assert_allclose(frames["tilt_rad"], 0.5)
 
 
 def test_frames_made_of_rows_that_agree(raw: Any) -> None:

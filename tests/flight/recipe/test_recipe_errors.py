@@ -32,15 +32,7 @@ def both(*changes: Change) -> Change:
 @pytest.mark.parametrize(
     ("change", "file", "field", "said"),
     [
-        # missing file, missing column
         (lambda raw: raw.tables.pop("nav.csv"), "nav.csv", "poses.log.file", "no such file"),
-        (in_recipe("files", {"survey.pdf": "the survey"}), "survey.pdf", "files.file", "no such file"),
-        (
-            in_table("nav.csv", "lat,lon", "Lat,lon"),
-            "nav.csv",
-            "lat (in [poses.log.position.latitude])",
-            "column is missing",
-        ),
         (
             in_table("clicks.csv", ",what", ",label"),
             "clicks.csv",
@@ -53,7 +45,6 @@ def both(*changes: Change) -> Change:
             "qw (in [poses.log.attitude.quaternion])",
             "two columns",
         ),
-        # units
         (
             in_recipe("poses.log.position.latitude.unit", "degree"),
             "recipe.toml",
@@ -67,23 +58,12 @@ def both(*changes: Change) -> Change:
             "not of length",
         ),
         (
-            in_recipe("detections.0.pixel.u.unit", "percent"),
-            "recipe.toml",
-            "detections[0].pixel.u",
-            "Use one of px",
-        ),
-        (in_recipe("truth.1.time.unit", "min"), "recipe.toml", "truth[1].time.unit", "'min' is not a unit"),
-        # poses
-        (
             in_table("nav.csv", ",140,1,0,0,0\n2024-06-12T09:30:04Z", ",,1,0,0,0\n2024-06-12T09:30:04Z"),
             "nav.csv",
             "height",
             "line 5: this cell is empty",
         ),
         (in_table("nav.csv", "63.440200", "nan"), "nav.csv", "lat", "line 4: 'nan'"),
-        (in_table("nav.csv", "63.440200", "inf"), "nav.csv", "lat", "line 4: 'inf'"),
-        (in_table("nav.csv", "63.440200", "1e999"), "nav.csv", "lat", "'1e999'"),
-        (in_table("nav.csv", "63.440200", "63 N"), "nav.csv", "lat", "'63 N'"),
         (in_table("nav.csv", "63.440200", "634.4"), "nav.csv", "lat", "no latitude"),
         (in_table("nav.csv", "63.440200,10.4,", "0,0,"), "nav.csv", "lat", "both 0"),
         (
@@ -94,7 +74,6 @@ def both(*changes: Change) -> Change:
             "qw, qx, qy, qz",
             "length is 1.414",
         ),
-        # camera
         (in_recipe("camera.fx_px", 0.0), "recipe.toml", "camera.fx_px", "length is 0"),
         (
             both(
@@ -107,14 +86,6 @@ def both(*changes: Change) -> Change:
             "length is 0",
         ),
         (
-            both(in_recipe("camera.file", "clicks.csv"), in_recipe("camera.fx_px", "x")),
-            "clicks.csv",
-            "x (in [camera.fx_px])",
-            "600 here, 10 before",
-        ),
-        (in_recipe("camera.fx_px", "fx"), "recipe.toml", "camera", "fx_px names"),
-        # times
-        (
             in_table("nav.csv", "09:30:03Z", "09:30:01Z"),
             "nav.csv",
             "time_s (from [poses.log])",
@@ -126,25 +97,17 @@ def both(*changes: Change) -> Change:
             "time_s (from [frames])",
             "not increasing",
         ),
-        (in_table("boat.csv", "\n4,", "\n0,"), "boat.csv", "time_s (from [truth])", "not increasing"),
         (
             lambda raw: raw.tables.update({"photos.csv": raw.tables["photos.csv"].replace("T09", "T11")}),
             "nav.csv",
             "time_s (from [poses.log])",
             "do not overlap",
         ),
-        (in_recipe("time.epoch", "2024-06-12T12:30:00Z"), "boat.csv", "time_s (from [truth])", "'boat' run"),
         (
             in_table("photos.csv", "2024-06-12T09:30:02.0Z", "noon"),
             "photos.csv",
             "time (in [frames.time])",
             "'noon' has no time zone",
-        ),
-        (
-            in_table("photos.csv", "2024-06-12T09:30:02.0Z", "2024-06-12T09:61:02.0Z"),
-            "photos.csv",
-            "time",
-            "format 'iso'",
         ),
         (
             lambda raw: raw.tables.update({"photos.csv": raw.tables["photos.csv"].replace("Z", "")}),
@@ -153,14 +116,6 @@ def both(*changes: Change) -> Change:
             "has no time zone",
         ),
         (in_recipe("time.zone", "Europe/Trondheim"), "recipe.toml", "time.zone", "'Europe/Trondheim'"),
-        (in_recipe("time.zone", "../../etc/passwd"), "recipe.toml", "time.zone", "is not a time zone"),
-        (
-            in_recipe("truth.1.time.format", "unix time"),
-            "recipe.toml",
-            "truth[1].time.format",
-            "not a format",
-        ),
-        (in_recipe("truth.1.time.format", "%Q"), "boat.csv", "t (in [truth[1].time])", "format '%Q'"),
         (
             both(in_recipe("truth.1.time.format", "unix"), in_table("boat.csv", "\n4,", "\n1718184602000,")),
             "boat.csv",
@@ -169,35 +124,12 @@ def both(*changes: Change) -> Change:
         ),
         (in_recipe("time.epoch", None), "recipe.toml", None, "since an epoch"),
         (
-            in_recipe("time.kind", "sequence"),
-            "recipe.toml",
-            None,
-            "[frames] has a time; set kind".replace("; set", ". Set"),
-        ),
-        (in_recipe("frames.time", None), "recipe.toml", None, "has no time"),
-        # truth, detections
-        (
             in_table("buoy.csv", "63.44,10.401", "10.401,63.44"),
             "buoy.csv",
             "north_m (from [truth])",
             "far from the flight",
         ),
-        (
-            both(
-                in_table("buoy.csv", ",40,", ",400,"),
-                lambda raw: raw.tables.update({"boat.csv": raw.tables["boat.csv"].replace(",40", ",400")}),
-            ),
-            "buoy.csv",
-            "down_m (from [truth])",
-            "above the highest",
-        ),
         (in_table("clicks.csv", "\nC,", "\nD,"), "clicks.csv", "frame_id (from [detections])", "first 'D'"),
-        (
-            in_table("clicks.csv", "600,500", "600,"),
-            "clicks.csv",
-            "y (in [detections[0].pixel.v])",
-            "line 3: this cell",
-        ),
         (in_table("photos.csv", "\nB,", "\nA,"), "photos.csv", "frame_id (from [frames])", "'A' stands"),
         (in_recipe("detections.0.frame", None), "clicks.csv", "frame (in [detections[0]])", "which frame"),
         (
@@ -206,17 +138,7 @@ def both(*changes: Change) -> Change:
             "plane_down_m (from [detections])",
             "3 of 3 ground",
         ),
-        # unknown keys, names
-        (in_recipe("cameras", {}), "recipe.toml", "cameras", "mean 'camera'"),
-        (
-            in_recipe("poses.log.position.latitde", {}),
-            "recipe.toml",
-            "poses.log.position.latitde",
-            "mean 'latitude'",
-        ),
         (in_recipe("detections.0.pixels", 1), "recipe.toml", "detections[0].pixels", "Did you mean 'pixel'"),
-        (in_recipe("name", "../x"), "recipe.toml", "name", "name of a flight"),
-        (in_recipe("name", "9" * 400), "recipe.toml", "name", "100 at most"),
         (in_recipe("poses", {}), "recipe.toml", None, "no poses"),
         (
             lambda raw: raw.recipe["poses"].update({"../x": raw.recipe["poses"].pop("log")}),
@@ -224,19 +146,14 @@ def both(*changes: Change) -> Change:
             "poses",
             "name a nav",
         ),
-        # paths
         (
             in_recipe("poses.log.file", "../../etc/passwd"),
             "recipe.toml",
             "poses.log.file",
             "leaves the folder",
         ),
-        (in_recipe("truth.0.file", "/etc/passwd"), "recipe.toml", "truth[0].file", "leaves the folder"),
-        (in_recipe("frames.file", "C:\\photos.csv"), "recipe.toml", "frames.file", "leaves the folder"),
         (in_recipe("files", {"../secret.txt": ""}), "recipe.toml", "files.file", "leaves the folder"),
-        (in_recipe("poses.log.file", ""), "recipe.toml", "poses.log.file", "leaves the folder"),
         (in_recipe("poses.log.file", "."), "raw", "poses.log.file", "is a folder"),
-        # what belongs together
         (in_recipe("poses.log.attitude.order", None), "recipe.toml", "poses.log.attitude", "with its order"),
         (
             in_recipe("poses.log.attitude", {"roll": {"value": 0.0, "unit": "deg"}}),
@@ -244,14 +161,7 @@ def both(*changes: Change) -> Change:
             "poses.log.attitude",
             "roll",
         ),
-        (
-            in_recipe("poses.log.position.height", None),
-            "recipe.toml",
-            "poses.log.position",
-            "give all three of one kind".replace("give", "Give"),
-        ),
         (in_recipe("poses.log.time", None), "recipe.toml", None, "neither a time"),
-        (in_recipe("poses.log.frame", "x"), "recipe.toml", None, "a time and a frame"),
         (
             in_recipe(
                 "poses.log.position",
@@ -262,27 +172,11 @@ def both(*changes: Change) -> Change:
             "no origin",
         ),
         (
-            in_recipe("detections.0.pixel", None),
-            "recipe.toml",
-            "detections[0]",
-            "give one of these".replace("give", "Give"),
-        ),
-        (in_recipe("frames.unique", ["time"]), "recipe.toml", "frames", "either id or unique"),
-        (in_recipe("truth.0.target", "x"), "recipe.toml", "truth[0]", "either id"),
-        (in_recipe("vertical", {"correction_m": 5.0}), "recipe.toml", "vertical", "say which heights"),
-        (
             in_recipe("vertical", {"correction_m": 5.0, "taken_off": ["poses"]}),
             "recipe.toml",
             "vertical",
             "no note says why",
         ),
-        (
-            in_recipe("poses.log.position.latitude", {"column": "lat", "value": 1.0, "unit": "deg"}),
-            "recipe.toml",
-            "poses.log.position.latitude",
-            "column or a value",
-        ),
-        # broken tables
         (in_table("nav.csv", "2024-06-12T09:30:03Z,", ""), "nav.csv", None, "line 5 has 7"),
         (lambda raw: raw.tables.update({"nav.csv": "time,lat\n"}), "nav.csv", None, "no rows"),
         (lambda raw: raw.tables.update({"nav.csv": ""}), "nav.csv", None, "no rows"),

@@ -79,7 +79,7 @@ def test_the_option_takes_the_place_of_the_recipe(raw: Raw, capsys: Any) -> None
     other = write_map(raw.folder / "other.tif", 3.0)
     command = ("import", raw.write(), "--source", raw.folder / "raw", "--into", raw.into)
     code, _, err = call(capsys, *command, "--terrain-heights", "0")
-    assert code == 2 and "--terrain-heights: something is said of a map, and no map is named" in err
+    assert code == 2 and "--terrain-heights" in err
     code, _, err = call(capsys, *command, "--terrain", other, "--terrain-heights", "ellipsoid")
     assert code == 0, err
     flight = load_flight(raw.into)
