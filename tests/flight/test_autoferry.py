@@ -102,7 +102,7 @@ def test_truth_is_each_sample_once():
         ([frame(4, 1.0, [0.1, 57.0])], "measurement", "bearing 57"),
     ],
 )
-def test_hostile_detections_are_refused(content: Any, field: str, problem: str):
+def test_hostile_detections_are_refused(content, field, problem):
     with pytest.raises(WildlabError) as caught:
         read(content, "radar")
     assert (caught.value.file, caught.value.field) == ("log.json", field)
@@ -118,7 +118,7 @@ def test_hostile_detections_are_refused(content: Any, field: str, problem: str):
         ([[target()], [target(position=[9, 2, 0])]], "position", "elsewhere"),
     ],
 )
-def test_hostile_truth_is_refused(content: Any, field: str, problem: str):
+def test_hostile_truth_is_refused(content, field, problem):
     with pytest.raises(WildlabError) as caught:
         read(content, "truth")
     assert caught.value.field == field
@@ -137,12 +137,12 @@ def test_hostile_truth_is_refused(content: Any, field: str, problem: str):
         (b"[" + b"9" * 5000 + b"]", "is not readable JSON"),
     ],
 )
-def test_what_is_no_json_is_refused(data: bytes, problem: str):
+def test_what_is_no_json_is_refused(data, problem):
     with pytest.raises(WildlabError, match=problem):
         read_part(HERE, data, "frames")
 
 
-def test_a_file_that_is_too_large_is_not_parsed(monkeypatch: pytest.MonkeyPatch):
+def test_a_file_that_is_too_large_is_not_parsed(monkeypatch):
     monkeypatch.setattr(autoferry, "MOST_BYTES", 3 << 20)
     with pytest.raises(WildlabError, match="has more than 3 MiB"):
         read_part(HERE, b" " * ((3 << 20) + 1), "frames")
@@ -161,7 +161,7 @@ def small(folder: Path) -> Path:
     return folder / "raw"
 
 
-def test_a_flight_of_what_was_and_was_not_seen(tmp_path: Path):
+def test_a_flight_of_what_was_and_was_not_seen(tmp_path):
     import_flight(DATA / "recipes" / "autoferry-2.toml", small(tmp_path), tmp_path / "flight")
     flight = load_flight(tmp_path / "flight")
     frames, detections = flight.table("frames"), flight.table("detections")
@@ -178,14 +178,6 @@ def test_a_flight_of_what_was_and_was_not_seen(tmp_path: Path):
     assert not [one for one in check_flight(flight) if one.level == "problem"]
 
 
-def test_a_wrong_file_leaves_no_flight(tmp_path: Path):
-    source = small(tmp_path)
-    (source / "scenario2" / "scenario2_groundTruth.json").write_text("[[3]]")
-    with pytest.raises(WildlabError, match=r"scenario2_groundTruth\.json.*targetID"):
-        import_flight(DATA / "recipes" / "autoferry-2.toml", source, tmp_path / "flight")
-    assert not (tmp_path / "flight").exists()
-
-
 @pytest.fixture(scope="module")
 def scenarios(
     shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory
@@ -197,7 +189,7 @@ def scenarios(
 
 
 @pytest.mark.slow
-def test_the_published_scenarios(scenarios: dict[int, Flight]):
+def test_the_published_scenarios(scenarios):
     for number, flight in scenarios.items():
         assert set(flight.table("frames")["sensor"]) == set(SENSORS.values())
         assert set(flight.table("truth")["target_id"]) == {"havfruen", SCENARIOS[number]}
@@ -216,7 +208,7 @@ def test_the_published_scenarios(scenarios: dict[int, Flight]):
     assert seen.loc[seen["frame_id"] == "ir-0001", "azimuth_rad"].item() == -2.2054613959028848
 
 
-def test_the_catalogue_has_the_files_as_published(shared_data: Callable[..., Path]):
+def test_the_catalogue_has_the_files_as_published(shared_data):
     root = shared_data("tracking", "autoferry")
     files = find_dataset("autoferry").files
     assert len(files) == 2 * len(SCENARIOS)
@@ -232,20 +224,13 @@ RECIPE = (DATA / "recipes" / "autoferry-2.toml").read_text(encoding="utf-8")
     ("old", "new", "problem"),
     [
         ('file = "scenario2/scenario2_detections.json"', 'file = "../frames.json"', "leaves its folder"),
-        ("[logs.lidar]", '[logs."a/b"]', "'a/b' cannot"),
         ("[logs.lidar]", '[tables.lidar]\nfile = "a.mat"\nfields = ["x"]\n\n[logs.lidar]', "'lidar' names"),
         ('format = "autoferry"', 'format = "other"', "'other'"),
         ('part = "lidar"', 'part = "sonar"', "'sonar'"),
-        ('sensor = "sensor"\n', "", "no camera"),
-        (
-            'azimuth = { column = "bearing", unit = "rad" }',
-            'range = { value = 9.0, unit = "m" }',
-            "an azimuth",
-        ),
         ('sensor = "sensor"\n', 'sensor = "sonar"\n', "(in [frames.sensor])"),
     ],
 )
-def test_what_a_recipe_may_not_say_of_logs(tmp_path: Path, old: str, new: str, problem: str):
+def test_what_a_recipe_may_not_say_of_logs(tmp_path, old, new, problem):
     assert old in RECIPE
     recipe = tmp_path / "recipe.toml"
     recipe.write_text(RECIPE.replace(old, new, 1), encoding="utf-8")

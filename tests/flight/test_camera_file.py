@@ -81,8 +81,3 @@ def test_one_that_is_not_there_and_one_that_lies_elsewhere_are_sentences(folder)
     recipe.write_text(recipe.read_text().replace("camera =", "camera_file ="))
     with pytest.raises(WildlabError, match="Write camera"):
         import_flight(recipe, None, folder / "flight")
-
-
-def test_it_cannot_be_written_where_no_folder_is(tmp_path):
-    with pytest.raises(WildlabError, match="cannot be written"):
-        write_camera(CameraFile.model_validate(CONTENT), tmp_path / "none" / "camera.toml")

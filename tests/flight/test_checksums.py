@@ -31,7 +31,7 @@ def _files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.rglob("*") if path.is_file())
 
 
-def test_they_are_those_of_the_files_and_the_flight_in_memory_has_none(folder: Path) -> None:
+def test_they_are_those_of_the_files_and_the_flight_in_memory_has_none(folder):
     names = {path.relative_to(folder).as_posix() for path in _files(folder)} - {"flight.toml"}
     found = checksums_of(folder)
     assert set(found) == names and "nav/autopilot.parquet" in names and "terrain.tif" in names
@@ -41,7 +41,7 @@ def test_they_are_those_of_the_files_and_the_flight_in_memory_has_none(folder: P
     assert load_flight(folder).manifest.checksums == {}
 
 
-def test_every_flipped_bit_of_a_table_is_found(folder: Path) -> None:
+def test_every_flipped_bit_of_a_table_is_found(folder):
     rng = np.random.default_rng(7)
     tables = [path for path in _files(folder) if path.name != "flight.toml"]
     for _ in range(100):
@@ -57,7 +57,7 @@ def test_every_flipped_bit_of_a_table_is_found(folder: Path) -> None:
     load_flight(folder)
 
 
-def test_every_flipped_bit_of_the_manifest_is_an_error_or_is_said(folder: Path) -> None:
+def test_every_flipped_bit_of_the_manifest_is_an_error_or_is_said(folder):
     rng = np.random.default_rng(8)
     path = folder / "flight.toml"
     whole = path.read_bytes()
@@ -79,7 +79,7 @@ def test_every_flipped_bit_of_the_manifest_is_an_error_or_is_said(folder: Path) 
         assert "warning" in worst or bytes(damaged).split() == whole.split(), damaged[place - 20 : place + 20]
 
 
-def test_a_missing_and_an_added_table_are_named(folder: Path) -> None:
+def test_a_missing_and_an_added_table_are_named(folder):
     (folder / "nav" / "other.parquet").write_bytes((folder / "nav" / "autopilot.parquet").read_bytes())
     with pytest.raises(WildlabError, match="no checksum"):
         load_flight(folder)
@@ -89,7 +89,7 @@ def test_a_missing_and_an_added_table_are_named(folder: Path) -> None:
         load_flight(folder)
 
 
-def test_a_change_on_purpose_is_accepted_and_comments_stay(folder: Path) -> None:
+def test_a_change_on_purpose_is_accepted_and_comments_stay(folder):
     path = folder / "flight.toml"
     text = path.read_text().replace("camera_offset_s = 0.0", "camera_offset_s = 0.25  # by the flash")
     path.write_text(text)
@@ -102,7 +102,7 @@ def test_a_change_on_purpose_is_accepted_and_comments_stay(folder: Path) -> None
     assert manifest_changed(folder) is False
 
 
-def test_what_is_stated_of_places_is_no_damage(folder: Path) -> None:
+def test_what_is_stated_of_places_is_no_damage(folder):
     path = folder / "flight.toml"
     whole = path.read_text()
     assert manifest_changed(folder) is False
@@ -118,7 +118,7 @@ def test_what_is_stated_of_places_is_no_damage(folder: Path) -> None:
     assert manifest_changed(folder) is False
 
 
-def test_a_flight_written_before_places_were_left_out_is_whole(folder: Path) -> None:
+def test_a_flight_written_before_places_were_left_out_is_whole(folder):
     path = folder / "flight.toml"
     whole = path.read_text()
     stated = read_manifest(path).checksums["flight.toml"]
@@ -129,14 +129,14 @@ def test_a_flight_written_before_places_were_left_out_is_whole(folder: Path) -> 
     assert manifest_changed(folder) is True
 
 
-def test_a_flight_without_checksums_is_loaded_and_told_so(folder: Path) -> None:
+def test_a_flight_without_checksums_is_loaded_and_told_so(folder):
     path = folder / "flight.toml"
     path.write_text(path.read_text().split("[checksums]")[0])
     (said,) = [one for one in check_flight(load_flight(folder)) if one.field == "checksums"]
     assert said.level == "note"
 
 
-def test_the_part_may_stand_anywhere_but_in_a_text(folder: Path) -> None:
+def test_the_part_may_stand_anywhere_but_in_a_text(folder):
     path = folder / "flight.toml"
     whole, part = path.read_text().split("[checksums]")
     head, rest = whole.split("[locations]")
@@ -155,6 +155,6 @@ def test_the_part_may_stand_anywhere_but_in_a_text(folder: Path) -> None:
     assert path.read_text() == quoted
 
 
-def test_writing_them_twice_changes_nothing() -> None:
+def test_writing_them_twice_changes_nothing():
     once = with_checksums('name = "lake"\n', {"frames.parquet": "0" * 64})
     assert with_checksums(once, {"frames.parquet": "0" * 64}) == once

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -23,7 +21,6 @@ from wildlab.flight.clocks import (
     poses_at,
     truth_at,
 )
-from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_quaternion, rotation_vector_to_matrix
 
 component = st.floats(-1.5, 1.5)
@@ -43,7 +40,7 @@ def _turning(rate: Array, velocity: Array, stamps: Array, start: Array) -> pd.Da
 
 
 @given(vectors, vectors, vectors, st.lists(st.floats(0.0, 4.0), min_size=1, max_size=10))
-def test_constant_rate_is_met_exactly(rate: Array, velocity: Array, start: Array, times: list[float]) -> None:
+def test_constant_rate_is_met_exactly(rate, velocity, start, times):
     nav = _turning(rate, velocity, np.array([0.0, 0.4, 0.9, 1.7, 2.5, 3.1, 4.0]), start)
     p, R, covariance = poses_at(nav, times)
     t = np.array(times)[:, None]
@@ -53,7 +50,7 @@ def test_constant_rate_is_met_exactly(rate: Array, velocity: Array, start: Array
     assert covariance is None
 
 
-def test_outside_and_in_gaps_there_is_no_pose() -> None:
+def test_outside_and_in_gaps_there_is_no_pose():
     nav = _turning(np.zeros(3), np.ones(3), np.array([0.0, 0.5, 5.0, 5.5]), np.zeros(3))
     times = [-0.01, 0.0, 0.25, 0.5, 0.6, 4.9, 5.0, 5.5, 5.51, np.nan]
     p, R, _ = poses_at(nav, times, max_gap_s=1.0)
@@ -64,7 +61,7 @@ def test_outside_and_in_gaps_there_is_no_pose() -> None:
     np.testing.assert_allclose(p, [[5.6, 5.6, 5.6]])
 
 
-def test_a_nan_row_only_spoils_its_neighbourhood() -> None:
+def test_a_nan_row_only_spoils_its_neighbourhood():
     nav = _turning(np.zeros(3), np.ones(3), np.array([0.0, 1.0, 2.0, 3.0]), np.zeros(3))
     nav.loc[1, ["north_m", "q_x"]] = np.nan
     p, R, _ = poses_at(nav, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5])
@@ -72,13 +69,13 @@ def test_a_nan_row_only_spoils_its_neighbourhood() -> None:
     assert list(np.isfinite(R[:, 0, 0])) == [True, False, False, False, True, True]
 
 
-def test_repeated_stamps_are_refused() -> None:
+def test_repeated_stamps_are_refused():
     nav = _turning(np.zeros(3), np.ones(3), np.array([0.0, 1.0, 1.0]), np.zeros(3))
     with pytest.raises(WildlabError, match="do not increase"):
         poses_at(nav, [0.5])
 
 
-def test_one_row_and_none() -> None:
+def test_one_row_and_none():
     nav = _turning(np.zeros(3), np.ones(3), np.array([2.0]), np.zeros(3))
     p, _, _ = poses_at(nav, [1.0, 2.0, 3.0])
     assert list(np.isfinite(p[:, 0])) == [False, True, False]
@@ -86,7 +83,7 @@ def test_one_row_and_none() -> None:
         poses_at(nav.iloc[:0], [1.0])
 
 
-def test_poses_that_belong_to_frames_are_not_interpolated() -> None:
+def test_poses_that_belong_to_frames_are_not_interpolated():
     nav = _turning(np.ones(3), np.ones(3), np.array([0.0, 0.0, 7.0]), np.zeros(3)).assign(
         frame_id=["b", "a", "c"]
     )
@@ -97,19 +94,18 @@ def test_poses_that_belong_to_frames_are_not_interpolated() -> None:
         poses_at(nav.drop(columns="frame_id"), frame_ids=["c"])
 
 
-def test_covariance_between_two_stamps(make_flight: Callable[..., Flight]) -> None:
+def test_covariance_between_two_stamps(make_flight):
     nav = make_flight().nav["autopilot"].copy()
     nav.loc[1, "cov_03"] = 0.01
     nav.loc[1, "cov_00"] = 8.0
     _, _, P = poses_at(nav, [0.25, 0.5])
-    assert P is not None
     assert P.shape == (2, 6, 6)
     assert P[0, 0, 0] == pytest.approx(6.0)
     assert P[1, 3, 0] == P[1, 0, 3] == pytest.approx(0.01)
     assert P[0, 3, 0] == P[0, 0, 3] == pytest.approx(0.005)
 
 
-def test_covariance_columns_are_the_upper_triangle() -> None:
+def test_covariance_columns_are_the_upper_triangle():
     root = np.random.default_rng(0).normal(size=(4, 6, 6))
     P = root @ root.transpose(0, 2, 1)
     columns = covariance_columns(P)
@@ -119,7 +115,7 @@ def test_covariance_columns_are_the_upper_triangle() -> None:
     np.testing.assert_allclose(back, P)
 
 
-def test_the_clock_of_the_camera(make_flight: Callable[..., Flight]) -> None:
+def test_the_clock_of_the_camera(make_flight):
     flight = make_flight(clocks={"camera_offset_s": -0.5})
     np.testing.assert_allclose(frame_times(flight), [0.5, 1.75, 7.5])
     p, R, P = frame_poses(flight)
@@ -129,7 +125,7 @@ def test_the_clock_of_the_camera(make_flight: Callable[..., Flight]) -> None:
     assert P is not None
 
 
-def test_gimbal_from_frames_from_its_log_or_fixed(make_flight: Callable[..., Flight]) -> None:
+def test_gimbal_from_frames_from_its_log_or_fixed(make_flight):
     flight = make_flight(mount={"pan_deg": 10.0, "tilt_deg": 20.0}, clocks={"camera_offset_s": 1.0})
     np.testing.assert_allclose(np.degrees(gimbal_angles(flight)), [[10.0] * 3, [20.0] * 3])
     # the log runs through +-180 deg between 2 s and 3 s
@@ -147,7 +143,7 @@ def test_gimbal_from_frames_from_its_log_or_fixed(make_flight: Callable[..., Fli
     np.testing.assert_allclose(gimbal_angles(flight)[0], [0.1, 0.2, 0.3])
 
 
-def test_truth_of_fixed_and_moving_targets(make_flight: Callable[..., Flight]) -> None:
+def test_truth_of_fixed_and_moving_targets(make_flight):
     truth = make_flight().tables["truth"]
     names, p = truth_at(truth, [0.0, 5.0, 11.0], max_gap_s=20.0, offset_s=1.0)
     assert names == ["buoy", "boat"]
@@ -158,7 +154,7 @@ def test_truth_of_fixed_and_moving_targets(make_flight: Callable[..., Flight]) -
     assert p.shape == (0, 1, 3)
 
 
-def test_a_slow_log_is_bridged_at_its_own_rate_but_not_over_a_missing_sample() -> None:
+def test_a_slow_log_is_bridged_at_its_own_rate_but_not_over_a_missing_sample():
     """A GPS that writes every two seconds explains gaps of two seconds, not one of four."""
     stamps = np.array([0.0, 2.0, 4.0, 6.0, 10.0, 12.0])
     truth = pd.DataFrame(
@@ -174,9 +170,7 @@ def test_a_slow_log_is_bridged_at_its_own_rate_but_not_over_a_missing_sample() -
 
 
 @given(vectors, vectors, vectors, st.lists(st.floats(-1.0, 7.0), min_size=1, max_size=5))
-def test_a_finder_finds_what_is_found_at_once(
-    rate: Array, velocity: Array, start: Array, times: list[float]
-) -> None:
+def test_a_finder_finds_what_is_found_at_once(rate, velocity, start, times):
     nav = _turning(rate, velocity, np.array([0.0, 0.5, 1.0, 3.0, 3.5, 6.0]), start)
     nav.loc[1, "q_x"] = np.nan
     for longest in (None, 2.5):
@@ -186,7 +180,7 @@ def test_a_finder_finds_what_is_found_at_once(
         np.testing.assert_array_equal(R, R_once)
 
 
-def test_a_finder_of_frames_does_not_look_at_times_and_refuses_what_poses_at_refuses() -> None:
+def test_a_finder_of_frames_does_not_look_at_times_and_refuses_what_poses_at_refuses():
     nav = _turning(np.zeros(3), np.ones(3), np.arange(3.0), np.zeros(3)).assign(frame_id=["a", "b", "c"])
     p, _ = pose_finder(nav, ["c", "x", "a"])(np.zeros(3))
     np.testing.assert_array_equal(p[:, 0], [7.0, np.nan, 5.0])

@@ -48,7 +48,7 @@ def grid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     datadir.set_data_dir(before)
 
 
-def test_undulation_by_the_grid(grid: None) -> None:
+def test_undulation_by_the_grid(grid):
     found = undulation([10.0, -20.25, 45.5], [20.0, 170.0, -75.3])
     assert found is not None
     assert found == pytest.approx([31.0, 27.975, 34.55], abs=1e-4)
@@ -59,11 +59,11 @@ def test_undulation_by_the_grid(grid: None) -> None:
     assert plan.uses["track"].add_m == pytest.approx(31.0, abs=1e-4)
 
 
-def test_without_a_grid_there_is_none_and_nothing_is_fetched() -> None:
+def test_without_a_grid_there_is_none_and_nothing_is_fetched():
     assert undulation(10.0, 20.0) is None
 
 
-def test_a_file_that_is_no_grid_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_no_grid_is_none(tmp_path, monkeypatch):
     from pyproj import datadir
 
     (tmp_path / "egm96_15.gtx").write_bytes(b"no grid")
@@ -76,7 +76,7 @@ def test_a_file_that_is_no_grid_is_none(tmp_path: Path, monkeypatch: pytest.Monk
         datadir.set_data_dir(before)
 
 
-def test_all_on_the_ellipsoid_stay_there() -> None:
+def test_all_on_the_ellipsoid_stay_there():
     plan = choose_reference({"a": positions(height_ellipsoid_m=5.0), "b": positions(height_ellipsoid_m=8.0)})
     assert plan.reference == "ellipsoid"
     assert {use.add_m for use in plan.uses.values()} == {0.0}
@@ -89,7 +89,7 @@ def test_all_on_the_ellipsoid_stay_there() -> None:
         {"height_sea_m": 60.0, "height_ellipsoid_m": 60.0 + GEOID},
     ],
 )
-def test_a_receiver_s_own_geoid_serves_all(receiver: dict[str, float]) -> None:
+def test_a_receiver_s_own_geoid_serves_all(receiver):
     plan = choose_reference({"gnss": positions(**receiver), "poses": positions(height_sea_m=61.0)})
     assert plan.reference == "ellipsoid"
     assert plan.uses["poses"] == (
@@ -99,12 +99,12 @@ def test_a_receiver_s_own_geoid_serves_all(receiver: dict[str, float]) -> None:
     assert float(receiver[use.column]) + use.add_m == pytest.approx(100.0)
 
 
-def test_a_stated_geoid_comes_first() -> None:
+def test_a_stated_geoid_comes_first():
     streams = {"gnss": positions(height_sea_m=60.0, undulation_m=GEOID)}
     assert choose_reference(streams, geoid_m=25.0).uses["gnss"].add_m == 25.0
 
 
-def test_sea_level_where_nothing_leads_to_the_ellipsoid() -> None:
+def test_sea_level_where_nothing_leads_to_the_ellipsoid():
     streams = {"a": positions(height_sea_m=60.0), "b": positions(height_sea_m=3.0)}
     plan = choose_reference(streams)
     assert plan.reference == "sea"
@@ -114,18 +114,18 @@ def test_sea_level_where_nothing_leads_to_the_ellipsoid() -> None:
 @pytest.mark.parametrize(
     "nothing", [{"undulation_m": 0.0}, {"undulation_m": np.nan}, {"undulation_m": 500.0}]
 )
-def test_a_placeholder_is_no_geoid(nothing: dict[str, float]) -> None:
+def test_a_placeholder_is_no_geoid(nothing):
     assert choose_reference({"a": positions(height_sea_m=60.0, **nothing)}).reference == "sea"
 
 
-def test_mixed_without_a_geoid_is_refused() -> None:
+def test_mixed_without_a_geoid_is_refused():
     streams = {"boat": positions(height_sea_m=2.0), "marks": positions(height_ellipsoid_m=44.0)}
     with pytest.raises(WildlabError, match="boat count from sea"):
         choose_reference(streams)
     assert choose_reference(streams, geoid_m=GEOID).reference == "ellipsoid"
 
 
-def test_take_off_is_tied_by_the_first_used_fix() -> None:
+def test_take_off_is_tied_by_the_first_used_fix():
     unusable = np.arange(10) < 3
     gnss = positions(unusable, height_sea_m=np.where(unusable, -9.0, 150.0 + np.arange(10)))
     poses = positions(height_home_m=np.arange(10.0), time_s=np.arange(10) + 0.5)
@@ -139,7 +139,7 @@ def test_take_off_is_tied_by_the_first_used_fix() -> None:
     assert plan.uses["poses"].add_m == pytest.approx(150.5 + GEOID)
 
 
-def test_another_vehicle_s_fix_ties_nothing() -> None:
+def test_another_vehicle_s_fix_ties_nothing():
     streams = {"drone": positions(height_home_m=50.0), "boat": positions(height_sea_m=1.0)}
     with pytest.raises(WildlabError, match="drone count from take-off"):
         choose_reference(streams, own=["drone"])
@@ -147,13 +147,13 @@ def test_another_vehicle_s_fix_ties_nothing() -> None:
     assert plan.uses["drone"].add_m == 12.0 and plan.reference == "sea"
 
 
-def test_a_fix_on_the_ellipsoid_ties_too() -> None:
+def test_a_fix_on_the_ellipsoid_ties_too():
     streams = {"poses": positions(height_home_m=0.0), "gnss": positions(height_ellipsoid_m=77.0)}
     plan = choose_reference(streams, own=["poses", "gnss"])
     assert plan.reference == "ellipsoid" and plan.uses["poses"].add_m == pytest.approx(77.0)
 
 
-def test_streams_without_heights_are_named() -> None:
+def test_streams_without_heights_are_named():
     streams = {"marks": positions(), "track": positions(height_sea_m=1.0)}
     plan = choose_reference(streams)
     assert plan.without == ("marks",) and list(plan.uses) == ["track"]

@@ -61,7 +61,7 @@ def in_px(labels: Labels, frame: str) -> list[list[float]]:
     return labels.boxes_of(frame, name, 200, 100)[0].tolist()
 
 
-def test_coco_has_its_boxes_classes_crowds_and_empty_images(tmp_path: Path) -> None:
+def test_coco_has_its_boxes_classes_crowds_and_empty_images(tmp_path):
     path = write(tmp_path / "anything.txt", COCO)
     every = read_labels(path)
     assert in_px(every, "a.png") == [[20, 10, 40, 30], [100, 50, 20.5, 10]]
@@ -75,7 +75,7 @@ def test_coco_has_its_boxes_classes_crowds_and_empty_images(tmp_path: Path) -> N
     assert in_px(read_labels(path, classes=("boar",)), "a.png") == []
 
 
-def test_results_of_coco_are_named_by_the_truth_or_by_their_ids(tmp_path: Path) -> None:
+def test_results_of_coco_are_named_by_the_truth_or_by_their_ids(tmp_path):
     truth = read_labels(write(tmp_path / "t.json", COCO))
     strange = [*RESULTS, {**RESULTS[0], "image_id": 1234}]
     found = read_labels(write(tmp_path / "r.json", strange), truth=truth, classes=("deer",))
@@ -89,7 +89,7 @@ def test_results_of_coco_are_named_by_the_truth_or_by_their_ids(tmp_path: Path) 
     assert read_labels(write(tmp_path / "r.json", [])).boxes == {}
 
 
-def test_megadetector_has_shares_of_the_image_and_says_where_it_failed(tmp_path: Path) -> None:
+def test_megadetector_has_shares_of_the_image_and_says_where_it_failed(tmp_path):
     found = read_labels(write(tmp_path / "md.json", BATCH))
     assert np.allclose(in_px(found, "a.png"), [[20, 10, 40, 30]]) and in_px(found, "b.png") == []
     assert found.name_of("c.png") is None
@@ -97,7 +97,7 @@ def test_megadetector_has_shares_of_the_image_and_says_where_it_failed(tmp_path:
     assert found.marked.known_kinds == ("animal", "person")
 
 
-def test_yolo_has_centres_in_shares_of_the_image(tmp_path: Path) -> None:
+def test_yolo_has_centres_in_shares_of_the_image(tmp_path):
     path = yolo(tmp_path / "labels", a="0 0.2 0.25 0.2 0.3\n\n2 0.5 0.5 0.1 0.1 0.75\n", b="")
     found = read_labels(path)
     assert np.allclose(in_px(found, "a.png"), [[20, 10, 40, 30], [90, 45, 20, 10]])
@@ -118,9 +118,7 @@ def test_yolo_has_centres_in_shares_of_the_image(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("above", [0, 2])
-def test_names_of_yolo_lie_beside_the_text_files_or_above(
-    tmp_path: Path, name: str, text: str, above: int
-) -> None:
+def test_names_of_yolo_lie_beside_the_text_files_or_above(tmp_path, name, text, above):
     path = tmp_path / "set" / "labels" / "train"
     path.mkdir(parents=True)
     yolo(path, a="0 0.2 0.25 0.2 0.3\n2 0.5 0.5 0.1 0.1\n")
@@ -130,7 +128,7 @@ def test_names_of_yolo_lie_beside_the_text_files_or_above(
     assert len(found.boxes["a"]) == 1 and len(found.ignore["a"]) == 1
 
 
-def test_one_truth_in_three_formats_is_one_truth(tmp_path: Path) -> None:
+def test_one_truth_in_three_formats_is_one_truth(tmp_path):
     """Written out of the same numbers, the boxes of the three formats are the same to rounding."""
     rng = np.random.default_rng(3)
     low, size = rng.uniform(0, 60, (20, 2)), rng.uniform(1, 40, (20, 2))
@@ -145,14 +143,14 @@ def test_one_truth_in_three_formats_is_one_truth(tmp_path: Path) -> None:
         assert np.allclose(in_px(labels, "b.png"), boxes, atol=1e-9)
 
 
-def test_images_of_another_size_are_told(tmp_path: Path) -> None:
+def test_images_of_another_size_are_told(tmp_path):
     labels = read_labels(write(tmp_path / "t.json", COCO))
     with pytest.raises(WildlabError, match=r"200 x 100 pixels, and a\.png has 400"):
         labels.boxes_of("a.png", "day/a.png", 400, 200)
     assert len(labels.boxes_of("a.png", "day/a.png", 0, 0)[0]) == 2
 
 
-def test_an_image_with_a_class_and_no_box_is_not_judged(tmp_path: Path) -> None:
+def test_an_image_with_a_class_and_no_box_is_not_judged(tmp_path):
     coco = copy.deepcopy(COCO)
     del coco["annotations"][0]["bbox"]
     labels = read_labels(write(tmp_path / "t.json", coco))
@@ -185,9 +183,7 @@ def changed(source: Any, change: Callable[[Any], Any]) -> Any:
 (COCO, lambda c: '{"images": [', "like JSON"),
 ],
 )  # fmt: skip
-def test_what_is_wrong_in_json_is_named(
-    tmp_path: Path, source: Any, change: Callable[[Any], Any], word: str
-) -> None:
+def test_what_is_wrong_in_json_is_named(tmp_path, source, change, word):
     path = write(tmp_path / "l.json", changed(source, change))
     with pytest.raises(WildlabError, match=word) as error:
         read_labels(path)
@@ -204,14 +200,14 @@ def test_what_is_wrong_in_json_is_named(
         ("5 0.5 0.5 0.1 0.1", "class 5"),
     ],
 )
-def test_what_is_wrong_in_a_line_of_yolo_is_named(tmp_path: Path, line: str, word: str) -> None:
+def test_what_is_wrong_in_a_line_of_yolo_is_named(tmp_path, line, word):
     path = yolo(tmp_path / "labels", a=f"{line}\n", classes="deer\ncar\n")
     with pytest.raises(WildlabError, match=word) as error:
         read_labels(path)
     assert str(path / "a.txt") in str(error.value)
 
 
-def test_folders_that_are_none_of_yolo_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_folders_that_are_none_of_yolo_are_refused(tmp_path, monkeypatch):
     with pytest.raises(WildlabError, match="no text file"):
         read_labels(yolo(tmp_path / "labels", classes="deer"))
     yolo(tmp_path / "labels", a="", b="")
@@ -226,17 +222,12 @@ def test_folders_that_are_none_of_yolo_are_refused(tmp_path: Path, monkeypatch: 
         read_labels(tmp_path / "labels")
 
 
-def test_groups_classes_and_crowded_images(tmp_path: Path) -> None:
+def test_groups_classes_and_crowded_images(tmp_path):
     coco = write(tmp_path / "t.json", COCO)
     with pytest.raises(WildlabError, match="no such field"):
         read_labels(coco, group="clip")
-    for path, word in (
-        (write(tmp_path / "r.json", RESULTS), "a list of COCO results, which says nothing of groups"),
-        (write(tmp_path / "m.json", BATCH), "a batch of MegaDetector, which says nothing of groups"),
-        (yolo(tmp_path / "labels", a=""), "a folder of YOLO's says nothing of groups"),
-    ):
-        with pytest.raises(WildlabError, match=word):
-            read_labels(path, group="clip")
+    with pytest.raises(WildlabError, match="nothing of groups"):
+        read_labels(write(tmp_path / "r.json", RESULTS), group="clip")
     with pytest.raises(WildlabError, match="class 'wolf'"):
         read_labels(coco, classes=("wolf",))
     with pytest.raises(WildlabError, match="none of 1"):

@@ -24,7 +24,7 @@ def two_sources(poses: str) -> Flight:
     )
 
 
-def test_the_mount_is_used_on_its_own_poses_and_refused_on_others() -> None:
+def test_the_mount_is_used_on_its_own_poses_and_refused_on_others():
     flight = two_sources("camera")
     assert len(observe(flight, "camera").table)
     with pytest.raises(WildlabError, match="'vehicle' are used") as caught:
@@ -34,12 +34,12 @@ def test_the_mount_is_used_on_its_own_poses_and_refused_on_others() -> None:
     assert len(observe(both, "camera").table) == len(observe(both, "vehicle").table)
 
 
-def test_sense_is_not_asked_of_a_mount_on_other_poses() -> None:
+def test_sense_is_not_asked_of_a_mount_on_other_poses():
     flight = two_sources("camera")
     assert sightings(flight, "camera") is not None and sightings(flight, "vehicle") is None
 
 
-def test_a_mount_on_poses_that_are_not_there_is_a_problem() -> None:
+def test_a_mount_on_poses_that_are_not_there_is_a_problem():
     found = [one for one in check_flight(two_sources("logger")) if one.field == "mount.poses"]
     assert [one.level for one in found] == ["problem"]
     assert not [one for one in check_flight(two_sources("camera")) if one.field == "mount.poses"]

@@ -16,7 +16,6 @@ from wildlab.files import sha256
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.clocks import frame_poses
 from wildlab.flight.recipe.importing import import_flight
-from wildlab.flight.recipe.model import read_recipe
 from wildlab.flight.store import Flight, load_flight
 from wildlab.flight.toml import dump_toml
 from wildlab.geometry.frames import matrix_to_euler
@@ -72,7 +71,7 @@ def _nearest(flight: Flight, points: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(points[:, None, :2] - truth[None, :, :2], axis=2).min(axis=1))
 
 
-def test_one_flight_as_plain_tables(f1: Flight) -> None:
+def test_one_flight_as_plain_tables(f1):
     clicks = _of(f1, "click")
     assert len(f1.table("frames")) == len(f1.nav["logged"]) == 41
     assert len(clicks) == 157
@@ -85,7 +84,7 @@ def test_one_flight_as_plain_tables(f1: Flight) -> None:
     assert height_above_ground == pytest.approx(55, abs=2)
 
 
-def test_errors_against_the_named_markers(f1: Flight) -> None:
+def test_errors_against_the_named_markers(f1):
     clicks, truth = _of(f1, "click"), f1.table("truth").set_index("target_id")
     marker = truth.reindex(clicks["target_id"])[NED].to_numpy()
     labelled = (clicks["target_id"] != "").to_numpy()
@@ -96,7 +95,7 @@ def test_errors_against_the_named_markers(f1: Flight) -> None:
     assert np.linalg.norm((answers - marker)[labelled, :2], axis=1).mean() == pytest.approx(8.0, abs=0.1)
 
 
-def test_four_flights_as_published(published: Flight) -> None:
+def test_four_flights_as_published(published):
     clicks = _of(published, "click")
     assert len(published.table("frames")) == len(published.nav["logged"]) == 98
     assert len(clicks) == len(_of(published, "openathena")) == 441
@@ -110,7 +109,7 @@ def test_four_flights_as_published(published: Flight) -> None:
     assert {one.level for one in check_flight(published)} == {"note"}
 
 
-def test_errors_against_the_nearest_marker(published: Flight) -> None:
+def test_errors_against_the_nearest_marker(published):
     error = _nearest(published, _ground(published, _of(published, "click")["plane_down_m"].to_numpy()))
     assert error.mean() == pytest.approx(5.56, abs=0.01)
     assert np.median(error) == pytest.approx(5.07, abs=0.01)
@@ -122,7 +121,7 @@ def test_errors_against_the_nearest_marker(published: Flight) -> None:
     assert np.percentile(answers, 90) == pytest.approx(17.26, abs=0.03)
 
 
-def test_the_recovered_azimuths(f1: Flight, published: Flight) -> None:
+def test_the_recovered_azimuths(f1, published):
     """The first flight is among the four, with the azimuths that others recovered from the same rays."""
     _, R_one, _ = frame_poses(f1)
     _, R_four, _ = frame_poses(published)
@@ -135,7 +134,7 @@ def test_the_recovered_azimuths(f1: Flight, published: Flight) -> None:
     np.testing.assert_allclose(clicks[["u_px", "v_px"]], _of(f1, "click")[["u_px", "v_px"]], atol=0.01)
 
 
-def test_bearings_that_do_not_agree_are_refused(shared_data: Callable[..., Path], tmp_path: Path) -> None:
+def test_bearings_that_do_not_agree_are_refused(shared_data, tmp_path):
     """Without the turn for rays past nadir, those of one photo stand half a circle apart."""
     source = shared_data("georeferencing", "openathena")
     recipe = tomllib.loads((RECIPES / "openathena.toml").read_text(encoding="utf-8"))
@@ -144,12 +143,3 @@ def test_bearings_that_do_not_agree_are_refused(shared_data: Callable[..., Path]
     with pytest.raises(WildlabError, match=r"gives is 1\d\d deg"):
         import_flight(tmp_path / "recipe.toml", source, tmp_path / "flight")
     assert not (tmp_path / "flight").exists()
-
-
-@pytest.mark.parametrize("name", ["openathena", "openathena-f1"])
-def test_the_recipes_state_what_they_assume(name: str) -> None:
-    recipe = read_recipe(RECIPES / f"{name}.toml")
-    assert recipe.locations.sensitivity == "open"
-    assert recipe.vertical.correction_m == 56.8
-    assert "truth" not in recipe.vertical.taken_off
-    assert recipe.scoring.rule == ("labelled" if name.endswith("f1") else "nearest")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +29,7 @@ def _same(one: Flight, other: Flight) -> None:
         pd.testing.assert_frame_equal(one.tables[name], other.tables[name])
 
 
-def test_round_trip(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+def test_round_trip(make_flight, tmp_path):
     flight = make_flight()
     saved = save_flight(flight, tmp_path / "deep" / "flight")
     _same(load_flight(tmp_path / "deep" / "flight"), flight)
@@ -39,7 +37,7 @@ def test_round_trip(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "deep").iterdir()] == ["flight"]
 
 
-def test_same_flight_same_bytes(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+def test_same_flight_same_bytes(make_flight, tmp_path):
     for name in "ab":
         save_flight(make_flight(), tmp_path / name)
     files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
@@ -57,9 +55,7 @@ names = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
         max_size=6,
     )
 )
-def test_table_values_survive(
-    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[str, str, float, int]]
-) -> None:
+def test_table_values_survive(tmp_path_factory, rows):
     truth = pd.DataFrame(rows, columns=["target_id", "remark", "north_m", "east_m"]).assign(
         down_m=0.0, time_s=np.nan
     )
@@ -70,7 +66,7 @@ def test_table_values_survive(
     pd.testing.assert_frame_equal(back, table, check_exact=True)
 
 
-def test_whole_numbers_become_float_and_the_caller_keeps_his_table() -> None:
+def test_whole_numbers_become_float_and_the_caller_keeps_his_table():
     mine = pd.DataFrame({"frame_id": ["1"], "time_s": np.array([3], dtype=np.int32)}, index=[7])
     table = conform(TABLES["frames"], mine, "frames")
     assert table["time_s"].dtype == np.float64
@@ -91,13 +87,8 @@ def test_whole_numbers_become_float_and_the_caller_keeps_his_table() -> None:
     ],
 )
 def test_a_table_that_does_not_fit_is_refused_and_nothing_written(
-    make_flight: Callable[..., Flight],
-    tmp_path: Path,
-    table: str,
-    change: Callable[[pd.DataFrame], pd.DataFrame],
-    field: str,
-    said: str,
-) -> None:
+    make_flight, tmp_path, table, change, field, said
+):
     flight = make_flight()
     flight.tables[table] = change(flight.tables[table])
     with pytest.raises(WildlabError) as caught:
@@ -110,9 +101,7 @@ def test_a_table_that_does_not_fit_is_refused_and_nothing_written(
 
 
 @pytest.mark.parametrize("column", ["q_w", "north_m", "time_s"])
-def test_loading_names_the_file_and_the_missing_column(
-    make_flight: Callable[..., Flight], tmp_path: Path, column: str
-) -> None:
+def test_loading_names_the_file_and_the_missing_column(make_flight, tmp_path, column):
     save_flight(make_flight(), tmp_path / "flight")
     path = tmp_path / "flight" / "nav" / "autopilot.parquet"
     pd.read_parquet(path).drop(columns=column).to_parquet(path)
@@ -123,23 +112,18 @@ def test_loading_names_the_file_and_the_missing_column(
     assert caught.value.field == column
 
 
-def test_partial_covariance_is_refused() -> None:
+def test_partial_covariance_is_refused():
     data = pd.DataFrame({name: [0.0] for name in NAV.column_names if name not in ("frame_id", "cov_35")})
     with pytest.raises(WildlabError, match="cov_35"):
         conform(NAV, data, "nav")
 
 
-def test_no_such_folder(tmp_path: Path) -> None:
-    with pytest.raises(WildlabError, match="no such folder"):
-        load_flight(tmp_path / "nothing")
-
-
-def test_folder_without_manifest(tmp_path: Path) -> None:
+def test_folder_without_manifest(tmp_path):
     with pytest.raises(WildlabError, match="no such file"):
         load_flight(tmp_path)
 
 
-def test_broken_parquet(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+def test_broken_parquet(make_flight, tmp_path):
     save_flight(make_flight(), tmp_path / "flight")
     (tmp_path / "flight" / "truth.parquet").write_bytes(b"PAR1 rubbish")
     accept_changes(tmp_path / "flight")
@@ -148,9 +132,7 @@ def test_broken_parquet(make_flight: Callable[..., Flight], tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("name", ["truth.parquet", "nav/other.parquet", "terrain.tif", "flight.toml"])
-def test_a_link_out_of_the_folder_is_refused(
-    make_flight: Callable[..., Flight], tmp_path: Path, name: str
-) -> None:
+def test_a_link_out_of_the_folder_is_refused(make_flight, tmp_path, name):
     save_flight(make_flight(), tmp_path / "flight")
     outside = tmp_path / "outside"
     outside.write_bytes((tmp_path / "flight" / "truth.parquet").read_bytes())
@@ -163,17 +145,8 @@ def test_a_link_out_of_the_folder_is_refused(
     assert caught.value.field == name
 
 
-def test_a_dangling_link_is_a_missing_file(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
-    save_flight(make_flight(), tmp_path / "flight")
-    (tmp_path / "flight" / "gnss.parquet").symlink_to("nowhere.parquet")
-    with pytest.raises(WildlabError, match=r"gnss\.parquet"):
-        load_flight(tmp_path / "flight")
-
-
 @pytest.mark.parametrize("source", ["../x", "/x", "a/b", "", ".", "a\\b", "x" * 101])
-def test_a_nav_source_cannot_leave_the_folder(
-    make_flight: Callable[..., Flight], tmp_path: Path, source: str
-) -> None:
+def test_a_nav_source_cannot_leave_the_folder(make_flight, tmp_path, source):
     flight = make_flight()
     flight.nav[source] = flight.nav["autopilot"]
     with pytest.raises(WildlabError, match="nav source"):
@@ -181,9 +154,7 @@ def test_a_nav_source_cannot_leave_the_folder(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_overwriting_only_when_asked_and_only_flights(
-    make_flight: Callable[..., Flight], tmp_path: Path
-) -> None:
+def test_overwriting_only_when_asked_and_only_flights(make_flight, tmp_path):
     folder = tmp_path / "flight"
     folder.mkdir()
     save_flight(make_flight(), folder)  # an empty folder is as good as none
@@ -209,12 +180,7 @@ def test_overwriting_only_when_asked_and_only_flights(
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
-def test_an_interrupted_write_leaves_the_old_flight(
-    make_flight: Callable[..., Flight],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    error: type[BaseException],
-) -> None:
+def test_an_interrupted_write_leaves_the_old_flight(make_flight, tmp_path, monkeypatch, error):
     save_flight(make_flight(), tmp_path / "flight")
 
     def fail(*_: Any) -> None:
@@ -229,7 +195,7 @@ def test_an_interrupted_write_leaves_the_old_flight(
     assert load_flight(tmp_path / "flight").manifest.description == ""
 
 
-def test_terrain_goes_along(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+def test_terrain_goes_along(make_flight, tmp_path):
     height = np.arange(12, dtype=np.float32).reshape(3, 4)
     height[1, 2] = np.nan
     flight = make_flight()
@@ -237,16 +203,13 @@ def test_terrain_goes_along(make_flight: Callable[..., Flight], tmp_path: Path) 
     first = load_flight(save_flight(flight, tmp_path / "one").folder or "")
     second = load_flight(save_flight(first, tmp_path / "two").folder or "")
     for found in (first.terrain, second.terrain):
-        assert found is not None
         np.testing.assert_array_equal(found.height, height)
         assert (found.north, found.east, found.step, found.sd) == (-10.1, 20.3, 0.7, 0.25)
     assert load_flight(save_flight(make_flight(), tmp_path / "three").folder or "").terrain is None
 
 
 @pytest.mark.parametrize("damage", ["cut", "text", "other"])
-def test_a_terrain_that_is_none_is_refused(
-    make_flight: Callable[..., Flight], tmp_path: Path, damage: str
-) -> None:
+def test_a_terrain_that_is_none_is_refused(make_flight, tmp_path, damage):
     flight = make_flight()
     flight.terrain = Terrain(
         np.random.default_rng(0).normal(0, 9, (300, 300)).astype(np.float32), 0.0, 0.0, 1.0
@@ -264,7 +227,7 @@ def test_a_terrain_that_is_none_is_refused(
         load_flight(tmp_path / "one")
 
 
-def test_choice_of_pose_source(make_flight: Callable[..., Flight]) -> None:
+def test_choice_of_pose_source(make_flight):
     flight = make_flight()
     assert flight.pose_source()[0] == "autopilot"
     flight.nav["observer"] = flight.nav["autopilot"]
@@ -278,7 +241,7 @@ def test_choice_of_pose_source(make_flight: Callable[..., Flight]) -> None:
         flight.pose_source("mekf")
 
 
-def test_the_truth_is_no_choice_of_poses(make_flight: Callable[..., Flight]) -> None:
+def test_the_truth_is_no_choice_of_poses(make_flight):
     flight = make_flight()
     flight.nav["truth"] = flight.nav["truth-payload"] = flight.nav["autopilot"]
     assert flight.pose_source()[0] == "autopilot"
@@ -286,8 +249,3 @@ def test_the_truth_is_no_choice_of_poses(make_flight: Callable[..., Flight]) -> 
     with pytest.raises(WildlabError, match="no estimated poses"):
         flight.pose_source()
     assert flight.pose_source("truth")[0] == "truth", "where it is named"
-
-
-def test_a_table_that_is_not_there(make_flight: Callable[..., Flight]) -> None:
-    with pytest.raises(WildlabError, match="no table 'imu'"):
-        make_flight().table("imu")

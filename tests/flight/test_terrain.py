@@ -90,12 +90,9 @@ def lay(flight: Flight, path: Path, **says: Any) -> Flight:
 
 
 @pytest.mark.parametrize(("crs", "cell", "turn"), [(UTM, 4.0, 30.0), (4326, 4e-5, 0.0), (3857, 6.0, 180.0)])
-def test_the_surface_in_n_is_the_surface_on_the_earth(
-    tmp_path: Path, flown: Callable[..., Flight], crs: int, cell: float, turn: float
-) -> None:
+def test_the_surface_in_n_is_the_surface_on_the_earth(tmp_path, flown, crs, cell, turn):
     """Points of the formula, taken to n by themselves, lie on the terrain: whatever the CRS and its turn."""
     flight = lay(flown(), write_map(tmp_path / "dem.tif", crs=crs, cell=cell, turn=turn))
-    assert flight.terrain is not None
     rng = np.random.default_rng(0)
     longitude, latitude = LONGITUDE + rng.uniform(-1e-3, 1e-3, 500), LATITUDE + rng.uniform(-3e-3, 3e-3, 500)
     p = geodetic_to_ned(
@@ -107,31 +104,28 @@ def test_the_surface_in_n_is_the_surface_on_the_earth(
     # Bilinear patches of 4 m cut the crests of waves of 240 m and 235 m by up to 0.05 m.
     assert np.abs(off).max() < 0.08
     record = flight.manifest.terrain
-    assert record is not None
     assert record.error_rms_m < 0.02
     assert np.abs(off).mean() < record.error_max_m + 0.05
 
 
-def test_curvature_is_taken_off(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_curvature_is_taken_off(tmp_path, flown):
     """Level ground falls by d^2 / 2R. (That grid north is not true north, the test above sees.)"""
     level = lay(
         flown(),
         write_map(tmp_path / "level.tif", cell=100.0, height=lambda x, y: np.full(x.shape, 600.0)),
         margin_m=12_000.0,
     )
-    assert level.terrain is not None
     d = np.array([[0.0, 0.0], [10_000.0, 0.0], [0.0, 10_000.0]])
     fall = -100.0 - level.terrain.heights_at(d)
     np.testing.assert_allclose(fall, [0.0, 7.85, 7.83], atol=0.03)
 
 
-def test_holes_stay_holes_and_are_counted(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_holes_stay_holes_and_are_counted(tmp_path, flown):
     def holed(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.where((x > LONGITUDE) & (y > LATITUDE), -9999.0, hills(x, y))
 
     path = write_map(tmp_path / "dem.tif", height=holed, nodata=-9999.0)
     flight = lay(flown(), path)
-    assert flight.terrain is not None and flight.manifest.terrain is not None
     north, east = np.array([100.0, -100.0, 100.0]), np.array([100.0, 100.0, -100.0])
     heights = flight.terrain.heights_at(np.column_stack([north, east]))
     np.testing.assert_array_equal(np.isnan(heights), [True, False, False])
@@ -140,11 +134,10 @@ def test_holes_stay_holes_and_are_counted(tmp_path: Path, flown: Callable[..., F
     with pytest.raises(WildlabError, match="heights of -9999"):
         lay(flown(), undeclared)
     again = lay(flown(), undeclared, nodata=-9999.0)
-    assert again.terrain is not None
     np.testing.assert_array_equal(again.terrain.height, flight.terrain.height)
 
 
-def test_a_hole_may_be_any_number(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_a_hole_may_be_any_number(tmp_path, flown):
     """As a file of its kind rounds it, or none at all where its kind cannot hold it."""
     holed = write_map(tmp_path / "f.tif", height=lambda x, y: np.where(x > LONGITUDE, -9999.1, 650.0))
     flight = lay(flown(), holed, nodata=-9999.1)
@@ -158,23 +151,19 @@ def test_a_hole_may_be_any_number(tmp_path: Path, flown: Callable[..., Flight]) 
     ("written", "said"),
     [({"units": "ft"}, {}), ({}, {"unit": "ft"}), ({"crs": "EPSG:32633+6360"}, {"heights": 0.0})],
 )
-def test_feet_are_feet(
-    tmp_path: Path, flown: Callable[..., Flight], written: dict[str, Any], said: dict[str, Any]
-) -> None:
+def test_feet_are_feet(tmp_path, flown, written, said):
     """By the band's unit, by the vertical CRS (EPSG:6360, US feet), or by what the user says."""
     foot = 1200 / 3937 if "crs" in written else 0.3048
     metres = lay(flown(), write_map(tmp_path / "m.tif"))
     feet = lay(
         flown(), write_map(tmp_path / "ft.tif", height=lambda x, y: hills(x, y) / foot, **written), **said
     )
-    assert metres.terrain is not None and feet.terrain is not None
     np.testing.assert_allclose(feet.terrain.height, metres.terrain.height, atol=2e-4)
 
 
-def test_heights_count_from_what_is_said(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_heights_count_from_what_is_said(tmp_path, flown):
     path = write_map(tmp_path / "dem.tif")
     plain, above = lay(flown(), path), lay(flown(), path, heights=20.0)
-    assert plain.terrain is not None and above.terrain is not None and above.manifest.terrain is not None
     np.testing.assert_allclose(above.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 20.0, atol=1e-3)
     assert above.manifest.terrain.heights == "geoid" and above.manifest.terrain.added_m == 20.0
     recorded = flown()
@@ -182,7 +171,6 @@ def test_heights_count_from_what_is_said(tmp_path: Path, flown: Callable[..., Fl
     data = recorded.manifest.model_dump(exclude_none=True) | {"vertical": vertical}
     recorded.manifest = make_manifest(data)
     same = lay(recorded, path, heights="flight")
-    assert same.terrain is not None
     np.testing.assert_allclose(same.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 30.0, atol=1e-3)
     with pytest.raises(WildlabError, match="heights count from"):
         lay(flown(), path, heights=None)
@@ -192,17 +180,16 @@ def test_heights_count_from_what_is_said(tmp_path: Path, flown: Callable[..., Fl
     with pytest.raises(WildlabError, match="the grid"):
         lay(flown(), egm, heights=None)
     three = write_map(tmp_path / "three.tif", crs=4979, cell=4e-5)
-    assert lay(flown(), three, heights=None).manifest.terrain.heights == "ellipsoid"  # type: ignore[union-attr]
+    assert lay(flown(), three, heights=None).manifest.terrain.heights == "ellipsoid"
 
 
-def test_standard_deviations_add_up(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_standard_deviations_add_up(tmp_path, flown):
     flight = lay(flown(), write_map(tmp_path / "dem.tif", cell=20.0), sd_m=0.4)
-    assert flight.terrain is not None and flight.manifest.terrain is not None
     assert flight.terrain.sd == math.hypot(0.4, flight.manifest.terrain.error_rms_m) > 0.4
-    assert math.isnan(lay(flown(), write_map(tmp_path / "b.tif")).terrain.sd)  # type: ignore[union-attr]
+    assert math.isnan(lay(flown(), write_map(tmp_path / "b.tif")).terrain.sd)
 
 
-def test_a_picture_as_f_has_it(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_a_picture_as_f_has_it(tmp_path, flown):
     """Equation 6.1: PNG = 5 (M - 71)."""
     grey = np.random.default_rng(0).integers(100, 110, (300, 300)).astype(np.uint8)
     path = tmp_path / "map.png"
@@ -211,7 +198,6 @@ def test_a_picture_as_f_has_it(tmp_path: Path, flown: Callable[..., Flight]) -> 
     x, y = Transformer.from_crs(4326, UTM, always_xy=True).transform(LONGITUDE, LATITUDE)
     says = {"crs": f"EPSG:{UTM}", "cell_m": 3.0, "corner": (x - 450.0, y + 450.0)}
     flight = lay(flown(height_m=100.0), path, heights=0.0, **says)
-    assert flight.terrain is not None
     known = flight.terrain.height[np.isfinite(flight.terrain.height)]
     assert known.min() >= 71 + 100 / 5 - 100 - 0.1 and known.max() <= 71 + 109 / 5 - 100 + 0.01
     with pytest.raises(WildlabError, match="cells lie"):
@@ -220,13 +206,12 @@ def test_a_picture_as_f_has_it(tmp_path: Path, flown: Callable[..., Flight]) -> 
         lay(flown(height_m=100.0), path, cell_m=3.0, corner=(x, y))
 
 
-def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path, flown):
     path = write_map(tmp_path / "dem.tif", cell=2.0, side=900)
     fine, coarse = lay(flown(), path), lay(flown(), path, step_m=11.0)
-    assert fine.terrain is not None and coarse.terrain is not None and coarse.manifest.terrain is not None
     assert coarse.manifest.terrain.averaged == 5
     np.testing.assert_allclose(coarse.terrain.heights_at(AT), fine.terrain.heights_at(AT), atol=0.7)
-    assert coarse.manifest.terrain.error_rms_m > fine.manifest.terrain.error_rms_m  # type: ignore[union-attr]
+    assert coarse.manifest.terrain.error_rms_m > fine.manifest.terrain.error_rms_m
 
 
 @pytest.mark.parametrize(
@@ -238,13 +223,7 @@ def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path: Path, flown: Callable[
         ({"height_m": 400.0}, {}, "below the ground"),
     ],
 )
-def test_a_map_of_elsewhere_is_refused(
-    tmp_path: Path,
-    flown: Callable[..., Flight],
-    origin: dict[str, float],
-    written: dict[str, Any],
-    words: str,
-) -> None:
+def test_a_map_of_elsewhere_is_refused(tmp_path, flown, origin, written, words):
     with pytest.raises(WildlabError, match=words):
         lay(flown(**origin), write_map(tmp_path / "dem.tif", **written))
 
@@ -257,9 +236,7 @@ def test_a_map_of_elsewhere_is_refused(
         ({"height": lambda x, y: 1e5 + x}, r"heights of 100\d"),
     ],
 )
-def test_what_is_no_map_of_heights_is_refused(
-    tmp_path: Path, flown: Callable[..., Flight], written: dict[str, Any], words: str
-) -> None:
+def test_what_is_no_map_of_heights_is_refused(tmp_path, flown, written, words):
     if written.get("crs", UTM) is None:
         path = write_map(tmp_path / "dem.tif")
         with rasterio.open(path) as data:
@@ -274,14 +251,11 @@ def test_what_is_no_map_of_heights_is_refused(
         lay(flown(), path)
 
 
-def test_what_is_no_file_or_damaged_is_refused(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_what_is_no_file_or_damaged_is_refused(tmp_path, flown):
     path = write_map(tmp_path / "dem.tif", compress="deflate", tiled=True, blockxsize=64, blockysize=64)
     whole = path.read_bytes()
     with pytest.raises(WildlabError, match="no such file"):
         lay(flown(), tmp_path / "gone.tif")
-    (tmp_path / "text.tif").write_text("no raster")
-    with pytest.raises(WildlabError, match="neither a TIFF"):
-        lay(flown(), tmp_path / "text.tif")
     (tmp_path / "cut.tif").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(
         WildlabError, match=r"is not a GeoTIFF or PNG that can be read|breaks off or is damaged"
@@ -295,7 +269,7 @@ def test_what_is_no_file_or_damaged_is_refused(tmp_path: Path, flown: Callable[.
         lay(flown(), write_map(tmp_path / "site.tif", local='LOCAL_CS["site",UNIT["metre",1]]'))
 
 
-def test_a_claim_beyond_belief_is_refused(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+def test_a_claim_beyond_belief_is_refused(tmp_path, flown):
     """A small file that claims blocks of a gigabyte: one of them would have to be unpacked as a whole."""
     x, y = Transformer.from_crs(4326, UTM, always_xy=True).transform(LONGITUDE, LATITUDE)
     given = {"crs": UTM, "count": 1, "dtype": "float32", "SPARSE_OK": True, "tiled": True}

@@ -28,7 +28,7 @@ def read(folder: Path, roles: dict[str, str] | None = None, **wishes: Any) -> Ca
     return read_card([folder / "card"], Wishes("card", **{"zone": "UTC", **wishes}), roles or {})
 
 
-def test_points_of_a_card_lie_where_they_were_surveyed(tmp_path: Path):
+def test_points_of_a_card_lie_where_they_were_surveyed(tmp_path):
     write_card(tmp_path / "card")
     card = read(tmp_path)
     flight = import_card(card, tmp_path / "flight")
@@ -36,7 +36,6 @@ def test_points_of_a_card_lie_where_they_were_surveyed(tmp_path: Path):
     assert flight.manifest.vertical.reference == "ellipsoid"
     points = georeference(flight).table
     assert len(points) >= 8
-    assert flight.truth is not None
     truth = flight.truth.set_index("target_id").loc[points["target_id"]]
     gap = points[["north_m", "east_m"]].to_numpy() - truth[["north_m", "east_m"]].to_numpy()
     errors = np.hypot(*gap.T)
@@ -45,7 +44,7 @@ def test_points_of_a_card_lie_where_they_were_surveyed(tmp_path: Path):
     assert set(points["target_id"]) <= set(MARKS)
 
 
-def test_the_recipe_beside_a_flight_makes_it_again(tmp_path: Path):
+def test_the_recipe_beside_a_flight_makes_it_again(tmp_path):
     write_card(tmp_path / "card")
     card = read(tmp_path)
     first = import_card(card, tmp_path / "flight")
@@ -57,19 +56,18 @@ def test_the_recipe_beside_a_flight_makes_it_again(tmp_path: Path):
     assert said["locations"] == {"sensitivity": "withheld"}
 
 
-def test_a_track_beside_the_images_is_a_target(tmp_path: Path):
+def test_a_track_beside_the_images_is_a_target(tmp_path):
     write_card(tmp_path / "card")
     (tmp_path / "card" / "fox <b>.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(20)]))
     card = read(tmp_path, geoid_m=0.0)
     target = next(one for one in card.choices if one.role == "target")
     assert target.target == "fox-b"
     flight = import_card(card, tmp_path / "flight")
-    assert flight.truth is not None
     fox = flight.truth[flight.truth["target_id"] == "fox-b"]
     assert np.allclose(np.diff(fox["north_m"]), 0.5, atol=1e-3)
 
 
-def test_heights_that_cannot_be_compared_are_refused(tmp_path: Path):
+def test_heights_that_cannot_be_compared_are_refused(tmp_path):
     write_card(tmp_path / "card")
     (tmp_path / "card" / "fox.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(20)]))
     with pytest.raises(WildlabError) as caught:
@@ -77,7 +75,7 @@ def test_heights_that_cannot_be_compared_are_refused(tmp_path: Path):
     assert "--geoid" in str(caught.value) and "fox.gpx" in str(caught.value)
 
 
-def test_a_dry_run_writes_nothing_and_gives_a_recipe(tmp_path: Path):
+def test_a_dry_run_writes_nothing_and_gives_a_recipe(tmp_path):
     write_card(tmp_path / "card")
     before = sorted(tmp_path.rglob("*"))
     result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", "--zone", "UTC"])
@@ -90,14 +88,14 @@ def test_a_dry_run_writes_nothing_and_gives_a_recipe(tmp_path: Path):
     assert {one["role"] for one in told["files"]} == {"images", "marks", "clicks"}
 
 
-def test_no_place_is_told(tmp_path: Path):
+def test_no_place_is_told(tmp_path):
     write_card(tmp_path / "card")
     result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", "--zone", "UTC"])
     for part in ("59.05", "10.12", "59.0", "10.1"):
         assert part not in result.output
 
 
-def test_the_zone_of_a_wall_clock_by_the_flight(tmp_path: Path):
+def test_the_zone_of_a_wall_clock_by_the_flight(tmp_path):
     """The camera runs two hours ahead of UTC, the track on board says when it flew."""
     write_card(tmp_path / "card")
     # A receiver on board: where the images are taken, in UTC two hours before their wall clock.
@@ -108,7 +106,7 @@ def test_the_zone_of_a_wall_clock_by_the_flight(tmp_path: Path):
     assert flight.manifest.clocks.camera_offset_s == -7200.0
 
 
-def test_overwriting_takes_a_word(tmp_path: Path):
+def test_overwriting_takes_a_word(tmp_path):
     write_card(tmp_path / "card")
     arguments = ["import", str(tmp_path / "card"), "--into", str(tmp_path / "flight"), "--zone", "UTC"]
     assert CliRunner().invoke(wildlab, arguments).exit_code == 0
@@ -120,7 +118,7 @@ def test_overwriting_takes_a_word(tmp_path: Path):
     assert load_flight(tmp_path / "flight").name == "flight"
 
 
-def test_marks_without_a_height_are_left_out(tmp_path: Path) -> None:
+def test_marks_without_a_height_are_left_out(tmp_path):
     """As most programs write placemarks: without a word on what their heights count from."""
     card = tmp_path / "card"
     write_card(card)
@@ -149,7 +147,7 @@ def test_marks_without_a_height_are_left_out(tmp_path: Path) -> None:
         (["--start", "yesterday"], "is no time with a zone"),
     ],
 )
-def test_what_is_stated_wrongly(tmp_path: Path, arguments: list[str], said: str):
+def test_what_is_stated_wrongly(tmp_path, arguments, said):
     write_card(tmp_path / "card", 1)
     result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", *arguments])
     assert isinstance(result.exception, WildlabError)
@@ -165,11 +163,11 @@ def test_what_is_stated_wrongly(tmp_path: Path, arguments: list[str], said: str)
         ["r.toml", "--into", "x", "--zone", "UTC"],
     ],
 )
-def test_options_that_do_not_go_together(arguments: list[str]):
+def test_options_that_do_not_go_together(arguments):
     assert CliRunner().invoke(wildlab, ["import", *arguments]).exit_code == 2
 
 
-def test_an_empty_card_and_one_that_says_nothing(tmp_path: Path):
+def test_an_empty_card_and_one_that_says_nothing(tmp_path):
     (tmp_path / "card").mkdir()
     with pytest.raises(WildlabError, match="nothing in it"):
         read(tmp_path, zone="")
@@ -180,15 +178,14 @@ def test_an_empty_card_and_one_that_says_nothing(tmp_path: Path):
         read_card([tmp_path / "lost"], Wishes("card"), {})
 
 
-def test_taken_is_what_the_frames_say(tmp_path: Path):
+def test_taken_is_what_the_frames_say(tmp_path):
     write_card(tmp_path / "card")
     flight = import_card(read(tmp_path), tmp_path / "flight")
-    assert flight.frames is not None
     assert np.allclose(flight.frames["time_s"], [0.0, 2.5, 5.0, 7.5], atol=1e-6)
     assert flight.manifest.time.epoch == TAKEN
 
 
-def test_several_folders_of_images_are_one_series(tmp_path: Path):
+def test_several_folders_of_images_are_one_series(tmp_path):
     write_card(tmp_path / "card")
     second = tmp_path / "card" / "DCIM" / "101MEDIA"
     second.mkdir()
@@ -198,7 +195,7 @@ def test_several_folders_of_images_are_one_series(tmp_path: Path):
     assert len(flight.nav["camera"]) == 4
 
 
-def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(tmp_path: Path):
+def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(tmp_path):
     write_card(tmp_path / "card")
     pictures = tmp_path / "card" / "DCIM" / "100MEDIA"
     for path in sorted(pictures.glob("*.JPG")):
@@ -210,7 +207,6 @@ def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(tmp_path: 
     (tmp_path / "card" / "clicks.csv").unlink()
     card = read(tmp_path)
     flight = import_card(card, tmp_path / "flight")
-    assert flight.manifest.camera is not None
     assert (flight.manifest.camera.width_px, flight.manifest.camera.fx_px) == (320, 400.0)
     assert len(flight.table("frames")) == 3
     roles = {"DCIM/100MEDIA": "images:wide"}
@@ -218,32 +214,6 @@ def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(tmp_path: 
     assert len(wide.table("frames")) == 4
     with pytest.raises(WildlabError, match="'infra'"):
         read_card([tmp_path / "card"], Wishes("x", zone="UTC"), {"DCIM/100MEDIA": "images:infra"})
-
-
-def test_pixels_of_images_that_are_not_there_are_counted_and_left_out(tmp_path: Path):
-    write_card(tmp_path / "card")
-    with (tmp_path / "card" / "clicks.csv").open("a", encoding="utf-8") as clicks:
-        clicks.write("DJI_0900.JPG,pole,10,20\n")
-    card = read(tmp_path)
-    flight = import_card(card, tmp_path / "flight")
-    assert set(flight.table("detections")["frame_id"]) <= set(flight.table("frames")["frame_id"])
-
-
-def test_a_counter_that_begins_again_is_put_in_the_order_of_time(tmp_path: Path):
-    write_card(tmp_path / "card")
-    pictures = tmp_path / "card" / "DCIM" / "100MEDIA"
-    (pictures / "DJI_0001.JPG").rename(pictures / "DJI_0999.JPG")
-    (tmp_path / "card" / "clicks.csv").unlink()
-    flight = import_card(read(tmp_path), tmp_path / "flight")
-    assert flight.table("frames")["frame_id"].tolist() == ["DJI_0999", "DJI_0002", "DJI_0003", "DJI_0004"]
-
-
-def test_a_focal_length_can_be_stated_alone(tmp_path: Path):
-    write_card(tmp_path / "card")
-    card = read(tmp_path, focal_px=750.0)
-    flight = import_card(card, tmp_path / "flight")
-    assert flight.manifest.camera is not None
-    assert (flight.manifest.camera.fx_px, flight.manifest.camera.height_px) == (750.0, 512)
 
 
 SUBTITLES = """{n}
@@ -255,7 +225,7 @@ SUBTITLES = """{n}
 """
 
 
-def test_a_boat_does_not_take_the_place_of_subtitles_without_a_zone(tmp_path: Path):
+def test_a_boat_does_not_take_the_place_of_subtitles_without_a_zone(tmp_path):
     card = tmp_path / "card"
     card.mkdir()
     places = [geodetic(30.0, 2.0 * i) for i in range(20)]
@@ -270,25 +240,24 @@ def test_a_boat_does_not_take_the_place_of_subtitles_without_a_zone(tmp_path: Pa
     assert roles == {"DJI_0001.SRT": "own", "boat.gpx": "target"}
 
 
-def test_one_track_and_one_clicked_name_that_are_left_over_are_the_same(tmp_path: Path):
+def test_one_track_and_one_clicked_name_that_are_left_over_are_the_same(tmp_path):
     write_card(tmp_path / "card")
     clicks = tmp_path / "card" / "clicks.csv"
     clicks.write_text(clicks.read_text(encoding="utf-8") + "DJI_0001.JPG,boat,300,200\n", encoding="utf-8")
     (tmp_path / "card" / "Boot Mörkö <b>.gpx").write_text(gpx([(i, 5.0, 2.0, 40.0) for i in range(-5, 20)]))
     card = read(tmp_path, geoid_m=0.0)
     flight = import_card(card, tmp_path / "flight")
-    assert flight.truth is not None
     assert "boat" in set(flight.truth["target_id"])
 
 
-def test_a_stated_camera_of_another_size_is_not_laid_on_images(tmp_path: Path):
+def test_a_stated_camera_of_another_size_is_not_laid_on_images(tmp_path):
     write_card(tmp_path / "card", 1)
     camera = CameraPart(name="c", width_px=1000, height_px=750, fx_px=900, fy_px=900, cx_px=500, cy_px=375)
     with pytest.raises(WildlabError, match="1000 x 750 px"):
         read(tmp_path, camera=camera)
 
 
-def test_the_planes_uncertainty_is_that_of_the_surveyed_heights(tmp_path: Path):
+def test_the_planes_uncertainty_is_that_of_the_surveyed_heights(tmp_path):
     write_card(tmp_path / "card")
     marks = tmp_path / "card" / "marks.csv"
     lines = marks.read_text(encoding="utf-8").splitlines()
@@ -298,7 +267,7 @@ def test_the_planes_uncertainty_is_that_of_the_surveyed_heights(tmp_path: Path):
     assert flight.manifest.uncertainty.plane_height_m == pytest.approx(3.0)
 
 
-def test_a_track_copied_twice_is_one_target(tmp_path: Path):
+def test_a_track_copied_twice_is_one_target(tmp_path):
     card = tmp_path / "card"
     write_card(card)
     track = [(i, 0.5 * i, 1.0, 40.0) for i in range(40)]

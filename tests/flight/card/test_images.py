@@ -24,7 +24,7 @@ def images(wall: NDArray[np.float64] | None, utc: NDArray[np.float64] | None = N
     columns: dict[str, object] = {"file": [f"a{i}.jpg" for i in range(count)]}
     columns["time_log_s"] = np.full(count, np.nan) if wall is None else wall
     columns["time_s"] = np.full(count, np.nan) if utc is None else utc
-    return Found("DCIM", 1, "photos", RawLog("photos", {"photos": make_stream("photos", columns)}))  # type: ignore[arg-type]
+    return Found("DCIM", 1, "photos", RawLog("photos", {"photos": make_stream("photos", columns)}))
 
 
 def triggers(times: NDArray[np.float64]) -> Stream:
@@ -76,7 +76,7 @@ def test_utc_is_taken_as_it_is_and_a_stated_offset_added():
 
 
 @pytest.mark.parametrize("quarters", [-14, 0, 8, 22, 23])
-def test_the_zone_that_brings_images_into_the_flight(quarters: int):
+def test_the_zone_that_brings_images_into_the_flight(quarters):
     wall = TAKEN + 900.0 * quarters + 2.0
     clock = clock_of_images(images(wall), own(), None)
     assert clock.offset_s == -900.0 * quarters

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wildlab.errors import WildlabError
 from wildlab.flight.card.importing import import_card, read_card
 from wildlab.flight.card.proposal import Wishes
 from wildlab.flight.store import Flight
@@ -43,19 +42,18 @@ LOGS = {
 
 
 def flight_of(shared: Shared, into: Path, *parts: str, **wishes: object) -> Flight:
-    card = read_card([shared("logs", *parts)], Wishes("logged", **wishes), {})  # type: ignore[arg-type]
+    card = read_card([shared("logs", *parts)], Wishes("logged", **wishes), {})
     return import_card(card, into)
 
 
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log[1])
-def test_a_log_comes_in(shared_data: Shared, tmp_path: Path, log: tuple[str, str]):
+def test_a_log_comes_in(shared_data, tmp_path, log):
     begins, lasts, rows = LOGS[log]
     flight = flight_of(shared_data, tmp_path / "flight", *log)
     tables = {**flight.tables, **flight.nav}
     for name, least in rows.items():
         assert len(tables[name]) >= least, name
     epoch = flight.manifest.time.epoch
-    assert epoch is not None
     every = np.concatenate([table["time_s"].to_numpy() for table in tables.values()])
     first = epoch.timestamp() + float(every.min())
     assert first == pytest.approx(datetime.fromisoformat(begins).replace(tzinfo=UTC).timestamp(), abs=2.0)
@@ -64,23 +62,8 @@ def test_a_log_comes_in(shared_data: Shared, tmp_path: Path, log: tuple[str, str
         assert (np.diff(table["time_s"]) > 0).all(), name
 
 
-@pytest.mark.parametrize(
-    ("log", "said"),
-    [(("target_gpx", "Mojstrovka.gpx"), "time"), (("umn_thor75",), "nothing here")],
-    ids=lambda one: one[-1] if isinstance(one, tuple) else "",
-)
-def test_what_cannot_be_a_flight_says_why(
-    shared_data: Shared, tmp_path: Path, log: tuple[str, ...], said: str
-):
-    with pytest.raises(WildlabError) as caught:
-        flight_of(shared_data, tmp_path / "flight", *log)
-    assert said in str(caught.value)
-    assert not (tmp_path / "flight").exists()
-
-
-def test_a_log_on_the_bench_keeps_only_true_fixes(shared_data: Shared, tmp_path: Path):
+def test_a_log_on_the_bench_keeps_only_true_fixes(shared_data, tmp_path):
     flight = flight_of(shared_data, tmp_path / "flight", "plane42_bench_badgps")
-    assert flight.gnss is not None
     assert flight.imu is None
     assert len(flight.gnss) == 461 - 376
     # The placeholders lay thousands of kilometres away, up to 17.8 km high.
@@ -88,11 +71,10 @@ def test_a_log_on_the_bench_keeps_only_true_fixes(shared_data: Shared, tmp_path:
     assert np.ptp(flight.gnss["down_m"]) < 200
 
 
-def test_a_folder_of_radiometric_images_has_poses_and_a_camera(shared_data: Shared, tmp_path: Path):
+def test_a_folder_of_radiometric_images_has_poses_and_a_camera(shared_data, tmp_path):
     card = read_card([shared_data("imagery", "deervision_rjpeg")], Wishes("deer"), {})
     flight = import_card(card, tmp_path / "flight")
     camera = flight.manifest.camera
-    assert camera is not None
     assert camera.fx_px == pytest.approx(764.7, abs=0.1)
     assert (camera.width_px, camera.height_px) == (640, 512)
     assert len(flight.nav["camera"]) == 4
@@ -106,7 +88,7 @@ def test_a_folder_of_radiometric_images_has_poses_and_a_camera(shared_data: Shar
         *("mavic_air2.srt", "mix_p4rtk_mavic2pro.srt", "broken_incomplete.SRT"),
     ],
 )
-def test_subtitles_come_in(shared_data: Shared, tmp_path: Path, name: str):
+def test_subtitles_come_in(shared_data, tmp_path, name):
     """Their clocks are local or none at all: with what the user states, they are flights."""
     start = datetime(2020, 1, 1, tzinfo=UTC)
     flight = flight_of(shared_data, tmp_path / "flight", "dji_srt", name, zone="UTC", start=start)

@@ -17,9 +17,7 @@ from wildlab.flight.card.said import paced
     st.lists(st.tuples(st.integers(30, 200), st.floats(8, 500)), min_size=1, max_size=5),
     st.integers(0, 99),
 )
-def test_running_periods_have_their_rate_and_pauses_are_counted(
-    rate: float, periods: list[tuple[int, float]], seed: int
-) -> None:
+def test_running_periods_have_their_rate_and_pauses_are_counted(rate, periods, seed):
     rng = np.random.default_rng(seed)
     stamps, at, paused = [], 0.0, []
     for count, steps in periods:
@@ -35,12 +33,12 @@ def test_running_periods_have_their_rate_and_pauses_are_counted(
 
 
 @pytest.mark.parametrize("burst", [2, 4, 8])
-def test_bursts_have_the_rate_of_the_whole(burst: int) -> None:
+def test_bursts_have_the_rate_of_the_whole(burst):
     stamps = np.concatenate([k * burst / 10 + 1e-3 * np.arange(burst) for k in range(100)])
     found = re.fullmatch(r" at ([\d.]+) Hz.*", paced(stamps))
     assert found is not None and float(found[1]) == pytest.approx(10.0, rel=0.25)
 
 
-def test_what_has_no_two_times_has_no_rate() -> None:
+def test_what_has_no_two_times_has_no_rate():
     assert paced([]) == "" and paced([3.0]) == "" and paced([3.0, 3.0]) == ""
     assert paced([3.0, 3.5]) == " at 2 Hz"

@@ -24,7 +24,7 @@ from wildlab.flight.recipe.series import LogTable
         (1.0, np.nan, "cannot be told"),
     ],
 )
-def test_how_a_clock_runs(rate: float, sd: float, said: str):
+def test_how_a_clock_runs(rate, sd, said):
     """A second of a fast clock is less than one of UTC."""
     stream = make_stream("gnss", {"time_s": [1.0, 2.0]})
     clock = Clock("GPS weeks", rate, 0.0, 0.001, 0.002, 10, sd)

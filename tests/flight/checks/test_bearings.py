@@ -64,11 +64,6 @@ def causes(flight: Flight) -> set[str]:
         (lambda bearing, yaw: bearing, 1.0, None),
     ],
 )
-def test_what_bearings_count_from_and_ranges_are_in_is_named(
-    make_flight: Callable[..., Flight],
-    reads: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    factor: float,
-    cause: str | None,
-) -> None:
+def test_what_bearings_count_from_and_ranges_are_in_is_named(make_flight, reads, factor, cause):
     found = causes(radar_flight(make_flight, reads, factor))
     assert len(found) == (cause is not None) and all(cause in one for one in found)

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.flight.checks.sense.seen import judge
 from wildlab.flight.checks.sense.sightings import Look, Sightings
-from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
@@ -101,12 +100,12 @@ MISTAKES: dict[str, Change] = {
 }
 
 
-def test_right_ones_are_not_accused(make_flight: Callable[..., Flight]) -> None:
+def test_right_ones_are_not_accused(make_flight):
     assert list(judge(make_flight(time={"kind": "sequence"}), sightings())) == []
 
 
 @pytest.mark.parametrize("cause", MISTAKES)
-def test_a_mistake_is_named(make_flight: Callable[..., Flight], cause: str) -> None:
+def test_a_mistake_is_named(make_flight, cause):
     # Clocks are left out: here nothing moves with time.
     flight = make_flight(time={"kind": "sequence"})
     found = [one.causes for one in judge(flight, MISTAKES[cause](sightings()))]

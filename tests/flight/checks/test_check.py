@@ -65,7 +65,7 @@ def _poses_of_frames(ids: list[str]) -> Callable[[Flight], None]:
     return change
 
 
-def test_the_right_flight_has_nothing_wrong(make_flight: Callable[..., Flight]) -> None:
+def test_the_right_flight_has_nothing_wrong(make_flight):
     found = check_flight(make_flight(clocks={"camera_offset_s": 0.01}))
     assert found == []
 
@@ -174,14 +174,7 @@ def test_the_right_flight_has_nothing_wrong(make_flight: Callable[..., Flight]) 
         (lambda flight: None, "note", "flight.toml", "clocks.camera_offset_s", "taken to agree"),
     ],
 )
-def test_each_fault_is_found(
-    make_flight: Callable[..., Flight],
-    change: Callable[[Flight], None],
-    level: str,
-    table: str,
-    field: str,
-    said: str,
-) -> None:
+def test_each_fault_is_found(make_flight, change, level, table, field, said):
     flight = make_flight()
     change(flight)
     found = check_flight(flight)
@@ -192,7 +185,7 @@ def test_each_fault_is_found(
     assert ranks == sorted(ranks)
 
 
-def test_another_sensor_needs_no_frame(make_flight: Callable[..., Flight]) -> None:
+def test_another_sensor_needs_no_frame(make_flight):
     flight = make_flight()
     radar = pd.DataFrame(
         {
@@ -221,9 +214,7 @@ def test_another_sensor_needs_no_frame(make_flight: Callable[..., Flight]) -> No
         ({"uncertainty": ASSUMED}, "note", "cov_00"),
     ],
 )
-def test_what_the_manifest_admits(
-    make_flight: Callable[..., Flight], manifest: dict[str, Any], level: str, field: str
-) -> None:
+def test_what_the_manifest_admits(make_flight, manifest, level, field):
     flight = make_flight(**manifest)
     _no_covariance(flight)
     assert [one.level for one in check_flight(flight) if one.field == field] == [level]
@@ -240,12 +231,7 @@ def test_what_the_manifest_admits(
         ({"time": {"kind": "sequence"}}, lambda flight: None, [True, False]),
     ],
 )
-def test_what_it_can_be_used_for(
-    make_flight: Callable[..., Flight],
-    manifest: dict[str, Any],
-    change: Callable[[Flight], None],
-    usable: list[bool],
-) -> None:
+def test_what_it_can_be_used_for(make_flight, manifest, change, usable):
     flight = make_flight(**manifest)
     change(flight)
     uses = usable_for(flight)
@@ -253,7 +239,7 @@ def test_what_it_can_be_used_for(
     assert all(use.why for use in uses)
 
 
-def test_imu_and_gnss_make_navigation_possible(make_flight: Callable[..., Flight]) -> None:
+def test_imu_and_gnss_make_navigation_possible(make_flight):
     flight = make_flight()
     times = {"time_s": [0.0, 1.0]}
     zeros = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2", "w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]

@@ -108,7 +108,7 @@ def _straight(times: Array) -> tuple[Array, Array, Array]:
     ("nav", "speeds", "noisy"),
     [(True, True, 1.0), (False, False, 1.0), (True, False, 0.0), (False, True, 0.0)],
 )
-def test_right_measurements_pass(path: Any, nav: bool, speeds: bool, noisy: float) -> None:
+def test_right_measurements_pass(path, nav, speeds, noisy):
     flight = _copy(_flight(path, noisy), nav)
     if not speeds:
         flight.tables["gnss"] = flight.tables["gnss"].drop(columns=SPEED)
@@ -205,9 +205,7 @@ CASES: list[Any] = [
 
 
 @pytest.mark.parametrize(("change", "level", "table", "field", "said"), CASES)
-def test_each_fault_is_found(
-    right: Flight, change: Change, level: str, table: str, field: str, said: str
-) -> None:
+def test_each_fault_is_found(right, change, level, table, field, said):
     flight = _copy(right)
     change(flight)
     found = _found(flight)
@@ -226,13 +224,13 @@ def test_each_fault_is_found(
         (_turn(FLU, FORCE, RATE), "problem", "f_z_m_s2"),
     ],
 )
-def test_without_any_attitude(right: Flight, change: Change, level: str, field: str) -> None:
+def test_without_any_attitude(right, change, level, field):
     flight = _copy(right, nav=False)
     change(flight)
     assert (level, field) in [(one.level, one.field) for one in _found(flight)]
 
 
-def test_degrees_without_anything_to_compare_with(right: Flight) -> None:
+def test_degrees_without_anything_to_compare_with(right):
     flight = _copy(right, nav=False)
     _scale(RATE, 180 / np.pi)(flight)
     del flight.tables["gnss"]
@@ -240,7 +238,7 @@ def test_degrees_without_anything_to_compare_with(right: Flight) -> None:
     assert found.level == "problem" and "deg/s" in found.sentence
 
 
-def test_the_suggested_offset_and_a_latency_are_taken_into_account(right: Flight) -> None:
+def test_the_suggested_offset_and_a_latency_are_taken_into_account(right):
     flight = _copy(right)
     _shift("gnss", 3.0)(flight)
 
@@ -253,7 +251,7 @@ def test_the_suggested_offset_and_a_latency_are_taken_into_account(right: Flight
 
 
 @pytest.mark.parametrize("offset", [3.0, -2.0])
-def test_an_offset_without_velocities(offset: float) -> None:
+def test_an_offset_without_velocities(offset):
     flight = _copy(_flight(noisy=0.05), nav=False)  # positions as good as RTK
     flight.tables["gnss"] = flight.tables["gnss"].drop(columns=SPEED)
     _shift("gnss", -offset)(flight)
@@ -261,7 +259,7 @@ def test_an_offset_without_velocities(offset: float) -> None:
     assert f"gnss_offset_s = {offset:.1f}" in found.fix
 
 
-def test_values_that_are_no_numbers_are_left_to_others(right: Flight) -> None:
+def test_values_that_are_no_numbers_are_left_to_others(right):
     flight = _copy(right)
     flight.tables["imu"].loc[100, FORCE[0]] = np.nan
     flight.tables["gnss"].loc[3, NED[0]] = np.nan
@@ -270,14 +268,14 @@ def test_values_that_are_no_numbers_are_left_to_others(right: Flight) -> None:
     assert {one.field for one in _found(flight)} == {FORCE[0], NED[0]}
 
 
-def test_times_that_do_not_increase_are_left_to_others(right: Flight) -> None:
+def test_times_that_do_not_increase_are_left_to_others(right):
     flight = _copy(right)
     flight.tables["imu"].loc[100, "time_s"] = 0.0
     flight.tables["gnss"].loc[3, "time_s"] = 0.0
     assert {(one.table, one.field) for one in _found(flight)} == {("imu", "time_s"), ("gnss", "time_s")}
 
 
-def test_a_few_samples_say_nothing(right: Flight) -> None:
+def test_a_few_samples_say_nothing(right):
     flight = _copy(right)
     for n in (0, 1, 2, 5):
         flight.tables["imu"] = right.tables["imu"].iloc[:n]

@@ -38,21 +38,20 @@ def flown(*, forward: bool, late: float = 0.0, off_m: float = 0.0) -> Sightings:
     )  # fmt: skip
 
 
-def test_forward_flight_alone_does_not_tell_a_clock_from_a_tilt() -> None:
+def test_forward_flight_alone_does_not_tell_a_clock_from_a_tilt():
     alike, apart = clock_fit(flown(forward=True), 0.0), clock_fit(flown(forward=False), 0.0)
     assert alike is None or alike.correlation > 0.95
     assert apart is not None and apart.correlation < 0.3
 
 
-def test_the_interval_is_that_of_as_many_images() -> None:
+def test_the_interval_is_that_of_as_many_images():
     """Each image says where it was along its course to so many metres."""
     found = clock_fit(flown(forward=False, late=0.5, off_m=OFF_M), 0.5)
-    assert found is not None
     assert found.sd_s == pytest.approx(OFF_M / SPEED / np.sqrt(IMAGES), rel=0.3)
 
 
 @pytest.mark.parametrize("late", [0.5, -0.5])
-def test_the_advice_has_the_interval(late: float) -> None:
+def test_the_advice_has_the_interval(late):
     first = next(clock_mistakes(flown(forward=False, late=late, off_m=4 * OFF_M), 0.0))
     low, high, alike = (float(x) for x in re.findall(r"\d\.\d+", first.said)[1:4])
     assert low < abs(late) < high and high - low < 0.1 and alike < HARD

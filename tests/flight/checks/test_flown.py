@@ -28,16 +28,14 @@ def flown(make_flight: Callable[..., Flight], north: float, east: float, *, velo
 
 @pytest.mark.parametrize("velocities", [True, False])
 @pytest.mark.parametrize("turn", np.radians([0, 37, 90, 200, 300]))
-def test_the_speed_counts_whichever_way_it_goes(
-    make_flight: Callable[..., Flight], turn: float, velocities: bool
-) -> None:
+def test_the_speed_counts_whichever_way_it_goes(make_flight, turn, velocities):
     for speed, fast in ((FLYING + 0.1, True), (FLYING - 0.1, False)):
         flight = flown(make_flight, speed * np.cos(turn), speed * np.sin(turn), velocities=velocities)
         why = why_no_start(flight)
         assert why == "" if fast else f"moves at {speed:.1f} m/s" in why
 
 
-def test_what_was_fast_before_the_inertial_samples_tells_nothing(make_flight: Callable[..., Flight]) -> None:
+def test_what_was_fast_before_the_inertial_samples_tells_nothing(make_flight):
     flight = flown(make_flight, 3.0, 0.0, velocities=True)
     flight.tables["gnss"].loc[:8, "v_east_m_s"] = 20.0
     assert "moves at 3.0 m/s" in why_no_start(flight)

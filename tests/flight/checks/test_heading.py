@@ -30,7 +30,7 @@ class _Flight:
 
 
 def causes(flight: _Flight) -> list[str]:
-    return [cause for one in heading(flight) for cause in one.causes]  # type: ignore[arg-type]
+    return [cause for one in heading(flight) for cause in one.causes]
 
 
 def wrapped(angle: Any) -> Any:
@@ -48,9 +48,9 @@ def wrapped(angle: Any) -> Any:
         (np.radians(wrapped(COURSE)), "attitude: yaw in radians, read as degrees"),
     ],
 )
-def test_the_usual_mistakes_about_yaw_are_named(yaw: Any, cause: str) -> None:
+def test_the_usual_mistakes_about_yaw_are_named(yaw, cause):
     assert causes(_Flight(yaw)) == [cause]
-    assert [(one.level, one.table) for one in heading(_Flight(yaw))] == [("warning", "nav/log")]  # type: ignore[arg-type]
+    assert [(one.level, one.table) for one in heading(_Flight(yaw))] == [("warning", "nav/log")]
 
 
 @pytest.mark.parametrize(
@@ -64,12 +64,11 @@ def test_the_usual_mistakes_about_yaw_are_named(yaw: Any, cause: str) -> None:
         _Flight(np.random.default_rng(1).uniform(-np.pi, np.pi, len(T))),
     ],
 )
-def test_nothing_is_said_where_no_mistake_explains_it(flight: _Flight) -> None:
+def test_nothing_is_said_where_no_mistake_explains_it(flight):
     assert causes(flight) == []
 
 
-def test_the_mean_cosine_is_that_of_a_known_angle() -> None:
+def test_the_mean_cosine_is_that_of_a_known_angle():
     given = headed(_Flight(COURSE + 0.3).nav["log"])
-    assert given is not None
     # The course over two seconds is that of their middle, but for the half step the positions lie late.
     np.testing.assert_allclose(follows(*given[:2]), np.cos(0.3), atol=0.02)

@@ -70,7 +70,7 @@ def causes(found: list[Finding]) -> set[str]:
 
 @pytest.mark.parametrize("who", ["gnss", "nav"])
 @pytest.mark.parametrize("velocity", [True, False])
-def test_a_leap_is_not_the_clock_though_it_looks_like_one(who: str, velocity: bool) -> None:
+def test_a_leap_is_not_the_clock_though_it_looks_like_one(who, velocity):
     flight = straight_flight(leap=60.0, who=who, velocity=velocity)
     # Without what tells the two apart the clock is blamed: 60 m at 17 m/s are three and a half seconds.
     assert "clock of the receiver" in causes(list(positions(flight)))
@@ -83,20 +83,20 @@ def test_a_leap_is_not_the_clock_though_it_looks_like_one(who: str, velocity: bo
 
 @pytest.mark.parametrize("turning", [0.0, 0.8])
 @pytest.mark.parametrize("velocity", [True, False])
-def test_a_clock_that_is_off_is_still_named(turning: float, velocity: bool) -> None:
+def test_a_clock_that_is_off_is_still_named(turning, velocity):
     flight = straight_flight(clock=3.5, velocity=velocity, turning=turning)
     assert "clock of the receiver" in causes(list(sense(flight)))
     assert without_leaps(flight)[1] == []
 
 
-def test_both_are_named_where_both_are() -> None:
+def test_both_are_named_where_both_are():
     found = list(sense(straight_flight(leap=60.0, clock=3.5, turning=0.8)))
     assert {"leap of the position", "clock of the receiver"} <= causes(found)
 
 
 @settings(max_examples=12, deadline=None)
 @given(st.floats(-100, 100), st.floats(-100, 100), st.floats(10, 110), st.booleans(), st.integers(0, 99))
-def test_a_leap_comes_off_as_it_went_on(north: float, east: float, at: float, bare: bool, seed: int) -> None:
+def test_a_leap_comes_off_as_it_went_on(north, east, at, bare, seed):
     clean = straight_flight(seed=seed, turning=0.5).nav["autopilot"]
     table = clean.drop(columns=["v_north_m_s", "v_east_m_s", "v_down_m_s"]) if bare else clean
     behind = table["time_s"].to_numpy() >= at
@@ -114,7 +114,7 @@ def test_a_leap_comes_off_as_it_went_on(north: float, east: float, at: float, ba
         assert found == []
 
 
-def test_a_stray_place_and_a_gap_are_no_leaps() -> None:
+def test_a_stray_place_and_a_gap_are_no_leaps():
     table = straight_flight().nav["autopilot"]
     stray = table.copy()
     stray.loc[500:502, "north_m"] += 80.0

@@ -57,23 +57,20 @@ def with_others(flight: Flight) -> Flight:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [25, 12, 6, 2, 1])
-def test_what_is_right_is_not_accused_however_few_are_known(flown: Flight, count: int) -> None:
+@pytest.mark.parametrize("count", [25, 6, 1])
+def test_what_is_right_is_not_accused_however_few_are_known(flown, count):
     assert told(few(flown, count)) == []
     nearest = replace_in_manifest(flown.manifest, {"scoring": {"rule": "nearest"}})
     assert told(replace(few(flown, count), manifest=nearest)) == []
 
 
-def test_where_few_are_known_a_share_that_grows_proves_nothing(flown: Flight) -> None:
-    """Negated yaw, and undone: of 3 and of 1 of 25 animals a share is too small to be told from others'."""
-    for count in (3, 1):
-        assert told(few(turned(flown, lambda a: a * [-1, 1, 1]), count)) == []
+def test_where_few_are_known_a_share_that_grows_proves_nothing(flown):
+    """Negated yaw, and undone: of 1 of 25 animals a share is too small to be told from others'."""
+    assert told(few(turned(flown, lambda a: a * [-1, 1, 1]), 1)) == []
 
 
 @pytest.mark.parametrize(("before", "accused"), [(0.29, True), (0.31, False)])
-def test_what_meets_targets_often_enough_needs_no_explanation(
-    flown: Flight, monkeypatch: pytest.MonkeyPatch, before: float, accused: bool
-) -> None:
+def test_what_meets_targets_often_enough_needs_no_explanation(flown, monkeypatch, before, accused):
     """As where a mount is off by a few degrees, which another mistake may make up for."""
     given = sightings(flown, "autopilot")
     assert given is not None
@@ -85,20 +82,18 @@ def test_what_meets_targets_often_enough_needs_no_explanation(
 @pytest.mark.parametrize(
     ("change", "cause"),
     [
-        (lambda a: a * [-1, 1, 1], "attitude: sign of yaw"),
-        (lambda a: a + np.array([np.pi / 2, 0, 0]), "attitude: yaw off by -90 deg"),
+        (lambda a: a * [-1, 1, 1], "sign of yaw"),
+        (lambda a: a + np.array([np.pi / 2, 0, 0]), "yaw off by -90 deg"),
     ],
 )
-def test_a_wrong_attitude_is_named_also_where_half_of_them_are_known(
-    flown: Flight, change: Callable[[np.ndarray], np.ndarray], cause: str
-) -> None:
+def test_a_wrong_attitude_is_named_also_where_half_of_them_are_known(flown, change, cause):
     for count in (25, 12):
         (found,) = told(few(turned(flown, change), count))
         assert found.level == "warning" and cause in found.causes
     assert told(with_others(turned(flown, change))) == []
 
 
-def test_a_clock_that_is_off_is_named_with_what_to_write(flown: Flight) -> None:
+def test_a_clock_that_is_off_is_named_with_what_to_write(flown):
     frames = flown.table("frames")
     late = replace(flown, tables={**flown.tables, "frames": frames.assign(time_s=frames["time_s"] + 8.0)})
     (found,) = told(late)
@@ -107,13 +102,13 @@ def test_a_clock_that_is_off_is_named_with_what_to_write(flown: Flight) -> None:
     assert written == pytest.approx(flown.manifest.clocks.camera_offset_s - 8.0, abs=1.0)
 
 
-def test_a_name_that_is_no_known_targets_says_nothing_of_known_ones(flown: Flight) -> None:
+def test_a_name_that_is_no_known_targets_says_nothing_of_known_ones(flown):
     wrong = turned(flown, lambda a: a * [-1, 1, 1])
     detections = wrong.table("detections").assign(target_id="somebody else")
     assert told(replace(wrong, tables={**wrong.tables, "detections": detections})) == []
 
 
-def test_other_things_in_a_photo_are_no_wrong_photo(flown: Flight) -> None:
+def test_other_things_in_a_photo_are_no_wrong_photo(flown):
     seen_by = flown.table("detections")
     # One in a photo, so that all in it are soon of others.
     rows = seen_by.drop_duplicates("frame_id").iloc[::15].reset_index(drop=True)
@@ -128,7 +123,7 @@ def test_other_things_in_a_photo_are_no_wrong_photo(flown: Flight) -> None:
     assert found.causes == ("one photo off",)
 
 
-def test_places_can_be_judged_by_names_or_where_the_nearest_is_meant(flown: Flight) -> None:
+def test_places_can_be_judged_by_names_or_where_the_nearest_is_meant(flown):
     def judged(flight: Flight) -> bool:
         (use,) = [one for one in usable_for(flight) if one.purpose == "georeferencing accuracy"]
         return use.usable

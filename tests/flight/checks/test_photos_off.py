@@ -76,11 +76,11 @@ def off(flight: Flight) -> list[str]:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("clutter", [0.0, 0.1, 0.25])
-def test_a_flight_as_stated_has_no_photo_off(make_flight: Make, seed: int, clutter: float) -> None:
+def test_a_flight_as_stated_has_no_photo_off(make_flight, seed, clutter):
     assert off(watched(make_flight, seed, clutter)) == []
 
 
-def test_one_wrong_of_two_detections_is_no_wrong_photo(make_flight: Make) -> None:
+def test_one_wrong_of_two_detections_is_no_wrong_photo(make_flight):
     flight = watched(make_flight, 1)
     detections = flight.table("detections")
     rows = np.flatnonzero(detections["frame_id"] == "P5")
@@ -90,7 +90,7 @@ def test_one_wrong_of_two_detections_is_no_wrong_photo(make_flight: Make) -> Non
 
 
 @pytest.mark.parametrize("clutter", [0.0, 0.1])
-def test_wrong_photos_are_still_named(make_flight: Make, clutter: float) -> None:
+def test_wrong_photos_are_still_named(make_flight, clutter):
     (said,) = off(watched(make_flight, 1, clutter, {7: 35.0, 31: -30.0}))
     assert re.findall(r"'(P\d+)'", said) == ["P7", "P31"]
 
@@ -102,13 +102,13 @@ def named(far: list[tuple[int, int]]) -> list[str]:
     return _off(rows, names, np.full(len(rows), True))
 
 
-def test_half_of_the_points_are_no_wrong_photo() -> None:
+def test_half_of_the_points_are_no_wrong_photo():
     assert named([(1, 2)] + [(0, 4)] * 20) == []
     assert named([(2, 4)] + [(0, 4)] * 20) == []
     assert named([(3, 4)] + [(0, 4)] * 20) == ["P0"]
 
 
-def test_what_far_ones_do_by_chance_is_no_wrong_photo() -> None:
+def test_what_far_ones_do_by_chance_is_no_wrong_photo():
     """A tenth of all points far: in 100 photos of two points both are so in one, by chance."""
     usual = [(1, 2)] * 20 + [(0, 2)] * 80
     assert named([(2, 2), *usual]) == []

@@ -25,12 +25,12 @@ def accusations(flight: Flight) -> list[Finding]:
 
 
 @pytest.mark.parametrize(("kind", "seed"), FEW)
-def test_a_sound_flight_is_not_accused(kind: str, seed: int) -> None:
+def test_a_sound_flight_is_not_accused(kind, seed):
     assert accusations(simulate_sound_flight(kind, seed)) == []
 
 
 @pytest.mark.slow
-def test_no_sound_flight_is_accused() -> None:
+def test_no_sound_flight_is_accused():
     accused = {(kind, seed): accusations(flight) for kind, seed, flight in sound_flights()}
     assert len(accused) >= 12
     assert {which: found for which, found in accused.items() if found} == {}
@@ -38,7 +38,7 @@ def test_no_sound_flight_is_accused() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("twin", ["crossing-vessels", "gondola", "large-ship", "uav-search-low"])
-def test_a_twin_is_not_accused(twin: str) -> None:
+def test_a_twin_is_not_accused(twin):
     assert accusations(simulate_twin(twin, 3)) == []
 
 
@@ -65,9 +65,7 @@ POSES = "nav/autopilot"
         ("nadir", sabotage.shift("frames", 18.0), "clock of the camera"),
     ],
 )
-def test_a_mistake_that_explains_others_is_named_alone(
-    kind: str, mistake: sabotage.Change, cause: str
-) -> None:
+def test_a_mistake_that_explains_others_is_named_alone(kind, mistake, cause):
     (found,) = accusations(mistake(simulate_sound_flight(kind, 2)))
     assert cause in found.causes
 
@@ -95,13 +93,13 @@ def circling(
     return Felt(R[:-1], R[1:], np.diff(t), np.zeros((len(t) - 1, 3)), force, R, a, t)
 
 
-def test_gravity_in_a_tilted_sensor_on_a_circle_is_no_heading() -> None:
+def test_gravity_in_a_tilted_sensor_on_a_circle_is_no_heading():
     assert heading_error(circling(5.6, 0.0, swings=False)) is None
 
 
 @pytest.mark.parametrize("late_s", [0.2, 0.35])
 @pytest.mark.parametrize("turn", [0.25, 0.6])
-def test_a_late_receiver_in_steady_turns_is_no_heading(turn: float, late_s: float) -> None:
+def test_a_late_receiver_in_steady_turns_is_no_heading(turn, late_s):
     """The nose stays where it is; attitude and accelerometer are wrong by what they usually are."""
     t, rng = np.arange(300.0), np.random.default_rng(3)
 
@@ -116,7 +114,7 @@ def test_a_late_receiver_in_steady_turns_is_no_heading(turn: float, late_s: floa
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_no_heading_is_told_from_steady_coordinated_turns(seed: int) -> None:
+def test_no_heading_is_told_from_steady_coordinated_turns(seed):
     t, rng, turn = np.arange(0.0, 1200.0), np.random.default_rng(seed), 0.25
     course = turn * t
     v = 12 * np.stack([np.cos(course), np.sin(course), 0 * t], axis=1)
@@ -129,26 +127,26 @@ def test_no_heading_is_told_from_steady_coordinated_turns(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("pitch_deg", "roll_deg"), [(5.6, 0.0), (15.0, 0.0), (-3.0, 8.0)])
-def test_a_heading_is_told_from_a_tilt_where_the_way_swings(pitch_deg: float, roll_deg: float) -> None:
+def test_a_heading_is_told_from_a_tilt_where_the_way_swings(pitch_deg, roll_deg):
     assert heading_error(circling(pitch_deg, 0.0, swings=True, roll_deg=roll_deg)) is None
     found = heading_error(circling(pitch_deg, 12.0, swings=True, noise=0.0, roll_deg=roll_deg))
     assert found is not None and np.degrees(found.by) == pytest.approx(12.0, abs=0.5)
 
 
-def test_a_heading_is_as_sure_as_it_says() -> None:
+def test_a_heading_is_as_sure_as_it_says():
     found = [heading_error(circling(3.0, 20.0, swings=True, noise=1.0, seed=seed)) for seed in range(30)]
     off = [(np.degrees(one.by) - 20.0) / np.degrees(one.sd) for one in found if one is not None]
     # The root mean square of 30 has a standard deviation of 0.13.
     assert len(off) == 30 and 0.6 < np.sqrt(np.mean(np.square(off))) < 1.5
 
 
-def test_a_heading_from_magnetic_north_is_named() -> None:
+def test_a_heading_from_magnetic_north_is_named():
     magnetic = sabotage.euler(POSES, lambda e: e + np.array([0, 0, 12.0]))
     (found,) = accusations(magnetic(simulate_sound_flight("fixed wing", 3)))
     assert "heading off" in found.causes
 
 
-def test_the_heading_error_is_the_turn_between_forces_and_accelerations() -> None:
+def test_the_heading_error_is_the_turn_between_forces_and_accelerations():
     """Without noise the angle itself, whatever the airframe does."""
     rng = np.random.default_rng(1)
     R = Rotation.random(200, random_state=2)
@@ -157,11 +155,10 @@ def test_the_heading_error_is_the_turn_between_forces_and_accelerations() -> Non
     logged = (Rotation.from_euler("z", 0.21) * R).as_matrix()
     still = np.zeros((200, 3))
     error = heading_error(Felt(logged, logged, np.ones(200), still, force, logged, moved, np.arange(200.0)))
-    assert error is not None
     assert error.by == pytest.approx(0.21, abs=1e-3) and error.sd < 1e-3
 
 
-def test_a_camera_tilted_by_nine_degrees_is_named() -> None:
+def test_a_camera_tilted_by_nine_degrees_is_named():
     flight = simulate_sound_flight("multirotor", 4)
     tilt = flight.manifest.mount.tilt_deg
     (found,) = accusations(sabotage.manifest_of(flight, mount={"tilt_deg": tilt + 9.0}))
@@ -169,7 +166,7 @@ def test_a_camera_tilted_by_nine_degrees_is_named() -> None:
 
 
 @pytest.mark.parametrize("seed", [2, 3])
-def test_height_is_no_certain_cause_where_a_tilt_explains_it_too(seed: int) -> None:
+def test_height_is_no_certain_cause_where_a_tilt_explains_it_too(seed):
     flight = simulate_sound_flight("boat", 2 * seed - 1)
     wrong = sabotage.manifest_of(flight, mount={"tilt_deg": 8.0})
     for one in accusations(wrong):

@@ -49,7 +49,7 @@ def of_poses(flight: Flight) -> list[Finding]:
     return [one for one in check_flight(flight) if (one.table, one.field) == ("nav/log", "time_s")]
 
 
-def test_a_hole_in_the_poses_is_told_with_its_looks_detections_and_seconds(make_flight: Make) -> None:
+def test_a_hole_in_the_poses_is_told_with_its_looks_detections_and_seconds(make_flight):
     flight = flown(make_flight)
     nav = flight.nav["log"]
     flight.nav["log"] = nav[(nav["time_s"] < 30.1) | (nav["time_s"] > 89.9)].reset_index(drop=True)
@@ -63,7 +63,7 @@ def test_a_hole_in_the_poses_is_told_with_its_looks_detections_and_seconds(make_
     assert np.isnan(p[:, 0]).sum() == 30
 
 
-def test_each_hole_is_named_and_positions_need_no_pose(make_flight: Make) -> None:
+def test_each_hole_is_named_and_positions_need_no_pose(make_flight):
     flight = flown(make_flight)
     nav = flight.nav["log"]
     for low, high in ((20.1, 29.9), (60.1, 69.9)):
@@ -76,7 +76,7 @@ def test_each_hole_is_named_and_positions_need_no_pose(make_flight: Make) -> Non
     assert "20.000 s to 30.000 s, 60.000 s to 70.000 s" in found.sentence
 
 
-def test_poses_as_slow_as_their_own_rate_have_no_hole(make_flight: Make) -> None:
+def test_poses_as_slow_as_their_own_rate_have_no_hole(make_flight):
     flight = flown(make_flight)
     assert of_poses(flight) == []
     flight.nav["log"] = flight.nav["log"].iloc[::30].reset_index(drop=True)  # one in six seconds
@@ -85,7 +85,7 @@ def test_poses_as_slow_as_their_own_rate_have_no_hole(make_flight: Make) -> None
     assert not any("without a pose" in one.sentence for one in of_poses(flight))
 
 
-def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight: Make) -> None:
+def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight):
     names = [f"collar {k}" for k in range(7)]
     (found,) = of_truths(flown(make_flight), {name: (0.0, 90.0 + 0.3 * k) for k, name in enumerate(names)})
     assert found.level == "warning"
@@ -93,7 +93,7 @@ def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight: 
     assert "15 of 60" in found.sentence and "29.0 s" in found.fix  # 91 to 119 s, of the first to end
 
 
-def test_receivers_of_different_times_are_told_apart(make_flight: Make) -> None:
+def test_receivers_of_different_times_are_told_apart(make_flight):
     found = of_truths(flown(make_flight), {"a": (0.0, 90.0), "b": (0.0, 40.0), "c": (0.0, 91.0)})
     assert ["'b'" in one.sentence for one in found] == [False, True]
 
@@ -101,12 +101,12 @@ def test_receivers_of_different_times_are_told_apart(make_flight: Make) -> None:
 @pytest.mark.parametrize(
     ("begins_s", "zone"), [(900.0, True), (930.0, True), (1800.0, True), (100.0, False), (1200.0, False)]
 )
-def test_the_zone_is_named_near_quarters_of_an_hour(make_flight: Make, begins_s: float, zone: bool) -> None:
+def test_the_zone_is_named_near_quarters_of_an_hour(make_flight, begins_s, zone):
     (found,) = of_truths(flown(make_flight, 2400.0), {"boat": (begins_s, 2500.0)})
     assert ("zone" in found.fix) == zone
     assert (f"{begins_s - 1:.1f} s after" in found.fix) != zone
 
 
-def test_truth_of_another_day_is_a_problem_that_names_the_zone(make_flight: Make) -> None:
+def test_truth_of_another_day_is_a_problem_that_names_the_zone(make_flight):
     found = of_truths(flown(make_flight), {"boat": (7200.0, 7300.0)})[0]
     assert found.level == "problem" and "time zone" in found.fix

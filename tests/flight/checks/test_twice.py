@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.flight.conftest import Raw
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.twice import twice
@@ -43,7 +42,7 @@ def seen(make: Make) -> Flight:
     return flight
 
 
-def test_rows_that_stand_there_again_are_counted(make_flight: Make) -> None:
+def test_rows_that_stand_there_again_are_counted(make_flight):
     flight = seen(make_flight)
     once = flight.table("detections")
     again = once.iloc[[0, 2, 3]].assign(detection_id=["x", "y", "z"], target_id="boat")
@@ -52,7 +51,7 @@ def test_rows_that_stand_there_again_are_counted(make_flight: Make) -> None:
     assert "3 of 7" in sentence and "3 looks, first 'x'" in sentence
 
 
-def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_flight: Make) -> None:
+def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_flight):
     flight = seen(make_flight)  # three of its looks have the place (10, 2)
     assert said(flight) == []
     once = flight.table("detections")
@@ -62,18 +61,6 @@ def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_f
     # Without a look nobody knows whether it was at the same time.
     flight.tables["detections"] = once.assign(frame_id="", north_m=1.0)
     assert said(flight) == []
-
-
-def test_one_among_hundreds_is_a_note(make_flight: Make) -> None:
-    """A click too many is worth a word, and no warning."""
-    flight = seen(make_flight)
-    first = flight.table("detections").iloc[:1]
-    many = pd.concat(
-        [first.assign(detection_id=f"m{number}", north_m=30.0 + number) for number in range(150)]
-    )
-    flight.tables["detections"] = pd.concat([many, many.iloc[:1].assign(detection_id="x")], ignore_index=True)
-    found = [one for one in check_flight(flight) if one.field == "detection_id"]
-    assert [one.level for one in found] == ["note"] and "1 of 151" in found[0].sentence
 
 
 def scans_of(make: Make, n: int = 20) -> Flight:
@@ -99,19 +86,17 @@ def read_again(flight: Flight, source: str, rows: int, later: float = 0.0) -> Fl
 
 
 @pytest.mark.parametrize(("source", "rows"), [("radar", 20), ("radar-2", 20), ("radar-2", 12)])
-def test_a_log_that_was_read_twice_is_a_problem(make_flight: Make, source: str, rows: int) -> None:
+def test_a_log_that_was_read_twice_is_a_problem(make_flight, source, rows):
     (found,) = twice(read_again(scans_of(make_flight), source, rows))
     assert found.level == "problem" and f"{rows} of {rows}" in found.sentence
 
 
 @pytest.mark.parametrize(("rows", "later"), [(0, 0.0), (5, 0.0), (20, 0.05)])
-def test_few_that_are_alike_and_those_of_other_times_are_no_copy(
-    make_flight: Make, rows: int, later: float
-) -> None:
+def test_few_that_are_alike_and_those_of_other_times_are_no_copy(make_flight, rows, later):
     assert list(twice(read_again(scans_of(make_flight), "radar-2", rows, later))) == []
 
 
-def test_two_copies_of_one_table_are_not_imported(raw: Raw) -> None:
+def test_two_copies_of_one_table_are_not_imported(raw):
     clicks = "photo,x,y,what\n" + "".join(f"A,{10 + k},{20 + 3 * k},\n" for k in range(20))
     shorter = clicks[: len(clicks) * 2 // 3].rsplit("\n", 1)[0] + "\n"
     raw.tables |= {"clicks.csv": clicks, "copy.csv": shorter}

@@ -20,7 +20,7 @@ def card(folder: Path) -> Path:
     return folder
 
 
-def test_frames_are_found_by_their_names_in_any_folder_below(tmp_path: Path) -> None:
+def test_frames_are_found_by_their_names_in_any_folder_below(tmp_path):
     there = card(tmp_path / "DCIM")
     for ids in (["IMG_1", "IMG_2", "IMG_3"], ["IMG_1.png", "IMG_2.png", "IMG_3.png"]):
         found = [one.relative_to(there).as_posix() for one in images_below(there, ids)]
@@ -32,7 +32,7 @@ def test_frames_are_found_by_their_names_in_any_folder_below(tmp_path: Path) -> 
         open_frames(there, ids=["DJI_1"])
 
 
-def test_of_two_files_of_one_name_nobody_can_tell_the_flights(tmp_path: Path) -> None:
+def test_of_two_files_of_one_name_nobody_can_tell_the_flights(tmp_path):
     there = card(tmp_path / "DCIM")
     write_images(there / "101CANON", "IMG_2.png", "IMG_9.png")
     assert len(images_below(there, ["IMG_1", "IMG_3"])) == 2

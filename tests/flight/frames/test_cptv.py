@@ -80,7 +80,7 @@ def written(path: Path, content: bytes) -> Path:
 
 
 @pytest.mark.parametrize("width", [5, 8, 11, 16, 24])
-def test_what_was_written_comes_back_whatever_the_width(tmp_path: Path, width: int) -> None:
+def test_what_was_written_comes_back_whatever_the_width(tmp_path, width):
     images = pictures(step=1) if width == 5 else pictures()
     # The first frame is the difference from nothing: its own steps have to fit too.
     found = list(read_cptv(written(tmp_path / "a.cptv", video(images, width))))
@@ -91,13 +91,13 @@ def test_what_was_written_comes_back_whatever_the_width(tmp_path: Path, width: i
         assert np.array_equal(one.image, image)
 
 
-def test_numbers_are_packed_high_bit_first_with_a_sign() -> None:
+def test_numbers_are_packed_high_bit_first_with_a_sign():
     assert unpack_bits(bytes([0b0111_1000, 0b1111_0001]), 4, 4).tolist() == [7, -8, -1, 1]
     assert unpack_bits(bytes([0x80, 0x00, 0x01, 0x7F, 0xFF, 0xFE]), 24, 2).tolist() == [1 - 2**23, 2**23 - 2]
     assert unpack_bits(b"", 9, 0).tolist() == []
 
 
-def test_frames_can_be_entered_anywhere_and_come_through_the_one_iterator(tmp_path: Path) -> None:
+def test_frames_can_be_entered_anywhere_and_come_through_the_one_iterator(tmp_path):
     images = pictures(6)
     frames = open_frames(written(tmp_path / "a.cptv", video(images, 12)))
     assert [one.name for one in frames.starting_at(4)] == ["a#000004", "a#000005"]
@@ -106,9 +106,7 @@ def test_frames_can_be_entered_anywhere_and_come_through_the_one_iterator(tmp_pa
     assert [one.name for one in some] == ["a#000001", "a#000005"]
 
 
-def test_a_correction_by_the_files_own_clock_and_a_background_picture_are_no_exposures(
-    tmp_path: Path,
-) -> None:
+def test_a_correction_by_the_files_own_clock_and_a_background_picture_are_no_exposures(tmp_path):
     corrected = {f"at{n}": [field("c", struct.pack("<I", 5200))] for n in range(12)}
     found = list(read_cptv(written(tmp_path / "a.cptv", video(pictures(12), 12, **corrected))))
     # 111 ms apart from 5000 ms on: numbers 2 to 10 lie within a second of 5200 ms.
@@ -120,7 +118,7 @@ def test_a_correction_by_the_files_own_clock_and_a_background_picture_are_no_exp
     assert np.array_equal(second.image, pictures(2)[1])
 
 
-def test_counts_run_over_as_numbers_of_sixteen_bits_do(tmp_path: Path) -> None:
+def test_counts_run_over_as_numbers_of_sixteen_bits_do(tmp_path):
     low, high = np.full((12, 16), 5), np.full((12, 16), 65530)
     low[0, 0], high[0, 0] = 9, 65000
     path = written(
@@ -141,12 +139,12 @@ def test_counts_run_over_as_numbers_of_sixteen_bits_do(tmp_path: Path) -> None:
         (b"CPTV\x02F\x00", "b'F'"),
     ],
 )
-def test_headers_that_cannot_be_are_refused(tmp_path: Path, content: bytes, said: str) -> None:
+def test_headers_that_cannot_be_are_refused(tmp_path, content, said):
     with pytest.raises(WildlabError, match=said):
         open_frames(written(tmp_path / "a.cptv", content))
 
 
-def test_what_is_not_packed_or_not_there_is_refused(tmp_path: Path) -> None:
+def test_what_is_not_packed_or_not_there_is_refused(tmp_path):
     plain = tmp_path / "a.cptv"
     plain.write_bytes(header())
     with pytest.raises(WildlabError, match="cut off"):
@@ -170,12 +168,12 @@ def test_what_is_not_packed_or_not_there_is_refused(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_damage_further_on_is_a_last_frame_with_a_sentence(tmp_path: Path, change, said: str) -> None:  # type: ignore[no-untyped-def]
+def test_damage_further_on_is_a_last_frame_with_a_sentence(tmp_path, change, said):
     found = list(read_cptv(written(tmp_path / "a.cptv", change(video(pictures(), 12)))))
     assert said in found[-1].problem and all(one.usable for one in found[:-1])
 
 
-def test_files_cut_anywhere_end_in_a_sentence_and_never_in_a_trace(tmp_path: Path) -> None:
+def test_files_cut_anywhere_end_in_a_sentence_and_never_in_a_trace(tmp_path):
     whole = gzip.compress(video(pictures(2), 12))
     for cut in range(0, len(whole), 7):
         (tmp_path / "a.cptv").write_bytes(whole[:cut])

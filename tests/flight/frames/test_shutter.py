@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -47,7 +46,7 @@ def flight(path: Path, times: np.ndarray, response: CameraResponse) -> tuple[np.
     return closed, sensor.dead
 
 
-def test_a_closed_shutter_is_found_and_nothing_else_and_dead_pixels_are_masked(tmp_path: Path) -> None:
+def test_a_closed_shutter_is_found_and_nothing_else_and_dead_pixels_are_masked(tmp_path):
     response = CameraResponse(dead_share=1e-3)
     closed, dead = flight(tmp_path / "in", np.arange(24) / 9, response)
     frames = list(open_frames(tmp_path / "in"))
@@ -63,7 +62,7 @@ def test_a_closed_shutter_is_found_and_nothing_else_and_dead_pixels_are_masked(t
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_closed_whatever_becomes_of_the_picture(seed: int) -> None:
+def test_closed_whatever_becomes_of_the_picture(seed):
     rng, response = np.random.default_rng(seed), CameraResponse()
     counts = shutter_image(SHAPE, 280.0 + seed, response, rng)
     grey = gain_control(counts)
@@ -72,7 +71,7 @@ def test_closed_whatever_becomes_of_the_picture(seed: int) -> None:
     assert [is_shutter(one, WHOLE) for one in (counts, grey, jpeg, kelvin)] == [True] * 4
 
 
-def test_even_scenes_are_no_shutter() -> None:
+def test_even_scenes_are_no_shutter():
     rng = np.random.default_rng(1)
     noise = rng.normal(7000, 1.25, SHAPE)
     dark = noise - 5 * ((np.mgrid[-1:1:128j, -1:1:160j] ** 2).sum(axis=0))
@@ -96,7 +95,7 @@ def frames_of(numbers: list[int]) -> list[Frame]:
     ]
 
 
-def test_a_held_picture_is_told_from_the_third_frame_on_where_frames_differ_as_a_rule() -> None:
+def test_a_held_picture_is_told_from_the_third_frame_on_where_frames_differ_as_a_rule():
     numbers = [1, 2, 2, 3, 3, 3, 3, 4]
     marked = [one.usable for one in mark_shutter(frames_of(numbers), held_can_be_told=True)]
     assert marked == [True, True, True, True, True, False, False, True]
@@ -110,7 +109,7 @@ def held_folder(path: Path, numbers: list[int]) -> Path:
     return path
 
 
-def test_a_run_that_goes_on_marks_the_same_frames(tmp_path: Path) -> None:
+def test_a_run_that_goes_on_marks_the_same_frames(tmp_path):
     numbers = [*range(10), 10, 10, 10, 10, *range(11, 30)]
     frames = open_frames(held_folder(tmp_path / "in", numbers))
     whole = [one.problem for one in frames]
@@ -120,7 +119,7 @@ def test_a_run_that_goes_on_marks_the_same_frames(tmp_path: Path) -> None:
     assert [one.problem for one in frames.some([10, 13, 20])] == [whole[10], whole[13], whole[20]]
 
 
-def test_where_neighbours_are_alike_as_a_rule_nothing_is_held(tmp_path: Path) -> None:
+def test_where_neighbours_are_alike_as_a_rule_nothing_is_held(tmp_path):
     frames = open_frames(held_folder(tmp_path / "in", [n // 4 for n in range(32)]))
     assert not frames.kept.held_can_be_told and all(one.usable for one in frames)
 
@@ -130,7 +129,7 @@ def scenes(count: int = 8, rough: float = 2.0) -> list[np.ndarray]:
     return [7000 + 25 * (ground(n, rough) - 285) + rng.normal(0, 1.25, SHAPE) for n in range(count)]
 
 
-def test_stuck_and_far_pixels_are_found_and_warm_points_are_not() -> None:
+def test_stuck_and_far_pixels_are_found_and_warm_points_are_not():
     images = scenes()
     rng = np.random.default_rng(2)
     for number, image in enumerate(images):
@@ -147,7 +146,7 @@ def test_stuck_and_far_pixels_are_found_and_warm_points_are_not() -> None:
     assert np.argwhere(dead).tolist() == [[10, 20], [30, 40], [50, 60]]
 
 
-def test_what_stands_still_or_is_too_few_tells_nothing() -> None:
+def test_what_stands_still_or_is_too_few_tells_nothing():
     images = scenes()
     images[0][10, 10] = 9000
     assert find_dead([images[0]] * 8, WHOLE) is None
@@ -158,7 +157,7 @@ def test_what_stands_still_or_is_too_few_tells_nothing() -> None:
 
 
 @pytest.mark.parametrize("fall", [-60.0, 40.0])
-def test_dark_corners_are_measured_and_taken_off(fall: float) -> None:
+def test_dark_corners_are_measured_and_taken_off(fall):
     v, u = np.mgrid[:128, :160] - np.array([63.5, 79.5])[:, None, None]
     square = (u**2 + v**2) / (63.5**2 + 79.5**2)
     plain = scenes(12, rough=0.4)
@@ -173,14 +172,14 @@ def test_dark_corners_are_measured_and_taken_off(fall: float) -> None:
     assert measure_vignetting(plain, WHOLE) is None
 
 
-def test_whole_numbers_stay_whole_and_within_their_kind() -> None:
+def test_whole_numbers_stay_whole_and_within_their_kind():
     offset = np.array([[-10.4, 10.4]], np.float32)
     assert without_vignetting(np.array([[250, 5]], np.uint8), offset).tolist() == [[255, 0]]
     assert without_vignetting(np.array([[250, 50]], np.uint16), offset).tolist() == [[260, 40]]
     assert without_vignetting(np.array([[280.0, 5]], np.float32), offset).dtype == np.float32
 
 
-def test_the_one_iterator_takes_the_corners_off_where_that_is_asked(tmp_path: Path) -> None:
+def test_the_one_iterator_takes_the_corners_off_where_that_is_asked(tmp_path):
     flight(
         tmp_path / "in", np.array([0.0, 0.2, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]), CameraResponse(vignetting=4.0)
     )
@@ -191,15 +190,13 @@ def test_the_one_iterator_takes_the_corners_off_where_that_is_asked(tmp_path: Pa
     def corners(frames: object) -> float:
         return float(
             np.mean([np.mean(one.image[:12, :12]) - np.mean(one.image[58:70, 74:86]) for one in frames])
-        )  # type: ignore[attr-defined]
+        )
 
     assert corners(as_seen) > 50 and abs(corners(even)) < 0.5 * corners(as_seen)
 
 
 @pytest.mark.slow
-def test_real_frames_are_no_shutter_and_one_camera_has_one_dead_pixel(
-    shared_data: Callable[..., Path],
-) -> None:
+def test_real_frames_are_no_shutter_and_one_camera_has_one_dead_pixel(shared_data):
     for name in ("IR_BIRD_070", "IR_DRONE_001"):
         assert all(one.usable for one in open_frames(shared_data("imagery", "ir_tracks", f"{name}.mp4")))
     assert all(one.usable for one in open_frames(shared_data("imagery", "hit_uav", "images")))
@@ -211,7 +208,7 @@ def test_real_frames_are_no_shutter_and_one_camera_has_one_dead_pixel(
         assert vignetting is not None and -60 < vignetting.corner < -20
 
 
-def test_what_stands_still_before_a_camera_is_not_dead() -> None:
+def test_what_stands_still_before_a_camera_is_not_dead():
     rng = np.random.default_rng(3)
     images = [rng.normal(100, 2, (60, 80)) for _ in range(6)]
     for number, image in enumerate(images):
@@ -225,7 +222,7 @@ def test_what_stands_still_before_a_camera_is_not_dead() -> None:
     assert np.argwhere(find_dead(seen, np.ones((60, 80), bool))).tolist() == [[50, 60]]
 
 
-def test_few_grey_levels_repeat_without_a_fault() -> None:
+def test_few_grey_levels_repeat_without_a_fault():
     rng = np.random.default_rng(4)
     seen = [rng.normal(100, 0.8, (120, 160)).round().astype(np.uint8) for _ in range(7)]
     still = np.all([one == seen[0] for one in seen], axis=0)

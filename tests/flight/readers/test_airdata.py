@@ -72,21 +72,6 @@ def test_equals_pandas(shared_data):
     assert log.parts["gnss"].used.all()
 
 
-def test_axes_of_velocity(shared_data):
-    """The way between rows is what the speeds say: north, east, down."""
-    path = shared_data("logs", "dji_airdata_p4rtk", "Jul-7th-2022-11-10AM-Flight-Airdata.csv")
-    columns = airdata.read(path, path.read_bytes()).parts["poses"].columns
-    own = columns["time_log_s"]
-    ways = {
-        "v_north_m_s": columns["latitude_deg"] * 111e3,
-        "v_east_m_s": columns["longitude_deg"] * 111e3 * np.cos(np.radians(32.8)),
-        "v_down_m_s": -columns["height_home_m"],
-    }
-    for name, way in ways.items():
-        moved = (way[20:] - way[:-20]) / (own[20:] - own[:-20])
-        assert np.corrcoef(moved, columns[name][10:-10])[0, 1] > 0.9
-
-
 @pytest.mark.parametrize("begin", [0.0, 0.37, 0.95])
 @pytest.mark.parametrize("pause", [0.0, 73.9])
 def test_fraction_of_a_second(begin, pause):
@@ -96,7 +81,6 @@ def test_fraction_of_a_second(begin, pause):
     # Rows are 0.1 s apart, so that a second begins up to 0.05 s from the middle between two.
     np.testing.assert_allclose(log.parts["gnss"].columns["time_s"], expected, rtol=0, atol=0.06)
     assert any("73" in one for one in log.notes) == (pause > 0)
-    assert log.clock is not None
     assert log.clock.spread_s < 0.1
 
 
@@ -180,6 +164,6 @@ def test_a_quotation_mark_costs_one_line():
 
 
 def test_damage(shared_data):
-    assert survives(airdata.read, table(rows(120)).encode()) > 130
+    assert survives(airdata.read, table(rows(120)).encode()) > 0.83
     path = shared_data("logs", "dji_airdata_p4rtk", "Jul-7th-2022-11-10AM-Flight-Airdata.csv")
-    assert survives(airdata.read, path.read_bytes()[:200000], every=10) > 12
+    assert survives(airdata.read, path.read_bytes()[:200000], 4, 6) > 0.72

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -72,18 +71,18 @@ def compare(path: Path) -> int:
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_every_field_is_as_pymavlink_has_it(shared_data: Callable[..., Path], name: str) -> None:
+def test_every_field_is_as_pymavlink_has_it(shared_data, name):
     assert compare(shared_data("logs", *name.split("/"))) > 10_000
 
 
 @pytest.mark.parametrize("make", [first_generation, second_generation, third_generation])
-def test_made_up_logs_too(tmp_path: Path, make: Callable[..., Log]) -> None:
+def test_made_up_logs_too(tmp_path, make):
     path = tmp_path / "made.bin"
     path.write_bytes(make(Truth(2025), 8.0).binary())
     assert compare(path) > 1000
 
 
-def test_every_format_character(tmp_path: Path) -> None:
+def test_every_format_character(tmp_path):
     log = Log()
     characters = "bBhHiIfdcCeELMqQ"
     log.define("ALL", characters, ",".join(f"A{i}" for i in range(len(characters))))
@@ -102,7 +101,7 @@ def test_every_format_character(tmp_path: Path) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.binary(max_size=30).map(lambda one: one.replace(b"\xa3", b"")), min_size=8, max_size=8))
-def test_nothing_between_messages_hides_them(garbage: list[bytes]) -> None:
+def test_nothing_between_messages_hides_them(garbage):
     log = Log()
     log.define("A", "Qf", "TimeUS,V")
     log.define("B", "QB", "TimeUS,W")
@@ -121,7 +120,7 @@ def test_nothing_between_messages_hides_them(garbage: list[bytes]) -> None:
     assert found.places == sum(map(bool, garbage))
 
 
-def test_heads_within_messages_are_not_believed() -> None:
+def test_heads_within_messages_are_not_believed():
     log = Log()
     log.define("A", "QZ", "TimeUS,Text")
     log.define("B", "QB", "TimeUS,W")
@@ -136,7 +135,7 @@ def test_heads_within_messages_are_not_believed() -> None:
     assert found.tables["B"].numbers("W").tolist() == list(range(50))
 
 
-def test_a_message_whose_kind_was_damaged_costs_itself() -> None:
+def test_a_message_whose_kind_was_damaged_costs_itself():
     log = Log()
     log.define("A", "QZ", "TimeUS,Text")
     log.define("B", "QB", "TimeUS,W")
@@ -152,7 +151,7 @@ def test_a_message_whose_kind_was_damaged_costs_itself() -> None:
     assert (found.lost_bytes, found.places) == (len(pieces[at]), 1)
 
 
-def test_definitions_that_change_hold_from_there_on() -> None:
+def test_definitions_that_change_hold_from_there_on():
     log = Log()
     log.define("A", "QB", "TimeUS,W")
     log.add("A", 1, 7)
@@ -166,7 +165,7 @@ def test_definitions_that_change_hold_from_there_on() -> None:
     np.testing.assert_array_equal(table.numbers("V"), [np.nan, 0.25])
 
 
-def test_definitions_that_change_without_end_are_not_followed() -> None:
+def test_definitions_that_change_without_end_are_not_followed():
     message = b"\xa3\x95\x01" + bytes(9)
     data = b"".join(fmt(1, "ATT", "QB", f"TimeUS,W{i}") + message for i in range(20_000))
     begun = time.monotonic()
@@ -186,7 +185,7 @@ def test_definitions_that_change_without_end_are_not_followed() -> None:
         fmt(128, "FMT", "B", "Type", length=4),
     ],
 )
-def test_absurd_definitions_are_passed_over(definition: bytes) -> None:
+def test_absurd_definitions_are_passed_over(definition):
     data = second_generation(Truth(2025), 3.0).binary()
     kept = dataflash.read(Path("x.bin"), definition + data)
     assert "BAD" not in read_records(definition + data).tables
@@ -195,7 +194,7 @@ def test_absurd_definitions_are_passed_over(definition: bytes) -> None:
     }
 
 
-def test_filling_at_the_end_is_no_loss_and_a_cut_message_is() -> None:
+def test_filling_at_the_end_is_no_loss_and_a_cut_message_is():
     data = second_generation(Truth(2025), 3.0).binary()
     for filling in (b"\0" * 5000, b"\xff" * 5000):
         assert dataflash.read(Path("x.bin"), data + filling).lost == ()
@@ -207,14 +206,14 @@ def test_filling_at_the_end_is_no_loss_and_a_cut_message_is() -> None:
     "data",
     [b"", b"\xa3", fmt(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"), b"\xa3\x95\x80" * 100_000],
 )
-def test_what_holds_nothing_is_refused(data: bytes) -> None:
+def test_what_holds_nothing_is_refused(data):
     for reader in (dataflash, dataflash_text):
         with pytest.raises(WildlabError, match="holds no message") as caught:
             reader.read(Path("flight.bin"), data)
         assert caught.value.file == "flight.bin"
 
 
-def test_other_logs_with_the_same_heads_are_refused() -> None:
+def test_other_logs_with_the_same_heads_are_refused():
     log = Log()
     log.define("PARM", "Nf", "Name,Value")
     log.add("PARM", "SYSID", 1)
@@ -228,7 +227,7 @@ def test_other_logs_with_the_same_heads_are_refused() -> None:
             reader.read(Path("flight.bin"), data)
 
 
-def test_a_file_is_known_by_its_content() -> None:
+def test_a_file_is_known_by_its_content():
     log = second_generation(Truth(2025), 3.0)
     assert dataflash.recognise(log.binary()[:8192], "x")
     assert dataflash.recognise(b"\0\0lost" + log.binary()[:8192], "x")
@@ -279,20 +278,20 @@ def read_damaged(data: bytes, text: bool) -> None:
 
 
 @pytest.mark.parametrize("name", [*REAL, "damaged/nan.log"])
-def test_real_logs_damaged(shared_data: Callable[..., Path], name: str) -> None:
+def test_real_logs_damaged(shared_data, name):
     read_damaged(shared_data("logs", *name.split("/")).read_bytes(), name.endswith(".log"))
 
 
 @pytest.mark.parametrize("make", [first_generation, second_generation, third_generation])
 @pytest.mark.parametrize("text", [False, True])
-def test_made_up_logs_damaged(make: Callable[..., Log], text: bool) -> None:
+def test_made_up_logs_damaged(make, text):
     log = make(Truth(2025), 8.0)
     read_damaged(log.text() if text else log.binary(), text)
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.binary(max_size=2000))
-def test_any_bytes(data: bytes) -> None:
+def test_any_bytes(data):
     for reader in (dataflash, dataflash_text):
         for start in (
             b"",

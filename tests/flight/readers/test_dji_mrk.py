@@ -35,7 +35,6 @@ def test_values():
     np.testing.assert_allclose(columns["sd_vertical_m"], 0.03)
     assert (columns["fix"] == 6.0).all()
     assert columns["use"].all()
-    assert log.clock is not None
     assert log.clock.offset_s == 315964800.0 - 18.0
 
 
@@ -66,4 +65,4 @@ def test_nothing_in_it():
 
 
 def test_damage():
-    assert survives(dji_mrk.read, "".join(map(row, range(1, 30))).encode()) > 140
+    assert survives(dji_mrk.read, "".join(map(row, range(1, 30))).encode()) > 0.89

@@ -97,15 +97,6 @@ def test_angles_of_the_phantom(shared_data):
     assert np.median(columns["roll_deg"]) < -10
 
 
-def test_two_families_in_one_file(shared_data):
-    path = shared_data("logs", "dji_srt", "mix_p4rtk_mavic2pro.srt")
-    log = dji_srt.read(path, path.read_bytes(), "-03:00")
-    columns = log.parts["gnss"].columns
-    assert columns["why"].tolist() == ["no time"] * 6 + [""] * 6
-    assert columns["longitude_deg"][-1] == -59.409483
-    assert columns["height_home_m"][-1] == 120.140999
-
-
 def test_heights_and_gimbal_of_new_aircraft():
     data = subtitles(*map(new, range(5))).encode()
     log = dji_srt.read(Path("x.SRT"), data, "Europe/Oslo")
@@ -168,8 +159,8 @@ def test_messages():
 
 
 def test_damage(shared_data):
-    assert survives(dji_srt.read, subtitles(*map(new, range(30))).encode()) > 140
+    assert survives(dji_srt.read, subtitles(*map(new, range(30))).encode()) > 0.89
     data = shared_data("logs", "dji_srt", "p4_rtk.SRT").read_bytes()
-    assert survives(dji_srt.read, data) > 140
+    assert survives(dji_srt.read, data) > 0.89
     zoned = lambda path, data, zone: dji_srt.read(path, data, "UTC")  # noqa: E731
-    assert survives(zoned, subtitles(*map(new, range(30))).encode()) > 140
+    assert survives(zoned, subtitles(*map(new, range(30))).encode()) > 0.89

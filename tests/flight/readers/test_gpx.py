@@ -51,12 +51,6 @@ def test_equals_gpxpy(name, shared_data):
         assert np.isnan(at) if p.time is None else at == p.time.timestamp()
 
 
-def test_times_that_cannot_be_true(shared_data):
-    path = shared_data("logs", "target_gpx", "Mojstrovka.gpx")
-    log = gpx.read(path, path.read_bytes())
-    assert set(log.parts["gnss"].columns["why"]) == {"impossible time"}
-
-
 def test_times_with_a_zone_and_without():
     stamps = ["2026-06-01T10:00:00Z", "2026-06-01T12:00:01.250+02:00", "2026-06-01T10:00:02", "yesterday"]
     log = gpx.read(Path("x.gpx"), document("".join(point(k, stamp=one) for k, one in enumerate(stamps))))
@@ -171,6 +165,6 @@ def test_points_that_never_end_cost_no_more_than_others():
 
 
 def test_damage(shared_data):
-    assert survives(gpx.read, document(track(40))) > 100
+    assert survives(gpx.read, document(track(40))) > 0.64
     data = shared_data("logs", "target_gpx", "around-visnjan-with-car.gpx").read_bytes()
-    assert survives(gpx.read, data, every=2) > 50
+    assert survives(gpx.read, data, 4, 6) > 0.63

@@ -60,13 +60,13 @@ def check_points(log: RawLog, height: str) -> None:
     assert [name for name in log.parts["marks"].columns if name.startswith("height_")] == [height]
 
 
-def test_kml_gives_its_points_above_sea_level() -> None:
+def test_kml_gives_its_points_above_sea_level():
     data = kml(POINTS)
     assert marks_kml.recognise(data[:8192], "x")
     check_points(marks_kml.read(HERE, data), "height_sea_m")
 
 
-def test_geojson_gives_its_points_above_the_ellipsoid() -> None:
+def test_geojson_gives_its_points_above_the_ellipsoid():
     data = geojson(POINTS)
     assert marks_geojson.recognise(data[:8192], "x")
     check_points(marks_geojson.read(HERE, data), "height_ellipsoid_m")
@@ -84,13 +84,13 @@ def test_geojson_gives_its_points_above_the_ellipsoid() -> None:
         ("Navn;Breddegrad;Lengdegrad;Høyde NN2000", ";", "height_sea_m"),
     ],
 )
-def test_tables_under_many_names(header: str, sign: str, height: str) -> None:
+def test_tables_under_many_names(header, sign, height):
     data = table(POINTS, header, sign)
     assert marks_csv.recognise(data[:8192], "x")
     check_points(marks_csv.read(HERE, data), height)
 
 
-def test_order_comments_and_spreads_of_a_table() -> None:
+def test_order_comments_and_spreads_of_a_table():
     data = b"# surveyed\n\nsd_vertical;height_ellipsoid;lon;lat;sd_horizontal_m;name\n"
     data += b"0.02;40;10.4;63.44;0.01;A\n"
     log = marks_csv.read(HERE, data)
@@ -109,32 +109,32 @@ def test_order_comments_and_spreads_of_a_table() -> None:
         ("name,a,b,c", "no latitude"),
     ],
 )
-def test_a_table_that_does_not_say_enough(header: str, problem: str) -> None:
+def test_a_table_that_does_not_say_enough(header, problem):
     with pytest.raises(WildlabError, match=problem):
         marks_csv.read(HERE, table(POINTS, header, ";" if ";" in header else ","))
 
 
-def test_a_table_of_metres_is_known_to_be_refused_and_others_are_not_taken() -> None:
+def test_a_table_of_metres_is_known_to_be_refused_and_others_are_not_taken():
     for header in ("Punkt;Rechtswert;Hochwert;H", "name;Easting (m);Northing (m);h"):
         assert marks_csv.recognise(table(POINTS, header, ";"), "x")
     for header in ("Name;X;Y;Z", "a;b;c;d", "time;easting;northing;name"):
         assert not marks_csv.recognise(table(POINTS, header, ";"), "x")
 
 
-def test_a_table_of_latin_1_has_its_umlauts() -> None:
+def test_a_table_of_latin_1_has_its_umlauts():
     data = table(POINTS, "Name;Breite;Länge;Höhe NHN", ";").decode().encode("latin-1")
     assert marks_csv.recognise(data, "x")
     check_points(marks_csv.read(HERE, data), "height_sea_m")
 
 
-def test_a_table_over_time_is_no_marks() -> None:
+def test_a_table_over_time_is_no_marks():
     assert not marks_csv.recognise(b"time,lat,lon,height_sea\n1,2,3,4\n", "x")
     assert not marks_csv.recognise(b"GPS date,lat,lon,alt\n", "x")
     assert not marks_csv.recognise(b"\x00\x01lat,lon\n", "x")
     assert not marks_csv.recognise("lat,lon,h\xf8yde_msl\n".encode("latin-1")[:3], "x")
 
 
-def test_rows_that_cannot_be_used_stay_and_say_why() -> None:
+def test_rows_that_cannot_be_used_stay_and_say_why():
     rows = [("A", 63.0, 10.0, 1.0), ("A", 63.1, 10.0, 1.0), ("C", 0.0, 0.0, 1.0), ("D", 91.0, 0.0, 1.0)]
     data = table(rows, "name,lat,lon,height_sea") + b"E,x,10,1\nF,63,10,\nG,63\n,64,11,5\n"
     log = marks_csv.read(HERE, data)
@@ -151,13 +151,13 @@ def test_rows_that_cannot_be_used_stay_and_say_why() -> None:
     assert log.lost[0].startswith("1 ")
 
 
-def test_heights_of_kml_count_only_where_they_are_absolute() -> None:
+def test_heights_of_kml_count_only_where_they_are_absolute():
     log = marks_kml.read(HERE, kml(POINTS, "relativeToGround"))
     assert np.isnan(values(log, "height_sea_m")).all()
     assert set(values(log, "why")) == {"no height"}
 
 
-def test_other_geometries_are_counted() -> None:
+def test_other_geometries_are_counted():
     line = (
         "<Placemark><name>way</name><LineString><coordinates>1,2 3,4</coordinates></LineString></Placemark>"
     )
@@ -190,7 +190,7 @@ def test_other_geometries_are_counted() -> None:
         ),
     ],
 )
-def test_kml_that_is_refused(data: bytes, problem: str) -> None:
+def test_kml_that_is_refused(data, problem):
     with pytest.raises(WildlabError, match=problem):
         marks_kml.read(HERE, data)
 
@@ -206,12 +206,12 @@ def test_kml_that_is_refused(data: bytes, problem: str) -> None:
         (geojson(POINTS, crs={"properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}), "coordinate system"),
     ],
 )
-def test_geojson_that_is_refused(data: bytes, problem: str) -> None:
+def test_geojson_that_is_refused(data, problem):
     with pytest.raises(WildlabError, match=problem):
         marks_geojson.read(HERE, data)
 
 
-def test_the_older_standards_words_for_the_same_system_are_taken() -> None:
+def test_the_older_standards_words_for_the_same_system_are_taken():
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
     check_points(marks_geojson.read(HERE, geojson(POINTS, crs=crs)), "height_ellipsoid_m")
 
@@ -224,7 +224,7 @@ def test_the_older_standards_words_for_the_same_system_are_taken() -> None:
         (marks_csv, table(POINTS * 5, "name,lat,lon,height_sea")),
     ],
 )
-def test_damaged_files_end_in_a_sentence(reader: Any, data: bytes) -> None:
+def test_damaged_files_end_in_a_sentence(reader, data):
     random = np.random.default_rng(14)
     for place in random.integers(0, len(data), 20):
         _try(reader, data[:place])

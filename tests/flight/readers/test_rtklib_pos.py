@@ -12,7 +12,6 @@ import pytest
 from tests.flight.readers.tracks import check, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.tracks import rtklib_pos
-from wildlab.flight.time.leap_seconds import leap_seconds
 
 START = datetime(2025, 3, 1, 23, 59, 50, tzinfo=UTC)
 COUNT = 40
@@ -121,14 +120,6 @@ def test_equals_pandas(shared_data):
     assert (columns["fix"] == 6.0).sum() == (table[5] == 1).sum()
 
 
-def test_leap_seconds_by_date():
-    for year in (2014, 2025):
-        at = datetime(year, 5, 5, 12, tzinfo=UTC).timestamp()
-        ahead = float(leap_seconds(at))
-        data = document("GPST", [calendar(at, ahead)], llh()[:1]).encode()
-        assert rtklib_pos.read(Path("x"), data).parts["gnss"].columns["time_s"][0] == at
-
-
 def test_geodetic_heights_velocities_and_quality():
     rest = "Q ns sdn(m) sde(m) sdu(m) vn(m/s) ve(m/s) vu(m/s)"
     data = document(
@@ -209,7 +200,7 @@ def test_lost_lines_and_wide_headers():
 
 
 def test_damage(shared_data):
-    assert survives(rtklib_pos.read, WAYS["calendar GPST"].encode()) > 140
-    assert survives(rtklib_pos.read, WAYS["ecef"].encode()) > 140
+    assert survives(rtklib_pos.read, WAYS["calendar GPST"].encode()) > 0.89
+    assert survives(rtklib_pos.read, WAYS["ecef"].encode()) > 0.89
     data = shared_data("logs", "target_car_rtk_pos", "demo5_b34f_f.pos").read_bytes()
-    assert survives(rtklib_pos.read, data, every=10) > 13
+    assert survives(rtklib_pos.read, data, 4, 6) > 0.78

@@ -57,12 +57,12 @@ def same_as_pymavlink(data: bytes) -> int:
     return compared
 
 
-def test_every_field_of_the_sample_is_pymavlinks(shared_data: Any) -> None:
+def test_every_field_of_the_sample_is_pymavlinks(shared_data):
     data = shared_data("logs", "cuav2018_sar", "flight.tlog").read_bytes()
     assert same_as_pymavlink(data) > 150_000
 
 
-def test_sample(shared_data: Any) -> None:
+def test_sample(shared_data):
     path = shared_data("logs", "cuav2018_sar", "flight.tlog")
     data = path.read_bytes()
     assert recognise(data[:8192], "unnamed") == "tlog"
@@ -75,7 +75,6 @@ def test_sample(shared_data: Any) -> None:
         "magnetometer": 771,
     }
     assert log.lost == ()
-    assert log.clock is not None
     assert log.clock.base == "times of receipt"
     # Receipts are never early, and were up to 0.9 s late.
     receipts = {m.time_boot_ms: at for at, m in decoded(data) if m.get_type() == "ATTITUDE"}
@@ -88,7 +87,7 @@ def test_sample(shared_data: Any) -> None:
 
 
 @pytest.mark.parametrize("version_1", [False, True])
-def test_straight_flight(version_1: bool) -> None:
+def test_straight_flight(version_1):
     log = read(joined(telemetry(version_1=version_1)))
     check(log)
     poses = log.parts["poses"].columns
@@ -112,21 +111,20 @@ def test_straight_flight(version_1: bool) -> None:
     jitter=st.floats(0.0, 0.5),
     seed=st.integers(0, 1000),
 )
-def test_clock_along_the_earliest_receipts(offset: float, ppm: float, jitter: float, seed: int) -> None:
+def test_clock_along_the_earliest_receipts(offset, ppm, jitter, seed):
     rng = np.random.default_rng(seed)
     rows = []
     for own in BOOT_S + np.arange(1500) * 0.2:
         received = START_S + offset + own * (1 + ppm * 1e-6) + rng.uniform(0, jitter)
         rows.append((received, frame(made("ATTITUDE", time_boot_ms=round(own * 1e3)), received)))
     clock = read(joined(rows)).clock
-    assert clock is not None
     ends = np.array([BOOT_S, BOOT_S + 300])
     wanted = START_S + offset + ends * (1 + ppm * 1e-6)
     assert np.abs(clock.offset_s + clock.rate * ends - wanted).max() < 0.01
     assert abs(clock.rate - 1 - ppm * 1e-6) < 1e-4
 
 
-def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts() -> None:
+def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts():
     flight = telemetry()
     told = []
     for row in range(30):
@@ -134,13 +132,12 @@ def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts() -> None:
         text = made("SYSTEM_TIME", time_boot_ms=round((BOOT_S + row) * 1e3), time_unix_usec=round(unix * 1e6))
         told.append((START_S + row + 0.2, frame(text, START_S + row + 0.2)))
     log = read(joined(flight, told))
-    assert log.clock is not None
     assert log.clock.base == "UTC of the messages SYSTEM_TIME"
     poses = log.parts["poses"].columns
     assert np.allclose(poses["time_s"], START_S + 3 + poses["time_log_s"] - BOOT_S, atol=1e-3)
 
 
-def test_restart_has_a_clock_of_its_own() -> None:
+def test_restart_has_a_clock_of_its_own():
     log = read(joined(telemetry(300), telemetry(100, boot_s=5.0, start_s=START_S + 100, heartbeat=False)))
     check(log)
     poses = log.parts["poses"].columns
@@ -152,13 +149,13 @@ def test_restart_has_a_clock_of_its_own() -> None:
     assert log.parts["poses"].used.sum() == 398
 
 
-def test_busiest_vehicle_is_read_and_the_others_are_named() -> None:
+def test_busiest_vehicle_is_read_and_the_others_are_named():
     station = [(START_S, frame(made("HEARTBEAT", type=6, autopilot=8), START_S, 255, 190))]
     log = read(joined(telemetry(50, system=3), telemetry(80, system=7), station))
     assert len(log.parts["poses"]) == 80
 
 
-def test_a_forwarding_station_is_no_vehicle() -> None:
+def test_a_forwarding_station_is_no_vehicle():
     station = [(at, frame(made("HEARTBEAT", type=6, autopilot=8), at, 255, 190)) for at in (START_S,)]
     station += telemetry(500, system=255, heartbeat=False)
     whose = [(at, one) for at, one in station]
@@ -167,7 +164,7 @@ def test_a_forwarding_station_is_no_vehicle() -> None:
     assert len(log.parts["poses"]) == 20
 
 
-def test_gaps_in_places_are_not_bridged() -> None:
+def test_gaps_in_places_are_not_bridged():
     flight = telemetry()
     cut = [
         item
@@ -195,7 +192,7 @@ def gnss(**fields: Any) -> Any:
     return read(joined(telemetry(40, jitter_s=0.0), log_rows)).parts["gnss"]
 
 
-def test_gnss_values() -> None:
+def test_gnss_values():
     part = gnss(h_acc=900, v_acc=1500, vel_acc=200, alt_ellipsoid=141_000)
     assert part.used.all()
     columns = part.columns
@@ -222,7 +219,7 @@ def test_gnss_values() -> None:
         ({"time_usec": round(5 * BOOT_S * 1e6)}, "a stamp that its receipt contradicts"),
     ],
 )
-def test_gnss_rows_that_cannot_be_true(fields: dict[str, int], reason: str) -> None:
+def test_gnss_rows_that_cannot_be_true(fields, reason):
     usual = {"fix_type": 3, "lat": round(ORIGIN[0] * 1e7), "lon": round(ORIGIN[1] * 1e7), "alt": 100_000}
     spoilt = {
         name: (lambda row, name=name, value=value: value if row == 7 else gnss_usual(name, row, usual))
@@ -237,7 +234,7 @@ def gnss_usual(name: str, row: int, usual: dict[str, int]) -> int:
     return round((BOOT_S + row * 0.2) * 1e6) if name == "time_usec" else usual[name]
 
 
-def test_gnss_stamps_in_utc_and_none_that_is_known() -> None:
+def test_gnss_stamps_in_utc_and_none_that_is_known():
     part = gnss(time_usec=lambda row: round((START_S + 0.2 * row + 40) * 1e6))
     assert np.allclose(part.columns["time_s"], START_S + np.arange(20) * 0.2 + 40)
     part = gnss(time_usec=0)
@@ -246,12 +243,12 @@ def test_gnss_stamps_in_utc_and_none_that_is_known() -> None:
     assert np.isnan(part.columns["time_log_s"]).all()
 
 
-def test_unknown_quality_is_no_number() -> None:
+def test_unknown_quality_is_no_number():
     columns = gnss(eph=65535, vel=65535, satellites_visible=255).columns
     assert not {"hdop", "v_north_m_s", "satellites", "sd_horizontal_m", "height_ellipsoid_m"} & set(columns)
 
 
-def test_one_number_for_both_heights() -> None:
+def test_one_number_for_both_heights():
     rows = []
     for row in range(10):
         text = made("GPS_RAW_INT", lat=634_000_000, lon=104_000_000, alt=9000, alt_ellipsoid=9000, fix_type=3)
@@ -260,14 +257,14 @@ def test_one_number_for_both_heights() -> None:
     assert "height_ellipsoid_m" not in log.parts["gnss"].columns
 
 
-def test_vehicle_by_its_own_words_or_its_heartbeat() -> None:
+def test_vehicle_by_its_own_words_or_its_heartbeat():
     flight = telemetry(20)
     assert read(joined(flight)).vehicle == "ardupilotmega (fixed wing)"
     text = frame(made("STATUSTEXT", text=b"ArduPlane V4.1.2 (\x1b[2J)"), START_S)
     assert read(joined(flight, [(START_S, text)])).vehicle == repr("ArduPlane V4.1.2 (\x1b[2J)")
 
 
-def test_fields_that_old_senders_leave_away_and_new_ones_append() -> None:
+def test_fields_that_old_senders_leave_away_and_new_ones_append():
     sender = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
     text = made("GPS_RAW_INT", fix_type=3)
     old = text.unpacker.pack(1, 5, *([0] * 14))[:30]
@@ -280,7 +277,7 @@ def test_fields_that_old_senders_leave_away_and_new_ones_append() -> None:
     assert found["yawspeed"].tolist() == [2.0]
 
 
-def test_signed_frames_and_unknown_messages_are_passed() -> None:
+def test_signed_frames_and_unknown_messages_are_passed():
     sender = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
     sender.signing.secret_key = bytes(32)
     sender.signing.sign_outgoing = True
@@ -297,7 +294,7 @@ def test_signed_frames_and_unknown_messages_are_passed() -> None:
     assert read(joined(telemetry(20)) + bytes(unknown) + plain).lost
 
 
-def test_what_is_no_log_is_refused() -> None:
+def test_what_is_no_log_is_refused():
     for data in (b"", b"\x00" * 500, b"\xfe" * 500, b"$GPGGA,1\n" * 100):
         assert not tlog.recognise(data[:8192], "a.tlog")
         with pytest.raises(WildlabError, match="no sound"):
@@ -309,7 +306,7 @@ def test_what_is_no_log_is_refused() -> None:
     assert not tlog.recognise(beat, "a.bin")
 
 
-def test_losses_are_counted() -> None:
+def test_losses_are_counted():
     sent = telemetry(50)
     data = joined(sent)
     spoilt = bytearray(data)
@@ -319,7 +316,7 @@ def test_losses_are_counted() -> None:
     assert len(read(data[:2000] + b"garbage" * 10 + data[2000:]).lost) > 0
 
 
-def test_damage_anywhere() -> None:
+def test_damage_anywhere():
     data = joined(telemetry(60), [(START_S, frame(made("SYSTEM_TIME", time_boot_ms=5), START_S))])
     for spoilt in damaged(data):
         try:
@@ -328,32 +325,15 @@ def test_damage_anywhere() -> None:
             assert "flight.tlog" in str(error)
 
 
-def test_damage_to_the_sample(shared_data: Any) -> None:
-    data = shared_data("logs", "cuav2018_sar", "flight.tlog").read_bytes()
-    rng = np.random.default_rng(14)
-    for at in rng.integers(10_000, len(data), 6):
-        log = read(data[:at])
-        check(log)
-        assert len(log.parts["imu"]) == pytest.approx(771 * at / len(data), rel=0.05, abs=5)
-    for _ in range(4):
-        spoilt = bytearray(data)
-        for at in rng.integers(0, len(data), 100):
-            spoilt[at] ^= int(rng.integers(1, 256))
-        log = read(bytes(spoilt))
-        check(log)
-        assert len(log.parts["imu"]) > 750
-        assert log.lost
-
-
 @pytest.mark.parametrize("unit", [b"\x00\x06" * 4 + b"\xfe", b"\x00" * 7 + b"\xfd\xff", b"\xfe", b"\x00"])
-def test_no_input_takes_long(unit: bytes) -> None:
+def test_no_input_takes_long(unit):
     start = joined(telemetry(5))
     began = time.monotonic()
     read(start + unit * (300_000 // len(unit)))
     assert time.monotonic() - began < 5.0
 
 
-def test_clocks_without_end_take_no_time() -> None:
+def test_clocks_without_end_take_no_time():
     rows = []
     for row in range(4000):
         at = START_S + row * 0.01

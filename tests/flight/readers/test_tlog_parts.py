@@ -29,7 +29,7 @@ def with_messages(make: Any, count: int = 50, component: int = 1) -> Any:
 
 
 @pytest.mark.parametrize("name", ["SCALED_IMU", "RAW_IMU", "HIGHRES_IMU"])
-def test_inertial_units(name: str) -> None:
+def test_inertial_units(name):
     si = name == "HIGHRES_IMU"
 
     def make(row: int, ms: int) -> Any:
@@ -46,12 +46,12 @@ def test_inertial_units(name: str) -> None:
     assert np.allclose(log.parts["imu"].columns["time_s"], START_S + np.arange(50) * 0.2, atol=2e-3)
 
 
-def test_raw_counts_are_no_inertial_units() -> None:
+def test_raw_counts_are_no_inertial_units():
     log = with_messages(lambda row, ms: made("RAW_IMU", time_usec=ms * 1000, zacc=-16384))
     assert "imu" not in log.parts
 
 
-def test_camera_feedback() -> None:
+def test_camera_feedback():
     def make(row: int, ms: int) -> Any:
         where = {"lat": 634_000_000, "lng": 104_000_000} if row else {}
         return made(
@@ -73,7 +73,7 @@ def test_camera_feedback() -> None:
     assert (part.columns["height_home_m"][1:] == 20).all()
 
 
-def test_camera_trigger_since_start() -> None:
+def test_camera_trigger_since_start():
     part = with_messages(lambda row, ms: made("CAMERA_TRIGGER", time_usec=ms * 1000, seq=row)).parts[
         "triggers"
     ]
@@ -87,7 +87,7 @@ def yaw_of_vehicle(count: int) -> Any:
 @pytest.mark.parametrize(
     ("flags", "turned"), [(0, True), (32, True), (64, False), (16, False), (16 | 32, True)]
 )
-def test_gimbal_device(flags: int, turned: bool) -> None:
+def test_gimbal_device(flags, turned):
     q = [np.cos(np.pi / 4), 0.0, -np.sin(np.pi / 4) * 0.9, 0.0]
     q = [one / np.linalg.norm(q) for one in q]
     pitch = -2 * np.degrees(np.arccos(q[0]))
@@ -104,7 +104,7 @@ def test_gimbal_device(flags: int, turned: bool) -> None:
 
 
 @pytest.mark.parametrize("absolute", [True, False])
-def test_mount_orientation(absolute: bool) -> None:
+def test_mount_orientation(absolute):
     def make(row: int, ms: int) -> Any:
         more = {"yaw_absolute": 33.0} if absolute else {}
         return made("MOUNT_ORIENTATION", time_boot_ms=ms, roll=1.0, pitch=-90.0, yaw=20.0, **more)
@@ -116,7 +116,7 @@ def test_mount_orientation(absolute: bool) -> None:
     assert np.allclose(part.columns["yaw_world_deg"][used], wanted, atol=0.05)
 
 
-def test_mount_status_says_what_it_leaves_open() -> None:
+def test_mount_status_says_what_it_leaves_open():
     log = with_messages(lambda row, ms: made("MOUNT_STATUS", pointing_a=-4500, pointing_b=100))
     part = log.parts["gimbal"]
     assert (part.columns["pitch_world_deg"] == -45).all()

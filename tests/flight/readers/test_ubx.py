@@ -137,7 +137,6 @@ def test_values_and_time_between_text_nmea_and_noise():
     np.testing.assert_allclose(columns["undulation_m"], 40.1)
     assert log.parts["gnss"].rows.tolist() == list(range(1, 11))
     assert log.lost[0] == "2 messages with a wrong checksum or cut off"
-    assert log.clock is not None
     assert log.clock.rate == pytest.approx(1.0, abs=1e-7)
 
 
@@ -244,7 +243,7 @@ def test_frames_agree_with_pyubx2_on_any_length():
 
 
 def test_damage(shared_data):
-    assert survives(ubx.read, b"".join(map(pvt, range(30)))) > 140
-    assert survives(ubx.read, b"".join(map(old, range(10)))) > 130
+    assert survives(ubx.read, b"".join(map(pvt, range(30)))) > 0.89
+    assert survives(ubx.read, b"".join(map(old, range(10)))) > 0.83
     data = shared_data("logs", "target_ubx_m8l", "ublox-neo-m8l.log").read_bytes()
-    assert survives(ubx.read, data, every=3) > 45
+    assert survives(ubx.read, data, 4, 6) > 0.85

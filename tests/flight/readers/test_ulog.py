@@ -88,7 +88,7 @@ def flight(**more: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("folder", "name"), SAMPLES)
-def test_every_value_of_the_samples_is_pyulogs(shared_data: Any, folder: str, name: str) -> None:
+def test_every_value_of_the_samples_is_pyulogs(shared_data, folder, name):
     path = shared_data("logs", folder, name)
     data = path.read_bytes()
     assert recognise(data[:8192], "unnamed") == "ulog"
@@ -140,7 +140,7 @@ def test_every_value_of_the_samples_is_pyulogs(shared_data: Any, folder: str, na
     assert np.abs(log.parts["gnss"].columns["time_s"] - gps["time_utc_usec"] / 1e6).max() < 0.05
 
 
-def test_a_crash_is_read_to_its_end(shared_data: Any) -> None:
+def test_a_crash_is_read_to_its_end(shared_data):
     path = shared_data("logs", "px4_quad_ekf_failure", "ekf_failure.ulg")
     log = reader.read(path, path.read_bytes())
     poses = log.parts["poses"].columns
@@ -152,14 +152,14 @@ def test_a_crash_is_read_to_its_end(shared_data: Any) -> None:
     assert np.nanmedian(poses["height_ellipsoid_m"] - poses["height_sea_m"]) == pytest.approx(45.05, abs=0.05)
 
 
-def test_one_height_for_both_names(shared_data: Any) -> None:
+def test_one_height_for_both_names(shared_data):
     path = shared_data("logs", "px4_quad_clean_short", "test.ulg")
     log = reader.read(path, path.read_bytes())
     assert "height_ellipsoid_m" not in log.parts["gnss"].columns
     assert "height_ellipsoid_m" not in log.parts["poses"].columns
 
 
-def test_local_frame_gives_the_global_places(shared_data: Any) -> None:
+def test_local_frame_gives_the_global_places(shared_data):
     path = shared_data("logs", "px4_quad_ekf_failure", "ekf_failure.ulg")
     whole = ULog(str(path), ["vehicle_local_position", "vehicle_global_position"])
     local, truth = (whole.get_dataset(f"vehicle_{one}_position").data for one in ("local", "global"))
@@ -171,7 +171,7 @@ def test_local_frame_gives_the_global_places(shared_data: Any) -> None:
     assert metres.max() < 1e-3
 
 
-def test_local_frame_is_near_the_ellipsoids() -> None:
+def test_local_frame_is_near_the_ellipsoids():
     north, east = np.array([300.0, -50.0]), np.array([-200.0, 900.0])
     lat, lon = from_local(north, east, LAT, LON)
     true = pymap3d.ned2geodetic(north, east, 0.0, LAT, LON, 0.0)
@@ -180,7 +180,7 @@ def test_local_frame_is_near_the_ellipsoids() -> None:
     assert np.allclose(from_local(0.0, 0.0, LAT, LON), [LAT, LON], atol=1e-12)
 
 
-def test_poses() -> None:
+def test_poses():
     log = read(ulog(flight(), {"sys_name": "PX4", "ver_hw": "BOARD", "ver_sw_release": 0x010E02FF}))
     check(log)
     assert log.vehicle == "PX4 v1.14.2 on BOARD"
@@ -198,7 +198,7 @@ def test_poses() -> None:
     assert np.allclose(columns["sd_vertical_m"], 0.7)
 
 
-def test_poses_from_the_local_frame_alone() -> None:
+def test_poses_from_the_local_frame_alone():
     rows = [
         (us(k), LAT, LON, 1.0 * k, 0.0, -5.0, 10.0, 0.0, 0.0, 100.0, 0.3, 0.4, 0.01, 0.0002, True)
         for k in range(50)
@@ -217,7 +217,7 @@ def test_poses_from_the_local_frame_alone() -> None:
     assert np.allclose(metres, np.arange(1, 50) - 4e-3, atol=1e-5)
 
 
-def test_old_names_and_integers() -> None:
+def test_old_names_and_integers():
     rows = []
     for k in range(25):
         utc = round((START_S + 0.2 * k - 0.05) * 1e6)
@@ -250,7 +250,7 @@ def test_old_names_and_integers() -> None:
         ({"lat": LAT + 1.0}, "a place out of reach"),
     ],
 )
-def test_fixes_that_cannot_be_true(other: dict[str, float], reason: str) -> None:
+def test_fixes_that_cannot_be_true(other, reason):
     form, rows = new_gps()
     rows[12] = new_gps(**other)[1][12]
     part = read(ulog(flight(vehicle_gps_position=(form, rows)))).parts["gnss"]
@@ -258,12 +258,12 @@ def test_fixes_that_cannot_be_true(other: dict[str, float], reason: str) -> None
     assert part.used.sum() == 24
 
 
-def test_velocity_that_is_not_valid_is_none() -> None:
+def test_velocity_that_is_not_valid_is_none():
     columns = read(ulog(flight(vehicle_gps_position=new_gps(valid=False)))).parts["gnss"].columns
     assert "v_north_m_s" not in columns
 
 
-def test_wrong_stamps_cost_their_rows_alone() -> None:
+def test_wrong_stamps_cost_their_rows_alone():
     form, rows = attitude()
     rows[20] = (us(20) + (1 << 40), 0, *rows[20][2:])
     rows[30] = (rows[29][1], 0, *rows[30][2:])
@@ -273,7 +273,7 @@ def test_wrong_stamps_cost_their_rows_alone() -> None:
     check(read(ulog(flight(vehicle_attitude=(form, rows)))))
 
 
-def test_without_utc_there_is_the_time_since_start() -> None:
+def test_without_utc_there_is_the_time_since_start():
     topics = flight()
     del topics["vehicle_gps_position"]
     log = read(ulog(topics))
@@ -283,7 +283,7 @@ def test_without_utc_there_is_the_time_since_start() -> None:
     assert log.parts["poses"].used.sum() == 49
 
 
-def test_clock_that_runs_slow_is_found() -> None:
+def test_clock_that_runs_slow_is_found():
     form, rows = new_gps(2000)
     rng = np.random.default_rng(3)
     slow = [
@@ -295,7 +295,7 @@ def test_clock_that_runs_slow_is_found() -> None:
     assert clock.spread_s == pytest.approx(5e-3, rel=0.1)
 
 
-def test_first_instance_is_read() -> None:
+def test_first_instance_is_read():
     form, rows = new_gps()
     wrong = [(row[0], 1.0, *row[2:]) for row in rows]
     del (topics := flight())["vehicle_gps_position"]
@@ -303,7 +303,7 @@ def test_first_instance_is_read() -> None:
     assert np.allclose(log.parts["gnss"].columns["latitude_deg"], LAT, atol=1e-5)
 
 
-def test_inertial_sensor_and_magnetometers() -> None:
+def test_inertial_sensor_and_magnetometers():
     rows = [(us(k, 0.01), 0.1, 0.2, 0.3, 0.0, 0.0, np.nan if k == 9 else -9.8, 0) for k in range(400)]
     field = ("uint64_t timestamp;float x;float y;float z;", [(us(k), 0.1, 0.2, 0.4) for k in range(40)])
     log = read(ulog(flight(sensor_combined=(COMBINED, rows), sensor_mag=field)))
@@ -315,7 +315,7 @@ def test_inertial_sensor_and_magnetometers() -> None:
     assert np.allclose(log.parts["magnetometer"].columns["field_z_ut"], 40)
 
 
-def test_triggers() -> None:
+def test_triggers():
     form = (
         "uint64_t timestamp;uint64_t timestamp_utc;uint32_t seq;double lat;double lon;float alt;float[4] q;"
     )
@@ -331,7 +331,7 @@ def test_triggers() -> None:
 
 
 @pytest.mark.parametrize(("flags", "yaw"), [(0, 30.0), (32, 30.0), (64, 0.0), (16, 0.0)])
-def test_gimbal_device(flags: int, yaw: float) -> None:
+def test_gimbal_device(flags, yaw):
     form = "uint64_t timestamp;float[4] q;uint16_t device_flags;"
     half = np.radians(-45) / 2
     rows = [(us(k), np.cos(half), 0.0, np.sin(half), 0.0, flags) for k in range(2, 40)]
@@ -341,7 +341,7 @@ def test_gimbal_device(flags: int, yaw: float) -> None:
     assert np.allclose(part.columns["yaw_world_deg"], yaw, atol=1e-3)
 
 
-def test_mount_orientation() -> None:
+def test_mount_orientation():
     form = "uint64_t timestamp;float[3] attitude_euler_angle;"
     rows = [(us(k), 0.0, np.radians(-60), np.radians(10)) for k in range(2, 40)]
     part = read(ulog(flight(mount_orientation=(form, rows)))).parts["gimbal"]
@@ -349,7 +349,7 @@ def test_mount_orientation() -> None:
     assert np.allclose(part.columns["yaw_world_deg"], 40, atol=1e-3)
 
 
-def test_fields_in_another_order_extra_and_missing() -> None:
+def test_fields_in_another_order_extra_and_missing():
     form = "bool strange;float[4] q;uint64_t timestamp;uint8_t[3] more;"
     rows = [(us(k), True) for k in range(50)]
     body = [(True, 1.0, 0.0, 0.0, 0.0, stamp, 1, 2, 3) for stamp, _ in rows]
@@ -365,7 +365,7 @@ def test_fields_in_another_order_extra_and_missing() -> None:
     assert not log.parts["poses"].used.any()
 
 
-def test_padding_may_be_left_away() -> None:
+def test_padding_may_be_left_away():
     form, rows = place()
     whole = ulog(flight(vehicle_global_position=(form, rows)))
     shorter = ulog(flight())

@@ -28,9 +28,7 @@ def angles(part: str, values: list[float], unit: str = "rad") -> np.ndarray:
         ("detections.azimuth", [1.0, 200.0, 30.0]),
     ],
 )
-def test_degrees_that_are_said_to_be_radians_are_refused_with_what_to_write(
-    part: str, values: list[float]
-) -> None:
+def test_degrees_that_are_said_to_be_radians_are_refused_with_what_to_write(part, values):
     with pytest.raises(WildlabError, match="no angle") as caught:
         angles(part, values)
     assert caught.value.fix == 'write unit = "deg", if they are in degrees'
@@ -38,7 +36,7 @@ def test_degrees_that_are_said_to_be_radians_are_refused_with_what_to_write(
     assert np.allclose(angles(part, values, "deg"), np.radians(values), equal_nan=True)
 
 
-def test_an_angle_may_be_counted_on_over_whole_turns() -> None:
+def test_an_angle_may_be_counted_on_over_whole_turns():
     turns = np.linspace(0.3, 40.0, 500)
     assert np.array_equal(angles("poses.log.attitude.yaw", turns.tolist()), turns)
     wrapped = [3.1, -3.1, 3.0, 6.2, 0.1]

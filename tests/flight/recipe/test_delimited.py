@@ -20,7 +20,7 @@ CELLS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=
 
 
 @given(st.lists(st.tuples(CELLS, CELLS, CELLS), min_size=1, max_size=12), st.integers(1, 5))
-def test_blocks_and_whole_say_the_same(rows: list[tuple[str, str, str]], block: int) -> None:
+def test_blocks_and_whole_say_the_same(rows, block):
     written = io.StringIO(newline="")
     writer = csv.writer(written, quoting=csv.QUOTE_ALL)
     writer.writerows([("a", "b", "c"), *rows])
@@ -39,7 +39,7 @@ def test_blocks_and_whole_say_the_same(rows: list[tuple[str, str, str]], block: 
     assert lines.tolist() == [line for _, line in expected]
 
 
-def test_numbers_over_several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_numbers_over_several_blocks(monkeypatch):
     monkeypatch.setattr(delimited, "BLOCK", 2)
     text = "t,x\n1,0.1\n2,1e-3\n3,\n4,7\n5, -8 \n"
     table = RawTable(Path("t.csv"), *read_delimited(Path("t.csv"), text.encode(), ","))
@@ -55,11 +55,11 @@ def test_numbers_over_several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
         plain_numbers(table, "x", "p")
 
 
-def test_the_line_of_a_wrong_byte_far_into_the_file() -> None:
+def test_the_line_of_a_wrong_byte_far_into_the_file():
     data = b"a,b\n" + b"1,2\n" * 50_000 + b"1,\xff\n"
     with pytest.raises(WildlabError, match="line 50002"):
         read_delimited(Path("t.csv"), data, ",")
 
 
-def test_text_out_of_other_files_is_packed_alike() -> None:
+def test_text_out_of_other_files_is_packed_alike():
     assert packed(np.array(["a", ""], dtype=object)).to_pylist() == ["a", ""]

@@ -56,7 +56,7 @@ def mat(raw: Any) -> Any:
     return raw
 
 
-def test_fields_of_the_file_itself(mat: Any) -> None:
+def test_fields_of_the_file_itself(mat):
     before = sha256(mat.folder / "raw" / "log.mat")
     frames = mat.run().table("frames")
     assert list(frames["frame_id"]) == ["A", "B", "C"]
@@ -70,14 +70,14 @@ def _sources(mat: Any) -> list[dict[str, Any]]:
     return list(tomllib.loads((mat.into / "flight.toml").read_text())["sources"])
 
 
-def test_numbers_as_names(mat: Any) -> None:
+def test_numbers_as_names(mat):
     mat.set("frames.id", "one")
     mat.replace("clicks.csv", "A,", "1,")
     mat.replace("clicks.csv", "C,", "3,")
     assert list(mat.run().table("frames")["frame_id"]) == ["1", "2", "3"]
 
 
-def test_a_matrix_with_labels_and_a_struct(mat: Any) -> None:
+def test_a_matrix_with_labels_and_a_struct(mat):
     variables = read_matlab(HERE, (mat.folder / "raw" / "log.mat").read_bytes())
     table = table_of(variables, MatlabTable(file="log.mat", matrix="POS", labels="POS_label"), HERE, "x")
     assert list(table) == ["lon", "height", "n"]
@@ -98,7 +98,7 @@ def test_a_matrix_with_labels_and_a_struct(mat: Any) -> None:
         ("labels", "POS_label", "made of fields"),
     ],
 )
-def test_what_a_recipe_gets_wrong(mat: Any, dotted: str, value: Any, said: str) -> None:
+def test_what_a_recipe_gets_wrong(mat, dotted, value, said):
     mat.set(f"tables.photos.{dotted}", value)
     with pytest.raises(WildlabError) as caught:
         mat.run()
@@ -115,14 +115,14 @@ def test_what_a_recipe_gets_wrong(mat: Any, dotted: str, value: Any, said: str) 
         ({"matrix": "POS", "columns": ("a", "b")}, "2 names"),
     ],
 )
-def test_what_is_no_table(mat: Any, block: dict[str, Any], said: str) -> None:
+def test_what_is_no_table(mat, block, said):
     variables = read_matlab(HERE, (mat.folder / "raw" / "log.mat").read_bytes())
     with pytest.raises(WildlabError) as caught:
         table_of(variables, MatlabTable(file="log.mat", **block), HERE, "tables.x")
     assert said in str(caught.value)
 
 
-def test_a_cell_that_is_no_number_names_its_row(mat: Any) -> None:
+def test_a_cell_that_is_no_number_names_its_row(mat):
     path = mat.folder / "raw" / "log.mat"
     scipy.io.savemat(path, {"photo": _cells("A", "B", "C"), "when": [1.0, np.nan, 3.0], "one": [1, 2, 3]})
     with pytest.raises(WildlabError, match="row 2"):
@@ -132,13 +132,13 @@ def test_a_cell_that_is_no_number_names_its_row(mat: Any) -> None:
 @pytest.mark.parametrize(
     "start", [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n"]
 )
-def test_version_7_3_is_told(start: bytes) -> None:
+def test_version_7_3_is_told(start):
     with pytest.raises(WildlabError, match=r"version 7\.3"):
         read_matlab(HERE, start + bytes(600))
 
 
 @pytest.mark.parametrize("data", [b"", b"time,lat\n1,2\n", b"MATLAB 5.0", bytes(200)])
-def test_other_files_are_told(data: bytes) -> None:
+def test_other_files_are_told(data):
     with pytest.raises(WildlabError, match="not a MATLAB"):
         read_matlab(HERE, data)
 
@@ -147,10 +147,10 @@ def _header() -> bytes:
     return b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
 
 
-def test_a_damaged_file_is_one_sentence(mat: Any) -> None:
+def test_a_damaged_file_is_one_sentence(mat):
     good = (mat.folder / "raw" / "log.mat").read_bytes()
     rng = np.random.default_rng(1)
-    for _ in range(60):
+    for _ in range(30):
         bad = bytearray(good[: rng.integers(140, len(good))])
         for at in rng.integers(128, len(bad), 20):
             bad[at] = rng.integers(256)
@@ -161,7 +161,7 @@ def test_a_damaged_file_is_one_sentence(mat: Any) -> None:
             assert "\n" not in str(error)
 
 
-def test_a_small_file_that_unpacks_to_a_huge_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_file_that_unpacks_to_a_huge_one(monkeypatch):
     monkeypatch.setattr(matlab, "MOST_BYTES", 1 << 22)
     bomb = zlib.compress(bytes(1 << 24))
     assert len(bomb) < 1 << 15
@@ -169,7 +169,7 @@ def test_a_small_file_that_unpacks_to_a_huge_one(monkeypatch: pytest.MonkeyPatch
         read_matlab(HERE, _header() + struct.pack("<II", 15, len(bomb)) + bomb)
 
 
-def test_a_variable_that_claims_to_be_huge() -> None:
+def test_a_variable_that_claims_to_be_huge():
     """A cell array of 2^40 cells in a few bytes."""
     flags = struct.pack("<IIII", 6, 8, 1, 0)
     dims = struct.pack("<IIii", 5, 8, 1 << 20, 1 << 20)
@@ -179,7 +179,7 @@ def test_a_variable_that_claims_to_be_huge() -> None:
         read_matlab(HERE, _header() + struct.pack("<II", 14, len(body)) + body)
 
 
-def test_objects_and_functions_do_nothing(mat: Any) -> None:
+def test_objects_and_functions_do_nothing(mat):
     """What is not numbers or text is an error, whatever it is: nothing of a file is ever called."""
     functions = np.array([(1, "disp('x')")], dtype=[("a", object), ("b", object)])
     path = mat.folder / "raw" / "log.mat"

@@ -188,7 +188,7 @@ def both(*changes: Change) -> Change:
         ),
     ],
 )
-def test_one_thing_wrong(raw: Any, change: Change, file: str, field: str | None, said: str) -> None:
+def test_one_thing_wrong(raw, change, file, field, said):
     change(raw)
     with pytest.raises(WildlabError) as caught:
         raw.run()

@@ -37,7 +37,7 @@ def example(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_example_is_a_flight_that_puts_the_boat_where_it_was(example: Path) -> None:
+def test_the_example_is_a_flight_that_puts_the_boat_where_it_was(example):
     before = {path.name: path.read_bytes() for path in example.iterdir()}
     import_flight(example / "recipe.toml", None, example / "flight")
     flight = load_flight(example / "flight")
@@ -78,29 +78,26 @@ def test_the_example_is_a_flight_that_puts_the_boat_where_it_was(example: Path) 
     assert [use.usable for use in usable_for(flight)] == [True, True, False]
 
 
-def test_every_unit_is_in_the_readme() -> None:
+def test_every_unit_is_in_the_readme():
     for dimension, units in UNITS.items():
         (row,) = re.findall(rf"^\| {dimension} \| (.*) \|$", README, re.MULTILINE)
         assert set(re.findall(r"`([^`]+)`", row)) == set(units)
 
 
-def test_the_other_parts_of_the_readme_are_what_a_recipe_may_say() -> None:
+def test_the_other_parts_of_the_readme_are_what_a_recipe_may_say():
     """All of them put behind the example make a recipe."""
     parts = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
     assert len(parts) == 7
     data = tomllib.loads("\n".join(parts))
     data["time"]["epoch"] = datetime(2024, 6, 12, tzinfo=UTC)  # since the times of the parts count from it
     recipe = check_model(Recipe, data, None)
-    assert recipe.imu is not None
     assert recipe.imu.force.z.negate
-    assert recipe.gnss is not None
     assert recipe.gnss.lever_arm_m == (-0.4, 0.0, -0.1)
-    assert recipe.magnetometer is not None
     assert recipe.magnetometer.field.z.unit == "mG"
     assert set(recipe.tables) == {"log", "gps"}
     assert recipe.detections[-1].counts_from == "bow"
 
 
-def test_the_vertical_part_of_the_readme_is_toml() -> None:
+def test_the_vertical_part_of_the_readme_is_toml():
     (part,) = re.findall(r"    \[vertical\]\n(?:    .*\n)+", README)
     assert tomllib.loads(part)["vertical"]["taken_off"] == ["poses", "truth"]

@@ -77,7 +77,7 @@ def sensors(raw: Any) -> Any:
     return raw
 
 
-def test_axes_and_units(sensors: Any) -> None:
+def test_axes_and_units(sensors):
     flight = sensors.run()
     imu = flight.table("imu")
     assert len(imu) == 200
@@ -93,7 +93,7 @@ def test_axes_and_units(sensors: Any) -> None:
     assert not usable_for(flight)[2].usable and "5.1 m/s" in usable_for(flight)[2].why
 
 
-def test_only_fresh_fixes(sensors: Any) -> None:
+def test_only_fresh_fixes(sensors):
     sensors.set("clocks.gnss_offset_s", 0.3)
     flight = sensors.run()
     gnss = flight.table("gnss")
@@ -113,7 +113,7 @@ def test_only_fresh_fixes(sensors: Any) -> None:
     np.testing.assert_allclose(gnss["satellites"], [8, 9, 7])
 
 
-def test_local_satellite_positions_and_the_vertical_correction(sensors: Any) -> None:
+def test_local_satellite_positions_and_the_vertical_correction(sensors):
     sensors.set("origin", {"latitude_deg": 63.44, "longitude_deg": 10.4, "height_m": 40.0})
     sensors.set(
         "gnss.position",
@@ -133,7 +133,7 @@ def _navigation_only(raw: Any) -> None:
         raw.set(part, None)
 
 
-def test_no_images_and_no_poses(sensors: Any) -> None:
+def test_no_images_and_no_poses(sensors):
     _navigation_only(sensors)
     sensors.set("poses", None)
     flight = sensors.run()
@@ -146,7 +146,7 @@ def test_no_images_and_no_poses(sensors: Any) -> None:
     assert {one.level for one in check_flight(flight) if one.field == "camera"} == {"note"}
 
 
-def test_attitude_without_positions(sensors: Any) -> None:
+def test_attitude_without_positions(sensors):
     _navigation_only(sensors)
     sensors.set("poses.log.position", None)
     sensors.set("poses.log.position_from", "gnss")
@@ -163,7 +163,7 @@ def test_attitude_without_positions(sensors: Any) -> None:
     np.testing.assert_allclose(matrix_to_euler(R), 0, atol=1e-12)
 
 
-def test_gimbal(sensors: Any) -> None:
+def test_gimbal(sensors):
     sensors.tables["gimbal.csv"] = "t,pan,tilt,ok\n0,10,0.5,1\n1,20,0.6,0\n2,-30,0.7,1\n"
     sensors.set(
         "gimbal",
@@ -180,7 +180,7 @@ def test_gimbal(sensors: Any) -> None:
     np.testing.assert_allclose(gimbal["tilt_rad"], [-0.5, -0.7])
 
 
-def test_magnetometer(sensors: Any) -> None:
+def test_magnetometer(sensors):
     sensors.tables["mag.csv"] = "ms,mx,my,mz\n0,100,200,-300\n100,110,210,-310\n"
     sensors.set(
         "magnetometer",
@@ -221,7 +221,7 @@ def test_magnetometer(sensors: Any) -> None:
         ("poses.log.position_from", "gnss", "either a position"),
     ],
 )
-def test_one_thing_wrong(sensors: Any, dotted: str, value: Any, said: str) -> None:
+def test_one_thing_wrong(sensors, dotted, value, said):
     sensors.set(dotted, value)
     with pytest.raises(WildlabError) as caught:
         sensors.run()
@@ -230,7 +230,7 @@ def test_one_thing_wrong(sensors: Any, dotted: str, value: Any, said: str) -> No
     assert not sensors.into.exists()
 
 
-def test_a_wrong_unit_is_refused_on_import(sensors: Any) -> None:
+def test_a_wrong_unit_is_refused_on_import(sensors):
     for axis in "xyz":
         sensors.set(f"imu.force.{axis}.unit", "m/s2")
     with pytest.raises(WildlabError, match="gravity alone") as caught:

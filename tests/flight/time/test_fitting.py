@@ -31,7 +31,7 @@ def assert_as_promised(fit: ClockFit, own: np.ndarray, true: np.ndarray, rate: f
 
 @pytest.mark.parametrize("jitter", [0.01, 0.05])
 @pytest.mark.parametrize("outliers", [0.0, 0.2])
-def test_rate_and_offset_through_jitter_and_outliers(jitter: float, outliers: float) -> None:
+def test_rate_and_offset_through_jitter_and_outliers(jitter, outliers):
     for seed in range(15):
         rng, own, true, rate = clocks(seed)
         wrong = rng.random(len(own)) < outliers
@@ -42,7 +42,7 @@ def test_rate_and_offset_through_jitter_and_outliers(jitter: float, outliers: fl
 
 
 @pytest.mark.parametrize("kind", ["uniform", "exponential", "steps of a stamp"])
-def test_under_stamps_that_are_only_late(kind: str) -> None:
+def test_under_stamps_that_are_only_late(kind):
     for seed in range(10):
         rng, own, true, rate = clocks(seed, 6000, 1200.0)
         late = rng.uniform(0, 0.85, len(own)) if kind == "uniform" else rng.exponential(0.2, len(own))
@@ -56,17 +56,6 @@ def test_under_stamps_that_are_only_late(kind: str) -> None:
         assert abs(fit_clock(own, stamps).to_reference(300.0) - fit.to_reference(300.0)) > 0.1
 
 
-def test_a_few_early_stamps_do_not_lift_the_line_off() -> None:
-    for seed in range(10):
-        rng, own, true, rate = clocks(seed, 6000, 1200.0)
-        stamps = true + rng.uniform(0, 0.85, len(own))
-        early = rng.choice(len(own), 6, replace=False)
-        stamps[early] -= rng.uniform(1.0, 500.0, 6)
-        fit = fit_clock(own, stamps, late=True)
-        assert_as_promised(fit, own, true, rate)
-        assert not fit.used[early].any()
-
-
 @settings(max_examples=50, deadline=None)
 @given(
     seed=st.integers(0, 2**31),
@@ -75,9 +64,7 @@ def test_a_few_early_stamps_do_not_lift_the_line_off() -> None:
     late=st.booleans(),
     long=st.floats(1.0, 5000.0),
 )
-def test_what_is_not_said_to_fall_short_is_as_promised(
-    seed: int, pairs: int, jitter: float, late: bool, long: float
-) -> None:
+def test_what_is_not_said_to_fall_short_is_as_promised(seed, pairs, jitter, late, long):
     rng, own, true, rate = clocks(seed, pairs, long)
     noise = rng.uniform(0, 10 * jitter, pairs) if late else rng.normal(0, jitter, pairs)
     fit = fit_clock(own, true + noise, late)
@@ -89,7 +76,7 @@ def test_what_is_not_said_to_fall_short_is_as_promised(
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_standard_deviations_are_those_of_many_clocks(late: bool) -> None:
+def test_standard_deviations_are_those_of_many_clocks(late):
     off = []
     for seed in range(200):
         rng, own, true, rate = clocks(seed, 500)
@@ -101,7 +88,7 @@ def test_standard_deviations_are_those_of_many_clocks(late: bool) -> None:
     assert (rms > 0.4).all() and (rms < 1.3).all()
 
 
-def test_residuals_that_go_together_count_for_fewer() -> None:
+def test_residuals_that_go_together_count_for_fewer():
     off = []
     for seed in range(100):
         rng, own, true, _ = clocks(seed, 1000)
@@ -113,7 +100,7 @@ def test_residuals_that_go_together_count_for_fewer() -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.4
 
 
-def test_a_wrong_rate_is_found_and_a_right_one_is_not() -> None:
+def test_a_wrong_rate_is_found_and_a_right_one_is_not():
     for seed in range(15):
         rng, own, true, rate = clocks(seed)
         found = rate_is_off(fit_clock(own, true + rng.normal(0, 0.03, len(own))))
@@ -126,7 +113,7 @@ def test_a_wrong_rate_is_found_and_a_right_one_is_not() -> None:
         assert rate_is_off(right) is None
 
 
-def test_few_pairs_say_that_they_do_not_tell() -> None:
+def test_few_pairs_say_that_they_do_not_tell():
     fit = fit_clock([1.0, 2.0], [11.0, 12.0])
     assert fit.to_reference(3.0) == pytest.approx(13.0)
     assert shortfall(fit)
@@ -139,7 +126,7 @@ def test_few_pairs_say_that_they_do_not_tell() -> None:
     assert shortfall(fit_clock(own, 3 + own + rng.normal(0, 0.05, 30)))
 
 
-def test_missing_stamps_are_left_out() -> None:
+def test_missing_stamps_are_left_out():
     own = np.array([0.0, 1.0, np.nan, 3.0, 4.0, 5.0])
     fit = fit_clock(own, [10.0, 11.0, 12.0, np.nan, 14.0, 15.0])
     assert np.isnan(fit.residual).tolist() == [False, False, True, True, False, False]
@@ -150,14 +137,14 @@ def test_missing_stamps_are_left_out() -> None:
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_stamps_that_are_all_alike_have_no_rate(late: bool) -> None:
+def test_stamps_that_are_all_alike_have_no_rate(late):
     fit = fit_clock([5.0] * 10, [7.0, 7.1] * 5, late)
     assert fit.rate == 1.0
     assert np.isinf(fit.rate_sd)
     assert rate_is_off(fit) is None
 
 
-def test_coarse_stamps_do_not_hide_the_rate() -> None:
+def test_coarse_stamps_do_not_hide_the_rate():
     """Most pairs of a clock that a loop of 50 Hz reads fall on one line, and the others beside it."""
     true = np.arange(0.0, 17.0, 0.2)
     own = np.floor((true / 1.0013 + 0.004) / 0.02) * 0.02

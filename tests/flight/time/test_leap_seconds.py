@@ -20,7 +20,7 @@ TAI_MINUS_UTC = {
 
 
 @pytest.mark.parametrize(("month", "tai"), TAI_MINUS_UTC.items())
-def test_each_border(month: tuple[int, int], tai: int) -> None:
+def test_each_border(month, tai):
     start = datetime(*month, 1, tzinfo=UTC).timestamp()
     assert leap_seconds([start - 1, start, start + 1]).tolist() == [tai - 20, tai - 19, tai - 19]
     # GPS time runs on through the leap second; UTC, which has no number for it here, stands for it.
@@ -29,7 +29,7 @@ def test_each_border(month: tuple[int, int], tai: int) -> None:
     assert at.tolist() == [-1.0, 0.0, 0.0, 1.0]
 
 
-def test_known_instants() -> None:
+def test_known_instants():
     # The epoch; the two roll-overs of the ten-bit week, and one day between.
     cases = {
         (0, 0.0): "1980-01-06T00:00:00",
@@ -43,14 +43,14 @@ def test_known_instants() -> None:
 
 
 @given(st.floats(315964800, 2.2e9))
-def test_there_and_back(utc: float) -> None:
+def test_there_and_back(utc):
     assert float(gps_to_utc(utc_to_gps(utc))) == pytest.approx(utc, abs=1e-6)
 
 
 @given(st.lists(st.floats(0, 1.8e9), min_size=2))
-def test_utc_never_goes_back(gps: list[float]) -> None:
+def test_utc_never_goes_back(gps):
     assert (np.diff(gps_to_utc(np.sort(gps))) >= 0).all()
 
 
-def test_not_known_stays_so() -> None:
+def test_not_known_stays_so():
     assert np.isnan(leap_seconds(np.nan)) and np.isnan(gps_to_utc(np.nan)) and np.isnan(utc_to_gps(np.nan))

@@ -23,7 +23,7 @@ def flown(rng: np.random.Generator, lines: int = 6, each: int = 30, interval: fl
 
 @pytest.mark.parametrize("resolution", [0.0, 1.0])
 @pytest.mark.parametrize("interval", [0.7, 2.0, 5.0])
-def test_missing_and_extra_ones_and_hours_between(resolution: float, interval: float) -> None:
+def test_missing_and_extra_ones_and_hours_between(resolution, interval):
     for seed in range(3):
         rng = np.random.default_rng(seed)
         true = flown(rng, interval=interval)
@@ -49,7 +49,7 @@ def test_missing_and_extra_ones_and_hours_between(resolution: float, interval: f
         assert match.triggers_left == has_record.sum() - (match.trigger >= 0).sum()
 
 
-def test_as_many_as_there_are_records() -> None:
+def test_as_many_as_there_are_records():
     times = np.arange(0, 100, 2.0)
     match = match_triggers(times - 7200.0, times)
     assert match.trigger.tolist() == list(range(50))
@@ -58,7 +58,7 @@ def test_as_many_as_there_are_records() -> None:
     assert (match.images_left, match.triggers_left) == (0, 0)
 
 
-def test_evenly_timed_with_one_missing_is_not_certain() -> None:
+def test_evenly_timed_with_one_missing_is_not_certain():
     times = np.arange(0, 100, 2.0)
     match = match_triggers(times[:-1] - 3600.0, times)
     assert not match.certain
@@ -66,7 +66,7 @@ def test_evenly_timed_with_one_missing_is_not_certain() -> None:
     assert (match.images_left, match.triggers_left) == (0, 1)
 
 
-def test_order_and_missing_stamps() -> None:
+def test_order_and_missing_stamps():
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(1.0, 4.0, 40))
     shuffled = rng.permutation(40)
@@ -78,7 +78,7 @@ def test_order_and_missing_stamps() -> None:
     assert (match.trigger == wanted).all()
 
 
-def test_nothing_to_match() -> None:
+def test_nothing_to_match():
     with pytest.raises(WildlabError, match="no image has a time"):
         match_triggers([np.nan], [1.0])
     with pytest.raises(WildlabError, match="no trigger has a time"):
@@ -88,7 +88,7 @@ def test_nothing_to_match() -> None:
     assert not alone.certain or alone.images_left == 0
 
 
-def test_the_best_pairs_are_those_of_an_assignment() -> None:
+def test_the_best_pairs_are_those_of_an_assignment():
     """Nearest pairs do not cross on a line, so a free assignment finds the same sum."""
     for seed in range(60):
         rng = np.random.default_rng(seed)
@@ -101,7 +101,7 @@ def test_the_best_pairs_are_those_of_an_assignment() -> None:
         assert worth[found[:, 0], found[:, 1]].sum() == pytest.approx(worth[rows, columns].sum())
 
 
-def test_many_of_both_in_a_moment() -> None:
+def test_many_of_both_in_a_moment():
     rng = np.random.default_rng(5)
     times = np.cumsum(rng.uniform(0.5, 3.0, 4000))
     images = np.delete(times, rng.choice(4000, 50, replace=False)) - 1e5

@@ -15,7 +15,7 @@ from wildlab.flight.time.steps import fit_stretches, step_sentences, unwrap_coun
 
 @pytest.mark.parametrize("jump", [-300.0, -1.0, 0.5, 3600.0])
 @pytest.mark.parametrize("rate", [0.92, 1.0, 1.08])
-def test_a_clock_set_anew_is_found_and_said(jump: float, rate: float) -> None:
+def test_a_clock_set_anew_is_found_and_said(jump, rate):
     for seed in range(3):
         rng = np.random.default_rng(seed)
         true = np.sort(rng.uniform(0, 600, 1500))
@@ -35,7 +35,7 @@ def test_a_clock_set_anew_is_found_and_said(jump: float, rate: float) -> None:
 
 
 @pytest.mark.parametrize("noise", ["normal", "late", "outliers", "none"])
-def test_no_step_where_there_is_none(noise: str) -> None:
+def test_no_step_where_there_is_none(noise):
     for seed in range(6):
         rng = np.random.default_rng(seed)
         own = np.sort(rng.uniform(0, 600, 1200))
@@ -52,7 +52,7 @@ def test_no_step_where_there_is_none(noise: str) -> None:
         assert step_sentences(stretches) == []
 
 
-def test_two_steps_and_missing_stamps() -> None:
+def test_two_steps_and_missing_stamps():
     rng = np.random.default_rng(4)
     true = np.arange(0, 300, 0.5)
     own = true + np.select([true < 100, true < 200], [0.0, 5.0], -40.0)
@@ -66,14 +66,14 @@ def test_two_steps_and_missing_stamps() -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**31), st.sampled_from([2.0**16, 2.0**32, 604800.0]))
-def test_a_counter_that_begins_again_goes_on(seed: int, period: float) -> None:
+def test_a_counter_that_begins_again_goes_on(seed, period):
     rng = np.random.default_rng(seed)
     true = np.cumsum(rng.uniform(0, 0.4 * period, 50)) + rng.uniform(0, period)
     out = unwrap_counter(true % period, period)
     assert out - out[0] == pytest.approx(true - true[0], abs=1e-6 * period)
 
 
-def test_a_start_anew_is_no_wrap_and_nan_stays() -> None:
+def test_a_start_anew_is_no_wrap_and_nan_stays():
     stamps = np.array([100.0, 101.0, np.nan, 0.0, 1.0])
     assert unwrap_counter(stamps, 4294.967296)[[0, 1, 3, 4]].tolist() == [100.0, 101.0, 0.0, 1.0]
     assert np.isnan(unwrap_counter(stamps, 4294.967296)[2])
