@@ -216,40 +216,6 @@ def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(tmp_path):
         read_card([tmp_path / "card"], Wishes("x", zone="UTC"), {"DCIM/100MEDIA": "images:infra"})
 
 
-SUBTITLES = """{n}
-00:00:{n:02d},000 --> 00:00:{m:02d},000
-<font size="28">FrameCnt: {n}, DiffTime: 1000ms
-2026-05-01 10:00:{n:02d}.000
-[iso: 100] [latitude: {lat:.6f}] [longitude: {lon:.6f}] [rel_alt: 80.000 abs_alt: 120.000] </font>
-
-"""
-
-
-def test_a_boat_does_not_take_the_place_of_subtitles_without_a_zone(tmp_path):
-    card = tmp_path / "card"
-    card.mkdir()
-    places = [geodetic(30.0, 2.0 * i) for i in range(20)]
-    lines = [SUBTITLES.format(n=i + 1, m=i + 2, lat=lat, lon=lon) for i, (lat, lon) in enumerate(places)]
-    (card / "DJI_0001.SRT").write_text("".join(lines), encoding="utf-8")
-    (card / "boat.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(-30, 60)]))
-    with pytest.raises(WildlabError) as caught:
-        read_card([card], Wishes("card"), {})
-    assert "--zone" in str(caught.value)
-    with_zone = read_card([card], Wishes("card", zone="+02:00", geoid_m=0.0, take_off_m=40.0), {})
-    roles = {one.found.name: one.role for one in with_zone.choices}
-    assert roles == {"DJI_0001.SRT": "own", "boat.gpx": "target"}
-
-
-def test_one_track_and_one_clicked_name_that_are_left_over_are_the_same(tmp_path):
-    write_card(tmp_path / "card")
-    clicks = tmp_path / "card" / "clicks.csv"
-    clicks.write_text(clicks.read_text(encoding="utf-8") + "DJI_0001.JPG,boat,300,200\n", encoding="utf-8")
-    (tmp_path / "card" / "Boot Mörkö <b>.gpx").write_text(gpx([(i, 5.0, 2.0, 40.0) for i in range(-5, 20)]))
-    card = read(tmp_path, geoid_m=0.0)
-    flight = import_card(card, tmp_path / "flight")
-    assert "boat" in set(flight.truth["target_id"])
-
-
 def test_a_stated_camera_of_another_size_is_not_laid_on_images(tmp_path):
     write_card(tmp_path / "card", 1)
     camera = CameraPart(name="c", width_px=1000, height_px=750, fx_px=900, fy_px=900, cx_px=500, cy_px=375)

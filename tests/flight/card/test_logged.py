@@ -71,16 +71,6 @@ def test_a_log_on_the_bench_keeps_only_true_fixes(shared_data, tmp_path):
     assert np.ptp(flight.gnss["down_m"]) < 200
 
 
-def test_a_folder_of_radiometric_images_has_poses_and_a_camera(shared_data, tmp_path):
-    card = read_card([shared_data("imagery", "deervision_rjpeg")], Wishes("deer"), {})
-    flight = import_card(card, tmp_path / "flight")
-    camera = flight.manifest.camera
-    assert camera.fx_px == pytest.approx(764.7, abs=0.1)
-    assert (camera.width_px, camera.height_px) == (640, 512)
-    assert len(flight.nav["camera"]) == 4
-    assert flight.manifest.mount.looks == "forward"
-
-
 @pytest.mark.parametrize(
     "name",
     [

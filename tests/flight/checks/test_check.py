@@ -96,7 +96,6 @@ def test_the_right_flight_has_nothing_wrong(make_flight):
             "time_s",
             "followed by 1.000 s",
         ),
-        (_set("frames", "time_s", 2, 1.5), "problem", "frames", "time_s", "followed by 1.500 s"),
         (_set("frames", "time_s", 2, 2.25), "warning", "frames", "time_s", "1 frames"),
         (_set("frames", "time_s", 2, 11.0), "warning", "nav/autopilot", "time_s", "1 of 3 frames"),
         (
@@ -113,36 +112,23 @@ def test_the_right_flight_has_nothing_wrong(make_flight):
             "time_s",
             "'boat' run",
         ),
-        (_set("frames", "time_s", 1, np.inf), "problem", "frames", "time_s", "1 of 3 rows"),
         (_poses_of_frames(["A", "B", "x"]), "warning", "nav/autopilot", "frame_id", "first 'C'"),
-        (_poses_of_frames(["x", "y", "z"]), "problem", "nav/autopilot", "frame_id", "3 of 3 frames"),
         (_poses_of_frames(["A", "B", "B"]), "problem", "nav/autopilot", "frame_id", "'B' stands"),
         (_truth_in_africa, "problem", "truth", "north_m", "'buoy'"),
         (_set("truth", "down_m", slice(None), -101.0), "problem", "truth", "down_m", "3 of 3 positions"),
         (_set("truth", "down_m", 0, -101.0), "warning", "truth", "down_m", "1 of 3 positions"),
-        (_set("truth", "time_s", 1, np.nan), "problem", "truth", "time_s", "'boat' has rows"),
-        (_set("truth", "time_s", 2, -1.0), "problem", "truth", "time_s", "not increasing"),
-        (_append_row("truth", 0), "problem", "truth", "target_id", "'buoy' stands"),
         (_append_row("frames", 2), "problem", "frames", "frame_id", "'C' stands"),
         (_append_row("detections", 0), "problem", "detections", "detection_id", "'1 of click'"),
         (_set("detections", "frame_id", 1, "Z"), "problem", "detections", "frame_id", "first 'Z'"),
         (_set("detections", "target_id", 1, "ghost"), "warning", "detections", "target_id", "'ghost'"),
         (_set("detections", "u_px", 1, np.nan), "problem", "detections", "u_px", "first '2'"),
         (_set("detections", "u_px", 1, 5000.0), "warning", "detections", "u_px", "first (5000, 500)"),
-        (_set("detections", "v_px", slice(None), 5000.0), "problem", "detections", "u_px", "3 of 3 pixels"),
         (
             _set("detections", "plane_down_m", 2, -100.0),
             "warning",
             "detections",
             "plane_down_m",
             "1 of 3 ground",
-        ),
-        (
-            _set("detections", "plane_down_m", slice(None), -200.0),
-            "problem",
-            "detections",
-            "plane_down_m",
-            "3 of 3 ground planes",
         ),
         (
             _set("detections", "plane_down_m", slice(None), np.nan),
@@ -158,7 +144,6 @@ def test_the_right_flight_has_nothing_wrong(make_flight):
             "target_id",
             "none names one",
         ),
-        (_set("detections", "targetid", slice(None), 0.0), "warning", "detections", "targetid", "not known"),
         (_no_covariance, "warning", "nav/autopilot", "cov_00", "pixel_px"),
         (_without("truth"), "warning", "truth", "", "no truth"),
         (_without("detections"), "warning", "detections", "", "nothing was detected"),
@@ -183,24 +168,6 @@ def test_each_fault_is_found(make_flight, change, level, table, field, said):
     ] == [level], found
     ranks = [("problem", "warning", "note").index(one.level) for one in found]
     assert ranks == sorted(ranks)
-
-
-def test_another_sensor_needs_no_frame(make_flight):
-    flight = make_flight()
-    radar = pd.DataFrame(
-        {
-            "detection_id": ["9"],
-            "frame_id": [""],
-            "source": "radar",
-            "kind": "range-bearing",
-            "azimuth_rad": 0.1,
-            "elevation_rad": 0.0,
-            "range_m": 10.0,
-            "target_id": [""],
-        }
-    )
-    flight.tables["detections"] = pd.concat([flight.tables["detections"], radar], ignore_index=True)
-    assert [one for one in check_flight(flight) if one.level == "problem"] == []
 
 
 @pytest.mark.parametrize(

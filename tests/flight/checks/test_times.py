@@ -63,19 +63,6 @@ def test_a_hole_in_the_poses_is_told_with_its_looks_detections_and_seconds(make_
     assert np.isnan(p[:, 0]).sum() == 30
 
 
-def test_each_hole_is_named_and_positions_need_no_pose(make_flight):
-    flight = flown(make_flight)
-    nav = flight.nav["log"]
-    for low, high in ((20.1, 29.9), (60.1, 69.9)):
-        nav = nav[(nav["time_s"] < low) | (nav["time_s"] > high)]
-    flight.nav["log"] = nav.reset_index(drop=True)
-    places = flight.table("detections").drop(columns=["azimuth_rad", "range_m"])
-    flight.tables["detections"] = places.assign(kind="position", north_m=1.0, east_m=2.0, down_m=0.0)
-    (found,) = of_poses(flight)
-    assert "10 of 60" in found.sentence
-    assert "20.000 s to 30.000 s, 60.000 s to 70.000 s" in found.sentence
-
-
 def test_poses_as_slow_as_their_own_rate_have_no_hole(make_flight):
     flight = flown(make_flight)
     assert of_poses(flight) == []

@@ -8,10 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.twice import twice
-from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
 
 Make = Callable[..., Flight]
@@ -94,15 +92,3 @@ def test_a_log_that_was_read_twice_is_a_problem(make_flight, source, rows):
 @pytest.mark.parametrize(("rows", "later"), [(0, 0.0), (5, 0.0), (20, 0.05)])
 def test_few_that_are_alike_and_those_of_other_times_are_no_copy(make_flight, rows, later):
     assert list(twice(read_again(scans_of(make_flight), "radar-2", rows, later))) == []
-
-
-def test_two_copies_of_one_table_are_not_imported(raw):
-    clicks = "photo,x,y,what\n" + "".join(f"A,{10 + k},{20 + 3 * k},\n" for k in range(20))
-    shorter = clicks[: len(clicks) * 2 // 3].rsplit("\n", 1)[0] + "\n"
-    raw.tables |= {"clicks.csv": clicks, "copy.csv": shorter}
-    assert len(raw.run().table("detections")) == 20
-    (block,) = raw.recipe["detections"]
-    for source in ("click", "other"):
-        raw.recipe["detections"] = [block, {**block, "file": "copy.csv", "source": source}]
-        with pytest.raises(WildlabError, match=r"exactly|more than once"):
-            import_flight(raw.write(), raw.folder / "raw", raw.folder / source)

@@ -144,18 +144,6 @@ def test_headers_that_cannot_be_are_refused(tmp_path, content, said):
         open_frames(written(tmp_path / "a.cptv", content))
 
 
-def test_what_is_not_packed_or_not_there_is_refused(tmp_path):
-    plain = tmp_path / "a.cptv"
-    plain.write_bytes(header())
-    with pytest.raises(WildlabError, match="cut off"):
-        open_frames(plain)
-    (tmp_path / "d.cptv").mkdir()
-    with pytest.raises(WildlabError, match="no images"):
-        open_frames(tmp_path / "d.cptv")
-    with pytest.raises(WildlabError, match="no such file"):
-        next(read_cptv(tmp_path / "none.cptv"))
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [

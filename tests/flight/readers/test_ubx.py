@@ -200,18 +200,6 @@ def test_the_week_ends():
     assert columns["hdop"].tolist() == [1.0 + k for k in range(6)]
 
 
-def test_nmea_alone():
-    line = b"$GPRMC,120000.00,A,6300.0,N,01030.0,E,0.0,,010325,,,A*58\r\n"
-    data = message("NAV-DOP", iTOW=5) + line
-    total = 0
-    for one in line[1 : line.index(b"*")]:
-        total ^= one
-    data = data.replace(b"*58", b"*%02X" % total)
-    log = ubx.read(Path("x"), data)
-    assert log.parts["gnss"].columns["time_s"][0] == UTC_S
-    assert log.notes[0].startswith("no message of UBX has a position")
-
-
 def test_nothing_in_it():
     with pytest.raises(WildlabError, match="1 message"):
         ubx.read(Path("x"), message("NAV-DOP", iTOW=5))

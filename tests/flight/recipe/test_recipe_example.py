@@ -96,8 +96,3 @@ def test_the_other_parts_of_the_readme_are_what_a_recipe_may_say():
     assert recipe.magnetometer.field.z.unit == "mG"
     assert set(recipe.tables) == {"log", "gps"}
     assert recipe.detections[-1].counts_from == "bow"
-
-
-def test_the_vertical_part_of_the_readme_is_toml():
-    (part,) = re.findall(r"    \[vertical\]\n(?:    .*\n)+", README)
-    assert tomllib.loads(part)["vertical"]["taken_off"] == ["poses", "truth"]
