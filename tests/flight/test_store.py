@@ -100,18 +100,6 @@ def test_a_table_that_does_not_fit_is_refused_and_nothing_written(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("column", ["q_w", "north_m", "time_s"])
-def test_loading_names_the_file_and_the_missing_column(make_flight, tmp_path, column):
-    save_flight(make_flight(), tmp_path / "flight")
-    path = tmp_path / "flight" / "nav" / "autopilot.parquet"
-    pd.read_parquet(path).drop(columns=column).to_parquet(path)
-    accept_changes(tmp_path / "flight")
-    with pytest.raises(WildlabError) as caught:
-        load_flight(tmp_path / "flight")
-    assert caught.value.file == str(path)
-    assert caught.value.field == column
-
-
 def test_partial_covariance_is_refused():
     data = pd.DataFrame({name: [0.0] for name in NAV.column_names if name not in ("frame_id", "cov_35")})
     with pytest.raises(WildlabError, match="cov_35"):

@@ -80,7 +80,6 @@ MISTAKES: dict[str, Change] = {
     "u and v exchanged": pixels(lambda uv: uv[:, ::-1]),
     "pixels of an image 0.5 times as large": pixels(lambda uv: uv / 2),
     "u and v from the centre": pixels(lambda uv: uv - SIZE / 2),
-    "focal length times 2": camera(fx=350.0, fy=350.0),
     "calibration of an image 0.5 times as large": camera(fx=350.0, fy=350.0, cx=165.0, cy=125.0),
     "cx and cy exchanged": camera(cx=250.0, cy=330.0),
     "the camera looks down": mount("forward"),

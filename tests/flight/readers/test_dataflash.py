@@ -27,7 +27,6 @@ from wildlab.flight.readers.ardupilot import text as dataflash_text
 from wildlab.flight.readers.ardupilot.records import read_records
 from wildlab.flight.readers.logs.log import RawLog
 
-GENERATIONS = {2014: first_generation, 2025: third_generation}
 REAL = (
     "copter_2014_joey/2014-10-18 20-04-24.bin",
     "plane42_bench_badgps/pilot_0004.BIN",

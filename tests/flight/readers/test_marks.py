@@ -127,13 +127,6 @@ def test_a_table_of_latin_1_has_its_umlauts():
     check_points(marks_csv.read(HERE, data), "height_sea_m")
 
 
-def test_a_table_over_time_is_no_marks():
-    assert not marks_csv.recognise(b"time,lat,lon,height_sea\n1,2,3,4\n", "x")
-    assert not marks_csv.recognise(b"GPS date,lat,lon,alt\n", "x")
-    assert not marks_csv.recognise(b"\x00\x01lat,lon\n", "x")
-    assert not marks_csv.recognise("lat,lon,h\xf8yde_msl\n".encode("latin-1")[:3], "x")
-
-
 def test_rows_that_cannot_be_used_stay_and_say_why():
     rows = [("A", 63.0, 10.0, 1.0), ("A", 63.1, 10.0, 1.0), ("C", 0.0, 0.0, 1.0), ("D", 91.0, 0.0, 1.0)]
     data = table(rows, "name,lat,lon,height_sea") + b"E,x,10,1\nF,63,10,\nG,63\n,64,11,5\n"

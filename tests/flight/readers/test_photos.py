@@ -187,16 +187,6 @@ def test_angles_from_nadir_are_the_same_rotation(roll, pitch, yaw):
     assert ahead[:, 2] == pytest.approx(-down[:, 0], abs=1e-6)
 
 
-def test_flirs_autopilot_and_tags_as_elements(tmp_path):
-    inside = "".join(
-        f"<FLIR:MAV{one}>{value}</FLIR:MAV{one}>" for one, value in (("Yaw", 10), ("Pitch", "-5/2"))
-    )
-    inside += "<FLIR:MAVRoll><rdf:Seq><rdf:li>4</rdf:li></rdf:Seq></FLIR:MAVRoll>"
-    made.write(tmp_path, "a.jpg", xmp=made.xmp_of(made.FLIR, {}, inside))
-    log = read_photos(tmp_path)
-    assert [column(log, f"{one}_deg") for one in ("roll", "pitch", "yaw")] == [[4.0], [-2.5], [10.0]]
-
-
 def test_the_makers_calibration_goes_before_its_design(tmp_path):
     data = "2018-09-04;3678.87,3671.84,10.1,27.29,-0.268652,0.114663,0.0000152,-0.000046,-0.0350261"
     for number, more in enumerate(({}, {"DewarpFlag": 1})):
@@ -275,23 +265,6 @@ def test_cameras_beside_each_other_are_told_apart_by_their_names(tmp_path):
     made.write(tmp_path, "x.JPG", **made.dji(1, ImageSource="InfraredCamera"))
     names = column(read_photos(tmp_path), "camera")
     assert [name.rpartition(", ")[2] for name in names] == ["thermal", "visual", "wide", "zoom", "thermal"]
-
-
-def test_images_without_any_tag(tmp_path):
-    Image.new("L", (12, 8)).save(tmp_path / "a.png")
-    Image.new("I;16", (7, 5)).save(tmp_path / "b.tiff")
-    made.write(tmp_path, "c.jpg")
-    (tmp_path / "d.dng").write_bytes(b"II*\0")
-    log = read_photos(tmp_path)
-    assert column(log, "file") == ["a.png", "b.tiff", "c.jpg"]
-    assert list(zip(column(log, "width_px"), column(log, "height_px"), strict=True)) == [
-        (12, 8),
-        (7, 5),
-        (40, 30),
-    ]
-    assert column(log, "why") == ["no position"] * 3
-    assert log.clock is None
-    assert log.lost[0].startswith("1 ")
 
 
 def test_tags_in_png_and_tiff(tmp_path):

@@ -155,15 +155,6 @@ def test_busiest_vehicle_is_read_and_the_others_are_named():
     assert len(log.parts["poses"]) == 80
 
 
-def test_a_forwarding_station_is_no_vehicle():
-    station = [(at, frame(made("HEARTBEAT", type=6, autopilot=8), at, 255, 190)) for at in (START_S,)]
-    station += telemetry(500, system=255, heartbeat=False)
-    whose = [(at, one) for at, one in station]
-    log = read(joined(telemetry(20, system=3), whose))
-    # Its component 1 never said what it is; the autopilot of system 3 did.
-    assert len(log.parts["poses"]) == 20
-
-
 def test_gaps_in_places_are_not_bridged():
     flight = telemetry()
     cut = [
