@@ -166,6 +166,7 @@ def test_heights_count_from_what_is_said(tmp_path, flown):
     plain, above = lay(flown(), path), lay(flown(), path, heights=20.0)
     np.testing.assert_allclose(above.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 20.0, atol=1e-3)
     assert above.manifest.terrain.heights == "geoid" and above.manifest.terrain.added_m == 20.0
+    assert above.manifest.terrain.error_rms_m == pytest.approx(plain.manifest.terrain.error_rms_m, abs=1e-4)
     recorded = flown()
     vertical = {"reference": "barometer", "correction_m": -30.0}
     data = recorded.manifest.model_dump(exclude_none=True) | {"vertical": vertical}

@@ -76,6 +76,15 @@ def test_two_tracks_of_which_one_cannot_be():
     assert np.flatnonzero(found["impossible jump"]).tolist() == [10, 11, 12, 13]
 
 
+def test_degrees_of_longitude_are_short_up_north():
+    """East at 650 m/s, which may be flown, and at 800 m/s, which may not."""
+    time = 1.6e9 + np.arange(30.0)
+    for speed, flown in ((650.0, True), (800.0, False)):
+        longitude = np.degrees(speed * np.arange(30) / (6371e3 * np.cos(np.radians(80))))
+        found = judge({"time_s": time, "latitude_deg": np.full(30, 80.0), "longitude_deg": longitude})
+        assert found["impossible jump"].any() != flown
+
+
 def test_heights_and_gaps():
     columns = {"height_sea_m": np.array([1.0, np.nan, np.nan]), "undulation_m": np.ones(3)}
     assert len(drop_rare_heights(columns)) == 1 and columns == {}

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pymap3d
 import pytest
 from pyulog import ULog
 
@@ -171,13 +170,15 @@ def test_local_frame_gives_the_global_places(shared_data):
     assert metres.max() < 1e-3
 
 
-def test_local_frame_is_near_the_ellipsoids():
-    north, east = np.array([300.0, -50.0]), np.array([-200.0, 900.0])
-    lat, lon = from_local(north, east, LAT, LON)
-    true = pymap3d.ned2geodetic(north, east, 0.0, LAT, LON, 0.0)
-    assert np.allclose(lat, true[0], atol=0.005 * 900 / 111_000)
-    assert np.allclose(lon, true[1], atol=0.005 * 900 / 50_000)
-    assert np.allclose(from_local(0.0, 0.0, LAT, LON), [LAT, LON], atol=1e-12)
+def test_the_local_frame_keeps_distance_and_bearing_on_the_sphere():
+    north, east = np.array([300.0, -5e4, 2e4]), np.array([-200.0, 9e4, 0.0])
+    lat, lon = np.radians(from_local(north, east, LAT, LON))
+    lat_0, turn = np.radians(LAT), lon - np.radians(LON)
+    across = np.cos(lat) * np.sin(turn)
+    ahead = np.cos(lat_0) * np.sin(lat) - np.sin(lat_0) * np.cos(lat) * np.cos(turn)
+    distance = 6371000.0 * np.arcsin(np.hypot(across, ahead))
+    np.testing.assert_allclose(distance, np.hypot(north, east), rtol=1e-9)
+    np.testing.assert_allclose(np.arctan2(across, ahead), np.arctan2(east, north), atol=1e-9)
 
 
 def test_poses():
