@@ -53,6 +53,8 @@ def test_a_hole_in_the_poses_is_told_with_its_looks_detections_and_seconds(make_
     flight = flown(make_flight)
     nav = flight.nav["log"]
     flight.nav["log"] = nav[(nav["time_s"] < 30.1) | (nav["time_s"] > 89.9)].reset_index(drop=True)
+    # At the last pose before the hole, and the first behind it.
+    flight.tables["frames"].loc[[14, 45], "time_s"] = flight.nav["log"]["time_s"][[150, 151]].to_numpy()
     (found,) = of_poses(flight)
     assert found.level == "warning"
     # Looks at 31, 33, ..., 89 s, three detections each.

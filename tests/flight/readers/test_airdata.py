@@ -149,7 +149,7 @@ def test_text_in_columns_of_numbers_and_placeholders():
 def test_messages():
     with pytest.raises(WildlabError, match="column 'latitude'"):
         airdata.read(Path("x.csv"), b"time(millisecond),longitude\n1,2\n")
-    with pytest.raises(WildlabError, match="row under"):
+    with pytest.raises(WildlabError, match="no row"):
         airdata.read(Path("x.csv"), table([]).encode())
     with pytest.raises(WildlabError, match="unit 'cubits'"):
         airdata.read(Path("x.csv"), table(rows()).replace("takeoff(meters)", "takeoff(cubits)").encode())
