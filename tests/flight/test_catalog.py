@@ -106,13 +106,6 @@ def test_no_network_and_no_mirror_is_one_sentence(dataset, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_page_that_is_gone(web, dataset, tmp_path):
-    dataset(web[0])
-    with pytest.raises(WildlabError, match="404"):
-        fetch("small", tmp_path / "here")
-    assert not (tmp_path / "here").exists()
-
-
 @pytest.mark.parametrize("layout", ["", "deep"])
 def test_mirror_instead_of_network(dataset, tmp_path, monkeypatch, layout):
     dataset("http://127.0.0.1:1")

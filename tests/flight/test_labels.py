@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
@@ -81,17 +80,6 @@ def test_numbers_of_a_clip_and_names_without_ending(tmp_path):
 def test_what_is_wrong_is_named(tmp_path, text, word):
     with pytest.raises(WildlabError, match=word):
         read_labels(table(tmp_path / "l.csv", text))
-
-
-def test_unknown_class_group_and_file_are_named(tmp_path):
-    path = table(tmp_path / "l.csv", "image,x,y,w,h,class\na.png,1,2,3,4,deer\n")
-    with pytest.raises(WildlabError, match="class 'boar'"):
-        read_labels(path, classes=("boar",))
-    with pytest.raises(WildlabError, match="no such column"):
-        read_labels(path, group="clip")
-    with pytest.raises(WildlabError, match="no such file"):
-        read_labels(tmp_path / "none.csv")
-    assert np.isfinite(read_labels(path).boxes["a.png"]).all()
 
 
 @pytest.mark.parametrize(

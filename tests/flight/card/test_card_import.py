@@ -178,13 +178,6 @@ def test_an_empty_card_and_one_that_says_nothing(tmp_path):
         read_card([tmp_path / "lost"], Wishes("card"), {})
 
 
-def test_taken_is_what_the_frames_say(tmp_path):
-    write_card(tmp_path / "card")
-    flight = import_card(read(tmp_path), tmp_path / "flight")
-    assert np.allclose(flight.frames["time_s"], [0.0, 2.5, 5.0, 7.5], atol=1e-6)
-    assert flight.manifest.time.epoch == TAKEN
-
-
 def test_several_folders_of_images_are_one_series(tmp_path):
     write_card(tmp_path / "card")
     second = tmp_path / "card" / "DCIM" / "101MEDIA"

@@ -30,15 +30,3 @@ def test_running_periods_have_their_rate_and_pauses_are_counted(rate, periods, s
     assert float(found[1]) == pytest.approx(rate, rel=0.05)
     assert int(found[2] or 0) == len(periods) - 1
     assert float(found[3] or 0) == pytest.approx(sum(paused[:-1]), rel=0.05, abs=0.3 / rate)
-
-
-@pytest.mark.parametrize("burst", [2, 4, 8])
-def test_bursts_have_the_rate_of_the_whole(burst):
-    stamps = np.concatenate([k * burst / 10 + 1e-3 * np.arange(burst) for k in range(100)])
-    found = re.fullmatch(r" at ([\d.]+) Hz.*", paced(stamps))
-    assert found is not None and float(found[1]) == pytest.approx(10.0, rel=0.25)
-
-
-def test_what_has_no_two_times_has_no_rate():
-    assert paced([]) == "" and paced([3.0]) == "" and paced([3.0, 3.0]) == ""
-    assert paced([3.0, 3.5]) == " at 2 Hz"

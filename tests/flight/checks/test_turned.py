@@ -112,14 +112,6 @@ def test_the_clock_of_one_of_two_sensors_is_named_with_what_to_state(make_flight
     assert abs(written) <= 1.5 and found.causes[0].startswith("radar: clock")
 
 
-def test_exchanged_axes_of_the_truth_are_told_from_a_heading(make_flight):
-    flight = watched(make_flight)
-    truth = flight.table("truth")
-    truth[["north_m", "east_m"]] = truth[["east_m", "north_m"]].to_numpy()
-    (found,) = said(flight)
-    assert found.level == "problem" and any("north and east" in one for one in found.causes)
-
-
 def test_only_the_sensor_that_is_turned_is_named(make_flight):
     flight = watched(make_flight)
     good, bad = flight.table("detections"), watched(make_flight, 5.0).table("detections")

@@ -31,21 +31,6 @@ def test_an_hour_that_is_there_twice(raw):
     assert str(raw.run().manifest.time.epoch) == "2024-10-27 00:30:00+00:00"
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ("id,lat\nbøye,1\n".encode("latin-1"), "line 2 is not UTF-8"),
-        (b'id,lat\n"buoy' + b"x" * 200_000, "field larger"),
-    ],
-)
-def test_what_is_not_a_table_of_text(raw, content, said):
-    path = raw.write()
-    (raw.folder / "raw" / "buoy.csv").write_bytes(content)
-    with pytest.raises(WildlabError, match=said):
-        import_flight(path, raw.folder / "raw", raw.into)
-    assert not raw.into.exists()
-
-
 def test_a_flight_that_is_there_stays(raw):
     raw.run()
     raw.set("description", "second")
