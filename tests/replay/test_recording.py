@@ -24,7 +24,6 @@ from wildlab.replay.gather import MOST_FRAMES, border, footprints, scene_of
 from wildlab.replay.recording import NEES_BAND, save_recording
 from wildlab.replay.shapes import ellipse_rings, mesh
 from wildlab.replay.shots import Shot
-from wildlab.replay.words import about
 from wildlab.simulation.twins import simulate_twin
 
 ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -128,7 +127,7 @@ def test_no_ray_past_the_horizon_makes_a_footprint(ship: Flight) -> None:
     poses = poses_of(replace(ship, manifest=level), "autopilot")
     assert np.isnan(footprints(replace(ship, manifest=level), poses)).all()
     scene = scene_of(replace(ship, manifest=level))
-    assert any("looks past the ground" in one for one in scene.lacks)
+    assert len(scene.lacks) > len(scene_of(ship).lacks)
 
 
 def test_ellipses_hold_what_they_say() -> None:
@@ -192,17 +191,17 @@ def test_terrain_becomes_triangles_that_lie_on_it() -> None:
 
 LACKING: dict[str, tuple[Callable[[Flight], Flight], str, str]] = {
     "images": (lambda f: without(f, "frames", "detections"), "images", "/world/flown/aircraft"),
-    "poses": (lambda f: replace(f, nav={}), "the aircraft", "/world/camera/image/detections"),
+    "poses": (lambda f: replace(f, nav={}), "aircraft", "/world/camera/image/detections"),
     "truth": (lambda f: without(f, "truth"), "truth", "/world/flown/aircraft"),
-    "detections": (lambda f: without(f, "detections"), "detections: the flight has none", "/world/footprint"),
+    "detections": (lambda f: without(f, "detections"), "detections", "/world/footprint"),
     "camera": (
         lambda f: replace(f, manifest=f.manifest.model_copy(update={"camera": None})),
-        "what the camera looked at: the flight has no camera",
+        "no camera",
         "/world/camera/image/detections",
     ),
     "poses of the camera": (
         lambda f: replace(f, nav={"autopilot": f.nav["autopilot"].head(5)}),
-        "they have no pose",
+        "no pose",
         "/world/camera/image/detections",
     ),
 }
@@ -219,9 +218,7 @@ def test_what_lacks_is_said_and_the_rest_is_shown(ship: Flight, tmp_path: Path, 
     scene = scene_of(flight)
     assert any(said in one for one in scene.lacks), scene.lacks
     assert not any(said in one for one in scene_of(ship).lacks)
-    found = saved(flight, tmp_path)
-    assert any(entity == still for entity, _ in found)
-    assert said.split(":")[0] in str(found["/about", "TextDocument:text"].values[0]).replace("\\", "")
+    assert any(entity == still for entity, _ in saved(flight, tmp_path))
 
 
 def test_a_flight_of_nothing_is_refused(ship: Flight, tmp_path: Path) -> None:
@@ -244,7 +241,6 @@ def test_times_that_number_the_images_are_no_seconds(ship: Flight, tmp_path: Pat
     found = saved(flight, tmp_path)
     times = found["/world/camera/image/detections", "Points2D:positions"].times
     assert times is not None and np.array_equal(times, np.round(times))
-    assert "number the images" in about(scene_of(flight), 0)
 
 
 def test_nothing_tells_where_when_or_by_whom(ship: Flight, tmp_path: Path) -> None:
@@ -331,7 +327,7 @@ def test_of_too_many_frames_those_that_saw_something_come_first(ship: Flight) ->
         "f7",
         "f9001",
     }
-    assert any("every frame" in one for one in scene.lacks)
+    assert len(scene.lacks) == 1 + len(scene_of(ship).lacks)
 
 
 def test_nothing_half_written_is_left(ship: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

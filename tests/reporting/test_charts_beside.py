@@ -1,4 +1,4 @@
-"""What is said of filters beside the plain one follows from their errors, and no strip hides another."""
+"""Filters beside the plain one: gains follow from their errors, and no strip hides another."""
 
 from __future__ import annotations
 
@@ -63,20 +63,20 @@ def test_without_a_plain_filter_and_another_there_is_no_figure(tracks: list[Sens
     assert not tracks or beside_plain_shown(tracks) is None
 
 
-def test_its_words_turn_with_the_numbers() -> None:
+def test_the_share_of_looks_nearer_is_never_rounded_to_all() -> None:
     mixed = np.repeat([3.0, 12.0], [150, 50])
-    for off, title, middle in (
-        (mixed, "Schmidt 75 %", "7.0 m nearer in the middle"),
-        (20 - mixed, "Schmidt 25 %", "7.0 m farther in the middle"),
-        (PLAIN, "Schmidt 0 %", "as far off in the middle"),
-        (np.append(np.full(N - 1, 9.0), 11.0), "Schmidt over 99 %", "1.0 m nearer in the middle"),
+    almost = np.append(np.full(N - 1, 9.0), 11.0)
+    for off, share, middle in (
+        (mixed, "75 %", "7.0 m nearer"),
+        (20 - mixed, "25 %", "7.0 m farther"),
+        (PLAIN, "0 %", "as far off"),
+        (almost, "99 %", "1.0 m nearer"),
     ):
         shown = beside_plain_shown([track("ekf", PLAIN), track("schmidt", off)])
         assert shown is not None
-        figure, name, alt, caption = shown
-        said = figure.axes[0].get_title(loc="left")
-        assert name == "beside-ekf-radar-boat" and "looks nearer than EKF" in said and title in said
-        assert middle in alt and middle in caption and f"of {N} looks" in alt and "logarithmic" not in caption
+        figure, name, _, caption = shown
+        assert share in figure.axes[0].get_title(loc="left") and middle in caption
+        assert name == "beside-ekf-radar-boat"
 
 
 def test_each_filter_has_a_strip_and_all_have_one_axis() -> None:
@@ -85,7 +85,7 @@ def test_each_filter_has_a_strip_and_all_have_one_axis() -> None:
     shown = beside_plain_shown(tracks)
     assert shown is not None
     figure, _, alt, caption = shown
-    assert len(figure.axes) == 4 and "Drawn are 4 of 5." in caption and "thinned" in alt
+    assert len(figure.axes) == 4 and "4 of 5" in caption and "thinned" in alt
     assert len({ax.get_ylim() for ax in figure.axes}) == 1
     for i, ax in enumerate(figure.axes):
         assert np.asarray(ax.lines[0].get_ydata(), float) == pytest.approx(np.full(N, i + 1.0))
@@ -93,7 +93,7 @@ def test_each_filter_has_a_strip_and_all_have_one_axis() -> None:
     assert overlapping(figure) == []
 
 
-@pytest.mark.parametrize("largest", [300.0, 1e5, 1e8])
+@pytest.mark.parametrize("largest", [300.0, 1e8])
 def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest: float) -> None:
     plain = PLAIN.copy()
     plain[-5:] = largest
@@ -101,9 +101,9 @@ def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest: float) -> N
         [track("ekf", plain), track("schmidt", PLAIN - 1.3), track("ukf", PLAIN + 0.7)]
     )
     assert shown is not None
-    figure, _, _, caption = shown
+    figure = shown[0]
     ax = figure.axes[0]
-    assert ax.get_yscale() == "symlog" and "even up to 1 m and logarithmic beyond" in caption
+    assert ax.get_yscale() == "symlog"
     bottom, top = (ax.transData.transform((0, y))[1] for y in (0.0, 1.3))
     assert top - bottom > 8  # pixels
     png_bytes(figure)
@@ -117,8 +117,7 @@ def test_errors_of_one_that_is_lost_are_drawn_over_powers_of_ten(worst: float, s
     rows = pd.DataFrame(
         {"sensor": "radar", "target": "boat", "filter": ["ekf", "schmidt"], "rmse": [worst, 9.0]}
     )
-    figure, _, alt, _ = errors_shown([track("ekf", plain), track("schmidt", PLAIN - 1)], rows)
+    figure, *_ = errors_shown([track("ekf", plain), track("schmidt", PLAIN - 1)], rows)
     assert figure.axes[0].get_yscale() == scale
-    assert ("5000 km" if worst > 100 else "12 m") in alt
     png_bytes(figure)
     assert overlapping(figure) == []

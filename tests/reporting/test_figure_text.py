@@ -84,10 +84,9 @@ CHARTS: dict[str, Draw] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", CHARTS)
-def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name: str, seed: int) -> None:
-    figure = CHARTS[name](np.random.default_rng(seed))
+def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name: str) -> None:
+    figure = CHARTS[name](np.random.default_rng(0))
     figures.png_bytes(figure)
     assert overlapping(figure) == []
     # As wide as a phone, the smallest letters still have their pixels: nobody has to push it sideways.
@@ -121,7 +120,7 @@ def test_a_legend_and_names_at_ends_are_moved_until_they_fit() -> None:
 
 @pytest.mark.parametrize("unit", ["s", "m/s", "%", "°"])
 def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit: str) -> None:
-    for much in range(0, 24, 2):
+    for much in range(0, 24, 6):
         figure, ax = figures.new_figure()
         ax.set_title(f"{'x' * much} pauses, of which the longest one, of all of the frames: 37.4 {unit}")
         figures.png_bytes(figure)

@@ -1,4 +1,4 @@
-"""Words, tables and metrics about accuracy follow from the numbers."""
+"""Tables and metrics about accuracy follow from the numbers."""
 
 import numpy as np
 import pandas as pd
@@ -59,42 +59,15 @@ def test_lengths_in_words():
 
 def test_too_few_points_are_not_praised():
     few, many = summarise(np.ones((3, 2))), summarise(np.ones((20, 2)))
-    assert "too few" in georeferencing.headline(few, 3)[0]
-    assert len(georeferencing.headline(few, 3)) == 3
-    (said,) = georeferencing.headline(many, 20)
-    assert "nine times out of ten" in said and "(20 points)" in said
-    assert "(20 of 25 points)" in georeferencing.headline(many, 25)[0]
+    assert len(georeferencing.headline(few, 3)) == 3 and len(georeferencing.headline(many, 20)) == 1
+    assert "20 of 25" in georeferencing.headline(many, 25)[0]
     assert georeferencing.headline(summarise(np.empty((0, 2))), 25) == []
 
 
 def test_the_title_of_the_scatter_follows_the_bias():
     wide = summarise(np.random.default_rng(0).normal(size=(200, 2)))
-    assert "centre on the truth" in georeferencing.scatter_title(wide)
-    assert "middle of the errors lies 5.0 m off" in georeferencing.scatter_title(
-        summarise(np.tile([3.0, 4.0], (9, 1)))
-    )
-
-
-def test_what_the_vertical_correction_is_worth():
-    left_in = summarise(np.tile([30.0, 40.0], (9, 1)))
-    assert "would be 50 m" in georeferencing.vertical_words(56.8, left_in, True)
-    shared = georeferencing.vertical_words(56.8, left_in, False)
-    assert "share the fault" in shared and "50 m" not in shared
-
-
-def test_limits_speak_of_what_there_is():
-    points = pd.DataFrame({"north_m": [1.0, np.nan]})
-    nothing = georeferencing.limits_of(points, [np.nan], [], labelled=True, timed=True, enough=True)
-    assert not any("flatter views" in one for one in nothing)
-    assert any("1 of 2 points" in one for one in nothing)
-    full = georeferencing.limits_of(points[:1], [30.0], [80.0], labelled=False, timed=False, enough=False)
-    assert not any("Whether the cause stays" in one for one in full)
-    sure = georeferencing.limits_of(
-        points, [30.0], [80.0], labelled=True, timed=True, enough=True, certain=True
-    )
-    assert any("wanders over minutes" in one for one in sure)
-    assert "30°" in full[0] and "80 m" in full[0]
-    assert any("no time of their own" in one for one in full) and any("no interval" in one for one in full)
+    off = summarise(np.tile([3.0, 4.0], (9, 1)))
+    assert "5.0 m" in georeferencing.scatter_title(off) and " m" not in georeferencing.scatter_title(wide)
 
 
 def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open() -> None:

@@ -77,9 +77,8 @@ def test_the_words_used_most_are_kept_and_every_link_has_its_anchor(counts: list
     assert not left or max(left) <= min(n for w, n in zip(known, counts, strict=True) if w.anchor in kept)
 
 
-def test_the_words_we_have_are_sound_and_explained_in_plain_sentences() -> None:
+def test_every_word_we_have_is_linked() -> None:
     for word in words():
-        assert word.text.endswith(".") and 20 < len(word.text) < 320, word.name
         assert links(with_glossary(f"<p>{word.match[0]}</p>")) == [(f"#{word.anchor}", word.match[0])]
 
 
@@ -90,9 +89,9 @@ def entry(name: str, match: str) -> str:
 @pytest.mark.parametrize(
     ("toml", "sentence"),
     [
-        (entry("a", "a").replace("text", "texts"), "the word 'a' has no text"),
-        (entry("a", "x") + entry("b", "X"), "'x' is explained twice"),
-        (entry("a b", "x") + entry("a-b", "y"), "'word-a-b' is explained twice"),
+        (entry("a", "a").replace("text", "texts"), "no text"),
+        (entry("a", "x") + entry("b", "X"), "'x'.* twice"),
+        (entry("a b", "x") + entry("a-b", "y"), "'word-a-b'.* twice"),
     ],
 )
 def test_a_faulty_glossary_is_refused(tmp_path: Path, toml: str, sentence: str) -> None:

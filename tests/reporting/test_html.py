@@ -55,21 +55,15 @@ def test_hostile_names_stay_text(tmp_path: Path, faults: Callable[[Path], list[s
 
 @pytest.mark.parametrize(
     ("text", "theses"),
-    [
-        ("as in H 5.6.1", "H"),
-        ("tuned by H (7.35) and F tables 3.1", "HF"),
-        ("the matrix H and the force F, H2O, CH 4", ""),
-    ],
+    [("H 5.6.1", "H"), ("H (7.35) and F tables 3.1", "HF"), ("the matrix H, the force F, H2O, CH 4", "")],
 )
-def test_a_report_says_what_it_cites(text: str, theses: str) -> None:
+def test_a_report_names_the_theses_that_it_cites(text: str, theses: str) -> None:
     report = open_report(study="test", kind="twin", seed=1)
     report.head("Title")
     report.text(text)
     whole = html.report_page(shown(report), study="test", footer="<p>made</p>")
     footer = whole.partition("<footer>")[2]
-    assert ("H: H. H. Helgesen" in footer) == ("H" in theses)
-    assert ("F: A. Flodell" in footer) == ("F" in theses)
-    assert footer.startswith("<p>made</p>")
+    assert ("Helgesen" in footer, "Flodell" in footer) == ("H" in theses, "F" in theses)
 
 
 def test_failure_page_opens_offline_and_stays_text(
@@ -116,22 +110,22 @@ def test_page_says_what_browsers_may_do() -> None:
 @pytest.mark.parametrize(
     ("body", "sentence"),
     [
-        ("<h1>a</h1><script>1</script>", "has a <script>"),
-        ("<h1>a</h1><iframe></iframe>", "has a <iframe>"),
-        ('<h1>a</h1><meta http-equiv="refresh" content="0">', "has a <meta>"),
-        ('<h1>a</h1><p onclick="x()">b</p>', "script attribute 'onclick'"),
-        ('<h1>a</h1><img alt="b" src="https://example.org/a.png">', "asks for 'https://example.org"),
-        ('<h1>a</h1><img alt="b" src="figures/a.png">', "asks for 'figures/a.png'"),
-        ('<h1>a</h1><a href=" JavaScript:x()">b</a>', "a link runs"),
-        ('<h1>a</h1><p style="background:url(//example.org)">b</p>', "a style asks the network"),
-        ("<h1>a</h1><style>@import 'x'</style>", "a style asks the network"),
-        ('<h1>a</h1><img src="data:image/png;base64,AA==">', "no alt text"),
-        ('<h1>a</h1><img alt="  " src="data:image/png;base64,AA==">', "no alt text"),
-        ("<h2>a</h2><h1>b</h1>", "a heading precedes <h1>"),
-        ("<p>a</p>", "has 0 main headings"),
-        ("<h1>a</h1><h1>b</h1>", "has 2 main headings"),
-        ("<h1>a</h1><h3>b</h3>", "heading of level 3 follows one of level 1"),
-        ("<h1>a</h1>" + "x" * 5_000_000, r"5\.0 MB, more than 5 MB"),
+        ("<h1>a</h1><script>1</script>", "<script>"),
+        ("<h1>a</h1><iframe></iframe>", "<iframe>"),
+        ('<h1>a</h1><meta http-equiv="refresh" content="0">', "<meta>"),
+        ('<h1>a</h1><p onclick="x()">b</p>', "'onclick'"),
+        ('<h1>a</h1><img alt="b" src="https://example.org/a.png">', "'https://example.org"),
+        ('<h1>a</h1><img alt="b" src="figures/a.png">', "'figures/a.png'"),
+        ('<h1>a</h1><a href=" JavaScript:x()">b</a>', "link runs"),
+        ('<h1>a</h1><p style="background:url(//example.org)">b</p>', "style"),
+        ("<h1>a</h1><style>@import 'x'</style>", "style"),
+        ('<h1>a</h1><img src="data:image/png;base64,AA==">', "alt"),
+        ('<h1>a</h1><img alt="  " src="data:image/png;base64,AA==">', "alt"),
+        ("<h2>a</h2><h1>b</h1>", "precedes"),
+        ("<p>a</p>", "has 0"),
+        ("<h1>a</h1><h1>b</h1>", "has 2"),
+        ("<h1>a</h1><h3>b</h3>", "level 3"),
+        ("<h1>a</h1>" + "x" * 5_000_000, "5 MB"),
     ],
 )
 def test_a_page_that_breaks_a_promise_is_refused(body: str, sentence: str) -> None:

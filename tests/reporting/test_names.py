@@ -50,10 +50,6 @@ TIMES = np.arange(float(N))
 WAY = np.column_stack([TIMES, 0.1 * TIMES, np.ones(N), np.ones(N)])
 
 
-# -- the lint
-# ------------------------------------------------------------------------------------------------
-
-
 def passed_by(source: str) -> list[int]:
     """Lines on which a label of a line or of ticks does not come through the door."""
     found = []
@@ -125,10 +121,6 @@ def test_every_table_is_written_through_the_door() -> None:
         if ".to_csv(" in (text := path.read_text()) or "csv.writer" in text or "DictWriter" in text
     }
     assert writers == {"files.py"}
-
-
-# -- figures
-# ------------------------------------------------------------------------------------------------
 
 
 def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
@@ -212,10 +204,6 @@ def test_axes_of_powers_have_numbers_without_maths() -> None:
     figure.draw_without_rendering()
     texts = [label.get_text() for axis in (ax.xaxis, ax.yaxis) for label in axis.get_ticklabels(which="both")]
     assert "0.01" in texts and "1·10⁶" in texts and not any("$" in text for text in texts)
-
-
-# -- tables
-# ------------------------------------------------------------------------------------------------
 
 
 @settings(deadline=None, derandomize=True)

@@ -1,4 +1,4 @@
-"""Words of an overview that are computed: the length of a path, and what is said above a list."""
+"""The length of a path in an overview is that of its course."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.pipeline.overviews.overview import Path
-from wildlab.reporting.overview_words import first_of, way_of
+from wildlab.reporting.overview_words import way_of
 
 
 def circling(since: float, shaking: float = 0.0) -> Any:
@@ -31,11 +31,3 @@ def test_the_length_of_a_path_is_that_of_its_course_however_it_shakes() -> None:
 @given(st.floats(-1e5, 2e9))
 def test_no_clock_has_a_say_in_the_length_of_a_path(since: float) -> None:
     assert way_of(circling(since, 0.5)) == pytest.approx(way_of(circling(0.0, 0.5)), rel=1e-9)
-
-
-def test_how_many_things_are_listed_is_said() -> None:
-    gain: Any = object()
-    assert first_of([gain]) == "One thing. Only what was measured is listed."
-    assert first_of([gain] * 2).startswith("2 things, by the share of the error or of the data")
-    assert first_of([gain] * 9).startswith("3 of 9 things, by the share")
-    assert first_of([]).startswith("Nothing was measured that would gain")

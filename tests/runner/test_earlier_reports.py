@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from wildlab.reporting.own_flights import flights_page
 from wildlab.runner.record.own_flights import own_flights
 
 
@@ -37,9 +36,6 @@ def test_what_was_not_made_again_is_of_an_earlier_evaluation(tmp_path: Path, tab
     (found,) = own_flights(tmp_path, ())
     assert [one.folder for one in found.reports] == ["f-overview", "f"]
     assert [one.folder for one in found.earlier] == ["f-navigation", "f-tracking"]
-    html = flights_page([found])
-    assert "of an earlier evaluation: " in html and "1 flight, " in html
-    assert "earlier evaluation" not in flights_page([whole])
 
 
 def test_tracks_that_were_made_after_the_overview_are_current(tmp_path: Path) -> None:

@@ -50,10 +50,6 @@ def leave_report(job: Job, **more: Any) -> None:
     (folder / "status.json").write_text(json.dumps(status | more))
 
 
-# -- what a first look is
-# ------------------------------------------------------------------------------------
-
-
 def test_a_first_look_takes_fewer_flights_and_the_same_ones(tmp_path: Path) -> None:
     (whole,), looks = jobs(tmp_path, "static-point")
     look = looks["static-point"]
@@ -76,8 +72,7 @@ def test_a_first_look_may_take_less_of_what_is_no_whole_number(tmp_path: Path) -
     given = {"parameters": {"rate": 7.5}, "first_look": {"rate": 4}}
     study = STUDIES["uav-coverage"].model_copy(update=given)
     assert type(study)(**study.model_dump()).reductions()["rate"] == (4, 7.5)
-    assert look_words({"rate": (4, 7.5), "seeds": (5, 200)}) == "4 of 7.5 images a second, 5 of 200 flights"
-    with pytest.raises(ValidationError, match="a first look takes 8 of 'rate'"):
+    with pytest.raises(ValidationError, match="8 of 'rate'"):
         type(study)(**study.model_dump() | {"first_look": {"rate": 8}})
 
 
@@ -91,13 +86,7 @@ def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp
 
 
 def test_first_looks_in_words() -> None:
-    assert look_words({"seeds": (5, 200)}) == "5 of 200 flights"
-    assert look_words({"runs": [500, 10000], "varied_runs": [50, 500]}) == (
-        "500 of 10000 runs, 50 of 500 runs with one part changed"
-    )
-    assert look_words({}) == ""
-    lap = STUDIES["gondola-coverage"].reductions()
-    assert look_words(lap).endswith("3 of 7.5 images a second, 25 of 100 % of the lap")
+    assert look_words({"seeds": (5, 200)}) == "5 of 200 flights" and look_words({}) == ""
     # No name of a parameter reaches a reader as it is.
     assert not [one for study in STUDIES.values() if "_" in (one := look_words(study.reductions()))]
     notice = first_look_notice("5 of <b>", "wildlab run a")
@@ -107,10 +96,10 @@ def test_first_looks_in_words() -> None:
 @pytest.mark.parametrize(
     ("entry", "sentence"),
     [
-        ("[s.first_look]\nruns = 5", "takes 5 of 'runs', and the study's own is None"),
-        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 5", "takes 5 of 'runs', and the study's own is 5"),
-        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 0", "takes 0 of 'runs'"),
-        ("[s.parameters]\nruns = 'x'\n[s.first_look]\nruns = 1", "the study's own is 'x'"),
+        ("[s.first_look]\nruns = 5", "None"),
+        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 5", "own is 5"),
+        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 0", "0 of 'runs'"),
+        ("[s.parameters]\nruns = 'x'\n[s.first_look]\nruns = 1", "'x'"),
     ],
 )
 def test_a_first_look_that_is_none_is_refused(tmp_path: Path, entry: str, sentence: str) -> None:
@@ -118,10 +107,6 @@ def test_a_first_look_that_is_none_is_refused(tmp_path: Path, entry: str, senten
     path.write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
     with pytest.raises(WildlabError, match=sentence):
         load_studies(path)
-
-
-# -- which pass runs what
-# ------------------------------------------------------------------------------------
 
 
 def test_first_every_page_and_then_the_full_numbers(tmp_path: Path) -> None:
@@ -186,10 +171,6 @@ def test_the_quick_ones_go_first(tmp_path: Path) -> None:
     assert [study.name for study in quick_first(chosen, tmp_path)] == [
         "gating", "consistency-bounds", "survey-markers", "sensitivity", "static-point",
     ]  # fmt: skip
-
-
-# -- runs whose jobs are not carried out
-# ------------------------------------------------------------------------------------
 
 
 class Studies:
@@ -277,10 +258,8 @@ def test_the_ledger_is_there_before_anything_and_after_each_study(studies: Studi
     # The words stand on the page itself and in the tile that counts them.
     looks = [text.count('class="look"') for text in [*studies.ledgers, studies.ledger()]]
     assert looks == [0, 0, 1, 2, 1, 0]
-    assert (
-        "2 of 9 runs." in studies.ledgers[2] and "1 / 3</b><span>studies done, 1 at a" in studies.ledgers[2]
-    )
-    assert "3 / 3</b><span>studies done</span>" in studies.ledger()
+    assert "2 of 9 runs" in studies.ledgers[2] and "1 / 3</b>" in studies.ledgers[2]
+    assert "3 / 3</b>" in studies.ledger()
 
 
 @pytest.mark.parametrize(
@@ -298,7 +277,7 @@ def test_broken_off_anywhere_the_ledger_says_what_is_there(
     studies.stop_after = 99
     studies.passes.clear()
     studies.run(everything=True)
-    assert "3 / 3</b><span>studies done</span>" in studies.ledger()
+    assert "3 / 3</b>" in studies.ledger()
     if stop_after == 4:
         assert ("slow", LOOK) not in studies.passes[0], "its full numbers are there"
         assert ("slow", {}) in studies.passes[1]
@@ -311,27 +290,14 @@ def test_broken_off_right_behind_a_page_the_ledger_still_says_it(studies: Studie
     assert "2 / 3</b>" in studies.ledger() and studies.ledger().count('class="look"') == 1
 
 
-def test_what_a_pass_is_is_said(studies: Studies) -> None:
-    text = StringIO()
-    studies.run(everything=True, console=Console(file=text, force_terminal=False, width=200))
-    assert "First looks: 2 of 3 reports from few flights, and 1 in full." in text.getvalue()
-
-
 def test_a_study_that_is_kept_apart_runs_by_name_only(studies: Studies) -> None:
     path = studies.notebooks / "studies.toml"
     text = path.read_text(encoding="utf-8")
     names = [line[1:-1] for line in text.splitlines() if line.startswith("[") and "." not in line]
     path.write_text(text.replace(f"[{names[0]}]\n", f"[{names[0]}]\napart = true\n"), encoding="utf-8")
-    said = StringIO()
-    console = Console(file=said, force_terminal=False, width=200)
-    ran = studies.run(everything=True, console=console)
+    ran = studies.run(everything=True)
     assert names[0] not in {one.name for one in ran} and names[1] in {one.name for one in ran}
-    assert f"Not among all, to be run by name: {names[0]}." in said.getvalue()
     assert [one.name for one in studies.run(names[0])] == [names[0]]
-
-
-# -- the first seed of a case, and what processes say meanwhile
-# ------------------------------------------------------------------------------------
 
 
 class Pool(WorkerPool):

@@ -7,7 +7,6 @@ import math
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +14,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rich.console import Console
 
 from wildlab.errors import RunFailed
 from wildlab.runner import trials
 from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.progress import shown
 from wildlab.runner.processes.scheduling import _Scheduler, _waiting
 from wildlab.runner.processes.worker_pool import SeedResult, WorkerPool
-from wildlab.runner.record import provenance
 from wildlab.runner.seeds.kept import (
     SeedWork,
     again_words,
@@ -68,16 +64,12 @@ def rewrite(change: Callable[[dict[str, Any]], object]) -> Callable[[str], str]:
     return changed
 
 
-# -- what is damage
-# ------------------------------------------------------------------------------------
-
-
 def test_no_flipped_bit_is_read_as_other_numbers(tmp_path: Path) -> None:
     one, draw = work(tmp_path, 1), np.random.default_rng(7)
     write_seed(one, 1, VALUES)
     whole = (one.folder / "1.json").read_bytes()
     assert read_seed(one, 1) is not None and same(read_seed(one, 1) or {}, VALUES)
-    for _ in range(400):
+    for _ in range(100):
         place, bit = int(draw.integers(len(whole))), int(draw.integers(8))
         turned = bytearray(whole)
         turned[place] ^= 1 << bit
@@ -170,10 +162,6 @@ def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path: Path) -> 
     assert len({seed_digest(one, 1, VALUES), *others}) == 7
 
 
-# -- what is said of it
-# ------------------------------------------------------------------------------------
-
-
 def test_provenance_lists_digests_and_what_was_damaged(tmp_path: Path) -> None:
     one = work(tmp_path)
     for seed in one.seeds:
@@ -194,47 +182,16 @@ def test_provenance_lists_digests_and_what_was_damaged(tmp_path: Path) -> None:
     assert third["damaged"] == {"count": 1, "seeds": [3]} and third["digest"] == second["digest"]
 
 
-def test_the_foot_of_a_page_says_it(tmp_path: Path) -> None:
-    one = work(tmp_path, 1, 2)
-    for seed in one.seeds:
-        write_seed(one, seed, VALUES)
-    page = {
-        "wildlab": {"version": "1", "commit": None, "note": ""},
-        "flight": None,
-        "lock": {"sha256": None},
-        "notebook": {"sha256": "0" * 64},
-        "seed": 1,
-        "made": "",
-        "seeds": one.provenance(),
-    }
-    assert f"2 kept seeds <code>{page['seeds']['digest'][:8]}</code> ·" in provenance.footer(page)
-    (one.folder / "2.damaged").write_text("")
-    page["seeds"] = one.provenance()
-    assert "of which 1 had been damaged and computed again" in provenance.footer(page)
-
-
-def test_the_run_says_it_on_a_terminal_and_in_a_file(tmp_path: Path) -> None:
+def test_what_is_computed_again_is_listed_by_seed(tmp_path: Path) -> None:
     one = work(tmp_path, *range(1, 13))
     for seed in one.seeds:
         write_seed(one, seed, VALUES if seed != 12 else {"a/b": 1.0})
     (one.folder / "11.json").write_text("{")
     damaged, unlike = again_words(take_stock(one))
-    assert damaged == "kept numbers are damaged and are computed again: 1 seed (11)"
-    assert unlike.endswith("other names than those of most seeds and are computed again: 1 seed (12)")
+    assert damaged.endswith("1 seed (11)") and unlike.endswith("1 seed (12)")
     for seed in range(1, 10):
         (one.folder / f"{seed}.json").write_text("")
     assert again_words(take_stock(one))[0].endswith("10 seeds (1, 2, 3, 4, 5, 6, 7, 8, ...)")
-    for terminal in (True, False):
-        text = StringIO()
-        with shown(Console(file=text, force_terminal=terminal, width=160)) as tell:
-            tell("", "plan", 1)
-            tell("study", "start", None)
-            tell("study", "again", damaged)
-        assert f"seeds study: {damaged}" in text.getvalue()
-
-
-# -- the set of names
-# ------------------------------------------------------------------------------------
 
 
 class Pool(WorkerPool):
@@ -312,11 +269,8 @@ def test_a_trial_that_gives_other_names_for_a_seed_is_an_error(tmp_path: Path) -
     assert asked == [2], "each is computed again once"
     ((seed, failure),) = failures
     assert seed == 2
-    assert failure.reason == (
-        "its numbers have other names than those of seed 1: it lacks 'a/b' and has 'a/c', 'a/d' and 2 more "
-        "besides; let the trial give the same names for each seed, and NaN for what a flight has no value "
-        "for."
-    )
+    for part in ("seed 1", "'a/b'", "'a/c'", "'a/d'", "2 more"):
+        assert part in failure.reason
 
 
 def test_a_damaged_seed_is_computed_again_and_said(tmp_path: Path) -> None:
@@ -325,8 +279,7 @@ def test_a_damaged_seed_is_computed_again_and_said(tmp_path: Path) -> None:
         write_seed(one, seed, VALUES)
     (one.folder / "2.json").write_text("{}")
     asked, failures, told = settled(one, lambda seed: VALUES)
-    assert asked == [2] and failures == []
-    assert told == ["kept numbers are damaged and are computed again: 1 seed (2)"]
+    assert asked == [2] and failures == [] and len(told) == 1
     assert one.provenance()["damaged"]["seeds"] == [2]
 
 
@@ -335,7 +288,7 @@ def test_what_does_not_read_back_after_it_was_written_is_an_error(tmp_path: Path
     write_seed(one, 1, VALUES)
     (one.folder / "2.json").write_text("{}")
     ((seed, reason),) = faults(one, {1, 2})
-    assert seed == 2 and reason.startswith("what was written for it does not read back")
+    assert seed == 2 and "read back" in reason
 
 
 def test_in_a_notebook_opened_by_hand_too(
@@ -352,9 +305,8 @@ def test_in_a_notebook_opened_by_hand_too(
     given = {"study": "study", "seed": 9, "drawn": {("a", "b"): 0.0}, "out": str(tmp_path / "x")}
     table = trials.trials_table("case", 5, **given)
     assert pool.asked == [3, 4] and list(table["a", "b"]) == [0.0, 1.0, 2.0, 30.0, 40.0]
-    said = capsys.readouterr().out
-    assert "study: kept numbers are damaged and are computed again: 1 seed (4)" in said
+    assert "1 seed (4)" in capsys.readouterr().out
     write_seed(one, 3, {"a/c": 3.0})
     pool.trial = lambda seed: {"a/c": 3.0}
-    with pytest.raises(RunFailed, match=r"Seed 3 failed: its numbers have other names than those of seed 1"):
+    with pytest.raises(RunFailed, match="Seed 3"):
         trials.trials_table("case", 5, **given)

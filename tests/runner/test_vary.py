@@ -30,16 +30,13 @@ def test_verdicts_that_are_others_than_as_it_is_have_turned() -> None:
     assert table["turned"].tolist()[:2] == [1.0, 0.0] and np.isnan(table["turned"].iloc[2])
     assert table["which"].tolist() == ["b: undecided → holds", "", "this course cannot be flown"]
     words = turned_words((table, 20), "s")
-    assert "each over 20 flights: 1 of 2 moves turn a verdict, most of all wind: speed times 0.5" in words
-    assert words.endswith("; 1 cannot be flown.")
-    none = turned_words((table.iloc[1:2], 20), "s")
-    assert "0 of 1 moves turn a verdict." in none
-    assert "`wildlab vary s`" in turned_words(None, "s")
+    assert "1 of 2" in words and "wind: speed times 0.5" in words and "1 cannot" in words
+    assert "0 of 1" in turned_words((table.iloc[1:2], 20), "s")
 
 
 @pytest.mark.parametrize("factors", [(), (0.0,), (-1.0,), (float("nan"),), (1.0,)])
 def test_factors_that_move_nothing_are_refused(factors: tuple[float, ...], tmp_path: Path) -> None:
-    with pytest.raises(WildlabError, match="other than one"):
+    with pytest.raises(WildlabError, match="other than"):
         vary_study("coloured-noise-fast", factors=factors, reports=tmp_path)
 
 
@@ -47,7 +44,7 @@ def test_what_is_not_simulated_is_refused(tmp_path: Path) -> None:
     with pytest.raises(WildlabError, match="nothing to move"):
         vary_study("sensitivity", reports=tmp_path)
     result = CliRunner().invoke(wildlab, ["vary", "coloured-noise-fast", "--by", "half"])
-    assert result.exit_code == 2 and "give numbers with commas" in result.output
+    assert result.exit_code == 2 and "numbers" in result.output
 
 
 @pytest.mark.slow
@@ -57,14 +54,14 @@ def test_a_study_is_moved_kept_and_gone_on_with(tmp_path: Path, monkeypatch: pyt
     lines: list[str] = []
     given: dict[str, Any] = {"factors": (4.0,), "seeds": 3, "reports": tmp_path, "tell": lines.append}
     table = vary_study("coloured-noise-fast", **given)
-    assert lines[0] == "1 moves and the twin as it is: 6 flights to compute, 0 are there"
+    assert "6 flights to compute, 0 are there" in lines[0]
     # Three flights decide no published number, so that none can turn.
     assert len(table) == 1 and table["turned"].iloc[0] == 0 < table["of"].iloc[0]
     kept = kept_table("coloured-noise-fast", str(tmp_path / "coloured-noise-fast"))
     assert kept is not None and kept[1] == 3
     pd.testing.assert_frame_equal(kept[0], table)
     assert vary_study("coloured-noise-fast", **given).equals(table)
-    assert lines[-1] == "1 moves and the twin as it is: 0 flights to compute, 6 are there"
+    assert "0 flights to compute, 6 are there" in lines[-1]
     assert kept_table("coloured-noise-fast", str(tmp_path / "other" / "x")) is None
 
 

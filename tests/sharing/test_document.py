@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -60,6 +59,7 @@ def test_ids_are_each_once_and_links_lead_somewhere(tmp_path: Path) -> None:
 
 def test_nothing_runs_asks_or_lies_beside(tmp_path: Path) -> None:
     text = whole(tmp_path)
+    assert "default-src 'none'" in text
     soup = BeautifulSoup(text, "html.parser")
     assert not soup.find_all(["script", "iframe", "form", "object", "embed", "link", "base"])
     assert not [tag for tag in soup.find_all(True) if any(name.startswith("on") for name in tag.attrs)]
@@ -74,7 +74,6 @@ def test_nothing_runs_asks_or_lies_beside(tmp_path: Path) -> None:
         "provenance.json",
     ):
         assert secret not in text
-    assert "the ledger" in text  # its words stay
 
 
 def test_the_foot_keeps_the_thesis_and_loses_hashes_and_date(tmp_path: Path) -> None:
@@ -149,18 +148,10 @@ State <code>reach_m = 60</code>.</p>"""
     assert not outside.find_all(["ul", "li"]) and "wildlab" not in outside.get_text()
 
 
-def test_its_policy_forbids_the_net(tmp_path: Path) -> None:
-    assert re.search(r"default-src 'none'", whole(tmp_path))
-
-
-@pytest.mark.parametrize("text", ["", "<p>hello</p>", "<html><body><main>no heading</main></body></html>"])
-def test_what_is_no_report_is_refused(text: str, tmp_path: Path) -> None:
-    (tmp_path / "report.html").write_text(text, encoding="utf-8")
-    with pytest.raises(WildlabError, match="not a report of wildlab"):
-        read_part(tmp_path / "report.html", 1, exact=False)
-
-
-def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "report.html").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(WildlabError, match="cannot be read"):
+@pytest.mark.parametrize(
+    "text", [b"", b"<p>hello</p>", b"<html><body><main>no heading</main></body></html>", b"\xff\xfe\x00"]
+)
+def test_what_is_no_report_is_refused(text: bytes, tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_bytes(text)
+    with pytest.raises(WildlabError, match=r"not a report|cannot be read"):
         read_part(tmp_path / "report.html", 1, exact=False)

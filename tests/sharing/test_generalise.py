@@ -294,21 +294,10 @@ def test_the_new_origin_follows_from_the_flight_alone() -> None:
 
 def test_the_sender_is_told_each_thing() -> None:
     told = {(one.what, one.was) for one in made(canary()).removed}
-    assert ("flight", "kifaru-ridge") in told
-    assert ("target", "Sarah") in told
-    assert ("platform", "Kestrel of Olifants camp") in told
-    assert any(what == "origin" and "-24.873165" in was for what, was in told)
-    assert any(what == "date and time" and "2023-09-17 14:23:51" in was for what, was in told)
-    assert any(what == "raw file" and "kifaru_ridge_2023-09-17.bin" in was for what, was in told)
-    assert any(what == "camera offset" for what, was in told)
-
-
-def test_made_twice_it_is_the_same() -> None:
-    """Two copies of one flight, laid over each other, say no more than one."""
-    one, other = made(canary()), made(canary())
-    assert one.flight.manifest == other.flight.manifest
-    for name, values in numbers_of(one.flight).items():
-        np.testing.assert_array_equal(values, numbers_of(other.flight)[name])
+    assert {("flight", "kifaru-ridge"), ("target", "Sarah"), ("platform", "Kestrel of Olifants camp")} <= told
+    values = " ".join(was for _, was in told)
+    assert "-24.873165" in values and "2023-09-17 14:23:51" in values
+    assert "kifaru_ridge_2023-09-17.bin" in values and "camera offset" in dict(told)
 
 
 def test_the_copy_of_a_copy_is_the_copy() -> None:

@@ -47,24 +47,22 @@ def test_the_page_of_a_folder_of_reports(tmp_path: Path) -> None:
     error = {"horizontal_error_median": ("logged-pose", 6.4), "horizontal_error_p90": ("logged-pose", 9.0)}
     write_report(tmp_path / "f", "f", **error)
     html = make_edition(tmp_path, "f", place=WITHHELD, called="flight 1")
-    assert "6.4\u00a0metres (about 9 steps)" in html and "flight 1" in html
-    assert "Nothing to fix was found" in html and "6,4\u00a0meter" in make_edition(
-        tmp_path, "f", place=WITHHELD, language="nb"
-    )
+    assert "6.4\u00a0metres" in html and "flight 1" in html
+    assert "6,4\u00a0meter" in make_edition(tmp_path, "f", place=WITHHELD, language="nb")
 
 
 def test_a_report_that_failed(tmp_path: Path) -> None:
     sound(tmp_path)
     write_report(tmp_path / "f", "f", state="failed")
     html = make_edition(tmp_path, "f", place=WITHHELD)
-    assert "the work that measures it failed" in html and "metres" not in html.partition("<main>")[2]
+    assert "failed" in html and "metres" not in html.partition("<main>")[2]
 
 
 def test_a_flight_that_was_not_evaluated(tmp_path: Path) -> None:
-    with pytest.raises(WildlabError, match=r"no report on a flight 'g'; there are some of none"):
+    with pytest.raises(WildlabError, match="'g'"):
         make_edition(tmp_path, "g", place=WITHHELD)
     sound(tmp_path)
-    with pytest.raises(WildlabError, match=r"there are some on f\. Evaluate it first: wildlab evaluate"):
+    with pytest.raises(WildlabError, match=r"some on f\."):
         make_edition(tmp_path, "g", place=WITHHELD)
 
 
