@@ -13,15 +13,14 @@ import pytest
 
 from tests.replay.recordings import Logged, read_recording
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry import CameraPoses, Terrain, inside_ellipse, project
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.overviews.image_coverage import ground_height
-from wildlab.replay.gather import MOST_FRAMES, border, footprints, scene_of
-from wildlab.replay.recording import NEES_BAND, save_recording
+from wildlab.replay.gather import MOST_FRAMES, footprints, scene_of
+from wildlab.replay.recording import save_recording
 from wildlab.replay.shapes import ellipse_rings, mesh
 from wildlab.replay.shots import Shot
 from wildlab.simulation.twins import simulate_twin
@@ -113,15 +112,6 @@ def test_footprints_are_those_of_the_geometry(ship: Flight, tmp_path: Path) -> N
     assert drawn > 0.9 * np.isfinite(poses.p_nc).all(axis=1).sum()
 
 
-def test_footprints_on_level_terrain_are_those_on_the_plane(ship: Flight) -> None:
-    poses, level = poses_of(ship, "autopilot").take(slice(0, 40)), ground_height(ship)
-    assert level is not None
-    flat = Terrain(np.full((400, 400), -level[0], np.float32), -8000.0, -8000.0, 40.0)
-    on_plane, on_terrain = footprints(ship, poses), footprints(replace(ship, terrain=flat), poses)
-    assert np.isfinite(on_plane).any()
-    assert np.allclose(on_plane, on_terrain, atol=0.05, equal_nan=True)
-
-
 def test_no_ray_past_the_horizon_makes_a_footprint(ship: Flight) -> None:
     level = replace_in_manifest(ship.manifest, {"mount": {"looks": "forward", "tilt_deg": 0.0}})
     poses = poses_of(replace(ship, manifest=level), "autopilot")
@@ -145,10 +135,6 @@ def test_ellipses_hold_what_they_say() -> None:
             inside_ellipse(0.999 * offset[k], P[k]).all()
             and not inside_ellipse(1.001 * offset[k], P[k]).any()
         )
-
-
-def test_the_band_of_the_plot_is_that_of_a_chi_square() -> None:
-    assert pytest.approx(chi_square_interval(2)) == NEES_BAND
 
 
 def test_errors_and_nees_are_those_of_the_tables(ship: Flight, tmp_path: Path) -> None:
@@ -225,22 +211,6 @@ def test_a_flight_of_nothing_is_refused(ship: Flight, tmp_path: Path) -> None:
     empty = replace(ship, nav={}, tables={})
     with pytest.raises(WildlabError, match="nothing to play back"):
         scene_of(empty)
-
-
-def test_times_that_number_the_images_are_no_seconds(ship: Flight, tmp_path: Path) -> None:
-    manifest = replace_in_manifest(ship.manifest, {"time": {"kind": "sequence"}})
-    manifest = manifest.model_copy(update={"time": manifest.time.model_copy(update={"epoch": None})})
-    frames = ship.table("frames").assign(time_s=np.arange(float(len(ship.table("frames")))))
-    nav = (
-        ship.nav["autopilot"]
-        .head(len(frames))
-        .assign(time_s=frames["time_s"].head(len(ship.nav["autopilot"])))
-    )
-    flight = replace(ship, manifest=manifest, nav={"a": nav.dropna(subset="time_s")},
-                     tables={"frames": frames, "detections": ship.table("detections")})  # fmt: skip
-    found = saved(flight, tmp_path)
-    times = found["/world/camera/image/detections", "Points2D:positions"].times
-    assert times is not None and np.array_equal(times, np.round(times))
 
 
 def test_nothing_tells_where_when_or_by_whom(ship: Flight, tmp_path: Path) -> None:
@@ -341,10 +311,3 @@ def test_nothing_half_written_is_left(ship: Flight, tmp_path: Path, monkeypatch:
         saved(ship, tmp_path)
     assert [one.name for one in tmp_path.iterdir()] == ["replay.rrd"]
     assert (tmp_path / "replay.rrd").read_bytes() == b"before"
-
-
-def test_the_border_goes_around_the_image_once() -> None:
-    around = border(640, 480)
-    closed = np.vstack([around, around[:1]])
-    area = 0.5 * np.sum(closed[:-1, 0] * closed[1:, 1] - closed[1:, 0] * closed[:-1, 1])
-    assert area == pytest.approx(640 * 480)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
-from wildlab.reporting import html
 from wildlab.reporting.animation import (
     Course,
     Ellipses,
@@ -111,12 +109,6 @@ def test_points_land_at_their_time_and_place() -> None:
     assert 'dur="20.00s"' in svg
 
 
-def test_a_point_just_before_the_end_still_has_keys_in_order() -> None:
-    svg = animated_flight(shown(points=Course(np.array([60.0]), np.zeros((1, 2)))), alt="x")
-    keys = [float(one) for one in re.search(r'keyTimes="([^"]+)"', svg)[1].split(";")]  # type: ignore[index]
-    assert all(a < b for a, b in pairwise(keys))
-
-
 def test_what_is_not_known_is_not_shown() -> None:
     gap = shown().truth[0].points.copy()
     gap[: len(gap) // 2] = np.nan
@@ -189,11 +181,6 @@ def test_a_long_flight_fits_into_its_bytes() -> None:
         animated_flight(long, alt="x", most_bytes=5_000)
 
 
-def test_it_keeps_what_pages_promise() -> None:
-    body = f"<h1>A flight</h1>{pausable(animated_flight(shown(), alt='A flight.'))}"
-    html.examine(page(title="x", body=body), "x")
-
-
 def opened(browser: Any, tmp_path: Path, **context: Any) -> Any:
     """The picture alone on a page, in a browser that is offline."""
     path = tmp_path / "flight.html"
@@ -211,11 +198,6 @@ def pictures(tab: Any) -> tuple[bytes, bytes]:
     before = svg.screenshot()
     tab.wait_for_timeout(1200)
     return before, svg.screenshot()
-
-
-def test_it_moves_without_a_script(browser: Any, tmp_path: Path) -> None:
-    before, after = pictures(opened(browser, tmp_path))
-    assert before != after
 
 
 @pytest.mark.parametrize("still", ["asked", "stopped", "paper"])

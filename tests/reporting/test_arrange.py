@@ -52,18 +52,6 @@ def test_any_order_of_the_parts_becomes_the_one(names: list[str]) -> None:
     assert all(html.count(word) == 1 for word in wanted) and "data-part" not in html
 
 
-def test_what_is_said_before_any_heading_stays_before_the_sections() -> None:
-    html = shown(PARTS["head"], "<p>a note</p>", PARTS["numbers"], PARTS["tiles"])
-    assert order(html, "tiles", "a note", "numbers") == ["tiles", "a note", "numbers"]
-
-
-def test_a_section_keeps_what_it_holds_and_its_order() -> None:
-    html = shown(
-        PARTS["head"], "<h2>one</h2>", "<p>a</p>", "<h3>b</h3>", "<p>c</p>", "<h2>two</h2>", "<p>d</p>"
-    )
-    assert order(html, "one", ">a<", ">b<", ">c<", "two", ">d<") == ["one", ">a<", ">b<", ">c<", "two", ">d<"]
-
-
 def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand() -> None:
     one = report()
     one.head("Title")
@@ -77,17 +65,6 @@ def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand
     assert soup.find(attrs={"data-main": True}) is None
     first, heading = soup.find("figure"), soup.h2
     assert isinstance(first, Tag) and heading in first.find_all_next()
-
-
-def test_one_of_a_row_may_be_the_main_picture_and_an_empty_row_goes() -> None:
-    one = report()
-    one.head("Title")
-    one.section("Section", "Words.")
-    one.figures([(new_figure()[0], name, name, f"Shows {name}.") for name in ("a", "b")])
-    soup = BeautifulSoup(arranged("\n".join(one.parts)), "html.parser")
-    assert len(soup.select(".row figure")) == 1 and len(soup.find_all("figure")) == 2
-    alone = arranged("\n".join([PARTS["head"], f'<h2>a</h2><div class="row"><figure>{IMAGE}</figure></div>']))
-    assert 'class="row"' not in alone and "<h2>" not in alone and alone.count("<img") == 1
 
 
 def test_a_folded_picture_or_a_table_is_not_the_main_picture() -> None:

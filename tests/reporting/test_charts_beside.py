@@ -63,22 +63,6 @@ def test_without_a_plain_filter_and_another_there_is_no_figure(tracks: list[Sens
     assert not tracks or beside_plain_shown(tracks) is None
 
 
-def test_the_share_of_looks_nearer_is_never_rounded_to_all() -> None:
-    mixed = np.repeat([3.0, 12.0], [150, 50])
-    almost = np.append(np.full(N - 1, 9.0), 11.0)
-    for off, share, middle in (
-        (mixed, "75 %", "7.0 m nearer"),
-        (20 - mixed, "25 %", "7.0 m farther"),
-        (PLAIN, "0 %", "as far off"),
-        (almost, "99 %", "1.0 m nearer"),
-    ):
-        shown = beside_plain_shown([track("ekf", PLAIN), track("schmidt", off)])
-        assert shown is not None
-        figure, name, _, caption = shown
-        assert share in figure.axes[0].get_title(loc="left") and middle in caption
-        assert name == "beside-ekf-radar-boat"
-
-
 def test_each_filter_has_a_strip_and_all_have_one_axis() -> None:
     names = ("schmidt", "coloured", "ukf", "imm", "thinned")
     tracks = [track("ekf", PLAIN), *(track(name, PLAIN - i - 1) for i, name in enumerate(names))]

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from wildlab.reporting.charts.tracks import (
     error_over_time,
-    innovation_correlations,
-    nees_over_flights,
     speed_and_course,
     squares_over_time,
     track_map,
@@ -92,12 +89,3 @@ def test_values_at_detections_alone_are_dots():
     assert [ax.get_ylabel() for ax in figure.axes] == ["NIS", "NEES"]
     assert all(ax.get_yscale() == "log" for ax in figure.axes)
     assert legend(figure) == ["Extended"]
-
-
-def test_flights_and_correlations():
-    spread = pd.DataFrame({"ekf": [8.0, 12.0], "schmidt": [1.0, 3.0]})
-    figure = nees_over_flights(spread, {"ekf": 9.0}, NAMES, "Flights")
-    hollow = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
-    assert [line.get_xdata()[0] for line in hollow] == [9.0]
-    figure = innovation_correlations({"ekf": np.ones((2, 5))}, 0.1, NAMES, "White?", ("u (px)", "v (px)"))
-    assert [ax.get_ylabel() for ax in figure.axes] == ["autocorrelation,\nu (px)", "autocorrelation,\nv (px)"]

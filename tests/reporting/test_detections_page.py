@@ -64,11 +64,6 @@ def test_other_detectors_stand_beside_ours_with_their_curves():
     assert without.count("data:image/png") == 1
 
 
-def test_without_labels_nothing_is_called_right():
-    _, words = shown(run())
-    assert "--labels FILE" in words and "recall" not in words
-
-
 def test_with_labels_the_counts_come_first():
     judged = rates(found=6, invented=2, missed=3)
     page, words = shown(run(judged=judged, pictures={"missed": 3, "invented": 2}), {"missed": JPEG})
@@ -95,11 +90,6 @@ def test_advice_follows_what_is_wrong(missed, invented, more):
     assert more in advice and "--fit" in advice
 
 
-def test_no_advice_where_all_is_found_and_a_warning_where_labels_are_few():
-    assert advice_of(run(judged=rates(6, 0, 0))) == []
-    assert len(advice_of(run(judged=rates(6, 0, 0, interval=False)))) == 1
-
-
 def test_images_that_could_not_be_used_are_listed_and_never_silent():
     problems = [[f"bad{n}.png", "it is empty"] for n in range(LISTED + 2)]
     page, words = shown(run(problems=problems))
@@ -121,15 +111,3 @@ def test_pictures_have_an_end():
     page, words = shown(run(), {}, [("a", large), ("b", JPEG), ("c", large), ("d", JPEG)])
     assert page.count("data:image/jpeg") == 2 and "2 more pictures" in words
     assert "data:image/jpeg" not in shown(run(), {}, [("a", large + large)])[0]
-
-
-def test_counts_of_each_image():
-    problem = [None] * 3 + ["bad"]
-    frames = pd.DataFrame({"frame_id": list("abcd"), "detections": [0, 3, 0, 9], "problem": problem})
-    assert "2 of 3 images have none; the most has b, with 3" in shown(run(), frames=frames)[1]
-
-
-def test_ellipses_are_held_against_labels_where_there_are_any():
-    judged = rates(6, 2, 3) | {"ellipse_coverage_90": {"estimate": 0.5, "low": 0.2, "high": 0.8}}
-    assert "50 % (20 to 80)" in shown(run(judged=judged))[1]
-    assert "12 %" in shown(run(), thresholds={"part": 0.12})[1]

@@ -13,7 +13,7 @@ from tests.figure_text import overlapping
 from tests.reporting.test_page import contrast
 from wildlab.reporting import figures
 from wildlab.reporting.charts import comparison, georeferencing, navigation, tracks
-from wildlab.reporting.figure_text import LEAST_TEXT, least_size
+from wildlab.reporting.figure_text import least_size
 from wildlab.reporting.pictures import PHONE_WIDTH
 
 LONG = "A title that says what is to be seen here, and says it at length: 12.3 m of 45.6 m"
@@ -126,17 +126,6 @@ def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit: str) -> None
         figures.png_bytes(figure)
         lines = ax.get_title(loc="left").split("\n")
         assert len(lines) > 1 and lines[-1].endswith(f"37.4 {unit}")
-
-
-def test_letters_have_their_size_also_where_some_are_small() -> None:
-    figure, ax = figures.new_figure(6.0)
-    ax.plot([0, 1])
-    figure.draw_without_rendering()
-    assert least_size(figure) == pytest.approx(72 * LEAST_TEXT / 10)
-    ax.text(0.5, 0.5, "tiny", fontsize=5)
-    assert least_size(figure) == pytest.approx(72 * LEAST_TEXT / 5)
-    ax.texts[0].set_visible(False)
-    assert least_size(figure) == pytest.approx(72 * LEAST_TEXT / 10)
 
 
 def test_every_line_stands_out_from_white() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -72,24 +71,7 @@ def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path: Path) -> None:
     assert b"Date" not in one[1] and b"matplotlib" not in one[0].lower()
 
 
-def test_a_readers_own_settings_do_not_show() -> None:
-    mpl.rcParams["lines.linewidth"] = 9
-    _, ax = figures.new_figure()
-    assert ax.plot([0, 1])[0].get_linewidth() == 1.7
-
-
 def test_subjects_that_share_a_figure_have_different_colours() -> None:
     for family in (("autopilot", "observer", "mekf"), ("kf", "ekf", "schmidt", "coloured", "ukf", "imm")):
         assert len({figures.colour(name) for name in (*family, "truth")}) == len(family) + 1
     assert figures.colour("logged-pose") != figures.colour("calibrated-pose") != figures.colour("recorded")
-
-
-def test_a_first_look_draws_letters_as_shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(figures.QUICK, raising=False)
-    figure, axes = figures.new_figure()
-    axes.set_title("Error in metres")
-    figures.save_figure(figure, tmp_path, "whole")
-    monkeypatch.setenv(figures.QUICK, "1")
-    figures.save_figure(figure, tmp_path, "quick")
-    fonts = [b"/Type3" in (tmp_path / f"{name}.pdf").read_bytes() for name in ("whole", "quick")]
-    assert fonts == [False, True]

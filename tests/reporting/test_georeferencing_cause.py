@@ -68,7 +68,6 @@ UNSURE = model(["boresight"], with_=7.0, half=4.0)
 SLIGHT = model(["boresight"], with_=9.4, half=2.0)
 NOTHING = model(())
 FAR = Outlier("mark", "", "M7", 8, 25.0)
-CLICK = Outlier("click", "P1", "M7", 1, 25.0)
 
 
 @pytest.mark.parametrize(
@@ -115,33 +114,6 @@ def test_numbers_alone_name_the_same(high):
     assert set(causes_told(numbers)) <= set(CAUSES)
 
 
-def test_sizes_are_given_only_where_the_interval_leaves_zero_out():
-    found = Calibration(
-        ("tilt", "clock"), np.array([np.radians(-5.0), 0.1]), np.diag([1e-6, 1.0]), {}, 40, 20, 10
-    )
-    said = cause.size_sentence(found, True)
-    assert "-5.00 °" in said and "clock" not in said
-    assert cause.size_sentence(calibration(["clock"], [0.1], 1.0), True) == ""
-
-
-@pytest.mark.parametrize(
-    ("found", "here", "word"),
-    [
-        (diagnosis(MOST), True, "wildlab calibrate"),
-        (diagnosis(MOST), False, "applied"),
-        (diagnosis(LITTLE), True, "hardly"),
-        (diagnosis(NOTHING), True, None),
-        (diagnosis(UNSURE), True, None),
-        (diagnosis(NOTHING, outliers=(FAR,)), True, "M7"),
-        (diagnosis(NOTHING, outliers=(FAR._replace(kind="photo", photo="P3"),)), True, "P3"),
-        (diagnosis(NOTHING, outliers=(CLICK,)), True, None),
-    ],
-)
-def test_advice_follows_from_gain_and_outliers(found, here, word):
-    said = cause.advice(found, here)
-    assert (word in said) if word else said == ""
-
-
 @pytest.mark.parametrize(
     ("lost", "word", "found", "level"),
     [
@@ -180,17 +152,6 @@ def test_a_cause_that_is_not_certain_is_in_no_figure_of_what_is_far_out():
     assert diagnosis(PART).held_summary().mean == 0.0
 
 
-def test_only_what_the_winner_cannot_be_told_from_is_listed():
-    rival = model(["height"], with_=2.0)
-    pairs = (("boresight", "lens"), ("position", "clock"))
-    assert len(cause.alike_sentences(diagnosis(MOST, rival, alike=pairs, rivals=(rival,)))) == 2
-    lost = model(["boresight"], with_=2.0, undetermined={"pan": ("tilt",), "roll": ()})
-    assert len(cause.alike_sentences(diagnosis(lost))) == 2
-    assert cause.alike_sentences(diagnosis(MOST)) == []
-    # What a cause that did not win has lost says nothing.
-    assert cause.alike_sentences(diagnosis(MOST, model(["height"], undetermined={"down": ()}))) == []
-
-
 def test_a_gain_without_a_parameter_told_from_zero_is_not_certain():
     sure = diagnosis(MOST)
     assert sure.counts
@@ -201,22 +162,11 @@ def test_no_cause_is_certain_where_a_third_is_far_out():
     assert diagnosis(MOST, out=5).counts and not diagnosis(MOST, out=6).counts
 
 
-@pytest.mark.parametrize(("share", "p90", "count"), [(0.3, 9.0, 3), (0.0, 7.1, 2), (0.0, 6.9, 1)])
-def test_the_nearest_mark_hides_errors_of_the_size_of_half_the_spacing(share, p90, count):
-    assert len(left.nearest_sentences(share, 10.0, p90)) == count
-
-
-def test_a_cause_that_hangs_on_ambiguous_clicks_is_said_to():
-    assert cause.ambiguity_sentence(diagnosis(MOST), diagnosis(PART)) == ""
-    assert cause.ambiguity_sentence(diagnosis(MOST), None) == ""
-    assert cause.ambiguity_sentence(diagnosis(MOST), diagnosis(NOTHING))
-
-
 def test_outliers_are_counted_with_the_figures_without_them():
     without = summarise(np.tile([0.6, 0.8], (41, 1)))
-    said = left.outliers_sentence((FAR, CLICK), MANY, without)
+    said = left.outliers_sentence((FAR, FAR), MANY, without)
     assert "9 of 50" in said and said.index("1.0 m") < said.index("5.0 m")
-    assert left.outliers_table((FAR, CLICK))["photo"].tolist() == ["several", "P1"]
+    assert left.outliers_table((FAR,))["photo"].tolist() == ["several"]
 
 
 def test_what_is_left_is_sorted_and_in_one_unit():
@@ -232,14 +182,6 @@ def test_an_axis_is_constant_by_its_interval():
     table = cause.axes_table({"north": AlongAxis(one, 0.5, 9), "east": AlongAxis(other, 0.1, 9)})
     assert [one == "constant" for one in table["verdict"]] == [True, False]
     assert table["share"].tolist() == [50.0, 10.0]
-
-
-def test_the_table_of_models_shows_nothing_and_the_winner():
-    others = [model([f"clock{i}"], with_=3.0 + i) for i in range(12)]
-    table = cause.models_table(diagnosis(MOST, *others))
-    assert table["what"].iloc[0] == "**boresight**"
-    assert "nothing" in table["what"].tolist()
-    assert len(table) == cause.SHOWN + 1
 
 
 def test_parameters_are_called_different_from_zero_by_their_interval():

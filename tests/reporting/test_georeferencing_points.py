@@ -17,7 +17,6 @@ from bs4 import BeautifulSoup
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.georeference import georeference, observe
-from wildlab.reporting import georeferencing_points
 from wildlab.reporting.georeferencing_points import COLUMNS, points_section
 from wildlab.reporting.report import Report, open_report
 from wildlab.simulation.twins import simulate_twin
@@ -80,21 +79,3 @@ def test_places_are_handed_over_where_they_are_open(made: tuple[Flight, Any]) ->
     )
     found = np.array([one["geometry"]["coordinates"][:2] for one in features])
     np.testing.assert_allclose(found, np.stack([longitude, latitude], axis=1), atol=2e-8)
-
-
-def test_too_many_points_are_said_to_be_elsewhere(
-    made: tuple[Flight, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    size = len(handed_over(shown(made, "withheld"))["points.csv"])
-    monkeypatch.setattr("wildlab.reporting.tables.MOST_BYTES", size - 1)
-    monkeypatch.setattr(georeferencing_points, "MOST_BYTES", size - 1)
-    report = shown(made, "withheld")
-    assert not handed_over(report)
-    assert "larger than the" in report.parts[-1] and "wildlab georeference" in report.parts[-1]
-
-
-def test_nothing_is_said_where_no_point_has_a_place(made: tuple[Flight, Any]) -> None:
-    flight, points = made
-    report = open_report(study="mine", kind="twin")
-    points_section(report, flight, points.assign(north_m=np.nan), "autopilot")
-    assert not report.parts

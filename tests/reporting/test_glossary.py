@@ -55,16 +55,6 @@ def test_what_is_folded_away_is_linked_only_where_there_is_no_other_use() -> Non
     assert [link.get_text() for link in soup.select("body > p a, :root > p a, p a")].count("NEES") == 1
 
 
-def test_the_longer_of_two_spellings_is_taken() -> None:
-    filters = [Word("filter", ("filter",), "f"), Word("Schmidt", ("Schmidt filter",), "s")]
-    assert links(with_glossary("<p>a Schmidt filter</p>", filters)) == [("#word-schmidt", "Schmidt filter")]
-
-
-def test_it_stands_before_the_method() -> None:
-    html = with_glossary('<p>NEES</p><details class="method"><summary>m</summary></details>', [A])
-    assert html.index("word-nees") < html.index('id="glossary"') < html.index("<details")
-
-
 @given(st.lists(st.integers(1, 4), min_size=1, max_size=14))
 def test_the_words_used_most_are_kept_and_every_link_has_its_anchor(counts: list[int]) -> None:
     known = [Word(f"w{chr(97 + i)}", (f"w{chr(97 + i)}",), "t") for i in range(len(counts))]
@@ -99,12 +89,3 @@ def test_a_faulty_glossary_is_refused(tmp_path: Path, toml: str, sentence: str) 
     file.write_text(toml, encoding="utf-8")
     with pytest.raises(WildlabError, match=sentence):
         words(file)
-
-
-def test_words_of_the_first_screen_are_explained_before_those_that_come_more_often() -> None:
-    many = [Word(f"word{i}", (f"word{i}",), "w") for i in range(MOST)]
-    often = " ".join(f"{word.name} {word.name}" for word in many)
-    html = with_glossary(f"<p>a pose</p><h2>More</h2><p>{often}</p>", [*many, B])
-    assert "#word-pose" in [to for to, _ in links(html)] and len(links(html)) == MOST
-    later = with_glossary(f"<p>word1</p><h2>More</h2><p>{often} a pose</p>", [*many, B])
-    assert "#word-pose" not in [to for to, _ in links(later)]

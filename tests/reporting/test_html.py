@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -137,12 +135,6 @@ def test_a_file_that_is_no_notebook_is_named(tmp_path: Path) -> None:
     (tmp_path / "a.ipynb").write_text("{}")
     with pytest.raises(WildlabError, match=r"a\.ipynb: this is not a notebook"):
         read_notebook(tmp_path / "a.ipynb")
-
-
-def test_reading_a_notebook_does_not_build_a_grammar() -> None:
-    # jsonschema would import it, which takes seconds in every process of a run.
-    program = "import sys, wildlab.runner.run, papermill\nassert 'lark' not in sys.modules"
-    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 @pytest.mark.parametrize("to", ["ledger.html", "a-b/report.html#x", "100%25/report.html"])

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.evaluation.blocks import Neighbours
 from wildlab.evaluation.errors import Scatter
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.reporting.georeferencing import noise_table
@@ -52,14 +51,6 @@ def test_clicks_and_lens_are_not_blamed_for_the_target_s_receiver():
         table = noise_table(noise, {**assumed, "pixel_px": 1.0}, known)
         for text in (" ".join(table["what"]), " ".join(remaining_parts(SCATTER, known))):
             assert ("receiver" in text) == (known is WALK)
-
-
-@pytest.mark.parametrize(
-    ("neighbours", "shared"),
-    [(Neighbours(0.5, 30), True), (Neighbours(0.1, 30), False), (Neighbours(float("nan"), 3), False)],
-)
-def test_whether_the_next_image_shares_an_error_is_what_was_measured(neighbours, shared):
-    assert ("0.50" in " ".join(remaining_parts(SCATTER, EXACT, neighbours))) == shared
 
 
 def corrected(offset, kind="logged"):

@@ -66,17 +66,6 @@ def test_letters_can_be_read_and_lie_on_no_others(name: str, seed: int) -> None:
     assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH
 
 
-def test_a_track_has_one_colour_in_every_chart() -> None:
-    followed, _ = made(1)
-    tints = charts.colours_of(followed)
-    longest = list(charts.ways_of(followed))
-    assert len({tints[one] for one in longest[: charts.MOST_NAMED]}) == charts.MOST_NAMED
-    assert {tints[one] for one in longest[charts.MOST_NAMED :]} == {figures.INK}
-    drawn = {line.get_label(): line.get_color() for line in charts.map_shown(followed)[0].axes[0].get_lines()}
-    for identity in longest[: charts.MOST_NAMED]:
-        assert drawn[f"track {identity}"] == tints[identity]
-
-
 def test_names_are_only_text_and_leave_room_for_the_picture() -> None:
     followed, lives = made(1, name="<b>a$b_{{$^</b>" + "L" * 60 + "{}")
     figure = charts.identities_shown(followed, lives)[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,11 +11,8 @@ import pytest
 from wildlab.evaluation.identities import Identities, TargetLife, TrackLife
 from wildlab.evaluation.sets import gospa
 from wildlab.pipeline.following.beliefs import Said
-from wildlab.pipeline.many.errors import OF_COVARIANCE, Errors
 from wildlab.reporting import many_tracks as words
-from wildlab.reporting.many_sections import pose_limits
 from wildlab.tracking.many import POINT, Hull, Shown
-from wildlab.tracking.predictions import POSE
 
 
 def followed(tracks: int = 2, looks: int = 61) -> Any:
@@ -145,28 +141,3 @@ def test_what_counts_as_on_a_target_must_hold_honest_errors_and_whole_hulls() ->
     assert len(advised(long)) == 1 and "reach_m = 61" in advised(long)[0]
     long.cutoff_m = 61.0
     assert advised(long) == []
-
-
-OF_EYE = tuple(f"eye: {name}" for name in POSE)
-
-
-@pytest.mark.parametrize(
-    ("camera", "radar", "named"),
-    [
-        (POSE, ("heading",), []),
-        (OF_EYE, ("heading",), ["eye radar"]),
-        (OF_COVARIANCE, ("heading",), ["eye radar"]),
-        (OF_COVARIANCE, (), ["radar"]),
-        (POSE, ("radar: range_bias",), ["radar"]),
-        (OF_EYE, ("radar: heading",), []),
-    ],
-)
-def test_errors_of_the_platform_counted_twice_or_not_at_all_are_told_by_sensor(
-    camera: tuple[str, ...], radar: tuple[str, ...], named: list[str]
-) -> None:
-    of: Any = {
-        name: SimpleNamespace(kind=kind, errors=Errors(names, (0.0,) * len(names)))
-        for name, kind, names in (("eye", "pixel", camera), ("radar", "range-bearing", radar))
-    }
-    _, *limits = pose_limits(SimpleNamespace(places=of))  # type: ignore[arg-type]
-    assert [" ".join(name for name in of if name in re.split(r"\W", one)) for one in limits] == named

@@ -49,13 +49,6 @@ def test_figures_that_are_refused(tmp_path: Path, name: str, alt: str, sentence:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_figure_name_is_used_once() -> None:
-    one = report()
-    one.figure(new_figure()[0], name="fig", alt="a")
-    with pytest.raises(WildlabError, match="shown twice"):
-        one.figure(new_figure()[0], name="fig", alt="a")
-
-
 def test_table_aligns_numbers_and_says_what_is_not_known() -> None:
     one = report()
     frame = pd.DataFrame({"who": ["a", None], "error": [1.234, np.nan], "n": [3, 4], "good": [True, False]})

@@ -63,8 +63,3 @@ def test_what_is_empty_or_large_is_not_embedded() -> None:
     assert csv_link(pd.DataFrame({"a": []}), "a") == ""
     assert data_link(b"x" * MOST_BYTES, "text/csv", "a.csv", "w")
     assert data_link(b"x" * (MOST_BYTES + 1), "text/csv", "a.csv", "w") == ""
-
-
-def test_a_column_without_a_heading_has_no_empty_one() -> None:
-    html = table_html(pd.DataFrame({"what": ["a"], " ": ["b"]}), {}, None)
-    assert html.count('<th role="columnheader"') == 1 and '<td role="cell"></td></tr></thead>' in html

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from wildlab.evaluation.consistency import Average
-from wildlab.pipeline.following.beliefs import Said
 from wildlab.pipeline.following.judged import Apart, leading_filter
 from wildlab.reporting import tracking as words
 
@@ -92,12 +91,6 @@ def test_what_few_values_say_is_neither_green_nor_red() -> None:
     assert colour(rows(nees=5.3, verdict="overconfident")) == "warn"
 
 
-def test_what_is_assumed_is_counted_and_comes_first() -> None:
-    said = [Said("targets", "speed", "3 m/s", "stated"), Said("radar", "noise", "1 m", "assumed: rough")]
-    assert words.assumed_sentence(said).startswith("1 of 2")
-    assert words.said_table(said)["source"].tolist() == ["assumed: rough", "stated"]
-
-
 def test_time_without_the_target_is_a_number_of_its_own() -> None:
     changes = {"rmse": 9.4, "compared": 263, "without": 1084, "rmse_without": 205.0, "wait": 67.7}
     said, _ = words.summary(rows(**changes), [], None)
@@ -119,10 +112,3 @@ def test_all_sensors_together_must_not_be_worse_than_the_best_alone(rmse: float,
     both = pd.concat([rows(), together.assign(sensor="together", kind="together")])
     assert colour(both) == level
     assert f"{words.length(rmse)} from boat" in words.summary(both, [], None)[0][1]
-
-
-@pytest.mark.parametrize(("verdict", "factor"), [("overconfident", True), ("consistent", False)])
-def test_a_verdict_on_little_says_how_little(verdict: str, factor: bool) -> None:
-    """ "About as far as stated: overconfident" contradicts itself unless the factor stands beside it."""
-    seen = blind().assign(nis=2.42, nis_verdict=verdict)
-    assert ("1.10" in words.summary(seen[seen["filter"] == "ekf"], [], None)[0][0]) == factor

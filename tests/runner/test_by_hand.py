@@ -14,11 +14,9 @@ from tests.figure_text import seen_figures
 from tests.notebooks import run_here
 from wildlab.errors import WildlabError
 from wildlab.flight.catalog import is_fetched
-from wildlab.flight.store import save_flight
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import by_hand
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.simulation.twins import simulate_twin
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
 
@@ -70,14 +68,6 @@ def test_without_its_data_set_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
     with pytest.raises(WildlabError, match="wildlab fetch openathena"):
         by_hand.flight_for("survey-markers", "", 1)
-
-
-@pytest.mark.slow
-def test_a_twin_by_hand_is_the_one_of_its_seed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(by_hand, "REPORTS", tmp_path)
-    save_flight(simulate_twin("static-antenna", 3), tmp_path / "expected")
-    ours, theirs = by_hand.flight_for("static-point", "", 3), by_hand.load_flight(tmp_path / "expected")
-    assert ours.imu is not None and ours.imu.equals(theirs.imu)
 
 
 OF_FLIGHTS = {

@@ -10,20 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.reporting.test_html import shown as notebook_of
 from tests.runner.test_ledger import a_study, published, ran
-from tests.sharing.canary import canary
 from wildlab import cli
 from wildlab.errors import WildlabError
-from wildlab.flight.store import load_flight, save_flight
-from wildlab.reporting import html
 from wildlab.reporting.metrics import metric
-from wildlab.reporting.report import open_report
 from wildlab.runner.compare import compare_flights
 from wildlab.runner.processes.outputs import FILES
 from wildlab.runner.record.digests import misfits, read_status, seal
 from wildlab.runner.record.own_flights import own_flights
-from wildlab.runner.record.provenance import changed_notice, footer, provenance_of_flight
 from wildlab.runner.record.status import as_plain, study_status
 from wildlab.runner.seeds.kept import SeedWork, read_seed, write_seed
 from wildlab.runner.verification import verify_report
@@ -157,27 +151,3 @@ def test_a_status_cannot_lose_its_digests_by_one_bit(report: Path) -> None:
         (report / "status.json").write_text(json.dumps({k: v for k, v in status.items() if k != key}))
         assert read_status(report)["state"] == "damaged"
         assert misfits(report, {k: v for k, v in status.items() if k != key})
-
-
-def test_a_changed_manifest_is_told_in_the_report(tmp_path: Path) -> None:
-    folder = tmp_path / "flight"
-    save_flight(canary(imu=False), folder)
-    about: dict[str, Any] = {
-        "flight": provenance_of_flight(folder),
-        "parameters": {},
-        "seed": None,
-        "made": "2026",
-    }
-    about |= {"wildlab": {"commit": None, "version": "0", "note": ""}, "lock": {"sha256": None}}
-    about |= {"notebook": {"sha256": "0" * 64}}
-    assert changed_notice(about) == "" and "changed" not in footer(about)
-    path = folder / "flight.toml"
-    path.write_text(f"# {path.read_text()}".replace("# ", "# by hand\n", 1))
-    load_flight(folder)
-    about["flight"] = provenance_of_flight(folder)
-    assert "flight.toml" in changed_notice(about) and "changed" in footer(about)
-    report = open_report(study="test", kind="logged", seed=1)
-    report.head("Title")
-    report.summary(["An answer."])
-    page = html.report_page(notebook_of(report), study="test", alert=changed_notice(about))
-    assert page.index("</h1>") < page.index("flight.toml of") and "data-part" not in page

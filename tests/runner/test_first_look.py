@@ -7,15 +7,11 @@ import logging
 import multiprocessing
 from collections.abc import Sequence
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
-from rich.console import Console
-from rich.text import Text
 
 from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
@@ -26,7 +22,6 @@ from wildlab.runner import run as running
 from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
 from wildlab.runner.first_look import THERE, has_whole_report, plan_passes, quick_first
 from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.progress import Tally, shown
 from wildlab.runner.processes.scheduling import Outcome, _Scheduler, _waiting
 from wildlab.runner.processes.worker_pool import SeedResult, WorkerPool, _ToRunner
 from wildlab.runner.run import make_job, run_studies
@@ -59,21 +54,6 @@ def test_a_first_look_takes_fewer_flights_and_the_same_ones(tmp_path: Path) -> N
     assert look.seed == whole.seed and len(look.seeds.seeds) == FIRST_LOOK_SEEDS - 1
     assert set(look.seeds.seeds) <= set(whole.seeds.seeds) and look.seeds.folder == whole.seeds.folder
     assert look.fingerprint != whole.fingerprint
-
-
-def test_runs_of_a_slow_study_are_fewer_as_it_says(tmp_path: Path) -> None:
-    (whole,), looks = jobs(tmp_path, "gating")
-    assert looks["gating"].parameters["runs"] < whole.parameters["runs"] == 10_000
-    assert set(looks["gating"].first_look) == {"runs", "varied_runs"}
-
-
-def test_a_first_look_may_take_less_of_what_is_no_whole_number(tmp_path: Path) -> None:
-    """The images that a camera takes each second, for one: 4 of 7.5."""
-    given = {"parameters": {"rate": 7.5}, "first_look": {"rate": 4}}
-    study = STUDIES["uav-coverage"].model_copy(update=given)
-    assert type(study)(**study.model_dump()).reductions()["rate"] == (4, 7.5)
-    with pytest.raises(ValidationError, match="8 of 'rate'"):
-        type(study)(**study.model_dump() | {"first_look": {"rate": 8}})
 
 
 def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp_path: Path) -> None:
@@ -283,23 +263,6 @@ def test_broken_off_anywhere_the_ledger_says_what_is_there(
         assert ("slow", {}) in studies.passes[1]
 
 
-def test_broken_off_right_behind_a_page_the_ledger_still_says_it(studies: Studies) -> None:
-    studies.stop_before_telling = 4
-    with pytest.raises(KeyboardInterrupt):
-        studies.run(everything=True)
-    assert "2 / 3</b>" in studies.ledger() and studies.ledger().count('class="look"') == 1
-
-
-def test_a_study_that_is_kept_apart_runs_by_name_only(studies: Studies) -> None:
-    path = studies.notebooks / "studies.toml"
-    text = path.read_text(encoding="utf-8")
-    names = [line[1:-1] for line in text.splitlines() if line.startswith("[") and "." not in line]
-    path.write_text(text.replace(f"[{names[0]}]\n", f"[{names[0]}]\napart = true\n"), encoding="utf-8")
-    ran = studies.run(everything=True)
-    assert names[0] not in {one.name for one in ran} and names[1] in {one.name for one in ran}
-    assert [one.name for one in studies.run(names[0])] == [names[0]]
-
-
 class Pool(WorkerPool):
     """Notes what it is handed; room for everything."""
 
@@ -361,28 +324,3 @@ def test_what_a_process_logs_reaches_the_runner_and_its_numbers_too(
     assert read_seed(whole.seeds, 1) == {"a/b": 1.0}
     ours.close()
     theirs.close()
-
-
-def test_what_a_process_says_is_shown() -> None:
-    text = StringIO()
-    with shown(Console(file=text, force_terminal=False, width=160)) as tell:
-        tell("one", "note", "compiling [b]")
-    assert "note  one: compiling [b]" in text.getvalue()
-    tally = Tally()
-    tally.note("one", "note", "too early: it is no longer under way, or not yet")
-    tally.note("one", "start", None)
-    tally.note("one", "note", "compiling [b]")
-    assert Text.from_markup(tally.now()).plain == "one compiling [b]"
-
-
-def test_with_a_number_of_flights_the_rest_is_reduced_too() -> None:
-    study = load_studies()["vessel-detection"]
-    asked = make_job(study, seeds=2, first_look=True)
-    few = {"seeds": (2, study.seeds)} | {
-        name: (n, study.parameters[name]) for name, n in study.first_look.items()
-    }
-    assert asked.first_look == few and {name: asked.parameters[name] for name in few} == {
-        name: n for name, (n, _) in few.items()
-    }
-    assert make_job(study, seeds=2).first_look == {"seeds": (2, study.seeds)}
-    assert "seeds" not in make_job(study, seeds=study.seeds, first_look=True).first_look

@@ -166,27 +166,6 @@ def test_poses_that_are_not_there_are_told_before_anything_runs(
     assert not (tmp_path / "reports").exists()
 
 
-@pytest.mark.slow
-def test_a_flight_of_which_nothing_can_be_judged_has_its_overview(
-    tmp_path: Path, make_flight: Callable[..., Flight]
-) -> None:
-    """With what it lacks for each other report; a calibration, which has no use then, is refused."""
-    flight = make_flight()
-    del flight.tables["detections"], flight.tables["truth"]
-    save_flight(flight, tmp_path / "flight")
-    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
-    with pytest.raises(WildlabError, match="calibration"):
-        evaluate_flight(tmp_path / "flight", calibration=tmp_path / "c.toml", **where)
-    with pytest.raises(WildlabError, match="no nav source 'mekf'"):
-        evaluate_flight(tmp_path / "flight", source="mekf", **where)
-    assert not (tmp_path / "reports").exists()
-    (outcome,) = evaluate_flight(tmp_path / "flight", **where)
-    assert outcome.state == "done" and outcome.name == "flight-overview"
-    said = json.loads((tmp_path / "reports" / outcome.name / "provenance.json").read_text())["parameters"]
-    assert said["beside"] == []
-    assert [one.split(" (")[0] for one in said["lacking"]] == ["georeferencing", "navigation", "tracking"]
-
-
 def lacking(flight: Flight) -> str:
     (use,) = (use for use in usable_for(flight) if use.purpose == "navigation")
     return lacking_for_navigation(flight, use)
@@ -299,21 +278,6 @@ def test_flights_that_share_marks_and_terrain_alone_are_two(
     left_report(other, reports)
 
 
-def several(folder: Path, **more: str) -> Path:
-    show = (
-        'report.head("Title")\nfrom wildlab.flight.store import load_flight\n'
-        "names = [load_flight(one).name for one in (flight, *others)]\n"
-        'report.metric("flights", "-".join(names), len(names), "")\nreport.save()'
-    )
-    write(folder, "several.ipynb", notebook(OPEN, show, more="others = []"))
-    write(folder, "alone.ipynb", notebook(OPEN, show))
-    text = f'[s]\ntitle = "S"\nnotebook = "{more.get("notebook", "several.ipynb")}"\n'
-    text += 'dataset = "autoferry"\nrecipe = "autoferry-2.toml"\n'
-    text += f'beside = ["{more.get("beside", "autoferry-17.toml")}"]\n'
-    (folder / "studies.toml").write_text(text)
-    return folder
-
-
 def test_a_study_may_have_several_flights_of_a_data_set(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_data: Callable[..., Path]
 ) -> None:
@@ -324,21 +288,6 @@ def test_a_study_may_have_several_flights_of_a_data_set(
     two = flights.dataset_flight("autoferry", "autoferry-17.toml", tmp_path)
     assert [load_flight(folder).name for folder in (one, two)] == ["autoferry-2", "autoferry-17"]
     assert one.is_dir() and two.is_dir() and one != two
-
-
-def test_a_notebook_must_know_the_flights_beside_the_first(tmp_path: Path) -> None:
-    from wildlab.runner.catalogue import load_studies
-    from wildlab.runner.run import make_job
-
-    folder = several(tmp_path / "a")
-    job = make_job(load_studies(folder / "studies.toml")["s"], notebooks=folder, reports=tmp_path)
-    assert (job.recipe, job.beside) == ("autoferry-2.toml", ("autoferry-17.toml",))
-    folder = several(tmp_path / "b", notebook="alone.ipynb")
-    with pytest.raises(WildlabError, match="'others'"):
-        make_job(load_studies(folder / "studies.toml")["s"], notebooks=folder, reports=tmp_path)
-    folder = several(tmp_path / "c", beside="../elsewhere.toml")
-    with pytest.raises(WildlabError, match="folder"):
-        load_studies(folder / "studies.toml")
 
 
 @pytest.mark.parametrize(
@@ -354,32 +303,3 @@ def test_flights_beside_the_first_belong_to_a_recipe(tmp_path: Path, entry: str,
     (tmp_path / "studies.toml").write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
     with pytest.raises(WildlabError, match=problem):
         load_studies(tmp_path / "studies.toml")
-
-
-def test_a_flight_of_the_readers_own_stands_alone(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
-    from wildlab.runner.catalogue import load_studies
-    from wildlab.runner.run import make_job
-
-    save_flight(make_flight(), tmp_path / "flight")
-    folder = several(tmp_path / "a")
-    study = load_studies(folder / "studies.toml")["s"]
-    job = make_job(study, notebooks=folder, reports=tmp_path, flight=tmp_path / "flight")
-    assert (job.recipe, job.beside) == (None, ())
-
-
-def test_provenance_names_every_flight(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
-    from wildlab.runner.record import provenance
-
-    for name in ("first", "second"):
-        save_flight(make_flight(name=name), tmp_path / name)
-    book = write(tmp_path, "n.ipynb", notebook(OPEN))
-    origin = provenance.collect(
-        study="s",
-        notebook=book,
-        flight=tmp_path / "first",
-        parameters={},
-        seed=1,
-        others=[tmp_path / "second"],
-    )
-    assert [one["name"] for one in origin["others"]] == ["second"]
-    assert "flight first:" in provenance.footer(origin) and "flight second:" in provenance.footer(origin)

@@ -24,7 +24,6 @@ from wildlab.reporting.front.cards import card_html, study_card
 from wildlab.reporting.front.flight import FILE, load_front_flight, simulated
 from wildlab.reporting.front.glimpse import Glimpse
 from wildlab.reporting.front.index import flight_words, front_page
-from wildlab.reporting.front.numbers import poster_page
 from wildlab.reporting.published import published_rows
 from wildlab.reporting.standing import standing
 from wildlab.reporting.status import StudyStatus
@@ -114,13 +113,6 @@ def test_counts_are_those_of_the_files(some: list[StudyStatus], tmp_path: Path) 
     assert "14 of the 19" in BeautifulSoup(page_of(some), "html.parser").get_text(" ", strip=True)
 
 
-def test_what_was_not_run_is_in_no_denominator(tmp_path: Path) -> None:
-    folder = printed(tmp_path / "published", never=[1.0] * 5)
-    never = study_status(a_study(name="never"), tmp_path, folder)
-    assert counted([never]).of == 0
-    assert " of 5" not in page_of([never]) + poster_page([never])
-
-
 def test_cards_say_the_word_that_reports_say(some: list[StudyStatus]) -> None:
     cards = {one.study.name: study_card(one, Glimpse(sentence="A first sentence.")) for one in some}
     expected = standing([n.compared for n in some[0].numbers if n.compared], [])
@@ -181,17 +173,6 @@ def overview(reports: Path, folder: str, flight: str, **report: str) -> None:
         f'<img alt="{report.get("alt", "A map.")}" src="data:image/png;base64,{picture}">',
         encoding="utf-8",
     )
-
-
-def test_own_flights_alone(tmp_path: Path) -> None:
-    overview(tmp_path, "tuesday-overview", "tuesday")
-    path = build_ledger(tmp_path, {})
-    soup = BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
-    (card,) = soup.select("article.card")
-    assert card.select_one("h3 a")["href"] == "tuesday-overview/report.html" and "9 m off." in card.get_text()
-    assert card.img["src"].startswith("data:image/webp;base64,") and card.img["alt"] == "A map."
-    assert "1 flight" in soup.select_one('.doors a[href="flights.html"]').get_text(" ")
-    assert "tuesday-overview" in (tmp_path / "partners.html").read_text(encoding="utf-8")
 
 
 def test_doors_lead_somewhere_before_anything_has_run(tmp_path: Path) -> None:
@@ -276,13 +257,6 @@ def whole(tmp_path: Path) -> Path:
 def test_pages_open_anywhere(whole: Path, name: str, faults: Callable[[Path], list[str]]) -> None:
     assert faults(whole / name) == []
     html.examine((whole / name).read_text(encoding="utf-8"), name, alone=False)
-
-
-def test_the_first_picture_is_within_two_screens_of_a_phone(whole: Path, browser: Any) -> None:
-    tab = browser.new_context(viewport={"width": 390, "height": 844}, offline=True).new_page()
-    tab.goto((whole / "index.html").as_uri())
-    assert tab.locator("svg.flown").bounding_box()["y"] < 844
-    assert tab.locator("article.card").first.bounding_box()["y"] < 3 * 844
 
 
 def test_the_sheet_is_one_page_of_paper(whole: Path, browser: Any) -> None:

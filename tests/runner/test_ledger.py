@@ -18,7 +18,6 @@ from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.ledger_tables import place, strip
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
-from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.record.status import as_plain, study_status
 
 PUBLISHED = """
@@ -257,28 +256,6 @@ def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[P
     assert faults(path) == []
 
 
-def test_long_tables_fold_behind_a_line_that_sums_them_up(tmp_path: Path) -> None:
-    first = PUBLISHED.split("[[number]]")[1].replace("7.90", "1.0") + 'kind = "calculated"\n'
-    entries = [f"[[number]]{first}".replace("kf/all", f"a/{i}") for i in range(42)]
-    folder = published(tmp_path / "published", "".join(entries))
-    ran(tmp_path, *(metrics.metric("error", f"a/{i}", 1.1 + (i == 3), "m") for i in range(42)))
-    status = study_status(a_study(), tmp_path, folder)
-    assert re.search(r"<summary>42 [^<]*41 close, 1 not close</summary>", ledger_page([status]))
-
-
-def test_build_ledger_works_before_anything_has_run(tmp_path: Path) -> None:
-    path = build_ledger(tmp_path / "reports", load_studies())
-    assert {one.name for one in path.parent.iterdir()} == {
-        *("index.html", "ledger.html", "numbers.html", "flights.html", "partners.html")
-    }
-
-
-def test_a_spread_without_width_can_be_drawn(tmp_path: Path) -> None:
-    ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m", low=7.9, high=7.9))
-    one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
-    assert 'role="img"' in strip(one.numbers[0]) and "nan" not in strip(one.numbers[0])
-
-
 @pytest.mark.parametrize(
     ("kind", "seeds", "n", "words"),
     [
@@ -297,13 +274,6 @@ def test_a_band_is_called_what_it_is(
     one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
     called = {name for name in ("lowest to highest", "middle 90 %") if f"</i>{name}<i" in ledger_page([one])}
     assert called == {words}
-
-
-def test_one_flight_has_no_band(tmp_path: Path) -> None:
-    ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m"), seeds=1)
-    one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
-    whole = ledger_page([one]).partition("<details><summary>How to read this")[0]
-    assert "<rect" not in whole and 'class="band"' not in whole and "1 flights" not in whole
 
 
 def first_look(reports: Path, **more: Any) -> None:

@@ -20,7 +20,6 @@ from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.paths import ROOT
 from wildlab.reporting import privacy
-from wildlab.reporting.failure import step_of
 from wildlab.runner.catalogue import STANDARD_PARAMETERS
 from wildlab.runner.notebooks import check_notebook, plain_parameters
 from wildlab.runner.processes import outputs
@@ -88,13 +87,6 @@ def test_ctrl_c_waits_for_the_move(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with pytest.raises(KeyboardInterrupt):
         outputs.install(folder, tmp_path / "s", DONE)
     assert set(contents(tmp_path / "s")) == {"report.html", "status.json"}
-
-
-def test_a_file_in_the_place_of_the_folder_is_not_touched(tmp_path: Path) -> None:
-    (tmp_path / "s").write_text("mine")
-    with pytest.raises(WildlabError, match="in the place"):
-        outputs.install(work_folder(tmp_path, "report.html"), tmp_path / "s", DONE)
-    assert (tmp_path / "s").read_text() == "mine"
 
 
 def test_leftovers_of_killed_runners_are_swept_and_those_of_running_ones_are_not(tmp_path: Path) -> None:
@@ -192,34 +184,3 @@ def test_provenance_says_where_numbers_come_from_and_not_who_or_where(tmp_path: 
     for secret in ("24.123456", "31.654321", str(tmp_path), platform.node(), str(Path.home())):
         assert len(secret) < 3 or secret not in text
     assert getpass.getuser() not in json.dumps(found["platform"])
-
-
-def test_without_git_provenance_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert provenance.git_state(tmp_path) == {"commit": None, "dirty": None, "note": "not a git checkout"}
-    monkeypatch.setattr("shutil.which", lambda name: None)
-    assert provenance.git_state(ROOT)["note"] == "git is not installed"
-    found = provenance.collect(
-        study="s", notebook=write(tmp_path, "a.ipynb", notebook()), flight=None, parameters={}, seed=1
-    )
-    assert "git is not installed" in provenance.footer(found)
-
-
-def test_an_installed_wildlab_is_known_by_its_version() -> None:
-    state = provenance.git_state(None)
-    assert state == {"commit": None, "dirty": None, "note": "installed from a wheel"}
-
-
-def test_text_loses_where_an_installed_wildlab_lies(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(privacy, "ROOT", None)
-    monkeypatch.setattr(privacy, "PACKAGE", Path("/srv/someone/wildlab"))
-    assert privacy.clean_text("/srv/someone/wildlab/cli.py") == "[wildlab]/cli.py"
-
-
-def test_the_step_is_the_heading_above() -> None:
-    node = notebook("# First\n\n## Second", "1", "# Third", "2")
-    output = nbformat.v4.new_output("display_data", {"text/html": '<h2 id="x">Shown &amp; <b>told</b></h2>'})
-    node.cells[2].outputs = [output]
-    assert step_of(node, 0) == ""
-    assert step_of(node, 1) == "Second"
-    assert step_of(node, 2) == "Shown & told"
-    assert step_of(node, None) == "Third"

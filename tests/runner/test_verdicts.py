@@ -11,7 +11,6 @@ from wildlab.evaluation.replication import SIZES
 from wildlab.reporting import metrics
 from wildlab.reporting.counts import CALCULATIONS, FITTED, PREDICTED, counted, group_of
 from wildlab.reporting.published import ONE_FLIGHT, load_published, quantity_kind
-from wildlab.reporting.verdicts import judge
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.record.status import study_status
 
@@ -161,11 +160,3 @@ def test_each_number_that_is_not_counted_is_counted_elsewhere() -> None:
         for source, what, value in mine[again][["source", "name", "value"]].to_numpy():
             elsewhere = [v for frame in same for n, v in frame[["name", "value"]].to_numpy() if n == what]
             assert (source, what, value) in here or any(abs(v / value - 1) < 0.02 for v in elsewhere)
-
-
-def test_deviations_of_a_filter_whose_tuning_is_not_printed_are_not_judged() -> None:
-    rows = [row for name, one in load_studies().items() if one.case == "navigation"
-            for row in load_published(name).to_dict("records")]  # fmt: skip
-    sds = [row for row in rows if row["name"].startswith("mean_sd_") and row["subject"] == "mekf"]
-    assert len(sds) == 18 and all(row["unjudged"] for row in sds)
-    assert judge(sds[0], {("mean_sd_north", "mekf"): {"value": 0.2}}).reproduction == "not judged"  # type: ignore[union-attr]

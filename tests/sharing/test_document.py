@@ -83,15 +83,6 @@ def test_the_foot_keeps_the_thesis_and_loses_hashes_and_date(tmp_path: Path) -> 
     assert "c247ba823b" in whole(tmp_path, exact=True)
 
 
-def test_sentences_are_escaped_and_reports_listed(tmp_path: Path) -> None:
-    soup = BeautifulSoup(whole(tmp_path), "html.parser")
-    assert "It was <b>somewhere</b>." in soup.header.get_text()  # type: ignore[union-attr]
-    assert "And <i>so</i>." in soup.get_text()
-    assert [one.get_text() for one in soup.nav.find_all("a")] == ["How far off & why?"] * 2  # type: ignore[union-attr]
-    assert len(soup.find_all("main")) == 1
-    assert not BeautifulSoup(whole(tmp_path, times=1), "html.parser").nav
-
-
 #: What stands in every report: its answer, and tables that may be wider than the screen.
 SUMMED = """<header><h1>How far off?</h1></header>
 <section class="summary warn" aria-label="Summary"><p>Look closer.</p></section>

@@ -138,10 +138,3 @@ def test_nothing_is_overwritten_without_being_asked(tmp_path: Path) -> None:
     assert there.read_text() == "new" and len(list(tmp_path.iterdir())) == 1
     with pytest.raises(WildlabError, match="is a folder, and a copy is one file"):
         refuse_existing(tmp_path, overwrite=True)
-
-
-def test_what_is_no_folder_is_refused_before_anything_is_made(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("old")
-    with pytest.raises(WildlabError, match="nothing can be written here"):
-        refuse_existing(tmp_path / "file" / "new" / "copy.html", overwrite=True)
-    refuse_existing(tmp_path / "new" / "copy.html", overwrite=False)

@@ -8,10 +8,10 @@ from hypothesis import settings as rounds
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.flight.following import Settings, parse_settings
+from wildlab.flight.following import parse_settings
 from wildlab.flight.toml import dump_toml
 from wildlab.sharing.names import Names
-from wildlab.sharing.settings import QUARTER, names_in, neutral_settings, whole_quarters
+from wildlab.sharing.settings import QUARTER, neutral_settings, whole_quarters
 
 TOLD = """
 [sensors."Letaba mast"]
@@ -59,21 +59,6 @@ def test_the_filter_is_told_the_same_in_neutral_names() -> None:
     for name in ("Letaba", "Pafuri", "Shingwedzi", "canoe", "Skukuza", "ferry"):
         assert name in TOLD and name not in text
     assert parse_settings(text) == found
-
-
-def test_what_was_told_is_not_changed() -> None:
-    told = parse_settings(TOLD)
-    neutral_settings(told, known(), {})
-    assert told == parse_settings(TOLD)
-
-
-def test_all_names_that_somebody_gave_are_known() -> None:
-    assert names_in(parse_settings(TOLD)) == (
-        "Letaba mast", "Pafuri post", "radar", "Shingwedzi canoe", "Skukuza ferry",
-    )  # fmt: skip
-    assert names_in(Settings()) == ()
-    # Neutral ones are found in every copy.
-    assert names_in(parse_settings('[[targets.many.hulls]]\nname = "kind B"')) == ()
 
 
 def test_an_offset_is_what_is_left_of_it_after_the_stamps_were_moved() -> None:

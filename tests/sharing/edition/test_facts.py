@@ -26,13 +26,6 @@ ERROR = {
 }
 
 
-def test_nothing_is_known_of_no_report() -> None:
-    facts = facts_of(flight())
-    assert facts.verdict is None and not facts.gains and not facts.alarms and not facts.failed
-    assert math.isnan(facts.error_median) and facts.compared == 0
-    assert facts.lacking == ("georeferencing", "tracking", "navigation")
-
-
 def test_errors_and_gains() -> None:
     places = report("georeferencing", {
         **ERROR,
@@ -71,12 +64,6 @@ def test_alarms_stand_in_order_and_troubles_by_time() -> None:
     assert facts.alarms == (Alarm("jumps", 9.0, 2), Alarm("shakes", 70.0, 1))
     assert facts.troubles == (("few_satellites", 30.0), ("poses", 3.0))
     assert facts.verdict == "went wrong"
-
-
-def test_what_failed_is_told_apart_from_what_is_not_there() -> None:
-    facts = facts_of(flight(report("overview", state="failed"), report("georeferencing", state="broken off")))
-    assert facts.failed == ("overview", "georeferencing") and facts.lacking == ("tracking", "navigation")
-    assert facts.verdict is None
 
 
 def test_tracks_of_the_filter_that_is_spoken_of() -> None:
@@ -121,12 +108,6 @@ def test_a_filter_is_as_sure_as_the_tracking_report_found(off_deg: float, tmp_pa
     assert facts.track_sure == pytest.approx(sure)
     assert set(rows["verdict"]) == ({"overconfident"} if off_deg else {"consistent"})
     assert (facts.track_sure > NEAR_THE_BAND) == bool(off_deg)
-
-
-def test_a_number_that_could_not_be_computed_is_not_known() -> None:
-    places = report("georeferencing", {("horizontal_error_median", "logged-pose"): {"value": None, "n": 0}})
-    facts = facts_of(flight(overview(detections={"value": 5}), places))
-    assert math.isnan(facts.error_median) and facts.compared == 0 and facts.possible is None
 
 
 @pytest.mark.parametrize(

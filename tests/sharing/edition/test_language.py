@@ -17,7 +17,6 @@ from wildlab.sharing.edition.language import (
     FOLDER,
     languages,
     load_language,
-    of_unflown,
     placeholders,
     say,
 )
@@ -88,14 +87,6 @@ def test_numbers_and_dates(code: str, said: Any, shown: str) -> None:
 def test_no_number_is_shown_with_a_minus_and_nothing(value: float, kind: str) -> None:
     text = say(load_language("sv"), Quantity(kind, abs(value) if kind != "number" else value))
     assert text.strip() and not text.startswith("−0 ") and text != "−0"
-
-
-def test_a_language_without_texts_for_what_never_flew_is_whole_and_keeps_its_own(tmp_path: Path) -> None:
-    file = tmp_path / "xx.toml"
-    text = (FOLDER / "nb.toml").read_text(encoding="utf-8").partition("[unflown.why]")[0]
-    file.write_text(text, encoding="utf-8")
-    language = load_language(file)
-    assert not language.missing and of_unflown(language).texts == language.texts
 
 
 def test_one_and_many() -> None:

@@ -51,13 +51,6 @@ def test_the_page_of_a_folder_of_reports(tmp_path: Path) -> None:
     assert "6,4\u00a0meter" in make_edition(tmp_path, "f", place=WITHHELD, language="nb")
 
 
-def test_a_report_that_failed(tmp_path: Path) -> None:
-    sound(tmp_path)
-    write_report(tmp_path / "f", "f", state="failed")
-    html = make_edition(tmp_path, "f", place=WITHHELD)
-    assert "failed" in html and "metres" not in html.partition("<main>")[2]
-
-
 def test_a_flight_that_was_not_evaluated(tmp_path: Path) -> None:
     with pytest.raises(WildlabError, match="'g'"):
         make_edition(tmp_path, "g", place=WITHHELD)
@@ -78,11 +71,3 @@ def test_the_map_of_a_flight(make_flight: Callable[..., Flight], tmp_path: Path)
     sound(tmp_path)
     html = make_edition(tmp_path, "f", place=WITHHELD, flight=flight)
     assert len(re.findall('<path class="way"', html)) == 1 and '<circle class="true"' in html
-
-
-def test_a_flight_with_nothing_to_draw_has_no_map(make_flight: Callable[..., Flight]) -> None:  # noqa: F811
-    flight = make_flight()
-    assert map_of(Flight(flight.manifest, {}, {"frames": flight.table("frames")})) is None
-    # Without poses the truth alone is drawn, and no way of the aircraft is made up from it.
-    drawn = map_of(Flight(flight.manifest, {}, {"truth": flight.table("truth")}))
-    assert drawn is not None and not len(drawn.path) and not len(drawn.seen) and len(drawn.truth) == 3

@@ -135,18 +135,6 @@ def test_seen_by_everybody(case: str, pages: Any) -> None:
     assert inside
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("code", languages())
-def test_labels_of_the_picture_lie_inside_it_in_every_language(code: str, pages: Any) -> None:
-    html = edition_html(WHOLE, name="f", place=Place("withheld"), language=code)
-    page = pages(html, 390)
-    assert page.evaluate(
-        """[...document.querySelectorAll('svg text')].every(one =>
-          one.getBoundingClientRect().right <= one.ownerSVGElement.getBoundingClientRect().right)"""
-    )
-    assert page.evaluate("document.documentElement.lang") == code
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_it_asks_nobody_and_runs_nothing(case: str) -> None:
     facts, picture = CASES[case]
@@ -177,13 +165,3 @@ def test_places_and_days_are_said_as_far_as_they_are_given() -> None:
         WHOLE, name="f", place=Place("generalised", 920.0, "", (58.66, -16.4)), language="nb"
     )
     assert "58,66° N, 16,4° V" in norwegian
-
-
-def test_what_is_not_translated_is_counted(tmp_path: Path) -> None:
-    path = tmp_path / "sw.toml"
-    path.write_text(
-        '[language]\ncode = "sw"\nname = "Kiswahili"\n[verdict]\nfix = "Rekebisha"\n', encoding="utf-8"
-    )
-    html = edition_html(WHOLE, name="f", place=Place("withheld"), language=path)
-    assert '<html lang="sw">' in html and "Rekebisha" in html
-    assert f"{len(load_language(path).missing)} texts" in html

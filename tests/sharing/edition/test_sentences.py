@@ -36,13 +36,6 @@ def test_a_flight_of_which_all_is_known() -> None:
     assert story.trusted and story.verdict.key == "verdict.fix" and story.next == story.advice[0]
 
 
-def test_a_flight_of_which_nothing_is_known() -> None:
-    story = tell(EMPTY)
-    assert keys(story.measured) == ["measured.nothing"] and keys(story.wrong) == ["wrong.unlooked"]
-    assert keys(story.unknown) == ["unknown.error", "unknown.seen"] and not story.tiles
-    assert keys(story.advice) == ["do.known_places"] and story.verdict.key == "verdict.unjudged"
-
-
 def test_an_alarm_comes_before_every_gain_and_takes_the_trust() -> None:
     story = tell(WHOLE._replace(verdict="went wrong", alarms=(Alarm("jumps", 12.0, 2),)))
     assert story.why == Said("alarm.jumps", story.why.values, 2)
@@ -122,21 +115,6 @@ def test_what_is_wrong_and_what_follows(changes: dict[str, Any], wrong: str, fol
 def test_tracks_that_are_too_sure(sure: float, said: bool) -> None:
     """As in the report on tracks: what may be so by chance, where few values are independent, is not said."""
     assert ("wrong.too_sure" in keys(tell(WHOLE._replace(track_sure=sure, troubles=())).wrong)) is said
-
-
-@pytest.mark.parametrize(
-    ("facts", "key"),
-    [
-        (WHOLE._replace(troubles=(("unsure", 200.0),)), "trouble.unsure"),
-        (WHOLE._replace(troubles=(("poses", 2.0),)), "trouble.poses"),
-        (WHOLE._replace(troubles=(), possible=POSSIBLE), "why.possible"),
-        (WHOLE._replace(troubles=(("few_satellites", 62.0),)), "why.alarm"),
-        (WHOLE._replace(alarms=(Alarm("apart", 9.0, 40),)), "alarm.apart"),
-    ],
-)
-def test_why_to_look_closer(facts: Facts, key: str) -> None:
-    """A trouble that is too short for the verdict is not given as its reason."""
-    assert tell(facts._replace(verdict="look closer", gains=())).why.key == key
 
 
 @pytest.mark.parametrize("what", [*_TROUBLES.values(), "sure", "tracking", "navigation"])

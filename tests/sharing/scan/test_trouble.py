@@ -54,15 +54,6 @@ def test_bombs_are_stopped() -> None:
         assert size < 12_000_000
 
 
-def test_many_small_parts_are_stopped() -> None:
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        for number in range(300):
-            archive.writestr(f"{number}", b"x")
-    parts = list(unpacked(out.getvalue(), Budget(parts=100)))
-    assert any("more than" in part.trouble for part in parts)
-
-
 def test_what_is_packed_too_often_is_a_finding() -> None:
     said = [part.trouble for part in unpacked(_quine_like(20), Budget()) if part.trouble]
     assert len(said) == 1 and "too many" in said[0]
@@ -153,3 +144,12 @@ def test_what_is_not_looked_for_is_said() -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(WildlabError, match="no such"):
         scan([tmp_path / "none"], secrets())
+
+
+def test_many_small_parts_are_stopped() -> None:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for number in range(300):
+            archive.writestr(f"{number}", b"x")
+    parts = list(unpacked(out.getvalue(), Budget(parts=100)))
+    assert any("more than" in part.trouble for part in parts)
