@@ -13,7 +13,6 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import save_flight
-from wildlab.replay import viewer as viewers
 from wildlab.replay.page import page, parts_of
 from wildlab.replay.viewer import Viewer, read_viewer
 from wildlab.runner.replay import PAGE, RECORDING, replay
@@ -37,64 +36,6 @@ def test_the_page_holds_all_and_allows_only_its_own_scripts() -> None:
     assert rules["script-src"].split() == [*(f"'sha256-{one}'" for one in hashes), "'wasm-unsafe-eval'"]
     assert "<script>x" not in text and "alert(1)" in scripts[1]
     assert not re.search(r"""(?:src|href)=(?!["']data:)""", text)
-
-
-NO_VIEWER = Viewer("0", "var wasm_bindgen = () => { throw new Error('no viewer') };", b"")
-
-
-@pytest.mark.parametrize(
-    ("why", "arguments", "script", "said"),
-    [
-        ("no graphics", ["--disable-gpu", "--disable-3d-apis"], True, "no WebGL 2"),
-        ("no script", [], False, "scripts are off"),
-        (
-            "no viewer",
-            ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
-            True,
-            "no viewer",
-        ),
-    ],
-)
-def test_where_it_cannot_be_shown_a_phone_is_told_why_and_what_is_instead(
-    launch: Callable[..., Any], tmp_path: Path, why: str, arguments: list[str], script: bool, said: str
-) -> None:
-    file = tmp_path / PAGE
-    file.write_text(page(b"recording", NO_VIEWER, "a-flight", b"narrow"), encoding="utf-8")
-    chromium = launch(*arguments)
-    context = chromium.new_context(
-        viewport={"width": 390, "height": 844}, offline=True, is_mobile=True, has_touch=True,
-        java_script_enabled=script, bypass_csp=True,
-    )  # fmt: skip
-    opened = context.new_page()
-    opened.goto(file.as_uri())
-    opened.wait_for_timeout(500)
-    words = opened.inner_text("#said")
-    assert said in words and not opened.is_visible("#narrow")
-    box = opened.locator("#said p").last.bounding_box()
-    assert box is not None and 0 <= box["x"] <= 390 - box["width"]
-    chromium.close()
-
-
-def test_where_the_viewer_is_missing_it_is_said_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import rerun_cli
-
-    monkeypatch.setattr(rerun_cli, "__file__", str(tmp_path / "__init__.py"))
-    with pytest.raises(WildlabError, match="missing"):
-        read_viewer()
-    program = tmp_path / "rerun"
-    program.write_text("#!/bin/sh\nexit 3\n")
-    program.chmod(0o755)
-    with pytest.raises(WildlabError, match="3"):
-        read_viewer()
-
-    def lacking(name: str) -> str:
-        raise viewers.PackageNotFoundError(name)
-
-    monkeypatch.setattr(viewers, "version", lacking)
-    with pytest.raises(WildlabError, match="not installed"):
-        read_viewer()
 
 
 def test_the_program_listens_to_this_machine_alone_and_counts_nobody(
@@ -153,37 +94,6 @@ def test_a_browser_without_a_network_plays_it(graphics: Any, tmp_path: Path) -> 
     first, second = pictures
     assert first.std() > 5, "nothing is drawn"
     assert (abs(first - second).max(axis=2) > 24).sum() > 100, "nothing moves"
-
-
-#: Where the viewer begins on a phone, px.
-TOP = 128
-
-
-@pytest.mark.slow
-def test_on_a_phone_the_map_is_as_wide_as_the_screen_and_the_rest_is_below(
-    graphics: Any, tmp_path: Path
-) -> None:
-    save_flight(simulate_twin("large-ship", 1), tmp_path / "flight")
-    written, _ = replay(tmp_path / "flight", into=tmp_path / "out", html=True)
-    # Without a density of its own: Chromium does not tell the viewer of one that is only pretended.
-    context = graphics.new_context(
-        viewport={"width": 390, "height": 844}, offline=True, is_mobile=True, has_touch=True
-    )
-    opened = context.new_page()
-    opened.goto(written[1].as_uri())
-    opened.wait_for_selector("html[data-shown=yes]", state="attached", timeout=180_000)
-    opened.wait_for_timeout(8000)
-    assert opened.evaluate("document.getElementById('canvas').getBoundingClientRect().top") == TOP
-    assert opened.is_visible("#narrow")
-    notice = opened.locator("#narrow")
-    assert notice.evaluate("one => one.scrollHeight <= one.clientHeight"), "its words are cut off"
-    picture = _pixels(opened.screenshot())
-    context.close()
-    # Of a map from edge to edge the title stands to the left and its buttons to the right; where a panel
-    # stands beside it, buttons and that one's title are between.
-    bar = picture[TOP + 6 : TOP + 24]
-    assert bar[:, :130].min() < 100 and bar[:, 300:].min() < 100, "the map has no title"
-    assert bar[:, 150:290].min() > 200
 
 
 def _pixels(png: bytes) -> Any:

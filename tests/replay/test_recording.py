@@ -173,6 +173,10 @@ def test_terrain_becomes_triangles_that_lie_on_it() -> None:
     sides = vertices[triangles[:, 1:]] - vertices[triangles[:, :1]]
     up = np.cross(sides[:, 0], sides[:, 1])
     assert (up[:, 2] > 0).all() and np.isfinite(normals).all() and len(colours) == len(vertices)
+    # Of a plane that rises by 2 to the north and by a half to the east.
+    north, east = 5.0 * np.mgrid[0:4, 0:6]
+    *_, normals = mesh((2.0 * north + 0.5 * east).astype(np.float32), 0.0, 0.0, 5.0)
+    assert np.allclose(normals / normals[:, 2:], [-0.5, -2.0, 1.0], atol=1e-5)
 
 
 LACKING: dict[str, tuple[Callable[[Flight], Flight], str, str]] = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,6 @@ import pytest
 
 from tests.pipeline.robots import robot_flight
 from wildlab.flight.store import save_flight
-from wildlab.paths import NOTEBOOKS
 from wildlab.runner import evaluate
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
@@ -36,15 +34,3 @@ def test_long_ones_begin_first_and_the_overview_waits_for_all(
     assert ran[0][0][0] == "navigation" and set(ran[0][0][1:]) >= {"tracking"}
     assert ran[1:] == [(["overview"], 2)] and ran[0][1] == 2
     assert told[0] == "flight-overview" and told[-1] == "flight-tracking"
-
-
-def test_every_notebook_of_a_flight_has_its_place() -> None:
-    assert all((NOTEBOOKS / name).is_file() for name in evaluate.LONGEST_FIRST)
-
-
-def test_cores_are_those_that_this_process_may_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
-    assert evaluate.cores() == 3
-    monkeypatch.delattr(os, "sched_getaffinity")
-    monkeypatch.setattr(os, "cpu_count", lambda: None)
-    assert evaluate.cores() == 1

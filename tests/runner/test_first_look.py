@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-import logging
-import multiprocessing
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -22,10 +19,9 @@ from wildlab.runner import run as running
 from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
 from wildlab.runner.first_look import THERE, has_whole_report, plan_passes, quick_first
 from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.scheduling import Outcome, _Scheduler, _waiting
-from wildlab.runner.processes.worker_pool import SeedResult, WorkerPool, _ToRunner
+from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.run import make_job, run_studies
-from wildlab.runner.seeds.kept import SeedWork, read_seed, write_seed
+from wildlab.runner.seeds.kept import write_seed
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
 
@@ -261,66 +257,3 @@ def test_broken_off_anywhere_the_ledger_says_what_is_there(
     if stop_after == 4:
         assert ("slow", LOOK) not in studies.passes[0], "its full numbers are there"
         assert ("slow", {}) in studies.passes[1]
-
-
-class Pool(WorkerPool):
-    """Notes what it is handed; room for everything."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.handed: list[tuple[str, int]] = []
-        self.over: list[SeedResult] = []
-
-    def places(self, room: int) -> int:
-        return 3 - len(self.handed) + len(self.over)
-
-    def submit(self, work: SeedWork, seed: int, timeout_s: float = float("inf")) -> None:
-        self.handed.append((work.study, seed))
-
-    def collect(self, wait_s: float = 0.0) -> list[SeedResult]:
-        return self.over
-
-
-def test_the_first_seed_of_a_case_is_computed_alone(tmp_path: Path) -> None:
-    whole, _ = jobs(tmp_path, "schmidt-fast-vessel", "schmidt-slow-vessel-eight", "static-point")
-    pool = Pool()
-    told: list[tuple[Any, ...]] = []
-    scheduler = _Scheduler([_waiting(job) for job in whole], pool, 3, lambda *what: told.append(what))
-    scheduler.hand_out_seeds()
-    assert pool.handed == [("schmidt-fast-vessel", 1), ("static-point", 1)]
-    scheduler.hand_out_seeds()
-    assert len(pool.handed) == 2, "a third process would compile the same once more"
-    pool.over = [SeedResult("schmidt-fast-vessel", 1)]
-    pool._notes = [("static-point", "compiling")]
-    scheduler.collect_seeds()
-    assert ("static-point", "note", "compiling") in told and pool.notes() == []
-    scheduler.hand_out_seeds()
-    assert pool.handed[2:] == [("schmidt-fast-vessel", 2), ("schmidt-fast-vessel", 3)]
-
-
-def test_what_a_process_logs_reaches_the_runner_and_its_numbers_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (whole,), _ = jobs(tmp_path, "static-point")
-    assert whole.seeds is not None
-    ours, theirs = multiprocessing.Pipe()
-    worker = SimpleNamespace(pipe=ours, work=whole.seeds, seed=1, ends=1e300)
-    worker.process = SimpleNamespace(is_alive=lambda: True)
-    pool = WorkerPool()
-    pool._workers = [worker]  # type: ignore[list-item]
-    logger = logging.getLogger("wildlab")
-    handler = _ToRunner(theirs)
-    monkeypatch.setattr(logger, "level", logging.INFO)
-    logger.addHandler(handler)
-    try:
-        logging.getLogger("wildlab.navigation.kernels").info("compiling %s", "it")
-    finally:
-        logger.removeHandler(handler)
-    assert pool.collect() == [] and pool.notes() == [("static-point", "compiling it")]
-    theirs.send(("note", "once more"))
-    theirs.send(("done", {"a/b": 1.0}))
-    assert pool.collect() == [SeedResult("static-point", 1)]
-    assert pool.notes() == [("static-point", "once more")]
-    assert read_seed(whole.seeds, 1) == {"a/b": 1.0}
-    ours.close()
-    theirs.close()

@@ -14,7 +14,6 @@ from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
 from wildlab.flight.checks.check import usable_for
-from wildlab.flight.checks.flown import why_no_start
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.runner import flights
@@ -186,36 +185,6 @@ def test_what_a_flight_lacks_for_its_navigation_is_said() -> None:
     assert "inertial measurements" in lacking(Flight(logged, {}, {"gnss": tables["gnss"]}))
 
 
-@pytest.mark.slow
-def test_a_flight_too_slow_for_its_course_to_tell_the_heading_is_not_judged() -> None:
-    """The fastest fix decides, logged or from positions, within the inertial samples; or two antennas do."""
-    twin = simulate_twin("fast-vessel", 1)
-    stated = twin.manifest.model_dump(exclude={"twin", "kind"}, exclude_none=True)
-    logged = make_manifest({**stated, "kind": "logged"})
-    second = [name for name in twin.table("gnss") if name.startswith("second_")]
-    velocity = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
-
-    def told(speed: float, drop: list[str]) -> str:
-        gnss = twin.table("gnss").copy()
-        since = gnss["time_s"] - gnss["time_s"].iloc[0]
-        gnss["north_m"], gnss["east_m"] = 0.6 * speed * since, 0.8 * speed * since
-        gnss[velocity] = [0.6 * speed, 0.8 * speed, 0.0]
-        gnss = gnss.drop(columns=drop)
-        tables = {"imu": twin.table("imu"), "gnss": gnss}
-        return lacking(Flight(logged, {"onboard": twin.nav["autopilot"]}, tables))
-
-    for drop in (second, [*second, *velocity]):
-        assert "7.8 m/s" in told(7.8, drop)
-        assert told(8.2, drop) == ""
-    late, first = twin.table("gnss").drop(columns=second), twin.table("gnss").drop(columns=second)[:1]
-    late = late.assign(time_s=late["time_s"] + 1e6)
-    flights = [Flight(logged, {}, {"imu": twin.table("imu"), "gnss": gnss}) for gnss in (late, first)]
-    assert "time" in why_no_start(flights[0]) and "only one" in why_no_start(flights[1])
-    for name in ("second_north_m", "second_east_m", "second_down_m"):
-        twin.table("gnss")[name] = 0.0
-    assert told(1.0, []) == ""
-
-
 def test_a_flight_named_like_a_study_would_replace_its_report(
     tmp_path: Path, make_flight: Callable[..., Flight]
 ) -> None:
@@ -276,18 +245,6 @@ def test_flights_that_share_marks_and_terrain_alone_are_two(
     again = load_flight(other)
     save_flight(Flight(more.manifest, again.nav, again.tables), other, overwrite=True)
     left_report(other, reports)
-
-
-def test_a_study_may_have_several_flights_of_a_data_set(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_data: Callable[..., Path]
-) -> None:
-    source = shared_data("tracking", "autoferry")
-    monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: True)
-    monkeypatch.setattr("wildlab.flight.catalog.dataset_folder", lambda name: source)
-    one = flights.dataset_flight("autoferry", "autoferry-2.toml", tmp_path)
-    two = flights.dataset_flight("autoferry", "autoferry-17.toml", tmp_path)
-    assert [load_flight(folder).name for folder in (one, two)] == ["autoferry-2", "autoferry-17"]
-    assert one.is_dir() and two.is_dir() and one != two
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,6 @@ from wildlab.reporting import html, metrics
 from wildlab.reporting.cases import load_cases
 from wildlab.reporting.counts import tally
 from wildlab.reporting.ledger import ledger_page
-from wildlab.reporting.ledger_tables import place, strip
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.record.status import as_plain, study_status
@@ -133,24 +132,6 @@ def test_a_misspelt_study_gets_a_hint() -> None:
         find_study("sensitivty", {"sensitivity": a_study()})
     with pytest.raises(WildlabError, match="wildlab list"):
         find_study("xyz", {})
-
-
-def test_strips_share_one_axis(tmp_path: Path) -> None:
-    """0.082 beside 0.08 lies where 8.2 beside 8 does, and 0.8 beside 0.08 far off."""
-    assert place(1.0) == 80 and place(2.0) - 80 == pytest.approx(80 - place(0.5))
-    assert place(2**0.5) - 80 == pytest.approx((place(2.0) - 80) / 2)
-
-    def dots(value: float, print_: float) -> list[str]:
-        row = PUBLISHED.split("[[claim]]")[0].replace("7.90", str(print_))
-        folder = published(tmp_path / f"p{print_}", row)
-        ran(tmp_path, metrics.metric("error", "kf/all", value, "m", low=value / 2, high=value * 2))
-        drawn = strip(study_status(a_study(), tmp_path, folder).numbers[0])
-        assert ("<path" in drawn) == (value / print_ > 8)
-        return re.findall(r'cx="([0-9.]+)"', drawn)
-
-    assert dots(0.082, 0.08) == dots(8.2, 8.0) == ["80.0", f"{place(1.025):.1f}"]
-    # Ours is not drawn at the print's place unless it lies there.
-    assert dots(0.16, 0.08) == ["80.0", f"{place(2):.1f}"] and dots(0.8, 0.08) == ["80.0"]
 
 
 def test_the_ledger_says_what_it_covers(tmp_path: Path) -> None:

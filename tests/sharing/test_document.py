@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -81,37 +80,6 @@ def test_the_foot_keeps_the_thesis_and_loses_hashes_and_date(tmp_path: Path) -> 
     assert "Helgesen" in text
     assert "c247ba823b" not in text and "2026-11-23" not in text
     assert "c247ba823b" in whole(tmp_path, exact=True)
-
-
-#: What stands in every report: its answer, and tables that may be wider than the screen.
-SUMMED = """<header><h1>How far off?</h1></header>
-<section class="summary warn" aria-label="Summary"><p>Look closer.</p></section>
-<div class="scroll" role="region" tabindex="0" aria-label="Table 1">
-<table><tr><th>a</th></tr></table></div>"""
-
-
-def test_reports_of_one_title_are_told_apart_in_the_list_and_by_screen_readers(
-    tmp_path: Path, faults: Callable[[Path], list[str]]
-) -> None:
-    path = report(tmp_path, SUMMED)
-    alone = joined([Chapter("Flight 1", "There.", (), (read_part(path, 1, exact=False),))], "")
-    assert [one["aria-label"] for one in BeautifulSoup(alone, "html.parser").select("section")] == ["Summary"]
-
-    chapters = [
-        Chapter(name, "There.", ("So.",), tuple(read_part(path, i, exact=False) for i in numbers))
-        for name, numbers in (("Flight 1", (1, 2)), ("Flight 2", (3,)))
-    ]
-    path.write_text(joined(chapters, "Reports on 2 flights"), encoding="utf-8")
-    assert faults(path) == []
-    soup = BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
-    assert [one.get_text() for one in soup.select("nav h3")] == ["Flight 1", "Flight 2"]
-    assert [one["start"] for one in soup.select("nav ol")] == ["1", "3"]
-    named = [one["aria-label"] for one in soup.select("section[aria-label], [role=region]")]
-    assert len(set(named)) == 6 and "Summary: How far off? (2)" in named
-    # In a zip each has a page of its own, and its list begins with 1.
-    report(tmp_path, SUMMED)
-    later = joined([Chapter("Flight 2", "", (), tuple(read_part(path, i, exact=False) for i in (3, 4)))], "")
-    assert [one["start"] for one in BeautifulSoup(later, "html.parser").select("nav ol")] == ["1"]
 
 
 def test_outsiders_are_not_told_what_to_type(tmp_path: Path) -> None:

@@ -102,14 +102,13 @@ from wildlab.sharing import package, share as module
 def kill(*given, **more):
     print("all pages were made", flush=True)
     os.kill(os.getpid(), signal.SIGKILL)
-{where} = kill
+os.fsync = kill
 module.share(Path(sys.argv[1]), "team", out=Path(sys.argv[2]), password="correct horse battery")
 """
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", ["module.zip_bytes", "os.fsync"])
-def test_a_killed_run_leaves_no_page_that_can_be_read(tmp_path: Path, where: str) -> None:
+def test_a_killed_run_leaves_no_page_that_can_be_read(tmp_path: Path) -> None:
     report = tmp_path / "reports" / "gating"
     report.mkdir(parents=True)
     said = "nobody may read this"
@@ -119,7 +118,7 @@ def test_a_killed_run_leaves_no_page_that_can_be_read(tmp_path: Path, where: str
     seal(report, {"state": "done"}, ("report.html", "provenance.json"))
     out, temporary = tmp_path / "out", tmp_path / "tmp"
     temporary.mkdir()
-    command = [sys.executable, "-c", KILLED.format(where=where), str(report), str(out / "copy.zip")]
+    command = [sys.executable, "-c", KILLED, str(report), str(out / "copy.zip")]
     ended = subprocess.run(
         command, env={**os.environ, "TMPDIR": str(temporary)}, capture_output=True, text=True, check=False
     )

@@ -29,22 +29,6 @@ def advice(folder: Path) -> str:
     return caught.value.fix
 
 
-def test_only_reports_that_are_there_are_advised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    reports = tmp_path / "reports"
-    report(reports / "kifaru-ridge")
-    report(reports / "kifaru-ridge-other", notebook=NOTEBOOK)
-    assert advice(reports / "kifaru-ridge-other").endswith("wildlab share reports/kifaru-ridge")
-    (reports / "kifaru-ridge").rename(reports / "kifaru-ridge-overview")
-    for name in ("kifaru-ridge-other", "kifaru-ridge"):
-        assert advice(reports / name).endswith("wildlab share reports/kifaru-ridge-overview")
-    write_json(reports / "kifaru-ridge-overview" / "status.json", {"state": "failed"})
-    assert "wildlab evaluate" in advice(reports / "kifaru-ridge-other")
-    assert "wildlab share" not in advice(reports / "kifaru-ridge-other") + advice(reports / "kifaru-ridge")
-    report(reports / "kifaru-ridge-many", notebook=NOTEBOOK)
-    assert advice(reports / "kifaru-ridge").endswith("wildlab share reports/kifaru-ridge-many")
-
-
 def test_a_report_on_many_targets_goes_with_the_others_whichever_is_named(tmp_path: Path) -> None:
     reports = tmp_path / "reports"
     report(reports / "kifaru-ridge-many", notebook=NOTEBOOK)

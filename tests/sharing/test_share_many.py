@@ -233,20 +233,6 @@ def test_one_that_was_made_from_other_tables_is_told_to_the_sender(made: Path) -
         assert any("kifaru-drift-many" in line and "other tables" in line for line in copy.lines)
 
 
-def test_poses_that_it_was_told_are_its_own_alone(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others are told none; only where there are no others, these are the poses that are meant."""
-    (made / "reports" / "kifaru-drift-overview").rename(made / "away")
-    told: list[str | None] = []
-
-    def evaluate(folder: Path, *, source: str | None, **_: Any) -> list[Outcome]:
-        told.append(source)
-        return []
-
-    monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
-    share(made / "reports" / "kifaru-drift-many")
-    assert told == ["poses-1"]
-
-
 def unpacked(data: bytes) -> bytes:
     """A page with all that is packed inside of its addresses."""
     packed = re.findall(rb'data:[^;,"]*(?:;charset=[^;,"]*)?(;base64)?,([^"\'\s>)]*)', data)

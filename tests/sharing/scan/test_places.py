@@ -7,16 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from tests.sharing.scan.spelt import LATITUDE, LONGITUDE, SPELLINGS, secrets, utm
+from tests.sharing.scan.spelt import LATITUDE, LONGITUDE, SPELLINGS, secrets
 from wildlab.sharing.scan import Secrets, scan
 from wildlab.sharing.scan.codes import (
     geohash_cell,
     geohash_of,
     locator_of,
-    mgrs_metres,
     plus_cell,
     plus_of,
 )
@@ -124,23 +123,6 @@ def test_locators_as_published() -> None:
     assert locator_of(48.14666, 11.60833) == "JN58td"
     assert locator_of(-34.91, -56.21166) == "GF15vc"
     assert locator_of(41.714775, -72.727260) == "FN31pr"
-
-
-@given(latitude=some.floats(-79, 83), longitude=some.floats(-179.9, 179.9))
-@example(21.309433, -157.916867)
-@settings(max_examples=15)
-def test_mgrs_against_its_definition(latitude: float, longitude: float) -> None:
-    """The square's letters, counted from the tables of the standard rather than by its arithmetic."""
-    zone, east, north = utm(latitude, longitude)
-    columns = {1: "ABCDEFGH", 2: "JKLMNPQR", 0: "STUVWXYZ"}[zone % 3]
-    rows = "ABCDEFGHJKLMNPQRSTUV" if zone % 2 else "FGHJKLMNPQRSTUVABCDE"
-    column, row = columns[int(east // 1e5) - 1], rows[int(north // 1e5) % 20]
-    digits = f"{int(east % 1e5):05d}{int(north % 1e5):05d}"
-    found = mgrs_metres(zone, column, row, digits)
-    assert found is not None
-    assert found[0] == pytest.approx(east, abs=1) and found[1] == pytest.approx(north % 2e6, abs=1)
-    for written in (f"{zone}X{column}{row}{digits}", f"{zone}X {column}{row} {digits[:3]} {digits[5:8]}"):
-        assert "MGRS" in kinds(written, secrets(latitude, longitude))
 
 
 # As two programs with no code in common (GEOTRANS and PyGeodesy) write these places, to a metre.
