@@ -158,9 +158,10 @@ def test_no_alt_text_no_picture() -> None:
     assert 'aria-label="&lt;script&gt;&quot;"' in animated_flight(shown(), alt='<script>"')
 
 
+@pytest.mark.slow
 def test_a_long_flight_fits_into_its_bytes() -> None:
-    """25 minutes of rounds, with 3000 points and five targets."""
-    t = np.arange(0.0, 1500.0, 0.2)
+    """25 minutes of rounds, with 3000 points and two targets."""
+    t = np.arange(0.0, 1500.0, 0.5)
     round_ = 2 * np.pi * t / 37
     path = Course(t, np.stack([150 * np.cos(round_), 300 * np.sin(round_)], axis=1))
     seen = np.sort(np.random.default_rng(0).uniform(0, 1500, 3000))
@@ -169,8 +170,8 @@ def test_a_long_flight_fits_into_its_bytes() -> None:
         path,
         Outlines(t, np.repeat(path.points[:, None], 16, axis=1)),
         Course(seen, np.zeros((3000, 2))),
-        [Ellipses(t, path.points / k, covariance) for k in range(2, 7)],
-        [Course(t, path.points / k) for k in range(2, 7)],
+        [Ellipses(t, path.points / k, covariance) for k in (2, 3)],
+        [Course(t, path.points / k) for k in (2, 3)],
     )
     drawn = animated_flight(long, alt="x")
     assert 100_000 < len(drawn.encode()) <= 1_000_000

@@ -50,8 +50,9 @@ def test_squares_have_the_band_of_chi_square():
 
 def test_units_of_biases_and_long_lines_and_white_bands():
     biases = np.tile([0.01, 0, 0, np.radians(1) / 3600, 0, 0], (301, 1))
-    fig = bias_chart(TIMES, biases, 0 * biases, "Biases")
+    fig = bias_chart(TIMES, biases, 0.5 * biases, "Biases")
     assert fig.axes[0].lines[0].get_ydata()[0] == pytest.approx(10.0)  # mm/s^2
+    assert fig.axes[0].collections[0].get_paths()[0].get_extents().y1 == pytest.approx(20.0)
     assert fig.axes[1].lines[0].get_ydata()[0] == pytest.approx(1.0)  # deg/h
     many = np.linspace(0, 1, 10 * MOST_POINTS)
     speed = speed_chart({"mekf": (many, np.tile([3.0, 4.0, 0.0], (len(many), 1)))}, "Speed")

@@ -98,8 +98,9 @@ def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
     yield georeferencing.error_shares({one: (TIMES, "#000000")}, other), set()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:Glyph")
-@settings(max_examples=2, deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
+@settings(max_examples=1, deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
 @example("_$HOME `id` $(id)\u202e\x1b", "$x_{")
 @given(NAMES, NAMES)
 def test_figures_show_any_name(one: str, other: str) -> None:

@@ -238,9 +238,7 @@ def test_the_ledger_is_there_before_anything_and_after_each_study(studies: Studi
     assert "3 / 3</b>" in studies.ledger()
 
 
-@pytest.mark.parametrize(
-    ("stop_after", "done", "looks", "not_run"), [(0, 0, 0, 3), (1, 1, 0, 2), (3, 1, 2, 0), (4, 2, 1, 0)]
-)
+@pytest.mark.parametrize(("stop_after", "done", "looks", "not_run"), [(1, 1, 0, 2), (4, 2, 1, 0)])
 def test_broken_off_anywhere_the_ledger_says_what_is_there(
     studies: Studies, stop_after: int, done: int, looks: int, not_run: int
 ) -> None:

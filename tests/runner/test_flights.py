@@ -170,6 +170,7 @@ def lacking(flight: Flight) -> str:
     return lacking_for_navigation(flight, use)
 
 
+@pytest.mark.slow
 def test_what_a_flight_lacks_for_its_navigation_is_said() -> None:
     """A reference, and how the sensor errs."""
     twin = simulate_twin("fast-vessel", 1)

@@ -9,7 +9,7 @@ import pytest
 from tests.runner.test_ledger import PUBLISHED, a_study, published, ran
 from wildlab.evaluation.replication import SIZES
 from wildlab.reporting import metrics
-from wildlab.reporting.counts import CALCULATIONS, FITTED, PREDICTED, counted, group_of
+from wildlab.reporting.counts import CALCULATIONS, FITTED, PREDICTED, counted, group_of, tally
 from wildlab.reporting.published import ONE_FLIGHT, load_published, quantity_kind
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.record.status import study_status
@@ -60,6 +60,8 @@ def test_a_mean_of_runs_is_held_against_a_mean(
     ran(tmp_path, *entries)
     one = study_status(a_study(), tmp_path, published(tmp_path / "published", row))
     assert one.numbers[0].answers == answers
+    # One true mean in ten is outside by chance.
+    assert tally(one.counted).chance == pytest.approx(0.0 if "not judged" in answers else 0.1)
 
 
 SIGNED = """signs = "undefined"

@@ -30,6 +30,7 @@ from wildlab.reporting.text import escape
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.sharing import redrawn
+from wildlab.sharing.agreement import share_apart
 from wildlab.sharing.reports import of_a_study
 from wildlab.sharing.share import BEWARE, share
 from wildlab.simulation.parameters import load_twin
@@ -236,6 +237,7 @@ def test_numbers_that_differ_are_said(made: Path) -> None:
     copy = share(made / "reports" / "kifaru-ridge")
     assert "Of 1 numbers, 0" in copy.file.read_text(encoding="utf-8")
     assert any("3.315" in line and "3.25" in line for line in copy.lines)
+    assert share_apart(3.315, 3.25) == share_apart(3.25, 3.315) == pytest.approx(0.02 / 1.02)
 
 
 @pytest.mark.parametrize(

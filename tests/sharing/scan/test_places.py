@@ -82,6 +82,12 @@ def test_how_near_is_near() -> None:
     assert places(outside, replace(known, near_m=1500.0))
 
 
+def test_the_latitude_of_one_place_and_the_longitude_of_another_are_none() -> None:
+    two = replace(secrets(), places=np.array([[LATITUDE, LONGITUDE, 0.0], [58.662064, 16.433337, 0.0]]))
+    assert places(f"{LATITUDE:.3f} {LONGITUDE:.3f}", two) and places("58.662 16.433", two)
+    assert not places(f"{LATITUDE:.3f} 16.433", two)
+
+
 def test_a_place_on_the_grid_of_what_may_be_told_is_none() -> None:
     known = replace(secrets(63.4003, 10.3997), near_m=20_000.0)
     told, finer = "63.40 N 10.40 E", "63.41 N 10.42 E"
