@@ -215,23 +215,3 @@ def test_it_stands_still(browser: Any, tmp_path: Path, still: str) -> None:
         tab.locator("summary").click()
         before, after = pictures(tab)
         assert before != after
-
-
-def test_a_browser_puts_the_aircraft_where_it_was(browser: Any, tmp_path: Path) -> None:
-    """At any time of a round, by the browser's own reckoning, against the closed form of the circle."""
-    tab = opened(browser, tmp_path)
-    lasts = float(re.search(r'dur="([\d.]+)s"', tab.content())[1])  # type: ignore[index]
-    svg = animated_flight(shown(), alt="A flight.")
-    for share in (0.1, 0.37, 0.5, 0.83):
-        got = tab.evaluate(
-            """share => { const svg = document.querySelector('svg.flown'); svg.pauseAnimations();
-            svg.setCurrentTime(share); const craft = svg.querySelector('.moves .craft').getCTM();
-            const cross = svg.querySelector('.moves .cross').getCTM(), own = svg.getCTM() || {a: 1};
-            const unit = svg.getBoundingClientRect().width / 620;
-            return [craft.e - cross.e, craft.f - cross.f].map(one => one / unit) }""",
-            share * lasts,
-        )
-        angle = 4 * np.pi * share
-        east, north = 120 * np.sin(angle) - 0.5 * 60 * share, 120 * np.cos(angle)
-        scale = metres_per_unit(svg)
-        assert [got[0] * scale, -got[1] * scale] == pytest.approx([east, north], abs=1.5)

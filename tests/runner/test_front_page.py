@@ -226,18 +226,6 @@ def test_pages_open_anywhere(whole: Path, name: str, faults: Callable[[Path], li
     html.examine((whole / name).read_text(encoding="utf-8"), name, alone=False)
 
 
-def test_the_sheet_is_one_page_of_paper(whole: Path, browser: Any) -> None:
-    tab = browser.new_page()
-    tab.goto((whole / "numbers.html").as_uri())
-    pages = len(re.findall(rb"/Type\s*/Page\b", tab.pdf(prefer_css_page_size=True)))
-    # No text leaves the sheet.
-    wide = tab.evaluate("""() => [...document.querySelectorAll('.sheet text')].filter(one => {
-        const box = one.getBBox(); return box.x < 0 || box.x + box.width > 190 || box.y + box.height > 276
-        }).map(one => one.textContent)""")
-    tab.close()
-    assert pages == 1 and wide == []
-
-
 def test_damaged_front_flight_is_named(tmp_path: Path) -> None:
     path = tmp_path / "front-flight.json"
     for text in ("{", "[]", '{"path": 1}', json.dumps({"path": {}})):

@@ -14,13 +14,10 @@ from axe_playwright_python.sync_playwright import Axe
 
 from tests.sharing.edition.flights import EMPTY, WHOLE
 from wildlab.reporting.page import POLICY
-from wildlab.sharing.edition import edition
 from wildlab.sharing.edition.edition import Place, edition_html
 from wildlab.sharing.edition.facts import Alarm
-from wildlab.sharing.edition.language import Language, languages, load_language
 from wildlab.sharing.edition.picture import MapPicture
-from wildlab.sharing.edition.said import Day, Said, length, number
-from wildlab.sharing.edition.sentences import Story
+from wildlab.sharing.edition.said import Day
 
 MAP = MapPicture(
     np.array([[0.0, 0.0], [0.0, 400.0], [300.0, 400.0], [300.0, 0.0]]),
@@ -34,37 +31,6 @@ CASES = {
     "look": (WHOLE._replace(verdict="look closer", gains=(), alarms=(Alarm("shakes", 70.0, 1),)), None),
     "empty": (EMPTY._replace(failed=("georeferencing",)), None),
 }
-
-
-def longest(language: Language, *begins: str) -> tuple[Said, ...]:
-    """The three longest texts of some kinds, with values that are as long as they come."""
-    sized = []
-    for key, text in language.texts.items():
-        if key.startswith(begins):
-            forms = [text] if isinstance(text, str) else list(text.values())  # type: ignore[union-attr]
-            sized.append((max(map(len, forms)), key))
-    values = dict.fromkeys(re.findall(r"{(\w+)}", str(dict(language.texts))), length(88.8))
-    values |= {"n": number(88888), "of": length(888.8), "first": Said("cause.height")}  # type: ignore[dict-item]
-    found = []
-    for _, key in sorted(sized, reverse=True)[:3]:
-        count = None if isinstance(language.texts[key], str) else 88888
-        found.append(Said(key, values, count))
-    return tuple(found)
-
-
-MORE = Said("page.more", {}, 88)
-
-
-def longest_story(language: Language) -> Story:
-    why = longest(language, "lost.cause", "why.", "alarm.")[0]
-    tiles = longest(language, "tile.")
-    return Story(
-        longest(language, "verdict.")[0], why, longest(language, "next.", "do.")[0], False,
-        tuple((length(8888.8), one) for one in (*tiles, tiles[0])), longest(language, "measured."),
-        (*longest(language, "alarm.", "trouble.", "lost.", "wrong."), MORE),
-        (*longest(language, "do."), MORE),
-        (*longest(language, "unknown."), MORE),
-    )  # fmt: skip
 
 
 @pytest.fixture
@@ -84,29 +50,6 @@ def pages(browser: Any, tmp_path: Path) -> Iterator[Any]:
     yield opened
     for context in contexts:
         context.close()
-
-
-def sheets(page: Any) -> int:
-    return len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("code", languages())
-def test_the_longest_texts_of_a_language_fit_one_sheet(
-    code: str, pages: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    language = load_language(code)
-    monkeypatch.setattr(edition, "tell", lambda _: longest_story(language))
-    facts = WHOLE._replace(twin=True, verdict="went wrong")
-    for picture in (MAP, None):
-        html = edition_html(
-            facts, name="a-flight-with-a-long-name",
-            place=Place("generalised", 11_100.0, "x" * 120, (-58.755, -116.455)),
-            day=Day(date(2026, 9, 30), True), picture=picture, language=language,
-        )  # fmt: skip
-        assert sheets(pages(html)) == 1
-    # The count can be another: twice as much does not fit.
-    assert sheets(pages(html.replace("</main>", "<p>x</p>" * 60 + "</main>"))) > 1
 
 
 @pytest.mark.slow
