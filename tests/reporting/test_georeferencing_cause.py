@@ -152,6 +152,13 @@ def test_a_cause_that_is_not_certain_is_in_no_figure_of_what_is_far_out():
     assert diagnosis(PART).held_summary().mean == 0.0
 
 
+def test_leaving_out_what_is_far_out_gains_what_the_mean_loses():
+    found = diagnosis(model(()), outliers=(FAR,), out=5)
+    found.models[0].held = np.where(np.arange(20)[:, None] < 5, [3.0, 4.0], [0.6, 0.8])
+    evidence = cause.evidence_of(MANY, 0, ellipses("honest"), found)
+    assert evidence.gain == pytest.approx(1 - 1.0 / 2.0) and evidence.troubled == 1
+
+
 def test_a_gain_without_a_parameter_told_from_zero_is_not_certain():
     sure = diagnosis(MOST)
     assert sure.counts

@@ -134,10 +134,11 @@ def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path: Path) -> 
         seed_digest(replace(one, key="l"), 1, VALUES),
         seed_digest(replace(one, case="l"), 1, VALUES),
         seed_digest(one, 1, VALUES | {"ekf/zero": 0.0}),
+        seed_digest(one, 1, {name.replace("zero", "nought"): value for name, value in VALUES.items()}),
         seed_digest(one, 1, VALUES | {"ekf/max_error": math.nextafter(1.0, 2.0)}),
         seed_digest(one, 1, {name: value for name, value in VALUES.items() if name != "ekf/none"}),
     ]
-    assert len({seed_digest(one, 1, VALUES), *others}) == 7
+    assert len({seed_digest(one, 1, VALUES), *others}) == 8
 
 
 def test_provenance_lists_digests_and_what_was_damaged(tmp_path: Path) -> None:

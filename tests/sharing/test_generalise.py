@@ -231,6 +231,9 @@ def test_stamps_begin_at_zero_and_keep_their_distances() -> None:
     copy = made(flight).flight
     assert first_stamp(copy) == pytest.approx(0.0, abs=1e-9)
     assert frame_times(copy) == pytest.approx(frame_times(flight) - START, abs=1e-9)
+    # A frame before the first pose, by a camera whose clock is ten seconds more ahead.
+    early = canary(imu=False, clocks={"camera_offset_s": 1.5 - 7200.0 - 10.0})
+    assert first_stamp(early) == pytest.approx(START + 5.0 - 10.0)
     # The zone of the camera's clock is gone, and what it is late by is still said.
     assert copy.manifest.clocks.camera_offset_s == pytest.approx(1.5)
     assert copy.table("frames")["time_s"].min() == pytest.approx(5.0 - 1.5)

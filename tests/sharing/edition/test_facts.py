@@ -17,7 +17,7 @@ from wildlab.reporting import tracking
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.report import open_report
 from wildlab.reporting.tracking import NEAR_THE_BAND
-from wildlab.sharing.edition.facts import Alarm, Gain, facts_of
+from wildlab.sharing.edition.facts import Alarm, Gain, _median, facts_of
 
 ERROR = {
     ("horizontal_error_median", "logged-pose"): {"value": 3.0, "n": 40},
@@ -84,6 +84,7 @@ def test_tracks_of_the_filter_that_is_spoken_of() -> None:
     facts = facts_of(flight(overview(), tracking))
     assert (facts.tracks, facts.track_error, facts.track_worst) == (2, 4.0, 6.0)
     assert facts.track_sure == pytest.approx((0.5 + 5.0) / 2)
+    assert _median([3.0, 1.0, math.nan, 2.0]) == 2.0 and math.isnan(_median([math.nan]))
 
 
 @pytest.mark.parametrize(("pictured", "others"), [({"value": 0}, True), ({"value": 7}, False), (None, False)])

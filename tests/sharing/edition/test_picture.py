@@ -13,7 +13,15 @@ from hypothesis import strategies as st
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from wildlab.errors import WildlabError
 from wildlab.sharing.edition.language import load_language
-from wildlab.sharing.edition.picture import ImagePicture, MapPicture, nice_length, picture_html
+from wildlab.sharing.edition.picture import (
+    FOOT,
+    HEIGHT,
+    WIDTH,
+    ImagePicture,
+    MapPicture,
+    nice_length,
+    picture_html,
+)
 
 EN = load_language()
 NONE = np.empty((0, 2))
@@ -47,6 +55,7 @@ def test_a_map_is_to_scale_with_north_up_and_east_right() -> None:
     ((sx, sy, _),), ((tx, ty, _),), ((ox, oy, _),) = (circles(html, one) for one in ("seen", "true", "start"))
     scale = bar(html) / 20 if ">20" in html else bar(html) / 10 if ">10\u00a0" in html else bar(html) / 50
     assert (sx - ox) == pytest.approx(80 * scale, abs=0.3) and (oy - sy) == pytest.approx(40 * scale, abs=0.3)
+    assert all(0 <= x <= WIDTH and 0 <= y <= HEIGHT - FOOT for x, y in ((sx, sy), (tx, ty), (ox, oy)))
     assert sx == pytest.approx(tx, abs=0.15) and (ty - sy) == pytest.approx(30 * scale, abs=0.3)
 
 
