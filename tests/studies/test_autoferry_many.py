@@ -55,24 +55,6 @@ def test_what_it_was_tuned_on_is_in_no_median() -> None:
     assert (middle["of"] == 2).all()
 
 
-def test_sentences_turn_with_the_numbers() -> None:
-    table = rows()
-    said = words.headline(table, words.medians(table, "s1"), "s1")
-    assert said[0].startswith(
-        "Tuned on s1 alone, the tracker's GOSPA on 2 other scenarios is, in the median, "
-    )
-    assert "radar alone 8.0 m (8.0 to 16.0 with the 2 best draws)" in said[0]
-    assert "another boat 0 times, and a boat got a new track 6 times" in said[1]
-    assert "a track at 90 % of the looks" in said[2] and "in 1 of 2 scenarios" in said[3]
-    better = table.assign(gospa=table["gospa"].where(table["mode"] != "both", 1.0))
-    assert "in 2 of 2 scenarios" in words.fusion(better[(better["rank"] == 1) & (better["case"] != "s1")])
-    own = table[(table["rank"] == 1) & (table["case"] != "s1")]
-    assert "in 6 of 6 scenarios" in words.doubts(own)
-    assert "in 0 of 6 scenarios" in words.doubts(own.assign(anees=9.0))
-    alone = table[table["case"] == "s1"]
-    assert "nothing can be judged" in words.headline(alone, words.medians(alone, "s1"), "s1")[0]
-
-
 def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first() -> None:
     settings = draw(np.random.default_rng(1), ERRORS)
     drawn = [
@@ -87,20 +69,6 @@ def test_what_is_assumed_of_the_truth_chooses_no_draw() -> None:
     for sd in (0.0, 2.0):
         lives = compare_identities([one._replace(truth_sd=sd)], 5.0)
         assert anees_of(lives) == 9 / 2 and anees_of(lives, alone=False) == 9 / (1 + sd**2) / 2
-
-
-def test_cameras_are_judged_with_the_settings_of_those_without() -> None:
-    table = pd.DataFrame(
-        {"case": ["s1", "s2", "s3", "s2"], "rank": [1, 1, 1, 2], "with": [1.0, 4.0, 6.0, 5.0],
-         "without": [9.0, 5.0, 5.5, 7.0]}
-    )  # fmt: skip
-    said = words.cameras(table, "s1")
-    assert "smaller in 2 of 3 pairs" in said and "in the median 1.0 m smaller (-2.0 to +0.5 m)" in said
-    worse = table.rename(columns={"with": "without", "without": "with"})
-    assert "smaller in 1 of 3 pairs" in words.cameras(worse, "s1")
-    assert "1.0 m larger" in words.cameras(worse, "s1")
-    assert "in the median no different (" in words.cameras(table.assign(without=table["with"]), "s1")
-    assert words.cameras(table, "none of them") and not words.cameras(table[:1], "s1")
 
 
 def test_the_table_of_draws_has_each_scenario_once() -> None:

@@ -1,15 +1,13 @@
-"""Joint association of two that cross: swaps, shared errors of the pose, and what is said of them."""
+"""Joint association of two that cross: swaps, and shared errors of the pose."""
 
 from __future__ import annotations
 
 from types import SimpleNamespace
 
-import pandas as pd
 import pytest
 
 from tests.studies.test_crossing_vessels import INTERVAL, passing
-from wildlab.studies.crossing_vessels import text
-from wildlab.studies.crossing_vessels.trial import DISTANCE, joint
+from wildlab.studies.crossing_vessels.trial import joint
 from wildlab.studies.crossing_vessels.trial.crossing import BOATS, EVERY
 
 
@@ -40,12 +38,3 @@ def test_shared_tracks_are_swapped_where_each_has_the_others(after, end, expecte
         pair = (1, 2) if time < 300 else after if time < 460 else end
         told.append({boat: name for boat, name in zip(BOATS, pair, strict=True) if name is not None})
     assert joint.joint_swapped(crossing, SimpleNamespace(followed=told)) == expected
-
-
-def test_joint_words_turn_with_the_flights():
-    table = {(joint.JOINT, "swapped"): [1.0] * 12 + [0.0] * 8, (DISTANCE, "swapped"): [0.0] * 20}
-    assert "on more of them, beyond chance" in text.joint_words(pd.DataFrame(table))
-    table = {(joint.JOINT, "swapped"): [0.0] * 20, (DISTANCE, "swapped"): [1.0] * 12 + [0.0] * 8}
-    assert "on fewer of them, beyond chance" in text.joint_words(pd.DataFrame(table))
-    table = {(joint.JOINT, "swapped"): [1.0, 0.0], (DISTANCE, "swapped"): [0.0, 0.0]}
-    assert "cannot be told" in text.joint_words(pd.DataFrame(table))

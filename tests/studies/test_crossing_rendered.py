@@ -405,31 +405,3 @@ def test_a_frame_is_the_same_when_it_is_seen_again(rendering) -> None:
 def frame_time(rendering: Rendering, exposure: int) -> float:
     crossing = rendering.frames.crossing
     return float(crossing.times[list(np.unique(crossing.looks.image)).index(exposure)])
-
-
-def test_the_figure_says_what_it_draws(rendering) -> None:
-    shown = charts.frames_shown(TWIN, [rendering])
-    assert shown is not None
-    fig, name, alt, caption = shown
-    exposures = charts.telling_exposures(rendering)
-    assert name == "fig-6-22" and len(fig.axes) == len(exposures)
-    for ax, exposure in zip(fig.axes, exposures, strict=True):
-        words = charts.picture_words(charts.picture_of(TWIN, rendering, exposure))
-        assert ax.get_title(loc="left").lower() == words
-        assert words in alt and words in caption
-        assert len(ax.patches) == (rendering.spotted.exposure == exposure).sum()
-        (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-        for box in ax.patches:
-            x, y = box.get_xy()
-            assert left <= x and x + box.get_width() <= right and top <= y and y + box.get_height() <= bottom
-    assert "flight 7" in caption
-
-
-def test_words_on_a_frame_turn_with_it() -> None:
-    spotted = spot(SHOTS[:1], SHAPE)
-    picture = charts.Picture(3, np.zeros(SHAPE, np.uint16), spotted, np.zeros((3, 4)), 11.2)
-    assert charts.picture_words(picture) == "both found, 11 m apart, 1 false"
-    as_one = picture._replace(spotted=spot(SHOTS[1:2], SHAPE))
-    assert charts.picture_words(as_one) == "found as one, 11 m apart"
-    assert charts.picture_words(picture._replace(spotted=spot(SHOTS[2:3], SHAPE))).startswith("none found")
-    assert charts.picture_words(picture._replace(spotted=spot(SHOTS[3:4], SHAPE))).startswith("one found")

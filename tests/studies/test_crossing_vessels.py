@@ -1,31 +1,26 @@
-"""The study of crossing vessels: known mistakes, and words that turn with numbers."""
+"""The study of crossing vessels: known mistakes, and claims that turn with numbers."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 import pytest
-from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from scipy.stats import binomtest
 
 from wildlab.geometry.validation import gate_threshold
 from wildlab.pipeline.georeference import observe
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.reporting.spread import share_below
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.crossing_vessels import STUDY, charts, text
+from wildlab.studies.crossing_vessels import STUDY, text
 from wildlab.studies.crossing_vessels import trial as study
 from wildlab.studies.crossing_vessels.claims import check_claims
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
     FEATURES,
     LOOKS,
-    SEPARATIONS,
-    STATE,
     SUBJECTS,
     VETO,
     all_numbers,
-    curve_subject,
     distances_of,
     dressed,
     follow_by,
@@ -282,149 +277,6 @@ def test_published_numbers_are_those_of_the_text():
     assert printed["wrong_rate_boat_1", FEATURES] == pytest.approx(5 / 1535, abs=5e-5)
     assert printed["wrong_rate_boat_2", FEATURES] == 0
     assert text.PUBLISHED_WRONG == 5
-
-
-def curve(wrong, swaps):
-    """Numbers over the separation."""
-    pairs = zip(SEPARATIONS, wrong, swaps, strict=True)
-    return {
-        (curve_subject(at), name): value
-        for at, count, swap in pairs
-        for name, value in (("wrong", count), ("swapped", swap))
-    }
-
-
-def test_words_turn_with_the_numbers(numbers):
-    good = spread_of(numbers, GOOD | curve((1500, 90, 40, 20, 6, 0), (1, 0, 0, 0, 0, 0)), 20)
-    bad = spread_of(numbers, GOOD | BAD | curve((1500,) * 6, (1,) * 6), 20)
-    first = text.summary(good)
-    assert "swapped on 20 of 20 flights" in first[0]
-    assert "look like, on 0 of 20 flights" in first[0]
-    assert "by distance alone 1800 on each of 20 flights" in first[1]
-    assert "features 5 on each of 20 flights. Published" in first[1]
-    worst = pd.concat([good, spread_of(numbers, GOOD | {(FEATURES, "wrong"): 455.0}, 1)])
-    assert "features 5 in the median (5 to 455 on nine flights of ten). Published" in text.summary(worst)[1]
-    hidden = pd.concat([good, good, spread_of(numbers, GOOD | {(FEATURES, "wrong"): 455.0}, 1)])
-    assert "(5 to 5 on nine flights of ten, at most 455). Published" in text.summary(hidden)[1]
-    assert "features 5. Published" in text.summary(good[:1])[1]
-    assert "at most" not in text.summary(good[:1])[1]
-    assert "80.0 %" in first[2] and "20.0 %" in text.summary(bad)[2]
-    assert "1. Of these 1 ends with" in text.end_words(good[:1])
-    assert "20. Of these 20 end" in text.end_words(good)
-    assert "nothing to recover" in text.end_words(bad)
-    assert "Size tells them apart best" in text.looks_words(good)
-    assert "Hu's first moment tells them apart best" in text.looks_words(bad)
-    words = text.curve_words(good)
-    assert "At a difference of 1 and more no flight of 20 is swapped" in words
-    assert "makes more flights swap cannot be told: 20 flights swapped with it, 20 without" in words
-    assert "1500 with it, 1800 without (medians); more on 0 of 20 flights, fewer on 20. As" in words
-    assert "cannot be told: 1 flight swapped with it, 1 without" in text.curve_words(good[:1])
-    assert "fewer on 1, which chance may have done too. As" in text.curve_words(good[:1])
-    assert "are reached at 6 (median" in words
-    worse = text.curve_words(bad)
-    assert "At 6 spreads 20 of 20 flights are still swapped" in worse
-    assert "nothing makes more flights swap: 20 flights swapped with it, 0 without" in worse
-    assert "1500 with it, 5 without (medians); more on 20 of 20 flights, fewer on 0. As" in worse
-    even = spread_of(numbers, GOOD | {(DISTANCE, "wrong"): 9.0} | curve((9,) * 6, (0,) * 6), 20)
-    assert "as many on every flight, 9 with it, 9 without" in text.curve_words(even)
-    assert "makes fewer flights swap: 0 flights swapped with it, 20 without" in text.curve_words(even)
-    assert "at none of these" in worse
-    assert "at all of these" in text.as_published_words(spread_of(numbers, curve((3,) * 6, (0,) * 6)))
-    gap = text.curve_words(spread_of(numbers, GOOD | curve((9,) * 6, (1, 0, 1, 0, 0, 0)), 20))
-    assert "At a difference of 3 and more" in gap
-
-
-@pytest.mark.parametrize(
-    ("wrong", "said"), [(2.0, "fewer wrong, 2"), (9.0, "more wrong, 9"), (5.0, "as many wrong, 5")]
-)
-def test_words_on_the_veto(numbers, wrong, said):
-    spread = spread_of(
-        numbers, {(VETO, "wrong"): wrong, (FEATURES, "wrong"): 5.0, (VETO, "unassigned"): 70.0}
-    )
-    assert said in text.veto_words(spread)
-    assert "70 detections go to no track" in text.veto_words(spread)
-
-
-def test_what_tells_best_is_said_where_one_does(numbers):
-    def told(*apart: float) -> str:
-        names = ("size", "intensity", "hu")
-        changes = {(LOOKS, f"separation_{k}"): v for k, v in zip(names, apart, strict=True)}
-        return text.looks_words(spread_of(numbers, changes, 3))
-
-    assert told(2.0, 5.0, 1.0).endswith("Intensity tells them apart best.")
-    for none in ((0.0, 0.0, 0.0), (2.0, 2.0, 2.0), (np.nan, np.nan, np.nan), (2.0, np.nan, 1.0)):
-        assert "best" not in told(*none)
-
-
-def test_words_on_features_in_the_state_turn_with_the_flights(numbers):
-    state = {(STATE, "wrong"): 2.0, (STATE, "tracks"): 9.0, (STATE, "unassigned"): 70.0}
-    base = {(FEATURES, "wrong"): 5.0, (FEATURES, "tracks"): 2.0, (FEATURES, "unassigned"): 30.0}
-    for mine, theirs, said in ((0.0, 1.0, "on fewer of them"), (1.0, 0.0, "on more"), (0.0, 0.0, "cannot")):
-        swaps = {(STATE, "swapped"): mine, (FEATURES, "swapped"): theirs}
-        told = text.state_words(spread_of(numbers, state | base | swaps, 20))
-        assert said in told and "2 and 5" in told and "70 and 30" in told and "9 and 2" in told
-        assert f"on {int(20 * mine)} of 20 flights" in told
-
-
-def test_ties_with_the_print_are_told_where_there_are_any(numbers):
-    spread = spread_of(numbers, GOOD, 3)
-    printed = {"wrong_rate_boat_1": 0.0033, "wrong_rate_boat_2": 0.0}
-    told = text.ties_words(spread, printed)
-    assert "counts half. Equal to it: boat 2, 3 of 3." in told and "boat 1" not in told
-    # What is said is what the column is computed by: all equal are half below.
-    assert share_below(spread[FEATURES, "wrong_rate_boat_2"], 0.0) == 0.5
-    assert text.ties_words(spread, printed | {"wrong_rate_boat_2": 0.1}).endswith("counts half.")
-    assert text.ties_words(spread[:1], printed) == ""
-
-
-def test_levels_of_none_are_seen_and_the_scale_bar_lies_free(flown, numbers):
-    spread = spread_of(numbers, GOOD | {(FEATURES, "wrong"): 0.0} | curve((353, 9, 6, 5, 2, 0), (0,) * 6), 3)
-    fig, _, _, _ = charts.curve_shown(spread)
-    fig.canvas.draw()
-    top = fig.axes[0]
-    assert top.get_title(loc="left") == "Wrong: 353 at no difference, 0 at 6 spreads"
-    none = top.transData.transform((0, 0))[1]
-    assert none > top.bbox.y0 + 5
-    fig, _, _, _ = charts.tracks_shown(flown)
-    fig.canvas.draw()
-    ax = fig.axes[1]
-    (bar,) = [one for one in ax.artists if isinstance(one, AnchoredSizeBar)]
-    box = bar.get_window_extent(fig.canvas.get_renderer())
-    for line in ax.lines:
-        # Between two points, too: a track may jump.
-        points = ax.transData.transform(np.asarray(line.get_xydata(), float))
-        steps = points[:-1, None] + np.linspace(0, 1, 20)[:, None] * np.diff(points, axis=0)[:, None]
-        assert not box.padded(2).count_contains(steps.reshape(-1, 2))
-
-
-def test_the_table_has_a_row_for_each_rule(numbers):
-    table = text.outcome_table(spread_of(numbers, GOOD, 20))
-    assert list(table.columns) == list(text.OUTCOME_COLUMNS)
-    assert table["wrong"].tolist()[:2] == [1800.0, 5.0]
-    assert text.swap_words(spread_of(numbers, GOOD, 1), DISTANCE) == "the one flight"
-    assert text.swap_words(spread_of(numbers, GOOD, 1), FEATURES) == "no flight of one"
-
-
-def test_figures_say_what_they_show(flown, numbers):
-    spread = spread_of(numbers, curve((1500, 90, 40, 20, 6, 0), (1, 0, 0, 0, 0, 0)), 20)
-    for shown, words in (
-        (charts.tracks_shown(flown), f"{numbers[DISTANCE, 'wrong']:.0f} wrong"),
-        (charts.looks_shown(flown.looks), f"size {numbers[LOOKS, 'separation_size']:.1f}"),
-        (charts.curve_shown(spread), "0: 1500 wrong, 100 % swapped"),
-    ):
-        assert words in shown[2]
-        assert words.split()[0] in shown[3]
-
-
-def test_outcomes_are_named(flown, monkeypatch):
-    for pair, words in (
-        ((True, True), "swapped for good"),
-        ((True, False), "swapped, and not at the end"),
-        ((False, True), "swapped at the end"),
-        ((False, False), "no swap"),
-    ):
-        monkeypatch.setattr(charts, "swapped", lambda *_, pair=pair: pair)
-        assert charts.outcome_words(flown.crossing, FEATURES, flown).startswith(words + ",")
 
 
 def test_two_are_apart_up_to_just_before_they_meet_and_from_just_after():

@@ -1,4 +1,4 @@
-"""What a twin was fitted to is no test of it, and the pages say so."""
+"""What a twin was fitted to is no test of it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from wildlab.reporting.published import load_published, published_rows
 from wildlab.runner.catalogue import load_studies
 from wildlab.simulation.parameters import each_parameter, fitted_to, load_twin, twin_names
-from wildlab.studies.fit_and_prediction import Beside, fit_words, tables_apart
+from wildlab.studies.fit_and_prediction import Beside, tables_apart
 
 
 def numbers(*rows: tuple[str, str]) -> pd.DataFrame:
@@ -23,25 +23,6 @@ def test_tables_are_parted_once_each_in_their_order() -> None:
         Beside("F table 1.1", 0, 1, ()),
     ]
     assert tables_apart(numbers()) == []
-
-
-def test_the_words_follow_the_numbers() -> None:
-    twin = load_twin("static-antenna")
-    words = fit_words(
-        numbers(("H table 5.4", "the sway"), ("H table 5.5", ""), ("H table 5.5", "course")), twin
-    )
-    assert "What stands beside H table 5.4 is no test: the sway." in words
-    assert "1 of 2 numbers beside H table 5.5 are no test: course." in words
-    assert "prediction" not in words and "not known" in words and "camera sway" in words
-    free = fit_words(numbers(("H table 5.6", "")), twin)
-    assert "no test" not in free and "What stands beside H table 5.6 is a prediction." in free
-
-
-def test_a_twin_without_fitted_parameters_says_so() -> None:
-    assert fit_words(numbers(("H table 6.1", "")), "large-ship") == (
-        "No parameter of this twin was fitted to a published table. What stands beside H table 6.1 is a "
-        "prediction."
-    )
 
 
 @pytest.mark.parametrize("name", [name for name in twin_names() if load_twin(name).camera_sway])

@@ -1,4 +1,4 @@
-"""Tracks of crossing vessels that are found again: known outcomes, and words that turn with numbers."""
+"""Tracks of crossing vessels that are found again: known outcomes."""
 
 from __future__ import annotations
 
@@ -131,8 +131,6 @@ def test_shares_are_of_tracks_that_had_something_to_find():
     assert np.array_equal(
         text.shares(spread, GUESSED_WITHOUT, "found_wrong"), [0.3, np.nan, 0.0], equal_nan=True
     )
-    empty = spread_of({way: (0, 0, 0, 5) for way in WAYS})
-    assert text.share_words(text.shares(empty, WITH, "found_right")) == "none to find"
 
 
 def test_intervals_are_those_of_flights():
@@ -143,43 +141,12 @@ def test_intervals_are_those_of_flights():
     wilson = share_interval(3, 6)
     assert row["none wrong"] == f"3 of 6 ({100 * wilson.low:.0f} to {100 * wilson.high:.0f} %)"
     assert row["all right"] == row["none wrong"]
-    assert text.share_words(np.array([0.4])) == "40.0 %"
-    assert list(text.again_table(spread).columns) == list(text.AGAIN_COLUMNS)
-
-
-def test_words_turn_with_the_numbers():
-    good, bad = text.again_words(spread_of(*[GOOD] * 8)), text.again_words(spread_of(*[BAD] * 8))
-    assert "alone 10.0 % on each of 8 flights, with what the vessels look like 100.0 % on each of 8" in good
-    assert "larger on 8 of 8, smaller on 0: looks help, beyond chance." in good
-    assert "larger on 0 of 8, smaller on 8: looks do harm, beyond chance." in bad
-    assert good.count("more is wrong, beyond chance") == 2
-    assert bad.count("that guessing makes more wrong cannot be told") == 1
-    assert bad.count("less is wrong, beyond chance") == 1
-    few = text.again_words(spread_of(*[GOOD] * 3))
-    assert "larger on 3 of 3, smaller on 0, which chance may have done too." in few
-    assert few.count("that guessing makes more wrong cannot be told") == 2
-
-
-def test_the_caption_counts_what_was_rightly_new():
-    said = text.caption(spread_of(*[GOOD] * 8))
-    assert "10 on a flight, in the median" in said
-    assert said.endswith(f"on all flights: {text.NAMES[GUESSED_WITH]} 8.")
-    assert text.caption(spread_of(BAD)).endswith("on all flights: none.")
-
-
-def test_what_is_explained_is_what_was_told():
-    assert "ends 10 s after" in text.EXPLAINED and "5 m/s" in text.EXPLAINED
-    assert "gate of 99 %" in text.EXPLAINED and "99.9 %" in text.EXPLAINED and "19 times" in text.EXPLAINED
 
 
 def test_flights_with_nothing_to_find_count_nowhere() -> None:
-    """Half of eight flights have a track to find: of four, in each column and sentence."""
+    """Half of eight flights have a track to find: of four, in each column."""
     parts = {text.RIGHT: [1.0] * 4 + [0.0] * 4, text.WRONG: 0.0, text.MISSED: 0.0, text.NEW: 0.0}
     table = pd.DataFrame({(way, name): np.broadcast_to(values, 8)
                           for way in text.NAMES for name, values in parts.items()})  # fmt: skip
     for _, row in text.again_table(table).iterrows():
         assert row["none wrong"].startswith("4 of 4") and row["all right"].startswith("4 of 4")
-    assert "larger on 0 of 4" in text.again_words(table)
-    none = table * 0.0
-    words = text.again_words(none)
-    assert "On no flight is there anything to find again" in words and "wrong for none" not in words

@@ -1,4 +1,4 @@
-"""What the study of a gondola's camera computes, and that its words turn with its numbers."""
+"""What the study of a gondola's camera computes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.gondola_coverage import STUDY, text
+from wildlab.studies.gondola_coverage import STUDY
 from wildlab.studies.gondola_coverage.trial import (
     ADAPT,
     DOWN,
@@ -137,32 +137,3 @@ def test_what_is_shown_of_a_claim_is_the_comparison_that_decides_it() -> None:
     check = check_claims(made_up(**{"adaptive-45/outside": 7e4}))["adaptive-least-outside"]
     assert check.first is not None and check.second is not None
     assert check.first == pytest.approx(60.0) and check.second == pytest.approx(70.0)
-
-
-def test_the_words_turn_with_the_numbers() -> None:
-    first, second, third = text.summary(made_up(), 100)
-    assert "adaptive, 45 deg: 35.0 %, against 10.0 %" in first
-    assert "adaptive, 45 deg, 20.0 % of what it sees" in second and "most is seen with yaw" in second
-    assert "held" in third and "99.0 %" in third
-    first, second, third = text.summary(
-        made_up(**{"roll-75/seen": 0.6, "roll-75/near": 0.9, f"{DOWN}/held": 0.5}), 25
-    )
-    assert first.endswith("with the camera straight down on 25 % of the lap.")
-    assert "roll, 75 deg: 60.0 %" in first and "most is seen with roll, 75 deg, 90.0 %" in second
-    assert "did not always hold" in third
-    assert "3 of 3 limits" in text.strategies_words(made_up())
-    assert "2 of 3 limits" in text.strategies_words(made_up(**{"adaptive-45/outside": 9e4}))
-    assert "3 of 3 see more there than" in text.near_words(made_up())
-    said = text.near_words(made_up(**{"roll-75/near": 0.9}))
-    assert "0 of 3 see more there than roll, 75 deg" in said
-    assert all(text.name_of(one) in said for one in YAW)
-    spread = made_up(3)
-    spread[DOWN, "near"] = [0.4, 0.5, 0.6]
-    assert text.table(spread)["near the cable"][0] == "50.0 % (25.2 to 74.8 %)"
-    spread[DOWN, "held"] = np.nan
-    assert "In 3 more nothing was surely to be seen" in text.summary(spread, 100)[2]
-    assert text.held_table(spread)["least of all draws"][0] == "nothing planned in 3 of 3"
-    assert "that hardly matters" in text.rate_words(5, {"roll-60": 0.004})
-    said = text.rate_words(5, {"roll-60": -0.03, "adaptive-60": 0.001})
-    assert "3.00 % more of the enclosures" in said and "hang on it" in said
-    assert len(text.table(made_up())) == len(text.held_table(made_up(1))) == len(STRATEGIES)

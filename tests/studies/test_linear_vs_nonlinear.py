@@ -1,7 +1,6 @@
 """Claims of H 6.4.2, 7.5.1 and 7.5.2 flight by flight, and filters over detections against every frame."""
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,9 +9,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.pipeline.track import follow_positions, start
 from wildlab.reporting.published import load_claims
-from wildlab.studies.coloured_noise import text as coloured_noise_text
 from wildlab.studies.coloured_noise import trial as coloured_noise
-from wildlab.studies.linear_vs_nonlinear import text as linear_vs_nonlinear_text
 from wildlab.studies.linear_vs_nonlinear import trial as linear_vs_nonlinear
 from wildlab.tracking.measurement import positions
 from wildlab.tracking.motion import singer
@@ -124,56 +121,6 @@ def test_claims_on_correlated_noise_are_decided_flight_by_flight(claim: str) -> 
     checks = coloured_noise.check_claims(noisy({}, NOISY_OPPOSED[claim]))
     assert set(checks) == set(NOISY_OPPOSED)
     assert checks[claim].holds(THRESHOLDS.get(claim)).tolist() == [True, False]
-
-
-def said(verdict: str, share: float | None) -> dict[str, Any]:
-    return {"verdict": verdict, "fraction": share}
-
-
-def test_words_turn_with_their_numbers() -> None:
-    claims = {"kf-ekf-similar": said("holds", 1.0)}
-    one = " ".join(linear_vs_nonlinear_text.summary(flights(*[{}] * 40), claims, "fast"))
-    assert "The linear filter is nearer to the truth on 40 of 40 flights, by 0.9 m" in one
-    assert "on nearly all of 40 flights (100 %)" in one and "times as large as it states" in one
-    assert "single detections do not show it" in one
-    turned = {
-        ("kf", "mae"): 14.0,
-        ("kf", "nees"): 1.0,
-        ("kf", "nis"): 9.0,
-        ("ekf", "nees"): 2.0,
-        ("ekf", "nis"): 2.0,
-    }
-    claims = {"kf-ekf-similar": said("does not hold", 0.02)}
-    other = " ".join(linear_vs_nonlinear_text.summary(flights(*[turned] * 40), claims, "slow"))
-    assert "The extended filter is nearer to the truth on 40 of 40 flights, by 3.1 m" in other
-    assert "on hardly any of 40 flights (2 %)" in other and "0.71 of what it states" in other
-    assert "would suggest larger ones" in other and "detections agree" in other
-    alone = " ".join(
-        linear_vs_nonlinear_text.summary(flights({}), {"kf-ekf-similar": said("undecided", 1.0)}, "fast")
-    )
-    assert "on one flight" in alone and "on 1 of 1 flights, which decides nothing" in alone
-    assert "−0.10 m in the middle" in linear_vs_nonlinear_text.unscented_words(flights({}, {}))
-
-
-def test_words_on_correlated_noise_turn_with_their_numbers() -> None:
-    claims = {"differencing-consistent": said("holds", 1.0)}
-    one = " ".join(coloured_noise_text.summary(noisy(*[{}] * 40), claims))
-    assert "Of the benchmark and differencing, the benchmark is nearer to the truth on 40 of 40" in one
-    assert (
-        "Singer's model, Singer's model is nearer to the truth on 40" in one and "on nearly all of 40" in one
-    )
-    turned = {("coloured", "mae"): 8.0, ("singer", "mae"): 12.0, ("coloured", "nees"): 50.0}
-    claims = {"differencing-consistent": said("premise not met", None)}
-    other = " ".join(coloured_noise_text.summary(noisy(*[turned] * 40), claims))
-    assert "differencing is nearer" in other and "the benchmark is nearer to the truth on 40" in other
-    assert "5.0 times as large as it states" in other and "not tested" in other
-    assert "4.0 times less" in coloured_noise_text.correlation_words({"cv": 0.4, "coloured": 0.1})
-    assert "no less" in coloured_noise_text.correlation_words({"cv": 0.1, "coloured": 0.4})
-    middling = [{("cv", "mae"): value} for value in (10.0, 9.0, 11.0, 8.0, 12.0)]
-    assert "is typical" in coloured_noise_text.drawn_words(noisy(*middling))
-    assert "is not typical: 0 of the 4" in coloured_noise_text.drawn_words(
-        noisy({("cv", "mae"): 1.0}, *middling[1:])
-    )
 
 
 def test_another_twin_is_refused() -> None:

@@ -1,17 +1,14 @@
-"""What the study of velocity from flow computes, and that its words turn with its numbers."""
+"""What the study of velocity from flow computes."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.detection.flow import FlowThresholds
 from wildlab.errors import WildlabError
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.optical_flow_velocity import STUDY, charts, text
+from wildlab.studies.optical_flow_velocity import STUDY
 from wildlab.studies.optical_flow_velocity import trial as study
 from wildlab.studies.optical_flow_velocity.trial import (
     CALIBRATED,
@@ -187,91 +184,9 @@ def test_a_mean_whose_interval_has_both_sides_in_it_decides_nothing():
     assert not mean_decided(spread_of(logged__half_mean_east=3.0)).any()
 
 
-def test_the_sentence_on_the_mean_says_how_many_pairs_can_tell():
-    none = text.mean_words(spread_of(4, logged__half_mean_north=2.0))
-    assert none.startswith("On none of 4 flights can the pairs tell")
-    assert "There are 50 pairs a flight; the thesis used every pair of its 250 images." in none
-    some = pd.concat([spread_of(3), spread_of(1, logged__half_mean_north=2.0, logged__pairs=70.0)])
-    said = text.mean_words(some)
-    assert said.startswith("On 3 of 3 flights (44 to 100 %)")
-    assert "on 1 more the pairs cannot tell" in said and "50 to 70 pairs" in said
-    value, label = text.mean_tile(spread_of(logged__half_mean_east=2.0))
-    assert value == "0.3 m/s" and "known to ± 2.0 m/s" in label
-    assert (
-        "known"
-        not in text.mean_tile(spread_of(logged__half_mean_east=np.nan, logged__half_mean_north=np.nan))[1]
-    )
-
-
-def test_what_exact_times_leave_is_said_beside_particularly_vulnerable():
-    few, many = ({"synchronised__sd_north": sd, "synchronised__sd_east": sd} for sd in (1.0, 5.0))
-    assert text.synchronised_words(spread_of(**few)).endswith("so it is here.")
-    said = text.synchronised_words(spread_of(**many))
-    assert said.endswith("so it is not here.") and "leave 91 %" in said
-    mixed = text.synchronised_words(pd.concat([spread_of(1, **few), spread_of(1, **many)]))
-    assert "18 to 91 %" in mixed and mixed.endswith("on some of the flights only.")
-    unknown = spread_of(1, synchronised__sd_north=np.nan)
-    assert "no flight can tell" in text.synchronised_words(unknown)
-    assert text.synchronised_words(pd.concat([unknown, spread_of(1, **few)])).endswith("so it is here.")
-    stated = {one["id"]: one for one in load_claims("optical-flow-velocity")}["better-synchronised"]
-    assert float(stated["threshold"]) == text.PARTICULAR and "particularly" in stated["text"]
-
-
-def test_limits_say_what_is_on_deck_and_how_many_pairs(monkeypatch):
-    monkeypatch.setattr(text, "SHIP", replace(study.SHIP, fittings=7))
-    said = " ".join(text.limits(42))
-    assert "that is 7 small things" in said and "about 42 pairs" in said
-
-
-def test_the_sentences_turn_with_the_numbers():
-    good = " ".join(text.summary(spread_of()))
-    assert "On 40 of 40 flights (91 to 100 %)" in good and "says little" in good
-    assert "Most of it comes from the poses: with all of them exact 0.5 m/s are left" in good
-    other = spread_of(1, logged__mean_north=2.5, logged__sd_north=0.4, logged__sd_east=0.4)
-    bad = " ".join(text.summary(other))
-    assert "On 0 of 1 flight " in bad and "largest mean is 2.50 m/s off" in bad
-    assert "says much" in bad and "Much of it comes from the images themselves" in bad
-
-
-def test_intervals_are_called_what_they_are():
-    for share, word in ((0.7, "too sure"), (0.95, "about right"), (1.0, "too cautious")):
-        assert text.interval_words(spread_of(logged__interval_share_95=share)).endswith(f"{word}.")
-    wide = pd.concat([spread_of(1, logged__interval_share_95=share) for share in (0.8, 0.9, 1.0)])
-    said = text.interval_words(wide)
-    assert "in 90 % (65 to 100 %, over flights) of a flight's pairs, of 150 in all" in said
-    assert said.endswith("about right."), "its interval has 95 % in it"
-    assert "one flight cannot tell" in text.interval_words(spread_of(1))
-
-
-def test_stamps_and_limits_say_what_they_do():
-    assert "busy now and then" in text.stamps_words(spread_of())
-    assert "busy" not in text.stamps_words(spread_of(stamps__sd_north=5.0, stamps__sd_east=5.0))
-    words = text.gimbal_words(spread_of(slow_gimbal__pairs=10.0, likely_speed__sd_north=2.0))
-    assert "20 % of the pairs pass the first limit" in words and "100 % the second" in words
-    assert "nan" not in text.gimbal_words(spread_of(slow_gimbal__sd_north=np.nan))
-
-
-def test_tables_have_a_row_for_everything():
-    assert set(text.readings_table(spread_of())["reading"]) == {
-        text.NAMES[one] for one in (*READINGS, SLOW, LIKELY)
-    }
-    assert len(text.thresholds_table(FlowThresholds())) == len(text.REASONS)
+def test_every_published_number_is_recorded():
     for row in load_published("optical-flow-velocity").itertuples():
         assert row.subject in STUDY.subjects and row.name in RECORDED
-
-
-def test_charts_say_what_they_show(looked, tables):
-    shown = [
-        charts.path_shown(looked), charts.gimbal_shown(looked), charts.features_shown(looked),
-        charts.flow_shown(tables[LOGGED]), charts.velocity_shown(tables[LOGGED]),
-        charts.readings_shown(spread_of()),
-    ]  # fmt: skip
-    assert len({name for _, name, _, _ in shown}) == len(shown)
-    assert all(alt and caption for _, _, alt, caption in shown)
-    assert f"{int((looked.shares > 0).sum())} of 600 images" in shown[1][2]
-    mean = tables[LOGGED]["v_north_m_s"].mean()
-    assert f"{mean:.1f} m/s north" in shown[4][2]
-    assert "all poses exact 0.5 m/s" in shown[5][2]
 
 
 def test_no_correlation_is_asked_to_be_above_one():

@@ -1,4 +1,4 @@
-"""What the study of the precision drop computes, and that its words turn with its numbers."""
+"""What the study of the precision drop computes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.coloured import Ground
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.studies import monte_carlo
-from wildlab.studies.precision_drop import STUDY, charts, text
+from wildlab.studies.precision_drop import STUDY, text
 from wildlab.studies.precision_drop.trial import (
     COUNTS,
     FOUND,
@@ -123,49 +123,14 @@ def table(**changed):
     return pd.DataFrame([base, base], dtype=float)
 
 
-def test_words_turn_with_the_numbers():
-    alike = text.summary(table())
-    assert "nothing else was found" in alike[0] and "100 %" in alike[0]
-    assert alike[2] == "The errors of 75 detections are alike: their mean is worth about 4 independent ones."
-    other = text.summary(table(tarpaulin_right=60, tarpaulin_false=3, mean_error=0.4))
-    assert "something else was found in 6" in other[0] and "80.0 %" in other[0]
-    assert "much better" in other[1] and "as independent errors are" in other[2]
-    assert "no better" in text.summary(table(mean_error=3.5))[1]
-    assert text.summary(table(mean_error=4.0))[2].endswith("worth about 1 independent one.")
-    assert "independent, 75 would lower it to 0.3 m" in text.mean_words(table())
-    assert "That is what independent errors would give" in text.mean_words(table(mean_error=0.4))
-    assert "25.0 % of the mean square error" in text.mean_words(table())
-    assert "69.4 % of the mean square error" in text.mean_words(table(mean_error=10 / 3))
-    assert "too narrow" in text.pixel_words(table(tarpaulin_ellipse_coverage_90=0.5))
-    assert "wider than" in text.pixel_words(table(tarpaulin_ellipse_coverage_90=1.0))
-    wide = table()
-    wide[FOUND, "ellipse_coverage_90"] = [0.8, 0.98]
-    assert "89.0 % (0 % to 100 %) of a flight's images, on the mean: they are not told from right" in (
-        text.pixel_words(wide)
-    )
-    assert "90.0 % of the images of the one flight." in text.pixel_words(table().head(1))
-    assert "All of the tarpaulin" in text.pixel_words(table(tarpaulin_area_share=1.02))
-    assert "12 have a sky" in text.horizon_words(table()) and "let 0 of these" in text.horizon_words(table())
-    assert "let 6 of these" in text.horizon_words(table(horizon_alarms_with_borders=0.25))
-    assert "is blue enough" in text.horizon_words(table(horizon_alarms_without_borders=0))
-
-
-def test_a_distance_is_never_said_to_be_below_zero():
-    two = table()
-    two[MEAN, "error"] = [0.5, 3.0]  # Student's interval of two begins far below zero
-    assert "(mean over flights 1.8 m, 0.0 to 17.6 m)" in text.mean_words(two)
-    assert "(mean over flights 2.0 m, 2.0 to 2.0 m)" in text.mean_words(table())
-
-
 def test_what_a_mean_is_worth_has_an_interval_over_flights():
     assert text.worth_interval(table()) is None
     twelve = pd.concat([table(), table(mean_error=2.5)] * 3, ignore_index=True)
     low, high = text.worth_interval(twelve)
     assert low < text.worth(twelve) < high
     assert 16 / 6.25 <= low < high <= 4
-    assert f"worth about 3 ({low:.1f} to {high:.1f}) independent ones" in text.summary(twelve)[2]
     alike = pd.concat([table()] * 3, ignore_index=True)
-    assert "worth about 4 (4.0 to 4.0) independent ones" in text.summary(alike)[2]
+    assert text.worth_interval(alike) == pytest.approx((4, 4)) and text.worth(alike) == pytest.approx(4)
 
 
 def test_a_few_pixels_on_the_ground_are_a_calculation():
@@ -173,8 +138,7 @@ def test_a_few_pixels_on_the_ground_are_a_calculation():
     assert (decide_check(check, 1.0).verdict, decide_check(check, 0.5).verdict) == (HOLDS, FAILS)
     assert decide_check(check, 1.0).share is None
     report = open_report(study="precision-drop", kind="twin")
-    said = monte_carlo.decide_claims(report, "precision-drop", check_claims(table()))
-    assert "a calculation: 0.6 m" in set(said["share"])
+    monte_carlo.decide_claims(report, "precision-drop", check_claims(table()))
     assert next(one for one in report.claims if one["id"] == "few-pixels-are-little")["fraction"] is None
 
 
@@ -192,19 +156,3 @@ def test_claims_turn_with_the_numbers():
         assert not bad[name].holds(claim.get("threshold")).any(), name
     none = check_claims(table(horizon_alarms_without_borders=0))["horizon-near-the-border"]
     assert decide(none.holds(0.1), none.premise).met == 0
-
-
-def test_pictures_say_what_they_show(few):
-    flight = SceneFlight(load_twin("precision-drop"), 1)
-    view = view_of(flight, few[0].look, int(few[0].exposures[0]), 1)
-    shown = charts.image_shown(view, Colour(), "found", "with the tarpaulin", "")
-    assert "one region is accepted" in shown[2]
-    assert "nothing is accepted" in charts.image_shown(view, Colour(smallest_px=1e6), "x", "y", "")[2]
-    assert "3.0 m after 75" in charts.mean_shown(table())[2]
-
-
-@pytest.mark.parametrize(("flights", "key"), [(1, None), (2, "lowest to highest"), (30, "middle 90 %")])
-def test_a_band_is_called_what_it_is(flights, key):
-    figure = charts.mean_shown(pd.concat([table()] * 15, ignore_index=True).head(flights))[0]
-    called = {one.get_text() for one in figure.legends[0].get_texts()}
-    assert {one for one in called if one.startswith("flights, ")} == ({f"flights, {key}"} if key else set())

@@ -1,11 +1,11 @@
-"""The arithmetic of the page on printed numbers, and that its words follow it."""
+"""The arithmetic of printed numbers."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from wildlab.studies.printed_numbers import planning_formulas, text
+from wildlab.studies.printed_numbers import planning_formulas
 from wildlab.studies.printed_numbers.arithmetic import (
     images_in,
     off_nadir,
@@ -13,7 +13,7 @@ from wildlab.studies.printed_numbers.arithmetic import (
     rescaled_nis,
     rest_of,
 )
-from wildlab.studies.printed_numbers.formulas import FORMULAS, formulas_table, formulas_words
+from wildlab.studies.printed_numbers.formulas import FORMULAS, formulas_table
 from wildlab.studies.printed_numbers.item import MARGIN, Item, load_printed
 from wildlab.studies.printed_numbers.items import all_items
 
@@ -83,15 +83,6 @@ def test_every_ratio_is_that_of_the_printed_numbers(items):
     assert {key: item.ratio for key, item in items.items()} == pytest.approx(expected)
 
 
-def test_every_item_quotes_its_sections_and_says_what_differs(items):
-    for item in items.values():
-        assert len(item.quotes) >= 2, item.key
-        assert all(section.startswith("H ") for section, _ in item.quotes), item.key
-        assert item.differs.endswith(".") and item.arithmetic.endswith("."), item.key
-        assert item.reading[0] != item.reading[1], item.key
-    assert len({item.topic for item in items.values()}) == len(items)
-
-
 @pytest.mark.parametrize(
     ("ratio", "apart"),
     [(1.0, False), (MARGIN, False), (1 / MARGIN, False), (1.01 * MARGIN, True), (0.99 / MARGIN, True),
@@ -101,11 +92,9 @@ def test_what_is_apart_is_beyond_the_margin_either_way(ratio, apart):
     item = an_item(one=ratio)
     assert item.apart is apart
     assert item.verdict == ("do not fit" if apart else "fit together")
-    assert ("which fit together" in item.title) is not apart
-    assert text.points_of(item)[-1] == ("So: if apart" if apart else "So: if together")
 
 
-def test_words_turn_with_the_numbers():
+def test_verdicts_turn_with_the_numbers():
     """All of the tables' numbers moved so that what did not fit fits, and the other way round."""
     opposed = load_printed()
     opposed["slow-vessel"]["observer", "mean_north"] = 1.85
@@ -123,35 +112,6 @@ def test_words_turn_with_the_numbers():
         "nis-of-two-poses-slow",
         "the-same-filter-twice",
     }
-    for key in turned:
-        assert before[key].title != after[key].title
-        assert text.points_of(before[key])[-1] != text.points_of(after[key])[-1]
-
-
-def test_summary_chart_and_alt_follow_the_items():
-    apart, near = an_item("far", 3.0), an_item("near", 1.0)
-    for items, first, title in (
-        ([apart, near], "1 of 2 pairs", "1 of 2 pairs lie"),
-        ([near, near], "None of the 2 pairs", "0 of 2 pairs lie"),
-        ([apart, apart], "2 of 2 pairs", "2 of 2 pairs lie"),
-    ):
-        said = text.summary(items)
-        assert said[0].startswith(first)
-        assert text.ratios_chart(items).axes[0].get_title("left").startswith(title)
-        alt = text.chart_alt(items)
-        assert ("Outside of the margin: Topic far (3.00)" in alt) is (apart in items)
-        assert ("Inside: Topic near (1.00)" in alt) is (near in items)
-    assert "3.00 times" in text.summary([near, apart])[1]
-    assert "0.20 times" in text.summary([an_item("low", 0.2), apart])[1]
-    shown = text.ratios_chart([apart, near]).axes[0].collections[-1].get_offsets()
-    assert shown[:, 0].tolist() == [3.0, 1.0]
-
-
-def test_the_table_has_a_row_for_each(items):
-    table = text.table_of(list(items.values()))
-    assert table.columns.tolist() == list(text.COLUMNS)
-    assert table["ratio"].tolist() == [item.ratio for item in items.values()]
-    assert set(table["verdict"]) <= {"fit together", "do not fit"}
 
 
 def test_formulas_are_judged_by_what_they_give():
@@ -162,12 +122,10 @@ def test_formulas_are_judged_by_what_they_give():
     added = found["metres_added"]
     # A thousandth of a degree is 111 m north, and 58 m east so far north.
     assert added.letter == pytest.approx(169.4, abs=0.5) and added.sense == pytest.approx(111.4, abs=0.5)
-    assert "metres north" in added.measure
     assert found["longer_side"].sense == found["occlusion_of_itself"].sense
     assert all(one.differs for one in found.values())
     same = added._replace(letter=1.0, sense=1.0)
     assert not same.differs and formulas_table([same])["verdict"].tolist() == ["does the same"]
-    assert "1 of 2" in formulas_words([same, added])
     assert not added._replace(letter=0.0, sense=0.0).differs
 
 
@@ -179,18 +137,14 @@ def test_formulas_of_planning_differ_from_what_they_should_follow_from():
     assert [one.formula for one in shown] == ["F (A.1)"] * 4 + ["F (5.5)"] * 2 + ["F (5.2)"]
     table = planning_formulas.table_of_formulas(shown)
     assert list(table.columns) == list(planning_formulas.COLUMNS) and len(table) == 7
-    said = planning_formulas.formula_words(shown)
-    assert said.startswith("2 of 2 printed formulas") and "in 5 of 5 rows" in said
-    assert "2 more are not defined as printed" in said
-    assert "not defined" not in planning_formulas.formula_words(computed)
     # sin(theta) where cos(theta)^2 belongs, for 80 m above and 67.1 m beside.
     r2 = 80.0**2 + 60.0**2 + 30.0**2
-    assert f"−{80 / r2**0.5:.2f} as printed, {(60.0**2 + 30.0**2) / r2:.2f} derived" in shown[0].shown
-    assert "just found is worth inf" in shown[-1].shown
+    assert f"−{80 / r2**0.5:.2f}" in shown[0].shown
+    assert f"{(60.0**2 + 30.0**2) / r2:.2f}" in shown[0].shown and "inf" in shown[-1].shown
 
 
 def test_a_formula_that_follows_is_not_called_different(monkeypatch):
-    """Were the print the derivative, the page would say that they agree."""
+    """Were the print the derivative, they would agree."""
     sensor = planning_formulas.SearchSensor(1.0, 1.0, sd=1.0, reach=1.0, nearest=1e-9)
 
     def right(points, p_nc, sd):
@@ -199,4 +153,3 @@ def test_a_formula_that_follows_is_not_called_different(monkeypatch):
 
     monkeypatch.setattr(planning_formulas, "as_printed", right)
     assert [one.verdict for one in planning_formulas.information_formulas()[:3]] == ["agree"] * 3
-    assert planning_formulas.formula_words(planning_formulas.information_formulas()).startswith("1 of 1")

@@ -9,6 +9,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import Mount, helgesen_misalignment
 from wildlab.reporting.published import load_published
 from wildlab.reporting.verdicts import judge
+from wildlab.studies.sensitivity import text
 from wildlab.studies.sensitivity.tables import (
     IMAGE_CENTRE,
     PRINTED_MISALIGNMENT_DEG,
@@ -108,3 +109,12 @@ def test_all_42_numbers_are_close_by_the_rounding_of_results_and_inputs():
         # One hundredth of the result beyond what rounding leaves open is seen.
         far = exact[row["subject"]] + row["rounding"] * 2.5 + 0.02 * row["value"]
         assert judge(row, {("horizontal_error", row["subject"]): {"value": far}}).words == "not close"
+
+
+@pytest.mark.parametrize(("tilt", "place", "growth"), [(20.0, 10.0, (4.0, 1.0)), (5.0, 30.0, (1.0, 3.0))])
+def test_growth_is_the_least_of_the_tilts_and_the_largest_of_the_places(tilt, place, growth):
+    near = {"roll": 5.0, "pitch": 5.0, "yaw": 0.0, "north": 10.0, "east": 10.0, "down": 1.0}
+    far = near | {"roll": tilt, "pitch": tilt, "north": place, "east": place}
+    heights = {100: near, 400: far}
+    errors = {f"level/{name}/{m}m": value for m, one in heights.items() for name, value in one.items()}
+    assert text.growth(errors) == growth

@@ -7,7 +7,7 @@ import pytest
 
 from wildlab.geometry.terrain import Terrain
 from wildlab.studies.sensitivity import heights
-from wildlab.studies.sensitivity.heights import PITCHES_DEG, Shift, coarser, heights_words, shifts
+from wildlab.studies.sensitivity.heights import PITCHES_DEG, coarser, shifts
 
 
 @pytest.fixture(scope="module")
@@ -39,21 +39,3 @@ def test_a_coarse_map_keeps_a_slope():
     rough = coarser(slope, 30.0)
     assert rough.step == 30 and rough.height.shape == (5, 5)
     assert rough.heights_at([[45.0, 50.0]]) == pytest.approx(slope.heights_at([[45.0, 50.0]]), abs=0.15)
-
-
-def test_words_follow_the_numbers(found):
-    heading, said = heights_words(found)
-    per_metre = np.mean(found[0].off["level"])
-    assert f"costs {per_metre:.1f} m at 15 degrees" in heading
-    assert f"{found[0].drawn - found[0].used} of the 240 rays at 15 degrees leave the land" in said
-
-    def made(pitch, level, plane, coarse):
-        off = {"level": level, "plane": plane, "coarse": coarse}
-        off = {name: np.array([value, value + 0.1]) for name, value in off.items()}
-        return Shift(pitch, off, dict.fromkeys(off, 0.0), 10, 12)
-
-    alike = [made(15.0, 0.4, 9.0, 9.0), made(90.0, 0.4, 0.0, 0.0)]
-    assert "at most" in heights_words(alike)[0] and "not told from a plane" in heights_words(alike)[1]
-    assert "takes most of that away" in heights_words([made(15.0, 4, 9.0, 1.0), made(90.0, 0, 0, 0)])[1]
-    assert "node every 30 m helps" in heights_words([made(15.0, 4, 9.0, 6.0), made(90.0, 0, 0, 0)])[1]
-    assert "2 of the 12 rays at 15 degrees" in heights_words(alike)[1]

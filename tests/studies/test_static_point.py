@@ -9,7 +9,6 @@ from wildlab.flight.clocks import poses_at
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.static_point import text
 from wildlab.studies.static_point.trial import (
     COLUMNS,
     METRICS,
@@ -123,38 +122,3 @@ def test_claims_are_decided_flight_by_flight(claim):
     threshold = float(typed[claim]["threshold"]) if "threshold" in typed[claim] else None
     assert checks[claim].holds(threshold).tolist() == [True, False]
     assert set(GOOD) <= set(METRICS)
-
-
-def test_words_turn_with_their_numbers():
-    published = {
-        (OBSERVER, name): value for name, value in (("mean_north", 0.2), ("mean_east", 0.1), ("mae", 6.4))
-    }
-    published["pixhawk-autopilot", "mae"] = 7.7
-    coverage = {("filter", "coverage"): 0.95}
-    far = pd.DataFrame([{**GOOD, **coverage}] * 4)
-    one, other = (text.partings(far, published, 500, bound) for bound in (0.1, 0.9))
-    assert "average out slowly" in one[0] and "average out slowly" not in other[0]
-    assert "0 of 4 flights come that near" in one[0] and "met by 4 of 4 flights" in one[1]
-    near = far.assign(**{}).copy()
-    near[("observer", "mean_north")] = near[("observer", "mean_east")] = 0.0
-    assert "average out slowly" not in text.partings(near, published, 500, 0.1)[0]
-    assert text.sureness(far) == "surer than it may be on 0 of 4 flights"
-    assert text.sureness(pd.DataFrame([{**GOOD, ("filter", "nees_at_end"): 9.0}])).endswith(
-        "on 1 of 1 flight"
-    )
-    ends = pd.DataFrame([{**GOOD, ("filter", "at_end"): value} for value in (0.7, 2.2, 2.0, 2.4, 3.0)])
-    assert (
-        "at the end it is not typical: 0 of the 4 others have a smaller one, where the median is 2.2 m"
-        in text.drawn_words(ends)
-    )
-    assert (
-        "costs 1.0 metres beside one that is" in text.summary(far, 0.1)[1]
-        and "are wrong in the same way" in text.summary(far, 0.1)[2]
-    )
-    cheap = pd.DataFrame(
-        [{**GOOD, **OPPOSED["synchronisation-matters"], **OPPOSED["innovations-coloured"]}] * 2
-    )
-    assert (
-        "costs nothing on most" in text.summary(cheap, 0.1)[1]
-        and "not all wrong" in text.summary(cheap, 0.1)[2]
-    )

@@ -1,4 +1,4 @@
-"""What the study of rows over enclosures computes, and that its words turn with its numbers."""
+"""What the study of rows over enclosures computes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from wildlab.evaluation.shares import FAILS, HOLDS, NO_PREMISE, decide_check
 from wildlab.planning.coverage import nodes_in
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.coverage_words import difference_words, with_interval
-from wildlab.studies.uav_coverage import STUDY, text
+from wildlab.studies.uav_coverage import STUDY
 from wildlab.studies.uav_coverage.trial import (
     CASES,
     DOWN,
@@ -128,66 +127,6 @@ def test_closer_rows_that_do_not_help_are_no_proof() -> None:
     assert decide_check(check, 0.02).verdict == FAILS
 
 
-def test_the_summary_turns_with_the_numbers() -> None:
-    first, second, third = text.summary(made_up())
-    assert "50 % more ground" in first and "8.0 % more of the enclosures" in first
-    assert "leave 20.0 % of the enclosures unseen" in second and "bring 17.0 % back" in second
-    assert "held" in third and "99.0 %" in third
-    first = text.summary(made_up(**{f"{YAW}/seen": 0.9, f"{YAW}/ground": 1.2e5}))[0]
-    assert "hardly any of the difference lies within the enclosures" in first
-    first = text.summary(made_up(**{f"{YAW}/ground": 0.9e5, f"{YAW}/seen": 0.8}))[0]
-    assert "10 % less ground" in first and "10.0 % less of the enclosures" in first
-    assert "as much of the enclosures" in text.summary(made_up(**{f"{LOW}/seen": 0.98}))[1]
-    assert "did not always hold" in text.summary(made_up(**{f"{LOW}/held": 0.9}))[2]
-
-
-def test_other_words_turn_too() -> None:
-    assert "In every draw of every case" in text.held_words(made_up())
-    assert "in some draw of: 30 m, rows 25 m, yaw" in text.held_words(made_up(**{f"{LOW}/held": 0.9}))
-    assert "which is no more" not in text.moving_words(made_up())
-    same = made_up(**{f"rows-{SPACINGS[-1]:.0f}m/missed": 0.0})
-    assert "which is no more" in text.moving_words(same)
-    said = text.moving_words(made_up())
-    assert "as many are missed as if they stood still with the closer rows" in said
-    assert "10.0 % more are missed than if they stood still with the wider ones" in said
-    wide = f"rows-{SPACINGS[-1]:.0f}m"
-    said = text.moving_words(made_up(**{f"{wide}/missed_still": 0.3, f"{wide}/unseen": 0.4}))
-    assert "10.0 % fewer are missed" in said and "the wider ones 40.0 %" in said
-    assert len(text.rows_apart_table(made_up())) == len(SPACINGS)
-    assert "half as many would do" in text.rate_words(2, {DOWN: 0.001, YAW: -0.004})
-    assert "half as many would leave some out" in text.rate_words(2, {DOWN: 0.001, YAW: 0.02})
-    assert "swings twice as fast bring 10.0 % back" in text.summary(made_up())[1]
-    assert (
-        "swings twice as fast bring nothing back" in text.summary(made_up(**{f"{LOW_FASTER}/seen": 0.7}))[1]
-    )
-    assert len(text.rows_table(made_up())) == len(text.held_table(made_up(1))) == len(CASES | MORE)
-
-
-def test_flights_of_which_nothing_is_surely_seen_are_counted_and_said() -> None:
-    spread = made_up(4)
-    spread.loc[:1, (LOW, "held")] = np.nan
-    said = text.summary(spread)[2]
-    assert f"in the worst of {4 * len(text.NAMES) - 2} flights 99.0 %" in said
-    assert "In 2 more nothing was surely to be seen" in said
-    assert f"{text.NAMES[LOW]}, in 2 of 4" in text.held_words(spread)
-    assert "In every draw of every case" not in text.held_words(spread)
-    table = text.held_table(spread).set_index("case")["least of all draws"]
-    assert (
-        table[text.NAMES[LOW]] == "99.0 %; nothing planned in 2 of 4" and table[text.NAMES[YAW]] == "99.0 %"
-    )
-    spread.loc[:, [(name, "held") for name in text.NAMES]] = np.nan
-    assert text.summary(spread)[2].startswith("Nothing was surely to be seen in any of")
-
-
-def test_what_a_map_says_of_half_is_true_of_half() -> None:
-    ages = np.array([60.0, 130.0, 250.0, 400.0, np.nan])
-    assert "in the last 4 min" in text.age_words(ages) and (ages <= 240).sum() >= 2
-    assert "for 3 min or longer" in text.gap_words(ages) and (ages >= 180).sum() >= 2
-    assert (
-        text.capital(text.age_words(ages[4:])) == "Nothing was seen" == text.capital(text.gap_words(ages[4:]))
-    )
-
-
 def test_animals_that_stand_are_missed_where_no_image_shows_the_ground(draws: pd.DataFrame) -> None:
     for spacing in SPACINGS:
         still, unseen = (draws[f"rows-{spacing:.0f}m", name] for name in ("missed_still", "unseen"))
@@ -198,32 +137,12 @@ def test_animals_that_stand_are_missed_where_no_image_shows_the_ground(draws: pd
     assert (draws[last, "missed"] != draws[last, "missed_still"]).any()
 
 
-def test_larger_errors_than_planned_for_are_said_by_what_they_give() -> None:
-    said = text.sensitivity_words({DOWN: (0.999, 0.97), LOW: (0.99, 0.8)}, 2.0)
-    assert "97.0 % for 99.9 %" in said and "less than 95 % in 1 of 2" in said and "2 times as large" in said
-    assert "cannot be tried" in text.sensitivity_words({DOWN: (np.nan, np.nan)}, 2.0)
-
-
 def test_larger_errors_show_less_of_what_is_surely_planned() -> None:
     twin, land = load_twin("uav-search"), land_of(1)
     run = run_case(twin, land, LOW, 1, 1, 1.0)
     held = [with_larger_errors(twin, land, LOW, 1, run, factor) for factor in (0.0, 1.0, 4.0)]
     assert held[0] == 1.0 and held[1] == pytest.approx(run[1].held) and held[2] < held[1]
     assert planned_coverage(twin, land, LOW, 1, 1.0).seen.sum() == run[1].planned.seen.sum()
-
-
-def test_intervals_stand_where_draws_differ() -> None:
-    spread = made_up(3)
-    spread[YAW, "ground"] = [1.4e5, 1.5e5, 1.6e5]
-    assert "50 % more ground (25 to 75 %) than" in text.summary(spread)[0]
-    spread[DOWN, "sharp"] = [0.8, 0.9, 1.0]
-    assert text.rows_table(spread)["sharp images"][0] == "90.0 % (65.2 to 100 %)"
-
-
-def test_an_interval_of_a_difference_keeps_its_sign() -> None:
-    said = difference_words([0.1, -0.02])
-    assert said == "4.0 % more (\N{MINUS SIGN}72.2 to 80.2 %)"
-    assert with_interval([-0.024], lowest=-1.0) == "\N{MINUS SIGN}2.4 %"
 
 
 def test_a_twin_without_a_survey_is_refused() -> None:

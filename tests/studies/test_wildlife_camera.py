@@ -1,11 +1,9 @@
-"""The study of the wildlife camera: the inverse, which video it is, what was assumed zero, and its words."""
+"""The study of the wildlife camera: the inverse, which video it is, and what was assumed zero."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from wildlab.studies.wildlife_camera import lens, text
-from wildlab.studies.wildlife_camera.lens import Video
+from wildlab.studies.wildlife_camera import lens
 
 CAMERA = lens.printed_camera(720, 480)
 
@@ -43,31 +41,3 @@ def test_the_camera_comes_back_and_what_is_zero_is_found_zero():
     assert bent["few"].median() > 2 * bent["all"].median()
     assert bent["few"].median() > 2 * straight["few"].median()
     assert straight["inside_skew"].mean() > 0.5
-
-
-def test_words_on_the_inverse_turn():
-    assert "nobody will see it" in text.inverse_words(np.full(9, 0.1), 60.0, 1117.0)
-    assert "only the rim" in text.inverse_words(np.r_[np.zeros(9), 2.0], 60.0, 1117.0)
-    assert "shows all over" in text.inverse_words(np.full(9, 2.0), 60.0, 1117.0)
-    assert text.title(np.r_[np.zeros(99), 2.0]).endswith(", 2 px at worst")
-
-
-def test_words_on_the_video_turn():
-    clear = [Video("a", 720, 480, 1257, 1117, 0.5, 20), Video("b", 640, 512, 1117, 1117, 9.0, 40)]
-    assert "video of a, which they fit to 0.5 %" in text.video_words(clear, 1267, 1117)
-    vague = [clear[0]._replace(off=3.0), clear[1]]
-    assert "no usual video" in text.video_words(vague, 1267, 1117)
-    close = [clear[0], clear[1]._replace(off=0.7)]
-    assert "no usual video" in text.video_words(close, 1267, 1117)
-    assert "+13.4 %" in text.sheet_words(1267, 1117, lens.DATA_SHEET)
-
-
-def test_words_on_what_was_assumed_turn():
-    def frame(few, whole):
-        return pd.DataFrame({"few": [few] * 3, "all": [whole] * 3, "sd_skew": [0.5] * 3, "sd_k2": [0.1] * 3})
-
-    said = text.assumed_words(frame(0.3, 0.6), frame(2.0, 0.6))
-    assert "keeps directions to 0.30 pixels instead of 0.60" in said and "costs 2.0 pixels" in said
-    said = text.assumed_words(frame(0.5, 0.5), frame(0.5, 0.5))
-    assert "hardly matters" in said and "costs nothing" in said
-    assert "skew 1 px, k2 0.2." in text.told_words(frame(1, 1), ["skew", "k2"], 20)

@@ -1,8 +1,7 @@
-"""The study of animals that are followed: its sentences turn with its numbers, which are counted by hand."""
+"""The study of animals that are followed: numbers counted by hand, and claims that turn with them."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -21,8 +20,7 @@ from wildlab.pipeline.animals.measures import (
 )
 from wildlab.pipeline.animals.revisit import Patrolled
 from wildlab.planning.high_level import SEARCH
-from wildlab.reporting.published import load_claims
-from wildlab.studies.wildlife_tracking import charts, search_text, text
+from wildlab.studies.wildlife_tracking import charts
 from wildlab.studies.wildlife_tracking.claims import check_claims
 from wildlab.studies.wildlife_tracking.trial import (
     FILTERS,
@@ -114,50 +112,6 @@ def test_the_cost_decides_its_claim() -> None:
     assert decide_check(check_claims(spread, np.full(N, 9.0))["dearer-than-ekf"], 1.0).verdict == HOLDS
     assert decide_check(check_claims(spread, np.full(N, 0.5))["dearer-than-ekf"], 1.0).verdict == FAILS
     assert "dearer-than-ekf" not in check_claims(spread)
-    said = text.cost_words(pd.DataFrame({"ratio": [9.0, 11.0, 8.0]}), spread)
-    assert (
-        "9.0 times" in said and "dearer" in said and "no dearer" not in said and "1.2 times as many" in said
-    )
-    assert "no dearer" in text.cost_words(pd.DataFrame({"ratio": [0.5]}), spread)
-
-
-def test_words_turn_with_the_numbers() -> None:
-    ours = spread_of()
-    assert "is lower by 1.0" in text.negative_words(ours)
-    other = spread_of(**{f"{UAV}-{NEGATIVE}__rmse": 25.0, f"{UAV}-{POSITIVE}__rmse": 24.0})
-    assert "RMS distance is higher by 1.00 m" in text.negative_words(other)
-    same = spread_of(**{f"{UAV}-{NEGATIVE}__sd": 14.0, f"{UAV}-{POSITIVE}__sd": 14.0})
-    assert "standard deviation is the same to a centimetre" in text.negative_words(same)
-    assert "too sure of itself" in text.consistency_words(ours)
-    timid = spread_of(
-        **{f"{one}-{NEGATIVE}__{name}": 1.2 for one in (GONDOLA, UAV) for name in ("anees", "anees_own")}
-    )
-    assert "too cautious" in text.consistency_words(timid) and "too sure" not in text.consistency_words(timid)
-    said = search_text.search_words(ours)
-    assert "1.0 min longer (1.0 to 1.0)" in said and "4.0 % of the animals had not been found" in said
-    undone = spread_of(**{f"{REVISITS}__done": 0.8})
-    assert "had not been found" not in search_text.search_words(undone)
-    whole = spread_of(**{f"{REVISITS}__animals_share": 1.0, f"{REVISITS}__minutes": 10.0})
-    assert "1.0 min less" in search_text.search_words(whole) and "been found" not in search_text.search_words(
-        whole
-    )
-
-
-def test_none_seen_again_is_said_and_one_world_has_no_interval() -> None:
-    ours = f"{GONDOLA}-{NEGATIVE}"
-    none = spread_of(**{f"{ours}__later": 0.0, f"{ours}__right": 0.0, f"{ours}__sd_later": np.nan})
-    assert text.later_words(none, GONDOLA) == "From the gondola no animal is detected in both laps."
-    assert "From the gondola no animal is detected in both laps." in text.summary(none)[2]
-    assert "none seen again get" not in " ".join(text.summary(none))
-    one = spread_of().iloc[:1]
-    assert " to " not in text.table(one)["rmse"].iloc[0]
-    assert "in the one world" in text.negative_words(one)
-    assert "Too few worlds have" in text.consistency_words(one)
-    assert len(text.summary(one)) == 3 and len(search_text.search_table(one).columns) == 3
-    assert list(search_text.search_table(one).columns) == list(search_text.SEARCH_COLUMNS)
-    blind = spread_of(**{f"{GONDOLA}__in_view": np.nan, f"{ours}__rmse": np.nan})
-    assert "nan" not in " ".join([*text.summary(blind), text.negative_words(blind)])
-    assert "not known in any world" in text.negative_words(blind)
 
 
 def test_worlds_without_a_number_count_neither_way() -> None:
@@ -170,55 +124,14 @@ def test_worlds_without_a_number_count_neither_way() -> None:
         assert decision.verdict == HOLDS and decision.met == N - N // 4 - 1
 
 
-def test_no_mean_of_what_is_positive_reaches_below_zero() -> None:
-    few = spread_of().iloc[:3].copy()
-    for subject in (f"{GONDOLA}-{NEGATIVE}", REVISITS):
-        for name in ("rmse", "sd"):
-            few[subject, name] = [1.0, 2.0, 30.0]
-    few[f"{GONDOLA}-{NEGATIVE}", "anees"] = [1.0, 2.0, 12.0]
-    few[REVISITS, "visits"] = [0.0, 0.0, 19.0]
-    told = [*text.table(few).to_numpy().ravel(), *text.own_table(few).to_numpy().ravel()]
-    told += [*search_text.search_table(few).to_numpy().ravel(), *text.summary(few)]
-    assert not any("\u2212" in str(one) or "-" in str(one) for one in told)
-    # By hand: mean 11, standard deviation of the mean 9.504, Student's 4.303: a factor of exp(3.718) = 41.2.
-    assert "off by 11 m (0 to 453) where the gondola looks" in text.summary(few)[1]
-    assert text.consistency_words(few).count("ANEES is 2 where") == 1
-    assert "it is 5.0 (0.2 to 102.7), from which 2 is not told apart" in text.consistency_words(few)
-    assert "0.0 in each of 3 worlds" in search_text.search_table(few)["uav-rows"].tolist()
-
-
-def test_tables_have_the_columns_of_their_headings_and_few_enough_to_be_seen_whole() -> None:
-    spread = spread_of()
-    for told, columns in (
-        (text.table(spread), text.COLUMNS), (text.own_table(spread), text.OWN_COLUMNS),
-        (search_text.search_table(spread), search_text.SEARCH_COLUMNS),
-    ):  # fmt: skip
-        # A column of words takes 6.5 rem of the page's 55.5.
-        assert list(told.columns) == list(columns) and 6.5 * len(columns) <= 55.5
-    for columns in (text.COLUMNS, text.OWN_COLUMNS):
-        assert "ANEES (2 is right)" in columns.values()
-
-
 @pytest.mark.parametrize(("wrong", "of", "holds"), [(5, 15, True), (1, 10, False), (2, 100, False)])
-def test_the_rule_that_is_told_is_the_one_that_decides(wrong: int, of: int, holds: bool) -> None:
+def test_animals_seen_again_are_counted_of_all_worlds_together(wrong: int, of: int, holds: bool) -> None:
     one = {f"{UAV}-{NEGATIVE}__later": of / N, f"{UAV}-{NEGATIVE}__right": (of - wrong) / N}
     checks = check_claims(spread_of(**one))
-    claims = load_claims("wildlife-tracking")
-    told = text.rule_words(checks, claims)
-    assert told.count("animals seen again are counted, of all worlds together") == 1
-    assert "lies wholly above its threshold, 10 %, does not hold where it lies wholly below" in told
     share = share_interval(wrong, of)
     decided = decide_check(checks["same-problem-uav"], 0.1).verdict
     assert (decided == HOLDS) == (share.low > 0.1) == holds
     assert (decided == FAILS) == (share.high <= 0.1)
-    # Nothing is told of a rule that no claim is decided by, and the threshold told is that of the claims.
-    assert text.rule_words({"couple-of-seconds": checks["couple-of-seconds"]}, claims) == ""
-    other = [claim | {"threshold": 0.3} for claim in claims]
-    assert "threshold, 30 %, does" in text.rule_words(checks, other)
-    below = {"same-problem-uav": replace(checks["same-problem-uav"], above=False)}
-    assert "wholly below its threshold, 10 %, does not hold where it lies wholly above" in text.rule_words(
-        below, claims
-    )
 
 
 def found(image: int, animal: int, track: int, **other: float) -> Found:
@@ -319,27 +232,3 @@ def test_a_fence_alone_tells_what_places_drawn_in_it_do() -> None:
         places = a + rng.random((20_000, 1)) * (b - a) + rng.random((20_000, 1)) * (d - a)
         spreads.append(np.trace(np.cov(places.T)) / 2)
     assert numbers[UAV, "by_fence_alone"] == pytest.approx(np.sqrt(np.mean(spreads)), rel=0.02)
-
-
-@pytest.mark.slow
-def test_charts_say_what_they_draw() -> None:
-    done, _ = runs()
-    world, followed = done.worlds[GONDOLA], done.followed[GONDOLA, NEGATIVE]
-    _, _, alt, caption = charts.map_shown(world, followed, 1.0, "x", "After a lap", "7.19 (b)", 5)
-    seen = {one.animal for one in followed.found if world.images.times[one.image] <= world.lap}
-    fig = charts.map_shown(world, followed, 1.0, "x", "After a lap", "7.19 (b)", 5)[0]
-    explained = {one.get_text() for one in fig.legends[0].get_texts()}
-    assert {"fence of an enclosure", "way flown so far", "the camera now"} <= explained
-    assert {"animal, detected", "animal, not detected yet", "track of an animal"} <= explained
-    assert f"{len(seen)} of 25 animals found" in alt and "7.19 (b)" in caption and "World 5." in caption
-    times, sd = charts.sd_of(done.worlds[UAV], done.followed[UAV, NEGATIVE], 3)
-    assert len(times) == len(sd) and np.nanmax(sd) > 5
-    shown = charts.visit_shown(done.worlds[UAV], done.patrolled[REVISITS])
-    assert shown is not None and "before the visit" in shown[2]
-    assert "track of the animal visited" in {one.get_text() for one in shown[0].legends[0].get_texts()}
-    assert charts.covariance_shown(done) is not None
-    # 0.5 m drawn anew each second for a lap of half an hour.
-    lap = done.worlds[GONDOLA].lap
-    assert f"{0.5 * np.sqrt(lap):.0f} m away" in text.walk_limit(done.worlds[GONDOLA])
-    faster = done.worlds[GONDOLA]._replace(motion=lambda dt: (np.eye(2), 4 * dt * np.eye(2)))
-    assert f"{2 * np.sqrt(lap):.0f} m away" in text.walk_limit(faster)

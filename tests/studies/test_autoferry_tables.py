@@ -1,0 +1,222 @@
+"""Tables, charts and metrics of the page on boats followed by sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.pipeline.following.sensor_tracks import COLUMNS, SensorTrack, table
+from wildlab.pipeline.following.sensor_tuning import SensorTuning
+from wildlab.reporting.published import load_claims
+from wildlab.reporting.report import Report, open_report
+from wildlab.studies.autoferry import charts, tables
+from wildlab.studies.autoferry import text as words
+from wildlab.studies.autoferry.comparison import check_claims, of_use, outcomes, with_hindsight
+
+LIDAR = SensorTuning("lidar", "position", -0.9, -1.1, -0.8, 3.0, 0.9, 20.0, 1.2, 1.5, 0.0, 100, 50, 0.5, 300)
+CAMERA = SensorTuning(
+    "eo", "bearing", -1.0, -2.0, 0.5, np.radians(2), 0.8, 5.0, 0.0, 0.0, np.radians(1), 100, 50, 0.2, 9
+)
+
+
+def track(sensor: str, target: str, name: str, error: float, nees: float, seed: int = 0) -> SensorTrack:
+    rng = np.random.default_rng(seed)
+    n, m = 60, 1 if sensor == "eo" else 2
+    estimate = np.column_stack([np.arange(n), np.zeros(n), np.ones(n), np.zeros(n)])
+    errors = np.tile([error, 0.0, 0.0, 0.0], (n, 1))
+    innovation = rng.normal(size=(n, m))
+    nis = np.sum(innovation**2, axis=1)
+    values = nees * rng.uniform(0.5, 1.5, n)
+    known = np.ones(n, bool)
+    return SensorTrack(
+        sensor, target, name, np.arange(n) * 0.5, estimate, errors, values, innovation, nis, known, known,
+        np.tile(np.eye(4), (n, 1, 1)),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def followed() -> list[SensorTrack]:
+    return [
+        track("lidar", "a", "kf", 4.0, 30.0, 1),
+        track("lidar", "a", "coloured", 4.1, 3.0, 2),
+        track("lidar", "a", "schmidt", 9.0, 2.0, 3),
+        track("lidar", "b", "kf", 40.0, 2.0, 4),
+        track("lidar", "b", "coloured", 41.0, 0.2, 5),
+        track("eo", "a", "ekf", 90.0, 900.0, 6),
+        track("eo", "a", "schmidt", 95.0, 300.0, 7),
+    ]
+
+
+@pytest.fixture
+def tracks(followed: list[SensorTrack]) -> pd.DataFrame:
+    return table(followed, 15.0).assign(case="scenario-3")
+
+
+@pytest.fixture
+def report() -> Report:
+    return open_report(study="autoferry", kind="logged", flight="autoferry")
+
+
+def recorded(report: Report) -> dict[tuple[str, str], float]:
+    return {(m["name"], m["subject"]): m["value"] for m in report._metrics}
+
+
+def test_every_track_has_the_numbers_of_its_kind(report: Report, tracks: pd.DataFrame) -> None:
+    tables.record_tracks(report, tracks)
+    found = recorded(report)
+    lidar = {name for name, subject in found if subject == "lidar/a/scenario-3/kf"}
+    camera = {name for name, subject in found if subject == "eo/a/scenario-3/ekf"}
+    assert lidar == {*COLUMNS, "detections_used"} - {"lag1_autocorrelation"}
+    assert camera == {*COLUMNS, "detections_used"} - {
+        "lag1_autocorrelation_north",
+        "lag1_autocorrelation_east",
+    }
+    assert found["rmse", "lidar/a/scenario-3/kf"] == pytest.approx(4.0)
+    report.save()
+
+
+def test_what_was_fitted_is_recorded_with_its_interval(report: Report) -> None:
+    rows = tables.record_tunings(report, {"lidar": LIDAR, "eo": CAMERA})
+    assert rows["offset"].tolist() == ["−0.90 (−1.1 to −0.8)", "−1.00 (−2.0 to 0.5)"]
+    assert rows["sd"].tolist() == ["3.0 m", "2.0°"]
+    assert rows["causes"].tolist() == ["position 1.2 m, clock 1.5 s", "heading 1.0°"]
+    metric = next(m for m in report._metrics if m["subject"] == "lidar" and m["name"] == "clock_offset")
+    assert (metric["low"], metric["value"], metric["high"], metric["n"]) == (-1.1, -0.9, -0.8, 300)
+    assert recorded(report)["error_sd", "eo"] == pytest.approx(2.0)
+
+
+def made(sensor: str, outcome: list[str], *, fixed: str = "schmidt", rmse: float = 3.0) -> pd.DataFrame:
+    """Tracks of a sensor with these outcomes, beside white noise: rows as `sensor_tracks.table` has them."""
+    bearing = sensor in ("ir", "eo")
+    inside = {"gained": (9.0, 2.0), "too dear": (9.0, 2.0), "both inside": (2.0, 2.0)}
+    inside |= {"neither inside": (9.0, 9.0), "spoilt": (2.0, 9.0), "lost": (9.0, 2.0)}
+    rows = []
+    for k, what in enumerate(outcome):
+        share = 0.25 if what == "lost" else 1.0
+        for name, anees in zip(("ekf" if bearing else "kf", fixed), inside[what], strict=True):
+            rows.append(
+                {
+                    "sensor": sensor, "target": f"boat-{k}", "case": "scenario-3", "filter": name,
+                    "kind": "bearing" if bearing else "position", "anees": anees, "nees_low": 1.0,
+                    "nees_high": 3.0, "anis": 1.0, "nis_low": 1.5, "nis_high": 2.5, "seen": 40,
+                    "share_with_target": share, "compared": 50, "detections": 40, "fraction_nees_inside": 0.5,
+                    "rmse": rmse * (2.0 if what == "too dear" and name == fixed else 1.0),
+                    "lag1_autocorrelation_north": 0.1, "lag1_autocorrelation_east": 0.1,
+                    "lag1_autocorrelation": np.nan,
+                }
+            )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def judged(rows: pd.DataFrame) -> pd.DataFrame:
+    return outcomes(rows, words.KEYS, "schmidt")
+
+
+FEW = judged(
+    pd.concat([made("lidar", ["gained", "spoilt", "spoilt"]), made("radar", ["lost"])], ignore_index=True)
+)
+
+
+def test_nothing_of_use_is_a_page_all_the_same(report: Report) -> None:
+    rows = made("ir", ["lost"] * 2)
+    use = of_use(rows)
+    useful = rows[rows["sensor"].isin(use.loc[use["of_use"], "sensor"])]
+    found, hind = judged(useful), with_hindsight(useful, words.KEYS)
+    words.strays(found)
+    words.hindsight_words(hind, found)
+    report.table(tables.outcomes_table(found))
+    report.table(tables.filters_table(useful, "schmidt"))
+    tables.record_outcomes(report, found, use, "schmidt")
+    charts.mean_nees_shown(rows, found, "schmidt")
+
+
+def test_tables_count_every_track() -> None:
+    rows = tables.outcomes_table(FEW).set_index("sensor")
+    assert rows["tracks"].to_dict() == {"lidar": 3, "radar": 1, "all": 4}
+    assert rows.loc["all"].tolist() == [4, 1, 0, 0, 0, 2, 1]
+    assert (rows.drop(columns="tracks").sum(axis=1) == rows["tracks"]).all()
+    held = tables.filters_table(made("lidar", ["gained", "lost"]), "schmidt")
+    assert held["filter"].tolist() == ["Schmidt (held fixed)", "differenced", "thinned"]
+    assert held["gained"].tolist() == [1, 0, 0] and held["tracks"].tolist() == [2, 0, 0]
+    every = tables.cases_table(FEW)
+    assert every["words"].tolist() == ["gained", "spoilt", "spoilt", "lost"]
+    assert every["near"].tolist()[-1] == "25 % of 40" and every["bound"].tolist()[0] == "1.0 to 3.0"
+
+
+def test_outcomes_are_recorded_with_their_denominator(report: Report) -> None:
+    use = of_use(made("ir", ["lost"] * 5))
+    tables.record_outcomes(report, FEW, use, "schmidt")
+    found = {(m["name"], m["subject"]): (m["value"], m["n"]) for m in report._metrics}
+    assert found["tracks_gained", "schmidt/lidar"] == (1, 3)
+    assert found["tracks_spoilt", "schmidt/all-sensors"] == (2, 4)
+    assert found["tracks_lost", "schmidt/radar"] == (1, 1)
+    assert found["tracks_kept_at_best", "ekf/ir"] == (0, 5)
+    report.save()
+
+
+def test_overview_is_of_the_tracks_that_stay(tracks: pd.DataFrame) -> None:
+    rows = tables.overview(tracks).set_index(["sensor", "filter"])
+    assert rows.loc[("lidar", "white noise"), "kept"] == "1 of 2"
+    assert rows.loc[("lidar", "white noise"), "rmse"] == pytest.approx(4.0)
+    assert rows.loc[("lidar", "white noise"), "rmse_all"] == pytest.approx(22.0)
+    assert rows.loc[("lidar", "white noise"), "inside"] == "0 of 1"
+    assert rows.loc[("lidar", "Schmidt"), "inside"] == "1 of 1"
+    assert rows.loc[("colour camera", "Schmidt"), ["kept", "inside"]].tolist() == ["0 of 1", "—"]
+
+
+def test_tracks_have_their_counts_beside_every_share(tracks: pd.DataFrame) -> None:
+    rows = tables.tracks_table(tracks, "lidar").set_index(["target", "filter"])
+    assert rows.loc[("a", "kf"), ["near", "kept"]].tolist() == ["100 % of 60", "yes"]
+    assert rows.loc[("b", "kf"), ["near", "kept"]].tolist() == ["0 % of 60", "no"]
+    assert rows.loc[("a", "kf"), "inside"] == "0 % of 60"
+
+
+def test_claims_sensor_by_sensor_on_the_tracks_that_stay(tracks: pd.DataFrame) -> None:
+    claims = load_claims("autoferry")
+    texts = {claim["id"]: claim["text"] for claim in claims}
+    rows = tables.claims_by_sensor(tracks, texts).set_index("claim")
+    assert len(rows) == len(texts)
+    over = rows.loc[texts["white-noise-overconfident"]]
+    assert (over["lidar"], over["colour camera"], over["radar"]) == ("1 of 1", "—", "—")
+    true = check_claims(tracks, words.KEYS)
+    decided = tables.claims_table(pd.DataFrame({"claim": list(texts.values())}), claims, true)
+    assert decided["count"].tolist()[0] == "2 of 3"
+
+
+def test_nees_over_time_shows_each_filter_and_the_band(
+    followed: list[SensorTrack], tracks: pd.DataFrame
+) -> None:
+    mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
+    rows = tracks[(tracks["sensor"] == "lidar") & (tracks["target"] == "a")]
+    figure, *_ = charts.nees_shown("lidar", mine, rows)
+    (ax,) = figure.axes
+    assert ax.get_yscale() == "log"
+    low, high = chi_square_interval(2)
+    assert ax.get_ylim()[0] < low < high < ax.get_ylim()[1]
+    labelled = [line for line in ax.get_lines() if not line.get_label().startswith("_")]
+    np.testing.assert_array_equal(labelled[0].get_ydata(), mine[0].nees)
+
+
+def test_innovations_beside_the_band_of_white_noise(
+    followed: list[SensorTrack], tracks: pd.DataFrame
+) -> None:
+    mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
+    rows = tracks[(tracks["sensor"] == "lidar") & (tracks["target"] == "a")]
+    figure, *_ = charts.innovations_shown("lidar", mine, rows)
+    (ax,) = figure.axes
+    assert len(ax.get_lines()) == 4
+    assert all(line.get_ydata()[0] == pytest.approx(1.0) for line in ax.get_lines())
+
+
+@pytest.mark.parametrize(
+    ("outcome", "said"),
+    [
+        (["gained"] * 8 + ["spoilt"], "helps more"),
+        (["spoilt"] * 8 + ["gained"] + ["lost"] * 3, "harms more"),
+        (["gained", "gained", "spoilt"], "neither"),
+    ],
+)
+def test_what_is_gained_and_spoilt_decides_the_headline(outcome: list[str], said: str) -> None:
+    assert said in words.headline(judged(made("lidar", outcome)), "schmidt", "x")
