@@ -10,6 +10,7 @@ from wildlab.evaluation.identities import Scan, compare_identities
 from wildlab.flight.following import parse_settings
 from wildlab.flight.toml import dump_toml
 from wildlab.studies.autoferry_many import judged as words
+from wildlab.studies.autoferry_many import tuning
 from wildlab.studies.autoferry_many.tuning import Lasting, Tuned, anees_of, draw, order
 
 OFFSETS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
@@ -78,19 +79,11 @@ def test_the_table_of_draws_has_each_scenario_once() -> None:
 
 
 @pytest.mark.slow
-def test_scenarios_are_followed_by_what_one_teaches(shared_data, tmp_path) -> None:  # type: ignore[no-untyped-def]
-    from wildlab.flight.recipe.importing import import_flight
-    from wildlab.paths import DATA
-    from wildlab.studies.autoferry_many.tuning import errors_of, follow_mode, tune
-
-    raw = shared_data("tracking", "autoferry")
-    first, second = (
-        import_flight(DATA / "recipes" / f"autoferry-{n}.toml", raw, tmp_path / str(n)) for n in (2, 3)
-    )
-    errors = errors_of(first)
+def test_scenarios_are_followed_by_what_one_teaches(scenario, tunings, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    monkeypatch.setattr(tuning, "tune_sensor", lambda flight, sensor: tunings[sensor])
+    errors = tuning.errors_of(scenario(2))
     assert -2.5 < errors["radar"].offset_s < -1.5 and -1.5 < errors["lidar"].offset_s < -0.5
     assert all(0.5 < errors[name].share < 1 for name in ("lidar", "radar"))
-    tuned = tune(first, draws=3, seed=1)
-    for mode, ordered in tuned.items():
-        assert ordered == sorted(ordered, key=order) and len(ordered) == 3
-        assert follow_mode(second, mode, ordered[0].settings) is not None
+    for mode, ordered in tuning.tune(scenario(2), draws=2, seed=1).items():
+        assert ordered == sorted(ordered, key=order) and len(ordered) == 2
+        assert tuning.follow_mode(scenario(3), mode, ordered[0].settings) is not None

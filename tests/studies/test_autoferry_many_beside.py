@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.pipeline.many.follow import Followed, judged
-from wildlab.studies.autoferry_many import beside, stone_soup
+from wildlab.pipeline.many.follow import Followed, follow_all, judged
+from wildlab.studies.autoferry_many import beside, stone_soup, tuning
 from wildlab.studies.autoferry_many.judged import HEADINGS
 from wildlab.studies.autoferry_many.stone_soup import Choice, Eye, draw_choice, run_stone_soup
 from wildlab.tracking.kalman import predict, update
@@ -189,21 +189,13 @@ def test_without_the_library_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-def test_the_draws_are_ordered_by_the_first_scenario_alone(shared_data, tmp_path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, monkeypatch) -> None:  # type: ignore[no-untyped-def]
     pytest.importorskip("stonesoup")
-    from wildlab.flight.recipe.importing import import_flight
-    from wildlab.paths import DATA
-    from wildlab.pipeline.many.follow import follow_all
-    from wildlab.studies.autoferry_many.tuning import MODES, draw, errors_of, gospa_of, reach_of
-
-    raw = shared_data("tracking", "autoferry")
-    flights = {
-        f"scenario-{n}": import_flight(DATA / "recipes" / f"autoferry-{n}.toml", raw, tmp_path / str(n))
-        for n in (2, 17)
-    }
+    flights = {f"scenario-{n}": scenario(n) for n in (2, 17)}
     monkeypatch.setattr(beside, "FOR_EACH", 1)
-    settings = draw(np.random.default_rng(1), errors_of(flights["scenario-2"]))
-    rows = beside.judge_beside(flights, dict.fromkeys(MODES, settings), 2, 1)
+    monkeypatch.setattr(tuning, "tune_sensor", lambda flight, sensor: tunings[sensor])
+    settings = tuning.draw(np.random.default_rng(1), tuning.errors_of(scenario(2)))
+    rows = beside.judge_beside(flights, dict.fromkeys(tuning.MODES, settings), 2, 1)
     assert rows["mode"].unique().tolist() == beside.modes_beside() and len(rows) == 2 * 2 * 3
     first = rows[rows["case"] == "scenario-2"]
     assert (first["gospa"] == first["tuned_gospa"]).all()
@@ -213,10 +205,10 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(shared_data, tmp_path
     # One of them by hand, from the flight on.
     row = rows[(rows["case"] == "scenario-17") & (rows["mode"] == "radar") & (rows["rank"] == 2)].iloc[0]
     drawn = draw_choice(np.random.default_rng(1).spawn(2)[row["draw"] - 1], beside.FAR_M)
-    given = follow_all(flights["scenario-17"], settings=settings, sensors=["radar"])
+    given = follow_all(scenario(17), settings=settings, sensors=["radar"])
     shown = run_stone_soup(given.scans, ["radar"], drawn)
-    lives = judged(given._replace(shown=shown), reach_of(flights["scenario-17"], "radar"))
-    assert gospa_of(lives) == row["gospa"]
+    lives = judged(given._replace(shown=shown), tuning.reach_of(scenario(17), "radar"))
+    assert tuning.gospa_of(lives) == row["gospa"]
 
 
 def test_what_is_compared_are_medians_of_the_scenarios_that_nothing_is_tuned_on() -> None:
