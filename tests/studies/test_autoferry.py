@@ -14,7 +14,7 @@ from wildlab.studies.autoferry.boats import BOATS
 from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes
 
 pytestmark = pytest.mark.slow
-SCENARIOS = (2, 3, 17)
+SCENARIOS = (2, 3, 13)
 
 
 @pytest.fixture(scope="module")

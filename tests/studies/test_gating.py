@@ -31,7 +31,6 @@ from wildlab.studies.gating.monte_carlo import (
 )
 from wildlab.studies.gating.readings import READINGS
 from wildlab.studies.gating.variations import (
-    chosen_parts,
     claim_margins,
     seconds_in_view,
     standard_error,
@@ -196,7 +195,7 @@ def test_what_is_behind_the_lens_or_on_its_axis_is_not_expected() -> None:
 def test_a_camera_that_distorts_is_refused(over: Overflight) -> None:
     camera = replace(over.poses.camera, distortion=(0.1, 0.0, 0.0, 0.0, 0.0))
     bent = replace(over, poses=replace(over.poses, camera=camera))
-    with pytest.raises(WildlabError, match=r"the camera distorts.*Use a twin whose camera has no distortion"):
+    with pytest.raises(WildlabError, match="distorts"):
         gate(bent, Choices(), streams(1, 2))
 
 
@@ -404,12 +403,6 @@ def test_a_run_without_mistakes_says_nothing_of_where_they_fall() -> None:
     assert np.isnan(margin["mistakes-on-different-images"]).all()
 
 
-def test_every_choice_has_its_reason(over: Overflight, flight: Flight) -> None:
+def test_a_gimbal_keeps_the_targets_in_view_longer(over: Overflight, flight: Flight) -> None:
     at_rest = seconds_in_view(overflight(flight, gimbal="down"))
     assert 0 < at_rest < seconds_in_view(over) == IMAGES / 10
-    table = chosen_parts(over, 0.93, at_rest)
-    assert (table.map(len) > 0).all(axis=None) and table["part"].is_unique
-    by_part = table.set_index("part")
-    assert "93 %" in by_part.loc["beyond the edge", "chosen"]
-    assert f"{at_rest:.1f} s of these 14.1 s" in by_part.loc["gimbal", "reason"]
-    assert READINGS["own"].short in by_part.loc["track updated with", "chosen"]

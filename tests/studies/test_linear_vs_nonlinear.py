@@ -124,9 +124,9 @@ def test_claims_on_correlated_noise_are_decided_flight_by_flight(claim: str) -> 
 
 
 def test_another_twin_is_refused() -> None:
-    with pytest.raises(WildlabError, match=r"none of the flights of H 6\.4\.2"):
+    with pytest.raises(WildlabError, match=r"6\.4\.2"):
         linear_vs_nonlinear.trial(1, twin="static-antenna", beside="")
-    with pytest.raises(WildlabError, match=r"none of the flights of H 7.5.1 and 7.5.2"):
+    with pytest.raises(WildlabError, match=r"7\.5\.1"):
         coloured_noise.trial(1, twin="static-antenna")
 
 

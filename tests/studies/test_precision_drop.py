@@ -102,7 +102,7 @@ def test_a_twin_without_a_find_is_refused(monkeypatch):
 
     empty = Drop(look_of(1), *[np.zeros((0, 2))] * 5, 1, 1, 0, 0, 0)
     monkeypatch.setattr(trial, "search", lambda *_: empty)
-    with pytest.raises(WildlabError, match="seed 1 nothing was found"):
+    with pytest.raises(WildlabError, match="seed 1"):
         flown(1, "precision-drop", 5, 1)
 
 

@@ -124,13 +124,13 @@ def test_a_part_of_a_flight_ends_its_sensors_and_leaves_the_rest(flight: Flight)
 
 def test_poses_without_covariance_are_refused(seen: Sighting) -> None:
     bare = seen._replace(poses=replace(seen.poses, covariance=None))
-    with pytest.raises(WildlabError, match="the poses have no covariance"):
+    with pytest.raises(WildlabError, match="no covariance"):
         compare(bare, seen, NOISE)
 
 
 def test_a_logged_flight_is_refused(flight: Flight) -> None:
     logged = Flight(flight.manifest.model_copy(update={"twin": None}), flight.nav, flight.tables)
-    with pytest.raises(WildlabError, match="The flight is logged"):
+    with pytest.raises(WildlabError, match="logged"):
         compare_flight(logged, 1)
 
 

@@ -42,7 +42,7 @@ def test_filtering_errors_is_filtering_positions():
 
 def test_columns_are_those_the_flight_has_and_none_is_an_error(make_flight):
     flight = make_flight(pixel_px=1.0)
-    with pytest.raises(WildlabError, match="no poses named 'observer'"):
+    with pytest.raises(WildlabError, match="observer"):
         evaluate_columns(flight, np.random.default_rng(0))
     flight.nav["observer"] = flight.nav["logged"]
     scored = evaluate_columns(flight, np.random.default_rng(0))
@@ -53,7 +53,7 @@ def test_columns_are_those_the_flight_has_and_none_is_an_error(make_flight):
 
 
 def test_only_a_twin_tells_how_the_imu_was_turned(make_flight):
-    with pytest.raises(WildlabError, match="how the IMU was turned against the airframe is not known"):
+    with pytest.raises(WildlabError, match="IMU"):
         navigate_observers(make_flight())
 
 

@@ -146,5 +146,5 @@ def test_larger_errors_show_less_of_what_is_surely_planned() -> None:
 
 
 def test_a_twin_without_a_survey_is_refused() -> None:
-    with pytest.raises(WildlabError, match="Name a twin that searches"):
+    with pytest.raises(WildlabError, match="twin"):
         required(None, "survey")

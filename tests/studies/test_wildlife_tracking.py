@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -28,6 +26,7 @@ from wildlab.studies.wildlife_tracking.trial import (
     KALMAN,
     NEGATIVE,
     POSITIVE,
+    RATES,
     REVISITS,
     ROWS,
     UAV,
@@ -202,14 +201,18 @@ def test_the_visit_of_the_figure_is_the_one_with_the_largest_fall() -> None:
     assert charts.visit_rows(flown._replace(found=log[2:])) is None
 
 
-@lru_cache(maxsize=1)
+@pytest.fixture(scope="module")
 def runs() -> tuple[Runs, dict[tuple[str, str], float]]:
-    return all_runs(5, "gondola", "uav-tracking")
+    """With a third of the study's images a second."""
+    with pytest.MonkeyPatch.context() as patch:
+        for platform, rate in list(RATES.items()):
+            patch.setitem(RATES, platform, rate / 3)
+        return all_runs(5, "gondola", "uav-tracking")
 
 
 @pytest.mark.slow
-def test_a_world_follows_as_it_should() -> None:
-    done, numbers = runs()
+def test_a_world_follows_as_it_should(runs: tuple[Runs, dict[tuple[str, str], float]]) -> None:
+    done, numbers = runs
     assert numbers[UAV, "seen_share"] > numbers[GONDOLA, "seen_share"] > 0.1
     # The Kalman filter of animals that are never mixed up: its covariance is that of their walk.
     assert numbers[f"{UAV}-{KALMAN}", "anees_own"] == pytest.approx(2.0, abs=0.7)
@@ -223,8 +226,10 @@ def test_a_world_follows_as_it_should() -> None:
 
 
 @pytest.mark.slow
-def test_a_fence_alone_tells_what_places_drawn_in_it_do() -> None:
-    done, numbers = runs()
+def test_a_fence_alone_tells_what_places_drawn_in_it_do(
+    runs: tuple[Runs, dict[tuple[str, str], float]],
+) -> None:
+    done, numbers = runs
     rng = np.random.default_rng(1)
     spreads = []
     for fence in done.worlds[UAV].fences:
