@@ -215,7 +215,7 @@ def test_innovations_beside_the_band_of_white_noise(
     [
         (["gained"] * 8 + ["spoilt"], "helps more"),
         (["spoilt"] * 8 + ["gained"] + ["lost"] * 3, "harms more"),
-        (["gained", "gained", "spoilt"], "neither"),
+        (["gained"] * 6 + ["spoilt"] * 3, "neither"),
     ],
 )
 def test_what_is_gained_and_spoilt_decides_the_headline(outcome: list[str], said: str) -> None:

@@ -52,16 +52,9 @@ def flight():
 
 
 @pytest.fixture(scope="module")
-def told() -> list[tuple[int, int]]:
-    return []
-
-
-@pytest.fixture(scope="module")
-def rendering(flight, told) -> Rendering:
+def rendering(flight) -> Rendering:
     """One in so many frames of the crossing."""
-    return render_crossing(
-        TWIN, SEED, 2, lambda done, total: told.append((done, total)), flight=flight, every=25
-    )
+    return render_crossing(TWIN, SEED, 2, lambda done, total: None, flight=flight, every=25)
 
 
 def things(uv: list[list[float]], box: list[list[float]] | None = None) -> Detections:
@@ -182,6 +175,7 @@ def test_whose_a_detection_is_has_no_part_in_where_it_is_put(flight) -> None:
     np.testing.assert_array_equal(nobody.looks.positions[order], crossing.looks.positions[other])
 
 
+@pytest.mark.slow
 def test_frames_are_those_with_a_vessel_near_and_one_in_ten_others(rendering, flight) -> None:
     scenes = Photographer(TWIN, SEED).flight
     until, since = apart_times(drawn_at_sea(flight))
@@ -196,11 +190,7 @@ def test_frames_are_those_with_a_vessel_near_and_one_in_ten_others(rendering, fl
     assert rendering.sea.frames == len(sea[::25])
 
 
-def test_progress_goes_from_the_first_frame_to_the_last(rendering, told) -> None:
-    total = rendering.near.frames + rendering.sea.frames
-    assert told == [(done, total) for done in range(1, total + 1)]
-
-
+@pytest.mark.slow
 def test_a_detection_is_of_the_vessel_that_is_nearest_in_the_image(rendering) -> None:
     scenes, spotted = Photographer(TWIN, SEED).flight, rendering.spotted
     rows = np.flatnonzero((spotted.boat != NONE) & ~spotted.both)
@@ -214,6 +204,7 @@ def test_a_detection_is_of_the_vessel_that_is_nearest_in_the_image(rendering) ->
         assert away.argmin() == spotted.boat[row] and away.min() < 40
 
 
+@pytest.mark.slow
 def test_places_are_as_far_off_as_the_told_pose_makes_drawn_ones(rendering) -> None:
     """In one frame both have the same error of pose; nothing else is metres off."""
     places = {}
@@ -228,6 +219,7 @@ def test_places_are_as_far_off_as_the_told_pose_makes_drawn_ones(rendering) -> N
     assert np.median(same) < 3 < np.nanmedian(rendering.frames.off)
 
 
+@pytest.mark.slow
 def test_looks_are_the_detections_own(rendering, flight) -> None:
     spotted = rendering.spotted
     placed = on_the_sea(flight, spotted)
@@ -241,6 +233,7 @@ def test_looks_are_the_detections_own(rendering, flight) -> None:
     assert len(np.unique(placed.appearance.features[:, 0])) == len(placed.appearance.features), "not drawn"
 
 
+@pytest.mark.slow
 def test_all_ways_are_followed_by_every_rule(rendering) -> None:
     assert rendering.near == count(rendering.spotted)
     for one in (rendering.frames, rendering.inside, rendering.drawn):
@@ -354,35 +347,7 @@ def test_flights_are_those_after_the_chosen_one(monkeypatch) -> None:
     assert render_flights(TWIN, 6, 2, 8) == [7, 8]
 
 
-def seen_frames(apart: list[float], found: list[list[bool]], joined: list[list[bool]]) -> Rendering:
-    """Frames 0, 1, ... with both whole in view, so many metres apart; a detection in each."""
-    n = len(apart)
-    none = np.zeros(n)
-    spotted = Spotted(
-        np.arange(n), np.arange(n), np.zeros((n, 2)), none, none, none, np.zeros(n, np.int64),
-        np.zeros(n, bool), np.zeros(n, bool), np.ones((n, 2)), np.array(found), np.array(joined),
-    )  # fmt: skip
-    truth = np.zeros((2, n, 2))
-    truth[1, :, 0] = apart
-    crossing = Crossing(Looks(np.arange(n), np.zeros((n, 2)), 1.0), spotted.boat, none, truth)
-    followed = study.Followed(crossing, none, {})
-    counted = count(spotted)
-    return Rendering(7, (0, 1), n, spotted, counted, counted, followed, followed, followed)
-
-
-def test_the_frames_shown_are_the_nearest_found_alone_and_as_one() -> None:
-    alone, one, missed = [True, True], [True, False], [False, False]
-    joined = [False, True]
-    found = [alone, alone, one, one, missed]
-    flight = seen_frames([9, 8, 7, 6, 1], found, [missed, missed, joined, joined, missed])
-    assert charts.telling_exposures(flight) == [1, 3]
-    cut = flight._replace(spotted=flight.spotted._replace(share=np.array([[1, 1], [1, 0.9], *[[1, 1]] * 3])))
-    assert charts.telling_exposures(cut) == [0, 3], "the border cuts one of the two in the nearer"
-    assert charts.telling_exposures(seen_frames([9.0], [missed], [missed])) == []
-    assert charts.frames_shown(TWIN, [seen_frames([9.0], [missed], [missed])]) is None
-    assert charts.frames_shown(TWIN, []) is None
-
-
+@pytest.mark.slow
 def test_a_frame_is_the_same_when_it_is_seen_again(rendering) -> None:
     exposure = charts.telling_exposures(rendering)[0]
     picture = charts.picture_of(TWIN, rendering, exposure)

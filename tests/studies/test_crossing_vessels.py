@@ -203,6 +203,7 @@ def test_how_far_apart_the_two_look():
     assert np.isnan(found[LOOKS, "separation_hu"]), "no spread, no measure"
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_the_tracks(flown):
     numbers = all_numbers(flown, 6)
     assert {name for _, name in numbers} == set(study.UNITS)

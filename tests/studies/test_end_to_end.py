@@ -148,8 +148,6 @@ def test_intervals_of_shares_stay_within_all_and_none():
     values = pd.Series([0.9, 1.0, 1.0])
     assert text.with_interval(values, 100, 0, share=True) == "97 (82 to 100)"
     assert text.with_interval(values, 100, 0) == "97 (82 to 111)"
-    assert text.with_interval(pd.Series([1.0])) == "1.0"
-    assert text.with_interval(pd.Series([np.nan])) == "nan"
 
 
 def test_a_count_has_no_end_at_one(numbers):

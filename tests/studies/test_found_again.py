@@ -150,3 +150,10 @@ def test_flights_with_nothing_to_find_count_nowhere() -> None:
                           for way in text.NAMES for name, values in parts.items()})  # fmt: skip
     for _, row in text.again_table(table).iterrows():
         assert row["none wrong"].startswith("4 of 4") and row["all right"].startswith("4 of 4")
+
+
+@pytest.mark.parametrize(
+    ("flights", "said"), [([GOOD] * 8, "help"), ([BAD] * 8, "harm"), ([GOOD] * 3, "chance")]
+)
+def test_looks_help_or_harm_only_beyond_chance(flights, said):
+    assert said in text.again_words(spread_of(*flights))

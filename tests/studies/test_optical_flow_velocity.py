@@ -8,7 +8,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.optical_flow_velocity import STUDY
+from wildlab.studies.optical_flow_velocity import STUDY, text
 from wildlab.studies.optical_flow_velocity import trial as study
 from wildlab.studies.optical_flow_velocity.trial import (
     CALIBRATED,
@@ -192,3 +192,8 @@ def test_every_published_number_is_recorded():
 def test_no_correlation_is_asked_to_be_above_one():
     check, threshold = check_claims(spread_of())["flows-correlate"], 0.5
     assert check.reaches(threshold / 2) and check.reaches(threshold) and not check.reaches(2 * threshold)
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.7, "sure"), (0.95, "right"), (1.0, "cautious")])
+def test_intervals_are_judged_by_the_share_that_they_hold(share, said):
+    assert said in text.interval_words(spread_of(logged__interval_share_95=share))

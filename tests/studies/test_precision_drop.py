@@ -156,3 +156,8 @@ def test_claims_turn_with_the_numbers():
         assert not bad[name].holds(claim.get("threshold")).any(), name
     none = check_claims(table(horizon_alarms_without_borders=0))["horizon-near-the-border"]
     assert decide(none.holds(0.1), none.premise).met == 0
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.5, "narrow"), (1.0, "wider")])
+def test_ellipses_are_judged_by_the_share_that_they_hold(share, said):
+    assert said in text.pixel_words(table(tarpaulin_ellipse_coverage_90=share))

@@ -11,7 +11,7 @@ from wildlab.evaluation.shares import FAILS, HOLDS, NO_PREMISE, decide_check
 from wildlab.planning.coverage import nodes_in
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.uav_coverage import STUDY
+from wildlab.studies.uav_coverage import STUDY, text
 from wildlab.studies.uav_coverage.trial import (
     CASES,
     DOWN,
@@ -148,3 +148,8 @@ def test_larger_errors_show_less_of_what_is_surely_planned() -> None:
 def test_a_twin_without_a_survey_is_refused() -> None:
     with pytest.raises(WildlabError, match="twin"):
         required(None, "survey")
+
+
+def test_a_case_that_did_not_hold_is_named() -> None:
+    assert text.NAMES[LOW] not in text.held_words(made_up())
+    assert text.NAMES[LOW] in text.held_words(made_up(**{f"{LOW}/held": 0.9}))

@@ -108,9 +108,10 @@ def test_no_frame_at_all_is_refused() -> None:
 
 @pytest.fixture(scope="module")
 def beginning() -> Renderings:
-    return run_rendered(draw_world(UAV, "uav-tracking", 1), 1, 6)
+    return run_rendered(draw_world(UAV, "uav-tracking", 1), 1, 10)
 
 
+@pytest.mark.slow
 def test_frames_of_a_world_show_its_animals_where_it_has_them(beginning: Renderings) -> None:
     drawn, by_weather = text.counts_of(beginning)
     assert set(by_weather) == {DAWN, CLOUDS}
@@ -121,6 +122,7 @@ def test_frames_of_a_world_show_its_animals_where_it_has_them(beginning: Renderi
     assert one.detections == len(beginning.by_weather[DAWN].framed.uv)
 
 
+@pytest.mark.slow
 def test_a_frame_is_the_same_when_it_is_seen_again(beginning: Renderings) -> None:
     run = beginning.by_weather[CLOUDS]
     images = run.framed.images

@@ -18,7 +18,7 @@ from wildlab.pipeline.animals.measures import (
 )
 from wildlab.pipeline.animals.revisit import Patrolled
 from wildlab.planning.high_level import SEARCH
-from wildlab.studies.wildlife_tracking import charts
+from wildlab.studies.wildlife_tracking import text
 from wildlab.studies.wildlife_tracking.claims import check_claims
 from wildlab.studies.wildlife_tracking.trial import (
     FILTERS,
@@ -113,6 +113,13 @@ def test_the_cost_decides_its_claim() -> None:
     assert "dearer-than-ekf" not in check_claims(spread)
 
 
+@pytest.mark.parametrize(("anees", "said"), [(4.0, "too sure"), (1.2, "too cautious")])
+def test_a_filter_is_too_sure_or_too_cautious_by_its_anees(anees: float, said: str) -> None:
+    names = [f"{one}-{NEGATIVE}__{name}" for one in (GONDOLA, UAV) for name in ("anees", "anees_own")]
+    told = text.consistency_words(spread_of(**dict.fromkeys(names, anees)))
+    assert said in told and ("too sure" in told) != ("too cautious" in told)
+
+
 def test_worlds_without_a_number_count_neither_way() -> None:
     spread = spread_of()
     spread.loc[: N // 4, (f"{UAV}-{NEGATIVE}", "sd")] = np.nan
@@ -188,17 +195,6 @@ def test_a_visit_is_one_that_found_its_animal() -> None:
     flown = Patrolled(np.arange(7.0), np.zeros((7, 3)), goal, [], log, [], np.array([np.inf]))
     assert [one.track for one in found_on_visits(flown)] == [4]
     assert turns(flown) == 3
-
-
-def test_the_visit_of_the_figure_is_the_one_with_the_largest_fall() -> None:
-    goal = np.array([SEARCH, 4, 4, SEARCH, 7, 7, 7])
-    log = [
-        found(2, 0, 4, before=60.0, after=5.0), found(6, 1, 7, before=90.0, after=5.0),
-        found(3, 2, 9, before=900.0, after=5.0),
-    ]  # fmt: skip
-    flown = Patrolled(np.arange(7.0), np.zeros((7, 3)), goal, [], log, [], np.array([np.inf]))
-    assert charts.visit_rows(flown) == (4, 6)
-    assert charts.visit_rows(flown._replace(found=log[2:])) is None
 
 
 @pytest.fixture(scope="module")
