@@ -26,27 +26,21 @@ SWAPPED = GOOD._replace(wrong=59, wrong_inside=50, swapped=True, swaps=2)
 SHARED = Associated(swapped=False, swaps=0)
 
 
-def followed(off: float = 10.0, count: int = 4, **rules: Associated) -> Followed:
-    """By every rule without a mistake but for those that are given, by their subjects with underscores."""
-    looks = Looks(np.arange(count), np.zeros((count, 2)), 0.5)
-    truth = np.array([np.zeros((count, 2)), np.full((count, 2), 3.0)])
-    crossing = Crossing(looks, np.zeros(count, int), np.arange(count) * 0.5, truth)
-    by_rule = dict.fromkeys(NAMES, GOOD) | {JOINT: SHARED}
-    by_rule |= {name.replace("_", "-"): one for name, one in rules.items()}
-    return Followed(crossing, np.full(count, off), by_rule)
-
-
-def flight(seed: int = 7, near: Counted = NEAR, sea: Counted = SEA, **ways: Followed) -> Rendering:
-    three = {"frames": followed(), "inside": followed(), "drawn": followed()} | ways
-    return Rendering(seed, (0.0, 60.0), 400, None, near, sea, **three)  # type: ignore[arg-type]
+def followed(swapped: str = "") -> Followed:
+    """By every rule without a mistake, but for the one that swaps the vessels."""
+    looks = Looks(np.arange(4), np.zeros((4, 2)), 0.5)
+    truth = np.array([np.zeros((4, 2)), np.full((4, 2), 3.0)])
+    crossing = Crossing(looks, np.zeros(4, int), np.arange(4) * 0.5, truth)
+    by_rule = {name: SWAPPED if name == swapped else GOOD for name in NAMES} | {JOINT: SHARED}
+    return Followed(crossing, np.full(4, 10.0), by_rule)
 
 
 def flights(count: int, **ways: Followed) -> list[Rendering]:
-    return [flight(7 + number, **ways) for number in range(count)]
-
-
-BY_DISTANCE = {DISTANCE.replace("-", "_"): SWAPPED}
-BY_LOOKS = {FEATURES.replace("-", "_"): SWAPPED}
+    three = {"frames": followed(), "inside": followed(), "drawn": followed()} | ways
+    return [
+        Rendering(7 + number, (0.0, 60.0), 400, None, NEAR, SEA, **three)  # type: ignore[arg-type]
+        for number in range(count)
+    ]
 
 
 def test_the_table_of_detections_has_a_row_for_all_where_there_are_several() -> None:
@@ -58,22 +52,22 @@ def test_the_table_of_detections_has_a_row_for_all_where_there_are_several() -> 
 
 
 def test_the_table_of_tracks_never_adds_up_two_ways() -> None:
-    many = flights(2, frames=followed(**BY_DISTANCE))
+    many = flights(2, frames=followed(DISTANCE))
     table = text.outcome_table(many)
     assert len(table) == len(NAMES) * len(text.WAYS)
     own = table[table["rule"] == NAMES[DISTANCE]].set_index("from")
     assert own.loc[text.FRAMES, "swapped"].startswith("2 of 2")
     assert own.loc[text.DRAWN, "swapped"].startswith("0 of 2")
-    assert own.loc[text.FRAMES, "flight-8"] == "59 of 118 wrong, 2 go over, swapped"
-    assert own.loc[text.INSIDE, "flight-8"] == "0 of 118 wrong, not swapped"
+    assert own.loc[text.FRAMES, "flight-8"].startswith("59 of 118")
+    assert own.loc[text.INSIDE, "flight-8"].startswith("0 of 118")
     shared = table[table["rule"] == NAMES[JOINT]]
     assert set(shared["flight-7"]) == {"not swapped"}, "no detection is one track's"
 
 
 def test_swaps_are_told_from_chance_only_where_enough_flights_differ() -> None:
-    many = text.swaps_words(flights(6, frames=followed(**BY_DISTANCE)))
+    many = text.swaps_words(flights(6, frames=followed(DISTANCE)))
     assert "more" in many and "cannot" not in many
-    fewer = text.swaps_words(flights(6, drawn=followed(**BY_LOOKS)))
+    fewer = text.swaps_words(flights(6, drawn=followed(FEATURES)))
     assert "fewer" in fewer and "cannot" not in fewer
-    for none in (flights(5, frames=followed(**BY_DISTANCE)), flights(6)):
+    for none in (flights(5, frames=followed(DISTANCE)), flights(6)):
         assert "cannot" in text.swaps_words(none)

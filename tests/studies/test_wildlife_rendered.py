@@ -108,7 +108,7 @@ def test_no_frame_at_all_is_refused() -> None:
 
 @pytest.fixture(scope="module")
 def beginning() -> Renderings:
-    return run_rendered(draw_world(UAV, "uav-tracking", 1), 1, 10)
+    return run_rendered(draw_world(UAV, "uav-tracking", 1), 1, 14)
 
 
 @pytest.mark.slow
