@@ -29,6 +29,23 @@ def test_a_constant_error_is_found_along_its_axis_and_no_other():
     assert found["away"].share > 0.9 > 0.1 > found["north"].share
 
 
+def test_of_sound_flights_one_in_ten_has_an_axis_told_from_zero():
+    """Blocks of ten points that err alike: all intervals of a flight hold at once."""
+    turn = np.linspace(0, 2 * np.pi, 240)
+    away = np.column_stack([np.cos(turn), np.sin(turn)])
+    axes = {"north": [1.0, 0.0], "east": [0.0, 1.0], "away": away, "right": away[:, ::-1] * [-1, 1]}
+    wrong = 0
+    for seed in range(200):
+        errors = np.repeat(normal(seed, n=24), 10, axis=0)
+        wrong += any(one.told for one in split_along(errors, axes, np.arange(240) // 10).values())
+    assert 4 <= wrong <= 20 + 3 * np.sqrt(200 * 0.1 * 0.9)
+
+
+def test_a_constant_that_is_certain_and_small_is_negligible():
+    found = split_along(normal(2, n=2400) + [0.3, 0.0], {"north": [1.0, 0.0]}, np.arange(2400) // 10)["north"]
+    assert found.told and found.share < 0.05 and not found.constant
+
+
 def test_points_without_an_axis_and_lost_points_are_left_out():
     errors = np.array([[1.0, 0.0], [np.nan, np.nan], [3.0, 0.0]])
     axes = {"seen": np.array([[1.0, 0.0], [1.0, 0.0], [np.nan, np.nan]]), "none": np.full((3, 2), np.nan)}

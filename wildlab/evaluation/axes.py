@@ -12,13 +12,17 @@ from wildlab.evaluation.blocks import PROBABILITY, block_mean
 from wildlab.evaluation.runs import Interval
 
 
+#: Share of the squared error below which a constant is of no consequence.
+NEGLIGIBLE = 0.05
+
+
 class AlongAxis(NamedTuple):
     """Errors along one axis.
 
     Attributes
     ----------
     mean
-        Of the component, m, with its interval from the blocks.
+        Of the component, m, with its interval from the blocks: those of all axes hold at once.
     share
         Of the mean square of the whole error that a constant of that size takes off, 0 to 1.
     n
@@ -30,9 +34,14 @@ class AlongAxis(NamedTuple):
     n: int
 
     @property
-    def constant(self) -> bool:
+    def told(self) -> bool:
         """Whether the interval of the mean leaves zero out."""
         return bool(self.mean.low > 0 or self.mean.high < 0)
+
+    @property
+    def constant(self) -> bool:
+        """Whether it does, and the constant matters."""
+        return self.told and self.share >= NEGLIGIBLE
 
 
 def split_along(
@@ -49,7 +58,7 @@ def split_along(
     blocks
         (N,) from `wildlab.evaluation.blocks.time_blocks`.
     probability
-        Of the intervals.
+        With which all the intervals hold at once.
 
     Returns
     -------
@@ -64,11 +73,12 @@ def split_along(
     e = np.asarray(errors, float)
     square = float(np.nanmean((e**2).sum(axis=1))) if np.isfinite(e).any() else float("nan")
     found = {}
+    each = 1 - (1 - probability) / max(len(axes), 1)
     for name, vectors in axes.items():
         component = (e * np.asarray(vectors, float)).sum(axis=1)
         n = int(np.isfinite(component).sum())
         if n:
-            mean = block_mean(component, blocks, probability)
+            mean = block_mean(component, blocks, each)
             share = mean.estimate**2 / square if square > 0 else 0.0
             found[name] = AlongAxis(mean, float(share), n)
     return found
