@@ -12,7 +12,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from tests.test_architecture import imported_names
+from tests.test_architecture import imported_names, parsed
 from wildlab import paths
 
 #: Asked for and imported by nothing: why it is asked for all the same.
@@ -22,15 +22,15 @@ NOT_IMPORTED = {
 }
 
 
-def sources(root: Path) -> Iterable[str]:
+def sources(root: Path) -> Iterable[ast.Module]:
     """The Python of the package and of the notebooks' code cells."""
     for path in sorted((root / "wildlab").rglob("*.py")):
-        yield path.read_text(encoding="utf-8")
+        yield parsed(path)
     for path in sorted((root / "notebooks").rglob("*.ipynb")):
         if ".ipynb_checkpoints" not in path.parts:
             for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
                 if cell["cell_type"] == "code":
-                    yield "".join(cell["source"])
+                    yield ast.parse("".join(cell["source"]))
 
 
 def complaints(root: Path, reasons: dict[str, str]) -> list[str]:
@@ -40,7 +40,7 @@ def complaints(root: Path, reasons: dict[str, str]) -> list[str]:
     providers = metadata.packages_distributions()
     used: set[str] = set()
     for source in sources(root):
-        for _, name in imported_names(ast.parse(source), ("wildlab",)):
+        for _, name in imported_names(source, ("wildlab",)):
             package = name.partition(".")[0]
             used |= {canonicalize_name(provider) for provider in providers.get(package, [package])}
     missing = [f"{name}: asked for and imported by nothing" for name in declared - used - set(reasons)]
