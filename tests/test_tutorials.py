@@ -74,15 +74,6 @@ def _allowed(module: str, name: str = "") -> bool:
     return name in offered if offered is not None and len(rest) < 2 else not name.startswith("_")
 
 
-def sections(notebook: Path) -> list[str]:
-    """The notebook as text, split at its headings of the second level; code stands behind a mark."""
-    texts = []
-    for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
-        source = "".join(cell["source"])
-        texts.append(source if cell["cell_type"] == "markdown" else "@code " + source.replace("\n#", "\n @"))
-    return re.split(r"^## ", "\n".join(texts), flags=re.MULTILINE)
-
-
 def test_there_are_tutorials_and_they_are_numbered() -> None:
     assert TUTORIALS
     numbers = [int(path.stem.partition("-")[0]) for path in TUTORIALS]
@@ -96,8 +87,6 @@ def test_how_a_tutorial_is_written(notebook: Path) -> None:
     assert max(lengths) <= MOST_LINES, code[lengths.index(max(lengths))]
     assert [name for source in code for name in strange_imports(source)] == []
     assert any("with_alt(" in source for source in code), "no picture"
-    without = [one[:60] for one in sections(notebook)[1:] if "@code" in one and "**Try:**" not in one]
-    assert without == [], "sections with code and nothing to try"
     assert tutorials.title_of(notebook) != notebook.stem
 
 

@@ -98,18 +98,8 @@ def test_points_of_a_staggered_grid_are_half_a_step_apart():
 
 @pytest.mark.parametrize("wrong", [(2, 6, 0.025), (9, 101, 0.025), (9, 6, 0.0), (9, 6, float("nan"))])
 def test_a_board_that_is_none_is_refused(wrong):
-    with pytest.raises(WildlabError, match="3 to 100 inner corners"):
+    with pytest.raises(WildlabError, match="3 to 100"):
         Board("chessboard", *wrong)
-
-
-@pytest.mark.slow
-def test_of_43_thermal_images_at_least_22_boards_are_found(shared_data):
-    """About a minute: light on dark, some cut off, some in the shade of a person."""
-    files = sorted(shared_data("calibration", "thermal_chessboard").glob("*.png"))
-    assert len(files) == 43
-    board = Board("chessboard", 8, 7, 0.05)
-    greys = [grey8(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) for path in files]
-    assert sum(find_board(grey, board) is not None for grey in greys) >= 22
 
 
 def test_corners_are_where_edges_cross():

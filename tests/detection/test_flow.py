@@ -15,7 +15,6 @@ from wildlab.detection.flow import (
     find_features,
     likely_speed,
     match_features,
-    moved_together,
     nearest_by_ratio,
     slow_gimbal,
 )
@@ -82,16 +81,6 @@ def test_the_same_pairs_each_time_and_the_same_as_by_comparing_all_with_all():
     assert len(expected) > 40
 
 
-def test_features_come_from_inside_alone():
-    picture = texture(3)
-    inside = np.zeros(SHAPE, bool)
-    inside[40:120, 60:150] = True
-    found = matched(shifted(picture, 0, 0), shifted(picture, 2, 1), inside, inside)
-    assert len(found) >= 5
-    for uv in (found.first, found.second):
-        assert inside[np.rint(uv[:, 1]).astype(int), np.rint(uv[:, 0]).astype(int)].all()
-
-
 def test_something_else_that_moves_otherwise_is_left_out():
     rng = np.random.default_rng(4)
     here = rng.uniform(0, 100, (30, 2))
@@ -135,13 +124,6 @@ def test_an_open_contour_is_filled_by_its_convex_outline():
     assert not filled_outlines(np.zeros((4, 4), np.int32)).any()
 
 
-def test_what_turns_and_grows_moves_together():
-    here = np.random.default_rng(5).uniform(0, 50, (8, 2))
-    turn = 1.2 * np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
-    there = here @ turn.T + [5.0, 7.0]
-    assert np.allclose(moved_together(here, there), there)
-
-
 def test_nothing_is_found_where_nothing_is():
     even, empty = np.full(SHAPE, 290.0), np.zeros(SHAPE, bool)
     picture = shifted(texture(6), 0, 0)
@@ -163,9 +145,9 @@ def test_pairs_that_say_little_can_be_told():
 
 
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(WildlabError, match="an image of the shape"):
+    with pytest.raises(WildlabError, match="image"):
         find_features(np.zeros((4, 4, 3)), EVERYWHERE)
-    with pytest.raises(WildlabError, match="a mask of the shape"):
+    with pytest.raises(WildlabError, match="mask"):
         find_features(np.zeros((4, 4)), EVERYWHERE)
     for field, value in (
         ("contrast", 0), ("ratio", 1.2), ("agreement", 0), ("largest_turn", 0), ("fewest", 2),

@@ -158,17 +158,14 @@ def test_through_the_ground_it_is_the_same_place() -> None:
     assert fuse_located(lost, second).second.tolist() == [0, 1]
 
 
-def test_what_cannot_be_joined_is_a_sentence() -> None:
+def test_what_cannot_be_joined_is_refused() -> None:
     for call, word in (
-        (lambda: fuse_points([[0, 0]], [P], [[0, 0]], [Q], gate=1.0), "The gate is 1"),
-        (lambda: fuse_points([[0, 0]], [P, P], [[0, 0]], [Q]), "The first points have the shape"),
-        (lambda: fuse_points([[0, np.nan]], [P], [[0, 0]], [Q]), "A point of the first is not finite"),
-        (
-            lambda: fuse_points([[0, 0]], [P], [[0, 0]], [-Q]),
-            "of the second is not finite, or its covariance",
-        ),
-        (lambda: through_homography([[0, 0]], [P], np.ones((3, 3))), "no invertible matrix"),
-        (lambda: through_homography([[0, 0]], [P], np.eye(3), -1.0), "registration is -1 px"),
+        (lambda: fuse_points([[0, 0]], [P], [[0, 0]], [Q], gate=1.0), "gate"),
+        (lambda: fuse_points([[0, 0]], [P, P], [[0, 0]], [Q]), "shape"),
+        (lambda: fuse_points([[0, np.nan]], [P], [[0, 0]], [Q]), "of the first"),
+        (lambda: fuse_points([[0, 0]], [P], [[0, 0]], [-Q]), "of the second"),
+        (lambda: through_homography([[0, 0]], [P], np.ones((3, 3))), "invertible"),
+        (lambda: through_homography([[0, 0]], [P], np.eye(3), -1.0), "registration"),
     ):
         with pytest.raises(WildlabError, match=word):
             call()

@@ -68,15 +68,6 @@ def test_ellipses_are_held_against_the_errors(stated, word):
     assert wider.coverage.estimate == pytest.approx(0.9, abs=0.01)
 
 
-@pytest.mark.parametrize("factor", [1.0, 1.08, 1.13, 1.3])
-def test_honest_is_said_of_no_ellipses_that_visibly_hold_less_than_they_say(factor):
-    """One hundred and fifty blocks: 83 % of the 90 % ellipses, and honest, is a contradiction."""
-    P = np.tile((2.0 / factor) ** 2 * np.eye(2), (3000, 1, 1))
-    found = judge_ellipses(normal(1, n=3000), P, np.arange(3000) // 20, np.random.default_rng(0))
-    assert (found.word == "honest") == (0.87 <= found.coverage.estimate <= 0.93)
-    assert (found.word == "too small") == (found.coverage.high < 0.87)
-
-
 def test_the_interval_of_the_factor_holds_what_it_says():
     P = np.tile(4.0 * np.eye(2), (240, 1, 1))
     inside = wrong = 0
@@ -102,16 +93,6 @@ def test_few_honest_ellipses_are_rarely_called_dishonest(images, points):
         inside += found.factor.low <= 1.0 <= found.factor.high
     assert words.count("too large") <= 10 and words.count("too small") <= 10
     assert inside >= 85
-
-
-def test_a_few_ellipses_that_are_far_too_large_are_still_called_so():
-    P = np.tile(25.0 * np.eye(2), (24, 1, 1))
-    assert (
-        judge_ellipses(normal(1, 1.0, 24), P, np.arange(24) // 4, np.random.default_rng(0)).word
-        == "too large"
-    )
-    exact = judge_ellipses(np.zeros((24, 2)), P, np.arange(24) // 4, np.random.default_rng(0))
-    assert exact.word == "too large" and exact.factor.high < 1e-3
 
 
 def test_too_few_or_too_scattered_for_a_verdict_on_ellipses():

@@ -37,15 +37,6 @@ def test_a_mark_a_photo_and_a_click_are_told_apart():
     assert rest.sum() == 100 - 10 - 5 + ((MARKS == "M3") & (PHOTOS == "P07")).sum() - 1
 
 
-def test_a_mark_seen_in_most_photos_is_still_the_mark():
-    """It is off in every photo that shows it, and no photo is blamed."""
-    marks = np.tile(["a", "b", "c", "d", "e"], 20)
-    z = residuals(5)
-    z[marks == "b"] += 15.0
-    (only,), rest = find_outliers(z, z, PHOTOS, marks)
-    assert (only.kind, only.mark, only.points) == ("mark", "b", 20) and rest.sum() == 80
-
-
 def test_without_names_of_marks_photos_and_clicks_are_found():
     z = residuals(1)
     z[PHOTOS == "P03"] += 25.0

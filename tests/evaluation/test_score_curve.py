@@ -84,7 +84,7 @@ def test_nothing_found_nothing_labelled_and_no_score() -> None:
     beside = np.array([[90.0, 0, 4, 4]])
     ignored = curve_along_score([ScoredFrame(box, np.ones(1), beside, box)])
     assert ignored.counts.tolist() == [[0, 0, 1]]
-    with pytest.raises(WildlabError, match="A score is no number"):
+    with pytest.raises(WildlabError, match="score"):
         curve_along_score([ScoredFrame(box, np.array([np.nan]), box, NONE)])
 
 
@@ -105,5 +105,5 @@ def test_a_difference_is_of_the_same_draws() -> None:
     alone = rates(counts).f1
     assert 0 < found.low < found.estimate < found.high < found.low + (alone.high - alone.low) / 2
     assert np.isnan(difference_of_f1(counts[:3], counts[:3]).low)
-    with pytest.raises(WildlabError, match="40 frames have counts and 3 have a clip"):
+    with pytest.raises(WildlabError, match="clip"):
         difference_of_f1(counts, counts, [1, 2, 3])

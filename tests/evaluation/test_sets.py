@@ -92,14 +92,12 @@ def test_parts_add_up(x, y, cutoff, order):
 
 @pytest.mark.parametrize(("cutoff", "order"), [(0, 2), (-1, 2), (np.inf, 2), (np.nan, 2), (1, 0.5)])
 def test_what_is_no_metric_is_refused(cutoff, order):
-    with pytest.raises(WildlabError, match="make no metric"):
+    with pytest.raises(WildlabError, match="no metric"):
         ospa(NONE, NONE, cutoff, order)
 
 
 def test_points_that_do_not_fit_are_refused():
-    with pytest.raises(
-        WildlabError, match=r"(?i)points of shape \(1, 2\) do not go with points of shape \(1, 3\)"
-    ):
+    with pytest.raises(WildlabError, match="do not go"):
         gospa([[0.0, 0.0]], [[0.0, 0.0, 0.0]], 1)
-    with pytest.raises(WildlabError, match=r"(?i)a point is not finite"):
+    with pytest.raises(WildlabError, match="not finite"):
         gospa([[0.0, np.nan]], [[0.0, 0.0]], 1)

@@ -56,7 +56,7 @@ def test_only_flights_that_meet_the_premise_are_asked() -> None:
 
 def test_what_cannot_be_decided_is_refused() -> None:
     for true, premise in (([], None), ([True, False], [True])):
-        with pytest.raises(WildlabError, match="one premise for each"):
+        with pytest.raises(WildlabError, match="premise"):
             s.decide(true, premise)
 
 
@@ -69,7 +69,7 @@ def test_a_measure_is_held_against_the_threshold() -> None:
     assert len(both) == 4 and s.Check.of(both) is both
     assert s.Check.of([1, 0]).holds().tolist() == [True, False]
     for check in (s.Check(measured=measured), s.Check()):
-        with pytest.raises(WildlabError, match="State the threshold"):
+        with pytest.raises(WildlabError, match="threshold"):
             check.holds()
 
 
@@ -79,7 +79,7 @@ def test_a_threshold_may_say_what_is_counted() -> None:
     assert check.holds(5).tolist() == [True, False] and check.holds(10).all()
     assert len(check) == 2 and check.reaches(10)
     assert s.decide_check(check, 5).true == 1
-    with pytest.raises(WildlabError, match=r"(?s)Nothing was counted for the threshold 7.*Use one of 5, 10"):
+    with pytest.raises(WildlabError, match="threshold 7"):
         check.holds(7)
 
 
@@ -120,7 +120,7 @@ def test_images_together_are_held_against_the_threshold(
 
 
 def test_images_together_need_a_threshold() -> None:
-    with pytest.raises(WildlabError, match="Images are pooled and no threshold"):
+    with pytest.raises(WildlabError, match="no threshold"):
         s.decide_check(s.Check(measured=np.zeros(6), pooled=s.Pooled(0, 48)))
 
 

@@ -54,10 +54,6 @@ def test_a_first_order_process_is_found_coloured():
     assert np.isclose(effective_sample_size(x, 200) / 5000, 0.2 / 1.8, rtol=0.25)
 
 
-def test_a_constant_series_has_no_autocorrelation():
-    assert np.isnan(autocorrelation(np.ones(10), 3)).all()
-
-
 def test_portmanteau_of_one_element_is_ljung_and_box():
     x = np.random.default_rng(3).normal(size=80)
     statistic, p_value = ljung_box(x, 10)
@@ -89,5 +85,5 @@ def test_innovations_that_are_missing_are_left_out():
     np.testing.assert_array_equal(got.autocorrelation, expected.autocorrelation)
     assert (got.n, got.bound, got.statistic) == (60, white_bound(60), expected.statistic)
     np.testing.assert_allclose(got.autocorrelation[1], autocorrelation(v[:, 1], 7))
-    with pytest.raises(WildlabError, match=r"(?i)60 innovations are too few for 59 lags"):
+    with pytest.raises(WildlabError, match="59 lags"):
         innovation_whiteness(v, 59)

@@ -14,7 +14,6 @@ from wildlab.geometry.attitude_uncertainty import (
 )
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.ellipses import ellipse_axes
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.terrain import Terrain
@@ -23,7 +22,7 @@ from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
 FOCAL, MIDDLE, HEIGHT = 800.0, (1000.0, 750.0), 60.0
 CAMERA = Camera(2000, 1500, FOCAL, FOCAL, *MIDDLE)
-PITCHES = (0, -15, -30, -45, -60, -75, -80, -85, -88, -90)
+PITCHES = (0, -30, -60, -85, -90)
 #: Standard deviations of tilt and heading, degrees.
 KINDS = {"isotropic": (1.0, 1.0), "heading": (0.5, 3.0), "compass": (0.2, 10.0), "wide": (1.0, 15.0)}
 DRAWS = 20_000
@@ -147,8 +146,8 @@ def ellipse(pitch: float, yaw: float, pixel: np.ndarray, kind: str, terrain: Ter
     return terrain_covariance(pose, pixel[None], terrain, errors, rng).covariance[0]
 
 
-def coverage(pitch: float, kind: str, on_hills: bool) -> tuple[float, np.ndarray]:
-    """Share of the true places in the 90 % ellipse, and its half axes."""
+def coverage(pitch: float, kind: str, on_hills: bool) -> float:
+    """Share of the true places in the 90 % ellipse."""
     yaw = 0.7
     pixel = (
         np.array([1100.0, 700.0])
@@ -161,26 +160,11 @@ def coverage(pitch: float, kind: str, on_hills: bool) -> tuple[float, np.ndarray
     covariance = ellipse(pitch, yaw, pixel, kind, hills() if on_hills else None)
     off = drawn(pitch, yaw, pixel, kind, on_hills, seed=abs(int(pitch)) + 7, n=n) - centre
     squared = np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)
-    return float((squared <= -2 * np.log(0.1)).mean()), np.array(ellipse_axes(covariance)[:2])
+    return float((squared <= -2 * np.log(0.1)).mean())
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("on_hills", [False, True])
 def test_ellipses_hold_what_they_say_at_every_pitch(kind: str, on_hills: bool) -> None:
     shares = {pitch: coverage(pitch, kind, on_hills) for pitch in PITCHES}
-    for pitch, (share, axes) in shares.items():
-        where = "hills" if on_hills else "plane"
-        print(f"{kind:9s} {where} {pitch:4d} {100 * share:5.1f} % {axes[0]:6.2f} x {axes[1]:5.2f} m")
-    assert all(0.87 <= share <= 0.93 for share, _ in shares.values()), shares
-
-
-def test_straight_down_an_isotropic_error_makes_a_circle() -> None:
-    """One degree at 60 m: 60 m * 1 deg * sqrt(-2 ln 0.1) = 2.25 m, both ways."""
-    pose = CameraPoses(
-        CAMERA, Mount("forward"), np.array([0.0, 0.0, -60.0]), euler_to_matrix(0.0, -np.pi / 2, 0.3)
-    )
-    P = pose_covariance(0.0, 0.0, np.radians(1.0), np.radians(1.0), pose.R_nb)
-    errors = PoseErrors(np.zeros((2, 2)), P, np.zeros((3, 3)), 0.0)
-    found = ground_covariance(pose, np.array(MIDDLE), 0.0, errors, np.random.default_rng(0))
-    expected = 60 * np.radians(1.0) * np.sqrt(-2 * np.log(0.1))
-    np.testing.assert_allclose(np.ravel(ellipse_axes(found.covariance)[:2]), expected, rtol=1e-6)
+    assert all(0.87 <= share <= 0.93 for share in shares.values()), shares

@@ -201,9 +201,9 @@ def test_halves_keep_images_whole():
     assert len(np.unique(image[half])) == 3
 
 
-def test_rolled_to_calibrate_with_is_an_error():
+def test_too_few_points_and_unknown_parameters_are_refused():
     survey = Survey(1, EVERY_WAY)
-    with pytest.raises(ValueError, match="fewer than two points"):
+    with pytest.raises(ValueError, match="two points"):
         calibrate(survey.poses_at(), survey.uv * np.nan, survey.known, survey.image)
-    with pytest.raises(ValueError, match="unknown parameters"):
+    with pytest.raises(ValueError, match="unknown"):
         calibrate(survey.poses_at(), survey.uv, survey.known, survey.image, ("yaw",))

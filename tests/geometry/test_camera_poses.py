@@ -5,12 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
-from wildlab.geometry import camera_poses
 from wildlab.geometry.calibration import calibrate
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
+from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount, camera_pose
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, ground_jacobians, ray_flatness
 
@@ -151,23 +150,3 @@ def test_a_pose_of_the_lens_itself():
     assert np.allclose(again[1], free.R_nc, rtol=0, atol=1e-14)
     same(free.take(1).take(0), free.take(1))
     assert np.array_equal(free.take(1).p_nc, mounted.p_nc[1])
-
-
-def test_points_and_ellipses_work_out_the_camera_s_pose_once(monkeypatch):
-    """Rays near the horizon among them, whose ellipses are sampled one by one."""
-    calls = []
-
-    def counted(*arguments):
-        calls.append(arguments)
-        return camera_pose(*arguments)
-
-    monkeypatch.setattr(camera_poses, "camera_pose", counted)
-    R = euler_to_matrix(0.0, np.radians([-80.0, -40.0, -12.0, -10.0]), 0.0)
-    poses = CameraPoses(CAMERA, Mount("forward"), np.array([0.0, 0.0, -100.0]), R)
-    uv = np.tile([313.0, 265.0], (N, 1))
-    e = PoseErrors(np.eye(2), np.diag([1, 1, 1, 1e-3, 1e-3, 1e-3]), np.zeros((3, 3)), 1.0)
-    ground = georeference_pixels(poses, uv, 0.0)
-    found = ground_covariance(poses, uv, 0.0, e, np.random.default_rng(0))
-    assert found.method.tolist() == ["linear", "linear", "sampled", "sampled"]
-    assert np.allclose(ground_to_pixel(CAMERA, ground, poses.p_nc, poses.R_nc), uv)
-    assert len(calls) == 1

@@ -13,7 +13,6 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.flow import (
     CameraMotion,
     camera_flow,
-    camera_rates,
     flow_between,
     flow_matrix,
     gimbal_axes,
@@ -102,11 +101,6 @@ def test_the_gimbal_turns_the_camera_as_its_angles_say():
     assert gimbal_axes(MOUNT, np.array([0.1, 0.2])).shape == (2, 3, 2)
 
 
-def test_without_a_moving_gimbal_only_the_airframe_turns():
-    still = MOTION._replace(gimbal_rates=None)
-    assert np.array_equal(camera_rates(pose_at(0.0), still), MOTION.rates)
-
-
 def test_the_finite_form_is_exact_and_the_other_one_nearly():
     errors = []
     for interval in (0.4, 0.2, 0.1):
@@ -191,26 +185,15 @@ def errors_of(scale=1.0):
     )  # fmt: skip
 
 
-def test_every_source_of_error_is_carried_by_its_own_derivatives():
-    """To first order the covariance is that of what one standard deviation of one error does, either way."""
-    uv = pixels(0.0)
-    J = flow_jacobians(pose_at(0.0), MOTION, uv, FLOW, PLANE)
-    nothing = FlowErrors(*(0.0 * np.asarray(part) for part in errors_of()))
-    total = velocity_covariance(J, errors_of())
-    for name, size in (
-        ("pixel", 2), ("flow", 2), ("pose", 6), ("mount", 3), ("velocity", 3), ("rates", 3),
-        ("gimbal_rates", 2), ("plane", 1), ("interval", 1),
-    ):  # fmt: skip
-        given = np.asarray(getattr(errors_of(), name))
-        found = velocity_covariance(J, nothing._replace(**{name: given}))
-        truth = np.zeros((3, 2, 2))
-        for deviation in 1e-3 * np.linalg.cholesky(np.atleast_2d(given)).T:
-            way = deviation if size > 1 else deviation[0]
-            change = (moved(CAMERA, **{name: way}) - moved(CAMERA, **{name: -way})) / 2e-3
-            truth += change[:, :, None] * change[:, None, :]
-        assert np.allclose(found, truth, rtol=1e-3, atol=1e-9), name
-        total = total - found
-    assert np.allclose(total, 0.0, atol=1e-9), "and there is nothing else in it"
+def test_the_covariance_is_the_sum_over_all_sources():
+    J = flow_jacobians(pose_at(0.0), MOTION, pixels(0.0), FLOW, PLANE)
+    expected = np.zeros((3, 2, 2))
+    for name in FlowErrors._fields:
+        by = getattr(J, name)
+        by = by[..., None] if by.ndim == 2 else by
+        given = np.atleast_2d(getattr(errors_of(), name))
+        expected += np.einsum("nij,jk,nlk->nil", by, given, by)
+    assert np.allclose(velocity_covariance(J, errors_of()), expected)
 
 
 def test_what_features_share_does_not_average_out():
@@ -254,11 +237,11 @@ def test_poses_in_rows_give_what_each_gives_alone():
 
 def test_what_does_not_fit_is_refused():
     pose, uv = pose_at(0.0), pixels(0.0)
-    with pytest.raises(WildlabError, match=r"flow of the shape \(1, 2\) for pixels of the shape \(3, 2\)"):
-        target_velocity(pose, MOTION, uv, FLOW[:1], PLANE)
-    with pytest.raises(WildlabError, match=r"0\.0 s between two images"):
-        flow_between(uv, uv, 0.0)
-    with pytest.raises(WildlabError, match="or of two mounts"):
-        motion_between(pose, replace(pose, mount=Mount("down")), 0.1)
-    with pytest.raises(WildlabError, match="Give one pose and at least one feature"):
-        mean_velocity(pose, MOTION, uv[:0], FLOW[:0], PLANE, errors_of())
+    for call, about in (
+        (lambda: target_velocity(pose, MOTION, uv, FLOW[:1], PLANE), "flow of the shape"),
+        (lambda: flow_between(uv, uv, 0.0), "0.0 s"),
+        (lambda: motion_between(pose, replace(pose, mount=Mount("down")), 0.1), "two mounts"),
+        (lambda: mean_velocity(pose, MOTION, uv[:0], FLOW[:0], PLANE, errors_of()), "one feature"),
+    ):
+        with pytest.raises(WildlabError, match=about):
+            call()

@@ -134,46 +134,6 @@ def test_without_absolute_values_a_line_to_the_other_side_leaves_its_wall_out():
     assert compare_angles(terrain, [[8, 36]], west).steps[0] > 0
 
 
-def test_both_see_over_even_ground_and_not_through_a_wall():
-    height = np.zeros((31, 31), np.float32)
-    height[:, 15] = 8.0
-    terrain = Terrain(height, 0.0, 0.0, 2.0)
-    p_nc = np.array([30.0, 10.0, -12.0])
-    nodes = all_nodes(terrain)
-    # The shadow of a wall 8 m high, 20 m off, from 12 m: three times as long as the way from 12 to 8 m.
-    behind = (nodes[:, 1] > 15) & (nodes[:, 1] * 2 - 10 < 20 * 12 / 4)
-    before = nodes[:, 1] < 14
-    for found in (compare_angles(terrain, nodes, p_nc), cast_rays(terrain, nodes, p_nc, 0.2, 1.0)):
-        assert not found.clear[behind].any()
-        assert found.clear[before].all()
-
-
-def test_a_ray_runs_over_a_crest_and_through_ground_thinner_than_its_step():
-    """What a fixed step costs, as F's algorithm stands."""
-    north = np.abs(np.arange(41) - 20.0)
-    ridge = Terrain(np.tile(20.0 - north, (3, 1)).astype(np.float32), 0.0, 0.0, 1.0)
-    lens = np.array([1.0, 0.0, -21.0])
-    assert compare_angles(ridge, [[1, 20]], lens).clear[0]
-    assert not any(cast_rays(ridge, [[1, 20]], lens, s, 1.0, shorten=False).clear[0] for s in (3.0, 0.7))
-    wall = np.zeros((3, 41), np.float32)
-    wall[:, 20] = 3.0
-    thin = Terrain(wall, 0.0, 0.0, 1.0)
-    through, held = (
-        cast_rays(thin, [[1, 38]], [1.0, 0.0, -4.0], step, 3.0, shorten=False).clear[0] for step in (8.0, 0.1)
-    )
-    assert through and not held
-
-
-def test_from_the_highest_ground_the_same_is_seen_in_fewer_steps():
-    rng = np.random.default_rng(3)
-    terrain = Terrain(rng.normal(0, 2, (25, 25)).astype(np.float32), 0.0, 0.0, 2.0)
-    nodes, p_nc = all_nodes(terrain), [24.0, 20.0, -90.0]
-    short = cast_rays(terrain, nodes, p_nc, 0.02, 1.0)
-    whole = cast_rays(terrain, nodes, p_nc, 0.02, 1.0, shorten=False)
-    assert (short.clear == whole.clear).mean() > 0.99  # the steps fall elsewhere
-    assert short.steps.sum() < whole.steps.sum() / 5
-
-
 def test_a_missing_node_is_not_seen_and_hides():
     height = np.zeros((3, 21), np.float32)
     height[:, 10], height[:, 20] = np.nan, 1.5
@@ -223,14 +183,11 @@ FLAT = Terrain(np.zeros((3, 4)), 0.0, 0.0, 1.0)
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: compare_angles(FLAT, [[3, 0]], [0, 0, -1]), "beyond the map of 3 by 4"),
-        (lambda: compare_angles(FLAT, [[0, 0]], [0, np.nan, -1]), "Give one known point"),
-        (lambda: cast_rays(FLAT, [[0, 0]], [0, 0, -1], 0.0, 1.0), "a step of 0.0 m"),
-        (lambda: cast_rays(FLAT, [[0, 0]], [0, 0, -1], 1.0, np.nan), "a tolerance of nan m"),
-        (
-            lambda: in_field_of_view((0.0, 1.0), [[0, 0, 1]], [0, 0, 0], np.eye(3)),
-            "Give two between 0 and 180",
-        ),
+        (lambda: compare_angles(FLAT, [[3, 0]], [0, 0, -1]), "beyond the map"),
+        (lambda: compare_angles(FLAT, [[0, 0]], [0, np.nan, -1]), "one known point"),
+        (lambda: cast_rays(FLAT, [[0, 0]], [0, 0, -1], 0.0, 1.0), "step of 0.0"),
+        (lambda: cast_rays(FLAT, [[0, 0]], [0, 0, -1], 1.0, np.nan), "tolerance of nan"),
+        (lambda: in_field_of_view((0.0, 1.0), [[0, 0, 1]], [0, 0, 0], np.eye(3)), "0 and 180"),
     ],
 )
 def test_what_cannot_be_looked_at_is_refused(call, says):

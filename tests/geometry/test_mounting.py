@@ -46,7 +46,7 @@ def test_what_is_left_grows_with_the_range():
 
 
 def test_two_points_an_image_are_too_few():
-    with pytest.raises(WildlabError, match="No image has more than 2 known points"):
+    with pytest.raises(WildlabError, match="2 known points"):
         mounting_from_points(*room(POINTS[:2]))
 
 
@@ -54,5 +54,5 @@ def test_angles_that_cannot_be_told_apart_are_named():
     # Three points in one place do not tell how the camera is turned about its own axis.
     near = np.array([[0.0, 0.0, 0.0]] * 3) + 1e-9 * np.arange(9).reshape(3, 3) * [1, 1, 0]
     poses, uv, known, image = room(near, poses=1)
-    with pytest.raises(WildlabError, match="cannot be told apart from"):
+    with pytest.raises(WildlabError, match="told apart"):
         mounting_from_points(poses, uv + np.random.default_rng(3).normal(0, 0.5, uv.shape), known, image)

@@ -176,10 +176,10 @@ def test_heights_and_slopes_are_those_of_the_surface():
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ((np.zeros(4), 0, 0, 1.0), "shape \\(4,\\)"),
-        ((np.zeros((1, 5)), 0, 0, 1.0), "two rows and two columns"),
-        ((np.zeros((3, 3)), 0, 0, 0.0), "a step of 0.0 m"),
-        ((np.full((3, 3), np.nan), 0, 0, 1.0), "no height at all"),
+        ((np.zeros(4), 0, 0, 1.0), "shape"),
+        ((np.zeros((1, 5)), 0, 0, 1.0), "two rows"),
+        ((np.zeros((3, 3)), 0, 0, 0.0), "step of 0.0"),
+        ((np.full((3, 3), np.nan), 0, 0, 1.0), "no height"),
     ],
 )
 def test_a_terrain_that_is_none_is_refused(arguments, says):
@@ -188,7 +188,7 @@ def test_a_terrain_that_is_none_is_refused(arguments, says):
 
 
 def test_starts_have_to_go_with_rays():
-    with pytest.raises(WildlabError, match="one start for each ray"):
+    with pytest.raises(WildlabError, match="one start"):
         intersect_terrain(Terrain(np.zeros((3, 3)), 0, 0, 1.0), np.ones((3, 3)), np.zeros((2, 3)))
 
 

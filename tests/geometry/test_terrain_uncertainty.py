@@ -109,18 +109,6 @@ def test_on_level_ground_it_is_what_a_plane_gives() -> None:
     assert list(found.method) == ["linear"] * 3
 
 
-def test_uphill_an_ellipse_is_shorter_than_downhill() -> None:
-    """30 deg below the horizon towards a slope of 30 deg: straight on, or along it."""
-    pose, uv, e = looking(30.0, 60.0, yaw=0.0), np.array([[320.0, 256.0]]), errors(0.3)
-    sizes = [
-        np.linalg.det(
-            terrain_covariance(pose, uv, sloping(a, 0.0), e, np.random.default_rng(0)).covariance[0]
-        )
-        for a in (0.577, 0.0, -0.2)
-    ]
-    assert sizes[0] < 0.2 * sizes[1] < sizes[2]
-
-
 def test_samples_are_those_of_each_error_by_itself() -> None:
     """One pixel, one pose, one terrain at a time: raised, turned and moved as the draws say."""
     rng = np.random.default_rng(3)
@@ -201,5 +189,5 @@ def test_beyond_the_map_there_is_no_ellipse() -> None:
 
 def test_errors_of_another_number_are_refused() -> None:
     e = errors()._replace(plane=np.ones(3))
-    with pytest.raises(WildlabError, match=r"errors of the rows \(3,\) for 2 pixels"):
+    with pytest.raises(WildlabError, match="2 pixels"):
         terrain_covariance(looking(60.0, 50.0), np.ones((2, 2)), sloping(0, 0), e, np.random.default_rng(0))

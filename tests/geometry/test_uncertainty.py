@@ -8,7 +8,7 @@ from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.ellipses import ellipse_axes, inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
-from wildlab.geometry.georeference import georeference_pixels, intersect_plane, pixel_to_plane
+from wildlab.geometry.georeference import georeference_pixels, pixel_to_plane
 from wildlab.geometry.mount import R_MC_DOWN, Mount, camera_rotation, mount_rotation
 from wildlab.geometry.uncertainty import (
     PoseErrors,
@@ -78,49 +78,6 @@ def test_straight_down_has_a_closed_form():
     assert np.allclose(result.covariance[0], expected)
 
 
-def test_flatness_of_a_forward_ray_is_sd_times_cotangent():
-    pitch = np.radians(-20.0)
-    R = euler_to_matrix([0.0], [pitch], [0.3])
-    only_attitude = errors(2.0, pixel=0.0, position=0.0)
-    poses = CameraPoses(TAU2, Mount("forward"), ZERO, R)
-    flatness = ray_flatness(poses, np.array([[TAU2.cx, TAU2.cy]]), only_attitude)
-    assert np.isclose(flatness[0], np.radians(2.0) / np.tan(np.radians(20.0)))
-
-
-@pytest.mark.parametrize("uv", [(322.0, 250.0), (20.0, 30.0), (600.0, 480.0)])
-def test_flatness_against_the_depression_of_sampled_rays(uv):
-    """Turned mount, bent lens, errors of one source at a time: each must turn the rays as far as it says."""
-    rng = np.random.default_rng(4)
-    n = 200_000
-    R_nb = euler_to_matrix(0.2, -0.5, 0.7)
-    mount = Mount("forward", pan=0.9, tilt=-0.3, misalignment=(0.1, -0.05, 0.02))
-    pose = CameraPoses(BENT, mount, ZERO, R_nb)
-    # Different about each axis, and not along any.
-    A = rng.normal(size=(3, 3))
-    turning = np.radians(0.4) ** 2 * A @ A.T
-    spread = np.array([[9.0, 3.0], [3.0, 16.0]])
-    none = errors(0.0, pixel=0.0)
-    sources = {
-        "pose": none._replace(pose=np.kron(np.diag([0.0, 1.0]), turning)),
-        "mount": none._replace(mount=turning),
-        "pixel": none._replace(pixel=spread),
-    }
-    for source, e in sources.items():
-        uvs = np.tile(uv, (n, 1))
-        body = wobble = np.broadcast_to(np.eye(3), (n, 3, 3))
-        if source == "pixel":
-            uvs = uvs + rng.multivariate_normal(np.zeros(2), spread, n)
-        else:
-            turns = rotation_vector_to_matrix(rng.multivariate_normal(ZERO, turning, n))
-            body, wobble = (turns, wobble) if source == "pose" else (body, turns)
-        R_bm = mount_rotation(mount)
-        R_nc = R_nb @ body @ R_bm @ wobble @ (R_bm.T @ camera_rotation(mount))
-        rays = np.einsum("nij,nj->ni", R_nc, np.column_stack([normalise(BENT, uvs), np.ones(n)]))
-        depression = np.arctan2(rays[:, 2], np.hypot(rays[:, 0], rays[:, 1]))
-        sampled = depression.std() / np.tan(depression.mean())
-        assert ray_flatness(pose, [uv], e)[0] == pytest.approx(sampled, rel=0.01), source
-
-
 def test_flatness_is_the_slope_of_the_depression_by_finite_differences():
     """Exact, and on its own: the depression of a ray is turned by each source's small steps."""
     R_nb, mount = euler_to_matrix(0.2, -0.5, 0.7), Mount("forward", 0.9, -0.3, (0.1, -0.05, 0.02))
@@ -188,8 +145,8 @@ def test_errors_of_another_length_than_the_pixels_are_refused(field, wrong):
         ground_covariance(poses, np.full((4, 2), 300.0), 0.0, e, np.random.default_rng(0))
 
 
-@pytest.mark.parametrize("pitch_deg", [-90, -70, -50, -40, -30, -25, -20, -15])
-@pytest.mark.parametrize("attitude_deg", [0.2, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("pitch_deg", [-90, -40, -25, -20, -15])
+@pytest.mark.parametrize("attitude_deg", [0.2, 1.0, 2.0])
 def test_ninety_per_cent_ellipses_hold_ninety_per_cent(pitch_deg, attitude_deg):
     """Independent draws against each ellipse, the pixel anywhere in the middle of the image."""
     rng = np.random.default_rng([abs(pitch_deg), int(10 * attitude_deg)])
@@ -216,33 +173,6 @@ def test_flat_rays_are_sampled_and_hopeless_ones_refused():
     assert np.isnan(result.covariance[2:]).all()
 
 
-def test_the_linear_ellipse_would_be_wrong_where_it_is_not_used():
-    """What the switch is for: at -7 deg the linear ellipse holds far less than it says."""
-    mount, e = Mount("forward"), errors(2.0)
-    R = euler_to_matrix(0.0, np.radians(-7.0), 0.0)
-    pose, uv = CameraPoses(TAU2, mount, np.array([0, 0, -100.0]), R), np.array([TAU2.cx, TAU2.cy])
-    draws = sample_ground(pose, uv, 0.0, e, np.random.default_rng(1), 20000)
-    centre = georeference_pixels(pose, uv, 0.0)[:2]
-    J = ground_jacobians(pose, uv[None], 0.0)
-    linear = (
-        J.pixel[0] @ e.pixel @ J.pixel[0].T + J.pose[0] @ e.pose @ J.pose[0].T + np.outer(J.plane, J.plane)
-    )
-    assert inside_ellipse(draws - centre, linear).mean() < 0.85
-    sampled = ground_covariance(pose, uv, 0.0, e, np.random.default_rng(2))
-    assert sampled.method[0] == "sampled"
-    assert 0.88 < inside_ellipse(draws - centre, sampled.covariance[0]).mean() < 0.92
-
-
-def test_same_seed_same_bytes():
-    R = euler_to_matrix(0.0, np.radians(-12.0), 0.0)
-    pose = CameraPoses(TAU2, Mount("forward"), np.array([0, 0, -90.0]), R)
-    one, two = (
-        ground_covariance(pose, [[320.0, 256.0]], 0.0, errors(2.0), np.random.default_rng(5)).covariance
-        for _ in range(2)
-    )
-    assert one.tobytes() == two.tobytes()
-
-
 def test_ellipse_axes_against_eigenvalues():
     rng = np.random.default_rng(0)
     A = rng.normal(size=(50, 2, 2))
@@ -254,7 +184,3 @@ def test_ellipse_axes_against_eigenvalues():
     assert np.allclose(short_axis**2, scale * values[:, 0], atol=1e-9)
     along = np.stack([np.cos(bearing), np.sin(bearing)], -1)
     assert np.allclose(np.abs(np.einsum("ni,ni->n", along, vectors[:, :, 1])), 1)
-
-
-def test_a_ray_over_the_horizon_has_no_point():
-    assert np.isnan(intersect_plane([[1.0, 0, -0.1]], [[0.0, 0, -10]], 0.0)).all()

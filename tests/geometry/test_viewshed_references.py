@@ -59,32 +59,3 @@ def test_the_thesis_is_further_from_grass_than_the_exact_one(references):
         assert (compare_angles(terrain, nodes, camera).clear != grass).mean() > 4 * wrong, name
         assert (cast_rays(terrain, nodes, camera, 0.5, 1.0).clear != grass).mean() > wrong, name
         assert not compare_angles(terrain, nodes, camera, itself=True).clear.any()
-
-
-@pytest.mark.parametrize(
-    ("name", "step", "high"),
-    [
-        ("bambi146_1m/146_matched_dem.tif", 1.0, 20.0),
-        ("jancaha_dsm_1m/dsm.tif", 1.0, 20.0),
-        ("terra_examples/elev_vinschgau.tif", 250.0, 600.0),
-    ],
-)
-def test_on_real_ground_a_clear_line_is_above_it_all_along(shared_data, name, step, high):
-    """Beside fine sampling; lines that it cannot tell, and lines over holes, are left out and counted."""
-    with rasterio.open(shared_data("dem", *name.split("/"))) as source:
-        height = source.read(1)[::-1].astype(np.float32)
-        height[height == np.float32(source.nodata)] = np.nan
-    terrain, rng = Terrain(height, 0.0, 0.0, step), np.random.default_rng(1)
-    nodes = np.argwhere(np.isfinite(height))
-    at = nodes[rng.integers(len(nodes))] * step
-    lens = np.array([*at, -float(terrain.heights_at(at[None])[0]) - high])
-    points = nodes[rng.permutation(len(nodes))[:300]] * step
-    points = np.column_stack([points, -terrain.heights_at(points) - rng.uniform(0, high / 4, len(points))])
-    along = np.linspace(0, 1 - 1e-4, 4000)[:, None, None]
-    way = lens + along * (points - lens)
-    gaps = -way[..., 2] - terrain.heights_at(way[..., :2].reshape(-1, 2)).reshape(way.shape[:2])
-    least = gaps.min(axis=0)  # NaN where a line leads over a hole
-    told = np.abs(least) > 0.02 * step
-    clear = lines_clear(terrain, points, lens)
-    np.testing.assert_array_equal(clear[told], least[told] > 0)
-    assert told.mean() > 0.4 and 0 < clear[told].mean() < 1, (told.mean(), clear[told].mean())

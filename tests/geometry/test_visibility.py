@@ -25,29 +25,6 @@ def rough(seed, cells=24, high=6.0):
     return Terrain(rng.uniform(0, high, (cells, cells)).astype(np.float32), -23.0, -31.0, 2.0)
 
 
-def least_clearance(terrain, start, point):
-    """The smallest height of a line above the ground, in steps of a hundredth of a cell, but for its end."""
-    length = np.linalg.norm(point - start)
-    along = np.linspace(0, 1 - 1e-3, int(length / terrain.step * 100) + 2)[:, None]
-    way = start + along * (point - start)
-    return np.nanmin(-way[:, 2] - terrain.heights_at(way[:, :2]))
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(0, 10**6), st.floats(1, 30))
-def test_a_clear_line_is_above_the_ground_all_along(seed, height):
-    terrain, rng = rough(seed), np.random.default_rng(seed + 1)
-    least, most, west, east = terrain.extent
-    where = rng.uniform([least, west], [most, east], (40, 2))
-    points = np.column_stack([where, -terrain.heights_at(where) - rng.uniform(0, 2, 40)])
-    start = np.array([*rng.uniform([least, west], [most, east]), 0.0])
-    start[2] = -terrain.heights_at(start[None, :2])[0] - height
-    clear = lines_clear(terrain, points, start)
-    for one, point in zip(clear, points, strict=True):
-        gap = least_clearance(terrain, start, point)
-        assert gap > -1e-6 if one else gap < 0.05, "hidden by what comes as near as the steps are wide"
-
-
 def test_a_wall_hides_what_is_below_the_line_over_its_edge():
     height = np.zeros((3, 101), np.float32)
     height[:, 50] = 10.0

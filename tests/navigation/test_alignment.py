@@ -44,7 +44,7 @@ def test_directions_give_the_attitude_back():
 
 
 def test_parallel_directions_are_refused():
-    with pytest.raises(WildlabError, match="parallel, zero or not known"):
+    with pytest.raises(WildlabError, match="parallel"):
         attitude_from_directions([0, 0, 1], [0, 0, 1], [0, 0, 2], [1, 0, 0])
 
 
@@ -78,7 +78,7 @@ def test_the_course_gives_the_heading(flight):
     )
     row = int(np.argmin(np.abs(motion.times - start.time)))
     assert turned_wrong(start, motion.R_nb[row]) < 0.06
-    with pytest.raises(WildlabError, match=r"no GNSS velocity reaches 50\.0 m/s"):
+    with pytest.raises(WildlabError, match=r"50\.0 m/s"):
         align_from_course(
             imu,
             motion.times[rows],
@@ -107,7 +107,7 @@ def test_a_start_on_the_ground_finds_its_heading_from_the_roll_out():
     roll, pitch, found = matrix_to_euler(quaternion_to_matrix(start.state[6:10]))
     assert (roll, pitch, found) == pytest.approx((0.02, 0.1, 0.5), abs=2e-3)
     assert start.state[13:] == pytest.approx(bias, abs=1e-6)
-    with pytest.raises(WildlabError, match="0 fixes after it move"):
+    with pytest.raises(WildlabError, match="0 fixes"):
         align_at_rest(imu, t, np.zeros((len(t), 3)), 0 * v, rest=(5.0, 55.0), gravity=GRAVITY)
 
 
@@ -140,9 +140,9 @@ def test_what_glides_evenly_is_not_at_rest():
     assert find_rest(imu, t, v + np.array([9.0, 0.0, 0.0])) is None  # flying from the first fix on
 
 
-def test_no_sample_near_the_start_is_said(flight):
+def test_a_start_without_samples_is_refused(flight):
     nothing = np.zeros(3)
-    with pytest.raises(WildlabError, match="on the same clock"):
+    with pytest.raises(WildlabError, match="clock"):
         align_at(
             5000.0, flight.imu, Kinematics(nothing, nothing), Reference([1, 0, 0], [1, 0, 0]), InitialSd(),
             gravity=GRAVITY,

@@ -173,7 +173,6 @@ def chosen_of(navigate):
 
     candidates = choose(run, Scale(*STATED, 0.5, 329.0))
     best = max(candidates, key=lambda one: one.score)
-    print([(c.parameters, round(c.score, 1), c.runs) for c in candidates], best.noise, best.sd.round(2))
     return best
 
 

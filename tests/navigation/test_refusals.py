@@ -30,14 +30,14 @@ def by_observer(start=START):
 
 @pytest.mark.parametrize("wrong", [0.0, 1e-4 - 1, 2.0, np.nan])
 def test_a_gate_is_a_probability(wrong):
-    with pytest.raises(WildlabError, match=rf"^gate_probability: a probability of {wrong}\."):
+    with pytest.raises(WildlabError, match=f"^gate_probability: .*{wrong}"):
         by_mekf(gate_probability=wrong)
 
 
 def test_the_filter_refuses_what_only_the_observer_takes():
     """Its kernel looks limits up by the kind of a measurement, and would read beyond them."""
     foreign = AIDING[0]._replace(kind=3)
-    with pytest.raises(WildlabError, match=r"^aiding\[1\]: a direction in the body .* of the observer only"):
+    with pytest.raises(WildlabError, match=r"^aiding\[1\]: .*observer"):
         run_mekf(IMU, START, STIM300, flat_earth(), [AIDING[0], foreign], [0.9])
 
 
@@ -51,21 +51,12 @@ def spoilt(array, at, value):
 @pytest.mark.parametrize(
     ("start", "message"),
     [
-        (START._replace(state=spoilt(LEVEL, 4, np.nan)), r"^start\.state: row 4 is nan\."),
-        (START._replace(state=LEVEL[:15]), r"^start: a state of the shape \(15,\)"),
-        (
-            START._replace(covariance=spoilt(np.eye(15), (7, 7), np.nan)),
-            r"^start\.covariance: row 7 is not finite",
-        ),
-        (
-            START._replace(covariance=spoilt(np.eye(15), (0, 7), 0.5)),
-            r"^start\.covariance: not symmetric: row 0, column 7",
-        ),
-        (
-            START._replace(covariance=spoilt(np.eye(15), (3, 3), -0.5)),
-            r"^start\.covariance: row 3 has the variance -0\.5",
-        ),
-        (START._replace(time=np.nan), "^start: the start at nan s is not within the inertial samples"),
+        (START._replace(state=spoilt(LEVEL, 4, np.nan)), r"^start\.state: row 4"),
+        (START._replace(state=LEVEL[:15]), r"^start: .*\(15,\)"),
+        (START._replace(covariance=spoilt(np.eye(15), (7, 7), np.nan)), r"^start\.covariance: row 7"),
+        (START._replace(covariance=spoilt(np.eye(15), (0, 7), 0.5)), r"^start\.covariance: not symmetric"),
+        (START._replace(covariance=spoilt(np.eye(15), (3, 3), -0.5)), r"^start\.covariance: row 3"),
+        (START._replace(time=np.nan), "^start: .*nan s"),
     ],
 )
 def test_an_initial_state_is_finite_and_has_a_covariance(run, start, message):

@@ -24,7 +24,7 @@ def covariance(rng, k):
     return A @ A.T + 0.1 * np.eye(k)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_whole_runs_agree_with_filterpy_over_random_models(seed):
     """Random transitions and noises, uneven times, every row its own R."""
     rng = np.random.default_rng(seed)
@@ -159,44 +159,3 @@ def test_smoothed_runs_agree_with_filterpy(seed):
     for found in (ours, again):
         assert np.allclose(found.x, x, rtol=1e-8, atol=1e-8)
         assert np.allclose(found.P, P, rtol=1e-8, atol=1e-8)
-
-
-def test_a_smoothed_run_agrees_with_stone_soup():
-    pytest.importorskip("stonesoup")
-    from stonesoup.models.measurement.linear import LinearGaussian
-    from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel, ConstantVelocity
-    from stonesoup.predictor.kalman import KalmanPredictor
-    from stonesoup.smoother.kalman import KalmanSmoother
-    from stonesoup.types.detection import Detection
-    from stonesoup.types.hypothesis import SingleHypothesis
-    from stonesoup.types.state import GaussianState
-    from stonesoup.types.track import Track
-    from stonesoup.updater.kalman import KalmanUpdater
-
-    rng = np.random.default_rng(1)
-    times = np.cumsum(rng.integers(1, 2000, 30)) / 1000
-    z = np.cumsum(rng.normal(0, 2, (30, 2)), axis=0)
-    model = CombinedLinearGaussianTransitionModel([ConstantVelocity(0.3)] * 2)
-    order = [0, 2, 1, 3]  # theirs is north, its speed, east, its speed
-
-    def motion(dt):
-        F = np.asarray(model.matrix(time_interval=timedelta(seconds=dt)), float)
-        Q = np.asarray(model.covar(time_interval=timedelta(seconds=dt)), float)
-        return F[np.ix_(order, order)], Q[np.ix_(order, order)]
-
-    start = Start(0.0, np.array([1.0, 2, 0.5, -0.5]), np.diag([30.0, 20, 4, 4]))
-    ours = run_smoothed(times, z, 9 * np.eye(2), m.positions(), motion, start)
-    predictor = KalmanPredictor(model)
-    updater = KalmanUpdater(LinearGaussian(4, (0, 2), 9 * np.eye(2)))
-    epoch = datetime(2020, 1, 1, tzinfo=UTC)
-    state = GaussianState(start.x[order], start.P[np.ix_(order, order)], timestamp=epoch)
-    track = Track()
-    for row, t in enumerate(times):
-        seen = Detection(z[row][:, None], timestamp=epoch + timedelta(seconds=float(t)))
-        state = updater.update(SingleHypothesis(predictor.predict(state, timestamp=seen.timestamp), seen))
-        track.append(state)
-    theirs = KalmanSmoother(transition_model=model).smooth(track)
-    for row, state in enumerate(theirs.states):
-        x = np.asarray(state.state_vector, float).ravel()[order]
-        assert np.allclose(ours.x[row], x, rtol=1e-7, atol=1e-7)
-        assert np.allclose(ours.P[row], np.asarray(state.covar, float)[np.ix_(order, order)], rtol=1e-7)

@@ -86,23 +86,19 @@ def test_what_cannot_stop_flies_every_row_and_turns_between_no_tighter_than_it_c
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
-        ({"speed": 0.0}, "a speed of 0.0 m/s"),
-        ({"speed": 5.0, "wind": [4.0, 3.0]}, "a wind of 5.0 m/s against an airspeed of 5 m/s"),
-        ({"speed": 5.0, "turn_radius": -1.0}, "a value of -1.0"),
-        ({"speed": 5.0, "turn_time": -1.0}, "a value of -1.0"),
+        ({"speed": 0.0}, "speed of 0"),
+        ({"speed": 5.0, "wind": [4.0, 3.0]}, "wind of 5"),
+        ({"speed": 5.0, "turn_radius": -1.0}, "-1.0"),
+        ({"speed": 5.0, "turn_time": -1.0}, "-1.0"),
     ],
 )
-def test_what_cannot_be_flown_is_said(arguments: dict[str, float], problem: str) -> None:
-    with pytest.raises(WildlabError) as caught:
+def test_what_cannot_be_flown_is_refused(arguments: dict[str, float], problem: str) -> None:
+    with pytest.raises(WildlabError, match=problem):
         fly([[0.0, 0.0], [1.0, 0.0]], **arguments)  # type: ignore[arg-type]
-    assert problem in caught.value.problem
 
 
-def test_one_point_is_no_way() -> None:
-    with pytest.raises(WildlabError, match="Give two at least"):
+def test_a_way_has_two_points_and_a_circle_a_radius() -> None:
+    with pytest.raises(WildlabError, match="two"):
         fly([[0.0, 0.0]], 5.0)
-
-
-def test_a_circle_needs_a_radius() -> None:
-    with pytest.raises(WildlabError, match="a turn radius of 0"):
+    with pytest.raises(WildlabError, match="radius"):
         dubins([0.0, 0.0], 0.0, [1.0, 0.0], 0.0, 0.0)

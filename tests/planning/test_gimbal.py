@@ -136,12 +136,12 @@ def test_the_rate_brings_the_swing_round_while_the_image_passes() -> None:
 @pytest.mark.parametrize(
     ("call", "problem"),
     [
-        (lambda: swing([0.0], -1.0, 1.0), "a swing to -1.0 rad"),
-        (lambda: swing([0.0], 1.0, 0.0), "a rate of 0.0 rad/s"),
-        (lambda: adapt_roll([0.0], np.ones((1, 1), bool), [0.0], (1.0, 0.5), 1.0), "limits of 1.0 and 0.5"),
-        (lambda: adapt_roll([0.0], np.ones((1, 1), bool), [0.0], (0.5, 1.0), 0.0), "a rate of 0.0"),
-        (lambda: swing_rate(0.5, 0.0, 1.0), "a value of 0.0"),
-        (lambda: swing_rate(0.5, 1.0, 1.0, 1.0), "an overlap of 1.0"),
+        (lambda: swing([0.0], -1.0, 1.0), "-1.0 rad"),
+        (lambda: swing([0.0], 1.0, 0.0), "0.0 rad/s"),
+        (lambda: adapt_roll([0.0], np.ones((1, 1), bool), [0.0], (1.0, 0.5), 1.0), "limits"),
+        (lambda: adapt_roll([0.0], np.ones((1, 1), bool), [0.0], (0.5, 1.0), 0.0), "rate of 0.0"),
+        (lambda: swing_rate(0.5, 0.0, 1.0), "0.0"),
+        (lambda: swing_rate(0.5, 1.0, 1.0, 1.0), "overlap"),
         (
             lambda: blur(
                 CAMERA, camera_on_course(CAMERA, np.zeros((1, 3)), [0.0], look_down([0.0])), [0.0], 1, 1
@@ -150,7 +150,7 @@ def test_the_rate_brings_the_swing_round_while_the_image_passes() -> None:
         ),
     ],
 )
-def test_wrong_use_is_said(call: object, problem: str) -> None:
+def test_wrong_use_is_refused(call: object, problem: str) -> None:
     with pytest.raises(WildlabError) as caught:
         call()  # type: ignore[operator]
     assert problem in caught.value.problem

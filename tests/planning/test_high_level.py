@@ -45,7 +45,7 @@ def test_the_greatest_utility_is_the_goal():
     assert best_goal(at, P, [0, 0], [0, 10], alpha=1, c=1) == 1
     assert best_goal(at, P, [0, 0], [0, 10], alpha=1, c=200) == SEARCH
     assert best_goal(at, P, [0, 45], [0, 10], alpha=1, c=1) == 0
-    with pytest.raises(WildlabError, match="no goal left"):
+    with pytest.raises(WildlabError, match="no goal"):
         best_goal(np.zeros((0, 2)), np.zeros((0, 2, 2)), [0, 0], None, alpha=1, c=1)
 
 

@@ -78,9 +78,9 @@ def test_no_cut_has_a_shorter_longest_part(seed, count, aircraft):
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(WildlabError, match="2 intervals for 1 places"):
+    with pytest.raises(WildlabError, match="2 intervals"):
         plan_calls([[0, 0]], [1, 2], [0, 0], speed=1, stay=0, horizon=1)
-    with pytest.raises(WildlabError, match="Give numbers above zero"):
+    with pytest.raises(WildlabError, match="above zero"):
         plan_calls([[0, 0]], [0], [0, 0], speed=1, stay=0, horizon=1)
     with pytest.raises(WildlabError, match="0 aircraft"):
         share_rows(np.zeros((2, 2, 2)), 0)

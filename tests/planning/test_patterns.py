@@ -136,7 +136,7 @@ def test_many_areas_are_not_far_from_the_shortest() -> None:
 def test_a_given_order_is_kept_and_a_wrong_one_refused() -> None:
     fields = [rectangle(0.0, east, 100.0, 40.0, 0.0) for east in (0.0, 200.0, 100.0)]
     assert lawn_mowers(fields, 20.0, order=[1, 0, 2]).area.tolist() == [1, 1, 0, 0, 2, 2]
-    with pytest.raises(WildlabError, match="Name each of 0 to 2 once"):
+    with pytest.raises(WildlabError, match="once"):
         lawn_mowers(fields, 20.0, order=[0, 0, 2])
 
 
@@ -157,17 +157,17 @@ def test_the_footprint_is_the_largest_rectangle_that_every_edge_allows() -> None
 @pytest.mark.parametrize(
     ("call", "problem"),
     [
-        (lambda: footprint(CAMERA, -1.0), "a height of -1.0 m"),
-        (lambda: row_distance(0.0), "a strip of 0.0 m"),
-        (lambda: row_distance(10.0, 1.0), "an overlap of 1.0"),
-        (lambda: lawn_mower(U_SHAPE, 0.0), "a row distance of 0.0 m"),
-        (lambda: lawn_mower(U_SHAPE, 1e-4), "more than 5000"),
-        (lambda: lawn_mowers([], 10.0), "there is no area"),
-        (lambda: lawn_mowers([U_SHAPE], [10.0, 20.0]), "2 values for 1 areas"),
-        (lambda: visit_order([[]]), "an area has no way"),
+        (lambda: footprint(CAMERA, -1.0), "-1.0 m"),
+        (lambda: row_distance(0.0), "strip"),
+        (lambda: row_distance(10.0, 1.0), "overlap"),
+        (lambda: lawn_mower(U_SHAPE, 0.0), "row distance"),
+        (lambda: lawn_mower(U_SHAPE, 1e-4), "5000"),
+        (lambda: lawn_mowers([], 10.0), "no area"),
+        (lambda: lawn_mowers([U_SHAPE], [10.0, 20.0]), "2 values"),
+        (lambda: visit_order([[]]), "no way"),
     ],
 )
-def test_wrong_use_is_said(call: object, problem: str) -> None:
+def test_wrong_use_is_refused(call: object, problem: str) -> None:
     with pytest.raises(WildlabError) as caught:
         call()  # type: ignore[operator]
     assert problem in caught.value.problem

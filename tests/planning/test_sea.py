@@ -126,16 +126,9 @@ def test_vessels_that_are_visited_in_time_are_seen_as_often_as_is_said():
     assert len(hits) > 80 and np.mean(hits) >= 0.9
 
 
-def test_no_vessel_is_left_out_where_there_is_time_for_few():
-    """Far apart and quickly lost: the one that was seen last is not the one that is seen next."""
-    visits = plan(fleet(4, spread=4000.0), horizon=5000.0)
-    counts = np.bincount([one.vessel for one in visits], minlength=4)
-    assert counts.min() >= 2 and any(one.slack < 0 for one in visits)
-
-
 def test_what_cannot_be_flown_is_refused():
-    with pytest.raises(WildlabError, match="a speed above that of all vessels"):
+    with pytest.raises(WildlabError, match="speed"):
         plan(fleet(2), speed=0.5)
-    with pytest.raises(WildlabError, match="Give metres above zero"):
+    with pytest.raises(WildlabError, match="above zero"):
         time_until_lost(fleet(1), 0.0)
     assert plan(fleet(0)) == []

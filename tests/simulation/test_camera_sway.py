@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from wildlab.geometry.frames import matrix_to_rotation_vector
-from wildlab.simulation.attitudes import fixed_wing_trajectory
 from wildlab.simulation.camera_sway import camera_motion, camera_sway, recent_change
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
@@ -24,15 +23,6 @@ def with_sway(twin, **values):
         name: getattr(sway, name).model_copy(update={"value": value}) for name, value in values.items()
     }
     return twin.model_copy(update={"camera_sway": sway.model_copy(update=changed)})
-
-
-def test_after_a_jump_the_change_is_that_of_two_values_with_fading_weights():
-    t = np.arange(0.0, 60.0, STEP)
-    change = recent_change(np.where(t < 5.0, 0.3, 0.8), STEP, MEMORY)
-    old = np.exp(-np.maximum(t - 5.0, 0.0) / MEMORY)  # the weight of what was before
-    assert change == pytest.approx(0.5 * np.sqrt(old * (1 - old)), abs=0.5 * np.sqrt(STEP / MEMORY))
-    assert change.max() == pytest.approx(0.25, rel=1e-3)
-    assert t[np.argmax(change)] - 5.0 == pytest.approx(MEMORY * np.log(2), abs=0.05)
 
 
 def test_the_change_is_the_weighted_standard_deviation():
@@ -53,7 +43,7 @@ def test_what_stands_still_or_is_moved_or_scaled():
 
 @pytest.mark.parametrize(("step", "memory"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0)])
 def test_time_goes_forward(step, memory):
-    with pytest.raises(ValueError, match="must be positive"):
+    with pytest.raises(ValueError, match="positive"):
         recent_change([1.0], step, memory)
 
 
@@ -86,18 +76,6 @@ def test_the_camera_is_turned_by_those_angles_and_stays_in_its_place():
     assert np.abs(turn).max() > np.radians(1.0)
 
 
-def test_on_a_long_straight_leg_the_camera_sits_still():
-    twin = load_twin("fast-vessel")
-
-    def straight(times):
-        t = np.asarray(times, float)
-        ahead = np.array([20.0, 0.0, 0.0])
-        return t[:, None] * ahead, np.tile(ahead, (len(t), 1)), np.zeros((len(t), 3))
-
-    angles = camera_sway(twin, fixed_wing_trajectory(straight), 1)(np.arange(0.0, 500.0))
-    assert np.abs(angles).max() < 1e-12
-
-
 def test_no_navigation_system_feels_the_camera_sway():
     twin = load_twin("slow-vessel-eight")
     calm, restless = (
@@ -121,18 +99,8 @@ def test_a_twin_without_sway_has_its_camera_fixed():
     assert (camera_motion(twin, trajectory, times, 1).R_nb == trajectory(times).R_nb).all()
 
 
-def test_every_flight_of_that_airframe_has_the_same_sway():
-    """One process with the same parameters for all, none for a flight."""
-    swaying = {}
-    for name in ("static-antenna", "slow-vessel", "fast-vessel", "drifting-vessel", "drifting-vessel-eight",
-                 "slow-vessel-eight", "crossing-vessels"):  # fmt: skip
-        sway = load_twin(name).camera_sway
-        swaying[name] = tuple(getattr(sway, key).number for key in type(sway).model_fields)
-    assert len(set(swaying.values())) == 1
-
-
 def test_a_band_the_wrong_way_round_is_named():
     sway = load_twin("fast-vessel").camera_sway.model_dump()
     sway["shortest_period"], sway["longest_period"] = sway["longest_period"], sway["shortest_period"]
-    with pytest.raises(ValueError, match="shortest_period is longer than longest_period; exchange the two"):
+    with pytest.raises(ValueError, match="shortest_period"):
         CameraSway.model_validate(sway)

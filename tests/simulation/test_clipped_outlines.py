@@ -75,16 +75,6 @@ def test_moments_of_a_rectangle_are_known(u, length, beam, angle):
     assert covariance == pytest.approx(expected, abs=1e-6 * length**2)
 
 
-def test_a_whole_outline_has_its_own_axes():
-    blob = visible_part(rectangle(300, 250, 200, 40, -0.7), WIDTH, HEIGHT)
-    assert not blob.cut
-    assert blob.centre == pytest.approx([300, 250])
-    assert blob.area == pytest.approx(8000)
-    assert (blob.major, blob.minor) == pytest.approx((200 * 2 / np.sqrt(3), 40 * 2 / np.sqrt(3)))
-    assert blob.angle == pytest.approx(-0.7)
-    assert visible_part(rectangle(300, 250, 40, 200, 0.0), WIDTH, HEIGHT).angle == pytest.approx(np.pi / 2)
-
-
 def test_a_cut_outline_is_what_filled_pixels_say():
     """OpenCV's moments of the pixels whose centres lie inside: a hundred across, so to a part in 200."""
     polygon = rectangle(600, 60, 500, 90, 0.6)

@@ -32,26 +32,21 @@ HULL = own("target.outline.length", 9.0, "m") + own("target.outline.beam", 2.0, 
 @pytest.mark.parametrize(
     ("twin", "leave_out", "add", "found"),
     [
-        ("static-antenna", (), CLIMB, "only a route changes its altitude"),
-        ("gondola", (), CLIMB, "a cable has its own heights. Take out"),
-        ("uav-search", ("enclosures",), "", "a survey goes over enclosures, and there are none"),
-        ("gondola", ("enclosures",), "", "animals live in enclosures, and there are none"),
-        ("gondola", ("animals",), "", "a twin looks for targets or for animals. Describe either"),
-        ("gondola", (), SEGMENTS, "second_target, pair, subset and segments go with a target"),
-        ("large-ship", ("segments",), "", "a target with an outline needs segments"),
-        ("slow-vessel", ("subset",), SEGMENTS, "a target with an outline needs segments, any other none"),
-        ("slow-vessel", (), HULL, "what has an outline is marked where most of it shows"),
-        ("large-ship", ("target.motion", "target.gps"), "", "an outline needs a motion"),
-        (
-            "large-ship",
-            (),
-            own("camera.k1", 0.1, "1"),
-            "an outline stays straight only in a camera without k1",
-        ),
-        ("large-ship", ("onboard_clock",), "", "its clock is missing. Add onboard_clock"),
-        ("slow-vessel", ("boresight",), "", "imu, gnss and boresight describe one payload. Give all or none"),
-        ("large-ship", (), own("autopilot.imu_roll", 1.0, "deg"), "imu_roll, imu_pitch and imu_yaw belong"),
-        ("large-ship", (), own("flight.kind", "balloon"), "'balloon' is not known. Use one of fixed wing"),
+        ("static-antenna", (), CLIMB, "route"),
+        ("gondola", (), CLIMB, "cable"),
+        ("uav-search", ("enclosures",), "", "survey"),
+        ("gondola", ("enclosures",), "", "animals live"),
+        ("gondola", ("animals",), "", "targets or for animals"),
+        ("gondola", (), SEGMENTS, "go with a target"),
+        ("large-ship", ("segments",), "", "needs segments"),
+        ("slow-vessel", ("subset",), SEGMENTS, "any other none"),
+        ("slow-vessel", (), HULL, "most of it"),
+        ("large-ship", ("target.motion", "target.gps"), "", "needs a motion"),
+        ("large-ship", (), own("camera.k1", 0.1, "1"), "without k1"),
+        ("large-ship", ("onboard_clock",), "", "onboard_clock"),
+        ("slow-vessel", ("boresight",), "", "boresight"),
+        ("large-ship", (), own("autopilot.imu_roll", 1.0, "deg"), "imu_roll"),
+        ("large-ship", (), own("flight.kind", "balloon"), "'balloon'"),
     ],
 )
 def test_twins_whose_groups_do_not_go_together_are_named(tmp_path, twin, leave_out, add, found):
@@ -70,9 +65,9 @@ def test_twins_whose_groups_do_not_go_together_are_named(tmp_path, twin, leave_o
     [
         ("gondola", "[cable.lowest]\nvalue = 3.0", "[cable.lowest]\nvalue = 30.0", "lowest is above highest"),
         ("gondola", "[enclosures.lake.length]\nvalue = 280.0", "[enclosures.lake.length]\nvalue = 80.0",
-         r"enclosures\.lake: the width is more than the length"),
-        ("gondola", "[enclosures.lake.", '[enclosures."the lake".', "'the lake' cannot name an enclosure"),
-        ("large-ship", "value = 441\n", "value = 400\n", "fewer images in the segments than observations"),
+         r"enclosures\.lake"),
+        ("gondola", "[enclosures.lake.", '[enclosures."the lake".', "'the lake'"),
+        ("large-ship", "value = 441\n", "value = 400\n", "fewer images"),
     ],
 )  # fmt: skip
 def test_searchers_and_ships_that_make_no_sense_are_named(tmp_path, twin, old, new, found):
@@ -88,7 +83,7 @@ def test_the_same_pair_of_targets_cannot_have_an_outline(tmp_path):
     text = complete("crossing-vessels").replace("missed at random", "largest")
     path = tmp_path / "twin.toml"
     path.write_text(text + HULL + HULL.replace("[target", "[second_target"), encoding="utf-8")
-    with pytest.raises(WildlabError, match="of two targets none can have an outline"):
+    with pytest.raises(WildlabError, match="outline"):
         load_twin(path)
 
 
@@ -96,7 +91,7 @@ def test_a_loiter_is_about_a_target_that_stays(tmp_path):
     text = without(complete("slow-vessel"), "route") + LOITER
     path = tmp_path / "twin.toml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(WildlabError, match="a loiter stands beside a target that never moves"):
+    with pytest.raises(WildlabError, match="never moves"):
         load_twin(path)
 
 

@@ -13,7 +13,7 @@ from wildlab.simulation.imu import TriadDataSheet, triad_data_sheets
 from wildlab.simulation.onboard_sensors import as_mounted, imu_table, mounted_imu, payload_boresight
 from wildlab.simulation.parameters import PARTS, TwinParameters, load_twin
 from wildlab.simulation.sensor_parameters import Imu
-from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, turned
+from wildlab.simulation.trajectory import angular_rates, attitude_along, turned
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate
 
@@ -121,25 +121,6 @@ def test_the_unit_feels_and_errs_in_its_own_axes_and_is_then_calibrated(exact):
             fine[columns].to_numpy() @ expected
         )
     pd.testing.assert_series_equal(own["time_s"], rough["time_s"])
-
-
-def test_a_level_unit_at_rest_reads_the_angles_that_the_thesis_prints(exact):
-    """How they were found (H 5.6.1): roll and pitch that gravity shows while the airframe is level."""
-
-    def still(times):
-        zeros = np.zeros((len(times), 3))
-        return Motion(times, zeros, zeros, zeros, np.tile(np.eye(3), (len(times), 1, 1)))
-
-    table, R_bi = imu_table(exact, still, 1), mounted_imu(exact)
-    assert R_bi is not None
-    x, y, z = as_mounted(table, R_bi)[FORCE].to_numpy()[0]
-    assert np.degrees([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))]) == pytest.approx([1.1, -5.7])
-    assert table[FORCE].to_numpy()[0, :2] == pytest.approx([0, 0], abs=1e-12), "calibrated, b is level"
-
-
-def test_without_known_angles_the_axes_are_those_of_the_airframe(exact):
-    autopilot = exact.autopilot.model_copy(update={"imu_yaw": None})
-    assert mounted_imu(exact.model_copy(update={"autopilot": autopilot})) is None
 
 
 @pytest.mark.parametrize("figure", sorted(Imu.model_fields))

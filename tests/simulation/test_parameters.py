@@ -17,7 +17,6 @@ from wildlab.simulation.parameters import (
     load_twin,
     parameters_table,
     part_names,
-    status_words,
     twin_names,
 )
 
@@ -99,12 +98,6 @@ def test_published_numbers_are_those_of_the_thesis():
     }
 
 
-def test_what_is_assumed_of_the_pose_is_the_mean_of_what_is_printed():
-    assumed = load_twin("static-antenna").assumed
-    assert assumed.tilt.number == round((1.35 + 1.22 + 1.73 + 1.30 + 1.24 + 1.78) / 6, 1)
-    assert assumed.heading.number == round((2.65 + 2.63 + 2.48) / 3, 1)
-
-
 def exchanged_imu(tmp_path, part: str):
     text = (TWINS / "static-antenna.toml").read_text(encoding="utf-8")
     assert text.count('"imu-adis16490"') == 1
@@ -149,17 +142,11 @@ def test_the_manifest_states_the_data_sheet_of_the_sensor(tmp_path, part, figure
     assert manifest.gnss.latency_s == 0.0
 
 
-def test_a_part_that_does_not_exist_is_answered_with_those_there_are(tmp_path):
+def test_a_part_that_does_not_exist_is_refused(tmp_path):
     assert "imu-stim300" in part_names()
-    with pytest.raises(WildlabError, match=r"parts: there is no part 'imu-stim30'.*'imu-stim300'"):
-        exchanged_imu(tmp_path, "imu-stim30")
-    with pytest.raises(WildlabError, match=r"parts: there is no part '\.\./static-antenna'"):
-        exchanged_imu(tmp_path, "../static-antenna")
-
-
-def test_parts_are_a_list_of_names(altered):
-    with pytest.raises(WildlabError, match=r"parts: 'imu' is not a list of names"):
-        altered('section = "H 5.6.1"', 'section = "H 5.6.1"\nparts = "imu"')
+    for wrong in ("imu-stim30", "../static-antenna"):
+        with pytest.raises(WildlabError, match="no part"):
+            exchanged_imu(tmp_path, wrong)
 
 
 def test_what_a_twin_says_itself_goes_before_what_its_parts_say(tmp_path):
@@ -187,124 +174,61 @@ def test_units_are_converted_once():
 def test_the_table_names_value_unit_and_reason():
     table = parameters_table("static-antenna").set_index("parameter")
     assert table.loc["camera: fx"].tolist() == ["1159.2", "px", "published", "H (2.3)"]
-    assert table.loc["flight: airspeed", "status"] == "chosen"
-    assert "H 7.5.4" in table.loc["flight: airspeed", "because"]
     assert table.index.is_unique
     assert len(table) == len(list(each_parameter(load_twin("static-antenna"))))
 
 
 RATE = '[camera.frame_rate]\nvalue = 7.5\nunit = "Hz"'
 RADIUS = '[loiter.radius]\nvalue = 160.0\nunit = "m"\nstatus = "chosen"'
+FITTED = '[loiter.radius]\nvalue = 160.0\nunit = "m"\nstatus = "fitted"\nfitted_to = ["H table 5.4"]'
+REASON = '[target.identifier]\nvalue = "antenna"\nunit = ""\nstatus = "chosen"\nreason = "only a name"'
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "field", "found", "fix"),
+    ("old", "new", "field", "found"),
     [
-        (RATE, RATE.replace("Hz", "kHz"), "camera.frame_rate", "unit is 'kHz'", "'Hz'"),
-        (RATE, RATE.replace("7.5", "0.0"), "camera.frame_rate", "0 is out of range", "above 0 to 500"),
-        (RATE, RATE.replace("7.5", "1e9"), "camera.frame_rate", "1e.09 is out of range", "above 0 to 500"),
-        (
-            RATE,
-            RATE.replace("7.5", "nan"),
-            "camera.frame_rate.value",
-            "nan is not a finite number",
-            "Give one",
-        ),
-        (RATE, RATE.replace("7.5", "true"), "camera.frame_rate.value", "[Tt]rue is neither", "Give one"),
-        (RATE, RATE.replace("7.5", '"fast"'), "camera.frame_rate", "'fast' is not a number", "in Hz"),
-        (RATE, RATE.replace("frame_rate", "frame_rat"), "camera.frame_rat", "not known", "'frame_rate'"),
-        (RADIUS, RADIUS.replace("chosen", "guessed"), "loiter.radius.status", "guessed", "Mend"),
-        (RADIUS, RADIUS.replace("chosen", "published"), "loiter.radius", "names no source", "Add"),
-        ("value = 552\n", "value = 552.5\n", "target.observations", "not a whole number", "Give one"),
-        ("value = 7990\n", "value = 9990\n", None, "after the flight's end", "camera.images"),
-        ('value = "clockwise"', 'value = "left"', "loiter.turn", "'left' is not known", "clockwise"),
-        ('value = "2018-06-01T10:00:00Z"', 'value = "2018-06-01"', "place.epoch", "not a time", "10:00:00Z"),
-        ('name = "static-antenna"', 'name = "../up"', "name", "'../up' cannot be the name", "letters"),
-        (
-            "[flight.wind_speed]\nvalue = 4.5",
-            "[flight.wind_speed]\nvalue = 18.0",
-            "flight",
-            "0.8 of",
-            "Lower wind_speed",
-        ),
+        (RATE, RATE.replace("Hz", "kHz"), "camera.frame_rate", "'kHz'"),
+        (RATE, RATE.replace("7.5", "0.0"), "camera.frame_rate", "out of range"),
+        (RATE, RATE.replace("7.5", "1e9"), "camera.frame_rate", "out of range"),
+        (RATE, RATE.replace("7.5", "nan"), "camera.frame_rate.value", "nan"),
+        (RATE, RATE.replace("7.5", "true"), "camera.frame_rate.value", "[Tt]rue"),
+        (RATE, RATE.replace("7.5", '"fast"'), "camera.frame_rate", "'fast'"),
+        (RATE, RATE.replace("frame_rate", "frame_rat"), "camera.frame_rat", "not known"),
+        (RADIUS, RADIUS.replace("chosen", "guessed"), "loiter.radius.status", "guessed"),
+        (RADIUS, RADIUS.replace("chosen", "published"), "loiter.radius", "source"),
+        (RADIUS, FITTED.replace('"fitted"', '"chosen"'), "loiter.radius", "fitted_to"),
+        (RADIUS, FITTED.partition("fitted_to")[0], "loiter.radius", "fitted_to"),
+        (RADIUS, FITTED.replace("H table", "table"), "loiter.radius", "'table 5.4'"),
+        (REASON, REASON.replace("only a name", " "), "target.identifier", "reason"),
+        (REASON, "", "target.identifier", "missing"),
+        ("value = 552\n", "value = 552.5\n", "target.observations", "whole number"),
+        ("value = 7990\n", "value = 9990\n", None, "after the flight's end"),
+        ('value = "clockwise"', 'value = "left"', "loiter.turn", "'left'"),
+        ('value = "2018-06-01T10:00:00Z"', 'value = "2018-06-01"', "place.epoch", "not a time"),
+        ('name = "static-antenna"', 'name = "../up"', "name", "'../up'"),
+        ("[flight.wind_speed]\nvalue = 4.5", "[flight.wind_speed]\nvalue = 18.0", "flight", "wind_speed"),
         (
             "[flight.attitude_longest_period]\nvalue = 9.0",
             "[flight.attitude_longest_period]\nvalue = 1.0",
             "flight",
-            "attitude_shortest_period is longer",
-            "Exchange",
+            "attitude_shortest_period",
         ),
     ],
 )
-def test_bad_parameters_are_named(altered, old, new, field, found, fix):
+def test_bad_parameters_are_named(altered, old, new, field, found):
     with pytest.raises(WildlabError) as caught:
         altered(old, new)
     assert caught.value.field == field
     assert caught.value.file is not None
     assert caught.value.file.endswith("twin.toml")
     assert re.search(found, str(caught.value)), str(caught.value)
-    assert re.search(fix, str(caught.value)), str(caught.value)
 
 
-def test_a_choice_without_a_reason_is_refused(altered):
-    old = '[target.identifier]\nvalue = "antenna"\nunit = ""\nstatus = "chosen"\nreason = "only a name"'
-    with pytest.raises(
-        WildlabError, match=r"target\.identifier: the value is called chosen but gives no reason"
-    ):
-        altered(old, old.replace("only a name", " "))
-
-
-FITTED = '[loiter.radius]\nvalue = 160.0\nunit = "m"\nstatus = "fitted"\nfitted_to = ["H table 5.4"]'
-
-
-def test_a_fitted_value_names_its_tables_and_the_page_shows_them(altered):
+def test_a_fitted_value_names_its_tables(altered):
     twin = altered(RADIUS, FITTED)
     assert twin.loiter.radius.fitted_to == ("H table 5.4",)
-    row = parameters_table(twin).set_index("parameter").loc["loiter: radius"]
-    assert row["status"] == "fitted"
-    assert row["because"].startswith("fitted to H table 5.4; a round one with which")
+    assert parameters_table(twin).set_index("parameter").loc["loiter: radius", "status"] == "fitted"
     assert "H table 5.4" in fitted_to(twin)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "found"),
-    [
-        (
-            'fitted_to = ["H table 5.4"]',
-            "",
-            r"loiter\.radius: the value is called fitted but not to what\. Add fitted_to",
-        ),
-        (
-            'fitted_to = ["H table 5.4"]',
-            'fitted_to = ["table 5.4"]',
-            r"loiter\.radius: 'table 5\.4' names no table\. Write it as 'H table 5\.4'",
-        ),
-        (
-            '"fitted"',
-            '"chosen"',
-            r"loiter\.radius: the value is called chosen and has fitted_to\. Take that out",
-        ),
-    ],
-)
-def test_a_fitted_value_that_does_not_say_to_what_is_refused(altered, old, new, found):
-    with pytest.raises(WildlabError, match=found):
-        altered(RADIUS, FITTED.replace(old, new))
-
-
-def test_a_fitted_value_without_a_reason_is_refused(altered):
-    old = '[target.identifier]\nvalue = "antenna"\nunit = ""\nstatus = "chosen"\nreason = "only a name"'
-    with pytest.raises(WildlabError, match=r"the value is called fitted but gives no reason\. Add a reason"):
-        altered(old, old.replace("chosen", "fitted").replace("only a name", ""))
-
-
-def test_how_many_were_published_chosen_and_fitted_is_counted(altered):
-    table = parameters_table(altered(RADIUS, FITTED))
-    counts = table["status"].value_counts()
-    assert status_words(table) == (
-        f"{len(table)} parameters: {counts['published']} published, {counts['chosen']} chosen, "
-        f"{counts['fitted']} fitted"
-    )
-    assert status_words(table[table["status"] == "chosen"]).endswith(f" {counts['chosen']} chosen")
 
 
 LOITER = """
@@ -339,24 +263,19 @@ source = "H 6.4.4: 349 images had both vessels within the same image"
 @pytest.mark.parametrize(
     ("twin", "old", "new", "found"),
     [
-        ("slow-vessel", "[target.gps.", "[target.gsp.", r"target\.gsp: this key is not known"),
-        ("slow-vessel", "\n[route.shape]", LOITER + "\n[route.shape]", "a twin flies one course"),
-        ("static-antenna", "[loiter.", "[climb.", r"climb\.\w+: this key is not known"),
-        (
-            "slow-vessel",
-            'value = "eight"',
-            'value = "nine"',
-            "'nine' is not known. Use one of eight",
-        ),
-        ("crossing-vessels", PAIR, "", "two targets need pair.both, one does not"),
-        ("crossing-vessels", "value = 349\n", "value = 900\n", "pair.both is more than the observations"),
-        ("crossing-vessels", 'value = "boat 2"', 'value = "boat 1"', "two targets have the same identifier"),
-        ("slow-vessel", "value = 2001\n", "value = 3000\n", "the subset ends behind the last of 3635"),
+        ("slow-vessel", "[target.gps.", "[target.gsp.", r"target\.gsp"),
+        ("slow-vessel", "\n[route.shape]", LOITER + "\n[route.shape]", "one course"),
+        ("static-antenna", "[loiter.", "[climb.", r"climb\.\w+"),
+        ("slow-vessel", 'value = "eight"', 'value = "nine"', "'nine'"),
+        ("crossing-vessels", PAIR, "", "two targets need"),
+        ("crossing-vessels", "value = 349\n", "value = 900\n", "more than the observations"),
+        ("crossing-vessels", 'value = "boat 2"', 'value = "boat 1"', "identifier"),
+        ("slow-vessel", "value = 2001\n", "value = 3000\n", "last of 3635"),
         (
             "drifting-vessel",
             "[target.motion.deviation_longest_period]\nvalue = 900.0",
             "[target.motion.deviation_longest_period]\nvalue = 9.0",
-            r"target\.motion: deviation_shortest_period is longer .* Exchange",
+            "deviation_shortest_period",
         ),
     ],
 )
@@ -374,18 +293,12 @@ def test_a_target_that_moves_has_a_receiver(tmp_path):
     parts = re.split(r"(?m)^(?=\[)", text)
     path = tmp_path / "twin.toml"
     path.write_text("".join(part for part in parts if not part.startswith("[target.gps.")), encoding="utf-8")
-    with pytest.raises(WildlabError, match="a target that moves needs both motion and gps"):
+    with pytest.raises(WildlabError, match="both motion and gps"):
         load_twin(path)
 
 
-def test_a_missing_parameter_is_named(altered):
-    old = '[target.identifier]\nvalue = "antenna"\nunit = ""\nstatus = "chosen"\nreason = "only a name"'
-    with pytest.raises(WildlabError, match=r"target\.identifier: this key is missing"):
-        altered(old, "")
-
-
-def test_an_unknown_twin_is_answered_with_those_there_are():
-    with pytest.raises(WildlabError, match=r"no twin 'static-antena'.*Did you mean 'static-antenna'"):
+def test_an_unknown_twin_is_refused():
+    with pytest.raises(WildlabError, match="'static-antenna'"):
         load_twin("static-antena")
-    with pytest.raises(WildlabError, match=r"nowhere\.toml: there is no such file"):
+    with pytest.raises(WildlabError, match="no such file"):
         load_twin("/nowhere.toml")

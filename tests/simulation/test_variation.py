@@ -66,8 +66,8 @@ def test_a_flight_is_flown_with_what_was_moved():
 def test_what_may_not_be_moved_is_refused():
     twin = load_twin("fast-vessel")
     published = next(path for path, one in parameters(twin).items() if one.status == "published")
-    with pytest.raises(WildlabError, match="published, or cannot be scaled"):
+    with pytest.raises(WildlabError, match="published"):
         apply(twin, {published: 2.0})
     assert apply(twin, {"no.such": 2.0}) == twin
-    with pytest.raises(WildlabError, match="is not possible"):
+    with pytest.raises(WildlabError, match="not possible"):
         apply(twin, {"boresight.shortest_period": 1e6})

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.simulation.attitudes import fixed_wing_trajectory
 from wildlab.simulation.disturbances import band_limited_disturbance
-from wildlab.simulation.imu import ideal_imu
 from wildlab.simulation.trajectory import angular_rates, attitude_along
 from wildlab.simulation.waypoint_courses import (
     ControlErrors,
@@ -152,25 +151,3 @@ def test_angular_rate_is_the_derivative_of_attitude():
     # As of the loiter; rolling into a turn adds some rad/s^3.
     assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 5e-6
     assert np.degrees(np.abs(rate)).max() < 60
-
-
-def test_ideal_inertial_readings_carry_a_strapdown_round_the_course():
-    trajectory = restless()
-    rate, count = 250.0, 30_001
-    force, spin = ideal_imu(trajectory, rate, count)
-    h = 1 / rate
-    turns = Rotation.from_rotvec((spin[1:] + spin[:-1]) * h / 2)
-    start, end = (trajectory(np.array([t])) for t in (0.0, (count - 1) * h))
-    R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
-    down = np.array([0.0, 0.0, 9.81])
-    before = R.apply(force[0]) + down
-    for i in range(count - 1):
-        R = R * turns[i]
-        after = R.apply(force[i + 1]) + down
-        a = (before + after) / 2
-        p += h * v + h**2 / 2 * a
-        v += h * a
-        before = after
-    assert np.degrees((R.inv() * Rotation.from_matrix(end.R_nb[0])).magnitude()) < 2e-3
-    assert np.linalg.norm(v - end.velocity[0]) < 0.02
-    assert np.linalg.norm(p - end.position[0]) < 0.5

@@ -17,7 +17,6 @@ from wildlab.simulation.scene import (
     ANIMALS,
     EVEN_LAND,
     GRASS,
-    ROCK,
     SAND,
     Cover,
     Land,
@@ -30,7 +29,6 @@ from wildlab.simulation.scene import (
     render_land,
     rolling_land,
     slab,
-    stone,
     tree,
 )
 from wildlab.simulation.scene.ground import CLOUD_BLANKET, SHADOW_DEPTH
@@ -119,12 +117,6 @@ def test_heat_that_is_kept_fades_by_its_lag_at_night():
     assert np.allclose(Weather(hour=2.0).kept(0.0), 0)
 
 
-def test_covers_are_ordered_as_they_are_known_to_be():
-    noon, night = Weather(hour=13.0), Weather(hour=2.0)
-    assert noon.level(SAND) > noon.level(ROCK) > noon.level(GRASS) > noon.air
-    assert night.level(ROCK) > night.level(SAND) and night.level(GRASS) < night.air
-
-
 def test_clouds_take_heat_and_keep_the_night_warm():
     clear, closed = Weather(hour=13.0), Weather(hour=13.0, clouds=1.0)
     heat = clear.heat(SAND)[2]
@@ -134,17 +126,6 @@ def test_clouds_take_heat_and_keep_the_night_warm():
     assert Weather(hour=2.0, clouds=1.0).level(GRASS) > Weather(hour=2.0).level(GRASS)
     half = rolling_land(Weather(hour=13.0, clouds=0.5), seed=2).shadow
     assert half.mean() == pytest.approx(0.5, abs=0.05)
-
-
-def test_cloud_shadows_cool_the_ground_under_them():
-    still = replace(EVEN_LAND, covers=(SMOOTH,), weather=Weather(hour=12.0))
-    p, R = pose(50.0)
-    sunny = render_land(LandScene(still), CAMERA, p, R).kelvin
-    shaded = render_land(
-        LandScene(replace(still, weather=Weather(hour=12.0, clouds=1.0))), CAMERA, p, R
-    ).kelvin
-    air = still.weather.air
-    assert np.allclose(shaded - air, (1 - SHADOW_DEPTH) * (sunny - air), atol=1e-3)
 
 
 def test_a_body_stands_on_the_height_of_the_ground():
@@ -180,13 +161,6 @@ def test_animals_are_warmer_than_air_and_cooler_at_their_ends():
     assert animal("rhinoceros", night).layers[-1].excess > animal("antelope", night).layers[-1].excess
 
 
-def test_stones_are_as_warm_as_rock_and_trees_near_the_air():
-    for weather in (Weather(hour=2.0), Weather(hour=13.0), Weather(hour=13.0, clouds=1.0)):
-        top = stone(1.0, weather, 3).layers[-1]
-        assert weather.air + top.excess == pytest.approx(weather.level(ROCK))
-        assert abs(tree(4.0, weather).layers[0].excess) < 5
-
-
 def test_a_group_keeps_its_distance_and_its_kinds():
     rng = np.random.default_rng(2)
     bodies = group(rng, ["calf"] * 6, np.array([10.0, 20.0]), 3.0, Weather())
@@ -204,28 +178,18 @@ def test_the_sky_is_no_ground():
     assert view.kelvin[~view.ground].max() < EVEN_LAND.weather.air - 20
 
 
-def test_the_same_seed_is_the_same_land():
-    one, other = (rolling_land(Weather(), seed=5) for _ in range(2))
-    assert np.array_equal(one.heights, other.heights) and np.array_equal(one.cover, other.cover)
-    assert not np.array_equal(one.heights, rolling_land(Weather(), seed=6).heights)
-    assert np.isclose(one.heights.std(), 2.0)
-
-
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Weather(clouds=1.5), "share from 0 to 1"),
-        (lambda: Weather(hour=25.0), "from 0 to below 24"),
-        (lambda: Land(np.zeros((3, 3))), "a power of two"),
-        (lambda: Land(np.full((2, 2), np.nan)), "heights in metres"),
-        (lambda: Land(cover=np.full((2, 2), 7)), "number them from 0"),
-        (lambda: rolling_land(Weather(), shares=(0.5, 0.6, 0.1)), "three that sum to one"),
-        (lambda: animal("whale", Weather()), "use one of: rhinoceros"),
-        (lambda: render_land(LandScene(EVEN_LAND), CAMERA, [0, 0, 1.0], R_MC_DOWN), "raise the camera"),
-        (
-            lambda: render_land(LandScene(hilly()), CAMERA, [32.0, 0, -3.5], R_MC_DOWN),
-            "-0.5 m above the ground. .*below -4 m",
-        ),
+        (lambda: Weather(clouds=1.5), "0 to 1"),
+        (lambda: Weather(hour=25.0), "below 24"),
+        (lambda: Land(np.zeros((3, 3))), "power of two"),
+        (lambda: Land(np.full((2, 2), np.nan)), "metres"),
+        (lambda: Land(cover=np.full((2, 2), 7)), "from 0"),
+        (lambda: rolling_land(Weather(), shares=(0.5, 0.6, 0.1)), "sum to one"),
+        (lambda: animal("whale", Weather()), "rhinoceros"),
+        (lambda: render_land(LandScene(EVEN_LAND), CAMERA, [0, 0, 1.0], R_MC_DOWN), "raise"),
+        (lambda: render_land(LandScene(hilly()), CAMERA, [32.0, 0, -3.5], R_MC_DOWN), "-0.5 m above"),
     ],
 )
 def test_what_cannot_be_is_refused(make, words):

@@ -53,17 +53,17 @@ def test_covers_keep_their_shares_and_their_places() -> None:
 def test_a_hole_in_the_terrain_is_refused() -> None:
     height = np.zeros((4, 4), np.float32)
     height[1, 2] = np.nan
-    with pytest.raises(WildlabError, match="a height of the terrain is missing"):
+    with pytest.raises(WildlabError, match="missing"):
         land_on(Terrain(height, 0.0, 0.0, 2.0), COVERS)
 
 
 def test_a_terrain_beside_multiples_of_its_step_is_refused() -> None:
     beside = Terrain(np.zeros((4, 4), np.float32), 8.0, 6.0, 4.0)
-    with pytest.raises(WildlabError, match=r"2 m beside multiples of 4 m"):
+    with pytest.raises(WildlabError, match="multiples of 4 m"):
         land_on(beside, COVERS)
 
 
 def test_a_terrain_too_large_is_refused() -> None:
     long = Terrain(np.zeros((2, MOST_CELLS), np.float32), 0.0, 0.0, 2.0)
-    with pytest.raises(WildlabError, match=f"{MOST_CELLS} nodes along a side"):
+    with pytest.raises(WildlabError, match=f"{MOST_CELLS} nodes"):
         land_on(long, COVERS)

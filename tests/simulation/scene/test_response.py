@@ -100,6 +100,6 @@ def test_gain_control_stretches_to_all_levels():
 
 def test_a_sensor_of_another_size_is_refused():
     sensor = sensor_of(IDEAL, (10, 10), np.random.default_rng(1))
-    with pytest.raises(WildlabError, match="Draw one of that size") as error:
+    with pytest.raises(WildlabError, match="of that size") as error:
         expose(even(), IDEAL, sensor, np.random.default_rng(1))
     assert error.value.field == "sensor"
