@@ -167,13 +167,6 @@ def test_what_cannot_be_compared_is_refused(
     assert not (reports / "comparison").exists()
 
 
-def test_a_report_without_a_flight_is_refused(capsys: pytest.CaptureFixture[str], reports: Path) -> None:
-    (reports / "monday-overview" / "provenance.json").write_text("[]")
-    code, _, err = call(capsys, "compare", reports / "monday-overview", reports / "tuesday-overview",
-                        "--out", reports)  # fmt: skip
-    assert code == 2 and "no report" in err.lower()
-
-
 def test_names_out_of_logs_are_only_text(reports: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (reports / "monday-overview" / "provenance.json").write_text(
         json.dumps({"flight": {"name": "<b>x", "kind": "<i>"}, "parameters": {"lacking": ["<script>"]}})

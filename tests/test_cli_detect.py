@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from tests.flight.frames.test_cptv import pictures, video, written
 from tests.pipeline.test_detect import folder, picture
 from tests.test_cli_camera import huge_png
 from wildlab import cli
@@ -54,16 +53,6 @@ def test_results_go_neither_among_the_images_nor_over_those_of_others(capsys, tm
     assert (tmp_path / "out" / "detections.csv").read_bytes() == before
 
 
-def test_images_that_are_dark_where_it_is_warm_are_asked_about(capsys, tmp_path):
-    path = folder(tmp_path / "in")
-    for one in path.glob("*.png"):
-        cv2.imwrite(str(one), 255 - cv2.imread(str(one), cv2.IMREAD_GRAYSCALE))
-    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out")
-    assert code == 0 and "--polarity black-hot" in out
-    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--polarity", "black-hot")
-    assert code == 0 and out.startswith("12 detections") and "black-hot" not in out
-
-
 def test_many_is_by_the_image():
     few, many = (too_few_or_many("warm", "unknown", n, 5, chosen=False) for n in (50, 51))
     assert few == [] and len(many) == 1
@@ -79,33 +68,6 @@ def test_what_was_missed_and_invented_is_on_sheets(capsys, tmp_path):
     assert result["pictures"] == {"overlays": 2, "found": 11, "missed": 1, "invented": 1}
     assert (result["judged"]["found"], result["judged"]["f1"]["estimate"]) == (11, round(22 / 24, 4))
     assert (tmp_path / "out" / "missed.jpg").is_file() and (tmp_path / "out" / "invented.jpg").is_file()
-
-
-@pytest.mark.slow
-def test_thresholds_of_a_fit_can_be_used_again(capsys, tmp_path):
-    path = folder(tmp_path / "in")
-    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--fit", path / "labels.csv",
-                          "--group", "scene")  # fmt: skip
-    assert code == 0 and "F1 1.00" in out, err
-    fit = json.loads((tmp_path / "out" / "result.json").read_text())["fit"]["ellipses"]
-    kept = json.loads((tmp_path / "out" / "thresholds.json").read_text())["thresholds"]["part"]
-    if fit["labels_found"] < 9:
-        assert fit["part"] is None and kept == 0.12
-    else:
-        assert kept == pytest.approx(fit["part"], abs=1e-5)
-    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "again", "--thresholds",
-                          tmp_path / "out" / "thresholds.json", "--labels", path / "labels.csv")  # fmt: skip
-    assert code == 0 and "F1 1.00" in out
-
-
-def test_a_second_run_computes_nothing_again(capsys, tmp_path, monkeypatch):
-    from wildlab.pipeline.detecting import detect as subject
-
-    monkeypatch.setattr(subject, "PART", 2)
-    path = folder(tmp_path / "in")
-    assert call(capsys, "detect", path, "--into", tmp_path / "out")[0] == 0
-    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--json")
-    assert code == 0 and json.loads(out)["frames"]["kept"] == 6
 
 
 def test_lengths_come_from_the_distance(capsys, tmp_path):
@@ -145,13 +107,6 @@ def test_a_flight_gives_its_images_and_their_times(capsys, tmp_path):
     assert time == pytest.approx(twin.frames["time_s"].iloc[3] + twin.manifest.clocks.camera_offset_s)
 
 
-def test_shapes_without_a_fit_are_refused(capsys, tmp_path):
-    code, _, err = call(
-        capsys, "detect", folder(tmp_path / "in"), "--into", tmp_path / "out", "--method", "shape"
-    )
-    assert code == 2 and "learnt" in err
-
-
 def test_wrong_use_is_refused(capsys, tmp_path):
     path = folder(tmp_path / "in")
     code, _, err = call(capsys, "detect", tmp_path / "none", "--into", tmp_path / "out")
@@ -163,15 +118,6 @@ def test_wrong_use_is_refused(capsys, tmp_path):
     assert code == 2 and "no labels" in err
     code, _, err = call(capsys, "detect", tmp_path, "--into", tmp_path / "out")
     assert code == 2 and "in" in err
-
-
-def test_labels_that_cannot_be_of_these_images(capsys, tmp_path):
-    path = folder(tmp_path / "in")
-    rows = (path / "labels.csv").read_text(encoding="utf-8").splitlines()
-    rows += ["000.png,900,900,5,5,far", "001.png,-40,20,30,10,far", "gone.png,1,2,3,4,far"]
-    (tmp_path / "l.csv").write_text("\n".join(rows), encoding="utf-8")
-    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--labels", tmp_path / "l.csv")
-    assert code == 0 and "2 labels" in out and "2 missed" in out and "gone.png" in out
 
 
 def test_a_turn_that_viewers_make_is_not_made(capsys, tmp_path):
@@ -292,7 +238,7 @@ def test_control_c_in_the_middle_loses_nothing_that_was_finished(tmp_path):
 
 
 def test_what_the_camera_does_is_seen(capsys, tmp_path):
-    """A closed shutter, a dead pixel, dark corners, and frames of a trail camera."""
+    """A closed shutter, a dead pixel and dark corners."""
     path = tmp_path / "in"
     path.mkdir()
     rng = np.random.default_rng(4)
@@ -310,7 +256,3 @@ def test_what_the_camera_does_is_seen(capsys, tmp_path):
     assert "1 pixel" in out and "darker" in out
     code, out, _ = call(capsys, "detect", path / "00.png", "--into", tmp_path / "one", "--even")
     assert code == 0 and "darker" not in out
-    write_trail = written(tmp_path / "trap.cptv", video(pictures(3, (64, 80)), 12))
-    code, out, err = call(capsys, "detect", write_trail, "--into", tmp_path / "trap", "--method", "warm")
-    assert code == 0, err
-    assert pd.read_csv(tmp_path / "trap" / "frames.csv")["time_s"].tolist() == [0.0, 0.111, 0.222]

@@ -81,11 +81,6 @@ def test_a_folder_is_replaced_only_when_asked(capsys, area, tmp_path):
     assert code == 2 and "photo.jpg" in err
 
 
-def test_json_is_what_is_in_the_file(capsys, area, tmp_path):
-    code, out, _ = call(capsys, area, *SHEET, "--into", tmp_path / "out", "--json")
-    assert code == 0 and json.loads(out) == json.loads((tmp_path / "out" / "result.json").read_text())
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [

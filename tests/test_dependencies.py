@@ -51,25 +51,3 @@ def complaints(root: Path, reasons: dict[str, str]) -> list[str]:
 
 def test_what_is_asked_for_is_used_or_has_a_reason() -> None:
     assert complaints(paths.ROOT, NOT_IMPORTED) == []
-
-
-def test_an_unused_package_and_a_stale_reason_are_found(tmp_path: Path) -> None:
-    (tmp_path / "wildlab").mkdir()
-    (tmp_path / "notebooks").mkdir()
-    (tmp_path / "pyproject.toml").write_text(
-        "[project]\ndependencies = ['numpy>=2', 'scipy', 'Click', 'opencv-python-headless', 'pandas']\n",
-        encoding="utf-8",
-    )
-    (tmp_path / "wildlab" / "a.py").write_text("def f():\n    import numpy.linalg\n", encoding="utf-8")
-    cells = [
-        {"cell_type": "code", "source": ["from cv2 import imread\n"]},
-        {"cell_type": "markdown", "source": ["import click\n"]},
-    ]
-    (tmp_path / "notebooks" / "a.ipynb").write_text(json.dumps({"cells": cells}), encoding="utf-8")
-    reasons = {"opencv-python-headless": "images", "rasterio": "terrain", "pandas": "tables"}
-    assert complaints(tmp_path, reasons) == [
-        "click: asked for and imported by nothing",
-        "opencv-python-headless: imported after all",
-        "rasterio: not asked for",
-        "scipy: asked for and imported by nothing",
-    ]

@@ -184,16 +184,6 @@ def test_moved_checkout_gets_a_new_environment(make: Run, checkout: Path) -> Non
     assert "Replacing .venv" in make("environment").stdout
 
 
-def test_another_python_asked_for_by_name(make: Run, checkout: Path) -> None:
-    make("environment")
-    assert make("environment", "PYTHON=python3").stdout == ""
-    newer = checkout.parent / "bin" / "python3.12"
-    newer.write_text(STAND_IN.replace("3.11.7", "3.12.1"), encoding="utf-8")
-    newer.chmod(0o755)
-    assert "python3.12 (3.12.1)" in make("environment", f"PYTHON={newer}").stdout
-    assert make("environment").stdout == ""
-
-
 @pytest.mark.parametrize(
     ("arguments", "more", "about"),
     [
@@ -242,12 +232,6 @@ def test_lock_names_no_index_and_hashes_everything() -> None:
     for block in blocks:
         assert re.match(r"[A-Za-z0-9._-]+==\S+", block), block[:80]
         assert "--hash=sha256:" in block, block[:80]
-
-
-def test_ci_runs_the_same_command_as_people_do() -> None:
-    script = paths.ROOT / ".ci" / "run"
-    assert os.access(script, os.X_OK)
-    assert "make test" in script.read_text(encoding="utf-8")
 
 
 def commands_in_readme() -> str:

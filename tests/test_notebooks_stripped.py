@@ -10,8 +10,6 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from wildlab import paths
 
 MOST_CODE_LINES = 250
@@ -83,42 +81,3 @@ def test_tracked_notebooks() -> None:
 def cell(source: str, **more: Any) -> dict[str, Any]:
     bare: dict[str, Any] = {"cell_type": "code", "source": source, "metadata": {}}
     return bare | {"outputs": [], "execution_count": None} | more
-
-
-PARAMETERS = cell("seed = 1", metadata={"tags": ["parameters"]})
-
-
-def test_a_stripped_notebook_passes() -> None:
-    text = {"cell_type": "markdown", "source": ["# Title\n", "metres/second, https://example.org/tmp/x"]}
-    code = cell("x = out + '/figures'\nratio = 1/2")
-    assert problems({"cells": [text, PARAMETERS, code], "metadata": {}}) == []
-
-
-@pytest.mark.parametrize(
-    ("more", "problem"),
-    [
-        ([cell("1", outputs=[{"output_type": "stream", "text": "1"}])], "has outputs"),
-        ([cell("1", execution_count=3)], "has an execution count"),
-        ([PARAMETERS], "2 cells are tagged"),
-        ([cell("x = 1\n" * 250)], "251 lines of code"),
-        ([cell("read('/home/someone/flight')")], "names an absolute path"),
-        ([cell("path = 'C:\\\\Users'")], "names an absolute path"),
-        ([{"cell_type": "markdown", "source": "see /Users/x/y"}], "names an absolute path"),
-        ([cell("%matplotlib inline")], "is not plain Python"),
-    ],
-)
-def test_what_must_not_be_committed_is_found(more: list[dict[str, Any]], problem: str) -> None:
-    found = problems({"cells": [PARAMETERS, *more], "metadata": {}})
-    assert len(found) == 1, found
-    assert problem in found[0]
-
-
-def test_a_tutorial_takes_no_parameters() -> None:
-    assert problems({"cells": [cell("1 + 1")], "metadata": {}}, tutorial=True) == []
-    assert len(problems({"cells": [PARAMETERS], "metadata": {}}, tutorial=True)) == 1
-
-
-def test_notebook_as_a_whole() -> None:
-    assert len(problems({"cells": []})) == 1
-    wrong = {"cells": [PARAMETERS], "metadata": {"kernelspec": {"name": "conda-base"}, "widgets": {}}}
-    assert len(problems(wrong)) == 2

@@ -86,18 +86,3 @@ def test_the_first_page_opens_in_a_browser(reference: Path, faults: Callable[...
     for page in ("index.html", "wildlab.html", "wildlab/flight.html", "wildlab/pipeline/track.html"):
         # The look of these pages is pdoc's.
         assert faults(reference / page, axe=False) == [], page
-
-
-def test_a_request_is_found() -> None:
-    assert (
-        len(
-            requests(
-                '<script src="https://x/y.js"></script><link href="//x/y.css"><style>@import "a";</style>'
-            )
-        )
-        == 3
-    )
-    assert (
-        requests('<a href="https://x">x</a><img src="data:image/svg+xml,%3Csvg xmlns=http://www.w3.org">')
-        == []
-    )

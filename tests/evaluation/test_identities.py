@@ -309,14 +309,6 @@ def test_scans_out_of_order_are_refused():
     assert compare_identities([one, one], CUTOFF).targets == {}
 
 
-@pytest.mark.parametrize("sd", [[1.0], [-1.0, 1.0], [[1.0, 1.0]]])
-def test_how_well_places_are_known_is_one_number_for_each(sd: list[float]) -> None:
-    one = Scan(0.0, np.zeros((1, 2)), np.eye(2)[None], ["t"], np.zeros((2, 2)), ["a", "b"], [True] * 2,
-               [False] * 2, truth_sd=sd)  # fmt: skip
-    with pytest.raises(WildlabError, match="truth_sd"):
-        compare_identities([one], 5.0)
-
-
 def test_the_truth_own_error_is_beside_the_tracks() -> None:
     """3 m off with 1 m of its own and a truth known to 2 m: 9 over 5 in one axis."""
     one = Scan(0.0, np.array([[3.0, 0.0]]), np.eye(2)[None], ["t"], np.zeros((1, 2)), ["a"], [True], [False],

@@ -63,14 +63,6 @@ def test_answers_do_not_depend_on_the_unit_nor_on_which_is_called_larger(
     assert r.compare_flight(kind, 1 / here, 1 / published, centre=turned, predicted=turned).words == found
 
 
-@given(st.floats(0.01, 0.99), st.floats(0.01, 0.99))
-def test_a_rate_and_its_complement_are_equally_close(here: float, published: float) -> None:
-    found = r.compare_flight("rate", here, published, centre=(here, here)).closeness
-    other = r.compare_flight("rate", 1 - here, 1 - published, centre=(1 - here, 1 - here)).closeness
-    odds = here / (1 - here) * (1 - published) / published
-    assert found == other or abs(abs(np.log(odds)) - np.log(1.25)) < 1e-6
-
-
 @pytest.mark.parametrize("n", [5, 6, 19, 20, 100])
 def test_the_interval_of_the_median_holds_it_as_often_as_it_says(n: int) -> None:
     """Coverage by the binomial distribution: the median lies between two order statistics."""

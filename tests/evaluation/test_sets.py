@@ -29,16 +29,6 @@ def test_empty_sets():
     assert gospa([], three, 10, 1) == pytest.approx((15, 0, 0, 15, 0, 3))
 
 
-def test_known_values():
-    truth, estimates = [[0.0, 0.0], [100.0, 0.0]], [[103.0, 4.0], [0.0, 0.0], [50.0, 50.0]]
-    assert ospa(truth, estimates, 10, 2) == pytest.approx(
-        (np.sqrt((25 + 100) / 3), np.sqrt(25 / 3), np.sqrt(100 / 3))
-    )
-    assert gospa(truth, estimates, 10, 2) == pytest.approx((np.sqrt(25 + 50), 5, 0, np.sqrt(50), 0, 1))
-    # Beyond the cut-off a pair is a miss and a false target.
-    assert gospa([[0.0, 0.0]], [[11.0, 0.0]], 10, 2) == pytest.approx((10, 0, np.sqrt(50), np.sqrt(50), 1, 1))
-
-
 def by_definition(x, y, cutoff, order):
     """Both distances over every way to pair the points."""
     x, y = sorted((x, y), key=len)
@@ -57,26 +47,6 @@ def test_against_every_pairing(x, y, cutoff, order):
     first, second = by_definition(x, y, cutoff, order)
     assert ospa(x, y, cutoff, order).distance == pytest.approx(first, abs=1e-9)
     assert gospa(x, y, cutoff, order).distance == pytest.approx(second, abs=1e-9)
-
-
-@given(points, points, points, cutoffs, orders)
-def test_triangle_inequality(x, y, z, cutoff, order):
-    for distance in (ospa, gospa):
-        xy, yz, xz = (
-            distance(a, b, cutoff, order).distance for a, b in itertools.combinations((x, y, z), 2)
-        )  # in the order xy, xz, yz
-        assert xy <= yz + xz + 1e-9
-
-
-@given(points, points, cutoffs, orders, st.randoms(use_true_random=False))
-def test_symmetry_and_permutations(x, y, cutoff, order, random):
-    mixed = y[random.sample(range(len(y)), len(y))]
-    for distance in (ospa, gospa):
-        there, back = distance(x, mixed, cutoff, order), distance(y, x, cutoff, order)
-        assert there.distance == pytest.approx(back.distance, abs=1e-9)
-        assert distance(y, mixed, cutoff, order).distance == pytest.approx(0, abs=1e-9)
-    one, other = gospa(x, y, cutoff, order), gospa(y, x, cutoff, order)
-    assert (one.n_missed, one.n_false) == (other.n_false, other.n_missed)
 
 
 @given(points, points, cutoffs, orders)

@@ -80,13 +80,6 @@ def test_boresight_comes_back_exactly_without_noise():
     assert error(found, survey).max() < 1e-4
 
 
-def test_a_correction_adds_to_the_mount_s_own_misalignment():
-    survey = Survey(1, EVERY_WAY)
-    nearly = Mount("down", misalignment=(0.02, -0.05, 0.025))
-    found = calibrate(survey.poses_at(nearly), survey.uv, survey.known, survey.image)
-    assert np.allclose(apply_calibration(found, nearly).misalignment, TRUE.misalignment, atol=1e-6)
-
-
 def test_a_correction_turns_about_the_axes_of_the_airframe():
     """Not about those of a base that is turned already: a roll leaves the airframe's x where it is."""
     rolled = Calibration(("roll",), np.array([0.1]), np.eye(1), {}, 4, 4)
@@ -177,12 +170,13 @@ def test_flying_one_way_cannot_tell_clock_or_position_from_the_angles():
 def test_the_stated_standard_deviation_is_the_scatter_over_flights():
     """Each image has an attitude error of its own, shared by its points."""
     estimates, stated = [], []
-    for seed in range(60):
+    for seed in range(40):
         survey = Survey(seed, EVERY_WAY, attitude_sd=0.01, pixel_sd=1.0)
         found = calibrate(survey.poses_at(), survey.uv, survey.known, survey.image)
         estimates.append(found.values)
         stated.append([found.sd(name) for name in found.names])
     ratio = np.mean(stated, axis=0) / np.std(estimates, axis=0, ddof=1)
+    # The scatter of 40 flights is known to 1 / sqrt(2 * 39), 11 %.
     assert (ratio > 0.7).all() and (ratio < 1.4).all(), ratio
 
 

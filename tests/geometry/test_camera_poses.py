@@ -106,16 +106,6 @@ def test_a_field_of_another_shape_is_named(field, shape):
         poses_of(**{field: np.zeros(shape)})
 
 
-@pytest.mark.parametrize(
-    ("field", "shape"),
-    [("R_nc", (N, 2, 2)), ("R_nc", (N + 1, 3, 3)), ("R_bc", (N, 3, 3)), ("lever_arm", (2,))],
-)
-def test_a_field_of_another_shape_is_named_at_the_lens_too(field, shape):
-    given = {"p_nc": np.zeros((N, 3)), "R_nc": np.eye(3), "R_bc": np.eye(3), "lever_arm": np.zeros(3)}
-    with pytest.raises(WildlabError, match=f"^{field}: "):
-        CameraPoses.at_lens(CAMERA, **(given | {field: np.zeros(shape)}))
-
-
 def test_poses_of_another_length_than_the_pixels_are_refused():
     poses, uv = poses_of(), np.full((N + 1, 2), 300.0)
     e = PoseErrors(np.eye(2), np.eye(6), np.eye(3), 1.0)

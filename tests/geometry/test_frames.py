@@ -62,12 +62,6 @@ def test_zero_quaternion_is_refused():
         frames.quaternion_to_matrix([0.0, 0, 0, 0])
 
 
-@given(st.lists(st.floats(-3, 3), min_size=6, max_size=6))
-def test_skew_is_the_cross_product(numbers):
-    a, b = np.array(numbers[:3]), np.array(numbers[3:])
-    assert np.allclose(frames.skew(a) @ b, np.cross(a, b))
-
-
 @given(st.floats(-1.4, 1.4), angle, st.floats(-0.02, 0.02), st.floats(-0.02, 0.02), st.floats(-500, 5000))
 def test_geodetic_round_trip(lat0, lon0, dlat, dlon, height):
     origin = (lat0, lon0, 100.0)

@@ -20,7 +20,6 @@ from wildlab.geometry.intrinsics import (
     PINHOLE,
     calibrate_camera,
     confused,
-    view_errors,
 )
 from wildlab.geometry.lens_choice import choose_lens
 from wildlab.simulation.boards import board_views
@@ -117,13 +116,6 @@ def test_what_is_not_estimated_is_held():
     assert np.isnan(found.sd("cx"))
 
 
-def test_views_of_another_camera_fit_worse():
-    uv = pixels(CAMERA, views(7, 5))
-    np.testing.assert_allclose(view_errors(CAMERA, BOARD, uv), 0, atol=1e-6)
-    bent = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
-    assert (view_errors(bent, BOARD, uv) > 0.05).all()
-
-
 def test_flat_views_do_not_tell_focal_length():
     rng = np.random.default_rng(8)
     flat = board_views(rng, CAMERA, BOARD, 8, tilt=np.radians(0.5))
@@ -179,8 +171,7 @@ def test_a_view_with_few_points_is_refused():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("n", "shared"), [(20, 0.0), (12, 0.3)])
-def test_intervals_hold_the_truth_as_often_as_they_say(n, shared):
+def test_intervals_hold_the_truth_as_often_as_they_say(n=12, shared=0.3):
     """Noise of each point, and an error that the points of a view share."""
     inside = []
     for seed in range(60):

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy import stats
@@ -29,6 +30,7 @@ def test_the_tail_is_that_of_scipy_stats(value: float, dof: float) -> None:
     np.testing.assert_equal(chi2_beyond(value, dof), float(stats.chi2.sf(value, dof)))
 
 
+@pytest.mark.slow
 def test_a_report_does_without_scipy_stats() -> None:
     rooms = "reporting.report", "pipeline.accuracy", "pipeline.navigation_errors", "runner.processes.job"
     imports = "; ".join(f"import wildlab.{room}" for room in rooms)

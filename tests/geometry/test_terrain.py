@@ -14,7 +14,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
+from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.ray_ends import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 from wildlab.geometry.terrain import Terrain, intersect_terrain, pixels_to_terrain
@@ -98,18 +98,6 @@ def test_a_tilted_plane_is_met_where_algebra_says(slope, pitch, yaw):
     np.testing.assert_allclose(met.points[good] @ [slope[0], slope[1], 1.0], 0.0, atol=1e-3)
     back = ground_to_pixel(CAMERA, met.points[good], poses.p_nc, poses.R_nc)
     np.testing.assert_allclose(back, uv[good], atol=1e-6)
-
-
-def test_even_ground_is_the_plane():
-    rng = np.random.default_rng(4)
-    poses = CameraPoses(
-        CAMERA, Mount("down"), np.array([5.0, -7.0, -80.0]), euler_to_matrix(*rng.normal(0, 0.2, 3))
-    )
-    uv = rng.uniform(0, 500, (200, 2))
-    level = Terrain(np.full((50, 50), 12.5, np.float32), -245.0, -245.0, 10.0)
-    np.testing.assert_allclose(
-        pixels_to_terrain(poses, uv, level).points, georeference_pixels(poses, uv, -12.5), atol=1e-9
-    )
 
 
 def test_what_becomes_of_rays_is_counted():

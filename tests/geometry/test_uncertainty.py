@@ -9,7 +9,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.ellipses import ellipse_axes, inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import georeference_pixels, pixel_to_plane
-from wildlab.geometry.mount import R_MC_DOWN, Mount, camera_rotation, mount_rotation
+from wildlab.geometry.mount import Mount, camera_rotation, mount_rotation
 from wildlab.geometry.uncertainty import (
     PoseErrors,
     ground_covariance,
@@ -118,20 +118,6 @@ def test_samples_scatter_about_the_point_as_the_derivatives_say():
     C = stated.covariance[0]
     assert np.abs(np.cov(draws.T) - C).max() < 0.03 * np.abs(C).max()
     assert np.allclose(draws.mean(axis=0), georeference_pixels(pose, uv, 1.0)[:2], atol=1e-3)
-
-
-def test_a_pose_of_its_own_lens_has_the_same_derivatives_as_one_on_a_mount():
-    """But for those with respect to the mount, whose axes are those of another mount."""
-    rng = np.random.default_rng(8)
-    R = euler_to_matrix(*rng.uniform([-0.3, -0.3, -3], [0.3, 0.3, 3], (5, 3)).T)
-    mounted = CameraPoses(BENT, TURNED, rng.uniform([-9, -9, -99], [9, 9, -50], (5, 3)), R)
-    free = CameraPoses.at_lens(BENT, mounted.p_nc, mounted.R_nc, mounted.R_bc, TURNED.lever_arm)
-    uv = rng.uniform([0, 0], [640, 512], (5, 2))
-    ours, theirs = ground_jacobians(free, uv, 0.0), ground_jacobians(mounted, uv, 0.0)
-    assert np.allclose(free.R_bm @ R_MC_DOWN, mounted.R_bc, atol=1e-15)
-    for name in ("pixel", "pose", "plane"):
-        assert np.allclose(getattr(ours, name), getattr(theirs, name), rtol=1e-10, atol=1e-10), name
-    assert ray_flatness(free, uv, errors(1.0)) == pytest.approx(ray_flatness(mounted, uv, errors(1.0)))
 
 
 @pytest.mark.parametrize(

@@ -47,16 +47,6 @@ def test_counts_are_the_sum_over_images():
     assert 0 < found.share < 1 and found.share == pytest.approx((expected > 0).mean())
 
 
-def test_one_pose_is_one_image_and_what_is_not_known_is_not_counted():
-    height = np.zeros((21, 21), np.float32)
-    height[0] = np.nan
-    terrain = Terrain(height, -20.0, -20.0, 2.0)
-    wide = Camera(400, 400, 50.0, 50.0, 200.0, 200.0)
-    seen = viewshed(terrain, CameraPoses(wide, Mount("down"), np.array([0.0, 0.0, -30.0]), np.eye(3)))
-    assert seen.known.sum() == 20 * 21 and seen.counts[0].sum() == 0
-    assert seen.counts.max() == 1 and seen.share == 1.0
-
-
 @settings(max_examples=25)
 @given(st.integers(0, 10**6))
 def test_what_hides_a_point_lies_on_the_ground_and_on_the_line(seed):
@@ -131,16 +121,6 @@ def test_the_outline_holds_what_the_image_shows_of_even_ground(roll, pitch, yaw)
     np.testing.assert_allclose(np.hypot(*(found.points[found.cut] - [5.0, -7.0]).T), furthest)
     # A chord in place of an arc, and borders between rays, may be wrong by a little.
     assert (inside(found.points, points) != shown).sum() < 0.03 * shown.sum() + 20
-
-
-def test_without_a_furthest_distance_rays_over_the_horizon_have_no_point():
-    terrain = Terrain(np.zeros((3, 3), np.float32), -2000.0, -2000.0, 2000.0)
-    level = CameraPoses(CAMERA, Mount("forward"), np.array([0.0, 0.0, -40.0]), np.eye(3))
-    found = footprint(terrain, level)
-    assert np.isnan(found.points[found.became != HIT]).all() and (found.became == HIT).any()
-    assert np.isfinite(found.points[found.became == HIT]).all() and not found.cut.any()
-    up = CameraPoses(CAMERA, Mount("forward"), np.array([0.0, 0.0, -40.0]), euler_to_matrix(0, 1.0, 0))
-    assert np.isnan(footprint(terrain, up, furthest=500.0).points).all()
 
 
 def test_an_outline_needs_one_pose_and_rays():

@@ -25,31 +25,6 @@ def rough(seed, cells=24, high=6.0):
     return Terrain(rng.uniform(0, high, (cells, cells)).astype(np.float32), -23.0, -31.0, 2.0)
 
 
-def test_a_wall_hides_what_is_below_the_line_over_its_edge():
-    height = np.zeros((3, 101), np.float32)
-    height[:, 50] = 10.0
-    wall = Terrain(height, -1.0, 0.0, 1.0)
-    # From 20 m above 0 over the edge at 50, 10 m: the ground is met at 100.
-    for east, down, clear in (
-        (99.0, 0.0, False),
-        (99.0, -0.19, False),
-        (99.0, -0.21, True),
-        (40.0, 0.0, True),
-    ):
-        assert lines_clear(wall, [[0.0, east, down]], [0.0, 0.0, -20.0]).tolist() == [clear], (east, down)
-
-
-def test_what_is_unknown_hides_and_so_does_a_camera_below_the_ground():
-    height = np.zeros((3, 11), np.float32)
-    height[:, 5], height[:, 8] = np.nan, 3.0
-    terrain = Terrain(height, -1.0, 0.0, 1.0)
-    assert not lines_clear(terrain, [[0.0, 9.0, -2.0]], [0.0, 1.0, -2.0]).any()
-    assert lines_clear(terrain, [[0.0, 9.0, -4.0]], [0.0, 1.0, -4.0]).all(), (
-        "it passes over all that is known"
-    )
-    assert not lines_clear(terrain, [[0.0, 2.0, -1.0]], [0.0, 1.0, 1.0]).any()
-
-
 @settings(max_examples=300, deadline=None)
 @given(st.integers(0, 10**6), st.sampled_from([0.4, 3.0, 30.0]), st.booleans())
 def test_a_line_is_clear_where_the_walk_from_the_camera_meets_nothing(seed, high, one):

@@ -64,15 +64,6 @@ def test_what_lies_inside_is_what_winds_round() -> None:
     assert not contains(star, [[np.nan, 0.0]]).any()
 
 
-def test_many_points_are_looked_at_as_few_are() -> None:
-    fence = check_area(U_SHAPE)
-    points = np.random.default_rng(3).uniform(-20, 120, (3000, 2))
-    few = np.array_split(points, 100)
-    assert np.array_equal(contains(fence, points), np.concatenate([contains(fence, one) for one in few]))
-    apart = np.concatenate([distance_to_border(fence, one) for one in few])
-    assert np.allclose(distance_to_border(fence, points), apart)
-
-
 def test_a_rectangle_has_its_sides_and_its_course() -> None:
     corners = rectangle(3.0, 4.0, 20.0, 10.0, 0.3)
     assert np.allclose(corners.mean(axis=0), [3.0, 4.0])

@@ -128,14 +128,6 @@ def test_a_border_is_a_smaller_image() -> None:
     assert shown.looks.sum() == len(one.node)
 
 
-def test_what_is_in_the_image_and_hidden_is_told_from_what_is_not_in_it() -> None:
-    terrain = hills(5)
-    poses = poses_over(terrain, 6)
-    every, clear = see(terrain, poses, 150.0, hidden=False), see(terrain, poses, 150.0)
-    size = terrain.height.size
-    assert set(clear.image * size + clear.node) < set(every.image * size + every.node)
-
-
 def test_trees_hide_the_ground_behind_and_below_them() -> None:
     flat = Terrain(np.zeros((101, 101), np.float32), north=-50.0, east=-50.0, step=1.0)
     raised = flat.height.copy()
@@ -160,12 +152,6 @@ def test_nodes_of_areas_have_their_area() -> None:
         assert (owner == k).sum() * 0.25 == pytest.approx(area_of(fence), rel=0.02)
 
 
-def test_of_no_nodes_nothing_is_said() -> None:
-    flat, poses = flat_flight(np.array([0.0]))
-    nothing = share_seen(cover(flat, poses, [0.0], furthest=100.0), np.zeros(flat.height.shape, bool))
-    assert nothing.area == 0 and np.isnan(nothing.seen)
-
-
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
@@ -183,9 +169,3 @@ def test_wrong_use_is_refused(change: dict[str, object], problem: str) -> None:
     with pytest.raises(WildlabError) as caught:
         cover(flat, poses, times, **given)  # type: ignore[arg-type]
     assert problem in caught.value.problem
-
-
-def test_one_pose_for_all_is_no_row_of_instants() -> None:
-    flat, _ = flat_flight(np.array([0.0, 1.0]))
-    with pytest.raises(WildlabError, match="instants"):
-        see(flat, CameraPoses(WIDE, Mount("down"), np.zeros(3), np.eye(3)), 10.0)

@@ -20,7 +20,6 @@ from wildlab.planning.gimbal import (
     swing,
     swing_rate,
     swing_roll,
-    swing_yaw,
     view_inside,
 )
 
@@ -55,15 +54,6 @@ def test_where_the_lens_points() -> None:
     assert np.allclose(right, [-0.5, 0, np.sqrt(0.75)])
     # The top of a level camera's image is ahead.
     assert np.allclose(camera_attitudes(east, look_down([0.0]))[0] @ [0, -1, 0], [0, 1, 0], atol=1e-12)
-
-
-def test_yaw_leaves_the_horizon_level_and_roll_does_not() -> None:
-    """F 5.4.1: the advantage of turning about yaw."""
-    t = np.linspace(0, 10, 50)
-    across = np.array([1.0, 0.0, 0.0])
-    for angles, level in ((swing_yaw(t, 0.8, 0.5, -1.0), True), (swing_roll(t, 0.8, 0.5, -1.0), False)):
-        down = (camera_attitudes(0 * t, angles) @ across)[:, 2]
-        assert (np.abs(down).max() < 1e-9) == level
 
 
 def test_blur_is_angle_rate_times_exposure_times_focal_length() -> None:

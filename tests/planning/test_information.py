@@ -28,7 +28,6 @@ from wildlab.planning.information import (
 )
 
 SENSOR = SearchSensor(0.3, 0.2, sd=0.02, reach=100.0, nearest=1e-6)
-EAST_NORTH_UP = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 coordinate = st.floats(-300, 300)
 point = st.tuples(coordinate, coordinate, st.floats(-50, 50)).filter(lambda p: np.hypot(p[0], p[1]) > 1.0)
 camera_at = np.array([0.0, 0.0, -80.0])
@@ -67,19 +66,6 @@ def test_what_is_told_is_a_projection_but_for_what_the_azimuth_tells_more(p):
     assert across @ Y @ across == pytest.approx(1 / cos2)
     assert upward @ Y @ upward == pytest.approx(1)
     assert across @ Y @ upward == pytest.approx(0, abs=1e-9 / cos2)
-
-
-def test_the_axes_of_the_thesis_tell_the_same():
-    """(5.7) in east-north-up, its azimuth from east, by numerical derivatives of the print."""
-    p = np.array([40.0, -70.0, 5.0])
-    d = ned_to_enu(p - camera_at)
-
-    def printed(d):
-        return np.array([np.arctan2(d[1], d[0]), np.arctan2(d[2], np.hypot(d[0], d[1]))])
-
-    H = np.stack([(printed(d + e) - printed(d - e)) / 2e-4 for e in 1e-4 * np.eye(3)], axis=1)
-    ours = EAST_NORTH_UP @ bearing_information([p], camera_at, SENSOR)[0] @ EAST_NORTH_UP.T
-    assert ours == pytest.approx(H.T @ H / SENSOR.sd**2, rel=1e-6)
 
 
 def test_straight_below_the_azimuth_tells_no_more_than_from_nearest():

@@ -107,13 +107,6 @@ def test_what_is_far_is_worth_less():
     assert worth == pytest.approx([2 * np.exp(-0.6) + 2.5 * np.exp(-0.8), np.exp(-1.0)])
 
 
-def test_it_flies_to_what_is_not_known_yet():
-    chosen = planner(grid((150, 250), (-50, 50))).choose(DOWN)
-    assert chosen.leg.p_nc[-1, 0] == pytest.approx(15.0)
-    east = planner(grid((-50, 50), (150, 250))).choose(DOWN)
-    assert east.leg.p_nc[-1, 1] == pytest.approx(15.0, abs=0.6)
-
-
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_it_looks_aside_where_that_shows_more(side):
     """A strip beside the way: the middle of the image lies on it, and a camera that is fixed tells less."""

@@ -102,14 +102,6 @@ def test_passes_are_level_legs_over_where_the_vessel_is_then():
         last_end, last_time = one.end, one.ends
 
 
-def test_the_most_urgent_is_not_left_to_the_last():
-    vessels = fleet(3, spread=300.0)
-    sure = np.tile(np.diag([1.0, 1.0, 1e-6, 1e-6]), (3, 1, 1))
-    sure[2] = np.diag([100.0, 100.0, 1.0, 1.0])
-    visits = plan(vessels._replace(covariance=sure))
-    assert visits[0].vessel == 2 and visits[0].slack > 0
-
-
 def test_vessels_that_are_visited_in_time_are_seen_as_often_as_is_said():
     """Vessels that move at random, looked for where the plan expects them when it expects them."""
     rng, reach, hits = np.random.default_rng(5), 60.0, []

@@ -89,13 +89,6 @@ def test_what_is_drawn_is_drawn_apart(stated, drawn):
     assert np.abs(together - np.eye(len(together))).max() < 5 / np.sqrt(len(SEEDS))
 
 
-def test_the_same_seed_flies_the_same_sensors(stated):
-    assert as_flown(stated, 3) == as_flown(stated, 3)
-    assert as_flown(stated, 3) != as_flown(stated, 4)
-    plain = without_tolerance(stated)
-    assert as_flown(plain, 3) is plain
-
-
 @pytest.mark.parametrize("name", ["static-antenna", "large-ship", "uav-search"])
 def test_no_file_of_a_flight_gives_away_what_was_drawn(name, tmp_path):
     """Nothing that a filter may read differs from that of a flight whose sensors are as stated."""

@@ -23,7 +23,6 @@ def without(text: str, group: str) -> str:
     return "".join(part for part in re.split(r"(?m)^(?=\[)", text) if not part.startswith(f"[{group}."))
 
 
-CABLE = own("cable.lowest", 9.0, "m") + own("cable.highest", 20.0, "m") + own("cable.spans", 3, "1")
 CLIMB = own("climb.altitude", 9.0, "m") + own("climb.start", 1.0, "s") + own("climb.duration", 3.0, "s")
 SEGMENTS = own("segments.count", 5, "1") + own("segments.images", 441, "1")
 HULL = own("target.outline.length", 9.0, "m") + own("target.outline.beam", 2.0, "m")

@@ -47,12 +47,6 @@ def test_trees_stand_on_their_share_of_the_ground_in_groups():
     assert grown.extent == land.extent
 
 
-@pytest.mark.parametrize(("share", "expected"), [(0.0, 0.0), (1.0, 1.0)])
-def test_no_tree_and_trees_everywhere(share, expected):
-    land = synthetic_landscape(3)
-    assert (grow_trees(land, 5, share=share).height > land.height).mean() == expected
-
-
 @pytest.mark.parametrize("given", [{"share": 1.2}, {"height": 0.0}, {"stand": -1.0}])
 def test_trees_without_a_size_are_refused(given):
     with pytest.raises(WildlabError, match="a share between 0 and 1"):

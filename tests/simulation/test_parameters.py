@@ -106,16 +106,6 @@ def exchanged_imu(tmp_path, part: str):
     return load_twin(path)
 
 
-def test_one_part_can_be_put_in_the_place_of_another(tmp_path):
-    """The STIM300's numbers, typed a second time from H table A.6."""
-    imu = exchanged_imu(tmp_path, "imu-stim300").imu
-    assert (imu.gyro_range.number, imu.accelerometer_range.number) == (400, 10)
-    assert (imu.gyro_random_walk.number, imu.accelerometer_random_walk.number) == (0.15, 0.07)
-    assert (imu.gyro_bias_stability.number, imu.accelerometer_bias_stability.number) == (0.3, 50)
-    assert imu.axis_misalignment.si == pytest.approx(0.2e-3, rel=1e-5)
-    assert imu.package_misalignment.si == pytest.approx(1e-3, rel=1e-5)
-
-
 @pytest.mark.parametrize(
     ("part", "figures"),
     [

@@ -263,19 +263,6 @@ def test_marks_are_of_animals_that_stand_on_the_land_and_that_no_hill_hides(name
     assert np.allclose(flight.detections["plane_down_m"], under, atol=0.3)
 
 
-def test_tables_are_whole(named):
-    _, _, flight = named
-    assert set(flight.tables) == {"frames", "detections", "truth", "gimbal"}
-    assert list(flight.nav) == ["autopilot", "truth"]
-    assert flight.truth["target_id"].nunique() == 25
-    assert flight.detections["target_id"].nunique() > 5
-    assert flight.detections["detection_id"].is_unique
-    assert flight.detections["frame_id"].is_monotonic_increasing
-    assert flight.detections["u_px"].between(0, 720).all()
-    assert flight.detections["v_px"].between(0, 480).all()
-    assert flight.manifest.geometry_camera().distortion == (0.446, 0, 0, 0, 0)
-
-
 def test_no_animal_in_view_is_refused():
     twin = load_twin("gondola")
     away = with_values(twin, camera__images=1, camera__recording_start=1799.0)

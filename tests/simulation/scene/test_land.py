@@ -149,18 +149,6 @@ def test_a_tree_hides_what_is_under_it():
     assert (view.labels == 3).any()
 
 
-def test_animals_are_warmer_than_air_and_cooler_at_their_ends():
-    night = Weather(hour=2.0)
-    for kind, size in ANIMALS.items():
-        body = animal(kind, night)
-        trunk = max(layer.excess for layer in body.layers)
-        ends = min(layer.excess for layer in body.layers)
-        assert 0 < ends < 0.7 * trunk
-        reach = np.ptp([x for layer in body.layers for x, _ in layer.outline])
-        assert size.length < reach < 1.8 * size.length
-    assert animal("rhinoceros", night).layers[-1].excess > animal("antelope", night).layers[-1].excess
-
-
 def test_a_group_keeps_its_distance_and_its_kinds():
     rng = np.random.default_rng(2)
     bodies = group(rng, ["calf"] * 6, np.array([10.0, 20.0]), 3.0, Weather())
@@ -169,13 +157,6 @@ def test_a_group_keeps_its_distance_and_its_kinds():
     assert len(bodies) == 6 and apart.min() >= 1.2 * ANIMALS["calf"].length
     crowd = group(rng, ["rhinoceros"] * 50, np.zeros(2), 0.5, Weather())
     assert len(crowd) < 50  # those without a place are left out
-
-
-def test_the_sky_is_no_ground():
-    p, R = pose(30.0, 0.0, 80.0)
-    view = render_land(LandScene(EVEN_LAND), CAMERA, p, R)
-    assert view.ground.any() and not view.ground.all()
-    assert view.kelvin[~view.ground].max() < EVEN_LAND.weather.air - 20
 
 
 @pytest.mark.parametrize(

@@ -50,20 +50,13 @@ def test_covers_keep_their_shares_and_their_places() -> None:
         assert LAND.cover[i, j] == COVERS.cover[int(at[0]), int(at[1])]
 
 
-def test_a_hole_in_the_terrain_is_refused() -> None:
-    height = np.zeros((4, 4), np.float32)
-    height[1, 2] = np.nan
-    with pytest.raises(WildlabError, match="missing"):
-        land_on(Terrain(height, 0.0, 0.0, 2.0), COVERS)
-
-
-def test_a_terrain_beside_multiples_of_its_step_is_refused() -> None:
-    beside = Terrain(np.zeros((4, 4), np.float32), 8.0, 6.0, 4.0)
-    with pytest.raises(WildlabError, match="multiples of 4 m"):
-        land_on(beside, COVERS)
-
-
-def test_a_terrain_too_large_is_refused() -> None:
-    long = Terrain(np.zeros((2, MOST_CELLS), np.float32), 0.0, 0.0, 2.0)
-    with pytest.raises(WildlabError, match=f"{MOST_CELLS} nodes"):
-        land_on(long, COVERS)
+def test_a_terrain_with_a_hole_beside_its_grid_or_too_large_is_refused() -> None:
+    holed = np.zeros((4, 4), np.float32)
+    holed[1, 2] = np.nan
+    for terrain, about in (
+        (Terrain(holed, 0.0, 0.0, 2.0), "missing"),
+        (Terrain(np.zeros((4, 4), np.float32), 8.0, 6.0, 4.0), "multiples of 4 m"),
+        (Terrain(np.zeros((2, MOST_CELLS), np.float32), 0.0, 0.0, 2.0), f"{MOST_CELLS} nodes"),
+    ):
+        with pytest.raises(WildlabError, match=about):
+            land_on(terrain, COVERS)
