@@ -80,6 +80,7 @@ def test_what_is_not_there_is_not_found():
     )
 
 
+@pytest.mark.slow
 def test_codes_are_counted_either_way_round_and_not_in_plain_boards():
     family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_250)
     coded = cv2.aruco.CharucoBoard((7, 5), 0.03, 0.022, family).generateImage((420, 300), marginSize=20)

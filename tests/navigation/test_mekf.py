@@ -306,6 +306,7 @@ def test_a_start_on_another_clock_is_refused(flight):
 PHASES = {"straight": (60, 90), "turn": (90, 130), "outage": (200, 260), "recovered": (262, 330)}
 
 
+@pytest.mark.slow
 def test_consistent_over_fifty_flights(flight):
     """NEES over its degrees of freedom is 1 for an ideal filter, in every part of the flight."""
     rows = np.arange(6000, len(flight.imu.times), 50)
