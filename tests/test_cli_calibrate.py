@@ -1,6 +1,5 @@
 """`wildlab calibrate` and `wildlab evaluate --calibration`, through the real command."""
 
-import json
 import re
 from types import SimpleNamespace
 
@@ -54,13 +53,6 @@ def test_what_is_learnt_is_written_and_of_one_camera_alone(capsys, folder, tmp_p
                         "--out", tmp_path / "reports")  # fmt: skip
     assert code == 2
     assert not (tmp_path / "reports").exists()
-
-
-@pytest.mark.slow
-def test_as_json(capsys, folder, tmp_path):
-    code, out, _ = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml", "--json")
-    assert code == 0
-    assert json.loads(out)["learnt_on"]["images"] == 18
 
 
 def test_causes_that_are_inseparable_are_named_and_not_written(capsys, folder, tmp_path, monkeypatch):

@@ -170,13 +170,12 @@ def test_opencv_s_own_images(capsys, shared_data, tmp_path):
 
 @pytest.mark.slow
 def test_a_thermal_board_light_on_dark(capsys, shared_data, tmp_path):
-    """Two minutes: 43 images without a licence, so only the test looks at them. Some show half a board, or
-    shadows across it."""
-    folder = shared_data("calibration", "thermal_chessboard")
-    code, _, err = run(capsys, folder, "--into", tmp_path / "c.toml", board="8x7", square="50mm")
+    """Every other of 43 images without a licence. Some show half a board, or shadows across it."""
+    files = sorted(shared_data("calibration", "thermal_chessboard").glob("*.png"))[::2]
+    code, _, err = run(capsys, *files, "--into", tmp_path / "c.toml", board="8x7", square="50mm")
     assert code == 0, err
     kept = read_camera(tmp_path / "c.toml")
-    assert kept.evidence.images == 43 and kept.evidence.views >= 22
+    assert kept.evidence.images == 22 and kept.evidence.views >= 11
     assert kept.evidence.rms_px < 0.6
     # Pixels are square, and the two focal lengths are found apart.
     fx, fy = ((one.value, one.high - one.low) for one in kept.parameter[:2])
