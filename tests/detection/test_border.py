@@ -84,3 +84,9 @@ def test_a_length_of_nothing_is_refused():
     with pytest.raises(WildlabError, match="above zero") as error:
         adjust_at_border(detect_floating(ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)), (200, 260), 0.0)
     assert error.value.field == "length"
+
+
+def test_an_unknown_length_moves_nothing():
+    image = ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)
+    seen = detect_floating(image)
+    assert np.array_equal(adjust_at_border(seen, image.shape, np.nan).uv, seen.uv)

@@ -300,3 +300,17 @@ def test_what_touches_a_border_may_go_on_beyond_it_by_as_much_as_is_seen() -> No
         covariances.append(found.covariance[0])
     inside, cut = covariances
     assert np.allclose(cut - inside, np.diag([24**2 / 12, 0.0]))
+
+
+def test_an_empty_border_gives_nothing_and_hides_nothing() -> None:
+    image, valid = ground(), EVERYWHERE.copy()
+    valid[:30] = False
+    image[~valid] = 0
+    image[ellipse(100, 45, 8, 5)] += 40
+    found = find_by_contrast(image, valid)
+    assert np.allclose(found.uv, [[100, 45]], atol=0.5)
+
+
+def test_removing_does_not_go_on_from_what_was_removed() -> None:
+    found = at([[20, 20], [28, 20], [36, 20]], [3.0, 2.0, 1.0])
+    assert remove_near(found, 10).uv[:, 0].tolist() == [20, 36]

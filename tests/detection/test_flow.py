@@ -237,3 +237,13 @@ def test_the_velocity_of_a_textured_plane_lies_within_its_interval():
     # And the interval is not merely wide: the errors fill it.
     assert axes < 1
     assert np.abs(error.mean(axis=0)).max() < 1
+
+
+def test_features_come_from_inside_alone():
+    picture = texture(3)
+    inside = np.zeros(SHAPE, bool)
+    inside[40:120, 60:150] = True
+    found = matched(shifted(picture, 0, 0), shifted(picture, 2, 1), inside, inside)
+    assert len(found) >= 5
+    for uv in (found.first, found.second):
+        assert inside[np.rint(uv[:, 1]).astype(int), np.rint(uv[:, 0]).astype(int)].all()

@@ -144,3 +144,12 @@ def test_beyond_half_the_spacing_an_error_cannot_show():
     grid = np.stack(np.meshgrid(np.arange(5) * 8.0, np.arange(5) * 8.0), -1).reshape(-1, 2)
     assert largest_visible(grid) == pytest.approx(4.0)
     assert largest_visible([[1.0, 2.0]]) == np.inf
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.08, 1.13, 1.3])
+def test_honest_is_said_of_no_ellipses_that_visibly_hold_less_than_they_say(factor):
+    """One hundred and fifty blocks: 83 % of the 90 % ellipses, and honest, is a contradiction."""
+    P = np.tile((2.0 / factor) ** 2 * np.eye(2), (3000, 1, 1))
+    found = judge_ellipses(normal(1, n=3000), P, np.arange(3000) // 20, np.random.default_rng(0))
+    assert (found.word == "honest") == (0.87 <= found.coverage.estimate <= 0.93)
+    assert (found.word == "too small") == (found.coverage.high < 0.87)

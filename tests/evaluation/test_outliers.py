@@ -47,3 +47,12 @@ def test_without_names_of_marks_photos_and_clicks_are_found():
 def test_what_all_share_is_no_outlier_of_anyone():
     z = residuals(2) * 30.0
     assert find_outliers(z, z, PHOTOS, MARKS)[0] == ()
+
+
+def test_a_mark_seen_in_most_photos_is_still_the_mark():
+    """It is off in every photo that shows it, and no photo is blamed."""
+    marks = np.tile(["a", "b", "c", "d", "e"], 20)
+    z = residuals(5)
+    z[marks == "b"] += 15.0
+    (only,), rest = find_outliers(z, z, PHOTOS, marks)
+    assert (only.kind, only.mark, only.points) == ("mark", "b", 20) and rest.sum() == 80

@@ -170,3 +170,10 @@ def test_a_share_of_images_is_close_by_its_interval() -> None:
     ):
         found = r.compare_flight("rate", high, 1.0, share=share, centre=(low, high))
         assert found.closeness == words
+
+
+def test_rounding_adds_to_what_is_close_and_to_what_is_within() -> None:
+    """0.08 stands for 0.075 to 0.085."""
+    near = {"centre": (0.1055, 0.106), "predicted": (0.0845, 0.2)}
+    assert r.compare_flight("error size", 0.1058, 0.08, **near).words == "not close, outside"
+    assert r.compare_flight("error size", 0.1058, 0.08, 0.005, **near).words == "close, within"

@@ -25,3 +25,12 @@ def test_pixels_that_see_nothing_are_nan_and_do_no_harm():
     folding = Camera(640, 512, 400.0, 400.0, 320.0, 256.0, 0.0, (-0.6, 0.0, 0.0, 0.0, 0.0))
     apart = direction_differences(Camera(640, 512, 400.0, 400.0, 320.0, 256.0), folding)
     assert np.isnan(apart).any() and np.isfinite(apart).any()
+
+
+def test_another_focal_length_shows_most_at_the_corners():
+    longer = Camera(640, 512, 1159.2 * 1.01, 1167.8 * 1.01, 313.0, 265.0)
+    apart = np.linalg.norm(direction_differences(CAMERA, longer), axis=1)
+    far = np.linalg.norm(image_raster(CAMERA) - [313, 265], axis=1)
+    assert np.corrcoef(apart, far)[0, 1] > 0.97
+    # One per cent of the distance from the middle.
+    assert np.isclose(apart.max(), 0.01 * far.max(), rtol=0.15)

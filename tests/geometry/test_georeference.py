@@ -107,3 +107,8 @@ def test_blocks_of_columns_are_the_plain_intersection():
         seen = np.abs(plain[:, 0]) < 1e5
         assert np.allclose(plain[seen], blocks[seen], rtol=1e-11, atol=1e-9)
         assert 0 < np.isnan(plain).any(axis=1).mean() < 1 or pose is one
+
+
+def test_a_camera_below_the_plane_sees_nothing_of_it():
+    pose = camera_pose(Mount("down"), np.array([[0.0, 0, 5]]), np.eye(3)[None])
+    assert np.isnan(pixel_to_plane(TAU2, np.array([[320.0, 256.0]]), *pose, 0.0)).all()

@@ -20,6 +20,7 @@ from wildlab.geometry.intrinsics import (
     PINHOLE,
     calibrate_camera,
     confused,
+    view_errors,
 )
 from wildlab.geometry.lens_choice import choose_lens
 from wildlab.simulation.boards import board_views
@@ -188,3 +189,10 @@ def test_intervals_hold_the_truth_as_often_as_they_say(n=12, shared=0.3):
         share = binomtest(int(held), len(inside)).proportion_ci(0.999)
         assert share.low <= 0.98 and share.high >= 0.92, (name, held)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
+
+
+def test_views_of_another_camera_fit_worse():
+    uv = pixels(CAMERA, views(7, 5))
+    np.testing.assert_allclose(view_errors(CAMERA, BOARD, uv), 0, atol=1e-6)
+    bent = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
+    assert (view_errors(bent, BOARD, uv) > 0.05).all()

@@ -130,3 +130,13 @@ def test_an_outline_needs_one_pose_and_rays():
         footprint(flat, two)
     with pytest.raises(WildlabError, match="0 rays"):
         footprint(flat, two.take(0), per_side=0)
+
+
+def test_one_pose_is_one_image_and_what_is_not_known_is_not_counted():
+    height = np.zeros((21, 21), np.float32)
+    height[0] = np.nan
+    terrain = Terrain(height, -20.0, -20.0, 2.0)
+    wide = Camera(400, 400, 50.0, 50.0, 200.0, 200.0)
+    seen = viewshed(terrain, CameraPoses(wide, Mount("down"), np.array([0.0, 0.0, -30.0]), np.eye(3)))
+    assert seen.known.sum() == 20 * 21 and seen.counts[0].sum() == 0
+    assert seen.counts.max() == 1 and seen.share == 1.0

@@ -9,6 +9,7 @@ from tests.navigation.flights import (
     GRAVITY,
     LEVERS,
     NOISE,
+    START_SD,
     attitude,
     begin,
     fixes,
@@ -324,3 +325,18 @@ def test_consistent_over_fifty_flights(flight):
         for name, value in zip(("position", "velocity", "attitude"), mean[:, part].mean(axis=1), strict=True):
             assert 0.7 < value < 1.4, (phase, name)
     assert np.mean(nis) == pytest.approx(1.0, abs=0.03)
+
+
+def test_standing_still_holds_the_velocity():
+    times = np.arange(0, 60, 0.02)
+    rng = np.random.default_rng(11)
+    imu = ImuSamples(
+        times,
+        np.array([0, 0, -GRAVITY]) + 0.02 * rng.standard_normal((len(times), 3)),
+        0.001 * rng.standard_normal((len(times), 3)),
+    )
+    start = InitialState(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
+    held = run_mekf(imu, start, NOISE, EARTH, [standstill(np.arange(1, 60, 1.0), 0.01)], [59.9])
+    free = run_mekf(imu, start, NOISE, EARTH, [], [59.9])
+    assert np.abs(held.velocity).max() < 0.02
+    assert np.sqrt(held.covariance[0, 3, 3]) < 0.02 < np.sqrt(free.covariance[0, 3, 3])

@@ -139,3 +139,10 @@ def test_what_is_no_series_of_samples_is_refused(spoil, about):
 def test_a_latitude_in_degrees_is_refused():
     with pytest.raises(WildlabError, match="radians"):
         local_earth(63.6)
+
+
+def test_rows_with_nan_are_missing_samples():
+    times = np.arange(0, 4, 0.01)
+    motion, imu = flown(times)
+    imu.angular_rate[100:250, 1] = np.nan
+    assert len(reckon(motion, imu, max_gap=0.5).gaps) == 1

@@ -11,6 +11,7 @@ from wildlab.planning.areas import (
     check_area,
     contains,
     distance_to_border,
+    is_convex,
     rectangle,
     stays_inside,
     way_inside,
@@ -90,3 +91,9 @@ def test_the_way_inside_goes_round_the_two_corners_of_the_gap() -> None:
     assert np.allclose(way, [[90, 15], [30, 30], [30, 70], [90, 85]])
     length = np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
     assert length == pytest.approx(40 + 2 * np.hypot(60, 15))
+
+
+def test_convex_or_not() -> None:
+    assert is_convex(check_area(SQUARE))
+    assert is_convex(rectangle(5.0, 6.0, 20.0, 10.0, 0.7))
+    assert not is_convex(check_area(U_SHAPE))

@@ -60,6 +60,7 @@ def test_stops_take_their_time_and_the_heading_turns_meanwhile() -> None:
     course = fly([[0.0, 0.0], [50.0, 0.0], [50.0, 20.0]], 5.0, turn_time=4.0)
     points, headings = course.at([9.0, 12.0, 14.0, 16.0])
     assert np.allclose(points, [[45, 0], [50, 0], [50, 0], [50, 10]])
+    assert np.allclose(course.distances([9.0, 12.0, 14.0, 16.0]), [45, 50, 50, 60])
     assert np.allclose(headings, [0, np.pi / 4, np.pi / 2, np.pi / 2])
     assert course.on_row.tolist() == [True, False, True, False]
 

@@ -176,3 +176,13 @@ def test_a_walk_that_is_no_covariance_is_refused(walk):
 def test_a_start_that_knows_all_is_refused():
     with pytest.raises(WildlabError, match="deviations"):
         initial_information(3, [50.0, 0.0, 1.0])
+
+
+def test_growing_old_needs_no_inverse_and_forgets_no_height():
+    assert (grow_old(np.zeros((1, 3, 3)), 4.0) == 0).all()
+    one_image = bearing_information([[50.0, 20.0, 0.0]], camera_at, SENSOR)
+    after = grow_old(one_image, 1e12)
+    assert np.isfinite(after).all() and np.abs(after[0, :2, :2]).max() < 1e-9
+    assert grow_old(np.diag([1.0, 1.0, 4.0])[None], 1e12)[0, 2, 2] == 4
+    twice = grow_old(grow_old(one_image, 1.0), 2.0)
+    assert twice == pytest.approx(grow_old(one_image, 3.0))

@@ -174,6 +174,7 @@ def test_wrong_use_is_refused(call: object, problem: str) -> None:
 
 
 def test_rows_over_share_the_extent_evenly() -> None:
+    assert row_distance(20.0, 0.25) == 15.0
     rows, step = rows_over(check_area(U_SHAPE), 30.0, 0.0)
     assert step == 25.0 and [len(row) for row in rows] == [1, 1, 1, 1]
     rows, _ = rows_over(check_area(U_SHAPE), 10.0, np.pi / 2)

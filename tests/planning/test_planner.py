@@ -262,3 +262,10 @@ def test_a_random_walk_stays_in_its_areas_and_repeats_with_its_generator():
     assert (ways[0] == ways[1]).all() and not (ways[0] == ways[2]).all()
     assert (ways[0] > -15.1).all() and (ways[0] < [115.1, 95.1]).all()
     assert np.ptp(ways[0], axis=0).min() > 50
+
+
+def test_blocks_hold_all_that_is_left():
+    one = planner(grid((-80, 80), (-80, 80)))
+    one.weights[::5] = 0
+    blocks = one._in_blocks(np.stack([one.left, 2 * one.left]))
+    assert blocks.sum(axis=1) == pytest.approx([one.left_to_know, 2 * one.left_to_know])

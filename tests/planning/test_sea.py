@@ -124,3 +124,11 @@ def test_what_cannot_be_flown_is_refused():
     with pytest.raises(WildlabError, match="above zero"):
         time_until_lost(fleet(1), 0.0)
     assert plan(fleet(0)) == []
+
+
+def test_the_most_urgent_is_not_left_to_the_last():
+    vessels = fleet(3, spread=300.0)
+    sure = np.tile(np.diag([1.0, 1.0, 1e-6, 1e-6]), (3, 1, 1))
+    sure[2] = np.diag([100.0, 100.0, 1.0, 1.0])
+    visits = plan(vessels._replace(covariance=sure))
+    assert visits[0].vessel == 2 and visits[0].slack > 0

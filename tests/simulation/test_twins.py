@@ -189,6 +189,13 @@ def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for
     assert np.linalg.norm(loiter_centre(twin)) > twin.loiter.radius.number
 
 
+def test_the_wind_blows_from_where_it_is_said_to_come(twin):
+    blown = with_values(twin, flight__wind_from=90.0, flight__track_sd=0.0, flight__altitude_sd=0.0)
+    v = twin_trajectory(blown, np.random.default_rng(0))(np.arange(0.0, 120.0, 0.5)).velocity
+    wind = [0.0, -twin.flight.wind_speed.number, 0.0]
+    assert np.linalg.norm(v - wind, axis=1) == pytest.approx(twin.flight.airspeed.number)
+
+
 def test_imu_and_gnss_cover_the_flight_at_their_rates(short, sensed):
     imu, gnss = sensed.imu, sensed.gnss
     for table, rate in ((imu, 250), (gnss, 10)):
@@ -292,3 +299,9 @@ def test_each_kind_of_twin_is_free_of_problems_as_it_is_read_back(name, tmp_path
         pd.testing.assert_frame_equal(every_table(loaded)[table], content, check_exact=True)
     assert loaded.manifest == flight.manifest
     assert [f.sentence for f in check_flight(loaded) if f.level != "note"] == []
+
+
+def test_the_first_images_that_show_the_target_are_the_ones_marked(twin):
+    fewer = quick(with_values(twin, target__observations=100), 3)
+    all_of_them = quick(twin, 3)
+    assert fewer.detections["frame_id"].tolist() == all_of_them.detections["frame_id"].tolist()[:100]

@@ -176,3 +176,14 @@ def test_a_group_keeps_its_distance_and_its_kinds():
 def test_what_cannot_be_is_refused(make, words):
     with pytest.raises(WildlabError, match=f"(?i){words}"):
         make()
+
+
+def test_cloud_shadows_cool_the_ground_under_them():
+    still = replace(EVEN_LAND, covers=(SMOOTH,), weather=Weather(hour=12.0))
+    p, R = pose(50.0)
+    sunny = render_land(LandScene(still), CAMERA, p, R).kelvin
+    shaded = render_land(
+        LandScene(replace(still, weather=Weather(hour=12.0, clouds=1.0))), CAMERA, p, R
+    ).kelvin
+    air = still.weather.air
+    assert np.allclose(shaded - air, (1 - SHADOW_DEPTH) * (sunny - air), atol=1e-3)
