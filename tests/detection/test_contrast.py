@@ -305,6 +305,7 @@ def test_what_touches_a_border_may_go_on_beyond_it_by_as_much_as_is_seen() -> No
 def test_an_empty_border_gives_nothing_and_hides_nothing() -> None:
     image, valid = ground(), EVERYWHERE.copy()
     valid[:30] = False
+    valid[100:108, 60:72] = False
     image[~valid] = 0
     image[ellipse(100, 45, 8, 5)] += 40
     found = find_by_contrast(image, valid)
