@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.simulation.attitudes import fixed_wing_trajectory
 from wildlab.simulation.disturbances import band_limited_disturbance
-from wildlab.simulation.trajectory import angular_rates, attitude_along
 from wildlab.simulation.waypoint_courses import (
     ControlErrors,
     Laps,
@@ -97,24 +95,6 @@ def test_legs_are_straight_at_the_airspeed_and_turns_are_coordinated():
     assert p[:, 2] == pytest.approx(-300.0)
 
 
-def test_head_and_tail_wind_give_the_ground_speeds_of_h_7_5_4():
-    """15 m/s upwind and 24 m/s downwind; across the wind the nose points into it."""
-    wind = np.array([4.5, 0.0, 0.0])
-    course = filleted_course(shape_corners("racetrack", 1500.0, 400.0), 100.0)
-    path = calm(course, wind=wind[:2])
-    t = np.arange(0, 300, 0.1)
-    _, v, a = path(t)
-    level = np.linalg.norm(a, axis=1) < 1e-9
-    speed = np.linalg.norm(v, axis=1)
-    assert speed[level].min() == pytest.approx(15.0, abs=1e-9)
-    assert speed[level].max() == pytest.approx(24.0, abs=1e-9)
-    across = level & (np.abs(v[:, 0]) < 1e-9)
-    assert across.any()
-    yaw = matrix_to_euler(fixed_wing_trajectory(path, wind=wind)(t).R_nb)[across, 2]
-    crab = np.arctan2(v[across, 1], v[across, 0]) - yaw
-    assert np.abs(np.degrees(crab)) == pytest.approx(np.degrees(np.arcsin(4.5 / 19.5)))
-
-
 def test_a_drifting_course_is_the_same_course_in_its_own_frame():
     course = filleted_course(shape_corners("eight", 500.0, 400.0), 80.0)
     drift = np.array([3.0, -4.0])
@@ -141,13 +121,3 @@ def test_velocity_and_acceleration_are_the_derivatives_of_position(shape):
     # Truncation is h^2/6 times the third (fourth) derivative, below 10 m/s^3 (m/s^4): 2e-6.
     assert np.abs((after.position - before.position) / (2 * h) - at.velocity).max() < 2e-6
     assert np.abs((after.velocity - before.velocity) / (2 * h) - at.acceleration).max() < 2e-6
-
-
-def test_angular_rate_is_the_derivative_of_attitude():
-    trajectory = restless()
-    attitude = attitude_along(trajectory)
-    t, h = np.linspace(5, 395, 3000), 1e-3
-    rate = Rotation.from_matrix(np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)).as_rotvec() / h
-    # As of the loiter; rolling into a turn adds some rad/s^3.
-    assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 5e-6
-    assert np.degrees(np.abs(rate)).max() < 60
