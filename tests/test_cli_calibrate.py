@@ -96,6 +96,7 @@ def example_recipe(into):
     return into / "recipe.toml"
 
 
+@pytest.mark.slow
 def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(
     capsys, folder, tmp_path, monkeypatch
 ):

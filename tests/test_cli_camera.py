@@ -44,6 +44,7 @@ def run(capsys, *arguments, square="30mm", board="7x5"):
     return call(capsys, "camera", *arguments, "--board", board, "--square", square)
 
 
+@pytest.mark.slow
 def test_the_camera_comes_out_and_is_written(capsys, boards, tmp_path):
     code, _, err = run(capsys, boards, "--into", tmp_path / "camera.toml", "--name", "Tau2")
     assert code == 0, err

@@ -226,6 +226,7 @@ def test_trees_and_rules_forbid(capsys, over_map, tmp_path):
     assert call(capsys, area, *SHEET, *given, "--into", tmp_path / "b")[0] == 0
 
 
+@pytest.mark.slow
 def test_a_take_off_point_of_unknown_height_is_refused(capsys, over_map, tmp_path):
     folder, area, dem, heights, corner = over_map
     given = ("--height", 60, "--into", tmp_path / "out")

@@ -53,6 +53,7 @@ def test_a_password_comes_from_the_environment_or_is_asked_for_twice(asked: list
     assert words not in typed.output
 
 
+@pytest.mark.slow
 def test_without_a_terminal_the_variable_is_named(tmp_path: Path) -> None:
     """In a process of its own session, which has no terminal: one sentence, no warning of Python's."""
     done = subprocess.run(
