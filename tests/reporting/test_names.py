@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import io
 from collections.abc import Iterator
 from pathlib import Path
@@ -49,6 +50,74 @@ TIMES = np.arange(float(N))
 WAY = np.column_stack([TIMES, 0.1 * TIMES, np.ones(N), np.ones(N)])
 
 
+# -- the lint
+# ------------------------------------------------------------------------------------------------
+
+
+def passed_by(source: str) -> list[int]:
+    """Lines on which a label of a line or of ticks does not come through the door."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else ""
+            given = [word.value for word in node.keywords if word.arg in ("label", "labels")]
+            given += node.args[1:2] if name in ("set_xticks", "set_yticks") else []
+            found += [node.lineno for one in given if not _harmless(one)]
+            found += [node.lineno for word in node.keywords if word.arg in ("parse_math", "usetex")]
+        elif isinstance(node, ast.Dict):
+            pairs = zip(node.keys, node.values, strict=True)
+            found += [
+                node.lineno
+                for key, value in pairs
+                if isinstance(key, ast.Constant) and key.value == "label" and not _harmless(value)
+            ]
+    return found
+
+
+def _harmless(value: ast.expr) -> bool:
+    """Whether a label is written out, begins with what is written out, or comes through `figure_name`."""
+    match value:
+        case ast.Constant():
+            return True
+        case ast.JoinedStr(values=[first, *_]):
+            # A number has a format.
+            number = isinstance(first, ast.FormattedValue) and first.format_spec is not None
+            return number or (isinstance(first, ast.Constant) and not str(first.value).startswith("_"))
+        case ast.Subscript(value=ast.Constant()):
+            return True  # a letter of what is written out
+        case ast.Call(func=ast.Name(id="figure_name")):
+            return True
+        case ast.IfExp():
+            return _harmless(value.body) and _harmless(value.orelse)
+        case ast.ListComp():
+            return _harmless(value.elt)
+    return False
+
+
+def drawing() -> Iterator[Path]:
+    yield from sorted((PACKAGE / "reporting").rglob("*.py"))
+    yield PACKAGE / "api/plot.py"
+
+
+def test_labels_of_figures_come_through_the_door() -> None:
+    lines = [f"{path}:{line}" for path in drawing() if "new_figure" in (text := path.read_text())
+             for line in passed_by(text)]  # fmt: skip
+    assert lines == []
+    # One place makes figures, and it takes nothing for maths.
+    makers = [path.name for path in PACKAGE.rglob("*.py") if "Figure(figsize" in path.read_text()]
+    assert makers == ["figures.py"]
+
+
+@pytest.mark.parametrize(
+    "bad",
+    ["ax.plot(x, label=one.name)", "ax.set_yticks(at, list(names))", 'look = {"label": name}',
+     'ax.plot(x, label=f"{name} m")', "ax.set_title(x, parse_math=True)"],
+)  # fmt: skip
+def test_the_lint_can_fail(bad: str) -> None:
+    assert passed_by(bad) == [1]
+    assert passed_by("ax.plot(x, label=figure_name(one.name))") == []
+
+
 def test_every_table_is_written_through_the_door() -> None:
     writers = {
         str(path.relative_to(PACKAGE))
@@ -56,6 +125,10 @@ def test_every_table_is_written_through_the_door() -> None:
         if ".to_csv(" in (text := path.read_text()) or "csv.writer" in text or "DictWriter" in text
     }
     assert writers == {"files.py"}
+
+
+# -- figures
+# ------------------------------------------------------------------------------------------------
 
 
 def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
@@ -125,6 +198,12 @@ def _seen(text: str) -> str:
     return "".join(c for c in text if c.isalnum() or c in "$_")
 
 
+def test_figures_of_strange_names_have_names_of_their_own() -> None:
+    names = [following.slug("map", one) for one in ("$", "å", "ä", "буй", "лес", "boat 1")]
+    assert len(set(names)) == len(names) and names[-1] == "map-boat-1"
+    assert all(one.isascii() and one.replace("-", "").isalnum() for one in names)
+
+
 def test_axes_of_powers_have_numbers_without_maths() -> None:
     from wildlab.reporting.figures import new_figure
 
@@ -134,6 +213,10 @@ def test_axes_of_powers_have_numbers_without_maths() -> None:
     figure.draw_without_rendering()
     texts = [label.get_text() for axis in (ax.xaxis, ax.yaxis) for label in axis.get_ticklabels(which="both")]
     assert "0.01" in texts and "1·10⁶" in texts and not any("$" in text for text in texts)
+
+
+# -- tables
+# ------------------------------------------------------------------------------------------------
 
 
 @settings(deadline=None, derandomize=True)

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.reporting.test_html import shown as notebook_of
 from tests.runner.test_ledger import a_study, published, ran
+from tests.sharing.canary import canary
 from wildlab import cli
 from wildlab.errors import WildlabError
+from wildlab.flight.store import load_flight, save_flight
+from wildlab.reporting import html
 from wildlab.reporting.metrics import metric
+from wildlab.reporting.report import open_report
 from wildlab.runner.compare import compare_flights
 from wildlab.runner.processes.outputs import FILES
 from wildlab.runner.record.digests import misfits, read_status, seal
 from wildlab.runner.record.own_flights import own_flights
+from wildlab.runner.record.provenance import changed_notice, footer, provenance_of_flight
 from wildlab.runner.record.status import as_plain, study_status
-from wildlab.runner.seeds.kept import SeedWork, write_seed
+from wildlab.runner.seeds.kept import SeedWork, read_seed, write_seed
 from wildlab.runner.verification import verify_report
 from wildlab.sharing.reports import sources_of
 
@@ -52,26 +59,48 @@ def flipped(path: Path, place: int, bit: int) -> None:
     path.write_bytes(data)
 
 
+def test_the_lowest_bit_of_every_leading_digit_is_noticed(report: Path) -> None:
+    path = report / "metrics.json"
+    whole = path.read_bytes()
+    places = [match.start() for match in re.finditer(rb"(?<![\d.])\d", whole)]
+    assert len(places) > 40
+    before = shown(report)
+    assert before["state"] == "done"
+    for place in places:
+        flipped(path, place, 0)
+        now = shown(report)
+        assert now["state"] == "damaged" and "metrics.json" in now["reason"]
+        assert all(one["here"] is None for one in now["published"])
+        path.write_bytes(whole)
+    assert shown(report) == before
+
+
 @pytest.mark.parametrize("name", ["status.json", "metrics.json", "provenance.json", "report.html"])
 def test_any_flipped_bit_is_noticed_or_changes_nothing(report: Path, name: str) -> None:
     random = np.random.default_rng(5)
     path = report / name
     whole, before = path.read_bytes(), shown(report)
     noticed = 0
-    for _ in range(40):
+    for _ in range(80):
         flipped(path, int(random.integers(len(whole))), int(random.integers(8)))
         now = shown(report)
         noticed += now["state"] in ("damaged", "broken off")
         assert now["state"] in ("damaged", "broken off") or now == before
         path.write_bytes(whole)
-    assert noticed > 30
+    assert noticed > 60
 
 
-def test_a_kept_seed_that_is_whole_and_of_another_run_is_noticed(report: Path) -> None:
+def test_a_flipped_bit_of_a_kept_seed_is_noticed_or_changes_nothing(report: Path) -> None:
+    random = np.random.default_rng(6)
     work = SeedWork(report.parent, "s", "case", {"a": 1}, "", "k" * 64, (2, 3))
     path = work.folder / "2.json"
+    whole = path.read_bytes()
+    for _ in range(80):
+        flipped(path, int(random.integers(len(whole))), int(random.integers(8)))
+        assert read_seed(work, 2) in (None, VALUES)
+        path.write_bytes(whole)
     assert verify_report(report).misfits == ()
-    write_seed(work, 2, VALUES | {"rmse": 1.5})
+    write_seed(work, 2, VALUES | {"rmse": 1.5})  # whole, and of another run
     (one,) = verify_report(report).misfits
     assert one.file == str(path) and one.field == "seed 2" and "wildlab run s" in one.fix
 
@@ -85,7 +114,7 @@ def call(capsys: Any, *arguments: str) -> tuple[Any, str, str]:
 
 def test_verify_says_what_does_not_fit(report: Path, capsys: Any) -> None:
     code, out, _ = call(capsys, "verify", str(report))
-    assert code == 0 and "2 kept seeds" in out
+    assert code == 0 and "No misfits" in out and "2 kept seeds" in out
     (report / "figures" / "a.png").unlink()
     flipped(report / "report.html", 0, 0)
     code, out, _ = call(capsys, "verify", "--json", str(report))
@@ -97,8 +126,9 @@ def test_verify_says_what_does_not_fit(report: Path, capsys: Any) -> None:
     assert all(one["fix"] for one in said["misfits"])
     assert call(capsys, "verify", str(report.parent))[0] == 2
     (report / "status.json").write_text(json.dumps({"state": "done", "seconds": 1.0}))
-    assert call(capsys, "verify", str(report))[0] == 1
-    assert shown(report)["state"] == "done" and shown(report)["reason"]
+    code, out, _ = call(capsys, "verify", str(report))
+    assert code == 1 and "made before digests" in out.lower()
+    assert shown(report)["state"] == "done" and "before digests" in shown(report)["reason"]
 
 
 def test_what_does_not_fit_is_left_out_and_named(report: Path) -> None:
@@ -115,10 +145,10 @@ def test_what_does_not_fit_is_left_out_and_named(report: Path) -> None:
     assert {one.about: one.state for one in own.reports} == {"overview": "done", "georeferencing": "damaged"}
     (source,), left_out = sources_of(reports / "tuesday-overview", {})
     assert [one.name for one in source.folders] == ["tuesday-overview"]
-    assert len(left_out) == 1 and "provenance.json" in left_out[0]
-    with pytest.raises(WildlabError, match="provenance"):
+    assert len(left_out) == 1 and "provenance.json is not as the run wrote it" in left_out[0]
+    with pytest.raises(WildlabError, match=r"provenance\.json is not as the run wrote it"):
         sources_of(reports / "tuesday", {})
-    with pytest.raises(WildlabError, match="provenance"):
+    with pytest.raises(WildlabError, match=r"provenance\.json is not as the run wrote it"):
         compare_flights([reports / "tuesday", reports / "tuesday-overview"], reports=reports)
 
 
@@ -128,3 +158,27 @@ def test_a_status_cannot_lose_its_digests_by_one_bit(report: Path) -> None:
         (report / "status.json").write_text(json.dumps({k: v for k, v in status.items() if k != key}))
         assert read_status(report)["state"] == "damaged"
         assert misfits(report, {k: v for k, v in status.items() if k != key})
+
+
+def test_a_changed_manifest_is_told_in_the_report(tmp_path: Path) -> None:
+    folder = tmp_path / "flight"
+    save_flight(canary(imu=False), folder)
+    about: dict[str, Any] = {
+        "flight": provenance_of_flight(folder),
+        "parameters": {},
+        "seed": None,
+        "made": "2026",
+    }
+    about |= {"wildlab": {"commit": None, "version": "0", "note": ""}, "lock": {"sha256": None}}
+    about |= {"notebook": {"sha256": "0" * 64}}
+    assert changed_notice(about) == "" and "changed" not in footer(about)
+    path = folder / "flight.toml"
+    path.write_text(f"# {path.read_text()}".replace("# ", "# by hand\n", 1))
+    load_flight(folder)
+    about["flight"] = provenance_of_flight(folder)
+    assert "flight.toml" in changed_notice(about) and "changed" in footer(about)
+    report = open_report(study="test", kind="logged", seed=1)
+    report.head("Title")
+    report.summary(["An answer."])
+    page = html.report_page(notebook_of(report), study="test", alert=changed_notice(about))
+    assert page.index("</h1>") < page.index("flight.toml of") and "data-part" not in page
