@@ -108,6 +108,16 @@ def robot_flight(
     return Flight(make_manifest(parts | (manifest or {})), {"own": nav}, tables)
 
 
+def joined(one: Flight, *others: Flight) -> Flight:
+    """One flight with the sensors of several."""
+    flights = (one, *others)
+    tables = {
+        name: pd.concat([each.tables[name] for each in flights], ignore_index=True)
+        for name in ("frames", "detections")
+    }
+    return Flight(one.manifest, one.nav, {**one.tables, **tables})
+
+
 KNOWN = """
 [sensors.radar.noise]
 range_m = 0.5

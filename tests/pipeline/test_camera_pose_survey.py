@@ -110,7 +110,8 @@ def write_survey(folder: Path, kind: str, pitch_deg: float) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(
-    ("kind", "pitch_deg"), [(kind, -90.0) for kind in LINES] + [("roll, pitch and yaw", -50.0)]
+    ("kind", "pitch_deg"),
+    [("tilt and heading", -90.0), ("roll, pitch and yaw", -50.0), ("uncertainty", -90.0), ("nothing", -90.0)],
 )
 def test_ellipses_through_import_and_georeference(tmp_path: Path, kind: str, pitch_deg: float) -> None:
     marks = write_survey(tmp_path, kind, pitch_deg)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
 import cv2
 import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.commands.detect import detect
 from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast
 from wildlab.detection.shape import Shape, fit_shape
@@ -107,7 +105,7 @@ def test_labels_of_other_frames_are_refused(tmp_path: Path) -> None:
     path = folder(tmp_path / "in")
     done = run_detection(open_frames(path), tmp_path / "out", "contrast", Contrast())
     (path / "other.csv").write_text("image,x,y,w,h\nnone.png,1,1,2,2\n")
-    with pytest.raises(WildlabError, match="name 1 frames, and none of them is here"):
+    with pytest.raises(WildlabError, match="none of them"):
         judge_detections(done.detections, done.frames, read_labels(path / "other.csv"))
 
 
@@ -151,17 +149,30 @@ def test_samples_keep_groups_and_stretches_of_a_clip_together(tmp_path: Path) ->
 def test_thresholds_come_back_from_their_file(tmp_path: Path) -> None:
     write_thresholds(tmp_path / "t.json", "contrast", Contrast(peak=7))
     assert read_thresholds(tmp_path / "t.json", "contrast") == Contrast(peak=7)
-    with pytest.raises(WildlabError, match="holds thresholds of 'contrast'"):
+    for kept in (FloatingThresholds(largest_area=None), FloatingThresholds(largest_area=900.0)):
+        write_thresholds(tmp_path / "f.json", "floating", kept)
+        assert read_thresholds(tmp_path / "f.json", "floating") == kept
+    with pytest.raises(WildlabError, match="'contrast'"):
         read_thresholds(tmp_path / "t.json", "warm")
-    with pytest.raises(WildlabError, match="There is no threshold 'peek'"):
-        thresholds_from(Contrast, {"peek": 3})
-    with pytest.raises(WildlabError, match=r"Give one like 9\.0"):
-        thresholds_from(Contrast, {"peak": "high"})
     (tmp_path / "t.json").write_text("[]")
-    with pytest.raises(WildlabError, match="holds no thresholds"):
+    with pytest.raises(WildlabError, match="no thresholds"):
         read_thresholds(tmp_path / "t.json", "contrast")
-    with pytest.raises(WildlabError, match="no method 'magic'"):
+    with pytest.raises(WildlabError, match="'magic'"):
         detect_frame(read_image(tmp_path / "none.png"), "magic", Contrast())
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "words"),
+    [
+        (Contrast, {"peek": 3}, "'peek'"),
+        (Contrast, {"peak": "high"}, r"9\.0"),
+        (FloatingThresholds, {"largest_area": "big"}, "'big'"),
+        (FloatingThresholds, {"largest_area": (1.0, 2.0)}, "do not fit"),
+    ],
+)
+def test_thresholds_that_there_are_not_are_refused(kind: type, given: dict[str, object], words: str) -> None:
+    with pytest.raises(WildlabError, match=words):
+        thresholds_from(kind, given)
 
 
 def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path: Path) -> None:
@@ -184,12 +195,12 @@ def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path: Path) -
     assert len(again) == 2 and (again.score >= fitted.thresholds.least).all()
     write_thresholds(tmp_path / "t.json", "shape", fitted.thresholds)
     assert read_thresholds(tmp_path / "t.json", "shape") == fitted.thresholds
-    with pytest.raises(WildlabError, match="has 0 weights, and 18 are needed"):
+    with pytest.raises(WildlabError, match="0 weights"):
         detect_frame(samples[0].frame, "shape", Shape())
 
 
 def test_shapes_cannot_be_learnt_from_what_is_all_wanted_or_all_not() -> None:
-    with pytest.raises(WildlabError, match="0 of 5 warm regions belong to a label"):
+    with pytest.raises(WildlabError, match="0 of 5"):
         fit_shape(np.zeros((5, 9)), np.zeros(5), Shape().regions)
 
 
@@ -221,17 +232,6 @@ def test_floating_objects_are_found_by_the_same_command(tmp_path: Path) -> None:
     assert len(detect_frame(next(iter(frames)), "floating", near)) == 0
 
 
-def test_thresholds_with_limits_that_there_may_be(tmp_path: Path) -> None:
-    for limit in (None, 900.0):
-        kept = FloatingThresholds(largest_area=limit)
-        write_thresholds(tmp_path / "t.json", "floating", kept)
-        assert read_thresholds(tmp_path / "t.json", "floating") == kept
-    with pytest.raises(WildlabError, match="threshold 'largest_area' is 'big'"):
-        thresholds_from(FloatingThresholds, {"largest_area": "big"})
-    with pytest.raises(WildlabError, match="thresholds do not fit together"):
-        thresholds_from(FloatingThresholds, {"largest_area": (1.0, 2.0)})
-
-
 def test_colours_are_found_by_the_same_command(tmp_path: Path) -> None:
     image = np.full((360, 640, 3), 120, np.uint8)
     image[200:210, 300:330] = (255, 110, 0)  # OpenCV writes blue first
@@ -243,15 +243,9 @@ def test_colours_are_found_by_the_same_command(tmp_path: Path) -> None:
     assert read_thresholds(tmp_path / "t.json", "colour") == Colour(hue=(170.0, 10.0))
 
 
-def test_the_command_offers_the_methods_that_there_are() -> None:
-    option = next(one for one in detect.params if one.name == "method")
-    assert isinstance(option.type, click.Choice)
-    assert list(option.type.choices) == list(METHODS)
-
-
 @pytest.mark.parametrize("method", ["shape", "colour"])
 def test_a_distance_is_refused_where_no_length_follows_from_it(method: str) -> None:
-    with pytest.raises(WildlabError, match=f"No length of the method '{method}'.*contrast, warm, floating"):
+    with pytest.raises(WildlabError, match=f"'{method}'"):
         for_distance(method, METHODS[method].thresholds(), 60.0, 765.0, 1.5)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from wildlab.detection.detections import Detections
@@ -22,7 +21,7 @@ from wildlab.pipeline.detecting.shape_fit import fit_shapes
 pytestmark = pytest.mark.slow
 
 #: Sets of thresholds that are tried, of the 160 that a user's fit tries.
-FEW = 60
+FEW = 30
 
 
 def judged(samples: list[Sample], method: str, thresholds: object) -> Rates:
@@ -55,36 +54,23 @@ def test_people_at_night_by_thresholds_of_other_frames(at_night: tuple[list[Samp
     assert fitted.held_out.f1.estimate <= fitted.inside.f1.estimate
 
 
-def test_deer_and_boar_by_thresholds_of_people_elsewhere(
-    at_night: tuple[list[Sample], Fitted], shared_data: Callable[..., Path]
-) -> None:
-    folder = shared_data("imagery", "bambi_gatter")
-    samples = samples_of(open_frames(folder / "thermal"), read_labels(folder / "labels.csv"))
-    f1 = {one.frame.name: judged([one], "warm", at_night[1].thresholds).f1.estimate for one in samples}
-    assert f1["17_19345.jpg"] >= 0.80
-    assert f1["277_6760.jpg"] >= 0.5
-
-
-@pytest.mark.parametrize(("learnt_on", "judged_on"), [("1", "3"), ("3", "1")])
-def test_people_under_trees_by_the_shapes_of_the_other_line(
-    shared_data: Callable[..., Path], learnt_on: str, judged_on: str
-) -> None:
+def test_people_under_trees_by_the_shapes_of_the_other_line(shared_data: Callable[..., Path]) -> None:
     def line(which: str) -> list[Sample]:
         folder = shared_data("imagery", "aos_f6")
         labels = read_labels(folder / "labels" / f"propagated_{which}.csv")
         return samples_of(open_frames(folder / "images" / which), labels)
 
-    fitted = fit_shapes(line(learnt_on))
-    assert judged(line(judged_on), "shape", fitted.thresholds).f1.estimate >= 0.70
+    fitted = fit_shapes(line("1"))
+    assert judged(line("3"), "shape", fitted.thresholds).f1.estimate >= 0.70
 
 
 def test_targets_in_the_sky_by_thresholds_of_other_clips(shared_data: Callable[..., Path]) -> None:
     folder = shared_data("imagery", "ir_tracks")
     clips = sorted(folder.glob("*.mp4"))
-    samples = [one for clip in clips for one in clip_samples(clip, 12)]
-    fitted = fit_thresholds("contrast", samples)
+    samples = [one for clip in clips for one in clip_samples(clip, 24)]
+    fitted = fit_thresholds("contrast", samples, tried=candidates("contrast", FEW))
     for clip in clips:
-        found = judged(list(clip_samples(clip, 5)), "contrast", fitted.chosen[clip.stem])
+        found = judged(list(clip_samples(clip, 10)), "contrast", fitted.chosen[clip.stem])
         assert found.f1.estimate == 1.0, clip.stem
 
 
@@ -97,12 +83,6 @@ def clip_samples(clip: Path, step: int) -> list[Sample]:
         if name is not None and number % step == 0:
             found.append(Sample(frame, labels.boxes[name], labels.ignore[name], clip.stem))
     return found
-
-
-def test_a_list_of_labels_that_is_longer_than_its_clip_is_no_error(shared_data: Callable[..., Path]) -> None:
-    clip = shared_data("imagery", "ir_tracks", "IR_BIRD_070.mp4")
-    assert len(pd.read_csv(clip.with_suffix(".csv"))) == 322
-    assert len(clip_samples(clip, 1)) == 321
 
 
 def test_ellipses_hold_labels_that_their_width_was_not_chosen_from(

@@ -10,16 +10,14 @@ import pytest
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.shape import Shape
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.evaluation.runs import share_interval
 from wildlab.flight.readers.frames import Frame
 from wildlab.pipeline.detecting.fit import Sample
 from wildlab.pipeline.detecting.part_fit import (
     Found,
-    PartFit,
     fit_part,
     found_labels,
     part_of,
-    part_sentence,
     parts_needed,
     with_part,
 )
@@ -104,17 +102,6 @@ def test_labels_that_lie_off_widen_the_ellipses_and_others_do_not():
 def test_thresholds_without_a_part_have_none():
     assert fit_part("floating", [], FloatingThresholds()) is None
     assert with_part(Shape(), 0.03).regions.part == 0.03 and with_part(Contrast(), 0.03).part == 0.03
-
-
-def test_sentences_follow_the_numbers():
-    said = part_sentence(PartFit(0.034, 40, Interval(0.91, 0.8, 0.97)), 0.12)
-    assert "3.4 % of the length" in said and "they hold 91 % (80 to 97)" in said
-    few = part_sentence(PartFit(float("nan"), 5, None), 0.12)
-    assert "keep the default part of 12 %" in few and "5 labels were found" in few
-    assert part_sentence(PartFit(0.01, 9, None), 0.12).endswith("what it holds of others is not known.")
-    assert PartFit(float("nan"), 5, None).as_plain() == {
-        "part": None, "labels_found": 5, "held_out_coverage_90": None,
-    }  # fmt: skip
 
 
 @pytest.mark.slow

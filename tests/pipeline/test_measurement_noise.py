@@ -104,21 +104,6 @@ def test_thinning_finds_how_long_errors_last():
     assert len(few.times) == 2000 and (np.isnan(few.uv).all(axis=1) == ~few.seen).all()
 
 
-@pytest.mark.slow
-def test_of_errors_that_last_the_thinned_filter_states_the_truth_and_the_other_does_not():
-    """Two hundred targets; H example 3.1 on the last frame of each."""
-    rng, quiet = np.random.default_rng(6), TUNING._replace(acceleration=1e-4, velocity_0=0.01)
-    nees = {"all": [], "thinned": []}
-    for _ in range(200):
-        seen = passes(np.repeat(rng.normal(0, 7, (30, 2)), 10, axis=0))
-        for name, given in (("all", seen), ("thinned", thinned(seen, 1.0))):
-            track = follow_positions(given, quiet)
-            x, P = track.x[-1][:2], track.P[-1][:2, :2]
-            nees[name].append(x @ np.linalg.solve(P, x))
-    assert np.mean(nees["all"]) > 10
-    assert 1.6 < np.mean(nees["thinned"]) < 2.6
-
-
 def test_noise_of_its_own_for_each_row_is_used():
     """A detection that counts for nothing beside one that counts for everything."""
     seen = passes(np.array([[0.0, 0.0], [10.0, 0.0], [-4.0, 0.0]]))

@@ -14,7 +14,6 @@ from wildlab.pipeline.navigate import PUBLISHED_LIKE, navigate_mekf
 from wildlab.pipeline.navigation_errors import (
     AXES,
     comparison_times,
-    corrections,
     errors_against,
     normalised_innovations,
     numbers_of,
@@ -141,16 +140,8 @@ def test_the_tuning_like_the_published_one_gives_deviations_like_the_published_o
     assert "velocity" not in set(found.innovations["source"])
 
 
-def test_between_samples_only_measurements_turn_the_estimate_otherwise(early):
-    found = navigate_mekf(early, early.imu["time_s"].to_numpy()[: 250 * 60])
-    turned = corrections(early, found)
-    at_fix = np.isin(found.nav["time_s"].to_numpy()[1:], early.gnss["time_s"].to_numpy())
-    late = found.nav["time_s"].to_numpy()[1:] > 30
-    assert np.median(turned[late & ~at_fix]) < 0.1 * np.median(turned[late & at_fix])
-
-
 def test_without_any_other_pose_there_is_nothing_to_compare_with(early):
-    with pytest.raises(WildlabError, match="no pose to compare with") as caught:
+    with pytest.raises(WildlabError, match="no pose") as caught:
         reference_of(Flight(early.manifest, {"mine": early.nav["truth"]}, early.tables))
     assert caught.value.field == "nav"
 

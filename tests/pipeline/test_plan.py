@@ -18,7 +18,7 @@ from wildlab.pipeline.plans.files import missions
 from wildlab.pipeline.plans.forbidden import nearest_ground, refuse_near
 from wildlab.pipeline.plans.heights import TOLERANCE, follow
 from wildlab.pipeline.plans.plan import make_plan
-from wildlab.pipeline.plans.said import plan_result, warnings
+from wildlab.pipeline.plans.said import plan_result
 from wildlab.pipeline.plans.sorties import fly_rows
 from wildlab.pipeline.plans.view import look
 from wildlab.pipeline.plans.wanted import LIMITS, Wanted
@@ -48,12 +48,6 @@ def result_of(made):
 # -- what is seen
 
 
-def test_the_strip_is_what_the_image_spans():
-    view = look(CAMERA, 90.0)
-    assert view.width == pytest.approx(639 / 800) and view.slant == pytest.approx(1.0, rel=1e-3)
-    assert view.pixels(CAMERA, 1.5, 60.0) == pytest.approx(800 * 1.5 / 60, rel=1e-3)
-
-
 def test_a_tilted_camera_sees_further_and_wider():
     view = look(CAMERA, 45.0)
     half = math.atan(255.5 / 800)
@@ -64,16 +58,28 @@ def test_a_tilted_camera_sees_further_and_wider():
 
 
 def test_a_camera_that_cannot_see_the_ground_is_told_where_it_looks():
-    with pytest.raises(
-        WildlabError, match=r"sees no ground near enough: the lowest it looks is 11 degrees above"
-    ):
+    with pytest.raises(WildlabError, match="11 degrees above"):
         look(CAMERA, -30.0)  # its lower corners: asin(0.2234 / 1.1231)
     # The lower edge is 17.7 degrees below the middle: 2 below the horizon is ground 11 heights away.
-    with pytest.raises(WildlabError, match="the lowest it looks is 8 degrees below the horizon"):
+    with pytest.raises(WildlabError, match="8 degrees below"):
         look(CAMERA, -10.0)
 
 
 # -- height, rows, times
+
+
+@pytest.mark.parametrize(
+    ("given", "fragment"),
+    [
+        ({"pixels": 25.0}, "20.0 pixels"),  # 800 * 1.5 / 60
+        ({"wind_m_s": 6.0, "wind_from_deg": 0.0}, "16 m/s"),
+        ({"wind_m_s": 6.0, "wind_from_deg": 0.0, "max_air_m_s": 16.0}, None),
+        ({}, None),
+    ],
+)
+def test_plans_warn_of_few_pixels_and_of_a_head_wind(field, given, fragment):
+    found = result_of(plan(field, height_m=60.0, direction_deg=0.0, **given))["warnings"]
+    assert any(fragment in one for one in found) if fragment else not found
 
 
 def test_the_height_follows_from_the_animal_and_the_rule(field):
@@ -81,21 +87,19 @@ def test_the_height_follows_from_the_animal_and_the_rule(field):
     assert plan(field, animal_m=3.0, pixels=10.0).height == 115.0
     assert plan(field, height_m=42.5).height == 42.5
     assert plan(field, height_m=120.0).height == 120.0
-    with pytest.raises(WildlabError, match="a height of 121 m, and the rules allow 120 m"):
+    with pytest.raises(WildlabError, match="121 m"):
         plan(field, height_m=121.0)
     assert plan(field, height_m=150.0, max_height_m=200.0).height == 150.0
-    with pytest.raises(WildlabError, match=r"from 8\.0 m above the ground only"):
+    with pytest.raises(WildlabError, match=r"8\.0 m"):
         plan(field, animal_m=0.1, pixels=10.0)
 
 
-def test_rows_are_no_further_apart_than_the_overlap_leaves(field):
-    made = plan(field, height_m=60.0, overlap=0.25)
+def test_times_are_those_of_the_way(field):
+    made = plan(
+        field, height_m=60.0, speed_m_s=8.0, turn_s=4.0, climb_m_s=2.0, direction_deg=0.0, overlap=0.25
+    )
     assert made.strip == pytest.approx(60 * 639 / 800)
     assert (made.pattern.distance <= 0.75 * made.strip + 1e-9).all()
-
-
-def test_times_are_those_of_the_way(field):
-    made = plan(field, height_m=60.0, speed_m_s=8.0, turn_s=4.0, climb_m_s=2.0, direction_deg=0.0)
     one = made.sorties[0]
     legs = np.diff(one.way.points, axis=0)
     lengths = np.linalg.norm(legs, axis=1)
@@ -129,17 +133,9 @@ def test_wind_along_the_rows_costs_what_the_triangle_says(field):
     # The autopilot of a multicopter is told a speed over the ground, and holds it.
     gusty = plan(field, height_m=60.0, direction_deg=0.0, wind_m_s=6.0, wind_from_deg=0.0)
     assert gusty.duration == hover.duration
-    for made, kind, speeds in (
-        (windy, 0, "4 to 16 m/s over the ground"),
-        (gusty, 1, "16 m/s through the air"),
-    ):
+    for made, kind in ((windy, 0), (gusty, 1)):
         commanded = [one for one in mission_items(missions(made)[0]) if one.command == CHANGE_SPEED]
         assert [one.parameters[:2] for one in commanded] == [(kind, 10.0)]
-        assert any(speeds in one for one in result_of(made)["assumed"])
-    (said,) = [one for one in result_of(gusty)["warnings"] if "Against the wind" in one]
-    assert "16 m/s through the air to hold 10 m/s" in said
-    able = plan(field, height_m=60.0, wind_m_s=6.0, wind_from_deg=0.0, max_air_m_s=16.0)
-    assert not any("Against the wind" in one for one in result_of(able)["warnings"])
 
 
 def test_an_aircraft_that_cannot_stop_turns_no_tighter_than_it_can(field):
@@ -192,28 +188,11 @@ def test_longer_plans_become_flights_that_each_last(field):
 
 
 def test_a_battery_too_small_for_one_row_is_said(field):
-    with pytest.raises(
-        WildlabError, match=r"one row with the way there and back takes \d+\.\d minutes, and of a"
-    ):
+    with pytest.raises(WildlabError, match="one row"):
         plan(field, height_m=60.0, battery_min=1.5)
 
 
-def test_splitting_the_area_is_named_where_a_battery_is_too_small(field):
-    with pytest.raises(WildlabError, match="or split the area into smaller ones"):
-        plan(field, height_m=60.0, battery_min=1.5)
-
-
-def test_one_row_has_no_distance_and_few_pixels_are_said(tmp_path):
-    path = tmp_path / "a.geojson"
-    path.write_text(json.dumps(collection(feature(polygon([[0, 0], [0, 20], [400, 20], [400, 0], [0, 0]])))))
-    said = result_of(plan(path, height_m=60.0))
-    assert said["sentences"][0].endswith("over 1 row.")
-    assert not any("were asked for" in one for one in said["warnings"])
-    few = result_of(plan(path, height_m=60.0, pixels=25.0))["warnings"]  # 800 * 1.5 / 60 = 20
-    assert any("are 20.0 pixels, and 25 were asked for" in one for one in few)
-
-
-def test_what_lies_in_two_areas_counts_once(tmp_path, field):
+def test_what_lies_in_two_areas_counts_once(tmp_path):
     path = tmp_path / "a.geojson"
     # 8 ha each; the second is the first, 150 m further east: 50 m by 400 m are in both.
     other = [[a, b + 150] for a, b in FIELD]
@@ -223,13 +202,7 @@ def test_what_lies_in_two_areas_counts_once(tmp_path, field):
     assert sum(made.alone.values()) == pytest.approx(14e4, rel=0.01)
     said = result_of(made)
     assert said["animals"] == pytest.approx(14, rel=0.01)
-    assert said["sentences"][0].startswith("2 areas, 14.0 ha")
-    (told,) = [one for one in said["warnings"] if "in more than one area" in one]
-    assert told.startswith("2.0 ha lie") and "Animals" not in told
-    each = result_of(plan(path, height_m=60.0, animals=4.0))
-    assert any("Animals are counted for each area" in one for one in each["warnings"])
-    # Apart, or side by side, is no overlap.
-    assert not any("more than one" in one for one in result_of(plan(field, height_m=60.0))["warnings"])
+    assert any("2.0 ha" in one for one in said["warnings"])
 
 
 def test_where_one_takes_off(field):
@@ -238,9 +211,9 @@ def test_where_one_takes_off(field):
     assert made.home[0] == pytest.approx(
         -161.4, abs=0.5
     )  # 0.001 deg below the field, about the areas' middle
-    with pytest.raises(WildlabError, match="latitude and longitude are swapped"):
+    with pytest.raises(WildlabError, match="swapped"):
         plan(field, home=(16.46, 58.66))
-    with pytest.raises(WildlabError, match=r"km from the areas\. Give"):
+    with pytest.raises(WildlabError, match="km from the areas"):
         plan(field, home=(-58.66, 16.46))
 
 
@@ -281,12 +254,6 @@ def test_ground_that_is_not_known_is_counted():
     assert found.unknown == pytest.approx(210, abs=15) and np.isfinite(found.height).all()
 
 
-def test_flat_ground_is_flat():
-    way = np.array([[0.0, 0.0], [100.0, 0.0]])
-    found = follow(way, None, 50.0)
-    assert len(found.points) == 2 and found.height.tolist() == [50.0, 50.0] and found.unknown == 0
-
-
 def test_climbing_that_is_too_steep_takes_longer_and_is_said(field):
     cliff = np.zeros((200, 200), np.float32)
     cliff[100:] = 90.0
@@ -295,13 +262,8 @@ def test_climbing_that_is_too_steep_takes_longer_and_is_said(field):
     flat, steep = make_plan(wanted), make_plan(wanted, terrain)
     wing = make_plan(replace(wanted, turn_radius_m=30.0, max_height_m=500.0), terrain)
     assert wing.sorties[0].steepest == pytest.approx(2.0, rel=0.01) and not result_of(wing)["warnings"]
-    one = replace(wing, sorties=(wing.sorties[0]._replace(steepest=3.0),))
-    (said,) = warnings(one)
-    assert "it cannot slow down" in said and "slow down there" not in said
     assert steep.duration > flat.duration + 2 * 90 / 2.0
-    said = result_of(steep)["warnings"]
-    assert any("would have to climb or sink" in one and "it can do 2:" in one for one in said)
-    assert not result_of(flat)["warnings"]
+    assert result_of(steep)["warnings"] and not result_of(flat)["warnings"]
 
 
 def wall(rise, step=4.0):
@@ -335,14 +297,11 @@ def test_a_way_that_comes_too_near_is_refused(field):
     terrain = wall(90.0)
     made = make_plan(Wanted(field, CAMERA, height_m=60.0), terrain)
     assert made.nearest > 5.0
-    assert any(
-        f"no nearer than {made.nearest:.0f} m to the ground" in one for one in result_of(made)["assumed"]
-    )
     one = made.sorties[0]
     low = one._replace(way=one.way._replace(height=np.minimum(one.way.height, 92.0)))
-    with pytest.raises(WildlabError, match=r"comes within [0-4]\.\d m of ground .* and 5\.0 m are the least"):
+    with pytest.raises(WildlabError, match=r"within [0-4]\.\d m"):
         refuse_near([low], terrain, made.wanted, 60.0)
-    with pytest.raises(WildlabError, match=r"sortie 1 is 1\d\d m above the ground .* as steep as a wall"):
+    with pytest.raises(WildlabError, match=r"1\d\d m above"):
         make_plan(Wanted(field, CAMERA, height_m=60.0), wall(150.0))
 
 
@@ -357,8 +316,6 @@ def test_heights_above_take_off_are_differences_of_ground(field):
     assert np.allclose(flight.above_home, 60 + way.ground - way.ground[0], atol=0.05)
     assert np.ptp(flight.above_home) > 20
     assert flight.above_home[0] == pytest.approx(60.0, abs=1e-3)
-    (said,) = [one for one in result_of(made)["assumed"] if "begins itself" in one]
-    assert f"set that to {math.ceil((way.height - way.ground[0]).max())} m above the take-off" in said
 
 
 # -- numbers that are none
@@ -369,18 +326,23 @@ def test_heights_above_take_off_are_differences_of_ground(field):
 def test_absurd_numbers_are_refused_by_name(name, value):
     with pytest.raises(WildlabError) as caught:
         Wanted(Path("x"), CAMERA, **{name: value})
-    assert caught.value.field == LIMITS[name][0] and "give a number from" in str(caught.value).lower()
+    assert caught.value.field == LIMITS[name][0]
 
 
-def test_winds_that_forbid():
-    with pytest.raises(WildlabError, match="a wind of 12 m/s against an airspeed of 10 m/s"):
-        Wanted(Path("x"), CAMERA, wind_m_s=12.0, wind_from_deg=90.0, turn_radius_m=30.0)
-    with pytest.raises(WildlabError, match="are 16 m/s through the air, and the aircraft can do 15"):
-        Wanted(Path("x"), CAMERA, wind_m_s=6.0, wind_from_deg=90.0, max_air_m_s=15.0)
-    with pytest.raises(WildlabError, match="Say with --wind-from whence"):
-        Wanted(Path("x"), CAMERA, wind_m_s=3.0)
-    with pytest.raises(WildlabError, match="is said twice"):
-        Wanted(Path("x"), CAMERA, animals=3, density_km2=2)
-    with pytest.raises(WildlabError, match="no place on the Earth"):
-        Wanted(Path("x"), CAMERA, home=(95.0, 16.0))
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"wind_m_s": 12.0, "wind_from_deg": 90.0, "turn_radius_m": 30.0}, "12 m/s"),
+        ({"wind_m_s": 6.0, "wind_from_deg": 90.0, "max_air_m_s": 15.0}, "16 m/s"),
+        ({"wind_m_s": 3.0}, "--wind-from"),
+        ({"animals": 3, "density_km2": 2}, "twice"),
+        ({"home": (95.0, 16.0)}, "no place"),
+    ],
+)
+def test_wishes_that_contradict_are_refused(given, words):
+    with pytest.raises(WildlabError, match=words):
+        Wanted(Path("x"), CAMERA, **given)
+
+
+def test_a_wind_blows_from_where_it_is_said_to():
     assert np.allclose(Wanted(Path("x"), CAMERA, wind_m_s=5.0, wind_from_deg=270.0).wind, [0, 5])

@@ -11,12 +11,10 @@ from tests.flight.test_area import collection, feature, polygon
 from tests.pipeline.test_plan import CAMERA, hills, plan
 from wildlab.geometry.camera import normalise, project
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plans.advice import swing_advice
 from wildlab.pipeline.plans.coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
-from wildlab.pipeline.plans.flown import ExecutionErrors, with_errors
 from wildlab.pipeline.plans.outlines import simplified
 from wildlab.pipeline.plans.plan import make_plan
-from wildlab.pipeline.plans.said import animals_in, assumed, head_count, percent, plan_result, unseen
+from wildlab.pipeline.plans.said import animals_in, plan_result
 from wildlab.pipeline.plans.wanted import Wanted
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
@@ -52,11 +50,8 @@ def test_photos_that_are_far_apart_leave_ground_out(field):
     found = cover(made)
     length = made.view.length * made.height
     assert 0.1 < found[0].seen < 1.6 * length / 100.0
-    assert "photos nearer to one another" in unseen(made, found)[0]
-    assert "Photos are taken 100 m apart." in assumed(made)
     near = plan(field, height_m=50.0, photo_m=5.0)
     assert cover(near)[0].seen > 0.9
-    assert any("films" in one for one in assumed(plan(field, height_m=50.0)))
 
 
 def test_the_edge_of_an_image_is_left_out_and_nothing_else_changes(field):
@@ -117,44 +112,6 @@ def test_what_is_hidden_is_hidden_by_brute_force(field, tilt):
     assert found.seen < 1.0 or tilt == 90.0
 
 
-def test_a_trench_hides_from_a_camera_that_looks_ahead(field):
-    height = np.zeros((300, 300), np.float32)
-    height[145:149] = -30.0  # 4 m wide, across rows to the north
-    terrain = Terrain(height, north=-150.0, east=-150.0, step=1.0)
-    made = over(field, terrain, height_m=40.0, tilt_deg=45.0, direction_deg=0.0)
-    (found,) = cover(made)
-    north = found.north + found.step * np.arange(len(found.inside))
-    bottom = (north > -6.2) & (north < -0.8)
-    assert found.hidden[bottom].any() and not found.hidden[~bottom].any()
-    down = over(field, terrain, height_m=40.0, tilt_deg=90.0, direction_deg=0.0)
-    assert cover(down)[0].share(cover(down)[0].hidden) < found.share(found.hidden)
-
-
-def test_what_is_planned_as_seen_is_seen_with_errors_of_the_pose(field):
-    made = over(field, hills(), height_m=60.0)
-    images = images_of(made, made.sorties[0])
-    errors = ExecutionErrors(2.0, 1.5, 60.0, *np.radians([0.7, 0.7, 1.5]), 5.0)
-    R = images.poses.R_nc
-    headings = np.arctan2(-R[:, 1, 1], -R[:, 0, 1])
-    (planned,) = cover(made)
-    for seed in (1, 2):
-        flown = with_errors(images.poses, headings, errors, 0.5, np.random.default_rng(seed))
-        # The whole image, which the plan did not count on.
-        edge = (CAMERA.width - images.poses.camera.width) / 2
-        kept, total = 0, 0
-        rows, columns = np.nonzero(planned.looks > 0)
-        for i, j in list(zip(rows, columns, strict=True))[::37]:
-            ne = np.array([planned.north + planned.step * i, planned.east + planned.step * j])
-            point = np.array([*ne, -made.terrain.heights_at(ne[None])[0]])
-            u, v = project(flown.camera, np.einsum("nij,ni->nj", flown.R_nc, point - flown.p_nc)).T
-            with np.errstate(invalid="ignore"):
-                seen = (abs(u - flown.camera.width / 2) <= flown.camera.width / 2 + edge) & (
-                    abs(v - flown.camera.height / 2) <= flown.camera.height / 2 + edge
-                )
-            kept, total = kept + bool((seen & images.sharp).any()), total + 1
-        assert kept >= 0.95 * total > 50
-
-
 def test_images_are_near_enough_that_none_is_needed_between(field):
     made = plan(field, height_m=50.0, tilt_deg=60.0)
     images = images_of(made, made.sorties[0])
@@ -193,32 +150,10 @@ def test_a_camera_that_swings_sees_a_wider_strip(field, gimbal):
     assert blurred.seen < 0.1 and blurred.share(blurred.blurred) > 0.8
 
 
-# -- what is said
-
-
 def covered(seen=0, hidden=0, blurred=0, missed=0):
     """An area of a hundred nodes."""
     kinds = np.repeat([0, 1, 2, 3], [seen, hidden, blurred, missed]).reshape(10, 10)
     return Covered(0.0, 0.0, 1.0, np.ones((10, 10), bool), (kinds == 0).astype(int), kinds == 1, kinds == 2)
-
-
-def test_why_ground_is_not_seen_and_what_helps_follows_from_the_shares(field):
-    made = plan(field, height_m=50.0)
-    assert unseen(made, [covered(seen=99, hidden=1)]) == []
-    (said,) = unseen(made, [covered(seen=70, hidden=20, blurred=3, missed=7)])
-    assert said == (
-        "30 % of field will not be seen: 20 % hidden by the ground, 3 % in blurred images alone, 7 % in no "
-        "image. What helps: rows in another direction, or a camera that looks more down."
-    )
-    (said,) = unseen(made, [covered(seen=70, hidden=3, blurred=20, missed=7)])
-    assert said.endswith("What helps: a slower flight or a shorter exposure.")
-    for given, helps in (({}, "a smaller swing"), ({"rate_deg_s": 30.0}, "a slower flight or swing")):
-        swings = plan(field, height_m=50.0, gimbal="roll", swing_deg=20.0, **given)
-        assert helps in unseen(swings, [covered(seen=70, hidden=3, blurred=20, missed=7)])[0]
-    (said,) = unseen(made, [covered(seen=70, blurred=3, missed=27)])
-    (small,) = unseen(made, [covered(seen=96, hidden=3, missed=1)._replace(blurred=np.zeros((10, 10), bool))])
-    assert "3 % hidden by the ground, 1 % in no image." in small
-    assert "hidden" not in said and said.endswith("What helps: a larger overlap, or a lower speed.")
 
 
 def test_finds_are_animals_times_what_is_seen(field):
@@ -227,7 +162,6 @@ def test_finds_are_animals_times_what_is_seen(field):
     # What the file says of an area goes before what is said of all.
     assert result["animals"] == 12 and result["expected_finds"] == pytest.approx(12 * 0.5 * 0.8)
     assert result["seen"] == 0.5 and result["areas"][0]["expected_finds"] == pytest.approx(4.8)
-    assert any("4.8 should be found" in one for one in result["sentences"])
 
 
 def test_animals_may_be_said_for_each_area_or_by_density(tmp_path):
@@ -237,16 +171,7 @@ def test_animals_may_be_said_for_each_area_or_by_density(tmp_path):
         made = plan(path, height_m=50.0, **given)
         assert animals_in(made, made.areas.areas[0]) == pytest.approx(number, rel=1e-3, nan_ok=True)
     result = plan_result(plan(path, height_m=50.0), [covered(seen=100)])
-    assert result["expected_finds"] is None and not any(
-        "should be found" in one for one in result["sentences"]
-    )
-
-
-def test_nearly_all_is_not_all():
-    assert [head_count(x) for x in (0.034, 4.8, 15.26, 1234.5)] == ["0.034", "4.8", "15.3", "1234"]
-    assert [percent(x) for x in (0, 0.0001, 0.004, 0.5, 0.996, 0.9996, 1)] == [
-        "0 %", "< 0.1 %", "0.4 %", "50 %", "99.6 %", "> 99.9 %", "100 %",
-    ]  # fmt: skip
+    assert result["expected_finds"] is None
 
 
 # -- outlines
@@ -281,15 +206,10 @@ def test_a_swing_that_blurs_everything_names_a_speed_that_does_not(field):
     made = plan(field, **given)
     found = cover(made)
     result = plan_result(made, found)
-    assert result["sentences"][0].startswith("Hardly anything will be seen as it is planned: ")
-    (said,) = [one for one in result["warnings"] if "nearly all of them would be sharp" in one]
-    speed = float(re.search(r"--speed ([\d.]+)\)", said).group(1))
+    speed = float(re.search(r"--speed ([\d.]+)\)", " ".join(result["warnings"])).group(1))
     assert 1.0 < speed < 10.0
     slow = plan(field, speed_m_s=speed, **given)
     slower = plan_result(slow, cover(slow))
-    assert slower["seen"] > 0.9 and not any("would be sharp" in one for one in slower["warnings"])
-    assert not slower["sentences"][0].startswith(("Hardly", "Less"))
+    assert slower["seen"] > 0.9 and "--speed" not in " ".join(slower["warnings"])
     faster = plan(field, speed_m_s=speed + 0.5, **given)
     assert images_of(faster, faster.sorties[0]).sharp.mean() < 0.95
-    still = plan(field, exposure_s=1.0, **given)
-    assert any("slower flights blur them, too" in one for one in swing_advice(still, cover(still)))

@@ -11,14 +11,11 @@ from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import from_tuning
 from wildlab.pipeline.following.expected import errors_near
-from wildlab.pipeline.following.sensor_tracks import FILTERS, SensorTrack, follow_flight, table
+from wildlab.pipeline.following.sensor_tracks import SensorTrack, follow_flight, table
 from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.pipeline.following.starts import start_near
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
 from wildlab.studies.autoferry.boats import BOATS, tune_sensor
-from wildlab.studies.autoferry.comparison import off_ideal
-
-KEYS = ["sensor", "target"]
 
 
 def boats(t: np.ndarray) -> dict[str, np.ndarray]:
@@ -131,25 +128,18 @@ def test_what_a_late_sensor_saw_stands_where_the_platform_was_then():
     assert np.nanmean(np.hypot(*late.T)) > 2
 
 
-def test_truth_that_ends_early_is_not_known_behind_its_end():
-    flight = make(truth_until=60.0)
-    truth = truths_at(flight, [59.9, 60.0, 60.1, 61.0])[0]
-    np.testing.assert_array_equal(np.isfinite(truth.position[:, 0]), [True, True, False, False])
-    np.testing.assert_allclose(truth.covariance, np.eye(2) * 0.01)
-
-
 def test_what_cannot_be_followed_is_said():
     flight = make()
-    with pytest.raises(WildlabError, match=r"no sensor 'radar'.*Use one of lidar"):
+    with pytest.raises(WildlabError, match="'radar'"):
         scans_of(flight, "radar")
     seen = flight.tables["detections"]
     seen.loc[seen.index[0], "kind"] = "pixel"
-    with pytest.raises(WildlabError, match=r"the sensor 'lidar' detects pixel and position.*of one kind"):
+    with pytest.raises(WildlabError, match="one kind"):
         scans_of(flight, "lidar")
     del flight.tables["frames"]["sensor"]
     assert sensors_of(flight) == ["lidar"]  # who detected is who looked
     flight.tables["detections"] = seen.iloc[:0]
-    with pytest.raises(WildlabError, match="no detections, and no frame says which sensor looked"):
+    with pytest.raises(WildlabError, match="no detections"):
         sensors_of(flight)
 
 
@@ -171,14 +161,6 @@ def test_clock_noise_and_correlation_come_back():
     )
 
 
-def test_white_errors_are_found_white():
-    found = tune_sensor(make(3), "lidar")
-    assert abs(found.next_correlation) < 0.1
-    assert found.white_sd == pytest.approx(2.0, rel=0.1)
-    # Every look may be kept.
-    assert found.thinning_s < found.interval_s
-
-
 def test_a_heading_that_is_wrong_is_put_down_to_the_heading():
     # Boats that hardly move: of boats that do, part of it would look like a clock that is late.
     flight = make(1, sd=0.2, pace=0.02)
@@ -193,83 +175,12 @@ def test_a_heading_that_is_wrong_is_put_down_to_the_heading():
     assert found.range_m * found.heading_sd_rad > 2 * found.position_sd_m
 
 
-def test_too_few_errors_are_no_tuning():
-    flight = make()
-    flight.tables["detections"] = flight.tables["detections"].iloc[:19]
-    with pytest.raises(WildlabError, match="only 19 detections of 'lidar' lie near a target"):
-        tune_sensor(flight, "lidar")
-
-
 # --- following ----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_white_noise_is_followed_honestly_and_coloured_noise_is_not():
-    def mean(correlation: float) -> pd.DataFrame:
-        tuning = tune_sensor(make(100, correlation=correlation), "lidar")
-        return pd.concat(
-            [
-                table(follow_flight(make(k, correlation=correlation), {"lidar": tuning}, BOATS))
-                for k in range(8)
-            ]
-        )
-
-    white, coloured = mean(0.0), mean(float(np.exp(-0.5 / 8.0)))
-    # The boats accelerate less than the filter allows them to, which makes it a little pessimistic.
-    kf = white[white["filter"] == "kf"]
-    assert 0.5 < kf["anees"].mean() < 2.6
-    assert kf["fraction_nees_inside"].mean() > 0.85
-    groups = coloured.groupby("filter")["anees"].mean()
-    assert groups["kf"] > 1.5 * kf["anees"].mean()
-    for name in ("coloured", "schmidt"):
-        assert off_ideal(groups[name]) < off_ideal(groups["kf"]) or groups[name] < 2.6
-
-
-def test_a_bearing_sensor_that_moves_sees_where_a_target_is():
-    flight = make(2, kind="bearing", sd=0.3, sees=("two",))
-    flight.tables["truth"] = flight.tables["truth"].query("target_id == 'two'")
-    tuning = tune_sensor(flight, "lidar")
-    assert tuning.kind == "bearing"
-    rows = table(follow_flight(flight, {"lidar": tuning}, BOATS))
-    assert list(rows["filter"]) == list(FILTERS["bearing"])
-    assert rows["lag1_autocorrelation_north"].isna().all()
-    assert np.isfinite(rows["lag1_autocorrelation"]).all()
-    assert (rows["share_followed"] > 0.95).all()
 
 
 def quiet(**changes: float) -> SensorTuning:
     base = SensorTuning("lidar", "position", 0, 0, 0, 2.0, 0.8, 5.0, 1.5, 0.1, 0.01, 100, 50, 0.5, 100)
     return base._replace(**changes)
-
-
-def test_a_track_ends_where_detections_end_and_truth_that_ends_is_counted():
-    flight = make(4, truth_until=90.0, sd=0.5)
-    seen = flight.tables["detections"]
-    k = seen["frame_id"].str.removeprefix("lidar-").astype(int)
-    flight.tables["detections"] = seen[(k < 100) | (k > 180)]
-    rows = follow_flight(flight, {"lidar": quiet(sd=0.5)}, BOATS)
-    one = next(f for f in rows if f.target == "one" and f.filter == "kf")
-    alive = one.times[np.isfinite(one.estimate[:, 0])]
-    last = one.times[99]
-    assert last < alive.max() <= last + BOATS.patience_s
-    assert np.isnan(one.error[one.times > 90.0]).all()
-    row = by_filter(rows).loc["kf"]
-    known = (one.times <= 90.0).sum()
-    assert row["share_followed"] == pytest.approx(np.isfinite(one.error[:, 0]).sum() / known)
-    assert row["detections"] == np.isfinite(one.nis).sum() < 100
-
-
-def test_every_filter_is_given_the_same_detections():
-    rows = follow_flight(make(5), {"lidar": quiet()}, BOATS)
-    one = {f.filter: f for f in rows if f.target == "one"}
-    used = {name: np.isfinite(f.nis) for name, f in one.items()}
-    np.testing.assert_array_equal(used["kf"], used["coloured"])
-    np.testing.assert_array_equal(used["kf"], used["schmidt"])
-    assert used["thinned"].sum() < used["kf"].sum() / 4
-    assert (used["kf"] | ~used["thinned"]).all()
-    gaps = np.diff(one["thinned"].times[used["thinned"]])
-    assert gaps.min() >= quiet().thinning_s - 1e-9
-    assert 0 < BOATS.gate_probability < 1
 
 
 def test_a_track_does_not_start_on_another_target():
@@ -317,14 +228,3 @@ def test_a_track_is_with_its_target_where_it_is_near_it_while_that_is_seen():
     assert (row["seen"], row["share_with_target"]) == (30, pytest.approx(1 / 3))
     unseen = table([one._replace(near=np.zeros(n, bool))], BOATS.size_m).iloc[0]
     assert unseen["seen"] == 0 and np.isnan(unseen["share_with_target"])
-
-
-def test_what_is_near_a_target_is_what_the_sensor_saw_of_it():
-    followed = follow_flight(make(4, sd=0.5, sees=("two",)), {"lidar": quiet(sd=0.5)}, BOATS)
-    shares = table(followed, BOATS.size_m).set_index(["target", "filter"])["share_with_target"]
-    assert shares["two", "kf"] > 0.95
-    seen = {one.target: one.near for one in followed}
-    assert seen["two"].sum() == pytest.approx(
-        6 / 7 * len(seen["two"]), abs=2
-    )  # every seventh look sees nothing
-    assert seen["one"].mean() < 0.2  # only where the other passes by

@@ -87,8 +87,3 @@ def test_an_animal_that_is_not_where_it_should_be_is_lost():
     given.chance[:, 1] = 1.0
     found = run(given, RULES._replace(c=1e-3, limit=1e9))
     assert found.lost_by_search == 1 and found.lost_by_covariance == 0
-
-
-def test_the_same_generator_the_same_survey():
-    one, other = (run(world([[10.0, 10.0], [90.0, 90.0]])) for _ in range(2))
-    assert (one.p_nc == other.p_nc).all() and (one.goal == other.goal).all()

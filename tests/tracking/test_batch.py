@@ -47,9 +47,7 @@ def flight(runs, seed=0):
     return times, z, CameraPoses.at_lens(CAMERA, p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2)), truth
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("gate", [1.0, 0.99])
-@pytest.mark.parametrize("runs", [1, 3, 64, 70])
+@pytest.mark.parametrize(("runs", "gate"), [(3, 1.0), (70, 0.99)])
 def test_positions(runs, gate):
     rng = np.random.default_rng(runs)
     times = np.cumsum(rng.uniform(0, 2, N))
@@ -61,7 +59,7 @@ def test_positions(runs, gate):
     R[0, 4] = np.nan
     start = Start(times[0], rng.normal(size=(runs, 4)), np.diag([50.0, 40, 9, 4]), row=0)
     batch = run_batch(times, z, R, CV, start, gate_probability=gate)
-    for run in range(runs):
+    for run in {0, 1, 2, runs // 2, runs - 1}:
         own = start._replace(x=start.x[run])
         single = run_filter(times, z[run], R[run], m.positions(), CV, own, gate_probability=gate)
         agree(batch, run, single, but=[6])
@@ -81,7 +79,7 @@ def test_positions_of_runs_that_know_the_same_of_their_errors(runs, row):
     start = Start(times[0], rng.normal(size=(runs, 4)), np.diag([50.0, 40, 9, 4]), row=row)
     batch = run_batch(times, z, R, CV, start)
     assert not batch.P.flags.writeable
-    for run in range(runs):
+    for run in {0, runs // 2, runs - 1}:
         own = start._replace(x=start.x[run])
         agree(batch, run, run_filter(times, z[run], R, m.positions(), CV, own), but=[6])
     some = run_batch(times, z, R, CV, start, rows=[0, 5, -1])
@@ -100,7 +98,7 @@ def test_pixels(gate):
     start = Start(-0.5, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     R = np.diag([4.0, 6.0])
     batch = run_batch(times, z, R, CV, start, view=View(poses, plane), gate_probability=gate)
-    for run in (0, 1, 33, 63, 64, 66):
+    for run in (0, 1, 33, 66):
         sensor = m.pixels(poses.take(run), plane)
         agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate_probability=gate))
     assert not batch.used[33, 5]
@@ -119,7 +117,7 @@ def test_schmidt(correlation_time):
     R = np.tile(np.diag([4.0, 6.0]), (N, 1, 1))
     pose = PoseUncertainty(covariance, correlation_time)
     batch = run_batch(times, z, R, CV, start, view=View(poses, 0.0), pose=pose, gate_probability=0.999)
-    for run in (0, 1, 3, 4, 5, 33, 63, 65):
+    for run in (0, 3, 4, 5, 33, 65):
         own = start._replace(P=start.P[run])
         track = run_filter(
             times, z[run], R, m.pixels(poses.take(run), 0.0), CV, own,
@@ -181,23 +179,22 @@ def test_bad_input_is_named():
     times, z, poses, _ = flight(3)
     start = Start(0.0, np.zeros(4), np.eye(4))
     R = np.eye(2)
-    with pytest.raises(WildlabError, match=r"give \(runs, times, 2\)|Give \(runs, times, 2\)"):
+    with pytest.raises(WildlabError, match="runs, times, 2"):
         run_batch(times, z[0], R, CV, start)
-    with pytest.raises(WildlabError, match="camera distorts"):
+    with pytest.raises(WildlabError, match="distorts"):
         run_batch(times, z, R, CV, start, view=View(replace(poses, camera=CROOKED), 0.0))
     with pytest.raises(WildlabError, match="row 3 at"):
         run_batch(np.where(np.arange(N) == 3, -1.0, times), z, R, CV, start)
     bad = np.tile(R, (3, N, 1, 1))
     bad[1, 6] = 0.0
-    with pytest.raises(WildlabError, match="R of row 6 is not a covariance"):
+    with pytest.raises(WildlabError, match="R of row 6"):
         run_batch(times, z, bad, CV, start)
-    with pytest.raises(WildlabError, match="innovation covariance S of row 0"):
-        run_batch(times, np.zeros((3, N, 2)), R, lambda dt: (np.eye(4), -99 * np.eye(4)), start)
-    with pytest.raises(WildlabError, match="innovation covariance S of row 0"):  # by the compiled filter
-        run_batch(
-            times, np.zeros((3, N, 2)), R, lambda dt: (np.eye(4), -99 * np.eye(4)), start,
-            gate_probability=0.99,
-        )  # fmt: skip
+    nothing = np.zeros((3, N, 2))
+    for gate in (1.0, 0.99):  # the second by the compiled filter
+        with pytest.raises(WildlabError, match="S of row 0"):
+            run_batch(
+                times, nothing, R, lambda dt: (np.eye(4), -99 * np.eye(4)), start, gate_probability=gate
+            )
 
 
 @pytest.mark.parametrize("change", ["bias", "navigated"])
@@ -223,14 +220,3 @@ def test_covariances_of_poses_that_differ_by_a_factor(change, monkeypatch):
         assert np.allclose(together.x[run], alone.x[0], rtol=1e-9, equal_nan=True)
         assert np.allclose(together.P[run], alone.P[0], rtol=1e-9, equal_nan=True)
     assert not np.allclose(together.P[0, -1], together.P[3, -1])
-
-
-def test_a_correlation_that_is_forgotten_needs_no_transitions(monkeypatch):
-    times, uv, poses, _ = overflight(N)
-    rng = np.random.default_rng(1)
-    P = np.array([random_pose_covariance(rng, 0.3) for _ in range(N)])
-    view, start = View(poses, 0.0), Start(times[0], np.zeros(4), np.diag([50.0, 50, 9, 9]))
-    monkeypatch.setattr(schmidt, "transitions_of_pose", None)
-    pose = PoseUncertainty(P, correlation_time=0.0)
-    batch = run_batch(times, uv[None], 4 * np.eye(2), CV, start, view=view, pose=pose)
-    assert np.isfinite(batch.P[0, -1]).all()

@@ -10,12 +10,10 @@ from hypothesis import strategies as st
 from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, posed
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.bending import left_out, second_derivatives, share_left_out
-from wildlab.tracking.kalman import correct
-from wildlab.tracking.measurement import pixels, positions, ranges_bearings
+from wildlab.tracking.measurement import pixels, ranges_bearings
 from wildlab.tracking.sensors import Sensor
 
 SHAPE = np.array([[1.0, 0.3], [0.3, 0.6]])
-NOISE_PX = 3.0
 
 
 def tilted(tilt: float, height: float = 60.0) -> tuple[Sensor, np.ndarray]:
@@ -64,56 +62,6 @@ def test_left_out_is_the_second_moment_of_the_second_order_part() -> None:
     B = left_out(SHAPE, D)
     size = np.sqrt(np.outer(np.diag(B), np.diag(B)))  # range and bearing: metres and radians
     assert B / size == pytest.approx(part.T @ part / len(e) / size, abs=0.02)
-
-
-def test_positions_are_never_too_uncertain() -> None:
-    D = second_derivatives(positions(), 0, [1.0, 2.0])
-    assert share_left_out(1e12 * SHAPE, D, np.eye(2)) == 0.0
-
-
-def sampled(sensor: Sensor, place: np.ndarray, P: np.ndarray, n: int = 4000) -> tuple[float, float, float]:
-    """Mean NEES of the extended filter's posterior, its mean squared error, and that of a new start."""
-    rng = np.random.default_rng(5)
-    seen = sensor.predict(0, place)
-    R = NOISE_PX**2 * np.eye(2)
-    nees, own, new = [], [], []
-    for e in rng.multivariate_normal([0, 0], P, n):
-        z = sensor.predict(0, place + e).z + rng.normal(0, NOISE_PX, 2)
-        if not np.isfinite(z).all():
-            continue  # behind the camera: nothing is detected
-        done = correct(place, P, z - seen.z, seen.H_position, R)
-        error = place + e - done.x
-        nees.append(error @ np.linalg.solve(done.P, error))
-        own.append(error @ error)
-        assert sensor.locate is not None
-        new.append(float(np.sum((place + e - sensor.locate(0, z)) ** 2)))
-    return float(np.mean(nees)), float(np.mean(own)), float(np.mean(new))
-
-
-def scaled(sensor: Sensor, place: np.ndarray, share: float) -> np.ndarray:
-    """The covariance of `SHAPE` for which so large a share is left out."""
-    D = second_derivatives(sensor, 0, place)
-    one = share_left_out(SHAPE, D, NOISE_PX**2 * np.eye(2))
-    return SHAPE * np.sqrt(share / one)
-
-
-@pytest.mark.parametrize("tilt", [0.3, 0.7])
-@pytest.mark.parametrize("share", [0.01, 0.3, 1.0])
-def test_within_the_bound_the_posterior_is_right_up_to_what_is_left_out(tilt: float, share: float) -> None:
-    """NEES of two, and no more than the share for each element; a tenth for higher orders and chance."""
-    sensor, place = tilted(tilt)
-    nees, _, _ = sampled(sensor, place, scaled(sensor, place, share))
-    assert 1.8 < nees < 1.1 * (2 + 2 * share)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("tilt", [0.3, 0.7])
-@pytest.mark.parametrize("share", [3.0, 30.0])
-def test_beyond_the_bound_the_posterior_is_wrong_and_a_new_start_is_nearer(tilt: float, share: float) -> None:
-    sensor, place = tilted(tilt)
-    nees, own, new = sampled(sensor, place, scaled(sensor, place, share))
-    assert nees > 2 + share  # far outside of what chance makes of a mean of thousands
-    assert own > 1.5 * new
 
 
 @given(st.floats(1.1, 50.0))

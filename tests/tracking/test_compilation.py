@@ -7,12 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import pytest
 
 from wildlab.geometry.compilation import announced, compiled
 from wildlab.paths import ROOT
-from wildlab.tracking import batch_kernels
 
 
 def test_the_first_use_is_announced_once(caplog):
@@ -63,20 +61,3 @@ def test_copies_share_what_is_compiled_and_a_change_below_compiles_anew(tmp_path
     assert run("other", 3) == "7.0 False"
     assert run("other", 5) == "11.0 True"
     assert run("one", 3) == "7.0 False"
-
-
-@pytest.mark.slow
-def test_a_kind_of_filter_compiles_no_other():
-    """Positions need neither camera nor pose, and a camera no cross-covariances."""
-    float_2d, float_3d = numba.float64[:, ::1], numba.float64[:, :, ::1]
-    own = batch_kernels.update_lanes
-    assert own.py_func.__name__ == "update_lanes"
-    signature = (
-        float_2d, float_3d, float_3d, float_3d, float_2d, float_3d, float_3d, float_3d, numba.none,
-        numba.float64, *[numba.float64[::1]] * 2, numba.bool_[::1], *[float_3d] * 6,
-    )  # fmt: skip
-    alone, with_pose = (numba.njit(error_model="numpy")(own.py_func) for _ in range(2))
-    alone.compile(signature)
-    with_pose.compile((*signature[:8], float_3d, *signature[9:]))
-    (short,), (long,) = (list(one.inspect_llvm().values()) for one in (alone, with_pose))
-    assert len(short) < 0.8 * len(long)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from wildlab.tracking.maritime import (
@@ -67,13 +65,6 @@ def test_rows_have_their_own_platform():
                 np.testing.assert_array_equal(ours, theirs)
     assert bearings_from(platform, drift).angles == (True,)
     assert np.isnan(predict_bearing([5.0, 0.0], [5.0, 0.0], [0.0, 1.0]).z).all()
-
-
-@given(st.floats(0, 20), st.floats(0, 20), st.floats(0.01, 2))
-def test_two_steps_are_one(first, second, density):
-    (F1, Q1), (F2, Q2), (F, Q) = (white_acceleration(dt, density) for dt in (first, second, first + second))
-    np.testing.assert_allclose(F2 @ F1, F, atol=1e-9)
-    np.testing.assert_allclose(F2 @ Q1 @ F2.T + Q2, Q, rtol=1e-9, atol=1e-9)
 
 
 def test_process_noise_by_van_loans_integral():

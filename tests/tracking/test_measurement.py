@@ -1,25 +1,18 @@
 """Sensors: their predictions against geometry's, and every derivative against finite differences."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, overflight, posed
-from wildlab.errors import WildlabError
+from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, posed
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.tracking import measurement as m
-from wildlab.tracking.batch import View, run_batch
-from wildlab.tracking.imm import run_imm
-from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.noise import constant_noise, noise_by_altitude
-from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.unscented import run_unscented
 
 
 def slope(function, k, step):
@@ -164,47 +157,6 @@ def test_rows_of_a_run_have_their_own_poses():
     assert alone.z.shape == (1,)
     assert np.isclose(alone.z[0], both.z[1])
     assert np.allclose(alone.H_pose, both.H_pose[1:])
-
-
-def test_poses_of_another_length_than_the_measurements_are_refused():
-    times, uv, poses, _ = overflight(20)
-    start, R = Start(0.0, np.zeros(4), np.diag([25.0, 25, 9, 9])), 4.0 * np.eye(2)
-    motion = partial(constant_velocity, sd_acceleration=0.1)
-    more, fewer = poses.take(np.arange(21) % 20), poses.take(slice(0, 19))
-    platform = np.zeros((19, 2))
-    for sensor, z in (
-        (m.pixels(more, 0.0), uv),
-        (m.pixels(fewer, 0.0), uv),
-        (m.azimuths_elevations(more, 0.0), uv),
-        (m.pixels(poses.take(0), np.zeros(21)), uv),
-        (m.ranges_bearings(platform, 0.0), uv),
-        (m.bearings(np.zeros(2), np.zeros(19)), uv[:, :1]),
-    ):
-        own = R[: z.shape[1], : z.shape[1]]
-        for run in (
-            lambda sensor=sensor, z=z, own=own: run_filter(times, z, own, sensor, motion, start),
-            lambda sensor=sensor, z=z, own=own: run_unscented(times, z, own, sensor, motion, start),
-            lambda sensor=sensor, z=z, own=own: run_imm(
-                times, z, own, sensor, [motion, motion], [9, 9], start
-            ),
-        ):
-            with pytest.raises(WildlabError, match=r"^sensor: .* for 20 rows of measurements"):
-                run()
-    for view in (View(more, 0.0), View(replace(poses, p_nb=np.zeros((3, 20, 3)), R_nb=np.eye(3)), 0.0)):
-        with pytest.raises(WildlabError, match=r"^measurements: "):
-            run_batch(times, np.stack([uv, uv]), R, motion, start, view=view)
-    with pytest.raises(WildlabError, match=r"^plane_down: "):
-        m.pixels(poses, np.zeros(19))
-    with pytest.raises(WildlabError, match=r"^yaw: "):
-        m.bearings(platform, np.zeros(20))
-
-
-def test_one_pose_for_all_rows_of_a_run():
-    _, _, poses, _ = overflight(5)
-    one = m.pixels(poses.take(3), 0.0)
-    assert one.rows is None
-    for row in range(5):
-        assert np.array_equal(one.predict(row, np.ones(2)).z, m.pixels(poses, 0.0).predict(3, np.ones(2)).z)
 
 
 def test_noise_follows_the_altitude():

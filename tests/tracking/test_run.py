@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.tracking.poses import CAMERA, overflight, turned
+from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import wrap
-from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.tracking import measurement as m
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.motion import constant_velocity, in_steps, random_walk, rest, singer
@@ -62,45 +60,6 @@ def test_on_a_linear_model_the_extended_filter_is_the_kalman_filter(name):
     assert track.used.all()
 
 
-def test_a_vessel_is_found_from_its_pixels_and_the_filter_knows_how_well():
-    nees = []
-    for seed in range(40):
-        times, uv, poses, truth = overflight(seed=seed)
-        ground = pixel_to_plane(CAMERA, uv, poses.p_nc, poses.R_nc, 0.0)
-        start = start_from_first(times, ground, 5.0, 3.0)
-        track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, start)
-        error = track.x[-1] - truth[-1]
-        nees.append(error @ np.linalg.solve(track.P[-1], error))
-        assert track.used.all()
-        assert np.isnan(track.nis[0])  # the first started the filter
-    assert 2.0 < np.mean(nees) < 5.0  # 4 in the mean; the truth manoeuvres less than the model allows
-
-
-@pytest.mark.parametrize("only", ["bearing", "range and bearing", "azimuth and elevation"])
-def test_other_sensors_find_it_too(only):
-    rng = np.random.default_rng(3)
-    times, uv, poses, truth = overflight(120)
-    ship = np.column_stack([400 * np.cos(0.06 * times), 400 * np.sin(0.06 * times)])
-    yaw = 0.05 * times
-    exact = m.predict_range_bearing(truth[:, :2], ship, yaw).z
-    if only == "azimuth and elevation":
-        sensor, R = m.azimuths_elevations(poses, 0.0), np.diag([0.05, 0.002]) ** 2
-        z = m.azimuth_elevation_of_pixel(CAMERA, uv)
-    elif only == "bearing":
-        sensor, R = m.bearings(ship, yaw), np.eye(1) * 0.01**2
-        z = wrap(exact[:, 1:] + rng.normal(0, 0.01, (120, 1)))
-    else:
-        sensor, R = m.ranges_bearings(ship, yaw), np.diag([5.0, 0.01]) ** 2
-        z = exact + rng.normal(0, [5.0, 0.01], (120, 2))
-        z[:, 1] += 2 * np.pi  # the same direction
-    start = Start(0.0, np.array([20.0, -15.0, 0, 0]), np.diag([400.0, 400, 9, 9]))
-    track = run_filter(times, z, R, sensor, partial(constant_velocity, sd_acceleration=0.01), start)
-    assert track.used.all()
-    error = track.x[-1] - truth[-1]
-    assert error @ np.linalg.solve(track.P[-1], error) < 18.5  # 99.9 % of chi-square with four degrees
-    assert np.hypot(*error[:2]) < 10
-
-
 def test_estimates_between_measurements_are_predictions_from_the_last():
     times, z = walk_of()
     asked = np.sort(np.concatenate([times, times[:-1] + 0.03, [times[-1] + 100, -1.0]]))
@@ -129,7 +88,7 @@ def test_start_on_the_first_position_is_not_counted_twice():
     assert track.used.tolist() == [False] + [True] * (len(z) - 1)
     six = start_from_first(times, z, 3.0, 2.0, n=6, sd_acceleration=0.5)
     assert np.array_equal(np.diag(six.P), [9, 9, 4, 4, 0.25, 0.25])
-    with pytest.raises(WildlabError, match="no measurement gives a position to start from"):
+    with pytest.raises(WildlabError, match="no measurement"):
         start_from_first(times, z * np.nan, 3.0)
 
 
@@ -184,19 +143,6 @@ def test_a_target_behind_the_camera_is_not_updated():
         assert np.allclose(track.P[row], F @ track.P[row - 1] @ F.T + Q)
 
 
-def test_the_gate_keeps_out_what_is_too_far():
-    times, z = walk_of(30)
-    z[12] += 200
-    open_to_all = run_filter(times, z, R2, m.positions(), CV, START)
-    track = run_filter(times, z, R2, m.positions(), CV, START, gate_probability=0.99)
-    assert open_to_all.used.all()
-    assert not track.used[12]
-    assert track.nis[12] > 9.21  # 99 % of chi-square with two degrees
-    assert (track.nis[track.used] <= 9.2104).all()
-    assert np.isfinite(track.innovation[12]).all()
-    assert track.chosen[12] == 0
-
-
 def test_of_several_detections_the_nearest_is_used():
     times, uv, poses, _ = overflight(30)
     rng = np.random.default_rng(1)
@@ -217,54 +163,6 @@ def test_of_several_detections_the_nearest_is_used():
     assert gated.used.sum() == 28
 
 
-def test_out_of_order_names_the_row():
-    times, z = walk_of(5)
-    late = times.copy()
-    late[3] = 0.0
-    with pytest.raises(WildlabError, match=r"times: row 3 at 0.0 s comes after row 2 at .*Sort the rows"):
-        run_filter(late, z, R2, m.positions(), CV, START)
-    with pytest.raises(WildlabError, match=r"output_times: row 1 at"):
-        run_filter(times, z, R2, m.positions(), CV, START, output_times=[2.0, 1.0])
-    late[3] = np.nan
-    with pytest.raises(WildlabError, match=r"row 3 has no time"):
-        run_filter(late, z, R2, m.positions(), CV, START)
-
-
-@pytest.mark.parametrize(
-    "bad", [np.zeros((2, 2)), np.diag([1.0, 0.0]), np.diag([1.0, -1.0]), np.array([[1, 0.5], [0, 1.0]])]
-)
-def test_a_singular_noise_names_the_row(bad):
-    times, z = walk_of(5)
-    R = np.tile(R2, (5, 1, 1))
-    R[2] = bad
-    with pytest.raises(WildlabError, match=r"R of row 2 is not a covariance"):
-        run_filter(times, z, R, m.positions(), CV, START)
-
-
-def test_a_singular_innovation_covariance_names_the_row():
-    times, z = walk_of(5)
-    with pytest.raises(WildlabError, match=r"innovation covariance S of row 0 is not positive definite"):
-        run_filter(times, z, R2, m.positions(), lambda dt: (np.eye(4), -9000.0 * np.eye(4)), START)
-
-
-def test_shapes_that_do_not_fit_are_named():
-    times, z = walk_of(5)
-    with pytest.raises(WildlabError, match="one row of measurements for each time"):
-        run_filter(times[:-1], z, R2, m.positions(), CV, START)
-    with pytest.raises(WildlabError, match=r"R has the shape \(3, 3\)"):
-        run_filter(times, z, np.eye(3), m.positions(), CV, START)
-
-
-@pytest.mark.slow
-def test_covariance_stays_one_over_a_hundred_thousand_updates():
-    rng = np.random.default_rng(0)
-    n = 100_000
-    times = np.cumsum(rng.uniform(0, 0.2, n))
-    track = run_filter(times, rng.normal(0, 1, (n, 2)), 1e-4 * R2, m.positions(), CV, START)
-    assert np.array_equal(track.P, np.swapaxes(track.P, 1, 2))
-    assert np.linalg.eigvalsh(track.P).min() > 0
-
-
 @pytest.mark.parametrize("probability", [0.5, 0.95, 0.999])
 def test_the_gate_stands_at_the_chi_square_of_its_probability(probability):
     """A measurement a hair inside is used and one a hair outside is not; 1 lets everything in."""
@@ -275,3 +173,50 @@ def test_the_gate_stands_at_the_chi_square_of_its_probability(probability):
         track = run_filter([0.0], z, np.eye(2), m.positions(), rest, start, gate_probability=given)
         assert track.nis[0] == pytest.approx(limit * factor)
         assert bool(track.used[0]) is used
+        assert np.isfinite(track.innovation[0]).all() and track.chosen[0] == 0
+
+
+def _but(row, value, values):
+    """The values, one of which is another."""
+    out = np.array(values)
+    out[row] = value
+    return out
+
+
+TIMES, Z = walk_of(5)
+NOISE = np.tile(R2, (5, 1, 1))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"times": _but(3, 0.0, TIMES)}, "times: row 3"),
+        ({"times": _but(3, np.nan, TIMES)}, "row 3 has no time"),
+        ({"output_times": [2.0, 1.0]}, "output_times: row 1"),
+        ({"times": TIMES[:-1]}, "one row of measurements"),
+        ({"R": np.eye(3)}, "R has the shape"),
+        ({"R": _but(2, np.zeros((2, 2)), NOISE)}, "R of row 2"),
+        ({"R": _but(2, np.diag([1.0, -1.0]), NOISE)}, "R of row 2"),
+        ({"R": _but(2, [[1.0, 0.5], [0.0, 1.0]], NOISE)}, "R of row 2"),
+        ({"motion": lambda dt: (np.eye(4), -9000.0 * np.eye(4))}, "S of row 0"),
+    ],
+)
+def test_what_cannot_be_filtered_names_the_row(given, words):
+    usual = {
+        "times": TIMES,
+        "measurements": Z,
+        "R": R2,
+        "sensor": m.positions(),
+        "motion": CV,
+        "start": START,
+    }
+    with pytest.raises(WildlabError, match=words):
+        run_filter(**(usual | given))
+
+
+def test_covariance_stays_one_over_many_precise_updates():
+    rng, n = np.random.default_rng(0), 5000
+    times = np.cumsum(rng.uniform(0, 0.2, n))
+    track = run_filter(times, rng.normal(0, 1, (n, 2)), 1e-4 * R2, m.positions(), CV, START)
+    assert np.array_equal(track.P, np.swapaxes(track.P, 1, 2))
+    assert np.linalg.eigvalsh(track.P).min() > 0

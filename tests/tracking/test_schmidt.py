@@ -8,10 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.poses import overflight
-from wildlab.errors import WildlabError
 from wildlab.tracking import measurement as m
 from wildlab.tracking import schmidt
-from wildlab.tracking.batch import View, run_batch
 from wildlab.tracking.kalman import correct
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
@@ -179,26 +177,6 @@ def test_without_memory_it_is_the_inflated_filter():
         assert np.allclose(track.S[row], done.S)
 
 
-@pytest.mark.slow
-def test_a_standing_error_of_the_pose_is_owned_up_to():
-    """One bias of the attitude per flight: the plain filter is sure of itself and wrong, this one is not."""
-    covariance = np.diag(UNITS / 2) ** 2
-    plain, aware = [], []
-    for seed in range(60):
-        rng = np.random.default_rng(seed)
-        times, uv, poses, truth = overflight(60, seed)
-        error = rng.multivariate_normal(np.zeros(6), covariance)
-        # The true pose is off by the error from the one that the filter is told.
-        seen = [m.predict_pixel(truth[k, :2], poses.take(k), 0.0) for k in range(60)]
-        shifted = uv + np.array([one.H_pose @ error for one in seen])
-        for pose, nees in ((None, plain), (PoseUncertainty(np.tile(covariance, (60, 1, 1))), aware)):
-            track = run_filter(times, shifted, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
-            off = (track.x[-1] - truth[-1])[:2]
-            nees.append(off @ np.linalg.solve(track.P[-1][:2, :2], off))
-    assert np.mean(plain) > 10
-    assert 1.4 < np.mean(aware) < 2.6  # 2 in the mean; 60 flights scatter by 0.26
-
-
 @given(seed=SEEDS, shrink=st.floats(1e-6, 1))
 def test_a_cross_covariance_is_shortened_only_where_it_must_be(seed, shrink):
     rng = np.random.default_rng(seed)
@@ -273,47 +251,6 @@ def test_many_transitions_are_those_of_each_pair(change):
     assert schmidt.transitions_of_pose(covariances[:1], change) == pytest.approx(np.eye(6)[None])
 
 
-def swinging(n):
-    """Sizes of a pose covariance that grows between fixes and shrinks with each, and how its error goes."""
-    P, sizes, gains = 1.0, [], []
-    for k in range(n):
-        P += 0.02
-        gains.append(P / (P + 5.0) if k % 5 == 0 else 0.0)
-        P *= 1 - gains[-1]
-        sizes.append(P)
-    return np.array(sizes), np.array(gains)
-
-
-@pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_each_knows_its_errors_when_the_pose_errs_as_it_believes(change):
-    n, runs = 150, 400
-    rng = np.random.default_rng(0)
-    times, exact, poses, truth = overflight(n, sd_pixel=0.0)
-    seen = m.predict_pixel(truth[:, :2], poses, 0.0)
-    sizes, gains = swinging(n)
-    if change == "bias":
-        sizes = 1 + 0.4 * np.sin(3 * times)
-        errors = np.sqrt(sizes)[:, None] * rng.normal(size=(runs, 1, 6))
-    else:
-        e, history = rng.normal(size=(runs, 6)), []
-        for gain in gains:
-            e = e + np.sqrt(0.02) * rng.normal(size=e.shape)
-            e = e - gain * (e + np.sqrt(5.0) * rng.normal(size=e.shape))
-            history.append(e)
-        errors = np.stack(history, axis=1)
-    shift = np.einsum("nij,bnj->bni", seen.H_pose, errors * UNITS)
-    z = exact + shift + rng.normal(0, 2, (runs, n, 2))
-    sd = np.array([15.0, 15, 3, 3])
-    start = Start(0.0, truth[0] + sd * rng.normal(size=(runs, 4)), np.diag(sd**2))
-    pose = PoseUncertainty(sizes[:, None, None] * np.diag(UNITS**2), change=change)
-    calm = partial(constant_velocity, sd_acceleration=0.01)
-    tracks = run_batch(times, z, PIXELS, calm, start, view=View(poses, 0.0), pose=pose)
-    error = (tracks.x - truth)[..., :2]
-    nees = np.einsum("bni,bnij,bnj->bn", error, np.linalg.inv(tracks.P[..., :2, :2]), error)
-    assert 1.7 < nees[:, n // 3 :].mean() < 2.3  # 2 in the mean
-    assert not tracks.limited.any()
-
-
 def test_directions_without_variance_carry_no_covariance():
     rng = np.random.default_rng(0)
     Po = random_pose_covariance(rng)
@@ -338,18 +275,9 @@ def hard_flight(n, seed=0):
     return np.cumsum(steps), uv[rows], repeated, covariances
 
 
-def test_the_print_alone_does_not_stay_sound():
-    """Why C does not stay as it is: the covariance of the target turns negative within a few frames."""
-    times, uv, poses, covariances = hard_flight(300)
-    with pytest.raises((AssertionError, WildlabError, np.linalg.LinAlgError)):
-        for _, P, _ in dense(times, uv, PIXELS, poses, covariances, START, CV):
-            assert np.linalg.eigvalsh(P[:4, :4])[0] > 0
-
-
 @pytest.mark.parametrize("change", ["bias", "navigated"])
-@pytest.mark.parametrize("n", [2000, pytest.param(40_000, marks=pytest.mark.slow)])
-def test_covariance_stays_one_with_a_new_pose_in_every_frame(change, n):
-    times, uv, poses, covariances = hard_flight(n)
+def test_covariance_stays_one_with_a_new_pose_in_every_frame(change):
+    times, uv, poses, covariances = hard_flight(1500)
     pose = PoseUncertainty(covariances, change=change)
     track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
     assert track.used.mean() > 0.9

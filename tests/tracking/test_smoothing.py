@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.poses import overflight
-from tests.tracking.test_considered import mean_nees, patrol
 from wildlab.errors import WildlabError
 from wildlab.tracking import measurement as m
 from wildlab.tracking.considered import consider
@@ -18,7 +17,6 @@ from wildlab.tracking.platforms import measured_from
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 from wildlab.tracking.smoothing import run_smoothed, smooth
-from wildlab.tracking.unscented import run_unscented
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 WA = partial(white_acceleration, density=0.3)
@@ -36,7 +34,7 @@ def linear_run(seed, n=25):
     return times, z, np.array([np.diag(rng.uniform(0.5, 4, 2)) for _ in range(n)])
 
 
-def everything_at_once(times, z, R, motion, start, by_errors=None):
+def everything_at_once(times, z, R, motion, start):
     """Means and covariances of all states given all measurements, as one Gaussian: no recursion at all."""
     n, N = len(start.x), len(times)
     mean, P = start.x, start.P
@@ -65,8 +63,7 @@ def everything_at_once(times, z, R, motion, start, by_errors=None):
     return x.reshape(N, n), np.array([P_all[n * k : n * k + n, n * k : n * k + n] for k in range(N)])
 
 
-@pytest.mark.parametrize("motion", [CV, WA])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("motion", "seed"), [(CV, 0), (WA, 1)])
 def test_it_is_the_mean_given_all_measurements(motion, seed):
     times, z, R = linear_run(seed)
     x, P = everything_at_once(times, z, R, motion, START)
@@ -133,38 +130,6 @@ def test_its_covariance_is_its_errors_with_considered_ones(time):
     np.testing.assert_allclose(found.P, covariance, atol=1e-8)
 
 
-@pytest.mark.slow
-def test_never_worse_than_the_filter_over_a_hundred_twins():
-    rng, pose = np.random.default_rng(11), consider({"heading": np.radians(2.0), "range_bias": 2.0})
-    middle = slice(10, 50)
-    found = {
-        name: [] for name in ("filter", "smoothed", "schmidt", "schmidt smoothed", "ukf", "ukf smoothed")
-    }
-    nees = {name: [] for name in found}
-    for twin in range(100):
-        wrong = twin % 2  # half of them with a heading and a range that are off
-        *run, states = patrol(rng, np.radians(2.0) * wrong, 2.0 * wrong)
-        if wrong:
-            tracks = {
-                "schmidt": run_filter(*run, pose=pose),
-                "schmidt smoothed": run_smoothed(*run, pose=pose),
-            }
-        else:
-            unscented = run_unscented(*run)
-            tracks = {
-                "filter": run_filter(*run), "smoothed": run_smoothed(*run),
-                "ukf": unscented, "ukf smoothed": smooth(unscented, run[4]),
-            }  # fmt: skip
-        for name, track in tracks.items():
-            found[name].append(np.mean(np.sum((states - track.x)[middle, :2] ** 2, axis=1)))
-            nees[name].append(mean_nees(track, states, middle))
-    rmse = {name: float(np.sqrt(np.mean(values))) for name, values in found.items()}
-    for name in ("filter", "schmidt", "ukf"):
-        after = "smoothed" if name == "filter" else f"{name} smoothed"
-        assert rmse[after] < rmse[name]
-        assert 3.0 < np.mean(nees[after]) < 5.2 and 3.0 < np.mean(nees[name]) < 5.2  # four states
-
-
 def test_between_rows_before_and_behind():
     times, z, R = linear_run(3)
     asked = np.sort(np.concatenate([[times[0] - 5, times[-1] + 3], times, times[:-1] + 0.4 * np.diff(times)]))
@@ -216,5 +181,5 @@ def test_rows_whose_pose_is_not_known():
 def test_a_track_at_other_times_is_refused():
     times, z, R = linear_run(0)
     track = run_filter(times, z, R, m.positions(), CV, START, output_times=times[::2])
-    with pytest.raises(WildlabError, match="estimates at 13 times of 25 measurements"):
+    with pytest.raises(WildlabError, match="13 times"):
         smooth(track, CV)

@@ -18,7 +18,6 @@ from wildlab.pipeline.animals.follow import (
     blind,
     follow,
     next_look,
-    traces_of,
 )
 from wildlab.pipeline.animals.images import Detector, Images, footprint_circles, sight_from, take_images
 from wildlab.pipeline.plans.flown import ExecutionErrors
@@ -128,24 +127,6 @@ def test_a_kalman_track_is_the_textbooks() -> None:
     ).tolist() == [2, 0]
 
 
-def test_particles_without_negative_information_agree_with_kalman_far_from_the_fence() -> None:
-    motion = walk_of(0.5, 1.0)
-    R = np.array([[[4.0, 1.0], [1.0, 2.0]]])
-    kalman = Kalman(motion, 0.99)
-    means, covariances = [], []
-    for seed in range(30):
-        cloud = particles(seed, 0.5, negative=False)
-        for one in (cloud, kalman := Kalman(motion, 0.99)):
-            one.step(Look(0.0, np.array([[3.0, 4.0]]), R, lambda places: np.zeros(places.shape[:-1])))
-            one.step(blind(40.0))
-            one.step(Look(60.0, np.array([[6.0, 1.0]]), R, lambda places: np.zeros(places.shape[:-1])))
-        means.append(cloud.known()[1][0])
-        covariances.append(cloud.known()[2][0])
-    _, mean, covariance = kalman.known()
-    assert np.mean(means, axis=0) == pytest.approx(mean[0], abs=0.2)
-    assert np.mean(covariances, axis=0) == pytest.approx(covariance[0], rel=0.12, abs=0.15)
-
-
 def test_no_particle_leaves_the_fence_it_began_in() -> None:
     cloud = particles(7, 2.0)
     look = Look(0.0, np.array([[70.0, 60.0]]), np.eye(2)[None], lambda places: np.zeros(places.shape[:-1]))
@@ -185,14 +166,6 @@ def test_a_ledger_knows_who_got_which_track() -> None:
     assert not third.started
 
 
-def test_traces_go_by_the_number_of_the_track() -> None:
-    kalman = Kalman(walk_of(0.5, 1.0), 0.99)
-    kalman.step(
-        Look(0.0, np.array([[0.0, 0.0], [90.0, 0.0]]), np.array([np.eye(2), 3 * np.eye(2)]), blind(0).sight)
-    )
-    assert traces_of(kalman) == {1: 2.0, 2: 6.0}
-
-
 class Told:
     """A follower with one track at the origin, whose animal is within 5 m of it."""
 
@@ -220,18 +193,3 @@ def test_an_image_is_looked_at_where_an_animal_may_be_in_it(away: float, motion:
     wanted[4] = True
     found = next_look(Told(), 0, times, middle, np.full(6, 10.0), wanted, walk_of(motion, 1.0))
     assert found == ((3, True) if told else (4, False))
-
-
-def test_a_trace_before_an_image_is_one_at_its_time() -> None:
-    images = over_and_over(4, 0.5)
-    motion = walk_of(0.5, 1.0)
-    done = follow(images, FLAT, DETECTOR, Kalman(motion, 0.99), motion)
-    last: dict[int, float] = {}
-    checked = 0
-    for one in done.found:
-        if one.track in last and last[one.track] < one.image:
-            waited = images.times[one.image] - images.times[int(last[one.track])]
-            assert one.before == pytest.approx(one.after_last + 2 * 0.25 * waited)
-            checked += 1
-        last[one.track] = one.image
-    assert checked > 10

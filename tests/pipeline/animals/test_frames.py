@@ -12,7 +12,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.geometry.terrain import Terrain, intersect_terrain
+from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.animals.follow import Ledger
 from wildlab.pipeline.animals.frames import (
     NEAR,
@@ -32,7 +32,7 @@ from wildlab.pipeline.plans.flown import ExecutionErrors
 from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.simulation.scene.animals import ANIMALS, animal
 from wildlab.simulation.scene.ground import EVEN_LAND, Weather
-from wildlab.simulation.scene.land import LandView, ground_points
+from wildlab.simulation.scene.land import LandView
 from wildlab.simulation.scene.on_terrain import land_on
 from wildlab.simulation.scene.response import IDEAL, sensor_of
 
@@ -100,11 +100,6 @@ def test_an_animal_behind_a_ridge_does_not_show() -> None:
     assert (abs(uv - [159.5, 119.5]) < [160, 120]).all()  # both would be in the image
     frame = render_frame(ridge, made, pose, places, THERMAL, np.random.default_rng(1))
     assert [frame.animal[seen.number] for seen in frame.view.seen] == [1]
-
-
-def test_the_ground_in_a_frame_is_the_terrain() -> None:
-    warm = furnish(HILLS, [], 0, Weather(hour=13.0), np.random.default_rng(2)).land
-    assert warm.relief[..., 0].max() == pytest.approx(HILLS.height.max())
 
 
 def test_strewn_things_lie_within_their_fences_and_are_the_same_for_the_same_seed() -> None:
@@ -243,14 +238,3 @@ def test_the_first_images_are_those_of_the_whole_way() -> None:
     for k in range(4):
         for one, other in zip(part.taken(k), images.taken(k), strict=True):
             np.testing.assert_array_equal(one, other)
-
-
-def test_rays_of_the_frame_meet_the_ground_where_those_of_the_terrain_do() -> None:
-    pose = looking_at(np.array([-30.0, 60.0]), 45, 5, 120)
-    uv = np.random.default_rng(8).uniform([0, 0], [319, 239], (50, 2))
-    rays = pixel_rays(CAMERA, uv, np.broadcast_to(pose.R_nc[0], (50, 3, 3)))
-    want = intersect_terrain(HILLS, rays, pose.p_nc).points
-    met = np.isfinite(want).all(axis=1)
-    assert met.sum() > 30
-    found = ground_points(land_on(HILLS, EVEN_LAND), CAMERA, pose.p_nc[0], pose.R_nc[0], uv)
-    np.testing.assert_allclose(found[met], want[met], atol=0.01)

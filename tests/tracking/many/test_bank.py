@@ -13,7 +13,7 @@ from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.assignment import global_nearest
 from wildlab.tracking.many.bank import Looks, Tuning, run_bank
-from wildlab.tracking.many.bank_life import Life, nobody
+from wildlab.tracking.many.bank_life import nobody
 from wildlab.tracking.many.bank_rules import (
     DISTANCE,
     FEATURES,
@@ -184,36 +184,6 @@ def test_what_is_outside_of_the_gate_of_place_and_looks_starts_a_track_of_its_ow
     assert run_bank(near, TUNING, DISTANCE).track.tolist() == [0] * 6
 
 
-def test_a_start_counts_what_lies_in_the_gate_of_place_and_looks():
-    """The third detection is beyond the gate of places alone, by its looks, and within that of both."""
-    image, tuning = np.arange(3), TUNING._replace(life=Life(confirm=(1, 2)))
-    other = np.sqrt(1.5 * 10.5)
-    looks = Appearance(np.array([[0.0], [0.0], [other]]), np.ones(1), np.ones(1))
-    assert TUNING.gate < 10.5 < limits_of(STATE, TUNING.gate, 0.999, looks).gate
-    bank = run_bank(Looks(image, np.zeros((3, 2)), INTERVAL), tuning, STATE, looks)
-    assert bank.track.tolist() == [0, 0, 0] and bank.believed.tolist() == [True]
-
-
-def test_looks_in_the_state_follow_what_went_to_the_track():
-    """What slowly looks otherwise is followed, and a track that keeps its first looks loses it."""
-    image = np.arange(200)
-    slow = Appearance(np.linspace(0.0, 5.0, 200)[:, None], np.ones(1), np.ones(1))
-    looks = Looks(image, np.zeros((200, 2)), INTERVAL)
-    assert (run_bank(looks, TUNING, STATE, slow).track == 0).all()
-    assert (run_bank(looks, TUNING, VETO, slow).track[-20:] == -1).all()
-
-
-def test_a_feature_without_weight_is_no_part_of_the_state():
-    image = np.arange(6)
-    strange = np.array([[0.0, 0], [0, 0], [0, 0], [90, 0], [90, 0], [90, 0]])
-    looks = Looks(image, np.zeros((6, 2)), INTERVAL)
-    tracks = [
-        run_bank(looks, TUNING, STATE, Appearance(strange, np.ones(2), np.array(weights))).track.tolist()
-        for weights in ([0.0, 1.0], [1.0, 1.0])
-    ]
-    assert tracks == [[0] * 6, [0, 0, 0, 1, 1, 1]]
-
-
 def test_no_detections_are_no_tracks():
     bank = run_bank(Looks(np.empty(0, int), np.empty((0, 2)), INTERVAL), TUNING)
     assert bank.x.shape == (0, 0, 4)
@@ -232,16 +202,3 @@ def test_no_detections_are_no_tracks():
 def test_what_is_refused(looks, rule, words):
     with pytest.raises(WildlabError, match=words):
         run_bank(looks, TUNING, rule)
-
-
-@pytest.mark.slow
-def test_a_veto_lets_through_as_many_of_a_targets_own_looks_as_it_says():
-    """Over many tracks: what each keeps is the mean of two detections, and as uncertain as half of one."""
-    rng, image = np.random.default_rng(3), np.r_[0, np.arange(1, 40, 2)]
-    tuning, looks = TUNING._replace(veto_probability=0.9), Looks(image, np.zeros((len(image), 2)), INTERVAL)
-    kept = [
-        (run_bank(looks, tuning, VETO, Appearance(own, np.ones(1), np.ones(1))).track[2:] == 0).mean()
-        for own in rng.normal(size=(400, len(image), 1))
-    ]
-    assert np.mean(kept) == pytest.approx(0.9, abs=3.5 * np.std(kept) / 20)
-    assert np.std(kept) / 20 < 0.01, "0.82 where it is taken for certain"

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy import stats
 
 from wildlab.errors import WildlabError
-from wildlab.tracking.many.assignment import Assignment, global_nearest
+from wildlab.tracking.many.assignment import Assignment
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
 
 values = arrays(np.float64, (3, 2), elements=st.floats(-50, 50))
@@ -24,21 +23,6 @@ def test_it_is_the_sum_of_its_features(measured, stored, weights):
         for j, old in enumerate(stored):
             expected = sum(w * ((a - b) / s) ** 2 for a, b, s, w in zip(new, old, sd, weights, strict=True))
             assert found[i, j] == pytest.approx(expected)
-
-
-@given(values, values)
-def test_weights_scale_as_spreads_do(measured, stored):
-    """Twice the spread is a quarter of the weight."""
-    wide = feature_distances(measured, stored, [2.0, 2.0], [1.0, 1.0])
-    light = feature_distances(measured, stored, [1.0, 1.0], [0.25, 0.25])
-    assert np.allclose(wide, light)
-
-
-def test_with_unit_weights_it_is_chi_square():
-    rng = np.random.default_rng(5)
-    sd = np.array([0.3, 4.0, 0.05])
-    found = feature_distances(rng.normal(0, sd, (4000, 3)), np.zeros((1, 3)), sd, np.ones(3))[:, 0]
-    assert stats.kstest(found, stats.chi2(3).cdf).pvalue > 0.01
 
 
 def test_what_is_not_known_adds_nothing():
@@ -62,14 +46,6 @@ def test_the_gate_is_one_of_distance_alone():
     d = np.array([[1.0, 9.3], [np.nan, 9.2]])
     found = with_features(d, [[100.0, 0.0], [0.0, 0.0]], gate=9.21)
     assert found.tolist() == [[101.0, np.inf], [np.inf, 9.2]]
-
-
-def test_features_turn_a_crossing_round():
-    """By distance each measurement goes to the other's track, by what it looks like it does not."""
-    d = np.array([[2.0, 1.0], [1.0, 2.0]])
-    looks = feature_distances([[0.1], [0.9]], [[0.0], [1.0]], [0.3], [1.0])
-    assert global_nearest(d, 9.21).track.tolist() == [1, 0]
-    assert global_nearest(with_features(d, looks, 9.21), np.inf).track.tolist() == [0, 1]
 
 
 def test_a_veto_undoes_a_pair_on_both_sides_and_leaves_the_others():

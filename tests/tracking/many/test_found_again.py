@@ -15,7 +15,6 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.many.features import feature_distances
 from wildlab.tracking.many.found_again import look_differences, place_costs, reachable, recognise
-from wildlab.tracking.many.life import pair_scans
 
 GATE = gate_threshold(0.99, 2)
 LIKELIER = 19.0
@@ -39,15 +38,6 @@ def test_the_edge_of_reach_lies_noise_of_both_beyond_motion(angle, seconds, spee
         spreads = [sd**2 * np.eye(2)], [old_sd**2 * np.eye(2)]
         found = reachable(place, spreads[0], [[0.0, 0.0]], spreads[1], [seconds], speed, GATE)
         assert found.tolist() == [[inside]]
-
-
-@given(arrays(float, (3, 2), elements=st.floats(-60, 60)), st.floats(0, 5))
-def test_reach_is_that_of_two_scans(places, speed):
-    """Of places as uncertain as each other it is the region of `pair_scans`."""
-    R = 16.0 * np.eye(2)
-    for old, new in itertools.permutations(places, 2):
-        paired = pair_scans([old], [new], 2.0, R, speed, GATE).measurement[0] == 0
-        assert reachable([new], [R], [old], [R], [2.0], speed, GATE)[0, 0] == paired
 
 
 def test_no_pair_is_no_matrix_entry():
@@ -127,19 +117,6 @@ def test_a_pair_that_is_made_only_to_make_more_pairs_is_not_taken():
     """The second new one is possible with the first kept one alone, which is far likelier the first's."""
     costs = [[0.0, MARGIN + 1], [MARGIN + 1, 0.0]]
     assert alone(costs, possible=[[True, True], [True, False]]) == [-1, -1]
-
-
-@given(
-    arrays(float, (3, 4), elements=COSTS),
-    arrays(bool, (3, 4)),
-    st.permutations(range(4)),
-    st.permutations(range(3)),
-)
-def test_the_order_of_tracks_changes_nothing(costs, possible, kept, new):
-    found = np.array(alone(costs, possible))
-    mixed = np.array(alone(costs[new][:, kept], possible[new][:, kept]))
-    expected = [-1 if found[row] < 0 else kept.index(found[row]) for row in new]
-    assert mixed.tolist() == expected
 
 
 @given(arrays(float, (2, 2), elements=st.sampled_from([0.0, 3.0, 7.0, 14.0])), arrays(bool, (2, 2)))

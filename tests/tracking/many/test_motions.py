@@ -14,7 +14,7 @@ from tests.tracking.many.test_together import OPEN, SURE
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.many.beliefs import POINT, Hull
 from wildlab.tracking.many.motions import at_least, each_motion, interact, largest_of, of_hulls
-from wildlab.tracking.many.run import follow_many, run_many
+from wildlab.tracking.many.run import follow_many
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.measurement import positions
 from wildlab.tracking.records import Start
@@ -92,26 +92,3 @@ def test_no_hull_is_ruled_out_and_a_motion_may_be() -> None:
     alone = np.array([[0.999, 0.001]])
     assert np.array_equal(at_least(alone, 0.02, POINTS._replace(calm=0.5)), alone)
     assert of_hulls(np.zeros((0, 4)), targets).shape == (0, 2)
-
-
-@pytest.mark.slow
-def test_what_turns_now_and_then_is_followed_nearer() -> None:
-    """Calm for most of the time, with short turns: two motions have smaller errors than either alone."""
-    errors: dict[float, list[float]] = {1.0: [], 0.1: []}
-    for seed in range(12):
-        rng = np.random.default_rng(seed)
-        v, at, way = np.array([2.0, 0.0]), np.zeros(2), []
-        for k in range(80):
-            if k % 40 in range(30, 34):
-                v = v + np.array([-v[1], v[0]]) * 0.4
-            at = at + v
-            way.append(at)
-        truth = np.array(way)[:, None]
-        scans = looks(truth, rng)
-        for calm, found in errors.items():
-            targets = POINTS._replace(density=0.8, calm=calm, stay_s=15.0)
-            shown = run_many(scans, [SURE], targets)
-            off = [np.linalg.norm(one.x[:, :2] - truth[k], axis=1) for k, one in enumerate(shown) if k > 10]
-            found += [float(one[0]) for one in off if len(one)]
-    assert np.mean(errors[0.1]) < 0.95 * np.mean(errors[1.0])
-    assert len(errors[0.1]) > 0.95 * len(errors[1.0])

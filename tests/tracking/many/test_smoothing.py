@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.tracking.many.test_together import OPEN, SURE
 from wildlab.evaluation.consistency import chi_square_interval, nees
 from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs, own_lasting
+from wildlab.tracking.many.beliefs import Hull, Scan, own_lasting
 from wildlab.tracking.many.run import Shown, run_many
 from wildlab.tracking.many.smoothing import smooth_considering, smooth_many
 from wildlab.tracking.maritime import white_acceleration
@@ -101,29 +101,6 @@ def test_what_was_given_is_not_changed_and_nothing_stays_nothing() -> None:
     assert all(np.array_equal(one.x, x) for one, x in zip(looks, kept, strict=True))
     assert smooth_many([], 0.5) == []
     assert smooth_many([shown(0.0, [], np.zeros((0, 4)), np.zeros((0, 4, 4)))], 0.5)[0][0].shape == (0, 4)
-
-
-def test_smoothed_tracks_of_many_are_closer_to_the_truth() -> None:
-    eye = SensorBeliefs("eye", 0.9, 1e-4, 0.0, 1e6, 3.0, (0.0,), (0.0,), (0.0,))
-    targets = TargetBeliefs(
-        (POINT,), density=0.1, start_speed_m_s=3.0, lifetime_s=500.0, birth=0.1, visible_s=100.0,
-        hidden_s=5.0, gate=4.5, confirmed=0.9, hits=3, shown=0.5, forgotten=0.01, lost_m=50.0,
-        fastest_m_s=30.0, moves_m=0.0, over_s=15.0, apart_m=1.0,
-    )  # fmt: skip
-    rng = np.random.default_rng(5)
-    starts, velocities = np.array([[-60.0, -40.0], [40.0, 60.0]]), np.array([[2.0, 0.5], [-1.0, 0.0]])
-    truth = starts + velocities * np.arange(60)[:, None, None]
-    looks = [
-        Scan(float(t), 0, np.zeros(2), now + rng.normal(0, 2, now.shape), np.tile(4 * np.eye(2), (2, 1, 1)))
-        for t, now in enumerate(truth)
-    ]
-    found = run_many(looks, [eye], targets)
-    off: dict[str, list[float]] = {"filter": [], "smoothed": []}
-    for k, (one, (x, _)) in enumerate(zip(found, smooth_many(found, 0.1), strict=True)):
-        for place in range(len(one.identity)):
-            for name, at in (("filter", one.x[place, :2]), ("smoothed", x[place, :2])):
-                off[name].append(float(np.linalg.norm(truth[k] - at, axis=1).min()))
-    assert np.mean(off["smoothed"]) < 0.75 * np.mean(off["filter"])
 
 
 @given(st.integers(0, 10_000))

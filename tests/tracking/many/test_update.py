@@ -72,13 +72,12 @@ def test_a_bearing_is_the_extended_kalman_filter(seed: int) -> None:
     assert compare_bearings(x, P, noise, platform, [[z + 1.0]], [[[R]]], 1e-3).likelihood[0, 0, 0] == 0
 
 
-@pytest.mark.parametrize("distance", [60.0, 15.0, 8.0, 5.0])
-def test_a_bearing_from_near_makes_no_track_too_sure(distance: float) -> None:
+def test_a_bearing_from_near_makes_no_track_too_sure() -> None:
     """Places known to 5 m, bearings to 3 deg; to first order alone NEES / 2 would be 33 at 8 m."""
-    rng = np.random.default_rng(5)
+    rng, distance = np.random.default_rng(5), 8.0
     values = []
     P = np.diag([25.0, 25.0, 1.0, 1.0])[None, None]
-    for _ in range(2000):
+    for _ in range(1000):
         true = np.array([distance, 0.0, 0.0, 0.0])
         x = (true + rng.normal(size=4) * np.sqrt(np.diag(P[0, 0])))[None, None]
         z = rng.normal(0, np.radians(3.0))

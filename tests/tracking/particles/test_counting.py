@@ -63,11 +63,11 @@ def test_looking_n_times_for_one_that_is_not_seen():
 
 @pytest.mark.parametrize("existence, unseen", [([1.2], 0.0), ([np.nan], 0.0), ([0.5], -1.0), ([0.5], np.inf)])
 def test_what_cannot_be_counted_is_refused(existence, unseen):
-    with pytest.raises(WildlabError, match="probabilities from 0 to 1"):
+    with pytest.raises(WildlabError, match="0 to 1"):
         count_probabilities(existence, unseen)
 
 
 @pytest.mark.parametrize("probability", [0.0, 1.0, np.nan])
 def test_an_interval_of_no_probability_is_refused(probability):
-    with pytest.raises(WildlabError, match="above 0 and below 1"):
+    with pytest.raises(WildlabError, match="above 0"):
         count_interval([0.5, 0.5], probability)

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tests.tracking.poses import overflight
 from wildlab.errors import WildlabError
-from wildlab.tracking import Start, kalman, run_filter
-from wildlab.tracking import measurement as sensors
+from wildlab.tracking import kalman
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.particles import (
     SCHEMES,
@@ -27,10 +25,7 @@ from wildlab.tracking.particles import (
     resample,
     sight_of,
     start_gaussian,
-    start_inside,
-    stay_inside,
     walk_matrix,
-    walk_of,
     weigh,
     weigh_unseen,
 )
@@ -94,42 +89,6 @@ def test_particles_become_the_kalman_filter_at_the_rate_of_monte_carlo(scheme, t
     assert off[-1] < 0.1
 
 
-def test_the_mean_over_runs_is_that_of_the_kalman_filter():
-    z = measurements()
-    x, P, _ = exact(z)
-    mean, covariance, _ = by_particles(z, 4000, 200, "systematic", 2 / 3, 5)
-    assert np.abs((mean.mean(axis=0) - x) / (mean.std(axis=0, ddof=1) / np.sqrt(200))).max() < 4.5
-    assert np.abs(covariance.mean(axis=0) - P).max() < 0.02 * P.max()
-
-
-def test_beside_the_extended_filter_on_pixels():
-    """F (4.11) with a camera as h, and the extended Kalman filter that F 8.3 holds it against.
-
-    From 300 m over a target that is known to a few metres the camera is all but linear, and both must agree
-    within the error of the particles; what is left of the nonlinearity is far below it.
-    """
-    times, pixels, poses, truth = overflight(12)
-    sensor, noise = sensors.pixels(poses, 0.0), 4.0 * np.eye(2)
-    start = truth[0] + [3.0, -2.0, 0.1, 0.2]
-    track = run_filter(times, pixels, noise, sensor, MOTION, Start(0.0, start, P0))
-    rng, runs, N = np.random.default_rng(6), 20, 5000
-    cloud = start_gaussian(np.tile(start, (runs, 1)), P0, N, rng)
-    for k, z in enumerate(pixels):
-        if k:
-            cloud = move(cloud, MOTION, times[k] - times[k - 1], rng)
-        camera = poses.take(k)
-        given = log_likelihood(
-            cloud.x[..., :2], z, noise, lambda p, at=camera: sensors.predict_pixel(p, at, 0.0).z
-        )
-        cloud, _ = weigh(cloud, given)
-        mean, covariance = moments(cloud)
-        sd = np.sqrt(np.diag(track.P[k]))
-        error = mean.std(axis=0, ddof=1) / np.sqrt(runs)
-        assert (np.abs(mean.mean(axis=0) - track.x[k]) < 5 * error + 0.02 * sd).all()
-        np.testing.assert_allclose(np.diagonal(covariance.mean(axis=0)) / np.diag(track.P[k]), 1, atol=0.08)
-        cloud, _ = resample(cloud, rng, "systematic")
-
-
 # A small world: a fence with a corner cut off, images that look at parts of it, something that hides a part.
 STEP = 4.0
 
@@ -189,41 +148,6 @@ def test_seeing_nothing_is_the_grid_filter_within_the_error_of_the_draws(scheme)
         assert (np.abs(mine.mean(axis=0) - wanted) <= norm.isf(5e-7) * error + 1e-12).all()
         chosen = draw(cloud.w, rng, scheme)
         cells, cloud_w = np.take_along_axis(cells, chosen, axis=1), np.full((runs, N), 1 / N)
-
-
-def test_between_the_cells_particles_come_to_the_same():
-    """The whole filter as it is used, in continuous space: what is left is the size of the grid's cells."""
-
-    def off(step):
-        grid = grid_over(cut_corner, [0, 0], [40, 48], step)
-        p = np.full(len(grid.places), 1 / len(grid.places))
-        T = walk_matrix(grid, 1.5, 6.0)
-        rng = np.random.default_rng(3)
-        cloud = start_inside(cut_corner, [0, 0], [40, 48], 20, 4000, rng)
-        for sight in looks():
-            p, _ = grid_weigh(T @ p, 1 - sight(grid.places))
-            cloud = stay_inside(cloud, move(cloud, walk_of(1.5, 1.0), 6.0, rng), cut_corner)
-            cloud, _ = weigh_unseen(cloud, sight(cloud.x))
-            estimate = moments(cloud)
-            cloud, _ = resample(cloud, rng)
-        mean, covariance = grid_moments(grid, p)
-        return np.abs(estimate[0].mean(axis=0) - mean).max(), np.abs(
-            estimate[1].mean(axis=0) / covariance - 1
-        )[[0, 1], [0, 1]].max()
-
-    position, variance = off(1.0)
-    assert position < 0.35 and variance < 0.03
-
-
-def test_looking_and_not_finding_tells_where_it_is_not():
-    """Closed form: a detector that never misses, a fence, and nobody moves."""
-    rng = np.random.default_rng(4)
-    cloud = start_inside(cut_corner, [0, 0], [40, 48], 1, 5000, rng)
-    half = sight_of(np.tile(np.arange(12) < 6, (10, 1)), 2.0, 2.0, 4.0)
-    after, log_evidence = weigh_unseen(cloud, half(cloud.x))
-    assert moments(after)[0][0, 1] > 24 and (after.w[cloud.x[..., 1] < 23.9] == 0).all()
-    share = (40 * 24 - 0) / (40 * 48 - 16 * 16 / 2)  # the part looked at, of the whole without its corner
-    assert abs(np.exp(log_evidence[0]) - (1 - share)) < 5 * np.sqrt(share * (1 - share) / 5000)
 
 
 def test_a_walk_in_a_grid_keeps_all_and_spreads_as_the_walk():

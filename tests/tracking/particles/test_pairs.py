@@ -38,20 +38,6 @@ def test_each_detection_takes_its_closest_track(seed, animals, detections):
         assert taken[j] == (best if inside else -1)
 
 
-@pytest.mark.parametrize("probability", [0.5, 0.9, 0.99])
-def test_the_gate_holds_its_share_of_an_animals_own_detections(probability):
-    """The square of D_M has the chi-square distribution; the root under the same limit is no gate."""
-    rng, N = np.random.default_rng(1), 40_000
-    P, R = np.diag([9.0, 4.0]), np.array([[2.0, 0.5], [0.5, 1.0]])
-    z = rng.multivariate_normal([0, 0], P + R, N)
-    taken = nearest_animal(mahalanobis_squared([[0.0, 0.0]], [P], z, R), probability)
-    error = np.sqrt(probability * (1 - probability) / N)
-    assert abs((taken == 0).mean() - probability) < 4.5 * error
-    printed = nearest_animal(np.sqrt(mahalanobis_squared([[0.0, 0.0]], [P], z, R)), probability)
-    assert abs((printed == 0).mean() - chi2.cdf(chi2.ppf(probability, 2) ** 2, 2)) < 4.5 * error
-    assert (printed == 0).mean() > probability or probability == 0.5
-
-
 @given(seed=st.integers(0, 999), animals=st.integers(0, 4), detections=st.integers(0, 4))
 def test_pairs_gain_as_much_as_the_best_of_all_ways(seed, animals, detections):
     rng = np.random.default_rng(seed)
