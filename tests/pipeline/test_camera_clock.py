@@ -37,8 +37,10 @@ def late(flight: Flight, shift: float) -> Flight:
 
 @pytest.fixture(scope="module")
 def tracking() -> Flight:
-    """Static and moving points under a gimballed camera, 1800 sightings."""
-    return simulate_twin("uav-tracking", 1)
+    """Static and moving points under a gimballed camera, a quarter of 1800 sightings."""
+    flight = simulate_twin("uav-tracking", 1)
+    few = flight.table("detections").iloc[::4].reset_index(drop=True)
+    return replace(flight, tables={**flight.tables, "detections": few})
 
 
 @pytest.fixture(scope="module")
@@ -51,12 +53,14 @@ def test_within_20_ms_from_known_points(tracking: Flight) -> None:
     shift = -14.05
     found = camera_clock_by_points(late(tracking, shift), "autopilot")
     assert found.offset_s == pytest.approx(shift, abs=0.020)
-    assert found.sd_s < 0.010 and abs(found.offset_s - shift) < 4 * found.sd_s
+    # Half of it of four times as many sightings.
+    assert found.sd_s < 0.020 and abs(found.offset_s - shift) < 4 * found.sd_s
     assert found.certain
     best = found.offsets[np.nanargmin(found.cost)]
     assert best == pytest.approx(shift, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna: Flight) -> None:
     """One degree for half a minute at 350 m: more than the clock's 20 ms can be told from."""
     found = camera_clock_by_points(late(antenna, 0.8), "autopilot-uncalibrated")
@@ -107,7 +111,7 @@ def over_land(flight: Flight, first: int, count: int) -> Iterator[Frame]:
 @pytest.mark.slow
 def test_from_the_motion_of_images(antenna: Flight) -> None:
     shifted = late(antenna, 1.3)
-    found = by_motion_in_words(shifted, over_land(antenna, 3000, 240), "autopilot")
+    found = by_motion_in_words(shifted, over_land(antenna, 3000, 160), "autopilot")
     assert found.numbers["certain"], found.sentence
     assert found.numbers["offset_s"] == pytest.approx(1.3, abs=0.030)
     assert found.numbers["gain"] == pytest.approx(1.0, abs=0.3)
@@ -115,6 +119,7 @@ def test_from_the_motion_of_images(antenna: Flight) -> None:
     assert found.curve["offset_s"][at] == pytest.approx(1.3, abs=0.05)
 
 
+@pytest.mark.slow
 def test_from_attitudes_where_there_is_no_gyro(antenna: Flight) -> None:
     bare = replace(antenna, tables={k: v for k, v in antenna.tables.items() if k != "imu"})
     bare = late(bare, -4.2)
@@ -126,7 +131,7 @@ def test_from_attitudes_where_there_is_no_gyro(antenna: Flight) -> None:
 
 
 def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna: Flight) -> None:
-    still = pd.DataFrame(antenna.table("frames")).iloc[3000:3080]
+    still = pd.DataFrame(antenna.table("frames")).iloc[3000:3040]
     rng = np.random.default_rng(1)
     pattern = rng.normal(120, 30, (512, 640))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.pipeline.survey_twin import CAMERA, Survey, simulate
-from tests.sound_flights import KINDS, simulate_sound_flight
+from tests.sound_flights import simulate_sound_flight
 from wildlab.errors import WildlabError
 from wildlab.evaluation.outliers import find_outliers
 from wildlab.geometry.corrections import BOUNDS, Calibration
@@ -32,7 +32,7 @@ def diagnosed(flight, seed=0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["fixed wing", "nadir", "gondola"])
 def test_a_sound_flight_whose_poses_wander_has_no_certain_cause(kind):
     """Attitudes that wander for 15 to 50 s and positions for minutes: in two minutes they look constant."""
     flight = simulate_sound_flight(kind, 1)
@@ -67,8 +67,8 @@ def test_what_wanders_is_seen_once_the_cause_is_taken_off():
 @pytest.mark.parametrize(
     "keys",
     [
-        ("tilt_deg", "clock_s"),
-        pytest.param(("down_m",), marks=pytest.mark.slow),
+        pytest.param(("tilt_deg", "clock_s"), marks=pytest.mark.slow),
+        ("down_m",),
         pytest.param(("clock_s", "down_m"), marks=pytest.mark.slow),
     ],
 )
@@ -113,7 +113,8 @@ def test_distortion_that_is_not_stated_is_no_focal_length(k1):
     assert low <= k1 <= high and high - low < 0.02
 
 
-@pytest.mark.parametrize("wrong", [{}, {"down_m": 6.0}, {"focal": 0.10}])
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [{}, {"focal": 0.10}])
 def test_height_and_focal_length_from_one_height_are_inseparable(wrong):
     """Straight down from one height either makes the image larger, and neither is offered."""
     level = {"slant_deg": (89.0, 90.0), "level_m": 0.1, "mark_m": 8.0, "every_s": 2.0}
@@ -123,6 +124,7 @@ def test_height_and_focal_length_from_one_height_are_inseparable(wrong):
         assert {"height", "focal length"} <= set(found.inseparable)
 
 
+@pytest.mark.slow
 def test_what_would_take_more_than_is_plausible_is_not_offered():
     found = diagnosed(simulate(Survey(tilt_deg=20.0, images=20)))
     assert any("boresight" in one.causes for one in found.implausible) and not found.counts
@@ -193,6 +195,7 @@ def with_wrong_clicks(flight, count, seed):
     return flight, set(clicks["detection_id"][rows])
 
 
+@pytest.mark.slow
 def test_wrong_clicks_are_kept_out_of_the_search_and_counted():
     flight, wrong = with_wrong_clicks(simulate(Survey(images=16, tilt_deg=3.0)), 8, 1)
     found = diagnosed(flight)
@@ -214,7 +217,6 @@ def test_nothing_is_certain_where_too_many_clicks_are_wrong():
     assert few.too_many_out and few.shown is few.models[0]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "views",
     [
@@ -226,7 +228,7 @@ def test_nothing_is_certain_where_too_many_clicks_are_wrong():
 def test_sound_flights_have_no_outliers(views):
     """However steep the view: what is stated of the attitude, a tilt and a heading, explains the errors."""
     inside, out = [], 0
-    for seed in range(20):
+    for seed in range(50):
         flight, rng = simulate(Survey(seed=seed, images=20, **views)), np.random.default_rng(seed)
         scored = score_points(flight, georeference(flight, observe(flight), rng))
         whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(scored)))

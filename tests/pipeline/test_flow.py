@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -27,9 +26,6 @@ from wildlab.pipeline.georeference import assumed_deviations
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.measurement import positions_or_velocities
-from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.run import Start, run_filter
 
 TWIN = "gimballed-ship"
 SHIP = np.array([[20.0, 4.0, 0.0], [-20.0, 3.0, 0.0], [0.0, -6.0, 0.0], [10.0, 0.0, 0.0]])
@@ -154,7 +150,7 @@ def test_no_row_is_left_out_and_each_says_whether_it_would_pass(flight, seen):
     assert pair_velocities(flight, [], Reading("autopilot")).empty
 
 
-def test_velocities_are_detections_of_their_own_kind_and_feed_a_track(flight, seen, tmp_path):
+def test_velocities_are_detections_of_their_own_kind(flight, seen, tmp_path):
     velocity = np.array([4.0, -3.0])
     quiet_flight = quiet(flight, seen)
     table = pair_velocities(quiet_flight, pairs_of(seen, velocity), true_reading(seen))
@@ -166,13 +162,6 @@ def test_velocities_are_detections_of_their_own_kind_and_feed_a_track(flight, se
     assert np.allclose(v, speeds(table)) and (np.diff(times) > 0).all()
     assert np.allclose(times, flight.frames["time_s"].to_numpy()[table["second"]]), "known with the second"
     assert np.allclose(R[:, 0, 1], table["cov_ne"]) and np.allclose(R[:, 1, 1], table["cov_ee"])
-    # Started without any idea of its speed, and with no position at all, a track knows it.
-    start = Start(times[0], np.zeros(4), np.diag([1e4, 1e4, 100.0, 100.0]))
-    motion = partial(constant_velocity, sd_acceleration=0.05)
-    track = run_filter(times, v, R, positions_or_velocities(np.ones(len(times), bool)), motion, start)
-    assert track.used.all()
-    assert np.allclose(track.x[-1, 2:], velocity, atol=0.3)
-    assert np.sqrt(track.P[-1, 2, 2]) < np.sqrt(R[:, 0, 0]).min()
 
 
 def test_without_velocities_there_is_nothing_to_feed(flight):

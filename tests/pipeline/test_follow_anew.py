@@ -172,6 +172,7 @@ def paused(sensor: str, seed: int) -> Flight:
     return flight
 
 
+@pytest.mark.slow
 def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track() -> None:
     one, other = paused("radar", 1), paused("lidar", 2)
     flight = joined(one, other)

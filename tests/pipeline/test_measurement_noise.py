@@ -74,10 +74,6 @@ def test_each_noise_follows_what_its_name_says():
     assert np.linalg.eigvalsh(aside[by_place] - level[by_place]).min() > 0
 
 
-def test_at_the_horizon_there_is_none():
-    assert np.isnan(noise_by_direction([[1.0, 0.0, 0.0], [1.0, 0.0, -0.1]], [90.0, 90.0])).all()
-
-
 def passes(errors: np.ndarray, seed: int = 0) -> Sighting:
     """A point at rest seen from straight above at 10 Hz, its georeferenced positions off by these errors."""
     n = len(errors)

@@ -25,10 +25,10 @@ from wildlab.simulation.twins import simulate_twin
 
 @pytest.fixture(scope="module")
 def flight() -> Flight:
-    """The first five minutes of the static twin's sensors, and its frames in that time."""
+    """The first minutes of the static twin's sensors, and its frames in that time."""
     whole = simulate_twin("static-antenna", 3)
     early = {
-        name: table[table["time_s"] < 420.0].reset_index(drop=True) if "time_s" in table else table
+        name: table[table["time_s"] < 240.0].reset_index(drop=True) if "time_s" in table else table
         for name, table in whole.tables.items()
         if name != "truth"
     }
@@ -49,7 +49,7 @@ def errors(flight: Flight, nav: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("navigate", [navigate_mekf, navigate_observer])
 def test_two_antennas_and_an_inertial_sensor_give_the_pose(flight, navigate):
     """Centimetres and about a degree: the airframe's own wandering error of that size is in the sensors."""
-    found = navigate(flight, np.arange(0.0, 420.0, 0.2))
+    found = navigate(flight, np.arange(0.0, 240.0, 0.2))
     position, attitude = errors(flight, found.nav)
     assert position.max() < 0.15
     assert attitude.max() < 2.5
@@ -99,7 +99,7 @@ def test_every_twin_with_sensors_states_what_the_filter_must_know(name):
 def test_one_antenna_starts_from_the_course(flight):
     tables = {**flight.tables, "gnss": flight.gnss.drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS[3:]])}
     single = Flight(flight.manifest, flight.nav, tables)
-    found = navigate_mekf(single, np.arange(0.0, 420.0, 0.5))
+    found = navigate_mekf(single, np.arange(0.0, 240.0, 0.5))
     assert set(found.innovations["source"]) == {"position", "velocity"}
     position, attitude = errors(flight, found.nav)
     assert position.max() < 0.5
@@ -162,12 +162,12 @@ def test_a_flight_that_banks_to_one_side_has_its_iron_stated(flight):
     with pytest.raises(WildlabError, match="hard_iron_ut"):
         navigate_observer(with_field(flight, **stated), [60.0])
     known = with_field(flight, **stated, hard_iron_ut=tuple(IRON))
-    assert errors(known, navigate_observer(known, np.arange(0.0, 420.0, 0.5)).nav)[1][2] < 4.0
+    assert errors(known, navigate_observer(known, np.arange(0.0, 240.0, 0.5)).nav)[1][2] < 4.0
 
 
 def test_the_latency_that_was_put_in_is_the_likeliest(flight):
     late = {**flight.tables, "gnss": flight.gnss.assign(time_s=flight.gnss["time_s"] + 0.12)}
-    latencies = np.array([0.0, 0.06, 0.1, 0.12, 0.14, 0.2])
+    latencies = np.array([0.06, 0.11, 0.12, 0.13])
     likely = likelihoods_of_latency(Flight(flight.manifest, flight.nav, late), latencies)
     assert latencies[np.argmax(likely)] == 0.12
 

@@ -28,7 +28,7 @@ from wildlab.pipeline.overviews.image_coverage import cover_images, ground_heigh
 from wildlab.pipeline.overviews.overview import TROUBLES, look_over
 from wildlab.pipeline.overviews.verdict import Evidence, Verdict, parts_of, verdict_of
 from wildlab.pipeline.overviews.worth_fixing import gains_of, numbers_of
-from wildlab.reporting.overview import show_overview
+from wildlab.reporting.overview import counts_of, show_overview
 from wildlab.reporting.report import open_report
 from wildlab.reporting.tracking_sections import head_section
 from wildlab.simulation.twins import simulate_twin
@@ -280,6 +280,7 @@ def without(flight: Flight, *, nav: bool = True, tables: tuple[str, ...] = ()) -
     return Flight(flight.manifest, dict(flight.nav) if nav else {}, kept)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("nav", "tables"),
     [
@@ -311,14 +312,13 @@ def test_poses_without_covariance_or_velocity_and_empty_tables_are_fine(tmp_path
     assert ("duration", "flight") not in values(page_of(nothing, tmp_path)[1])
 
 
-def test_broken_rows_are_left_out_and_counted_as_problems(tmp_path: Path) -> None:
+def test_broken_rows_are_left_out_and_counted_as_problems() -> None:
     whole = simulate_twin("large-ship", 1)
     nav = whole.nav["autopilot"].copy()
     nav.loc[10:20, "north_m"] = np.nan
     nav.loc[30, "time_s"] = nav.loc[28, "time_s"]
     nav.loc[40, ["q_w", "q_x", "q_y", "q_z"]] = 0.0
-    _, content = page_of(Flight(whole.manifest, {"autopilot": nav}, dict(whole.tables)), tmp_path)
-    assert values(content)["problems", "flight"] >= 2
+    assert look_over(Flight(whole.manifest, {"autopilot": nav}, dict(whole.tables))).problems >= 2
 
 
 def test_photos_without_times_have_no_rates(tmp_path: Path) -> None:
@@ -353,16 +353,13 @@ def test_the_best_estimated_poses_are_taken_and_never_the_truth() -> None:
         look_over(Flight(manifest, {"mine": table}), "other")
 
 
-def test_trouble_that_lasts_asks_for_a_closer_look(
-    make_flight: Callable[..., Flight], tmp_path: Path
-) -> None:
+def test_trouble_that_lasts_asks_for_a_closer_look(make_flight: Callable[..., Flight]) -> None:
     flight = make_flight(n_images=40)
     nav = flight.nav["logged"]
     t = np.arange(nav["time_s"].min(), nav["time_s"].max(), 0.5)
     at = {name: np.interp(t, nav["time_s"], nav[name]) for name in ("north_m", "east_m", "down_m")}
     flight.tables["gnss"] = pd.DataFrame({"time_s": t, **at, "satellites": np.where(t < t[0] + 12, 4.0, 9.0)})
-    _, content = page_of(flight, tmp_path, judged=1)
-    assert values(content)["troubled", "flight"] == 1
+    assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 1
 
 
 def test_points_that_are_far_out_are_listed_with_what_stays(make_flight: Callable[..., Flight]) -> None:

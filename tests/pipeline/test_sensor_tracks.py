@@ -161,20 +161,6 @@ def test_clock_noise_and_correlation_come_back():
     )
 
 
-def test_a_heading_that_is_wrong_is_put_down_to_the_heading():
-    # Boats that hardly move: of boats that do, part of it would look like a clock that is late.
-    flight = make(1, sd=0.2, pace=0.02)
-    seen = flight.tables["detections"]
-    k = seen["frame_id"].str.removeprefix("lidar-").astype(int).to_numpy()
-    own = platform(flight.tables["frames"]["time_s"].to_numpy()[k])
-    turn, offset = np.radians(3.0), seen[["north_m", "east_m"]].to_numpy() - own
-    seen["north_m"] = own[:, 0] + np.cos(turn) * offset[:, 0] - np.sin(turn) * offset[:, 1]
-    seen["east_m"] = own[:, 1] + np.sin(turn) * offset[:, 0] + np.cos(turn) * offset[:, 1]
-    found = tune_sensor(flight, "lidar")
-    assert np.degrees(found.heading_sd_rad) == pytest.approx(3.0, rel=0.25)
-    assert found.range_m * found.heading_sd_rad > 2 * found.position_sd_m
-
-
 # --- following ----------------------------------------------------------------------------------------------
 
 

@@ -105,14 +105,6 @@ def test_a_measurement_that_is_not_used_is_no_reference():
         assert np.allclose(track.P, left_out.P)
 
 
-def test_a_start_without_a_measurement_takes_the_first_as_it_is():
-    times, z = data(5)
-    start = Start(0.0, np.zeros(4), np.diag([100.0, 100, 9, 9]))
-    track = run_coloured(times, z, R_W, CV, start)
-    direct = run_filter(times[:1], z[:1], R_W, m.positions(), CV, start)
-    assert np.allclose(track.x[0], direct.x[0])
-
-
 def test_two_at_once_say_nothing_of_the_velocity():
     times, z = data(6)
     times[3] = times[2]

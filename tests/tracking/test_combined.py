@@ -129,16 +129,6 @@ def test_errors_are_shared_by_name_and_apart_by_another():
     assert across @ apart.P[-1] @ across < 0.6 * (across @ shared.P[-1] @ across)
 
 
-def test_several_detections_in_a_frame_of_one_sensor():
-    parts = crew(2, 5)
-    radar = np.stack([parts[0].measurements + np.array([40.0, 0.5]), parts[0].measurements], axis=1)
-    merged = merge([parts[0]._replace(measurements=radar), *parts[1:]])
-    assert merged.measurements.shape == (15, 2, 2) and merged.R.shape == (15, 2, 2, 2)
-    track, plain = (run_filter(*one[:4], WA, START) for one in (merged, merge(parts)))
-    np.testing.assert_allclose(track.x, plain.x)
-    np.testing.assert_array_equal(track.chosen, np.where(merged.which == 0, 1, 0))
-
-
 @pytest.mark.parametrize("camera", [False, True])
 @pytest.mark.parametrize("correlation_time", [None, 0.0, 5.0, np.inf])
 def test_two_measurements_at_one_time_are_the_same_to_readable_and_compiled_filters(camera, correlation_time):

@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pytest
 
 from tests.pipeline.robots import boat, robot_flight
 from wildlab.flight.following import Settings, parse_settings
@@ -98,10 +97,10 @@ def test_all_errors_of_a_look_move_its_detections_alike() -> None:
 
 @cache
 def _pixels() -> tuple[Flight, Observations]:
-    """The last eighth of a twin's detections: more than a hundred."""
+    """The last quarter of a twin's detections: more than a hundred."""
     flight = simulate_twin("static-antenna", 3)
     seen = flight.table("detections")
-    flight.tables["detections"] = seen.iloc[-len(seen) // 8 :].reset_index(drop=True)
+    flight.tables["detections"] = seen.iloc[-len(seen) // 4 :].reset_index(drop=True)
     return flight, observe(flight, "autopilot")
 
 
@@ -112,7 +111,6 @@ def taken(flight: Flight, observed: Observations, lasting_s: float = np.inf) -> 
     return told, of_poses(flight, observed, told, belief, lasting_s)
 
 
-@pytest.mark.slow
 def test_an_error_stays_itself_along_the_flight() -> None:
     """From one look to the next as the Schmidt filter carries it; and a roll moves places as rays say."""
     flight, observed = _pixels()
@@ -172,7 +170,6 @@ def test_a_heading_that_is_off_is_in_the_covariance_of_tracks() -> None:
     assert nees[0] > 10 and 0.2 < nees[1] < 1.2
 
 
-@pytest.mark.slow
 def test_what_is_considered_of_a_camera_is_in_its_pose() -> None:
     """In place of what is assumed, on top of a covariance that poses have; pixels are as noisy as told."""
     flight, observed = _pixels()
@@ -209,7 +206,6 @@ def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it() -> None:
     assert of("[sensors.eye.considered.clock]\nsd_s = 0.1\ncorrelation_time_s = 0.5\n") == 0.0
 
 
-@pytest.mark.slow
 def test_mount_and_ground_are_in_what_is_shared_and_stay() -> None:
     flight, observed = _pixels()
     errors = pose_errors(flight, observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
@@ -223,7 +219,6 @@ def test_mount_and_ground_are_in_what_is_shared_and_stay() -> None:
     assert (np.abs(shared[linear][..., 6:]).max(axis=(0, 1)) > 0.01).all()
 
 
-@pytest.mark.slow
 def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one() -> None:
     flight, observed = _pixels()
     own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
@@ -273,7 +268,6 @@ def test_an_error_of_the_heading_stays_one_whichever_way_the_body_lies() -> None
     assert np.allclose(roots[:, 3:, 5], by_hand * sd[5], atol=1e-6)
 
 
-@pytest.mark.slow
 def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places() -> None:
     """North, east and heading, by the same closed form: a radar on board has one and the same error."""
     flight, observed = _pixels()

@@ -75,16 +75,6 @@ def test_two_in_one_image_do_not_go_to_one_track():
     assert np.isnan(bank.x[:3, 1]).all() and np.isfinite(bank.x[3, 1]).all()
 
 
-def test_what_a_veto_has_left_starts_nothing():
-    """Other looks in the gate of a track that took nothing are not a new target (H 3.3)."""
-    image, z = np.arange(6), np.zeros((6, 2))
-    strange = np.array([0, 0, 0, 90, 90, 90], float)[:, None]
-    looks = Appearance(strange, np.ones(1), np.ones(1))
-    bank = run_bank(Looks(image, z, INTERVAL), TUNING, VETO, looks)
-    assert bank.track.tolist() == [0, 0, 0, -1, -1, -1]
-    assert run_bank(Looks(image, z, INTERVAL), TUNING, FEATURES, looks).track.tolist() == [0] * 6
-
-
 def test_each_rule_by_hand():
     d = np.array([[2.0, 1.0], [1.0, 2.0]])
     f = np.array([[0.0, 50.0], [50.0, 0.0]])
@@ -171,23 +161,6 @@ def test_weights_are_of_features_that_are_weighed_in_alone():
     looks = Appearance(np.zeros((1, 1)), np.ones(1), np.array([9.0]))
     seen = {rule: compare_looks(np.array([[3.0]]), alive, looks, rule, 9.21) for rule in RULES[1:]}
     assert np.allclose([seen[rule] for rule in (FEATURES, VETO, STATE)], [[[54.0]], [[6.0]], [[6.0]]])
-
-
-def test_what_is_outside_of_the_gate_of_place_and_looks_starts_a_track_of_its_own():
-    """Near a track that took nothing, but of other looks: with features in the state it is another target."""
-    image = np.arange(6)
-    strange = np.array([0, 0, 0, 4.2, 4.2, 4.2])[:, None]
-    near = Looks(image, np.zeros((6, 2)), INTERVAL)
-    track = run_bank(near, TUNING, STATE, Appearance(strange, np.ones(1), np.ones(1))).track.tolist()
-    assert track == [0, 0, 0, 1, 1, 1]
-    # By place alone they would lie in its gate, which has room for them.
-    assert run_bank(near, TUNING, DISTANCE).track.tolist() == [0] * 6
-
-
-def test_no_detections_are_no_tracks():
-    bank = run_bank(Looks(np.empty(0, int), np.empty((0, 2)), INTERVAL), TUNING)
-    assert bank.x.shape == (0, 0, 4)
-    assert len(bank.started) == 0
 
 
 @pytest.mark.parametrize(

@@ -155,15 +155,6 @@ def test_who_comes_back_from_too_far_is_another_one():
         assert run_bank(looks._replace(positions=z), living(AGE)).identity[1] == identity
 
 
-def test_two_that_come_back_together_are_assigned_at_once():
-    looks, owner = still([COMES_BACK] * 2, [(0, 0), (400, 0)])
-    for appearance, rule in ((None, DISTANCE), (looking(owner), VETO)):
-        bank = run_bank(looks, living(AGE), rule, appearance)
-        of = [owner[bank.track == number][0] for number in range(4)]
-        assert bank.identity[of.index(0, 2)] == of.index(0)
-        assert bank.identity[of.index(1, 2)] == of.index(1)
-
-
 def test_who_was_detected_beside_its_first_detection_is_another_one():
     """In one image they are two; where one comes after the other they may be one that is fast."""
     fast = living(AGE)._replace(max_speed=100.0)
@@ -213,14 +204,6 @@ def test_reach_is_from_where_it_was_detected_last():
         assert run_bank(looks, living(AGE)).identity.tolist() == [0, identity], back
 
 
-def test_of_two_it_is_the_one_that_is_expected_there():
-    """One goes on for 20 s to where another that rests is nearer to than its own last place."""
-    looks, _ = going(
-        (range(100), (0, 0), 4.0), (range(100), (60, 260), 0.0), (range(140, 150), (0, 280), 4.0)
-    )
-    assert run_bank(looks, living(AGE)).identity.tolist() == [0, 1, 0]
-
-
 @pytest.mark.parametrize(
     ("hits", "believed"), [((2, 3, 4), True), ((2, 6), False), ((2, 4, 6), True), ((), False)]
 )
@@ -244,16 +227,6 @@ def test_a_start_is_dropped_as_soon_as_m_cannot_be_reached():
     # Images that do not look at it do not count.
     blind = dict.fromkeys(range(2, 12), lambda places: places[:, 0] > 450)
     assert run_bank(looks._replace(sees=blind), living(Life(confirm=(3, 5)))).ended[own] == 14
-
-
-def test_a_detection_in_the_gate_was_looked_at_whoever_takes_it():
-    """No view shows the place: else there would be more images with a detection than images that looked."""
-    looks, _ = still([range(5)])
-    blind = looks._replace(sees=dict.fromkeys(range(5), never))
-    strange = Appearance(np.array([0, 0, 90, 90, 90], float)[:, None], np.ones(1), np.ones(1))
-    bank = run_bank(blind, living(Life(confirm=(3, 5))), VETO, strange)
-    assert bank.track.tolist() == [0, 0, -1, -1, -1]
-    assert bank.believed.tolist() == [True]
 
 
 def test_an_impossible_confirmation_is_refused():

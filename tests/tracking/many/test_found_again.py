@@ -113,12 +113,6 @@ def test_two_assignments_as_likely_as_each_other_leave_both_new():
     assert alone([[0.0, MARGIN + 1], [2 * MARGIN, 3 * MARGIN + 1]]) == [-1, -1]
 
 
-def test_a_pair_that_is_made_only_to_make_more_pairs_is_not_taken():
-    """The second new one is possible with the first kept one alone, which is far likelier the first's."""
-    costs = [[0.0, MARGIN + 1], [MARGIN + 1, 0.0]]
-    assert alone(costs, possible=[[True, True], [True, False]]) == [-1, -1]
-
-
 @given(arrays(float, (2, 2), elements=st.sampled_from([0.0, 3.0, 7.0, 14.0])), arrays(bool, (2, 2)))
 def test_the_order_of_tracks_changes_nothing_with_ties(costs, possible):
     found = np.array(alone(costs, possible))

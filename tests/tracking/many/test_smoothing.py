@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.tracking.many.test_together import OPEN, SURE
 from wildlab.evaluation.consistency import chi_square_interval, nees
 from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many.beliefs import Hull, Scan, own_lasting
+from wildlab.tracking.many.beliefs import Hull, Scan, own_columns, own_lasting
 from wildlab.tracking.many.run import Shown, run_many
 from wildlab.tracking.many.smoothing import smooth_considering, smooth_many
 from wildlab.tracking.maritime import white_acceleration
@@ -181,3 +181,10 @@ def test_errors_are_as_large_as_tracks_of_two_sensors_say() -> None:
         # Errors of one boat are correlated: the band is of as many values as there are boats.
     assert all(low < np.mean(means[name]) < high for name in ("filter", "smoothed")), means
     assert np.mean(means["white"]) > 2 * high
+
+
+def test_each_sensor_has_two_errors_of_its_own_behind_all_shared_ones() -> None:
+    alone, own = SURE, SURE._replace(correlation=0.5, lasting_s=7.0)
+    eyes = [own, alone, own]
+    assert own_lasting(eyes) == (7.0,) * 4
+    assert [own_columns(eyes, k, 9) for k in range(3)] == [slice(5, 7), slice(7, 7), slice(7, 9)]

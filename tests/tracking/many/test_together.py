@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from tests.tracking.many.test_run import EYE, POINTS, lines, looks
 from wildlab.errors import WildlabError
-from wildlab.tracking.many.beliefs import Hull, Scan
+from wildlab.tracking.many.beliefs import Scan
 from wildlab.tracking.many.probabilities import association_probabilities
 from wildlab.tracking.many.run import follow_many, run_many
 from wildlab.tracking.many.together import moved_together, told_by_others
@@ -246,19 +246,6 @@ def test_who_lies_far_off_by_what_is_shared_is_compared_too() -> None:
         *_, last = follow_many(scans, [sure], POINTS, [0.0] * 2 if met else [])
         hits = dict(zip(last[0].identity.tolist(), last[0].hits.tolist(), strict=True))
         assert hits[0] == (5 if met else 4)
-
-
-def test_what_is_shown_has_the_mean_of_its_kinds() -> None:
-    hulls = (Hull("a", 4.0, 2.0, 0.5), Hull("b", 30.0, 8.0, 0.5))
-    sensor = EYE._replace(rough_m=(0.0, 4.0), along_m=(0.0, 6.0), near_side_m=(0.0, 3.0))
-    scans = moved(
-        lines(np.array([[50.0, 8.0]]), np.array([[1.0, 0.5]]), 8), 10.0, 3.0, 0.5, np.random.default_rng(1)
-    )
-    targets = POINTS._replace(hulls=hulls, hits=1, confirmed=0.05, shown=0.01)
-    for tracks, shown in follow_many(scans, [sensor], targets, [10.0] * 2):
-        expected = np.einsum("tk,tkij->tij", tracks.kinds, tracks.C)
-        assert np.allclose(shown.C, expected[: len(shown.C)])
-    assert len(shown.C) == 1 and not np.allclose(tracks.C[0, 0], tracks.C[0, 1])
 
 
 def test_targets_that_are_moved_together_are_told_apart() -> None:
