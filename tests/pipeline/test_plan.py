@@ -344,5 +344,9 @@ def test_wishes_that_contradict_are_refused(given, words):
         Wanted(Path("x"), CAMERA, **given)
 
 
-def test_a_wind_blows_from_where_it_is_said_to():
-    assert np.allclose(Wanted(Path("x"), CAMERA, wind_m_s=5.0, wind_from_deg=270.0).wind, [0, 5])
+def test_a_wind_blows_from_where_it_is_said_to_and_changes_the_speed_of_a_wing():
+    given = {"wind_m_s": 5.0, "wind_from_deg": 270.0}
+    copter, wing = (Wanted(Path("x"), CAMERA, turn_radius_m=turn, **given) for turn in (0.0, 30.0))
+    assert np.allclose(copter.wind, [0, 5])
+    assert (copter.slowest_m_s, copter.fastest_m_s) == (10.0, 10.0)
+    assert (wing.slowest_m_s, wing.fastest_m_s) == (5.0, 15.0)
