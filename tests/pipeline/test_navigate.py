@@ -28,7 +28,7 @@ def flight() -> Flight:
     """The first minutes of the static twin's sensors, and its frames in that time."""
     whole = simulate_twin("static-antenna", 3)
     early = {
-        name: table[table["time_s"] < 240.0].reset_index(drop=True) if "time_s" in table else table
+        name: table[table["time_s"] < 420.0].reset_index(drop=True) if "time_s" in table else table
         for name, table in whole.tables.items()
         if name != "truth"
     }

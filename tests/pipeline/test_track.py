@@ -44,6 +44,9 @@ def test_the_truth_of_a_sighting_is_that_of_its_target(flight: Flight, seen: Sig
         known = np.interp(seen.times, flight.truth["time_s"], flight.truth[name])
         inside = (seen.times >= flight.truth["time_s"].min()) & (seen.times <= flight.truth["time_s"].max())
         np.testing.assert_allclose(seen.truth[inside, column], known[inside], atol=0.5)
+        # Its velocity sums up to its way.
+        steps = seen.truth[inside, 2 + column][:-1] * np.diff(seen.times[inside])
+        assert steps.sum() == pytest.approx(known[inside][-1] - known[inside][0], rel=0.1, abs=2.0)
 
 
 def test_the_sighting_holds_every_frame_between_first_and_last_detection(

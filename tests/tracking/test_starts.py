@@ -17,7 +17,7 @@ from wildlab.tracking.rays import intersect_rays
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.starts import start_from_measurement, start_from_position, start_from_rays
 
-RUNS = 200
+RUNS = 400
 POSE = (20.0, -30.0, 120.0, 0.1, -0.15, 0.6, (0.0, 0.02, 0.0), (0.1, 0.0, 0.2))
 RAE = ("range", "azimuth", "elevation")
 
@@ -123,7 +123,7 @@ def test_a_start_that_knows_its_errors_keeps_the_filter_honest():
     times, last = np.arange(15.0), {True: [], False: []}
     platform = np.column_stack([np.zeros(15), 2.0 * times])
     sensor, R = considering(ranges_bearings(platform, 0.0), pose.names), np.diag([1.0, 1e-6])
-    for _ in range(RUNS):
+    for _ in range(RUNS // 2):
         truth = np.array([300.0, 50.0])
         z = m.predict_range_bearing(truth, platform, 0.0).z - [0.0, 0.01 * rng.normal()]
         z += rng.normal(size=(15, 2)) * np.sqrt(np.diag(R))
@@ -150,7 +150,7 @@ def test_start_from_bearings_alone():
     platform = np.column_stack([5 * times - 50, np.zeros(40)])
     sensor = considering(bearings(platform, 0.0), pose.names)
     errors, covariances = [], []
-    for _ in range(RUNS):
+    for _ in range(RUNS // 2):
         v = rng.normal(0, sd_velocity, 2)
         truth = np.column_stack([np.tile([60.0, 180.0], (40, 1)) + np.outer(times, v), np.tile(v, (40, 1))])
         heading = 0.005 * rng.normal()
