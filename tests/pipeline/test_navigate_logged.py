@@ -93,14 +93,12 @@ def test_thor_by_the_observer(thor) -> None:
     assert (off <= [2.0, 1.2, 4.0]).all()
 
 
-@pytest.mark.slow
 def test_thor_has_the_latency_that_its_own_fixes_make_likeliest(thor) -> None:
     flight, _ = thor
     stated = flight.manifest.gnss.latency_s
     assert np.argmax(likelihoods_of_latency(flight, [stated - 0.02, stated, stated + 0.02])) == 1
 
 
-@pytest.mark.slow
 def test_x8_through_loops_and_rolls(shared_data: Callable[..., Path], tmp_path: Path) -> None:
     source = shared_data("logs", "inertialnav_x8")
     flight, samples = loaded("inertialnav-x8", source, tmp_path / "flight")

@@ -67,7 +67,7 @@ VIEWS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("kind", "view"), zip(sorted(ANIMALS), [*VIEWS, *VIEWS], strict=False))
+@pytest.mark.parametrize(("kind", "view"), list(zip(sorted(ANIMALS), [*VIEWS, *VIEWS], strict=False)))
 def test_an_animal_is_where_the_terrain_puts_it(
     kind: str, view: tuple[tuple[float, float], float, float, float]
 ) -> None:
