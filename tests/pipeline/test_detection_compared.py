@@ -12,9 +12,7 @@ import pytest
 from tests.pipeline.test_detect import folder
 from tests.test_cli_detect import call
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.labels import read_labels
-from wildlab.pipeline.detecting.command import samples_of
 from wildlab.pipeline.detecting.compared import compare_detectors, named_file, read_others
 
 #: Of the frames of `folder`.
@@ -119,14 +117,6 @@ def test_labels_of_any_format_judge_alike(capsys, tmp_path):
         capsys, "detect", path, "--into", tmp_path / "out", "--labels", tmp_path / "coco.json"
     )
     assert code == 2 and "256 x 96" in err
-
-
-def test_a_fit_gets_the_same_boxes_from_shares_of_the_image(tmp_path: Path) -> None:
-    path = folder(tmp_path / "in")
-    images = open_frames(path)
-    relative = samples_of(images, read_labels(batch(tmp_path / "md.json"), classes=("animal",)))
-    assert len(relative) == 6 and np.allclose(relative[0].boxes[0], [97.5, 67.5, 5, 5])
-    assert len(relative[0].boxes) == 2 and len(relative[0].ignore) == 1
 
 
 def frames(count: int = 3, unusable: int = 0) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""What went wrong on a flight stands first in its overview, and nothing is small that was not measured."""
+"""What went wrong on a flight is found with its size and time, and nothing on a sound one."""
 
 from __future__ import annotations
 

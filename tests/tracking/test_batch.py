@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.tracking.poses import CAMERA, CROOKED, overflight
-from tests.tracking.test_schmidt import hard_flight, random_pose_covariance
+from tests.tracking.test_schmidt import random_pose_covariance
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.tracking import measurement as m
@@ -123,20 +123,6 @@ def test_schmidt(correlation_time):
             times, z[run], R, m.pixels(poses.take(run), 0.0), CV, own,
             pose=pose._replace(covariance=covariance[run]), gate_probability=0.999,
         )  # fmt: skip
-        agree(batch, run, track)
-
-
-@pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_schmidt_with_poses_of_any_uncertainty(change):
-    times, uv, poses, covariances = hard_flight(60)
-    covariances[::7, 3] = covariances[::7, :, 3] = 0.0
-    pose = PoseUncertainty(covariances, change=change)
-    start = Start(0.0, np.zeros(4), np.diag([25.0, 25, 9, 9]))
-    z = np.stack([uv, uv + 3.0])
-    R = 4.0 * np.eye(2)
-    batch = run_batch(times, z, R, CV, start, view=View(poses, 0.0), pose=pose)
-    for run in range(2):
-        track = run_filter(times, z[run], R, m.pixels(poses, 0.0), CV, start, pose=pose)
         agree(batch, run, track)
 
 

@@ -1,4 +1,4 @@
-"""What a linearisation leaves out, beside sampled truth: where a track is too uncertain, where not."""
+"""What a linearisation leaves out: by closed forms, differences and samples."""
 
 from __future__ import annotations
 

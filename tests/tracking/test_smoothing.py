@@ -1,4 +1,4 @@
-"""The smoother: exactly what it says of itself in linear cases, never worse than the filter in others."""
+"""The smoother: exact in linear cases, its covariance that of its errors and never above the filter's."""
 
 from functools import partial
 

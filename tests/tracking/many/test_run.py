@@ -1,4 +1,4 @@
-"""All targets at once: one alone is the single filter, two that meet stay two, clutter is nothing."""
+"""All targets at once: one alone is the single filter, long hulls are one, clutter is nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Back over many tracks: the answer of all equations at once, each by itself, and closer to the truth."""
+"""Back over many tracks: the answer of all equations at once, each by itself, errors as predicted."""
 
 from __future__ import annotations
 

@@ -155,17 +155,6 @@ def test_a_lost_one_is_found_in_its_gate_alone(share, name):
     assert taken.tolist() == [name]
 
 
-def test_two_lost_ones_are_not_one_detection_each_twice():
-    """A lap later two detections near two lost tracks go to one each, the pairs that are nearest together."""
-    rng = np.random.default_rng(8)
-    rules = RULES._replace(lost_trace=30.0)
-    herd, _ = step_nearest(no_herd(rules), look(0.0, [40.0, 40.0], [52.0, 40.0]), rules, rng)
-    herd, _ = step_nearest(herd, look(60.0), rules, rng)
-    assert herd.lost.all()
-    herd, taken = step_nearest(herd, look(60.0, [42.0, 40.0], [45.0, 40.0]), rules, rng)
-    assert taken.tolist() == [1, 2]
-
-
 def test_without_negative_information_an_empty_image_says_nothing():
     rng = np.random.default_rng(9)
     half = lambda p: np.where(p[..., 0] > 50, 1.0, 0.0)  # noqa: E731

@@ -1,4 +1,4 @@
-"""Which detection is of which animal: F's rule by its letter, the gate by its share, pairs by trying all."""
+"""Which detection is of which animal: F's rule and its gate, pairs by trying all."""
 
 from __future__ import annotations
 
