@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from wildlab.detection.contrast import Contrast, find_by_contrast
+from wildlab.detection.contrast import Contrast
 from wildlab.detection.shape import Shape
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.evaluation.runs import share_interval
 from wildlab.flight.readers.frames import Frame
 from wildlab.pipeline.detecting.fit import Sample
 from wildlab.pipeline.detecting.part_fit import (
@@ -21,17 +18,6 @@ from wildlab.pipeline.detecting.part_fit import (
     parts_needed,
     with_part,
 )
-from wildlab.studies.wildlife_detection.trial import (
-    BY_MEAN,
-    METHODS,
-    find,
-    judge,
-    operator_of,
-    take_pictures,
-)
-
-#: For animals that fill much of the image.
-LARGE = Contrast(window_px=151, largest_px=6000.0, longest=8.0)
 
 
 def drawn(rng, count, part):
@@ -102,52 +88,3 @@ def test_labels_that_lie_off_widen_the_ellipses_and_others_do_not():
 def test_thresholds_without_a_part_have_none():
     assert fit_part("floating", [], FloatingThresholds()) is None
     assert with_part(Shape(), 0.03).regions.part == 0.03 and with_part(Contrast(), 0.03).part == 0.03
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("method", "thresholds"), [("contrast", LARGE), ("warm", METHODS[BY_MEAN])])
-def test_ellipses_hold_true_centres_of_animals_in_scenes_that_the_part_was_not_chosen_from(
-    method, thresholds
-):
-    """Rendered animals wholly in view, their true outlines' centres; half of the seeds choose, half judge."""
-    halves = [Found(*(np.concatenate(one) for one in zip(*parts, strict=True))) for parts in (
-        [found_in(seed, method, thresholds) for seed in range(first, 8, 2)] for first in (0, 1)
-    )]  # fmt: skip
-    held = [
-        judged.inside(part_of(parts_needed(chosen)))
-        for chosen, judged in (halves, halves[::-1])
-    ]  # fmt: skip
-    share = share_interval(int(np.concatenate(held).sum()), sum(map(len, held)))
-    assert 0.85 <= share.estimate <= 0.95 and share.low < 0.9 < share.high, share
-    assert share.high - share.low < 0.12, "enough of them to tell"
-
-
-@cache
-def pictures_of(seed):
-    """The rendered pictures of a seed, once for all methods."""
-    return list(take_pictures(operator_of("gondola", seed), seed).plain.values())
-
-
-def found_in(seed, method, thresholds):
-    """Animals found in the rendered pictures of a seed, with the true centres of their outlines."""
-    off, covariance, major = [], [], []
-    for picture in pictures_of(seed):
-        bare = with_part(thresholds, 0.0)
-        if method == "warm":
-            found = find(picture, bare)
-        else:
-            found = find_by_contrast(picture.counts, picture.view.ground, bare)
-        seen = {one.number: one for one in picture.view.seen}
-        height, width = picture.view.labels.shape
-        for number, rows in judge(picture, found).rows.items():
-            if len(rows) != 1 or picture.view.visible(number) < 0.95:
-                continue
-            left, top, wide, high = found.box[rows[0]]
-            if min(left, top) < 3 or left + wide > width - 3 or top + high > height - 3:
-                continue
-            off.append(seen[number].centre - found.uv[rows[0]])
-            covariance.append(found.covariance[rows[0]])
-            major.append(found.axes[rows[0], 0])
-    return Found(
-        np.reshape(off, (-1, 2)), np.reshape(covariance, (-1, 2, 2)), np.asarray(major, float)
-    )  # fmt: skip
