@@ -74,6 +74,7 @@ def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna: Flight) -
     assert true.offset_s == pytest.approx(0.8, abs=0.020)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_estimated_is_refused(tracking: Flight) -> None:
     nobody = replace(tracking, tables={**tracking.tables, "truth": tracking.table("truth").head(0)})
     with pytest.raises(WildlabError, match="0 detections"):

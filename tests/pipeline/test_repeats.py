@@ -60,6 +60,7 @@ def test_a_clock_shows_without_a_known_place():
     assert not any("position" in one.causes for one in late.models)
 
 
+@pytest.mark.slow
 def test_calibration_and_clock_have_what_sightings_say(monkeypatch):
     flight, seen, found = unknown(0.3)
     learnt = learn_from(flight, seen, found.diagnosis, np.random.default_rng(0))

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.tracking.poses import overflight
@@ -78,6 +78,7 @@ def test_it_is_the_mean_given_all_measurements(motion, seed):
         np.testing.assert_allclose(found.P, P, atol=1e-6)
 
 
+@settings(max_examples=30)
 @given(SEEDS)
 def test_covariances_are_never_above_the_filters(seed):
     times, z, R = linear_run(seed)
