@@ -42,7 +42,9 @@ def test_of_sound_flights_one_in_ten_has_an_axis_told_from_zero():
 
 
 def test_a_constant_that_is_certain_and_small_is_negligible():
-    found = split_along(normal(2, n=2400) + [0.3, 0.0], {"north": [1.0, 0.0]}, np.arange(2400) // 10)["north"]
+    found = split_along(
+        normal(2, n=2400) + np.array([0.3, 0.0]), {"north": [1.0, 0.0]}, np.arange(2400) // 10
+    )["north"]
     assert found.told and found.share < 0.05 and not found.constant
 
 

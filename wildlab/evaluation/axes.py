@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from wildlab.evaluation.blocks import PROBABILITY, block_mean
 from wildlab.evaluation.runs import Interval
 
-
 #: Share of the squared error below which a constant is of no consequence.
 NEGLIGIBLE = 0.05
 
