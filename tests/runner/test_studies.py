@@ -183,10 +183,8 @@ PAGES = {
     "coloured-noise-fast": Page(2),
     "coloured-noise-drifting": Page(1),
     "schmidt-fast-vessel": Page(3),
-    "schmidt-slow-vessel-eight": Page(1),
     "schmidt-drifting-vessel-eight": Page(1),
     "navigation-fast-vessel": Page(2, judge=navigation),
-    "navigation-slow-vessel-eight": Page(1, judge=navigation),
     "navigation-drifting-vessel-eight": Page(1, judge=navigation),
     "slow-vessel": Page(2),
     "replay": Page(2),
@@ -260,7 +258,9 @@ def trial_gives_what_is_asked(entry: StudyEntry, folder: Path) -> None:
 
 def test_every_study_has_its_page_here() -> None:
     of_logs = {name for name, entry in STUDIES.items() if entry.recipe is not None}
-    assert set(STUDIES) - of_logs - set(PAGES) == {"end-to-end-slow"}
+    # Of one notebook on three flights the first and the longest.
+    left_out = {"end-to-end-slow", "navigation-slow-vessel-eight", "schmidt-slow-vessel-eight"}
+    assert set(STUDIES) - of_logs - set(PAGES) == left_out
 
 
 # -- on logged flights -----------------------------------------------------------------------------------
@@ -325,15 +325,11 @@ def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(
     assert outcome.folder is not None and faults(outcome.folder / "report.html") == []
 
 
-@pytest.mark.parametrize(
-    ("dataset", "study"),
-    [("umn_thor75", "navigation-thor75"), ("inertialnav_x8", "navigation-x8")],
-)
 def test_navigation_of_a_logged_flight(
-    dataset: str, study: str, reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
 ) -> None:
-    flight = imported(tmp_path, dataset.replace("_", "-"), shared_data("logs", dataset))
-    folder = run(study, reports, flight=flight)
+    flight = imported(tmp_path, "inertialnav-x8", shared_data("logs", "inertialnav_x8"))
+    folder = run("navigation-x8", reports, flight=flight)
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert content["kind"] == "logged"
     assert {metric["subject"].split("/")[0] for metric in content["metrics"]} >= {"mekf", "observer"}

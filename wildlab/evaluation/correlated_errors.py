@@ -272,8 +272,13 @@ def estimate_wander(
     first = np.append(start, 0.0)
     bounds = [(value - 3 * PRIOR, value + 3 * PRIOR) for value in start] + [(-4.0, 4.0)]
     # Differences over less are lost in the rounding of thousands of images, and the search stops half way.
-    options = {"maxiter": 200, "ftol": 1e-9, "eps": 1e-5}
-    found = minimize(negative_log_posterior, first, method="L-BFGS-B", bounds=bounds, options=options)
+    found = minimize(
+        negative_log_posterior,
+        first,
+        method="L-BFGS-B",
+        bounds=bounds,
+        options={"maxiter": 200, "ftol": 1e-9, "eps": 1e-5},
+    )
     return WanderFit(WanderNoise.from_logarithms(found.x), negative_log_posterior)
 
 
