@@ -74,7 +74,7 @@ def test_first_looks_in_words() -> None:
     [
         ("[s.first_look]\nruns = 5", "None"),
         ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 5", "own is 5"),
-        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 0", "0 of 'runs'"),
+        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = -1", "-1 of 'runs'"),
         ("[s.parameters]\nruns = 'x'\n[s.first_look]\nruns = 1", "'x'"),
     ],
 )

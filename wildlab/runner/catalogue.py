@@ -113,10 +113,10 @@ class StudyEntry(BaseModel):
             raise ValueError("flights beside the first need a recipe of the first")
         for name, few in self.first_look.items():
             whole = self.parameters.get(name)
-            if isinstance(whole, bool) or not isinstance(whole, int | float) or not 0 < few < whole:
+            if isinstance(whole, bool) or not isinstance(whole, int | float) or not 0 <= few < whole:
                 raise ValueError(
                     f"a first look takes {few} of {name!r}, and the study's own is {whole!r}: "
-                    "give a whole number above 0 and below the study's own"
+                    "give a whole number from 0 to below the study's own"
                 )
         taken = sorted(set(self.parameters) & {*STANDARD_PARAMETERS, OTHERS})
         if taken:
