@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
-import os
 import re
 import signal
 import socket
@@ -202,7 +201,14 @@ def test_images_of_a_flight_are_looked_for_in_the_folders_of_a_card(tmp_path: Pa
 def start(*arguments: Any) -> tuple[subprocess.Popen[str], str]:
     command = [sys.executable, "-m", "wildlab.cli", "click", *map(str, arguments)]
     pipe = subprocess.PIPE
-    process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env={**os.environ})
+    process = subprocess.Popen(
+        command,
+        stdout=pipe,
+        stderr=pipe,
+        text=True,
+        # In the background of a script Ctrl-C is ignored from birth; in a terminal it is not.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     assert process.stdout is not None
     return process, process.stdout.readline().strip()
 

@@ -328,8 +328,8 @@ def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(
 def test_navigation_of_a_logged_flight(
     reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
 ) -> None:
-    flight = imported(tmp_path, "inertialnav-x8", shared_data("logs", "inertialnav_x8"))
-    folder = run("navigation-x8", reports, flight=flight)
+    flight = imported(tmp_path, "umn-thor75", shared_data("logs", "umn_thor75"))
+    folder = run("navigation-thor75", reports, flight=flight)
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert content["kind"] == "logged"
     assert {metric["subject"].split("/")[0] for metric in content["metrics"]} >= {"mekf", "observer"}
