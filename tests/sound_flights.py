@@ -61,9 +61,9 @@ def simulate_sound_flight(kind: str, seed: int) -> Flight:
 
 
 def sound_flights() -> Iterator[tuple[str, int, Flight]]:
-    """Kind, seed, flight: two of each kind, and all sixty where WILDLAB_ALL_SABOTAGE is set."""
+    """Kind, seed, flight: two of each kind, and all sixty where WILDLAB_ALL_FLIGHTS is set."""
     for kind in KINDS:
-        for seed in SEEDS if os.environ.get("WILDLAB_ALL_SABOTAGE") else SEEDS[:2]:
+        for seed in SEEDS if os.environ.get("WILDLAB_ALL_FLIGHTS") else SEEDS[:2]:
             yield kind, seed, simulate_sound_flight(kind, seed)
 
 
