@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -193,10 +194,10 @@ def lines_chart(
     if ground is not None:
         keep = thinned(len(ground[0]))
         at, height = clock(ground[0][keep]), ground[1][keep]
-        ax.plot(at, height, color="#8C6D00", lw=1.2, label="ground")
-    for (name, (times, values)), color in zip(_truth_first(series), _colours(series), strict=True):
+        ax.plot(at, height, color=GREY, ls="-.", lw=1.2, label="ground")
+    for (name, (times, values)), look in zip(_truth_first(series), _looks(series), strict=True):
         keep = thinned(len(times))
-        ax.plot(clock(times[keep]), values[keep], color=color, lw=1.2, label=figure_name(name))
+        ax.plot(clock(times[keep]), values[keep], **look, lw=1.2, label=figure_name(name))
     if floor:
         ax.set_ylim(0, None)
     ax.set_xlabel(clock.label)
@@ -211,11 +212,11 @@ def attitude_chart(series: Mapping[str, tuple[Array, Array]], clock: Clock, titl
     """Roll, pitch and yaw over time, a strip each; jumps at 180 degrees are not joined."""
     fig, axes = new_figure(4.6, 4.8, rows=3, sharex=True)
     for row, axis in enumerate(("roll (°)", "pitch (°)", "yaw (°)")):
-        for (name, (times, angles)), color in zip(_truth_first(series), _colours(series), strict=True):
+        for (name, (times, angles)), look in zip(_truth_first(series), _looks(series), strict=True):
             keep = thinned(len(times))
             t, value = clock(times[keep]), angles[keep, row].copy()
             value[1:][np.abs(np.diff(value)) > 180] = np.nan
-            axes[row].plot(t, value, color=color, lw=1.1, label=figure_name(name) if row == 0 else None)
+            axes[row].plot(t, value, **look, lw=1.1, label=figure_name(name) if row == 0 else None)
         axes[row].set_ylabel(axis)
     axes[0].set_title(title)
     axes[-1].set_xlabel(clock.label)
@@ -229,12 +230,17 @@ def _truth_first(series: Mapping[str, tuple[Array, Array]]) -> list[tuple[str, t
     return sorted(series.items(), key=lambda one: not one[0].startswith("truth"))
 
 
-def _colours(series: Mapping[str, object]) -> list[str]:
-    """Of sources, the truth first: black it, and those that have one the colour of all figures."""
+def _looks(series: Mapping[str, object]) -> list[dict[str, Any]]:
+    """Of sources, the truth first: black it, a second one dashed, and those that have one the colour of all
+    figures."""
     others = iter(LINES * 3)
     named = sorted(series, key=lambda one: not one.startswith("truth"))
+    truths = sum(one.startswith("truth") for one in named)
     return [
-        colour("truth") if name.startswith("truth") else COLOURS.get(name) or next(others) for name in named
+        {"color": colour("truth"), "ls": "--" if index else "-"}
+        if index < truths
+        else {"color": COLOURS.get(name) or next(others)}
+        for index, name in enumerate(named)
     ]
 
 
