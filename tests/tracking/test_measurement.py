@@ -12,7 +12,10 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.tracking import measurement as m
+from wildlab.tracking.combined import combined
+from wildlab.tracking.considering import considering
 from wildlab.tracking.noise import constant_noise, noise_by_altitude
+from wildlab.tracking.platforms import measured_from, polar
 
 
 def slope(function, k, step):
@@ -163,3 +166,32 @@ def test_noise_follows_the_altitude():
     R = noise_by_altitude([100.0, 350.0])
     assert np.allclose(R[1], 17.5**2 * np.eye(2))
     assert np.allclose(constant_noise(2, 3.0, 4.0), np.tile(np.diag([9.0, 16.0]), (2, 1, 1)))
+
+
+@given(pose=POSE, seed=st.integers(0, 99))
+def test_many_positions_are_seen_as_each_alone(pose, seed):
+    """What an unscented filter asks of a sensor for all its points at once."""
+    poses = posed(pose, CAMERA)
+    at, level = poses.p_nb[:2], np.zeros(2)
+    pixels = m.pixels(poses, 0.0)
+    sensors = [
+        m.positions(),
+        m.positions_or_velocities([True, False])._replace(rows=None),
+        pixels,
+        m.azimuths_elevations(poses, 0.0),
+        m.ranges_bearings(at, 0.3),
+        m.bearings(at, 0.3),
+        measured_from(at),
+        polar(poses.p_nb, poses.R_nb, 0.0),
+        considering(pixels, ("u_bias", "clock", "focal", "platform_north"), camera=CAMERA),
+        considering(m.azimuths_elevations(poses, 0.0), ("focal", "heading")),
+        considering(measured_from(at), ("clock",), velocity=level + 2.0),
+        combined([m.ranges_bearings(at, 0.3), m.positions()], [0]),
+    ]
+    states = np.random.default_rng(seed).normal([*at, 0.0, 0.0], 200.0, (7, 4))
+    for sensor in sensors:
+        seen = sensor.predict(0, states[:, : sensor.states])
+        alone = [sensor.predict(0, one[: sensor.states]) for one in states]
+        for many, single in zip(seen, zip(*alone, strict=True), strict=True):
+            together = np.broadcast_to(many, (7, *np.shape(single[0])))
+            np.testing.assert_allclose(together, single, rtol=1e-12, atol=1e-12)

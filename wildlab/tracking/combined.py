@@ -110,11 +110,11 @@ def combined(sensors: Sequence[Sensor], which: ArrayLike) -> Sensor:
 
     def predict(row: int, state: Array) -> Prediction:
         i = kinds[row]
-        seen = sensors[i].predict(int(own_row[row]), state[: sensors[i].states])
+        seen = sensors[i].predict(int(own_row[row]), state[..., : sensors[i].states])
         size = sizes[i]
-        z, H, H_pose = np.zeros(m), np.zeros((m, states)), np.zeros((m, len(names)))
-        z[:size], H[:size] = seen.z, on_state(seen.H_position, states)
-        H_pose[:size, columns[i]] = seen.H_pose
+        z, H, H_pose = (np.zeros((*state.shape[:-1], m, *more)) for more in ((), (states,), (len(names),)))
+        z[..., :size], H[..., :size, :] = seen.z, on_state(seen.H_position, states)
+        H_pose[..., :size, columns[i]] = seen.H_pose
         return Prediction(z, H, H_pose)
 
     def ray(row: int, z: Array) -> tuple[Array, Array]:

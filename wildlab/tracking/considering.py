@@ -79,7 +79,7 @@ def considering(
     by_state = "clock" in wanted and "clock" not in sensor.considers and own is None
 
     def predict(row: int, state: Array) -> Prediction:
-        seen = sensor.predict(row, state[: sensor.states])
+        seen = sensor.predict(row, state[..., : sensor.states])
         columns = []
         for name in wanted:
             if name in sensor.considers:
@@ -89,9 +89,9 @@ def considering(
             elif name == "focal":
                 columns.append(_by_focal(seen.z, camera))
             else:
-                v = state[2:4] if own is None else row_of(own, row, 1)
+                v = state[..., 2:4] if own is None else row_of(own, row, 1)
                 columns.append(_by_clock(seen, sensor, v, None if gone is None else row_of(gone, row, 1)))
-        return seen._replace(H_pose=np.stack(columns, axis=-1))
+        return seen._replace(H_pose=np.stack(np.broadcast_arrays(*columns), axis=-1))
 
     known_rows = [len(a) for a in (gone, own) if a is not None and a.ndim == 2]
     return sensor._replace(
@@ -103,8 +103,8 @@ def considering(
 
 
 def _by_clock(seen: Prediction, sensor: Sensor, velocity: Array, moves: Array | None) -> Array:
-    """(m,) derivative for a stamp that is too early: target and platform have gone on."""
-    at = np.asarray(seen.H_position[..., :2] @ velocity)
+    """(..., m) derivative for a stamp that is too early: target and platform have gone on."""
+    at = np.asarray(np.einsum("...ij,...j->...i", seen.H_position[..., :2], velocity))
     if moves is not None:
         place = POSE[: len(moves)]
         for name, rate in zip(place, moves, strict=True):
@@ -114,10 +114,10 @@ def _by_clock(seen: Prediction, sensor: Sensor, velocity: Array, moves: Array | 
 
 
 def _by_focal(z: Array, camera: Camera | None) -> Array:
-    """(m,) derivative for the relative error of the focal length: pixels move out, elevations in c down."""
+    """(..., m) derivative for the relative error of the focal length: pixels move out, elevations down."""
     if camera is not None:
         return np.asarray(z - np.array([camera.cx, camera.cy]))
-    return np.array([0.0, -np.sin(z[1]) * np.cos(z[1])])
+    return np.stack([np.zeros(z.shape[:-1]), -np.sin(z[..., 1]) * np.cos(z[..., 1])], axis=-1)
 
 
 def renamed(sensor: Sensor, names: Mapping[str, str]) -> Sensor:

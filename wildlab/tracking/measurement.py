@@ -83,7 +83,7 @@ def positions_or_velocities(is_velocity: ArrayLike) -> Sensor:
     def predict(row: int, state: Array) -> Prediction:
         first = 2 if kinds[row] else 0
         H = np.eye(4)[first : first + 2]
-        return Prediction(np.array(state[first : first + 2], float), H, np.zeros((2, 6)))
+        return Prediction(np.array(state[..., first : first + 2], float), H, np.zeros((2, 6)))
 
     def locate(row: int, z: Array) -> Array:
         return np.full(2, np.nan) if kinds[row] else np.array(z, float)

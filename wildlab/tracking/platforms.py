@@ -71,7 +71,7 @@ def bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
 
     def predict(row: int, position: Array) -> Prediction:
         both = predict_range_bearing(position, row_of(platform, row, 1), row_of(yaw, row, 0))
-        return Prediction(both.z[1:], both.H_position[1:], both.H_pose[1:])
+        return Prediction(both.z[..., 1:], both.H_position[..., 1:, :], both.H_pose[..., 1:, :])
 
     return Sensor(
         predict, (True,), _platform_rows(platform, yaw), elements=("bearing",),
@@ -154,7 +154,7 @@ def polar(
         whole = predict_polar(
             position, row_of(platform, row, 1), row_of(R_nb, row, 2), row_of(plane_down, row, 0)
         )
-        return Prediction(whole.z[which], whole.H_position[which], whole.H_pose[which])
+        return Prediction(whole.z[..., which], whole.H_position[..., which, :], whole.H_pose[..., which, :])
 
     def ray(row: int, z: Array) -> tuple[Array, Array]:
         azimuth = z[elements.index("azimuth")]

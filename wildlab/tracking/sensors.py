@@ -28,12 +28,12 @@ Locate = Callable[[int, Array], Array]
 
 
 class Sensor(NamedTuple):
-    """A sensor on its way: ``predict(row, position)`` for a row of the run and the target's (2,) north, east.
+    """A sensor on its way: ``predict(row, positions)`` of targets at (..., 2) north, east, at a row of a run.
 
     Attributes
     ----------
     predict
-        Row and (2,) position, or (4,) where ``states`` says so, to a `Prediction`.
+        Row and (..., 2) positions, or (..., 4) where ``states`` says so, to a `Prediction`.
     angles
         (m,) which elements are angles, whose differences are wrapped.
     rows

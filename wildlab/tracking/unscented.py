@@ -105,7 +105,7 @@ def run_unscented(
         prior = given.times[row], ukf.x.copy(), (ukf.P + ukf.P.T) / 2
         if not np.isfinite(given.z[row, 0]).all():
             return prior
-        seen = np.array([sensor.predict(row, point[: sensor.states]).z for point in ukf.sigmas_f])
+        seen = sensor.predict(row, ukf.sigmas_f[:, : sensor.states]).z
         if not np.isfinite(seen).all():
             return prior
         noise = given.R[row, 0]
