@@ -48,6 +48,17 @@ def test_a_constant_that_is_certain_and_small_is_negligible():
     assert found.told and found.share < 0.05 and not found.constant
 
 
+def test_the_share_is_of_all_points_where_only_some_have_the_axis():
+    """What taking the constant off where it is takes off the squared error."""
+    errors, axis = normal(3), np.tile([1.0, 0.0], (240, 1))
+    errors[:24, 0] += 3.0
+    axis[24:] = np.nan
+    one = split_along(errors, {"some": axis}, BLOCKS)["some"]
+    without = errors.copy()
+    without[:24, 0] -= one.mean.estimate
+    assert one.share == pytest.approx(1 - (without**2).sum() / (errors**2).sum(), rel=1e-6)
+
+
 def test_points_without_an_axis_and_lost_points_are_left_out():
     errors = np.array([[1.0, 0.0], [np.nan, np.nan], [3.0, 0.0]])
     axes = {"seen": np.array([[1.0, 0.0], [1.0, 0.0], [np.nan, np.nan]]), "none": np.full((3, 2), np.nan)}

@@ -187,7 +187,7 @@ def test_what_is_left_is_sorted_and_in_one_unit():
 def test_an_axis_is_constant_by_its_interval():
     one, other = Interval(3.0, 2.0, 4.0), Interval(1.0, -1.0, 3.0)
     table = cause.axes_table({"north": AlongAxis(one, 0.5, 9), "east": AlongAxis(other, 0.1, 9)})
-    assert [one == "constant" for one in table["verdict"]] == [True, False]
+    assert [one == "lasting" for one in table["verdict"]] == [True, False]
     assert table["share"].tolist() == [50.0, 10.0]
 
 

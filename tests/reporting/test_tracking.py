@@ -50,7 +50,13 @@ def test_where_no_filter_is_consistent_the_least_error_leads() -> None:
 @pytest.mark.parametrize(("nis", "level"), [(4.0, "good"), (5.0, "warn"), (20.0, "warn")])
 def test_a_filter_that_its_detections_surprise_is_looked_at(nis: float, level: str) -> None:
     # Of two elements: 1.5 times is 4.5.
-    assert colour(rows(nis=nis, nis_verdict="overconfident")) == level
+    odd = rows(nis=nis, nis_verdict="overconfident")
+    assert colour(odd) == level
+    assert ("detections" in words.reason_of(odd)) == (level == "warn")
+
+
+def test_few_detections_do_not_surprise() -> None:
+    assert colour(rows(nis=4.6, nis_high=3.9, nis_worth=6.0, nis_verdict="overconfident")) == "good"
 
 
 def blind() -> pd.DataFrame:

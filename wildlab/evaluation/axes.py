@@ -21,7 +21,8 @@ class AlongAxis(NamedTuple):
     Attributes
     ----------
     mean
-        Of the component, m, with its interval from the blocks: those of all axes hold at once.
+        Of the component, m, with its interval from the blocks: those of all axes hold at once, where blocks
+        are longer than errors last.
     share
         Of the mean square of the whole error that a constant of that size takes off, 0 to 1.
     n
@@ -39,7 +40,7 @@ class AlongAxis(NamedTuple):
 
     @property
     def constant(self) -> bool:
-        """Whether it does, and the constant matters."""
+        """Whether it does, and the constant matters; what wanders more slowly than the flight does, too."""
         return self.told and self.share >= NEGLIGIBLE
 
 
@@ -70,7 +71,8 @@ def split_along(
     3.0
     """
     e = np.asarray(errors, float)
-    square = float(np.nanmean((e**2).sum(axis=1))) if np.isfinite(e).any() else float("nan")
+    known = int(np.isfinite(e).all(axis=1).sum())
+    square = float(np.nanmean((e**2).sum(axis=1))) if known else float("nan")
     found = {}
     each = 1 - (1 - probability) / max(len(axes), 1)
     for name, vectors in axes.items():
@@ -78,6 +80,6 @@ def split_along(
         n = int(np.isfinite(component).sum())
         if n:
             mean = block_mean(component, blocks, each)
-            share = mean.estimate**2 / square if square > 0 else 0.0
+            share = mean.estimate**2 * n / (square * known) if square > 0 else 0.0
             found[name] = AlongAxis(mean, float(share), n)
     return found

@@ -396,7 +396,7 @@ def axes_table(axes: dict[str, AlongAxis]) -> pd.DataFrame:
             "mean": one.mean.estimate,
             "interval": f"{one.mean.low:+.1f} to {one.mean.high:+.1f}",
             "share": 100 * one.share,
-            "verdict": "constant" if one.constant else "negligible" if one.told else "not told from zero",
+            "verdict": "lasting" if one.constant else "negligible" if one.told else "not told from zero",
         }
         for name, one in axes.items()
     ]

@@ -172,7 +172,8 @@ def cause_section(report: Report, found: Accuracy) -> None:
             "verdict": "verdict",
         },
         digits={"mean": 1, "share": 0},
-        caption="Errors along axes of the world, of the camera and of the course, nothing taken off.",
+        caption="Errors along axes of the world, of the camera and of the course, nothing taken off. "
+        "Lasting: constant, or slower than the flight; negligible: under a twentieth of the squared error.",
     )
     _far_out(report, diagnosis)
     if found.nearest is not None:

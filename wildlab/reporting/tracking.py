@@ -117,10 +117,7 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
     if not (rows["detections"] > 0).any() and (rows["used"] > 0).any():
         return ["One detection started a track, and none followed: nothing can be judged."], Verdict.MEND
     if not (rows["detections"] > 0).any():
-        return (
-            ["No track was started: no detection gives a place to start from near a target."],
-            Verdict.MEND,
-        )
+        return ["No track was started: no detection gives a place near a target."], Verdict.MEND
     known = rows[rows["compared"] > 0]
     said, word = _with_truth(known) if len(known) else _without_truth(rows[rows["detections"] > 0], pairs)
     pairs_of = [group for _, group in rows.groupby(["sensor", "target"], sort=False)]
@@ -157,7 +154,8 @@ def reason_of(rows: pd.DataFrame) -> str:
         ("verdict", "errors") if len(known) else ("nis_verdict", "distances from where it was expected")
     )
     what = "track" if len(mine) == 1 else "tracks"
-    return f"{len(mine)} {what}, by the size of their {of}: {_counts(mine, column)}."
+    reason = f"{len(mine)} {what}, by the size of their {of}: {_counts(mine, column)}"
+    return reason + (", but for their detections." if len(known) and len(_surprised(mine)) else ".")
 
 
 def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
@@ -181,7 +179,8 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
     surprised = _surprised(mine)
     if len(surprised):
         times = float(np.sqrt((surprised["nis"] / surprised["dof"]).median()))
-        said.append(f"Detections fall {times:.1f} times as far from where it expects them as it states.")
+        of = "" if len(mine) == 1 else f" of {len(surprised)} of the {len(mine)} tracks"
+        said.append(f"Detections{of} fall {times:.1f} times as far from where they are expected as stated.")
     unseen = mine[mine["without"] > 0]
     if len(unseen):
         wait = f"; the longest wait is {unseen['wait'].max():.1f} s" if unseen["wait"].notna().any() else ""
@@ -216,7 +215,8 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:
 def _surprised(rows: pd.DataFrame) -> pd.DataFrame:
     """Tracks whose errors are as stated, and whose detections are not where they expect them."""
     beyond = np.sqrt(rows["nis"] / rows["dof"]) > SURPRISED
-    return rows[(rows["verdict"] == CONSISTENT) & (rows["nis_verdict"] == OVERCONFIDENT) & beyond]
+    beyond &= (rows["verdict"] == CONSISTENT) & (rows["nis_verdict"] == OVERCONFIDENT)
+    return rows[beyond & ~rows.apply(on_few, axis=1, what="nis")]
 
 
 def _smoothed(mine: pd.DataFrame, smoothed: pd.DataFrame | None) -> list[str]:

@@ -24,7 +24,7 @@ POSE = ("platform_north", "platform_east", "platform_down", "roll", "pitch", "he
 
 
 class Prediction(NamedTuple):
-    """Expected measurement and its derivatives; leading axes as the input's."""
+    """Expected measurement and its derivatives; leading axes as the input's, or none where all are alike."""
 
     z: Array  # (..., m)
     H_position: Array  # (..., m, 2) north and east of the target; (..., m, 4) where velocity is seen too
