@@ -68,7 +68,7 @@ def make_studies(folder: Path, pids: Path) -> Path:
     entries = []
     for name, cells in {**STUDIES, "slow": [OPEN, HEAD, SLEEP.format(str(pids))]}.items():
         write(folder, f"{name}.ipynb", notebook(*cells, more="runs = 3"))
-        limit = "timeout_minutes = 0.5\n" if name == "slow" else ""
+        limit = "timeout_minutes = 0.75\n" if name == "slow" else ""
         entries.append(f'[{name}]\ntitle = "Study {name}"\nnotebook = "{name}.ipynb"\n{limit}')
         entries.append(f"[{name}.parameters]\nruns = 5\n")
     (folder / "studies.toml").write_text("".join(entries))
@@ -148,7 +148,7 @@ def test_the_same_seed_gives_the_same_numbers_and_figures(ran: Ran) -> None:
         ("dies", "crashed or was ended from outside", "A heading"),
         ("unsaved", "wrote no metrics.json", "The hard part"),
         ("scripted", "has a <script>", ""),
-        ("slow", "time limit of 30 seconds", "The hard part"),
+        ("slow", "time limit of 45 seconds", "The hard part"),
     ],
 )
 def test_a_failed_run_says_so_in_words(ran: Ran, study: str, reason: str, step: str) -> None:
