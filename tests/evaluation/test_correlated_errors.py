@@ -24,8 +24,8 @@ def drawn_points(images=40, seed=0, every=3.0):
     n = 4 * images
     return PosePoints(
         rng.normal(size=(n, 2, 6)) * [1.0, 1.0, 1.0, 70.0, 70.0, 70.0],
-        np.tile(0.02**2 * np.eye(2), (n, 1, 1)),
-        np.tile(0.05**2 * np.eye(2), (n, 1, 1)),
+        np.tile(0.02**2 * np.array([[1.0, -0.4], [-0.4, 0.8]]), (n, 1, 1)),
+        np.tile(0.05**2 * np.array([[1.0, 0.6], [0.6, 2.0]]), (n, 1, 1)),
         rng.permutation(np.repeat(every * np.arange(images), 4)),
     )
 

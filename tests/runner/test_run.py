@@ -232,6 +232,51 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path: Path, number
     assert left() == [], "nothing is left of the work, whoever ended it"
 
 
+#: A notebook that ends as soon as what it waits for does, in a process whose folders take a while to remove.
+KILLED = """
+import multiprocessing, shutil, subprocess, sys, time
+from pathlib import Path
+from wildlab.runner.processes import notebook_process
+from wildlab.runner.processes.ending import start_process
+from wildlab.runner.processes.job import Job
+
+def body(pipe, job, begun):
+    remove = shutil.rmtree
+    def outcome(*_):
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
+        Path(begun).touch()
+        child.wait()
+        return ("done",)
+    notebook_process._outcome = outcome
+    shutil.rmtree = lambda folder, **more: (time.sleep(1.0), remove(folder, **more))
+    notebook_process.run_notebook(pipe, job)
+
+if __name__ == "__main__":
+    base = Path(sys.argv[1])
+    theirs, ours = multiprocessing.Pipe()
+    job = Job("a", "A", "a.ipynb", work=str(base / "work"), runtime=str(base / "runtime"), reports=str(base))
+    start_process("a", body, ours, job, str(base / "begun"))
+    time.sleep(300)
+"""
+
+
+def test_a_notebook_whose_runner_is_killed_does_not_end_before_its_folders_are_gone(tmp_path: Path) -> None:
+    program, folders = tmp_path / "program.py", [tmp_path / "work", tmp_path / "runtime"]
+    program.write_text(KILLED)
+    for folder in folders:
+        folder.mkdir()
+    runner = subprocess.Popen([sys.executable, str(program), str(tmp_path)], start_new_session=True)
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "begun").exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    os.killpg(runner.pid, signal.SIGKILL)
+    runner.wait(20)
+    deadline = time.monotonic() + 30
+    while any(folder.exists() for folder in folders) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not any(folder.exists() for folder in folders)
+
+
 def test_wrong_use_is_an_error_before_anything_runs(tmp_path: Path) -> None:
     notebooks = make_studies(tmp_path / "notebooks", tmp_path / "pids")
     for names, more, sentence in (

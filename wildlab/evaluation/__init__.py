@@ -14,8 +14,7 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `summarise`, `scatter_by_image`, `bootstrap_interval`, `estimate_pose_noise`: single positions, and why they
   err; `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
 - `held_out`, `gain_of`, `rank_models`: which constant error is behind them, `estimate_wander`: against noise
-that
-  is correlated in time; `split_along`; `find_outliers`.
+  that is correlated in time; `split_along`; `find_outliers`.
 - `judge_ellipses`, `try_averaging`, `spread_of_sightings`, `ambiguous`: what they are worth.
 """
 

@@ -71,8 +71,7 @@ def split_along(
     3.0
     """
     e = np.asarray(errors, float)
-    known = int(np.isfinite(e).all(axis=1).sum())
-    square = float(np.nanmean((e**2).sum(axis=1))) if known else float("nan")
+    squares = float(np.nansum((e**2).sum(axis=1)))
     found = {}
     each = 1 - (1 - probability) / max(len(axes), 1)
     for name, vectors in axes.items():
@@ -80,6 +79,6 @@ def split_along(
         n = int(np.isfinite(component).sum())
         if n:
             mean = block_mean(component, blocks, each)
-            share = mean.estimate**2 * n / (square * known) if square > 0 else 0.0
+            share = n * mean.estimate**2 / squares if squares > 0 else 0.0
             found[name] = AlongAxis(mean, float(share), n)
     return found

@@ -89,7 +89,7 @@ def size_words(nees: float) -> str:
 
 #: Where no filter is consistent.
 NONE_CONSISTENT = "No filter is consistent; that of the least error leads."
-#: How many times as far from where a filter expects them as it states detections fall, before that troubles.
+#: Detections may fall this many times as far from where they are expected as stated.
 SURPRISED = 1.5
 #: What is said of a verdict by a mean of few independent values.
 FEW = "on few independent values"
@@ -154,8 +154,8 @@ def reason_of(rows: pd.DataFrame) -> str:
         ("verdict", "errors") if len(known) else ("nis_verdict", "distances from where it was expected")
     )
     what = "track" if len(mine) == 1 else "tracks"
-    reason = f"{len(mine)} {what}, by the size of their {of}: {_counts(mine, column)}"
-    return reason + (", but for their detections." if len(known) and len(_surprised(mine)) else ".")
+    more = "; detections lie farther off than stated" if len(known) and len(_surprised(mine)) else ""
+    return f"{len(mine)} {what}, by the size of their {of}: {_counts(mine, column)}{more}."
 
 
 def _with_truth(rows: pd.DataFrame) -> tuple[list[str], Verdict]:

@@ -233,7 +233,8 @@ def _truth_first(series: Mapping[str, tuple[Array, Array]]) -> list[tuple[str, t
 def _looks(series: Mapping[str, object]) -> list[dict[str, Any]]:
     """Of sources, the truth first: black it, a second one dashed, and those that have one the colour of all
     figures."""
-    others = iter(LINES * 3)
+    taken = {COLOURS.get(name) for name in series}
+    others = iter((*(one for one in LINES if one not in taken), *LINES * 3))
     named = sorted(series, key=lambda one: not one.startswith("truth"))
     truths = sum(one.startswith("truth") for one in named)
     return [
