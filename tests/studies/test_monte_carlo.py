@@ -48,6 +48,14 @@ def test_published_beside_flights(report: Report) -> None:
         monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["speed"])
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_digits_of_a_range_are_those_of_its_size(sign: float) -> None:
+    report = open_report(study="static-point", kind="twin")
+    spread = pd.DataFrame({("observer", "mean_east"): sign * np.array([1.2098, 2.6001])})
+    (row,) = monte_carlo.beside_published(report, spread, {"observer": "x"}, ["mean_east"])["range"]
+    assert sorted(one.strip("\N{MINUS SIGN}") for one in row.split(" to ")) == ["1.2", "2.6"]
+
+
 def test_a_number_that_needs_what_is_not_printed_is_not_judged(report: Report) -> None:
     """Even where ours is the printed one: as printed and turned by a right angle it would say two things."""
     row = report.printed("mae", "ekf")

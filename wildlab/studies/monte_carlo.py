@@ -227,7 +227,7 @@ def beside_published(
                     "published": abs(row["value"]) if by_size else row["value"],
                     "here": found.get("value", np.nan),
                     "ratio": "" if compared is None else comparison_words(compared),
-                    "range": range_words(values, _decimals(np.nanmax(values, initial=0.0))),
+                    "range": range_words(values, _decimals(float(np.nanmax(np.abs(values), initial=0.0)))),
                     "below": "" if below is None else f"{100 * below:.0f} %",
                     "verdict": ""
                     if compared is None
