@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import bdtr
 
 Array = NDArray[np.float64]
 
@@ -78,6 +77,8 @@ def false_outside(flights: int) -> float:
 @lru_cache(maxsize=256)
 def _median_rank(flights: int) -> int:
     """The number below the median is binomial: the largest rank that each side passes with at most 5 %."""
+    from scipy.special import bdtr
+
     below = bdtr(np.arange(flights), flights, 0.5)
     return int(np.searchsorted(below, (1 - LEVEL) / 2 + 1e-9, "right"))
 

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, BinaryIO
 
-import pooch
 from pydantic import Field, RootModel, field_validator
 
 from wildlab.errors import WildlabError, system_error
@@ -246,6 +245,8 @@ def _copy(mirror: Path, file: DataFile, target: Path) -> None:
 
 def _download(file: DataFile, target: Path) -> None:
     # Asked not to compress: a small answer must not become a large file.
+    import pooch
+
     download = pooch.HTTPDownloader(timeout=TIMEOUT_S, headers={"Accept-Encoding": "identity"})
     try:
         with target.open("wb") as copy:

@@ -43,13 +43,14 @@ from collections.abc import Mapping
 from decimal import Decimal
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from wildlab.errors import WildlabError
 from wildlab.paths import DATA
 from wildlab.reporting.metrics import metric
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FOLDER = DATA / "published"
 
@@ -126,30 +127,9 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     >>> len(load_published("consistency-bounds"))
     6
     """
-    rows = [
-        {
-            **{key: entry[key] for key in ("name", "subject", "unit", "source")},
-            "value": float(entry["value"]),
-            "digits": _decimals(entry["value"]),
-            "rounding": _rounding(entry),
-            "kind": entry["kind"],
-            "by_size": entry["signs"] == "undefined" and quantity_kind(entry["name"]) == "signed mean",
-            "runs": float(entry.get("runs", math.nan)),
-            "again": bool(entry.get("again", False)),
-            "fitted": entry.get("fitted", ""),
-            "unjudged": entry.get("unjudged", ""),
-        }
-        for entry in _entries("number", folder)
-        if entry["study"] == study
-    ]
-    frame = pd.DataFrame(rows, columns=_COLUMNS)
-    twice = frame[frame.duplicated(["name", "subject"])]
-    if len(twice):
-        name, subject = twice.iloc[0]["name"], twice.iloc[0]["subject"]
-        raise WildlabError(
-            f"{name} of {subject} of study {study!r} is given twice", "keep one of them", file=folder.name
-        )
-    return frame
+    import pandas as pd  # `wildlab list` takes the rows alone, and is there in half the time
+
+    return pd.DataFrame(published_rows(study, folder), columns=_COLUMNS)
 
 
 def quantity_kind(name: str) -> str:
@@ -174,18 +154,32 @@ def quantity_kind(name: str) -> str:
 
 
 def published_rows(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
-    """The rows of `load_published`.
-
-    Parameters
-    ----------
-    study, folder
-        As for `load_published`.
-
-    Returns
-    -------
-    list of dict
-    """
-    return [dict(zip(_COLUMNS, row, strict=True)) for row in load_published(study, folder).to_numpy(object)]
+    """The rows of `load_published`, with its arguments and errors."""
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    for entry in _entries("number", folder):
+        if entry["study"] != study:
+            continue
+        name, subject = entry["name"], entry["subject"]
+        if (name, subject) in rows:
+            raise WildlabError(
+                f"{name} of {subject} of study {study!r} is given twice", "keep one of them", file=folder.name
+            )
+        rows[name, subject] = {
+            "name": name,
+            "subject": subject,
+            "value": float(entry["value"]),
+            "digits": _decimals(entry["value"]),
+            "unit": entry["unit"],
+            "source": entry["source"],
+            "rounding": _rounding(entry),
+            "kind": entry["kind"],
+            "by_size": entry["signs"] == "undefined" and quantity_kind(name) == "signed mean",
+            "runs": float(entry.get("runs", math.nan)),
+            "again": bool(entry.get("again", False)),
+            "fitted": entry.get("fitted", ""),
+            "unjudged": entry.get("unjudged", ""),
+        }
+    return list(rows.values())
 
 
 def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
@@ -203,7 +197,7 @@ def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
     -------
     list of dict
     """
-    return [entry for entry in _entries("claim", folder) if entry["study"] == study]
+    return [dict(entry) for entry in _entries("claim", folder) if entry["study"] == study]
 
 
 def _entries(kind: str, folder: Path) -> list[dict[str, Any]]:
@@ -211,33 +205,30 @@ def _entries(kind: str, folder: Path) -> list[dict[str, Any]]:
     for path in sorted(folder.glob("*.toml")):
         try:
             state = path.stat()
-            content = _content(path, state.st_mtime_ns, state.st_size)
+            entries += _read(path, kind, state.st_mtime_ns, state.st_size)
         except (OSError, ValueError) as error:
             raise WildlabError(f"it cannot be read ({error})", "mend the file", file=path.name) from error
-        unknown = set(content) - set(_REQUIRED) - set(_OF_FILE)
-        if unknown:
-            raise WildlabError(
-                f"the table [[{min(unknown)}]] is unknown", "use [[number]] or [[claim]]", file=path.name
-            )
-        of_file = {key: content.get(key, words[0]) for key, words in _OF_FILE.items()}
-        for key, value in of_file.items():
-            _check_word(key, value, path.name, key)
-        values = [entry.get("value", 0) for entry in content.get("number", [])]
-        of_file["digits"] = max(
-            (_decimals(one) for one in values if isinstance(one, (Decimal, int))), default=0
-        )
-        for index, entry in enumerate(content.get(kind, []), 1):
-            _check_entry(entry, kind, f"[[{kind}]] {index}", path.name)
-            entries.append(of_file | entry if kind == "number" else dict(entry))
     return entries
 
 
-@lru_cache(maxsize=128)
-def _content(path: Path, changed: int, size: int) -> dict[str, Any]:
-    """A file, read once as long as it stays the same: each study asks for all of them, twice, each time the
-    front page is put together."""
+@lru_cache(maxsize=256)
+def _read(path: Path, kind: str, changed: int, size: int) -> list[dict[str, Any]]:
+    """The entries of a file, read once as long as it stays the same: each study asks for all of them."""
     # Decimals, so that 7.90 keeps its second digit: it says how far the print can be trusted.
-    return tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
+    content = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
+    unknown = set(content) - set(_REQUIRED) - set(_OF_FILE)
+    if unknown:
+        raise WildlabError(
+            f"the table [[{min(unknown)}]] is unknown", "use [[number]] or [[claim]]", file=path.name
+        )
+    of_file = {key: content.get(key, words[0]) for key, words in _OF_FILE.items()}
+    for key, value in of_file.items():
+        _check_word(key, value, path.name, key)
+    values = [entry.get("value", 0) for entry in content.get("number", [])]
+    of_file["digits"] = max((_decimals(one) for one in values if isinstance(one, (Decimal, int))), default=0)
+    for index, entry in enumerate(content.get(kind, []), 1):
+        _check_entry(entry, kind, f"[[{kind}]] {index}", path.name)
+    return [of_file | entry if kind == "number" else dict(entry) for entry in content.get(kind, [])]
 
 
 def _check_word(key: str, value: Any, file: str, where: str) -> None:

@@ -34,14 +34,15 @@ import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
 from wildlab import studies
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
-from wildlab.simulation.variation import varied
+
+if TYPE_CHECKING:
+    from wildlab.evaluation.shares import Check
 
 #: The parameter of `run_trial` that moves the twins.
 VARIED = "varied"
@@ -129,6 +130,8 @@ def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:
         If there is no such case, it has no trial, or what it gives is not numbers by (subject, name); and
         whatever the trial raises.
     """
+    from wildlab.simulation.variation import varied  # who lists the studies moves none
+
     trial = find_case(case).trial
     if trial is None:
         raise WildlabError(f"the case {case!r} has no trial for each seed", "give it one, or leave seeds out")
