@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ os.environ.update(ONE_THREAD)
 # Letters of figures as shapes, not as a font: a third of the time of a page.
 os.environ.setdefault("WILDLAB_QUICK_FIGURES", "1")
 
+import psutil
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -27,6 +30,17 @@ IN_CI = os.environ.get("CI", "").lower() not in ("", "0", "false")
 settings.register_profile("here", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("ci", parent=settings.get_profile("here"), derandomize=True, print_blob=True)
 settings.load_profile("ci" if IN_CI else "here")
+
+
+def pytest_configure() -> None:
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def pytest_keyboard_interrupt() -> None:
+    """Told to end: what the tests have started ends as well, and no process waits for the end of its test."""
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            process.kill()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
