@@ -277,13 +277,28 @@ def predict_measurement(
 
 
 @compiled
+def columns_of(H: Array, m: int) -> Integers:
+    """The columns in which any of the first m rows has a value."""
+    used, count = np.empty(H.shape[1], np.int64), 0
+    for j in range(H.shape[1]):
+        for a in range(m):
+            if H[a, j] != 0:
+                used[count] = j
+                count += 1
+                break
+    return used[:count]
+
+
+@compiled
 def correct(
-    x: Array, P: Array, H: Array, m: int, y: Array, variance: Array, axes: bool, S_inverse: Array, PH: Array,
-    K: Array, M: Array, work: Array,
+    x: Array, P: Array, H: Array, used: Integers, m: int, y: Array, variance: Array, axes: bool,
+    S_inverse: Array, HP: Array, K: Array, M: Array, work: Array,
 ) -> None:  # fmt: skip
     """Measurement update, Joseph form; the attitude error is then folded into the quaternion.
 
-    Errors of the axes have no gain, as in a Schmidt filter: they are considered, not estimated.
+    H has values in the columns ``used`` alone. K (3, n) is the gain's transpose, HP (3, n) is ``H P``: along
+    rows the processor takes several columns at once. Errors of the axes have no gain, as in a Schmidt filter:
+    they are considered, not estimated.
     """
     n = P.shape[0]
     dx = np.zeros(n)
@@ -293,23 +308,26 @@ def correct(
             continue
         for a in range(m):
             for b in range(m):
-                K[i, a] += PH[i, b] * S_inverse[b, a]
-            dx[i] += K[i, a] * y[a]
-    # (I - K H) P (I - K H)' + K R K', the two products one after the other, H P being PH'.
-    for i in range(n):
-        for j in range(n):
-            M[i, j] = P[i, j]
-            for a in range(m):
-                M[i, j] -= K[i, a] * PH[j, a]
+                K[a, i] += HP[b, i] * S_inverse[b, a]
+            dx[i] += K[a, i] * y[a]
+    # (I - K H) P (I - K H)' + K R K', the two products one after the other.
+    M[:] = P
     for i in range(n):
         for a in range(m):
-            PH[i, a] = -K[i, a] * variance[a]
+            gain = K[a, i]
             for j in range(n):
-                PH[i, a] += M[i, j] * H[a, j]
+                M[i, j] -= gain * HP[a, j]
+    for a in range(m):
+        for i in range(n):
+            left = -K[a, i] * variance[a]
+            for j in used:
+                left += M[i, j] * H[a, j]
+            HP[a, i] = left
     for i in range(n):
-        for j in range(n):
-            for a in range(m):
-                M[i, j] -= PH[i, a] * K[j, a]
+        for a in range(m):
+            left = HP[a, i]
+            for j in range(n):
+                M[i, j] -= left * K[a, j]
     x[:6] += dx[:6]
     x[10:] += dx[9:]
     # Four times the modified Rodrigues parameters, H (7.16), as a quaternion.
@@ -323,15 +341,15 @@ def correct(
     x[6:10] = q
     # What is left of the attitude error is now seen from the turned body: I - S(dx / 2) on both sides.
     h0, h1, h2 = dx[6] / 2, dx[7] / 2, dx[8] / 2
-    for _ in range(2):
-        for j in range(n):
-            a0, a1, a2 = M[6, j], M[7, j], M[8, j]
-            M[6, j] = a0 + h2 * a1 - h1 * a2
-            M[7, j] = a1 + h0 * a2 - h2 * a0
-            M[8, j] = a2 + h1 * a0 - h0 * a1
-        P[:] = M.T
-        M[:] = P
-    P[:] = (M + M.T) / 2
+    for j in range(n):
+        a0, a1, a2 = M[6, j], M[7, j], M[8, j]
+        M[6, j], M[7, j], M[8, j] = a0 + h2 * a1 - h1 * a2, a1 + h0 * a2 - h2 * a0, a2 + h1 * a0 - h0 * a1
+    for i in range(n):
+        a0, a1, a2 = M[i, 6], M[i, 7], M[i, 8]
+        M[i, 6], M[i, 7], M[i, 8] = a0 + h2 * a1 - h1 * a2, a1 + h0 * a2 - h2 * a0, a2 + h1 * a0 - h0 * a1
+    for i in range(n):
+        for j in range(i + 1):
+            P[i, j] = P[j, i] = (M[i, j] + M[j, i]) / 2
 
 
 @compiled
@@ -348,7 +366,7 @@ def mekf(
     f_mean, w_mean, f_n, y = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     f_felt, w_felt, slow = np.zeros(3), np.zeros(3), np.empty((6, n))
     H, S, S_inverse = np.empty((3, n)), np.empty((3, 3)), np.empty((3, 3))
-    PH, K, M = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, n))
+    HP, K, M = np.empty((3, n)), np.empty((3, n)), np.empty((n, n))
     rejected_since = np.full(3, np.nan)
     event = 0
     for k in range(len(times)):
@@ -391,18 +409,19 @@ def mekf(
             if gauss_markov[event] >= 0:
                 y -= x[1 + gauss_markov[event] : 4 + gauss_markov[event]]
                 H[:, gauss_markov[event] : gauss_markov[event] + 3] = np.eye(3)
+            used = columns_of(H, m)
             growth = 1.0
             while True:
-                PH[:] = 0.0
-                for i in range(n):
-                    for a in range(m):
-                        for j in range(n):
-                            PH[i, a] += growth * P[i, j] * H[a, j]
+                HP[:] = 0.0
+                for a in range(m):
+                    for i in range(n):
+                        for j in used:
+                            HP[a, i] += growth * P[i, j] * H[a, j]
                 for a in range(m):
                     for b in range(m):
                         S[a, b] = variance[event, a] if a == b else 0.0
-                        for j in range(n):
-                            S[a, b] += H[a, j] * PH[j, b]
+                        for j in used:
+                            S[a, b] += H[a, j] * HP[b, j]
                 invert(S, m, S_inverse)
                 square = 0.0
                 for a in range(m):
@@ -428,7 +447,7 @@ def mekf(
                 growth *= 2.0
             if verdicts[event] != REJECTED:
                 P *= growth
-                correct(x, P, H, m, y, variance[event], axes, S_inverse, PH, K, M, work)
+                correct(x, P, H, used, m, y, variance[event], axes, S_inverse, HP, K, M, work)
             event += 1
         row = row_of_node[k]
         if row >= 0:
