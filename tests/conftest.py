@@ -16,7 +16,7 @@ from wildlab.runner.processes.ending import ONE_THREAD
 # Before numpy and OpenCV are imported: their threads take the cores of other test processes, and make small
 # matrices slower, not faster.
 os.environ.update(ONE_THREAD)
-# Letters of figures as shapes, not as a font: a third of the time of a page.
+# No PDF of figures: a third of the time of a page.
 os.environ.setdefault("WILDLAB_QUICK_FIGURES", "1")
 
 import psutil

@@ -53,7 +53,9 @@ def test_log_band_and_gaps() -> None:
     assert figures.mark_gaps(ax, [0.0, 1.0, 2.0, 9.0, 10.0, 30.0], longest_s=3.0) == 2
 
 
-def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path: Path) -> None:
+def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(figures.QUICK, raising=False)
+
     def draw(folder: Path) -> tuple[bytes, bytes]:
         fig, ax = figures.new_figure(4, 3)
         ax.plot([1, 2, 3], label="ü")

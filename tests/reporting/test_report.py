@@ -11,7 +11,7 @@ import pytest
 from bs4 import BeautifulSoup
 
 from wildlab.errors import WildlabError
-from wildlab.reporting.figures import new_figure
+from wildlab.reporting.figures import QUICK, new_figure
 from wildlab.reporting.report import Report, open_report
 
 
@@ -26,7 +26,10 @@ def test_only_the_name_of_a_flight_folder_is_shown() -> None:
     assert "logged flight" in one.parts[0]
 
 
-def test_figure_is_shown_with_alt_and_written_as_pdf_and_png(tmp_path: Path) -> None:
+def test_figure_is_shown_with_alt_and_written_as_pdf_and_png(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(QUICK, raising=False)
     one = report(tmp_path)
     fig, ax = new_figure(5, 3)
     ax.plot([0, 1])

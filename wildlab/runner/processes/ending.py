@@ -33,6 +33,7 @@ _PRELOADED = (
     "wildlab",
     "pandas",
     "scipy.optimize",
+    "scipy.signal",
     "scipy.spatial.transform",
     "numba",
     "matplotlib.figure",
