@@ -9,7 +9,14 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Column
 
 from wildlab.runner.processes.job import Job
@@ -52,10 +59,15 @@ def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
         BarColumn(bar_width=20),
         TextColumn("{task.completed:.0f} of {task.total:.0f} seeds and cells"),
         TimeElapsedColumn(),
+        TextColumn("gone, left"),
+        TimeRemainingColumn(),
         # Whatever does not fit is cut off: the line must not wrap.
         TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
     )
-    with Progress(*columns, console=console, transient=True, expand=True) as progress:
+    # Seeds and cells take unlike times: ten minutes of them are a steadier guess than half a minute.
+    with Progress(
+        *columns, console=console, transient=True, expand=True, speed_estimate_period=600
+    ) as progress:
         task = progress.add_task("", total=0)
         tally = Tally()
 
