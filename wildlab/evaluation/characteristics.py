@@ -29,7 +29,7 @@ ANSWERS = (
 
 
 def operating_characteristics(
-    flights: int = 200,
+    flights: int = 100,
     *,
     factors: Sequence[float] = (1.0, 1.2, 1.5, 2.0),
     independent: int = 20,

@@ -245,7 +245,7 @@ def _characteristics() -> str:
     body = table_html(frame, {"factor": "our errors (times)"}, 2)
     return (
         '<details id="characteristics"><summary>How often each answer is right</summary><p>Probability of '
-        "each answer where the errors of our 200 flights are so many times those of the published flight, by "
+        "each answer where the errors of our 100 flights are so many times those of the published flight, by "
         "simulation of the rule; a flight has 20 independent errors. <code>wildlab list --rule</code> gives "
         'it.</p><div class="scroll" role="region" tabindex="0" aria-label="Operating characteristics">'
         f"{body}</div></details>"
