@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from wildlab.flight.following import parse_settings
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
+from wildlab.pipeline.following.beliefs import Beliefs, of_flight, of_sensor
 from wildlab.pipeline.following.follow import Followed
 from wildlab.pipeline.following.judged import judged
+from wildlab.pipeline.scans import Scans, scans_of
 
 
 def boat(t: np.ndarray) -> np.ndarray:
@@ -116,6 +119,27 @@ def joined(one: Flight, *others: Flight) -> Flight:
         for name in ("frames", "detections")
     }
     return Flight(one.manifest, one.nav, {**one.tables, **tables})
+
+
+def seen_only(flight: Flight, keep: np.ndarray) -> Flight:
+    """The flight with detections of some of its looks alone; the looks stay."""
+    seen, names = flight.tables["detections"], flight.tables["frames"]["frame_id"][keep]
+    flight.tables["detections"] = seen[seen["frame_id"].isin(names)].reset_index(drop=True)
+    return flight
+
+
+def paused(flight: Flight, begin: float, end: float) -> Flight:
+    """The flight with its target out of sight between two times."""
+    t = flight.tables["frames"]["time_s"]
+    return seen_only(flight, (t < begin) | (t > end))
+
+
+def believed(
+    flight: Flight, text: str = "", sensor: str = "radar", source: str | None = None
+) -> tuple[Scans, Beliefs]:
+    """A sensor's scans, and what filters believe of it by a flight and a file of settings."""
+    scans = scans_of(flight, sensor, 0.0, source)
+    return scans, of_sensor(flight, scans, of_flight(flight, parse_settings(text)))[0]
 
 
 KNOWN = """

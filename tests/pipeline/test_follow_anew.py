@@ -1,4 +1,7 @@
-"""A target out of sight for long: its track ends when it is too uncertain, and another finds it again."""
+"""A target out of sight for long: its track ends when it is too uncertain, and another finds it again.
+
+A track is judged where its target was seen; where it was not is a number of its own.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.pipeline.robots import KNOWN, joined, robot_flight, rows_of
+from tests.pipeline.robots import KNOWN, joined, paused, robot_flight, rows_of, seen_only
 from wildlab.flight.following import parse_settings
-from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -20,7 +22,7 @@ from wildlab.pipeline.following.anew import Geometry, ends_by, part_of
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
 from wildlab.pipeline.following.estimates import estimates_table
 from wildlab.pipeline.following.follow import Followed, follow_targets
-from wildlab.pipeline.following.judged import judged, seen_of
+from wildlab.pipeline.following.judged import UNKNOWN, judged, seen_of, used_of
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.pipeline.scans import Scans, Truth
 
@@ -65,11 +67,6 @@ def follow(pause_s: float = 200.0) -> list[SensorTrack]:
     return sensor_tracks.follow(scans, truth, beliefs(scans), TARGETS, FILTERS)
 
 
-def followed(tracks: list[SensorTrack]) -> Followed:
-    scans, _ = watched()
-    return Followed(tracks, {"camera": scans}, {"camera": beliefs(scans)}, TARGETS, [], [], True)
-
-
 def off_after(one: SensorTrack) -> float:
     """Root mean square distance where the target is seen again, m."""
     again = seen_of(one) & (one.times > 100)
@@ -90,7 +87,9 @@ def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch: pytest.M
 
 def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silently() -> None:
     tracks = follow()
-    rows = judged(followed(tracks))
+    scans, _ = watched()
+    sensor = {"camera": scans}, {"camera": beliefs(scans)}
+    rows = judged(Followed(tracks, *sensor, TARGETS, [], [], True))
     first = tracks[0]
     for one in tracks:
         assert (np.isfinite(one.estimate) == np.isfinite(first.estimate)).all()
@@ -101,7 +100,7 @@ def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silent
         assert row["compared"] == seen_of(first).sum() == row["used"]
         assert row["detections"] == row["used"] - 2  # the two that tracks were put on
         # The table says which of the two a row is of.
-        table = estimates_table([one], {"camera": watched()[0]})
+        table = estimates_table([one], sensor[0])
         times = one.times[one.starts]
         right = 1 + (table["time_s"] >= times[1]).to_numpy(int)
         assert (table["track"] == right).all() and set(right) == {1, 2}
@@ -153,29 +152,17 @@ def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there() -> None:
 
 @pytest.mark.parametrize("kind", ["position", "bearing"])
 def test_positions_and_bearings_alone_do_not_end_so(kind: str) -> None:
-    flight = robot_flight(1, kind=kind)
-    detections = flight.tables["detections"]
-    t = flight.tables["frames"]["time_s"].to_numpy()
-    names = flight.tables["frames"]["frame_id"][(t < 40) | (t > 90)]
-    flight.tables["detections"] = detections[detections["frame_id"].isin(names)].reset_index(drop=True)
     near = "[sensors.radar]\nrange_m = 90.0\nrange_sd_m = 30.0\n"
+    flight = paused(robot_flight(1, kind=kind), 40, 90)
     one = follow_targets(flight, settings=parse_settings(near + KNOWN)).tracks[0]
     assert len(one.starts) == 1 and not one.without.any()
 
 
-def paused(sensor: str, seed: int) -> Flight:
-    """A boat by ranges and bearings that are precise, out of sight for a minute and a half."""
-    flight = robot_flight(seed, sensor=sensor, range_sd=0.1, bearing_sd_deg=0.1, seconds=180.0)
-    detections, frames = flight.tables["detections"], flight.tables["frames"]
-    names = frames["frame_id"][(frames["time_s"] < 40) | (frames["time_s"] > 130)]
-    flight.tables["detections"] = detections[detections["frame_id"].isin(names)].reset_index(drop=True)
-    return flight
-
-
 @pytest.mark.slow
 def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track() -> None:
-    one, other = paused("radar", 1), paused("lidar", 2)
-    flight = joined(one, other)
+    precise = {"range_sd": 0.1, "bearing_sd_deg": 0.1, "seconds": 180.0}
+    flights = (robot_flight(k, sensor=name, **precise) for k, name in enumerate(("radar", "lidar"), 1))
+    flight = joined(*(paused(one, 40, 130) for one in flights))
     noise = "".join(f"[sensors.{n}.noise]\nrange_m = 0.1\nazimuth_deg = 0.1\n" for n in ("radar", "lidar"))
     settings = parse_settings(noise + "[targets]\nacceleration_m_s_sqrt_s = 0.5\nstart_speed_m_s = 2.0\n")
     found = follow_targets(flight, settings=settings, filters=["ekf", "ukf", "imm"], smooth=True)
@@ -186,3 +173,36 @@ def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track(
     assert (rows["rmse"] < 0.5).all()
     for mine in (track for track in found.tracks if track.sensor == "together"):
         assert mine.times[mine.starts[1]] > 130
+
+
+def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen() -> None:
+    followed = follow_targets(paused(robot_flight(3), 40, 90), settings=parse_settings(KNOWN))
+    row = rows_of(followed).loc["ekf"]
+    one = next(one for one in followed.tracks if one.filter == "ekf")
+    away, used = np.hypot(*one.error[:, :2].T), used_of(one)
+    known = np.isfinite(away)
+    assert row["rmse"] == pytest.approx(np.sqrt(np.mean(away[used & known] ** 2)))
+    assert row["rmse_without"] == pytest.approx(np.sqrt(np.mean(away[~used & known] ** 2)))
+    assert row["rmse"] < 1.5 < 3 < row["rmse_without"]
+    assert row["nees"] == pytest.approx(np.nanmean(one.nees[used]))
+    assert row["compared"] == (used & known).sum()
+    # The track ends within the wait: looks without one are counted, and are in neither number.
+    assert row["without"] + row["gone"] == 101 and row["gone"] > 0 and row["anew"] == 1
+    assert row["wait"] == pytest.approx(51.0, abs=1.1)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_of_one_or_three_detections_nothing_is_judged(count: int) -> None:
+    flight = robot_flight(3)
+    few = seen_only(flight, np.arange(len(flight.tables["frames"])) < count)
+    rows = rows_of(follow_targets(few, settings=parse_settings(KNOWN)))
+    assert set(rows["verdict"]) == {UNKNOWN} and set(rows["nis_verdict"]) == {UNKNOWN}
+    assert (rows["used"] == count).all()
+
+
+def test_a_track_that_lost_its_target_is_judged_where_the_target_was_seen() -> None:
+    """What a gate no longer lets in was seen all the same."""
+    flight = robot_flight(3, labelled=False)
+    flight.tables["detections"].loc[119:, "range_m"] += 6.0  # after a minute
+    row = rows_of(follow_targets(flight, settings=parse_settings(KNOWN))).loc["ekf"]
+    assert row["compared"] > row["used"]

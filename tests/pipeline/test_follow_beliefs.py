@@ -19,7 +19,7 @@ from wildlab.pipeline.following.considering import spread_of
 from wildlab.pipeline.following.expected import predict_scan
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.roughness import roughness
-from wildlab.pipeline.following.tuned import refuse_same, tune_flight
+from wildlab.pipeline.following.tuned import tune_flight
 from wildlab.pipeline.scans import scans_of
 
 # --- what is believed ---------------------------------------------------------------------------------------
@@ -164,13 +164,6 @@ def test_truth_tells_a_heading_and_the_other_flight_is_judged_by_it():
     assert any(one.source == "tuned on first" for one in followed.said)
     rows = rows_of(followed)
     assert rows.loc["schmidt", "nees"] < rows.loc["ekf", "nees"]
-
-
-def test_nothing_is_tuned_where_it_is_judged():
-    flight = robot_flight(1)
-    with pytest.raises(WildlabError, match="judged"):
-        refuse_same(flight, robot_flight(1, name="renamed"))
-    refuse_same(flight, robot_flight(2))
 
 
 def test_truth_that_is_not_there_is_no_teacher():

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.pipeline.robots import boat, joined, robot, robot_flight, rows_of
+from tests.pipeline.robots import boat, joined, paused, robot, robot_flight, rows_of
 from wildlab.errors import WildlabError
 from wildlab.flight.following import CONSIDERED, Settings
 from wildlab.flight.manifest import make_manifest
@@ -14,7 +14,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import errors_named
 from wildlab.pipeline.following.estimates import estimates_table, write_estimates
 from wildlab.pipeline.following.expected import SLOTS, predict_scan
-from wildlab.pipeline.following.follow import Followed, follow_targets
+from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.judged import apart, judged, worth_of_errors
 from wildlab.pipeline.scans import KINDS, Scans, scans_of, truths_at
 
@@ -154,14 +154,10 @@ def test_names_may_be_left_aside():
 
 
 def test_a_named_target_is_found_again_after_a_pause_and_an_unnamed_one_is_not():
-    def paused(labelled: bool) -> Followed:
-        flight = robot_flight(5, labelled=labelled)
-        seen = flight.tables["detections"]
-        k = seen["frame_id"].str.removeprefix("radar-").astype(int)
-        flight.tables["detections"] = seen[(k < 60) | (k > 120)].reset_index(drop=True)
-        return follow_targets(flight)
-
-    named, unnamed = paused(True).tracks[0], paused(False).tracks[0]
+    named, unnamed = (
+        follow_targets(paused(robot_flight(5, labelled=labelled), 31, 61)).tracks[0]
+        for labelled in (True, False)
+    )
     assert np.isfinite(named.estimate[-1]).all() and np.isnan(unnamed.estimate[-1]).all()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from tests.pipeline.robots import joined, robot_flight, rows_of
+from tests.pipeline.robots import boat, joined, paused, robot_flight, rows_of, seen_only
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
@@ -25,6 +25,20 @@ def later(flight: Flight, seconds: float) -> Flight:
     return replace(flight, tables=tables)
 
 
+def by_filterpy(z, t, density, sd, x, P):
+    """Its filter after the last of positions z, and at each its state, covariance, NIS and log-likelihood."""
+    kf = KalmanFilter(4, 2)
+    kf.x, kf.P, kf.R, kf.H = x, P, np.diag(sd**2), np.eye(2, 4)
+    steps = [(x, P, 0.0, 0.0)]
+    for dt, position in zip(np.diff(t), z[1:], strict=True):
+        kf.F = np.eye(4) + dt * np.eye(4, k=2)
+        kf.Q = density**2 * np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.eye(2))
+        kf.predict()
+        kf.update(position)
+        steps.append((kf.x, kf.P, kf.mahalanobis**2, kf.log_likelihood))
+    return kf, *(np.array(one) for one in zip(*steps, strict=True))
+
+
 def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
     """Tuned on one flight, judged on another: filterpy's filter and smoother, and sums written out."""
     tuned = tune_flight(robot_flight(1, kind="position", position_sd=1.0), ["radar"], None, "innovations")
@@ -32,38 +46,21 @@ def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
     followed = follow_targets(flight, tuned=tuned, smooth=True, filters=["ekf"])
     track, back = followed.tracks
     scans = followed.scans["radar"]
-    z, t = scans.detections[:, 0], scans.times
-    sd, q = np.array(tuned.sensors["radar"].own_sds), tuned.density**2
-    kf = KalmanFilter(4, 2)
-    kf.x, kf.P, kf.R = track.estimate[0], track.covariance[0], np.diag(sd**2)
-    kf.H = np.eye(2, 4)
-    xs, Ps, Fs, Qs, nis = [kf.x], [kf.P], [np.eye(4)], [np.zeros((4, 4))], []
-    for k in range(1, len(t)):
-        dt = t[k] - t[k - 1]
-        kf.F = np.eye(4) + dt * np.eye(4, k=2)
-        kf.Q = q * np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.eye(2))
-        kf.predict()
-        kf.update(z[k])
-        nis.append(float(kf.y @ np.linalg.inv(kf.S) @ kf.y))
-        xs, Ps, Fs, Qs = [*xs, kf.x], [*Ps, kf.P], [*Fs, kf.F], [*Qs, kf.Q]
+    z, t, sd = scans.detections[:, 0], scans.times, np.array(tuned.sensors["radar"].own_sds)
+    kf, xs, Ps, nis, _ = by_filterpy(z, t, tuned.density, sd, track.estimate[0], track.covariance[0])
     np.testing.assert_allclose(track.estimate, xs, atol=1e-7)
-    # Their smoother takes the matrices of the step from a row from that row, or from the next: the steps are
-    # equal here, and both are the same.
-    steps = slice(1, None)
-    Fs[0], Qs[0] = Fs[steps][0], Qs[steps][0]
-    smoothed, covariance, *_ = kf.rts_smoother(np.array(xs), np.array(Ps), Fs=Fs, Qs=Qs)
+    smoothed, covariance, *_ = kf.rts_smoother(xs, Ps)  # all steps are alike
     np.testing.assert_allclose(back.estimate, smoothed, atol=1e-6)
     np.testing.assert_allclose(back.covariance, covariance, atol=1e-6)
     rows = rows_of(followed)
-    truth = np.column_stack([80 + 0.8 * t, 40 + 25 * np.sin(t / 25)])
-    for name, x, P in (("ekf", np.array(xs), np.array(Ps)), ("ekf-smoothed", smoothed, covariance)):
-        e = truth - x[:, :2]
+    for name, x, P in (("ekf", xs, Ps), ("ekf-smoothed", smoothed, covariance)):
+        e = boat(t) - x[:, :2]
         shown = rows.loc[name]
         assert shown["rmse"] == pytest.approx(np.sqrt((e**2).sum(axis=1).mean()), rel=1e-3)
         with_truth = P[:, :2, :2] + 0.05**2 * np.eye(2)
         nees = np.einsum("ni,nij,nj->n", e, np.linalg.inv(with_truth), e)
         assert shown["nees"] == pytest.approx(nees.mean(), rel=0.02)
-    assert rows.loc["ekf", "nis"] == pytest.approx(np.mean(nis), rel=1e-6)
+    assert rows.loc["ekf", "nis"] == pytest.approx(nis[1:].mean(), rel=1e-6)
     # A smoother is never fed to NIS or to whiteness.
     assert np.isnan(rows.loc["ekf-smoothed", "nis"]) and rows.loc["ekf-smoothed", "detections"] == 0
     assert np.isnan(back.nis).all() and np.isnan(back.innovation).all() and np.isnan(back.S).all()
@@ -75,26 +72,16 @@ def test_innovations_are_likeliest_at_what_was_tuned():
     scans = follow_targets(flight, tuned=tuned).scans["radar"]
     z, t = scans.detections[:, 0], scans.times
 
-    def minus_log_likelihood(density: float, sd: np.ndarray) -> float:
-        x, P = np.array([*z[0], 0.0, 0.0]), np.diag([*sd**2, 25.0, 25.0])
-        total, H = 0.0, np.eye(2, 4)
-        for k in range(1, len(t)):
-            dt = t[k] - t[k - 1]
-            F = np.eye(4) + dt * np.eye(4, k=2)
-            Q = density**2 * np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.eye(2))
-            x, P = F @ x, F @ P @ F.T + Q
-            S = H @ P @ H.T + np.diag(sd**2)
-            y, K = z[k] - x[:2], P @ H.T @ np.linalg.inv(S)
-            x, P = x + K @ y, P - K @ H @ P
-            total += (y @ np.linalg.solve(S, y) + np.log(np.linalg.det(S))) / 2
-        return total
+    def log_likelihood(density, sd):
+        start = np.array([*z[0], 0.0, 0.0]), np.diag([*sd**2, 25.0, 25.0])
+        return by_filterpy(z, t, density, sd, *start)[-1].sum()
 
     assert repr(read_tuned(tuned_text(tuned))) == repr(tuned)
     sd, density = np.array(tuned.sensors["radar"].own_sds), tuned.density
-    best = minus_log_likelihood(density, sd)
+    best = log_likelihood(density, sd)
     for by in (0.7, 1.4):
-        assert minus_log_likelihood(by * density, sd) > best - 0.1
-        assert minus_log_likelihood(density, by * sd) > best - 0.1
+        assert log_likelihood(by * density, sd) < best + 0.1
+        assert log_likelihood(density, by * sd) < best + 0.1
 
 
 def test_part_of_the_flight_that_is_judged_teaches_nothing():
@@ -104,6 +91,8 @@ def test_part_of_the_flight_that_is_judged_teaches_nothing():
     with pytest.raises(WildlabError, match="70") as caught:
         refuse_same(flight, part)
     assert caught.value.field == "--tune"
+    with pytest.raises(WildlabError, match="judged"):
+        refuse_same(flight, robot_flight(1, name="renamed"))
     refuse_same(flight, robot_flight(2))
 
 
@@ -138,12 +127,8 @@ def test_a_stated_clock_holds_while_innovations_are_tuned():
 
 
 def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_track():
-    whole = robot_flight(3, kind="position", labelled=False, truth=False)
-    stamps = whole.tables["frames"].set_index("frame_id")["time_s"]
-    seen = whole.tables["detections"]
-    at = seen["frame_id"].map(stamps)
-    torn = replace(whole, tables=whole.tables | {"detections": seen[(at < 50) | (at > 90)]})
-    short = replace(whole, tables=whole.tables | {"detections": seen[at < 50]})
+    whole, short = (robot_flight(3, kind="position", labelled=False, truth=False) for _ in range(2))
+    torn, short = paused(whole, 50, 90), seen_only(short, short.tables["frames"]["time_s"] < 50)
     settings = parse_settings(
         "[sensors.radar.noise]\nposition_m = 1.0\n[targets]\npatience_s = 10.0\ngate_probability = 0.9999\n"
     )
