@@ -7,17 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.detection.ellipses import inside
 from wildlab.detection.border import adjust_at_border, border_moves, to_border
 from wildlab.detection.floating import detect_floating
 from wildlab.errors import WildlabError
 
 
-def ellipse_image(centre, axes, angle, shape=(200, 260)):
-    v, u = np.mgrid[: shape[0], : shape[1]].astype(float)
-    along = (u - centre[0]) * np.cos(angle) + (v - centre[1]) * np.sin(angle)
-    across = -(u - centre[0]) * np.sin(angle) + (v - centre[1]) * np.cos(angle)
-    inside = (2 * along / axes[0]) ** 2 + (2 * across / axes[1]) ** 2 <= 1
-    return (288.0 + 12.0 * inside).astype(np.float32)
+def ellipse_image(centre=(8.0, 90.0), axes=(120.0, 24.0), angle=0.1):
+    return (288.0 + 12.0 * inside(centre, axes, angle, (200, 260))).astype(np.float32)
 
 
 @pytest.mark.parametrize(
@@ -25,7 +22,7 @@ def ellipse_image(centre, axes, angle, shape=(200, 260)):
     [((8.0, 90.0), 0.1), ((250.0, 90.0), -0.2), ((120.0, 5.0), 1.5), ((120.0, 192.0), 1.7)],
 )
 def test_the_centre_comes_near_to_the_true_one_and_is_inside_what_is_stated(centre, angle):
-    image = ellipse_image(centre, (120.0, 24.0), angle)
+    image = ellipse_image(centre, angle=angle)
     seen = detect_floating(image)
     assert len(seen) == 1
     moved = adjust_at_border(seen, image.shape, 124.0, 4.0)
@@ -51,23 +48,24 @@ def test_h_4_7_holds_for_the_full_axis_where_the_blob_ends_at_the_border():
 
 
 @pytest.mark.parametrize(
-    ("centre", "axes", "angle", "why"),
+    ("centre", "axes", "angle", "length", "why"),
     [
-        ((130.0, 100.0), (120.0, 24.0), 0.3, "whole"),
-        ((3.0, 100.0), (60.0, 56.0), 0.0, "round"),
-        ((130.0, 100.0), (400.0, 30.0), 0.0, "cut at both ends"),
-        ((130.0, 4.0), (120.0, 30.0), 0.0, "along the border"),
+        ((130.0, 100.0), (120.0, 24.0), 0.3, 150.0, "whole"),
+        ((3.0, 100.0), (60.0, 56.0), 0.0, 150.0, "round"),
+        ((130.0, 100.0), (400.0, 30.0), 0.0, 150.0, "cut at both ends"),
+        ((130.0, 4.0), (120.0, 30.0), 0.0, 150.0, "along the border"),
+        ((8.0, 90.0), (120.0, 24.0), 0.1, np.nan, "of unknown length"),
     ],
 )
-def test_what_is_whole_round_or_cut_otherwise_stays(centre, axes, angle, why):
+def test_what_is_whole_round_or_cut_otherwise_stays(centre, axes, angle, length, why):
     image = ellipse_image(centre, axes, angle)
     seen = detect_floating(image)
     assert len(seen) == 1, why
-    assert np.array_equal(adjust_at_border(seen, image.shape, 150.0).uv, seen.uv), why
+    assert np.array_equal(adjust_at_border(seen, image.shape, length).uv, seen.uv), why
 
 
 def test_of_a_broken_contour_the_axis_is_not_trusted():
-    image = ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)
+    image = ellipse_image()
     seen = detect_floating(image)
     line = replace(seen, area=0.3 * seen.area)
     assert not np.array_equal(adjust_at_border(seen, image.shape, 124.0).uv, seen.uv)
@@ -82,11 +80,5 @@ def test_the_nearer_border():
 
 def test_a_length_of_nothing_is_refused():
     with pytest.raises(WildlabError, match="above zero") as error:
-        adjust_at_border(detect_floating(ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)), (200, 260), 0.0)
+        adjust_at_border(detect_floating(ellipse_image()), (200, 260), 0.0)
     assert error.value.field == "length"
-
-
-def test_an_unknown_length_moves_nothing():
-    image = ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)
-    seen = detect_floating(image)
-    assert np.array_equal(adjust_at_border(seen, image.shape, np.nan).uv, seen.uv)

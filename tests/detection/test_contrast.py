@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.detection.ellipses import inside as inside_ellipse
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections, describe, join, no_detections
 from wildlab.detection.near import merge_near, remove_near
@@ -32,10 +33,7 @@ def ground(seed: int = 1, noise: float = 2.0) -> np.ndarray:
 
 
 def ellipse(u: float, v: float, a: float, b: float, angle: float = 0.0) -> np.ndarray:
-    y, x = np.mgrid[:160, :200]
-    along = (x - u) * np.cos(angle) + (y - v) * np.sin(angle)
-    across = -(x - u) * np.sin(angle) + (y - v) * np.cos(angle)
-    return (along / a) ** 2 + (across / b) ** 2 <= 1
+    return inside_ellipse((u, v), (2 * a, 2 * b), angle, EVERYWHERE.shape)
 
 
 def test_shape_of_an_ellipse_comes_out() -> None:
@@ -87,16 +85,13 @@ def test_ellipses_hold_the_true_centre_as_often_as_they_say(a: float, b: float, 
     assert 0.5 < np.mean(squared) < 3.0
 
 
-def test_what_is_not_seen_and_what_is_cut_off_widens_the_ellipse() -> None:
+def test_what_is_not_seen_widens_the_ellipse() -> None:
     image = ground()
-    image[:5, 90:110] += 60
     image[100:105, 90:110] += 60
     whole, part = (find_by_contrast(image, EVERYWHERE, Contrast(part=one)) for one in (0.0, 0.2))
     assert np.allclose(
         part.covariance - whole.covariance, (0.2 * whole.axes[:, :1, None]) ** 2 * np.eye(2), rtol=1e-6
     )
-    cut, inner = whole.covariance[np.argsort(whole.uv[:, 1])]
-    assert cut[1, 1] > inner[1, 1] + 1.5 and cut[0, 0] == pytest.approx(inner[0, 0], rel=0.5)
 
 
 def test_what_stands_out_is_found_and_what_is_too_small_too_large_or_too_long_is_not() -> None:
@@ -177,6 +172,9 @@ def test_of_those_too_near_the_surest_stays_or_all_become_one() -> None:
     left = remove_near(found, 10)
     assert left.uv[:, 0].tolist() == [28, 100] and left.score.tolist() == [3.0, 0.5]
     assert len(remove_near(found, 0)) == 4
+    # What was removed removes nothing.
+    chain = at([[20, 20], [28, 20], [36, 20]], [3.0, 2.0, 1.0])
+    assert remove_near(chain, 10).uv[:, 0].tolist() == [20, 36]
     merged = merge_near(found, 10)
     assert np.allclose(sorted(merged.uv[:, 0]), [28, 100]) and merged.area.max() == 27
     row = int(np.argmax(merged.area))
@@ -310,8 +308,3 @@ def test_an_empty_border_gives_nothing_and_hides_nothing() -> None:
     image[ellipse(100, 45, 8, 5)] += 40
     found = find_by_contrast(image, valid)
     assert np.allclose(found.uv, [[100, 45]], atol=0.5)
-
-
-def test_removing_does_not_go_on_from_what_was_removed() -> None:
-    found = at([[20, 20], [28, 20], [36, 20]], [3.0, 2.0, 1.0])
-    assert remove_near(found, 10).uv[:, 0].tolist() == [20, 36]

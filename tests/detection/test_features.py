@@ -6,15 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.detection.ellipses import inside
 from wildlab.detection.features import boundary_spread, region_moments, shape_of
 
 
-def drawn_ellipse(centre, axes, angle, size=400):
-    """An ellipse by the pixels whose centres lie within it: a tenth of a pixel about the smooth one."""
-    v, u = np.mgrid[:size, :size].astype(float)
-    along = (u - centre[0]) * np.cos(angle) + (v - centre[1]) * np.sin(angle)
-    across = -(u - centre[0]) * np.sin(angle) + (v - centre[1]) * np.cos(angle)
-    return ((2 * along / axes[0]) ** 2 + (2 * across / axes[1]) ** 2 <= 1).astype(np.uint8)
+def drawn_ellipse(centre, axes, angle):
+    """A tenth of a pixel about the smooth one."""
+    return inside(centre, axes, angle, (400, 400)).astype(np.uint8)
 
 
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (7, 3), (40, 90)])

@@ -183,15 +183,10 @@ def test_a_gradient_of_counts_is_that_of_their_kelvin():
     assert find_edges(counts, None, thresholds).gradient.max() == 300
 
 
-def ring(thickness_gap=0):
-    image = sea()
-    image[20:70, 30:100] += 12
-    return image
-
-
 def test_whether_the_contour_or_the_filled_blob_is_small():
     """A ring of steep pixels is counted before it is filled, H 4.3, or after."""
-    image = ring()
+    image = sea()
+    image[20:70, 30:100] += 12
     edges = int((find_edges(image, None, FloatingThresholds()).steep > 0).sum())
     assert edges < 50 * 70
     between = (edges + 50 * 70) / 2
