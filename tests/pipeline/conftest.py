@@ -105,3 +105,18 @@ def build(
 @pytest.fixture
 def make_flight() -> Callable[..., Flight]:
     return build
+
+
+def receiver(flight: Flight, **columns: object) -> pd.DataFrame:
+    """A receiver that agrees with the poses twice a second, with more columns by its times."""
+    nav = flight.nav["logged"]
+    t = np.arange(float(nav["time_s"].min()), float(nav["time_s"].max()), 0.5)
+    at = {name: np.interp(t, nav["time_s"], nav[name]) for name in ("north_m", "east_m", "down_m")}
+    more = {name: values(t) if callable(values) else values for name, values in columns.items()}
+    return pd.DataFrame({"time_s": t, **at, **more})
+
+
+def without_poses(flight: Flight, begin: float, end: float) -> Flight:
+    nav = flight.nav["logged"]
+    flight.nav["logged"] = nav[(nav["time_s"] < begin) | (nav["time_s"] > end)].reset_index(drop=True)
+    return flight

@@ -8,33 +8,29 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.conftest import receiver
 from wildlab.flight.store import Flight
-from wildlab.pipeline.overviews.overview import look_over
-from wildlab.pipeline.overviews.worth_fixing import numbers_of, possible_gain
-from wildlab.reporting.overview import counts_of
+from wildlab.pipeline.overviews.overview import Overview, look_over
 from wildlab.simulation.twins import simulate_twin
-
-
-def leapt(twin: Flight, *, speeds: bool = True) -> Flight:
-    """A twin whose poses leap by 40 m after 200 samples, once, and lie there from then on."""
-    nav = twin.nav["autopilot"].copy()
-    nav.loc[200:, "east_m"] += 40.0
-    nav = nav if speeds else nav.drop(columns=["v_north_m_s", "v_east_m_s", "v_down_m_s"])
-    return Flight(twin.manifest, {"autopilot": nav}, dict(twin.tables))
 
 
 @pytest.mark.parametrize("speeds", [True, False])
 def test_a_leap_is_found_with_and_without_speeds(speeds: bool) -> None:
     twin = simulate_twin("large-ship", 1)
-    jump = look_over(leapt(twin, speeds=speeds)).alarms[0]
     nav = twin.nav["autopilot"]
-    assert (jump.what, jump.often, jump.broken) == ("jumps", 1, True) and jump.size == pytest.approx(
-        40, abs=1
-    )
-    assert jump.first == pytest.approx(nav["time_s"].iloc[199])
-    bare = nav.drop(columns=["v_north_m_s", "v_east_m_s", "v_down_m_s"])
-    whole = Flight(twin.manifest, {"autopilot": bare}, dict(twin.tables))
-    assert not [one for one in look_over(whole).alarms if one.what == "jumps"]
+    if not speeds:
+        nav = nav.drop(columns=["v_north_m_s", "v_east_m_s", "v_down_m_s"])
+
+    def seen(nav: pd.DataFrame) -> Overview:
+        return look_over(Flight(twin.manifest, {"autopilot": nav}, dict(twin.tables)))
+
+    assert not seen(nav).alarms and not seen(nav).troubles
+    leap = nav.assign(east_m=nav["east_m"] + 40.0 * (nav.index >= 200))
+    jump = seen(leap).alarms[0]
+    assert (jump.what, jump.often, jump.broken) == ("jumps", 1, True)
+    assert jump.size == pytest.approx(40, abs=1) and jump.first == nav["time_s"].iloc[199]
+    (trouble,) = [one for one in seen(leap).troubles if one.what == "position jumps"]
+    assert trouble.spells == pytest.approx(nav["time_s"].to_numpy()[None, 199:201])
 
 
 def test_an_airframe_that_leans_as_nobody_flies_went_wrong() -> None:
@@ -68,35 +64,12 @@ def test_harmful_shaking_is_an_alarm(make_flight: Callable[..., Flight]) -> None
 
 def test_poses_that_contradict_the_satellites_are_an_alarm(make_flight: Callable[..., Flight]) -> None:
     flight = make_flight(n_images=40)
-    nav = flight.nav["logged"]
-    t = np.arange(float(nav["time_s"].min()), float(nav["time_s"].max()), 0.5)
-    at = {name: np.interp(t, nav["time_s"], nav[name]) for name in ("north_m", "east_m", "down_m")}
-    gnss = pd.DataFrame({"time_s": t, **at})
-    flight.tables["gnss"] = gnss
+    gnss = flight.tables["gnss"] = receiver(flight)
     assert not look_over(flight).alarms
     gnss.loc[:9, "north_m"] += 12.0
     (apart,) = look_over(flight).alarms
     assert (apart.what, apart.often) == ("apart", 10) and apart.size == pytest.approx(12, abs=1e-6)
-    assert apart.share == pytest.approx(10 / len(t))
+    assert apart.share == pytest.approx(10 / len(gnss))
     # What the receiver itself says it does not know is no contradiction.
     flight.tables["gnss"] = gnss.assign(sd_horizontal_m=6.0)
     assert not look_over(flight).alarms
-
-
-def test_poses_that_pause_shortly_count_as_trouble(make_flight: Callable[..., Flight]) -> None:
-    flight = make_flight(n_images=80)
-    nav = flight.nav["logged"]
-    assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 0
-    flight.nav["logged"] = nav[(nav["time_s"] < 10.05) | (nav["time_s"] > 11.95)].reset_index(drop=True)
-    assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 1
-
-
-@pytest.mark.parametrize(("gain", "possible"), [(1.6, True), (0.3, False)])
-def test_a_gain_that_is_large_and_not_certain_is_possible(gain: float, possible: bool) -> None:
-    entry = {"low": 0.28, "high": 2.88, "n": 90}
-    numbers = numbers_of([{"metrics": [
-        {"name": "gain", "subject": "winner", "value": gain, **entry},
-        {"name": "horizontal_error_mean", "subject": "logged-pose", "value": 4.5, **entry},
-    ]}])  # fmt: skip
-    found = possible_gain(numbers)
-    assert (found is not None and found.share == pytest.approx(gain / 4.5)) == possible

@@ -18,6 +18,8 @@ from wildlab.pipeline.search import (
     rows_at,
     search,
 )
+from wildlab.pipeline.survey import Rules, survey
+from wildlab.planning.high_level import SEARCH
 from wildlab.planning.information import SearchSensor
 from wildlab.planning.legs import Flying, Leg, Platform, look_attitude
 
@@ -31,10 +33,10 @@ AREAS = (
 START = Platform(np.zeros(2), 0.0, look_attitude(0.0, 0.0, 0.0))
 
 
-def world(spots, chance=0.0, images=300, terrain=FLAT) -> World:
+def world(spots, chance=0.0, images=300, terrain=FLAT, areas=AREAS) -> World:
     at = np.column_stack([np.array(spots, float), np.full(len(spots), -0.5)])
-    area_of = np.array([0 if east < 80 else 1 for _, east in spots])
-    return World(terrain, AREAS, np.tile(at, (images, 1, 1)), area_of, np.full((images, len(spots)), chance))
+    area_of = np.array([int(east > 80 and len(areas) > 1) for _, east in spots])
+    return World(terrain, areas, np.tile(at, (images, 1, 1)), area_of, np.full((images, len(spots)), chance))
 
 
 def test_an_animal_is_found_by_its_probability_and_in_the_field_of_view():
@@ -136,3 +138,59 @@ def test_a_grid_lies_in_its_areas_and_on_the_ground():
 def test_an_area_off_the_map_or_without_a_point_is_refused(area):
     with pytest.raises(WildlabError, match="area 1"):
         grid_over([area], FLAT, 10.0)
+
+
+# --- search and revisit: who is gone back to, who is lost, and when it ends ---------------------------------
+
+FIELD = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
+RULES = Rules(alpha=1.0, c=200.0, walk=0.1, limit=200.0)
+
+
+def run(spots, rules: Rules = RULES, unseen=((), ()), images=600, areas=(FIELD,)):
+    """``unseen``: from which image on each animal is not found any more, and up to which not yet."""
+    given = world(spots, 0.5, images, areas=areas)
+    for animal, first in enumerate(unseen[0]):
+        given.chance[first:, animal] = 1.0
+    for animal, last in enumerate(unseen[1]):
+        given.chance[:last, animal] = 1.0
+    rows, sensor = SearchInRows(given, FLYING, 20.0, range(len(areas))), replace(SENSOR, reach=200.0)
+    return survey(given, rows, START, sensor, FLYING, rules, np.random.default_rng(1))
+
+
+def test_it_ends_when_all_are_known_at_once():
+    found = run([[10.0, 10.0], [90.0, 90.0], [50.0, 50.0]])
+    assert 10 < found.positioned < 400 and found.known[-1] == 3
+    assert found.lost_by_covariance == found.lost_by_search == 0
+    assert len(found.p_nc) == FLYING.images * len(found.goal) == pytest.approx(found.positioned)
+    assert np.nanmax(found.error) < 8
+
+
+def test_an_enclosure_that_is_done_stays_done():
+    """One animal is seen for a while only, but then its enclosure was done; the other takes until the end."""
+    areas = (FIELD, FIELD + np.array([0.0, 150.0]))
+    spots, soon_lost = [[10.0, 10.0], [50.0, 180.0]], RULES._replace(walk=1.0)
+    found = run(spots, soon_lost, ((20,), (0, 300)), 900, areas)
+    assert 300 < found.positioned < 900 and found.lost_by_covariance == found.lost_by_search == 0
+    assert 0 not in found.goal[1:]
+
+
+def test_nobody_to_find_ends_with_the_time():
+    found = run([[10.0, 10.0]], unseen=((0,), ()), images=90)
+    assert np.isinf(found.positioned) and (found.goal == SEARCH).all() and found.revisits == 0
+
+
+def test_it_goes_back_to_what_is_known_badly():
+    fast = Rules(alpha=1.0, c=50.0, walk=2.0, limit=1e6)
+    found = run([[10.0, 10.0], [90.0, 90.0]], fast)
+    assert found.revisits > 0 and set(found.goal.tolist()) > {SEARCH}
+    assert run([[10.0, 10.0], [90.0, 90.0]], fast._replace(c=1e9)).revisits == 0
+
+
+@pytest.mark.parametrize(
+    ("rules", "lost"), [({"c": 1e9, "walk": 2.0}, (1, 0)), ({"c": 1e-3, "limit": 1e9}, (0, 1))]
+)
+def test_an_animal_that_is_unseen_for_long_or_not_where_it_should_be_is_lost(rules, lost):
+    """Two animals, of which one is seen at the beginning only, and the other never."""
+    found = run([[10.0, 10.0], [90.0, 90.0]], RULES._replace(**rules), ((10, 0), ()))
+    assert (found.lost_by_covariance, found.lost_by_search) == lost
+    assert found.known.max() == 1 and found.known[-1] == 0

@@ -46,9 +46,7 @@ def test_either_sense_and_a_closed_ring_give_the_same_area() -> None:
         p, q = fence - fence[0], np.roll(fence - fence[0], -1, axis=0)
         assert (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum() > 0
     assert area_of(SQUARE) == area_of(SQUARE[::-1]) == 100.0
-
-
-def test_area_far_from_the_origin_keeps_its_digits() -> None:
+    # Far from the origin it keeps its digits.
     assert area_of(np.add(SQUARE, [6e6, 5e5])) == pytest.approx(100.0, rel=1e-9)
 
 
@@ -67,6 +65,7 @@ def test_what_lies_inside_is_what_winds_round() -> None:
 
 def test_a_rectangle_has_its_sides_and_its_course() -> None:
     corners = rectangle(3.0, 4.0, 20.0, 10.0, 0.3)
+    assert is_convex(corners)
     assert np.allclose(corners.mean(axis=0), [3.0, 4.0])
     assert area_of(corners) == pytest.approx(200.0)
     along = np.array([np.cos(0.3), np.sin(0.3)])
@@ -79,6 +78,7 @@ def test_distance_to_the_border() -> None:
 
 def test_a_way_along_the_border_is_inside_and_one_across_the_gap_is_not() -> None:
     fence = check_area(U_SHAPE)
+    assert not is_convex(fence) and is_convex(check_area(SQUARE))
     assert stays_inside(fence, [0, 0], [0, 100])
     assert stays_inside(fence, [30, 30], [30, 70])
     assert stays_inside(fence, [10, 10], [10, 90])
@@ -91,9 +91,3 @@ def test_the_way_inside_goes_round_the_two_corners_of_the_gap() -> None:
     assert np.allclose(way, [[90, 15], [30, 30], [30, 70], [90, 85]])
     length = np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
     assert length == pytest.approx(40 + 2 * np.hypot(60, 15))
-
-
-def test_convex_or_not() -> None:
-    assert is_convex(check_area(SQUARE))
-    assert is_convex(rectangle(5.0, 6.0, 20.0, 10.0, 0.7))
-    assert not is_convex(check_area(U_SHAPE))

@@ -78,21 +78,20 @@ def test_what_cannot_stop_flies_every_row_and_turns_between_no_tighter_than_it_c
 
 
 @pytest.mark.parametrize(
-    ("arguments", "problem"),
+    ("points", "arguments", "problem"),
     [
-        ({"speed": 0.0}, "speed of 0"),
-        ({"speed": 5.0, "wind": [4.0, 3.0]}, "wind of 5"),
-        ({"speed": 5.0, "turn_radius": -1.0}, "-1.0"),
-        ({"speed": 5.0, "turn_time": -1.0}, "-1.0"),
+        (2, {"speed": 0.0}, "speed of 0"),
+        (2, {"speed": 5.0, "wind": [4.0, 3.0]}, "wind of 5"),
+        (2, {"speed": 5.0, "turn_radius": -1.0}, "-1.0"),
+        (2, {"speed": 5.0, "turn_time": -1.0}, "-1.0"),
+        (1, {"speed": 5.0}, "two"),
     ],
 )
-def test_what_cannot_be_flown_is_refused(arguments: dict[str, float], problem: str) -> None:
+def test_what_cannot_be_flown_is_refused(points: int, arguments: dict[str, float], problem: str) -> None:
     with pytest.raises(WildlabError, match=problem):
-        fly([[0.0, 0.0], [1.0, 0.0]], **arguments)  # type: ignore[arg-type]
+        fly([[0.0, 0.0], [1.0, 0.0]][:points], **arguments)  # type: ignore[arg-type]
 
 
-def test_a_way_has_two_points_and_a_circle_a_radius() -> None:
-    with pytest.raises(WildlabError, match="two"):
-        fly([[0.0, 0.0]], 5.0)
+def test_a_circle_without_a_radius_is_refused() -> None:
     with pytest.raises(WildlabError, match="radius"):
         dubins([0.0, 0.0], 0.0, [1.0, 0.0], 0.0, 0.0)

@@ -18,6 +18,7 @@ from wildlab.geometry.visibility import visible_nodes
 from wildlab.planning.areas import area_of, rectangle
 from wildlab.planning.coverage import cover, nodes_in, share_seen
 from wildlab.planning.sightings import see
+from wildlab.simulation.landscape import synthetic_landscape
 
 CAMERA = Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6, 0.0, (0.446, 0.0, 0.0, 0.0, 0.0))
 #: 90 degrees each way, without distortion.
@@ -25,16 +26,10 @@ WIDE = Camera(100, 100, 50.0, 50.0, 50.0, 50.0)
 
 
 def hills(seed: int, holes: bool = False) -> Terrain:
-    rng = np.random.default_rng(seed)
-    n, e = np.meshgrid(np.arange(60), np.arange(80), indexing="ij")
-    height = sum(
-        rng.uniform(3, 8) * np.sin(rng.uniform(0.1, 0.5) * n + rng.uniform(0.1, 0.5) * e + rng.uniform(0, 6))
-        for _ in range(4)
-    )
-    height = np.asarray(height + rng.uniform(0, 1, n.shape), np.float32)
+    land = synthetic_landscape(seed, north=120.0, east=160.0, relief=25.0)
     if holes:
-        height[20:25, 30:40] = np.nan
-    return Terrain(height, north=-60.0, east=-80.0, step=2.0)
+        land.height[20:25, 30:40] = np.nan
+    return land
 
 
 def poses_over(terrain: Terrain, seed: int, count: int = 40) -> CameraPoses:

@@ -24,6 +24,7 @@ from wildlab.planning.gimbal import (
 )
 
 CAMERA = Camera(100, 80, 200.0, 200.0, 50.0, 40.0)
+ALONE = camera_on_course(CAMERA, np.zeros((1, 3)), [0.0], look_down([0.0]))
 FLAT = Terrain(np.zeros((3, 3), np.float32), north=-500.0, east=-500.0, step=500.0)
 
 
@@ -57,23 +58,19 @@ def test_where_the_lens_points() -> None:
 
 
 def test_blur_is_angle_rate_times_exposure_times_focal_length() -> None:
-    t = np.arange(0.0, 2.0, 0.1)
-    still = np.tile([0.0, 0.0, -50.0], (len(t), 1))
-    swings = camera_on_course(CAMERA, still, 0 * t, swing_roll(t, 10.0, 0.6))
-    assert np.allclose(blur(CAMERA, swings, t, 0.02, 50.0), 0.6 * 0.02 * 200)
-    moving = still + np.outer(t, [5.0, 0.0, 0.0])
-    flown = camera_on_course(CAMERA, moving, 0 * t, look_down(t))
-    assert np.allclose(blur(CAMERA, flown, t, 0.02, 50.0), 5.0 / 50 * 0.02 * 200)
-    # About the optical axis, the corner: a camera that looks down on a platform that turns.
-    turning = camera_on_course(CAMERA, still, 0.3 * t, look_down(t))
-    assert np.allclose(blur(CAMERA, turning, t, 0.02, 50.0), 0.3 * 0.02 * np.hypot(50, 40))
-
-
-def test_blur_at_a_turn_is_that_of_the_faster_side() -> None:
     t = np.arange(0.0, 4.0, 0.1)
     still = np.tile([0.0, 0.0, -50.0], (len(t), 1))
-    swings = camera_on_course(CAMERA, still, 0 * t, swing_roll(t, 0.6, 0.6))
-    assert blur(CAMERA, swings, t, 0.02, 50.0).min() > 0.99 * 0.6 * 0.02 * 200
+
+    def blurred(p: np.ndarray, headings: np.ndarray, angles: GimbalAngles) -> np.ndarray:
+        return blur(CAMERA, camera_on_course(CAMERA, p, headings, angles), t, 0.02, 50.0)
+
+    assert np.allclose(blurred(still, 0 * t, swing_roll(t, 10.0, 0.6)), 0.6 * 0.02 * 200)
+    # Where it turns round, that of the faster side.
+    assert blurred(still, 0 * t, swing_roll(t, 0.6, 0.6)).min() > 0.99 * 0.6 * 0.02 * 200
+    moving = still + np.outer(t, [5.0, 0.0, 0.0])
+    assert np.allclose(blurred(moving, 0 * t, look_down(t)), 5.0 / 50 * 0.02 * 200)
+    # About the optical axis, the corner: a camera that looks down on a platform that turns.
+    assert np.allclose(blurred(still, 0.3 * t, look_down(t)), 0.3 * 0.02 * np.hypot(50, 40))
 
 
 def test_the_view_is_inside_as_its_corners_are() -> None:
@@ -132,12 +129,7 @@ def test_the_rate_brings_the_swing_round_while_the_image_passes() -> None:
         (lambda: adapt_roll([0.0], np.ones((1, 1), bool), [0.0], (0.5, 1.0), 0.0), "rate of 0.0"),
         (lambda: swing_rate(0.5, 0.0, 1.0), "0.0"),
         (lambda: swing_rate(0.5, 1.0, 1.0, 1.0), "overlap"),
-        (
-            lambda: blur(
-                CAMERA, camera_on_course(CAMERA, np.zeros((1, 3)), [0.0], look_down([0.0])), [0.0], 1, 1
-            ),
-            "1 instant",
-        ),
+        (lambda: blur(CAMERA, ALONE, [0.0], 1, 1), "1 instant"),
     ],
 )
 def test_wrong_use_is_refused(call: object, problem: str) -> None:

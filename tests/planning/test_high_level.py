@@ -56,10 +56,8 @@ def test_the_measure_sends_back_for_what_is_known_badly_and_on_where_much_can_be
     well = [np.eye(2)]
     assert best_by_measure(at, well, [0, 0], finds=0.02, **MEASURE) == SEARCH
     assert best_by_measure([[0.0, 400.0]], bad, [0, 0], finds=0.0, **MEASURE) == SEARCH  # not in time
-    two = best_by_measure(
-        [[0.0, 50.0], [0.0, 50.0]], [20 * np.eye(2), 200 * np.eye(2)], [0, 0], finds=0.0, **MEASURE
-    )
-    assert two == 1
+    two = [20 * np.eye(2), *bad]
+    assert best_by_measure([*at, *at], two, [0, 0], finds=0.0, **MEASURE) == 1
 
 
 @pytest.mark.parametrize("alpha", [0.001, 0.05, 1.0])
