@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.flight.manifest import Manifest
+from wildlab.flight.manifest import Manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
 from wildlab.geometry.georeference import ground_to_pixel
@@ -120,3 +122,15 @@ def without_poses(flight: Flight, begin: float, end: float) -> Flight:
     nav = flight.nav["logged"]
     flight.nav["logged"] = nav[(nav["time_s"] < begin) | (nav["time_s"] > end)].reset_index(drop=True)
     return flight
+
+
+def changed(flight: Flight, parts: dict[str, Any] | None = None, **tables: pd.DataFrame) -> Flight:
+    """The flight with parts of its manifest replaced, and some of its tables."""
+    manifest = replace_in_manifest(flight.manifest, parts or {})
+    return replace(flight, manifest=manifest, tables={**flight.tables, **tables})
+
+
+def first_seconds(flight: Flight, seconds: float) -> Flight:
+    """The flight's inertial unit and receivers up to that time, and nothing else of it."""
+    few = {name: flight.table(name).query("time_s < @seconds") for name in ("imu", "gnss")}
+    return replace(flight, tables={name: table.reset_index(drop=True) for name, table in few.items()})

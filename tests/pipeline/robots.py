@@ -43,18 +43,21 @@ def robot_flight(
     name: str = "robot",
     sensor: str = "radar",
     clutter: int = 0,
+    late_s: float = 0.0,
+    correlation: float = 0.0,
     manifest: dict[str, Any] | None = None,
 ) -> Flight:
     """A flight whose every number is known; the robot takes its heading for right and it is off.
 
     What it measures relative to its bow it turns by the heading it believes in: bearings from north are too
-    large by how far that is.
+    large by how far that is. Stamps are ``late_s`` after what was seen, and to positions that of the robot at
+    the stamp was added; their errors have this correlation from one to the next.
     """
     rng = np.random.default_rng(seed)
     t = np.arange(1.0, seconds, 1 / rate_hz)
     at = np.zeros((len(t), 2)) if fixed else robot(t)
-    where = boat(t)
-    off = where - at
+    off = boat(t - late_s) - (at if fixed else robot(t - late_s))
+    error = np.zeros(2)
     distance = np.hypot(*off.T)
     azimuth = np.arctan2(off[:, 1], off[:, 0]) + np.radians(heading_off_deg)
     rows = []
@@ -81,7 +84,9 @@ def robot_flight(
                 row |= {"azimuth_rad": a}
             elif kind == "position":
                 turn = r * np.array([np.cos(a), np.sin(a)])
-                north, east = at[k] + turn + rng.normal(0, position_sd, 2)
+                drawn = rng.normal(0, position_sd, 2)
+                error = correlation * error + np.sqrt(1 - correlation**2) * drawn
+                north, east = at[k] + turn + error
                 row |= {"north_m": north, "east_m": east, "down_m": 0.0}
             elif kind == "velocity":
                 v = (boat(t[k : k + 1] + 0.5) - boat(t[k : k + 1] - 0.5))[0] + rng.normal(0, 0.2, 2)

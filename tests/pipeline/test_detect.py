@@ -204,32 +204,22 @@ def test_shapes_cannot_be_learnt_from_what_is_all_wanted_or_all_not() -> None:
         fit_shape(np.zeros((5, 9)), np.zeros(5), Shape().regions)
 
 
-@pytest.mark.parametrize("method", ["contrast", "warm"])
-def test_black_hot_frames_are_turned(tmp_path: Path, method: str) -> None:
-    cv2.imwrite(str(tmp_path / "a.png"), 255 - picture([(50, 40)], 1, size=7, warmer=80))
-    for polarity, wanted in (("black-hot", 1), ("white-hot", 0)):
+@pytest.mark.parametrize(("method", "unturned"), [("contrast", 0), ("warm", 0), ("floating", 1)])
+def test_black_hot_frames_are_turned(tmp_path: Path, method: str, unturned: int) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), 255 - picture([(50, 40)], 1, size=15, warmer=150))
+    for polarity, wanted in (("black-hot", 1), ("white-hot", unturned)):
         frame = read_image(tmp_path / "a.png", polarity=polarity)  # type: ignore[arg-type]
         assert len(detect_frame(frame, method, METHODS[method].thresholds())) == wanted
 
 
-def test_floating_objects_are_found_by_the_same_command(tmp_path: Path) -> None:
-    (tmp_path / "sea").mkdir()
-    for number in range(2):
-        image = picture([(40 + 10 * number, 50)], number, size=15, warmer=150)
-        cv2.imwrite(str(tmp_path / "sea" / f"{number}.png"), image)
-        cv2.imwrite(str(tmp_path / f"cold{number}.png"), 255 - image)
-    frames = open_frames(tmp_path / "sea")
-    done = run_detection(frames, tmp_path / "out", "floating", FloatingThresholds())
-    np.testing.assert_allclose(done.detections["u_px"], [40, 50], atol=0.5)
-    np.testing.assert_allclose(done.detections["v_px"], 50, atol=0.5)
-    cold = read_image(tmp_path / "cold0.png", polarity="black-hot")
-    assert len(detect_frame(cold, "floating", FloatingThresholds())) == 1
-    far = for_distance("floating", FloatingThresholds(), 100.0, 1000.0, 2.0)
+def test_areas_of_floating_objects_follow_from_the_distance(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "sea.png"), picture([(40, 50)], 0, size=15, warmer=150))
+    far, near = (for_distance("floating", FloatingThresholds(), d, 1000.0, 2.0) for d in (100.0, 10.0))
     assert (far.area_of, far.largest_area) == ("filled", 400.0)
-    # A seven times smaller thing is let through by neither limit.
-    assert len(detect_frame(next(iter(frames)), "floating", far)) == 1
-    near = for_distance("floating", FloatingThresholds(), 10.0, 1000.0, 2.0)
-    assert len(detect_frame(next(iter(frames)), "floating", near)) == 0
+    found = detect_frame(read_image(tmp_path / "sea.png"), "floating", far)
+    np.testing.assert_allclose(found.uv, [[40, 50]], atol=0.5)
+    # A seven times smaller thing than at that distance is not let through.
+    assert len(detect_frame(read_image(tmp_path / "sea.png"), "floating", near)) == 0
 
 
 def test_colours_are_found_by_the_same_command(tmp_path: Path) -> None:

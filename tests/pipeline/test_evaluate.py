@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.conftest import changed
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import covariance_columns
 from wildlab.geometry.frames import (
@@ -44,10 +45,7 @@ def test_a_clock_offset_shows_and_the_manifest_s_offset_takes_it_off(make_flight
     flight = make_flight(clock_s=0.5)
     assert scored(flight)["error_m"].mean() > 4.0
     assert scored(flight, clock_shift=0.5)["error_m"].max() < 1e-6
-    flight.manifest = flight.manifest.model_copy(
-        update={"clocks": flight.manifest.clocks.model_copy(update={"camera_offset_s": 0.5})}
-    )
-    assert scored(flight)["error_m"].max() < 1e-6
+    assert scored(changed(flight, {"clocks": {"camera_offset_s": 0.5}}))["error_m"].max() < 1e-6
 
 
 def test_calibration_finds_boresight_and_clock_and_helps_images_it_has_not_seen(make_flight):
@@ -67,10 +65,7 @@ def test_calibration_finds_boresight_and_clock_and_helps_images_it_has_not_seen(
 
 
 def test_images_without_time_are_not_asked_for_the_clock(make_flight):
-    flight = make_flight(misalignment_deg=(1.0, 0.0, 0.0))
-    flight.manifest = flight.manifest.model_copy(
-        update={"time": flight.manifest.time.model_copy(update={"kind": "sequence"})}
-    )
+    flight = changed(make_flight(misalignment_deg=(1.0, 0.0, 0.0)), {"time": {"kind": "sequence"}})
     result = calibrate_flight(flight, np.random.default_rng(0), estimate=("roll", "clock"), splits=1)
     assert result.calibration.names == ("roll",)
     assert "clock" not in result.calibration.undetermined
@@ -102,26 +97,16 @@ def test_a_log_s_own_covariance_is_used_and_can_be_overridden(make_flight):
     )
 
 
-def test_answers_that_name_no_target_are_left_out(make_flight):
-    flight = make_flight()
-    rows = flight.tables["detections"].assign(kind="position", source="Other 1.2", target_id="")
-    rows[["north_m", "east_m", "down_m"]] = 0.0
-    flight.tables["detections"] = pd.concat([flight.tables["detections"], rows], ignore_index=True)
-    assert unlabelled_programs(flight) == ["Other 1.2"] and "Other 1.2" not in recorded_answers(flight)
-    named = flight.tables["detections"]
-    named.loc[named["source"] == "Other 1.2", "target_id"] = flight.truth["target_id"].iloc[0]
-    assert unlabelled_programs(flight) == [] and "Other 1.2" in recorded_answers(flight)
-
-
-def test_recorded_answers_are_judged_by_the_same_rule(make_flight):
+def test_recorded_answers_are_judged_by_the_same_rule_where_they_name_targets(make_flight):
     flight = make_flight()
     table = flight.tables["detections"]
     theirs = table.assign(kind="position", source="other", u_px=np.nan, v_px=np.nan)
     place = flight.truth[["north_m", "east_m", "down_m"]].to_numpy() + np.array([3.0, -4.0, 0.0])
     theirs[["north_m", "east_m", "down_m"]] = place
-    flight.tables["detections"] = pd.concat([table, theirs], ignore_index=True)
+    nameless = theirs.assign(source="Other 1.2", target_id="")
+    flight.tables["detections"] = pd.concat([table, theirs, nameless], ignore_index=True)
     answers = recorded_answers(flight)
-    assert list(answers) == ["other"]
+    assert list(answers) == ["other"] and unlabelled_programs(flight) == ["Other 1.2"]
     assert np.allclose(errors_of(answers["other"]), [3.0, -4.0])
     assert len(scored(flight)) == 160
 
@@ -161,21 +146,16 @@ def test_a_minute_is_one_block_where_there_are_times(make_flight):
     few = pd.Series(blocks_of(short, observe(short).table))
     assert few.is_monotonic_increasing
     assert set(observe(short).table.groupby(few)["frame_id"].nunique()) == {3, 4}
-    long.manifest = long.manifest.model_copy(
-        update={"time": long.manifest.time.model_copy(update={"kind": "sequence"})}
-    )
-    assert len(np.unique(blocks_of(long, table))) == 20
+    assert len(np.unique(blocks_of(changed(long, {"time": {"kind": "sequence"}}), table))) == 20
 
 
 def test_errors_that_wander_widen_what_is_stated(make_flight):
     """The same errors in every image of a minute are worth one image of it, not sixty."""
     flight = make_flight(n_images=420, pixel_px=1.0)
     rng = np.random.default_rng(0)
-    wander = np.repeat(rng.normal(0, np.radians(1.0), (8, 3)), 600, axis=0)[: len(flight.nav["logged"])]
-    nav = flight.nav["logged"].iloc[: len(wander)].copy()
-    R = quaternion_to_matrix(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy()) @ rotation_vector_to_matrix(wander)
-    nav[["q_w", "q_x", "q_y", "q_z"]] = matrix_to_quaternion(R)
-    flight.nav["logged"] = nav
+    nav, q = flight.nav["logged"], ["q_w", "q_x", "q_y", "q_z"]
+    wander = np.repeat(rng.normal(0, np.radians(1.0), (8, 3)), 600, axis=0)[: len(nav)]
+    nav[q] = matrix_to_quaternion(quaternion_to_matrix(nav[q].to_numpy()) @ rotation_vector_to_matrix(wander))
     found = calibrate_flight(flight, rng, splits=1).calibration
     # Seven draws of one degree each: about 0.4 deg, where 420 images would claim 0.05.
     assert 0.2 < np.degrees(found.sd("roll")) < 0.8

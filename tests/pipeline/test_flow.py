@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.conftest import changed
 from wildlab.detection.flow import FlowThresholds, Matches
 from wildlab.errors import WildlabError
 from wildlab.flight.store import load_flight, save_flight
@@ -22,7 +23,7 @@ from wildlab.pipeline.flow import (
     velocity_detections,
     velocity_measurements,
 )
-from wildlab.pipeline.georeference import assumed_deviations
+from wildlab.pipeline.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
@@ -65,7 +66,7 @@ def quiet(flight, seen):
     gimbal = flight.gimbal.iloc[: len(seen.times)].assign(
         time_s=seen.times, pan_rad=seen.poses.pan, tilt_rad=seen.poses.tilt
     )
-    return replace(flight, tables=flight.tables | {"gimbal": gimbal})
+    return changed(flight, gimbal=gimbal)
 
 
 def speeds(table):
@@ -82,25 +83,17 @@ def test_with_true_poses_the_velocity_is_the_true_one(flight, seen):
 def test_a_deck_is_seen_on_its_own_plane(flight, seen):
     pairs = pairs_of(seen, down=-30.0)
     table = pair_velocities(quiet(flight, seen), pairs, true_reading(seen, plane_down=-30.0))
-    assert np.allclose(table["flow_u"], table["camera_u"], atol=1.0)
-    assert np.allclose(table["flow_v"], table["camera_v"], atol=1.0)
+    assert np.allclose(table[["flow_u", "flow_v"]], table[["camera_u", "camera_v"]], atol=1.0)
     assert np.allclose(speeds(table), 0.0, atol=0.15)
     flat = pair_velocities(quiet(flight, seen), pairs, true_reading(seen))
     assert not np.allclose(speeds(flat), 0.0, atol=0.5)
 
 
 def test_what_is_stated_of_a_flight_is_what_its_velocities_are_held_to(flight, seen):
-    """Of a pose that the log gives no covariance: two tilts about level axes, and a heading."""
     stated = assumed_deviations(flight)
-    assert stated["position_horizontal_m"] != stated["position_vertical_m"]
     pose = replace(seen.poses.take(40), R_nb=euler_to_matrix(0.3, 0.2, 1.1), covariance=None)
     found = flow_errors(flight, pose, 0.2, 0.25)
-    tilt, heading = np.radians([stated["tilt_deg"], stated["heading_deg"]])
-    in_n = pose.R_nb @ found.pose[3:, 3:] @ pose.R_nb.T
-    assert np.allclose(in_n, np.diag([tilt, tilt, heading]) ** 2)
-    across, down = stated["position_horizontal_m"], stated["position_vertical_m"]
-    assert np.allclose(found.pose[:3, :3], np.diag([across, across, down]) ** 2)
-    assert not found.pose[:3, 3:].any()
+    assert np.allclose(found.pose, assumed_pose_covariance(pose.R_nb, stated))
     assert np.allclose(found.pixel, 0.04 * np.eye(2))
     assert np.allclose(found.flow, 0.8**2 * np.eye(2)), "0.2 px in a quarter of a second are 0.8 px/s"
     usual = {name: np.radians(USUAL_MOTION[name]) ** 2 for name in ("rate_deg_s", "gimbal_rate_deg_s")}
@@ -156,7 +149,7 @@ def test_velocities_are_detections_of_their_own_kind(flight, seen, tmp_path):
     table = pair_velocities(quiet_flight, pairs_of(seen, velocity), true_reading(seen))
     rows = velocity_detections(flight, table, target="ship")
     both = pd.concat([flight.detections, rows.sample(frac=1, random_state=1)], ignore_index=True)
-    save_flight(replace(flight, tables=flight.tables | {"detections": both}), tmp_path / "flight")
+    save_flight(changed(flight, detections=both), tmp_path / "flight")
     loaded = load_flight(tmp_path / "flight")
     times, v, R = velocity_measurements(loaded)
     assert np.allclose(v, speeds(table)) and (np.diff(times) > 0).all()
@@ -167,15 +160,12 @@ def test_velocities_are_detections_of_their_own_kind(flight, seen, tmp_path):
 def test_without_velocities_there_is_nothing_to_feed(flight):
     times, v, R = velocity_measurements(flight)
     assert (times.shape, v.shape, R.shape) == ((0,), (0, 2), (0, 2, 2))
-    rows = pd.DataFrame(
-        {"detection_id": ["a"], "frame_id": ["f000003"], "source": ["radar"], "kind": ["velocity"],
-         "v_north_m_s": [1.0], "v_east_m_s": [2.0]}
-    )  # fmt: skip
-    alone = replace(flight, tables=flight.tables | {"detections": rows})
-    times, v, R = velocity_measurements(alone)
-    assert v.tolist() == [[1.0, 2.0]] and np.isnan(R).all()
-    lost = replace(flight, tables=flight.tables | {"detections": rows.assign(frame_id="nowhere")})
-    assert len(velocity_measurements(lost)[0]) == 0
+    row = {"detection_id": "a", "source": "radar", "kind": "velocity",
+           "v_north_m_s": 1.0, "v_east_m_s": 2.0}  # fmt: skip
+    for frame, count in (("f000003", 1), ("nowhere", 0)):
+        rows = pd.DataFrame([row | {"frame_id": frame}])
+        _, v, R = velocity_measurements(changed(flight, detections=rows))
+        assert v.tolist() == [[1.0, 2.0]] * count and np.isnan(R).all()
 
 
 def test_what_does_not_fit_is_refused(flight, seen):

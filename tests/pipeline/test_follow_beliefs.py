@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.pipeline.robots import KNOWN, robot_flight, rows_of
+from tests.pipeline.robots import KNOWN, believed, robot_flight, rows_of
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings
@@ -87,9 +87,7 @@ def test_errors_of_roll_and_pitch_in_older_settings_are_one_of_the_tilt():
 def test_errors_of_a_camera_that_looks_straight_down_are_tilts_and_a_heading():
     """Against rotations of the camera; and all of them make the covariance of the pose."""
     flight = simulate(Survey(images=6, slant_deg=(90.0, 90.0), stated_heading_deg=4.0))
-    scans = scans_of(flight, "click", 0.0, "logged")
-    assert scans.poses is not None
-    beliefs, _ = of_sensor(flight, scans, of_flight(flight))
+    scans, beliefs = believed(flight, "", "click", "logged")
     assert [one.name for one in beliefs.considered if one.sd == np.radians(0.7)] == ["roll", "pitch"]
     place = scans.platform + np.array([7.0, -5.0])
     still, small = np.zeros_like(place), 1e-5

@@ -3,12 +3,11 @@ than its track: each held against numbers computed here."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
+from tests.pipeline.conftest import changed
 from tests.pipeline.robots import boat, joined, paused, robot_flight, rows_of, seen_only
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings
@@ -21,8 +20,7 @@ from wildlab.tracking.maritime import white_acceleration
 
 def later(flight: Flight, seconds: float) -> Flight:
     frames = flight.tables["frames"]
-    tables = flight.tables | {"frames": frames.assign(time_s=frames["time_s"] + seconds)}
-    return replace(flight, tables=tables)
+    return changed(flight, frames=frames.assign(time_s=frames["time_s"] + seconds))
 
 
 def by_filterpy(z, t, density, sd, x, P):
@@ -87,7 +85,7 @@ def test_innovations_are_likeliest_at_what_was_tuned():
 def test_part_of_the_flight_that_is_judged_teaches_nothing():
     flight = robot_flight(1)
     seen = flight.tables["detections"]
-    part = replace(flight, tables=flight.tables | {"detections": seen.iloc[20:90].assign(target_id="x")})
+    part = changed(flight, detections=seen.iloc[20:90].assign(target_id="x"))
     with pytest.raises(WildlabError, match="70") as caught:
         refuse_same(flight, part)
     assert caught.value.field == "--tune"

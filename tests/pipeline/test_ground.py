@@ -10,10 +10,11 @@ import pandas as pd
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from tests.pipeline.conftest import changed
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.checks.check import check_flight
-from wildlab.flight.manifest import make_manifest, replace_in_manifest
+from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, rotation_vector_to_matrix
@@ -38,6 +39,12 @@ MANIFEST = {
 def hills(seed: int = 0) -> Terrain:
     height = 40 * 14 * gaussian_filter(np.random.default_rng(seed).normal(size=(150, 150)), 12)
     return Terrain(height.astype(np.float32), -450.0, -450.0, 6.0)
+
+
+def holed() -> Terrain:
+    height = hills().height.copy()
+    height[60:95, 60:] = np.nan
+    return replace(hills(), height=height)
 
 
 @pytest.fixture
@@ -99,8 +106,7 @@ def test_with_exact_poses_points_are_the_marks(flown: Callable[..., Flight]) -> 
 def test_ellipses_hold_what_they_should_over_hills(flown: Callable[..., Flight]) -> None:
     """Poses, pixels and nothing else are wrong, by what the manifest states."""
     flight = flown(noise=1.0, per_image=24)
-    ground = hills()
-    flight.terrain = Terrain(ground.height, ground.north, ground.east, ground.step, 1e-3)
+    flight.terrain = replace(hills(), sd=1e-3)
     scored = score_points(flight, georeference(flight, observe(flight), np.random.default_rng(0)))
     assert len(scored) > 500
     # 25 poses are drawn: 90 % of their points, give or take what so few decide.
@@ -111,8 +117,8 @@ def test_ellipses_hold_what_they_should_over_hills(flown: Callable[..., Flight])
 def test_the_map_decides_how_good_its_heights_are(flown: Callable[..., Flight]) -> None:
     sizes = []
     for sd in (np.nan, 0.3, 6.0):
-        flight, ground = flown(), hills()
-        flight.terrain = Terrain(ground.height, ground.north, ground.east, ground.step, sd)
+        flight = flown()
+        flight.terrain = replace(hills(), sd=sd)
         points = georeference(flight, observe(flight), np.random.default_rng(0))
         sizes.append(float((points["cov_nn"] + points["cov_ee"]).median()))
     assert sizes[0] == sizes[1]  # 0.3 m is what the manifest assumes where the map is silent
@@ -121,9 +127,7 @@ def test_the_map_decides_how_good_its_heights_are(flown: Callable[..., Flight]) 
 
 def test_rays_that_meet_no_ground_are_counted(flown: Callable[..., Flight]) -> None:
     flight = flown()
-    height = hills().height.copy()
-    height[60:95, 60:] = np.nan
-    flight.terrain = Terrain(height, -450.0, -450.0, 6.0)
+    flight.terrain = holed()
     nav = flight.nav["logged"]
     nav.loc[[0, 2, 3, 4], "down_m"] = 500.0
     nav.loc[1, "east_m"] = 4000.0
@@ -139,9 +143,7 @@ def test_rays_that_meet_no_ground_are_counted(flown: Callable[..., Flight]) -> N
 def test_a_ray_without_ground_is_no_sighting(flown: Callable[..., Flight]) -> None:
     flight = flown()
     flight.tables["detections"]["target_id"] = "m0-0"
-    height = hills().height.copy()
-    height[60:95, 60:] = np.nan
-    flight.terrain = Terrain(height, -450.0, -450.0, 6.0)
+    flight.terrain = holed()
     lost = np.isnan(observe(flight).plane_down)
     found = sighting(flight, "logged")
     assert lost.any() and np.isnan(found.positions[:, 0]).any()
@@ -159,11 +161,8 @@ def test_heights_left_in_raise_terrain_that_counts_alike(flown: Callable[..., Fl
     }  # fmt: skip
     moved = {}
     for heights in ("flight", "ellipsoid"):
-        flight = flown()
-        flight.manifest = replace_in_manifest(
-            flight.manifest,
-            {"terrain": record | {"heights": heights}, "vertical": {"reference": "x", "correction_m": 20.0}},
-        )
+        vertical = {"reference": "x", "correction_m": 20.0}
+        flight = changed(flown(), {"terrain": record | {"heights": heights}, "vertical": vertical})
         seen = observe(flight)
         raised = heights_left_in(flight, seen)
         before, after = (georeference(flight, o, np.random.default_rng(0)) for o in (seen, raised))
@@ -175,7 +174,7 @@ def test_a_check_holds_the_survey_against_the_map(flown: Callable[..., Flight]) 
     flight, ground = flown(), hills()
 
     def findings(height: np.ndarray, words: str) -> list[str]:
-        flight.terrain = Terrain(height, ground.north, ground.east, ground.step)
+        flight.terrain = replace(ground, height=height)
         return [one.level for one in check_flight(flight) if words in one.sentence and one.level != "note"]
 
     assert findings(ground.height, "known points") == []

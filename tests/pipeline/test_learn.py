@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.pipeline.conftest import changed
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.sense.sense import sense_sentences
 from wildlab.flight.learnt import LearntParameter, learnt_toml, parse_learnt, read_learnt, write_learnt
-from wildlab.flight.manifest import replace_in_manifest
 from wildlab.pipeline.diagnose import diagnose
 from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import georeference, observe, pose_errors
@@ -21,8 +21,7 @@ def tuesday(**more):
 
 
 def named(flight, name):
-    flight.manifest = replace_in_manifest(flight.manifest, {"name": name})
-    return flight
+    return changed(flight, {"name": name})
 
 
 @cache
@@ -49,6 +48,12 @@ def test_it_comes_back_from_its_file_as_it_was(tmp_path):
     assert "latitude" not in learnt_toml(learnt())
 
 
+def only(name, value, half, unit):
+    """The calibration with one parameter alone."""
+    one = LearntParameter(name=name, value=value, low=value - half, high=value + half, unit=unit)
+    return learnt().model_copy(update={"parameter": (one,), "covariance": ((half**2 / 4,),)})
+
+
 def test_a_corrected_flight_says_what_the_applied_calibration_says():
     flight = named(tuesday(seed=5), "wednesday")
     applied = apply_learnt(flight, None, observe(flight), learnt())
@@ -60,17 +65,14 @@ def test_a_corrected_flight_says_what_the_applied_calibration_says():
         atol=1e-6,
     )
     # So it does of the lens.
-    k1 = LearntParameter(name="radial", value=0.1, low=0.09, high=0.11, unit="1")
-    of_lens = learnt().model_copy(update={"parameter": (k1,), "covariance": ((2.5e-5,),)})
+    of_lens = only("radial", 0.1, 0.01, "1")
     camera = apply_learnt(flight, None, observe(flight), of_lens).observations.poses.camera
     assert camera == observe(corrected_flight(flight, None, of_lens)).poses.camera
     assert camera.distortion == (0.1, 0.0, 0.0, 0.0, 0.0)
     # What the calibration takes off is no contradiction any more.
     late = simulate(Survey(seed=5, clock_s=1.0))
     assert len(sense_sentences(late)) == 1
-    clock = LearntParameter(name="clock", value=1.0, low=0.9, high=1.1, unit="s")
-    of_clock = learnt().model_copy(update={"parameter": (clock,), "covariance": ((0.0025,),)})
-    assert sense_sentences(corrected_flight(late, None, of_clock)) == []
+    assert sense_sentences(corrected_flight(late, None, only("clock", 1.0, 0.1, "s"))) == []
     nothing = learnt().model_copy(update={"parameter": (), "covariance": ()})
     assert corrected_flight(flight, None, nothing) is flight
 
@@ -119,8 +121,7 @@ def test_on_the_very_flight_it_was_learnt_on_that_is_said():
     ],
 )
 def test_another_camera_or_mount_is_refused(change, words):
-    flight = tuesday(images=8)
-    flight.manifest = replace_in_manifest(flight.manifest, change)
+    flight = changed(tuesday(images=8), change)
     with pytest.raises(WildlabError, match=words):
         apply_learnt(flight, None, observe(flight), learnt())
 

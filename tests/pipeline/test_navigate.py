@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.conftest import changed, first_seconds
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.manifest_parts import ImuPart
 from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight, save_flight
@@ -27,13 +29,9 @@ from wildlab.simulation.twins import simulate_twin
 def flight() -> Flight:
     """The first minutes of the static twin's sensors, and its frames in that time."""
     whole = simulate_twin("static-antenna", 3)
-    early = {
-        name: table[table["time_s"] < 420.0].reset_index(drop=True) if "time_s" in table else table
-        for name, table in whole.tables.items()
-        if name != "truth"
-    }
-    early["detections"] = whole.detections[whole.detections["frame_id"].isin(early["frames"]["frame_id"])]
-    return Flight(whole.manifest, whole.nav, {**early, "truth": whole.truth})
+    frames = whole.frames[whole.frames["time_s"] < 420.0]
+    detections = whole.detections[whole.detections["frame_id"].isin(frames["frame_id"])]
+    return changed(first_seconds(whole, 420.0), frames=frames, detections=detections, truth=whole.truth)
 
 
 def errors(flight: Flight, nav: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
@@ -78,15 +76,11 @@ def test_the_filter_states_its_covariance_and_its_innovations(flight):
 
 
 def test_the_manifest_says_how_uncertain_velocities_are_where_the_log_does_not(flight):
-    silent = {**flight.tables, "gnss": flight.gnss.drop(columns="sd_velocity_m_s")}
+    silent = changed(flight, gnss=flight.gnss.drop(columns="sd_velocity_m_s"))
     some = np.arange(0.0, 60.0, 1.0)
-    nothing = navigate_mekf(Flight(flight.manifest, flight.nav, silent), some)
-    assert "velocity" not in set(nothing.innovations["source"])
+    assert "velocity" not in set(navigate_mekf(silent, some).innovations["source"])
     stated = {"velocity_horizontal_m_s": 0.05, "velocity_vertical_m_s": 0.05}
-    manifest = flight.manifest.model_copy(
-        update={"uncertainty": flight.manifest.uncertainty.model_copy(update=stated)}
-    )
-    found = navigate_mekf(Flight(manifest, flight.nav, silent), some)
+    found = navigate_mekf(changed(silent, {"uncertainty": stated}), some)
     logged = navigate_mekf(flight, some)
     pd.testing.assert_frame_equal(found.nav, logged.nav)
 
@@ -96,10 +90,13 @@ def test_every_twin_with_sensors_states_what_the_filter_must_know(name):
     assert imu_noise(Flight(twin_manifest(load_twin(name), 5), {}, {})) is not None
 
 
+def single(flight: Flight) -> Flight:
+    """The flight with one antenna."""
+    return changed(flight, gnss=flight.gnss.drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS[3:]]))
+
+
 def test_one_antenna_starts_from_the_course(flight):
-    tables = {**flight.tables, "gnss": flight.gnss.drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS[3:]])}
-    single = Flight(flight.manifest, flight.nav, tables)
-    found = navigate_mekf(single, np.arange(0.0, 240.0, 0.5))
+    found = navigate_mekf(single(flight), np.arange(0.0, 240.0, 0.5))
     assert set(found.innovations["source"]) == {"position", "velocity"}
     position, attitude = errors(flight, found.nav)
     assert position.max() < 0.5
@@ -107,18 +104,15 @@ def test_one_antenna_starts_from_the_course(flight):
 
 
 def test_what_the_filter_must_know_is_asked_for(flight):
-    bare = Flight(flight.manifest.model_copy(update={"imu": ImuPart()}), flight.nav, flight.tables)
+    bare = replace(flight, manifest=flight.manifest.model_copy(update={"imu": ImuPart()}))
     with pytest.raises(WildlabError, match="not stated") as caught:
         imu_noise(bare)
     assert caught.value.field == "imu.velocity_random_walk_m_s_sqrt_h"
-    gnss = flight.gnss.drop(columns=["sd_vertical_m"])
-    manifest = flight.manifest.model_copy(
-        update={"uncertainty": flight.manifest.uncertainty.model_copy(update={"position_vertical_m": None})}
-    )
+    silent = changed(flight, gnss=flight.gnss.drop(columns=["sd_vertical_m"]))
     with pytest.raises(WildlabError, match="satellite positions"):
-        navigate_observer(Flight(manifest, flight.nav, {**flight.tables, "gnss": gnss}))
+        navigate_observer(changed(silent, {"uncertainty": {"position_vertical_m": None}}))
     with pytest.raises(WildlabError, match="no table 'imu'"):
-        navigate_observer(Flight(flight.manifest, flight.nav, {"gnss": flight.gnss}))
+        navigate_observer(replace(flight, tables={"gnss": flight.gnss}))
 
 
 IRON = np.array([8.0, -3.0, 5.0])
@@ -131,9 +125,8 @@ def with_field(flight: Flight, **stated: object) -> Flight:
     field = 50.0 * np.einsum("kji,j->ki", R, earth_field(0.05, 1.2)) + IRON
     field += np.random.default_rng(1).normal(0, 0.5, field.shape)
     table = pd.DataFrame(field, columns=["field_x_ut", "field_y_ut", "field_z_ut"])
-    tables = {**flight.tables, "gnss": flight.gnss.drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS[3:]])}
-    tables["magnetometer"] = table.assign(time_s=truth["time_s"])
-    return Flight(replace_in_manifest(flight.manifest, {"magnetometer": stated}), flight.nav, tables)
+    table["time_s"] = truth["time_s"]
+    return changed(single(flight), {"magnetometer": stated}, magnetometer=table)
 
 
 def test_a_magnetometer_stands_in_for_the_second_antenna():
@@ -141,16 +134,14 @@ def test_a_magnetometer_stands_in_for_the_second_antenna():
     flight, times = simulate_twin("slow-vessel-eight", 3), np.arange(0.0, 420.0, 0.5)
     stated = {"declination_deg": np.degrees(0.05), "inclination_deg": np.degrees(1.2), "heading_sd_deg": 3.0}
     known, silent = with_field(flight, **stated), with_field(flight)  # silent: where does the field point?
-    by_field = errors(known, navigate_observer(known, times).nav)[1][2]
-    by_course = errors(silent, navigate_observer(silent, times).nav)[1][2]
-    print(f"heading by the field {by_field:.1f} deg, by the course {by_course:.1f} deg")
+    by_field, by_course = (errors(one, navigate_observer(one, times).nav)[1][2] for one in (known, silent))
     assert 2 * by_field < by_course
     filtered = navigate_mekf(known, times, magnetometer=True)
     assert set(filtered.innovations["source"]) == {"position", "velocity", "heading"}
     assert errors(known, filtered.nav)[1][2] < 2.0
-    flipped = known.tables["magnetometer"].assign(field_y_ut=-known.tables["magnetometer"]["field_y_ut"])
+    known.tables["magnetometer"]["field_y_ut"] *= -1
     with pytest.raises(WildlabError, match="gyros"):
-        navigate_observer(Flight(known.manifest, known.nav, {**known.tables, "magnetometer": flipped}), times)
+        navigate_observer(known, times)
     with pytest.raises(WildlabError, match="declination_deg") as caught:
         navigate_mekf(silent, times, magnetometer=True)
     assert caught.value.field == "magnetometer.declination_deg"
@@ -166,9 +157,9 @@ def test_a_flight_that_banks_to_one_side_has_its_iron_stated(flight):
 
 
 def test_the_latency_that_was_put_in_is_the_likeliest(flight):
-    late = {**flight.tables, "gnss": flight.gnss.assign(time_s=flight.gnss["time_s"] + 0.12)}
+    late = changed(flight, gnss=flight.gnss.assign(time_s=flight.gnss["time_s"] + 0.12))
     latencies = np.array([0.06, 0.11, 0.12, 0.13])
-    likely = likelihoods_of_latency(Flight(flight.manifest, flight.nav, late), latencies)
+    likely = likelihoods_of_latency(late, latencies)
     assert latencies[np.argmax(likely)] == 0.12
 
 
@@ -177,16 +168,12 @@ def test_an_accelerometer_off_by_a_known_bias_is_the_same_as_none(flight):
     wrong = flight.imu.copy()
     wrong[["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]] += off
     times = np.arange(0.0, 100.0, 1.0)
-    mended = navigate_observer(
-        Flight(flight.manifest, flight.nav, {**flight.tables, "imu": wrong}), times, accelerometer_bias=off
-    )
+    mended = navigate_observer(changed(flight, imu=wrong), times, accelerometer_bias=off)
     pd.testing.assert_frame_equal(mended.nav, navigate_observer(flight, times).nav, rtol=1e-6, atol=1e-6)
 
 
 def test_what_cannot_be_believed_says_so() -> None:
     flight = simulate_twin("fast-vessel", 1)
     assert navigate_mekf(flight).signs == ()
-    wrong = flight.tables["imu"].copy()
-    wrong[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]] *= 180 / np.pi  # deg/s taken for rad/s
-    flight.tables["imu"] = wrong
+    flight.tables["imu"][["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]] *= 180 / np.pi  # deg/s for rad/s
     assert navigate_mekf(flight).signs

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.pipeline.conftest import first_seconds
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import covariance_columns
 from wildlab.flight.store import Flight
@@ -93,13 +94,8 @@ def test_times_without_a_pose_or_between_rows_state_nothing(pair):
 @pytest.fixture(scope="module")
 def early() -> Flight:
     """Two minutes of a twin whose sensors are what is said of them."""
-    whole = simulate(load_twin("fast-vessel").model_copy(update={"tolerance": None}), 4)
-    tables = {
-        name: t[t["time_s"] < 120.0].reset_index(drop=True)
-        for name, t in whole.tables.items()
-        if name in ("imu", "gnss")
-    }
-    return Flight(whole.manifest, whole.nav, tables)
+    exact = load_twin("fast-vessel").model_copy(update={"tolerance": None})
+    return first_seconds(simulate(exact, 4), 120.0)
 
 
 def test_a_twin_is_judged_by_the_truth_of_its_payload(early):

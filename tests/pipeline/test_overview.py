@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.pipeline.conftest import build, receiver, without_poses
+from tests.pipeline.conftest import build, changed, receiver, without_poses
 from tests.pipeline.robots import KNOWN, robot_flight
 from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import pace_of, runs_of
@@ -304,8 +304,7 @@ def test_broken_rows_are_left_out_and_counted_as_problems() -> None:
 
 
 def test_photos_without_times_have_no_rates(tmp_path: Path) -> None:
-    flight = level_images([(0.0, 0.0), (50.0, 0.0), (90.0, 10.0)])
-    flight = replace(flight, manifest=replace_in_manifest(flight.manifest, {"time": {"kind": "sequence"}}))
+    flight = changed(level_images([(0.0, 0.0), (50.0, 0.0), (90.0, 10.0)]), {"time": {"kind": "sequence"}})
     _, content = page_of(flight, tmp_path)
     assert ("duration", "flight") not in values(content)
     assert values(content)["area_seen", "flight"] > 0

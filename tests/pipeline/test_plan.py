@@ -237,10 +237,9 @@ def test_a_way_stays_near_its_height_everywhere():
 
 
 def test_ground_that_is_not_known_is_counted():
-    terrain = hills()
-    height = terrain.height.copy()
+    height = hills().height.copy()
     height[40:60, 40:60] = np.nan
-    holed = Terrain(height, terrain.north, terrain.east, terrain.step)
+    holed = replace(hills(), height=height)
     found = follow(np.array([[-100.0, -500.0], [-100.0, 500.0]]), holed, 60.0)
     assert found.unknown == pytest.approx(210, abs=15) and np.isfinite(found.height).all()
 

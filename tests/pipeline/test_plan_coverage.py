@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ import pytest
 from tests.flight.test_area import collection, feature, polygon
 from tests.pipeline.test_plan import CAMERA, hills, plan
 from wildlab.geometry.camera import normalise, project
-from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plans.coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
 from wildlab.pipeline.plans.outlines import simplified
 from wildlab.pipeline.plans.plan import make_plan
@@ -82,7 +82,7 @@ def test_without_overlap_what_lies_at_the_edges_of_images_is_missed(field):
 @pytest.mark.parametrize("tilt", [90.0, 30.0])
 def test_what_is_hidden_is_hidden_by_brute_force(field, tilt):
     terrain = hills(step=8.0)
-    steep = Terrain(5.0 * terrain.height, terrain.north, terrain.east, terrain.step)
+    steep = replace(terrain, height=5.0 * terrain.height)
     made = over(field, steep, height_m=40.0, tilt_deg=tilt)
     (found,) = cover(made)
     images = images_of(made, made.sorties[0])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tests.pipeline.conftest import changed, first_seconds
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import make_manifest, replace_in_manifest
+from wildlab.flight.manifest import make_manifest
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight
@@ -31,26 +34,15 @@ from wildlab.studies.navigation.receiver import left_over
 def early() -> Flight:
     """A minute and a half of a twin's sensors, as if they had been logged."""
     whole = simulate_twin("fast-vessel", 1)
-    tables = {
-        name: t[t["time_s"] < 90.0].reset_index(drop=True)
-        for name, t in whole.tables.items()
-        if name in ("imu", "gnss")
-    }
-    manifest = make_manifest(
-        {
-            name: value
-            for name, value in whole.manifest.model_dump(mode="json", exclude_none=True).items()
-            if name not in ("twin", "files")
-        }
-        | {"kind": "logged"}
-    )
-    return Flight(manifest, {"onboard": whole.nav["autopilot"]}, tables)
+    parts = whole.manifest.model_dump(mode="json", exclude_none=True, exclude={"twin", "files"})
+    nav = {"onboard": whole.nav["autopilot"]}
+    return replace(first_seconds(whole, 90.0), manifest=make_manifest(parts | {"kind": "logged"}), nav=nav)
 
 
 def jumped(flight: Flight, rows: list[int]) -> Flight:
     gnss = flight.table("gnss").copy()
     gnss.loc[rows, "north_m"] += 1000.0
-    return Flight(flight.manifest, flight.nav, {**flight.tables, "gnss": gnss})
+    return changed(flight, gnss=gnss)
 
 
 def test_a_fix_a_kilometre_off_is_no_noise(early: Flight) -> None:
@@ -75,7 +67,7 @@ def test_a_filter_that_is_lost_is_nothing_to_learn_from(early: Flight) -> None:
 
 def test_what_was_refused_is_kept_for_the_report(early: Flight) -> None:
     few = early.table("gnss").iloc[::20].reset_index(drop=True)
-    studied = study_navigation(Flight(early.manifest, early.nav, {**early.tables, "gnss": few}))
+    studied = study_navigation(changed(early, gnss=few))
     assert studied.receiver is None and "too few" in studied.refusal
     assert "mekf-receiver" not in studied.found
     assert {name for who, name in numbers_of(studied, 0.0) if who == "mekf" and name.startswith("lag1")} == {
@@ -120,7 +112,7 @@ def test_innovations_of_a_logged_flight_are_of_the_right_level_and_white(shared_
     numbers = numbers_of(studied, begin, end)
     for name in ("position", "velocity"):
         after = numbers["mekf-receiver", f"nis_{name}"] / 3, numbers["mekf-receiver", f"lag1_{name}"]
-        print(name, numbers["mekf", f"nis_{name}"] / 3, numbers["mekf", f"lag1_{name}"], after)
+
         assert left_over(*after) == ()
     assert left_over(numbers["mekf", "nis_position"] / 3, numbers["mekf", "lag1_position"])
 
@@ -128,16 +120,11 @@ def test_innovations_of_a_logged_flight_are_of_the_right_level_and_white(shared_
 @pytest.fixture(scope="module")
 def turning() -> Flight:
     """Three minutes of a twin with one antenna, as if they had been logged."""
-    whole = simulate_twin("fast-vessel", 1)
-    tables = {
-        name: t[t["time_s"] < 180.0].reset_index(drop=True)
-        for name, t in whole.tables.items()
-        if name in ("imu", "gnss")
-    }
-    arm = tables["gnss"][list(LEVER_COLUMNS[:3])].iloc[0].tolist()
-    tables["gnss"] = tables["gnss"].drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS])
-    manifest = replace_in_manifest(whole.manifest, {"gnss": {"lever_arm_m": arm}})
-    return Flight(manifest, whole.nav, tables)
+    flight = first_seconds(simulate_twin("fast-vessel", 1), 180.0)
+    gnss = flight.table("gnss")
+    arm = gnss[list(LEVER_COLUMNS[:3])].iloc[0].tolist()
+    single = gnss.drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS])
+    return changed(flight, {"gnss": {"lever_arm_m": arm}}, gnss=single)
 
 
 @pytest.mark.slow
@@ -146,14 +133,11 @@ def test_a_late_receiver_and_a_misplaced_antenna_are_found(turning: Flight) -> N
     right = place_receiver(turning, ReceiverNoise())
     truth = np.array([0.0, *arm])
     found = np.array([right.latency, *right.lever])
-    print(found, truth, right.sd, right.gain)
+
     assert (np.abs(found - truth) < 4 * right.sd).all()
     late = turning.table("gnss").assign(time_s=turning.table("gnss")["time_s"] + 0.12)
-    wrong = replace_in_manifest(
-        turning.manifest, {"gnss": {"lever_arm_m": (arm + np.array([0.4, -0.3, 0.2])).tolist()}}
-    )
-    spoilt = place_receiver(Flight(wrong, turning.nav, {**turning.tables, "gnss": late}), ReceiverNoise())
-    print(spoilt)
+    wrong = {"gnss": {"lever_arm_m": (arm + np.array([0.4, -0.3, 0.2])).tolist()}}
+    spoilt = place_receiver(changed(turning, wrong, gnss=late), ReceiverNoise())
     assert spoilt.latency - right.latency == pytest.approx(0.12, abs=0.01)
     assert np.allclose(spoilt.lever, right.lever, atol=4 * right.sd[1:].max())
     assert spoilt.gain > right.gain + 20

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.conftest import changed
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import replace_in_manifest
 from wildlab.pipeline.camera_clock import by_points_in_words
 from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import observe
@@ -94,7 +94,5 @@ def test_without_names_there_is_nothing_to_compare():
 
 def test_where_no_ray_meets_the_ground_all_is_lost():
     """All rays above the horizon: things are in many images, and have a position from none."""
-    flight = simulate(Survey(images=8))
-    flight.manifest = replace_in_manifest(flight.manifest, {"mount": {"tilt_deg": 120.0}})
-    found = judged(flight)
+    found = judged(changed(simulate(Survey(images=8)), {"mount": {"tilt_deg": 120.0}}))
     assert found.lost == len(found.points) and found.spread is None

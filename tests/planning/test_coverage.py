@@ -27,9 +27,9 @@ WIDE = Camera(100, 100, 50.0, 50.0, 50.0, 50.0)
 
 def hills(seed: int, holes: bool = False) -> Terrain:
     land = synthetic_landscape(seed, north=120.0, east=160.0, relief=25.0)
-    if holes:
-        land.height[20:25, 30:40] = np.nan
-    return land
+    height = land.height.copy()
+    height[20:25, 30:40] = np.nan
+    return replace(land, height=height) if holes else land
 
 
 def poses_over(terrain: Terrain, seed: int, count: int = 40) -> CameraPoses:

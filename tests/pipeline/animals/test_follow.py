@@ -19,6 +19,7 @@ from wildlab.pipeline.animals.follow import (
     follow,
     next_look,
 )
+from wildlab.pipeline.animals.frames import NONE
 from wildlab.pipeline.animals.images import Detector, Images, footprint_circles, sight_from, take_images
 from wildlab.pipeline.plans.flown import ExecutionErrors
 from wildlab.planning.areas import inside_of, rectangle
@@ -155,15 +156,22 @@ def test_negative_information_moves_a_track_out_of_what_was_seen() -> None:
     assert mean[0, 1] == pytest.approx(np.sqrt(2 / np.pi) * np.sqrt(25.25) * 9 / 11, rel=0.2)
 
 
-def test_a_ledger_knows_who_got_which_track() -> None:
+def test_a_ledger_knows_who_got_which_track_and_takes_a_false_detection_for_no_animal() -> None:
     ledger = Ledger(3)
-    ledger.enter(0, 0.0, np.array([0, 1]), np.array([1, 2]), {}, {1: 4.0, 2: 6.0})
-    ledger.enter(9, 90.0, np.array([1, 2]), np.array([1, 0]), {1: 50.0, 2: 60.0}, {1: 5.0, 2: 60.0})
-    first, _, third = ledger.found
+    ledger.enter(0, 0.0, np.arange(3), np.array([1, 2, 3]), {}, {1: 4.0, 2: 6.0, 3: 8.0})
+    for image, time in ((1, 10.0), (2, 50.0)):
+        ledger.enter(image, time, np.array([NONE]), np.array([4]), {3: 8.0}, {3: 8.0, 4: 9.0})
+    before = {1: 50.0, 2: 60.0, 3: 7.0}
+    ledger.enter(9, 90.0, np.array([1, 2, 0]), np.array([1, 3, 0]), before, {1: 5.0, 2: 60.0, 3: 4.0})
+    first, _, _, false, again, third, last = ledger.found
     assert first.started and first.away == np.inf and first.own == 0 and np.isnan(first.before)
     assert (third.animal, third.track, third.own, third.away) == (1, 1, 2, 90.0)
     assert (third.before, third.after, third.after_last, third.own_before) == (50.0, 5.0, 4.0, 60.0)
     assert not third.started
+    assert (false.animal, false.started, false.own, false.away) == (NONE, True, 0, np.inf)
+    assert np.isnan(false.own_before) and again.away == np.inf and again.own == 0
+    # The last animal's own track and time are not those of the detections that are nobody's.
+    assert (last.own, last.away, last.own_before) == (3, 90.0, 7.0)
 
 
 class Told:

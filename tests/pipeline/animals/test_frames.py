@@ -3,6 +3,8 @@ ground, and that a detection of no animal is nobody's sighting."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -13,12 +15,12 @@ from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.animals.follow import Ledger
 from wildlab.pipeline.animals.frames import (
     NEAR,
     NONE,
     TOO_LARGE,
     Frame,
+    Framed,
     Scenery,
     Thermal,
     furnish,
@@ -27,7 +29,7 @@ from wildlab.pipeline.animals.frames import (
     render_frame,
     take_frames,
 )
-from wildlab.pipeline.animals.images import FURTHEST, Detector, Images, take_images
+from wildlab.pipeline.animals.images import FURTHEST, Detector, Images
 from wildlab.pipeline.plans.flown import ExecutionErrors
 from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.simulation.scene.animals import ANIMALS, animal
@@ -133,36 +135,33 @@ def test_detections_are_judged_by_what_is_under_them() -> None:
     order = np.argsort(found.uv[:, 1])
     assert judged.animal[order].tolist() == [4, NONE, NONE]
     assert judged.standing[order].tolist() == [True, True, False]
+    # A centroid near an animal is of it, one of much more than the animal is not.
+    widest = int(TOO_LARGE * 20)
+    for box, whose in (
+        ((117 + NEAR, 50, 5, 5), 4),
+        ((118 + NEAR, 50, 5, 5), NONE),
+        ((110 - (widest - 1) // 2, 50, widest - 1, 10), 4),
+        ((110 - (widest + 1) // 2, 50, widest + 1, 10), NONE),
+    ):
+        assert judge(frame, detections(box)).animal.tolist() == [whose], box
 
 
-@pytest.mark.parametrize("away, animal", [(NEAR, 0), (NEAR + 1, NONE)])
-def test_a_centroid_near_an_animal_is_of_it(away: int, animal: int) -> None:
-    labels = np.zeros(SHAPE)
-    labels[50:60, 100:120] = 1
-    found = detections((119 + away - 2, 50, 5, 5))
-    assert judge(frame_of(labels, [0]), found).animal.tolist() == [animal]
-
-
-@pytest.mark.parametrize("more, animal", [(-1, 0), (1, NONE)])
-def test_a_detection_much_larger_than_an_animal_is_not_of_it(more: int, animal: int) -> None:
-    labels = np.zeros(SHAPE)
-    labels[100:110, 100:110] = 1
-    width = int(TOO_LARGE * 10) + more
-    found = detections((105 - width // 2, 100, width, 10))
-    assert judge(frame_of(labels, [0]), found).animal.tolist() == [animal]
-
-
-def stretch(told: CameraPoses, places: Array) -> Images:
-    n = len(told.p_nc)
-    return Images(
-        np.arange(float(n)), told, np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0, np.intp),
-        np.zeros(0, np.intp), np.broadcast_to(places, (n, *places.shape)), np.ones((n, len(places)), bool),
+def framed(labels: Array, find: Callable[[np.ndarray, float], Detections]) -> Framed:
+    """Two images, 3 m apart, straight down over ground at 8 m, that show an animal where it is labelled."""
+    flat = Terrain(np.full((41, 41), 8.0, np.float32), north=-200.0, east=-200.0, step=10.0)
+    told = poses(np.array([[0.0, 0.0, -58.0], [3.0, 0.0, -58.0]]), np.array([R_MC_DOWN] * 2))
+    none = np.zeros(0, np.intp)
+    images = Images(
+        np.arange(2.0), told, np.zeros((0, 2)), np.zeros((0, 2, 2)), none, none, np.zeros((2, 1, 2)),
+        np.ones((2, 1), bool),
+    )  # fmt: skip
+    return take_frames(
+        flat, images, np.zeros(2), lambda k: frame_of(labels, [0]), find, ERRORS, DETECTOR,
+        np.random.default_rng(0),
     )  # fmt: skip
 
 
 def test_detections_go_to_the_ground_from_the_told_pose() -> None:
-    flat = Terrain(np.full((41, 41), 8.0, np.float32), north=-200.0, east=-200.0, step=10.0)
-    told = poses(np.array([[0.0, 0.0, -58.0], [3.0, 0.0, -58.0]]), np.array([R_MC_DOWN] * 2))
     labels = np.zeros(SHAPE)
     labels[50:61, 100:121] = 1
     asked = []
@@ -171,12 +170,8 @@ def test_detections_go_to_the_ground_from_the_told_pose() -> None:
         asked.append(distance)
         return detections((100, 50, 21, 11), (10, 10, 5, 5))
 
-    framed = take_frames(
-        flat, stretch(told, np.zeros((1, 2))), np.zeros(2), lambda k: frame_of(labels, [0]), find,
-        ERRORS, DETECTOR, np.random.default_rng(0),
-    )  # fmt: skip
+    images = framed(labels, find).images
     assert asked == pytest.approx([50.0, 50.0], abs=0.01)
-    images = framed.images
     assert images.image.tolist() == [0, 0, 1, 1]
     assert sorted(images.animal.tolist()) == [NONE, NONE, 0, 0]
     own = images.animal == 0
@@ -191,48 +186,11 @@ def test_detections_go_to_the_ground_from_the_told_pose() -> None:
 
 
 def test_frames_without_detections_give_images_without() -> None:
-    flat = Terrain(np.zeros((3, 3), np.float32), north=-100.0, east=-100.0, step=100.0)
-    told = poses(np.array([0.0, 0.0, -50.0]), R_MC_DOWN)
-    framed = take_frames(
-        flat, stretch(told, np.zeros((1, 2))), np.zeros(2), lambda k: frame_of(np.zeros(SHAPE), []),
-        lambda counts, distance: detections(), ERRORS, DETECTOR, np.random.default_rng(0),
-    )  # fmt: skip
-    assert framed.images.z.shape == (0, 2) and framed.uv.shape == (0, 2) and not len(framed.standing)
+    found = framed(np.zeros(SHAPE), lambda counts, distance: detections())
+    assert found.images.z.shape == (0, 2) and found.uv.shape == (0, 2) and not len(found.standing)
 
 
 def test_the_distance_to_the_ground_is_limited() -> None:
     assert ground_distance(HILLS, looking_at(np.array([10.0, 10.0]), 0, 0, 0)) == pytest.approx(60, abs=3)
     up = poses(np.array([0.0, 0.0, -90.0]), np.diag([1.0, -1.0, -1.0]) @ R_MC_DOWN)
     assert ground_distance(HILLS, up) == FURTHEST
-
-
-def test_the_ledger_takes_a_false_detection_for_no_animal() -> None:
-    ledger = Ledger(2)
-    none, last = np.array([NONE]), np.array([1])
-    ledger.enter(0, 10.0, last, np.array([1]), {}, {1: 4.0})
-    ledger.enter(1, 20.0, none, np.array([2]), {1: 5.0}, {1: 5.0, 2: 9.0})
-    ledger.enter(2, 50.0, none, np.array([2]), {1: 6.0, 2: 9.5}, {1: 6.0, 2: 9.0})
-    ledger.enter(3, 60.0, last, np.array([1]), {1: 7.0, 2: 9.5}, {1: 4.0, 2: 9.5})
-    _, first, second, again = ledger.found
-    assert (first.animal, first.started, first.own, first.away) == (NONE, True, 0, np.inf)
-    assert np.isnan(first.own_before) and second.away == np.inf and second.own == 0
-    # The last animal's own track and time are not those of the detections that are nobody's.
-    assert (again.own, again.away, again.own_before) == (1, 50.0, 7.0)
-
-
-def test_the_first_images_are_those_of_the_whole_way() -> None:
-    rng = np.random.default_rng(3)
-    n = 6
-    told = poses(
-        np.column_stack([5.0 * np.arange(n), np.zeros(n), np.full(n, -90.0)]), np.array([R_MC_DOWN] * n)
-    )
-    truth = np.broadcast_to(np.array([[10.0, 0.0], [14.0, 3.0]]), (n, 2, 2))
-    images = take_images(
-        HILLS, told, told, np.zeros(n), np.arange(n), truth, ERRORS, DETECTOR._replace(detected=1.0), rng
-    )
-    part = images.first(4)
-    assert len(part.times) == len(part.poses.p_nc) == len(part.truth) == len(part.in_view) == 4
-    assert len(part.image) == (images.image < 4).sum() > 0
-    for k in range(4):
-        for one, other in zip(part.taken(k), images.taken(k), strict=True):
-            np.testing.assert_array_equal(one, other)

@@ -144,6 +144,12 @@ def test_images_detect_only_what_they_show_and_so_often() -> None:
     z, R, animals = found.taken(7)
     assert len(z) == len(R) == len(animals) == (found.image == 7).sum()
     assert z == pytest.approx(truth[7, animals], abs=1e-3)
+    # The first of them are those of the whole way.
+    part = found.first(9)
+    assert len(part.times) == len(part.poses.p_nc) == len(part.truth) == len(part.in_view) == 9
+    assert len(part.image) == (found.image < 9).sum() > 0
+    for one, other in zip(part.taken(7), (z, R, animals), strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_a_covariance_is_that_of_the_distance_to_the_middle_of_the_animal() -> None:

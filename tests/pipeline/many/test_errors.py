@@ -7,12 +7,12 @@ from functools import cache
 
 import numpy as np
 
-from tests.pipeline.robots import boat, robot_flight
-from wildlab.flight.following import Settings, parse_settings
+from tests.pipeline.many.test_places import places
+from tests.pipeline.robots import believed, boat, robot_flight
+from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, rotation_vector_to_matrix
 from wildlab.geometry.uncertainty import PoseErrors
-from wildlab.pipeline.following.beliefs import of_flight, of_sensor
 from wildlab.pipeline.georeference import (
     Observations,
     assumed_pose_covariance,
@@ -36,7 +36,6 @@ from wildlab.pipeline.many.errors import (
     told_errors,
 )
 from wildlab.pipeline.many.follow import follow_all, tracks_table
-from wildlab.pipeline.many.places import Places, places_of
 from wildlab.pipeline.scans import scans_of
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.many import smooth_many
@@ -59,15 +58,13 @@ sd_s = 0.5
 """
 
 
-def places(flight: Flight, settings: Settings) -> Places:
-    scans = scans_of(flight, "radar")
-    return places_of(flight, scans, of_sensor(flight, scans, settings)[0], 0, None)
+NOISE = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
 
 
 def test_a_place_moves_as_what_it_was_computed_from() -> None:
     """Each error undone by hand: the place moves by what one standard deviation of it is said to do."""
     flight = robot_flight(seconds=20.0)
-    found = places(flight, parse_settings(ALL))
+    found = places(flight, ALL)
     names = ("platform_north", "platform_east", "heading", "radar: range_bias")
     assert set(found.errors.names) == set(names) and len(found.errors.names) == 4
     assert dict(zip(*found.errors, strict=True))["heading"] == 30.0
@@ -86,12 +83,11 @@ def test_a_place_moves_as_what_it_was_computed_from() -> None:
 def test_all_errors_of_a_look_move_its_detections_alike() -> None:
     flight = robot_flight(kind="position", clutter=3, seconds=20.0, labelled=False)
     text = "[sensors.radar.considered.platform_north]\nsd_m = 3.0\n"
-    for scan in places(flight, parse_settings(text)).scans:
+    for scan in places(flight, text).scans:
         assert scan.shared.shape == (4, 2, 1)
         assert np.allclose(np.abs(scan.shared[:, 0, 0]), 3.0) and np.allclose(scan.shared[:, 1], 0.0)
         assert len(np.unique(np.sign(scan.shared[:, 0, 0]))) == 1
-    scans = scans_of(flight, "radar")
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    scans, belief = believed(flight)
     assert of_elements(scans, belief, scans.detections)[0].shape[-1] == 0
 
 
@@ -104,9 +100,12 @@ def _pixels() -> tuple[Flight, Observations]:
     return flight, observe(flight, "autopilot")
 
 
+#: The twin's only source, and the poses that are taken for it.
+MANUAL = "manual", "autopilot"
+
+
 def taken(flight: Flight, observed: Observations, lasting_s: float = np.inf) -> tuple[PoseErrors, OfPose]:
-    scans = scans_of(flight, "manual", 0.0, "autopilot")
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    belief = believed(flight, "", *MANUAL)[1]
     told = told_errors(flight, observed, belief)
     return told, of_poses(flight, observed, told, belief, lasting_s)
 
@@ -156,12 +155,10 @@ def test_errors_of_one_name_are_one_and_those_that_move_nothing_none() -> None:
 
 def test_a_heading_that_is_off_is_in_the_covariance_of_tracks() -> None:
     """Three degrees at 100 m are five metres for the whole flight."""
-    told = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
-    considered = told + "[sensors.radar.considered.heading]\nsd_deg = 3.0\n"
     nees = []
     flight = robot_flight(heading_off_deg=3.0, labelled=False)
-    for text in (told, considered):
-        followed = follow_all(flight, settings=parse_settings(text))
+    for considered in ("", "[sensors.radar.considered.heading]\nsd_deg = 3.0\n"):
+        followed = follow_all(flight, settings=parse_settings(NOISE + considered))
         own = []
         for one in followed.shown[20:]:
             e = one.x[:, :2] - boat(np.array([one.time]))
@@ -173,11 +170,9 @@ def test_a_heading_that_is_off_is_in_the_covariance_of_tracks() -> None:
 def test_what_is_considered_of_a_camera_is_in_its_pose() -> None:
     """In place of what is assumed, on top of a covariance that poses have; pixels are as noisy as told."""
     flight, observed = _pixels()
-    name = str(flight.table("detections")["source"].iloc[0])
-    text = f"[sensors.{name}.noise]\npixel_px = 7.0\n[sensors.{name}.considered.heading]\nsd_deg = 9.0\n"
-    text += f"[sensors.{name}.considered.platform_east]\nsd_m = 4.0\n"
-    scans = scans_of(flight, name, 0.0, "autopilot")
-    belief, _ = of_sensor(flight, scans, of_flight(flight, parse_settings(text)))
+    text = "[sensors.manual.noise]\npixel_px = 7.0\n[sensors.manual.considered.heading]\nsd_deg = 9.0\n"
+    text += "[sensors.manual.considered.platform_east]\nsd_m = 4.0\n"
+    belief = believed(flight, text, *MANUAL)[1]
     usual, told = pose_errors(flight, observed), told_errors(flight, observed, belief)
     assert np.allclose(told.pixel, 49.0 * np.eye(2))
     assert np.allclose(told.pose[:, 1, 1], 16.0) and np.allclose(told.pose[:, 0, 0], usual.pose[:, 0, 0])
@@ -224,15 +219,13 @@ def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one() -> N
     own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
     own[::3] = np.nan
     known = replace(observed, poses=replace(observed.poses, covariance=own))
-    scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    belief = believed(flight, "", *MANUAL)[1]
     told, usual = told_errors(flight, known, belief._replace(considered=())), pose_errors(flight, observed)
     assert np.allclose(told.pose[::3], usual.pose[::3]) and np.allclose(told.pose[1::3], own[1::3])
 
 
 def test_tables_of_tracks_are_smoothed_by_what_lasts() -> None:
-    told = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
-    told += "[sensors.radar.considered.heading]\nsd_deg = 3.0\ncorrelation_time_s = 5.0\n"
+    told = NOISE + "[sensors.radar.considered.heading]\nsd_deg = 3.0\ncorrelation_time_s = 5.0\n"
     followed = follow_all(robot_flight(labelled=False, seconds=60.0), settings=parse_settings(told))
     table = tracks_table(followed)
     after = smooth_many(followed.shown, followed.targets.density, followed.lasting_s)
@@ -243,11 +236,10 @@ def test_tables_of_tracks_are_smoothed_by_what_lasts() -> None:
 
 
 def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_last() -> None:
-    told = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
     flight = robot_flight(labelled=False, seconds=30.0)
     covariances = []
     for more in ("", "[sensors.radar]\ncorrelation = 0.0\n", "[sensors.radar]\ncorrelation = 0.8\n"):
-        table = tracks_table(follow_all(flight, settings=parse_settings(more + told)))
+        table = tracks_table(follow_all(flight, settings=parse_settings(more + NOISE)))
         assert np.isfinite(table["smoothed_north_m"]).all()
         covariances.append(float(table["smoothed_p_00"].mean()) if "smoothed_p_00" in table else np.nan)
     assert np.isnan(covariances[0]) and covariances[2] > 1.5 * covariances[1]
@@ -295,13 +287,11 @@ def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last() ->
         camera = Errors(of_pose.names, (lasting_s,) * 6)
         assert counted_twice(camera, radar) is twice
         known = replace(observed, poses=replace(observed.poses, covariance=told.pose))
-        scans = scans_of(flight, "manual", 0.0, "autopilot")
-        belief, _ = of_sensor(flight, scans, of_flight(flight))
-        of_pose = of_poses(flight, known, told, belief, lasting_s)
+        of_pose = of_poses(flight, known, told, believed(flight, "", *MANUAL)[1], lasting_s)
         assert counted_twice(Errors(of_pose.names, (lasting_s,) * 6), radar)
         assert not counted_twice(camera, Errors(("radar: range_bias",), (np.inf,)))
     text = "[sensors.manual]\ncorrelation_time_s = 9.0\n[sensors.manual.considered.heading]\nsd_deg = 3.0\n"
-    apart = of_sensor(flight, scans, of_flight(flight, parse_settings(text + "shared = false\n")))[0]
+    apart = believed(flight, text + "shared = false\n", *MANUAL)[1]
     names = of_poses(flight, observed, told, apart, 9.0).names
     assert names == (*POSE[:5], "manual: heading")
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.conftest import changed
 from tests.pipeline.robots import boat, joined, robot_flight
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings, settings_over
@@ -110,7 +109,7 @@ def test_where_a_true_place_is_not_known_nothing_is_judged() -> None:
     flight = robot_flight(kind="position", seconds=100.0)
     truth = flight.table("truth")
     early = truth[truth["time_s"] < truth["time_s"].min() + 50]
-    followed = follow_all(replace(flight, tables={**flight.tables, "truth": early}))
+    followed = follow_all(changed(flight, truth=early))
     lives, known = judged(followed), known_looks(followed)
     assert lives is not None and 0.3 < known.mean() < 0.7 and len(lives.gospa) == known.sum()
     assert lives.false_tracks_per_minute == 0 and not any(one.n_false for one in lives.gospa)
@@ -122,7 +121,7 @@ def test_where_some_true_places_are_known_tracks_on_others_are_not_judged() -> N
     truth = flight.table("truth")
     other = truth[truth["time_s"] < truth["time_s"].min() + 50].assign(target_id="other", north_m=900.0)
     both = pd.concat([truth, other], ignore_index=True)
-    followed = follow_all(replace(flight, tables={**flight.tables, "truth": both}))
+    followed = follow_all(changed(flight, truth=both))
     lives, whole = judged(followed), complete_looks(followed)
     assert lives is not None and 0.3 < whole.mean() < 0.7
     assert lives.incomplete == int((~whole).sum()) and len(lives.gospa) == len(whole)
@@ -132,7 +131,7 @@ def test_detections_that_are_no_sensors_are_told_and_not_left_out_in_silence() -
     flight = robot_flight()
     frames, seen = flight.table("frames").assign(sensor="radar"), flight.table("detections")
     some = seen.assign(source=np.where(np.arange(len(seen)) < 5, "rader", "radar"))
-    followed = follow_all(replace(flight, tables={**flight.tables, "frames": frames, "detections": some}))
+    followed = follow_all(changed(flight, frames=frames, detections=some))
     assert any("5 detections" in note and "are not used" in note for note in followed.notes)
     assert not any("are not used" in note for note in follow_all(flight).notes)
 
@@ -171,8 +170,7 @@ def test_what_the_truth_may_be_off_is_beside_the_tracks_own() -> None:
     truth[["north_m", "east_m"]] += rng.normal(0, 5.0, (len(truth), 2))
     found = []
     for sd in (0.0, 5.0, np.nan):
-        off = replace(flight, tables={**flight.tables, "truth": truth.assign(sd_horizontal_m=sd)})
-        followed = follow_all(off)
+        followed = follow_all(changed(flight, truth=truth.assign(sd_horizontal_m=sd)))
         lives = judged(followed)
         assert lives is not None
         found.append(max(one.anees / 2 for one in lives.tracks.values()))

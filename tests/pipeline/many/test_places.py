@@ -8,24 +8,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.pipeline.robots import boat, robot, robot_flight
+from tests.pipeline.robots import believed, boat, robot, robot_flight
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
-from wildlab.pipeline.following.beliefs import of_flight, of_sensor
 from wildlab.pipeline.georeference import georeference, observe
 from wildlab.pipeline.many.places import Places, _of_ranges, places_of, sees_of
 from wildlab.pipeline.scans import Scans, scans_of
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.many import Scan
 
+NOISE = "[sensors.radar.noise]\nrange_m = 2.0\nazimuth_deg = 1.5\n"
 
-def places(flight: Flight, sensor: str = "radar", source: str | None = None) -> Places:
-    scans = scans_of(flight, sensor, 0.0, source)
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
+
+def places(flight: Flight, text: str = "", sensor: str = "radar", source: str | None = None) -> Places:
+    scans, belief = believed(flight, text, sensor, source)
     return places_of(flight, scans, belief, 0, source)
 
 
@@ -39,9 +40,7 @@ def test_ranges_and_bearings_lie_where_the_boat_is() -> None:
 
 
 def test_covariances_are_those_of_errors_drawn_at_random() -> None:
-    noise = {"sensors": {"radar": {"noise": {"range_m": 2.0, "azimuth_deg": 1.5}}}}
-    flight = robot_flight(seconds=30.0, manifest=noise)
-    scan = places(flight).scans[20]
+    scan = places(robot_flight(seconds=30.0), NOISE).scans[20]
     off = scan.z[0] - scan.platform
     rng = np.random.default_rng(0)
     distance = np.hypot(*off) + rng.normal(0, 2.0, 200_000)
@@ -68,11 +67,9 @@ def test_a_range_no_longer_than_the_drop_tells_no_place() -> None:
 
 def test_a_slant_range_tells_less_of_the_place_on_the_level() -> None:
     """50 m to what lies 30 m below is 40 m on the level, which change by 5 m where the range does by 4 m."""
-    noise = {"sensors": {"radar": {"noise": {"range_m": 2.0, "azimuth_deg": 1.5}}}}
-    flight = robot_flight(seconds=30.0, manifest=noise)
-    scans = scans_of(flight, "radar", 0.0, None)
+    flight = robot_flight(seconds=30.0)
+    scans, belief = believed(flight, NOISE)
     scans.detections[..., 0] = 50.0
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
     high = scans._replace(drop=np.full(len(scans.times), 30.0))
     scan = places_of(flight, high, belief, 0, None).scans[20]
     off = scan.z[0] - scan.platform
@@ -82,20 +79,20 @@ def test_a_slant_range_tells_less_of_the_place_on_the_level() -> None:
 
 
 def test_positions_are_taken_as_they_are() -> None:
-    noise = {"sensors": {"radar": {"noise": {"position_m": 1.5}}}}
-    found = places(robot_flight(kind="position", clutter=2, labelled=False, manifest=noise))
+    noise = "[sensors.radar.noise]\nposition_m = 1.5\n"
+    found = places(robot_flight(kind="position", clutter=2, labelled=False), noise)
     assert np.allclose(found.scans[0].R, 1.5**2 * np.eye(2))
     assert {len(one.z) for one in found.scans} == {3}
     assert found.area(100.0) == pytest.approx(np.pi * 100.0**2)
     assert set(found.named) == {frozenset()}
-    assert set(places(robot_flight(kind="position", manifest=noise)).named) == {frozenset({"boat"})}
+    assert set(places(robot_flight(kind="position"), noise).named) == {frozenset({"boat"})}
 
 
 @pytest.mark.slow
 def test_pixels_are_where_georeferencing_puts_them() -> None:
     flight = simulate_twin("large-ship", 1)
     scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
-    found = places(flight, scans.sensor, "autopilot")
+    found = places(flight, "", scans.sensor, "autopilot")
     points = georeference(flight, observe(flight, "autopilot"), np.random.default_rng(0))
     points = points.set_index("detection_id")
     rows = np.flatnonzero(np.isfinite(scans.platform).all(axis=1))
@@ -106,21 +103,23 @@ def test_pixels_are_where_georeferencing_puts_them() -> None:
         assert np.allclose(whole[:, 0, 1], points.loc[ids, "cov_ne"].to_numpy(float), rtol=1e-4)
 
 
+def looking(R_nb: np.ndarray, north_east: tuple[float, float], plane: float) -> Scans:
+    """One image without a detection, from 60 m above zero."""
+    camera, at = Camera(640, 512, 700.0, 700.0, 320.0, 256.0), np.array([north_east])
+    poses = CameraPoses(camera, Mount("down"), np.insert(at, 2, -60.0, axis=1), R_nb[None])
+    return Scans("eye", "pixel", np.zeros(1), np.zeros((1, 0, 2)), at, np.zeros((1, 2)), poses=poses,
+                 plane_down=np.array([plane]))  # fmt: skip
+
+
 @pytest.mark.parametrize("tilt_deg", [10.0, 60.0, 85.0])
 def test_an_image_shows_what_lies_under_its_pixels(tilt_deg: float) -> None:
     """Also where its upper edge looks past the horizon: rays of pixels are the truth."""
-    camera = Camera(640, 512, 700.0, 700.0, 320.0, 256.0)
-    tilt = np.radians(tilt_deg)
-    R_nb = np.array([[[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]]])
-    poses = CameraPoses(camera, Mount("down"), np.array([[5.0, -8.0, -60.0]]), R_nb)
-    empty = np.zeros((1, 0, 2))
-    scans = Scans("eye", "pixel", np.zeros(1), empty, np.array([[5.0, -8.0]]), np.zeros((1, 2)), poses=poses,
-                  plane_down=np.array([3.0]))  # fmt: skip
+    scans = looking(euler_to_matrix(0.0, np.radians(tilt_deg), 0.0), (5.0, -8.0), 3.0)
     sees = sees_of(scans, 0)
-    assert sees is not None
+    assert sees is not None and scans.poses is not None
     rng = np.random.default_rng(0)
     uv = rng.uniform((-300, -300), (940, 812), (2000, 2))
-    ground = georeference_pixels(poses.take(np.zeros(len(uv), int)), uv, np.full(len(uv), 3.0))
+    ground = georeference_pixels(scans.poses.take(np.zeros(len(uv), int)), uv, np.full(len(uv), 3.0))
     met = np.isfinite(ground).all(axis=1)
     inside = (uv >= 0).all(axis=1) & (uv <= (640, 512)).all(axis=1)
     assert met.sum() > 200 and np.array_equal(sees(ground[met, :2]), inside[met])
@@ -129,12 +128,8 @@ def test_an_image_shows_what_lies_under_its_pixels(tilt_deg: float) -> None:
 
 def test_how_much_ground_an_image_covers() -> None:
     """Straight down from 60 m: 640 x 512 pixels of 60 / 700 m."""
-    camera = Camera(640, 512, 700.0, 700.0, 320.0, 256.0)
-    poses = CameraPoses(camera, Mount("down"), np.array([[0.0, 0.0, -60.0]]), np.eye(3)[None])
-    scans = Scans("eye", "pixel", np.zeros(1), np.zeros((1, 0, 2)), np.zeros((1, 2)), np.zeros((1, 2)),
-                  poses=poses, plane_down=np.zeros(1))  # fmt: skip
     nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
-    look = Scan(0.0, 0, np.zeros(2), *nothing, sees_of(scans, 0))
+    look = Scan(0.0, 0, np.zeros(2), *nothing, sees_of(looking(np.eye(3), (0.0, 0.0), 0.0), 0))
     found = Places("eye", "pixel", [look], [frozenset()], 1.0, 0)
     assert found.area(50.0) == pytest.approx(640 * 512 * (60 / 700) ** 2, rel=0.02)
 
@@ -153,9 +148,8 @@ def test_the_ground_covered_is_that_of_most_looks(count: int) -> None:
 
 def test_bearings_are_taken_as_they_are() -> None:
     flight = robot_flight(kind="bearing")
-    scans = scans_of(flight, "radar")
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
-    found = places_of(flight, scans, belief, 0, None)
+    scans, belief = believed(flight)
+    found = places(flight)
     assert found.bearings and not len(found.distances())
     row = int(np.isfinite(scans.detections[..., 0]).any(axis=1).argmax())
     assert np.array_equal(found.scans[row].z[:1, 0], scans.detections[row, :1, 0])
@@ -163,8 +157,5 @@ def test_bearings_are_taken_as_they_are() -> None:
 
 
 def test_what_tells_no_place_is_refused() -> None:
-    flight = robot_flight(kind="velocity")
-    scans = scans_of(flight, "radar")
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
     with pytest.raises(WildlabError, match="nothing of a place"):
-        places_of(flight, scans, belief, 0, None)
+        places(robot_flight(kind="velocity"))
