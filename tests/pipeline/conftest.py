@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.flight.manifest import Manifest, replace_in_manifest
+from tests.pipeline.building import manifest_of, poses_table, surveyed
+from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
+from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_pose
 from wildlab.studies.sensitivity.tables import TAU2
@@ -41,10 +42,7 @@ def build(
     p = np.column_stack(
         [SPEED / 0.4 * np.sin(heading), -SPEED / 0.4 * np.cos(heading), -90 - 25 * np.sin(0.21 * t)]
     )
-    q = matrix_to_quaternion(euler_to_matrix(*euler.T))
-    nav = pd.DataFrame({"time_s": t, "north_m": p[:, 0], "east_m": p[:, 1], "down_m": p[:, 2]})
-    for i, name in enumerate(("q_w", "q_x", "q_y", "q_z")):
-        nav[name] = q[:, i]
+    nav = poses_table(t, p, euler_to_matrix(*euler.T))
 
     at = np.arange(n_images) * 1.0  # flight time of the images; the camera's own stamps are off by the clock
     index = np.searchsorted(t, at - 1e-6)
@@ -71,35 +69,20 @@ def build(
             "plane_down_m": markers[:, 2],
         }
     )
-    truth = pd.DataFrame(
-        {
-            "target_id": names,
-            "time_s": np.nan,
-            "north_m": markers[:, 0],
-            "east_m": markers[:, 1],
-            "down_m": markers[:, 2],
-        }
-    )
+    truth = surveyed(names, markers)
     if moving:  # each marker on a track of its own that passes its place when it is seen
         rows = []
         for name, marker, k in zip(names, markers, image, strict=True):
             for dt in (-0.5, 0.5):
                 rows.append([name, at[k] + dt, marker[0] + 2.0 * dt, marker[1] - 1.0 * dt, marker[2]])
         truth = pd.DataFrame(rows, columns=truth.columns)
-    manifest = Manifest.model_validate(
-        {
-            "name": "synthetic",
-            "kind": "logged",
-            "origin": {"latitude_deg": 60.0, "longitude_deg": 10.0, "height_m": 0.0},
-            "platform": {"name": "made up"},
-            "camera": {"name": "Tau 2", "width_px": 640, "height_px": 512, "fx_px": TAU2.fx, "fy_px": TAU2.fy,
-                       "cx_px": TAU2.cx, "cy_px": TAU2.cy},
-            "mount": {"looks": "down"},
-            "time": {"kind": "utc", "epoch": "2024-01-01T00:00:00Z"},
-            "uncertainty": {"pixel_px": 2.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
-                            "tilt_deg": 1.0, "heading_deg": 1.0, "plane_height_m": 0.1},
-            "scoring": {"rule": rule},
-        }
+    manifest = manifest_of(
+        TAU2,
+        name="synthetic",
+        mount={"looks": "down"},
+        uncertainty={"pixel_px": 2.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
+                     "tilt_deg": 1.0, "heading_deg": 1.0, "plane_height_m": 0.1},
+        scoring={"rule": rule},
     )  # fmt: skip
     return Flight(manifest, {"logged": nav}, {"frames": frames, "detections": detections, "truth": truth})
 
@@ -132,5 +115,6 @@ def changed(flight: Flight, parts: dict[str, Any] | None = None, **tables: pd.Da
 
 def first_seconds(flight: Flight, seconds: float) -> Flight:
     """The flight's inertial unit and receivers up to that time, and nothing else of it."""
-    few = {name: flight.table(name).query("time_s < @seconds") for name in ("imu", "gnss")}
-    return replace(flight, tables={name: table.reset_index(drop=True) for name, table in few.items()})
+    tables = {name: flight.table(name) for name in ("imu", "gnss")}
+    few = {name: t[t["time_s"] < seconds].reset_index(drop=True) for name, t in tables.items()}
+    return replace(flight, tables=few)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from tests.pipeline.building import manifest_of, poses_table
 from wildlab.flight.following import parse_settings
-from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Beliefs, of_flight, of_sensor
 from wildlab.pipeline.following.follow import Followed
@@ -93,18 +93,12 @@ def robot_flight(
                 row |= {"v_north_m_s": v[0], "v_east_m_s": v[1]}
             rows.append(row)
     stamps = np.zeros(1) if fixed else np.arange(0.0, seconds + 2, 0.2)
-    nav = pd.DataFrame({"time_s": stamps, "down_m": 0.0, "q_w": 1.0, "q_x": 0.0, "q_y": 0.0, "q_z": 0.0})
-    nav[["north_m", "east_m"]] = np.zeros((1, 2)) if fixed else robot(stamps)
+    place = np.zeros((1, 2)) if fixed else robot(stamps)
+    nav = poses_table(stamps, np.insert(place, 2, 0.0, axis=1), np.tile(np.eye(3), (len(stamps), 1, 1)))
     fine = np.arange(0.0, seconds + 2, 0.2)
     way = pd.DataFrame({"target_id": "boat", "time_s": fine, "down_m": 0.0, "sd_horizontal_m": 0.05})
     way[["north_m", "east_m"]] = boat(fine)
-    parts: dict[str, Any] = {
-        "name": name,
-        "kind": "logged",
-        "origin": {"latitude_deg": 63.0, "longitude_deg": 10.0, "height_m": 0.0},
-        "platform": {"name": "robot"},
-        "time": {"kind": "utc", "epoch": "2024-05-04T12:00:00Z"},
-    }
+    parts: dict[str, Any] = {"name": name}
     if heading_sd_deg is not None:
         parts["uncertainty"] = {"heading_deg": heading_sd_deg}
     frames = pd.DataFrame(
@@ -113,7 +107,7 @@ def robot_flight(
     tables = {"frames": frames, "detections": pd.DataFrame(rows)}
     if truth:
         tables["truth"] = way
-    return Flight(make_manifest(parts | (manifest or {})), {"own": nav}, tables)
+    return Flight(manifest_of(**parts | (manifest or {})), {"own": nav}, tables)
 
 
 def joined(one: Flight, *others: Flight) -> Flight:

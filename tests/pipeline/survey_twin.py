@@ -5,15 +5,15 @@ What is wrong on top of that is put in by name, so that a diagnosis can be held 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
 
-from wildlab.flight.manifest import Manifest
+from tests.pipeline.building import manifest_of, poses_table, surveyed
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, rotation_vector_to_matrix
+from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_pose
 
@@ -104,13 +104,8 @@ def simulate(survey: Survey) -> Flight:
     logged = np.column_stack([roll, -slant + np.radians(survey.tilt_deg), heading])
     for image, degrees in survey.turned_deg.items():
         logged[np.abs(t - at[image]) < survey.every_s / 2, 2] += np.radians(degrees)
-    q = matrix_to_quaternion(euler_to_matrix(*logged.T))
-    place = way + np.array([survey.north_m, 0.0, survey.down_m])
-    columns = ["time_s", "north_m", "east_m", "down_m", "q_w", "q_x", "q_y", "q_z"]
-    nav = pd.DataFrame(np.column_stack([t, place, q]), columns=columns)
-    surveyed = marks[:, :2] + np.array([survey.off.get(name, (0.0, 0.0)) for name in names])
-    truth = pd.DataFrame({"target_id": names, "time_s": np.nan, "north_m": surveyed[:, 0],
-                          "east_m": surveyed[:, 1], "down_m": 0.0})  # fmt: skip
+    nav = poses_table(t, way + np.array([survey.north_m, 0.0, survey.down_m]), euler_to_matrix(*logged.T))
+    truth = surveyed(names, marks + np.array([(*survey.off.get(name, (0.0, 0.0)), 0.0) for name in names]))
     frames = pd.DataFrame({"frame_id": [f"I{i:03d}" for i in range(n)], "time_s": at - survey.clock_s})
     time = {"kind": "utc", "epoch": "2024-01-01T00:00:00Z"} if survey.timed else {"kind": "sequence"}
     if not survey.timed:
@@ -120,21 +115,15 @@ def simulate(survey: Survey) -> Flight:
         frames["time_s"] = np.arange(float(n))
     stated = survey.stated_deg
     f = CAMERA.fx * (1 + survey.focal)
-    manifest = Manifest.model_validate(
-        {
-            "name": "survey", "kind": "logged",
-            "origin": {"latitude_deg": 60.0, "longitude_deg": 10.0, "height_m": 0.0},
-            "platform": {"name": "made up"},
-            "camera": {"name": "made up", "width_px": CAMERA.width, "height_px": CAMERA.height, "fx_px": f,
-                       "fy_px": f, "cx_px": CAMERA.cx, "cy_px": CAMERA.cy},
-            "mount": {"looks": "forward"}, "time": time, "scoring": {"rule": survey.rule},
-            "uncertainty": {"pixel_px": 4.0, "position_horizontal_m": 0.7, "position_vertical_m": 0.7,
-                            "tilt_deg": stated, "heading_deg": survey.stated_heading_deg or stated,
-                            "plane_height_m": 0.1},
-        }
+    manifest = manifest_of(
+        replace(CAMERA, fx=f, fy=f),
+        name="survey", mount={"looks": "forward"}, time=time, scoring={"rule": survey.rule},
+        uncertainty={"pixel_px": 4.0, "position_horizontal_m": 0.7, "position_vertical_m": 0.7,
+                     "tilt_deg": stated, "heading_deg": survey.stated_heading_deg or stated,
+                     "plane_height_m": 0.1},
     )  # fmt: skip
-    return Flight(manifest, {"logged": nav.reset_index(drop=True)},
-                  {"frames": frames, "detections": detections, "truth": truth})  # fmt: skip
+    tables = {"frames": frames, "detections": detections, "truth": truth}
+    return Flight(manifest, {"logged": nav.reset_index(drop=True)}, tables)
 
 
 def _marks(rng: np.random.Generator, spacing: float) -> np.ndarray:

@@ -127,7 +127,6 @@ def test_ellipses_through_import_and_georeference(tmp_path: Path, kind: str, pit
     off = points[["north_m", "east_m"]].to_numpy() - true
     C = points[["cov_nn", "cov_ne", "cov_ne", "cov_ee"]].to_numpy().reshape(-1, 2, 2)
     share = (np.einsum("ni,nij,nj->n", off, np.linalg.inv(C), off) <= -2 * np.log(0.1)).mean()
-    print(f"{kind}, {pitch_deg:.0f} deg: {100 * share:.1f} % of {len(off)}")
     assert len(off) == PHOTOS and 0.87 <= share <= 0.93
     flight = load_flight(flight_folder)
     used = used_deviations(flight, observe(flight))

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.pipeline.conftest import build
 from tests.pipeline.survey_twin import CAMERA, Survey, simulate
 from tests.sound_flights import simulate_sound_flight
 from wildlab.errors import WildlabError
@@ -88,14 +89,6 @@ def test_what_is_wrong_is_named_and_its_size_recovered(keys):
     assert found.held_summary().mean == pytest.approx(found.winner.gain.with_)
 
 
-def test_a_wrong_focal_length_is_the_lens():
-    focal = 0.08
-    found = diagnosed(simulate(Survey(focal=focal)))
-    assert found.counts and found.winner.causes == ("focal length",)
-    low, high = found.calibration.interval("focal")
-    assert low <= -np.log(1 + focal) <= high
-
-
 def with_distortion(flight, k1):
     """The flight with clicks of a lens with a k1 that the manifest does not state."""
     clicks = flight.tables["detections"]
@@ -105,12 +98,35 @@ def with_distortion(flight, k1):
     return flight
 
 
-@pytest.mark.parametrize("k1", [0.1, pytest.param(-0.1, marks=pytest.mark.slow)])
-def test_distortion_that_is_not_stated_is_no_focal_length(k1):
-    found = diagnosed(with_distortion(simulate(Survey(seed=1)), k1))
-    assert found.counts and found.winner.causes == ("distortion",)
-    low, high = found.calibration.interval("radial")
-    assert low <= k1 <= high and high - low < 0.02
+@pytest.mark.parametrize(
+    ("made", "cause", "name", "true", "width"),
+    [
+        (lambda: simulate(Survey(focal=0.08)), "focal length", "focal", -np.log(1.08), np.inf),
+        (lambda: with_distortion(simulate(Survey(seed=1)), 0.1), "distortion", "radial", 0.1, 0.02),
+        pytest.param(
+            lambda: with_distortion(simulate(Survey(seed=1)), -0.1),
+            "distortion",
+            "radial",
+            -0.1,
+            0.02,
+            marks=pytest.mark.slow,
+        ),
+        # Where targets move both do in the time that the clock is off: the camera by 15 m/s, each by 2 m/s.
+        pytest.param(
+            lambda: build(moving=True, clock_s=0.3, pixel_px=1.0, attitude_deg=0.3),
+            "clock",
+            "clock",
+            0.3,
+            0.1,
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_a_lens_or_a_clock_that_is_wrong_is_named_alone(made, cause, name, true, width):
+    found = diagnosed(made())
+    assert found.counts and found.winner.causes == (cause,)
+    low, high = found.calibration.interval(name)
+    assert low <= true <= high and high - low < width
 
 
 @pytest.mark.slow
@@ -160,16 +176,6 @@ def test_a_mark_that_is_off_and_a_photo_that_is_turned_are_named():
     assert low <= np.radians(-5.0) <= high
     clean = found.held_summary(found.inliers)
     assert clean.mean <= 1.1 * untouched().winner.gain.with_ < found.held_summary().mean
-
-
-@pytest.mark.slow
-def test_a_clock_is_found_where_the_targets_move(make_flight):
-    """Both move in the time that the clock is off: the camera by 15 m/s, each target by 2 m/s of its own."""
-    flight = make_flight(moving=True, clock_s=0.3, pixel_px=1.0, attitude_deg=0.3)
-    found = diagnosed(flight)
-    assert found.winner.causes == ("clock",) and found.counts
-    low, high = found.calibration.interval("clock")
-    assert low <= 0.3 <= high and high - low < 0.1
 
 
 def test_images_without_times_are_not_asked_for_the_clock():

@@ -10,30 +10,29 @@ import pandas as pd
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from tests.pipeline.building import manifest_of, poses_table, surveyed
 from tests.pipeline.conftest import changed
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.checks.check import check_flight
-from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, rotation_vector_to_matrix
+from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
 from wildlab.pipeline.evaluate import errors_of, score_points
 from wildlab.pipeline.georeference import georeference, heights_left_in, observe
 from wildlab.pipeline.ground import on_level, rays_of, shift_from_level
 from wildlab.pipeline.track import sighting
 
-MANIFEST = {
-    "name": "hills", "kind": "logged", "platform": {"name": "kite"},
-    "time": {"kind": "sequence"},
-    "origin": {"latitude_deg": 61.0, "longitude_deg": 15.0, "height_m": 300.0},
-    "camera": {"name": "c", "width_px": 640, "height_px": 512, "fx_px": 700.0, "fy_px": 700.0, "cx_px": 320.0,
-               "cy_px": 256.0},
-    "mount": {"looks": "down", "tilt_deg": 40.0},
-    "uncertainty": {"pixel_px": 1.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
-                    "tilt_deg": 0.5, "heading_deg": 1.0, "plane_height_m": 0.3},
-}  # fmt: skip
+MANIFEST = manifest_of(
+    Camera(640, 512, 700.0, 700.0, 320.0, 256.0),
+    time={"kind": "sequence"},
+    origin={"latitude_deg": 61.0, "longitude_deg": 15.0, "height_m": 300.0},
+    mount={"looks": "down", "tilt_deg": 40.0},
+    uncertainty={"pixel_px": 1.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
+                 "tilt_deg": 0.5, "heading_deg": 1.0, "plane_height_m": 0.3},
+)  # fmt: skip
 
 
 def hills(seed: int = 0) -> Terrain:
@@ -51,37 +50,30 @@ def holed() -> Terrain:
 def flown() -> Callable[..., Flight]:
     """``flown(noise=1.0)``: marks on hills in 25 images, poses wrong by noise times what is stated."""
 
-    def make(noise: float = 0.0, terrain: Terrain | None = None, per_image: int = 6) -> Flight:
-        ground = terrain or hills()
+    def make(noise: float = 0.0, per_image: int = 6) -> Flight:
+        ground, n = hills(), 25
         rng = np.random.default_rng(5)
-        manifest = make_manifest(MANIFEST)
-        at = rng.uniform(-120, 120, (25, 2))
+        at = rng.uniform(-120, 120, (n, 2))
         p = np.column_stack([at, -(ground.heights_at(at) + 80)])
-        R = euler_to_matrix(0 * at[:, 0], 0 * at[:, 0], rng.uniform(-3, 3, 25))
-        poses = CameraPoses(manifest.geometry_camera(), manifest.geometry_mount(), p, R)
-        rows, truth = [], []
-        for i in range(25):
+        R = euler_to_matrix(np.zeros(n), np.zeros(n), rng.uniform(-3, 3, n))
+        poses = CameraPoses(MANIFEST.geometry_camera(), MANIFEST.geometry_mount(), p, R)
+        rows, marks = [], []
+        for i in range(n):
             uv = rng.uniform([20, 20], [620, 490], (per_image, 2))
-            one = poses.take(np.full(per_image, i))
-            marks = pixels_to_terrain(one, uv, ground).points
-            for k in np.flatnonzero(np.isfinite(marks[:, 0])):
+            points = pixels_to_terrain(poses.take(np.full(per_image, i)), uv, ground).points
+            for k in np.flatnonzero(np.isfinite(points[:, 0])):
                 rows.append((f"d{i}-{k}", f"f{i}", "pixel", *uv[k], f"m{i}-{k}"))
-                truth.append((f"m{i}-{k}", np.nan, *marks[k]))
+                marks.append(points[k])
         logged_p = p + noise * rng.normal(0, 1.0, p.shape)
-        turn = rng.normal(0, 1, (25, 3)) * np.radians([0.5, 0.5, 1.0]) * noise
-        q = matrix_to_quaternion(R @ rotation_vector_to_matrix(turn))
-        nav = pd.DataFrame(logged_p, columns=["north_m", "east_m", "down_m"])
-        nav = nav.assign(**{f"q_{x}": q[:, j] for j, x in enumerate("wxyz")}, time_s=np.arange(25.0))
-        nav["frame_id"] = [f"f{i}" for i in range(25)]
+        turn = rng.normal(0, 1, (n, 3)) * np.radians([0.5, 0.5, 1.0]) * noise
+        nav = poses_table(np.arange(float(n)), logged_p, R @ rotation_vector_to_matrix(turn))
+        nav["frame_id"] = [f"f{i}" for i in range(n)]
         names = ["detection_id", "frame_id", "kind", "u_px", "v_px", "target_id"]
         detections = pd.DataFrame(rows, columns=names).assign(source="click")
         detections[["u_px", "v_px"]] += noise * rng.normal(0, 1.0, (len(rows), 2))
-        tables = {
-            "frames": nav[["frame_id", "time_s"]].copy(),
-            "detections": detections,
-            "truth": pd.DataFrame(truth, columns=["target_id", "time_s", "north_m", "east_m", "down_m"]),
-        }
-        return Flight(manifest, {"logged": nav}, tables, None, ground)
+        truth = surveyed(detections["target_id"].tolist(), np.array(marks))
+        tables = {"frames": nav[["frame_id", "time_s"]].copy(), "detections": detections, "truth": truth}
+        return Flight(MANIFEST, {"logged": nav}, tables, None, ground)
 
     return make
 

@@ -75,7 +75,6 @@ def test_thor_in_the_air(thor) -> None:
     mekf = found["mekf"]
     off = rms(euler_differences(flight, mekf, *THOR_AIRBORNE))
     sd = euler_deviations(mekf, *THOR_AIRBORNE)
-    print(f"filter: {off.round(2)} deg, it states {sd.round(2)} deg")
     assert (off <= [1.0, 0.6, 2.0]).all()
     assert (sd < 2 * off).all()
     assert (off < 2 * sd).all()
@@ -89,7 +88,6 @@ def test_thor_by_the_observer(thor) -> None:
     """With the magnetic field as its second vector, and accelerometers calibrated by the filter's bias."""
     flight, found = thor
     off = rms(euler_differences(flight, found["observer"], *THOR_AIRBORNE))
-    print(f"observer: {off.round(2)} deg")
     assert (off <= [2.0, 1.2, 4.0]).all()
 
 
@@ -112,12 +110,10 @@ def test_x8_through_loops_and_rolls(shared_data: Callable[..., Path], tmp_path: 
         turned = np.degrees(
             np.linalg.norm(matrix_to_rotation_vector(np.swapaxes(onboard[part], 1, 2) @ ours[part]), axis=1)
         )
-        print(f"{begin} to {end} s: {rms(turned):.1f} deg rms, {turned.max():.1f} deg at most")
         assert rms(turned) < limit
     aerobatic = (times > 410) & (times < 515) & known
     assert np.abs(onboard[aerobatic, 2, 0]).max() > 0.95  # near the vertical
     assert onboard[aerobatic, 2, 2].min() < -0.9  # and on its back
     # Through the vertical without a jump: from sample to sample the attitude turns as the gyros say.
     jump = np.degrees(corrections(flight, found)[aerobatic[1:]])
-    print(f"largest correction {jump.max():.2f} deg")
     assert jump.max() < 5.0

@@ -83,7 +83,6 @@ def test_errors_are_as_large_as_the_filter_says(name):
         for part, rows in parts.items()
         for block, values in squares.items()
     }
-    print(name, {" ".join(key): round(value, 2) for key, value in means.items()}, f"NIS {np.mean(nis):.2f}")
     assert min(rows.sum() for rows in parts.values()) > 20 * SEEDS
     assert all(LIMITS[0] < mean < LIMITS[1] for mean in means.values()), means
     assert 0.95 < np.mean(nis) < 1.05

@@ -14,14 +14,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.building import manifest_of, poses_table, surveyed
 from tests.pipeline.conftest import build, changed, receiver, without_poses
 from tests.pipeline.robots import KNOWN, robot_flight
 from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import pace_of, runs_of
 from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
 from wildlab.flight.following import parse_settings
-from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.judged import judged as judged_tracks
@@ -112,19 +114,13 @@ def test_too_slow_or_too_few_samples_tell_nothing_of_shaking() -> None:
 
 def level_images(places: list[tuple[float, float]], height: float = 100.0, lean_deg: float = 0.0) -> Flight:
     """Images straight down at places (north, east), or leaning forward; the ground is level at 0."""
-    camera = {"width_px": 400, "height_px": 200, "fx_px": 200.0, "fy_px": 200.0, "cx_px": 200.0,
-              "cy_px": 100.0}  # fmt: skip
-    names = [f"i{k}" for k in range(len(places))]
-    times = np.arange(float(len(places)))
-    half = np.radians(lean_deg) / 2
-    nav = pd.DataFrame(places, columns=["north_m", "east_m"]).assign(
-        time_s=times, down_m=-height, frame_id=names,
-        q_w=np.cos(half), q_x=0.0, q_y=np.sin(half), q_z=0.0,
-    )  # fmt: skip
-    truth = {"target_id": ["t"], "time_s": np.nan, "north_m": 0.0, "east_m": 0.0, "down_m": 0.0}
-    tables = {"frames": pd.DataFrame({"frame_id": names, "time_s": times}), "truth": pd.DataFrame(truth)}
-    manifest = replace_in_manifest(build(n_images=1).manifest, {"camera": camera})
-    return Flight(manifest, {"logged": nav}, tables)
+    n = len(places)
+    frames = pd.DataFrame({"frame_id": [f"i{k}" for k in range(n)], "time_s": np.arange(float(n))})
+    R = euler_to_matrix(np.zeros(n), np.full(n, np.radians(lean_deg)), np.zeros(n))
+    nav = poses_table(np.arange(float(n)), np.insert(places, 2, -height, axis=1), R)
+    manifest = manifest_of(Camera(400, 200, 200.0, 200.0, 200.0, 100.0), mount={"looks": "down"})
+    tables = {"frames": frames, "truth": surveyed(["t"], np.zeros((1, 3)))}
+    return Flight(manifest, {"logged": nav.assign(frame_id=frames["frame_id"])}, tables)
 
 
 def test_footprints_have_the_area_and_the_overlap_of_rectangles() -> None:

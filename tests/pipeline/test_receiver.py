@@ -112,7 +112,6 @@ def test_innovations_of_a_logged_flight_are_of_the_right_level_and_white(shared_
     numbers = numbers_of(studied, begin, end)
     for name in ("position", "velocity"):
         after = numbers["mekf-receiver", f"nis_{name}"] / 3, numbers["mekf-receiver", f"lag1_{name}"]
-
         assert left_over(*after) == ()
     assert left_over(numbers["mekf", "nis_position"] / 3, numbers["mekf", "lag1_position"])
 
@@ -131,9 +130,7 @@ def turning() -> Flight:
 def test_a_late_receiver_and_a_misplaced_antenna_are_found(turning: Flight) -> None:
     arm = np.array(turning.manifest.gnss.lever_arm_m)
     right = place_receiver(turning, ReceiverNoise())
-    truth = np.array([0.0, *arm])
-    found = np.array([right.latency, *right.lever])
-
+    found, truth = np.array([right.latency, *right.lever]), np.array([0.0, *arm])
     assert (np.abs(found - truth) < 4 * right.sd).all()
     late = turning.table("gnss").assign(time_s=turning.table("gnss")["time_s"] + 0.12)
     wrong = {"gnss": {"lever_arm_m": (arm + np.array([0.4, -0.3, 0.2])).tolist()}}

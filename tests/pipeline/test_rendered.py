@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -62,15 +60,11 @@ def test_the_stated_centre_is_the_target_seen_through_the_true_pose(camera, shot
         assert np.allclose(uv, shot.seen[0].uv)
 
 
-def test_without_a_length_nothing_is_moved(camera, shots):
+def test_centres_of_what_the_border_cuts_are_moved_where_the_length_is_known(camera, shots):
     plain = marks_of(shots, shape_of(camera))
     assert not plain.moved.any()
-    for k, shot in enumerate(shots):
-        assert np.array_equal(plain.uv[k], shot.detections.uv[shot.judged.found[1][0]])
-
-
-def test_centres_of_what_the_border_cuts_are_moved(camera, shots):
-    plain = marks_of(shots, shape_of(camera))
+    for uv, shot in zip(plain.uv, shots, strict=True):
+        assert np.array_equal(uv, shot.detections.uv[shot.judged.found[1][0]])
     moved = marks_of(shots, shape_of(camera), length=535.0)
     assert moved.moved.any()
     assert (moved.uv[~moved.moved] == plain.uv[~moved.moved]).all()
@@ -99,22 +93,14 @@ def test_rendered_detections_take_the_place_of_the_drawn_ones(flight, camera, sh
     assert len(whole.frames) == len(flight.frames)
 
 
-def test_a_target_that_is_found_nowhere_is_said(flight, camera, shots):
-    nothing = [replace_found(shot) for shot in shots]
+def test_a_target_that_is_found_nowhere_and_an_image_of_another_flight_are_refused(flight, camera, shots):
+    nothing = [shot._replace(judged=Judged({1: []}, set(), 0), detections=no_detections()) for shot in shots]
     with pytest.raises(WildlabError, match="none of 4"):
         with_detections(flight, marks_of(nothing, shape_of(camera)), "ship")
-
-
-def test_an_image_of_another_flight_is_refused(flight, camera, shots):
     marks = marks_of(shots, shape_of(camera))
-    other = marks._replace(exposure=marks.exposure.copy())
-    other.exposure[1] = 10**6
+    marks.exposure[1] = 10**6
     with pytest.raises(WildlabError, match="1000000"):
-        with_detections(flight, other, "ship")
-
-
-def replace_found(shot):
-    return shot._replace(judged=Judged({1: []}, set(), 0), detections=replace(no_detections()))
+        with_detections(flight, marks, "ship")
 
 
 def test_a_window_is_that_part_of_the_whole_image():
@@ -128,17 +114,15 @@ def test_a_window_is_that_part_of_the_whole_image():
         assert part.kelvin.size < 0.1 * whole.kelvin.size
         assert np.array_equal(part.kelvin, whole.kelvin[window.slices])
         assert np.array_equal(part.labels, whole.labels[window.slices])
-    shape = shape_of(camera)
     windows, wholes = list(camera.shoot(exposures, margin=48)), list(camera.shoot(exposures))
     for part, whole in zip(windows, wholes, strict=True):
         one, other = part.seen[0], whole.seen[0]
         for name in ("uv", "centre", "middle"):
             assert np.allclose(getattr(one, name), getattr(other, name)), name
-        for end in (np.min, np.max):
-            assert np.allclose(end(one.outline, axis=0), end(other.outline, axis=0))
+        assert np.allclose(np.ptp(one.outline, axis=0), np.ptp(other.outline, axis=0))
         boxes = (shot.detections.box[shot.judged.found[1][0]] for shot in (part, whole))
         assert np.abs(np.subtract(*boxes)).max() <= 2, "but for other draws of the noise"
-    apart, together = marks_of(windows, shape), marks_of(wholes, shape)
+    apart, together = (marks_of(shots, shape_of(camera)) for shots in (windows, wholes))
     assert np.allclose(apart.centre, together.centre)
     # The noise has other draws; what they move is a fraction of a pixel.
     assert np.hypot(*(apart.uv - together.uv).T).max() < 0.5
