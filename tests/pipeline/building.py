@@ -16,7 +16,7 @@ NED = ["north_m", "east_m", "down_m"]
 
 def manifest_of(camera: Camera | None = None, **parts: Any) -> Manifest:
     given: dict[str, Any] = {
-        "name": "made up",
+        "name": "made-up",
         "kind": "logged",
         "origin": {"latitude_deg": 60.0, "longitude_deg": 10.0, "height_m": 0.0},
         "platform": {"name": "made up"},
