@@ -74,9 +74,7 @@ TRUE = {
 
 def axes_of(pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Right, down and forward of the image in north, east, down, (n, 3, 3) columns."""
-    ahead = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), -np.sin(pitch)])
-    right = np.column_stack([-np.sin(yaw), np.cos(yaw), 0 * yaw])
-    return np.stack([right, np.cross(ahead, right), ahead], axis=-1)
+    return Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, 0 * yaw])).as_matrix()[..., [1, 2, 0]]
 
 
 def write_survey(folder: Path, kind: str, pitch_deg: float) -> pd.DataFrame:
@@ -98,13 +96,10 @@ def write_survey(folder: Path, kind: str, pitch_deg: float) -> pd.DataFrame:
     names = [f"P{i:04d}" for i in range(n)]
     ned = ["north", "east", "down"]
     photos = pd.DataFrame(logged, columns=ned).assign(photo=names, pitch=pitch_deg, yaw=np.degrees(yaw))
-    clicked = uv + rng.normal(0, 2.0, (n, 2))
-    photos.to_csv(folder / "photos.csv", index=False)
-    pd.DataFrame(clicked, columns=["u", "v"]).assign(photo=names, mark=names).to_csv(
-        folder / "clicks.csv", index=False
-    )
+    clicks = pd.DataFrame(uv + rng.normal(0, 2.0, (n, 2)), columns=["u", "v"]).assign(photo=names, mark=names)
     truth = pd.DataFrame(marks, columns=ned).assign(mark=names)
-    truth.to_csv(folder / "marks.csv", index=False)
+    for name, table in (("photos", photos), ("clicks", clicks), ("marks", truth)):
+        table.to_csv(folder / f"{name}.csv", index=False)
     (folder / "recipe.toml").write_text(RECIPE.replace("SPREADS", LINES[kind]))
     return truth.set_index("mark")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
@@ -43,9 +44,8 @@ def parse(blob: bytes) -> tuple[int, list[float], int, np.ndarray]:
     return system, bounds, kind, np.array(struct.unpack_from(f"{order}{2 * count}d", body, 13)).reshape(-1, 2)
 
 
-def rows_of(base: sqlite3.Connection, query: str) -> list[dict[str, Any]]:
-    found = base.execute(query)
-    return [dict(zip([one[0] for one in found.description], row, strict=True)) for row in found]
+def rows_of(base: sqlite3.Connection, query: str) -> list[Any]:
+    return pd.read_sql_query(query, base).to_dict("records")
 
 
 @pytest.fixture(scope="module")
