@@ -16,6 +16,8 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.pipeline.evaluate import score_points
+from wildlab.pipeline.georeference import Observations, georeference, observe, pose_errors
 from wildlab.studies.sensitivity.tables import TAU2
 
 SPEED = 15.0
@@ -118,3 +120,15 @@ def first_seconds(flight: Flight, seconds: float) -> Flight:
     tables = {name: flight.table(name) for name in ("imu", "gnss")}
     few = {name: t[t["time_s"] < seconds].reset_index(drop=True) for name, t in tables.items()}
     return replace(flight, tables=few)
+
+
+def score(
+    flight: Flight,
+    observations: Observations | None = None,
+    deviations: dict[str, float] | None = None,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """The errors of a flight's detections, as observed by its log or otherwise."""
+    seen = observations or observe(flight)
+    errors = pose_errors(flight, seen, deviations)
+    return score_points(flight, georeference(flight, seen, np.random.default_rng(seed), errors))

@@ -36,7 +36,6 @@ def robot_flight(
     bearing_sd_deg: float = 0.3,
     position_sd: float = 1.0,
     seconds: float = 120.0,
-    rate_hz: float = 2.0,
     labelled: bool = True,
     truth: bool = True,
     fixed: bool = False,
@@ -54,7 +53,7 @@ def robot_flight(
     the stamp was added; their errors have this correlation from one to the next.
     """
     rng = np.random.default_rng(seed)
-    t = np.arange(1.0, seconds, 1 / rate_hz)
+    t = np.arange(1.0, seconds, 0.5)
     at = np.zeros((len(t), 2)) if fixed else robot(t)
     off = boat(t - late_s) - (at if fixed else robot(t - late_s))
     error = np.zeros(2)

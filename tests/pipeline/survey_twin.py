@@ -29,26 +29,21 @@ class Survey:
     ``down_m`` and ``north_m`` are added to the logged position; ``focal`` is by how much the stated focal
     lengths are too large (a share). ``off`` moves what the survey says of a mark (metres, north-east),
     ``turned_deg`` the yaw that is logged while a photo is taken. ``mark_m`` is the spacing of the marks.
-    ``pan_deg`` stands in the log on top of the true heading. Attitude errors of photos are independent, or,
-    with ``wanders_s``, a Gauss-Markov process of that time constant. ``level_m`` is half the range of the
-    heights.
+    Attitude errors of photos are independent, or, with ``wanders_s``, a Gauss-Markov process of that time
+    constant. ``level_m`` is half the range of the heights.
     """
 
     seed: int = 0
     images: int = 40
     every_s: float = 6.0
     tilt_deg: float = 0.0
-    pan_deg: float = 0.0
     clock_s: float = 0.0
     down_m: float = 0.0
     north_m: float = 0.0
     focal: float = 0.0
     off: dict[str, tuple[float, float]] = field(default_factory=dict)
     turned_deg: dict[int, float] = field(default_factory=dict)
-    attitude_deg: float = 0.7
     heading_deg: float = 0.7
-    position_m: float = 0.7
-    pixel_px: float = 4.0
     stated_deg: float = 0.7
     stated_heading_deg: float | None = None
     slant_deg: tuple[float, float] = (35.0, 80.0)
@@ -76,14 +71,13 @@ def simulate(survey: Survey) -> Flight:
     roll = np.radians(3.0) * np.sin(2 * np.pi * t / 13.0)
 
     index = np.round(at / STEP_S).astype(int)
-    tilt, heading = np.radians([survey.attitude_deg, survey.heading_deg])
-    shared = [tilt, tilt, heading] * rng.normal(size=(n, 3))
+    shared = np.radians([0.7, 0.7, survey.heading_deg]) * rng.normal(size=(n, 3))
     keep = np.exp(-survey.every_s / survey.wanders_s) if survey.wanders_s else 0.0
     for i in range(1, n):
         shared[i] = keep * shared[i - 1] + np.sqrt(1 - keep**2) * shared[i]
     logged_then = euler_to_matrix(*np.column_stack([roll, -slant, np.unwrap(yaw)])[index].T)
     true = rotation_vector_to_matrix(shared) @ logged_then
-    where = way[index] + rng.normal(0, survey.position_m, (n, 3))
+    where = way[index] + rng.normal(0, 0.7, (n, 3))
     marks = _marks(rng, survey.mark_m)
     names = np.array([f"M{i:02d}" for i in range(len(marks))])
     mount = Mount("forward")
@@ -93,15 +87,14 @@ def simulate(survey: Survey) -> Flight:
         uv = ground_to_pixel(CAMERA, marks, np.repeat(p, len(marks), 0), np.repeat(R, len(marks), 0))
         seen = np.isfinite(uv).all(axis=1) & (uv > 40).all(axis=1) & (uv < [4016, 3000]).all(axis=1)
         for mark in rng.permutation(np.flatnonzero(seen))[:5]:
-            rows.append((f"I{i:03d}", names[mark], *(uv[mark] + rng.normal(0, survey.pixel_px, 2))))
+            rows.append((f"I{i:03d}", names[mark], *(uv[mark] + rng.normal(0, 4.0, 2))))
     detections = pd.DataFrame(rows, columns=["frame_id", "target_id", "u_px", "v_px"])
     detections.insert(0, "detection_id", [f"D{i:03d}" for i in range(len(detections))])
     detections["source"], detections["kind"], detections["plane_down_m"] = "click", "pixel", 0.0
     if survey.rule == "nearest":
         detections["target_id"] = ""
 
-    heading = np.unwrap(yaw) + np.radians(survey.pan_deg)
-    logged = np.column_stack([roll, -slant + np.radians(survey.tilt_deg), heading])
+    logged = np.column_stack([roll, -slant + np.radians(survey.tilt_deg), np.unwrap(yaw)])
     for image, degrees in survey.turned_deg.items():
         logged[np.abs(t - at[image]) < survey.every_s / 2, 2] += np.radians(degrees)
     nav = poses_table(t, way + np.array([survey.north_m, 0.0, survey.down_m]), euler_to_matrix(*logged.T))

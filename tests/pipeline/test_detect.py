@@ -9,17 +9,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.test_detection_part_fit import sample
 from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast
 from wildlab.detection.shape import Shape, fit_shape
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.errors import WildlabError
+from wildlab.evaluation.runs import Interval
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels
 from wildlab.pipeline.detecting import detect as subject
 from wildlab.pipeline.detecting.command import samples_of
 from wildlab.pipeline.detecting.detect import detect_frame, run_detection
-from wildlab.pipeline.detecting.fit import Sample, fit_thresholds
+from wildlab.pipeline.detecting.fit import fit_thresholds
 from wildlab.pipeline.detecting.judged import judge_detections
 from wildlab.pipeline.detecting.methods import METHODS, for_distance
 from wildlab.pipeline.detecting.shape_fit import fit_shapes
@@ -109,17 +111,15 @@ def test_labels_of_other_frames_are_refused(tmp_path: Path) -> None:
         judge_detections(done.detections, done.frames, read_labels(path / "other.csv"))
 
 
-def test_thresholds_are_judged_where_they_were_not_chosen(tmp_path: Path) -> None:
+def test_thresholds_are_judged_where_they_were_not_chosen() -> None:
     """Two clips whose animals differ in size: what suits one misses the other, and the fit has to say so."""
     rng = np.random.default_rng(1)
     samples = []
     for number in range(8):
         size = 3 if number % 2 else 13
-        u, v = rng.integers(20, 100), rng.integers(20, 70)
-        path = tmp_path / f"{number}.png"
-        cv2.imwrite(str(path), picture([(int(u), int(v))], number, size))
-        box = np.array([[u - size / 2, v - size / 2, size, size]], float)
-        samples.append(Sample(read_image(path), box, np.zeros((0, 4)), f"clip {number % 2}"))
+        u, v = int(rng.integers(20, 100)), int(rng.integers(20, 70))
+        box = [u - size / 2, v - size / 2, size, size]
+        samples.append(sample(number, picture([(u, v)], number, size), [box], f"clip {number % 2}"))
     small, large = Contrast(smallest_px=5, largest_px=40), Contrast(smallest_px=60, largest_px=900)
     fitted = fit_thresholds("contrast", samples, tried=[small, large])
     assert fitted.held_out.f1.estimate == 0 and fitted.inside.f1.estimate > 0.5
@@ -132,17 +132,15 @@ def test_thresholds_are_judged_where_they_were_not_chosen(tmp_path: Path) -> Non
 
 def test_samples_keep_groups_and_stretches_of_a_clip_together(tmp_path: Path) -> None:
     path = folder(tmp_path / "in", 8)
-    frames = open_frames(path)
-    grouped = samples_of(frames, read_labels(path / "labels.csv", group="scene"))
+    grouped = samples_of(open_frames(path), read_labels(path / "labels.csv", group="scene"))
     assert [one.group for one in grouped] == [f"scene {n // 2}" for n in range(8)]
-    writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (128, 96))
+    clip, labels = tmp_path / "a.avi", tmp_path / "l.csv"
+    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (128, 96))
     for number in range(40):
         writer.write(cv2.cvtColor(picture([(50, 50)], number), cv2.COLOR_GRAY2BGR))
     writer.release()
-    pd.DataFrame({"frame0": range(40), "x": 48, "y": 48, "w": 5, "h": 5}).to_csv(tmp_path / "l.csv")
-    stretches = [
-        one.group for one in samples_of(open_frames(tmp_path / "a.avi"), read_labels(tmp_path / "l.csv"))
-    ]
+    pd.DataFrame({"frame0": range(40), "x": 48, "y": 48, "w": 5, "h": 5}).to_csv(labels)
+    stretches = [one.group for one in samples_of(open_frames(clip), read_labels(labels))]
     assert len(set(stretches)) == 10 and stretches == sorted(stretches, key=stretches.index)
 
 
@@ -181,14 +179,13 @@ def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path: Path) -
     for number in range(10):
         rng = np.random.default_rng(number)
         image = rng.normal(100, 2, (160, 200))
-        places = [(30 + 40 * k, 40 + int(rng.integers(0, 80))) for k in range(4)]
-        for row, (u, v) in enumerate(places):
-            h, w = (7, 7) if row % 2 else (3, 16)
+        boxes = []
+        for u, w, h in ((30, 7, 7), (70, 16, 3), (110, 7, 7), (150, 16, 3)):
+            v = 40 + int(rng.integers(0, 80))
             image[v - h // 2 : v - h // 2 + h, u - w // 2 : u - w // 2 + w] += 60
-        cv2.imwrite(str(tmp_path / f"{number}.png"), np.clip(image, 0, 255).astype(np.uint8))
-        boxes = np.array([[u - 3.5, v - 3.5, 7, 7] for u, v in places[1::2]], float)
-        frame = read_image(tmp_path / f"{number}.png")
-        samples.append(Sample(frame, boxes, np.zeros((0, 4)), f"clip {number // 2}"))
+            boxes.append([u - w / 2, v - h / 2, w, h])
+        grey = np.clip(image, 0, 255).astype(np.uint8)
+        samples.append(sample(number, grey, boxes[::2], f"clip {number // 2}"))
     fitted = fit_shapes(samples)
     assert fitted.held_out.f1.estimate > 0.95 > 0.8 > fitted.defaults.f1.estimate
     again = detect_frame(samples[0].frame, "shape", fitted.thresholds)
@@ -250,26 +247,24 @@ def test_what_a_method_says_of_itself_holds(method: str) -> None:
 
 
 def test_stated_ellipses_are_held_against_the_middle_of_labels(tmp_path: Path) -> None:
-    rng = np.random.default_rng(8)
-    count = 400
-    covariance = np.array([[4.0, 1.0], [1.0, 2.0]])
-    off = rng.multivariate_normal([0, 0], covariance, count)
-    table = pd.DataFrame(
-        {
-            "frame_id": [f"{n}.png" for n in range(count)], "u_px": 50 + off[:, 0], "v_px": 40 + off[:, 1],
-            "left_px": 45.0, "top_px": 35.0, "width_px": 10.0, "height_px": 10.0, "score": 1.0,
-            "cov_uu_px2": 4.0, "cov_uv_px2": 1.0, "cov_vv_px2": 2.0,
-        }
+    count, covariance = 400, np.array([[4.0, 1.0], [1.0, 2.0]])
+    off = np.random.default_rng(8).multivariate_normal([0, 0], covariance, count)
+    frames = pd.DataFrame({"frame_id": [f"{n}.png" for n in range(count)]})
+    table = frames.assign(
+        u_px=50 + off[:, 0], v_px=40 + off[:, 1], left_px=45.0, top_px=35.0, width_px=10.0, height_px=10.0,
+        score=1.0, cov_uu_px2=4.0, cov_uv_px2=1.0, cov_vv_px2=2.0,
     )  # fmt: skip
-    frames = pd.DataFrame({"frame_id": table["frame_id"], "width_px": 128, "height_px": 96, "problem": None})
-    rows = "".join(f"{name},46,34,8,12\n" for name in table["frame_id"])
-    (tmp_path / "l.csv").write_text(f"image,x,y,w,h\n{rows}", encoding="utf-8")
-    labels = read_labels(tmp_path / "l.csv")
-    honest = judge_detections(table, frames, labels).ellipse
+    labels = frames.rename(columns={"frame_id": "image"}).assign(x=46, y=34, w=8, h=12)
+    labels.to_csv(tmp_path / "l.csv", index=False)
+
+    def ellipse(table: pd.DataFrame) -> Interval | None:
+        seen = frames.assign(width_px=128, height_px=96, problem=None)
+        return judge_detections(table, seen, read_labels(tmp_path / "l.csv")).ellipse
+
+    honest = ellipse(table)
     assert honest is not None and honest.low < 0.9 < honest.high
-    small = judge_detections(table.assign(cov_uu_px2=1.0, cov_uv_px2=0.0, cov_vv_px2=1.0), frames, labels)
+    small = ellipse(table.assign(cov_uu_px2=1.0, cov_uv_px2=0.0, cov_vv_px2=1.0))
     # 4.6 = -2 ln 0.1: within a circle of that squared radius.
     expected = float((np.sum(off**2, axis=1) <= 4.605).mean())
-    assert small.ellipse is not None and abs(small.ellipse.estimate - expected) < 1e-9
-    assert small.ellipse.high < 0.9
-    assert judge_detections(table.drop(columns=["cov_uv_px2"]), frames, labels).ellipse is None
+    assert small is not None and abs(small.estimate - expected) < 1e-9 and small.high < 0.9
+    assert ellipse(table.drop(columns=["cov_uv_px2"])) is None

@@ -56,6 +56,12 @@ def test_of_too_few_nothing_is_chosen():
     assert np.isnan(part_of(np.zeros(8))) and part_of(np.zeros(9)) == 0
 
 
+def sample(number, image, boxes, group):
+    """A labelled frame; its boxes are left, top, width, height in px."""
+    frame = Frame(f"{number}.png", None, image, "grey", "white-hot", np.ones(image.shape, bool))
+    return Sample(frame, np.array(boxes, float), np.zeros((0, 4)), group)
+
+
 def samples_of(rng, frames, shift):
     """Warm blobs, and labels whose middle is off by a share of the length, as each group has it."""
     made = []
@@ -66,11 +72,8 @@ def samples_of(rng, frames, shift):
             u, v = at + rng.integers(-8, 8), 60 + rng.integers(-20, 20)
             image[v - 4 : v + 4, u - 8 : u + 8] += 40
             # A label lies off by a share of 20 px, its size, one way or the other.
-            du = 20 * shift * rng.choice([-1, 1])
-            boxes.append([u - 10 + du, v - 6, 20, 12])
-        valid = np.ones(image.shape, bool)
-        frame = Frame(f"{number}.png", None, image, "grey", "white-hot", valid)
-        made.append(Sample(frame, np.array(boxes, float), np.zeros((0, 4)), f"clip {number // 4}"))
+            boxes.append([u - 10 + 20 * shift * rng.choice([-1, 1]), v - 6, 20, 12])
+        made.append(sample(number, image, boxes, f"clip {number // 4}"))
     return made
 
 

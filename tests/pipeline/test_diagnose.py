@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.pipeline.conftest import build, changed
+from tests.pipeline.conftest import build, changed, score
 from tests.pipeline.survey_twin import CAMERA, Survey, simulate
 from tests.sound_flights import simulate_sound_flight
 from wildlab.errors import WildlabError
@@ -18,7 +18,7 @@ from wildlab.pipeline.camera_clock import by_points_in_words
 from wildlab.pipeline.diagnose import diagnose
 from wildlab.pipeline.diagnosis import find_implausible
 from wildlab.pipeline.evaluate import errors_of, score_points
-from wildlab.pipeline.georeference import covariances_of, georeference, observe
+from wildlab.pipeline.georeference import covariances_of, observe
 from wildlab.pipeline.learn import learn_from
 from wildlab.pipeline.repeats import compare_sightings, judge_repeats
 
@@ -30,10 +30,8 @@ WRONG = {
 }
 
 
-def diagnosed(flight, seed=0):
-    rng = np.random.default_rng(seed)
-    observations = observe(flight)
-    return diagnose(flight, observations, score_points(flight, georeference(flight, observations, rng)))
+def diagnosed(flight):
+    return diagnose(flight, observe(flight), score(flight))
 
 
 @pytest.mark.slow
@@ -43,8 +41,7 @@ def test_a_sound_flight_whose_poses_wander_has_no_certain_cause(kind):
     flight = simulate_sound_flight(kind, 1)
     source = "camera" if "camera" in flight.nav else None
     observations = observe(flight, source)
-    scored = score_points(flight, georeference(flight, observations, np.random.default_rng(0)))
-    found = diagnose(flight, observations, scored, source)
+    found = diagnose(flight, observations, score(flight, observations), source)
     assert not found.counts, found.winner.name
     assert found.noise.share > 0.5
 
@@ -239,8 +236,7 @@ def test_sound_flights_have_no_outliers(views):
     """However steep the view: what is stated of the attitude, a tilt and a heading, explains the errors."""
     inside, out = [], 0
     for seed in range(50):
-        flight, rng = simulate(Survey(seed=seed, images=20, **views)), np.random.default_rng(seed)
-        scored = score_points(flight, georeference(flight, observe(flight), rng))
+        scored = score(simulate(Survey(seed=seed, images=20, **views)), seed=seed)
         whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(scored)))
         errors = errors_of(scored)
         whitened = np.einsum("nij,nj->ni", whiten, errors)

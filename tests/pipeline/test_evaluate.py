@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.pipeline.conftest import changed
+from tests.pipeline.conftest import changed, score
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import covariance_columns
 from wildlab.geometry.frames import (
@@ -17,35 +17,29 @@ from wildlab.pipeline.evaluate import (
     blocks_of,
     errors_of,
     recorded_answers,
-    score_points,
     unlabelled_programs,
 )
-from wildlab.pipeline.georeference import georeference, observe, pose_errors
+from wildlab.pipeline.georeference import observe, pose_errors
 from wildlab.pipeline.pose_noise import estimate_noise, evaluate_with_estimated_noise
-
-
-def scored(flight, seed=0, **kwargs):
-    rng = np.random.default_rng(seed)
-    return score_points(flight, georeference(flight, observe(flight, **kwargs), rng))
 
 
 @pytest.mark.parametrize("rule", ["labelled", "nearest"])
 def test_a_perfect_flight_has_no_error(make_flight, rule):
-    table = scored(make_flight(rule=rule))
+    table = score(make_flight(rule=rule))
     assert len(table) == 160
     assert table["error_m"].max() < 1e-6
     assert table["inside_90"].all()
 
 
 def test_a_moving_target_is_judged_where_it_was_at_the_time(make_flight):
-    assert scored(make_flight(moving=True))["error_m"].max() < 1e-6
+    assert score(make_flight(moving=True))["error_m"].max() < 1e-6
 
 
 def test_a_clock_offset_shows_and_the_manifest_s_offset_takes_it_off(make_flight):
     flight = make_flight(clock_s=0.5)
-    assert scored(flight)["error_m"].mean() > 4.0
-    assert scored(flight, clock_shift=0.5)["error_m"].max() < 1e-6
-    assert scored(changed(flight, {"clocks": {"camera_offset_s": 0.5}}))["error_m"].max() < 1e-6
+    assert score(flight)["error_m"].mean() > 4.0
+    assert score(flight, observe(flight, clock_shift=0.5))["error_m"].max() < 1e-6
+    assert score(changed(flight, {"clocks": {"camera_offset_s": 0.5}}))["error_m"].max() < 1e-6
 
 
 def test_calibration_finds_boresight_and_clock_and_helps_images_it_has_not_seen(make_flight):
@@ -59,7 +53,7 @@ def test_calibration_finds_boresight_and_clock_and_helps_images_it_has_not_seen(
         np.degrees([found.value(k) for k in ("roll", "tilt", "pan")]), [1.0, -2.0, 1.5], atol=0.15
     )
     assert found.value("clock") == pytest.approx(0.3, abs=0.03)
-    assert result.scored["error_m"].mean() < 0.3 < scored(flight)["error_m"].mean()
+    assert result.scored["error_m"].mean() < 0.3 < score(flight)["error_m"].mean()
     assert len(result.scored) == 160
     assert len(result.mean_errors) == 3
 
@@ -74,7 +68,7 @@ def test_images_without_time_are_not_asked_for_the_clock(make_flight):
 def test_ellipses_from_estimated_noise_hold_what_they_say(make_flight):
     """Assumed 1 deg, true 0.3 deg: far too wide before, right after, on images the estimate has not seen."""
     flight = make_flight(n_images=150, attitude_deg=0.3, position_m=0.3, pixel_px=2.0)
-    table = scored(flight)
+    table = score(flight)
     observations = observe(flight)
     assert table["inside_90"].mean() > 0.97
     after = evaluate_with_estimated_noise(flight, observations, table, np.random.default_rng(1))
@@ -108,13 +102,13 @@ def test_recorded_answers_are_judged_by_the_same_rule_where_they_name_targets(ma
     answers = recorded_answers(flight)
     assert list(answers) == ["other"] and unlabelled_programs(flight) == ["Other 1.2"]
     assert np.allclose(errors_of(answers["other"]), [3.0, -4.0])
-    assert len(scored(flight)) == 160
+    assert len(score(flight)) == 160
 
 
 def test_frames_without_a_pose_are_nan_and_stay_in_their_row(make_flight):
     flight = make_flight()
     flight.nav["logged"] = flight.nav["logged"].query("time_s < 20")
-    table = scored(flight)
+    table = score(flight)
     assert len(table) == 160
     assert table["error_m"].isna().sum() == 4 * 20
     assert not table.loc[table["error_m"].isna(), "inside_90"].any()
@@ -124,7 +118,7 @@ def test_what_cannot_be_scored_or_calibrated_is_refused(make_flight):
     flight = make_flight()
     flight.tables["detections"]["target_id"] = "elsewhere"
     with pytest.raises(WildlabError, match="target_id"):
-        scored(flight)
+        score(flight)
     with pytest.raises(WildlabError, match="'time_gps_s'"):
         observe(flight, stamps="time_gps_s")
     flight.tables["detections"]["kind"] = "position"

@@ -77,13 +77,6 @@ def test_bearings_with_elevation_start_where_they_meet_the_plane():
     assert rows.loc["ekf", "rmse"] < 4.0 and rows.loc["ekf", "detections"] > 230
 
 
-def test_bearings_alone_start_where_a_range_is_given():
-    flight = robot_flight(3, kind="bearing")
-    settings = Settings(sensors={"radar": {"range_m": 90.0, "range_sd_m": 30.0}})
-    rows = rows_of(follow_targets(flight, settings=settings))
-    assert rows.loc["ekf", "detections"] > 230
-
-
 def test_velocities_help_positions_in_one_track():
     """They say how fast, the others where."""
     flight = joined(

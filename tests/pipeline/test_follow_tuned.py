@@ -137,11 +137,6 @@ def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_
     np.testing.assert_allclose(one.estimate[: len(known)][known], two.estimate[known])
 
 
-def test_filters_without_a_smoother_are_named():
-    followed = follow_targets(robot_flight(1, kind="position"), smooth=True, filters=["imm", "ukf"])
-    assert ["'imm'" in one for one in followed.notes if "not smoothed" in one] == [True]
-
-
 def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
     track = follow_targets(robot_flight(1, kind="position"), filters=["ekf"]).tracks[0]
     for dt in (0.0, 0.3):

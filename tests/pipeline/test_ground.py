@@ -11,7 +11,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from tests.pipeline.building import manifest_of, poses_table, surveyed
-from tests.pipeline.conftest import changed
+from tests.pipeline.conftest import changed, score
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.checks.check import check_flight
@@ -20,7 +20,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
-from wildlab.pipeline.evaluate import errors_of, score_points
+from wildlab.pipeline.evaluate import errors_of
 from wildlab.pipeline.georeference import georeference, heights_left_in, observe
 from wildlab.pipeline.ground import on_level, rays_of, shift_from_level
 from wildlab.pipeline.track import sighting
@@ -99,7 +99,7 @@ def test_ellipses_hold_what_they_should_over_hills(flown: Callable[..., Flight])
     """Poses, pixels and nothing else are wrong, by what the manifest states."""
     flight = flown(noise=1.0, per_image=24)
     flight.terrain = replace(hills(), sd=1e-3)
-    scored = score_points(flight, georeference(flight, observe(flight), np.random.default_rng(0)))
+    scored = score(flight)
     assert len(scored) > 500
     # 25 poses are drawn: 90 % of their points, give or take what so few decide.
     assert 0.8 <= scored["inside_90"].mean() <= 0.97

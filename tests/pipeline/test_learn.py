@@ -5,14 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.pipeline.conftest import changed
+from tests.pipeline.conftest import changed, score
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.sense.sense import sense_sentences
 from wildlab.flight.learnt import LearntParameter, learnt_toml, parse_learnt, read_learnt, write_learnt
 from wildlab.pipeline.diagnose import diagnose
-from wildlab.pipeline.evaluate import score_points
-from wildlab.pipeline.georeference import georeference, observe, pose_errors
+from wildlab.pipeline.georeference import georeference, observe
 from wildlab.pipeline.learn import apply_learnt, corrected_flight, learn_flight
 
 
@@ -27,12 +26,6 @@ def named(flight, name):
 @cache
 def learnt():
     return learn_flight(named(tuesday(), "tuesday"), np.random.default_rng(0))[0]
-
-
-def errors_of(flight, observations, deviations=None):
-    rng = np.random.default_rng(0)
-    points = georeference(flight, observations, rng, pose_errors(flight, observations, deviations))
-    return score_points(flight, points)
 
 
 def test_it_comes_back_from_its_file_as_it_was(tmp_path):
@@ -93,10 +86,10 @@ def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
     flight = named(tuesday(seed=5), "wednesday")
     logged = observe(flight)
     applied = apply_learnt(flight, None, logged, learnt())
-    after = errors_of(flight, applied.observations, applied.deviations)
+    after = score(flight, applied.observations, applied.deviations)
     well = simulate(Survey(seed=5))
-    untouched = errors_of(well, observe(well))
-    assert errors_of(flight, logged)["error_m"].mean() > 10.0
+    untouched = score(well)
+    assert score(flight, logged)["error_m"].mean() > 10.0
     assert after["error_m"].mean() <= 1.1 * untouched["error_m"].mean()
     assert 0.83 < after["inside_90"].mean() < 0.97
     assert "this very flight" not in applied.sentence
@@ -134,7 +127,7 @@ def test_what_was_applied_is_not_found_again():
     own = learn_flight(flight, np.random.default_rng(0))[0]
     assert {"east", "clock", "tilt"} <= {one.name for one in own.parameter}
     applied = apply_learnt(flight, None, observe(flight), own)
-    scored = errors_of(flight, applied.observations)
+    scored = score(flight, applied.observations)
     again = diagnose(flight, applied.observations, scored)
     assert not again.counts
     clock = next(model for model in again.models if model.causes == ("clock",))
