@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.detection.ellipses import inside
+from tests.refused import refused
 from wildlab.detection.border import adjust_at_border, border_moves, to_border
 from wildlab.detection.floating import detect_floating
-from wildlab.errors import WildlabError
 
 
 def ellipse_image(centre=(8.0, 90.0), axes=(120.0, 24.0), angle=0.1):
@@ -78,6 +78,5 @@ def test_the_nearer_border():
 
 
 def test_a_length_of_nothing_is_refused():
-    with pytest.raises(WildlabError, match="above zero") as error:
+    with refused("above zero", field="length"):
         adjust_at_border(detect_floating(ellipse_image()), (200, 260), 0.0)
-    assert error.value.field == "length"

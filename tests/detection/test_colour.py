@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from tests.refused import refused
 from wildlab.detection.colour import Colour, coloured, find_coloured
-from wildlab.errors import WildlabError
 
 BLUE = (10, 110, 240)
 
@@ -98,7 +98,7 @@ def test_what_cannot_be_is_refused() -> None:
         (lambda: Colour(hue=(100, 250)), "hue"),
         (lambda: Colour(smallest_px=0), "below zero"),
     ):
-        with pytest.raises(WildlabError, match=about):
+        with refused(about):
             call()
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.detection.ellipses import inside as inside_ellipse
+from tests.refused import refused
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections, describe, join, no_detections
 from wildlab.detection.near import merge_near, remove_near
@@ -21,7 +22,6 @@ from wildlab.detection.warm import (
     subtract_background,
     to_grey,
 )
-from wildlab.errors import WildlabError
 
 EVERYWHERE = np.ones((160, 200), bool)
 
@@ -154,9 +154,9 @@ def test_block_and_gate_shrink_with_the_distance() -> None:
     assert block_from_distance(1e6, 800) == 3
     near, far = gate_from_distance(50, 800), gate_from_distance(100, 800)
     assert np.allclose(np.array(near) / 4, far)
-    with pytest.raises(WildlabError, match="above zero"):
+    with refused("above zero"):
         block_from_distance(0, 800)
-    with pytest.raises(WildlabError, match="middle"):
+    with refused("middle"):
         Warm(block_px=50)
 
 

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.pipeline.conftest import changed
+from tests.refused import refused
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import poses_at
@@ -74,9 +75,9 @@ def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna: Flight) -
 @pytest.mark.slow
 def test_what_cannot_be_estimated_is_refused(tracking: Flight) -> None:
     nobody = changed(tracking, truth=tracking.table("truth").head(0))
-    with pytest.raises(WildlabError, match="0 detections"):
+    with refused("0 detections"):
         camera_clock_by_points(nobody, "autopilot")
-    with pytest.raises(WildlabError, match="fewer than four"):
+    with refused("fewer than four"):
         camera_clock_by_points(late(tracking, 1e6), "autopilot")
 
 
@@ -138,7 +139,7 @@ def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna: Flight) ->
 
     found = by_motion_in_words(antenna, frames(), "autopilot")
     assert not found.numbers["certain"]
-    with pytest.raises(WildlabError, match="0 of 0"):
+    with refused("0 of 0"):
         by_motion_in_words(antenna, iter(()), "autopilot")
 
 

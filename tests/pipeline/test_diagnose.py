@@ -10,8 +10,8 @@ import pytest
 
 from tests.pipeline.conftest import build, changed, score
 from tests.pipeline.survey_twin import CAMERA, Survey, simulate
+from tests.refused import refused
 from tests.sound_flights import simulate_sound_flight
-from wildlab.errors import WildlabError
 from wildlab.evaluation.outliers import find_outliers
 from wildlab.geometry.corrections import BOUNDS, Calibration
 from wildlab.pipeline.camera_clock import by_points_in_words
@@ -187,7 +187,7 @@ def test_images_without_times_are_not_asked_for_the_clock():
 
 
 def test_too_few_images_are_refused():
-    with pytest.raises(WildlabError, match="5 images"):
+    with refused("5 images"):
         diagnosed(simulate(Survey(images=5)))
 
 
@@ -321,7 +321,7 @@ def test_a_sighting_is_held_against_those_of_other_images():
 
 
 def test_without_names_there_is_nothing_to_compare():
-    with pytest.raises(WildlabError, match="no detection names"):
+    with refused("no detection names"):
         judged(simulate(Survey(images=8, rule="nearest")))
 
 

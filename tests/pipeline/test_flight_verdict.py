@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -11,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.pipeline.conftest import receiver
+from tests.pipeline.conftest import build, receiver
 from wildlab.evaluation.runs import Interval
 from wildlab.flight.store import Flight
 from wildlab.pipeline.overviews.overview import Overview, look_over
@@ -120,8 +119,8 @@ def shaken(size: float) -> pd.DataFrame:
     return pd.DataFrame({"time_s": t, "f_x_m_s2": force, "f_y_m_s2": 0.0, "f_z_m_s2": -9.81, **turns})
 
 
-def test_harmful_shaking_is_an_alarm(make_flight: Callable[..., Flight]) -> None:
-    flight = make_flight(n_images=20)
+def test_harmful_shaking_is_an_alarm() -> None:
+    flight = build(n_images=20)
     flight.tables["imu"] = shaken(150.0)
     (shaking,) = look_over(flight).alarms
     assert 12 < shaking.worst < 13.1 and shaking.size > 60 and not shaking.broken
@@ -129,8 +128,8 @@ def test_harmful_shaking_is_an_alarm(make_flight: Callable[..., Flight]) -> None
     assert not look_over(flight).alarms
 
 
-def test_poses_that_contradict_the_satellites_are_an_alarm(make_flight: Callable[..., Flight]) -> None:
-    flight = make_flight(n_images=40)
+def test_poses_that_contradict_the_satellites_are_an_alarm() -> None:
+    flight = build(n_images=40)
     gnss = flight.tables["gnss"] = receiver(flight)
     assert not look_over(flight).alarms
     gnss.loc[:9, "north_m"] += 12.0

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from tests.pipeline.conftest import changed
+from tests.refused import refused
 from wildlab.detection.flow import FlowThresholds, Matches
-from wildlab.errors import WildlabError
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
@@ -169,8 +169,8 @@ def test_without_velocities_there_is_nothing_to_feed(flight):
 
 
 def test_what_does_not_fit_is_refused(flight, seen):
-    with pytest.raises(WildlabError, match="3 times"):
+    with refused("3 times"):
         pair_velocities(flight, [], Reading("autopilot", times=np.arange(3.0)))
     far = [pairs_of(seen, rows=[10])[0]._replace(second=600)]
-    with pytest.raises(WildlabError, match="frame 600"):
+    with refused("frame 600"):
         pair_velocities(flight, far, Reading("autopilot"))

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-import pytest
 from scipy.ndimage import gaussian_filter
 
 from tests.pipeline.building import manifest_of, poses_table, surveyed
 from tests.pipeline.conftest import changed, score
-from wildlab.errors import WildlabError
+from tests.refused import refused
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.store import Flight
@@ -46,39 +44,34 @@ def holed() -> Terrain:
     return replace(hills(), height=height)
 
 
-@pytest.fixture
-def flown() -> Callable[..., Flight]:
-    """``flown(noise=1.0)``: marks on hills in 25 images, poses wrong by noise times what is stated."""
-
-    def make(noise: float = 0.0, per_image: int = 6) -> Flight:
-        ground, n = hills(), 25
-        rng = np.random.default_rng(5)
-        at = rng.uniform(-120, 120, (n, 2))
-        p = np.column_stack([at, -(ground.heights_at(at) + 80)])
-        R = euler_to_matrix(np.zeros(n), np.zeros(n), rng.uniform(-3, 3, n))
-        poses = CameraPoses(MANIFEST.geometry_camera(), MANIFEST.geometry_mount(), p, R)
-        rows, marks = [], []
-        for i in range(n):
-            uv = rng.uniform([20, 20], [620, 490], (per_image, 2))
-            points = pixels_to_terrain(poses.take(np.full(per_image, i)), uv, ground).points
-            for k in np.flatnonzero(np.isfinite(points[:, 0])):
-                rows.append((f"d{i}-{k}", f"f{i}", "pixel", *uv[k], f"m{i}-{k}"))
-                marks.append(points[k])
-        logged_p = p + noise * rng.normal(0, 1.0, p.shape)
-        turn = rng.normal(0, 1, (n, 3)) * np.radians([0.5, 0.5, 1.0]) * noise
-        nav = poses_table(np.arange(float(n)), logged_p, R @ rotation_vector_to_matrix(turn))
-        nav["frame_id"] = [f"f{i}" for i in range(n)]
-        names = ["detection_id", "frame_id", "kind", "u_px", "v_px", "target_id"]
-        detections = pd.DataFrame(rows, columns=names).assign(source="click")
-        detections[["u_px", "v_px"]] += noise * rng.normal(0, 1.0, (len(rows), 2))
-        truth = surveyed(detections["target_id"].tolist(), np.array(marks))
-        tables = {"frames": nav[["frame_id", "time_s"]].copy(), "detections": detections, "truth": truth}
-        return Flight(MANIFEST, {"logged": nav}, tables, None, ground)
-
-    return make
+def flown(noise: float = 0.0, per_image: int = 6) -> Flight:
+    """Marks on hills in 25 images, poses wrong by noise times what is stated."""
+    ground, n = hills(), 25
+    rng = np.random.default_rng(5)
+    at = rng.uniform(-120, 120, (n, 2))
+    p = np.column_stack([at, -(ground.heights_at(at) + 80)])
+    R = euler_to_matrix(np.zeros(n), np.zeros(n), rng.uniform(-3, 3, n))
+    poses = CameraPoses(MANIFEST.geometry_camera(), MANIFEST.geometry_mount(), p, R)
+    rows, marks = [], []
+    for i in range(n):
+        uv = rng.uniform([20, 20], [620, 490], (per_image, 2))
+        points = pixels_to_terrain(poses.take(np.full(per_image, i)), uv, ground).points
+        for k in np.flatnonzero(np.isfinite(points[:, 0])):
+            rows.append((f"d{i}-{k}", f"f{i}", "pixel", *uv[k], f"m{i}-{k}"))
+            marks.append(points[k])
+    logged_p = p + noise * rng.normal(0, 1.0, p.shape)
+    turn = rng.normal(0, 1, (n, 3)) * np.radians([0.5, 0.5, 1.0]) * noise
+    nav = poses_table(np.arange(float(n)), logged_p, R @ rotation_vector_to_matrix(turn))
+    nav["frame_id"] = [f"f{i}" for i in range(n)]
+    names = ["detection_id", "frame_id", "kind", "u_px", "v_px", "target_id"]
+    detections = pd.DataFrame(rows, columns=names).assign(source="click")
+    detections[["u_px", "v_px"]] += noise * rng.normal(0, 1.0, (len(rows), 2))
+    truth = surveyed(detections["target_id"].tolist(), np.array(marks))
+    tables = {"frames": nav[["frame_id", "time_s"]].copy(), "detections": detections, "truth": truth}
+    return Flight(MANIFEST, {"logged": nav}, tables, None, ground)
 
 
-def test_with_exact_poses_points_are_the_marks(flown: Callable[..., Flight]) -> None:
+def test_with_exact_poses_points_are_the_marks() -> None:
     flight = flown()
     seen = observe(flight)
     points = georeference(flight, seen, np.random.default_rng(0))
@@ -95,7 +88,7 @@ def test_with_exact_poses_points_are_the_marks(flown: Callable[..., Flight]) -> 
     assert shift.median > 3.0
 
 
-def test_ellipses_hold_what_they_should_over_hills(flown: Callable[..., Flight]) -> None:
+def test_ellipses_hold_what_they_should_over_hills() -> None:
     """Poses, pixels and nothing else are wrong, by what the manifest states."""
     flight = flown(noise=1.0, per_image=24)
     flight.terrain = replace(hills(), sd=1e-3)
@@ -106,7 +99,7 @@ def test_ellipses_hold_what_they_should_over_hills(flown: Callable[..., Flight])
     assert summarise(errors_of(scored)).median < 3.0
 
 
-def test_the_map_decides_how_good_its_heights_are(flown: Callable[..., Flight]) -> None:
+def test_the_map_decides_how_good_its_heights_are() -> None:
     sizes = []
     for sd in (np.nan, 0.3, 6.0):
         flight = flown()
@@ -117,7 +110,7 @@ def test_the_map_decides_how_good_its_heights_are(flown: Callable[..., Flight]) 
     assert sizes[2] > 3 * sizes[1]
 
 
-def test_rays_that_meet_no_ground_are_counted(flown: Callable[..., Flight]) -> None:
+def test_rays_that_meet_no_ground_are_counted() -> None:
     flight = flown()
     flight.terrain = holed()
     nav = flight.nav["logged"]
@@ -132,7 +125,7 @@ def test_rays_that_meet_no_ground_are_counted(flown: Callable[..., Flight]) -> N
     assert set(points.loc[lost, "ellipse"]) == {"none"} and points.loc[lost, "cov_nn"].isna().all()
 
 
-def test_a_ray_without_ground_is_no_sighting(flown: Callable[..., Flight]) -> None:
+def test_a_ray_without_ground_is_no_sighting() -> None:
     flight = flown()
     flight.tables["detections"]["target_id"] = "m0-0"
     flight.terrain = holed()
@@ -145,7 +138,7 @@ def test_a_ray_without_ground_is_no_sighting(flown: Callable[..., Flight]) -> No
     assert np.isnan(found.uv[rows]).all() and np.isnan(found.positions[rows]).all()
 
 
-def test_heights_left_in_raise_terrain_that_counts_alike(flown: Callable[..., Flight]) -> None:
+def test_heights_left_in_raise_terrain_that_counts_alike() -> None:
     record = {
         "source": "dem.tif", "sha256": "0" * 64, "crs": "EPSG:4326", "added_m": 0.0, "unit": "m",
         "cell_m": [6.0, 6.0], "step_m": 6.0, "rows": 150, "columns": 150, "holes": 0, "error_rms_m": 0.0,
@@ -162,7 +155,7 @@ def test_heights_left_in_raise_terrain_that_counts_alike(flown: Callable[..., Fl
     assert moved["flight"] < 1e-3 < 1.0 < moved["ellipsoid"]
 
 
-def test_a_check_holds_the_survey_against_the_map(flown: Callable[..., Flight]) -> None:
+def test_a_check_holds_the_survey_against_the_map() -> None:
     flight, ground = flown(), hills()
 
     def findings(height: np.ndarray, words: str) -> list[str]:
@@ -181,8 +174,8 @@ def test_a_check_holds_the_survey_against_the_map(flown: Callable[..., Flight]) 
     assert findings(holed, "beyond the border") == []
 
 
-def test_without_terrain_it_is_said(flown: Callable[..., Flight]) -> None:
+def test_without_terrain_it_is_said() -> None:
     flight = flown()
     flight.terrain = None
-    with pytest.raises(WildlabError, match="no terrain"):
+    with refused("no terrain"):
         rays_of(observe(flight))

@@ -7,7 +7,7 @@ import pytest
 
 from tests.pipeline.conftest import changed, score
 from tests.pipeline.survey_twin import Survey, simulate
-from wildlab.errors import WildlabError
+from tests.refused import refused
 from wildlab.flight.checks.sense.sense import sense_sentences
 from wildlab.flight.learnt import LearntParameter, learnt_toml, parse_learnt, read_learnt, write_learnt
 from wildlab.pipeline.diagnose import diagnose
@@ -115,7 +115,7 @@ def test_on_the_very_flight_it_was_learnt_on_that_is_said():
 )
 def test_another_camera_or_mount_is_refused(change, words):
     flight = changed(tuesday(images=8), change)
-    with pytest.raises(WildlabError, match=words):
+    with refused(words):
         apply_learnt(flight, None, observe(flight), learnt())
 
 
@@ -170,12 +170,12 @@ def test_noise_of_roll_pitch_and_yaw_in_older_files_is_read_as_tilt_and_heading(
 def test_a_damaged_file_is_refused(old, new, words):
     text = learnt_toml(learnt())
     assert old in text
-    with pytest.raises(WildlabError, match=words):
+    with refused(words):
         parse_learnt(text.replace(old, new, 1))
 
 
 def test_files_that_cannot_be_read_or_written_are_refused(tmp_path):
-    with pytest.raises(WildlabError, match="no such file"):
+    with refused("no such file"):
         read_learnt(tmp_path / "none.toml")
-    with pytest.raises(WildlabError, match="cannot be written"):
+    with refused("cannot be written"):
         write_learnt(learnt(), tmp_path / "nowhere" / "calibration.toml")

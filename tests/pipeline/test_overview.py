@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,17 +16,18 @@ import pytest
 from tests.pipeline.building import manifest_of, poses_table, surveyed
 from tests.pipeline.conftest import build, changed, receiver, without_poses
 from tests.pipeline.robots import KNOWN, robot_flight
-from wildlab.errors import WildlabError
+from tests.planning.ground import FLAT
+from tests.refused import refused
 from wildlab.evaluation.streams import pace_of, runs_of
 from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
 from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.judged import judged as judged_tracks
 from wildlab.pipeline.overviews.image_coverage import cover_images, ground_height
+from wildlab.pipeline.overviews.lost import Recovered
 from wildlab.pipeline.overviews.overview import TROUBLES, look_over
 from wildlab.pipeline.overviews.verdict import Evidence, Verdict, parts_of, verdict_of
 from wildlab.pipeline.overviews.worth_fixing import gains_of, numbers_of, possible_gain
@@ -137,9 +137,8 @@ def test_footprints_have_the_area_and_the_overlap_of_rectangles() -> None:
 
 def test_footprints_on_level_terrain_are_those_on_the_plane() -> None:
     flight = level_images([(0.0, 0.0), (30.0, 20.0)])
-    terrain = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
     one, _ = cover_images(flight, "logged")
-    other, _ = cover_images(replace(flight, terrain=terrain), "logged")
+    other, _ = cover_images(replace(flight, terrain=FLAT), "logged")
     assert other.ground == "the flight's terrain"
     assert other.outlines == pytest.approx(one.outlines, abs=1e-3)
 
@@ -157,9 +156,9 @@ def test_without_images_or_a_height_of_the_ground_there_is_no_coverage(without: 
     assert cover_images(flight, "logged")[0] is None and cover_images(flight, None)[0] is None
 
 
-def holed(make_flight: Callable[..., Flight]) -> Flight:
+def holed() -> Flight:
     """A flight whose poses have a hole of five seconds, and a receiver with little to see in it."""
-    flight = make_flight(n_images=40)
+    flight = build(n_images=40)
     flight.tables["gnss"] = receiver(
         flight,
         satellites=lambda t: np.where((t > 20) & (t < 23.9), 5.0, 11.0),
@@ -169,8 +168,8 @@ def holed(make_flight: Callable[..., Flight]) -> Flight:
     return without_poses(flight, 10.05, 14.95)
 
 
-def test_what_is_wrong_along_the_path_is_found(make_flight: Callable[..., Flight]) -> None:
-    overview = look_over(holed(make_flight))
+def test_what_is_wrong_along_the_path_is_found() -> None:
+    overview = look_over(holed())
     found = {one.what: one for one in overview.troubles}
     assert set(found) == {TROUBLES[0], TROUBLES[3], TROUBLES[4]}
     assert found["no poses"].spells == pytest.approx(np.array([[10.0, 15.0]]), abs=0.06)
@@ -179,34 +178,39 @@ def test_what_is_wrong_along_the_path_is_found(make_flight: Callable[..., Flight
     assert [one.what for one in overview.troubles] == [what for what in TROUBLES if what in found]
 
 
-def test_images_in_a_hole_are_counted_with_the_reason(make_flight: Callable[..., Flight]) -> None:
-    flight = holed(make_flight)
+def lost_of(flight: Flight, key: str) -> Recovered:
+    (lost,) = [one for one in look_over(flight).lost if one.key == key]
+    return lost
+
+
+def test_images_in_a_hole_are_counted_with_the_reason() -> None:
+    flight = holed()
     frames = flight.tables["frames"]
     inside = int(((frames["time_s"] > 10.0) & (frames["time_s"] < 15.0)).sum())
-    (lost,) = [one for one in look_over(flight).lost if one.key == "images_without_pose"]
+    lost = lost_of(flight, "images_without_pose")
     assert (lost.lost, lost.of) == (inside, len(frames)) and inside
     flight.nav["logged"] = flight.nav["logged"].query("time_s < 20")
-    (lost,) = [one for one in look_over(flight).lost if one.key == "images_without_pose"]
+    lost = lost_of(flight, "images_without_pose")
     after = int((frames["time_s"] >= 20).sum())
     assert f"{after} before" in lost.why and str(inside) in lost.why
 
 
-def test_time_without_poses_is_that_of_the_record(make_flight: Callable[..., Flight]) -> None:
-    flight = make_flight(n_images=40)
+def test_time_without_poses_is_that_of_the_record() -> None:
+    flight = build(n_images=40)
     nav = flight.nav["logged"]
     flight.nav["logged"] = nav[(nav["time_s"] >= 20) & ((nav["time_s"] < 25) | (nav["time_s"] >= 30))]
     t = np.arange(0.0, 40.0, 0.1)
     flight.tables["magnetometer"] = pd.DataFrame({"time_s": t, **{f"field_{a}_ut": 0.0 for a in "xyz"}})
-    (lost,) = [one for one in look_over(flight).lost if one.key == "time_without_poses"]
+    lost = lost_of(flight, "time_without_poses")
     end = float(nav["time_s"].max())
     assert lost.lost == pytest.approx(25, abs=0.6) and lost.of == pytest.approx(end, abs=0.6)
 
 
-def test_detections_whose_target_has_no_truth_are_counted(make_flight: Callable[..., Flight]) -> None:
-    flight = make_flight(n_images=10)
+def test_detections_whose_target_has_no_truth_are_counted() -> None:
+    flight = build(n_images=10)
     detections = flight.tables["detections"]
     detections.loc[:4, "target_id"] = "nobody"
-    (lost,) = [one for one in look_over(flight).lost if one.key == "detections_without_truth"]
+    lost = lost_of(flight, "detections_without_truth")
     assert (lost.lost, lost.of) == (5, int((detections["target_id"] != "").sum()))
 
 
@@ -226,8 +230,8 @@ def georeferenced(gain: float, after: float, low: float) -> dict[tuple[str, str]
     return numbers_of([{"metrics": metrics}])
 
 
-def test_only_what_was_measured_is_a_gain(make_flight: Callable[..., Flight]) -> None:
-    overview = look_over(holed(make_flight))
+def test_only_what_was_measured_is_a_gain() -> None:
+    overview = look_over(holed())
     alone = gains_of(overview, {})
     assert alone and {one.unit for one in alone} == {"1"}
     first, *others = gains_of(overview, georeferenced(3.0, 1.0, 2.0))
@@ -238,10 +242,8 @@ def test_only_what_was_measured_is_a_gain(make_flight: Callable[..., Flight]) ->
     assert [one.key for one in uncertain] == [one.key for one in alone]
 
 
-def test_gains_and_troubles_are_recorded_and_no_place_is_given_away(
-    make_flight: Callable[..., Flight], tmp_path: Path
-) -> None:
-    flight = holed(make_flight)
+def test_gains_and_troubles_are_recorded_and_no_place_is_given_away(tmp_path: Path) -> None:
+    flight = holed()
     html, content = page_of(flight, tmp_path, numbers=georeferenced(3.0, 1.0, 2.0), judged=1)
     found = values(content)
     assert found["worth_fixing", "flight"] == 3 and found["problems", "flight"] == 0
@@ -310,29 +312,29 @@ def test_the_best_estimated_poses_come_first_and_others_are_refused() -> None:
     names = ("truth", "observer", "autopilot", "rtk", "mekf", "autopilot-uncalibrated")
     flight = Flight(build(n_images=1).manifest, dict.fromkeys(names, table))
     assert flight.estimated_sources[:4] == ["rtk", "mekf", "observer", "autopilot"]
-    with pytest.raises(WildlabError, match="no nav source 'other'"):
+    with refused("no nav source 'other'"):
         look_over(flight, "other")
 
 
-def test_trouble_that_lasts_asks_for_a_closer_look(make_flight: Callable[..., Flight]) -> None:
-    flight = make_flight(n_images=40)
+def test_trouble_that_lasts_asks_for_a_closer_look() -> None:
+    flight = build(n_images=40)
     flight.tables["gnss"] = receiver(flight, satellites=lambda t: np.where(t < t[0] + 12, 4.0, 9.0))
     assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 1
 
 
-def test_poses_that_pause_shortly_count_as_trouble(make_flight: Callable[..., Flight]) -> None:
-    flight = make_flight(n_images=80)
+def test_poses_that_pause_shortly_count_as_trouble() -> None:
+    flight = build(n_images=80)
     assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 0
     assert counts_of(look_over(without_poses(flight, 10.05, 11.95)), [], 0, 1, None)["troubled"] == 1
 
 
-def test_points_that_are_far_out_are_listed_with_what_stays(make_flight: Callable[..., Flight]) -> None:
+def test_points_that_are_far_out_are_listed_with_what_stays() -> None:
     metrics = [
         entry("gain", "without-far-out", 0.5),
         entry("horizontal_error_mean", "without-far-out", 1.5),
         entry("points_far_out", "winner", 2),
     ]
-    overview, numbers = look_over(make_flight(n_images=8)), numbers_of([{"metrics": metrics}])
+    overview, numbers = look_over(build(n_images=8)), numbers_of([{"metrics": metrics}])
     (far,) = [one for one in gains_of(overview, numbers) if one.key == "far_out"]
     assert far.share == pytest.approx(0.25)
 
@@ -363,10 +365,8 @@ def test_tracks_that_their_own_report_doubts_are_not_sound_here(off_deg: float, 
     )
 
 
-def test_detections_of_no_camera_are_not_held_against_the_ground(
-    make_flight: Callable[..., Flight], tmp_path: Path
-) -> None:
-    flight = make_flight(n_images=10)
+def test_detections_of_no_camera_are_not_held_against_the_ground(tmp_path: Path) -> None:
+    flight = build(n_images=10)
     flight.tables["detections"] = flight.table("detections").assign(
         source="radar", kind="position", north_m=0.0, east_m=0.0, down_m=0.0
     )

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wildlab.errors import WildlabError
+from tests.refused import refused
 from wildlab.evaluation.pose_noise import KINDS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import rotation_vector_to_matrix
@@ -76,7 +76,7 @@ def test_the_covariance_is_that_of_the_deviations(flight: Flight, exact: Sightin
 
 
 def test_poses_that_state_nothing_are_refused(flight: Flight, exact: Sighting) -> None:
-    with pytest.raises(WildlabError, match="no covariance"):
+    with refused("no covariance"):
         estimate_from_sighting(flight, exact._replace(poses=replace(exact.poses, covariance=None)))
 
 
@@ -84,5 +84,5 @@ def test_a_target_that_is_known_in_two_images_is_refused(flight: Flight, exact: 
     truth = exact.truth.copy()
     rows = np.flatnonzero(exact.seen)
     truth[np.setdiff1d(np.arange(len(truth)), rows[[0, -1]])] = np.nan
-    with pytest.raises(WildlabError, match="2 images"):
+    with refused("2 images"):
         estimate_from_sighting(flight, exact._replace(truth=truth))

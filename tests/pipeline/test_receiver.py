@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.pipeline.conftest import changed, first_seconds
-from wildlab.errors import WildlabError
+from tests.refused import refused
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
@@ -61,7 +61,7 @@ def test_a_fix_a_kilometre_off_is_no_noise(early: Flight) -> None:
 
 def test_a_filter_that_is_lost_is_nothing_to_learn_from(early: Flight) -> None:
     rows = list(range(60, len(early.table("gnss")), 5))
-    with pytest.raises(WildlabError, match="lost"):
+    with refused("lost"):
         receiver_noise(jumped(early, rows))
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.refused import refused
 from wildlab.detection.detections import no_detections
-from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.pipeline.rendered import Judged, Photographer, Shot, exposures_of, marks_of, with_detections
 from wildlab.simulation.twins import simulate_twin
@@ -95,11 +95,11 @@ def test_rendered_detections_take_the_place_of_the_drawn_ones(flight, camera, sh
 
 def test_a_target_that_is_found_nowhere_and_an_image_of_another_flight_are_refused(flight, camera, shots):
     nothing = [shot._replace(judged=Judged({1: []}, set(), 0), detections=no_detections()) for shot in shots]
-    with pytest.raises(WildlabError, match="none of 4"):
+    with refused("none of 4"):
         with_detections(flight, marks_of(nothing, shape_of(camera)), "ship")
     marks = marks_of(shots, shape_of(camera))
     marks.exposure[1] = 10**6
-    with pytest.raises(WildlabError, match="1000000"):
+    with refused("1000000"):
         with_detections(flight, marks, "ship")
 
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wildlab.errors import WildlabError
+from tests.planning.ground import FLAT, with_wall
+from tests.refused import refused
 from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.search import (
     SearchByChance,
@@ -25,7 +26,6 @@ from wildlab.planning.legs import Flying, Leg, Platform, look_attitude
 
 SENSOR = SearchSensor(0.3, 0.2, sd=0.2, reach=100.0, nearest=5.0)
 FLYING = Flying(5.0, 50.0)
-FLAT = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
 AREAS = (
     np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]]),
     np.array([[0.0, 100.0], [60.0, 100.0], [60.0, 160.0], [0.0, 160.0]]),
@@ -59,14 +59,11 @@ def test_an_animal_is_found_by_its_probability_and_in_the_field_of_view():
 
 
 def test_what_the_ground_hides_is_not_found():
-    height = np.zeros((101, 101), np.float32)
-    height[:, 52] = 45.0
-    walled = Terrain(height, north=-500.0, east=-500.0, step=10.0)
     leg = Leg(
         np.array([[0.0, 0.0, -50.0]]), look_attitude(0.0, 0.7, 0.0)[None], np.array([True]), 0.0, np.ones(1)
     )
     assert found_in(world([[0.0, 45.0]]), leg, np.arange(1), SENSOR).all()
-    assert not found_in(world([[0.0, 45.0]], terrain=walled), leg, np.arange(1), SENSOR).any()
+    assert not found_in(world([[0.0, 45.0]], terrain=with_wall(20, 45.0)), leg, np.arange(1), SENSOR).any()
 
 
 def test_a_search_ends_when_all_are_found_and_leaves_an_area_that_is_done():
@@ -136,7 +133,7 @@ def test_a_grid_lies_in_its_areas_and_on_the_ground():
 
 @pytest.mark.parametrize("area", [AREAS[0] + 1000, AREAS[0] / 100])
 def test_an_area_off_the_map_or_without_a_point_is_refused(area):
-    with pytest.raises(WildlabError, match="area 1"):
+    with refused("area 1"):
         grid_over([area], FLAT, 10.0)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.planning.ground import length
 from wildlab.errors import WildlabError
 from wildlab.planning.areas import (
     area_of,
@@ -89,5 +90,4 @@ def test_a_way_along_the_border_is_inside_and_one_across_the_gap_is_not() -> Non
 def test_the_way_inside_goes_round_the_two_corners_of_the_gap() -> None:
     way = way_inside(check_area(U_SHAPE), [90, 15], [90, 85])
     assert np.allclose(way, [[90, 15], [30, 30], [30, 70], [90, 85]])
-    length = np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
-    assert length == pytest.approx(40 + 2 * np.hypot(60, 15))
+    assert length(way) == pytest.approx(40 + 2 * np.hypot(60, 15))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.planning.ground import FLAT
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.animals.follow import (
     STATION_S,
     Kalman,
@@ -32,10 +32,14 @@ from wildlab.tracking.particles.clouds import Inside
 from wildlab.tracking.particles.herd import Moves
 
 CAMERA = Camera(640, 480, 1267.0, 1117.0, 356.0, 216.6)
-FLAT = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
 DETECTOR = Detector(detected=0.9, sd=1.0, border=0.0, height=0.7)
 ERRORS = ExecutionErrors(0.2, 0.2, 300.0, 0.002, 0.002, 0.005, 60.0)
 FENCE = rectangle(0.0, 0.0, 200.0, 160.0, 0.0)
+
+
+def nowhere(places: Array) -> Array:
+    """What an image shows that shows nothing."""
+    return np.zeros(places.shape[:-1])
 
 
 def over_and_over(seed: int, speed_sd: float, seconds: float = 300.0) -> Images:
@@ -100,7 +104,7 @@ def test_every_image_with_a_detection_is_looked_at_and_every_station() -> None:
 def every_image(images: Images, kalman: Kalman) -> Kalman:
     for k, time in enumerate(images.times.tolist()):
         z, R, _ = images.taken(k)
-        kalman.step(Look(time, z, R, lambda places: np.zeros(places.shape[:-1])))
+        kalman.step(Look(time, z, R, nowhere))
     return kalman
 
 
@@ -117,7 +121,6 @@ def test_a_kalman_track_is_the_textbooks() -> None:
     kalman, motion = Kalman(walk_of(0.5, 1.0), 0.99), walk_of(0.5, 1.0)
     first, second = np.array([[3.0, 4.0]]), np.array([[5.0, 4.5]])
     R = np.array([[[4.0, 1.0], [1.0, 2.0]]])
-    nowhere: Inside = lambda places: np.zeros(places.shape[:-1], bool)  # noqa: E731
     kalman.step(Look(0.0, first, R, nowhere))
     assert kalman.step(Look(10.0, second, R, nowhere)).tolist() == [1]
     P = R[0] + motion(10.0)[1]
@@ -133,7 +136,7 @@ def test_a_kalman_track_is_the_textbooks() -> None:
 
 def test_no_particle_leaves_the_fence_it_began_in() -> None:
     cloud = particles(7, 2.0)
-    look = Look(0.0, np.array([[70.0, 60.0]]), np.eye(2)[None], lambda places: np.zeros(places.shape[:-1]))
+    look = Look(0.0, np.array([[70.0, 60.0]]), np.eye(2)[None], nowhere)
     cloud.step(look)
     cloud.step(blind(900.0))
     assert cloud.home.tolist() == [0]
@@ -145,9 +148,7 @@ def test_no_particle_leaves_the_fence_it_began_in() -> None:
 
 def test_negative_information_moves_a_track_out_of_what_was_seen() -> None:
     cloud = particles(8, 0.5)
-    whole = Look(
-        0.0, np.array([[0.0, 0.0]]), 25 * np.eye(2)[None], lambda places: np.zeros(places.shape[:-1])
-    )
+    whole = Look(0.0, np.array([[0.0, 0.0]]), 25 * np.eye(2)[None], nowhere)
     cloud.step(whole)
 
     def west(places: Array) -> Array:

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.planning.ground import FLAT, with_wall
 from wildlab.geometry.camera import Camera, in_image
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.animals.images import (
     Detector,
     footprint_circles,
@@ -31,7 +31,6 @@ NONE = ExecutionErrors(0.0, 0.0, 300.0, 0.0, 0.0, 0.0, 60.0)
 SOME = ExecutionErrors(1.0, 1.5, 300.0, 0.01, 0.02, 0.04, 60.0)
 ROLLS = SOME._replace(roll=0.04, pitch=0.004, yaw=0.004, horizontal=0.1, vertical=0.1)
 PITCHES = ROLLS._replace(roll=0.004, pitch=0.04)
-FLAT = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
 
 
 def pose(north: float, east: float, above: float, roll: float, pitch: float, yaw: float) -> CameraPoses:
@@ -72,9 +71,7 @@ def test_shown_is_what_projects_into_the_image_over_level_ground() -> None:
 
 
 def test_a_hill_hides_what_is_behind_it() -> None:
-    height = np.zeros((101, 101), np.float32)
-    height[:, 52] = 30.0  # a ridge at 20 m east
-    ridge = Terrain(height, north=-500.0, east=-500.0, step=10.0)
+    ridge = with_wall(20, 30.0)
     R = euler_to_matrix(-1.2, 0.0, 0.0) @ R_MC_DOWN  # to the right, east
     p = np.array([0.0, 0.0, -12.0])
     behind = np.array([[0.0, 31.0]])

@@ -8,7 +8,7 @@ import pytest
 
 from tests.pipeline.conftest import changed
 from tests.pipeline.robots import boat, joined, robot_flight
-from wildlab.errors import WildlabError
+from tests.refused import refused
 from wildlab.flight.following import parse_settings, settings_over
 from wildlab.pipeline.many.follow import complete_looks, follow_all, judged, known_looks, tracks_table
 
@@ -53,9 +53,9 @@ def test_bearings_help_where_places_are_known_and_begin_nothing_alone() -> None:
         assert len(lives.tracks) == 1
     assert errors[0] < errors[1]
     several = parse_settings("[sensors.eye.many]\nseveral = true\n")
-    with pytest.raises(WildlabError, match="one hull"):
+    with refused("one hull"):
         follow_all(both, settings=several)
-    with pytest.raises(WildlabError, match="bearings alone"):
+    with refused("bearings alone"):
         follow_all(bearings)
 
 
@@ -84,7 +84,7 @@ HULL = "[[targets.many.hulls]]\nname = 'a'\n"
     ],
 )
 def test_settings_that_nothing_can_satisfy_are_refused(text: str, words: str) -> None:
-    with pytest.raises(WildlabError, match=words):
+    with refused(words):
         follow_all(robot_flight(kind="position"), settings=parse_settings(text))
 
 

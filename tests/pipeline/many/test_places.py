@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.pipeline.robots import believed, boat, robot, robot_flight
-from wildlab.errors import WildlabError
+from tests.refused import refused
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
@@ -157,5 +157,5 @@ def test_bearings_are_taken_as_they_are() -> None:
 
 
 def test_what_tells_no_place_is_refused() -> None:
-    with pytest.raises(WildlabError, match="nothing of a place"):
+    with refused("nothing of a place"):
         places(robot_flight(kind="velocity"))
