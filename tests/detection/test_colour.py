@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import colorsys
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.stats import chi2
 
 from tests.refused import refused
 from wildlab.detection.colour import Colour, coloured, find_coloured
+from wildlab.detection.detections import Detections
 
 BLUE = (10, 110, 240)
 
@@ -31,6 +33,10 @@ def all_of(image: np.ndarray) -> np.ndarray:
     return np.ones(image.shape[:2], bool)
 
 
+def found_in(image: np.ndarray, **kinds: Any) -> Detections:
+    return find_coloured(image, all_of(image), Colour(**kinds))
+
+
 def test_the_limits_are_those_of_another_conversion_of_colours() -> None:
     rng = np.random.default_rng(1)
     image = rng.integers(0, 256, (60, 80, 3), dtype=np.uint8)
@@ -48,18 +54,18 @@ def test_the_limits_are_those_of_another_conversion_of_colours() -> None:
 def test_only_the_largest_is_found() -> None:
     image = scene([(200, 180), (400, 180)], (20, 12), (360, 640))
     image[170:190, 100:160] = BLUE
-    assert find_coloured(image, all_of(image)).uv.tolist() == [[129.5, 179.5]]
-    every = find_coloured(image, all_of(image), Colour(only_largest=False))
+    assert found_in(image).uv.tolist() == [[129.5, 179.5]]
+    every = found_in(image, only_largest=False)
     assert len(every) == 3 and (np.diff(every.area) <= 0).all()
     # The largest is at the horizon: what is smaller is not taken in its place, as in print.
     image[0:40] = BLUE
-    assert len(find_coloured(image, all_of(image))) == 0
+    assert len(found_in(image)) == 0
 
 
 def test_what_is_too_small_or_outside_of_the_scene_is_not_found() -> None:
     image = scene([(300, 180)], (6, 5), (360, 640))
-    assert len(find_coloured(image, all_of(image))) == 0
-    assert len(find_coloured(image, all_of(image), Colour(smallest_px=20))) == 1
+    assert len(found_in(image)) == 0
+    assert len(found_in(image, smallest_px=20)) == 1
     image = scene([(300, 180)], (30, 20), (360, 640))
     valid = all_of(image)
     valid[150:210, 250:350] = False
@@ -69,8 +75,8 @@ def test_what_is_too_small_or_outside_of_the_scene_is_not_found() -> None:
 def test_red_goes_through_zero() -> None:
     image = np.full((360, 640, 3), 90, np.uint8)
     image[150:170, 300:330] = (250, 10, 30)
-    assert len(find_coloured(image, all_of(image), Colour(hue=(170, 10)))) == 1
-    assert len(find_coloured(image, all_of(image))) == 0
+    assert len(found_in(image, hue=(170, 10))) == 1
+    assert len(found_in(image)) == 0
 
 
 @pytest.mark.slow
@@ -81,7 +87,7 @@ def test_centres_lie_in_their_ellipses_as_often_as_they_say() -> None:
         u, v = rng.uniform([100, 120], [540, 240])
         clean = scene([(u, v)], tuple(rng.uniform([14, 10], [40, 24])), (360, 640))
         image = np.clip(clean + rng.normal(0, 6, clean.shape), 0, 255).astype(np.uint8)
-        found = find_coloured(image, all_of(image), Colour(part=0.01, hue=(95, 115)))
+        found = found_in(image, part=0.01, hue=(95, 115))
         assert len(found) == 1
         off = found.uv[0] - [u, v]
         squares.append(off @ np.linalg.solve(found.covariance[0], off))
@@ -131,4 +137,4 @@ def test_a_centre_on_the_limit_of_the_border_is_inside(
     for (u, v), found in ((inside, 1), (outside, 0)):
         image = np.full((360, 640, 3), (60, 110, 70), np.uint8)
         image[v - 6 : v + 7, u - 8 : u + 9] = BLUE
-        assert len(find_coloured(image, all_of(image))) == found
+        assert len(found_in(image)) == found

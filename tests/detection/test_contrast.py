@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import cv2
 import numpy as np
@@ -34,6 +35,14 @@ def ground(seed: int = 1, noise: float = 2.0) -> np.ndarray:
 
 def ellipse(u: float, v: float, a: float, b: float, angle: float = 0.0) -> np.ndarray:
     return inside_ellipse((u, v), (2 * a, 2 * b), angle, EVERYWHERE.shape)
+
+
+def by_contrast(image: np.ndarray, **thresholds: Any) -> Detections:
+    return find_by_contrast(image, EVERYWHERE, Contrast(**thresholds))
+
+
+def warm(image: np.ndarray, **thresholds: Any) -> Detections:
+    return find_warm(image, EVERYWHERE, Warm(**thresholds))
 
 
 def test_shape_of_an_ellipse_comes_out() -> None:
@@ -77,7 +86,7 @@ def test_ellipses_hold_the_true_centre_as_often_as_they_say(a: float, b: float, 
         u, v, angle = rng.uniform(60, 140), rng.uniform(60, 100), rng.uniform(0, 3)
         shown = warmer * cv2.GaussianBlur(drawn(u, v, a, b, angle), (0, 0), 1.0)
         image = ground(int(rng.integers(1e6))) + shown
-        found = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0, largest_px=3000))
+        found = by_contrast(image, part=0.0, largest_px=3000)
         assert len(found) == 1
         off = found.uv[0] - [u, v]
         squared.append(off @ np.linalg.solve(found.covariance[0], off))
@@ -88,7 +97,7 @@ def test_ellipses_hold_the_true_centre_as_often_as_they_say(a: float, b: float, 
 def test_what_is_not_seen_widens_the_ellipse() -> None:
     image = ground()
     image[100:105, 90:110] += 60
-    whole, part = (find_by_contrast(image, EVERYWHERE, Contrast(part=one)) for one in (0.0, 0.2))
+    whole, part = (by_contrast(image, part=one) for one in (0.0, 0.2))
     assert np.allclose(
         part.covariance - whole.covariance, (0.2 * whole.axes[:, :1, None]) ** 2 * np.eye(2), rtol=1e-6
     )
@@ -100,7 +109,7 @@ def test_what_stands_out_is_found_and_what_is_too_small_too_large_or_too_long_is
     image[ellipse(120, 40, 1.2, 1.2)] += 60
     image[100:150, 20:80] += 40
     image[20:22, 60:150] += 60
-    found = find_by_contrast(image, EVERYWHERE, Contrast(window_px=101, smallest_px=30, largest_px=1000))
+    found = by_contrast(image, window_px=101, smallest_px=30, largest_px=1000)
     assert np.allclose(found.uv, [[50, 40]], atol=0.5)
 
 
@@ -110,15 +119,15 @@ def test_two_animals_that_touch_are_two_with_a_share_of_the_peak() -> None:
         image += 80 * np.exp(
             -((np.arange(200)[None] - u) ** 2 + (np.arange(160)[:, None] - 80) ** 2) / (2 * 5**2)
         )
-    assert len(find_by_contrast(image, EVERYWHERE, Contrast(of_peak=0.0))) == 1
-    assert len(find_by_contrast(image, EVERYWHERE, Contrast(of_peak=0.85))) == 2
+    assert len(by_contrast(image, of_peak=0.0)) == 1
+    assert len(by_contrast(image, of_peak=0.85)) == 2
 
 
 def test_cold_things_are_found_in_a_black_hot_image_only() -> None:
     image = ground()
     image[ellipse(50, 40, 9, 5)] -= 40
-    assert len(find_by_contrast(image, EVERYWHERE)) == 0
-    found = find_by_contrast(image, EVERYWHERE, Contrast(warm_is_bright=False))
+    assert len(by_contrast(image)) == 0
+    found = by_contrast(image, warm_is_bright=False)
     assert np.allclose(found.uv, [[50, 40]], atol=0.5)
 
 
@@ -185,18 +194,18 @@ def test_of_those_too_near_the_surest_stays_or_all_become_one() -> None:
     assert np.allclose(merged.axes[row], describe(whole, whole, EVERYWHERE).axes[0])
 
 
-@pytest.mark.parametrize("find", [find_warm, find_by_contrast])
+@pytest.mark.parametrize("find", [warm, by_contrast])
 def test_an_even_image_has_nothing(find: Callable[..., Detections]) -> None:
-    assert len(find(np.full((160, 200), 100, np.uint8), EVERYWHERE)) == 0
+    assert len(find(np.full((160, 200), 100, np.uint8))) == 0
     assert len(join([no_detections(), no_detections()])) == 0
 
 
 def test_one_grey_level_on_even_ground_is_rounding_and_not_an_animal() -> None:
     image = np.full((160, 200), 100, np.uint8)
     image[60:70, 90:100] = 101
-    assert len(find_by_contrast(image, EVERYWHERE)) == 0
+    assert len(by_contrast(image)) == 0
     image[60:70, 90:100] = 110
-    assert len(find_by_contrast(image, EVERYWHERE)) == 1
+    assert len(by_contrast(image)) == 1
 
 
 def test_what_is_too_hot_for_an_animal_is_left_out_in_kelvin() -> None:
@@ -205,16 +214,16 @@ def test_what_is_too_hot_for_an_animal_is_left_out_in_kelvin() -> None:
     kelvin[ellipse(50, 80, 9, 6)] = 300
     kelvin[ellipse(150, 80, 9, 6)] = 700
     window = (270.0, 310.0)
-    assert len(find_warm(kelvin, EVERYWHERE, Warm(window=window))) == 2
-    cool = find_warm(kelvin, EVERYWHERE, Warm(window=window, hottest=320.0))
+    assert len(warm(kelvin, window=window)) == 2
+    cool = warm(kelvin, window=window, hottest=320.0)
     assert np.allclose(cool.uv, [[50, 80]], atol=0.1) and cool.intensity[0] == 300
 
 
 def test_f_in_a_black_hot_image_and_beside_a_border() -> None:
     image = np.full((160, 200), 150, np.uint8)
     image[ellipse(50, 80, 9, 6)] = 40
-    assert len(find_warm(image, EVERYWHERE)) == 0
-    assert len(find_warm(image, EVERYWHERE, Warm(warm_is_bright=False))) == 1
+    assert len(warm(image)) == 0
+    assert len(warm(image, warm_is_bright=False)) == 1
     valid = EVERYWHERE.copy()
     valid[:, :60] = False
     assert len(find_warm(image, valid, Warm(warm_is_bright=False))) == 0
@@ -224,8 +233,8 @@ def test_a_share_of_the_strongest_leaves_the_weak_out() -> None:
     image = ground(noise=1.0)
     image[ellipse(50, 40, 12, 10)] += 150
     image[ellipse(150, 100, 9, 6)] += 30
-    assert len(find_by_contrast(image, EVERYWHERE)) == 2
-    assert np.allclose(find_by_contrast(image, EVERYWHERE, Contrast(of_image=0.5)).uv, [[50, 40]], atol=0.5)
+    assert len(by_contrast(image)) == 2
+    assert np.allclose(by_contrast(image, of_image=0.5).uv, [[50, 40]], atol=0.5)
 
 
 def test_noise_of_a_window_keeps_rough_ground_quiet() -> None:
@@ -233,8 +242,8 @@ def test_noise_of_a_window_keeps_rough_ground_quiet() -> None:
     image = ground(noise=1.0)
     image[:, 100:] += cv2.GaussianBlur(rng.normal(0, 60, (160, 100)), (0, 0), 1.5)
     image[ellipse(50, 80, 6, 4)] += 40
-    over_all = find_by_contrast(image, EVERYWHERE, Contrast(peak=7))
-    by_window = find_by_contrast(image, EVERYWHERE, Contrast(peak=7, deviation="window"))
+    over_all = by_contrast(image, peak=7)
+    by_window = by_contrast(image, peak=7, deviation="window")
     assert len(by_window) < len(over_all) / 2 and np.abs(by_window.uv - [50, 80]).sum(axis=1).min() < 1
 
 
@@ -243,9 +252,9 @@ def test_the_warmest_part_of_a_body_is_not_taken_for_all_of_it() -> None:
     body, hot = ellipse(90, 80, 20, 6), ellipse(104, 80, 4, 4)
     image = np.full((160, 200), 100.0) + np.random.default_rng(1).normal(0, 1, (160, 200))
     image[body] += 40
-    even = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0))
+    even = by_contrast(image, part=0.0)
     image[hot] += 100
-    uneven = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0))
+    uneven = by_contrast(image, part=0.0)
     assert len(even) == len(uneven) == 1 and np.allclose(even.uv, [[90, 80]], atol=0.2)
     off = uneven.uv[0] - [90, 80]
     assert off[0] > 10
@@ -254,7 +263,7 @@ def test_the_warmest_part_of_a_body_is_not_taken_for_all_of_it() -> None:
     assert uneven.covariance[0, 1, 1] < 0.1 > even.covariance[0].max()
     # Two hot ends: which of them all the rest belongs to is not known, and nothing is added.
     image[ellipse(76, 80, 4, 4)] += 100
-    two = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0))
+    two = by_contrast(image, part=0.0)
     assert len(two) == 2 and two.covariance.max() < 0.5
 
 
@@ -262,13 +271,13 @@ def test_limits_of_the_area_are_themselves_allowed() -> None:
     image = np.full((160, 200), 90, np.uint8)
     image[60:66, 40:50] = 200
     # A rectangle of 10 by 6 pixels has 60 of them, whatever its contour's polygon.
-    assert len(find_warm(image, EVERYWHERE, Warm(smallest_px=60, largest_px=60))) == 1
-    assert len(find_warm(image, EVERYWHERE, Warm(smallest_px=61, largest_px=900))) == 0
-    assert len(find_warm(image, EVERYWHERE, Warm(smallest_px=1, largest_px=59))) == 0
+    assert len(warm(image, smallest_px=60, largest_px=60)) == 1
+    assert len(warm(image, smallest_px=61, largest_px=900)) == 0
+    assert len(warm(image, smallest_px=1, largest_px=59)) == 0
     rough = ground(noise=1.0)
     rough[ellipse(90, 80, 7, 5)] += 60
     for of_peak in (0.0, 0.5):
-        one = find_by_contrast(rough, EVERYWHERE, Contrast(of_peak=of_peak))
+        one = by_contrast(rough, of_peak=of_peak)
         area = float(one.area[0])
         kept = Contrast(of_peak=of_peak, smallest_px=area, largest_px=area)
         assert np.allclose(find_by_contrast(rough, EVERYWHERE, kept).uv, one.uv)
