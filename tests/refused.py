@@ -11,7 +11,7 @@ from wildlab.errors import WildlabError
 
 
 @contextmanager
-def refused(words: str = "", *, field: str | None = None) -> Iterator[None]:
+def refused(words: str | None = None, *, field: str | None = None) -> Iterator[None]:
     """``words``: a regular expression for the message; ``field``: what the error says it is about."""
     with pytest.raises(WildlabError, match=words) as caught:
         yield
