@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.detection.ellipses import inside
-from wildlab.detection.features import boundary_spread, region_moments, shape_of
+from wildlab.detection.features import boundary_spread, shape_of
 
 
 def drawn_ellipse(centre, axes, angle):
@@ -48,18 +48,6 @@ def test_hu_invariants_do_not_change_with_place_angle_or_size_and_tell_shapes_ap
     turned = np.rot90(triangle)
     assert np.allclose(shape_of(triangle).hu[:6], shape_of(turned).hu[:6], rtol=1e-9)
     assert not np.isclose(shape_of(triangle).hu[2], own[2], rtol=0.5)
-
-
-def test_moments_against_sums_over_pixels():
-    mask = (np.random.default_rng(2).random((23, 31)) < 0.4).astype(np.uint8)
-    v, u = np.nonzero(mask)
-    raw, central = region_moments(mask, central=False), region_moments(mask)
-    for p in range(4):
-        for q in range(4 - p):
-            assert np.isclose(raw[p, q], (u.astype(float) ** p * v.astype(float) ** q).sum())
-            about = (u - u.mean()) ** p * (v - v.mean()) ** q
-            assert np.isclose(central[p, q], about.sum(), atol=1e-8)
-    assert np.isnan(raw[3, 3])
 
 
 def test_the_boundary_of_a_disc_in_closed_form():

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from tests.pipeline.conftest import changed
 from tests.refused import refused
 from wildlab.detection.flow import FlowThresholds, Matches
-from wildlab.flight.store import load_flight, save_flight
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.pipeline.flow import (
@@ -20,8 +18,6 @@ from wildlab.pipeline.flow import (
     Reading,
     flow_errors,
     pair_velocities,
-    velocity_detections,
-    velocity_measurements,
 )
 from wildlab.pipeline.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.simulation.parameters import load_twin
@@ -141,31 +137,6 @@ def test_no_row_is_left_out_and_each_says_whether_it_would_pass(flight, seen):
     outside = pair_velocities(flight, pairs, Reading("autopilot", times=seen.times + 1000.0))
     assert np.isnan(speeds(outside)).all()
     assert pair_velocities(flight, [], Reading("autopilot")).empty
-
-
-def test_velocities_are_detections_of_their_own_kind(flight, seen, tmp_path):
-    velocity = np.array([4.0, -3.0])
-    quiet_flight = quiet(flight, seen)
-    table = pair_velocities(quiet_flight, pairs_of(seen, velocity), true_reading(seen))
-    rows = velocity_detections(flight, table, target="ship")
-    both = pd.concat([flight.detections, rows.sample(frac=1, random_state=1)], ignore_index=True)
-    save_flight(changed(flight, detections=both), tmp_path / "flight")
-    loaded = load_flight(tmp_path / "flight")
-    times, v, R = velocity_measurements(loaded)
-    assert np.allclose(v, speeds(table)) and (np.diff(times) > 0).all()
-    assert np.allclose(times, flight.frames["time_s"].to_numpy()[table["second"]]), "known with the second"
-    assert np.allclose(R[:, 0, 1], table["cov_ne"]) and np.allclose(R[:, 1, 1], table["cov_ee"])
-
-
-def test_without_velocities_there_is_nothing_to_feed(flight):
-    times, v, R = velocity_measurements(flight)
-    assert (times.shape, v.shape, R.shape) == ((0,), (0, 2), (0, 2, 2))
-    row = {"detection_id": "a", "source": "radar", "kind": "velocity",
-           "v_north_m_s": 1.0, "v_east_m_s": 2.0}  # fmt: skip
-    for frame, count in (("f000003", 1), ("nowhere", 0)):
-        rows = pd.DataFrame([row | {"frame_id": frame}])
-        _, v, R = velocity_measurements(changed(flight, detections=rows))
-        assert v.tolist() == [[1.0, 2.0]] * count and np.isnan(R).all()
 
 
 def test_what_does_not_fit_is_refused(flight, seen):

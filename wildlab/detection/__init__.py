@@ -11,7 +11,6 @@ of Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
   border of the image cuts (H 4.7); `features`: shape of a region by its moments (H 4.5, 4.6).
 - `wildlab.detection.colour`: something of one colour in a colour image (H 4.4.2); `boards`: what calibrates;
   `flow`: the same features in two images (H 5.4).
-- `wildlab.detection.fusion`: detections of two cameras, as a thermal and a colour one, joined.
 
 >>> import numpy as np
 >>> from wildlab.detection import find_by_contrast

@@ -46,39 +46,6 @@ class Shape(NamedTuple):
     hu: Array
 
 
-def region_moments(mask: NDArray[Any], *, central: bool = True) -> Array:
-    """Moments of a region up to the third order, H (4.5).
-
-    H calls (4.5) central and prints raw moments, about the corner of the image. The eigenvectors of (4.6) are
-    the region's axes with central ones only.
-
-    Parameters
-    ----------
-    mask
-        (H, W), nonzero inside.
-    central
-        About the region's centre; else about the pixel (0, 0), as printed.
-
-    Returns
-    -------
-    (4, 4): power of u, power of v; NaN above the third order. px^(2 + p + q), sums over pixel centres.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> m = region_moments(np.ones((3, 5), np.uint8))
-    >>> float(m[0, 0]), float(m[2, 0]), float(m[0, 2])
-    (15.0, 30.0, 10.0)
-    """
-    found = cv2.moments(np.ascontiguousarray(mask, np.uint8), binaryImage=True)
-    moments = np.full((4, 4), np.nan)
-    for p in range(4):
-        for q in range(4 - p):
-            name = f"{'mu' if central and p + q > 1 else 'm'}{p}{q}"
-            moments[p, q] = 0.0 if central and p + q == 1 else found[name]
-    return moments
-
-
 def axes_of(covariance: Array) -> tuple[Array, float]:
     """Full axes (2,) and orientation of the ellipse whose points have that covariance (2, 2).
 

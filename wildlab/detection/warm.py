@@ -15,9 +15,6 @@ from wildlab.detection.near import merge_near, remove_near
 from wildlab.errors import WildlabError
 
 Grey = NDArray[np.uint8]
-
-#: Parts of red, green and blue in grey, F (3.1).
-GREY_PARTS = (0.299, 0.587, 0.114)
 #: The most contours of one image that are looked at further.
 MOST_CONTOURS = 5000
 

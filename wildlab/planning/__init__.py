@@ -13,9 +13,6 @@ C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, master's
 - `wildlab.planning.gimbal`: strategies of a gimbal and how they blur images (F 5.4).
 - `wildlab.planning.sightings`, `coverage`: what images show of a terrain, how often, when last and how surely
   (F 5.8, 5.9); `moving`: animals that walk meanwhile.
-- `wildlab.planning.sea`: when tracked vessels have to be seen again, and level passes over them (H 8.2).
-- `wildlab.planning.patrol`: places that are visited again and again, once round a border, rows that several
-  aircraft share (F 5.2, 8.4).
 - `wildlab.planning.information`: what is known of each point of a grid, and what an image adds (F 5.3.2).
 - `wildlab.planning.planner`: where to fly and look next, by what is to be learnt; `followers`: along way
   points, or by chance; `legs`: what platform and gimbal can do.

@@ -36,7 +36,6 @@ from wildlab.files import write_json
 
 KINDS = ("logged", "twin", "computed")
 VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE, FITTED)
-NUMBERS = ("value", "published", "low", "high", "fraction", "below")
 
 #: The metric that tells by its subject which poses others were held against; its value is at how many times.
 AGAINST = "compared_with"

@@ -114,11 +114,6 @@ class SensorTuning(NamedTuple):
         return float(self.sd * np.sqrt(1 + F_c**2 - 2 * F_c * self.next_correlation))
 
     @property
-    def white_sd(self) -> float:
-        """Standard deviation of what is new at every scan, beside errors that are considered."""
-        return float(self.sd * np.sqrt(1 - self.next_correlation))
-
-    @property
     def thinning_s(self) -> float:
         """Lag from which errors are correlated by less than 1/e; nought where they never are by more."""
         return float(max(0.0, self.correlation_time_s * (1 + np.log(max(self.share, 1e-9)))))

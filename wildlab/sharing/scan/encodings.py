@@ -13,7 +13,6 @@ from wildlab.sharing.scan.secrets import Array
 
 #: Metres per degree of latitude, for how near is near.
 DEGREE_M = 111_320.0
-EARTH_M = 6_371_000.0
 #: Zones of UTM to either side of the own: Norway counts from zone 31 to 36 in zone 33.
 ZONES = 3
 

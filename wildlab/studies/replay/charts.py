@@ -21,8 +21,6 @@ from wildlab.reporting.figures import (
 
 #: Half of the side of the map, m.
 AROUND = 170.0
-#: What is a moment: detections this near in time belong to it, s.
-NOW_S = 0.01
 
 
 def operator_view(scene: Scene, t: float, title: str) -> Figure:

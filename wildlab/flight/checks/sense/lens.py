@@ -12,7 +12,7 @@ from wildlab.flight.checks.sense.sightings import Sightings
 from wildlab.flight.checks.sense.trial import Mistake
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
-from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_rotation
+from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, camera_rotation
 
 QUARTER = (0, 90, 180, -90)
 
@@ -252,8 +252,3 @@ def calibration_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
             f"k3 = {p1:.6g}, p1 = {p2:.6g}, p2 = {k3:.6g} in [camera]",
             camera(lambda c: replace(c, distortion=(k1, k2, p2, k3, p1))),
         )
-
-
-def turned_freely(s: Sightings, mount: Mount) -> Sightings:
-    """The sightings with another mount."""
-    return replace(s, mount=mount)

@@ -69,18 +69,6 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     return ardupilot.raw_log(path, "dataflash-text", tables, lost, "line", title)
 
 
-def read_messages(data: bytes) -> dict[str, Table]:
-    """All messages of a log as text, by name: the counterpart of `records.read_records`.
-
-    Parameters
-    ----------
-    data
-        The whole file.
-    """
-    lines = _lines(data)
-    return _tables(lines, _definitions(lines))[0]
-
-
 def _lines(data: bytes) -> list[str]:
     lines = data.decode("utf-8", errors="replace").split("\n")
     return lines if lines[-1].strip() else lines[:-1]
