@@ -24,7 +24,6 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
-from wildlab.pipeline.follow import usual_tuning
 from wildlab.pipeline.navigate import PUBLISHED_LIKE
 from wildlab.pipeline.navigation_errors import Errors
 from wildlab.simulation.twins import simulate_twin
@@ -127,18 +126,9 @@ def test_points_and_their_errors(ship: Flight) -> None:
         wildlab.georeference(two, source="other")
 
 
-def test_the_usual_tuning_is_that_of_the_flight(ship: Flight) -> None:
-    usual = wildlab.track(ship, source="autopilot", filter="ekf")
-    assert usual.tuning == usual_tuning(ship, source="autopilot")
-    assert usual.tuning.pixel == ship.manifest.uncertainty.pixel_px
-    P = wildlab.georeference(ship, source="autopilot").table
-    assert usual.tuning.measurement == pytest.approx(np.sqrt((P["cov_nn"] + P["cov_ee"]).mean() / 2))
-
-
 def test_what_cannot_be_done_is_refused(ship: Flight) -> None:
     for call, about in (
-        (lambda: wildlab.track(ship, source="autopilot"), "no covariance"),
-        (lambda: wildlab.track(ship, source="autopilot", filter="ukf"), "filter 'ukf'"),  # type: ignore[arg-type]
+        (lambda: wildlab.track(ship, source="autopilot", filter="magic"), "filter 'magic'"),
         (lambda: wildlab.navigate(ship, method="magic"), "method 'magic'"),  # type: ignore[arg-type]
         (lambda: wildlab.consistency(), "one kind"),
         (lambda: wildlab.plot("track"), "figure of a str"),  # type: ignore[arg-type]
@@ -161,7 +151,7 @@ def test_correlated_values_are_worth_less() -> None:
 
 def test_every_result_has_a_figure(ship: Flight) -> None:
     points = wildlab.georeference(ship, source="autopilot")
-    track = wildlab.track(ship, source="autopilot", filter="kf")
+    track = wildlab.track(ship, source="autopilot")
     for result in (ship, points, wildlab.evaluate_points(points), track, wildlab.consistency(track)):
         figure = wildlab.plot(result)
         assert figure._repr_png_()[1:4] == b"PNG"  # type: ignore[attr-defined]

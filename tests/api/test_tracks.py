@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,17 @@ from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
 from wildlab.evaluation.consistency import Average, chi_square_interval
 from wildlab.flight.clocks import frame_times, poses_at
+from wildlab.flight.files import check_model
+from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_quaternion
 from wildlab.pipeline.consistency import Series
-from wildlab.pipeline.follow import usual_tuning
-from wildlab.pipeline.georeference import assumed_deviations
+from wildlab.pipeline.following.estimates import STATE, estimates_table
+from wildlab.pipeline.following.follow import follow_targets
+from wildlab.pipeline.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.pipeline.navigate import PUBLISHED_LIKE, Navigated
 from wildlab.pipeline.navigation_errors import comparison_times
+from wildlab.pipeline.track import FILTERS, CvTuning, evaluate_track, follow_schmidt, sighting
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate, simulate_twin
 
@@ -122,17 +127,49 @@ def test_only_the_truth_judges_and_only_in_the_part_that_counts(
 
 @pytest.fixture(scope="module")
 def ship() -> Flight:
-    return simulate_twin("large-ship", 1)
+    return simulate_twin("large-ship", 1, without=("imu", "gnss"))
 
 
-def test_a_track_is_told_what_was_asked_for_and_the_rest_as_usual(ship: Flight) -> None:
-    usual = usual_tuning(ship, source="autopilot", acceleration=0.2, velocity=3.0)
-    told = wildlab.track(ship, source="autopilot", filter="kf", acceleration=0.2, velocity=3.0).tuning
-    assert told == usual and told[:3] == (0.2, usual.measurement, 3.0)
-    pixel = wildlab.track(ship, source="autopilot", filter="ekf", pixel=7.5).tuning
-    assert pixel == usual_tuning(ship, source="autopilot")._replace(pixel=7.5)
-    given = wildlab.track(ship, source="autopilot", filter="ekf", measurement=15.0).tuning
-    assert given[1:] == (15.0, 5.0, 15.0, assumed_deviations(ship)["pixel_px"])
+TUNING = CvTuning(acceleration=0.2, position_0=15.0, velocity_0=3.0, measurement=15.0, pixel=6.0)
+SETTINGS = {"targets": {"acceleration_m_s_sqrt_s": 0.2}}
+
+
+def test_a_track_is_the_commands(ship: Flight) -> None:
+    """What `wildlab track` writes is the table of the same function, see tests of that command."""
+    found = follow_targets(ship, settings=check_model(Settings, SETTINGS, None))
+    table = estimates_table(found.tracks, found.scans)
+    for name in ("ekf", "schmidt"):
+        one, rows = wildlab.track(ship, filter=name, settings=SETTINGS), table[table["filter"] == name]
+        there = np.isin(one.times, rows["time_s"])
+        assert np.allclose(one.estimate[there], rows[list(STATE)], rtol=0, atol=1e-9)
+        assert np.allclose(one.covariance[there, 0, 1], rows["p_01"], rtol=1e-9, atol=0)
+        assert np.allclose(one.nees[there], rows["nees"], rtol=1e-9, atol=0, equal_nan=True)
+    left_out = wildlab.track(ship, settings=SETTINGS)
+    assert left_out.filter == "schmidt", "there is an uncertainty to consider"
+
+
+def test_settings_come_as_a_file_too(ship: Flight, tmp_path: Path) -> None:
+    file = tmp_path / "settings.toml"
+    file.write_text("[targets]\nacceleration_m_s_sqrt_s = 0.2\n")
+    one, other = (wildlab.track(ship, filter="ekf", settings=told) for told in (file, SETTINGS))
+    assert np.array_equal(one.estimate, other.estimate, equal_nan=True)
+    with pytest.raises(wildlab.WildlabError, match="acceleration"):
+        wildlab.track(ship, settings={"targets": {"acceleration": 0.2}})
+
+
+@pytest.mark.parametrize("name", ["kf", "ekf", "schmidt"])
+def test_a_tuning_is_that_of_the_studies(ship: Flight, name: str) -> None:
+    one = wildlab.track(ship, source="autopilot", filter=name, tuning=TUNING)
+    seen = sighting(ship, "autopilot")
+    if name == "schmidt":
+        P = assumed_pose_covariance(seen.poses.R_nb, assumed_deviations(ship))
+        other = follow_schmidt(seen, TUNING, P)
+    else:
+        other = FILTERS[name](seen, TUNING)
+    scored = evaluate_track(seen, other)
+    assert np.array_equal(one.estimate, other.x[:, :4], equal_nan=True)
+    assert one.numbers == pytest.approx({name: scored.numbers[name] for name in one.numbers})
+    assert one.numbers["rmse"] > one.numbers["mae"] + 0.01
 
 
 def test_of_several_targets_the_one_asked_for_is_followed(ship: Flight) -> None:
@@ -142,53 +179,80 @@ def test_of_several_targets_the_one_asked_for_is_followed(ship: Flight) -> None:
     truth = ship.table("truth")
     both = pd.concat([truth, truth.assign(target_id="another")], ignore_index=True)
     two = Flight(ship.manifest, ship.nav, ship.tables | {"detections": seen, "truth": both})
-    with pytest.raises(wildlab.WildlabError, match="2 targets"):
-        wildlab.track(two, source="autopilot", filter="kf", measurement=15.0)
-    track = wildlab.track(two, "another", source="autopilot", filter="kf", measurement=15.0)
-    assert int(track.seen.seen.sum()) == rows - rows // 3
+    for told in ({"tuning": TUNING, "source": "autopilot"}, {}):
+        with pytest.raises(wildlab.WildlabError, match="2 targets"):
+            wildlab.track(two, **told)
+    track = wildlab.track(two, "another", source="autopilot", filter="kf", tuning=TUNING)
+    assert int(track.used.sum()) == rows - rows // 3
+    assert wildlab.track(two, "another").target == "another"
 
 
-@pytest.mark.parametrize(("filter", "axes"), [("kf", ("north", "east")), ("ekf", ("u", "v"))])
-def test_innovations_have_the_axes_of_the_measurement(
-    ship: Flight, filter: Any, axes: tuple[str, str]
-) -> None:
-    track = wildlab.track(ship, source="autopilot", filter=filter, measurement=15.0, pixel=6.0)
-    assert track.scored is not None
-    found = {name for name in track.scored.numbers if name.startswith("lag1")}
-    assert found == {f"lag1_autocorrelation_{axis}" for axis in axes}
-    numbers = track.scored.numbers
-    assert numbers["rmse"] > numbers["mae"] + 0.01
+def test_what_is_not_there_is_refused(ship: Flight) -> None:
+    for wrong in (
+        {"filter": "kalman"},
+        {"filter": "imm", "tuning": TUNING},
+        {"sensor": "radar"},
+        {"target": "x"},
+    ):
+        with pytest.raises(wildlab.WildlabError):
+            wildlab.track(ship, **wrong)
 
 
-def test_without_a_truth_a_track_is_not_scored(ship: Flight) -> None:
+def test_without_a_truth_a_track_is_not_judged_by_it(ship: Flight) -> None:
     elsewhere = ship.table("truth").assign(time_s=lambda truth: truth["time_s"] + 1e5)
     blind = Flight(ship.manifest, ship.nav, ship.tables | {"truth": elsewhere})
-    track = wildlab.track(blind, source="autopilot", filter="kf", measurement=15.0)
-    assert track.scored is None
-    found = wildlab.consistency(track)
-    assert list(found.means) == ["NIS"]
+    for told in ({"filter": "kf", "tuning": TUNING, "source": "autopilot"}, {"filter": "ekf"}):
+        track = wildlab.track(blind, **told)
+        assert np.isnan(track.numbers["mae"]) and "truth" not in repr(track)
+        assert list(wildlab.consistency(track).means) == ["NIS"]
+
+
+def test_measured_places_are_those_of_the_detections_used(ship: Flight) -> None:
+    track = wildlab.track(ship, filter="ekf", settings=SETTINGS)
+    assert np.array_equal(track.used, np.isfinite(track.measured[:, 0]))
+    apart = np.hypot(*(track.measured - track.truth[:, :2])[track.used].T)
+    assert np.nanmedian(apart) < 60.0
 
 
 def test_consistency_is_over_all_runs_with_two_degrees_of_freedom(ship: Flight) -> None:
     one, other = (
-        wildlab.track(ship, source="autopilot", filter="kf", measurement=metres) for metres in (15.0, 40.0)
+        wildlab.track(ship, source="autopilot", filter="kf", tuning=TUNING._replace(measurement=metres))
+        for metres in (15.0, 40.0)
     )
     found, alone = wildlab.consistency(one, other), wildlab.consistency(one)
     twice = wildlab.consistency(one, one).means["NEES position"]
     nees = alone.means["NEES position"]
-    assert one.scored is not None
-    assert nees.mean == pytest.approx(one.scored.numbers["nees"])
+    assert nees.mean == pytest.approx(one.numbers["nees"])
     assert 1 <= nees.worth < nees.n / 2  # errors of neighbouring frames are alike
     assert twice.worth == pytest.approx(2 * nees.worth)
     assert nees.low < twice.low < twice.high < nees.high
     for name in ("NEES position", "NIS"):
         runs = found.series[name]
-        assert [run.dof for run in runs] == [2, 2] and len(runs[0].times) == len(one.seen.times)
+        assert [run.dof for run in runs] == [2, 2] and len(runs[0].times) == len(one.times)
         values = np.concatenate([run.values for run in runs])
         assert found.means[name].mean == pytest.approx(np.nanmean(values))
         assert found.means[name].mean != pytest.approx(alone.means[name].mean, rel=0.01)
         mean = alone.means[name]
         assert (mean.low, mean.high) == chi_square_interval(2, runs=mean.worth)
+
+
+def test_anybodys_filter_by_its_errors_and_covariances() -> None:
+    """NEES of white errors is chi-square: the mean of a right filter lies in its interval, of others not."""
+    rng = np.random.default_rng(4)
+    P = np.tile(np.diag([4.0, 1.0, 9.0]), (8, 400, 1, 1))
+    e = rng.multivariate_normal(np.zeros(3), P[0, 0], (8, 400))
+    runs = wildlab.consistency(errors=e, covariances=P).means["NEES"]
+    assert runs.inside and runs.n == 3200 and runs.mean == pytest.approx(3.0, abs=5 * np.sqrt(6 / 3200))
+    one = wildlab.consistency(errors=e[0], covariances=P[0]).means["NEES"]
+    assert one.n == 400 and one.mean == pytest.approx(float(np.mean(np.sum(e[0] ** 2 / [4, 1, 9], axis=1))))
+    assert not wildlab.consistency(errors=e, covariances=P / 2).means["NEES"].inside
+    for wrong in (
+        {"errors": e},
+        {"errors": e, "covariances": P[0]},
+        {"errors": e[0, 0], "covariances": P[0, 0]},
+    ):
+        with pytest.raises(wildlab.WildlabError):
+            wildlab.consistency(**wrong)
 
 
 @pytest.mark.parametrize(("worth", "hedged"), [(FEW_INDEPENDENT - 1, True), (FEW_INDEPENDENT + 1, False)])

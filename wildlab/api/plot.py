@@ -130,10 +130,11 @@ def _truth(ax: Axes, flight: Flight) -> None:
 
 
 def _track(one: Tracked) -> Figure:
-    called: dict[str, str] = {"schmidt": "Schmidt-Kalman", "ekf": "extended Kalman", "kf": "Kalman"}
-    truth = one.seen.truth if np.isfinite(one.seen.truth).any() else one.track.x[:, :4]
-    title = "Track and truth" if one.scored is not None else "Track"
-    return track_map(truth, {one.filter: one.track.x}, called, title, measured=one.seen.positions)
+    called = {"schmidt": "Schmidt-Kalman", "ekf": "extended Kalman", "kf": "Kalman"}
+    known = np.isfinite(one.truth).any()
+    truth = one.truth if known else one.estimate
+    title = "Track and truth" if known else "Track"
+    return track_map(truth, {one.filter: one.estimate}, called, title, measured=one.measured)
 
 
 def _navigation(one: Navigation) -> Figure:

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.brief import Brief, Summary
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import Average
+from wildlab.evaluation.consistency import Average, nees, position_nees
+from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times
+from wildlab.flight.files import check_model
+from wildlab.flight.following import Settings, read_settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series
-from wildlab.pipeline.follow import ACCELERATION, FILTERS, START_SPEED, Filter, usual_tuning
+from wildlab.pipeline.following.filters import SMOOTHED
+from wildlab.pipeline.following.follow import TOGETHER, WHITE, Followed, follow_targets
 from wildlab.pipeline.following.judged import FEW_INDEPENDENT, verdict
-from wildlab.pipeline.georeference import assumed_deviations
+from wildlab.pipeline.following.sensor_tracks import SensorTrack
+from wildlab.pipeline.georeference import (
+    assumed_deviations,
+    assumed_pose_covariance,
+    georeference,
+    observe,
+)
 from wildlab.pipeline.navigate import MekfTuning, Navigated, navigate_mekf, navigate_observer
 from wildlab.pipeline.navigation_errors import (
     REFERENCES,
@@ -25,9 +38,9 @@ from wildlab.pipeline.navigation_errors import (
     flown_part,
     summarise,
 )
-from wildlab.pipeline.track import CvTuning, Scored, Sighting, evaluate_track, sighting
-from wildlab.tracking.run import Track
+from wildlab.pipeline.track import FILTERS, CvTuning, follow_schmidt, sighting
 
+Array = NDArray[np.float64]
 Method = Literal["mekf", "observer"]
 
 
@@ -138,84 +151,106 @@ def navigate(flight: Flight, method: Method = "mekf", tuning: MekfTuning | None 
 
 @dataclass(frozen=True, repr=False)
 class Tracked(Brief):
-    """One target followed through a flight.
+    """One target followed by one filter, look by look.
 
     Attributes
     ----------
-    flight, source, filter
-        The flight, the poses that the filter saw, and the filter.
-    tuning
-        What it was told.
-    seen
-        What the camera saw of the target.
-    track
-        Estimates with covariances, innovations.
-    scored
-        Beside the truth; None where the target has none.
+    flight, sensor, target, filter
+        Their names; the sensor is ``"together"`` where several look.
+    times
+        (N,) of the looks, s.
+    estimate, covariance
+        (N, 4) north, east (m) and their velocities (m/s), and (N, 4, 4); NaN where there is no track.
+    error
+        (N, 4) truth minus estimate; NaN without a track or truth.
+    used
+        (N,) looks whose detection the filter used, the one that it starts on among them.
+    measured
+        (N, 2) north and east, m, of the detection that was used; NaN where there was none.
+    innovation
+        (N, m) in the unit of the detections; NaN where none was used.
+    nees, nis
+        (N,) of the position, and of the detections.
+    dof
+        Elements of a detection, on average: what the mean NIS should be.
+    told
+        What the filter was told: what, how much and who says so.
     """
 
-    flight: Flight
-    source: str
-    filter: Filter
-    tuning: CvTuning
-    seen: Sighting
-    track: Track
-    scored: Scored | None
+    flight: str
+    sensor: str
+    target: str
+    filter: str
+    times: Array
+    estimate: Array
+    covariance: Array
+    error: Array
+    used: NDArray[np.bool_]
+    measured: Array
+    innovation: Array
+    nees: Array
+    nis: Array
+    dof: float
+    told: tuple[tuple[str, str], ...]
+
+    @property
+    def truth(self) -> Array:
+        """(N, 4) where the target was while it was followed; NaN where that is not known."""
+        return self.estimate + self.error
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """``mae`` and ``rmse`` (m, horizontal), mean ``nees`` and ``nis``; NaN where they are not known."""
+        summary = summarise_track(track_errors(self.truth, self.estimate))
+        means = {name: _mean(getattr(self, name)) for name in ("nees", "nis")}
+        return {"mae": summary.mae, "rmse": summary.rmse} | means
 
     def brief(self) -> Summary:
         """What was followed with what, and how far off it was."""
-        t = self.tuning
-        noise = f"{t.measurement:.3g} m" if self.filter == "kf" else f"{t.pixel:.3g} px"
-        rows = [
-            ("filter", f"{self.filter}, poses from {self.source}"),
-            ("tuning", f"acceleration {t.acceleration:g} m/s^2, measurement {noise}"),
-            ("at the start", f"{t.position_0:.3g} m, {t.velocity_0:.3g} m/s"),
-            ("detections", f"{int(self.seen.seen.sum())} in {np.ptp(self.seen.times):.0f} s"),
-        ]
-        if self.scored is not None:
-            n = self.scored.numbers
+        n = self.numbers
+        rows = [("filter", f"{self.filter}, by {self.sensor}"), *self.told]
+        rows.append(("detections used", f"{int(self.used.sum())} in {np.ptp(self.times):.0f} s"))
+        if np.isfinite(n["mae"]):
             far = f"{n['mae']:.2f} m mean, {n['rmse']:.2f} m RMS, with or without a detection"
             rows.append(("distance from the truth", far))
             rows.append(("mean NEES and NIS", f"{n['nees']:.2f} and {n['nis']:.2f} (see consistency)"))
-        return Summary(f"Track on {self.flight.name}", rows)
+        return Summary(f"Track on {self.flight}", rows)
 
 
 def track(
     flight: Flight,
     target: str | None = None,
     source: str | None = None,
-    filter: Filter = "schmidt",
+    filter: str | None = None,
     *,
-    acceleration: float = ACCELERATION,
-    velocity: float = START_SPEED,
-    position: float | None = None,
-    measurement: float | None = None,
-    pixel: float | None = None,
+    sensor: str | None = None,
+    settings: Settings | Mapping[str, Any] | Path | None = None,
+    smooth: bool = False,
+    tuning: CvTuning | None = None,
 ) -> Tracked:
-    """Follow one target with constant velocity (H 6.2, 6.3, 7.4). All noise is standard deviations per axis.
+    """Follow one target, as `wildlab track` does; or with a tuning as H prints it, as the studies do.
 
     Parameters
     ----------
     flight
-        With frames, pixel detections and poses.
+        With detections, and poses or positions of the platform.
     target
-        Its name; may be left out where the detections name one only.
+        Its name; may be left out where there is one only.
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
     filter
-        ``"schmidt"`` on pixels, with the poses' uncertainty considered; ``"ekf"`` on pixels, poses taken for
-        true; ``"kf"`` on georeferenced positions.
-    acceleration
-        Of the target, m/s^2.
-    velocity
-        At the start, m/s; the track starts at rest on the first detection.
-    position
-        At the start, m. Left out: as ``measurement``.
-    measurement
-        Of a georeferenced position, m. Left out: what `georeference` states of this target's detections, root
-        mean square.
-    pixel
-        Of a detection, px. Left out: what the manifest states, else 2.
+        Of `wildlab.pipeline.following.filters`: ``"ekf"``, ``"schmidt"``, ``"ukf"``, ``"imm"``,
+        ``"coloured"``, ``"thinned"``. Left out: the Schmidt filter where there are errors to consider, else
+        the extended one. With a ``tuning``: ``"schmidt"``, ``"ekf"`` on pixels (H 7.4, 6.3), or ``"kf"`` on
+        georeferenced positions (H 6.2).
+    sensor
+        Its name. Left out: the one that detected something, or all of several together.
+    settings
+        What is told of sensors and targets: a ``settings.toml``, or the same as a mapping.
+    smooth
+        Backwards in time as well.
+    tuning
+        In place of ``settings``, for pixels of one camera.
 
     Returns
     -------
@@ -224,44 +259,102 @@ def track(
     Raises
     ------
     WildlabError
-        Where there is no such target or source or filter, several to choose from, or for ``"schmidt"`` no
-        covariance of the poses.
+        Where there is no such target, source, sensor or filter, or several to choose from.
 
     Examples
     --------
     >>> import wildlab
-    >>> flight = wildlab.simulate("large-ship")
-    >>> followed = wildlab.track(flight, source="autopilot", filter="kf", acceleration=0.1)
-    >>> followed.track.x.shape[1], followed.tuning.acceleration
-    (4, 0.1)
+    >>> flight = wildlab.simulate("large-ship", without=("imu", "gnss"))
+    >>> followed = wildlab.track(flight, settings={"targets": {"acceleration_m_s_sqrt_s": 0.1}})
+    >>> followed.filter, followed.estimate.shape[1]
+    ('schmidt', 4)
     """
+    if tuning is not None:
+        return _as_tuned(flight, target, source, filter or "schmidt", tuning)
+    told = settings
+    if isinstance(told, (str, Path)):
+        told = read_settings(Path(told))
+    elif isinstance(told, Mapping):
+        told = check_model(Settings, told, None)
+    found = follow_targets(
+        flight,
+        settings=told,
+        filters=[] if filter is None else [filter],
+        targets=[] if target is None else [target],
+        sensors=[] if sensor is None else [sensor],
+        source=source,
+        smooth=smooth,
+    )
+    names = sorted({one.target for one in found.tracks})
+    if len(names) > 1:
+        raise WildlabError(
+            f"there are {len(names)} targets", f"name one of {', '.join(names)}", field="target"
+        )
+    looks = found.tracks[-1].sensor if len(found.scans) == 1 else TOGETHER
+    by_filter = {one.filter.removesuffix(SMOOTHED): one for one in found.tracks if one.sensor == looks}
+    wanted = WHITE if filter == "kf" else filter or ("schmidt" if "schmidt" in by_filter else WHITE)
+    if wanted not in by_filter:
+        raise WildlabError(
+            f"the filter {wanted!r} was not used: {' '.join(found.notes)}",
+            f"use one of {', '.join(by_filter)}",
+            field="filter",
+        )
+    return _as_followed(flight, found, by_filter[wanted], source)
+
+
+def _as_followed(flight: Flight, found: Followed, one: SensorTrack, source: str | None) -> Tracked:
+    about = [each for each in found.said if each.subject in ("targets", one.sensor)]
+    told = tuple((each.what, f"{each.value} ({each.source})") for each in about)
+    measured = np.full((len(one.times), 2), np.nan)
+    kinds = {name: scans.kind for name, scans in found.scans.items()}
+    if kinds.get(one.sensor) == "position":
+        rows = np.arange(len(one.times))
+        scans = found.scans[one.sensor]
+        which = np.argmax((scans.ids == one.detection[:, None]) & (scans.ids != ""), axis=1)
+        measured = np.where((one.detection != "")[:, None], scans.detections[rows, which], np.nan)
+    elif kinds.get(one.sensor) == "pixel":
+        points = georeference(flight, observe(flight, source), np.random.default_rng(0))
+        places = points.set_index("detection_id")[["north_m", "east_m"]]
+        measured = places.reindex(one.detection).to_numpy(float)
+    return Tracked(
+        flight.name, one.sensor, one.target, one.filter, one.times, one.estimate, one.covariance, one.error,
+        one.detection != "", measured, one.innovation, one.nees, one.nis, one.dof, told,
+    )  # fmt: skip
+
+
+def _as_tuned(
+    flight: Flight, target: str | None, source: str | None, filter: str, tuning: CvTuning
+) -> Tracked:
     if filter not in FILTERS:
         raise WildlabError(
-            f"there is no filter {filter!r}", f"use one of {', '.join(FILTERS)}", field="filter"
+            f"there is no filter {filter!r} with a tuning", f"use one of {', '.join(FILTERS)}", field="filter"
         )
     name, _ = flight.pose_source(source)
     seen = sighting(flight, name, target)
-    if filter == "schmidt" and seen.poses.covariance is None:
-        raise WildlabError(
-            f"the poses {name!r} have no covariance, and the Schmidt filter considers it",
-            "use those of navigate(flight).flight, source 'mekf'; or the filter 'ekf' or 'kf'",
-            field="source",
-        )
-    if measurement is None:
-        usual = usual_tuning(flight, target, name, acceleration=acceleration, velocity=velocity)
+    assumed = filter == "schmidt" and seen.poses.covariance is None
+    if assumed:
+        P = assumed_pose_covariance(seen.poses.R_nb, assumed_deviations(flight))
+        found = follow_schmidt(seen, tuning, P)
     else:
-        usual = CvTuning(
-            acceleration, measurement, velocity, measurement, assumed_deviations(flight)["pixel_px"]
-        )
-    tuning = usual._replace(
-        position_0=usual.measurement if position is None else position,
-        pixel=usual.pixel if pixel is None else pixel,
+        found = FILTERS[filter](seen, tuning)
+    error = seen.truth - found.x[:, :4]
+    noise = f"{tuning.measurement:.3g} m" if filter == "kf" else f"{tuning.pixel:.3g} px"
+    told = (
+        ("acceleration, measurement", f"{tuning.acceleration:g} m/s^2, {noise}"),
+        ("at the start", f"{tuning.position_0:.3g} m, {tuning.velocity_0:.3g} m/s"),
+        ("poses", f"{name}, uncertainty assumed" if assumed else name),
     )
-    found = FILTERS[filter](seen, tuning)
-    known = np.isfinite(seen.truth[:, :2]).all(axis=1) & np.isfinite(found.x[:, :2]).all(axis=1)
-    axes = ("north", "east") if filter == "kf" else ("u", "v")
-    scored = evaluate_track(seen, found, axes) if known.any() else None
-    return Tracked(flight, name, filter, tuning, seen, found, scored)
+    nees = position_nees(error[:, :2], found.P[:, :2, :2])
+    called = target or str(flight.table("detections")["target_id"].iloc[0])
+    return Tracked(
+        flight.name, "camera", called, filter, seen.times, found.x[:, :4], found.P[:, :4, :4], error,
+        seen.seen, seen.positions, found.innovation, nees, found.nis, 2.0, told,
+    )  # fmt: skip
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
 
 
 @dataclass(frozen=True, repr=False)
@@ -294,7 +387,9 @@ class Consistency(Brief):
         return Summary("Consistency", rows, head)
 
 
-def consistency(*results: Tracked | Navigation) -> Consistency:
+def consistency(
+    *results: Tracked | Navigation, errors: ArrayLike | None = None, covariances: ArrayLike | None = None
+) -> Consistency:
     """Mean NEES and NIS of one run, or of several independent ones, beside what they should be.
 
     Of a track: the NEES of its position (two degrees of freedom) and the NIS of its detections (two). Of a
@@ -307,6 +402,9 @@ def consistency(*results: Tracked | Navigation) -> Consistency:
     ----------
     *results
         All from `track`, or all from `navigate`; of different flights, or seeds, where there are several.
+    errors, covariances
+        Of anybody's filter, in place of results: (N, n) truth minus estimate and (N, n, n), in the order of
+        time; or (M, N, n) and (M, N, n, n) of M independent runs. Innovations and theirs do as well.
 
     Returns
     -------
@@ -315,20 +413,37 @@ def consistency(*results: Tracked | Navigation) -> Consistency:
     Raises
     ------
     WildlabError
-        Where nothing is given, tracks are mixed with navigation, or there is nothing to judge.
+        Where nothing is given, tracks are mixed with navigation, shapes do not fit, a covariance is none, or
+        there is nothing to judge.
 
     Examples
     --------
     >>> import wildlab
-    >>> followed = wildlab.track(wildlab.simulate("large-ship"), source="autopilot", filter="kf")
-    >>> list(wildlab.consistency(followed).means)
-    ['NEES position', 'NIS']
+    >>> e = np.random.default_rng(1).normal(0.0, 2.0, (500, 2))
+    >>> found = wildlab.consistency(errors=e, covariances=np.tile(4 * np.eye(2), (500, 1, 1)))
+    >>> found.means["NEES"].inside
+    True
     """
-    if len({type(one) for one in results}) != 1:
-        raise WildlabError(
-            "results of one kind are needed", "give tracks, or give navigations", field="results"
-        )
     gathered: dict[str, list[Series]] = {}
+    if errors is not None and covariances is not None and not results:
+        e, P = np.asarray(errors, float), np.asarray(covariances, float)
+        if e.ndim not in (2, 3) or P.shape != (*e.shape, e.shape[-1]):
+            raise WildlabError(
+                f"errors are {e.shape}, covariances {P.shape}",
+                "give (N, n) and (N, n, n), or (M, N, n) and (M, N, n, n) of M runs",
+                field="covariances",
+            )
+        runs = zip(e.reshape(-1, *e.shape[-2:]), P.reshape(-1, *P.shape[-3:]), strict=True)
+        values = [nees(*run) for run in runs]
+        known = [one for one in values if np.isfinite(one).any()]
+        gathered = {"NEES": [Series("NEES", e.shape[-1], np.arange(len(one)), one) for one in known]}
+        gathered = {name: found for name, found in gathered.items() if found}
+    elif errors is not None or covariances is not None or len({type(one) for one in results}) != 1:
+        raise WildlabError(
+            "results of one kind are needed",
+            "give tracks, or navigations, or errors with their covariances",
+            field="results",
+        )
     for one in results:
         for series in _series(one):
             gathered.setdefault(series.name, []).append(series)
@@ -346,6 +461,8 @@ def _series(one: Tracked | Navigation) -> list[Series]:
     if isinstance(one, Navigation):
         scored = one.errors is not None and one.reference == REFERENCES[0]
         return navigation_series(one.errors, *one.part[1:]) if one.errors is not None and scored else []
-    nis = Series("NIS", 2, one.seen.times, one.track.nis)
-    nees = [] if one.scored is None else [Series("NEES position", 2, one.seen.times, one.scored.nees)]
-    return [each for each in (*nees, nis) if np.isfinite(each.values).any()]
+    both = [
+        Series("NEES position", 2, one.times, one.nees),
+        Series("NIS", round(one.dof), one.times, one.nis),
+    ]
+    return [each for each in both if np.isfinite(each.values).any()]

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from wildlab.pipeline.calibrate import Calibrated, calibrate_flight
     from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
     from wildlab.pipeline.evaluate import errors_of, recorded_answers, score_points, unlabelled_programs
-    from wildlab.pipeline.follow import FILTERS, usual_tuning
     from wildlab.pipeline.georeference import (
         USUAL,
         Observations,
@@ -54,7 +53,6 @@ else:
     __getattr__, __dir__ = offer(__name__)
 
 __all__ = [
-    "FILTERS",
     "PUBLISHED_LIKE",
     "USUAL",
     "Accuracy",
@@ -98,6 +96,5 @@ __all__ = [
     "sighting",
     "truth_of",
     "unlabelled_programs",
-    "usual_tuning",
     "worth",
 ]

@@ -7,6 +7,7 @@ the same detections, and a comparison of sources is a comparison of sightings.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -277,6 +278,14 @@ def follow_schmidt(
     view = View(seen.poses, seen.plane_down)
     pose = PoseUncertainty(own, correlation_time, change)
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, pose)
+
+
+#: The filters of H by name: on pixels with the poses' uncertainty considered, on pixels, on the ground.
+FILTERS: dict[str, Callable[[Sighting, CvTuning], Track]] = {
+    "schmidt": follow_schmidt,
+    "ekf": follow_pixels,
+    "kf": follow_positions,
+}
 
 
 def _compiled(

@@ -24,7 +24,7 @@ FILE = DATA / "front-flight.json"
 #: Which twin, by which poses, from when, and at most how long, s: some rounds of its course.
 TWIN, SEED, SOURCE, BEGIN, AT_LEAST, AT_MOST = "drifting-vessel-eight", 1, "autopilot", 430.0, 85.0, 125.0
 #: Told to the Schmidt filter: m/s^2, and over how many seconds errors of the pose persist.
-ACCELERATION, PERSIST = 0.1, 10.0
+ACCELERATION, START_SPEED, PERSIST = 0.1, 5.0, 10.0
 PROBABILITY = 0.9
 
 
@@ -120,15 +120,15 @@ def simulated() -> dict[str, Any]:
     dict
         For JSON.
     """
-    from wildlab.pipeline.follow import usual_tuning
     from wildlab.pipeline.georeference import (
         assumed_deviations,
         assumed_pose_covariance,
+        covariances_of,
         georeference,
         observe,
     )
     from wildlab.pipeline.overviews.image_coverage import cover_images
-    from wildlab.pipeline.track import follow_schmidt, sighting
+    from wildlab.pipeline.track import CvTuning, follow_schmidt, sighting
     from wildlab.simulation.twins import simulate_twin
 
     flight = simulate_twin(TWIN, SEED, ("imu", "gnss"))
@@ -146,14 +146,18 @@ def simulated() -> dict[str, Any]:
         kept = rows[np.unique(np.floor((times[rows] - BEGIN) / every_s), return_index=True)[1]]
         return [times[kept] - BEGIN, *(one[kept] for one in arrays)]
 
-    tuning = usual_tuning(flight, source=SOURCE)._replace(acceleration=ACCELERATION)
+    points = georeference(flight, observe(flight, SOURCE), np.random.default_rng(0))
+    # Per axis, root mean square.
+    metres = float(np.sqrt(np.nanmean(np.trace(covariances_of(points), axis1=1, axis2=2) / 2)))
+    assumed = assumed_deviations(flight)
+    tuning = CvTuning(ACCELERATION, metres, START_SPEED, metres, assumed["pixel_px"])
     seen = sighting(flight, SOURCE)
     cover, why = cover_images(flight, SOURCE)
     if cover is None:
         raise WildlabError(f"the twin has no footprints: {why}", "choose another")
-    pose = assumed_pose_covariance(seen.poses.R_nb, assumed_deviations(flight))
+    pose = assumed_pose_covariance(seen.poses.R_nb, assumed)
     track = follow_schmidt(seen, tuning, pose, PERSIST)
-    points = georeference(flight, observe(flight, SOURCE), np.random.default_rng(0)).sort_values("time_s")
+    points = points.sort_values("time_s")
     frames = np.sort(flight.table("frames")["time_s"].to_numpy(float))
     truth = flight.table("truth")
     corners = cover.outlines[:, :: cover.outlines.shape[1] // 4]
