@@ -436,7 +436,7 @@ def consistency(
         runs = zip(e.reshape(-1, *e.shape[-2:]), P.reshape(-1, *P.shape[-3:]), strict=True)
         values = [nees(*run) for run in runs]
         known = [one for one in values if np.isfinite(one).any()]
-        gathered = {"NEES": [Series("NEES", e.shape[-1], np.arange(len(one)), one) for one in known]}
+        gathered = {"NEES": [Series("NEES", e.shape[-1], np.arange(float(len(one))), one) for one in known]}
         gathered = {name: found for name, found in gathered.items() if found}
     elif errors is not None or covariances is not None or len({type(one) for one in results}) != 1:
         raise WildlabError(
