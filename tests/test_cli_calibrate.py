@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from tests.commands import refuse, succeed
 from tests.pipeline.survey_twin import Survey, simulate
-from wildlab import cli
 from wildlab.errors import WildlabError
 from wildlab.evaluation.runs import Interval
 from wildlab.flight.learnt import parse_learnt, read_learnt, write_learnt
@@ -14,13 +14,6 @@ from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.paths import DATA
 from wildlab.runner.evaluate import evaluate_flight
-
-
-def call(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        cli.main([str(one) for one in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
 
 
 @pytest.fixture(scope="module")
@@ -38,52 +31,61 @@ def folder(tmp_path_factory):
     return into
 
 
-def test_what_is_learnt_is_written_and_of_one_camera_alone(capsys, folder, tmp_path):
-    code, _, err = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
-    assert code == 0, err
+def test_what_is_learnt_is_written_and_of_one_camera_alone(folder, tmp_path):
+    succeed("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
     kept = read_learnt(tmp_path / "c.toml")
     assert {"tilt"} <= {one.name for one in kept.parameter}
-    code, _, err = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
-    assert code == 2 and "--overwrite" in err
+    assert "--overwrite" in refuse("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
     assert read_learnt(tmp_path / "c.toml") == kept
-    code, _, err = call(capsys, "evaluate", folder / "other", "--calibration", tmp_path / "c.toml",
-                        "--out", tmp_path / "reports")  # fmt: skip
-    assert code == 2 and "fx_px" in err
-    code, _, err = call(capsys, "evaluate", folder / "untrue", "--calibration", tmp_path / "c.toml",
-                        "--out", tmp_path / "reports")  # fmt: skip
-    assert code == 2
+    assert "fx_px" in refuse(
+        "evaluate", folder / "other", "--calibration", tmp_path / "c.toml", "--out", tmp_path / "reports"
+    )
+    refuse("evaluate", folder / "untrue", "--calibration", tmp_path / "c.toml", "--out", tmp_path / "reports")
     assert not (tmp_path / "reports").exists()
 
 
-def test_causes_that_are_inseparable_are_named_and_not_written(capsys, folder, tmp_path, monkeypatch):
+def learn(monkeypatch, **found):
+    """Have the command find this, and write nothing."""
+    learnt = SimpleNamespace(gain=None, parameter=())
+    both = learnt, SimpleNamespace(**found)
+    monkeypatch.setattr("wildlab.pipeline.learn.learn_flight", lambda *_: both)
+    monkeypatch.setattr("wildlab.flight.learnt.write_learnt", lambda *_: None)
+
+
+def test_causes_that_are_inseparable_are_named(folder, tmp_path, monkeypatch):
     """A small tilt of a camera in level flight: position and clock explain it, too."""
     gain = SimpleNamespace(with_=2.0, counts=True, gain=Interval(1.0, 0.4, 1.6))
     winner = SimpleNamespace(causes=("clock",), name="clock", gain=gain)
     rival = SimpleNamespace(causes=("boresight",), gain=SimpleNamespace(with_=2.1, counts=True))
     for rivals in ((rival,), ()):
-        found = SimpleNamespace(winner=winner, rivals=rivals, models=[winner, *rivals])
-        learnt = SimpleNamespace(gain=None, parameter=())
-        monkeypatch.setattr("wildlab.pipeline.learn.learn_flight", lambda *_, f=(learnt, found): f)
-        monkeypatch.setattr("wildlab.flight.learnt.write_learnt", lambda *_: None)
-        code, out, _ = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
-        assert code == 0 and ("boresight" in out) == bool(rivals)
+        learn(monkeypatch, winner=winner, rivals=rivals, models=[winner, *rivals])
+        out = succeed("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+        assert ("boresight" in out) == bool(rivals)
 
 
-def test_logs_that_contradict_each_other_teach_nothing(capsys, folder, tmp_path):
+@pytest.mark.parametrize("low", [0.1, -0.1])
+def test_nothing_is_not_said_to_gain_nothing_where_something_does(folder, tmp_path, monkeypatch, low):
+    """Nothing may be as likely as the best while some model gains for certain."""
+    model = SimpleNamespace(causes=("height",), gain=SimpleNamespace(counts=low > 0))
+    nothing = SimpleNamespace(causes=(), gain=SimpleNamespace(gain=Interval(0.0, 0.0, 0.0)))
+    learn(monkeypatch, models=[model], winner=nothing, rivals=())
+    out = succeed("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+    assert ("for certain" in out) == (low < 0)
+
+
+def test_logs_that_contradict_each_other_teach_nothing(folder, tmp_path):
     flight = load_flight(folder / "tilted")
     nav = flight.nav["logged"]
     nav["down_m"] *= 3.28084
     save_flight(flight, tmp_path / "feet")
-    code, _, err = call(capsys, "calibrate", tmp_path / "feet", "--into", tmp_path / "c.toml")
-    assert code == 2 and "contradict" in err
+    assert "contradict" in refuse("calibrate", tmp_path / "feet", "--into", tmp_path / "c.toml")
     assert not (tmp_path / "c.toml").exists()
 
 
-def test_too_few_images_and_files_that_are_not_there_are_sentences(capsys, folder, tmp_path):
-    code, _, err = call(capsys, "calibrate", folder / "short", "--into", tmp_path / "c.toml")
-    assert code == 2 and "5 images" in err and not (tmp_path / "c.toml").exists()
-    code, _, err = call(capsys, "evaluate", folder / "tilted", "--calibration", tmp_path / "none.toml")
-    assert code == 2 and "no such file" in err
+def test_too_few_images_and_files_that_are_not_there_are_sentences(folder, tmp_path):
+    assert "5 images" in refuse("calibrate", folder / "short", "--into", tmp_path / "c.toml")
+    assert not (tmp_path / "c.toml").exists()
+    assert "no such file" in refuse("evaluate", folder / "tilted", "--calibration", tmp_path / "none.toml")
 
 
 def example_recipe(into):
@@ -97,35 +99,24 @@ def example_recipe(into):
 
 
 @pytest.mark.slow
-def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(
-    capsys, folder, tmp_path, monkeypatch
-):
-    code, _, err = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
-    assert code == 0, err
+def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(folder, tmp_path, monkeypatch):
+    succeed("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
     recipe = example_recipe(tmp_path)
-    code, _, err = call(
-        capsys, "import", recipe, "--into", tmp_path / "f", "--calibration", tmp_path / "c.toml"
+    assert "another camera" in refuse(
+        "import", recipe, "--into", tmp_path / "f", "--calibration", tmp_path / "c.toml"
     )
-    assert code == 2 and "another camera" in err and not (tmp_path / "f").exists()
-    assert call(capsys, "import", recipe, "--into", tmp_path / "f")[0] == 0
+    assert not (tmp_path / "f").exists()
+    succeed("import", recipe, "--into", tmp_path / "f")
     flight, learnt = load_flight(tmp_path / "f"), read_learnt(tmp_path / "c.toml")
     # The same learnt values, of this flight's own camera.
     mine = learnt.model_copy(update={"camera": flight.manifest.camera, "mount": flight.manifest.mount})
     write_learnt(mine, tmp_path / "mine.toml")
-    code, _, err = call(
-        capsys,
-        "import",
-        recipe,
-        "--into",
-        tmp_path / "f",
-        "--calibration",
-        tmp_path / "mine.toml",
-        "--overwrite",
+    succeed(
+        "import", recipe, "--into", tmp_path / "f", "--calibration", tmp_path / "mine.toml", "--overwrite"
     )
-    assert code == 0, err
     kept = load_flight(tmp_path / "f")
     assert kept.calibration is not None and read_learnt(kept.calibration) == mine
-    assert call(capsys, "import", recipe, "--into", tmp_path / "f", "--overwrite")[0] == 0
+    succeed("import", recipe, "--into", tmp_path / "f", "--overwrite")
     assert load_flight(tmp_path / "f").calibration is None
 
     jobs = []
@@ -145,16 +136,3 @@ def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(
     (tmp_path / "g" / "calibration.toml").write_text(text)
     with pytest.raises(WildlabError, match="SHA-256"):
         load_flight(tmp_path / "g")
-
-
-@pytest.mark.parametrize("low", [0.1, -0.1])
-def test_nothing_is_not_said_to_gain_nothing_where_something_does(capsys, folder, tmp_path, monkeypatch, low):
-    """Nothing may be as likely as the best while some model gains for certain."""
-    model = SimpleNamespace(causes=("height",), gain=SimpleNamespace(counts=low > 0))
-    learnt = SimpleNamespace(gain=None, parameter=())
-    nothing = SimpleNamespace(causes=(), gain=SimpleNamespace(gain=Interval(0.0, 0.0, 0.0)))
-    found = SimpleNamespace(models=[model], winner=nothing, rivals=())
-    monkeypatch.setattr("wildlab.pipeline.learn.learn_flight", lambda *_: (learnt, found))
-    monkeypatch.setattr("wildlab.flight.learnt.write_learnt", lambda *_: None)
-    code, out, _ = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
-    assert code == 0 and ("for certain" in out) == (low < 0)

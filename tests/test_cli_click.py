@@ -19,19 +19,12 @@ from typing import Any
 import pytest
 
 from tests.clicking import HOSTILE, ask, serving, write_images
+from tests.commands import call, refuse
 from tests.pipeline.survey_twin import Survey, simulate
-from wildlab import cli
 from wildlab.flight.readers.clicks import clicks as click_files
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.runner.clicking.server import HEADER_S, MOST_LINKS, ClickServer, open_server
 from wildlab.runner.clicking.session import Session, check_points, open_session, read_points, table_of
-
-
-def call(capsys: Any, *arguments: Any) -> tuple[Any, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        cli.main([str(one) for one in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
 
 
 @pytest.fixture
@@ -167,14 +160,11 @@ def test_points_are_checked_by_value() -> None:
     assert isinstance(check_points([["A", float("nan"), 1]]), str)
 
 
-def test_where_images_are_looked_for(tmp_path: Path, capsys: Any) -> None:
+def test_where_images_are_looked_for(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
-    code, _, err = call(capsys, "click", tmp_path / "empty")
-    assert code == 2
+    err = refuse("click", tmp_path / "empty")
     assert "no images" in err
-    code, _, err = call(capsys, "click", tmp_path / "none")
-    assert code == 2
-    assert "no such folder" in err
+    assert "no such folder" in refuse("click", tmp_path / "none")
     write_images(tmp_path / "a" / "images", "x.png")
     write_images(tmp_path / "elsewhere", "y.png", "z.png")
     assert [one.name for one in open_session(tmp_path / "a").images] == ["x.png"]
@@ -213,7 +203,7 @@ def start(*arguments: Any) -> tuple[subprocess.Popen[str], str]:
     return process, process.stdout.readline().strip()
 
 
-def test_from_a_flight_to_its_detections(tmp_path: Path, capsys: Any) -> None:
+def test_from_a_flight_to_its_detections(tmp_path: Path) -> None:
     flight = simulate(Survey(images=4))
     frames = flight.table("frames")["frame_id"].tolist()
     targets = list(dict.fromkeys(flight.table("truth")["target_id"]))
@@ -236,7 +226,7 @@ def test_from_a_flight_to_its_detections(tmp_path: Path, capsys: Any) -> None:
     process.communicate(timeout=60)
     assert process.returncode == 0
     for _ in range(2):
-        code, _, err = call(capsys, "click", folder, "--take")
+        code, _, err = call("click", folder, "--take")
         assert code == 0 and "extra.png" in err
     # Loading holds every table against its checksum.
     found = load_flight(folder).table("detections")
@@ -247,34 +237,26 @@ def test_from_a_flight_to_its_detections(tmp_path: Path, capsys: Any) -> None:
     assert (folder / "images" / "extra.png").is_file()
 
 
-def test_a_port_that_is_taken(images: Path, capsys: Any) -> None:
+def test_a_port_that_is_taken(images: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        code, _, err = call(capsys, "click", images, "--port", port)
-    assert code == 2
-    assert f"port {port}" in err
+        assert f"port {port}" in refuse("click", images, "--port", port)
 
 
-def test_taking_what_is_not_there(tmp_path: Path, images: Path, capsys: Any) -> None:
+def test_taking_what_is_not_there(tmp_path: Path, images: Path) -> None:
     folder = tmp_path / "flight"
     save_flight(simulate(Survey(images=4)), folder)
-    code, _, err = call(capsys, "click", folder, "--take")
-    assert code == 2
-    assert "no point" in err
+    assert "no point" in refuse("click", folder, "--take")
     table_of(folder).write_text("image,name,u_px,v_px\nother.png,A,1,2\n", encoding="utf-8")
-    code, _, err = call(capsys, "click", folder, "--take")
-    assert code == 2
-    assert "other.png" in err
+    assert "other.png" in refuse("click", folder, "--take")
     frame = load_flight(folder).table("frames")["frame_id"].iloc[0]
     rows = f"image,name,u_px,v_px\n{frame}.png,A,1,2\n{frame}.jpg,A,1,2\n"
     table_of(folder).write_text(rows, encoding="utf-8")
-    code, _, err = call(capsys, "click", folder, "--take")
-    assert code == 2
-    assert f"two images of the frame {frame}" in err
-    assert call(capsys, "click", folder, "--take", "--images", images)[0] == 2
-    assert call(capsys, "click", images, "--take")[0] == 2
+    assert f"two images of the frame {frame}" in refuse("click", folder, "--take")
+    refuse("click", folder, "--take", "--images", images)
+    refuse("click", images, "--take")
 
 
 def test_half_open_links_take_few_threads_and_a_click_is_still_served(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import shutil
@@ -14,21 +13,14 @@ import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
-from wildlab.cli import main
+from tests.commands import refuse, succeed
 from wildlab.flight.store import save_flight
 from wildlab.reporting import metrics as schema
-from wildlab.reporting.comparison import QUANTITIES
+from wildlab.reporting.comparison import QUANTITIES, flights_table
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.record.own_flights import own_flights
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.simulation.twins import simulate_twin
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        main([str(argument) for argument in arguments])
-    said = capsys.readouterr()
-    return int(ended.value.code or 0), said.out, " ".join(said.err.split())
 
 
 def leave(
@@ -36,7 +28,7 @@ def leave(
     flight: str,
     end: str = "-overview",
     *,
-    numbers: dict[tuple[str, str], tuple[float, float | None, float | None, int | None]] | None = None,
+    numbers: dict[tuple[str, str], float | dict[str, float]] | None = None,
     state: str = "done",
     lacking: tuple[str, ...] = (),
     folder: Path | None = None,
@@ -46,8 +38,8 @@ def leave(
     target.mkdir(parents=True)
     (target / "report.html").write_text("<p>report</p>")
     entries = [
-        schema.metric(name, subject, value, "m", low=low, high=high, n=n)
-        for (name, subject), (value, low, high, n) in (numbers or {}).items()
+        schema.metric(name, subject, unit="m", **(value if isinstance(value, dict) else {"value": value}))
+        for (name, subject), value in (numbers or {}).items()
     ]
     if state == "done":
         content = schema.document(
@@ -64,46 +56,35 @@ def leave(
 
 def counts(problems: int, worth: int, troubled: int, judged: int, length: float = 600.0) -> dict[Any, Any]:
     values = {"problems": problems, "worth_fixing": worth, "troubled": troubled, "reports_beside": judged}
-    return {(name, "flight"): (value, None, None, None) for name, value in values.items()} | {
-        ("duration", "flight"): (length, None, None, None)
-    }
+    return {(name, "flight"): value for name, value in (values | {"duration": length}).items()}
 
 
 @pytest.fixture
 def reports(tmp_path: Path) -> Path:
     """Three flights: one whole, one of which only navigation could be judged, one that failed."""
     folder = tmp_path / "reports"
-    error = {("horizontal_error_mean", "logged-pose"): (3.2, 2.8, 3.7, 90),
-             ("ellipse_coverage_90", "logged-pose"): (0.71, None, None, 90)}  # fmt: skip
+    error = {("horizontal_error_mean", "logged-pose"): {"value": 3.2, "low": 2.8, "high": 3.7, "n": 90},
+             ("ellipse_coverage_90", "logged-pose"): {"value": 0.71, "n": 90}}  # fmt: skip
     leave(folder, "monday", numbers=counts(0, 1, 0, 1))
     leave(folder, "monday", "", numbers=error)
     lacking = ("georeferencing (it lacks truth)",)
     leave(folder, "tuesday", numbers=counts(0, 0, 0, 1, 7300.0), lacking=lacking)
-    leave(folder, "tuesday", "-navigation", numbers={("rms_yaw", "mekf"): (2.5, None, None, None)})
+    leave(folder, "tuesday", "-navigation", numbers={("rms_yaw", "mekf"): 2.5})
     leave(folder, "friday", numbers=counts(2, 0, 0, 0))
     leave(folder, "friday", "", state="failed")
     return folder
 
 
-def test_the_page_and_the_table_have_every_flight(capsys: pytest.CaptureFixture[str], reports: Path) -> None:
+def test_the_page_and_the_table_have_every_flight(reports: Path) -> None:
     folders = [reports / f"{name}-overview" for name in ("monday", "tuesday", "friday")]
-    code, out, err = call(capsys, "compare", *folders, "--out", reports)
-    assert code == 0, err
+    out = succeed("compare", *folders, "--out", reports)
     assert out.strip().endswith("comparison/report.html")
     page = (reports / "comparison" / "report.html").read_text(encoding="utf-8")
     assert "<script" not in page and not re.search("https?:", page)
-    with (reports / "comparison" / "flights.csv").open() as file:
-        rows = {row["flight"]: row for row in csv.DictReader(file)}
-    assert list(rows) == ["monday", "tuesday", "friday"]
-    assert float(rows["monday"]["error_mean_m"]) == 3.2 and rows["monday"]["error_mean_m_n"] == "90.0"
-    assert rows["tuesday"]["error_mean_m"] == "" and rows["tuesday"]["verdict"] == "sound"
-    assert float(rows["tuesday"]["yaw_deg"]) == 2.5
-
-
-def test_what_is_lacking_has_a_reason(capsys: pytest.CaptureFixture[str], reports: Path) -> None:
-    folders = [reports / f"{name}-overview" for name in ("monday", "tuesday", "friday")]
-    assert call(capsys, "compare", *folders, "--out", reports)[0] == 0
     table = pd.read_csv(reports / "comparison" / "flights.csv").set_index("flight")
+    assert list(table.index) == ["monday", "tuesday", "friday"]
+    assert table.loc["monday", ["error_mean_m", "error_mean_m_n"]].tolist() == [3.2, 90]
+    assert table.loc["tuesday", ["verdict", "yaw_deg"]].tolist() == ["sound", 2.5]
     assert "truth" in table.loc["tuesday", "error_mean_m_why"]
     assert "failed" in table.loc["friday", "error_mean_m_why"]
     for quantity in QUANTITIES:
@@ -112,11 +93,8 @@ def test_what_is_lacking_has_a_reason(capsys: pytest.CaptureFixture[str], report
 
 
 def test_one_of_several_tracks_does_not_stand_for_all(reports: Path) -> None:
-    two = {("rmse", f"radar/{target}/ekf"): (4.0, None, None, 9) for target in ("a", "b")}
-    leave(reports, "monday", "-tracking", numbers=two)
-    leave(reports, "tuesday", "-tracking", numbers={("rmse", "radar/a/ekf"): (4.0, None, None, 9)})
-    from wildlab.reporting.comparison import flights_table
-
+    leave(reports, "monday", "-tracking", numbers={("rmse", f"radar/{one}/ekf"): 4.0 for one in "ab"})
+    leave(reports, "tuesday", "-tracking", numbers={("rmse", "radar/a/ekf"): 4.0})
     table = flights_table(own_flights(reports, ())).set_index("flight")
     assert table.loc["tuesday", "track_rmse_m"] == 4.0
     assert np.isnan(table.loc["monday", "track_rmse_m"])
@@ -124,26 +102,20 @@ def test_one_of_several_tracks_does_not_stand_for_all(reports: Path) -> None:
 
 def test_a_crash_is_not_sound_and_the_attitude_is_that_of_the_page(tmp_path: Path) -> None:
     """Of the receiver's noise as found, where the page on the navigation speaks of it."""
-    crash = counts(0, 0, 0, 1) | {("broken", "flight"): (1, None, None, None)}
+    crash = counts(0, 0, 0, 1) | {("broken", "flight"): 1}
     leave(tmp_path, "monday", numbers=crash)
-    yaws = (("mekf", 12.1), ("mekf-receiver", 6.8))
     leave(tmp_path, "tuesday", numbers=counts(0, 0, 0, 1))
-    leave(
-        tmp_path, "tuesday", "-navigation", numbers={("rms_yaw", w): (v, None, None, None) for w, v in yaws}
-    )
-    from wildlab.reporting.comparison import flights_table
-
+    yaws = {("rms_yaw", "mekf"): 12.1, ("rms_yaw", "mekf-receiver"): 6.8}
+    leave(tmp_path, "tuesday", "-navigation", numbers=yaws)
     table = flights_table(own_flights(tmp_path, ())).set_index("flight")
     assert table.loc["monday", "verdict"] == "went wrong" and table.loc["tuesday", "verdict"] == "sound"
     assert table.loc["tuesday", "yaw_deg"] == 6.8
 
 
-def test_into_another_folder_has_no_links_that_lead_nowhere(
-    capsys: pytest.CaptureFixture[str], reports: Path, tmp_path: Path
-) -> None:
+def test_into_another_folder_has_no_links_that_lead_nowhere(reports: Path, tmp_path: Path) -> None:
     folders = [reports / "monday", reports / "tuesday-overview"]
-    code, out, _ = call(capsys, "compare", *folders, "--out", reports, "--into", tmp_path / "a" / "b")
-    assert code == 0 and out.strip().endswith("a/b/report.html")
+    out = succeed("compare", *folders, "--out", reports, "--into", tmp_path / "a" / "b")
+    assert out.strip().endswith("a/b/report.html")
     soup = BeautifulSoup((tmp_path / "a" / "b" / "report.html").read_text(encoding="utf-8"), "html.parser")
     links = [str(link["href"]) for link in soup.find_all("a")]
     assert any(link.startswith("data:text/csv") for link in links)
@@ -158,22 +130,18 @@ def test_into_another_folder_has_no_links_that_lead_nowhere(
         (("monday-overview", "nowhere"), "neither a flight"),
     ],
 )
-def test_what_cannot_be_compared_is_refused(
-    capsys: pytest.CaptureFixture[str], reports: Path, named: tuple[str, ...], said: str
-) -> None:
-    code, out, err = call(capsys, "compare", *(reports / name for name in named), "--out", reports)
-    assert code == 2 and not out
+def test_what_cannot_be_compared_is_refused(reports: Path, named: tuple[str, ...], said: str) -> None:
+    err = refuse("compare", *(reports / name for name in named), "--out", reports)
     assert said in err.lower()
     assert not (reports / "comparison").exists()
 
 
-def test_names_out_of_logs_are_only_text(reports: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_out_of_logs_are_only_text(reports: Path) -> None:
     (reports / "monday-overview" / "provenance.json").write_text(
         json.dumps({"flight": {"name": "<b>x", "kind": "<i>"}, "parameters": {"lacking": ["<script>"]}})
     )
     build_ledger(reports, {})
-    assert call(capsys, "compare", reports / "monday-overview", reports / "tuesday-overview",
-                "--out", reports)[0] == 0  # fmt: skip
+    succeed("compare", reports / "monday-overview", reports / "tuesday-overview", "--out", reports)
     for page in (reports / "flights.html", reports / "comparison" / "report.html"):
         text = page.read_text(encoding="utf-8")
         assert "&lt;b&gt;x" in text and "<b>x" not in text and "<script" not in text and "<i>" not in text
@@ -208,16 +176,13 @@ def test_a_damaged_report_does_not_spoil_the_list(reports: Path, damage: str) ->
 
 
 @pytest.mark.slow
-def test_a_flight_without_reports_is_evaluated_first(
-    capsys: pytest.CaptureFixture[str], reports: Path, tmp_path: Path
-) -> None:
+def test_a_flight_without_reports_is_evaluated_first(reports: Path, tmp_path: Path) -> None:
     flight = simulate_twin("large-ship", 1)
     for name in ("detections", "truth", "frames"):
         flight.tables.pop(name, None)
     save_flight(flight, tmp_path / "flight")
-    code, _, err = call(capsys, "compare", tmp_path / "flight", reports / "monday", "--out", reports)
-    assert code == 0, err
+    succeed("compare", tmp_path / "flight", reports / "monday", "--out", reports)
     made = (reports / "flight-overview" / "status.json").stat().st_mtime_ns
     assert "georeferencing" in (reports / "comparison" / "report.html").read_text(encoding="utf-8")
-    assert call(capsys, "compare", tmp_path / "flight", reports / "monday", "--out", reports)[0] == 0
+    succeed("compare", tmp_path / "flight", reports / "monday", "--out", reports)
     assert (reports / "flight-overview" / "status.json").stat().st_mtime_ns == made

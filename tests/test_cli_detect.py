@@ -13,10 +13,13 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+from tests.commands import refuse, succeed
 from tests.pipeline.test_detect import folder, picture
 from tests.test_cli_camera import huge_png
 from wildlab import cli
+from wildlab.flight.store import save_flight
 from wildlab.pipeline.detecting.said import too_few_or_many
+from wildlab.simulation.twins import simulate_twin
 
 
 def call(capsys, *arguments):
@@ -40,16 +43,14 @@ def test_a_folder_with_bad_images_leaves_tables_and_pictures(capsys, tmp_path):
     assert len(pd.read_csv(tmp_path / "out" / "detections.csv")) == 12
 
 
-def test_results_go_neither_among_the_images_nor_over_those_of_others(capsys, tmp_path):
+def test_results_go_neither_among_the_images_nor_over_those_of_others(tmp_path):
     path, other = folder(tmp_path / "in"), folder(tmp_path / "other")
-    code, _, err = call(capsys, "detect", path, "--into", path)
-    assert code == 2 and "among" in err
+    assert "among" in refuse("detect", path, "--into", path)
     assert not (path / "detections.csv").exists()
-    assert call(capsys, "detect", path, "--into", tmp_path / "out")[0] == 0
+    succeed("detect", path, "--into", tmp_path / "out")
     before = (tmp_path / "out" / "detections.csv").read_bytes()
     assert str(tmp_path) not in (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
-    code, _, err = call(capsys, "detect", other, "--into", tmp_path / "out")
-    assert code == 2 and "another folder" in err
+    assert "another folder" in refuse("detect", other, "--into", tmp_path / "out")
     assert (tmp_path / "out" / "detections.csv").read_bytes() == before
 
 
@@ -58,69 +59,56 @@ def test_many_is_by_the_image():
     assert few == [] and len(many) == 1
 
 
-def test_what_was_missed_and_invented_is_on_sheets(capsys, tmp_path):
+def test_what_was_missed_and_invented_is_on_sheets(tmp_path):
     path = folder(tmp_path / "in")
     cv2.imwrite(str(path / "000.png"), picture([(30, 60), (100, 70)], 0))
-    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv",
-                        "--json", "--overlays", 2)  # fmt: skip
-    assert code == 0
+    out = succeed(
+        "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv", "--json", "--overlays", 2
+    )
     result = json.loads(out)
     assert result["pictures"] == {"overlays": 2, "found": 11, "missed": 1, "invented": 1}
     assert (result["judged"]["found"], result["judged"]["f1"]["estimate"]) == (11, round(22 / 24, 4))
     assert (tmp_path / "out" / "missed.jpg").is_file() and (tmp_path / "out" / "invented.jpg").is_file()
 
 
-def test_lengths_come_from_the_distance(capsys, tmp_path):
-    path = folder(tmp_path / "in")
+def test_lengths_come_from_the_distance(tmp_path):
+    path, into = folder(tmp_path / "in"), ("--into", tmp_path / "out")
     thresholds = {}
     for distance in (50, 100):
-        code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", distance,
-                            "--focal", 1000)  # fmt: skip
-        assert code == 0, err
+        succeed("detect", path, *into, "--distance", distance, "--focal", 1000)
         found = json.loads((tmp_path / "out" / "thresholds.json").read_text())
         thresholds[distance] = found["thresholds"]
     assert thresholds[50]["largest_px"] == 4 * thresholds[100]["largest_px"] == 900
     assert thresholds[50]["window_px"] > thresholds[100]["window_px"]
-    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", 50)
-    assert code == 2 and "together" in err
-    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", 50, "--focal", 900,
-                        "--fit", path / "labels.csv")  # fmt: skip
-    assert code == 2 and "a fit" in err
+    assert "together" in refuse("detect", path, *into, "--distance", 50)
+    fit = ("--fit", path / "labels.csv")
+    assert "a fit" in refuse("detect", path, *into, "--distance", 50, "--focal", 900, *fit)
 
 
-def test_a_flight_gives_its_images_and_their_times(capsys, tmp_path):
-    from wildlab.flight.store import save_flight
-    from wildlab.simulation.twins import simulate_twin
-
+def test_a_flight_gives_its_images_and_their_times(tmp_path):
     twin = simulate_twin("large-ship", 1)
     save_flight(twin, tmp_path / "flight")
-    code, _, err = call(capsys, "detect", tmp_path / "flight", "--into", tmp_path / "out")
-    assert code == 2 and "'images'" in err
+    assert "'images'" in refuse("detect", tmp_path / "flight", "--into", tmp_path / "out")
     (tmp_path / "flight" / "images").mkdir()
     name = str(twin.frames["frame_id"].iloc[3])
     cv2.imwrite(str(tmp_path / "flight" / "images" / f"{name}.png"), picture([(30, 60)], 0))
-    code, _, err = call(capsys, "detect", tmp_path / "flight", "--into", tmp_path / "out")
-    assert code == 0, err
+    succeed("detect", tmp_path / "flight", "--into", tmp_path / "out")
     frame = pd.read_csv(tmp_path / "out" / "frames.csv").iloc[0]
     assert str(frame["frame_id"]) == name
     time = frame["time_s"]
     assert time == pytest.approx(twin.frames["time_s"].iloc[3] + twin.manifest.clocks.camera_offset_s)
 
 
-def test_wrong_use_is_refused(capsys, tmp_path):
-    path = folder(tmp_path / "in")
-    code, _, err = call(capsys, "detect", tmp_path / "none", "--into", tmp_path / "out")
-    assert code == 2 and "no such file" in err
-    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--fit", path / "labels.csv",
-                        "--thresholds", path / "labels.csv")  # fmt: skip
-    assert code == 2 and "--thresholds" in err
-    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "b", "--class", "deer")
-    assert code == 2 and "no labels" in err
-    code, _, err = call(capsys, "detect", tmp_path, "--into", tmp_path / "out")
-    assert code == 2 and "in" in err
+def test_wrong_use_is_refused(tmp_path):
+    path, into = folder(tmp_path / "in"), ("--into", tmp_path / "out")
+    labels = path / "labels.csv"
+    assert "no such file" in refuse("detect", tmp_path / "none", *into)
+    assert "--thresholds" in refuse("detect", path, *into, "--fit", labels, "--thresholds", labels)
+    assert "no labels" in refuse("detect", path, *into, "--class", "deer")
+    refuse("detect", tmp_path, *into)
 
 
-def test_a_turn_that_viewers_make_is_not_made(capsys, tmp_path):
+def test_a_turn_that_viewers_make_is_not_made(tmp_path):
     path = tmp_path / "in"
     path.mkdir()
     for number in range(2):
@@ -128,7 +116,7 @@ def test_a_turn_that_viewers_make_is_not_made(capsys, tmp_path):
         exif = Image.Exif()
         exif[0x0112] = 6
         Image.fromarray(seen).save(path / f"{number}.jpg", exif=exif, quality=98)
-    assert call(capsys, "detect", path, "--into", tmp_path / "out")[0] == 0
+    succeed("detect", path, "--into", tmp_path / "out")
     assert pd.read_csv(tmp_path / "out" / "frames.csv")["width_px"].tolist() == [128, 128]
 
 
@@ -160,21 +148,8 @@ def hostile(path):
     (path / os.fsdecode(b"raw\xff\x1b.png")).write_bytes(whole[:99])
     (path / "secret.png").write_bytes(whole)
     (path / "secret.png").chmod(0)
-    names = [
-        "cut",
-        "zero",
-        "text",
-        "huge",
-        "black",
-        "full",
-        "small",
-        "loop",
-        "gone",
-        "device",
-        "folder",
-        "pipe",
-    ]
-    hostile = {f"{name}.png" for name in names} | {"cut.jpg", "raw\\udcff\x1b.png"}
+    names = "cut zero text huge black full small loop gone device folder pipe"
+    hostile = {f"{name}.png" for name in names.split()} | {"cut.jpg", "raw\\udcff\x1b.png"}
     if os.geteuid():  # nothing is secret from the superuser
         return path, hostile | {"secret.png"}
     (path / "secret.png").unlink()
@@ -183,8 +158,7 @@ def hostile(path):
 
 def test_whatever_lies_in_the_folder_is_counted(capsys, tmp_path):
     path, names = hostile(tmp_path / "in")
-    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--json")
-    assert code == 0, err
+    out = succeed("detect", path, "--into", tmp_path / "out", "--json")
     result = json.loads(out)
     assert result["frames"] == {"all": 3 + len(names), "usable": 3, "kept": 0}
     assert set(dict(result["problems"])) == names
@@ -196,12 +170,12 @@ def test_whatever_lies_in_the_folder_is_counted(capsys, tmp_path):
     assert code == 0 and len(lines) == 11 and "\x1b" not in err and f"{len(names) - 10} more" in lines[-1]
 
 
-def test_names_that_become_one_file_name_keep_a_picture_each(capsys, tmp_path):
+def test_names_that_become_one_file_name_keep_a_picture_each(tmp_path):
     path = folder(tmp_path / "in", 2)
     for name in ("鹿.png", "猫.png", "000.jpg"):
         cv2.imwrite(str(path / "x.png"), picture([(40, 40)], len(name)))
         (path / "x.png").rename(path / name)
-    assert call(capsys, "detect", path, "--into", tmp_path / "out")[0] == 0
+    succeed("detect", path, "--into", tmp_path / "out")
     found = sorted(one.name for one in (tmp_path / "out" / "overlays").glob("*.jpg"))
     assert found == ["000-2.jpg", "000.jpg", "001.jpg", "_-2.jpg", "_.jpg"]
 
@@ -254,5 +228,5 @@ def test_what_the_camera_does_is_seen(capsys, tmp_path):
     code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--even")
     assert code == 0 and "05.png" in err and "11 frames of 12" in out
     assert "1 pixel" in out and "darker" in out
-    code, out, _ = call(capsys, "detect", path / "00.png", "--into", tmp_path / "one", "--even")
-    assert code == 0 and "darker" not in out
+    out = succeed("detect", path / "00.png", "--into", tmp_path / "one", "--even")
+    assert "darker" not in out

@@ -7,27 +7,15 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from click.testing import CliRunner, Result
 
+from tests.commands import refuse, succeed
 from tests.replay.recordings import read_recording
-from wildlab.cli import wildlab
-from wildlab.errors import WildlabError
 from wildlab.flight.store import save_flight
 from wildlab.pipeline.following.estimates import COLUMNS
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.simulation.twins import simulate_twin
 
 POSES = ("--source", "autopilot")
-
-
-def typed(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(wildlab, ["replay", *map(str, arguments)])
-
-
-def refused(*arguments: str | Path) -> str:
-    result = typed(*arguments)
-    assert isinstance(result.exception, WildlabError), result.output
-    return str(result.exception)
 
 
 @pytest.fixture(scope="module")
@@ -47,17 +35,15 @@ def report_of(flight: Path, place: Path) -> Path:
 
 
 def test_a_flight_is_written(flight: Path, tmp_path: Path) -> None:
-    result = typed(flight, "--into", tmp_path / "out", *POSES)
-    assert result.exit_code == 0, result.output
-    assert result.stdout.strip() == str(tmp_path / "out" / "replay.rrd")
+    out = succeed("replay", flight, "--into", tmp_path / "out", *POSES)
+    assert out.strip() == str(tmp_path / "out" / "replay.rrd")
     assert [one.name for one in (tmp_path / "out").iterdir()] == ["replay.rrd"]
     assert not (flight / "replay.rrd").exists()
 
 
 def test_a_report_finds_its_flight_and_shows_its_tracks(flight: Path, tmp_path: Path) -> None:
     report = report_of(flight, flight.parents[1] / "reports" / "ship-tracking")
-    result = typed(report)
-    assert result.exit_code == 0, result.output
+    succeed("replay", report)
     found = read_recording(report / "replay.rrd")
     assert ("/world/tracks/schmidt/ship/camera/place", "Points3D:positions") in found
     # The flight is another one now: its report is not taken for it.
@@ -65,13 +51,13 @@ def test_a_report_finds_its_flight_and_shows_its_tracks(flight: Path, tmp_path: 
     content = json.loads((other / "provenance.json").read_text())
     content["flight"]["files"] = {"flight.toml": "0" * 64}
     (other / "provenance.json").write_text(json.dumps(content))
-    assert "changed" in refused(other)
+    assert "changed" in refuse("replay", other)
 
 
 def test_what_is_refused(flight: Path, tmp_path: Path) -> None:
-    assert "no such folder" in refused(tmp_path / "nowhere")
+    assert "no such folder" in refuse("replay", tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
-    assert "neither a flight" in refused(tmp_path / "empty")
-    assert "no part" in refused(flight, "--into", flight, *POSES)
-    assert "nav source 'x'" in refused(flight, "--source", "x", "--into", tmp_path / "a")
+    assert "neither a flight" in refuse("replay", tmp_path / "empty")
+    assert "no part" in refuse("replay", flight, "--into", flight, *POSES)
+    assert "nav source 'x'" in refuse("replay", flight, "--source", "x", "--into", tmp_path / "a")
     assert not (tmp_path / "a").exists()

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-import rasterio
 from pyproj import Transformer
-from rasterio.transform import Affine
 
+from tests.commands import refuse, succeed
 from tests.pipeline.survey_twin import Survey, simulate
-from wildlab import cli
+from tests.test_cli_plan import write_map
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.geometry.frames import ned_to_geodetic
@@ -22,31 +20,12 @@ from wildlab.geometry.frames import ned_to_geodetic
 UTM = 25833
 
 
-def call(capsys: Any, *arguments: Any) -> tuple[Any, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        cli.main([str(one) for one in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
-
-
 def write_slope(path: Path, latitude: float, longitude: float, height: float, rise: float) -> Path:
     """A slope that rises by so much a metre to the east, as high as said at the place; cells of 5 m."""
     x, y = Transformer.from_crs(4326, UTM, always_xy=True).transform(longitude, latitude)
-    side = 400
-    columns = np.arange(side) + 0.5 - side / 2
-    heights = np.tile(height + rise * 5.0 * columns, (side, 1)).astype(np.float32)
-    transform = Affine(5.0, 0.0, x - 5.0 * side / 2, 0.0, -5.0, y + 5.0 * side / 2)
-    given = {
-        "width": side,
-        "height": side,
-        "count": 1,
-        "dtype": "float32",
-        "crs": UTM,
-        "transform": transform,
-    }
-    with rasterio.open(path, "w", driver="GTiff", **given) as data:
-        data.write(heights, 1)
-    return path
+    columns = np.arange(400) - 199.5
+    heights = np.tile(height + rise * 5.0 * columns, (400, 1)).astype(np.float32)
+    return write_map(path, heights, (x - 1000.0, y + 1000.0), UTM)
 
 
 @pytest.fixture
@@ -62,31 +41,28 @@ def surveyed(tmp_path: Path) -> tuple[Path, Path]:
 
 
 def test_a_map_is_laid_under_a_flight_and_its_points_lie_on_it(
-    capsys: Any, surveyed: tuple[Path, Path], tmp_path: Path
+    surveyed: tuple[Path, Path], tmp_path: Path
 ) -> None:
     folder, dem = surveyed
-    code, _, err = call(capsys, "georeference", folder, "--into", tmp_path / "level.csv")
-    assert code == 0, err
-    code, _, err = call(capsys, "terrain", folder, dem, "--heights", "ellipsoid", "--sd", "0.3")
-    assert code == 0, err
+    succeed("georeference", folder, "--into", tmp_path / "level.csv")
+    succeed("terrain", folder, dem, "--heights", "ellipsoid", "--sd", "0.3")
     flight = load_flight(folder)
     assert flight.terrain is not None and flight.manifest.terrain is not None
     assert flight.manifest.terrain.crs == "EPSG:25833"
-    code, out, err = call(capsys, "georeference", folder, "--into", tmp_path / "slope.csv")
-    assert code == 0, err
+    out = succeed("georeference", folder, "--into", tmp_path / "slope.csv")
     level, slope = pd.read_csv(tmp_path / "level.csv"), pd.read_csv(tmp_path / "slope.csv")
     shift = np.hypot(slope["north_m"] - level["north_m"], slope["east_m"] - level["east_m"])
     assert f"{shift.median():.2f} m" in out and f"{shift.max():.2f} m" in out
     # On the slope, convergence of the grid aside: it leans to the east.
     rise = -(slope["down_m"] - level["down_m"])
     np.testing.assert_allclose(rise, 0.1 * slope["east_m"], atol=0.1)
-    assert call(capsys, "check", folder)[0] == 0
+    succeed("check", folder)
 
 
-def test_a_geojson_has_the_places(capsys: Any, surveyed: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_geojson_has_the_places(surveyed: tuple[Path, Path], tmp_path: Path) -> None:
     folder, _ = surveyed
-    assert call(capsys, "georeference", folder, "--into", tmp_path / "p.csv")[0] == 0
-    assert call(capsys, "georeference", folder, "--into", tmp_path / "p.geojson")[0] == 0
+    succeed("georeference", folder, "--into", tmp_path / "p.csv")
+    succeed("georeference", folder, "--into", tmp_path / "p.geojson")
     points = pd.read_csv(tmp_path / "p.csv")
     found = json.loads((tmp_path / "p.geojson").read_text())["features"]
     origin = load_flight(folder).manifest.origin_tuple()
@@ -95,15 +71,11 @@ def test_a_geojson_has_the_places(capsys: Any, surveyed: tuple[Path, Path], tmp_
     np.testing.assert_allclose(places[:, 0], np.degrees(llh[:, 1]), atol=2e-8)
     np.testing.assert_allclose(places[:, 1], np.degrees(llh[:, 0]), atol=2e-8)
     assert [one["properties"]["detection_id"] for one in found] == list(points["detection_id"])
-    code, _, err = call(capsys, "georeference", folder, "--into", tmp_path / "p.csv")
-    assert code == 2 and "--overwrite" in err
-    code, _, err = call(capsys, "georeference", folder, "--into", tmp_path / "p.shp")
-    assert code == 2 and ".geojson" in err
+    assert "--overwrite" in refuse("georeference", folder, "--into", tmp_path / "p.csv")
+    assert ".geojson" in refuse("georeference", folder, "--into", tmp_path / "p.shp")
 
 
-def test_wrong_use_leaves_the_flight_as_it_is(
-    capsys: Any, surveyed: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_wrong_use_leaves_the_flight_as_it_is(surveyed: tuple[Path, Path], tmp_path: Path) -> None:
     folder, dem = surveyed
     before = (folder / "flight.toml").read_bytes()
     for options, words in (
@@ -113,6 +85,5 @@ def test_wrong_use_leaves_the_flight_as_it_is(
         (["--heights", "ellipsoid", "--sd", "-1"], "--sd: "),
         (["--heights", "ellipsoid", "--cell", "2"], "corner"),
     ):
-        code, _, err = call(capsys, "terrain", folder, dem, *options)
-        assert code == 2 and words in err
+        assert words in refuse("terrain", folder, dem, *options)
     assert (folder / "flight.toml").read_bytes() == before and not (folder / "terrain.tif").exists()

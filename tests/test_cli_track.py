@@ -7,22 +7,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from click.testing import CliRunner, Result
 
+from tests.commands import refuse, succeed
 from tests.pipeline.robots import robot_flight
-from wildlab.cli import wildlab
-from wildlab.errors import WildlabError
 from wildlab.flight.store import save_flight
-
-
-def typed(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(wildlab, ["track", *map(str, arguments)])
-
-
-def refused(*arguments: str | Path) -> str:
-    result = typed(*arguments)
-    assert isinstance(result.exception, WildlabError), result.output
-    return str(result.exception)
 
 
 def kept(folder: Path, **changes: object) -> Path:
@@ -39,8 +27,7 @@ def numbers(report: Path) -> dict[tuple[str, str], float]:
 @pytest.mark.slow
 def test_a_heading_that_is_off_is_seen_through_by_the_command_line_alone(tmp_path: Path) -> None:
     flight = kept(tmp_path, seed=1, heading_off_deg=2.0, heading_sd_deg=2.0)
-    result = typed(flight, "--into", tmp_path / "out", "--smooth")
-    assert result.exit_code == 0, result.output
+    succeed("track", flight, "--into", tmp_path / "out", "--smooth")
     found = numbers(tmp_path / "out")
     assert found["nees", "radar/boat/ekf"] > 20 > 5 > found["nees", "radar/boat/schmidt"]
     page = (tmp_path / "out" / "report.html").read_text()
@@ -56,42 +43,40 @@ def test_a_heading_that_is_off_is_seen_through_by_the_command_line_alone(tmp_pat
 def test_tuned_on_one_flight_and_judged_on_another(tmp_path: Path) -> None:
     one = kept(tmp_path, seed=1, name="monday", truth=False)
     other = kept(tmp_path, seed=2, name="tuesday", truth=False)
-    result = typed(other, "--tune", one, "--into", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    succeed("track", other, "--tune", one, "--into", tmp_path / "out")
     assert ("nis", "radar/boat/ekf") in numbers(tmp_path / "out")
     assert not any(name == "nees" for name, _ in numbers(tmp_path / "out"))
 
 
 def test_what_is_refused(tmp_path: Path) -> None:
     flight = kept(tmp_path)
-    assert "target 'ship'" in refused(flight, "--target", "ship")
-    assert "sensor 'sonar'" in refused(flight, "--sensor", "sonar")
-    assert "filter 'magic'" in refused(flight, "--filter", "magic")
-    assert "which flight" in refused(flight, "--against", "truth")
+    assert "target 'ship'" in refuse("track", flight, "--target", "ship")
+    assert "sensor 'sonar'" in refuse("track", flight, "--sensor", "sonar")
+    assert "filter 'magic'" in refuse("track", flight, "--filter", "magic")
+    assert "which flight" in refuse("track", flight, "--against", "truth")
     other = kept(tmp_path, seed=3, name="blind", truth=False)
-    assert "no truth" in refused(flight, "--tune", other, "--against", "truth")
+    assert "no truth" in refuse("track", flight, "--tune", other, "--against", "truth")
     copy = kept(tmp_path, name="copy")
-    assert "tuned where" in refused(flight, "--tune", copy)
+    assert "tuned where" in refuse("track", flight, "--tune", copy)
     lidar = kept(tmp_path, name="lidar", sensor="lidar")
-    assert "sensor 'radar'" in refused(flight, "--tune", lidar)
+    assert "sensor 'radar'" in refuse("track", flight, "--tune", lidar)
     settings = tmp_path / "settings.toml"
     settings.write_text("[targets]\nsped = 3\n")
-    assert "sped" in refused(flight, "--settings", settings)
-    assert "flight.toml" in refused(tmp_path)
+    assert "sped" in refuse("track", flight, "--settings", settings)
+    assert "flight.toml" in refuse("track", tmp_path)
 
 
 def test_a_flight_without_detections_is_refused(tmp_path: Path) -> None:
     flight = robot_flight()
     del flight.tables["detections"]
     save_flight(flight, tmp_path / "empty")
-    assert "no detections" in refused(tmp_path / "empty")
+    assert "no detections" in refuse("track", tmp_path / "empty")
 
 
 @pytest.mark.slow
 def test_all_targets_at_once_without_a_name(tmp_path: Path) -> None:
     flight = kept(tmp_path, kind="position", clutter=2, labelled=False)
-    result = typed(flight, "--many", "--into", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    succeed("track", flight, "--many", "--into", tmp_path / "out")
     assert numbers(tmp_path / "out")["tracked", "target-1"] > 0.9
     assert (pd.read_parquet(tmp_path / "out" / "estimates.parquet")["track"] >= 0).all()
 
@@ -103,4 +88,4 @@ def test_options_that_do_not_go_with_many(tmp_path: Path, option: tuple[str, ...
     flight = kept(tmp_path, kind="position")
     (tmp_path / "other").mkdir()
     given = [tmp_path / one if one == "other" else one for one in option]
-    assert f"{option[0]} and --many" in refused(flight, "--many", *given)
+    assert f"{option[0]} and --many" in refuse("track", flight, "--many", *given)
