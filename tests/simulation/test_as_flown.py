@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 import wildlab
-from wildlab.flight.clocks import frame_times, poses_at
+from tests.simulation.test_twins import marks, with_values
 from wildlab.flight.store import save_flight
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import camera_pose
@@ -115,10 +115,8 @@ def test_no_file_of_a_flight_gives_away_what_was_drawn(name, tmp_path):
 
 def floats_in(content):
     """All numbers of nested tables and lists."""
-    if isinstance(content, dict):
-        content = list(content.values())
-    if isinstance(content, list):
-        for part in content:
+    if isinstance(content, dict | list):
+        for part in content.values() if isinstance(content, dict) else content:
             yield from floats_in(part)
     elif isinstance(content, float):
         yield content
@@ -138,40 +136,32 @@ def test_only_the_simulation_asks_what_was_drawn():
 
 def test_the_camera_that_took_the_images_is_the_one_drawn(stated):
     """Marks without noise lie where the real camera sees the antenna, and not where the stated one would."""
-    still = {"camera_sway": None}
-    camera = stated.camera
-    exact = {key: getattr(camera, key).model_copy(update={"value": 0.0}) for key in ("marking_sd", "latency")}
-    twin = stated.model_copy(update={"camera": camera.model_copy(update=exact), **still})
+    exact = with_values(stated, camera__marking_sd=0.0, camera__latency=0.0)
+    twin = exact.model_copy(update={"camera_sway": None})
     flight = simulate(twin, 5, without=OPTIONAL_TABLES)
-    at = pd.Series(frame_times(flight), flight.frames["frame_id"]).loc[flight.detections["frame_id"]]
-    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at.to_numpy())
-    uv = flight.detections[["u_px", "v_px"]].to_numpy()
-    real = as_flown(twin, 5)
-    seen = ground_to_pixel(
-        twin_manifest(real, 5).geometry_camera(), [0.0, 0.0, -2.0], *camera_pose(true_mount(real), p_nb, R_nb)
+    uv, _, *pose = marks(flight)
+    real, told = as_flown(twin, 5), flight.manifest
+    seen, expected = (
+        ground_to_pixel(camera, [0.0, 0.0, -2.0], *camera_pose(mount, *pose))
+        for camera, mount in (
+            (twin_manifest(real, 5).geometry_camera(), true_mount(real)),
+            (told.geometry_camera(), told.geometry_mount()),
+        )
     )
     assert np.abs(seen - uv).max() < 1e-6
-    m = flight.manifest
-    told = ground_to_pixel(
-        m.geometry_camera(), [0.0, 0.0, -2.0], *camera_pose(m.geometry_mount(), p_nb, R_nb)
-    )
-    assert np.abs(told - uv).max() > 1.0
+    assert np.abs(expected - uv).max() > 1.0
 
 
 def test_the_receivers_are_as_noisy_as_drawn_and_say_what_is_stated(stated):
     """A receiver drawn ten times noisier would show it; its columns would not."""
     gnss = stated.gnss
-    loud = gnss.model_copy(
-        update={"horizontal_noise": gnss.horizontal_noise.model_copy(update={"value": 0.5})}
-    )
+    loud = with_values(stated, gnss__horizontal_noise=0.5)
     trajectory = twin_trajectory(stated, np.random.default_rng(0))
     payload = lambda times: turned(trajectory(times), (np.zeros_like,) * 3)  # noqa: E731
-    quiet, noisy = (
-        gnss_table(stated.model_copy(update={"gnss": one}), payload, 1, gnss) for one in (gnss, loud)
-    )
+    quiet, noisy = (gnss_table(one, payload, 1, gnss) for one in (stated, loud))
     assert quiet["sd_horizontal_m"].equals(noisy["sd_horizontal_m"])
     assert np.diff(noisy["north_m"] - quiet["north_m"]).std() == pytest.approx(0.49 * np.sqrt(2), rel=0.05)
-    alone = gnss_table(stated.model_copy(update={"gnss": loud}), payload, 1)
+    alone = gnss_table(loud, payload, 1)
     assert alone["sd_horizontal_m"].iloc[0] == pytest.approx(np.hypot(0.5, 0.01))
 
 

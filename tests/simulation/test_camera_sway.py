@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.simulation.test_twins import with_values
 from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.simulation.camera_sway import camera_motion, camera_sway, recent_change
 from wildlab.simulation.error_models import stream
@@ -15,14 +16,6 @@ from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate
 
 STEP, MEMORY = 0.01, 10.0
-
-
-def with_sway(twin, **values):
-    sway = twin.camera_sway
-    changed = {
-        name: getattr(sway, name).model_copy(update={"value": value}) for name, value in values.items()
-    }
-    return twin.model_copy(update={"camera_sway": sway.model_copy(update=changed)})
 
 
 def test_the_change_is_the_weighted_standard_deviation():
@@ -79,7 +72,8 @@ def test_the_camera_is_turned_by_those_angles_and_stays_in_its_place():
 def test_no_navigation_system_feels_the_camera_sway():
     twin = load_twin("slow-vessel-eight")
     calm, restless = (
-        simulate(with_sway(twin, share=share), 5, without=OPTIONAL_TABLES) for share in (0.0, 0.2)
+        simulate(with_values(twin, camera_sway__share=share), 5, without=OPTIONAL_TABLES)
+        for share in (0.0, 0.2)
     )
     for name, table in calm.nav.items():
         pd.testing.assert_frame_equal(table, restless.nav[name], check_exact=True)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.simulation.motions import restless_loiter
 from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
 from wildlab.simulation.trajectory import angular_rates, attitude_along
 
 ARM = np.array([0.5, -0.2, -0.1])
 
 
-def test_an_antennas_velocity_is_the_derivative_of_its_position(restless_loiter):
+def test_an_antennas_velocity_is_the_derivative_of_its_position():
     trajectory = restless_loiter()
     t, h = np.linspace(5, 500, 400), 1e-3
 

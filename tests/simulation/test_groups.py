@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from tests.simulation.test_parameters import LOITER, complete
+from tests.simulation.test_parameters import LOITER, complete, load_text
 from wildlab.errors import WildlabError
 from wildlab.simulation.parameters import each_parameter, load_twin
 
@@ -53,10 +53,8 @@ def test_twins_whose_groups_do_not_go_together_are_named(tmp_path, twin, leave_o
     for group in leave_out:
         assert f"[{group}." in text
         text = without(text, group)
-    path = tmp_path / "twin.toml"
-    path.write_text(text + add, encoding="utf-8")
     with pytest.raises(WildlabError, match=found):
-        load_twin(path)
+        load_text(tmp_path, text + add)
 
 
 @pytest.mark.parametrize(
@@ -72,26 +70,19 @@ def test_twins_whose_groups_do_not_go_together_are_named(tmp_path, twin, leave_o
 def test_searchers_and_ships_that_make_no_sense_are_named(tmp_path, twin, old, new, found):
     text = complete(twin)
     assert old in text
-    path = tmp_path / "twin.toml"
-    path.write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(WildlabError, match=found):
-        load_twin(path)
+        load_text(tmp_path, text.replace(old, new))
 
 
 def test_the_same_pair_of_targets_cannot_have_an_outline(tmp_path):
     text = complete("crossing-vessels").replace("missed at random", "largest")
-    path = tmp_path / "twin.toml"
-    path.write_text(text + HULL + HULL.replace("[target", "[second_target"), encoding="utf-8")
     with pytest.raises(WildlabError, match="outline"):
-        load_twin(path)
+        load_text(tmp_path, text + HULL + HULL.replace("[target", "[second_target"))
 
 
 def test_a_loiter_is_about_a_target_that_stays(tmp_path):
-    text = without(complete("slow-vessel"), "route") + LOITER
-    path = tmp_path / "twin.toml"
-    path.write_text(text, encoding="utf-8")
     with pytest.raises(WildlabError, match="never moves"):
-        load_twin(path)
+        load_text(tmp_path, without(complete("slow-vessel"), "route") + LOITER)
 
 
 def test_published_numbers_of_the_ship_and_the_animals_are_those_of_the_theses():

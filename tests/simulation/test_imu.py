@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.simulation.motions import restless_loiter
 from wildlab.flight.files import read_toml
 from wildlab.geometry.gravity import Earth
 from wildlab.simulation import kernels
@@ -44,7 +45,7 @@ def allan_deviation(rate: np.ndarray, hertz: float, averaged: int) -> float:
     return float(np.sqrt(np.mean(second**2) / 2) / (averaged / hertz))
 
 
-def test_ideal_readings_are_those_of_the_motion_whatever_the_chunk(restless_loiter):
+def test_ideal_readings_are_those_of_the_motion_whatever_the_chunk():
     trajectory = restless_loiter()
     count = 40_000  # three chunks
     force, rate = ideal_imu(trajectory, 250.0, count)

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from tests.simulation.test_twins import with_values
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.simulation.land import ground_heights
@@ -127,10 +128,7 @@ def test_a_wind_that_cannot_be_flown_in_is_refused() -> None:
 
 def with_subset(first: int) -> TwinParameters:
     """A twin with a third of its printed passes, and a subset that begins with detection ``first``."""
-    twin = scaled(load_twin("slow-vessel"), {"camera.images": 0.2})
-    assert twin.subset is not None
-    number = twin.subset.first.model_copy(update={"value": first})
-    return twin.model_copy(update={"subset": twin.subset.model_copy(update={"first": number})})
+    return with_values(scaled(load_twin("slow-vessel"), {"camera.images": 0.2}), subset__first=first)
 
 
 def test_a_subset_ends_with_the_last_detection_there_is() -> None:

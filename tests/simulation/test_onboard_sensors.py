@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.simulation.test_twins import with_values
 from wildlab.flight.files import read_toml
 from wildlab.geometry.gravity import EARTH_RATE, normal_gravity
 from wildlab.simulation.imu import TriadDataSheet, triad_data_sheets
@@ -26,19 +27,11 @@ ERRORS = [
 ] + ["axis_misalignment", "package_misalignment"]
 
 
-def with_imu(twin: TwinParameters, **values: float) -> TwinParameters:
-    imu = twin.imu
-    assert imu is not None
-    changed = {name: getattr(imu, name).model_copy(update={"value": value}) for name, value in values.items()}
-    return twin.model_copy(update={"imu": imu.model_copy(update=changed)})
-
-
 @pytest.fixture(scope="module")
 def exact() -> TwinParameters:
     """Twenty seconds of a flight whose inertial unit does not err."""
-    twin = with_imu(load_twin("static-antenna"), **dict.fromkeys(ERRORS, 0.0))
-    duration = twin.flight.duration.model_copy(update={"value": 20.0})
-    return twin.model_copy(update={"flight": twin.flight.model_copy(update={"duration": duration})})
+    errors = {f"imu__{name}": 0.0 for name in ERRORS}
+    return with_values(load_twin("static-antenna"), flight__duration=20.0, **errors)
 
 
 def test_a_unit_without_errors_feels_the_payload_move_on_the_turning_earth(exact):
@@ -71,17 +64,8 @@ def test_a_unit_without_errors_feels_the_payload_move_on_the_turning_earth(exact
 
 def test_a_flight_has_the_readings_of_the_unit_on_the_payload(exact):
     """Its attitude at the end is the one at the start carried on by its gyros, less the Earth's turning."""
-    camera = exact.camera.model_copy(
-        update={
-            "images": exact.camera.images.model_copy(update={"value": 100}),
-            "recording_start": exact.camera.recording_start.model_copy(update={"value": 1.0}),
-        }
-    )
-    assert exact.target is not None
-    target = exact.target.model_copy(
-        update={"observations": exact.target.observations.model_copy(update={"value": 0})}
-    )
-    flight = simulate(exact.model_copy(update={"camera": camera, "target": target}), 4)
+    short = with_values(exact, camera__images=100, camera__recording_start=1.0, target__observations=0)
+    flight = simulate(short, 4)
     imu = flight.table("imu")
     w, t = imu[RATE].to_numpy(), imu["time_s"].to_numpy()
     steps = Rotation.from_rotvec((w[1:] + w[:-1]) / 2 * np.diff(t)[:, None])
@@ -102,7 +86,7 @@ def test_a_flight_has_the_readings_of_the_unit_on_the_payload(exact):
 def test_the_unit_feels_and_errs_in_its_own_axes_and_is_then_calibrated(exact):
     """Steps of a coarse resolution lie along the axes of the unit, as it is mounted, and not along b."""
     airframe = twin_trajectory(exact, np.random.default_rng(0))
-    coarse = with_imu(exact, accelerometer_resolution=50.0, gyro_resolution=0.5)
+    coarse = with_values(exact, imu__accelerometer_resolution=50.0, imu__gyro_resolution=0.5)
     fine, rough = imu_table(exact, airframe, 4), imu_table(coarse, airframe, 4)
     R_bi, unit = mounted_imu(exact), coarse.imu
     assert R_bi is not None and unit is not None

@@ -33,6 +33,13 @@ def complete(name: str) -> str:
     return text
 
 
+def load_text(folder, text):
+    """The twin of a file with this text."""
+    path = folder / "twin.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_twin(path)
+
+
 @pytest.fixture
 def altered(tmp_path):
     """Load the shipped twin with some text of its file replaced."""
@@ -40,9 +47,7 @@ def altered(tmp_path):
     def load(old: str, new: str):
         text = complete("static-antenna")
         assert text.count(old) == 1, f"{old!r} is there {text.count(old)} times"
-        path = tmp_path / "twin.toml"
-        path.write_text(text.replace(old, new), encoding="utf-8")
-        return load_twin(path)
+        return load_text(tmp_path, text.replace(old, new))
 
     return load
 
@@ -101,9 +106,7 @@ def test_published_numbers_are_those_of_the_thesis():
 def exchanged_imu(tmp_path, part: str):
     text = (TWINS / "static-antenna.toml").read_text(encoding="utf-8")
     assert text.count('"imu-adis16490"') == 1
-    path = tmp_path / "twin.toml"
-    path.write_text(text.replace("imu-adis16490", part), encoding="utf-8")
-    return load_twin(path)
+    return load_text(tmp_path, text.replace("imu-adis16490", part))
 
 
 @pytest.mark.parametrize(
@@ -142,9 +145,7 @@ def test_a_part_that_does_not_exist_is_refused(tmp_path):
 def test_what_a_twin_says_itself_goes_before_what_its_parts_say(tmp_path):
     text = (TWINS / "static-antenna.toml").read_text(encoding="utf-8")
     own = '[autopilot.rate]\nvalue = 5\nunit = "Hz"\nstatus = "chosen"\nreason = "for this test"\n'
-    path = tmp_path / "twin.toml"
-    path.write_text(f"{text}\n{own}", encoding="utf-8")
-    twin = load_twin(path)
+    twin = load_text(tmp_path, f"{text}\n{own}")
     assert twin.autopilot.rate.number == 5
     assert twin.autopilot.roll_sd == load_twin("static-antenna").autopilot.roll_sd
 
@@ -272,19 +273,15 @@ source = "H 6.4.4: 349 images had both vessels within the same image"
 def test_courses_and_targets_that_make_no_sense_are_named(tmp_path, twin, old, new, found):
     text = complete(twin)
     assert old in text
-    path = tmp_path / "twin.toml"
-    path.write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(WildlabError, match=found):
-        load_twin(path)
+        load_text(tmp_path, text.replace(old, new))
 
 
 def test_a_target_that_moves_has_a_receiver(tmp_path):
     text = complete("drifting-vessel")
     parts = re.split(r"(?m)^(?=\[)", text)
-    path = tmp_path / "twin.toml"
-    path.write_text("".join(part for part in parts if not part.startswith("[target.gps.")), encoding="utf-8")
     with pytest.raises(WildlabError, match="both motion and gps"):
-        load_twin(path)
+        load_text(tmp_path, "".join(part for part in parts if not part.startswith("[target.gps.")))
 
 
 def test_an_unknown_twin_is_refused():

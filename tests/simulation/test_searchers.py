@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from tests.simulation.test_twins import with_values
+from tests.simulation.test_twins import marks, with_values, without_errors
 from wildlab.errors import WildlabError
-from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at
+from wildlab.flight.clocks import gimbal_angles
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose
@@ -19,7 +18,7 @@ from wildlab.simulation.land import ground_heights, twin_land
 from wildlab.simulation.manifest import true_mount
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.survey_courses import rows, survey_course
-from wildlab.simulation.trajectory import angular_rates, attitude_along, specific_forces
+from wildlab.simulation.trajectory import attitude_along, specific_forces
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate, simulate_twin
 from wildlab.simulation.waypoint_courses import Laps, leg_headings
@@ -39,41 +38,20 @@ def level(twin):
     return twin.model_copy(update={"land": None})
 
 
+def places_of(flight, twin, times):
+    """Where the animal of each detection was (N, 3)."""
+    walks = animal_paths(twin, 2)
+    names = flight.detections["target_id"]
+    return np.concatenate([walks[name]([time]) for name, time in zip(names, times, strict=True)])
+
+
 def above_ground(twin, position):
     """Heights over the land below, m."""
     return -position[:, 2] - twin_land(twin).heights_at(position[:, :2])
 
 
-def calm(twin):
-    """The twin without control errors and disturbance."""
-    spreads = ("track_sd", "altitude_sd", "roll_sd", "pitch_sd", "yaw_sd")
-    return with_values(twin, **{f"flight__{name}": 0.0 for name in spreads})
-
-
-@pytest.mark.parametrize("name", ["uav-search-low", "gondola"])
-def test_velocity_and_acceleration_are_the_derivatives_of_position(name):
-    trajectory = twin_trajectory(load_twin(name), np.random.default_rng(1))
-    t, h = np.linspace(0, 1700, 6000), 1e-3
-    before, at, after = trajectory(t - h), trajectory(t), trajectory(t + h)
-    # Truncation is h^2/6 times the third (fourth) derivative, below 10 m/s^3 (m/s^4); rounding of 500 m
-    # over 2 h is some 1e-10.
-    assert np.abs((after.position - before.position) / (2 * h) - at.velocity).max() < 2e-6
-    assert np.abs((after.velocity - before.velocity) / (2 * h) - at.acceleration).max() < 2e-6
-    assert np.abs(at.acceleration).max() < 3.0
-
-
-@pytest.mark.parametrize("name", ["uav-search", "uav-search-low", "gondola"])
-def test_angular_rate_is_the_derivative_of_attitude(name):
-    trajectory = twin_trajectory(load_twin(name), np.random.default_rng(1))
-    attitude = attitude_along(trajectory)
-    t, h = np.linspace(5, 1700, 6000), 1e-3
-    rate = Rotation.from_matrix(np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)).as_rotvec() / h
-    assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 5e-6
-    assert np.degrees(np.abs(rate)).max() < 120  # turning round where a course reverses
-
-
 def test_a_multicopter_leans_just_as_its_thrust_must():
-    twin = level(with_values(calm(load_twin("uav-search")), flight__trim_pitch=0.0))
+    twin = level(with_values(without_errors(load_twin("uav-search")), flight__trim_pitch=0.0))
     trajectory = twin_trajectory(twin, np.random.default_rng(1))
     motion = trajectory(np.linspace(0, 2000, 5000))
     force = specific_forces(motion, twin.place.gravity.si)
@@ -85,13 +63,13 @@ def test_a_multicopter_leans_just_as_its_thrust_must():
     assert 0.9 * steepest < lean.max() < steepest
     assert np.median(lean) < 0.01
     # In steady flight it has its trim, nose down.
-    trajectory = twin_trajectory(calm(load_twin("uav-search")), np.random.default_rng(1))
+    trajectory = twin_trajectory(without_errors(load_twin("uav-search")), np.random.default_rng(1))
     angles = np.degrees(matrix_to_euler(attitude_along(trajectory)(np.linspace(0, 2000, 5000))))
     assert np.median(angles[:, 1]) == pytest.approx(-4.0, abs=0.01)
 
 
 def test_a_gondola_hangs_level_and_goes_round_clockwise_at_its_speed():
-    twin = calm(load_twin("gondola"))
+    twin = without_errors(load_twin("gondola"))
     trajectory = twin_trajectory(twin, np.random.default_rng(1))
     t = np.arange(0, 1800, 0.5)
     motion = trajectory(t)
@@ -169,7 +147,8 @@ def test_altitude_and_rows_are_those_printed(name, pattern):
     assert above.mean() == pytest.approx(pattern[0], abs=0.5)
     # What is shorter than the way over which the autopilot averages the ground is flown over.
     assert np.abs(above - pattern[0]).max() < 8.0
-    assert np.abs(motion.velocity[:, 2]).max() < 4.0, "a multicopter climbs and sinks so fast"
+    assert np.abs(v[:, 2]).max() < 4.0, "a multicopter climbs and sinks so fast"
+    assert np.abs(motion.acceleration).max() < 3.0
     assert np.hypot(v[:, 0], v[:, 1]).max() < 1.3 * twin.flight.airspeed.number
     if pattern[1] is not None:
         assert twin.survey.row_distance.number == pattern[1]
@@ -221,17 +200,13 @@ def test_marks_are_on_the_animals_through_pose_and_gimbal(named):
     _, twin, _ = named
     exact = level(with_values(twin, camera__marking_sd=0.0, gimbal__noise=0.0))
     flight = simulate(exact.model_copy(update={"tolerance": None}), 2)
+    uv, times, p_nb, R_nb = marks(flight)
     row = flight.frames.set_index("frame_id").index.get_indexer(flight.detections["frame_id"])
-    times = frame_times(flight)
-    p_nb, R_nb, _ = poses_at(flight.nav["truth"], times[row])
-    pan, tilt = (angle[row] for angle in gimbal_angles(flight))
-    pose = camera_pose(flight.manifest.geometry_mount(), p_nb, R_nb, pan, tilt)
-    uv = flight.detections[["u_px", "v_px"]].to_numpy()
-    ground = pixel_to_plane(flight.manifest.geometry_camera(), uv, *pose, -0.7)
-    walks = animal_paths(exact, 2)
-    at = np.concatenate(
-        [walks[animal](times[[i]]) for animal, i in zip(flight.detections["target_id"], row, strict=True)]
+    pose = camera_pose(
+        flight.manifest.geometry_mount(), p_nb, R_nb, *(one[row] for one in gimbal_angles(flight))
     )
+    ground = pixel_to_plane(flight.manifest.geometry_camera(), uv, *pose, -0.7)
+    at = places_of(flight, exact, times)
     off = np.linalg.norm(ground - at, axis=1)
     assert np.median(off) < 0.01
     assert off.max() < 0.002 * np.linalg.norm(at - p_nb, axis=1).max()
@@ -250,13 +225,8 @@ def test_marks_are_of_animals_that_stand_on_the_land_and_that_no_hill_hides(name
     truth = flight.truth
     at = truth[["north_m", "east_m"]].to_numpy(float)
     assert np.allclose(-truth["down_m"] - land.heights_at(at), twin.animals.height.si, atol=1e-6)
-    row = flight.frames.set_index("frame_id").index.get_indexer(flight.detections["frame_id"])
-    times = frame_times(flight)
-    walks = animal_paths(twin, 2)
-    p_nb, _, _ = poses_at(flight.nav["truth"], times[row])
-    where = np.concatenate(
-        [walks[animal](times[[i]]) for animal, i in zip(flight.detections["target_id"], row, strict=True)]
-    )
+    _, times, p_nb, _ = marks(flight)
+    where = places_of(flight, twin, times)
     # From the airframe, some decimetres from the lens.
     assert lines_clear(land, where, p_nb).mean() > 0.999
     under = -land.heights_at(p_nb[:, :2])

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.simulation.motions import WIND, flown, restless_laps, restless_loiter
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.simulation.attitudes import coordinated_attitude, fixed_wing_trajectory
 from wildlab.simulation.disturbances import band_limited_disturbance
 from wildlab.simulation.loiter import loiter_path
 from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces
-
-WIND = np.array([4.0, -3.0, 0.0])
 
 
 @pytest.mark.parametrize(("turn", "sense"), [("clockwise", 1), ("counter-clockwise", -1)])
@@ -44,7 +45,7 @@ def test_in_wind_the_airspeed_is_steady_and_the_ground_track_a_circle():
     assert np.einsum("ij,ij->i", v - WIND, a) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_coordinated_flight_has_no_sideslip_and_no_lateral_force(restless_loiter):
+def test_coordinated_flight_has_no_sideslip_and_no_lateral_force():
     trajectory = restless_loiter()
     t = np.linspace(0, 200, 1000)
     restless = trajectory(t)
@@ -58,27 +59,43 @@ def test_coordinated_flight_has_no_sideslip_and_no_lateral_force(restless_loiter
     assert np.linalg.det(R) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("turn", ["clockwise", "counter-clockwise"])
-def test_velocity_and_acceleration_are_the_derivatives_of_position(turn, restless_loiter):
-    trajectory = restless_loiter(turn)
-    t, h = np.linspace(5, 1400, 2000), 1e-3
+@pytest.mark.parametrize(
+    ("motion", "last", "within"),
+    [
+        # Truncation is h^2/6 times the third (fourth) derivative: of a loiter below 2 m/s^3 (m/s^4), of turns
+        # between waypoints below 10. Rounding of 500 m over 2 h is some 1e-10.
+        (partial(restless_loiter, "clockwise"), 1400, 4e-7),
+        (partial(restless_loiter, "counter-clockwise"), 1400, 4e-7),
+        (partial(restless_laps, "eight"), 400, 2e-6),
+        (partial(restless_laps, "racetrack"), 400, 2e-6),
+        (partial(flown, "uav-search-low"), 1700, 2e-6),
+        (partial(flown, "gondola"), 1700, 2e-6),
+    ],
+)
+def test_velocity_and_acceleration_are_the_derivatives_of_position(motion, last, within):
+    trajectory = motion()
+    t, h = np.linspace(0, last, 5000), 1e-3
     before, at, after = trajectory(t - h), trajectory(t), trajectory(t + h)
-    # Truncation is h^2/6 times the third derivative, below 2 m/s^3 (and its own, below 2 m/s^4): 4e-7.
-    # Rounding is 1e-13 m in 2e-3 s times a few, 1e-9.
-    assert np.abs((after.position - before.position) / (2 * h) - at.velocity).max() < 4e-7
-    assert np.abs((after.velocity - before.velocity) / (2 * h) - at.acceleration).max() < 4e-7
+    assert np.abs((after.position - before.position) / (2 * h) - at.velocity).max() < within
+    assert np.abs((after.velocity - before.velocity) / (2 * h) - at.acceleration).max() < within
 
 
-def test_angular_rate_is_the_derivative_of_attitude(restless_loiter):
-    trajectory = restless_loiter()
-    attitude = attitude_along(trajectory)
-    t, h = np.linspace(5, 1400, 2000), 1e-3
-    turn = np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)
-    rate = Rotation.from_matrix(turn).as_rotvec() / h
-    # A turn from t to t+h has the mean rate at t+h/2, but for h^2/24 times the rate's second derivative
-    # (below 3 rad/s^3) and products of it.
-    assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 1e-6
-    assert np.abs(rate - angular_rates(attitude, t)).max() > 1e-5  # the bound could fail
+@pytest.mark.parametrize(
+    ("motion", "within"),
+    [
+        # A turn from t to t+h has the mean rate at t+h/2, but for h^2/24 times the rate's second derivative
+        # (of a loiter below 3 rad/s^3) and products of it.
+        (restless_loiter, 1e-6),
+        *((partial(flown, name), 5e-6) for name in ("uav-search", "uav-search-low", "gondola")),
+    ],
+)
+def test_angular_rate_is_the_derivative_of_attitude(motion, within):
+    attitude = attitude_along(motion())
+    t, h = np.linspace(5, 1400, 5000), 1e-3
+    rate = Rotation.from_matrix(np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)).as_rotvec() / h
+    assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < within
+    assert np.abs(rate - angular_rates(attitude, t)).max() > within  # the bound could fail
+    assert np.degrees(np.abs(rate)).max() < 120  # turning round where a course reverses
 
 
 def test_a_disturbance_has_its_spread_its_band_and_its_derivatives():

@@ -42,6 +42,20 @@ def with_values(twin, **changes):
     return twin
 
 
+def without_errors(twin):
+    """The twin without errors of its control, and without disturbance."""
+    names = ("track", "altitude", "roll", "pitch", "yaw")
+    return with_values(twin, **{f"flight__{name}_sd": 0.0 for name in names})
+
+
+def marks(flight):
+    """Of each detection its pixel (N, 2), when it was exposed, and the true pose of the airframe then."""
+    row = flight.frames.set_index("frame_id").index.get_indexer(flight.detections["frame_id"])
+    at = frame_times(flight)[row]
+    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at)
+    return flight.detections[["u_px", "v_px"]].to_numpy(), at, p_nb, R_nb
+
+
 @pytest.fixture(scope="module")
 def twin():
     return load_twin("static-antenna")
@@ -115,10 +129,8 @@ def test_the_true_pose_puts_unspoiled_marks_on_the_antenna(twin):
     exact = with_values(twin, camera__marking_sd=0.0, camera__latency=0.0, camera_sway__share=0.0)
     flight = quick(exact.model_copy(update={"tolerance": None}), 5)
     m = flight.manifest
-    at = pd.Series(frame_times(flight), flight.frames["frame_id"]).loc[flight.detections["frame_id"]]
-    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at.to_numpy())
+    uv, _, p_nb, R_nb = marks(flight)
     pose = camera_pose(m.geometry_mount(), p_nb, R_nb)
-    uv = flight.detections[["u_px", "v_px"]].to_numpy()
     ground = pixel_to_plane(m.geometry_camera(), uv, *pose, -2.0)
     assert np.abs(ground - [0.0, 0.0, -2.0]).max() < 1e-6
     assert np.abs(ground_to_pixel(m.geometry_camera(), [0.0, 0.0, -2.0], *pose) - uv).max() < 1e-6
@@ -171,8 +183,7 @@ def test_autopilot_errors_have_the_stated_size_and_correlation():
 
 
 def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for(twin):
-    calm = with_values(twin, flight__track_sd=0.0, flight__altitude_sd=0.0)
-    calm = with_values(calm, flight__roll_sd=0.0, flight__pitch_sd=0.0, flight__yaw_sd=0.0)
+    calm = without_errors(twin)
     for changes in ({}, {"loiter__turn": "counter-clockwise"}, {"loiter__course_at_target": 120.0}):
         changed = with_values(calm, **changes)
         trajectory = twin_trajectory(changed, np.random.default_rng(0))
@@ -190,7 +201,7 @@ def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for
 
 
 def test_the_wind_blows_from_where_it_is_said_to_come(twin):
-    blown = with_values(twin, flight__wind_from=90.0, flight__track_sd=0.0, flight__altitude_sd=0.0)
+    blown = with_values(without_errors(twin), flight__wind_from=90.0)
     v = twin_trajectory(blown, np.random.default_rng(0))(np.arange(0.0, 120.0, 0.5)).velocity
     wind = [0.0, -twin.flight.wind_speed.number, 0.0]
     assert np.linalg.norm(v - wind, axis=1) == pytest.approx(twin.flight.airspeed.number)

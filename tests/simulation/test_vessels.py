@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 import pytest
 
+from tests.simulation.test_twins import marks, with_values
 from wildlab.errors import WildlabError
-from wildlab.flight.clocks import frame_times, poses_at
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose
@@ -34,57 +33,48 @@ def named(request):
     return request.param, simulate_twin(request.param, 2, without=OPTIONAL_TABLES)
 
 
-def detection_times(flight):
-    return flight.frames.set_index("frame_id").loc[flight.detections["frame_id"], "time_s"].to_numpy()
-
-
 def unspoiled(twin):
     """The twin whose camera and detector do not err, is as stated, and does not turn against the airframe."""
-    camera = twin.camera
-    exact = {key: getattr(camera, key).model_copy(update={"value": 0.0}) for key in ("marking_sd", "latency")}
-    as_stated = {"camera_sway": None, "tolerance": None}
-    return twin.model_copy(update={"camera": camera.model_copy(update=exact), **as_stated})
+    exact = with_values(twin, camera__marking_sd=0.0, camera__latency=0.0)
+    return exact.model_copy(update={"camera_sway": None, "tolerance": None})
+
+
+def ground_of(flight, plane_down):
+    """When each detection was exposed, and where it is on the plane by the true pose."""
+    uv, at, *pose = marks(flight)
+    m = flight.manifest
+    # The log has every exposure but for rounding in the fifteenth digit.
+    return at, pixel_to_plane(m.geometry_camera(), uv, *camera_pose(m.geometry_mount(), *pose), plane_down)
 
 
 @pytest.mark.parametrize(("name", "count", "segments", "period", "fix"), FLIGHTS)
 def test_counts_and_grouping_are_those_printed(name, count, segments, period, fix):
-    for seed in (11,):
-        flight = simulate_twin(name, seed, without=OPTIONAL_TABLES)
-        d, frames, truth = flight.detections, flight.frames, flight.truth
-        assert len(d) == count
-        assert d["frame_id"].is_unique  # no more than one detection in an image
-        assert d["detection_id"].is_unique
-        assert d["frame_id"].is_monotonic_increasing
-        assert d["u_px"].between(0, 640).all()
-        assert d["v_px"].between(0, 512).all()
-        assert (d["source"] == "detector").all()
-        assert (d["target_id"] == "vessel").all()
-        assert np.diff(frames["time_s"]) == pytest.approx(1 / 7.5)
-        assert np.ptp(frames["time_s"]) == pytest.approx(period, abs=0.2)
-        gaps = np.diff(detection_times(flight))
-        if segments is not None:
-            assert (gaps > 20).sum() + 1 == segments
-            assert (gaps > 5).sum() + 1 == segments  # nothing in between
-        else:
-            assert (gaps > 5).sum() + 1 >= 40  # many different periods
-        assert np.diff(truth["time_s"]) == pytest.approx(fix)
+    flight = simulate_twin(name, 11, without=OPTIONAL_TABLES)
+    d, frames, truth = flight.detections, flight.frames, flight.truth
+    assert len(d) == count
+    assert d["frame_id"].is_unique  # no more than one detection in an image
+    assert d["detection_id"].is_unique
+    assert d["frame_id"].is_monotonic_increasing
+    assert d["u_px"].between(0, 640).all()
+    assert d["v_px"].between(0, 512).all()
+    assert (d["source"] == "detector").all()
+    assert (d["target_id"] == "vessel").all()
+    assert np.diff(frames["time_s"]) == pytest.approx(1 / 7.5)
+    assert np.ptp(frames["time_s"]) == pytest.approx(period, abs=0.2)
+    gaps = np.diff(frames.set_index("frame_id").loc[d["frame_id"], "time_s"])
+    if segments is not None:
+        assert (gaps > 20).sum() + 1 == segments
+        assert (gaps > 5).sum() + 1 == segments  # nothing in between
+    else:
+        assert (gaps > 5).sum() + 1 >= 40  # many different periods
+    assert np.diff(truth["time_s"]) == pytest.approx(fix)
 
 
 def test_the_true_pose_puts_unspoiled_marks_on_the_vessel(named):
     name, _ = named
     twin = unspoiled(load_twin(name))
     flight = simulate(twin, 2, without=OPTIONAL_TABLES)
-    at = (
-        pd.Series(frame_times(flight), flight.frames["frame_id"])
-        .loc[flight.detections["frame_id"]]
-        .to_numpy()
-    )
-    # The log has every exposure but for rounding in the fifteenth digit.
-    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at)
-    m = flight.manifest
-    uv = flight.detections[["u_px", "v_px"]].to_numpy()
-    pose = camera_pose(m.geometry_mount(), p_nb, R_nb)
-    ground = pixel_to_plane(m.geometry_camera(), uv, *pose, -twin.target.height.si)
+    at, ground = ground_of(flight, -twin.target.height.si)
     assert np.abs(ground - target_path(twin.target, 2)(at)).max() < 1e-6
     # and the truth in the flight is where the receiver says that is: metres off, no more
     logged = np.stack(
@@ -178,29 +168,20 @@ def test_two_vessels_cross_and_are_seen_as_printed(seed):
 def test_marks_of_two_vessels_are_on_the_one_they_name():
     twin = unspoiled(load_twin("crossing-vessels"))
     flight = simulate(twin, 3, without=OPTIONAL_TABLES)
-    at = detection_times(flight)
-    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at)
-    m = flight.manifest
-    uv = flight.detections[["u_px", "v_px"]].to_numpy()
-    ground = pixel_to_plane(m.geometry_camera(), uv, *camera_pose(m.geometry_mount(), p_nb, R_nb), 0.0)
+    at, ground = ground_of(flight, 0.0)
     for target in twin.targets:
         its = (flight.detections["target_id"] == target.identifier.text).to_numpy()
         assert np.abs(ground[its] - target_path(target, 3)(at[its])).max() < 1e-6
 
 
 @pytest.mark.parametrize(
-    ("group", "key", "value", "found"),
-    [
-        ("pair", "both", 860, "left with|both targets"),
-        ("second_target", "observations", 6000, "images only"),
-    ],
+    ("name", "value", "found"),
+    [("pair__both", 860, "left with|both targets"), ("second_target__observations", 6000, "images only")],
 )
-def test_pairs_that_are_not_seen_often_enough_are_refused(group, key, value, found):
-    twin = load_twin("crossing-vessels")
-    part = getattr(twin, group)
-    part = part.model_copy(update={key: getattr(part, key).model_copy(update={"value": value})})
+def test_pairs_that_are_not_seen_often_enough_are_refused(name, value, found):
+    twin = with_values(load_twin("crossing-vessels"), **{name: value})
     with pytest.raises(WildlabError, match=found):
-        simulate(twin.model_copy(update={group: part}), 1, without=OPTIONAL_TABLES)
+        simulate(twin, 1, without=OPTIONAL_TABLES)
 
 
 def test_the_subset_is_1250_detections_in_succession():

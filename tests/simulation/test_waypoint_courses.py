@@ -5,31 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.simulation.motions import ALTITUDE, LAPS_WIND
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.simulation.attitudes import fixed_wing_trajectory
-from wildlab.simulation.disturbances import band_limited_disturbance
 from wildlab.simulation.waypoint_courses import (
-    ControlErrors,
     Laps,
     filleted_course,
     lap_times,
     laps_path,
     shape_corners,
 )
-
-WIND = np.array([-3.2, -3.2, 0.0])  # 4.5 m/s from the north-east
-ALTITUDE = [[0.0, 200.0], [100.0, 200.0], [160.0, 300.0]]
-
-
-def restless(shape="eight"):
-    """A course with wind, drift, climb, control errors and gusts, all on: its trajectory."""
-    rng = np.random.default_rng(5)
-    course = filleted_course(shape_corners(shape, 500.0, 400.0), 80.0)
-    laps = Laps(course, 19.5, 400.0, wind=WIND[:2], drift=(0.5, -0.3), start=0.2)
-    errors = ControlErrors(*(band_limited_disturbance(sd, 20.0, 120.0, rng) for sd in (3.0, 3.0, 2.0)))
-    path = laps_path(laps, ALTITUDE, errors)
-    gusts = tuple(band_limited_disturbance(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
-    return fixed_wing_trajectory(path, wind=WIND, trim_pitch=np.radians(2.0), gusts=gusts)
 
 
 def calm(course, **more):
@@ -74,11 +59,11 @@ def test_a_lap_in_still_air_takes_its_length_over_the_airspeed():
 
 def test_legs_are_straight_at_the_airspeed_and_turns_are_coordinated():
     course = filleted_course(shape_corners("eight", 1500.0, 400.0), 80.0)
-    path = calm(course, wind=WIND[:2])
-    trajectory = fixed_wing_trajectory(path, wind=WIND)
+    path = calm(course, wind=LAPS_WIND[:2])
+    trajectory = fixed_wing_trajectory(path, wind=LAPS_WIND)
     t = np.arange(0, 600, 0.1)
     p, v, a = path(t)
-    airspeed = np.linalg.norm(v - WIND, axis=1)
+    airspeed = np.linalg.norm(v - LAPS_WIND, axis=1)
     level = np.linalg.norm(a, axis=1) < 1e-9
     assert 0.4 < level.mean() < 0.9
     assert airspeed[level] == pytest.approx(19.5, abs=1e-9)
@@ -111,13 +96,3 @@ def test_altitude_follows_its_profile():
     p, v, _ = path(np.array([0.0, 50.0, 130.0, 200.0, 290.0]))
     assert -p[:, 2] == pytest.approx([200, 200, 250, 300, 300], abs=1e-6)
     assert v[2, 2] == pytest.approx(-100 / 60)
-
-
-@pytest.mark.parametrize("shape", ["eight", "racetrack"])
-def test_velocity_and_acceleration_are_the_derivatives_of_position(shape):
-    trajectory = restless(shape)
-    t, h = np.linspace(0, 400, 4000), 1e-3
-    before, at, after = trajectory(t - h), trajectory(t), trajectory(t + h)
-    # Truncation is h^2/6 times the third (fourth) derivative, below 10 m/s^3 (m/s^4): 2e-6.
-    assert np.abs((after.position - before.position) / (2 * h) - at.velocity).max() < 2e-6
-    assert np.abs((after.velocity - before.velocity) / (2 * h) - at.acceleration).max() < 2e-6

@@ -20,6 +20,8 @@ from wildlab.tracking.schmidt import PoseUncertainty
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 N = 40
+#: Rows of a `flight` that others of the same time follow.
+TWICE = [11, 21, 22]
 
 
 def agree(batch, run, track, but=()):
@@ -34,9 +36,10 @@ def agree(batch, run, track, but=()):
 
 
 def flight(runs, seed=0):
-    """Pixels, poses and noise of their own for each run, with frames missed and a target out of sight."""
+    """Pixels, poses and noise of each run: some at one time, some missed, a target out of sight."""
     rng = np.random.default_rng(seed)
-    times, uv, poses, truth = overflight(N)
+    times, uv, poses, _ = overflight(N)
+    times[[12, 22, 23]] = times[[11, 21, 21]]
     p_nc = poses.p_nc + rng.normal(0, 1, (runs, N, 3))
     R_nc = np.tile(poses.R_nc, (runs, 1, 1, 1))
     R_nc[runs // 2, 5] = R_nc[runs // 2, 5] @ np.diag([1.0, -1.0, -1.0])
@@ -44,70 +47,63 @@ def flight(runs, seed=0):
     z = uv + rng.normal(0, 2, (runs, N, 2))
     z[rng.random((runs, N)) < 0.1, 0] = np.nan
     z[1, 12] += 300
-    return times, z, CameraPoses.at_lens(CAMERA, p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2)), truth
+    return times, z, CameraPoses.at_lens(CAMERA, p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2))
 
 
-@pytest.mark.parametrize(("runs", "gate"), [(3, 1.0), (70, 0.99)])
-def test_positions(runs, gate):
-    rng = np.random.default_rng(runs)
-    times = np.cumsum(rng.uniform(0, 2, N))
-    times[7] = times[6]
-    z = np.cumsum(rng.normal(0, 3, (runs, N, 2)), axis=1)
-    z[rng.random((runs, N)) < 0.1] = np.nan
-    A = rng.normal(size=(runs, N, 2, 3))
-    R = A @ np.swapaxes(A, -1, -2) + np.eye(2)
-    R[0, 4] = np.nan
-    start = Start(times[0], rng.normal(size=(runs, 4)), np.diag([50.0, 40, 9, 4]), row=0)
-    batch = run_batch(times, z, R, CV, start, gate_probability=gate)
-    for run in {0, 1, 2, runs // 2, runs - 1}:
-        own = start._replace(x=start.x[run])
-        single = run_filter(times, z[run], R[run], m.positions(), CV, own, gate_probability=gate)
-        agree(batch, run, single, but=[6])
-
-
-@pytest.mark.parametrize("runs", [1, 70])
+@pytest.mark.parametrize(
+    ("runs", "gate", "alike"), [(3, 1.0, False), (70, 0.99, False), (1, 1.0, True), (70, 1.0, True)]
+)
 @pytest.mark.parametrize("row", [-1, 0])
-def test_positions_of_runs_that_know_the_same_of_their_errors(runs, row):
-    """Covariances are then computed once; the estimates are those of each run all the same."""
+def test_positions(runs, gate, alike, row):
+    """Of runs that know the same of their errors, covariances are computed once."""
     rng = np.random.default_rng(runs)
     times = np.cumsum(rng.uniform(0, 2, N))
     times[7] = times[6]
     z = np.cumsum(rng.normal(0, 3, (runs, N, 2)), axis=1)
     z[:, rng.random(N) < 0.2] = np.nan
-    A = rng.normal(size=(N, 2, 3))
+    A = rng.normal(size=(N, 2, 3) if alike else (runs, N, 2, 3))
     R = A @ np.swapaxes(A, -1, -2) + np.eye(2)
+    if not alike:
+        R[0, 4], z[1, 12] = np.nan, np.nan
     start = Start(times[0], rng.normal(size=(runs, 4)), np.diag([50.0, 40, 9, 4]), row=row)
-    batch = run_batch(times, z, R, CV, start)
-    assert not batch.P.flags.writeable
-    for run in {0, runs // 2, runs - 1}:
-        own = start._replace(x=start.x[run])
-        agree(batch, run, run_filter(times, z[run], R, m.positions(), CV, own), but=[6])
-    some = run_batch(times, z, R, CV, start, rows=[0, 5, -1])
-    assert np.array_equal(some.x, batch.x[:, [0, 5, -1]])
-    assert np.array_equal(some.P, batch.P[:, [0, 5, -1]])
-    # One run with a gap of its own, and every run is computed by itself.
+    batch = run_batch(times, z, R, CV, start, gate_probability=gate)
+    assert batch.P.flags.writeable == (not alike)
+    for run in {0, 1, runs // 2, runs - 1} & set(range(runs)):
+        own, noise = start._replace(x=start.x[run]), R if alike else R[run]
+        agree(
+            batch,
+            run,
+            run_filter(times, z[run], noise, m.positions(), CV, own, gate_probability=gate),
+            but=[6],
+        )
+
+
+def test_one_gap_of_its_own_and_every_run_is_computed_by_itself():
+    times, z = np.arange(float(N)), np.ones((3, N, 2))
+    start = Start(0.0, np.zeros(4), np.eye(4))
+    assert not run_batch(times, z, np.eye(2), CV, start).P.flags.writeable
     z[0, 12:14] = np.nan
-    assert run_batch(times, z, R, CV, start).P.flags.writeable == (runs > 1)
+    assert run_batch(times, z, np.eye(2), CV, start).P.flags.writeable
 
 
 @pytest.mark.parametrize("gate", [1.0, 0.99])
 def test_pixels(gate):
     runs = 67
-    times, z, poses, _ = flight(runs)
+    times, z, poses = flight(runs)
     plane = np.linspace(0, 1, N)
     start = Start(-0.5, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     R = np.diag([4.0, 6.0])
     batch = run_batch(times, z, R, CV, start, view=View(poses, plane), gate_probability=gate)
     for run in (0, 1, 33, 66):
         sensor = m.pixels(poses.take(run), plane)
-        agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate_probability=gate))
+        agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate_probability=gate), but=TWICE)
     assert not batch.used[33, 5]
 
 
 @pytest.mark.parametrize("correlation_time", [np.inf, 5.0, 0.0])
 def test_schmidt(correlation_time):
     runs = 66
-    times, z, poses, _ = flight(runs)
+    times, z, poses = flight(runs)
     rng = np.random.default_rng(1)
     covariance = np.array([[random_pose_covariance(rng, 0.2) for _ in range(N)] for _ in range(runs)])
     covariance[3, 20] = np.nan
@@ -123,17 +119,14 @@ def test_schmidt(correlation_time):
             times, z[run], R, m.pixels(poses.take(run), 0.0), CV, own,
             pose=pose._replace(covariance=covariance[run]), gate_probability=0.999,
         )  # fmt: skip
-        agree(batch, run, track)
+        agree(batch, run, track, but=TWICE)
 
 
 def test_the_cross_covariance_is_limited_alike():
     rng = np.random.default_rng(0)
     changed = 0
     for _ in range(50):
-        A = (
-            rng.normal(size=(10, 14))
-            * np.concatenate([np.array([5, 5, 1, 1.0]), np.repeat([1, 0.02], 3)])[:, None]
-        )
+        A = rng.normal(size=(10, 14)) * np.repeat([5, 1, 1, 0.02], [2, 2, 3, 3])[:, None]
         J = A @ A.T
         shrink = np.diag(rng.uniform(0.6, 1, 6))
         given = J[:4, 4:], J[:4, :4], np.ascontiguousarray(shrink @ J[4:, 4:] @ shrink)
@@ -146,7 +139,7 @@ def test_the_cross_covariance_is_limited_alike():
 
 
 def test_only_the_rows_asked_for_are_kept():
-    times, z, poses, _ = flight(66)
+    times, z, poses = flight(66)
     start = Start(times[1], np.ones(4), np.diag([25.0, 25, 9, 9]), row=1)
     arguments = dict(view=View(poses, 0.0), gate_probability=0.99)
     full = run_batch(times, z, np.eye(2), CV, start, **arguments)
@@ -162,7 +155,7 @@ def test_only_the_rows_asked_for_are_kept():
 
 
 def test_bad_input_is_named():
-    times, z, poses, _ = flight(3)
+    times, z, poses = flight(3)
     start = Start(0.0, np.zeros(4), np.eye(4))
     R = np.eye(2)
     with pytest.raises(WildlabError, match="runs, times, 2"):

@@ -5,10 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tests.tracking.poses import overflight
 from wildlab.errors import WildlabError
 from wildlab.tracking import measurement as m
-from wildlab.tracking.batch import View, run_batch
 from wildlab.tracking.combined import Seen, combined, merge
 from wildlab.tracking.considered import consider
 from wildlab.tracking.considering import considering, renamed
@@ -16,7 +14,6 @@ from wildlab.tracking.following import follow
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.platforms import bearings, polar, ranges_bearings
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
 
 WA = partial(white_acceleration, density=0.3)
 START = Start(0.0, np.array([50.0, 60.0, 0.0, 0.0]), np.diag([100.0, 100.0, 9.0, 9.0]))
@@ -127,33 +124,6 @@ def test_errors_are_shared_by_name_and_apart_by_another():
     # With a compass each the direction is averaged, and known better.
     across = np.array([-np.sin(0.3), np.cos(0.3)])
     assert across @ apart.P[-1] @ across < 0.6 * (across @ shared.P[-1] @ across)
-
-
-@pytest.mark.parametrize("camera", [False, True])
-@pytest.mark.parametrize("correlation_time", [None, 0.0, 5.0, np.inf])
-def test_two_measurements_at_one_time_are_the_same_to_readable_and_compiled_filters(camera, correlation_time):
-    times, uv, poses, truth = overflight(30)
-    rng = np.random.default_rng(1)
-    times = times.copy()
-    times[[5, 11, 12]] = times[[4, 10, 10]]
-    z = uv if camera else truth[:, :2] + rng.normal(0, 2, (30, 2))
-    z[20] += 300
-    pose = None
-    if correlation_time is not None:
-        pose = PoseUncertainty(np.tile(np.diag([1, 1, 1, 1e-4, 1e-4, 1e-4]), (30, 1, 1)), correlation_time)
-    start = Start(0.0, np.zeros(4), np.diag([25.0, 25.0, 9.0, 9.0]))
-    sensor, view = (m.pixels(poses, 0.0), View(poses, 0.0)) if camera else (m.positions(), None)
-    if view is None and pose is not None:
-        return  # positions have no pose
-    R = 4.0 * np.eye(2)
-    one = run_filter(times, z, R, sensor, WA, start, pose=pose, gate_probability=0.999)
-    many = run_batch(times, np.stack([z, z]), R, WA, start, view=view, pose=pose, gate_probability=0.999)
-    last = np.append(np.diff(times) > 0, True)
-    np.testing.assert_array_equal(many.used[0], one.used)
-    np.testing.assert_allclose(many.nis[1], one.nis, rtol=1e-7)
-    np.testing.assert_allclose(many.x[0][last], one.x[last], atol=1e-8)
-    np.testing.assert_allclose(many.P[1][last], one.P[last], atol=1e-8)
-    assert one.used[[4, 5, 10, 11, 12]].all() and not one.used[20]
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,6 @@ from wildlab.tracking import predictions as p
 from wildlab.tracking.considered import Considered, consider, consider_all, errors_of
 from wildlab.tracking.considering import considering, renamed
 from wildlab.tracking.following import follow
-from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.platforms import bearings, measured_from, polar, ranges_bearings
 from wildlab.tracking.run import Start, run_filter
@@ -43,26 +42,19 @@ def test_polar_derivatives(pose, place, plane):
     position = poses.p_nb[:2] + place[0] * np.array([np.cos(place[1]), np.sin(place[1])])
     seen = p.predict_polar(position, poses.p_nb, poses.R_nb, plane)
 
-    def moved(error):
-        wrong = disturbed(poses, error)
-        return p.predict_polar(position, wrong.p_nb, wrong.R_nb, plane).z
+    def away(position, pose):
+        return m.difference(
+            p.predict_polar(position, pose.p_nb, pose.R_nb, plane).z, seen.z, (False, True, False)
+        )
 
-    def target(step):
-        return p.predict_polar(position + step, poses.p_nb, poses.R_nb, plane).z
-
-    steps = 1e-5 * np.eye(6)
-    by_pose = np.stack(
-        [m.difference(moved(e), moved(-e), (False, True, False)) / 2e-5 for e in steps], axis=-1
-    )
-    by_target = np.stack(
-        [m.difference(target(e), target(-e), (False, True, False)) / 2e-5 for e in steps[:2, :2]], axis=-1
-    )
+    by_pose = differences(lambda error: away(position, disturbed(poses, error)), 6)
+    by_target = differences(lambda step: away(position + step, poses), 2)
     np.testing.assert_allclose(seen.H_pose, by_pose, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(seen.H_position, by_target, rtol=1e-4, atol=1e-5)
-    offset = poses.R_nb @ (seen.z[0] * np.array([
-        np.cos(seen.z[2]) * np.cos(seen.z[1]), np.cos(seen.z[2]) * np.sin(seen.z[1]), -np.sin(seen.z[2])
-    ]))  # fmt: skip
-    np.testing.assert_allclose(poses.p_nb + offset, [*position, plane], atol=1e-8)
+    distance, azimuth, elevation = seen.z
+    level = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
+    there = poses.p_nb + distance * poses.R_nb @ np.array([*level, -np.sin(elevation)])
+    np.testing.assert_allclose(there, [*position, plane], atol=1e-8)
 
 
 @given(PLACE, st.tuples(*(SPEED,) * 4), st.floats(-np.pi, np.pi), st.floats(-1, 1), st.booleans())
@@ -200,26 +192,6 @@ def test_correlated_errors_of_different_times_stay_a_covariance(seed):
     np.testing.assert_allclose(alone, np.diag(expected), atol=1e-12)
 
 
-def patrol(rng, heading_sd, range_sd, n=60):
-    """A robot goes by a moving target, with a heading and a range that are off: a run, and the states."""
-    t = np.arange(n, dtype=float)
-    motion = partial(white_acceleration, density=0.05)
-    x = np.array([0.0, 0.0, 1.0, -0.5]) + rng.normal(size=4) * [5, 5, 1, 1]
-    states = [x]
-    for _ in range(n - 1):
-        F, Q = motion(1.0)
-        states.append(F @ states[-1] + rng.multivariate_normal(np.zeros(4), Q))
-    states = np.array(states)
-    platform = np.column_stack([-400 + 3 * t, 200 * np.sin(t / 10)])
-    offset = states[:, :2] - platform
-    error = rng.normal(size=2) * [heading_sd, range_sd]
-    z = np.column_stack([np.hypot(*offset.T) + error[1], np.arctan2(offset[:, 1], offset[:, 0]) - error[0]])
-    z += rng.normal(size=(n, 2)) * [1.0, 0.005]
-    sensor = considering(ranges_bearings(platform, 0.0), ("heading", "range_bias"))
-    start = Start(0.0, np.array([0.0, 0.0, 1.0, -0.5]), np.diag([25.0, 25.0, 1.0, 1.0]))
-    return t, z, np.diag([1.0, 0.005**2]), sensor, motion, start, states
-
-
 @pytest.mark.parametrize("name", ["ukf", "imm", "coloured"])
 def test_filters_that_widen_their_noise_are_those_that_forget(name):
     """H (7.40)-(7.41): a Schmidt filter whose errors are new at every measurement."""
@@ -298,8 +270,8 @@ def test_refusals(act, words):
 
 
 def test_what_no_filter_follows():
-    *run, _ = patrol(np.random.default_rng(1), 0.0, 0.0, 5)
-    two = [*run[:4], [CV, CV], *run[5:]]
+    run = [np.arange(5.0), np.ones((5, 2)), np.eye(2), ranges_bearings([0.0, 0.0], 0.0), CV, START]
+    two = [*run[:4], [CV, CV], START]
     for name, arguments, words in (
         ("magic", run, "'magic'"),
         ("schmidt", run, "no errors"),

@@ -137,29 +137,25 @@ def test_rows_of_a_run_have_their_own_poses():
     drawn = [(10.0, 20.0, 100.0, 0.1, -0.2, 1.0, (0.0, 0.1, 0.0), (0.5, 0.0, 0.0)),
              (-10.0, 5.0, 120.0, -0.1, 0.1, 2.0, (0.0, 0.1, 0.0), (0.5, 0.0, 0.0))]  # fmt: skip
     singles = [posed(one) for one in drawn]
-    together = replace(
-        singles[0], p_nb=np.stack([one.p_nb for one in singles]), R_nb=np.stack([one.R_nb for one in singles])
-    )
+    p_nb, R_nb = (np.stack(part) for part in zip(*((one.p_nb, one.R_nb) for one in singles), strict=True))
+    together = replace(singles[0], p_nb=p_nb, R_nb=R_nb)
     planes, position = np.array([0.0, 2.0]), np.array([3.0, 4.0])
-    for row, one in enumerate(singles):
-        for sensor, expected in (
-            (m.pixels(together, planes), m.predict_pixel(position, one, planes[row])),
-            (
-                m.azimuths_elevations(together, planes),
-                m.predict_azimuth_elevation(position, one, planes[row]),
-            ),
-        ):
-            for ours, theirs in zip(sensor.predict(row, position), expected, strict=True):
+    platforms, yaws = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([0.0, 0.5])
+    for make, predict, poses, rows in (
+        (m.pixels, m.predict_pixel, (together, planes), (singles, planes)),
+        (m.azimuths_elevations, m.predict_azimuth_elevation, (together, planes), (singles, planes)),
+        (m.ranges_bearings, m.predict_range_bearing, (platforms, yaws), (platforms, yaws)),
+    ):
+        sensor = make(*poses)
+        for row, own in enumerate(zip(*rows, strict=True)):
+            for ours, theirs in zip(sensor.predict(row, position), predict(position, *own), strict=True):
                 assert np.allclose(ours, theirs)
     batch = m.predict_pixel(np.tile(position, (2, 1)), together, planes)
     assert np.allclose(batch.z[1], m.predict_pixel(position, singles[1], 2.0).z)
-    platform, yaw = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([0.0, 0.5])
-    both = m.ranges_bearings(platform, yaw).predict(1, position)
-    alone = m.bearings(platform, yaw).predict(1, position)
-    assert np.allclose(both.z, m.predict_range_bearing(position, [1.0, 1.0], 0.5).z)
-    assert alone.z.shape == (1,)
-    assert np.isclose(alone.z[0], both.z[1])
-    assert np.allclose(alone.H_pose, both.H_pose[1:])
+    for ours, theirs in zip(
+        m.bearings(platforms, yaws).predict(1, position), sensor.predict(1, position), strict=True
+    ):
+        assert np.allclose(ours, theirs[1:])
 
 
 def test_noise_follows_the_altitude():

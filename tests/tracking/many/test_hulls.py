@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -58,37 +61,36 @@ def test_the_near_side_of_a_ship_is_that_of_an_ellipse() -> None:
     assert np.isclose(seen([0.0, 0.0]), np.sqrt((144 + 9) / 2))
 
 
+def gathered(z: np.ndarray, likely: float | list[float], kinds: list[float], **changes: Any) -> Gathered:
+    """Measurements (M, m) with one sure track at the origin, as likely of the ship as told."""
+    likelihood = np.zeros((1, 2, len(z)))
+    likelihood[0, 1] = likely
+    sensor = LONG._replace(several=True, **changes)
+    m = z.shape[1]
+    J = np.arange(2.0 * m * len(z)).reshape(len(z), m, 2)
+    R = np.tile(np.eye(m), (len(z), 1, 1))
+    return gather(
+        z, R, J, np.zeros((1, 2)), np.array([kinds]), np.array([True]), likelihood, sensor, BOTH.hulls
+    )
+
+
+def along(*north: float, likely: float, clutter: float = 1e-5) -> Gathered:
+    """Of places along a line through a track whose kinds are as probable as each other."""
+    return gathered(np.array([[one, 0.0] for one in north]), likely, [0.5, 0.5], clutter=clutter)
+
+
 def test_parts_of_a_hull_count_as_they_are_likely() -> None:
     """The stern, seen now and then, does not pull a track aft whose superstructure is seen always."""
-    z, R = np.array([[0.0, 1.0], [-20.0, 0.0], [300.0, 0.0]]), np.tile(np.eye(2), (3, 1, 1))
-    likely = np.zeros((1, 2, 3))
-    likely[0, 1] = [0.03, 0.01, 0.0]
-    sensor = LONG._replace(several=True)
-    kinds, sure = np.array([[0.1, 0.9]]), np.array([True])
-    J = np.random.default_rng(0).normal(size=(3, 2, 2))
-    found = gather(z, R, J, np.array([[0.0, 0.0]]), kinds, sure, likely, sensor, BOTH.hulls)
+    z = np.array([[0.0, 1.0], [-20.0, 0.0], [300.0, 0.0]])
+    found = gathered(z, [0.03, 0.01, 0.0], [0.1, 0.9])
     assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.75]]) and len(found.R) == 2
-    assert np.allclose(found.shared, [J[2], 0.75 * J[0] + 0.25 * J[1]])
+    # What they share is numbered: 0 to 3 of the first, 4 to 7 of the second, 8 to 11 of the third.
+    assert np.allclose(found.shared, [[[8, 9], [10, 11]], [[1, 2], [3, 4]]])
     spread = 0.75 * np.outer([5, 0.25], [5, 0.25]) + 0.25 * np.outer([-15, -0.75], [-15, -0.75])
     assert np.allclose(found.R[1], np.eye(2) + spread)
     # What no gate takes is of the hull all the same, each part alike.
     z[1] = [-10.0, 0.0]
-    found = gather(
-        z, R, np.zeros((len(z), 2, 0)), np.array([[0.0, 0.0]]), kinds, sure, 0 * likely, sensor, BOTH.hulls
-    )
-    assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.5]])
-
-
-def along(*north: float, likely: float, clutter: float = 1e-5) -> Gathered:
-    """Measurements along a line through one track of 50 %, gathered; all of them as likely of the ship."""
-    z = np.array([[one, 0.0] for one in north])
-    likelihood = np.zeros((1, 2, len(z)))
-    likelihood[0, 1] = likely
-    return gather(
-        z, np.tile(np.eye(2), (len(z), 1, 1)), np.zeros((len(z), 2, 0)), np.zeros((1, 2)),
-        np.full((1, 2), 0.5), np.array([True]), likelihood,
-        LONG._replace(several=True, clutter=clutter), BOTH.hulls,
-    )  # fmt: skip
+    assert np.allclose(gathered(z, 0.0, [0.1, 0.9]).z, [[300.0, 0.0], [-5.0, 0.5]])
 
 
 def test_each_further_measurement_tells_of_a_ship_and_the_first_does_not() -> None:
@@ -115,21 +117,14 @@ def test_what_no_gate_takes_is_of_a_ship_up_to_a_little_more_than_its_half() -> 
 
 def test_bearings_of_one_hull_are_not_merged() -> None:
     """The mean of two on either side of south would be north."""
-    z, R = np.array([[np.pi - 0.01], [0.01 - np.pi]]), np.full((2, 1, 1), 1e-4)
-    kinds, sure = np.array([[0.1, 0.9]]), np.array([True])
-    sensor = LONG._replace(several=True, bearings=True)
-    found = gather(
-        z, R, np.zeros((len(z), 2, 0)), np.zeros((1, 2)), kinds, sure, np.ones((1, 2, 2)), sensor, BOTH.hulls
-    )
-    assert np.array_equal(found.z, z) and np.array_equal(found.kinds, kinds)
+    z = np.array([[np.pi - 0.01], [0.01 - np.pi]])
+    found = gathered(z, 1.0, [0.1, 0.9], bearings=True)
+    assert np.array_equal(found.z, z) and np.array_equal(found.kinds, [[0.1, 0.9]])
 
 
 def test_a_new_track_is_where_its_measurement_would_be_seen() -> None:
-    z, R, platform = (
-        np.array([[60.0, 5.0], [-20.0, 80.0]]),
-        np.tile(np.eye(2), (2, 1, 1)),
-        np.array([3.0, -9.0]),
-    )
+    z, platform = np.array([[60.0, 5.0], [-20.0, 80.0]]), np.array([3.0, -9.0])
+    R = np.tile(np.eye(2), (2, 1, 1))
     tracks = begin(z, R, 2.0, platform, (LONG,), 0, BOTH, 7, np.zeros((2, 2, 0)))
     seen = tracks.x[..., :2] + near_side(tracks.x, platform, LONG)
     assert np.allclose(seen, z[:, None], atol=0.05) and not np.allclose(tracks.x[:, 1, :2], z, atol=1.0)
@@ -137,10 +132,15 @@ def test_a_new_track_is_where_its_measurement_would_be_seen() -> None:
     assert np.allclose(tracks.P[:, 1, :2, :2], (1 + 1.0**2 + 6.0**2 / 2) * np.eye(2))
 
 
-def test_two_ends_of_one_hull_and_two_ships() -> None:
-    end = np.array([0.0, 0.0, 3.0, 0.0])
-    assert on_one_hull(end, [20.0, 2.0, 3.0, 0.2], SHIP)
-    assert not on_one_hull(end, [35.0, 0.0, 3.0, 0.0], SHIP), "too far ahead"
-    assert not on_one_hull(end, [10.0, 7.0, 3.0, 0.0], SHIP), "abreast"
-    assert not on_one_hull(end, [20.0, 0.0, 1.0, 0.0], SHIP), "slower"
+@pytest.mark.parametrize(
+    ("other", "one"),
+    [
+        ([20.0, 2.0, 3.0, 0.2], True),
+        ([35.0, 0.0, 3.0, 0.0], False),  # too far ahead
+        ([10.0, 7.0, 3.0, 0.0], False),  # abreast
+        ([20.0, 0.0, 1.0, 0.0], False),  # slower
+    ],
+)
+def test_two_ends_of_one_hull_and_two_ships(other: list[float], one: bool) -> None:
+    assert on_one_hull([0.0, 0.0, 3.0, 0.0], other, SHIP) == one
     assert not on_one_hull([0.0, 0.0, 0.1, 0.0], [5.0, 0.0, 0.1, 0.0], SHIP), "at rest nobody knows the line"

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.run import follow_many, run_many, step
 from wildlab.tracking.many.tracks import begin, moves
-from wildlab.tracking.maritime import white_acceleration
 
 EYE = SensorBeliefs("eye", 0.9, 1e-4, 0.0, 1e6, 3.0, (0.0,), (0.0,), (0.0,))
 POINTS = TargetBeliefs(
@@ -20,7 +19,19 @@ POINTS = TargetBeliefs(
     gate=4.5, confirmed=0.9, hits=3, shown=0.5, forgotten=0.01, lost_m=50.0, fastest_m_s=30.0, moves_m=0.0,
     over_s=15.0, apart_m=1.0,
 )  # fmt: skip
-R = np.eye(2)
+R, PLATFORM = np.eye(2), np.array([0.0, -500.0])
+
+
+def look(time: float, *places: Any, **more: Any) -> Scan:
+    """A scan of these places (2,), each known to a metre."""
+    z = np.reshape(places, (-1, 2)).astype(float)
+    usual = {"sensor": 0, "platform": PLATFORM, "z": z, "R": np.tile(R, (len(z), 1, 1))}
+    return Scan(float(time), **usual | more)
+
+
+def never(at: np.ndarray) -> np.ndarray:
+    """That no place is in view."""
+    return np.zeros(len(at), bool)
 
 
 def looks(places: np.ndarray, rng: np.random.Generator, clutter: int = 0, seen: float = 1.0) -> list[Scan]:
@@ -29,31 +40,12 @@ def looks(places: np.ndarray, rng: np.random.Generator, clutter: int = 0, seen: 
     for t, now in enumerate(places):
         own = now[rng.random(len(now)) < seen]
         z = np.concatenate([own + rng.normal(size=own.shape), rng.uniform(-100, 100, (clutter, 2))])
-        found.append(
-            Scan(float(t), 0, np.array([0.0, -500.0]), rng.permutation(z), np.tile(R, (len(z), 1, 1)))
-        )
+        found.append(look(t, *rng.permutation(z)))
     return found
 
 
 def lines(starts: np.ndarray, velocities: np.ndarray, steps: int) -> np.ndarray:
     return starts + velocities * np.arange(steps)[:, None, None]
-
-
-@given(st.integers(0, 1000))
-@settings(max_examples=20)
-def test_one_target_without_clutter_is_the_kalman_filter(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    sure = EYE._replace(detection=1 - 1e-12, clutter=1e-30)
-    scans = looks(lines(np.array([[5.0, 8.0]]), np.array([[1.0, -2.0]]), 15), rng)
-    targets = POINTS._replace(gate=1e3, lifetime_s=1e12, hidden_s=1e-9)
-    x, P = np.array([*scans[0].z[0], 0.0, 0.0]), np.diag([1.0, 1.0, 9.0, 9.0])
-    for scan, (tracks, _) in zip(scans, follow_many(scans, [sure], targets), strict=True):
-        if scan.time:
-            prior = predict(x, P, *white_acceleration(1.0, targets.density))
-            after = update(*prior, scan.z[0], np.eye(2, 4), R)
-            x, P = after.x, after.P
-        assert tracks.number == 1
-        assert np.allclose(tracks.x[0, 0], x) and np.allclose(tracks.P[0, 0], P)
 
 
 def test_clutter_alone_is_no_target() -> None:
@@ -65,7 +57,7 @@ def test_clutter_alone_is_no_target() -> None:
 def test_what_hides_for_a_while_keeps_its_name() -> None:
     rng = np.random.default_rng(2)
     scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 60), rng)
-    scans = [s if not 30 <= s.time < 38 else s._replace(z=s.z[:0], R=s.R[:0]) for s in scans]
+    scans = [s if not 30 <= s.time < 38 else look(s.time) for s in scans]
     shown = run_many(scans, [EYE], POINTS)
     assert [len(one.identity) for one in shown[34:38]] == [0] * 4, "not shown while nobody sees it"
     assert shown[29].identity.tolist() == shown[45].identity.tolist() != []
@@ -74,13 +66,9 @@ def test_what_hides_for_a_while_keeps_its_name() -> None:
 def test_what_is_not_in_view_is_not_missed() -> None:
     """The camera turns away for ten looks: a target that was sure stays as sure."""
     scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 30), np.random.default_rng(7))
-    away = [
-        one
-        if one.time < 15
-        else one._replace(z=one.z[:0], R=one.R[:0], sees=lambda at: np.zeros(len(at), bool))
-        for one in scans
-    ]
-    blind = [one if one.time < 15 else one._replace(z=one.z[:0], R=one.R[:0]) for one in scans]
+    away, blind = (
+        [one if one.time < 15 else look(one.time, sees=sees) for one in scans] for sees in (never, None)
+    )
     existence = [
         [tracks.existence.max() for tracks, _ in follow_many(these, [EYE], POINTS)] for these in (away, blind)
     ]
@@ -92,41 +80,35 @@ def test_a_target_gets_older_by_the_time_that_it_is_looked_at() -> None:
     targets = POINTS._replace(lifetime_s=20.0, hidden_s=1e-9)
     places = lines(np.array([[0.0, 0.0]]), np.array([[0.5, 0.0]]), 12)
     seen = looks(places, np.random.default_rng(3))
-    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
 
-    def after(times: list[float], eyes: int, hidden: tuple[float, float] = (0.0, 0.0)) -> float:
+    def after(times: Sequence[float], eyes: int, hidden: tuple[float, float] = (0.0, 0.0)) -> float:
         blind = [
-            Scan(t, n % eyes, np.array([0.0, -500.0]), *nothing,
-                 (lambda at: np.zeros(len(at), bool)) if hidden[0] < t < hidden[1] else None)
+            look(t, sensor=1 + n % eyes, sees=never if hidden[0] < t < hidden[1] else None)
             for n, t in enumerate(times)
-        ]  # fmt: skip
+        ]
         # A sensor that hardly ever detects: what is left of existence is its age.
-        rarely = EYE._replace(detection=1e-9)
-        both = [EYE, *[rarely] * eyes]
-        moved = [one._replace(sensor=one.sensor + 1) for one in blind]
-        return float(
-            [tracks.existence.max() for tracks, _ in follow_many([*seen, *moved], both, targets)][-1]
-        )
+        both = [EYE, *[EYE._replace(detection=1e-9)] * eyes]
+        *_, (tracks, _) = follow_many([*seen, *blind], both, targets)
+        return float(tracks.existence.max())
 
     start = after([12.0], 1)
-    alone = after([float(t) for t in range(12, 22)], 1)
+    alone = after(range(12, 22), 1)
     assert alone == pytest.approx(start * np.exp(-9 / 20), rel=1e-6)
-    assert after([float(t) for t in range(12, 22)], 2) == pytest.approx(alone, rel=1e-6)
+    assert after(range(12, 22), 2) == pytest.approx(alone, rel=1e-6)
     # Nobody looks at it from 13 s to 20 s: one look in sight before, one after, 1 s each.
-    away = after([float(t) for t in range(12, 22)], 1, (12.5, 20.5))
+    away = after(range(12, 22), 1, (12.5, 20.5))
     assert away == pytest.approx(start * np.exp(-1 / 20), rel=1e-6)
 
 
 def test_bearings_neither_confirm_nor_end_a_track() -> None:
     """Two sightings of three that are asked for: bearings add none, and without them none is missed."""
-    platform = np.array([0.0, -500.0])
     seen = looks(lines(np.array([[0.0, 0.0]]), np.array([[0.5, 0.0]]), 2), np.random.default_rng(3))
     eyes = [EYE, EYE._replace(bearings=True, clutter=1e-3)]
     one, none = (np.array([[np.pi / 2]]), np.full((1, 1, 1), 1e-4)), (np.zeros((0, 1)), np.zeros((0, 1, 1)))
     times, across = np.arange(1.1, 3.0, 0.1), []
     for z, R in (one, none):
-        scans = [*seen, *(Scan(float(t), 1, platform, z, R) for t in times)]
-        steps = [(tracks, shown) for tracks, shown in follow_many(scans, eyes, POINTS)]
+        scans = [*seen, *(look(t, sensor=1, z=z, R=R) for t in times)]
+        steps = list(follow_many(scans, eyes, POINTS))
         before = steps[1][0].existence[0]
         aged = before * np.exp(-(times[-1] - 1.0) / POINTS.lifetime_s)
         assert steps[-1][0].existence[0] == pytest.approx(aged, rel=1e-3)
@@ -150,8 +132,7 @@ def test_what_moves(gone: float, lasted: float, before: bool, right: bool) -> No
 def test_a_track_is_shown_as_long_as_the_sensor_that_saw_it_has_patience() -> None:
     """A slow sensor saw it; a fast one with little patience, which cannot, does not make it flicker."""
     slow = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 12), np.random.default_rng(7))
-    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
-    fast = [Scan(t, 1, np.array([0.0, -500.0]), *nothing) for t in np.arange(0.25, 12, 0.25)]
+    fast = [look(t, sensor=1) for t in np.arange(0.25, 12, 0.25)]
     eyes = [EYE._replace(patience_s=3.0), EYE._replace(patience_s=0.1, far_m=10.0)]
     shown = [one for one in run_many([*slow, *fast], eyes, POINTS) if one.time > 6]
     assert {len(one.identity) for one in shown} == {1}
@@ -170,12 +151,7 @@ def test_many_at_once_and_none() -> None:
     rng = np.random.default_rng(5)
     crowd = rng.uniform(-1000, 1000, (300, 2))
     crowd[7] = np.nan
-    scans = [
-        Scan(0.0, 0, np.zeros(2), np.zeros((0, 2)), np.zeros((0, 2, 2))),
-        Scan(1.0, 0, np.zeros(2), crowd, np.tile(R, (len(crowd), 1, 1))),
-        Scan(2.0, 0, np.zeros(2), crowd + 0.3, np.tile(R, (len(crowd), 1, 1))),
-        Scan(3.0, 0, np.zeros(2), np.zeros((0, 2)), np.zeros((0, 2, 2))),
-    ]
+    scans = [look(0.0), look(1.0, *crowd), look(2.0, *crowd + 0.3), look(3.0)]
     *_, (tracks, shown) = follow_many(scans, [EYE], POINTS)
     assert not len(shown.identity) and np.isfinite(tracks.x).all()
     assert run_many([], [EYE], POINTS) == []
@@ -195,7 +171,7 @@ def ship(seed: int, steps: int = 40) -> tuple[np.ndarray, list[Scan]]:
         along = rng.uniform(-13, 13, rng.integers(2, 4))
         z = np.stack([place[0] + along, np.full(len(along), place[1] - 3.0)], axis=1)
         z += 0.3 * rng.normal(size=z.shape)
-        scans.append(Scan(float(t), 0, np.array([0.0, -100.0]), z, np.tile(0.1 * R, (len(z), 1, 1))))
+        scans.append(look(t, *z, platform=np.array([0.0, -100.0]), R=np.tile(0.1 * R, (len(z), 1, 1))))
     return middle, scans
 
 
@@ -221,7 +197,7 @@ def test_a_measurement_is_compared_however_far_apart_two_kinds_have_a_target() -
         np.array([[50.0, 0.0]]), R[None], 0.0, platform, (eye,), 0, targets, 0, np.zeros((1, 2, 0))
     )
     tracks.x[0, 1, 0] = 150.0
-    scan = Scan(0.0, 0, platform, np.array([[150.0, 0.0]]), R[None])
+    scan = look(0.0, [150.0, 0.0], platform=platform)
     after, free = step(tracks._replace(existence=np.ones(1)), scan, 0.0, 0.0, (eye,), targets, 1)
     assert after.hits.tolist() == [2] and free == 1, "it is the track's, and begins none"
     assert after.kinds[0, 1] > 0.9
@@ -229,18 +205,18 @@ def test_a_measurement_is_compared_however_far_apart_two_kinds_have_a_target() -
 
 def test_bow_and_stern_of_a_known_ship_begin_no_target() -> None:
     """15 m off its middle, in no gate, and at a speed at which no track that begins there is a double."""
-    targets, platform = POINTS._replace(hulls=(SHIP,)), np.array([0.0, -500.0])
-    tracks = begin(np.zeros((1, 2)), R[None], 0.0, platform, (EYE,), 0, targets, 0, np.zeros((1, 2, 0)))
+    targets = POINTS._replace(hulls=(SHIP,))
+    tracks = begin(np.zeros((1, 2)), R[None], 0.0, PLATFORM, (EYE,), 0, targets, 0, np.zeros((1, 2, 0)))
     tracks.x[0, 0, 2] = 5.0
     known = tracks._replace(existence=np.ones(1), confirmed=np.ones(1, bool))
     for confirmed, off, began in ((known, 15.0, 0), (known, 30.0, 2), (tracks, 15.0, 2)):
-        ends = Scan(0.0, 0, platform, np.array([[off, 0.0], [-off, 0.0]]), np.tile(R, (2, 1, 1)))
+        ends = look(0.0, [off, 0.0], [-off, 0.0])
         _, free = step(confirmed, ends, 0.0, 0.0, (EYE,), targets, 1)
         assert free == 1 + began, off
 
 
 @pytest.mark.parametrize(("change", "words"), [({"time": np.nan}, "no time"), ({"sensor": 3}, "there are 1")])
 def test_scans_that_cannot_be_are_said(change: dict[str, float], words: str) -> None:
-    scan = Scan(0.0, 0, np.zeros(2), np.zeros((1, 2)), R[None])
+    scan = look(0.0, [0.0, 0.0])
     with pytest.raises(WildlabError, match=words):
         run_many([scan._replace(**change)], [EYE], POINTS)

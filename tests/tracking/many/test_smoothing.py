@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.tracking.many.test_run import look
 from tests.tracking.many.test_together import OPEN, SURE
 from wildlab.evaluation.consistency import chi_square_interval, nees
-from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many.beliefs import Hull, Scan, own_columns, own_lasting
+from wildlab.tracking.many.beliefs import Hull, own_columns, own_lasting
 from wildlab.tracking.many.run import Shown, run_many
 from wildlab.tracking.many.smoothing import smooth_considering, smooth_many
 from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.measurement import positions
+from wildlab.tracking.records import Start, Track
+from wildlab.tracking.run import run_filter
+from wildlab.tracking.smoothing import smooth
 
 H = np.eye(2, 4)
 
@@ -27,71 +33,36 @@ def shown(time: float, names: list[int], x: np.ndarray, P: np.ndarray) -> Shown:
     )  # fmt: skip
 
 
-def filtered(z: np.ndarray, times: np.ndarray, density: float) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    x, P = np.zeros(4), np.diag([25.0, 25.0, 4.0, 4.0])
-    means, covariances = [], []
-    for k, one in enumerate(z):
-        if k:
-            x, P = predict(x, P, *white_acceleration(float(times[k] - times[k - 1]), density))
-        after = update(x, P, one, H, np.eye(2))
-        x, P = after.x, after.P
-        means.append(x)
-        covariances.append(P)
-    return means, covariances
+def filtered(seed: int, density: float) -> Track:
+    """One target by the filter of one target, at uneven times."""
+    rng = np.random.default_rng(seed)
+    times, z = np.cumsum(rng.uniform(0.2, 3.0, 6)), rng.normal(0, 5, (6, 2))
+    start = Start(times[0], np.zeros(4), np.diag([25.0, 25.0, 4.0, 4.0]))
+    return run_filter(times, z, np.eye(2), positions(), partial(white_acceleration, density=density), start)
 
 
 @given(st.integers(0, 10_000), st.floats(0.05, 2.0))
 @settings(max_examples=30, deadline=None)
-def test_it_is_the_solution_of_all_equations_at_once(seed: int, density: float) -> None:
-    rng = np.random.default_rng(seed)
-    times = np.cumsum(rng.uniform(0.2, 3.0, 6))
-    z = rng.normal(0, 5, (6, 2))
-    means, covariances = filtered(z, times, density)
-    after = smooth_many(
-        [shown(t, [7], x, P) for t, x, P in zip(times, means, covariances, strict=True)], density
-    )
-    # Information of the start, of every measurement and of every step between, of all states together.
-    Y, y = np.zeros((24, 24)), np.zeros(24)
-    Y[:4, :4] += np.linalg.inv(np.diag([25.0, 25.0, 4.0, 4.0]))
-    for k in range(6):
-        rows = slice(4 * k, 4 * k + 4)
-        Y[rows, rows] += H.T @ H
-        y[rows] += H.T @ z[k]
-        if k:
-            F, Q = white_acceleration(float(times[k] - times[k - 1]), density)
-            pair = slice(4 * k - 4, 4 * k + 4)
-            G = np.hstack([-F, np.eye(4)])
-            Y[pair, pair] += G.T @ np.linalg.inv(Q) @ G
-    whole = np.linalg.inv(Y)
-    expected = (whole @ y).reshape(6, 4)
-    for k, (x, P) in enumerate(after):
-        assert x[0] == pytest.approx(expected[k], rel=1e-5, abs=1e-5)
-        assert P[0] == pytest.approx(whole[4 * k : 4 * k + 4, 4 * k : 4 * k + 4], rel=1e-4, abs=1e-5)
-
-
-def test_each_track_is_smoothed_by_itself_and_on_either_side_of_an_absence() -> None:
-    rng = np.random.default_rng(3)
-    times = np.arange(6.0)
-    a, b = (filtered(rng.normal(0, 5, (6, 2)), times, 0.5) for _ in range(2))
-    alone = smooth_many([shown(t, [1], x, P) for t, x, P in zip(times, *a, strict=True)], 0.5)
+def test_each_track_is_smoothed_by_itself_and_on_either_side_of_an_absence(seed: int, density: float) -> None:
+    one = filtered(seed, density)
+    other = one.x[::-1], one.P[::-1]
+    alone = smooth(one, partial(white_acceleration, density=density))
     # The other one changes places with it in the rows, and is absent at the fourth look.
-    looks = []
-    for k, t in enumerate(times):
-        order = [2, 1] if k % 2 else [1, 2]
-        order = [1] if k == 3 else order
-        states = {1: (a[0][k], a[1][k]), 2: (b[0][k], b[1][k])}
-        looks.append(
-            shown(t, order, np.array([states[n][0] for n in order]), np.array([states[n][1] for n in order]))
+    looks, orders = [], ([1, 2], [2, 1], [1, 2], [1], [1, 2], [2, 1])
+    for k, order in enumerate(orders):
+        x, P = (
+            np.array([(mine[k], its[k])[n - 1] for n in order])
+            for mine, its in zip(one[1:3], other, strict=True)
         )
-    after = smooth_many(looks, 0.5)
-    for k, one in enumerate(looks):
-        place = one.identity.tolist().index(1)
-        assert np.allclose(after[k][0][place], alone[k][0][0])
-        assert np.allclose(after[k][1][place], alone[k][1][0])
-    before = looks[2].identity.tolist().index(2)
+        looks.append(shown(one.times[k], order, x, P))
+    after = smooth_many(looks, density)
+    for k, order in enumerate(orders):
+        x, P = (part[order.index(1)] for part in after[k])
+        assert x == pytest.approx(alone.x[k], rel=1e-5, abs=1e-5)
+        assert pytest.approx(alone.P[k], rel=1e-4, abs=1e-5) == P
     # Its last look before the absence and its last of all know nothing later.
-    assert np.allclose(after[2][0][before], b[0][2])
-    assert np.allclose(after[5][0][looks[5].identity.tolist().index(2)], b[0][5])
+    for k in (2, 5):
+        assert np.allclose(after[k][0][orders[k].index(2)], other[0][k])
 
 
 def test_what_was_given_is_not_changed_and_nothing_stays_nothing() -> None:
@@ -160,7 +131,7 @@ def test_errors_are_as_large_as_tracks_of_two_sensors_say() -> None:
         lasts = left * lasts + np.sqrt(1 - left**2) * rng.normal(size=lasts.shape)
         error = np.sqrt(share) * lasts[which] + np.sqrt(1 - share) * rng.normal(size=(count, 2))
         z, R = state[:, :2] + np.hypot(own[which], rough[which]) * error, own[which] ** 2 * np.eye(2)
-        scans.append(Scan(t / 2, which, np.array([0.0, -500.0]), z, np.tile(R, (count, 1, 1))))
+        scans.append(look(t / 2, *z, sensor=which, R=np.tile(R, (count, 1, 1))))
         way.append(state[:, :2])
         F, Q = white_acceleration(0.5, targets.density)
         state = state @ F.T + rng.multivariate_normal(np.zeros(4), Q, count)

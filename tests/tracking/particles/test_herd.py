@@ -106,7 +106,7 @@ def test_those_never_seen_are_the_exact_grid():
     herd = expect(RULES, 8.0, inside, np.zeros(2), SIZE, rng, particles=30_000)
     grid = grid_over(inside, [0, 0], SIZE, 2.0)
     T, intensity = walk_matrix(grid, 0.5, 4.0), np.full(len(grid.places), 8.0 / len(grid.places))
-    for k, one in enumerate(world(rng, 0, images=12, clutter=0.0).looks):
+    for k, one in enumerate(world(rng, 0, images=12, clutter=0.0)):
         herd, _ = step_counting(herd, one, RULES, rng)
         intensity = (T @ intensity if k else intensity) * (1 - one.sight(grid.places))
     # The error of a share of 30 000 particles, and that of cells of 2 m at the edges of the images.

@@ -8,7 +8,6 @@ import pytest
 from tests.tracking.particles.worlds import (
     RULES,
     SIZE,
-    followed,
     inside,
     world,
 )
@@ -39,9 +38,10 @@ def counted(images):
     for seed in range(WORLDS):
         rng = np.random.default_rng([seed, 2024])
         animals = int(rng.poisson(12))
-        w = world(rng, animals, images=images)
+        looks = world(rng, animals, images=images)
         herd = expect(RULES, 12.0, inside, np.zeros(2), SIZE, rng, particles=3000)
-        *_, (herd, _) = followed(w.looks, herd, step_counting, RULES, rng)
+        for look in looks:
+            herd, _ = step_counting(herd, look, RULES, rng)
         p = count_probabilities(herd.existence, herd.expected_unseen)
         count = count_interval(p, 0.9)
         exact.append(held_exactly(p, animals, 0.9) if animals < len(p) else 0.0)

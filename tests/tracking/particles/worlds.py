@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
-
 import numpy as np
 
 from wildlab.tracking.particles import Look, Rules, move, stay_inside, walk_of
@@ -26,12 +23,6 @@ def moves(cloud, seen, dt, rng):
 RULES = Rules(moves, particles=400, scheme="systematic")
 
 
-class World(NamedTuple):
-    looks: list[Look]
-    truth: np.ndarray  # (T, A, 2)
-    source: list[np.ndarray]  # for each image, which animal each detection is of, -1 for a false one
-
-
 def footprint(k):
     """Lanes to and fro: 50 m by 30 m, which move on by half their length."""
     lane, along = divmod(k, 5)
@@ -49,27 +40,19 @@ def sight_from(middle, probability):
 
 
 def world(rng, animals, images=30, dt=4.0, probability=0.8, clutter=2e-5):
+    """What each image shows."""
     at = rng.uniform(0, SIZE, (animals, 2))
-    looks, truth, source = [], [], []
+    looks = []
     for k in range(images):
         if k:
             step = at + rng.standard_normal((animals, 2)) * np.sqrt(WALK(dt)[1][0, 0])
             at = np.where(inside(step)[:, None], step, at)
         middle = footprint(k)
         sight = sight_from(middle, probability)
-        found = np.flatnonzero(rng.random(animals) < sight(at))
-        z = at[found] + NOISE * rng.standard_normal((len(found), 2))
+        seen = at[rng.random(animals) < sight(at)]
+        z = seen + NOISE * rng.standard_normal(seen.shape)
         low, high = np.maximum(middle - VIEW, 0), np.minimum(middle + VIEW, SIZE)
         false = rng.uniform(low, high, (rng.poisson(clutter * np.prod(high - low)), 2))
-        order = rng.permutation(len(z) + len(false))
-        both = np.concatenate([z, false])[order]
+        both = rng.permutation(np.concatenate([z, false]))
         looks.append(Look(k * dt, both, np.tile(NOISE**2 * np.eye(2), (len(both), 1, 1)), sight, clutter))
-        source.append(np.concatenate([found, np.full(len(false), -1)])[order])
-        truth.append(at)
-    return World(looks, np.array(truth), source)
-
-
-def followed(looks, herd, step, rules, rng) -> Iterator:
-    for look in looks:
-        herd, taken = step(herd, look, rules, rng)
-        yield herd, taken
+    return looks
