@@ -14,12 +14,12 @@ import pytest
 from bs4 import BeautifulSoup
 
 from tests.commands import refuse, succeed
+from tests.sharing.left import leave_report
 from wildlab.flight.store import save_flight
-from wildlab.reporting import metrics as schema
 from wildlab.reporting.comparison import QUANTITIES, flights_table
+from wildlab.reporting.metrics import metric
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.record.own_flights import own_flights
-from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.simulation.twins import simulate_twin
 
 
@@ -29,29 +29,16 @@ def leave(
     end: str = "-overview",
     *,
     numbers: dict[tuple[str, str], float | dict[str, float]] | None = None,
-    state: str = "done",
     lacking: tuple[str, ...] = (),
-    folder: Path | None = None,
-) -> Path:
+    state: str = "done",
+) -> None:
     """What a run leaves behind, without the run."""
-    target = reports / f"{flight}{end}"
-    target.mkdir(parents=True)
-    (target / "report.html").write_text("<p>report</p>")
     entries = [
-        schema.metric(name, subject, unit="m", **(value if isinstance(value, dict) else {"value": value}))
+        metric(name, subject, unit="m", **(value if isinstance(value, dict) else {"value": value}))
         for (name, subject), value in (numbers or {}).items()
     ]
-    if state == "done":
-        content = schema.document(
-            study=target.name, flight=flight, kind="logged", seed=1, seeds=None, metrics=entries, claims=[]
-        )
-        schema.write_metrics(target / "metrics.json", content)
-    about = provenance_of_flight(folder) if folder else {"name": flight, "kind": "logged", "files": {}}
-    provenance = {"flight": about, "parameters": {"lacking": list(lacking)}}
-    (target / "provenance.json").write_text(json.dumps(provenance))
-    status = {"state": state, "seconds": 3.0, "finished": "2026-11-22T10:15:00+00:00", "reason": "it rained"}
-    (target / "status.json").write_text(json.dumps(status))
-    return target
+    told = {"lacking": list(lacking)}
+    leave_report(reports / f"{flight}{end}", flight, metrics=entries, parameters=told, state=state)
 
 
 def counts(problems: int, worth: int, troubled: int, judged: int, length: float = 600.0) -> dict[Any, Any]:

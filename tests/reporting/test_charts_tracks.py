@@ -9,29 +9,13 @@ from wildlab.reporting.charts.tracks import (
     error_over_time,
     speed_and_course,
     squares_over_time,
-    track_map,
 )
-from wildlab.reporting.figures import colour
 
 TIMES = np.arange(0.0, 20.0, 0.1)
 SEEN = (TIMES < 5.0) | (TIMES > 15.0)
 NAMES = {"ekf": "Extended", "schmidt": "Schmidt"}
 #: At 1 m/s to the north, a little east and west of it.
 TRUTH = np.column_stack([TIMES, 0 * TIMES, 0 * TIMES + 1.0, 0.05 * np.sin(TIMES)])
-
-
-def legend(figure):
-    return [text.get_text() for text in figure.legends[0].get_texts()]
-
-
-def test_a_map_has_the_truth_over_all_else():
-    tracks = {who: TRUTH + i + 1 for i, who in enumerate(NAMES)}
-    figure = track_map(TRUTH, tracks, NAMES, "Map", measured=TRUTH[SEEN], aircraft=10 * TRUTH)
-    assert legend(figure) == ["aircraft", "single images", "Extended", "Schmidt", "truth"]
-    lines = {line.get_label(): line for line in figure.axes[0].lines}
-    assert np.array_equal(lines["Schmidt"].get_ydata(), TRUTH[:, 0] + 2)  # north is up
-    assert lines["Extended"].get_linewidth() > lines["Schmidt"].get_linewidth()
-    assert lines["truth"].get_color() == colour("truth")
 
 
 @pytest.mark.parametrize("strips", [1, 2])
@@ -43,10 +27,7 @@ def test_errors_are_distances_or_north_and_east(strips):
         line = next(line for line in ax.lines if line.get_label() == "Extended")
         assert np.array_equal(line.get_ydata(), np.column_stack([error])[:, i])
         assert len(ax.patches) == 1  # the pause
-        strokes = ax.lines[-1]
-        assert len(strokes.get_xdata()) == SEEN.sum()
-    assert figure.axes[0].get_title(loc="left") == "Errors"
-    assert figure.axes[-1].get_xlabel() == "time since the first detection (s)"
+        assert len(ax.lines[-1].get_xdata()) == SEEN.sum()
 
 
 def courses(figure):
@@ -79,13 +60,7 @@ def test_courses_all_round_break_over_north():
 
 
 def test_values_at_detections_alone_are_dots():
-    nees = np.full(len(TIMES), 2.0)
-    nis = np.where(SEEN, 0.5, np.nan)
+    nis, nees = np.where(SEEN, 0.5, np.nan), np.full(len(TIMES), 2.0)
     figure = squares_over_time(TIMES, SEEN, {"NIS": {"ekf": nis}, "NEES": {"ekf": nees}}, NAMES, "Squares")
-    styles = [
-        [one.get_linestyle() for one in ax.lines if one.get_label() == "Extended"] for ax in figure.axes
-    ]
-    assert styles == [["None"], ["-"]]
-    assert [ax.get_ylabel() for ax in figure.axes] == ["NIS", "NEES"]
-    assert all(ax.get_yscale() == "log" for ax in figure.axes)
-    assert legend(figure) == ["Extended"]
+    dots, line = (one for ax in figure.axes for one in ax.lines if one.get_label() == "Extended")
+    assert (dots.get_linestyle(), line.get_linestyle()) == ("None", "-")

@@ -55,12 +55,8 @@ def made(
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", ["map", "identities", "wrong"])
 def test_letters_can_be_read_and_lie_on_no_others(name: str, seed: int) -> None:
-    followed, lives = made(seed)
-    figure = {
-        "map": lambda: charts.map_shown(followed),
-        "identities": lambda: charts.identities_shown(followed, lives),
-        "wrong": lambda: charts.wrong_shown(followed, lives),
-    }[name]()[0]
+    given = made(seed)
+    figure = getattr(charts, f"{name}_shown")(*given[: 1 if name == "map" else 2])[0]
     figures.png_bytes(figure)
     assert overlapping(figure) == []
     assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH

@@ -125,19 +125,12 @@ def test_names_are_only_text_and_what_is_not_known_is_not_said() -> None:
 
 def test_what_counts_as_on_a_target_must_hold_honest_errors_and_whole_hulls() -> None:
     """Three standard deviations of the tracks, and the longest hull: else a larger reach is advised."""
-
-    def advised(one: Any) -> list[str]:
-        return [told for told in words.summary(one, lives())[0] if "reach_m" in told]
-
-    wide = followed()
-    assert advised(wide) == []
-    for look in wide.shown:
-        look.P[:, 0, 0] = 7.0**2
-    assert len(advised(wide)) == 1 and "reach_m = 21" in advised(wide)[0]
-    wide.cutoff_m = 22.0
-    assert advised(wide) == []
-    long = followed()
-    long.targets = SimpleNamespace(hulls=(POINT, Hull("ferry", 60.5, 12.0)))
-    assert len(advised(long)) == 1 and "reach_m = 61" in advised(long)[0]
-    long.cutoff_m = 61.0
-    assert advised(long) == []
+    for sd, hulls, reach in ((1.0, (), 0), (7.0, (), 21), (1.0, (Hull("ferry", 60.5, 12.0),), 61)):
+        one = followed()
+        one.targets = SimpleNamespace(hulls=(POINT, *hulls))
+        for look in one.shown:
+            look.P[:, 0, 0] = sd**2
+        for cutoff, advised in ((20.0, bool(reach)), (max(reach, 20.0) + 1.0, False)):
+            one.cutoff_m = cutoff
+            told = [told for told in words.summary(one, lives())[0] if "reach_m" in told]
+            assert [f"reach_m = {reach}" in one for one in told] == [True] * advised

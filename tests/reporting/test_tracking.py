@@ -31,7 +31,7 @@ def colour(rows: pd.DataFrame, pairs: list[Apart] | None = None) -> str:
 
 
 def test_the_best_consistent_filter_leads() -> None:
-    assert colour(rows()) == "good" and leading_filter(rows()) == "schmidt"
+    assert leading_filter(rows()) == "schmidt"
     # However much larger its error is than that of one which is not consistent.
     assert leading_filter(rows(rmse=8.0)) == "schmidt"
     both = rows().assign(verdict="consistent", nees=2.0, rmse=[3.9, 4.0])
@@ -55,8 +55,18 @@ def test_a_filter_that_its_detections_surprise_is_looked_at(nis: float, level: s
     assert ("detections" in words.reason_of(odd)) == (level == "warn")
 
 
-def test_few_detections_do_not_surprise() -> None:
-    assert colour(rows(nis=4.6, nis_high=3.9, nis_worth=6.0, nis_verdict="overconfident")) == "good"
+@pytest.mark.parametrize(
+    ("changes", "level"),
+    [
+        ({}, "good"),
+        # Few detections do not surprise, and what few values say is neither green nor red.
+        ({"nis": 4.6, "nis_high": 3.9, "nis_worth": 6.0, "nis_verdict": "overconfident"}, "good"),
+        ({"nees_worth": 4.0}, "neutral"),
+        ({"nees": 5.3, "verdict": "overconfident"}, "warn"),
+    ],
+)
+def test_the_colour_of_the_verdict(changes: dict[str, object], level: str) -> None:
+    assert colour(rows(**changes)) == level
 
 
 def blind() -> pd.DataFrame:
@@ -92,17 +102,11 @@ def test_few_values_are_an_excuse_near_the_band_only(nees: float, few: bool) -> 
     assert words.on_few(row) == few
 
 
-def test_what_few_values_say_is_neither_green_nor_red() -> None:
-    assert colour(rows(nees_worth=4.0)) == "neutral"
-    assert colour(rows(nees=5.3, verdict="overconfident")) == "warn"
-
-
 def test_time_without_the_target_is_a_number_of_its_own() -> None:
-    changes = {"rmse": 9.4, "compared": 263, "without": 1084, "rmse_without": 205.0, "wait": 67.7}
-    said, _ = words.summary(rows(**changes), [], None)
-    assert "9.4 m" in said[0] and "263 of 1347" in said[0]
-    assert "205 m" in said[1] and "67.7 s" in said[1]
-    table = words.tracks_table(rows(**changes))
+    lost = rows(rmse=9.4, compared=263, without=1084, rmse_without=205.0, wait=67.7)
+    said, _ = words.summary(lost, [], None)
+    assert "263 of 1347" in said[0] and "205 m" in said[1]
+    table = words.tracks_table(lost)
     assert table["compared"].tolist() == [100, 263] and table["rmse_without"].iloc[1] == 205.0
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
@@ -25,25 +26,10 @@ SECONDS, RATE = 60.0, 100.0
 HASH = "c0ffee" * 10 + "cafe"
 
 
-def attitude(t: Array) -> Array:
-    """(N, 3, 3) from b to n: turning, and banking a little."""
-    yaw, roll = 0.8 + 0.05 * t, 0.2 * np.sin(0.4 * t)
-    c, s, a, b = np.cos(yaw), np.sin(yaw), np.cos(roll), np.sin(roll)
-    zero = np.zeros_like(t)
-    Z = np.stack(
-        [np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, zero + 1], -1)], -2
-    )
-    X = np.stack(
-        [np.stack([zero + 1, zero, zero], -1), np.stack([zero, a, -b], -1), np.stack([zero, b, a], -1)], -2
-    )
-    return np.asarray(Z @ X)
-
-
-def quaternion(t: Array) -> Array:
-    """(N, 4) of the same: w, x, y, z."""
-    yaw, roll = 0.8 + 0.05 * t, 0.2 * np.sin(0.4 * t)
-    cy, sy, cr, sr = np.cos(yaw / 2), np.sin(yaw / 2), np.cos(roll / 2), np.sin(roll / 2)
-    return np.column_stack([cy * cr, cy * sr, sy * sr, sy * cr])
+def attitude(t: Array) -> Rotation:
+    """From b to n: turning, and banking a little."""
+    angles = np.column_stack([0.8 + 0.05 * t, np.zeros_like(t), 0.2 * np.sin(0.4 * t)])
+    return Rotation.from_euler("ZYX", angles)
 
 
 def place(t: Array, corner: Array) -> Array:
@@ -69,11 +55,11 @@ def felt(t: Array, p: Array, where: tuple[float, float, float]) -> tuple[Array, 
     g = earth.gravity + earth.gradient * p[:, 2]
     pull = np.column_stack([-g * earth.curvature * p[:, 0], -g * earth.curvature * p[:, 1], g])
     turning = np.array(earth.rate)
-    R = attitude(t)
-    f = np.einsum("nji,nj->ni", R, acceleration(t) - pull + 2 * np.cross(turning, velocity(t)))
+    to_body = attitude(t).inv()
+    f = to_body.apply(acceleration(t) - pull + 2 * np.cross(turning, velocity(t)))
     roll, roll_rate, yaw_rate = 0.2 * np.sin(0.4 * t), 0.08 * np.cos(0.4 * t), 0.05
     w = np.column_stack([roll_rate, yaw_rate * np.sin(roll), yaw_rate * np.cos(roll)])
-    return f, w + np.einsum("nji,j->ni", R, turning)
+    return f, w + to_body.apply(turning)
 
 
 def canary(
@@ -92,7 +78,7 @@ def canary(
     t = np.arange(0, SECONDS + 1e-9, 0.2)
     nav = pd.DataFrame({"time_s": t + START})
     nav[["north_m", "east_m", "down_m"]] = place(t, at)
-    nav[["q_w", "q_x", "q_y", "q_z"]] = quaternion(t)
+    nav[["q_w", "q_x", "q_y", "q_z"]] = attitude(t).as_quat(scalar_first=True)
     nav[["v_north_m_s", "v_east_m_s", "v_down_m_s"]] = velocity(t)
     nav["lat_raw"] = where[0]
     frames = pd.DataFrame(
@@ -127,7 +113,7 @@ def canary(
             **dict(zip(columns, np.column_stack([f, w]).T, strict=True))
         )
         iron = [2.0, -1.0, 4.0]
-        m = field[0] * np.einsum("nji,j->ni", attitude(t), earth_field(*np.radians(field[1:]))) + iron
+        m = field[0] * attitude(t).inv().apply(earth_field(*np.radians(field[1:]))) + iron
         tables["magnetometer"] = pd.DataFrame({"time_s": t + START}).assign(
             **dict(zip(("field_x_ut", "field_y_ut", "field_z_ut"), m.T, strict=True))
         )

@@ -63,7 +63,7 @@ def test_nothing_runs_asks_or_lies_beside(tmp_path: Path) -> None:
     assert not soup.find_all(["script", "iframe", "form", "object", "embed", "link", "base"])
     assert not [tag for tag in soup.find_all(True) if any(name.startswith("on") for name in tag.attrs)]
     assert [tag["src"] for tag in soup.find_all(src=True)] == ["data:image/png;base64,YQ=="] * 2
-    for secret in (
+    for secret in [
         "jonas",
         "kestrel",
         "example.org",
@@ -71,7 +71,7 @@ def test_nothing_runs_asks_or_lies_beside(tmp_path: Path) -> None:
         "ledger</a>",
         "kifaru-ridge",
         "provenance.json",
-    ):
+    ]:
         assert secret not in text
 
 

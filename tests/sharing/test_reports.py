@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sharing.left import leave_report
 from wildlab.errors import WildlabError
-from wildlab.files import write_json
 from wildlab.runner.record.digests import seal
 from wildlab.runner.track_many import NOTEBOOK
 from wildlab.sharing.reports import sources_of
@@ -15,11 +15,8 @@ from wildlab.sharing.reports import sources_of
 
 def report(folder: Path, *, notebook: str = "overview.ipynb", tables: str = "x") -> None:
     """One that is done, on a flight of this name."""
-    folder.mkdir(parents=True)
-    (folder / "report.html").write_text("<p>x</p>", encoding="utf-8")
-    flight = {"name": "kifaru-ridge", "kind": "logged", "files": {"nav": tables}}
-    told = {"flight": flight, "parameters": {"source": folder.name}, "notebook": {"file": notebook}}
-    write_json(folder / "provenance.json", told)
+    told = {"source": folder.name}
+    leave_report(folder, "kifaru-ridge", parameters=told, notebook=notebook, files={"nav": tables})
     seal(folder, {"state": "done"}, ("provenance.json",))
 
 

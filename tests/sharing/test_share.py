@@ -14,54 +14,36 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import pytest
 import pyzipper
 from bs4 import BeautifulSoup
 
 from tests.sharing.canary import HASH, canary
+from tests.sharing.left import everything, leave_report
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
-from wildlab.flight.manifest import Manifest, manifest_toml
+from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.reporting.metrics import AGAINST, document, metric
+from wildlab.reporting.metrics import AGAINST, metric
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
 from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.sharing import redrawn
 from wildlab.sharing.agreement import share_apart
 from wildlab.sharing.reports import of_a_study
 from wildlab.sharing.share import BEWARE, share
 from wildlab.simulation.parameters import load_twin
 
+REPORT = Path("reports/kifaru-ridge")
 SECRETS = (
     *("kifaru", "Olifants", "Letaba", "Skukuza", "Jonas", "Kestrel", "Thandi", "873165", "486297", "13.57"),
     *("2023-09-17", HASH[:8], "lat_raw"),
 )
 
 
-def write_report(folder: Path, flight: Path, body: str, parameters: dict[str, Any] | None = None) -> None:
-    folder.mkdir(parents=True)
-    (folder / "report.html").write_text(page(title="x", body=f"<h1>Report</h1>{body}"), encoding="utf-8")
-    given = parameters or {"source": "Kestrel-log"}
-    write_json(folder / "provenance.json", {"flight": provenance_of_flight(flight), "parameters": given})
-    write_json(folder / "status.json", {"state": "done"})
+def leave(folder: Path, flight: Path, body: str = "") -> None:
     numbers = [metric(name="error", subject="logged-pose", value=3.25, unit="m")]
-    content = document(study="x", flight="x", kind="logged", seed=1, seeds=None, metrics=numbers, claims=[])
-    write_json(folder / "metrics.json", content)
-
-
-def everything(flight: Path) -> str:
-    """All that a flight says, as a careless report might print it."""
-    loaded = load_flight(flight)
-    tables = {**loaded.nav, **loaded.tables}
-    # Its first and last rows: of every group, and few enough to be read quickly.
-    shown = "".join(
-        f"<h2>{escape(name)}</h2>{pd.concat([table.head(3), table.tail(3)]).to_html()}"
-        for name, table in tables.items()
-    )
-    return f"<pre>{escape(manifest_toml(loaded.manifest))}</pre>{shown}"
+    leave_report(folder, flight, body, metrics=numbers, parameters={"source": "Kestrel-log"})
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +52,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("kept")
     flight = folder / "flights" / "kifaru-ridge"
     save_flight(canary(locations={"category": 2}, imu=False), flight)
-    write_report(folder / "reports" / "kifaru-ridge", flight, everything(flight))
+    leave(folder / "reports" / "kifaru-ridge", flight, everything(flight))
     return folder
 
 
@@ -83,7 +65,7 @@ def made(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def evaluate(folder: Path, *, source: str | None, reports: Path, **_: Any) -> list[Outcome]:
         name = load_flight(folder).name
         assert source in load_flight(folder).nav
-        write_report(reports / name, folder, everything(folder))
+        leave(reports / name, folder, everything(folder))
         return [Outcome(name, "done", 1.0, "", reports / name)]
 
     monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
@@ -91,23 +73,22 @@ def made(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_canary_is_in_no_copy_but_that_of_the_team(made: Path) -> None:
-    report = made / "reports" / "kifaru-ridge"
     for tier in ("public", "partner"):
-        copy = share(report, tier)  # type: ignore[arg-type]
+        copy = share(REPORT, tier)  # type: ignore[arg-type]
         assert copy.file.name == f"flight-{tier}.html"
         text = copy.file.read_text(encoding="utf-8")
         for secret in SECRETS:
             assert secret not in text, (tier, secret)
         assert "24.9° S" in text and "dataGeneralizations" in text and "September 2023" in text
         assert "All 1 numbers" in text
-    team = share(report, "team")
+    team = share(REPORT, "team")
     text = team.file.read_text(encoding="utf-8")
     assert team.file.name == "kifaru-ridge-team.html"
     assert "Olifants" in text and "873165" in text
 
 
 def test_the_sender_is_told_in_a_file_that_others_cannot_read(made: Path) -> None:
-    copy = share(made / "reports" / "kifaru-ridge")
+    copy = share(REPORT)
     told = copy.told.read_text(encoding="utf-8")
     for secret in ("kifaru-ridge", "-24.873165", "Thandi", "Kestrel of Olifants camp"):
         assert secret in told
@@ -120,7 +101,7 @@ def test_the_sender_is_told_in_a_file_that_others_cannot_read(made: Path) -> Non
 
 def test_a_zip_is_encrypted_and_lists_neutral_names(made: Path) -> None:
     words = "four words that differ"
-    copy = share(made / "reports" / "kifaru-ridge", password=words)
+    copy = share(REPORT, password=words)
     assert copy.file.name == "flight-public.zip"
     with zipfile.ZipFile(copy.file) as zipped:
         assert [(one.filename, one.date_time[0]) for one in zipped.infolist()] == [("flight.html", 1980)]
@@ -148,18 +129,18 @@ def test_what_slips_through_is_found_and_no_copy_is_left(
 
     monkeypatch.setattr(redrawn, "evaluate_flight", leaky)
     with pytest.raises(RunFailed, match="no copy"):
-        share(made / "reports" / "kifaru-ridge")
+        share(REPORT)
     assert sorted(path.name for path in made.iterdir()) == ["flights", "reports"]
 
 
 def test_a_name_of_the_file_that_gives_the_place_away_is_refused(made: Path) -> None:
     with pytest.raises(RunFailed, match="the name of the file"):
-        share(made / "reports" / "kifaru-ridge", out=made / "kifaru-ridge.html")
+        share(REPORT, out=made / "kifaru-ridge.html")
     with pytest.raises(RunFailed, match="the name of the file"):
-        share(made / "reports" / "kifaru-ridge", out=made / "olifants.zip", zipped=True)
+        share(REPORT, out=made / "olifants.zip", zipped=True)
     # That of its folder, by which reports are called, is a secret beside the one that it states.
     flight = (made / "flights" / "kifaru-ridge").rename(made / "flights" / "mopani")
-    write_report(made / "reports" / "mopani", flight, "")
+    leave(made / "reports" / "mopani", flight)
     with pytest.raises(RunFailed, match="the name of the file"):
         share(made / "reports" / "mopani", out=made / "mopani.html")
     assert not list(made.glob("*.html")) and not list(made.glob("*.zip"))
@@ -171,7 +152,7 @@ def test_nothing_is_left_of_what_was_broken_off(made: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(redrawn, "evaluate_flight", broken)
     with pytest.raises(KeyboardInterrupt):
-        share(made / "reports" / "kifaru-ridge")
+        share(REPORT)
     assert sorted(path.name for path in made.iterdir()) == ["flights", "reports"]
 
 
@@ -181,7 +162,7 @@ def test_a_report_that_fails_on_the_copy_stops_it(made: Path, monkeypatch: pytes
 
     monkeypatch.setattr(redrawn, "evaluate_flight", failed)
     with pytest.raises(RunFailed, match="no rays"):
-        share(made / "reports" / "kifaru-ridge")
+        share(REPORT)
 
 
 def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(
@@ -191,32 +172,31 @@ def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(
     clean = redrawn.evaluate_flight
 
     def failed(folder: Path, *, reports: Path, **more: Any) -> list[Outcome]:
-        write_report(reports / "flight-navigation", folder, "<h2>half a report</h2>")
+        leave(reports / "flight-navigation", folder, "<h2>half a report</h2>")
         lost = Outcome("flight-navigation", "failed", 1.0, "lost near Letaba.")
         return [*clean(folder, reports=reports, **more), lost]
 
     monkeypatch.setattr(redrawn, "evaluate_flight", failed)
-    copy = share(made / "reports" / "kifaru-ridge")
+    copy = share(REPORT)
     text = copy.file.read_text(encoding="utf-8")
     assert "no report on navigation" in text and "no report on navigation" in "\n".join(copy.lines)
     assert "half a report" not in text and "Letaba" not in text
-    here = made / "reports" / "kifaru-ridge"
-    write_report(made / "reports" / "kifaru-ridge-navigation", made / "flights" / "kifaru-ridge", "x")
+    leave(made / "reports" / "kifaru-ridge-navigation", made / "flights" / "kifaru-ridge", "x")
     with pytest.raises(RunFailed, match="flight-navigation"):
-        share(here, overwrite=True)
+        share(REPORT, overwrite=True)
 
 
 def test_without_its_flight_a_report_is_refused(made: Path) -> None:
     (made / "flights").rename(made / "elsewhere")
     with pytest.raises(WildlabError, match="--flight FOLDER"):
-        share(made / "reports" / "kifaru-ridge")
-    assert share(made / "reports" / "kifaru-ridge", flight=made / "elsewhere" / "kifaru-ridge").file.is_file()
+        share(REPORT)
+    assert share(REPORT, flight=made / "elsewhere" / "kifaru-ridge").file.is_file()
     other = made / "other"
     save_flight(canary((10.0, 20.0, 30.0), corner=(0.0, 0.0, 0.0), imu=False), other)
     with pytest.raises(WildlabError, match="not the flight"):
-        share(made / "reports" / "kifaru-ridge", flight=other, overwrite=True)
+        share(REPORT, flight=other, overwrite=True)
     with pytest.raises(WildlabError, match="no flight in"):
-        share(made / "reports" / "kifaru-ridge", flight=made, overwrite=True)
+        share(REPORT, flight=made, overwrite=True)
 
 
 def test_a_category_that_was_stated_later_counts(made: Path) -> None:
@@ -225,16 +205,16 @@ def test_a_category_that_was_stated_later_counts(made: Path) -> None:
     path.write_text(
         path.read_text(encoding="utf-8").replace("category = 2", "category = 1"), encoding="utf-8"
     )
-    text = share(made / "reports" / "kifaru-ridge").file.read_text(encoding="utf-8")
+    text = share(REPORT).file.read_text(encoding="utf-8")
     assert "informationWithheld" in text and "° S" not in text
 
 
 def test_numbers_that_differ_are_said(made: Path) -> None:
-    path = made / "reports" / "kifaru-ridge" / "metrics.json"
+    path = REPORT / "metrics.json"
     content = json.loads(path.read_text(encoding="utf-8"))
     content["metrics"][0]["value"] = 3.25 * 1.02
     write_json(path, content)
-    copy = share(made / "reports" / "kifaru-ridge")
+    copy = share(REPORT)
     assert "Of 1 numbers, 0" in copy.file.read_text(encoding="utf-8")
     assert any("3.315" in line and "3.25" in line for line in copy.lines)
     assert share_apart(3.315, 3.25) == share_apart(3.25, 3.315) == pytest.approx(0.02 / 1.02)
@@ -269,17 +249,16 @@ def test_a_copy_that_says_otherwise_says_so_at_its_top(
         return outcomes
 
     monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
-    report = made / "reports" / "kifaru-ridge"
-    judged(report, original, against)
-    copy = share(report)
+    judged(REPORT, original, against)
+    copy = share(REPORT)
     top = BeautifulSoup(copy.file.read_text(encoding="utf-8"), "html.parser").select_one("header .sub")
     assert top is not None and said in top.get_text() and (BEWARE in top.get_text()) == bool(said)
     if said:
         assert any(said in line for line in copy.lines)
         with pytest.raises(RunFailed, match="would not say"):
-            share(report, "partner", edition="en")
+            share(REPORT, "partner", edition="en")
     else:
-        assert share(report, "partner", edition="en").file.is_file()
+        assert share(REPORT, "partner", edition="en").file.is_file()
 
 
 @pytest.mark.parametrize(
@@ -292,9 +271,9 @@ def test_a_copy_that_says_otherwise_says_so_at_its_top(
     ],
 )
 def test_a_report_that_cannot_be_shared_is_refused(change: Any, said: str, made: Path) -> None:
-    change(made / "reports" / "kifaru-ridge")
+    change(REPORT)
     with pytest.raises(WildlabError, match=said):
-        share(made / "reports" / "kifaru-ridge")
+        share(REPORT)
 
 
 @pytest.mark.parametrize(
@@ -310,7 +289,7 @@ def test_what_cannot_be_made_is_refused(tier: Any, options: dict[str, Any], said
     if "out" in options:
         options = options | {"out": made / options["out"]}
     with pytest.raises(WildlabError, match=said):
-        share(made / "reports" / "kifaru-ridge", tier, **options)
+        share(REPORT, tier, **options)
 
 
 def test_a_study_is_copied_as_it_is(made: Path) -> None:
@@ -342,7 +321,7 @@ def test_a_twin_that_does_not_come_with_wildlab_is_hidden_like_a_flight(made: Pa
         made / "flights" / "kifaru-ridge",
         overwrite=True,
     )
-    write_report(made / "more" / "kifaru-ridge", made / "flights" / "kifaru-ridge", "")
+    leave(made / "more" / "kifaru-ridge", made / "flights" / "kifaru-ridge")
     text = share(made / "more" / "kifaru-ridge").file.read_text(encoding="utf-8")
     assert all(secret not in text for secret in SECRETS) and "24.9° S" in text
 
@@ -365,19 +344,18 @@ def test_a_twin_is_not_taken_for_a_study_of_its_name(made: Path) -> None:
 
 
 def test_a_copy_with_this_machines_folders_in_it_is_refused_even_for_the_team(made: Path) -> None:
-    path = made / "reports" / "kifaru-ridge" / "report.html"
+    path = REPORT / "report.html"
     text = path.read_text(encoding="utf-8").replace("</main>", f"<p>{Path.cwd()}</p></main>")
     path.write_text(text, encoding="utf-8")
     with pytest.raises(RunFailed, match="there is no copy"):
-        share(made / "reports" / "kifaru-ridge", "team")
+        share(REPORT, "team")
 
 
 def test_one_sheet_stands_alone_or_beside_the_reports(made: Path) -> None:
-    report = made / "reports" / "kifaru-ridge"
-    text = share(report, "partner", edition="en").file.read_text(encoding="utf-8")
+    text = share(REPORT, "partner", edition="en").file.read_text(encoding="utf-8")
     assert text.count("<h1>") == 1 and "<h1>Report</h1>" not in text
     assert all(secret not in text for secret in SECRETS)
-    copy = share(report, "partner", edition="sv", zipped=True)
+    copy = share(REPORT, "partner", edition="sv", zipped=True)
     with zipfile.ZipFile(copy.file) as zipped:
         assert zipped.namelist() == ["flight.html", "flight-one-sheet.html"]
         assert b'<html lang="sv">' in zipped.read("flight-one-sheet.html")
@@ -392,7 +370,7 @@ def test_names_that_are_neutral_already_are_no_leak(
             {"Sarah": "target-2", "Thandi": "target-3", "7": "target-1"}
         )
     save_flight(flight, made / "flights" / "kifaru-ridge", overwrite=True)
-    write_report(made / "more" / "kifaru-ridge", made / "flights" / "kifaru-ridge", "")
+    leave(made / "more" / "kifaru-ridge", made / "flights" / "kifaru-ridge")
     text = share(made / "more" / "kifaru-ridge").file.read_text(encoding="utf-8")
     assert "target-3" in text
 

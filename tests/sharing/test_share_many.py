@@ -19,16 +19,12 @@ import pytest
 from bs4 import BeautifulSoup
 
 from tests.pipeline.robots import robot_flight
+from tests.sharing.left import everything, leave_report
 from wildlab.errors import RunFailed, WildlabError
-from wildlab.files import write_json
 from wildlab.flight.following import read_settings
-from wildlab.flight.manifest import manifest_toml
 from wildlab.flight.store import Flight, load_flight, save_flight
-from wildlab.reporting.metrics import document, metric
-from wildlab.reporting.page import page
-from wildlab.reporting.text import escape
+from wildlab.reporting.metrics import metric
 from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.runner.track_many import NOTEBOOK, track_many
 from wildlab.sharing import generalise, redrawn
 from wildlab.sharing import settings as neutral
@@ -86,25 +82,11 @@ def telling(seconds: float = 12.0) -> Flight:
     return replace(flight, tables=tables, nav={"Kestrel-log": flight.nav["own"]})
 
 
-def everything(flight: Path, told: Path | None = None, sensors: Any = ()) -> str:
-    """All that a flight and its settings say, as a careless report might print it."""
-    loaded = load_flight(flight)
-    tables = {**loaded.nav, **loaded.tables}
-    shown = "".join(f"<h2>{escape(name)}</h2>{table.head(6).to_html()}" for name, table in tables.items())
-    texts = [manifest_toml(loaded.manifest), "" if told is None else told.read_text(encoding="utf-8")]
-    return f"<pre>{escape(' '.join((*texts, *sensors)))}</pre>{shown}"
-
-
-def write_report(folder: Path, flight: Path, body: str, told: dict[str, Any], notebook: str) -> None:
-    folder.mkdir(parents=True)
-    (folder / "report.html").write_text(page(title="x", body=f"<h1>{notebook}</h1>{body}"), encoding="utf-8")
-    content = {"flight": provenance_of_flight(flight), "parameters": told, "notebook": {"file": notebook}}
-    write_json(folder / "provenance.json", content)
-    write_json(folder / "status.json", {"state": "done"})
+def leave(folder: Path, flight: Path, body: str, notebook: str = "overview.ipynb", **told: Any) -> Outcome:
     subjects = ("all", "target-1") if notebook == NOTEBOOK else ("logged-pose",)
     numbers = [metric(name="error", subject=one, value=3.25, unit="m") for one in subjects]
-    whole = document(study="x", flight="x", kind="logged", seed=1, seeds=None, metrics=numbers, claims=[])
-    write_json(folder / "metrics.json", whole)
+    leave_report(folder, flight, body, metrics=numbers, parameters=told, notebook=notebook)
+    return Outcome(folder.name, "done", 1.0, "", folder)
 
 
 @pytest.fixture(scope="module")
@@ -113,9 +95,9 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("kept")
     flight, reports = folder / "flights" / "kifaru-drift", folder / "reports"
     save_flight(telling(), flight)
-    write_report(reports / "kifaru-drift-overview", flight, everything(flight), {}, "overview.ipynb")
+    leave(reports / "kifaru-drift-overview", flight, everything(flight))
     told = {"settings": TOLD, "sensors": ["Letaba mast"], "source": "Kestrel-log"}
-    write_report(reports / "kifaru-drift-many", flight, everything(flight), told, NOTEBOOK)
+    leave(reports / "kifaru-drift-many", flight, everything(flight), NOTEBOOK, **told)
     return folder
 
 
@@ -127,9 +109,7 @@ def made(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     def evaluate(folder: Path, *, source: str | None, reports: Path, **_: Any) -> list[Outcome]:
         assert source is None
-        place = reports / f"{load_flight(folder).name}-overview"
-        write_report(place, folder, everything(folder), {}, "overview.ipynb")
-        return [Outcome(place.name, "done", 1.0, "", place)]
+        return [leave(reports / f"{load_flight(folder).name}-overview", folder, everything(folder))]
 
     def follow(
         folder: Path, *, settings: Path, sensors: Any, source: str, reports: Path, **_: Any
@@ -137,9 +117,8 @@ def made(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         copy = load_flight(folder)
         assert source in copy.nav and set(sensors) == set(copy.manifest.sensors) == {"sensor-1"}
         assert set(read_settings(settings).sensors) == {"sensor-1"}
-        place = reports / f"{copy.name}-many"
-        write_report(place, folder, everything(folder, settings, sensors), {}, NOTEBOOK)
-        return Outcome(place.name, "done", 1.0, "", place)
+        shown = everything(folder, settings.read_text(encoding="utf-8"), *sensors)
+        return leave(reports / f"{copy.name}-many", folder, shown, NOTEBOOK)
 
     monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
     monkeypatch.setattr(redrawn, "track_many", follow)
@@ -226,7 +205,7 @@ def test_one_that_was_made_from_other_tables_is_told_to_the_sender(made: Path) -
     for folder in (made / "reports").iterdir():
         if folder.name.endswith("-overview"):
             folder.rename(made / "away")
-    write_report(made / "reports" / "kifaru-drift-overview", flight, "", {}, "overview.ipynb")
+    leave(made / "reports" / "kifaru-drift-overview", flight, "")
     for named in ("", "kifaru-drift-overview"):
         copy = share(made / "reports" / named, overwrite=True)
         assert NOTEBOOK not in copy.file.read_text(encoding="utf-8")

@@ -18,6 +18,8 @@ POSE = st.tuples(
     *(st.floats(-300, 300),) * 2, st.floats(50, 400), ANGLE, ANGLE, st.floats(-np.pi, np.pi),
     st.tuples(ANGLE, ANGLE, ANGLE), st.tuples(*(st.floats(-2, 2),) * 3),
 )  # fmt: skip
+#: Generators of random numbers, shown by their seed where an example fails.
+GENERATORS = st.builds(np.random.default_rng, st.integers(0, 2**31))
 #: Where in the image the target is, as a share of it.
 PIXEL = st.tuples(st.floats(0.05, 0.95), st.floats(0.05, 0.95))
 

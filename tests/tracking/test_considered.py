@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tracking.poses import CAMERA, PIXEL, POSE, disturbed, overflight, posed
-from tests.tracking.test_schmidt import growing, joint
+from tests.tracking.full_filter import beside, full_filter
+from tests.tracking.poses import CAMERA, GENERATORS, PIXEL, POSE, disturbed, overflight, posed
+from tests.tracking.test_schmidt import growing
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
@@ -158,26 +159,24 @@ def test_each_has_its_own_correlation_time():
     )
     R = np.diag([4.0, 1e-4])
     track = run_filter(times, z, R, sensor, CV, START, pose=pose)
-    x, P, then = np.zeros(7), joint(START.P, np.zeros((4, 3)), pose.covariance), 0.0
-    for row, t in enumerate(times):
-        F, Q = np.eye(7), np.zeros((7, 7))
-        F[:4, :4], Q[:4, :4] = CV(t - then)
-        F[4:, 4:] = np.diag([np.exp(-(t - then) / 5.0), 1.0, 0.0])
-        Q[4:, 4:] = pose.covariance - F[4:, 4:] @ pose.covariance @ F[4:, 4:].T
-        x, P, then = F @ x, F @ P @ F.T + Q, t
+
+    def look(row, x):
         seen = sensor.predict(row, x[:4])
         H = np.hstack([m.on_state(seen.H_position, 4), seen.H_pose[:, [0, 2, 1]]])
-        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
-        K[4:] = 0
-        x = x + K @ m.difference(z[row], seen.z, sensor.angles)
-        P = (np.eye(7) - K @ H) @ P @ (np.eye(7) - K @ H).T + K @ R @ K.T
+        return m.difference(z[row], seen.z, sensor.angles), H
+
+    def move(_, dt):
+        left = np.diag([np.exp(-dt / 5.0), 1.0, 0.0])
+        return tuple(map(beside, CV(dt), (left, pose.covariance - left @ pose.covariance @ left.T)))
+
+    start = Start(0.0, np.zeros(7), beside(START.P, pose.covariance))
+    for row, (x, P, _) in enumerate(full_filter(times, R, look, move, start, estimated=4)):
         np.testing.assert_allclose(track.x[row], x[:4], rtol=1e-8, atol=1e-8)
         np.testing.assert_allclose(track.P[row], P[:4, :4], rtol=1e-8, atol=1e-10)
 
 
-@given(st.integers(0, 2**31))
-def test_correlated_errors_of_different_times_stay_a_covariance(seed):
-    rng = np.random.default_rng(seed)
+@given(GENERATORS)
+def test_correlated_errors_of_different_times_stay_a_covariance(rng):
     A = rng.normal(size=(3, 3 + int(rng.integers(2)))) * np.array([[1.0], [0.01], [5.0]])
     P = A @ A.T
     times = tuple(rng.choice([0.0, 0.5, 20.0, np.inf], 3))

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tracking.poses import overflight
+from tests.tracking.full_filter import beside, full_filter
+from tests.tracking.poses import GENERATORS, overflight
 from wildlab.tracking import measurement as m
 from wildlab.tracking import schmidt
-from wildlab.tracking.kalman import correct
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
@@ -28,51 +28,33 @@ def random_pose_covariance(rng, spread=0.0):
     return A @ A.T / 9
 
 
-def joint(P, C, P_pose):
-    return np.block([[P, C], [C.T, P_pose]])
-
-
 def lowest(P, C, P_pose):
     """Least eigenvalue of the joint covariance, in units in which every variance is one."""
-    J = joint(P, C, P_pose)
+    J = np.block([[P, C], [C.T, P_pose]])
     sd = np.sqrt(np.diag(J))
     return np.linalg.eigvalsh(J / np.outer(sd, sd))[0]
 
 
-def dense(times, uv, R, poses, covariances, start, motion, fade=lambda dt: 1.0, carry=None):
-    """A full filter of all ten states with the gain of the last six put to zero, written without blocks.
+def by_full_filter(times, uv, poses, covariances, fade=lambda dt: 1.0, carry=None):
+    """Target and pose errors at once; noise of the pose makes its covariance the next one."""
 
-    The pose's error has the transition ``phi`` and whatever process noise makes its covariance the next one.
-    """
-    x, P = np.zeros(10), joint(start.P, np.zeros((4, 6)), covariances[0])
-    x[:4] = start.x
-    then = start.time
-    for k, t in enumerate(times):
-        F, Q = np.eye(10), np.zeros((10, 10))
-        F[:4, :4], Q[:4, :4] = motion(t - then)
-        if carry is not None and k:
-            F[4:, 4:] = carry(covariances[k - 1], covariances[k])
-        F[4:, 4:] *= fade(t - then)
-        P = F @ P @ F.T + Q
-        P[4:, 4:] = covariances[k]  # process noise of the pose's error
-        x[:4] = F[:4, :4] @ x[:4]
-        seen = m.predict_pixel(x[:2], poses.take(k), 0.0)
-        H = np.zeros((2, 10))
-        H[:, :2], H[:, 4:] = seen.H_position, seen.H_pose
-        S = H @ P @ H.T + R
-        K = P @ H.T @ np.linalg.inv(S)
-        K[4:] = 0
-        x = x + K @ (uv[k] - seen.z)
-        left = np.eye(10) - K @ H
-        P = left @ P @ left.T + K @ R @ K.T
-        then = t
-        yield x[:4].copy(), P, S
+    def look(row, x):
+        seen = m.predict_pixel(x[:2], poses.take(row), 0.0)
+        return uv[row] - seen.z, np.hstack([seen.H_position, np.zeros((2, 2)), seen.H_pose])
+
+    def move(row, dt):
+        before, after = covariances[max(row - 1, 0)], covariances[row]
+        phi = fade(dt) * (np.eye(6) if carry is None or not row else carry(before, after))
+        return tuple(map(beside, CV(dt), (phi, after - phi @ before @ phi.T)))
+
+    start = Start(0.0, np.zeros(10), beside(START.P, covariances[0]))
+    return full_filter(times, PIXELS, look, move, start, estimated=4)
 
 
 def assert_full(track, full, tolerance):
     """Row by row the states of the full filter, without a cross-covariance that was limited."""
     x, P, S = (np.array(part) for part in zip(*full, strict=True))
-    assert np.allclose(track.x, x, rtol=tolerance, atol=tolerance)
+    assert np.allclose(track.x, x[:, :4], rtol=tolerance, atol=tolerance)
     assert np.allclose(track.P, P[:, :4, :4], rtol=tolerance, atol=tolerance)
     assert np.allclose(track.S, S, rtol=tolerance)
     assert not track.limited.any()
@@ -86,7 +68,7 @@ def growing(n, seed=0):
     )
 
 
-@pytest.mark.parametrize("correlation_time", [np.inf, 8.0])
+@pytest.mark.parametrize("correlation_time", [np.inf, 8.0, 0.0])
 @pytest.mark.parametrize("change", ["bias", "navigated"])
 def test_it_is_the_full_filter_with_no_gain_for_the_pose(change, correlation_time):
     """As printed, C kept: with a pose covariance that does not change, or, if navigated, one that grows."""
@@ -96,7 +78,9 @@ def test_it_is_the_full_filter_with_no_gain_for_the_pose(change, correlation_tim
         covariances[:] = covariances[20]
     pose = PoseUncertainty(covariances, correlation_time, change)
     track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
-    full = dense(times, uv, PIXELS, poses, covariances, START, CV, lambda dt: np.exp(-dt / correlation_time))
+    full = by_full_filter(
+        times, uv, poses, covariances, lambda dt: np.exp(-dt / correlation_time) if correlation_time else 0.0
+    )
     assert_full(track, full, 1e-8)
 
 
@@ -119,7 +103,7 @@ def test_it_is_the_full_filter_whose_pose_error_changes_as_said(change, function
     covariances = np.array([random_pose_covariance(rng, 0.3) for _ in times])
     pose = PoseUncertainty(covariances, change=change)
     track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
-    full = dense(times, uv, PIXELS, poses, covariances, START, CV, carry=by_eigenvectors(function))
+    full = by_full_filter(times, uv, poses, covariances, carry=by_eigenvectors(function))
     assert_full(track, full, 1e-7)
 
 
@@ -134,10 +118,9 @@ def test_with_a_perfect_pose_it_is_the_extended_filter(change):
         assert np.allclose(ours, theirs, rtol=1e-12, atol=1e-12, equal_nan=True)
 
 
-@given(seed=SEEDS)
-def test_update_is_the_print(seed):
+@given(rng=GENERATORS)
+def test_update_is_the_print(rng):
     """H (7.34), (7.35) and (7.38) term by term."""
-    rng = np.random.default_rng(seed)
     A = rng.normal(size=(10, 12))
     J = A @ A.T
     P, C, Po = J[:4, :4], J[:4, 4:], J[4:, 4:]
@@ -158,29 +141,8 @@ def test_update_is_the_print(seed):
     assert np.allclose(done.C, C - K @ (H @ C + Ho @ Po), atol=1e-10 * scale)
 
 
-def test_without_memory_it_is_the_inflated_filter():
-    """H (7.40)-(7.41): the pose's covariance counts as more noise."""
-    times, uv, poses, _ = overflight(40)
-    covariances = growing(40)
-    sensor = m.pixels(poses, 0.0)
-    track = run_filter(times, uv, PIXELS, sensor, CV, START, pose=PoseUncertainty(covariances, 0.0))
-    x, P, then = START.x, START.P, 0.0
-    for row, t in enumerate(times):
-        F, Q = CV(t - then)
-        x, P = F @ x, F @ P @ F.T + Q
-        seen = sensor.predict(row, x[:2])
-        H = m.on_state(seen.H_position, 4)
-        noise = PIXELS + seen.H_pose @ covariances[row] @ seen.H_pose.T
-        done = correct(x, P, uv[row] - seen.z, H, noise)
-        x, P, then = done.x, done.P, t
-        assert np.allclose(track.x[row], x)
-        assert np.allclose(track.P[row], P)
-        assert np.allclose(track.S[row], done.S)
-
-
-@given(seed=SEEDS, shrink=st.floats(1e-6, 1))
-def test_a_cross_covariance_is_shortened_only_where_it_must_be(seed, shrink):
-    rng = np.random.default_rng(seed)
+@given(rng=GENERATORS, shrink=st.floats(1e-6, 1))
+def test_a_cross_covariance_is_shortened_only_where_it_must_be(rng, shrink):
     A = rng.normal(size=(10, 14)) * np.concatenate([np.array([5, 5, 1, 1.0]), UNITS])[:, None]
     J = A @ A.T
     P, C, Po = J[:4, :4], J[:4, 4:], J[4:, 4:]
@@ -197,9 +159,8 @@ def test_a_cross_covariance_is_shortened_only_where_it_must_be(seed, shrink):
     assert np.allclose(again, new, rtol=1e-8)
 
 
-@given(seed=SEEDS)
-def test_transitions_lead_from_one_pose_covariance_to_the_next(seed):
-    rng = np.random.default_rng(seed)
+@given(rng=GENERATORS)
+def test_transitions_lead_from_one_pose_covariance_to_the_next(rng):
     before, after = random_pose_covariance(rng, 1.0), random_pose_covariance(rng, 1.0)
     unit = np.outer(UNITS, UNITS)
     bias = schmidt.transition_of_pose(before, after, "bias")

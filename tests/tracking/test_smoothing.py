@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import block_diag
 
 from tests.tracking.poses import overflight
 from wildlab.errors import WildlabError
@@ -37,30 +38,21 @@ def linear_run(seed, n=25):
 def everything_at_once(times, z, R, motion, start):
     """Means and covariances of all states given all measurements, as one Gaussian: no recursion at all."""
     n, N = len(start.x), len(times)
-    mean, P = start.x, start.P
-    means, covariance = [], np.zeros((n * N, n * N))
-    then = start.time
-    for k, t in enumerate(times):
+    sources = np.eye(n * (N + 1)).reshape(N + 1, n, -1)
+    A, mean, then, rows = np.linalg.cholesky(start.P) @ sources[0], start.x, start.time, []
+    for t, source in zip(times, sources[1:], strict=True):
         F, Q = motion(t - then)
-        mean, P = F @ mean, F @ P @ F.T + Q
-        means.append(mean)
-        own = slice(n * k, n * k + n)
-        if k:
-            covariance[own, : n * k] = F @ covariance[n * (k - 1) : n * k, : n * k]
-            covariance[: n * k, own] = covariance[own, : n * k].T
-        covariance[own, own] = P
-        then = t
-    seen = [k for k in range(N) if np.isfinite(z[k]).all()]
-    H = np.zeros((2 * len(seen), n * N))
-    noise = np.zeros((2 * len(seen),) * 2)
-    for i, k in enumerate(seen):
-        H[2 * i : 2 * i + 2, n * k : n * k + 2] = np.eye(2)
-        noise[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = R[k]
-    S = H @ covariance @ H.T + noise
-    gain = covariance @ H.T @ np.linalg.inv(S)
-    x = np.concatenate(means) + gain @ (z[seen].ravel() - H @ np.concatenate(means))
-    P_all = covariance - gain @ H @ covariance
-    return x.reshape(N, n), np.array([P_all[n * k : n * k + n, n * k : n * k + n] for k in range(N)])
+        values, axes = np.linalg.eigh(Q)
+        A, mean, then = F @ A + axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * source), F @ mean, t
+        rows.append((A, mean))
+    A, mean = (np.concatenate(part) for part in zip(*rows, strict=True))
+    seen = np.isfinite(z).all(axis=1)
+    H = np.kron(np.eye(N)[seen], np.eye(2, n))
+    S = H @ A @ A.T @ H.T + block_diag(*R[seen])
+    gain = A @ A.T @ H.T @ np.linalg.inv(S)
+    P = (A @ A.T - gain @ H @ A @ A.T).reshape(N, n, N, n)
+    x = mean + gain @ (z[seen].ravel() - H @ mean)
+    return x.reshape(N, n), P[np.arange(N), :, np.arange(N)]
 
 
 @pytest.mark.parametrize(("motion", "seed"), [(CV, 0), (WA, 1)])
@@ -104,31 +96,18 @@ def test_its_covariance_is_its_errors_with_considered_ones(time):
     start = Start(0.0, np.zeros(4), np.diag([9.0, 9.0, 1.0, 1.0]))
     F, Q = WA(1.0)
     left = float(np.exp(-1 / time)) if time else 0.0
-    sources = [("start", i) for i in range(4)] + [("bias", i) for i in range(2)]
-    sources += [
-        (kind, k, i) for k in range(N) for kind, size in (("q", 4), ("r", 2), ("o", 2)) for i in range(size)
-    ]
-    root = np.linalg.cholesky(Q)
-    covariance = np.zeros((N, 4, 4))
-    for source in sources:
-        x, o = np.zeros(4), np.zeros(2)
-        if source[0] == "start":
-            x[source[1]] = np.sqrt(start.P[source[1], source[1]])
-        if source[0] == "bias":
-            o[source[1]] = bias
-        truth, z = [], []
-        for k in range(N):
-            x, o = F @ x, o * (left if k else 1.0)
-            if source[0] == "q" and source[1] == k:
-                x = x + root[:, source[2]]
-            if source[0] == "o" and source[1] == k and k:
-                o = o + bias * np.sqrt(1 - left**2) * np.eye(2)[source[2]]
-            truth.append(x)
-            z.append(x[:2] - o + (np.eye(2)[source[2]] if source[0] == "r" and source[1] == k else 0.0))
-        found = run_smoothed(times, np.array(z), R, sensor, WA, start, pose=pose)
-        e = np.array(truth) - found.x
-        covariance += e[:, :, None] * e[:, None, :]
-    np.testing.assert_allclose(found.P, covariance, atol=1e-8)
+    # A column for each source: of the state 4 and of the bias 2, then in each row motion 4, noise 2, bias 2.
+    unit = np.eye(6 + 8 * N)
+    x, o, rest = np.sqrt(start.P) @ unit[:4], bias * unit[4:6], unit[6:].reshape(N, 8, -1)
+    truth, z = [], []
+    for k in range(N):
+        x = F @ x + np.linalg.cholesky(Q) @ rest[k, :4]
+        o = left * o + bias * np.sqrt(1 - left**2) * rest[k, 6:] if k else o
+        truth.append(x)
+        z.append(x[:2] - o + rest[k, 4:6])
+    found = [run_smoothed(times, one, R, sensor, WA, start, pose=pose) for one in np.moveaxis(z, -1, 0)]
+    e = np.array(truth) - np.stack([one.x for one in found], axis=-1)
+    np.testing.assert_allclose(found[0].P, e @ np.swapaxes(e, 1, 2), atol=1e-8)
 
 
 def test_between_rows_before_and_behind():

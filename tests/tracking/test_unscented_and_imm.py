@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
@@ -105,10 +106,7 @@ def by_hand(times, z, motions, mean_stay, start):
     xs, Ps, then = [start.x] * 2, [start.P] * 2, start.time
     for t, one in zip(times, z, strict=True):
         dt = t - then
-        gone = 1 - np.exp(-(a + b) * dt)
-        M = np.array(
-            [[1 - a / (a + b) * gone, a / (a + b) * gone], [b / (a + b) * gone, 1 - b / (a + b) * gone]]
-        )
+        M = expm(dt * np.array([[-a, a], [b, -b]]))
         c = mu @ M
         mixed = []
         for j in range(2):

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.flight.conftest import make_flight  # noqa: F401 - a fixture of another room
+from tests.sharing.left import leave_report
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.georeference import observe
-from wildlab.reporting.metrics import document, metric, write_metrics
+from wildlab.reporting.metrics import metric
 from wildlab.sharing.edition.edition import Place
 from wildlab.sharing.edition.flight_map import map_of
 from wildlab.sharing.edition.make import make_edition
@@ -24,28 +23,20 @@ from wildlab.sharing.edition.make import make_edition
 WITHHELD = Place("withheld")
 
 
-def write_report(folder: Path, flight: str, state: str = "done", **numbers: tuple[str, float]) -> None:
-    folder.mkdir(parents=True)
-    (folder / "report.html").write_text("x", encoding="utf-8")
-    (folder / "status.json").write_text(json.dumps({"state": state}), encoding="utf-8")
-    about: dict[str, Any] = {"flight": {"name": flight, "kind": "logged", "files": {}}}
-    (folder / "provenance.json").write_text(json.dumps(about), encoding="utf-8")
+def leave(folder: Path, **numbers: tuple[str, float]) -> None:
     entries = [metric(name, subject, value, "1", n=50) for name, (subject, value) in numbers.items()]
-    content = document(
-        study="evaluate", flight=flight, kind="logged", seed=None, seeds=None, metrics=entries, claims=[]
-    )
-    write_metrics(folder / "metrics.json", content)
+    leave_report(folder, "f", metrics=entries)
 
 
 def sound(reports: Path) -> None:
     counts = dict.fromkeys(("problems", "worth_fixing", "troubled", "broken", "alarmed"), ("flight", 0.0))
-    write_report(reports / "f-overview", "f", **counts, reports_beside=("flight", 1.0))
+    leave(reports / "f-overview", **counts, reports_beside=("flight", 1.0))
 
 
 def test_the_page_of_a_folder_of_reports(tmp_path: Path) -> None:
     sound(tmp_path)
     error = {"horizontal_error_median": ("logged-pose", 6.4), "horizontal_error_p90": ("logged-pose", 9.0)}
-    write_report(tmp_path / "f", "f", **error)
+    leave(tmp_path / "f", **error)
     html = make_edition(tmp_path, "f", place=WITHHELD, called="flight 1")
     assert "6.4\u00a0metres" in html and "flight 1" in html
     assert "6,4\u00a0meter" in make_edition(tmp_path, "f", place=WITHHELD, language="nb")

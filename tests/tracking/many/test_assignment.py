@@ -78,20 +78,6 @@ def test_the_gate_itself_is_inside():
     assert nearest([[9.1]], 9.0).tolist() == [-1]
 
 
-def test_two_measurements_in_the_gate_of_one_track():
-    """Scipy alone finds this infeasible."""
-    found = global_nearest([[3.0, np.inf], [2.0, np.inf]], 9.0)
-    assert found.track.tolist() == [-1, 0]
-    assert found.measurement.tolist() == [1, -1]
-
-
-def test_a_far_pair_is_not_forced_to_save_another():
-    """Two pairs at 4 cost less than one at 0 and a gate of 9 for the two left over, not one of 5."""
-    d = [[0.0, 4.0], [4.0, np.inf]]
-    assert global_nearest(d, 9.0).track.tolist() == [1, 0]
-    assert global_nearest(d, 5.0).track.tolist() == [0, -1]
-
-
 @pytest.mark.parametrize(
     ("distances", "gate", "words"),
     [

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.tracking.poses import GENERATORS
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
 from wildlab.tracking.many.probabilities import association_probabilities
 
@@ -45,9 +46,8 @@ def by_counting(
     return there / total, seen / there, own / there[:, None]
 
 
-@given(st.integers(0, 10_000), st.integers(1, 3), st.integers(0, 3), shares)
-def test_every_state_of_the_world_counted(seed: int, n: int, m: int, d: float) -> None:
-    rng = np.random.default_rng(seed)
+@given(GENERATORS, st.integers(1, 3), st.integers(0, 3), shares)
+def test_every_state_of_the_world_counted(rng: np.random.Generator, n: int, m: int, d: float) -> None:
     r, v = rng.uniform(0.02, 0.98, n), rng.uniform(0.02, 0.98, n)
     L, c = np.exp(rng.normal(-3, 3, (n, m))) * (rng.random((n, m)) > 0.3), 1e-2
     p = association_probabilities(*weights(r, v, d, L, c))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from tests.tracking.many.test_run import POINTS, looks
 from tests.tracking.many.test_together import OPEN, SURE
+from tests.tracking.poses import GENERATORS
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.many.beliefs import POINT, Hull
 from wildlab.tracking.many.motions import at_least, each_motion, interact, largest_of, of_hulls
@@ -22,10 +23,9 @@ from wildlab.tracking.records import Start
 BOTH = (Hull("boat", 6.0, 2.0, 0.6), Hull("ship", 30.0, 8.0, 0.4))
 
 
-@given(st.integers(0, 1000), st.floats(0.05, 0.9), st.floats(2.0, 60.0))
+@given(GENERATORS, st.floats(0.05, 0.9), st.floats(2.0, 60.0))
 @settings(max_examples=20, deadline=None)
-def test_one_target_is_the_filter_of_one_target(seed: int, calm: float, stay_s: float) -> None:
-    rng = np.random.default_rng(seed)
+def test_one_target_is_the_filter_of_one_target(rng: np.random.Generator, calm: float, stay_s: float) -> None:
     way = np.cumsum(np.cumsum(rng.normal(0, 0.5, (12, 1, 2)), axis=0), axis=0)
     scans = looks(way, rng)
     targets = OPEN._replace(density=0.8, calm=calm, stay_s=stay_s)
@@ -56,10 +56,9 @@ def test_one_motion_is_none_beside_another() -> None:
     assert largest_of((POINT,)).tolist() == [True]
 
 
-@given(st.integers(0, 1000), st.floats(0.0, 100.0))
-def test_mixing_keeps_hulls_means_and_what_is_shared(seed: int, dt: float) -> None:
+@given(GENERATORS, st.floats(0.0, 100.0))
+def test_mixing_keeps_hulls_means_and_what_is_shared(rng: np.random.Generator, dt: float) -> None:
     """The mixture of both motions has the same mean, covariance and cross-covariance before and after."""
-    rng = np.random.default_rng(seed)
     x, C, kinds = rng.normal(size=(2, 4, 4)), rng.normal(size=(2, 4, 4, 3)), rng.dirichlet(np.ones(4), 2)
     root = rng.normal(size=(2, 4, 4, 4))
     P = root @ np.swapaxes(root, -1, -2)

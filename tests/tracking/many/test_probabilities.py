@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
 from wildlab.tracking.many.probabilities import (
     association_probabilities,
@@ -54,10 +55,9 @@ def test_many_targets_in_one_cluster_lose_no_digits() -> None:
     assert np.allclose(found, found[0]) and np.allclose(found[:, 1:], found[0, 1])
 
 
-@given(st.integers(0, 10_000))
-def test_messages_are_exact_where_nothing_competes_in_a_loop(seed: int) -> None:
+@given(GENERATORS)
+def test_messages_are_exact_where_nothing_competes_in_a_loop(rng: np.random.Generator) -> None:
     """A chain: each target shares one measurement with the next."""
-    rng = np.random.default_rng(seed)
     w = np.zeros((5, 6))
     for i in range(5):
         w[i, i : i + 2] = np.exp(rng.normal(0, 2, 2))

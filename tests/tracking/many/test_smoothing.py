@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from tests.tracking.many.test_run import look
 from tests.tracking.many.test_together import OPEN, SURE
+from tests.tracking.poses import GENERATORS
 from wildlab.evaluation.consistency import chi_square_interval, nees
 from wildlab.tracking.many.beliefs import Hull, own_columns, own_lasting
 from wildlab.tracking.many.run import Shown, run_many
@@ -74,11 +75,10 @@ def test_what_was_given_is_not_changed_and_nothing_stays_nothing() -> None:
     assert smooth_many([shown(0.0, [], np.zeros((0, 4)), np.zeros((0, 4, 4)))], 0.5)[0][0].shape == (0, 4)
 
 
-@given(st.integers(0, 10_000))
+@given(GENERATORS)
 @settings(max_examples=8, deadline=None)
-def test_covariances_are_those_of_the_errors_of_smoothed_tracks(seed: int) -> None:
+def test_covariances_are_those_of_the_errors_of_smoothed_tracks(rng: np.random.Generator) -> None:
     """Errors that fade, each at its own rate: everything is a sum of sources of variance one, and exact."""
-    rng = np.random.default_rng(seed)
     looks, k = 6, 2
     lasting = rng.choice([0.0, 1.0, 5.0, 40.0, np.inf], k)
     times = np.cumsum(rng.uniform(0.2, 3.0, looks))

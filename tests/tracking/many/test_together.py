@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 from tests.tracking.many.test_run import EYE, POINTS, lines, look, looks
+from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
 from wildlab.tracking.many.beliefs import Scan
 from wildlab.tracking.many.probabilities import association_probabilities
@@ -47,11 +48,10 @@ def moved(
     return scans
 
 
-@given(st.integers(0, 10_000), st.integers(0, 4))
+@given(GENERATORS, st.integers(0, 4))
 @settings(max_examples=30)
-def test_one_target_is_the_schmidt_filter(seed: int, k: int) -> None:
+def test_one_target_is_the_schmidt_filter(rng: np.random.Generator, k: int) -> None:
     """Without errors the Kalman filter; also where how errors move a measurement changes, and they fade."""
-    rng = np.random.default_rng(seed)
     lasting = rng.choice([0.0, 3.0, np.inf], k)
     scans = [
         one._replace(shared=rng.normal(size=(1, 2, k)))

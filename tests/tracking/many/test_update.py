@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal, norm
 
+from tests.tracking.poses import GENERATORS
 from wildlab.tracking.bending import left_out
 from wildlab.tracking.many.update import compare, compare_bearings, update
 from wildlab.tracking.schmidt import update_schmidt
@@ -84,10 +85,9 @@ def test_what_is_at_the_platform_is_in_no_direction() -> None:
     assert compared.likelihood[0, 0, 0] == 0 and np.isfinite(compared.S).all()
 
 
-@given(st.integers(0, 10_000))
-def test_the_mixture_has_the_moments_of_its_parts(seed: int) -> None:
+@given(GENERATORS)
+def test_the_mixture_has_the_moments_of_its_parts(rng: np.random.Generator) -> None:
     """Each way alone by a Schmidt filter, weighed by Bayes' rule, summed: moments and kinds."""
-    rng = np.random.default_rng(seed)
     K, M, n = 2, 3, 2
     x, C = rng.normal(size=(K, 4)), rng.normal(size=(K, 4, n))
     z, R, J = rng.normal(size=(M, 2)), spread(rng, M, 2), rng.normal(size=(M, 2, n))
@@ -116,9 +116,8 @@ def test_the_mixture_has_the_moments_of_its_parts(seed: int) -> None:
     assert np.allclose(found.P[0], second - mean[..., :, None] * mean[..., None, :], atol=1e-9)
 
 
-@given(st.integers(0, 10_000))
-def test_likelihoods_are_densities_of_the_gate(seed: int) -> None:
-    rng = np.random.default_rng(seed)
+@given(GENERATORS)
+def test_likelihoods_are_densities_of_the_gate(rng: np.random.Generator) -> None:
     x, P = rng.normal(size=(2, 1, 4)), spread(rng, 2, 1, 4)
     z, R = 3 * rng.normal(size=(4, 2)), spread(rng, 4, 2)
     gate = 1.2

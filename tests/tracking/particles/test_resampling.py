@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
 from wildlab.tracking.particles import SCHEMES, Cloud, draw, effective_size, resample
 from wildlab.tracking.particles.kernels import pick, take
@@ -18,9 +19,8 @@ def uneven(rng, animals, particles):
     return w / w.sum(axis=1, keepdims=True)
 
 
-@given(seed=st.integers(0, 999), animals=st.integers(1, 4), particles=st.integers(2, 60))
-def test_the_compiled_walk_finds_what_a_search_finds(seed, animals, particles):
-    rng = np.random.default_rng(seed)
+@given(rng=GENERATORS, animals=st.integers(1, 4), particles=st.integers(2, 60))
+def test_the_compiled_walk_finds_what_a_search_finds(rng, animals, particles):
     cumulative = np.cumsum(uneven(rng, animals, particles), axis=1)
     cumulative /= cumulative[:, -1:]
     points = np.sort(rng.random((animals, particles)), axis=1)
@@ -29,9 +29,8 @@ def test_the_compiled_walk_finds_what_a_search_finds(seed, animals, particles):
     np.testing.assert_array_equal(pick(cumulative, points), wanted)
 
 
-@given(seed=st.integers(0, 999), n=st.integers(1, 5))
-def test_the_compiled_choice_takes_what_numpy_takes(seed, n):
-    rng = np.random.default_rng(seed)
+@given(rng=GENERATORS, n=st.integers(1, 5))
+def test_the_compiled_choice_takes_what_numpy_takes(rng, n):
     x, chosen = rng.normal(size=(3, 20, n)), rng.integers(0, 20, (3, 9))
     np.testing.assert_array_equal(take(x, chosen), np.take_along_axis(x, chosen[..., None], axis=1))
 
@@ -54,9 +53,8 @@ def test_copies_are_unbiased(scheme):
         assert (np.abs(copies - N * w) < 1).all()
 
 
-@given(seed=st.integers(0, 500), threshold=st.floats(0, 1))
-def test_only_those_at_or_below_the_threshold_are_drawn_anew(seed, threshold):
-    rng = np.random.default_rng(seed)
+@given(rng=GENERATORS, threshold=st.floats(0, 1))
+def test_only_those_at_or_below_the_threshold_are_drawn_anew(rng, threshold):
     power = rng.uniform(0, 3, (6, 1))
     w = rng.exponential(size=(6, 30)) ** power
     w /= w.sum(axis=1, keepdims=True)
