@@ -134,22 +134,20 @@ def test_a_target_at_rest_has_a_cross_that_rests() -> None:
 
 
 @pytest.mark.parametrize(
-    ("parts", "sentence"),
+    ("field", "part", "sentence"),
     [
-        ({"path": Course(TIMES[:1], np.zeros((1, 2)))}, "1 known places"),
-        ({"path": Course(TIMES[::-1], np.zeros((len(TIMES), 2)))}, "no increasing row of seconds"),
-        ({"path": Course(np.zeros(2), np.zeros((2, 2)))}, "over as it begins"),
-        ({"path": Course(TIMES, np.zeros((3, 2)))}, r"shape \(3, 2\) beside 241 times"),
-        ({"footprints": Outlines(TIMES, np.zeros((len(TIMES), 2)))}, r"one of shape \(N, K, 2\)"),
-        ({"ellipses": [Ellipses(TIMES, circle().points, np.zeros((len(TIMES), 3, 2)))]}, r"\(N, 2, 2\)"),
+        ("path", Course(TIMES[:1], np.zeros((1, 2))), "1 known places"),
+        ("path", Course(TIMES[::-1], np.zeros((len(TIMES), 2))), "no increasing row of seconds"),
+        ("path", Course(np.zeros(2), np.zeros((2, 2))), "over as it begins"),
+        ("path", Course(TIMES, np.zeros((3, 2))), r"shape \(3, 2\) beside 241 times"),
+        ("footprints", Outlines(TIMES, np.zeros((len(TIMES), 2))), r"one of shape \(N, K, 2\)"),
+        ("ellipses", Ellipses(TIMES, circle().points, np.zeros((len(TIMES), 3, 2))), r"\(N, 2, 2\)"),
     ],
 )
-def test_arrays_that_do_not_fit_are_named(parts: dict[str, Any], sentence: str) -> None:
+def test_arrays_that_do_not_fit_are_named(field: str, part: Any, sentence: str) -> None:
     with pytest.raises(WildlabError) as caught:
-        animated_flight(shown(**parts), alt="x")
-    assert re.search(sentence, f"{caught.value.problem} {caught.value.fix}") and caught.value.field in (
-        *("path", "footprints", "ellipses"),
-    )
+        animated_flight(shown(**{field: [part] if field == "ellipses" else part}), alt="x")
+    assert re.search(sentence, f"{caught.value.problem} {caught.value.fix}") and caught.value.field == field
 
 
 def test_no_alt_text_no_picture() -> None:

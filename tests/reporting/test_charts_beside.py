@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from tests.figure_text import overlapping
 from wildlab.pipeline.following.sensor_tracks import Array, SensorTrack
@@ -27,6 +28,12 @@ def track(name: str, off: Array, seen: Array | None = None, start: int = 0) -> S
         "radar", "boat", name, times, np.zeros((n, 4)), error, nan, np.full((n, 2), np.nan), nan,
         np.ones(n, bool), near, covariance,
     )  # fmt: skip
+
+
+def assert_readable(figure: Figure) -> None:
+    """No letters lie on others once it is saved."""
+    png_bytes(figure)
+    assert overlapping(figure) == []
 
 
 PLAIN = np.full(N, 10.0)
@@ -73,8 +80,7 @@ def test_each_filter_has_a_strip_and_all_have_one_axis() -> None:
     assert len({ax.get_ylim() for ax in figure.axes}) == 1
     for i, ax in enumerate(figure.axes):
         assert np.asarray(ax.lines[0].get_ydata(), float) == pytest.approx(np.full(N, i + 1.0))
-    png_bytes(figure)
-    assert overlapping(figure) == []
+    assert_readable(figure)
 
 
 @pytest.mark.parametrize("largest", [300.0, 1e8])
@@ -90,8 +96,7 @@ def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest: float) -> N
     assert ax.get_yscale() == "symlog"
     bottom, top = (ax.transData.transform((0, y))[1] for y in (0.0, 1.3))
     assert top - bottom > 8  # pixels
-    png_bytes(figure)
-    assert overlapping(figure) == []
+    assert_readable(figure)
 
 
 @pytest.mark.parametrize(("worst", "scale"), [(12.0, "linear"), (5e6, "log")])
@@ -103,5 +108,4 @@ def test_errors_of_one_that_is_lost_are_drawn_over_powers_of_ten(worst: float, s
     )
     figure, *_ = errors_shown([track("ekf", plain), track("schmidt", PLAIN - 1)], rows)
     assert figure.axes[0].get_yscale() == scale
-    png_bytes(figure)
-    assert overlapping(figure) == []
+    assert_readable(figure)

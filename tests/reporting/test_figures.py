@@ -37,40 +37,19 @@ def test_nice_length(about: float, length: float) -> None:
     assert figures.nice_length(about) == pytest.approx(length)
 
 
-def test_map_is_a_map() -> None:
-    _, ax = figures.new_figure()
-    ax.plot([0, 100], [0, 10])
-    figures.map_axes(ax)
-    assert ax.get_aspect() == 1.0
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("east (m)", "north (m)")
-    assert any(getattr(artist, "txt_label", None) for artist in ax.artists)
-
-
-def test_log_band_and_gaps() -> None:
-    _, ax = figures.new_figure()
-    figures.log_band(ax, 0.48, 11.14)
-    assert ax.get_yscale() == "log"
-    assert figures.mark_gaps(ax, [0.0, 1.0, 2.0, 9.0, 10.0, 30.0], longest_s=3.0) == 2
-
-
 def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(figures.QUICK, raising=False)
-
-    def draw(folder: Path) -> tuple[bytes, bytes]:
+    saved = []
+    for name in ("1", "2", "3"):
         fig, ax = figures.new_figure(4, 3)
         ax.plot([1, 2, 3], label="ü")
-        png = figures.save_figure(fig, folder, "a")
-        assert png == (folder / "a.png").read_bytes()
-        return png, (folder / "a.pdf").read_bytes()
-
-    one, two = draw(tmp_path / "1"), draw(tmp_path / "2")
-    assert one == two
-    fig, ax = figures.new_figure(4, 3)
-    ax.plot([1, 2, 3], label="ü")
-    engine = fig.get_layout_engine()
-    assert figures.save_figure(fig, tmp_path / "3", "a") == one[0]
-    assert fig.get_layout_engine() is engine, "it can be added to, and saved once more"
-    assert b"Date" not in one[1] and b"matplotlib" not in one[0].lower()
+        engine = fig.get_layout_engine()
+        png = figures.save_figure(fig, tmp_path / name, "a")
+        assert png == (tmp_path / name / "a.png").read_bytes()
+        saved.append((png, (tmp_path / name / "a.pdf").read_bytes()))
+        assert fig.get_layout_engine() is engine, "it can be added to, and saved once more"
+    assert saved[0] == saved[1] == saved[2]
+    assert b"Date" not in saved[0][1] and b"matplotlib" not in saved[0][0].lower()
 
 
 def test_subjects_that_share_a_figure_have_different_colours() -> None:

@@ -143,9 +143,6 @@ def test_pages_of_the_folder_may_lead_to_one_another(to: str) -> None:
     html.examine(whole, "index", alone=False)
     with pytest.raises(WildlabError, match="mailed alone"):
         html.examine(whole, "study")
-
-
-@pytest.mark.parametrize("to", ["//host/x", "/etc/x", "http://host/x", "file:x", "a b", "javascript:x", ""])
-def test_and_nowhere_else(to: str) -> None:
-    with pytest.raises(WildlabError):
-        html.examine(page(title="a", body=f'<h1>a</h1><a href="{to}">x</a>'), "index", alone=False)
+    for away in ("//host/x", "/etc/x", "http://host/x", "file:x", "a b", "javascript:x", ""):
+        with pytest.raises(WildlabError):
+            html.examine(whole.replace(to, away), "index", alone=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,6 +18,15 @@ from wildlab.reporting.pictures import PHONE_WIDTH
 from wildlab.tracking.many import POINT, Shown
 
 
+def shown_at(time: int, names: Iterable[int], x: np.ndarray, P: np.ndarray) -> Shown:
+    """What is shown at a time: the named tracks, with states (N, 4) of one covariance."""
+    n = len(x)
+    identity = np.array([*names], int)
+    return Shown(
+        float(time), 0, identity, x, np.tile(P, (n, 1, 1)), np.ones(n), np.ones((n, 1)), np.zeros((n, 4, 0))
+    )
+
+
 def made(
     seed: int, tracks: int = 9, targets: int = 3, looks: int = 80, name: str = "boat {}"
 ) -> tuple[Any, Any]:
@@ -25,27 +35,21 @@ def made(
     size = rng.uniform(1, 300)
     ways = rng.normal(0, size, (targets, 1, 2)) + rng.normal(0, size / 20, (targets, looks, 2)).cumsum(axis=1)
     begin = np.sort(rng.integers(0, looks // 2, tracks))
+    names, flags = [name.format(i) for i in range(targets)], np.ones(targets, bool)
     shown, compared = [], []
     for t in range(looks):
         there = np.flatnonzero(begin <= t)
-        at = np.array([ways[i, t] if i < targets else rng.normal(0, size, 2) for i in there]).reshape(-1, 2)
-        x = np.concatenate([at, np.zeros((len(at), 2))], axis=1)
-        P = np.tile(np.eye(4), (len(at), 1, 1))
-        shown.append(
-            Shown(
-                float(t), 0, there, x, P, np.ones(len(at)), np.ones((len(at), 1)), np.zeros((len(at), 4, 0))
-            )
-        )
-        flags = np.ones(targets, bool)
-        compared.append(
-            Scan(float(t), at, P[:, :2, :2], there.tolist(), ways[:, t],
-                 [name.format(i) for i in range(targets)], flags, ~flags)
-        )  # fmt: skip
+        x = np.pad(rng.normal(0, size, (len(there), 2)), ((0, 0), (0, 2)))
+        on = there < targets
+        x[on, :2] = ways[there[on], t]
+        shown.append(shown_at(t, there, x, np.eye(4)))
+        P = shown[-1].P[:, :2, :2]
+        compared.append(Scan(float(t), x[:, :2], P, there.tolist(), ways[:, t], names, flags, ~flags))
     platform = rng.normal(0, size / 50, (looks, 2)).cumsum(axis=0)
     followed = SimpleNamespace(
         shown=shown,
         scans=[SimpleNamespace(time=float(t), platform=platform[t]) for t in range(looks)],
-        truth={name.format(i): ways[i] for i in range(targets)},
+        truth=dict(zip(names, ways, strict=True)),
         targets=SimpleNamespace(hulls=(POINT,)),
         cutoff_m=20.0,
     )

@@ -8,25 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.reporting.test_many_charts import shown_at
 from wildlab.evaluation.identities import Identities, TargetLife, TrackLife
 from wildlab.evaluation.sets import gospa
 from wildlab.pipeline.following.beliefs import Said
 from wildlab.reporting import many_tracks as words
-from wildlab.tracking.many import POINT, Hull, Shown
+from wildlab.tracking.many import POINT, Hull
 
 
 def followed(tracks: int = 2, looks: int = 61) -> Any:
-    shown = [
-        Shown(
-            float(t), 0, np.arange(tracks), np.zeros((tracks, 4)), np.tile(np.eye(4), (tracks, 1, 1)),
-            np.ones(tracks), np.ones((tracks, 1)), np.zeros((tracks, 4, 0)),
-        )
-        for t in range(looks)
-    ]  # fmt: skip
-    scans = [SimpleNamespace(time=float(t)) for t in range(looks)]
+    P = np.eye(4)
     return SimpleNamespace(
-        shown=shown,
-        scans=scans,
+        shown=[shown_at(t, range(tracks), np.zeros((tracks, 4)), P) for t in range(looks)],
+        scans=[SimpleNamespace(time=float(t)) for t in range(looks)],
         minutes=(looks - 1) / 60,
         targets=SimpleNamespace(hulls=(POINT,)),
         cutoff_m=20.0,

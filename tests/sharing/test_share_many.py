@@ -198,20 +198,6 @@ def test_one_that_is_refused_on_the_copy_stops_it_with_what_to_do(
     assert "kifaru-drift-many" in str(caught.value.file) and caught.value.field == "detections.kind"
 
 
-def test_one_that_was_made_from_other_tables_is_told_to_the_sender(made: Path) -> None:
-    """Followed, then imported and evaluated anew: the flight that is there is the one that is shared."""
-    flight = made / "flights" / "kifaru-drift"
-    save_flight(telling(seconds=11.0), flight, overwrite=True)
-    for folder in (made / "reports").iterdir():
-        if folder.name.endswith("-overview"):
-            folder.rename(made / "away")
-    leave(made / "reports" / "kifaru-drift-overview", flight, "")
-    for named in ("", "kifaru-drift-overview"):
-        copy = share(made / "reports" / named, overwrite=True)
-        assert NOTEBOOK not in copy.file.read_text(encoding="utf-8")
-        assert any("kifaru-drift-many" in line and "other tables" in line for line in copy.lines)
-
-
 def unpacked(data: bytes) -> bytes:
     """A page with all that is packed inside of its addresses."""
     packed = re.findall(rb'data:[^;,"]*(?:;charset=[^;,"]*)?(;base64)?,([^"\'\s>)]*)', data)

@@ -1,4 +1,4 @@
-"""Groups of parameters that do not go together are named; ship and animals have the printed numbers."""
+"""Groups of parameters, courses and targets that do not go together are named."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import pytest
 
 from tests.simulation.test_parameters import LOITER, complete, load_text
 from wildlab.errors import WildlabError
-from wildlab.simulation.parameters import each_parameter, load_twin
 
 OWN = 'value = {value}\nunit = "{unit}"\nstatus = "chosen"\nreason = "for this test"\n'
 
@@ -57,17 +56,43 @@ def test_twins_whose_groups_do_not_go_together_are_named(tmp_path, twin, leave_o
         load_text(tmp_path, text + add)
 
 
+PAIR = """[pair.both]
+value = 349
+unit = "1"
+status = "published"
+source = "H 6.4.4: 349 images had both vessels within the same image"
+"""
+
+
 @pytest.mark.parametrize(
     ("twin", "old", "new", "found"),
     [
+        ("slow-vessel", "[target.gps.", "[target.gsp.", r"target\.gsp"),
+        ("slow-vessel", "\n[route.shape]", LOITER + "\n[route.shape]", "one course"),
+        ("static-antenna", "[loiter.", "[climb.", r"climb\.\w+"),
+        ("slow-vessel", 'value = "eight"', 'value = "nine"', "'nine'"),
+        ("crossing-vessels", PAIR, "", "two targets need"),
+        ("crossing-vessels", "value = 349\n", "value = 900\n", "more than the observations"),
+        ("crossing-vessels", 'value = "boat 2"', 'value = "boat 1"', "identifier"),
+        ("slow-vessel", "value = 2001\n", "value = 3000\n", "last of 3635"),
+        (
+            "drifting-vessel",
+            "[target.motion.deviation_longest_period]\nvalue = 900.0",
+            "[target.motion.deviation_longest_period]\nvalue = 9.0",
+            "deviation_shortest_period",
+        ),
         ("gondola", "[cable.lowest]\nvalue = 3.0", "[cable.lowest]\nvalue = 30.0", "lowest is above highest"),
-        ("gondola", "[enclosures.lake.length]\nvalue = 280.0", "[enclosures.lake.length]\nvalue = 80.0",
-         r"enclosures\.lake"),
+        (
+            "gondola",
+            "[enclosures.lake.length]\nvalue = 280.0",
+            "[enclosures.lake.length]\nvalue = 80.0",
+            r"enclosures\.lake",
+        ),
         ("gondola", "[enclosures.lake.", '[enclosures."the lake".', "'the lake'"),
         ("large-ship", "value = 441\n", "value = 400\n", "fewer images"),
     ],
-)  # fmt: skip
-def test_searchers_and_ships_that_make_no_sense_are_named(tmp_path, twin, old, new, found):
+)
+def test_courses_and_targets_that_make_no_sense_are_named(tmp_path, twin, old, new, found):
     text = complete(twin)
     assert old in text
     with pytest.raises(WildlabError, match=found):
@@ -83,40 +108,3 @@ def test_the_same_pair_of_targets_cannot_have_an_outline(tmp_path):
 def test_a_loiter_is_about_a_target_that_stays(tmp_path):
     with pytest.raises(WildlabError, match="never moves"):
         load_text(tmp_path, without(complete("slow-vessel"), "route") + LOITER)
-
-
-def test_published_numbers_of_the_ship_and_the_animals_are_those_of_the_theses():
-    """Typed a second time, from H 4.4.1 and 6.4.1, and F (2.1), 7.1, 7.3, 7.5 and 8.2."""
-
-    def published(name: str) -> dict[str, object]:
-        return {
-            f"{group}.{key}": p.value
-            for group, key, p in each_parameter(load_twin(name))
-            if p.status == "published" and not isinstance(p.value, str)
-        }
-
-    assert published("large-ship") == {
-        "flight.altitude": 100,
-        "target.observations": 438,
-        "target.outline.length": 70,
-        "segments.count": 5,
-        "segments.images": 441,
-        "camera.frame_rate": 10,
-        "autopilot.rate": 10,
-    }
-    place_and_camera = {
-        "place.latitude": 58.662064,
-        "place.longitude": 16.433337,
-        "camera.fx": 1267,
-        "camera.fy": 1117,
-        "camera.cx": 356.0,
-        "camera.cy": 216.6,
-        "camera.k1": 0.446,
-    }
-    fields = ("plain", "ridge", "meadow", "lake", "wood")
-    animals = {f"enclosures.{name}.animals": 5 for name in fields}
-    gondola = {"flight.duration": 1800, "flight.airspeed": 1.5, "cable.lowest": 3, "cable.highest": 20}
-    place_and_camera |= {"land.step": 2, "land.relief": 51}
-    assert published("gondola") == place_and_camera | animals | gondola
-    search = {"flight.altitude": 60, "survey.row_distance": 25}
-    assert published("uav-search") == place_and_camera | search

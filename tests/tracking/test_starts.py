@@ -1,5 +1,7 @@
 """Starts whose covariance is that of their errors, and rays that do not meet."""
 
+from collections import defaultdict
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -13,6 +15,7 @@ from wildlab.tracking.considered import consider
 from wildlab.tracking.considering import considering
 from wildlab.tracking.noise import own_noise
 from wildlab.tracking.platforms import bearings, measured_from, polar, ranges_bearings
+from wildlab.tracking.predictions import POSE as POSE_ERRORS
 from wildlab.tracking.rays import intersect_rays
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.starts import start_from_measurement, start_from_position, start_from_rays
@@ -33,22 +36,20 @@ def wrong_by(rng, sds):
     return {name: rng.normal() * sd for name, sd in sds.items()}
 
 
-def sighted(kind, rng, target, error):
+def sighted(kind, target, error):
     """A sensor that believes itself where it is not, and what it measured of the target, without noise."""
-    get = error.get
-    platform = np.array([20.0 + get("platform_north", 0.0), -30.0 + get("platform_east", 0.0)])
+    error = defaultdict(float, error)
+    platform = [20.0 + error["platform_north"], -30.0 + error["platform_east"]]
     if kind == "range-bearing":
-        z = m.predict_range_bearing(target, platform, 0.4 + get("heading", 0.0)).z
-        z = z + np.array([get("range_bias", 0.0), get("bearing_bias", 0.0)])
+        z = m.predict_range_bearing(target, platform, 0.4 + error["heading"]).z
+        z = z + np.array([error["range_bias"], error["bearing_bias"]])
         return ranges_bearings([20.0, -30.0], 0.4), z, [1.0, 0.01]
     if kind == "position":
-        turn = -get("heading", 0.0)
-        R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        turn = -error["heading"]
+        R = euler_to_matrix(0.0, 0.0, turn)[:2, :2]
         return measured_from([20.0, -30.0]), [20.0, -30.0] + R @ (target - platform), [2.0, 1.0]
-    dp = [get("platform_north", 0.0), get("platform_east", 0.0), get("platform_down", 0.0)]
-    turn = [get("roll", 0.0), get("pitch", 0.0), get("heading", 0.0)]
     believed = posed(POSE)
-    true = disturbed(believed, np.array([*dp, *turn]))
+    true = disturbed(believed, np.array([error[name] for name in POSE_ERRORS]))
     if kind == "pixel":
         return m.pixels(believed, 2.0), m.predict_pixel(target, true, 2.0).z, [2.0, 3.0]
     if kind == "camera angles":
@@ -64,14 +65,8 @@ def sighted(kind, rng, target, error):
     )
 
 
-TILTED = {
-    "platform_north": 1.0,
-    "platform_east": 2.0,
-    "platform_down": 1.0,
-    "roll": 0.004,
-    "pitch": 0.003,
-    "heading": 0.01,
-}
+TILTED = {"platform_north": 1.0, "platform_east": 2.0, "platform_down": 1.0,
+          "roll": 0.004, "pitch": 0.003, "heading": 0.01}  # fmt: skip
 LEVEL = {"platform_north": 1.0, "heading": 0.01}
 
 
@@ -95,7 +90,7 @@ def test_covariance_of_a_start_is_that_of_its_errors(kind, sds):
     errors, covariances = [], []
     for _ in range(RUNS):
         error = wrong_by(rng, sds)
-        sensor, z, sd = sighted(kind, rng, target, error)
+        sensor, z, sd = sighted(kind, target, error)
         z = z + rng.normal(size=len(sd)) * sd
         pose = consider(sds) if sds else None
         if pose is not None:
@@ -172,7 +167,7 @@ def test_start_from_bearings_alone():
 
 def test_start_from_rays_of_a_camera_and_of_several_sensors():
     target = np.array([95.0, 40.0])
-    one, z_one, _ = sighted("pixel", None, target, {})
+    one, z_one, _ = sighted("pixel", target, {})
     other = bearings([-100.0, 100.0], 0.0)
     z_other = np.array([np.arctan2(40.0 - 100, 95.0 + 100)])
     both = merge([
@@ -249,31 +244,38 @@ def test_position_and_velocity_as_they_are_given():
     assert start_from_position(0.0, [1.0, 2.0], np.eye(2), n=2).P.shape == (2, 2)
 
 
-def test_what_cannot_be_a_start_is_said():
-    times, z = [0.0, 1.0, 2.0], [[0.1], [0.1], [0.1]]
-    fixed = bearings([0.0, 0.0], 0.0)
-    for given, words in (
-        (z, "parallel"), ([[0.1], [np.nan], [np.nan]], "1 ray"), (np.full((3, 1), np.nan), "0 rays")
-    ):  # fmt: skip
-        with pytest.raises(WildlabError, match=words):
-            start_from_rays(times, given, [[1e-4]], fixed)
-    with pytest.raises(WildlabError, match="no rays"):
-        start_from_rays(times, np.zeros((3, 2)), np.eye(2), m.positions())
-    for given, R, sensor in ((z, [[1e-4]], fixed), (np.full((3, 2), np.nan), np.eye(2), m.positions())):
-        with pytest.raises(WildlabError, match="no measurement"):
-            start_from_measurement(times, given, R, sensor)
-    o, clock = [[0.0, 0.0], [0.0, 100.0]], consider({"clock": 1.0})
-    for directions, pose, words in (
-        ([[-1.0, -0.5], [1.0, -0.5]], None, "behind"),
-        ([[1.0, 0.5], [1.0, -0.5]], clock, "clock"),
-        (np.zeros((3, 2)), None, "directions"),
-    ):
-        with pytest.raises(WildlabError, match=words):
-            intersect_rays(o, directions, 0.01, pose=pose)
-    start, heading = Start(0.0, np.zeros(2), np.eye(2), C=np.zeros((2, 3))), consider({"heading": 1})
-    sensor = considering(fixed, ["heading"])
-    with pytest.raises(WildlabError, match="cross-covariance"):
-        run_filter(times, z, [[1e-4]], sensor, lambda dt: (np.eye(2), np.eye(2)), start, pose=heading)
+FIXED, TIMES, BEARINGS = bearings([0.0, 0.0], 0.0), [0.0, 1.0, 2.0], [[0.1], [0.1], [0.1]]
+NOWHERE = np.full((3, 2), np.nan)
+
+
+def intersect(directions, **more):
+    return intersect_rays([[0.0, 0.0], [0.0, 100.0]], directions, 0.01, **more)
+
+
+def filter_with_cross_covariance():
+    start = Start(0.0, np.zeros(2), np.eye(2), C=np.zeros((2, 3)))
+    sensor, pose = considering(FIXED, ["heading"]), consider({"heading": 1})
+    run_filter(TIMES, BEARINGS, [[1e-4]], sensor, lambda dt: (np.eye(2), np.eye(2)), start, pose=pose)
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (lambda: start_from_rays(TIMES, BEARINGS, [[1e-4]], FIXED), "parallel"),
+        (lambda: start_from_rays(TIMES, [[0.1], [np.nan], [np.nan]], [[1e-4]], FIXED), "1 ray"),
+        (lambda: start_from_rays(TIMES, NOWHERE[:, :1], [[1e-4]], FIXED), "0 rays"),
+        (lambda: start_from_rays(TIMES, np.zeros((3, 2)), np.eye(2), m.positions()), "no rays"),
+        (lambda: start_from_measurement(TIMES, BEARINGS, [[1e-4]], FIXED), "no measurement"),
+        (lambda: start_from_measurement(TIMES, NOWHERE, np.eye(2), m.positions()), "no measurement"),
+        (lambda: intersect([[-1.0, -0.5], [1.0, -0.5]]), "behind"),
+        (lambda: intersect([[1.0, 0.5], [1.0, -0.5]], pose=consider({"clock": 1.0})), "clock"),
+        (lambda: intersect(np.zeros((3, 2))), "directions"),
+        (filter_with_cross_covariance, "cross-covariance"),
+    ],
+)
+def test_what_cannot_be_a_start_is_said(act, words):
+    with pytest.raises(WildlabError, match=words):
+        act()
 
 
 def test_a_detections_own_noise():

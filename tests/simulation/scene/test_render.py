@@ -32,9 +32,14 @@ def poses(height, roll=0.0, pitch=0.0, yaw=0.0, camera=CAMERA):
     return CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -height]), R_nb)
 
 
+def shown(sea, bodies, at, *time):
+    """What the camera of the poses sees of bodies on a sea."""
+    return render(Scene(sea, bodies), at.camera, at.p_nc, at.R_nc, *time)
+
+
 def rendered(body, height=60.0, camera=CAMERA, sea=EVEN, **angles):
     at = poses(height, camera=camera, **angles)
-    return render(Scene(sea, (body,)), camera, at.p_nc, at.R_nc), at
+    return shown(sea, (body,), at), at
 
 
 def test_a_rectangle_straight_below_has_its_size_in_closed_form():
@@ -56,7 +61,7 @@ def test_what_is_warm_integrates_to_the_projected_outline(roll, pitch, yaw):
     at = poses(70.0, roll, pitch, yaw)
     middle = georeference_pixels(at, [[80.0, 64.0]], 0.0)[0]
     body = body.at(middle[0], middle[1], 0.7)
-    view = render(Scene(EVEN, (body,)), CAMERA, at.p_nc, at.R_nc)
+    view = shown(EVEN, (body,), at)
     seen, warm = view.seen[0], (view.kelvin.astype(float) - 286.0) / 8.0
     assert np.isclose(warm.sum(), seen.area, rtol=0.01)
     v, u = np.mgrid[:128, :160]
@@ -81,7 +86,7 @@ def test_what_the_border_cuts_is_cut_exactly():
     beside, _ = rendered(rectangle(20.0, 6.0, 8.0).at(0.0, 40.0))
     assert beside.seen == ()
     behind = poses(60.0, pitch=60.0)
-    view = render(Scene(EVEN, (rectangle(5, 5, 8).at(-500.0, 0.0),)), CAMERA, behind.p_nc, behind.R_nc)
+    view = shown(EVEN, (rectangle(5, 5, 8).at(-500.0, 0.0),), behind)
     assert view.seen == ()
 
 
@@ -104,7 +109,7 @@ def test_nearer_bodies_hide_farther_ones():
     at = poses(60.0)
     tall = rectangle(8.0, 8.0, 9.0, height=20.0)
     for bodies in ((tall, rectangle(4, 4, 3.0)), (rectangle(4, 4, 3.0), tall)):
-        view = render(Scene(EVEN, bodies), CAMERA, at.p_nc, at.R_nc)
+        view = shown(EVEN, bodies, at)
         assert view.labels[66, 78] == 1 + bodies.index(tall)
         assert np.isclose(view.kelvin[66, 78], 295.0, atol=1e-3)
 
@@ -112,7 +117,7 @@ def test_nearer_bodies_hide_farther_ones():
 def test_the_horizon_is_where_the_rays_are_level():
     camera = Camera(160, 128, 290.0, 292.0, 78.0, 66.0, distortion=(-0.1, 0.02, 0.0, 0.0, 0.0))
     at = poses(100.0, roll=10, pitch=85, camera=camera)
-    view = render(Scene(Sea(), ()), camera, at.p_nc, at.R_nc)
+    view = shown(Sea(), (), at)
     v, u = np.mgrid[:128, :160].astype(float)
     xy = normalise(camera, np.stack([u, v], axis=-1))
     down = xy @ at.R_nc[2, :2] + at.R_nc[2, 2]
@@ -148,18 +153,18 @@ def test_the_sun_glints_where_it_is_mirrored():
         glint=5.0,
     )
     at = poses(60.0, pitch=30.0)  # straight down is turned 30 deg forward: north, 60 deg below the horizon
-    warm = render(Scene(sea, ()), CAMERA, at.p_nc, at.R_nc).kelvin
+    warm = shown(sea, (), at).kelvin
     assert np.unravel_index(warm.argmax(), warm.shape) == (66, 78)
     assert warm.max() > 290
     away = poses(60.0, pitch=30.0, yaw=180.0)
-    assert render(Scene(sea, ()), CAMERA, away.p_nc, away.R_nc).kelvin.max() < 286.1
+    assert shown(sea, (), away).kelvin.max() < 286.1
 
 
 def test_a_moving_vessel_is_elsewhere_later_and_leaves_a_wake():
     boat = vessel(12.0, 4.0, 6.0, speed=3.0, seed=1).at(0.0, 0.0, np.pi / 2, 3.0)
     assert np.allclose(boat.centre(2.0), [0.0, 6.0, 0.0])
     at = poses(100.0)
-    views = [render(Scene(EVEN, (boat,)), CAMERA, at.p_nc, at.R_nc, time) for time in (0.0, 2.0)]
+    views = [shown(EVEN, (boat,), at, time) for time in (0.0, 2.0)]
     assert np.isclose(views[1].seen[0].uv[0] - views[0].seen[0].uv[0], 290 * 6 / 100)
     behind = views[0].kelvin[66, 78 - 25]
     assert views[0].labels[66, 78 - 25] == 0

@@ -24,6 +24,12 @@ def even(level=290.15):
     return np.full(SHAPE, level, np.float32)
 
 
+def seen(response, image, seed=1):
+    """What an image is taken for by one sensor."""
+    sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
+    return to_kelvin(expose(image, response, sensor, np.random.default_rng(seed)), response).astype(float)
+
+
 def test_an_ideal_camera_only_counts():
     sensor = sensor_of(IDEAL, SHAPE, np.random.default_rng(1))
     image = even()
@@ -36,8 +42,7 @@ def test_an_ideal_camera_only_counts():
 
 def test_noise_and_pattern_have_their_deviations_and_the_pattern_stays():
     response = CameraResponse(vignetting=0.0, dead_share=0.0)
-    sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
-    images = [to_kelvin(expose(even(), response, sensor, np.random.default_rng(k)), response) for k in (2, 3)]
+    images = [seen(response, even(), seed) for seed in (2, 3)]
     difference = (images[0] - images[1]).std()
     # Rounding to counts of 0.04 K adds its own.
     assert np.isclose(difference, np.sqrt(2 * (0.05**2 + 0.04**2 / 12)), rtol=0.03)
@@ -48,8 +53,7 @@ def test_noise_and_pattern_have_their_deviations_and_the_pattern_stays():
 
 def test_corners_look_warmer_by_the_vignetting():
     response = CameraResponse(noise=0.0, pattern=0.0, stripes=0.0, dead_share=0.0, vignetting=2.0)
-    sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
-    kelvin = to_kelvin(expose(even(), response, sensor, np.random.default_rng(1)), response)
+    kelvin = seen(response, even())
     assert np.isclose(kelvin[0, 0] - kelvin[60, 80], 2.0, atol=0.05)
 
 
@@ -57,10 +61,7 @@ def test_blur_keeps_the_energy_and_widens_a_point():
     response = CameraResponse(blur_sd=1.5, noise=0, pattern=0, stripes=0, vignetting=0, dead_share=0)
     image = even()
     image[60, 80] += 200.0
-    sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
-    excess = (
-        to_kelvin(expose(image, response, sensor, np.random.default_rng(1)), response).astype(float) - 290.15
-    )
+    excess = seen(response, image) - 290.15
     assert np.isclose(excess[40:80, 60:100].sum(), 200, rtol=0.05)
     v = np.arange(SHAPE[0]) - 60
     assert np.isclose(

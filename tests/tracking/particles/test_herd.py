@@ -29,6 +29,18 @@ def free(cloud, seen, dt, rng):
     return move(cloud, WALK, dt, rng)
 
 
+def everywhere(probability):
+    """To be detected as probably in all places."""
+    return lambda places: np.full(places.shape[:-1], probability)
+
+
+def begun(step, rules, rng, **more):
+    """No herd, or three animals that nobody has seen."""
+    return (
+        no_herd(rules) if step is step_nearest else expect(rules, 3.0, inside, np.zeros(2), SIZE, rng, **more)
+    )
+
+
 def look(time, *z, sight=lambda p: np.zeros(p.shape[:-1]), clutter=0.0):
     return Look(time, np.reshape(z, (-1, 2)).astype(float), np.tile(R, (len(z), 1, 1)), sight, clutter)
 
@@ -38,13 +50,13 @@ def test_one_animal_and_nothing_else_is_the_single_filter(step):
     """A detection in each image, none false: the Kalman filter's, within the error of the particles."""
     rng = np.random.default_rng(2)
     rules = RULES._replace(moves=free, particles=20_000)
-    everywhere = lambda p: np.full(p.shape[:-1], 0.9)  # noqa: E731
+    sight = everywhere(0.9)
     at, x, P = np.array([60.0, 45.0]), None, None
     herd = no_herd(rules) if step is step_nearest else expect(rules, 1.0, inside, np.zeros(2), SIZE, rng)
     for k in range(8):
         at = at + rng.standard_normal(2) * np.sqrt(WALK(4.0)[1][0, 0])
         z = at + NOISE * rng.standard_normal(2)
-        herd, taken = step(herd, look(4.0 * k, z, sight=everywhere), rules, rng)
+        herd, taken = step(herd, look(4.0 * k, z, sight=sight), rules, rng)
         if x is None:
             x, P = z, R
         else:
@@ -60,7 +72,7 @@ def test_who_is_not_where_it_should_be_is_less_and_less_there():
     """An animal at rest that images cannot miss but by the detector: the rule of Bayes, image by image."""
     rng = np.random.default_rng(5)
     rules = RULES._replace(moves=lambda cloud, seen, dt, rng: cloud)
-    sight = lambda p: np.full(p.shape[:-1], 0.6)  # noqa: E731
+    sight = everywhere(0.6)
     herd = expect(rules, 3.0, inside, np.zeros(2), SIZE, rng)
     clutter = 1e-4
     herd, _ = step_counting(herd, look(0.0, [60.0, 45.0], sight=sight, clutter=clutter), rules, rng)
@@ -84,11 +96,11 @@ def test_one_detection_is_shared_out_among_all_it_may_be_of():
     """A track's, an animal's that was never seen, or false: by hand, with normal densities."""
     rng = np.random.default_rng(16)
     rules = RULES._replace(moves=lambda cloud, seen, dt, rng: cloud, particles=40_000)
-    everywhere, p, clutter = (lambda x: np.full(x.shape[:-1], 0.6)), 0.6, 2e-4
+    sight, p, clutter = everywhere(0.6), 0.6, 2e-4
     herd = expect(rules, 5.0, inside, np.zeros(2), SIZE, rng, particles=200_000)
-    herd, _ = step_counting(herd, look(0.0, [60.0, 45.0], sight=everywhere, clutter=clutter), rules, rng)
+    herd, _ = step_counting(herd, look(0.0, [60.0, 45.0], sight=sight, clutter=clutter), rules, rng)
     r, u = herd.existence[0], herd.expected_unseen
-    after, taken = step_counting(herd, look(1.0, [63.0, 45.0], sight=everywhere, clutter=clutter), rules, rng)
+    after, taken = step_counting(herd, look(1.0, [63.0, 45.0], sight=sight, clutter=clutter), rules, rng)
     g = np.exp(-0.5 * 9 / (2 * NOISE**2)) / (2 * np.pi * 2 * NOISE**2)  # track and detection both unsure
     new = p * u / np.prod(SIZE)
     assert taken.tolist() == [1]
@@ -130,7 +142,7 @@ def test_both_lost_rules_and_found_again_under_the_same_name():
 
     by_search = RULES._replace(lost_doubt=0.05)
     herd, _ = step_nearest(no_herd(RULES), look(0.0, [50.0, 40.0]), by_search, rng)
-    wide = lambda p: np.full(p.shape[:-1], 0.5)  # noqa: E731
+    wide = everywhere(0.5)
     for k in range(1, 5):
         herd, _ = step_nearest(herd, look(float(k), sight=wide), by_search, rng)
         assert np.isclose(herd.missed[0], 0.5**k) and not herd.lost.any()
@@ -171,14 +183,12 @@ def test_without_negative_information_an_empty_image_says_nothing():
 def test_nothing_at_all_and_very_much(step):
     rng = np.random.default_rng(10)
     rules = RULES._replace(particles=50)
-    start = expect(rules, 3.0, inside, np.zeros(2), SIZE, rng, particles=400)
-    start = no_herd(rules) if step is step_nearest else start
-    herd, taken = step(start, look(0.0), rules, rng)
+    herd, taken = step(begun(step, rules, rng, particles=400), look(0.0), rules, rng)
     assert not len(taken) and not len(herd.identity)
     crowd = rng.uniform(0, SIZE, (1000, 2))
-    everywhere = lambda p: np.full(p.shape[:-1], 0.5)  # noqa: E731
+    sight = everywhere(0.5)
     for k in range(2):
-        herd, taken = step(herd, look(float(k), *crowd, sight=everywhere, clutter=0.05), rules, rng)
+        herd, taken = step(herd, look(float(k), *crowd, sight=sight, clutter=0.05), rules, rng)
         assert len(taken) == 1000 and len(set(herd.identity.tolist())) == len(herd.identity)
         assert (herd.existence <= 1).all()
         np.testing.assert_allclose(herd.cloud.w.sum(axis=1), 1)
@@ -187,12 +197,12 @@ def test_nothing_at_all_and_very_much(step):
 @pytest.mark.parametrize("step", [step_nearest, step_counting])
 def test_a_ray_that_met_no_ground_keeps_its_place_and_nothing_else(step):
     rng = np.random.default_rng(14)
-    everywhere = lambda p: np.full(p.shape[:-1], 0.5)  # noqa: E731
-    start = no_herd(RULES) if step is step_nearest else expect(RULES, 3.0, inside, np.zeros(2), SIZE, rng)
-    gaps = look(0.0, [np.nan, np.nan], [50.0, 40.0], [90.0, 70.0], sight=everywhere, clutter=1e-6)
+    sight = everywhere(0.5)
+    start = begun(step, RULES, rng)
+    gaps = look(0.0, [np.nan, np.nan], [50.0, 40.0], [90.0, 70.0], sight=sight, clutter=1e-6)
     gaps.R[2] = np.nan
     herd, taken = step(start, gaps, RULES, np.random.default_rng(1))
-    alone = look(0.0, [50.0, 40.0], sight=everywhere, clutter=1e-6)
+    alone = look(0.0, [50.0, 40.0], sight=sight, clutter=1e-6)
     wanted, _ = step(start, alone, RULES, np.random.default_rng(1))
     assert taken.tolist() == [0, 1, 0]
     np.testing.assert_array_equal(herd.cloud.x, wanted.cloud.x)
@@ -202,9 +212,9 @@ def test_a_ray_that_met_no_ground_keeps_its_place_and_nothing_else(step):
 def test_a_detection_that_can_only_be_false_starts_nothing():
     """Nobody is left to be found, or nobody can be seen there."""
     rng = np.random.default_rng(15)
-    everywhere = lambda p: np.full(p.shape[:-1], 0.9)  # noqa: E731
+    sight = everywhere(0.9)
     none = expect(RULES, 0.0, inside, np.zeros(2), SIZE, rng)
-    herd, taken = step_counting(none, look(0.0, [50.0, 40.0], sight=everywhere, clutter=1e-5), RULES, rng)
+    herd, taken = step_counting(none, look(0.0, [50.0, 40.0], sight=sight, clutter=1e-5), RULES, rng)
     assert taken.tolist() == [0] and not len(herd.identity)
     blind = expect(RULES, 5.0, inside, np.zeros(2), SIZE, rng)
     herd, taken = step_counting(blind, look(0.0, [50.0, 40.0], clutter=1e-5), RULES, rng)
@@ -214,8 +224,7 @@ def test_a_detection_that_can_only_be_false_starts_nothing():
 @pytest.mark.parametrize("step", [step_nearest, step_counting])
 def test_time_does_not_go_back_and_a_step_leaves_what_was_known_alone(step):
     rng = np.random.default_rng(11)
-    begun = no_herd(RULES) if step is step_nearest else expect(RULES, 3.0, inside, np.zeros(2), SIZE, rng)
-    herd, _ = step(begun, look(5.0, [50.0, 40.0], clutter=1e-5), RULES, rng)
+    herd, _ = step(begun(step, RULES, rng), look(5.0, [50.0, 40.0], clutter=1e-5), RULES, rng)
     kept = herd.cloud.x.copy(), herd.cloud.w.copy()
     step(herd, look(5.0, [50.0, 41.0], clutter=1e-5), RULES, rng)
     step(herd, look(5.0, [90.0, 41.0], clutter=1e-5), RULES, rng)
