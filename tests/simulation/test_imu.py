@@ -176,7 +176,7 @@ def test_gyros_and_accelerometers_err_apart():
 
 
 @pytest.mark.parametrize(
-    ("what", "keeps_length"), [("package_misalignment", True), ("axis_misalignment", False)]
+    ("what", "rigid"), [("package_misalignment", True), ("axis_misalignment", False)]
 )
 def test_a_misaligned_unit_reads_another_direction(what, rigid):
     """Gravity seen by a turned package keeps its length; axes that lean read a share of their neighbours."""
