@@ -1,13 +1,21 @@
-"""Figures: the ellipse is the right one, the same figure gives the same bytes, a map can be measured."""
+"""Figures: ellipses, the same bytes, and letters that can be read and lie on no others."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
+from tests.figure_text import overlapping
+from tests.reporting.test_html import contrast
 from wildlab.reporting import figures
+from wildlab.reporting.charts import comparison, georeferencing, navigation, tracks
+from wildlab.reporting.figure_text import least_size
+from wildlab.reporting.pictures import PHONE_WIDTH
 
 
 def test_ellipse_holds_its_share_of_samples() -> None:
@@ -56,3 +64,121 @@ def test_subjects_that_share_a_figure_have_different_colours() -> None:
     for family in (("autopilot", "observer", "mekf"), ("kf", "ekf", "schmidt", "coloured", "ukf", "imm")):
         assert len({figures.colour(name) for name in (*family, "truth")}) == len(family) + 1
     assert figures.colour("logged-pose") != figures.colour("calibrated-pose") != figures.colour("recorded")
+
+
+LONG = "A title that says what is to be seen here, and says it at length: 12.3 m of 45.6 m"
+TIMES = np.linspace(0.0, 90.0, 181)
+SEEN = (TIMES < 30.0) | (TIMES > 60.0)
+NAMES = {"ekf": "extended filter", "schmidt": "Schmidt filter", "coloured": "differenced"}
+Draw = Callable[[np.random.Generator], Figure]
+
+
+def walk(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    return rng.normal(0, rng.uniform(0.1, 30), shape).cumsum(axis=0)
+
+
+def strips_of(rng: np.random.Generator) -> Figure:
+    one = {"roll (°)": walk(rng, 181), "pitch (°)": walk(rng, 181)}
+    sources = dict.fromkeys(("mekf", "truth", "autopilot", "observer"), (TIMES, one))
+    return navigation.strips(sources, LONG)
+
+
+def scored(rng: np.random.Generator) -> pd.DataFrame:
+    return pd.DataFrame(
+        {"frame_id": [f"f{i}" for i in range(40)], "time_s": np.arange(40.0), "error_m": rng.gamma(2, 3, 40)}
+    )
+
+
+CHARTS: dict[str, Draw] = {
+    "scatter": lambda rng: georeferencing.error_scatter(rng.normal(0, rng.uniform(0.1, 50), (80, 2)), LONG),
+    "shares": lambda rng: georeferencing.error_shares(
+        {name: (rng.normal(0, 3, (50, 2)), figures.BLUE) for name in ("as logged", "corrected")}, LONG
+    ),
+    "by image": lambda rng: georeferencing.errors_by_image(scored(rng), LONG),
+    "positions": lambda rng: georeferencing.positions_map(walk(rng, 90, 2), walk(rng, 90, 2), LONG, "black"),
+    "aircraft": lambda rng: georeferencing.aircraft_map(*(walk(rng, 90, 2) for _ in range(3)), title=LONG),
+    "filter": lambda rng: georeferencing.filter_chart(*rng.gamma(2, 3, (3, 90)), title=LONG),
+    "over time": lambda rng: georeferencing.errors_over_time(TIMES, *rng.gamma(2, 3, (2, 181)), title=LONG),
+    "lags": lambda rng: georeferencing.autocorrelation_chart(
+        {"north": rng.uniform(-1, 1, 20), "east": rng.uniform(-1, 1, 20)}, 0.2, LONG
+    ),
+    "track map": lambda rng: tracks.track_map(
+        walk(rng, 181, 2), {name: walk(rng, 181, 2) for name in NAMES}, NAMES, LONG, aircraft=walk(rng, 90, 2)
+    ),
+    "errors": lambda rng: tracks.error_over_time(
+        TIMES, SEEN, {name: walk(rng, 181, 2) for name in NAMES}, NAMES, LONG, measured=walk(rng, 181, 2)
+    ),
+    "course": lambda rng: tracks.speed_and_course(
+        TIMES, SEEN, walk(rng, 181, 4), {name: walk(rng, 181, 4) for name in NAMES}, NAMES, LONG
+    ),
+    "squares": lambda rng: tracks.squares_over_time(
+        TIMES, SEEN, {what: {name: rng.chisquare(2, 181) for name in NAMES} for what in ("NEES", "NIS")},
+        NAMES, LONG,
+    ),
+    "strips": strips_of,
+    "bands": lambda rng: navigation.error_bands(
+        TIMES, {name: walk(rng, 181, 3) for name in ("mekf", "observer")},
+        {"mekf": rng.gamma(2, 1, (181, 3))}, ["roll (°)", "pitch (°)", "yaw (°)"], LONG,
+    ),
+    "deviations": lambda rng: navigation.deviation_chart(
+        TIMES, rng.gamma(2, 1, (181, 6)), list(rng.gamma(2, 1, 6)), ("m", "°"), LONG
+    ),
+    "biases": lambda rng: navigation.bias_chart(TIMES, walk(rng, 181, 6), rng.gamma(2, 1, (181, 6)), LONG),
+    "nis": lambda rng: navigation.squares_chart(
+        {name: (TIMES, rng.chisquare(3, 181)) for name in ("position", "velocity")}, 3, "NIS", LONG
+    ),
+    "flights": lambda rng: comparison.dots_chart(
+        ["a", "a flight with quite a long name", "c"], rng.gamma(2, 1, 3), *np.full((2, 3), np.nan), "m",
+        LONG, 1.0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CHARTS)
+def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name: str) -> None:
+    figure = CHARTS[name](np.random.default_rng(0))
+    figures.png_bytes(figure)
+    assert overlapping(figure) == []
+    # As wide as a phone, the smallest letters still have their pixels: nobody has to push it sideways.
+    assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH
+
+
+def test_the_look_out_finds_what_is_wrong() -> None:
+    figure, ax = figures.new_figure()
+    ax.text(0.5, 0.5, "one")
+    ax.text(0.5, 0.5, "other")
+    figure.text(0.9, 0.5, "far to the right of all")
+    found = overlapping(figure)
+    assert any("'one' lies on 'other'" in one for one in found)
+    assert any("'far to the right of all' leaves the figure" in one for one in found)
+    assert len(found) == 2
+
+
+def test_a_legend_and_names_at_ends_are_moved_until_they_fit() -> None:
+    figure, ax = figures.new_figure()
+    for i in range(5):
+        ax.plot([0, 1], [0, 1e-9 * i], label=f"the line number {i}")
+        figures.end_label(ax, 1, 1e-9 * i, f"name {i}", "black")
+    ax.set_ylim(-1, 1)
+    figure.legend(loc="outside lower center", ncols=5)
+    assert len(overlapping(figure)) > 1
+    figures.png_bytes(figure)
+    assert overlapping(figure) == []
+    heights = [text.get_window_extent().y0 for text in ax.texts]
+    assert heights == sorted(heights)  # in the order of the lines
+
+
+@pytest.mark.parametrize("unit", ["s", "m/s", "%", "°"])
+def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit: str) -> None:
+    for much in range(0, 24, 6):
+        figure, ax = figures.new_figure()
+        ax.set_title(f"{'x' * much} pauses, of which the longest one, of all of the frames: 37.4 {unit}")
+        figures.png_bytes(figure)
+        lines = ax.get_title(loc="left").split("\n")
+        assert len(lines) > 1 and lines[-1].endswith(f"37.4 {unit}")
+
+
+def test_every_line_stands_out_from_white() -> None:
+    cycle = [str(one["color"]) for one in figures._STYLE["axes.prop_cycle"]]
+    for colour in {*figures.COLOURS.values(), *cycle}:
+        assert contrast(colour, "#ffffff") >= 3.0, colour

@@ -1,21 +1,28 @@
-"""The page of a report: what it promises is examined, and what comes out of a log stays text."""
+"""Pages: what they promise is examined, what comes out of a log stays text, and parts have their order."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from itertools import permutations
 from pathlib import Path
 
 import nbformat
 import pandas as pd
 import pytest
+from bs4 import BeautifulSoup, Tag
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.notebooks import notebook, shown
 from wildlab.errors import WildlabError
 from wildlab.reporting import html
+from wildlab.reporting.arrange import ADVICE, LIMITS, METHOD, arranged
 from wildlab.reporting.failure import failure_page
 from wildlab.reporting.figures import new_figure
+from wildlab.reporting.glossary import MOST, Word, with_glossary, words
 from wildlab.reporting.notebook_file import read_notebook
-from wildlab.reporting.page import page
+from wildlab.reporting.page import STYLE, page
 from wildlab.reporting.report import Report, open_report
 
 HOSTILE = "<script>alert(1)</script>\"'\n<img src=x onerror=alert(2)>"
@@ -146,3 +153,207 @@ def test_pages_of_the_folder_may_lead_to_one_another(to: str) -> None:
     for away in ("//host/x", "/etc/x", "http://host/x", "file:x", "a b", "javascript:x", ""):
         with pytest.raises(WildlabError):
             html.examine(whole.replace(to, away), "index", alone=False)
+
+
+WORDS = ("ink", "dim", "link", "good", "warn", "bad")
+
+
+def colours(rule: str) -> dict[str, str]:
+    """The variables of the first ``:root`` after ``rule``, those that are a plain colour."""
+    block = re.search(r":root \{(.*?)\}", STYLE[STYLE.index(rule) :], re.S)
+    assert block is not None
+    return dict(re.findall(r"--([a-z]+): (#[0-9a-f]{6})(?![0-9a-f])", block[1]))
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of WCAG 2.2."""
+    channels = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    red, green, blue = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def contrast(one: str, other: str) -> float:
+    """The contrast ratio of WCAG 2.2."""
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_contrast_is_that_of_the_standard() -> None:
+    assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
+    assert contrast("#767676", "#ffffff") == pytest.approx(4.54, abs=0.01)
+
+
+@pytest.mark.parametrize("scheme", [":root", "prefers-color-scheme: dark"])
+def test_every_colour_of_words_can_be_read(scheme: str) -> None:
+    found = colours(":root") | colours(scheme)
+    for behind in ("bg", "soft"):
+        for word in WORDS:
+            assert contrast(found[word], found[behind]) >= 4.5, (scheme, word, behind)
+    for status in ("dim", "good", "warn", "bad"):
+        assert contrast(found["on"], found[status]) >= 4.5, (scheme, status)
+    # What is drawn, not written.
+    for mark in ("blue", "ink"):
+        assert contrast(found[mark], found["bg"]) >= 3.0
+
+
+def test_the_night_has_its_own_ground_and_leaves_paper_white() -> None:
+    assert luminance(colours("prefers-color-scheme: dark")["bg"]) < 0.02
+    assert "@media screen and (prefers-color-scheme: dark)" in STYLE
+    # A colour written outside the variables would stay as it is by night.
+    assert not re.findall(r"#[0-9a-fA-F]{3,8}\b", STYLE.split("* { box-sizing")[1])
+
+
+IMAGE = '<img alt="a" src="data:image/png;base64,AA==">'
+
+
+def in_order(*parts: str) -> str:
+    return arranged("\n".join(parts))
+
+
+def order(html: str, *words: str) -> list[str]:
+    """The words in the order in which they come."""
+    return sorted(words, key=html.index)
+
+
+def report() -> Report:
+    return open_report(study="test", kind="computed")
+
+
+PARTS = {
+    "head": "<header><h1>head</h1></header>",
+    "summary": '<section class="summary neutral"><p>summary</p></section>',
+    "alert": '<section class="alert" data-part="alert"><p>alert</p></section>',
+    "tiles": '<ul class="tiles"><li>tiles</li></ul>',
+    "advice": f'<h2 data-part="{ADVICE}">advice</h2>\n<p>do this</p>',
+    "limits": f'<h2 data-part="{LIMITS}">limits</h2>\n<ul><li>doubt</li></ul>',
+    "numbers": f"<h2>numbers</h2>\n<p>before</p><figure>{IMAGE}<figcaption><b>Figure 1.</b> picture"
+    "</figcaption></figure><p>after</p>",
+    "method": f'<details class="method" data-part="{METHOD}"><summary>by</summary><p>thus</p></details>',
+}
+
+
+@given(st.permutations(list(PARTS)))
+def test_any_order_of_the_parts_becomes_the_one(names: list[str]) -> None:
+    html = in_order(*(PARTS[name] for name in names))
+    wanted = ["head</h1", "summary</p", "alert</p", "picture", "tiles</li", "advice", "do this"]
+    wanted += ["limits", "doubt", "numbers</h2", "before", "after", "by</summary", "thus"]
+    assert order(html, *wanted) == wanted
+    # Nothing is lost, and nothing is said twice.
+    assert all(html.count(word) == 1 for word in wanted) and "data-part" not in html
+
+
+def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand() -> None:
+    one = report()
+    one.head("Title")
+    one.section("Section")
+    for name in ("a", "b", "c"):
+        one.figure(new_figure()[0], name=name, alt=name, caption=f"Shows {name}.", main=name == "b")
+    soup = BeautifulSoup(arranged("\n".join(one.parts)), "html.parser")
+    captions = [caption.get_text() for caption in soup.find_all("figcaption")]
+    assert captions == ["Figure 1. Shows b.", "Figure 2. Shows a.", "Figure 3. Shows c."]
+    assert [box["aria-label"] for box in soup.find_all(role="group")] == ["Figure 1", "Figure 2", "Figure 3"]
+    assert soup.find(attrs={"data-main": True}) is None
+    first, heading = soup.find("figure"), soup.h2
+    assert isinstance(first, Tag) and heading in first.find_all_next()
+
+
+def test_a_folded_picture_or_a_table_is_not_the_main_picture() -> None:
+    folded = f"<details><summary>s</summary><figure>{IMAGE}</figure></details>"
+    table = '<figure class="table"><table></table></figure>'
+    html = in_order(PARTS["head"], "<h2>sec</h2>", table, folded, PARTS["tiles"])
+    assert order(html, "tiles", "sec", "<table", "<img") == ["tiles", "sec", "<table", "<img"]
+
+
+@pytest.mark.parametrize(("level", "given"), [("good", "good"), ("bad", "bad")])
+def test_the_last_verdict_colours_the_bar(level: str, given: str) -> None:
+    verdicts = [
+        f'<p class="verdict" data-part="verdict" data-level="{one}">{one} word</p>' for one in ("warn", level)
+    ]
+    box = BeautifulSoup(in_order(PARTS["head"], PARTS["summary"], *verdicts), "html.parser").section
+    assert box is not None and box["class"] == ["summary", given]
+    assert box.get_text() == f"summary{given} word" and "data-level" not in str(box)
+
+
+def test_what_is_no_report_is_left_alone() -> None:
+    for names in permutations(("limits", "numbers")):
+        body = "\n".join(PARTS[name] for name in names)
+        assert arranged(body) == body
+
+
+A, B = Word("NEES", ("NEES",), "Squares."), Word("pose", ("poses", "pose"), "Where & which way.")
+
+
+def links(html: str) -> list[tuple[str, str]]:
+    soup = BeautifulSoup(html, "html.parser")
+    return [(str(link["href"]), link.get_text()) for link in soup.find_all("a", class_="word")]
+
+
+def test_the_first_use_is_linked_and_explained() -> None:
+    html = with_glossary("<p>Poses, and the mean NEES; a pose again, NEES.</p>", [A, B])
+    assert links(html) == [("#word-pose", "Poses"), ("#word-nees", "NEES")]
+    assert '<dt id="word-pose">pose</dt><dd>Where &amp; which way.</dd>' in html
+    assert BeautifulSoup(html, "html.parser").p.get_text() == "Poses, and the mean NEES; a pose again, NEES."
+
+
+@pytest.mark.parametrize(
+    "within",
+    [
+        "<h2>NEES</h2>",
+        "<a href='#x'>NEES</a>",
+        "<code>NEES</code>",
+        "<math><mi>NEES</mi></math>",
+        "<table><thead><tr><th>NEES</th></tr></thead></table>",
+        "<details><summary>NEES</summary></details>",
+    ],
+)
+def test_headings_links_code_and_formulas_are_no_use(within: str) -> None:
+    assert with_glossary(within, [A]) == within
+    assert links(with_glossary(f"{within}<p>the NEES</p>", [A])) == [("#word-nees", "NEES")]
+
+
+@pytest.mark.parametrize("text", ["nees", "NEESES", "anNEES", "NEES-like", "self-NEES", "NEES_1"])
+def test_only_whole_words_count(text: str) -> None:
+    assert with_glossary(f"<p>{text}</p>", [A]) == f"<p>{text}</p>"
+
+
+def test_what_is_folded_away_is_linked_only_where_there_is_no_other_use() -> None:
+    folded = "<details><summary>s</summary><p>NEES pose</p></details><p>NEES</p>"
+    soup = BeautifulSoup(with_glossary(folded, [A, B]), "html.parser")
+    assert [link.get_text() for link in soup.select("details a")] == ["pose"]
+    assert [link.get_text() for link in soup.select("body > p a, :root > p a, p a")].count("NEES") == 1
+
+
+@given(st.lists(st.integers(1, 4), min_size=1, max_size=14))
+def test_the_words_used_most_are_kept_and_every_link_has_its_anchor(counts: list[int]) -> None:
+    known = [Word(f"w{chr(97 + i)}", (f"w{chr(97 + i)}",), "t") for i in range(len(counts))]
+    text = " ".join(" ".join([word.name] * n) for word, n in zip(known, counts, strict=True))
+    html = with_glossary(f"<p>{text}</p>", known)
+    soup = BeautifulSoup(html, "html.parser")
+    kept = {str(dt["id"]) for dt in soup.find_all("dt")}
+    assert len(kept) == min(MOST, len(counts)) and {to[1:] for to, _ in links(html)} == kept
+    left = [n for word, n in zip(known, counts, strict=True) if word.anchor not in kept]
+    assert not left or max(left) <= min(n for w, n in zip(known, counts, strict=True) if w.anchor in kept)
+
+
+def test_every_word_we_have_is_linked() -> None:
+    for word in words():
+        assert links(with_glossary(f"<p>{word.match[0]}</p>")) == [(f"#{word.anchor}", word.match[0])]
+
+
+def entry(name: str, match: str) -> str:
+    return f'[[word]]\nname = "{name}"\nmatch = ["{match}"]\ntext = "t"\n'
+
+
+@pytest.mark.parametrize(
+    ("toml", "sentence"),
+    [
+        (entry("a", "a").replace("text", "texts"), "no text"),
+        (entry("a", "x") + entry("b", "X"), "'x'.* twice"),
+        (entry("a b", "x") + entry("a-b", "y"), "'word-a-b'.* twice"),
+    ],
+)
+def test_a_faulty_glossary_is_refused(tmp_path: Path, toml: str, sentence: str) -> None:
+    file = tmp_path / "glossary.toml"
+    file.write_text(toml, encoding="utf-8")
+    with pytest.raises(WildlabError, match=sentence):
+        words(file)

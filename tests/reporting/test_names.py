@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 import wildlab
-from tests.reporting.test_charts_beside import track
-from tests.reporting.test_many_charts import made
+from tests.reporting.test_charts import track
+from tests.reporting.test_many_tracks import made
 from wildlab.files import csv_text, read_csv
 from wildlab.names import FORMULA
 from wildlab.pipeline.detecting.detect import TABLE_COLUMNS

@@ -1,19 +1,28 @@
-"""Report: order, files, numbers, and the mistakes it does not let through."""
+"""Reports: files, numbers, tables and texts, and the mistakes that are not let through."""
 
 from __future__ import annotations
 
+import base64
+import io
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
+from hypothesis import given
+from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.reporting.figures import QUICK, new_figure
+from wildlab.reporting.metrics import claim, document, metric, read_metrics, write_metrics
 from wildlab.reporting.report import Report, open_report
+from wildlab.reporting.tables import MOST_BYTES, csv_link, data_link, table_html
+from wildlab.reporting.text import escape, inline, known, maths, number, percent, percent_between, prose, slug
 
 
 def report(out: Path | None = None, study: str = "consistency-bounds") -> Report:
@@ -100,3 +109,174 @@ def test_a_number_that_is_not_known_is_nowhere_on_a_page(tmp_path: Path) -> None
     assert "nan" not in page.get_text() and page.img is not None and page.img["alt"]
     assert ax.get_title(loc="left") == "" == ax.get_title()
     assert {"Two flights.", "2", "There are two.", "It is so.", "1 to 2", "–"} <= set(page.stripped_strings)
+
+
+def whole(**changes: Any) -> dict[str, Any]:
+    given: dict[str, Any] = {"study": "s", "flight": "", "kind": "twin", "seed": 1, "seeds": None}
+    given |= {"metrics": [metric("a", "b", 1.0, "m")], "claims": [claim("c", "It holds.", "holds")]}
+    return document(**(given | changes))
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    content = whole(metrics=[metric("a", "b/c", np.float64(0.5), "m", n=3, low=0.1, high=0.9, source="H 1")])
+    write_metrics(tmp_path / "metrics.json", content)
+    assert read_metrics(tmp_path / "metrics.json") == content
+    assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]
+
+
+def test_what_could_not_be_computed_is_null() -> None:
+    assert metric("a", "b", math.nan, "m")["value"] is None
+    assert metric("a", "b", None, "m")["value"] is None
+    assert type(metric("a", "b", np.int64(3), "m")["value"]) in (int, float)
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: metric("Error", "b", 1.0, "m"), "not made of a-z"),
+        (lambda: metric("a", "two words", 1.0, "m"), "has a blank"),
+        (lambda: metric("a", "", 1.0, "m"), "is empty"),
+        (lambda: metric("a", "b", math.inf, "m"), "is infinite"),
+        (lambda: metric("a", "b", "1.0", "m"), "'1.0'"),
+        (lambda: metric("a", "b", 1.0, "m", low=2.0, high=1.0), "above the high one"),
+        (lambda: claim("c", "x", "maybe"), "verdict 'maybe'"),
+        (lambda: claim("c", "x", "holds", fraction=1.2), "share from 0 to 1"),
+        (lambda: whole(kind="dream"), "kind 'dream'"),
+        (lambda: whole(metrics=[metric("a", "b", 1.0, "m")] * 2), "given twice"),
+        (lambda: whole(claims=[claim("c", "x", "holds")] * 2), "given twice"),
+    ],
+)
+def test_refusals(make: Any, sentence: str) -> None:
+    with pytest.raises(WildlabError, match=f"(?i){sentence}"):
+        make()
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"study": 1}', '{"metrics": NaN}', "\x00"])
+def test_a_file_that_is_none_is_named(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "metrics.json"
+    path.write_text(content)
+    with pytest.raises(WildlabError, match=r"metrics\.json: this is not a metrics file"):
+        read_metrics(path)
+    path.write_text(json.dumps(whole() | {"metrics": [{"name": "a"}]}))
+    with pytest.raises(WildlabError, match="not a metrics file"):
+        read_metrics(path)
+
+
+def content(link: str) -> str:
+    anchor = BeautifulSoup(link, "html.parser").a
+    assert anchor is not None and str(anchor["href"]).startswith("data:text/csv;base64,")
+    return base64.b64decode(str(anchor["href"]).split(",", 1)[1]).decode("utf-8")
+
+
+def test_every_cell_says_which_column_it_is_of() -> None:
+    frame = pd.DataFrame({"a": ["x", "y"], "b": [1, 2], "c": [0.5, np.nan], "d": [True, False]})
+    soup = BeautifulSoup(table_html(frame, {"b": 'the **second** "b"'}, None), "html.parser")
+    heads = [one.get_text() for one in soup.select("thead th")]
+    for row in soup.select("tbody tr"):
+        assert (
+            [cell["data-label"] for cell in row.find_all(["th", "td"])]
+            == heads
+            == ["a", 'the second "b"', "c", "d"]
+        )
+    # A style that makes blocks of rows takes the table away from who hears it; roles give it back.
+    assert {one["role"] for one in soup.find_all(role=True)} == {
+        *("table", "rowgroup", "row", "columnheader", "rowheader", "cell")
+    }
+    assert soup.table is not None and soup.table["class"] == ["many"]
+    assert "many" not in table_html(frame[["a", "b"]], {}, None)
+
+
+def test_the_link_holds_the_table_to_the_last_digit() -> None:
+    rng = np.random.default_rng(0)
+    frame = pd.DataFrame({"name": ["ä", "b,c", '"'], "value": rng.normal(size=3) * 1e5})
+    back = pd.read_csv(io.StringIO(content(csv_link(frame, "Study/../x", "words"))))
+    pd.testing.assert_frame_equal(back, frame)
+    assert 'download="study-x.csv"' in csv_link(frame, "Study/../x", "words")
+
+
+def test_no_cell_and_no_column_is_a_formula() -> None:
+    text = content(csv_link(pd.DataFrame({"=1+1": ["@x", "-3"]}), "a"))
+    assert text.splitlines() == ["'=1+1", "'@x", "'-3"]
+
+
+@pytest.mark.parametrize("column", ["lat", "lon_deg", "Latitude", "longitude", "utm_zone", "ecef_x", "mgrs"])
+def test_where_on_earth_something_is_gets_into_no_link(column: str) -> None:
+    assert csv_link(pd.DataFrame({"name": ["a"], column: [1.0]}), "a") == ""
+
+
+def test_local_metres_do_and_words_that_begin_alike() -> None:
+    assert csv_link(pd.DataFrame({"north_m": [1.0], "later": [2.0], "long": [3.0]}), "a")
+
+
+def test_what_is_empty_or_large_is_not_embedded() -> None:
+    assert csv_link(pd.DataFrame({"a": []}), "a") == ""
+    assert data_link(b"x" * MOST_BYTES, "text/csv", "a.csv", "w")
+    assert data_link(b"x" * (MOST_BYTES + 1), "text/csv", "a.csv", "w") == ""
+
+
+@given(st.text())
+def test_whatever_the_text_no_element_comes_out_of_it(text: str) -> None:
+    shown = inline(text)
+    for mark in ("<b>", "</b>", "<code>", '<code class="short">', "</code>"):
+        shown = shown.replace(mark, "")
+    assert "<" not in shown and ">" not in shown and '"' not in shown and "'" not in shown
+    assert "<" not in escape(text) and "\x00" not in escape(text)
+
+
+def test_marks() -> None:
+    assert inline("**2 m**, see `a<b`") == '<b>2 m</b>, see <code class="short">a&lt;b</code>'
+
+
+def test_prose_has_paragraphs_and_maths_but_no_html() -> None:
+    shown = prose("One <i>.\n\nTwo $x_k$ and\n\n$$P^{-1}$$\n\nThree costs \\$5.")
+    assert shown.startswith("<p>One &lt;i&gt;.</p><p>Two <math")
+    assert shown.count("<math") == 2 and "costs $5." in shown and "<p></p>" not in shown
+
+
+@pytest.mark.parametrize(
+    "latex", [r"x^", r"\left( x", r"\nosuchcommand{x}", r"\text{<script>}", r"\text{a < b}"]
+)
+def test_maths_that_cannot_be_shown_is_refused(latex: str) -> None:
+    with pytest.raises(WildlabError, match="formula"):
+        maths(latex)
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "shown"),
+    [
+        (2.345, 1, "2.3"),
+        (-0.004, 2, "0.00"),
+        (-1.5, 1, "−1.5"),
+        (math.nan, 2, "–"),
+        (None, None, "–"),
+        (math.inf, 1, "∞"),
+        (0.0123456, None, "0.0123"),
+        (1234.5, None, "1234"),
+        (3e-9, None, "3.00e−09"),
+        ("nonsense", 2, "–"),
+    ],
+)
+def test_numbers(value: object, digits: int | None, shown: str) -> None:
+    assert number(value, digits) == shown
+
+
+def test_slug() -> None:
+    assert slug("What most limits it?") == "what-most-limits-it"
+    assert slug("<>") == "part"
+
+
+@given(st.floats(1e-8, 1 - 1e-8), st.integers(0, 2))
+def test_a_share_is_rounded_by_less_than_itself_and_never_to_all_or_none(share: float, digits: int) -> None:
+    shown = float(percent(share, digits).removesuffix(" %")) / 100
+    assert 0 < shown < 1
+    assert abs(shown - share) <= max(0.5 * 10.0 ** -(digits + 2), min(share, 1 - share)) + 1e-12
+
+
+def test_what_is_not_known_is_not_said() -> None:
+    assert percent(0.004, 0) == "0.4 %"
+    for words in (percent(math.nan), percent(math.inf), percent_between([math.nan] * 3), f"{math.nan:.1f} m"):
+        assert known(words) == "" and known(f"Two. It is {words} off; 3 m are left. H (5.1) is kept.") == (
+            "Two. H (5.1) is kept."
+        )
+    for said in ("Tirza Nan-Ek and nana-nan5", "", "It is 3.1 m."):
+        assert known(said) == said

@@ -1,11 +1,140 @@
-"""How a number is said beside a printed one."""
+"""How numbers and claims stand beside published ones, and the spread over few flights and many."""
 
 from __future__ import annotations
 
+import re
+
+import numpy as np
+import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, UNDECIDED
+from wildlab.reporting.report import open_report
+from wildlab.reporting.spread import bounds_of, range_clause, range_words, share_below, spread_words
+from wildlab.reporting.standing import (
+    ALONE,
+    AS_PUBLISHED,
+    IN_PART,
+    LEVELS,
+    NOT_AS_PUBLISHED,
+    OPEN,
+    standing,
+)
 from wildlab.reporting.verdicts import comparison_words
+from wildlab.studies import monte_carlo, single_target
+from wildlab.studies.protocol import Metric, Study
+
+
+def number(closeness: Closeness, compatibility: Compatibility, fitted: str = "") -> Comparison:
+    return Comparison(closeness, compatibility, 1.0, 0.0, fitted=fitted)
+
+
+GOOD = number(Closeness.CLOSE, Compatibility.WITHIN)
+BAD = number(Closeness.NOT_CLOSE, Compatibility.OUTSIDE)
+VAGUE = number(Closeness.CANNOT_TELL, Compatibility.NO_POWER)
+POSSIBLE = number(Closeness.NOT_CLOSE, Compatibility.WITHIN)
+UNJUDGED = number(Closeness.NOT_JUDGED, Compatibility.NOT_JUDGED)
+MISSED = number(Closeness.NOT_CLOSE, Compatibility.OUTSIDE, "chosen by it")
+NUMBERS = st.lists(st.sampled_from([GOOD, BAD, VAGUE, POSSIBLE, UNJUDGED, MISSED]))
+CLAIMS = st.lists(st.sampled_from([HOLDS, MOSTLY, FAILS, MOSTLY_NOT, UNDECIDED, NO_PREMISE]))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "claims", "word"),
+    [
+        ([GOOD], [HOLDS], AS_PUBLISHED),
+        ([GOOD, UNJUDGED], [UNDECIDED], AS_PUBLISHED),
+        ([GOOD, BAD], [], IN_PART),
+        ([GOOD], [FAILS, MOSTLY_NOT], NOT_AS_PUBLISHED),
+        ([], [HOLDS, MOSTLY], IN_PART),
+        ([POSSIBLE] * 5, [], OPEN),
+        ([VAGUE] * 9 + [GOOD], [], OPEN),
+        ([UNJUDGED], [NO_PREMISE], ALONE),
+        ([MISSED], [], ALONE),
+    ],
+)
+def test_words(numbers: list[Comparison], claims: list[str], word: str) -> None:
+    found = standing(numbers, claims)
+    assert found.word == word and found.level == LEVELS[word]
+
+
+def test_the_reason_counts_numbers_fitted_ones_and_claims_apart() -> None:
+    reason = standing([GOOD, GOOD, BAD, MISSED], [HOLDS, FAILS, FAILS, FAILS]).reason
+    totals = [re.findall(r"\d+", part) for part in reason.split(";")]
+    assert [int(part[0]) for part in totals] == [3, 1, 4]
+    assert [sum(map(int, part[1:])) for part in totals] == [3, 1, 4]
+
+
+@given(NUMBERS, CLAIMS)
+def test_one_more_that_is_contradicted_or_open_never_betters_the_word(
+    numbers: list[Comparison], claims: list[str]
+) -> None:
+    order = [NOT_AS_PUBLISHED, IN_PART, AS_PUBLISHED]
+    before = standing(numbers, claims).word
+    after = standing([*numbers, BAD], claims).word
+    assert after != AS_PUBLISHED and (before not in order or after not in order or
+                                      order.index(after) <= order.index(before))  # fmt: skip
+    assert standing([*numbers, VAGUE], claims).word in (before, OPEN)
+    assert standing([*numbers, UNJUDGED, MISSED], [*claims, NO_PREMISE]).word == before
+
+
+FLIGHTS = pd.Series(np.random.default_rng(1).permutation(np.arange(200.0)))
+
+
+@pytest.mark.parametrize("n", [2, 18, 19, 200])
+def test_few_flights_have_a_range_and_many_the_prediction_interval_of_one_more(n: int) -> None:
+    values, rank = FLIGHTS[:n], max((n + 1) // 20, 1)
+    assert bounds_of(values) == (np.sort(values)[rank - 1], np.sort(values)[-rank])
+    assert spread_words(n).key == ("lowest to highest" if n < 19 else "middle 90 %")
+
+
+def test_one_flight_has_no_spread() -> None:
+    assert np.isnan(bounds_of(FLIGHTS[:1])).all()
+    assert spread_words(1).key == range_words(FLIGHTS[:1]) == range_clause(FLIGHTS[:1]) == ""
+
+
+def test_flights_without_a_value_are_left_out_and_still_counted() -> None:
+    few = pd.Series([np.nan, 3.0, 1.0])
+    assert bounds_of(few) == (1.0, 3.0)
+    many = pd.concat([FLIGHTS[:20], pd.Series([np.nan] * 10)])
+    assert bounds_of(many) == (FLIGHTS[:20].min(), FLIGHTS[:20].max())
+
+
+def test_flights_on_a_printed_number_count_by_halves() -> None:
+    values = pd.Series([1.0, 2.0, 2.0, 5.0, np.nan])
+    assert [share_below(values, one) for one in (0.5, 2.0, 3.0, 9.0)] == [0.0, 0.5, 0.75, 1.0]
+    assert np.isnan(share_below(values[:0], 1.0))
+
+
+def test_ranges_are_typeset_with_a_minus() -> None:
+    assert range_words([-2.0, -1.0]) == "−2.0 to −1.0" and range_words([1.4, 3.6], 0) == "1 to 4"
+
+
+@pytest.mark.parametrize("n", [1, 2, 18, 19])
+def test_tables_follow_the_number_of_flights(n: int) -> None:
+    spread = pd.DataFrame({("kf", "mae"): FLIGHTS[:n]})
+    study = Study("x", ("kf",), metric_of=lambda subject, name: Metric(name, subject, "m"))
+    report = open_report(study="linear-vs-nonlinear-fast", kind="twin")
+    monte_carlo.record_spread(report, study, spread, {})
+    table = monte_carlo.beside_published(report, spread, {"kf": "A"}, ["mae"])
+    for columns in (monte_carlo.published_columns(n), single_target.published_columns(n)):
+        assert set(columns) <= set(table)
+        assert columns.get("range", "") == spread_words(n).heading and ("below" in columns) == (n > 1)
+    assert table.loc[0, "range"] == range_words(FLIGHTS[:n])
+
+
+@pytest.mark.parametrize("n", [1, 2, 18, 99])
+def test_metrics_have_the_bounds_that_are_shown(n: int) -> None:
+    study = Study("x", ("a",), metric_of=lambda subject, name: Metric(name, subject, "m"))
+    report = open_report(study="x", kind="twin")
+    values = FLIGHTS[:n]
+    monte_carlo.record_spread(report, study, pd.DataFrame({("a", "mae"): values}), {})
+    (entry,) = report._metrics
+    assert (entry["low"], entry["high"]) == (bounds_of(values) if n > 1 else (None, None))
+    assert entry["value"] == values.median()
 
 
 @pytest.mark.parametrize(

@@ -175,9 +175,7 @@ def test_gyros_and_accelerometers_err_apart():
     assert sorted(asked) == ["accelerometers", "gyros"]
 
 
-@pytest.mark.parametrize(
-    ("what", "rigid"), [("package_misalignment", True), ("axis_misalignment", False)]
-)
+@pytest.mark.parametrize(("what", "rigid"), [("package_misalignment", True), ("axis_misalignment", False)])
 def test_a_misaligned_unit_reads_another_direction(what, rigid):
     """Gravity seen by a turned package keeps its length; axes that lean read a share of their neighbours."""
     g, limit, rng = 9.81, np.radians(0.25), np.random.default_rng(0)

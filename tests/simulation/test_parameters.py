@@ -1,4 +1,4 @@
-"""A twin's file: every number accounted for, every promised sentence said."""
+"""A twin's file: every number accounted for, every fault named, and values that are varied."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import tomllib
 import pytest
 
 from wildlab.errors import WildlabError
+from wildlab.simulation import simulate_twin
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.parameters import (
     PARTS,
@@ -19,6 +20,7 @@ from wildlab.simulation.parameters import (
     part_names,
     twin_names,
 )
+from wildlab.simulation.variation import TOLD, apply, groups_of, varied
 
 
 def complete(name: str) -> str:
@@ -288,3 +290,167 @@ def test_an_unknown_twin_is_refused():
         load_twin("static-antena")
     with pytest.raises(WildlabError, match="no such file"):
         load_twin("/nowhere.toml")
+
+
+OWN = 'value = {value}\nunit = "{unit}"\nstatus = "chosen"\nreason = "for this test"\n'
+
+
+def own(key: str, value: object, unit: str = "") -> str:
+    shown = f'"{value}"' if isinstance(value, str) else value
+    return f"\n[{key}]\n" + OWN.format(value=shown, unit=unit)
+
+
+def without(text: str, group: str) -> str:
+    """The text without the parameters of a group."""
+    return "".join(part for part in re.split(r"(?m)^(?=\[)", text) if not part.startswith(f"[{group}."))
+
+
+CLIMB = own("climb.altitude", 9.0, "m") + own("climb.start", 1.0, "s") + own("climb.duration", 3.0, "s")
+SEGMENTS = own("segments.count", 5, "1") + own("segments.images", 441, "1")
+HULL = own("target.outline.length", 9.0, "m") + own("target.outline.beam", 2.0, "m")
+
+
+@pytest.mark.parametrize(
+    ("twin", "leave_out", "add", "found"),
+    [
+        ("static-antenna", (), CLIMB, "route"),
+        ("gondola", (), CLIMB, "cable"),
+        ("uav-search", ("enclosures",), "", "survey"),
+        ("gondola", ("enclosures",), "", "animals live"),
+        ("gondola", ("animals",), "", "targets or for animals"),
+        ("gondola", (), SEGMENTS, "go with a target"),
+        ("large-ship", ("segments",), "", "needs segments"),
+        ("slow-vessel", ("subset",), SEGMENTS, "any other none"),
+        ("slow-vessel", (), HULL, "most of it"),
+        ("large-ship", ("target.motion", "target.gps"), "", "needs a motion"),
+        ("large-ship", (), own("camera.k1", 0.1, "1"), "without k1"),
+        ("large-ship", ("onboard_clock",), "", "onboard_clock"),
+        ("slow-vessel", ("boresight",), "", "boresight"),
+        ("large-ship", (), own("autopilot.imu_roll", 1.0, "deg"), "imu_roll"),
+        ("large-ship", (), own("flight.kind", "balloon"), "'balloon'"),
+    ],
+)
+def test_twins_whose_groups_do_not_go_together_are_named(tmp_path, twin, leave_out, add, found):
+    text = complete(twin)
+    for group in leave_out:
+        assert f"[{group}." in text
+        text = without(text, group)
+    with pytest.raises(WildlabError, match=found):
+        load_text(tmp_path, text + add)
+
+
+PAIR = """[pair.both]
+value = 349
+unit = "1"
+status = "published"
+source = "H 6.4.4: 349 images had both vessels within the same image"
+"""
+
+
+@pytest.mark.parametrize(
+    ("twin", "old", "new", "found"),
+    [
+        ("slow-vessel", "[target.gps.", "[target.gsp.", r"target\.gsp"),
+        ("slow-vessel", "\n[route.shape]", LOITER + "\n[route.shape]", "one course"),
+        ("static-antenna", "[loiter.", "[climb.", r"climb\.\w+"),
+        ("slow-vessel", 'value = "eight"', 'value = "nine"', "'nine'"),
+        ("crossing-vessels", PAIR, "", "two targets need"),
+        ("crossing-vessels", "value = 349\n", "value = 900\n", "more than the observations"),
+        ("crossing-vessels", 'value = "boat 2"', 'value = "boat 1"', "identifier"),
+        ("slow-vessel", "value = 2001\n", "value = 3000\n", "last of 3635"),
+        (
+            "drifting-vessel",
+            "[target.motion.deviation_longest_period]\nvalue = 900.0",
+            "[target.motion.deviation_longest_period]\nvalue = 9.0",
+            "deviation_shortest_period",
+        ),
+        ("gondola", "[cable.lowest]\nvalue = 3.0", "[cable.lowest]\nvalue = 30.0", "lowest is above highest"),
+        (
+            "gondola",
+            "[enclosures.lake.length]\nvalue = 280.0",
+            "[enclosures.lake.length]\nvalue = 80.0",
+            r"enclosures\.lake",
+        ),
+        ("gondola", "[enclosures.lake.", '[enclosures."the lake".', "'the lake'"),
+        ("large-ship", "value = 441\n", "value = 400\n", "fewer images"),
+    ],
+)
+def test_courses_and_targets_that_make_no_sense_are_named(tmp_path, twin, old, new, found):
+    text = complete(twin)
+    assert old in text
+    with pytest.raises(WildlabError, match=found):
+        load_text(tmp_path, text.replace(old, new))
+
+
+def test_the_same_pair_of_targets_cannot_have_an_outline(tmp_path):
+    text = complete("crossing-vessels").replace("missed at random", "largest")
+    with pytest.raises(WildlabError, match="outline"):
+        load_text(tmp_path, text + HULL + HULL.replace("[target", "[second_target"))
+
+
+def test_a_loiter_is_about_a_target_that_stays(tmp_path):
+    with pytest.raises(WildlabError, match="never moves"):
+        load_text(tmp_path, without(complete("slow-vessel"), "route") + LOITER)
+
+
+def parameters(twin):
+    return {f"{part}.{name}": parameter for part, name, parameter in each_parameter(twin)}
+
+
+@pytest.mark.parametrize("name", twin_names())
+def test_what_is_published_or_told_is_in_no_group(name):
+    twin = load_twin(name)
+    there, groups = parameters(twin), groups_of(twin)
+    assert groups
+    moved = [path for paths in groups.values() for path in paths]
+    assert len(moved) == len(set(moved))
+    for path in moved:
+        assert there[path].status != "published" and path.partition(".")[0] not in TOLD
+        assert there[path].number != 0
+
+
+@pytest.mark.parametrize("name", twin_names())
+def test_each_group_is_moved_and_nothing_else(name):
+    twin = load_twin(name)
+    for paths in groups_of(twin).values():
+        try:
+            moved = parameters(apply(twin, dict.fromkeys(paths, 1.25)))
+        except WildlabError as error:
+            assert "not possible" in str(error)
+            continue
+        for path, before in parameters(twin).items():
+            if path in paths:
+                assert moved[path].number == pytest.approx(1.25 * before.number)
+            else:
+                assert moved[path] == before
+
+
+def test_within_it_every_twin_that_is_loaded_is_moved():
+    before = load_twin("fast-vessel").boresight.roll_sd.number
+    with varied({"boresight.roll_sd": 0.5}):
+        assert load_twin("fast-vessel").boresight.roll_sd.number == before / 2
+        with varied({}):
+            assert load_twin("fast-vessel").boresight.roll_sd.number == before
+    assert load_twin("fast-vessel").boresight.roll_sd.number == before
+    with pytest.raises(ZeroDivisionError), varied({"boresight.roll_sd": 0.5}):
+        raise ZeroDivisionError
+    assert load_twin("fast-vessel").boresight.roll_sd.number == before
+
+
+def test_a_flight_is_flown_with_what_was_moved():
+    paths = groups_of(load_twin("fast-vessel"))["target, gps: errors"]
+    plain = simulate_twin("fast-vessel", 1, ("imu", "gnss"))
+    with varied(dict.fromkeys(paths, 2.0)):
+        moved = simulate_twin("fast-vessel", 1, ("imu", "gnss"))
+    assert plain.nav["truth"].equals(moved.nav["truth"])
+    assert not plain.table("truth").equals(moved.table("truth"))
+
+
+def test_what_may_not_be_moved_is_refused():
+    twin = load_twin("fast-vessel")
+    published = next(path for path, one in parameters(twin).items() if one.status == "published")
+    with pytest.raises(WildlabError, match="published"):
+        apply(twin, {published: 2.0})
+    assert apply(twin, {"no.such": 2.0}) == twin
+    with pytest.raises(WildlabError, match="not possible"):
+        apply(twin, {"boresight.shortest_period": 1e6})

@@ -1,4 +1,6 @@
-"""Sensors: their predictions against geometry's, and every derivative against finite differences."""
+"""Sensors: predictions against geometry, derivatives against differences; which detection is nearest."""
+
+from __future__ import annotations
 
 from dataclasses import replace
 
@@ -6,14 +8,28 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.linalg import expm
+from scipy.stats import chi2
 
-from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, posed
+from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, overflight, posed, turned
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.tracking import measurement as m
+from wildlab.tracking.association import distances, gate_threshold, nearest_within
 from wildlab.tracking.combined import combined
 from wildlab.tracking.considering import considering
+from wildlab.tracking.maritime import (
+    CLOCK,
+    EAST,
+    NORTH,
+    YAW,
+    bearings_from,
+    positions_from,
+    predict_bearing,
+    predict_position,
+    white_acceleration,
+)
 from wildlab.tracking.noise import constant_noise, noise_by_altitude
 from wildlab.tracking.platforms import measured_from, polar
 
@@ -191,3 +207,117 @@ def test_many_positions_are_seen_as_each_alone(pose, seed):
         for many, single in zip(seen, zip(*alone, strict=True), strict=True):
             together = np.broadcast_to(many, (7, *np.shape(single[0])))
             np.testing.assert_allclose(together, single, rtol=1e-12, atol=1e-12)
+
+
+TARGET, PLATFORM, DRIFT = np.array([120.0, -40.0]), np.array([10.0, 30.0]), np.array([2.0, -1.5])
+
+
+def logged(error: np.ndarray) -> np.ndarray:
+    """Where a platform puts the target that has its position, yaw and stamp too small by the error."""
+    there = TARGET + DRIFT * error[CLOCK] - PLATFORM
+    turn = -error[YAW]
+    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    return PLATFORM - error[[NORTH, EAST]] + R @ there
+
+
+def test_positions_with_a_wrong_pose_and_clock():
+    found = predict_position(TARGET, PLATFORM, DRIFT)
+    np.testing.assert_allclose(found.z, logged(np.zeros(6)))
+    for i in (NORTH, EAST, CLOCK, YAW):
+        step = np.eye(6)[i] * 1e-6
+        numeric = (logged(step) - logged(-step)) / 2e-6
+        np.testing.assert_allclose(found.H_pose[:, i], numeric, atol=1e-6)
+    np.testing.assert_array_equal(found.H_position, np.eye(2))
+
+
+def test_bearings_with_a_wrong_pose_and_clock():
+    found = predict_bearing(TARGET, PLATFORM, DRIFT)
+
+    def bearing(error: np.ndarray) -> float:
+        # The position error moves the sensor itself, and the heading turns what it sees.
+        there = TARGET + DRIFT * error[CLOCK] - (PLATFORM + error[[NORTH, EAST]])
+        return float(np.arctan2(there[1], there[0])) - error[YAW]
+
+    assert found.z == pytest.approx([bearing(np.zeros(6))])
+    for i in (NORTH, EAST, CLOCK, YAW):
+        step = np.eye(6)[i] * 1e-6
+        assert found.H_pose[0, i] == pytest.approx((bearing(step) - bearing(-step)) / 2e-6, abs=1e-6)
+
+
+def test_rows_have_their_own_platform():
+    platform, drift = np.array([[0.0, 0.0], [5.0, 0.0]]), np.array([[1.0, 0.0], [0.0, 3.0]])
+    position = np.array([5.0, 10.0])
+    for make, single in ((positions_from, predict_position), (bearings_from, predict_bearing)):
+        sensor = make(platform, drift)
+        for row in (0, 1):
+            for ours, theirs in zip(
+                sensor.predict(row, position), single(position, platform[row], drift[row]), strict=True
+            ):
+                np.testing.assert_array_equal(ours, theirs)
+    assert bearings_from(platform, drift).angles == (True,)
+    assert np.isnan(predict_bearing([5.0, 0.0], [5.0, 0.0], [0.0, 1.0]).z).all()
+
+
+def test_process_noise_by_van_loans_integral():
+    A, L = np.kron([[0.0, 1.0], [0.0, 0.0]], np.eye(2)), np.kron([[0.0], [0.3]], np.eye(2))
+    block = expm(np.block([[-A, L @ L.T], [np.zeros((4, 4)), A.T]]) * 1.7)
+    F, Q = white_acceleration(1.7, 0.3)
+    np.testing.assert_allclose(F, block[4:, 4:].T, atol=1e-12)
+    np.testing.assert_allclose(Q, block[4:, 4:].T @ block[:4, 4:], atol=1e-12)
+
+
+P = np.diag([20.0, 12.0, 4.0, 4.0])
+ANGLES = {"position": (False, False), "pixel": (False, False), "azimuth and elevation": (True, False)}
+NOISE = {"position": np.diag([100.0, 100.0]), "pixel": np.diag([360.0, 160.0]),
+         "azimuth and elevation": np.diag(np.radians([6.0, 3.0]) ** 2)}  # fmt: skip
+
+
+def expected(kind, position, poses):
+    if kind == "position":
+        shape = (*np.shape(position)[:-1], 1, 1)
+        return m.Prediction(np.asarray(position), np.tile(np.eye(2), shape), np.zeros((*shape[:-2], 2, 6)))
+    if kind == "pixel":
+        return m.predict_pixel(position, poses, 0.0)
+    return m.predict_azimuth_elevation(position, poses, 0.0)
+
+
+@pytest.mark.parametrize("kind", ANGLES)
+def test_many_tracks_at_once_are_as_one_after_the_other(kind):
+    _, _, poses, truth = overflight(30)
+    rng = np.random.default_rng(0)
+    there = truth[:, :2] + rng.normal(0, 3, (30, 2))
+    both = np.stack([truth[:, :2], truth[:, :2] + [10.0, 15.0]], axis=1)
+    each = poses.take((slice(None), None))
+    z = expected(kind, both, each).z
+    z[3, 1] = np.nan
+    seen = expected(kind, there, poses)
+    nis = distances(seen, ANGLES[kind], P, z, NOISE[kind])
+    assert nis.shape == (30, 2)
+    for k in range(30):
+        H = seen.H_position[k]
+        S = H @ P[:2, :2] @ H.T + NOISE[kind]
+        for j in range(2):
+            if (k, j) == (3, 1):
+                assert np.isnan(nis[k, j])
+                continue
+            v = z[k, j] - seen.z[k]
+            if kind == "azimuth and elevation":
+                v[0] = np.angle(np.exp(1j * v[0]))
+            assert np.isclose(nis[k, j], v @ np.linalg.inv(S) @ v)
+    assert nearest_within(nis, 0.99, 2)[3] == 0
+
+
+@pytest.mark.parametrize("kind", ["pixel", "azimuth and elevation"])
+def test_who_is_not_in_sight_has_no_detection(kind):
+    _, _, poses, truth = overflight(1)
+    up = turned(poses, slice(None))
+    nis = distances(expected(kind, truth[:, :2], up), ANGLES[kind], P, np.zeros((1, 3, 2)), NOISE[kind])
+    assert np.isnan(nis).all()
+    assert nearest_within(nis, 1.0, 2).tolist() == [-1]
+
+
+def test_outside_the_gate_there_is_no_neighbour():
+    nis = np.array([[5.0, 3.0, np.nan], [np.nan, np.nan, np.nan], [30.0, 20.0, 10.0]])
+    assert nearest_within(nis, 0.95, 2).tolist() == [1, -1, -1]
+    assert nearest_within(nis, 1.0, 2).tolist() == [1, -1, 2]
+    assert gate_threshold(0.95, 3) == pytest.approx(chi2.ppf(0.95, 3))

@@ -1,18 +1,73 @@
-"""Whole flights: the extended filter is the linear one on a linear model, and bad input is answered."""
+"""Filters of positions and velocities against filterpy, weighted means and the loop by hand."""
+
+from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
+from filterpy.kalman import KalmanFilter
 from scipy.stats import chi2
 
 from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
 from wildlab.tracking import measurement as m
-from wildlab.tracking.kalman import predict, update
+from wildlab.tracking.imm import run_imm
+from wildlab.tracking.kalman import filter_at_rest, predict, update
+from wildlab.tracking.measurement import on_state, positions_or_velocities
 from wildlab.tracking.motion import constant_velocity, in_steps, random_walk, rest, singer
 from wildlab.tracking.run import Start, run_filter, start_from_first
+from wildlab.tracking.unscented import run_unscented
+
+
+def test_predict_and_update_agree_with_filterpy_over_random_models():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        n, m = rng.integers(1, 6), rng.integers(1, 4)
+
+        def spread(k):
+            A = rng.normal(size=(k, k))
+            return A @ A.T + 0.1 * np.eye(k)
+
+        F, H = rng.normal(size=(n, n)), rng.normal(size=(m, n))
+        Q, R, x, P = spread(n), spread(m), rng.normal(size=n), spread(n)
+        oracle = KalmanFilter(dim_x=n, dim_z=m)
+        oracle.F, oracle.H, oracle.Q, oracle.R, oracle.x, oracle.P = F, H, Q, R, x.copy(), P.copy()
+        for z in rng.normal(size=(5, m)):
+            oracle.predict()
+            oracle.update(z)
+            x, P = predict(x, P, F, Q)
+            step = update(x, P, z, H, R)
+            x, P = step.x, step.P
+            assert np.allclose(x, oracle.x, rtol=1e-10, atol=1e-10)
+            assert np.allclose(P, oracle.P, rtol=1e-10, atol=1e-10)
+            assert np.allclose(step.S, oracle.S)
+            assert np.allclose(step.innovation, oracle.y)
+
+
+def test_at_rest_the_filter_is_the_weighted_mean():
+    rng = np.random.default_rng(1)
+    A = rng.normal(size=(30, 2, 2))
+    R = A @ np.swapaxes(A, 1, 2) + 0.2 * np.eye(2)
+    z = rng.normal(size=(30, 2))
+    information = np.linalg.inv(R)
+    P = np.linalg.inv(information.sum(axis=0))
+    mean = P @ np.einsum("nij,nj->i", information, z)
+    filtered = filter_at_rest(z, R)
+    assert np.allclose(filtered.x[-1], mean)
+    assert np.allclose(filtered.P[-1], P)
+
+
+def test_a_missing_measurement_carries_the_estimate_on():
+    z = np.array([[np.nan, 0], [1.0, 2.0], [np.nan, np.nan], [3.0, 4.0]])
+    filtered = filter_at_rest(z, np.tile(np.eye(2), (4, 1, 1)))
+    assert np.isnan(filtered.x[0]).all()
+    assert np.allclose(filtered.x[1:], [[1, 2], [1, 2], [2, 3]])
+    assert np.isnan(filtered.innovation[:3]).all()
+    assert np.allclose(filtered.innovation[3], [2, 2])
+    assert np.isnan(filter_at_rest(z * np.nan, np.tile(np.eye(2), (4, 1, 1))).x).all()
+
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 R2 = 9.0 * np.eye(2)
@@ -220,3 +275,56 @@ def test_covariance_stays_one_over_many_precise_updates():
     track = run_filter(times, rng.normal(0, 1, (n, 2)), 1e-4 * R2, m.positions(), CV, START)
     assert np.array_equal(track.P, np.swapaxes(track.P, 1, 2))
     assert np.linalg.eigvalsh(track.P).min() > 0
+
+
+MOTION = partial(constant_velocity, sd_acceleration=0.1)
+STATE = np.array([10.0, -20.0, 3.0, -1.5])
+WIDE = Start(0.0, np.zeros(4), np.diag([400.0, 400.0, 100.0, 100.0]))
+
+
+@pytest.mark.parametrize("is_velocity", [False, True])
+def test_derivatives_are_those_of_differences(is_velocity):
+    sensor = positions_or_velocities([is_velocity])
+    H = on_state(sensor.predict(0, STATE).H_position, 4)
+    step = 1e-3
+    truth = [
+        (sensor.predict(0, STATE + d).z - sensor.predict(0, STATE - d).z) / (2 * step)
+        for d in step * np.eye(4)
+    ]
+    assert np.allclose(H, np.stack(truth, axis=-1))
+    assert np.array_equal(sensor.predict(0, STATE).z, STATE[2:] if is_velocity else STATE[:2])
+
+
+def test_one_velocity_is_the_update_of_a_kalman_filter_by_hand():
+    R = np.array([[0.5, 0.1], [0.1, 0.8]])
+    start = Start(0.0, np.array([5.0, 6.0, 1.0, 0.0]), np.diag([4.0, 9.0, 2.0, 3.0]) + 0.5)
+    track = run_filter([0.0], STATE[None, 2:], R, positions_or_velocities([True]), MOTION, start)
+    H = np.array([[0, 0, 1.0, 0], [0, 0, 0, 1.0]])
+    information = np.linalg.inv(start.P) + H.T @ np.linalg.inv(R) @ H
+    P = np.linalg.inv(information)
+    x = P @ (np.linalg.inv(start.P) @ start.x + H.T @ np.linalg.inv(R) @ STATE[2:])
+    assert np.allclose(track.x[0], x)
+    assert np.allclose(track.P[0], P)
+    assert np.allclose(track.innovation[0], STATE[2:] - start.x[2:])
+
+
+def test_all_filters_take_it_alike():
+    times = np.array([0.0, 0.5, 1.0])
+    z = np.array([[10.0, -20.0], [3.0, -1.4], [3.1, -1.6]])
+    R, sensor = 0.2 * np.eye(2), positions_or_velocities([False, True, True])
+    one = run_filter(times, z, R, sensor, MOTION, WIDE)
+    two = run_unscented(times, z, R, sensor, MOTION, WIDE)
+    three = run_imm(times, z, R, sensor, [MOTION, MOTION], [10.0, 10.0], WIDE)
+    assert np.allclose(one.x, two.x)
+    assert np.allclose(one.x, three.track.x)
+    assert np.allclose(one.P, two.P)
+
+
+def test_what_does_not_fit_is_refused():
+    start = Start(0.0, np.zeros(2), np.eye(2))
+    given = [0.0], [[1.0, 2.0]], np.eye(2), positions_or_velocities([True])
+    for run, more in ((run_filter, [rest]), (run_unscented, [rest]), (run_imm, [[rest, rest], [9.0, 9.0]])):
+        with pytest.raises(WildlabError, match="4 states"):
+            run(*given, *more, start)
+    with pytest.raises(WildlabError, match="kinds"):
+        positions_or_velocities(True)

@@ -1,9 +1,10 @@
-"""The page: safe, on one sheet of A4 and on a phone in every language, readable by everybody."""
+"""The one sheet: from reports to a page that is safe and readable, and its picture."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,32 @@ from typing import Any
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.sharing.edition.flights import EMPTY, WHOLE
+from tests.flight.conftest import make_flight  # noqa: F401 - a fixture of another room
+from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
+from tests.sharing.left import leave_report
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.pipeline.georeference import observe
+from wildlab.reporting.metrics import metric
 from wildlab.reporting.page import POLICY
 from wildlab.sharing.edition.edition import Place, edition_html
 from wildlab.sharing.edition.facts import Alarm
-from wildlab.sharing.edition.picture import MapPicture
+from wildlab.sharing.edition.flight_map import map_of
+from wildlab.sharing.edition.language import load_language
+from wildlab.sharing.edition.make import make_edition
+from wildlab.sharing.edition.picture import (
+    FOOT,
+    HEIGHT,
+    WIDTH,
+    ImagePicture,
+    MapPicture,
+    nice_length,
+    picture_html,
+)
 from wildlab.sharing.edition.said import Day
 
 MAP = MapPicture(
@@ -108,3 +129,121 @@ def test_places_and_days_are_said_as_far_as_they_are_given() -> None:
         WHOLE, name="f", place=Place("generalised", 920.0, "", (58.66, -16.4)), language="nb"
     )
     assert "58,66° N, 16,4° V" in norwegian
+
+
+WITHHELD = Place("withheld")
+
+
+def leave(folder: Path, **numbers: tuple[str, float]) -> None:
+    entries = [metric(name, subject, value, "1", n=50) for name, (subject, value) in numbers.items()]
+    leave_report(folder, "f", metrics=entries)
+
+
+def sound(reports: Path) -> None:
+    counts = dict.fromkeys(("problems", "worth_fixing", "troubled", "broken", "alarmed"), ("flight", 0.0))
+    leave(reports / "f-overview", **counts, reports_beside=("flight", 1.0))
+
+
+def test_the_page_of_a_folder_of_reports(tmp_path: Path) -> None:
+    sound(tmp_path)
+    error = {"horizontal_error_median": ("logged-pose", 6.4), "horizontal_error_p90": ("logged-pose", 9.0)}
+    leave(tmp_path / "f", **error)
+    html = make_edition(tmp_path, "f", place=WITHHELD, called="flight 1")
+    assert "6.4\u00a0metres" in html and "flight 1" in html
+    assert "6,4\u00a0meter" in make_edition(tmp_path, "f", place=WITHHELD, language="nb")
+
+
+def test_a_flight_that_was_not_evaluated(tmp_path: Path) -> None:
+    with pytest.raises(WildlabError, match="'g'"):
+        make_edition(tmp_path, "g", place=WITHHELD)
+    sound(tmp_path)
+    with pytest.raises(WildlabError, match=r"some on f\."):
+        make_edition(tmp_path, "g", place=WITHHELD)
+
+
+def test_the_map_of_a_flight(make_flight: Callable[..., Flight], tmp_path: Path) -> None:  # noqa: F811
+    flight = make_flight()
+    drawn = map_of(flight)
+    assert drawn is not None
+    nav = flight.nav["autopilot"]
+    assert np.array_equal(drawn.path, nav[["north_m", "east_m"]].to_numpy())
+    seen = observe(flight, "autopilot")
+    expected = georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
+    assert np.array_equal(drawn.seen, expected, equal_nan=True) and len(drawn.truth) == 3
+    sound(tmp_path)
+    html = make_edition(tmp_path, "f", place=WITHHELD, flight=flight)
+    assert len(re.findall('<path class="way"', html)) == 1 and '<circle class="true"' in html
+
+
+EN = load_language()
+NONE = np.empty((0, 2))
+
+
+def circles(html: str, name: str) -> list[tuple[float, float, float]]:
+    found = re.findall(rf'<circle class="{name}" cx="([\d.-]+)" cy="([\d.-]+)" r="([\d.]+)"', html)
+    return [(float(x), float(y), float(r)) for x, y, r in found]
+
+
+def bar(html: str) -> float:
+    """Length of the scale bar in drawn units."""
+    found = re.search(r'class="scale" d="[^"h]*h([\d.]+)M', html)
+    assert found is not None
+    return float(found[1])
+
+
+def test_circles_are_to_scale() -> None:
+    html = picture_html(None, WHOLE, EN)
+    (_, _, inner), (_, _, outer) = circles(html, "ring median")[0], circles(html, "ring p90")[0]
+    assert outer / inner == pytest.approx(9.57 / 3.47, rel=0.005)
+    # The bar is of 10 m.
+    assert bar(html) / outer == pytest.approx(10 / 9.57, rel=0.005)
+
+
+def test_a_map_is_to_scale_with_north_up_and_east_right() -> None:
+    path = np.array([[0.0, 0.0], [0.0, 100.0], [50.0, 100.0]])
+    html = picture_html(
+        MapPicture(path, np.array([[40.0, 80.0], [NAN, 1.0]]), np.array([[10.0, 80.0]])), EMPTY, EN
+    )
+    ((sx, sy, _),), ((tx, ty, _),), ((ox, oy, _),) = (circles(html, one) for one in ("seen", "true", "start"))
+    scale = bar(html) / 20 if ">20" in html else bar(html) / 10 if ">10\u00a0" in html else bar(html) / 50
+    assert (sx - ox) == pytest.approx(80 * scale, abs=0.3) and (oy - sy) == pytest.approx(40 * scale, abs=0.3)
+    assert all(0 <= x <= WIDTH and 0 <= y <= HEIGHT - FOOT for x, y in ((sx, sy), (tx, ty), (ox, oy)))
+    assert sx == pytest.approx(tx, abs=0.15) and (ty - sy) == pytest.approx(30 * scale, abs=0.3)
+
+
+def test_one_who_walked_elsewhere_does_not_shrink_the_map() -> None:
+    """The flight and what was seen set the extent: a tracker may run for long before and after."""
+    path = np.array([[0.0, 0.0], [0.0, 100.0], [50.0, 100.0]])
+    walk = np.stack([np.linspace(0, 3000, 200), np.full(200, 50.0)], axis=1)
+    alone = picture_html(MapPicture(path, NONE, NONE), EMPTY, EN)
+    walked = picture_html(MapPicture(path, NONE, walk), EMPTY, EN)
+    assert circles(walked, "start") == circles(alone, "start")
+    assert 0 < len(circles(walked, "true")) < 10
+    assert not circles(picture_html(MapPicture(path, NONE, walk + 9000.0), EMPTY, EN), "true")
+
+
+def test_what_is_drawn_where_less_is_known() -> None:
+    tracked = picture_html(None, WHOLE._replace(compared=3), EN)
+    assert "4.1" in tracked and not circles(tracked, "ring p90")
+    scattered = picture_html(None, EMPTY._replace(scatter=2.0, sightings=9), EN)
+    assert f"{2 * math.sqrt(2 * math.log(2)):.1f}" in scattered
+    assert "3 of 4" in picture_html(None, EMPTY._replace(seen=4.0, placed=3.0), EN)
+    assert picture_html(None, EMPTY, EN) == ""
+    assert picture_html(MapPicture(NONE, NONE, NONE), EMPTY, EN) == ""
+
+
+def test_an_image_goes_in_as_an_image() -> None:
+    html = picture_html(ImagePicture(b"<svg xmlns='x'><script>alert(1)</script></svg>", 'a "map"'), EMPTY, EN)
+    assert '<img src="data:image/svg+xml;base64,' in html and "<script" not in html
+    assert 'alt="a &quot;map&quot;"' in html
+    with pytest.raises(WildlabError, match="neither PNG"):
+        picture_html(ImagePicture(b"GIF89a", "x"), EMPTY, EN)
+    with pytest.raises(WildlabError, match="no words"):
+        picture_html(ImagePicture(b"\x89PNG", " "), EMPTY, EN)
+
+
+@given(st.floats(1e-3, 1e7))
+def test_a_nice_length_is_round_and_most_of_the_room(most: float) -> None:
+    found = nice_length(most)
+    assert found <= most * (1 + 1e-9) and found > 0.39 * most
+    assert f"{found:.0e}"[0] in "125"

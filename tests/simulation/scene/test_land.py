@@ -1,4 +1,4 @@
-"""Scenes on land against what is known otherwise: closed forms, the surface itself, and the sun's way."""
+"""Land and scenes on it: closed forms, the surface itself, the sun's way, and the heights of a terrain."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
@@ -13,6 +15,8 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN, Mount
+from wildlab.geometry.terrain import Terrain
+from wildlab.simulation.landscape import TREES_M, UNEVEN, grow_trees, synthetic_landscape
 from wildlab.simulation.scene import (
     ANIMALS,
     EVEN_LAND,
@@ -32,6 +36,7 @@ from wildlab.simulation.scene import (
     tree,
 )
 from wildlab.simulation.scene.ground import CLOUD_BLANKET, SHADOW_DEPTH
+from wildlab.simulation.scene.on_terrain import MOST_CELLS, land_on
 
 CAMERA = Camera(160, 128, 290.0, 292.0, 78.0, 66.0)
 SMOOTH = Cover(heating=20.0, cooling=0.0, lag=0.0, texture_sd=0.0)
@@ -187,3 +192,95 @@ def test_cloud_shadows_cool_the_ground_under_them():
     ).kelvin
     air = still.weather.air
     assert np.allclose(shaded - air, (1 - SHADOW_DEPTH) * (sunny - air), atol=1e-3)
+
+
+COVERS = rolling_land(Weather(hour=13.0), 3)
+TERRAIN = synthetic_landscape(2, north=120.0, east=260.0, step=2.0)
+LAND = land_on(TERRAIN, COVERS)
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.floats(-60.0, 60.0), st.floats(-130.0, 130.0))
+def test_heights_are_those_of_the_terrain(north: float, east: float) -> None:
+    want = TERRAIN.heights_at([[north, east]])[0]
+    assert height_at(LAND, [north, east]) == pytest.approx(want, abs=1e-4)
+
+
+@pytest.mark.parametrize("north, east", [(500.0, -300.0), (-1036.0, 412.0), (8.0, -12.0)])
+def test_a_terrain_far_from_the_origin_keeps_its_place(north: float, east: float) -> None:
+    rng = np.random.default_rng(1)
+    far = Terrain(rng.uniform(0, 9, (20, 31)).astype(np.float32), north=north, east=east, step=4.0)
+    land = land_on(far, COVERS)
+    for place in rng.uniform([north, east], [north + 76.0, east + 120.0], (20, 2)):
+        assert height_at(land, place) == pytest.approx(far.heights_at([place])[0], abs=1e-4)
+
+
+def test_beyond_the_terrain_it_is_as_high_as_its_border() -> None:
+    for beyond, border in (((75.0, 10.0), (60.0, 10.0)), ((-20.0, -160.0), (-20.0, -130.0))):
+        assert height_at(LAND, beyond) == pytest.approx(TERRAIN.heights_at([border])[0], abs=1e-4)
+
+
+def test_covers_keep_their_shares_and_their_places() -> None:
+    assert LAND.weather == COVERS.weather
+    for one in range(3):
+        assert (LAND.cover == one).mean() == pytest.approx((COVERS.cover == one).mean(), abs=0.02)
+    fine, cell = COVERS.side / len(COVERS.cover), LAND.side / len(LAND.cover)
+    for i, j in np.random.default_rng(4).integers(0, len(LAND.cover), (40, 2)):
+        at = (np.array([i, j]) + 0.5) * cell % COVERS.side / fine
+        assert LAND.cover[i, j] == COVERS.cover[int(at[0]), int(at[1])]
+
+
+def test_a_terrain_with_a_hole_beside_its_grid_or_too_large_is_refused() -> None:
+    holed = np.zeros((4, 4), np.float32)
+    holed[1, 2] = np.nan
+    for terrain, about in (
+        (Terrain(holed, 0.0, 0.0, 2.0), "missing"),
+        (Terrain(np.zeros((4, 4), np.float32), 8.0, 6.0, 4.0), "multiples of 4 m"),
+        (Terrain(np.zeros((2, MOST_CELLS), np.float32), 0.0, 0.0, 2.0), f"{MOST_CELLS} nodes"),
+    ):
+        with pytest.raises(WildlabError, match=about):
+            land_on(terrain, COVERS)
+
+
+def test_it_has_the_size_and_the_relief_that_are_printed():
+    land = synthetic_landscape(3)
+    assert land.extent == (-250.0, 250.0, -500.0, 500.0)
+    assert land.height.min() == 0 and land.height.max() == pytest.approx(51.0, abs=1e-4)
+    assert np.array_equal(land.height, synthetic_landscape(3).height)
+    assert not np.allclose(land.height, synthetic_landscape(4).height)
+
+
+def test_neighbours_are_alike_and_ends_are_not():
+    """The longer the distance, the larger the difference of heights, as on natural ground."""
+    squares = []
+    for seed in range(6):
+        h = synthetic_landscape(seed).height.astype(float)
+        squares.append([np.mean((h[:, lag:] - h[:, :-lag]) ** 2) for lag in (1, 4, 16, 64)])
+        assert abs(h[:, 0] - h[:, -1]).mean() > 1, "it does not repeat itself"
+    rises = np.diff(np.log(np.mean(squares, axis=0))) / np.log(4)
+    assert (rises > 0.5).all() and (rises < 2.05).all()
+
+
+def test_land_without_size_is_refused():
+    for wrong in ({"step": 0.0}, {"north": 1.0}, {"relief": -1.0}, {"east": np.inf}):
+        with pytest.raises(WildlabError, match="two steps each way"):
+            synthetic_landscape(1, **wrong)
+
+
+def test_trees_stand_on_their_share_of_the_ground_in_groups():
+    land = synthetic_landscape(3)
+    grown = grow_trees(land, 5, share=0.2)
+    trees = grown.height - land.height
+    assert (trees > 0).mean() == pytest.approx(0.2, abs=0.001)
+    assert trees[trees > 0].min() >= (1 - UNEVEN) * TREES_M - 1e-3
+    assert trees.max() <= (1 + UNEVEN) * TREES_M + 1e-3
+    beside = (trees[:, 1:] > 0)[trees[:, :-1] > 0].mean()
+    assert beside > 0.8, "beside a tree stands another"
+    assert np.array_equal(grown.height, grow_trees(land, 5, share=0.2).height)
+    assert grown.extent == land.extent
+
+
+@pytest.mark.parametrize("wrong", [{"share": 1.2}, {"height": 0.0}, {"stand": -1.0}])
+def test_trees_without_a_size_are_refused(wrong):
+    with pytest.raises(WildlabError, match="a share between 0 and 1"):
+        grow_trees(synthetic_landscape(1, north=20, east=20), 1, **wrong)

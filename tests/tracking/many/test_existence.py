@@ -1,7 +1,8 @@
-"""Existence and visibility: every state of the world counted one by one, and the textbook's closed form."""
+"""Existence, association and the life of a track: every state and every way counted one by one."""
 
 from __future__ import annotations
 
+import itertools
 from itertools import product
 
 import numpy as np
@@ -10,8 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.poses import GENERATORS
+from wildlab.errors import WildlabError
+from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
-from wildlab.tracking.many.probabilities import association_probabilities
+from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
+from wildlab.tracking.many.probabilities import (
+    association_probabilities,
+    association_probabilities_by_enumeration,
+    belief_propagation,
+)
 
 shares = st.floats(0.01, 0.99)
 
@@ -98,3 +106,185 @@ def test_two_waits_are_one(v: float, visible_s: float, hidden_s: float, one: flo
 
 def test_existence_decays_with_its_lifetime() -> None:
     assert still_there(0.8, 50.0, 50.0) == pytest.approx(0.8 / np.e)
+
+
+GATE = gate_threshold(0.99, 2)
+
+
+@pytest.mark.parametrize(("m", "n"), [(3, 5), (1, 1), (2, 2), (1, 4)])
+def test_every_course_of_scans_is_decided_as_its_end_says(m, n):
+    """Judged at every scan: open until the end is certain, and right from then on."""
+    for course in itertools.product([0, 1], repeat=n):
+        verdicts = [int(judge_start([sum(course[:scans])], [scans], m, n)[0]) for scans in range(1, n + 1)]
+        assert verdicts[-1] == (CONFIRMED if sum(course) >= m else DROPPED)
+        for scans, verdict in enumerate(verdicts, start=1):
+            ends = {
+                sum(course[:scans]) + sum(rest) >= m for rest in itertools.product([0, 1], repeat=n - scans)
+            }
+            certain = {True: CONFIRMED, False: DROPPED}
+            assert verdict == (certain[ends.pop()] if len(ends) == 1 else UNDECIDED)
+
+
+def test_before_the_first_scan_nothing_is_decided():
+    assert judge_start([0], [0]).tolist() == [UNDECIDED]
+
+
+@pytest.mark.parametrize(
+    ("hits", "scans", "m", "n"),
+    [
+        ([1], [1], 0, 5),
+        ([1], [1], 6, 5),
+        ([2], [1], 3, 5),
+        ([0], [6], 3, 5),
+        ([-1], [1], 3, 5),
+        ([1], [1, 2], 3, 5),
+    ],
+)
+def test_counts_that_cannot_be_are_refused(hits, scans, m, n):
+    with pytest.raises(WildlabError):
+        judge_start(hits, scans, m, n)
+
+
+@given(st.floats(0, 2 * np.pi), st.floats(0.1, 3), st.floats(0, 10), st.floats(0.5, 20))
+def test_the_region_is_that_of_noise_about_where_motion_may_lead(angle, dt, speed, sd):
+    """Without correlation its edge lies the reach of noise beyond that of motion, all around."""
+    edge = speed * dt + np.sqrt(GATE * 2) * sd
+    for length, inside in ((0.999 * edge, True), (1.001 * edge, False)):
+        point = length * np.array([np.cos(angle), np.sin(angle)])
+        found = pair_scans([[0.0, 0.0]], [point], dt, sd**2 * np.eye(2), speed, GATE)
+        assert (found.measurement[0] == 0) == inside
+
+
+def test_a_target_at_rest_is_let_in_as_often_as_the_gate_says():
+    rng = np.random.default_rng(2)
+    R = np.array([[9.0, 4.0], [4.0, 4.0]])
+    z = rng.multivariate_normal([0, 0], R, (20000, 2))
+    paired = [pair_scans(one[:1], one[1:], 1.0, R, 0.0, GATE).track[0] == 0 for one in z[:3000]]
+    assert np.mean(paired) == pytest.approx(0.99, abs=0.006)
+
+
+def test_of_several_the_nearest_whole_is_taken():
+    """All are within reach of both: the sum of squares decides, not the first."""
+    found = pair_scans([[0.0, 0.0], [4.0, 0.0]], [[5.0, 0.0], [1.0, 0.0]], 1.0, np.eye(2), 20.0, GATE)
+    assert found.measurement.tolist() == [1, 0]
+
+
+def test_a_detection_without_a_position_continues_nothing():
+    found = pair_scans([[0.0, 0.0]], [[np.nan, np.nan]], 1.0, np.eye(2), 20.0, GATE)
+    assert found.track.tolist() == [-1]
+
+
+def test_no_detections():
+    assert pair_scans([], [[1.0, 2.0]], 1.0, np.eye(2), 1.0, GATE).track.tolist() == [-1]
+    assert pair_scans([[1.0, 2.0]], [], 1.0, np.eye(2), 1.0, GATE).measurement.tolist() == [-1]
+
+
+@pytest.mark.parametrize(
+    ("dt", "speed", "field"), [(-1.0, 1.0, "dt"), (1.0, np.inf, "max_speed"), (np.nan, 1.0, "dt")]
+)
+def test_times_and_speeds_that_cannot_be_are_refused(dt, speed, field):
+    with pytest.raises(WildlabError, match=f"{field} is"):
+        pair_scans([[0.0, 0.0]], [[0.0, 0.0]], dt, np.eye(2), speed, GATE)
+
+
+def test_a_track_ends_by_time_or_by_its_largest_deviation():
+    turned = np.array([[26.0, 24.0], [24.0, 26.0]])  # 50 along the diagonal, 2 across
+    P = np.array([turned, turned, turned, np.full((2, 2), np.nan)])
+    assert outlived([1, 1, 6, 1], P, 5.0, 7.1).tolist() == [False, False, True, True]
+    assert outlived([1, 1, 6, 1], P, np.inf, 7.0).tolist() == [True, True, True, True]
+    assert outlived([5, 5, 1e9, 1], P, np.inf, np.inf).tolist() == [False, False, False, True]
+    with pytest.raises(WildlabError, match="do not go with covariances"):
+        outlived([1.0], P, 1.0, 1.0)
+
+
+def weights_of(seed: int, n: int, m: int, empty: float = 0.4) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    w = np.exp(rng.normal(0.0, 3.0, (n, m))) * (rng.random((n, m)) > empty)
+    return w, rng.uniform(0.01, 1.0, n)
+
+
+@given(st.integers(0, 10_000), st.integers(0, 4), st.integers(0, 4))
+def test_sums_are_those_of_every_way(seed: int, n: int, m: int) -> None:
+    w, w0 = weights_of(seed, n, m)
+    found = association_probabilities(w, w0)
+    assert found.shape == (n, 1 + m)
+    assert np.allclose(found, association_probabilities_by_enumeration(w, w0), rtol=1e-9, atol=1e-12)
+
+
+@given(st.integers(0, 10_000))
+def test_no_measurement_is_given_away_twice(seed: int) -> None:
+    w, w0 = weights_of(seed, 7, 9, empty=0.6)
+    found = association_probabilities(w, w0)
+    assert np.allclose(found.sum(axis=1), 1) and (found >= 0).all()
+    assert (found[:, 1:].sum(axis=0) <= 1 + 1e-9).all()
+    assert (found[:, 1:][w == 0] == 0).all()
+
+
+@given(st.integers(0, 10_000), st.floats(1e-8, 1e8))
+def test_a_targets_weights_may_be_scaled(seed: int, factor: float) -> None:
+    w, w0 = weights_of(seed, 4, 4)
+    before = association_probabilities(w, w0)
+    w[1] *= factor
+    w0[1] *= factor
+    assert np.allclose(association_probabilities(w, w0), before, atol=1e-9)
+
+
+def test_many_targets_in_one_cluster_lose_no_digits() -> None:
+    w = np.full((40, 10), 1e-3)
+    found = association_probabilities(w, np.full(40, 0.5))
+    # All alike: each measurement is shared by all.
+    assert np.allclose(found, found[0]) and np.allclose(found[:, 1:], found[0, 1])
+
+
+@given(GENERATORS)
+def test_messages_are_exact_where_nothing_competes_in_a_loop(rng: np.random.Generator) -> None:
+    """A chain: each target shares one measurement with the next."""
+    w = np.zeros((5, 6))
+    for i in range(5):
+        w[i, i : i + 2] = np.exp(rng.normal(0, 2, 2))
+    w0 = rng.uniform(0.05, 1, 5)
+    assert np.allclose(belief_propagation(w, w0), association_probabilities(w, w0), atol=1e-7)
+
+
+def test_messages_are_near_where_loops_are() -> None:
+    """Of 200 crowded clusters the mean difference is below a percent, and large ones take this way."""
+    rng, off = np.random.default_rng(1), []
+    for _ in range(200):
+        place, seen = rng.uniform(0, 30, (6, 2)), rng.uniform(0, 30, (6, 2))
+        apart = np.linalg.norm(place[:, None] - seen[None], axis=2)
+        w, w0 = 0.9 * np.exp(-((apart / 4) ** 2) / 2) / 0.05, np.full(6, 0.1)
+        off.append(np.abs(belief_propagation(w, w0) - association_probabilities(w, w0)).mean())
+    assert 0 < np.mean(off) < 0.01
+    w, w0 = weights_of(3, 20, 20, empty=0.5)
+    assert np.allclose(association_probabilities(w, w0), belief_propagation(w, w0), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("weights", "missed", "words"),
+    [
+        ([[1.0]], [1.0, 2.0], "do not fit"),
+        ([[-1.0]], [1.0], "negative"),
+        ([[np.nan]], [1.0], "not a number"),
+        ([[1.0], [1.0]], [0.0, 0.0], "no way to deal them out"),
+    ],
+)
+def test_what_cannot_be_is_said(weights: list[list[float]], missed: list[float], words: str) -> None:
+    with pytest.raises(WildlabError, match=words):
+        association_probabilities(weights, missed)
+
+
+def test_messages_need_targets_that_can_be_missed() -> None:
+    with pytest.raises(WildlabError, match="cannot be missed"):
+        belief_propagation([[1.0]], [0.0])
+
+
+def test_a_target_that_nothing_is_of_has_none_whatever_others_have() -> None:
+    """Also one that cannot be missed, and whether few or many are summed at once."""
+    for count in (2, 9):
+        weights = np.zeros((count, count))
+        weights[: count - 1, : count - 1] = 1.0
+        missed = np.append(np.full(count - 1, 0.5), 0.0)
+        found = association_probabilities(weights, missed)
+        assert found[-1].tolist() == [1.0] + [0.0] * count
+        assert np.allclose(found[:-1, -1], 0) and np.allclose(found.sum(axis=1), 1)
+        assert np.allclose(found[:-1, 1:-1], found[0, 1])

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.tracking.many.test_run import POINTS, looks
-from tests.tracking.many.test_together import OPEN, SURE
+from tests.tracking.many.test_update import OPEN, SURE
 from tests.tracking.poses import GENERATORS
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.many.beliefs import POINT, Hull

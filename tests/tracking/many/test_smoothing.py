@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.tracking.many.test_run import look
-from tests.tracking.many.test_together import OPEN, SURE
+from tests.tracking.many.test_update import OPEN, SURE
 from tests.tracking.poses import GENERATORS
 from wildlab.evaluation.consistency import chi_square_interval, nees
 from wildlab.tracking.many.beliefs import Hull, own_columns, own_lasting

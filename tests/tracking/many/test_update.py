@@ -1,16 +1,25 @@
-"""One target without clutter is the Kalman filter; a mixture has the moments of its parts."""
+"""Tracks after a scan are those of Kalman's and Schmidt's filters; shared errors are sums over all ways."""
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal, norm
 
+from tests.tracking.many.test_run import EYE, POINTS, lines, look, looks
 from tests.tracking.poses import GENERATORS
+from wildlab.errors import WildlabError
 from wildlab.tracking.bending import left_out
-from wildlab.tracking.many.update import compare, compare_bearings, update
+from wildlab.tracking.many.beliefs import Scan
+from wildlab.tracking.many.probabilities import association_probabilities
+from wildlab.tracking.many.run import follow_many, run_many
+from wildlab.tracking.many.together import moved_together, told_by_others
+from wildlab.tracking.many.update import Compared, compare, compare_bearings, update
+from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.schmidt import update_schmidt
 
 H = np.eye(2, 4)
@@ -127,3 +136,206 @@ def test_likelihoods_are_densities_of_the_gate(rng: np.random.Generator) -> None
         d = z[j] - x[i, 0, :2]
         inside = d @ np.linalg.solve(S, d) < gate**2
         assert np.isclose(found.likelihood[i, 0, j], inside * multivariate_normal(cov=S).pdf(d))
+
+
+SURE = EYE._replace(detection=1 - 1e-12, clutter=1e-30)
+OPEN = POINTS._replace(gate=1e3, lifetime_s=1e12, hidden_s=1e-9, lost_m=1e6, fastest_m_s=1e6)
+
+
+def moved(
+    truth: np.ndarray, lasting_s: float, size: float, own: float, rng: np.random.Generator, told: bool = True
+) -> list[Scan]:
+    """Scans of (N, T, 2) places, in their order; an error north and one east, first order, move all.
+
+    Parameters
+    ----------
+    told
+        Whether the scans say that it is shared, or have it in the noise of each.
+    """
+    error = rng.normal(size=2)
+    left = np.exp(-1 / lasting_s) if lasting_s else 0.0
+    scans = []
+    for t, places in enumerate(truth):
+        if t:
+            error = left * error + np.sqrt(1 - left**2) * rng.normal(size=2)
+        z = places + size * error + own * rng.normal(size=places.shape)
+        R = np.tile((own**2 + (0 if told else size**2)) * np.eye(2), (len(z), 1, 1))
+        shared = np.tile(size * np.eye(2), (len(z), 1, 1)) if told else None
+        scans.append(look(t, *z, R=R, shared=shared))
+    return scans
+
+
+@given(GENERATORS, st.integers(0, 4))
+@settings(max_examples=30)
+def test_one_target_is_the_schmidt_filter(rng: np.random.Generator, k: int) -> None:
+    """Without errors the Kalman filter; also where how errors move a measurement changes, and they fade."""
+    lasting = rng.choice([0.0, 3.0, np.inf], k)
+    scans = [
+        one._replace(shared=rng.normal(size=(1, 2, k)))
+        for one in looks(lines(np.array([[5.0, 8.0]]), np.array([[1.0, -2.0]]), 8), rng)
+    ]
+    J, H = scans[0].shared[0], np.eye(2, 4)
+    x, P = np.array([*scans[0].z[0], 0.0, 0.0]), np.diag([0.0, 0.0, 9.0, 9.0])
+    P[:2, :2] = scans[0].R[0] + J @ J.T
+    C = np.vstack([-J, np.zeros((2, k))])
+    for scan, (tracks, _) in zip(scans, follow_many(scans, [SURE], OPEN, lasting), strict=True):
+        if scan.time:
+            F, Q = white_acceleration(1.0, OPEN.density)
+            x, P = F @ x, F @ P @ F.T + Q
+            C = F @ C @ np.diag([0.0 if one == 0 else np.exp(-1.0 / one) for one in lasting])
+            after = update_schmidt(
+                x, P, C, np.eye(k), scan.z[0] - x[:2], H, scan.shared[0], scan.R[0]
+            )  # fmt: skip
+            x, P, C = after.x, after.P, after.C
+        assert np.allclose(tracks.x[0, 0], x) and np.allclose(tracks.P[0, 0], P)
+        assert tracks.number == 1 and np.allclose(tracks.C[0, 0], C)
+
+
+def _drawn(rng: np.random.Generator, T: int, k: int, size: float, uneven: float = 0.1) -> Compared:
+    """T targets some metres apart, each detected, moved together; known to a metre."""
+    x = np.zeros((T, 1, 4))
+    x[:, 0, :2] = rng.uniform(-6, 6, (T, 2))
+    J = np.tile(size * np.eye(2, k), (T, 1, 1)) + uneven * rng.normal(size=(T, 2, k))
+    z = x[:, 0, :2] + J @ rng.normal(size=k) + rng.normal(size=(T, 2)) * np.sqrt(0.5)
+    P = np.tile(np.diag([0.25, 0.25, 1.0, 1.0]), (T, 1, 1, 1))
+    R = np.tile(0.25 * np.eye(2), (T, 1, 1))
+    return compare(x, P, np.zeros((T, 1, 2)), np.zeros((T, 1, 2, 2)), z, R, 1e3, np.zeros((T, 1, 4, k)), J)
+
+
+def _enumerated(compared: Compared, seen: float, clutter: float) -> np.ndarray:
+    """(T, 1 + M) by all ways, each with the errors integrated out."""
+    nu, S, _, _, G = (part[:, 0] for part in compared)
+    T, M = nu.shape[:2]
+    alone = S - G @ np.swapaxes(G, -1, -2)
+    total = np.zeros((T, 1 + M))
+    for way in product(range(-1, M), repeat=T):
+        taken = [m for m in way if m >= 0]
+        if len(set(taken)) < len(taken):
+            continue
+        who = [t for t in range(T) if way[t] >= 0]
+        weight = (1 - seen) ** (T - len(who)) * (seen / clutter) ** len(who)
+        if who:
+            g = np.concatenate([G[t, way[t]] for t in who])
+            spread = g @ g.T
+            for place, t in enumerate(who):
+                spread[2 * place : 2 * place + 2, 2 * place : 2 * place + 2] += alone[t, way[t]]
+            weight *= multivariate_normal.pdf(np.concatenate([nu[t, way[t]] for t in who]), cov=spread)
+        for t in range(T):
+            total[t, 1 + way[t]] += weight
+    return np.asarray(total / total.sum(axis=1, keepdims=True))
+
+
+def _both(compared: Compared, seen: float, clutter: float) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 1 + M) with each target by itself, and together."""
+    T, M = compared.likelihood.shape[0], compared.likelihood.shape[2]
+
+    def probable(likely: np.ndarray) -> np.ndarray:
+        return association_probabilities(seen * likely[:, 0] / clutter, np.full(T, 1 - seen))
+
+    alone = probable(compared.likelihood)
+    near = np.tile(np.arange(M), (T, 1))
+    return alone, moved_together(compared, near, np.ones((T, 1)), alone, 1e3, probable)[1]
+
+
+@pytest.mark.slow
+def test_together_is_near_the_sum_over_all_ways() -> None:
+    """Each target by itself is far off, where all are moved by more than they are apart."""
+    rng = np.random.default_rng(1)
+    off = []
+    for _ in range(60):
+        compared = _drawn(rng, int(rng.integers(2, 5)), 3, 3.0)
+        right = _enumerated(compared, 0.9, 1e-4)
+        off.append([np.abs(one - right).max(axis=1).mean() for one in _both(compared, 0.9, 1e-4)])
+    alone, together = np.mean(off, axis=0)
+    assert alone > 0.15 and together < alone / 3
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=25)
+def test_an_error_that_moves_nothing_changes_nothing(seed: int) -> None:
+    compared = _drawn(np.random.default_rng(seed), 3, 2, 0.0, 0.0)
+    alone, together = _both(compared, 0.9, 1e-4)
+    assert np.allclose(alone, together) and np.allclose(alone, _enumerated(compared, 0.9, 1e-4))
+
+
+def test_what_others_tell_is_the_least_squares_of_them() -> None:
+    """Sure associations: the errors' posterior is that of all other targets' innovations at once."""
+    rng = np.random.default_rng(2)
+    compared = _drawn(rng, 4, 3, 2.0)
+    mean, covariance = told_by_others(compared, np.eye(4)[:, None])
+    nu, S, _, _, G = (part[:, 0] for part in compared)
+    for t in range(4):
+        others = [u for u in range(4) if u != t]
+        g = np.concatenate([G[u, u] for u in others])
+        alone = np.zeros((6, 6))
+        for place, u in enumerate(others):
+            alone[2 * place : 2 * place + 2, 2 * place : 2 * place + 2] = S[u, u] - G[u, u] @ G[u, u].T
+        gain = g.T @ np.linalg.inv(g @ g.T + alone)
+        assert np.allclose(mean[t], gain @ np.concatenate([nu[u, u] for u in others]))
+        assert np.allclose(covariance[t], np.eye(3) - gain @ g)
+
+
+def test_what_nobody_is_sure_of_tells_little() -> None:
+    """Two measurements that may be a target's: their middle, as unsure as they lie apart, and probable."""
+    nu = np.array([[4.0, 0.0], [0.0, 2.0]])
+    S, G = np.tile(5.0 * np.eye(2), (2, 1, 1)), np.tile(2.0 * np.eye(2), (2, 1, 1))
+    one = Compared(*(np.stack([part, part])[:, None] for part in (nu, S)), np.ones((2, 1, 2)), np.zeros(0),
+                   np.stack([G, G])[:, None])  # fmt: skip
+    share, probable = np.array([0.25, 0.75]), 0.6
+    mean, covariance = told_by_others(one, np.tile(probable * share, (2, 1, 1)))
+    middle = share @ nu
+    off = nu - middle
+    spread = np.eye(2) + np.einsum("m,mi,mj->ij", share, off, off)
+    information = probable * 2.0 * np.linalg.inv(spread) * 2.0
+    right = np.linalg.inv(np.eye(2) + information)
+    assert np.allclose(covariance, right)
+    assert np.allclose(mean, right @ (probable * 2.0 * np.linalg.solve(spread, middle)))
+
+
+def test_who_lies_far_off_by_what_is_shared_is_compared_too() -> None:
+    """A place known to a metre, and a look that is wrong by thirty: sixty is no reason to leave it out."""
+    known = looks(np.zeros((4, 1, 2)), np.random.default_rng(0))
+    off = look(4.0, [60.0, 0.0])
+    sure = EYE._replace(clutter=1e-9)
+    for shared, met in ((np.tile(30.0 * np.eye(2), (1, 1, 1)), True), (None, False)):
+        scans = [*known, off._replace(shared=shared)]
+        *_, last = follow_many(scans, [sure], POINTS, [0.0] * 2 if met else [])
+        hits = dict(zip(last[0].identity.tolist(), last[0].hits.tolist(), strict=True))
+        assert hits[0] == (5 if met else 4)
+
+
+def test_targets_that_are_moved_together_are_told_apart() -> None:
+    """Two metres apart and moved by three for long: who knows that they are moved together keeps them."""
+    starts = 2.0 * np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
+    truth = lines(starts, np.array([[0.3, 0.2]] * 3), 40)
+    targets = POINTS._replace(density=0.02, start_speed_m_s=1.0)
+    kept = dict.fromkeys((True, False), 0)
+    for seed in range(4):
+        for told in kept:
+            scans = moved(truth, 100.0, 3.0, 0.3, np.random.default_rng(seed), told)
+            names = []
+            for k, (tracks, _) in enumerate(follow_many(scans, [EYE], targets, [100.0] * 2 if told else [])):
+                sure = tracks.only(np.flatnonzero(tracks.confirmed))
+                if k in (10, 39) and sure.number >= 3:
+                    near = np.linalg.norm(sure.x[:, :1, :2] - scans[k].z[None], axis=2).argmin(axis=0)
+                    names.append(tuple(sure.identity[near].tolist()))
+            kept[told] += len(names) == 2 and names[0] == names[1] and len(set(names[0])) == 3
+    assert kept[True] >= 3 > 1 >= kept[False]
+
+
+def test_a_track_is_not_lost_for_what_all_are_wrong_by() -> None:
+    """A hundred metres that all share, where 50 m is what a place may be unknown by: new ones count."""
+    truth = lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 15)
+    for lasting, kept in ((np.inf, True), (0.0, False)):
+        scans = moved(truth, lasting, 100.0, 0.5, np.random.default_rng(1))
+        first, *_, last = [tracks for tracks, _ in follow_many(scans, [EYE], POINTS, [lasting] * 2)]
+        assert first.identity.tolist() == [0]
+        assert (last.identity.tolist() == [0]) == kept
+
+
+def test_shared_errors_that_nobody_told_of_are_refused() -> None:
+    scan = look(0.0, [1.0, 1.0], shared=np.zeros((1, 2, 3)))
+    with pytest.raises(WildlabError, match="shared errors"):
+        run_many([scan], [EYE], POINTS, [1.0])
+    with pytest.raises(WildlabError, match="less than"):
+        run_many([scan], [EYE], POINTS, [1.0, -1.0, 0.0])

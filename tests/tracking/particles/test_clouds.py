@@ -1,24 +1,42 @@
-"""What particles say together: weights, evidence, moments, effective size, and where a cloud starts."""
+"""Clouds of particles: weights, moments, starts, moves, draws and counts, by closed forms and by numpy."""
 
 from __future__ import annotations
+
+from functools import partial
+from itertools import product
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import poisson
 
+from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
+from wildlab.tracking.motion import constant_position, constant_velocity, in_steps
 from wildlab.tracking.particles import (
+    SCHEMES,
     Cloud,
+    count_interval,
+    count_probabilities,
+    draw,
+    drift,
     effective_size,
+    existence_after,
     log_likelihood,
     moments,
+    move,
+    move_by_sight,
+    resample,
     sight_of,
     start_gaussian,
     start_inside,
+    stay_inside,
+    walk_of,
     weigh,
     weigh_unseen,
 )
+from wildlab.tracking.particles.kernels import pick, take
 
 
 def some_cloud(seed, animals=3, particles=40, n=4):
@@ -156,3 +174,265 @@ def nowhere(places):
 def test_refusals(act, words):
     with pytest.raises(WildlabError, match=words):
         act()
+
+
+def uneven(rng, animals, particles):
+    w = rng.exponential(size=(animals, particles)) ** 3
+    w[:, ::4] = 0
+    return w / w.sum(axis=1, keepdims=True)
+
+
+@given(rng=GENERATORS, animals=st.integers(1, 4), particles=st.integers(2, 60))
+def test_the_compiled_walk_finds_what_a_search_finds(rng, animals, particles):
+    cumulative = np.cumsum(uneven(rng, animals, particles), axis=1)
+    cumulative /= cumulative[:, -1:]
+    points = np.sort(rng.random((animals, particles)), axis=1)
+    points[:, 0] = 0.0
+    wanted = [np.searchsorted(c, p, side="right") for c, p in zip(cumulative, points, strict=True)]
+    np.testing.assert_array_equal(pick(cumulative, points), wanted)
+
+
+@given(rng=GENERATORS, n=st.integers(1, 5))
+def test_the_compiled_choice_takes_what_numpy_takes(rng, n):
+    x, chosen = rng.normal(size=(3, 20, n)), rng.integers(0, 20, (3, 9))
+    np.testing.assert_array_equal(take(x, chosen), np.take_along_axis(x, chosen[..., None], axis=1))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_copies_are_unbiased(scheme):
+    """The mean number of copies is N w, within the error of the draws themselves."""
+    rng = np.random.default_rng(7)
+    N, runs = 24, 20_000
+    w = uneven(rng, 1, N)[0]
+    chosen = draw(np.tile(w, (runs, 1)), rng, scheme)
+    copies = np.apply_along_axis(np.bincount, 1, chosen, minlength=N)
+    assert (copies[:, w == 0] == 0).all() and (copies.sum(axis=1) == N).all()
+    part = (N * w) % 1
+    variance = part * (1 - part) if scheme == "systematic" else N * w * (1 - w)
+    off = np.abs(copies.mean(axis=0) - N * w)
+    assert (off <= 4.5 * np.sqrt(variance / runs) + 1e-12).all()
+    np.testing.assert_allclose(copies.var(axis=0)[variance > 0.05], variance[variance > 0.05], rtol=0.08)
+    if scheme == "systematic":
+        assert (np.abs(copies - N * w) < 1).all()
+
+
+@given(rng=GENERATORS, threshold=st.floats(0, 1))
+def test_only_those_at_or_below_the_threshold_are_drawn_anew(rng, threshold):
+    power = rng.uniform(0, 3, (6, 1))
+    w = rng.exponential(size=(6, 30)) ** power
+    w /= w.sum(axis=1, keepdims=True)
+    cloud = Cloud(rng.normal(size=(6, 30, 2)), w)
+    size = effective_size(w) / 30
+    after, due = resample(cloud, rng, "systematic", threshold)
+    clear = np.abs(size - threshold) > 1e-6
+    np.testing.assert_array_equal(due[clear], (size < threshold)[clear])
+    np.testing.assert_array_equal(after.x[~due], cloud.x[~due])
+    np.testing.assert_array_equal(after.w[~due], cloud.w[~due])
+    assert (after.w[due] == 1 / 30).all()
+    for a in np.flatnonzero(due):
+        assert {tuple(one) for one in after.x[a]} <= {tuple(one) for one in cloud.x[a]}
+
+
+def test_two_thirds_is_the_default_and_one_is_always():
+    w = np.full((1, 9), 1 / 9)
+    w2 = np.array([[1 / 5] * 5 + [0.0] * 4, [1 / 7] * 7 + [0.0] * 2])
+    rng = np.random.default_rng(0)
+    assert resample(Cloud(np.zeros((2, 9, 2)), w2), rng)[1].tolist() == [True, False]
+    assert not resample(Cloud(np.zeros((1, 9, 2)), w), rng)[1].any()
+    assert resample(Cloud(np.zeros((1, 9, 2)), w), rng, threshold=1)[1].all()
+
+
+@pytest.mark.parametrize("arguments", [{"scheme": "residual", "threshold": 1}, {"threshold": 1.2}])
+def test_what_there_is_not_is_refused(arguments):
+    cloud = Cloud(np.zeros((1, 2, 2)), np.full((1, 2), 0.5))
+    with pytest.raises(WildlabError, match="multinomial, systematic" if "scheme" in arguments else "0 to 1"):
+        resample(cloud, np.random.default_rng(0), **arguments)
+
+
+some = st.lists(st.floats(0, 1), max_size=7)
+
+
+@given(existence=some)
+def test_every_way_of_being_there_is_counted(existence):
+    wanted = np.zeros(len(existence) + 1)
+    for way in product([0, 1], repeat=len(existence)):
+        wanted[sum(way)] += np.prod([r if there else 1 - r for r, there in zip(existence, way, strict=True)])
+    np.testing.assert_allclose(count_probabilities(existence), wanted, atol=1e-12)
+
+
+@given(existence=some, unseen=st.floats(0.01, 40))
+def test_those_never_seen_come_on_top(existence, unseen):
+    p = count_probabilities(existence, unseen)
+    numbers = np.arange(len(p))
+    assert np.isclose(p.sum(), 1)
+    mean, variance = numbers @ p, numbers**2 @ p - (numbers @ p) ** 2
+    r = np.array(existence)
+    assert np.isclose(mean, r.sum() + unseen) and np.isclose(
+        variance, (r * (1 - r)).sum() + unseen, rtol=1e-6
+    )
+    if not existence:
+        np.testing.assert_allclose(p, poisson(unseen).pmf(numbers), atol=1e-10)
+
+
+@given(existence=some, unseen=st.floats(0, 10), probability=st.floats(0.05, 0.99))
+def test_the_interval_is_the_shortest_that_holds_enough(existence, unseen, probability):
+    p = count_probabilities(existence, unseen)
+    count = count_interval(p, probability)
+    assert np.isclose(count.probability, p[count.low : count.high + 1].sum())
+    assert count.probability >= probability - 1e-9
+    length = count.high - count.low
+    for low in range(len(p)):
+        assert p[low : low + length].sum() < probability  # none that is shorter by one holds it
+        assert p[low : low + length + 1].sum() <= count.probability + 1e-9
+    assert np.isclose(count.mean, np.arange(len(p)) @ p)
+
+
+def test_looking_n_times_for_one_that_is_not_seen():
+    r = 0.7
+    for _ in range(5):
+        r = float(existence_after(r, 0.4))
+    assert np.isclose(r, 0.7 * 0.4**5 / (0.3 + 0.7 * 0.4**5))
+    assert (
+        existence_after(1.0, 0.0) == 0 and existence_after(1.0, 1e-9) == 1 and existence_after(0.0, 1e9) == 0
+    )
+
+
+@pytest.mark.parametrize("existence, unseen", [([1.2], 0.0), ([np.nan], 0.0), ([0.5], -1.0), ([0.5], np.inf)])
+def test_what_cannot_be_counted_is_refused(existence, unseen):
+    with pytest.raises(WildlabError, match="0 to 1"):
+        count_probabilities(existence, unseen)
+
+
+@pytest.mark.parametrize("probability", [0.0, 1.0, np.nan])
+def test_an_interval_of_no_probability_is_refused(probability):
+    with pytest.raises(WildlabError, match="above 0"):
+        count_interval([0.5, 0.5], probability)
+
+
+N = 40_000
+
+
+def near(covariance, wanted, count=N):
+    """Within five errors of a sample covariance of normal numbers."""
+    sd = np.sqrt(np.diag(wanted))
+    return (
+        np.abs(covariance - wanted) <= 5 * np.sqrt((np.outer(sd, sd) ** 2 + wanted**2) / count) + 1e-9
+    ).all()
+
+
+def test_a_cloud_moves_as_its_model_says():
+    rng = np.random.default_rng(1)
+    start, P = np.array([10.0, 5.0, 1.0, -2.0]), np.diag([9.0, 4.0, 0.25, 1.0])
+    motion = partial(constant_velocity, sd_acceleration=0.7)
+    F, Q = motion(3.0)
+    mean, covariance = moments(move(start_gaussian([start], P, N, rng), motion, 3.0, rng))
+    wanted = F @ P @ F.T + Q
+    assert (np.abs(mean[0] - F @ start) < 5 * np.sqrt(np.diag(wanted) / N)).all()
+    assert near(covariance[0], wanted)
+
+
+@pytest.mark.parametrize("step", [0.5, 1.0, 3.0])
+def test_the_walk_does_not_depend_on_how_often_it_is_predicted(step):
+    """It spreads as (4.5) does when (4.5) is taken in its own step, and as (4.5) alone does not."""
+    walk, printed = walk_of(0.5, step), partial(constant_position, sd_velocity=0.5)
+    _, half_an_hour = walk(1800.0)
+    np.testing.assert_allclose(half_an_hour, in_steps(1800.0, printed, step)[1], rtol=1e-9)
+    np.testing.assert_allclose(half_an_hour, 600 * walk(3.0)[1], rtol=1e-9)
+    assert not np.allclose(printed(3.0)[1], 30 * printed(0.1)[1])
+
+
+@pytest.mark.parametrize("sd, step", [(-1.0, 1.0), (1.0, 0.0), (np.nan, 1.0), (1.0, np.inf)])
+def test_a_walk_without_a_step_is_refused(sd, step):
+    with pytest.raises(WildlabError, match="more than zero"):
+        walk_of(sd, step)
+
+
+@pytest.mark.parametrize("dt", [0.1, 60.0, 4000.0])
+def test_one_place_draws_as_the_closed_form_says(dt):
+    """Ornstein and Uhlenbeck: exact for any step, and a plain walk for a short one."""
+    rng, place = np.random.default_rng(2), np.array([50.0, -20.0])
+    density, spread = 0.6, 25.0
+    after = drift(np.zeros((N, 2)), dt, rng, density=density, places=[place], spread=spread)
+    rate = density**2 / (2 * spread**2)
+    variance = spread**2 * (1 - np.exp(-2 * rate * dt))
+    assert (np.abs(after.mean(axis=0) - place * (1 - np.exp(-rate * dt))) < 5 * np.sqrt(variance / N)).all()
+    assert near(np.cov(after.T), variance * np.eye(2))
+    if dt == 0.1:
+        np.testing.assert_allclose(variance, density**2 * dt, rtol=1e-3)
+
+
+def test_in_the_long_run_they_are_where_the_places_are():
+    """A mixture about its places, each with its share; those who start in it stay in it."""
+    rng = np.random.default_rng(4)
+    places, shares, spread = np.array([[0.0, 0.0], [0.0, 50.0]]), np.array([0.3, 0.7]), 25.0
+    where = places[rng.choice(2, 8000, p=shares)] + spread * rng.standard_normal((8000, 2))
+    away = np.zeros((8000, 2))
+    for _ in range(400):
+        both = np.stack([where, away])
+        where, away = drift(both, 30.0, rng, density=1.0, places=places, spread=spread, shares=shares)
+    assert abs(where[:, 1].mean() - 35) < 2.0  # 0.3 * 0 + 0.7 * 50
+    assert abs(where[:, 1].std() - np.sqrt(25**2 + 0.21 * 50**2)) < 1.5
+    assert abs(where[:, 0].std() - 25) < 0.7
+    # Started all in one place, they forget it.
+    assert abs(away[:, 1].mean() - 35) < 2.0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"places": np.zeros((0, 2))},
+        {"shares": [1.0]},
+        {"shares": [0.0, 0.0]},
+        {"spread": 0.0},
+        {"density": 0.0},
+    ],
+)
+def test_places_that_do_not_draw_are_refused(wrong):
+    told = {"density": 1.0, "places": [[0.0, 0.0], [1.0, 1.0]], "spread": 1.0, "shares": [1.0, 1.0]} | wrong
+    with pytest.raises(WildlabError, match=r"place|spread"):
+        drift(np.zeros((1, 2)), 1.0, np.random.default_rng(0), **told)
+
+
+def test_in_sight_they_keep_their_velocity_and_out_of_sight_they_forget_it():
+    rng = np.random.default_rng(6)
+    start = np.array([[0.0, 0.0, 2.0, 0.0]] * 2)
+    cloud = start_gaussian(start, np.diag([1.0, 1.0, 0.01, 0.01]), N, rng)
+    motion = partial(constant_velocity, sd_acceleration=0.1)
+    after = move_by_sight(
+        cloud, [True, False], 10.0, rng, motion=motion, sd_velocity=0.5,
+        density=0.5, places=[[0.0, 100.0]], spread=10.0,
+    )  # fmt: skip
+    mean, covariance = moments(after)
+    F, Q = motion(10.0)
+    assert np.abs(mean[0] - [20, 0, 2, 0]).max() < 0.2
+    assert near(covariance[0], F @ np.diag([1.0, 1.0, 0.01, 0.01]) @ F.T + Q)
+    assert np.abs(mean[1, 2:]).max() < 0.02 and near(covariance[1, 2:, 2:], 0.25 * np.eye(2))
+    assert abs(mean[1, 0]) < 0.1 and mean[1, 1] > 0.5  # not 20 m on, but towards the place
+    np.testing.assert_array_equal(after.w, cloud.w)
+
+
+def test_nobody_leaves_and_all_of_the_enclosure_is_used():
+    def half_disc(places):
+        return (np.hypot(places[..., 0], places[..., 1]) < 50) & (places[..., 0] > 0)
+
+    rng = np.random.default_rng(8)
+    cloud = start_inside(half_disc, [0, -50], [50, 50], 1, 20_000, rng)
+    corner = Cloud(np.full_like(cloud.x, 1.0), cloud.w)
+    for _ in range(400):
+        cloud = stay_inside(cloud, move(cloud, walk_of(2.0, 1.0), 10.0, rng), half_disc)
+        corner = stay_inside(corner, move(corner, walk_of(2.0, 1.0), 10.0, rng), half_disc)
+        assert half_disc(cloud.x).all()
+    for one in (
+        cloud,
+        corner,
+    ):  # even in the long run, wherever it started: a half disc's middle is 4 r / 3 pi
+        mean, covariance = moments(one)
+        assert abs(mean[0, 0] - 4 * 50 / (3 * np.pi)) < 0.6 and abs(mean[0, 1]) < 1.0
+        assert abs(covariance[0, 1, 1] - 50**2 / 4) < 25
+
+
+def test_a_velocity_that_led_out_is_given_up():
+    before = Cloud(np.array([[[0.0, 0.0, 9.0, 0.0], [0.0, 0.0, 1.0, 0.0]]]), np.full((1, 2), 0.5))
+    after = Cloud(np.array([[[9.0, 0.0, 9.0, 0.0], [1.0, 0.0, 1.0, 0.0]]]), np.full((1, 2), 0.5))
+    kept = stay_inside(before, after, lambda p: p[..., 0] < 5)
+    assert kept.x.tolist() == [[[0, 0, 0, 0], [1, 0, 1, 0]]]

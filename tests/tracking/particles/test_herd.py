@@ -1,4 +1,4 @@
-"""Many animals image after image: F's rule, the one that counts, what is lost, and what is found again."""
+"""Many animals image after image: who is seen, lost, found again, and how many there are."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ import pytest
 
 from tests.tracking.particles.worlds import NOISE, RULES, SIZE, WALK, inside, world
 from wildlab.errors import WildlabError
+from wildlab.evaluation import share_interval
 from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking import kalman
 from wildlab.tracking.particles import (
     Look,
+    count_interval,
+    count_probabilities,
+    effective_size,
     existence_after,
     expect,
     grid_over,
@@ -41,8 +45,8 @@ def begun(step, rules, rng, **more):
     )
 
 
-def look(time, *z, sight=lambda p: np.zeros(p.shape[:-1]), clutter=0.0):
-    return Look(time, np.reshape(z, (-1, 2)).astype(float), np.tile(R, (len(z), 1, 1)), sight, clutter)
+def look(time, *z, sight=lambda p: np.zeros(p.shape[:-1]), clutter=0.0, noise=R):
+    return Look(time, np.reshape(z, (-1, 2)).astype(float), np.tile(noise, (len(z), 1, 1)), sight, clutter)
 
 
 @pytest.mark.parametrize("step", [step_nearest, step_counting])
@@ -73,7 +77,7 @@ def test_who_is_not_where_it_should_be_is_less_and_less_there():
     rng = np.random.default_rng(5)
     rules = RULES._replace(moves=lambda cloud, seen, dt, rng: cloud)
     sight = everywhere(0.6)
-    herd = expect(rules, 3.0, inside, np.zeros(2), SIZE, rng)
+    herd = expect(rules, 3.0, inside, np.zeros(2), SIZE, rng, particles=200_000)
     clutter = 1e-4
     herd, _ = step_counting(herd, look(0.0, [60.0, 45.0], sight=sight, clutter=clutter), rules, rng)
     # Three animals in the enclosure's area, those seen of a detector that sees 0.6.
@@ -237,3 +241,93 @@ def test_time_does_not_go_back_and_a_step_leaves_what_was_known_alone(step):
 def test_a_number_below_zero_is_not_expected():
     with pytest.raises(WildlabError, match="zero or more"):
         expect(RULES, -1.0, inside, np.zeros(2), SIZE, np.random.default_rng())
+
+
+#: A detection that is sharper than the cloud about it, and a rule that has few particles for it.
+SMALL = 0.04 * np.eye(2)
+SPARSE = RULES._replace(moves=free, particles=500, gate_probability=0.999)
+
+
+def test_it_is_what_a_kalman_filter_would_have() -> None:
+    off, covariances, means = 20.0, [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        herd, _ = step_nearest(no_herd(SPARSE), look(0.0, [0.0, 0.0], noise=SMALL), SPARSE, rng)
+        # 1600 s later an animal may be 20 m off each way: of 500 particles hardly one is as near as 0.2 m.
+        found = look(1600.0, [off, 0.0], noise=SMALL)
+        herd, names = step_nearest(herd, found, SPARSE, rng)
+        assert names.tolist() == [1]
+        mean, covariance = moments(herd.cloud)
+        means.append(mean[0])
+        covariances.append(covariance[0])
+    gain = 400.04 / 400.08
+    assert np.mean(means, axis=0) == pytest.approx([gain * off, 0.0], abs=0.1)
+    assert np.mean(covariances, axis=0) == pytest.approx(gain * SMALL, abs=0.004)
+    assert min(np.linalg.eigvalsh(one).min() for one in covariances) > 0.02
+
+
+def test_a_handful_of_particles_is_not_taken_for_what_is_known() -> None:
+    """Of n points drawn from a distribution the variance about their own mean is 1 - 1/n of its own.
+
+    After 32 s an animal may be sqrt(8) m off: of 500 particles the detection leaves 2 * 500 * 0.04 / 8 = 5.
+    """
+    covariances = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        herd, _ = step_nearest(no_herd(SPARSE), look(0.0, [0.0, 0.0], noise=SMALL), SPARSE, rng)
+        herd, _ = step_nearest(herd, look(32.0, [0.0, 0.0], noise=SMALL), SPARSE, rng)
+        covariances.append(moments(herd.cloud)[1][0])
+    assert np.trace(np.mean(covariances, axis=0)) == pytest.approx(2 * 0.04 * 8.04 / 8.08, rel=0.05)
+
+
+def test_a_cloud_with_particles_enough_stays_its_own() -> None:
+    rng = np.random.default_rng(3)
+    wide = 4.0 * np.eye(2)
+    herd, _ = step_nearest(no_herd(SPARSE), look(0.0, [0.0, 0.0], noise=wide), SPARSE, rng)
+    before = herd.cloud.x.copy()
+    herd, _ = step_nearest(herd, look(0.0, [1.0, 0.0], noise=wide), SPARSE, rng)
+    # No time has passed: what is left of it are its own particles.
+    assert np.isin(herd.cloud.x[0, :, 0], before[0, :, 0]).all()
+    assert effective_size(herd.cloud.w)[0] > 100
+
+
+WORLDS = 200
+
+
+def held_exactly(p, number, probability):
+    """How much of a number lies in the likeliest numbers that hold a probability to the last digit.
+
+    Whole numbers cannot hold 90 % to the digit; the least likely one that is needed is let in
+    for the part of it that is needed.
+    """
+    before = p[p > p[number]].sum()
+    return float(np.clip((probability - before) / p[number], 0, 1))
+
+
+def counted(images):
+    """What the 90 % interval held, and the exact one; how probable it said that is; how far off its mean."""
+    held, exact, said, off = [], [], [], []
+    for seed in range(WORLDS):
+        rng = np.random.default_rng([seed, 2024])
+        animals = int(rng.poisson(12))
+        looks = world(rng, animals, images=images)
+        herd = expect(RULES, 12.0, inside, np.zeros(2), SIZE, rng, particles=3000)
+        for look in looks:
+            herd, _ = step_counting(herd, look, RULES, rng)
+        p = count_probabilities(herd.existence, herd.expected_unseen)
+        count = count_interval(p, 0.9)
+        exact.append(held_exactly(p, animals, 0.9) if animals < len(p) else 0.0)
+        held.append(count.low <= animals <= count.high)
+        said.append(count.probability)
+        off.append(count.mean - animals)
+    return np.array(held), np.array(exact), np.array(said), np.array(off)
+
+
+@pytest.mark.slow
+def test_counts_hold_what_they_promise():
+    held, exact, said, off = counted(15)
+    # Shares of at most one with a mean of 0.9 have a deviation of 0.3 at most.
+    assert abs(exact.mean() - 0.9) < 2.5 * 0.3 / np.sqrt(WORLDS)
+    between = share_interval(held.sum(), WORLDS, 0.99)
+    assert between.low <= said.mean() <= between.high
+    assert abs(off.mean()) < 3 * off.std(ddof=1) / np.sqrt(WORLDS)

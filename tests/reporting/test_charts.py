@@ -1,0 +1,251 @@
+"""Charts draw the numbers they are given: bounds and bands, gains, courses, and looks of their own."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+
+from tests.figure_text import overlapping
+from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.pipeline.following.sensor_tracks import Array, SensorTrack
+from wildlab.pipeline.overviews.overview import Path
+from wildlab.reporting.charts.beside import beside_plain, beside_plain_shown
+from wildlab.reporting.charts.following import errors_shown
+from wildlab.reporting.charts.navigation import (
+    bias_chart,
+    error_bands,
+    speed_chart,
+    squares_chart,
+)
+from wildlab.reporting.charts.overview import Clock, lines_chart
+from wildlab.reporting.charts.tracks import (
+    error_over_time,
+    speed_and_course,
+    squares_over_time,
+)
+from wildlab.reporting.figures import MOST_POINTS, png_bytes
+from wildlab.reporting.overview_words import way_of
+
+N = 200
+
+
+def track(name: str, off: Array, seen: Array | None = None, start: int = 0) -> SensorTrack:
+    """A track that is off by so many metres to the north-east, of looks a second apart."""
+    n = len(off)
+    error = np.zeros((n, 4))
+    error[:, :2] = off[:, None] * np.array([0.6, -0.8])
+    near = np.ones(n, bool) if seen is None else np.asarray(seen, bool)
+    covariance = np.broadcast_to(np.eye(4), (n, 4, 4))
+    times, nan = start + np.arange(n, dtype=float), np.full(n, np.nan)
+    return SensorTrack(
+        "radar", "boat", name, times, np.zeros((n, 4)), error, nan, np.full((n, 2), np.nan), nan,
+        np.ones(n, bool), near, covariance,
+    )  # fmt: skip
+
+
+def assert_readable(figure: Figure) -> None:
+    """No letters lie on others once it is saved."""
+    png_bytes(figure)
+    assert overlapping(figure) == []
+
+
+PLAIN = np.full(N, 10.0)
+
+
+def test_gains_are_differences_of_distances_where_both_see_the_target() -> None:
+    seen = np.arange(N) % 2 == 0
+    plain, (one,) = beside_plain([track("ekf", PLAIN), track("schmidt", np.full(N, 4.0), seen)])
+    assert plain == "ekf" and one.filter == "schmidt"
+    assert one.times.tolist() == np.arange(0, N, 2).tolist()
+    assert one.gain == pytest.approx(np.full(N // 2, 6.0))
+    assert (one.nearer, one.farther, one.middle) == (1.0, 0.0, pytest.approx(6.0))
+
+
+def test_shares_count_looks_and_leave_out_what_is_alike() -> None:
+    off = np.repeat([10.05, 9.95, 12.0, 3.0], [40, 40, 30, 90])
+    _, (one,) = beside_plain([track("ekf", PLAIN), track("coloured", off)])
+    assert (one.nearer, one.farther) == (0.45, 0.15)
+
+
+def test_tracks_of_other_looks_are_held_together_by_time() -> None:
+    _, (one,) = beside_plain([track("kf", np.arange(N) + 1.0), track("imm", np.ones(50), start=100)])
+    assert one.times.tolist() == list(range(100, 150))
+    assert one.gain == pytest.approx(np.arange(100.0, 150.0))
+    lost = track("imm", np.full(N, np.nan))
+    assert beside_plain([track("kf", PLAIN), lost]) == ("kf", [])
+
+
+@pytest.mark.parametrize(
+    "tracks", [[], [track("ekf", PLAIN)], [track("schmidt", PLAIN), track("coloured", PLAIN)]]
+)
+def test_without_a_plain_filter_and_another_there_is_no_figure(tracks: list[SensorTrack]) -> None:
+    assert beside_plain(tracks)[1] == []
+    assert not tracks or beside_plain_shown(tracks) is None
+
+
+def test_each_filter_has_a_strip_and_all_have_one_axis() -> None:
+    names = ("schmidt", "coloured", "ukf", "imm", "thinned")
+    tracks = [track("ekf", PLAIN), *(track(name, PLAIN - i - 1) for i, name in enumerate(names))]
+    shown = beside_plain_shown(tracks)
+    assert shown is not None
+    figure, _, alt, caption = shown
+    assert len(figure.axes) == 4 and "4 of 5" in caption and "thinned" in alt
+    assert len({ax.get_ylim() for ax in figure.axes}) == 1
+    for i, ax in enumerate(figure.axes):
+        assert np.asarray(ax.lines[0].get_ydata(), float) == pytest.approx(np.full(N, i + 1.0))
+    assert_readable(figure)
+
+
+@pytest.mark.parametrize("largest", [300.0, 1e8])
+def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest: float) -> None:
+    plain = PLAIN.copy()
+    plain[-5:] = largest
+    shown = beside_plain_shown(
+        [track("ekf", plain), track("schmidt", PLAIN - 1.3), track("ukf", PLAIN + 0.7)]
+    )
+    assert shown is not None
+    figure = shown[0]
+    ax = figure.axes[0]
+    assert ax.get_yscale() == "symlog"
+    bottom, top = (ax.transData.transform((0, y))[1] for y in (0.0, 1.3))
+    assert top - bottom > 8  # pixels
+    assert_readable(figure)
+
+
+@pytest.mark.parametrize(("worst", "scale"), [(12.0, "linear"), (5e6, "log")])
+def test_errors_of_one_that_is_lost_are_drawn_over_powers_of_ten(worst: float, scale: str) -> None:
+    plain = PLAIN.copy()
+    plain[-5:] = worst
+    rows = pd.DataFrame(
+        {"sensor": "radar", "target": "boat", "filter": ["ekf", "schmidt"], "rmse": [worst, 9.0]}
+    )
+    figure, *_ = errors_shown([track("ekf", plain), track("schmidt", PLAIN - 1)], rows)
+    assert figure.axes[0].get_yscale() == scale
+    assert_readable(figure)
+
+
+TIMES = np.linspace(0.0, 60.0, 301)
+
+
+def test_errors_and_twice_their_deviations_are_drawn():
+    rng, sds = np.random.default_rng(0), [1.0, 2.0, 3.0]
+    error, sd = rng.normal(0, sds, (301, 3)), np.tile(sds, (301, 1))
+    fig = error_bands(TIMES, {"mekf": error}, {"mekf": sd}, ["a (m)", "b (m)", "c (m)"], "Errors")
+    for i, ax in enumerate(fig.axes[:3]):
+        (band,) = ax.collections
+        assert band.get_paths()[0].get_extents().y1 == pytest.approx(2 * sds[i])
+        assert any(np.array_equal(line.get_ydata(), error[:, i]) for line in ax.lines)
+        assert ax.get_ylim()[1] >= np.abs(error[:, i]).max()
+
+
+def test_squares_have_the_band_of_chi_square():
+    values = np.random.default_rng(1).chisquare(3, 301)
+    fig = squares_chart({"position": (TIMES, values)}, 3, "NIS", "NIS")
+    edges = [line.get_ydata()[0] for line in fig.axes[0].lines if len(line.get_ydata()) == 2]
+    assert sorted(edges) == pytest.approx(chi_square_interval(3))
+
+
+def test_units_of_biases_and_long_lines():
+    biases = np.tile([0.01, 0, 0, np.radians(1) / 3600, 0, 0], (301, 1))
+    forces, rates = bias_chart(TIMES, biases, 0.5 * biases, "Biases").axes
+    assert forces.lines[0].get_ydata()[0] == pytest.approx(10.0)  # mm/s^2
+    assert forces.collections[0].get_paths()[0].get_extents().y1 == pytest.approx(20.0)
+    assert rates.lines[0].get_ydata()[0] == pytest.approx(1.0)  # deg/h
+    many = np.linspace(0, 1, 10 * MOST_POINTS)
+    speed = speed_chart({"mekf": (many, np.tile([3.0, 4.0, 0.0], (len(many), 1)))}, "Speed")
+    shown = speed.axes[0].lines[0].get_ydata()
+    assert len(shown) <= MOST_POINTS and shown[0] == pytest.approx(5.0)
+
+
+SECONDS = np.arange(0.0, 20.0, 0.1)
+SEEN = (SECONDS < 5.0) | (SECONDS > 15.0)
+NAMES = {"ekf": "Extended", "schmidt": "Schmidt"}
+#: At 1 m/s to the north, a little east and west of it.
+TRUTH = np.column_stack([SECONDS, 0 * SECONDS, 0 * SECONDS + 1.0, 0.05 * np.sin(SECONDS)])
+
+
+@pytest.mark.parametrize("strips", [1, 2])
+def test_errors_are_distances_or_north_and_east(strips):
+    error = TRUTH[:, 0] if strips == 1 else TRUTH[:, :2]
+    figure = error_over_time(SECONDS, SEEN, {"ekf": error}, NAMES, "Errors", measured=error)
+    assert len(figure.axes) == strips
+    for i, ax in enumerate(figure.axes):
+        line = next(line for line in ax.lines if line.get_label() == "Extended")
+        assert np.array_equal(line.get_ydata(), np.column_stack([error])[:, i])
+        assert len(ax.patches) == 1  # the pause
+        assert len(ax.lines[-1].get_xdata()) == SEEN.sum()
+
+
+def courses(figure):
+    return {line.get_label(): np.asarray(line.get_ydata(), float) for line in figure.axes[1].lines}
+
+
+def test_a_steady_course_is_drawn_about_itself_also_over_north():
+    rest = TRUTH.copy()
+    rest[:, 2:] *= 0.1
+    figure = speed_and_course(SECONDS, SEEN, TRUTH, {"ekf": rest}, NAMES, "Speed")
+    assert np.isnan(courses(figure)["Extended"]).all()  # of what hardly moves
+    about = courses(figure)["truth"]
+    assert np.ptp(about) == pytest.approx(2 * np.degrees(np.arctan(0.05)), rel=0.01)
+    low, high = figure.axes[1].get_ylim()
+    assert low < about.min() and about.max() < high and high - low == pytest.approx(20.0)
+    assert figure.axes[1].yaxis.get_major_formatter()(-5.0, 0) == "355"
+    assert figure.axes[0].get_ylim()[1] == pytest.approx(1.2, rel=0.01)
+
+
+def test_courses_all_round_break_over_north():
+    turning = TRUTH.copy()
+    turning[:, 2], turning[:, 3] = np.cos(0.7 * SECONDS), np.sin(0.7 * SECONDS)
+    figure = speed_and_course(SECONDS, SEEN, turning, {"ekf": turning}, NAMES, "Speed")
+    angle = courses(figure)["truth"]
+    seen = angle[np.isfinite(angle)]
+    assert len(seen) < len(angle)
+    assert (seen >= 0).all() and (seen <= 360).all()
+    assert np.nanmax(np.abs(np.diff(angle))) < 180
+    assert figure.axes[1].get_ylim() == (-5.0, 365.0)
+
+
+def test_values_at_detections_alone_are_dots():
+    nis, nees = np.where(SEEN, 0.5, np.nan), np.full(len(SECONDS), 2.0)
+    figure = squares_over_time(SECONDS, SEEN, {"NIS": {"ekf": nis}, "NEES": {"ekf": nees}}, NAMES, "Squares")
+    dots, line = (one for ax in figure.axes for one in ax.lines if one.get_label() == "Extended")
+    assert (dots.get_linestyle(), line.get_linestyle()) == ("None", "-")
+
+
+SOURCES = ("autopilot", "truth", "mine", "truth-payload", "mekf")
+
+
+def test_every_source_and_the_ground_have_a_look_of_their_own():
+    times = np.arange(3.0)
+    series = {name: (times, times + index) for index, name in enumerate(SOURCES)}
+    figure = lines_chart(series, Clock(0.0, 10.0), "height (m)", "Heights", ground=(times, times))
+    looks = {line.get_label(): (line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
+    assert set(looks) == {"ground", *SOURCES} and len(set(looks.values())) == len(looks)
+    black = {name for name, (color, _) in looks.items() if color == "#000000"}
+    assert black == {"truth", "truth-payload"}
+
+
+def circling(since: float, shaking: float = 0.0) -> Any:
+    """A round of 100 m radius in 60 s at 20 Hz, which shakes from sample to sample."""
+    times = np.arange(0, 60.0001, 0.05)
+    turn = 2 * np.pi * times / 60
+    place = 100 * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    place[1::2] += shaking
+    return SimpleNamespace(path=Path("poses", since + times, place, timed=True))
+
+
+def test_the_length_of_a_path_is_that_of_its_course_however_it_shakes() -> None:
+    assert way_of(circling(0.0)) == pytest.approx(2 * np.pi * 100, rel=1e-3)
+    assert way_of(circling(0.0, shaking=0.5)) == pytest.approx(2 * np.pi * 100, rel=0.01)
+
+
+@given(st.floats(-1e5, 2e9))
+def test_no_clock_has_a_say_in_the_length_of_a_path(since: float) -> None:
+    assert way_of(circling(since, 0.5)) == pytest.approx(way_of(circling(0.0, 0.5)), rel=1e-9)
