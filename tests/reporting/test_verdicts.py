@@ -113,28 +113,21 @@ def test_ranges_are_typeset_with_a_minus() -> None:
     assert range_words([-2.0, -1.0]) == "−2.0 to −1.0" and range_words([1.4, 3.6], 0) == "1 to 4"
 
 
-@pytest.mark.parametrize("n", [1, 2, 18, 19])
-def test_tables_follow_the_number_of_flights(n: int) -> None:
-    spread = pd.DataFrame({("kf", "mae"): FLIGHTS[:n]})
+@pytest.mark.parametrize("n", [1, 2, 18, 19, 99])
+def test_metrics_and_tables_follow_the_number_of_flights(n: int) -> None:
+    values = FLIGHTS[:n]
+    spread = pd.DataFrame({("kf", "mae"): values})
     study = Study("x", ("kf",), metric_of=lambda subject, name: Metric(name, subject, "m"))
     report = open_report(study="linear-vs-nonlinear-fast", kind="twin")
     monte_carlo.record_spread(report, study, spread, {})
+    (entry,) = report._metrics
+    assert (entry["low"], entry["high"]) == (bounds_of(values) if n > 1 else (None, None))
+    assert entry["value"] == values.median()
     table = monte_carlo.beside_published(report, spread, {"kf": "A"}, ["mae"])
     for columns in (monte_carlo.published_columns(n), single_target.published_columns(n)):
         assert set(columns) <= set(table)
         assert columns.get("range", "") == spread_words(n).heading and ("below" in columns) == (n > 1)
-    assert table.loc[0, "range"] == range_words(FLIGHTS[:n])
-
-
-@pytest.mark.parametrize("n", [1, 2, 18, 99])
-def test_metrics_have_the_bounds_that_are_shown(n: int) -> None:
-    study = Study("x", ("a",), metric_of=lambda subject, name: Metric(name, subject, "m"))
-    report = open_report(study="x", kind="twin")
-    values = FLIGHTS[:n]
-    monte_carlo.record_spread(report, study, pd.DataFrame({("a", "mae"): values}), {})
-    (entry,) = report._metrics
-    assert (entry["low"], entry["high"]) == (bounds_of(values) if n > 1 else (None, None))
-    assert entry["value"] == values.median()
+    assert table.loc[0, "range"] == range_words(values)
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,10 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
+def assert_no_copy(folder: Path) -> None:
+    assert sorted(path.name for path in folder.iterdir()) == ["flights", "reports"]
+
+
 def then(monkeypatch: pytest.MonkeyPatch, change: Callable[[Path, Path], Iterable[Outcome] | None]) -> None:
     """Have something done to the flight and the folder of reports that the stand-in was given."""
     clean = redrawn.evaluate_flight
@@ -146,7 +150,7 @@ def test_what_slips_through_is_found_and_no_copy_is_left(
     )
     with pytest.raises(RunFailed, match="no copy"):
         share(REPORT)
-    assert sorted(path.name for path in made.iterdir()) == ["flights", "reports"]
+    assert_no_copy(made)
 
 
 def test_a_name_of_the_file_that_gives_the_place_away_is_refused(made: Path) -> None:
@@ -157,7 +161,7 @@ def test_a_name_of_the_file_that_gives_the_place_away_is_refused(made: Path) -> 
     for report, name in ((REPORT, "kifaru-ridge.html"), (REPORT, "olifants.zip"), (mopani, "mopani.html")):
         with pytest.raises(RunFailed, match="the name of the file"):
             share(report, out=made / name, zipped=name.endswith("zip"))
-    assert sorted(path.name for path in made.iterdir()) == ["flights", "reports"]
+    assert_no_copy(made)
 
 
 @pytest.mark.parametrize(
@@ -173,7 +177,7 @@ def test_nothing_is_left_of_what_was_broken_off_or_failed(
     monkeypatch.setattr(redrawn, "evaluate_flight", stand_in)
     with pytest.raises(error, match=said):
         share(REPORT)
-    assert sorted(path.name for path in made.iterdir()) == ["flights", "reports"]
+    assert_no_copy(made)
 
 
 def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(

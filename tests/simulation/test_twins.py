@@ -42,6 +42,12 @@ def with_values(twin, **changes):
     return twin
 
 
+def assert_in_image(detections):
+    """Pixels lie in an image of 640 by 512."""
+    assert detections["u_px"].between(0, 640).all()
+    assert detections["v_px"].between(0, 512).all()
+
+
 def without_errors(twin):
     """The twin without errors of its control, and without disturbance."""
     names = ("track", "altitude", "roll", "pitch", "yaw")
@@ -111,8 +117,7 @@ def test_every_seed_has_552_observations_inside_the_image_in_batches(seed):
     d, frames = flight.detections, flight.frames
     assert len(d) == 552
     assert d["frame_id"].is_unique
-    assert d["u_px"].between(0, 640).all()
-    assert d["v_px"].between(0, 512).all()
+    assert_in_image(d)
     assert (d["kind"] == "pixel").all()
     assert (d["target_id"] == "antenna").all()
     assert len(frames) == 7990

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.simulation.test_twins import marks, with_values
+from tests.simulation.test_twins import assert_in_image, marks, with_values
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
@@ -61,8 +61,7 @@ def test_counts_and_grouping_are_those_printed(name, count, segments, period, fi
     assert d["frame_id"].is_unique  # no more than one detection in an image
     assert d["detection_id"].is_unique
     assert d["frame_id"].is_monotonic_increasing
-    assert d["u_px"].between(0, 640).all()
-    assert d["v_px"].between(0, 512).all()
+    assert_in_image(d)
     assert (d["source"] == "detector").all()
     assert (d["target_id"] == "vessel").all()
     assert np.diff(frames["time_s"]) == pytest.approx(1 / 7.5)
@@ -153,8 +152,7 @@ def test_two_vessels_cross_and_are_seen_as_printed(seed):
     assert not d.duplicated(["frame_id", "target_id"]).any()
     assert d["frame_id"].duplicated().sum() == 349  # images with both
     assert d["detection_id"].is_unique
-    assert d["u_px"].between(0, 640).all()
-    assert d["v_px"].between(0, 512).all()
+    assert_in_image(d)
     assert np.ptp(flight.frames["time_s"]) == pytest.approx(19 * 60, abs=0.2)
     # They meet about four minutes into the tracking period, and move at about 1 m/s.
     begin = flight.frames["time_s"].iloc[0]
@@ -239,8 +237,7 @@ def test_five_segments_of_441_images_and_438_detections_whatever_the_seed(seed):
     assert len(d) == 438
     assert d["frame_id"].is_unique
     assert set(d["frame_id"]) < set(frames["frame_id"])
-    assert d["u_px"].between(0, 640).all()
-    assert d["v_px"].between(0, 512).all()
+    assert_in_image(d)
     length = frames.groupby("group")["time_s"].agg(np.ptp)
     assert length.sum() == pytest.approx(45, abs=2)  # a period of 45 s
     # Only a part was visible in the majority of the images, the whole in some.

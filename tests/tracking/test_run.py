@@ -1,4 +1,4 @@
-"""Filters of positions and velocities against filterpy, weighted means and the loop by hand."""
+"""Filters of positions and velocities against filterpy and the loop by hand; what every filter refuses."""
 
 from __future__ import annotations
 
@@ -13,11 +13,16 @@ from scipy.stats import chi2
 from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
 from wildlab.tracking import measurement as m
+from wildlab.tracking.association import nearest_within
+from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.coloured import run_coloured
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.kalman import filter_at_rest, predict, update
+from wildlab.tracking.maritime import bearings_from, positions_from
 from wildlab.tracking.measurement import on_state, positions_or_velocities
 from wildlab.tracking.motion import constant_velocity, in_steps, random_walk, rest, singer
 from wildlab.tracking.run import Start, run_filter, start_from_first
+from wildlab.tracking.schmidt import PoseUncertainty
 from wildlab.tracking.unscented import run_unscented
 
 
@@ -328,3 +333,131 @@ def test_what_does_not_fit_is_refused():
             run(*given, *more, start)
     with pytest.raises(WildlabError, match="kinds"):
         positions_or_velocities(True)
+
+
+N, R = 5, np.eye(2)
+INSTANTS, NOTHING = 0.5 * np.arange(N), np.zeros((N, 2))
+KNOWN = Start(0.0, np.zeros(4), 9.0 * np.eye(4))
+
+
+def by_kalman(start=KNOWN, **options):
+    return run_filter(INSTANTS, NOTHING, R, m.positions(), CV, start, **options)
+
+
+def by_coloured(start=KNOWN, **options):
+    return run_coloured(INSTANTS, NOTHING, R, CV, start, **options)
+
+
+def by_unscented(start=KNOWN, **options):
+    return run_unscented(INSTANTS, NOTHING, R, m.positions(), CV, start, **options)
+
+
+def by_imm(start=KNOWN, **options):
+    return run_imm(INSTANTS, NOTHING, R, m.positions(), [CV, CV], [5.0, 5.0], start, **options)
+
+
+def by_batch(start=KNOWN, **options):
+    return run_batch(INSTANTS, np.tile(NOTHING, (3, 1, 1)), R, CV, start, **options)
+
+
+FILTERS = [by_kalman, by_coloured, by_unscented, by_imm, by_batch]
+
+
+@pytest.mark.parametrize("run", FILTERS)
+@pytest.mark.parametrize("wrong", [0.0, 1.0001, np.nan])
+def test_a_gate_is_a_probability(run, wrong):
+    with pytest.raises(WildlabError, match=r"^gate_probability: "):
+        run(gate_probability=wrong)
+    with pytest.raises(WildlabError, match=r"^gate_probability: "):
+        nearest_within(np.ones((1, 2)), wrong, 2)
+
+
+def spoilt(value, at=(1, 1)):
+    P = 9.0 * np.eye(4)
+    P[at] = value
+    return P
+
+
+@pytest.mark.parametrize("run", FILTERS)
+@pytest.mark.parametrize(
+    ("start", "message"),
+    [
+        (KNOWN._replace(x=np.array([0, 0, np.nan, 0])), r"^start\.x: row 2"),
+        (KNOWN._replace(time=np.inf), r"^start\.time: "),
+        (KNOWN._replace(P=np.eye(2)), r"^start: x of the shape"),
+        (KNOWN._replace(P=spoilt(np.nan)), r"^start\.P: row 1 is not finite"),
+        (KNOWN._replace(P=spoilt(0.5, (0, 3))), r"^start\.P: not symmetric: row 0"),
+        (KNOWN._replace(P=spoilt(-4.0, (2, 2))), r"^start\.P: row 2"),
+        (
+            KNOWN._replace(P=spoilt(10.0, (0, 1)) + spoilt(10.0, (1, 0)) - 9 * np.eye(4)),
+            r"^start\.P: .* negative",
+        ),
+    ],
+)
+def test_a_start_is_finite_and_has_a_covariance(run, start, message):
+    with pytest.raises(WildlabError, match=message):
+        run(start)
+
+
+def test_of_many_starts_the_wrong_one_is_named():
+    P = np.tile(9.0 * np.eye(4), (3, 1, 1))
+    P[2, 1, 1] = -1.0
+    with pytest.raises(WildlabError, match=r"^start\.P\[2\]: row 1"):
+        by_batch(Start(0.0, np.zeros((3, 4)), P))
+    x = np.zeros((3, 4))
+    x[1, 3] = np.nan
+    with pytest.raises(WildlabError, match=r"^start\.x: row 1, 3"):
+        by_batch(Start(0.0, x, P[0]))
+
+
+def test_a_start_may_be_sure_of_some_states():
+    known = np.diag([4.0, 4.0, 0.0, 0.0])
+    for run in FILTERS[:2]:
+        assert np.isfinite(run(KNOWN._replace(P=known)).x).all()
+    correlated = np.outer([1.0, 2.0, 3.0, 1e6], [1.0, 2.0, 3.0, 1e6])  # rounding may push it below zero
+    assert np.isfinite(by_kalman(KNOWN._replace(P=correlated)).x).all()
+
+
+def test_a_pose_for_each_measurement():
+    _, _, poses, _ = overflight(N + 1)
+    for sensor in (
+        m.pixels(poses, 0.0),
+        m.azimuths_elevations(poses, 0.0),
+        m.ranges_bearings(np.zeros((N + 1, 2)), np.zeros(N + 1)),
+        positions_from(np.ones((N + 1, 2)), np.zeros((N + 1, 2))),
+    ):
+        with pytest.raises(WildlabError, match=r"^sensor: 6 rows"):
+            run_filter(INSTANTS, NOTHING, R, sensor, CV, KNOWN)
+    for sensor in (
+        m.bearings(np.zeros((N - 1, 2)), np.zeros(N - 1)),
+        bearings_from(np.ones((N - 1, 2)), np.zeros((N - 1, 2))),
+    ):
+        with pytest.raises(WildlabError, match=r"^sensor: 4 rows"):
+            run_filter(INSTANTS, NOTHING[:, :1], R[:1, :1], sensor, CV, KNOWN)
+    sensor = m.pixels(poses, 0.0)
+    for run in (
+        lambda: run_unscented(INSTANTS, NOTHING, R, sensor, CV, KNOWN),
+        lambda: run_imm(INSTANTS, NOTHING, R, sensor, [CV, CV], [5.0, 5.0], KNOWN),
+    ):
+        with pytest.raises(WildlabError, match=r"^sensor: 6 rows"):
+            run()
+
+
+def test_a_camera_pose_for_each_row_of_many_runs():
+    _, _, poses, _ = overflight(N + 1)
+    many = np.tile(NOTHING, (3, 1, 1))
+    with pytest.raises(WildlabError, match=r"^measurements: 5 rows"):
+        run_batch(INSTANTS, many, R, CV, KNOWN, view=View(poses, 0.0))
+    with pytest.raises(WildlabError, match=r"^view\.plane_down: 4 rows"):
+        run_batch(INSTANTS, many, R, CV, KNOWN, view=View(poses.take(slice(N)), np.zeros(N - 1)))
+    with pytest.raises(WildlabError, match=r"^plane_down: "):
+        m.pixels(poses, np.zeros(N))
+    with pytest.raises(WildlabError, match=r"^yaw: "):
+        m.bearings(np.zeros((N + 1, 2)), np.zeros(N))
+
+
+def test_a_pose_covariance_for_each_measurement():
+    pose = PoseUncertainty(np.tile(np.eye(6), (N + 1, 1, 1)))
+    for run, wrong in ((by_kalman, pose), (by_batch, pose), (by_kalman, PoseUncertainty(np.eye(6)))):
+        with pytest.raises(WildlabError, match=r"^pose\.covariance: "):
+            run(pose=wrong)

@@ -1,0 +1,432 @@
+"""Other filters of one target: differenced, unscented, of several models, smoothed; exact where they must be."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import block_diag, expm
+
+from tests.tracking.full_filter import beside, full_filter
+from tests.tracking.poses import overflight, turned
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import wrap
+from wildlab.tracking import measurement as m
+from wildlab.tracking.coloured import difference_model, run_coloured, thin
+from wildlab.tracking.considered import consider
+from wildlab.tracking.imm import run_imm
+from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.motion import constant_velocity, rest, singer
+from wildlab.tracking.platforms import measured_from
+from wildlab.tracking.run import Start, run_filter, start_from_first
+from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.smoothing import run_smoothed, smooth
+from wildlab.tracking.unscented import run_unscented
+
+ROUGH = partial(constant_velocity, sd_acceleration=0.3)
+SINGER = partial(singer, alpha=0.1, variance=0.2)
+R_W = np.array([[0.5, 0.1], [0.1, 0.8]])
+SLOW = np.array([[0.9, 0.05], [-0.02, 0.8]])
+
+
+def data(n=40, longest=0.9, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.cumsum(rng.uniform(0.02, longest, n)), np.cumsum(rng.normal(0, 1.5, (n, 2)), axis=0)
+
+
+def augmented(times, z, motion, prior, F_c):
+    """Target and noise in one state, measured without any noise; ``prior`` is for the first row."""
+    n = len(prior.x)
+    H = np.hstack([np.eye(2, n), np.eye(2)])
+    start = Start(times[0], np.append(prior.x, [0.0, 0.0]), beside(prior.P, R_W))
+
+    def move(row, dt):
+        still = np.eye(n + 2), np.zeros((n + 2, n + 2))
+        return tuple(map(beside, motion(dt), (F_c, R_W))) if row else still
+
+    return full_filter(times, np.zeros((2, 2)), lambda row, x: (z[row] - H @ x, H), move, start)
+
+
+@pytest.mark.parametrize("F_c", [np.eye(2), SLOW], ids=["constant", "fading"])
+@pytest.mark.parametrize(("motion", "n"), [(ROUGH, 4), (SINGER, 6)], ids=["constant velocity", "singer"])
+def test_differencing_is_the_augmented_filter(motion, n, F_c):
+    """Exactly: once the target is known, the noise is the rest of the measurement.
+
+    Both use the first measurement with noise R_w; the differences begin at the second.
+    """
+    times, z = data()
+    prior = Start(times[0], np.ones(n), np.diag([30.0, 20, 9, 4, 0.3, 0.2])[:n, :n])
+    track = run_coloured(times, z, R_W, motion, prior, F_c=F_c)
+    assert track.used.all()
+    for row, (x, P, _) in enumerate(augmented(times, z, motion, prior, F_c)):
+        assert np.allclose(track.x[row], x[:n], rtol=1e-8, atol=1e-8)
+        assert np.allclose(track.P[row], P[:n, :n], rtol=1e-8, atol=1e-8)
+
+
+def test_the_model_is_the_print():
+    F, Q = SINGER(0.4)
+    H = np.eye(2, 6)
+    model = difference_model(F, Q, H, SLOW, R_W)
+    R = H @ Q @ H.T + R_W
+    T = Q @ H.T @ np.linalg.inv(R)
+    assert np.allclose(model.H, H @ F - SLOW @ H)
+    assert np.allclose(model.R, R)
+    assert np.allclose(model.T, T)
+    assert np.allclose(model.F, F - T @ model.H)
+    assert np.allclose(model.Q, Q - Q @ H.T @ np.linalg.inv(R) @ H @ Q)
+
+
+def test_after_a_gap_the_position_itself_is_used():
+    times, z = data(20)
+    times[10:] += 5.0
+    start = start_from_first(times, z, 1.0, 3.0)
+    track = run_coloured(times, z, R_W, ROUGH, start)
+    before = run_coloured(times[:10], z[:10], R_W, ROUGH, start)
+    direct = run_filter(
+        times[10:11], z[10:11], R_W, m.positions(), ROUGH, Start(times[9], before.x[-1], before.P[-1])
+    )
+    assert np.allclose(track.x[10], direct.x[0])
+    assert np.allclose(track.P[10], direct.P[0])
+    assert np.allclose(track.S[10], direct.S[0])
+    patient = run_coloured(times, z, R_W, ROUGH, start, longest_gap=10.0)
+    assert not np.allclose(patient.x[10], direct.x[0])
+
+
+def test_a_measurement_that_is_not_used_is_no_reference():
+    times, z = data(20, longest=0.3)
+    start = start_from_first(times, z, 1.0, 3.0)
+    far, gone = z.copy(), z.copy()
+    far[8] += 500
+    gone[8] = np.nan
+    left_out = run_coloured(np.delete(times, 8), np.delete(z, 8, 0), R_W, ROUGH, start, output_times=times)
+    gated = run_coloured(times, far, R_W, ROUGH, start, gate_probability=0.9999)
+    assert not gated.used[8]
+    assert gated.nis[8] > 100
+    missing = run_coloured(times, gone, R_W, ROUGH, start)
+    assert np.isnan(missing.nis[8])
+    for track in (gated, missing):
+        assert track.used.sum() == 19
+        assert np.allclose(track.x, left_out.x)
+        assert np.allclose(track.P, left_out.P)
+
+
+def test_two_at_once_say_nothing_of_the_velocity():
+    times, z = data(6)
+    times[3] = times[2]
+    start = start_from_first(times, z, 1.0, 3.0)
+    track = run_coloured(times, z, R_W, ROUGH, start, output_times=times)
+    assert track.used.all()
+    without = run_coloured(times[:3], z[:3], R_W, ROUGH, start)
+    assert np.allclose(track.x[3], without.x[2])
+    assert np.allclose(track.P[3], without.P[2])
+
+
+def test_several_detections_are_refused():
+    times, z = data(4)
+    with pytest.raises(WildlabError, match="several detections"):
+        run_coloured(times, np.stack([z, z], axis=1), R_W, ROUGH, start_from_first(times, z, 1.0))
+
+
+@given(
+    steps=st.lists(st.floats(0, 3), min_size=1, max_size=60),
+    interval=st.floats(0.01, 5),
+    seed=st.integers(0, 99),
+)
+def test_thinning_keeps_as_many_as_it_may(steps, interval, seed):
+    times = np.cumsum(steps)
+    usable = np.random.default_rng(seed).random(len(times)) < 0.8
+    kept = thin(times, interval, usable)
+    assert not kept[~usable].any()
+    assert (np.diff(times[kept]) >= interval * (1 - 1e-8)).all()
+    for row in np.flatnonzero(usable & ~kept):  # none left out without one kept shortly before
+        before = times[:row][kept[:row]]
+        assert len(before)
+        assert times[row] - before[-1] < interval
+    assert np.array_equal(thin(times, interval), thin(times, interval, np.ones(len(times), bool)))
+
+
+CV = partial(constant_velocity, sd_acceleration=0.2)
+CALM = partial(constant_velocity, sd_acceleration=0.02)
+WILD = partial(constant_velocity, sd_acceleration=2.0)
+START = Start(0.0, np.zeros(4), np.diag([25.0, 25, 9, 9]))
+PIXELS = 4.0 * np.eye(2)
+R2 = 9.0 * np.eye(2)
+
+
+def positions_seen(n=50, seed=0):
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0, 1.5, n))
+    times[8] = times[7]
+    z = np.cumsum(rng.normal(0, 2, (n, 2)), axis=0)
+    z[[4, 20]] = np.nan
+    z[12] += 100
+    return times, z
+
+
+def the_same(ours, theirs, rtol=1e-9):
+    for name in ("x", "P", "innovation", "S", "nis"):
+        assert np.allclose(
+            getattr(ours, name), getattr(theirs, name), rtol=rtol, atol=1e-8, equal_nan=True
+        ), name
+    assert np.array_equal(ours.used, theirs.used)
+    assert np.array_equal(ours.chosen, theirs.chosen)
+
+
+@pytest.mark.parametrize("gate", [1.0, 0.99])
+def test_on_a_linear_model_all_are_the_kalman_filter(gate):
+    times, z = positions_seen()
+    asked = np.sort(np.concatenate([times, times + 0.01]))
+    arguments = dict(gate_probability=gate, output_times=asked)
+    plain = run_filter(times, z, R2, m.positions(), CV, START, **arguments)
+    the_same(run_unscented(times, z, R2, m.positions(), CV, START, **arguments), plain)
+    twice = run_imm(times, z, R2, m.positions(), [CV, CV], [5.0, 2.0], START, **arguments)
+    the_same(twice.track, plain)
+    assert np.allclose(twice.probabilities.sum(axis=1), 1)
+
+
+def test_the_unscented_filter_sees_the_bend():
+    """Range and bearing of a far target across a wide arc: its mean range is larger, and so is S."""
+    rng = np.random.default_rng(0)
+    P = np.diag([1.0, 40.0**2, 1, 1])  # across the line of sight
+    sensor = m.ranges_bearings(np.zeros(2), 0.0)
+    start = Start(0.0, np.array([100.0, 0, 0, 0]), P)
+    R = np.diag([1.0, 0.01]) ** 2
+    track = run_unscented([0.0], [[100.0, 0.0]], R, sensor, CV, start)
+    x = rng.multivariate_normal(start.x, P, 400_000)
+    z = m.predict_range_bearing(x[:, :2], np.zeros(2), 0.0).z
+    assert abs(track.innovation[0, 0] - (100 - z[:, 0].mean())) < 0.6  # about seven metres too short
+    extended = run_filter([0.0], [[100.0, 0.0]], R, sensor, CV, start)
+    sampled = np.cov(z.T) + R
+    assert abs(np.sqrt(track.S[0, 0, 0]) - np.sqrt(sampled[0, 0])) < 0.3 * np.sqrt(sampled[0, 0])
+    assert extended.S[0, 0, 0] < 0.1 * sampled[0, 0]
+
+
+def test_bearings_are_averaged_across_the_wrap():
+    rng = np.random.default_rng(1)
+    times = 0.5 * np.arange(80)
+    own = np.column_stack([200 * np.cos(0.1 * times), 200 * np.sin(0.1 * times)])
+    z = m.predict_range_bearing(np.zeros(2), own, 0.0).z[:, 1:] + rng.normal(0, 0.02, (80, 1))
+    sensor, R = m.bearings(own, 0.0), 4e-4 * np.eye(1)
+    start = Start(0.0, np.array([10.0, 10, 0, 0]), np.diag([400.0, 400, 1, 1]))
+    for track in (
+        run_unscented(times, wrap(z), R, sensor, CALM, start),
+        run_imm(times, wrap(z), R, sensor, [CALM, CV], [10, 10], start).track,
+    ):
+        assert track.used.all()
+        assert np.abs(track.innovation).max() < 0.5
+        assert np.hypot(*track.x[-1, :2]) < 10
+
+
+def test_behind_the_camera_there_is_no_update():
+    times, uv, poses, _ = overflight(20)
+    sensor = m.pixels(turned(poses, 7), 0.0)
+    for track in (
+        run_unscented(times, uv, PIXELS, sensor, CV, START),
+        run_imm(times, uv, PIXELS, sensor, [CALM, WILD], [10, 10], START).track,
+    ):
+        assert np.flatnonzero(~track.used).tolist() == [7]
+        assert np.isnan(track.nis[7])
+        assert np.isfinite(track.x).all()
+
+
+def by_hand(times, z, motions, mean_stay, start):
+    """Blom and Bar-Shalom's cycle, without filterpy; two models."""
+    a, b = 1 / np.asarray(mean_stay)
+    mu, H = np.array([0.5, 0.5]), np.eye(2, 4)
+    xs, Ps, then = [start.x] * 2, [start.P] * 2, start.time
+    for t, one in zip(times, z, strict=True):
+        dt = t - then
+        M = expm(dt * np.array([[-a, a], [b, -b]]))
+        c = mu @ M
+        mixed = []
+        for j in range(2):
+            w = M[:, j] * mu / c[j]
+            x = w[0] * xs[0] + w[1] * xs[1]
+            mixed.append((x, sum(w[i] * (Ps[i] + np.outer(xs[i] - x, xs[i] - x)) for i in range(2))))
+        xs, Ps, likelihood = [], [], np.ones(2)
+        for j in range(2):
+            F, Q = motions[j](dt)
+            x, P = F @ mixed[j][0], F @ mixed[j][1] @ F.T + Q
+            if np.isfinite(one).all():
+                S, v = H @ P @ H.T + R2, one - H @ x
+                K = P @ H.T @ np.linalg.inv(S)
+                x, P = x + K @ v, P - K @ S @ K.T
+                likelihood[j] = np.exp(-v @ np.linalg.inv(S) @ v / 2) / np.sqrt(np.linalg.det(2 * np.pi * S))
+            xs.append(x)
+            Ps.append(P)
+        mu = c * likelihood / (c * likelihood).sum()
+        then = t
+        x = mu @ np.array(xs)
+        yield x, sum(mu[i] * (Ps[i] + np.outer(xs[i] - x, xs[i] - x)) for i in range(2)), mu
+
+
+def test_the_models_interact_as_they_should():
+    times, z = positions_seen()
+    z[12] -= 100
+    result = run_imm(times, z, R2, m.positions(), [CALM, WILD], [8.0, 3.0], START)
+    for row, (x, P, mu) in enumerate(by_hand(times, z, [CALM, WILD], [8.0, 3.0], START)):
+        if row == 7:
+            continue  # what is asked for at a time has all measurements of that time
+        assert np.allclose(result.track.x[row], x, rtol=1e-8, atol=1e-8)
+        assert np.allclose(result.track.P[row], P, rtol=1e-8, atol=1e-8)
+        assert np.allclose(result.probabilities[row], mu, rtol=1e-8)
+
+
+def test_bad_input_is_named():
+    times, z = positions_seen()
+    with pytest.raises(WildlabError, match="at least two models"):
+        run_imm(times, z, R2, m.positions(), [CV], [1.0], START)
+    with pytest.raises(WildlabError, match="at least two models"):
+        run_imm(times, z, R2, m.positions(), [CV, CALM], [1.0, 0.0], START)
+    both = np.stack([z, z], axis=1)
+    with pytest.raises(WildlabError, match="several detections"):
+        run_imm(times, both, R2, m.positions(), [CV, CALM], [1.0, 1.0], START)
+    with pytest.raises(WildlabError, match="several detections"):
+        run_unscented(times, both, R2, m.positions(), CV, START)
+    with pytest.raises(WildlabError, match="row 3 at"):
+        run_unscented(np.where(np.arange(50) == 3, 0.0, times), z, R2, m.positions(), CV, START)
+
+
+WA = partial(white_acceleration, density=0.3)
+SEEDS = st.integers(0, 2**31)
+
+
+def linear_run(seed, n=25):
+    """Positions with uneven times, gaps, one instant twice."""
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0, 2, n))
+    times[7] = times[6]
+    z = rng.normal(0, 5, (n, 2))
+    z[rng.random(n) < 0.2] = np.nan
+    return times, z, np.array([np.diag(rng.uniform(0.5, 4, 2)) for _ in range(n)])
+
+
+def everything_at_once(times, z, R, motion, start):
+    """Means and covariances of all states given all measurements, as one Gaussian: no recursion at all."""
+    n, N = len(start.x), len(times)
+    sources = np.eye(n * (N + 1)).reshape(N + 1, n, -1)
+    A, mean, then, rows = np.linalg.cholesky(start.P) @ sources[0], start.x, start.time, []
+    for t, source in zip(times, sources[1:], strict=True):
+        F, Q = motion(t - then)
+        values, axes = np.linalg.eigh(Q)
+        A, mean, then = F @ A + axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * source), F @ mean, t
+        rows.append((A, mean))
+    A, mean = (np.concatenate(part) for part in zip(*rows, strict=True))
+    seen = np.isfinite(z).all(axis=1)
+    H = np.kron(np.eye(N)[seen], np.eye(2, n))
+    S = H @ A @ A.T @ H.T + block_diag(*R[seen])
+    gain = A @ A.T @ H.T @ np.linalg.inv(S)
+    P = (A @ A.T - gain @ H @ A @ A.T).reshape(N, n, N, n)
+    x = mean + gain @ (z[seen].ravel() - H @ mean)
+    return x.reshape(N, n), P[np.arange(N), :, np.arange(N)]
+
+
+@pytest.mark.parametrize(("motion", "seed"), [(CV, 0), (WA, 1)])
+def test_it_is_the_mean_given_all_measurements(motion, seed):
+    times, z, R = linear_run(seed)
+    x, P = everything_at_once(times, z, R, motion, START)
+    track = run_filter(times, z, R, m.positions(), motion, START)
+    for found in (
+        smooth(track, motion),
+        run_smoothed(times, z, R, m.positions(), motion, START),
+        # With nothing that could be wrong the joint smoother is the same.
+        run_smoothed(times, z, R, measured_from([0, 0]), motion, START, pose=consider({"heading": 0.0})),
+    ):
+        np.testing.assert_allclose(found.x, x, atol=1e-6)
+        np.testing.assert_allclose(found.P, P, atol=1e-6)
+
+
+@settings(max_examples=30)
+@given(SEEDS)
+def test_covariances_are_never_above_the_filters(seed):
+    times, z, R = linear_run(seed)
+    for pose in (None, consider({"platform_north": 3.0, "heading": 0.02}, correlation_time={"heading": 4.0})):
+        sensor = measured_from([-100.0, 30.0])
+        filtered = run_filter(times, z, R, sensor, WA, START, pose=pose)
+        smoothed = run_smoothed(times, z, R, sensor, WA, START, pose=pose)
+        sd = np.sqrt(np.diagonal(filtered.P, axis1=1, axis2=2))
+        gained = (filtered.P - smoothed.P) / (sd[:, :, None] * sd[:, None, :])
+        assert np.linalg.eigvalsh(gained)[:, 0].min() > -1e-8
+        assert np.linalg.eigvalsh(smoothed.P)[:, 0].min() > 0
+        np.testing.assert_allclose(smoothed.x[-1], filtered.x[-1])
+        np.testing.assert_array_equal(smoothed.nis, filtered.nis)
+
+
+@pytest.mark.parametrize("time", [0.0, 5.0, np.inf])
+def test_its_covariance_is_its_errors_with_considered_ones(time):
+    """The smoother is linear in what is random: its true covariance, one source of randomness at a time."""
+    N, bias = 12, 2.0
+    times = np.arange(1.0, N + 1)
+    pose = consider({"platform_north": bias, "platform_east": bias}, correlation_time=time)
+    sensor, R = measured_from([0.0, 0.0]), np.eye(2)
+    start = Start(0.0, np.zeros(4), np.diag([9.0, 9.0, 1.0, 1.0]))
+    F, Q = WA(1.0)
+    left = float(np.exp(-1 / time)) if time else 0.0
+    # A column for each source: of the state 4 and of the bias 2, then in each row motion 4, noise 2, bias 2.
+    unit = np.eye(6 + 8 * N)
+    x, o, rest = np.sqrt(start.P) @ unit[:4], bias * unit[4:6], unit[6:].reshape(N, 8, -1)
+    truth, z = [], []
+    for k in range(N):
+        x = F @ x + np.linalg.cholesky(Q) @ rest[k, :4]
+        o = left * o + bias * np.sqrt(1 - left**2) * rest[k, 6:] if k else o
+        truth.append(x)
+        z.append(x[:2] - o + rest[k, 4:6])
+    found = [run_smoothed(times, one, R, sensor, WA, start, pose=pose) for one in np.moveaxis(z, -1, 0)]
+    e = np.array(truth) - np.stack([one.x for one in found], axis=-1)
+    np.testing.assert_allclose(found[0].P, e @ np.swapaxes(e, 1, 2), atol=1e-8)
+
+
+def test_between_rows_before_and_behind():
+    times, z, R = linear_run(3)
+    asked = np.sort(np.concatenate([[times[0] - 5, times[-1] + 3], times, times[:-1] + 0.4 * np.diff(times)]))
+    for pose in (None, consider({"heading": 0.0})):
+        sensor = measured_from([0.0, 0.0])
+        given = (R, sensor, WA, START)
+        rows = np.sort(np.concatenate([times, asked]))
+        filled = np.full((len(rows), 2), np.nan)
+        noise = np.tile(np.eye(2), (len(rows), 1, 1))
+        place = np.searchsorted(rows, times)
+        for i, k in enumerate(place):
+            k = k + (1 if i and place[i - 1] == place[i] else 0)
+            filled[k], noise[k] = z[i], R[i]
+        found = run_smoothed(times, z, *given, pose=pose, output_times=asked)
+        # A model that is continuous in time does not mind rows in between at which nothing is seen.
+        every = run_smoothed(rows, filled, noise, *given[1:], pose=pose, output_times=asked)
+        np.testing.assert_allclose(found.x, every.x, atol=1e-6)
+        np.testing.assert_allclose(found.P, every.P, atol=1e-6)
+        before = asked < 0
+        assert np.isnan(found.x[before]).all()
+
+
+def test_a_start_without_variance_and_one_row():
+    start = Start(0.0, np.zeros(2), np.zeros((2, 2)))
+    track = run_filter([1.0, 2.0], np.ones((2, 2)), np.eye(2), m.positions(), rest, start)
+    np.testing.assert_array_equal(smooth(track, rest).x, 0.0)
+    alone = Start(0.0, np.zeros(2), np.eye(2))
+    found = run_smoothed(
+        [1.0], np.ones((1, 2)), np.eye(2), m.positions(), rest, alone, output_times=[0.0, 1.0]
+    )
+    np.testing.assert_allclose(found.x, 0.5)
+    begun = Start(0.0, np.zeros(2), np.eye(2), row=0)
+    found = run_smoothed([0.0], np.ones((1, 2)), np.eye(2), m.positions(), rest, begun)
+    np.testing.assert_allclose(found.x, 0.0)
+
+
+def test_rows_whose_pose_is_not_known():
+    times, uv, poses, truth = overflight(40)
+    P = np.tile(np.diag([1.0, 1, 1, 1e-4, 1e-4, 1e-4]), (40, 1, 1))
+    P[[0, 1, 20, 21]] = np.nan
+    pose = PoseUncertainty(P, 30.0)
+    filtered = run_filter(times, uv, 4 * np.eye(2), m.pixels(poses, 0.0), CV, START, pose=pose)
+    smoothed = run_smoothed(times, uv, 4 * np.eye(2), m.pixels(poses, 0.0), CV, START, pose=pose)
+    assert not filtered.used[[0, 1, 20, 21]].any() and filtered.used.sum() == 36
+    off = [np.sqrt(np.mean((track.x - truth)[:, :2] ** 2)) for track in (filtered, smoothed)]
+    assert np.isfinite(smoothed.P).all() and off[1] < off[0]
+
+
+def test_a_track_at_other_times_is_refused():
+    times, z, R = linear_run(0)
+    track = run_filter(times, z, R, m.positions(), CV, START, output_times=times[::2])
+    with pytest.raises(WildlabError, match="13 times"):
+        smooth(track, CV)
