@@ -135,8 +135,7 @@ def test_the_turn_on_bias_is_drawn_once_per_flight():
     assert np.corrcoef(runs[:, 0].T)[np.triu_indices(3, 1)] == pytest.approx([0] * 3, abs=5 / np.sqrt(2000))
 
 
-def test_misaligned_axes_stay_within_the_stated_angles():
-    rng = np.random.default_rng(3)
+def test_misaligned_axes_stay_within_the_stated_angles(rng):
     axis, package = np.radians([0.05, 0.25])
     between, turned = [], []
     for _ in range(3000):

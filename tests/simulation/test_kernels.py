@@ -68,8 +68,7 @@ def test_times_a_little_off_equal_steps_are_noticed(off):
         same(some.with_derivatives(uneven), expected, 1e-10)
 
 
-def test_polynomials_in_pieces_are_those_of_scipy_and_nan_outside():
-    rng = np.random.default_rng(2)
+def test_polynomials_in_pieces_are_those_of_scipy_and_nan_outside(rng):
     coefficients = rng.normal(size=(9, 3, 8))
     times = np.concatenate([np.linspace(-3.0, -3.0 + 9 * 0.7, COUNT), [-3.1, 3.4, np.nan]])
     found = [np.zeros((len(times), 3)) for _ in range(3)]
@@ -80,8 +79,7 @@ def test_polynomials_in_pieces_are_those_of_scipy_and_nan_outside():
         assert np.isnan(expected[-3:]).all()
 
 
-def test_the_polynomials_of_a_spline_are_the_spline():
-    rng = np.random.default_rng(3)
+def test_the_polynomials_of_a_spline_are_the_spline(rng):
     interval = 0.95
     spline = _smoothed(interval * (np.arange(120) - 24.0), 100 * rng.normal(size=(120, 3)), interval)
     start, coefficients = _polynomials(spline)
@@ -95,10 +93,9 @@ def test_the_polynomials_of_a_spline_are_the_spline():
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (4.0, -3.0), (9.0, 12.0), (11.0, 15.0)])
-def test_angles_on_a_circle_solve_the_same_equation(sense, wind):
+def test_angles_on_a_circle_solve_the_same_equation(sense, wind, rng):
     circle = (160.0, 19.5, *wind, sense, 0.4)
     series = _times_of_angles(circle)
-    rng = np.random.default_rng(4)
     for times in (np.arange(-4, 400) / 250, np.arange(COUNT) / 7.5, 1000 * rng.random(COUNT)):
         found = np.empty(len(times))
         kernels.angles_on_circle(times, circle, *series, found)
@@ -106,8 +103,7 @@ def test_angles_on_a_circle_solve_the_same_equation(sense, wind):
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_motion_on_a_circle_is_that_of_its_angle(sense):
-    rng = np.random.default_rng(5)
+def test_motion_on_a_circle_is_that_of_its_angle(sense, rng):
     circle = (160.0, 19.5, 4.0, -3.0, sense, 0.4)
     angles, off = rng.uniform(-10, 10, COUNT), rng.normal(size=(3, COUNT))
     found = [np.zeros((COUNT, 3)) for _ in range(3)]
@@ -116,25 +112,22 @@ def test_motion_on_a_circle_is_that_of_its_angle(sense):
         same(part[:, :2], expected)
 
 
-def test_coordinated_attitudes_are_the_plain_ones():
-    rng = np.random.default_rng(6)
+def test_coordinated_attitudes_are_the_plain_ones(rng):
     velocity, acceleration, wind = 20 + rows(rng), rows(rng), np.array([4.0, -3.0, 0.5])
     found = np.empty((COUNT, 3, 3))
     kernels.coordinated_attitude(velocity, acceleration, wind, 0.1, 9.8, found)
     same(found, plain.coordinated_attitude(velocity, acceleration, wind, 0.1, 9.8))
 
 
-def test_turned_attitudes_are_the_plain_ones():
-    rng = np.random.default_rng(7)
+def test_turned_attitudes_are_the_plain_ones(rng):
     R, angles, found = attitudes(rng), rng.uniform(-1.5, 1.5, (3, COUNT)), np.empty((COUNT, 3, 3))
     kernels.turn(R, *angles, found)
     same(found, plain.turn(R, *angles))
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 0.7])
-def test_rates_are_the_plain_ones(size):
+def test_rates_are_the_plain_ones(size, rng):
     """Attitudes that turn by up to ``size`` rad from one to the next."""
-    rng = np.random.default_rng(8)
     R = [attitudes(rng)]
     for _ in range(3):
         R.append(R[-1] @ Rotation.from_rotvec(size * rng.uniform(-1, 1, (COUNT, 3))).as_matrix())
@@ -143,8 +136,7 @@ def test_rates_are_the_plain_ones(size):
     same(found, plain.body_rates(*R, 0.5))
 
 
-def test_what_is_felt_on_earth_is_the_plain_sum():
-    rng = np.random.default_rng(9)
+def test_what_is_felt_on_earth_is_the_plain_sum(rng):
     R, p, v, a, rate = attitudes(rng), 1000 * rows(rng), 20 * rows(rng), rows(rng), rows(rng)
     # Larger than those of the Earth, so that every term shows.
     earth = Earth(9.8, 1e-3, 1e-3, (0.1, -0.2, 0.3))
@@ -155,8 +147,7 @@ def test_what_is_felt_on_earth_is_the_plain_sum():
     same(found, expected[1])
 
 
-def test_quaternions_are_those_of_geometry():
-    rng = np.random.default_rng(10)
+def test_quaternions_are_those_of_geometry(rng):
     axes = Rotation.from_rotvec(np.pi * np.eye(3)[[0, 1, 2, 0]] * [[1.0], [1.0], [1.0], [0.999]])
     nearly = Rotation.from_rotvec(rng.choice([-3.1, 3.1, 1e-9], (COUNT, 3)))
     R = np.concatenate([attitudes(rng), axes.as_matrix(), nearly.as_matrix(), [np.eye(3)]])
@@ -169,8 +160,7 @@ def test_quaternions_are_those_of_geometry():
     same(sign * found, expected)
 
 
-def test_gauss_markov_errors_are_those_of_a_linear_filter():
-    rng = np.random.default_rng(11)
+def test_gauss_markov_errors_are_those_of_a_linear_filter(rng):
     draws, sd, kept = rows(rng), np.array([1.0, 2.0, 0.0]), np.array([0.9, 0.0, 0.5])
     found = draws.copy()
     kernels.gauss_markov(found, sd, kept)
@@ -179,8 +169,7 @@ def test_gauss_markov_errors_are_those_of_a_linear_filter():
 
 
 @pytest.mark.parametrize("limits", [(np.inf, 0.0), (2.5, 0.0), (np.inf, 0.01), (2.5, 0.01)])
-def test_readings_of_a_triad_are_the_plain_ones(limits):
-    rng = np.random.default_rng(12)
+def test_readings_of_a_triad_are_the_plain_ones(limits, rng):
     true, axes, turn_on = rows(rng), np.eye(3) + 0.1 * rng.normal(size=(3, 3)), rng.normal(size=3)
     drift, noise = 0.1 * rows(rng), rows(rng)
     found = noise.copy()

@@ -59,8 +59,7 @@ def test_a_new_sensor_changes_nobody_elses_noise():
     assert not np.isin(a, next_seed).any()
 
 
-def test_reported_attitude_and_error_give_back_the_truth():
-    rng = np.random.default_rng(2)
+def test_reported_attitude_and_error_give_back_the_truth(rng):
     true = Rotation.random(20, rng=rng).as_matrix()
     error = 0.05 * rng.standard_normal((20, 3))
     reported = with_attitude_error(true, error)
@@ -108,10 +107,9 @@ def test_an_antennas_velocity_is_the_derivative_of_its_position():
     assert np.abs((position(t + h) - position(t - h)) / (2 * h) - v).max() < 2e-6
 
 
-def test_fixes_scatter_about_the_truth_as_stated():
+def test_fixes_scatter_about_the_truth_as_stated(rng):
     runs, count = 300, 200
     true = np.tile([10.0, 20.0, -300.0], (count, 1))
-    rng = np.random.default_rng(12)
     off = (
         np.array(
             [

@@ -105,8 +105,7 @@ def test_angular_rate_is_the_derivative_of_attitude(motion, within):
     assert np.degrees(np.abs(rate)).max() < 120  # turning round where a course reverses
 
 
-def test_a_disturbance_has_its_spread_its_band_and_its_derivatives():
-    rng = np.random.default_rng(3)
+def test_a_disturbance_has_its_spread_its_band_and_its_derivatives(rng):
     t = np.arange(0, 200_000, 0.7)
     for _ in range(5):
         w = band_limited_disturbance(2.5, 4.0, 40.0, rng)

@@ -101,10 +101,9 @@ def test_pixels(gate):
 
 
 @pytest.mark.parametrize("correlation_time", [np.inf, 5.0, 0.0])
-def test_schmidt(correlation_time):
+def test_schmidt(correlation_time, rng):
     runs = 66
     times, z, poses = flight(runs)
-    rng = np.random.default_rng(1)
     covariance = np.array([[random_pose_covariance(rng, 0.2) for _ in range(N)] for _ in range(runs)])
     covariance[3, 20] = np.nan
     covariance[4, :, 2] = covariance[4, :, :, 2] = 0.0
@@ -122,8 +121,7 @@ def test_schmidt(correlation_time):
         agree(batch, run, track, but=TWICE)
 
 
-def test_the_cross_covariance_is_limited_alike():
-    rng = np.random.default_rng(0)
+def test_the_cross_covariance_is_limited_alike(rng):
     changed = 0
     for _ in range(50):
         A = rng.normal(size=(10, 14)) * np.repeat([5, 1, 1, 0.02], [2, 2, 3, 3])[:, None]
@@ -177,10 +175,9 @@ def test_bad_input_is_named():
 
 
 @pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_covariances_of_poses_that_differ_by_a_factor(change, monkeypatch):
+def test_covariances_of_poses_that_differ_by_a_factor(change, monkeypatch, rng):
     """Share their transitions, and give what each gives alone; one that differs otherwise has its own."""
     times, uv, poses, _ = overflight(N)
-    rng = np.random.default_rng(1)
     P = np.array([random_pose_covariance(rng, 0.3) for _ in range(N)])
     bent = P.copy()
     bent[7:, 3, 3] *= 1.1

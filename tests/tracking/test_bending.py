@@ -54,8 +54,7 @@ def test_a_tilted_camera_bends_by_its_tilt_and_one_that_looks_down_does_not() ->
     assert left_out(1e6 * P, second_derivatives(*tilted(0.0)[:1], 0, tilted(0.0)[1])) == pytest.approx(0.0)
 
 
-def test_left_out_is_the_second_moment_of_the_second_order_part() -> None:
-    rng = np.random.default_rng(1)
+def test_left_out_is_the_second_moment_of_the_second_order_part(rng: np.random.Generator) -> None:
     D = second_derivatives(ranges_bearings([0.0, 0.0], 0.0), 0, [40.0, 30.0])
     e = rng.multivariate_normal([0, 0], SHAPE, 400_000)
     part = np.einsum("na,iab,nb->ni", e, D, e) / 2

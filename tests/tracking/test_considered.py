@@ -146,9 +146,8 @@ def test_the_six_of_a_pose_by_name_are_the_six():
     np.testing.assert_allclose(again.P, old.P, rtol=1e-7, atol=1e-8)
 
 
-def test_each_has_its_own_correlation_time():
+def test_each_has_its_own_correlation_time(rng):
     """Against the full filter of target and errors, with the gain of the errors put to zero."""
-    rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.1, 1, 40))
     platform = np.column_stack([30 * np.sin(times / 5), 10 * times]) - 200
     z = np.column_stack([rng.normal(300, 20, 40), rng.normal(0.7, 0.1, 40)])

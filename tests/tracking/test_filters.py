@@ -1,4 +1,4 @@
-"""Other filters of one target: differenced, unscented, of several models, smoothed; exact where they must be."""
+"""Other filters of one target, differenced, unscented, of several models, smoothed: exact where they must."""
 
 from functools import partial
 
@@ -185,9 +185,8 @@ def test_on_a_linear_model_all_are_the_kalman_filter(gate):
     assert np.allclose(twice.probabilities.sum(axis=1), 1)
 
 
-def test_the_unscented_filter_sees_the_bend():
+def test_the_unscented_filter_sees_the_bend(rng):
     """Range and bearing of a far target across a wide arc: its mean range is larger, and so is S."""
-    rng = np.random.default_rng(0)
     P = np.diag([1.0, 40.0**2, 1, 1])  # across the line of sight
     sensor = m.ranges_bearings(np.zeros(2), 0.0)
     start = Start(0.0, np.array([100.0, 0, 0, 0]), P)
@@ -202,8 +201,7 @@ def test_the_unscented_filter_sees_the_bend():
     assert extended.S[0, 0, 0] < 0.1 * sampled[0, 0]
 
 
-def test_bearings_are_averaged_across_the_wrap():
-    rng = np.random.default_rng(1)
+def test_bearings_are_averaged_across_the_wrap(rng):
     times = 0.5 * np.arange(80)
     own = np.column_stack([200 * np.cos(0.1 * times), 200 * np.sin(0.1 * times)])
     z = m.predict_range_bearing(np.zeros(2), own, 0.0).z[:, 1:] + rng.normal(0, 0.02, (80, 1))

@@ -282,9 +282,8 @@ def expected(kind, position, poses):
 
 
 @pytest.mark.parametrize("kind", ANGLES)
-def test_many_tracks_at_once_are_as_one_after_the_other(kind):
+def test_many_tracks_at_once_are_as_one_after_the_other(kind, rng):
     _, _, poses, truth = overflight(30)
-    rng = np.random.default_rng(0)
     there = truth[:, :2] + rng.normal(0, 3, (30, 2))
     both = np.stack([truth[:, :2], truth[:, :2] + [10.0, 15.0]], axis=1)
     each = poses.take((slice(None), None))

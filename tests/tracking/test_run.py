@@ -26,8 +26,7 @@ from wildlab.tracking.schmidt import PoseUncertainty
 from wildlab.tracking.unscented import run_unscented
 
 
-def test_predict_and_update_agree_with_filterpy_over_random_models():
-    rng = np.random.default_rng(0)
+def test_predict_and_update_agree_with_filterpy_over_random_models(rng):
     for _ in range(20):
         n, m = rng.integers(1, 6), rng.integers(1, 4)
 
@@ -51,8 +50,7 @@ def test_predict_and_update_agree_with_filterpy_over_random_models():
             assert np.allclose(step.innovation, oracle.y)
 
 
-def test_at_rest_the_filter_is_the_weighted_mean():
-    rng = np.random.default_rng(1)
+def test_at_rest_the_filter_is_the_weighted_mean(rng):
     A = rng.normal(size=(30, 2, 2))
     R = A @ np.swapaxes(A, 1, 2) + 0.2 * np.eye(2)
     z = rng.normal(size=(30, 2))
@@ -203,9 +201,8 @@ def test_a_target_behind_the_camera_is_not_updated():
         assert np.allclose(track.P[row], F @ track.P[row - 1] @ F.T + Q)
 
 
-def test_of_several_detections_the_nearest_is_used():
+def test_of_several_detections_the_nearest_is_used(rng):
     times, uv, poses, _ = overflight(30)
-    rng = np.random.default_rng(1)
     both = np.stack([uv + rng.uniform(60, 200, (30, 1)) * rng.choice([-1, 1], (30, 2)), uv], axis=1)
     order = rng.integers(0, 2, 30)
     both = np.take_along_axis(both, np.stack([order, 1 - order], axis=1)[..., None], axis=1)

@@ -97,9 +97,8 @@ def by_eigenvectors(function):
 @pytest.mark.parametrize(
     ("change", "function"), [("bias", np.sqrt), ("navigated", lambda v: np.minimum(v, 1))]
 )
-def test_it_is_the_full_filter_whose_pose_error_changes_as_said(change, function):
+def test_it_is_the_full_filter_whose_pose_error_changes_as_said(change, function, rng):
     times, uv, poses, _ = overflight(50)
-    rng = np.random.default_rng(4)
     covariances = np.array([random_pose_covariance(rng, 0.3) for _ in times])
     pose = PoseUncertainty(covariances, change=change)
     track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
@@ -188,8 +187,7 @@ def test_transitions_lead_from_one_pose_covariance_to_the_next(rng):
         )
 
 
-def test_a_row_without_a_pose_covariance_is_passed_over():
-    rng = np.random.default_rng(0)
+def test_a_row_without_a_pose_covariance_is_passed_over(rng):
     covariances = np.array([random_pose_covariance(rng) for _ in range(4)])
     covariances[1] = np.nan
     phi = schmidt.transitions_of_pose(covariances, "bias")
@@ -198,9 +196,8 @@ def test_a_row_without_a_pose_covariance_is_passed_over():
 
 
 @pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_many_transitions_are_those_of_each_pair(change):
+def test_many_transitions_are_those_of_each_pair(change, rng):
     """Also where nothing changes, and from a pose without variance in some direction, or in none."""
-    rng = np.random.default_rng(3)
     covariances = np.array([random_pose_covariance(rng) for _ in range(12)])
     covariances[3] = covariances[2]
     covariances[5, 2] = covariances[5, :, 2] = 0.0
@@ -213,8 +210,7 @@ def test_many_transitions_are_those_of_each_pair(change):
     assert schmidt.transitions_of_pose(covariances[:1], change) == pytest.approx(np.eye(6)[None])
 
 
-def test_directions_without_variance_carry_no_covariance():
-    rng = np.random.default_rng(0)
+def test_directions_without_variance_carry_no_covariance(rng):
     Po = random_pose_covariance(rng)
     Po[2] = Po[:, 2] = 0.0
     C = 0.1 * rng.normal(size=(4, 6)) * UNITS

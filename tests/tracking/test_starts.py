@@ -83,9 +83,8 @@ LEVEL = {"platform_north": 1.0, "heading": 0.01}
         ("angles", TILTED),
     ],
 )
-def test_covariance_of_a_start_is_that_of_its_errors(kind, sds):
+def test_covariance_of_a_start_is_that_of_its_errors(kind, sds, rng):
     """State and considered errors together: the start knows what they have in common."""
-    rng = np.random.default_rng(7)
     target, v = np.array([95.0, 40.0]), np.array([2.0, -1.0])
     errors, covariances = [], []
     for _ in range(RUNS):

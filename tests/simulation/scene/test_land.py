@@ -154,8 +154,7 @@ def test_a_tree_hides_what_is_under_it():
     assert (view.labels == 3).any()
 
 
-def test_a_group_keeps_its_distance_and_its_kinds():
-    rng = np.random.default_rng(2)
+def test_a_group_keeps_its_distance_and_its_kinds(rng):
     bodies = group(rng, ["calf"] * 6, np.array([10.0, 20.0]), 3.0, Weather())
     places = np.array([body.centre(0.0)[:2] for body in bodies])
     apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 1e9 * np.eye(len(places))
@@ -207,8 +206,9 @@ def test_heights_are_those_of_the_terrain(north: float, east: float) -> None:
 
 
 @pytest.mark.parametrize("north, east", [(500.0, -300.0), (-1036.0, 412.0), (8.0, -12.0)])
-def test_a_terrain_far_from_the_origin_keeps_its_place(north: float, east: float) -> None:
-    rng = np.random.default_rng(1)
+def test_a_terrain_far_from_the_origin_keeps_its_place(
+    north: float, east: float, rng: np.random.Generator
+) -> None:
     far = Terrain(rng.uniform(0, 9, (20, 31)).astype(np.float32), north=north, east=east, step=4.0)
     land = land_on(far, COVERS)
     for place in rng.uniform([north, east], [north + 76.0, east + 120.0], (20, 2)):

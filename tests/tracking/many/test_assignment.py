@@ -196,8 +196,7 @@ def test_no_pair_is_no_matrix_entry():
     assert recognise(np.ones((1, 0), bool), np.ones((1, 0)), np.ones((1, 0, 2)), 9.0, LIKELIER).track[0] == -1
 
 
-def test_costs_of_places_are_those_of_the_normal_density():
-    rng = np.random.default_rng(1)
+def test_costs_of_places_are_those_of_the_normal_density(rng):
     new, old = rng.normal(0, 9, (2, 2)), rng.normal(0, 9, (3, 2))
     A, B = (one @ np.swapaxes(one, 1, 2) + np.eye(2) for one in (rng.normal(size=(k, 2, 2)) for k in (2, 3)))
     costs = place_costs(new, A, old, B)
@@ -206,8 +205,7 @@ def test_costs_of_places_are_those_of_the_normal_density():
         assert costs[i, j] == pytest.approx(-2 * density - 2 * np.log(2 * np.pi))
 
 
-def test_looks_summed_are_the_feature_distance_where_all_is_known():
-    rng = np.random.default_rng(2)
+def test_looks_summed_are_the_feature_distance_where_all_is_known(rng):
     new, old = rng.normal(size=(3, 2)), rng.normal(size=(4, 2))
     sd, weights = [0.5, 2.0], [1.0, 0.3]
     summed = look_differences(new, old, sd, weights).sum(axis=-1)

@@ -38,9 +38,8 @@ INTERVAL = 0.5
 TUNING = Tuning(17.5, 0.2, 5.0, gate_threshold(0.99, 2), 5.0)
 
 
-def test_of_one_target_it_is_the_single_filter():
+def test_of_one_target_it_is_the_single_filter(rng):
     """One target with pauses: the states are those of `run_filter`, started on the first detection."""
-    rng = np.random.default_rng(4)
     image = np.array([3, 4, 5, 6, 7, 9, 10, 40, 41, 90])
     z = np.column_stack([0.1 * image, -0.2 * image]) + rng.normal(0, 10, (len(image), 2))
     bank = run_bank(Looks(image, z, INTERVAL), TUNING)
@@ -96,13 +95,12 @@ def test_each_rule_by_hand():
     assert by(VETO, 0.22 * f, 2) == [1, 0], "and below 13.8, of two"
 
 
-def test_features_in_the_state_are_a_filter_of_the_whole_state():
+def test_features_in_the_state_are_a_filter_of_the_whole_state(rng):
     """Places and two features, one of them now and then not known, through one filter of six elements.
 
     Its innovation squared lets in or keeps out what the bank does, which keeps the two parts apart; what it
     keeps out moves neither the place nor the looks.
     """
-    rng = np.random.default_rng(8)
     image = np.r_[0, np.arange(1, 119, 2)]  # with an image between any two, nothing else can start
     z = np.column_stack([0.3 * image, 0.0 * image]) + rng.normal(0, 20, (60, 2))
     sd, true = np.array([0.1, 8.0]), np.array([3.0, 50.0])
@@ -138,9 +136,8 @@ def test_features_in_the_state_are_a_filter_of_the_whole_state():
     assert 0 < outside < 20, "some that are near enough do not look like it"
 
 
-def test_a_gate_lets_in_as_many_with_features_as_without():
+def test_a_gate_lets_in_as_many_with_features_as_without(rng):
     """Of chi-square numbers, however many features count or are known; and a large gate stays finite."""
-    rng = np.random.default_rng(2)
     weights = np.array([1.0, 0.0, 3.0])
     looks = Appearance(np.zeros((1, 3)), np.ones(3), weights)
     place = (rng.normal(size=(40000, 2)) ** 2).sum(axis=1)

@@ -155,8 +155,7 @@ def test_the_region_is_that_of_noise_about_where_motion_may_lead(angle, dt, spee
         assert (found.measurement[0] == 0) == inside
 
 
-def test_a_target_at_rest_is_let_in_as_often_as_the_gate_says():
-    rng = np.random.default_rng(2)
+def test_a_target_at_rest_is_let_in_as_often_as_the_gate_says(rng):
     R = np.array([[9.0, 4.0], [4.0, 4.0]])
     z = rng.multivariate_normal([0, 0], R, (20000, 2))
     paired = [pair_scans(one[:1], one[1:], 1.0, R, 0.0, GATE).track[0] == 0 for one in z[:3000]]

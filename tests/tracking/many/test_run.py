@@ -48,14 +48,12 @@ def lines(starts: np.ndarray, velocities: np.ndarray, steps: int) -> np.ndarray:
     return starts + velocities * np.arange(steps)[:, None, None]
 
 
-def test_clutter_alone_is_no_target() -> None:
-    rng = np.random.default_rng(4)
+def test_clutter_alone_is_no_target(rng: np.random.Generator) -> None:
     scans = looks(np.zeros((100, 0, 2)), rng, clutter=4)
     assert sum(len(one.identity) for one in run_many(scans, [EYE], POINTS)) <= 4
 
 
-def test_what_hides_for_a_while_keeps_its_name() -> None:
-    rng = np.random.default_rng(2)
+def test_what_hides_for_a_while_keeps_its_name(rng: np.random.Generator) -> None:
     scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 60), rng)
     scans = [s if not 30 <= s.time < 38 else look(s.time) for s in scans]
     shown = run_many(scans, [EYE], POINTS)
@@ -138,17 +136,15 @@ def test_a_track_is_shown_as_long_as_the_sensor_that_saw_it_has_patience() -> No
     assert {len(one.identity) for one in shown} == {1}
 
 
-def test_order_of_scans_does_not_matter() -> None:
-    rng = np.random.default_rng(3)
+def test_order_of_scans_does_not_matter(rng: np.random.Generator) -> None:
     scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 20), rng, clutter=2)
     shuffled = [scans[i] for i in rng.permutation(len(scans))]
     for one, other in zip(run_many(scans, [EYE], POINTS), run_many(shuffled, [EYE], POINTS), strict=True):
         assert one.time == other.time and np.array_equal(one.x, other.x)
 
 
-def test_many_at_once_and_none() -> None:
+def test_many_at_once_and_none(rng: np.random.Generator) -> None:
     """A scan of hundreds, twice, an empty one, and places that are no numbers."""
-    rng = np.random.default_rng(5)
     crowd = rng.uniform(-1000, 1000, (300, 2))
     crowd[7] = np.nan
     scans = [look(0.0), look(1.0, *crowd), look(2.0, *crowd + 0.3), look(3.0)]

@@ -258,9 +258,8 @@ def test_an_error_that_moves_nothing_changes_nothing(seed: int) -> None:
     assert np.allclose(alone, together) and np.allclose(alone, _enumerated(compared, 0.9, 1e-4))
 
 
-def test_what_others_tell_is_the_least_squares_of_them() -> None:
+def test_what_others_tell_is_the_least_squares_of_them(rng: np.random.Generator) -> None:
     """Sure associations: the errors' posterior is that of all other targets' innovations at once."""
-    rng = np.random.default_rng(2)
     compared = _drawn(rng, 4, 3, 2.0)
     mean, covariance = told_by_others(compared, np.eye(4)[:, None])
     nu, S, _, _, G = (part[:, 0] for part in compared)

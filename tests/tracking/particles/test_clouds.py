@@ -93,8 +93,7 @@ def test_the_effective_size_is_from_one_to_n_and_counts_copies(weights, copies):
     assert np.isclose(effective_size(np.append(w, np.zeros(copies))), size)
 
 
-def test_a_start_has_its_mean_and_covariance():
-    rng = np.random.default_rng(5)
+def test_a_start_has_its_mean_and_covariance(rng):
     P = np.array([[400.0, 150.0, 0, 0], [150.0, 100.0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 4.0]])
     N = 40_000
     cloud = start_gaussian([[5.0, -3.0, 1.0, 2.0]] * 2, P, N, rng)
@@ -119,8 +118,7 @@ def test_a_start_in_an_enclosure_is_even_in_it():
     assert np.abs(covariance[:, 0, 0] - 200).max() < 12
 
 
-def test_several_measurements_are_multiplied():
-    rng = np.random.default_rng(3)
+def test_several_measurements_are_multiplied(rng):
     x, z = rng.normal(0, 5, (2, 7, 2)), rng.normal(0, 5, (3, 2))
     R = np.array([[4.0, 1.0], [1.0, 2.0]])
     from scipy.stats import multivariate_normal
@@ -137,8 +135,7 @@ def test_who_cannot_be_measured_has_not_been():
     assert np.isfinite(given_each[0]) and given_each[1] == -np.inf
 
 
-def test_a_footprint_is_read_at_the_nearest_node():
-    rng = np.random.default_rng(1)
+def test_a_footprint_is_read_at_the_nearest_node(rng):
     mask = rng.random((5, 7)) < 0.5
     sight = sight_of(mask, 100.0, -20.0, 4.0, 0.7)
     at = np.stack(np.meshgrid(np.arange(5), np.arange(7), indexing="ij"), axis=-1)
@@ -199,9 +196,8 @@ def test_the_compiled_choice_takes_what_numpy_takes(rng, n):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_copies_are_unbiased(scheme):
+def test_copies_are_unbiased(scheme, rng):
     """The mean number of copies is N w, within the error of the draws themselves."""
-    rng = np.random.default_rng(7)
     N, runs = 24, 20_000
     w = uneven(rng, 1, N)[0]
     chosen = draw(np.tile(w, (runs, 1)), rng, scheme)
@@ -233,10 +229,9 @@ def test_only_those_at_or_below_the_threshold_are_drawn_anew(rng, threshold):
         assert {tuple(one) for one in after.x[a]} <= {tuple(one) for one in cloud.x[a]}
 
 
-def test_two_thirds_is_the_default_and_one_is_always():
+def test_two_thirds_is_the_default_and_one_is_always(rng):
     w = np.full((1, 9), 1 / 9)
     w2 = np.array([[1 / 5] * 5 + [0.0] * 4, [1 / 7] * 7 + [0.0] * 2])
-    rng = np.random.default_rng(0)
     assert resample(Cloud(np.zeros((2, 9, 2)), w2), rng)[1].tolist() == [True, False]
     assert not resample(Cloud(np.zeros((1, 9, 2)), w), rng)[1].any()
     assert resample(Cloud(np.zeros((1, 9, 2)), w), rng, threshold=1)[1].all()
@@ -320,8 +315,7 @@ def near(covariance, wanted, count=N):
     ).all()
 
 
-def test_a_cloud_moves_as_its_model_says():
-    rng = np.random.default_rng(1)
+def test_a_cloud_moves_as_its_model_says(rng):
     start, P = np.array([10.0, 5.0, 1.0, -2.0]), np.diag([9.0, 4.0, 0.25, 1.0])
     motion = partial(constant_velocity, sd_acceleration=0.7)
     F, Q = motion(3.0)
@@ -361,9 +355,8 @@ def test_one_place_draws_as_the_closed_form_says(dt):
         np.testing.assert_allclose(variance, density**2 * dt, rtol=1e-3)
 
 
-def test_in_the_long_run_they_are_where_the_places_are():
+def test_in_the_long_run_they_are_where_the_places_are(rng):
     """A mixture about its places, each with its share; those who start in it stay in it."""
-    rng = np.random.default_rng(4)
     places, shares, spread = np.array([[0.0, 0.0], [0.0, 50.0]]), np.array([0.3, 0.7]), 25.0
     where = places[rng.choice(2, 8000, p=shares)] + spread * rng.standard_normal((8000, 2))
     away = np.zeros((8000, 2))
@@ -393,8 +386,7 @@ def test_places_that_do_not_draw_are_refused(wrong):
         drift(np.zeros((1, 2)), 1.0, np.random.default_rng(0), **told)
 
 
-def test_in_sight_they_keep_their_velocity_and_out_of_sight_they_forget_it():
-    rng = np.random.default_rng(6)
+def test_in_sight_they_keep_their_velocity_and_out_of_sight_they_forget_it(rng):
     start = np.array([[0.0, 0.0, 2.0, 0.0]] * 2)
     cloud = start_gaussian(start, np.diag([1.0, 1.0, 0.01, 0.01]), N, rng)
     motion = partial(constant_velocity, sd_acceleration=0.1)
@@ -411,11 +403,10 @@ def test_in_sight_they_keep_their_velocity_and_out_of_sight_they_forget_it():
     np.testing.assert_array_equal(after.w, cloud.w)
 
 
-def test_nobody_leaves_and_all_of_the_enclosure_is_used():
+def test_nobody_leaves_and_all_of_the_enclosure_is_used(rng):
     def half_disc(places):
         return (np.hypot(places[..., 0], places[..., 1]) < 50) & (places[..., 0] > 0)
 
-    rng = np.random.default_rng(8)
     cloud = start_inside(half_disc, [0, -50], [50, 50], 1, 20_000, rng)
     corner = Cloud(np.full_like(cloud.x, 1.0), cloud.w)
     for _ in range(400):

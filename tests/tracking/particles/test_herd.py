@@ -50,9 +50,8 @@ def look(time, *z, sight=lambda p: np.zeros(p.shape[:-1]), clutter=0.0, noise=R)
 
 
 @pytest.mark.parametrize("step", [step_nearest, step_counting])
-def test_one_animal_and_nothing_else_is_the_single_filter(step):
+def test_one_animal_and_nothing_else_is_the_single_filter(step, rng):
     """A detection in each image, none false: the Kalman filter's, within the error of the particles."""
-    rng = np.random.default_rng(2)
     rules = RULES._replace(moves=free, particles=20_000)
     sight = everywhere(0.9)
     at, x, P = np.array([60.0, 45.0]), None, None
@@ -72,9 +71,8 @@ def test_one_animal_and_nothing_else_is_the_single_filter(step):
     assert herd.existence[0] > 0.99999 if step is step_counting else herd.existence[0] == 1
 
 
-def test_who_is_not_where_it_should_be_is_less_and_less_there():
+def test_who_is_not_where_it_should_be_is_less_and_less_there(rng):
     """An animal at rest that images cannot miss but by the detector: the rule of Bayes, image by image."""
-    rng = np.random.default_rng(5)
     rules = RULES._replace(moves=lambda cloud, seen, dt, rng: cloud)
     sight = everywhere(0.6)
     herd = expect(rules, 3.0, inside, np.zeros(2), SIZE, rng, particles=200_000)
@@ -96,9 +94,8 @@ def test_who_is_not_where_it_should_be_is_less_and_less_there():
     assert not len(herd.identity)
 
 
-def test_one_detection_is_shared_out_among_all_it_may_be_of():
+def test_one_detection_is_shared_out_among_all_it_may_be_of(rng):
     """A track's, an animal's that was never seen, or false: by hand, with normal densities."""
-    rng = np.random.default_rng(16)
     rules = RULES._replace(moves=lambda cloud, seen, dt, rng: cloud, particles=40_000)
     sight, p, clutter = everywhere(0.6), 0.6, 2e-4
     herd = expect(rules, 5.0, inside, np.zeros(2), SIZE, rng, particles=200_000)
@@ -116,9 +113,8 @@ def test_one_detection_is_shared_out_among_all_it_may_be_of():
     assert np.isclose(after.existence[0], r * seen / (1 - r + r * seen), rtol=0.01)
 
 
-def test_those_never_seen_are_the_exact_grid():
+def test_those_never_seen_are_the_exact_grid(rng):
     """No detection at all: where animals may still be, and how many, by the matrix of moves."""
-    rng = np.random.default_rng(6)
     herd = expect(RULES, 8.0, inside, np.zeros(2), SIZE, rng, particles=30_000)
     grid = grid_over(inside, [0, 0], SIZE, 2.0)
     T, intensity = walk_matrix(grid, 0.5, 4.0), np.full(len(grid.places), 8.0 / len(grid.places))
@@ -131,8 +127,7 @@ def test_those_never_seen_are_the_exact_grid():
     assert np.abs(mean[0] - intensity @ grid.places / intensity.sum()).max() < 1.0
 
 
-def test_both_lost_rules_and_found_again_under_the_same_name():
-    rng = np.random.default_rng(7)
+def test_both_lost_rules_and_found_again_under_the_same_name(rng):
     by_spread = RULES._replace(lost_trace=40.0)
     herd, _ = step_nearest(no_herd(RULES), look(0.0, [50.0, 40.0]), by_spread, rng)
     herd, _ = step_nearest(herd, look(20.0), by_spread, rng)  # 2 (4 + 0.25 * 20) = 18
@@ -157,8 +152,7 @@ def test_both_lost_rules_and_found_again_under_the_same_name():
 
 
 @pytest.mark.parametrize(("share", "name"), [(0.9, 1), (1.1, 2)])
-def test_a_lost_one_is_found_in_its_gate_alone(share, name):
-    rng = np.random.default_rng(17)
+def test_a_lost_one_is_found_in_its_gate_alone(share, name, rng):
     rules = RULES._replace(lost_trace=40.0)
     herd, _ = step_nearest(no_herd(rules), look(0.0, [50.0, 40.0]), rules, rng)
     herd, _ = step_nearest(herd, look(80.0), rules, rng)
@@ -171,8 +165,7 @@ def test_a_lost_one_is_found_in_its_gate_alone(share, name):
     assert taken.tolist() == [name]
 
 
-def test_without_negative_information_an_empty_image_says_nothing():
-    rng = np.random.default_rng(9)
+def test_without_negative_information_an_empty_image_says_nothing(rng):
     half = lambda p: np.where(p[..., 0] > 50, 1.0, 0.0)  # noqa: E731
     start, _ = step_nearest(no_herd(RULES), look(0.0, [50.0, 40.0]), RULES, rng)
     quiet = RULES._replace(negative=False)
@@ -184,8 +177,7 @@ def test_without_negative_information_an_empty_image_says_nothing():
 
 
 @pytest.mark.parametrize("step", [step_nearest, step_counting])
-def test_nothing_at_all_and_very_much(step):
-    rng = np.random.default_rng(10)
+def test_nothing_at_all_and_very_much(step, rng):
     rules = RULES._replace(particles=50)
     herd, taken = step(begun(step, rules, rng, particles=400), look(0.0), rules, rng)
     assert not len(taken) and not len(herd.identity)
@@ -199,8 +191,7 @@ def test_nothing_at_all_and_very_much(step):
 
 
 @pytest.mark.parametrize("step", [step_nearest, step_counting])
-def test_a_ray_that_met_no_ground_keeps_its_place_and_nothing_else(step):
-    rng = np.random.default_rng(14)
+def test_a_ray_that_met_no_ground_keeps_its_place_and_nothing_else(step, rng):
     sight = everywhere(0.5)
     start = begun(step, RULES, rng)
     gaps = look(0.0, [np.nan, np.nan], [50.0, 40.0], [90.0, 70.0], sight=sight, clutter=1e-6)
@@ -213,9 +204,8 @@ def test_a_ray_that_met_no_ground_keeps_its_place_and_nothing_else(step):
     np.testing.assert_array_equal(herd.existence, wanted.existence)
 
 
-def test_a_detection_that_can_only_be_false_starts_nothing():
+def test_a_detection_that_can_only_be_false_starts_nothing(rng):
     """Nobody is left to be found, or nobody can be seen there."""
-    rng = np.random.default_rng(15)
     sight = everywhere(0.9)
     none = expect(RULES, 0.0, inside, np.zeros(2), SIZE, rng)
     herd, taken = step_counting(none, look(0.0, [50.0, 40.0], sight=sight, clutter=1e-5), RULES, rng)
@@ -226,8 +216,7 @@ def test_a_detection_that_can_only_be_false_starts_nothing():
 
 
 @pytest.mark.parametrize("step", [step_nearest, step_counting])
-def test_time_does_not_go_back_and_a_step_leaves_what_was_known_alone(step):
-    rng = np.random.default_rng(11)
+def test_time_does_not_go_back_and_a_step_leaves_what_was_known_alone(step, rng):
     herd, _ = step(begun(step, RULES, rng), look(5.0, [50.0, 40.0], clutter=1e-5), RULES, rng)
     kept = herd.cloud.x.copy(), herd.cloud.w.copy()
     step(herd, look(5.0, [50.0, 41.0], clutter=1e-5), RULES, rng)
@@ -280,8 +269,7 @@ def test_a_handful_of_particles_is_not_taken_for_what_is_known() -> None:
     assert np.trace(np.mean(covariances, axis=0)) == pytest.approx(2 * 0.04 * 8.04 / 8.08, rel=0.05)
 
 
-def test_a_cloud_with_particles_enough_stays_its_own() -> None:
-    rng = np.random.default_rng(3)
+def test_a_cloud_with_particles_enough_stays_its_own(rng: np.random.Generator) -> None:
     wide = 4.0 * np.eye(2)
     herd, _ = step_nearest(no_herd(SPARSE), look(0.0, [0.0, 0.0], noise=wide), SPARSE, rng)
     before = herd.cloud.x.copy()
