@@ -103,7 +103,8 @@ CHARTS: dict[str, Draw] = {
         {"north": rng.uniform(-1, 1, 20), "east": rng.uniform(-1, 1, 20)}, 0.2, LONG
     ),
     "track map": lambda rng: tracks.track_map(
-        walk(rng, 181, 2), {name: walk(rng, 181, 2) for name in NAMES}, NAMES, LONG, aircraft=walk(rng, 90, 2)
+        walk(rng, 181, 2), {name: walk(rng, 181, 2) for name in NAMES}, NAMES, LONG,
+        aircraft=walk(rng, 90, 2), measured=walk(rng, 90, 2),
     ),
     "errors": lambda rng: tracks.error_over_time(
         TIMES, SEEN, {name: walk(rng, 181, 2) for name in NAMES}, NAMES, LONG, measured=walk(rng, 181, 2)
@@ -126,6 +127,9 @@ CHARTS: dict[str, Draw] = {
     "biases": lambda rng: navigation.bias_chart(TIMES, walk(rng, 181, 6), rng.gamma(2, 1, (181, 6)), LONG),
     "nis": lambda rng: navigation.squares_chart(
         {name: (TIMES, rng.chisquare(3, 181)) for name in ("position", "velocity")}, 3, "NIS", LONG
+    ),
+    "white": lambda rng: navigation.correlation_strips(
+        {"velocity": rng.uniform(-0.2, 0.2, (3, 11))}, {"velocity": 0.1}, LONG
     ),
     "flights": lambda rng: comparison.dots_chart(
         ["a", "a flight with quite a long name", "c"], rng.gamma(2, 1, 3), *np.full((2, 3), np.nan), "m",

@@ -68,6 +68,13 @@ def test_too_few_points_are_not_praised():
     assert georeferencing.headline(summarise(np.empty((0, 2))), 25) == []
 
 
+def test_the_title_of_the_scatter_follows_the_bias():
+    wide = summarise(np.random.default_rng(0).normal(size=(200, 2)))
+    off = summarise(np.tile([3.0, 4.0], (9, 1)))
+    assert "5.0 m" in georeferencing.scatter_title(off) and " m" not in georeferencing.scatter_title(wide)
+    assert georeferencing.span([50.6, 111.2, np.nan]) == "51 to 111"
+
+
 def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open() -> None:
     tables = {name: pd.DataFrame() for name in ("Flight 1", "Flight  1", "north gate")}
     assert list(georeferencing.named(tables, "part", shown=False)) == ["part-1", "part-2", "part-3"]

@@ -74,10 +74,12 @@ def test_published_values_are_looked_up(tmp_path: Path) -> None:
     one = report(tmp_path)
     one.metric("interval_low", "nees-1-run", 0.4844, "")
     one.metric("interval_low", "something-else", 0.1, "m")
+    one.claim("c", "It holds.", "holds", fraction=0.9, seeds=10)
     one.save()
     content = json.loads((tmp_path / "metrics.json").read_text())
     known, unknown = content["metrics"]
     assert (known["published"], known["source"], unknown["published"]) == (0.48, "H example 3.1", None)
+    assert content["claims"][0]["verdict"] == "holds"
     assert (content["study"], content["kind"]) == ("consistency-bounds", "computed")
 
 
