@@ -71,8 +71,9 @@ def test_one_animal_and_nothing_else_is_the_single_filter(step, rng):
     assert herd.existence[0] > 0.99999 if step is step_counting else herd.existence[0] == 1
 
 
-def test_who_is_not_where_it_should_be_is_less_and_less_there(rng):
+def test_who_is_not_where_it_should_be_is_less_and_less_there():
     """An animal at rest that images cannot miss but by the detector: the rule of Bayes, image by image."""
+    rng = np.random.default_rng(5)
     rules = RULES._replace(moves=lambda cloud, seen, dt, rng: cloud)
     sight = everywhere(0.6)
     herd = expect(rules, 3.0, inside, np.zeros(2), SIZE, rng, particles=200_000)
