@@ -161,15 +161,19 @@ def test_heights_follow_a_map(over_map, tmp_path):
 
 
 def test_maps_that_do_not_fit_are_refused(over_map, tmp_path):
-    folder, area, _, heights, corner = over_map
+    folder, area, dem, heights, corner = over_map
     into = ("--into", tmp_path / "out")
 
-    def refused(path):
+    def refused(path, area=area):
         return refuse(area, *SHEET, "--height", 60, "--terrain", path, *into)
 
     # The same map, 300 m further north: it holds a part of the area.
     part = write_map(folder / "part.tif", heights, (corner[0], corner[1] + 500))
     assert re.search(r"\d\d % of Wolf", refused(part))
+    turned = folder / "turned.geojson"
+    ring = [[b, a] for a, b in polygon(FIELD)["coordinates"][0]]
+    turned.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    assert "swapped" in refused(dem, area=turned)
     holes = heights.copy()
     holes[:, 80:] = np.nan
     assert "where it has none" in refused(write_map(folder / "holes.tif", holes, corner))
