@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.flight.readers.tracks import check, survives
+from tests.flight.readers.tracks import check, near, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.dji import airdata
 
@@ -79,7 +79,7 @@ def test_fraction_of_a_second(begin, pause):
     check(log)
     expected = START.timestamp() + begin + 0.1 * np.arange(600) + pause * (np.arange(600) >= 300)
     # Rows are 0.1 s apart, so that a second begins up to 0.05 s from the middle between two.
-    np.testing.assert_allclose(log.parts["gnss"].columns["time_s"], expected, rtol=0, atol=0.06)
+    near(log.parts["gnss"].columns, 0.06, time_s=expected)
     assert any("73" in one for one in log.notes) == (pause > 0)
     assert log.clock.spread_s < 0.1
 
@@ -108,9 +108,7 @@ def test_feet_and_miles_renamed_and_reordered():
     order = tuple(sorted(made[0]))
     log = airdata.read(Path("x.csv"), table(made, order).encode())
     columns = log.parts["poses"].columns
-    np.testing.assert_allclose(columns["height_home_m"], 30.5 * 0.3048)
-    np.testing.assert_allclose(columns["height_sea_m"], 120.25 * 0.3048)
-    np.testing.assert_allclose(columns["v_east_m_s"], -4.0 * 0.44704)
+    near(columns, height_home_m=30.5 * 0.3048, height_sea_m=120.25 * 0.3048, v_east_m_s=-4.0 * 0.44704)
 
 
 def test_missing_columns():

@@ -21,6 +21,7 @@ from tests.flight.readers.dataflash_logs import (
     second_generation,
     third_generation,
 )
+from tests.flight.readers.tracks import near
 from wildlab.flight.readers.ardupilot import binary as dataflash
 from wildlab.flight.readers.ardupilot import text as dataflash_text
 from wildlab.flight.readers.logs.formats import read_log
@@ -120,14 +121,14 @@ def test_early_rows_are_dated_by_the_first_true_fix():
     log = read(third_generation(truth))
     gnss = log.parts["gnss"]
     assert whys(gnss) == {"": 150, "no fix": 50}
-    np.testing.assert_allclose(gnss.columns["time_s"], truth.utc(gnss.columns["time_log_s"]), atol=2e-3)
+    near(gnss.columns, 0.002, time_s=truth.utc(gnss.columns["time_log_s"]))
     poses = log.parts["poses"]
     assert whys(poses) == {"": 300, "no position at that time": 100}
     assert poses.columns["time_s"][0] == pytest.approx(float(truth.utc(20.0)), abs=2e-3)
     np.testing.assert_allclose(gnss.columns["sd_horizontal_m"][gnss.used], 1.5)
     # What the receiver could not say, 655.35 m, is not known.
     assert np.isnan(gnss.columns["sd_vertical_m"][~gnss.used]).all()
-    np.testing.assert_allclose(gnss.columns["undulation_m"], 48.5)
+    near(gnss.columns, undulation_m=48.5)
 
 
 def test_gimbal_and_images():
@@ -135,11 +136,11 @@ def test_gimbal_and_images():
     gimbal, triggers = log.parts["gimbal"].columns, log.parts["triggers"].columns
     assert (gimbal["pitch_world_deg"][0], gimbal["yaw_world_deg"][0], gimbal["pan_deg"][0]) == (-60, 110, 20)
     assert triggers["number"].tolist() == list(range(1, 9))
-    np.testing.assert_allclose(triggers["yaw_deg"], [90 + 2.5 * i for i in range(8)])
+    near(triggers, yaw_deg=[90 + 2.5 * i for i in range(8)])
     # Images of the first generation know GPS time alone, and not what their heights count from.
     old = read(first_generation(Truth(2014)))
     triggers = old.parts["triggers"].columns
-    np.testing.assert_allclose(triggers["time_log_s"], [20.0 + 5 * i for i in range(8)], atol=0.1)
+    near(triggers, 0.1, time_log_s=[20.0 + 5 * i for i in range(8)])
     assert "height_sea_m" not in triggers
 
 

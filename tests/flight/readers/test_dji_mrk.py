@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.flight.readers.tracks import check, survives
+from tests.flight.readers.tracks import check, near, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.dji import mrk as dji_mrk
 from wildlab.flight.time.leap_seconds import week_to_utc
@@ -27,13 +27,11 @@ def test_values():
     check(log)
     k = np.arange(1, 21)
     columns = log.parts["triggers"].columns
-    np.testing.assert_array_equal(columns["number"], k)
-    np.testing.assert_allclose(columns["time_s"], week_to_utc(2200, 302400 + 2.5 * k), atol=1e-6)
-    np.testing.assert_allclose(columns["latitude_deg"], 63.4 + 1e-5 * k, atol=1e-9)
-    np.testing.assert_allclose(columns["height_ellipsoid_m"], 100 + 0.1 * k, atol=1e-9)
-    np.testing.assert_allclose(columns["sd_horizontal_m"], np.sqrt((0.012**2 + 0.016**2) / 2))
-    np.testing.assert_allclose(columns["sd_vertical_m"], 0.03)
-    assert (columns["fix"] == 6.0).all()
+    near(columns, 0, number=k)
+    near(columns, 1e-06, time_s=week_to_utc(2200, 302400 + 2.5 * k))
+    near(columns, 1e-09, latitude_deg=63.4 + 1e-05 * k, height_ellipsoid_m=100 + 0.1 * k)
+    near(columns, sd_horizontal_m=np.sqrt((0.012**2 + 0.016**2) / 2), sd_vertical_m=0.03)
+    near(columns, 0, fix=6.0)
     assert columns["use"].all()
     assert log.clock.offset_s == 315964800.0 - 18.0
 

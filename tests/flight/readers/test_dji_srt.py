@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.flight.readers.tracks import check, survives
+from tests.flight.readers.tracks import check, near, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.dji import srt as dji_srt
 
@@ -74,7 +74,7 @@ def test_samples(name, shared_data):
                 assert columns["use"][0] == 1
         elif name != "mix_p4rtk_mavic2pro.srt":
             assert log.clock is None
-            assert (columns["use"] == 1).all()
+            near(columns, 0, use=1)
 
 
 def test_angles_of_the_phantom(shared_data):
@@ -102,11 +102,8 @@ def test_heights_and_gimbal_of_new_aircraft():
     log = dji_srt.read(Path("x.SRT"), data, "Europe/Oslo")
     check(log)
     columns = log.parts["gnss"].columns
-    np.testing.assert_allclose(columns["height_home_m"], 20.3 + np.arange(5))
-    np.testing.assert_allclose(columns["height_sea_m"], 140.5 + np.arange(5))
-    np.testing.assert_allclose(
-        columns["time_s"], seconds("2026-06-01T10:00:00.123") + np.arange(5), atol=1e-6
-    )
+    near(columns, height_home_m=20.3 + np.arange(5), height_sea_m=140.5 + np.arange(5))
+    near(columns, 1e-06, time_s=seconds("2026-06-01T10:00:00.123") + np.arange(5))
     gimbal = log.parts["gimbal"].columns
     assert [gimbal[f"{name}_world_deg"][0] for name in ("yaw", "pitch", "roll")] == [77.4, -90.0, 0.5]
     assert "poses" not in log.parts
@@ -118,8 +115,7 @@ def test_names_and_order():
     reordered = subtitles(*(re.sub(r"(\[lat.*?\]) (\[lon.*?\])", r"\2 \1", new(k)) for k in range(3)))
     for text in (misspelt, reordered):
         columns = dji_srt.read(Path("x"), text.encode(), "UTC").parts["gnss"].columns
-        np.testing.assert_allclose(columns["longitude_deg"], 10.4)
-        np.testing.assert_allclose(columns["latitude_deg"], 63.4 + 1e-5 * np.arange(3))
+        near(columns, longitude_deg=10.4, latitude_deg=63.4 + 1e-05 * np.arange(3))
     # Longitude first by habit, and here it can only be the other way.
     turned = subtitles("GPS (-34.5, -121.7, 17), H 20.00m", "GPS (-34.5, -121.8, 17), H 20.00m")
     log = dji_srt.read(Path("x"), turned.encode())

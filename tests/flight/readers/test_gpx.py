@@ -8,7 +8,7 @@ import gpxpy
 import numpy as np
 import pytest
 
-from tests.flight.readers.tracks import check, survives
+from tests.flight.readers.tracks import check, near, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.tracks import gpx
 
@@ -107,8 +107,8 @@ def test_speed_course_and_quality_of_gpx_1_0():
     cases = [("3d", 1.0), ("none", 1.0), ("dgps", 99.9), ("2d", 1.5)]
     body = "".join(point(k, inside=inside.format(k, *case)) for k, case in enumerate(cases))
     columns = gpx.read(Path("x.gpx"), document(body, version="1.0")).parts["gnss"].columns
-    np.testing.assert_allclose(columns["v_east_m_s"], 5.0)
-    np.testing.assert_allclose(columns["v_north_m_s"], 0.0, atol=1e-12)
+    near(columns, v_east_m_s=5.0)
+    near(columns, 1e-12, v_north_m_s=0.0)
     assert columns["fix"].tolist() == [3.0, 0.0, 4.0, 2.0]
     assert columns["why"].tolist() == ["", "no fix", "no dilution of precision", ""]
     assert columns["undulation_m"].tolist() == [40.0] * 4

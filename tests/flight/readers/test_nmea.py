@@ -8,7 +8,7 @@ import numpy as np
 import pynmea2
 import pytest
 
-from tests.flight.readers.tracks import check, survives
+from tests.flight.readers.tracks import check, near, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.tracks import nmea
 
@@ -94,21 +94,23 @@ def test_over_midnight_from_any_sentence(without):
         log = nmea.read(Path("x"), text.encode())
         check(log)
         expected = start.timestamp() + 0.2 * np.arange(20)
-        np.testing.assert_allclose(log.parts["gnss"].columns["time_s"], expected, atol=1e-6)
+        near(log.parts["gnss"].columns, 1e-06, time_s=expected)
         assert log.parts["gnss"].used.all()
 
 
 def test_values():
     log = nmea.read(Path("x"), track(datetime(2014, 5, 1, tzinfo=UTC), 3, speed=10.0, course=30.0))
     columns = log.parts["gnss"].columns
-    np.testing.assert_allclose(columns["latitude_deg"], 63.4 + 1e-6 * np.arange(3), atol=1e-9)
-    np.testing.assert_allclose(columns["longitude_deg"], 10.4 - 2e-6 * np.arange(3), atol=1e-9)
-    np.testing.assert_allclose(columns["v_north_m_s"], 10 * KNOT * math.cos(math.pi / 6))
-    np.testing.assert_allclose(columns["v_east_m_s"], 10 * KNOT * 0.5)
-    np.testing.assert_allclose(columns["height_sea_m"], 12.5)
-    np.testing.assert_allclose(columns["undulation_m"], 40.1)
-    np.testing.assert_allclose(columns["sd_horizontal_m"], math.sqrt((0.3**2 + 0.4**2) / 2))
-    np.testing.assert_allclose(columns["sd_vertical_m"], 0.9)
+    near(columns, 1e-09, latitude_deg=63.4 + 1e-06 * np.arange(3), longitude_deg=10.4 - 2e-06 * np.arange(3))
+    near(
+        columns,
+        v_north_m_s=10 * KNOT * math.cos(math.pi / 6),
+        v_east_m_s=10 * KNOT * 0.5,
+        height_sea_m=12.5,
+        undulation_m=40.1,
+        sd_horizontal_m=math.sqrt((0.3**2 + 0.4**2) / 2),
+        sd_vertical_m=0.9,
+    )
     assert columns["fix"].tolist() == [6.0] * 3
     assert columns["satellites"].tolist() == [12.0] * 3
 
@@ -170,10 +172,10 @@ def test_talkers():
     )
     log = nmea.read(Path("x"), both.encode())
     assert log.parts["gnss"].used.all()
-    np.testing.assert_allclose(log.parts["gnss"].columns["latitude_deg"], 63.4)
+    near(log.parts["gnss"].columns, latitude_deg=63.4)
     plotter = burst(start, 63.5, 10.4, talker="II") + burst(start, 63.4, 10.4, talker="SD", without=("RMC",))
     log = nmea.read(Path("x"), plotter.encode())
-    np.testing.assert_allclose(log.parts["gnss"].columns["latitude_deg"], 63.5)
+    near(log.parts["gnss"].columns, latitude_deg=63.5)
 
 
 def test_no_date():
@@ -181,7 +183,7 @@ def test_no_date():
     log = nmea.read(Path("x"), track(start, 10, without=("RMC",)))
     stream = log.parts["gnss"]
     assert np.isnan(stream.columns["time_s"]).all()
-    np.testing.assert_allclose(stream.columns["time_log_s"], 86399 + 0.2 * np.arange(10), atol=1e-6)
+    near(stream.columns, 1e-06, time_log_s=86399 + 0.2 * np.arange(10))
     assert log.clock is None
 
 

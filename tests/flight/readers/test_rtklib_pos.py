@@ -9,7 +9,7 @@ import pandas as pd
 import pymap3d
 import pytest
 
-from tests.flight.readers.tracks import check, survives
+from tests.flight.readers.tracks import check, near, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.tracks import rtklib_pos
 
@@ -91,14 +91,12 @@ def test_every_way_gives_the_same_track(way):
     check(log)
     stream = log.parts["gnss"]
     assert stream.used.all()
-    np.testing.assert_allclose(stream.columns["time_s"], UTC_S, rtol=0, atol=1e-3)
-    np.testing.assert_allclose(stream.columns["latitude_deg"], LATITUDE, rtol=0, atol=2e-9)
-    np.testing.assert_allclose(stream.columns["longitude_deg"], LONGITUDE, rtol=0, atol=2e-9)
-    np.testing.assert_allclose(stream.columns["height_ellipsoid_m"], HEIGHT, rtol=0, atol=1e-4)
-    assert (stream.columns["fix"] == 6.0).all()
+    near(stream.columns, 0.001, time_s=UTC_S)
+    near(stream.columns, 2e-09, latitude_deg=LATITUDE, longitude_deg=LONGITUDE)
+    near(stream.columns, 0.0001, height_ellipsoid_m=HEIGHT)
+    near(stream.columns, 0, fix=6.0)
     if way != "ecef":
-        np.testing.assert_allclose(stream.columns["sd_horizontal_m"], math.sqrt((0.3**2 + 0.4**2) / 2))
-        np.testing.assert_allclose(stream.columns["sd_vertical_m"], 0.9)
+        near(stream.columns, sd_horizontal_m=math.sqrt((0.3**2 + 0.4**2) / 2), sd_vertical_m=0.9)
     assert ("put in order" in " ".join(log.notes)) == (way == "backwards")
     assert ("no header names the columns" in " ".join(log.notes)) == (way == "no header")
     assert stream.rows[0] == {"backwards": 4 + COUNT, "no header": 1}.get(way, 5)
@@ -116,7 +114,7 @@ def test_equals_pandas(shared_data):
         np.testing.assert_array_equal(columns[name], table[k])
     stamps = pd.to_datetime(table[0] + " " + table[1], utc=True)
     seconds = (stamps - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy() - 18.0
-    np.testing.assert_allclose(columns["time_s"], seconds, rtol=0, atol=1e-6)
+    near(columns, 1e-06, time_s=seconds)
     assert (columns["fix"] == 6.0).sum() == (table[5] == 1).sum()
 
 
@@ -127,7 +125,7 @@ def test_geodetic_heights_velocities_and_quality():
         **{"vertical": "geodetic", "rest": rest, "tail": "1 1 1 3.0 -4.0 0.5", "quality": [*range(8)] * 5},
     )
     columns = rtklib_pos.read(Path("x"), data.encode()).parts["gnss"].columns
-    np.testing.assert_allclose(columns["height_sea_m"], HEIGHT, atol=1e-4)
+    near(columns, 0.0001, height_sea_m=HEIGHT)
     assert "height_ellipsoid_m" not in columns
     assert (columns["v_north_m_s"][0], columns["v_east_m_s"][0], columns["v_down_m_s"][0]) == (
         3.0,
@@ -164,8 +162,8 @@ def test_reordered_and_missing_columns():
         f"{t} {h:.4f} {b:.9f} {a:.9f}\n" for t, a, b, h in zip(GPST, LATITUDE, LONGITUDE, HEIGHT, strict=True)
     )
     columns = rtklib_pos.read(Path("x"), text.encode()).parts["gnss"].columns
-    np.testing.assert_allclose(columns["latitude_deg"], LATITUDE, atol=1e-9)
-    np.testing.assert_allclose(columns["height_ellipsoid_m"], HEIGHT, atol=1e-4)
+    near(columns, 1e-09, latitude_deg=LATITUDE)
+    near(columns, 0.0001, height_ellipsoid_m=HEIGHT)
     assert "fix" not in columns
     assert "sd_horizontal_m" not in columns
 

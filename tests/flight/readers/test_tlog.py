@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
 from tests.flight.readers.mavlink_logs import BOOT_S, ORIGIN, START_S, frame, joined, made, telemetry
-from tests.flight.readers.tracks import check, damaged
+from tests.flight.readers.tracks import check, damaged, near
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs.formats import recognise
 from wildlab.flight.readers.mavlink import telemetry as tlog
@@ -100,7 +100,7 @@ def test_straight_flight(version_1):
     assert np.allclose(north, 10 * at, atol=0.02)
     assert np.allclose(poses["height_sea_m"][used], 150)
     assert np.allclose(poses["height_home_m"][used], 50)
-    assert np.allclose(poses["roll_deg"], np.degrees(0.1), atol=1e-5)
+    near(poses, 1e-05, roll_deg=np.degrees(0.1))
     assert np.allclose(poses["v_north_m_s"][used], 10)
 
 
@@ -134,7 +134,7 @@ def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts():
     log = read(joined(flight, told))
     assert log.clock.base == "UTC of the messages SYSTEM_TIME"
     poses = log.parts["poses"].columns
-    assert np.allclose(poses["time_s"], START_S + 3 + poses["time_log_s"] - BOOT_S, atol=1e-3)
+    near(poses, 0.001, time_s=START_S + 3 + poses["time_log_s"] - BOOT_S)
 
 
 def test_restart_has_a_clock_of_its_own():
@@ -187,15 +187,19 @@ def test_gnss_values():
     part = gnss(h_acc=900, v_acc=1500, vel_acc=200, alt_ellipsoid=141_000)
     assert part.used.all()
     columns = part.columns
-    assert np.allclose(columns["v_north_m_s"], 0, atol=1e-9)
-    assert np.allclose(columns["v_east_m_s"], 5)
-    assert (columns["height_sea_m"] == 100).all()
-    assert (columns["height_ellipsoid_m"] == 141).all()
-    assert (columns["sd_horizontal_m"] == 0.9).all()
-    assert (columns["sd_vertical_m"] == 1.5).all()
-    assert (columns["sd_velocity_m_s"] == 0.2).all()
-    assert (columns["hdop"] == 0.8).all()
-    assert np.allclose(columns["time_s"], START_S + np.arange(20) * 0.2, atol=1e-3)
+    near(columns, 1e-09, v_north_m_s=0)
+    near(columns, v_east_m_s=5)
+    near(
+        columns,
+        0,
+        height_sea_m=100,
+        height_ellipsoid_m=141,
+        sd_horizontal_m=0.9,
+        sd_vertical_m=1.5,
+        sd_velocity_m_s=0.2,
+        hdop=0.8,
+    )
+    near(columns, 0.001, time_s=START_S + np.arange(20) * 0.2)
 
 
 @pytest.mark.parametrize(
@@ -227,10 +231,10 @@ def gnss_usual(name: str, row: int, usual: dict[str, int]) -> int:
 
 def test_gnss_stamps_in_utc_and_none_that_is_known():
     part = gnss(time_usec=lambda row: round((START_S + 0.2 * row + 40) * 1e6))
-    assert np.allclose(part.columns["time_s"], START_S + np.arange(20) * 0.2 + 40)
+    near(part.columns, time_s=START_S + np.arange(20) * 0.2 + 40)
     part = gnss(time_usec=0)
     assert part.used.all()
-    assert np.allclose(part.columns["time_s"], START_S + np.arange(20) * 0.2 + 0.01)
+    near(part.columns, time_s=START_S + np.arange(20) * 0.2 + 0.01)
     assert np.isnan(part.columns["time_log_s"]).all()
 
 

@@ -1,6 +1,7 @@
 """PX4 logs: values against pyulog on the whole file, both generations of names, damage of all kinds."""
 
 import struct
+import time
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,9 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from tests.flight.readers.mavlink_logs import START_S, ulog
-from tests.flight.readers.tracks import check
+from tests.flight.readers.mavlink_logs import START_S, message, ulog
+from tests.flight.readers.tracks import check, near, survives
+from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs.formats import recognise
 from wildlab.flight.readers.px4 import ulog as reader
 from wildlab.flight.readers.px4.frames import sound_part
@@ -54,27 +56,24 @@ def place(count: int = 50) -> tuple[str, list[tuple[Any, ...]]]:
 
 
 def new_gps(count: int = 25, **other: float) -> tuple[str, list[tuple[Any, ...]]]:
-    usual = {
-        "lat": LAT,
-        "lon": LON,
-        "up": 120.0,
-        "ellipsoid": 160.0,
-        "fix": 3,
-        "vn": 5.0,
-        "valid": True,
-    } | other
+    usual = {"lat": LAT, "lon": LON, "up": 120.0, "ellipsoid": 160.0, "fix": 3, "vn": 5.0, "valid": True}
+    lat, lon, up, ellipsoid, fix, vn, valid = (usual | other).values()
     rows = []
     for k in range(count):
         utc = round((START_S + k * 0.2) * 1e6)
-        where = (usual["lat"] + 1e-7 * k, usual["lon"], usual["up"], usual["ellipsoid"], utc)
-        rows.append(
-            (us(2 * k), *where, 0.9, 1.5, 0.2, usual["vn"], 0.0, 0.0, usual["fix"], 14, usual["valid"])
-        )
+        where = (lat + 1e-7 * k, lon, up, ellipsoid, utc, 0.9, 1.5, 0.2)
+        rows.append((us(2 * k), *where, vn, 0.0, 0.0, fix, 14, valid))
     return NEW_GPS, rows
 
 
 def read(data: bytes) -> Any:
-    return reader.read(PATH, data)
+    log = reader.read(PATH, data)
+    check(log)
+    return log
+
+
+def part_of(name: str, **more: Any) -> Any:
+    return reader.read(PATH, ulog(flight(**more))).parts[name]
 
 
 def flight(**more: Any) -> dict[str, Any]:
@@ -94,61 +93,42 @@ def test_every_value_of_the_samples_is_pyulogs(shared_data, folder, name):
     sound = sound_part(data, TOPICS)
     assert (sound.skipped, sound.rest, sound.homeless) == (0, 0, {})
     whole = ULog(str(path), list(TOPICS))
-    log = reader.read(path, data)
-    check(log)
+    log = read(data)
     assert log.lost == ()
 
-    def same(part: str, topic: str, **fields: tuple[str, float]) -> None:
+    def same(part: str, topic: str, factor: float = 1, **fields: str) -> None:
         truth = whole.get_dataset(topic).data
-        ours = log.parts[part].columns
         assert len(log.parts[part]) == len(truth["timestamp"])
-        for column, (field, factor) in fields.items():
-            values = truth[field].astype(float) * factor
-            assert np.array_equal(ours[column], values, equal_nan=True), column
+        near(log.parts[part].columns, 0, **{ours: truth[one] * factor for ours, one in fields.items()})
 
-    same(
-        "gnss",
-        "vehicle_gps_position",
-        latitude_deg=("latitude_deg", 1),
-        longitude_deg=("longitude_deg", 1),
-        height_sea_m=("altitude_msl_m", 1),
-        sd_horizontal_m=("eph", 1),
-        sd_vertical_m=("epv", 1),
-        sd_velocity_m_s=("s_variance_m_s", 1),
-        v_north_m_s=("vel_n_m_s", 1),
-        v_east_m_s=("vel_e_m_s", 1),
-        v_down_m_s=("vel_d_m_s", 1),
-        satellites=("satellites_used", 1),
-        fix=("fix_type", 1),
-        hdop=("hdop", 1),
-    )
-    same(
-        "imu",
-        "sensor_combined",
-        f_x_m_s2=("accelerometer_m_s2[0]", 1),
-        f_z_m_s2=("accelerometer_m_s2[2]", 1),
-        w_x_rad_s=("gyro_rad[0]", 1),
-        w_z_rad_s=("gyro_rad[2]", 1),
-    )
-    same("magnetometer", "vehicle_magnetometer", field_y_ut=("magnetometer_ga[1]", 100))
-    q = np.stack([log.parts["poses"].columns[f"q_{axis}"] for axis in "wxyz"], axis=1)
+    same("gnss", "vehicle_gps_position", latitude_deg="latitude_deg", longitude_deg="longitude_deg",
+         height_sea_m="altitude_msl_m", sd_horizontal_m="eph", sd_vertical_m="epv", fix="fix_type",
+         sd_velocity_m_s="s_variance_m_s", v_north_m_s="vel_n_m_s", v_east_m_s="vel_e_m_s",
+         v_down_m_s="vel_d_m_s", satellites="satellites_used", hdop="hdop")  # fmt: skip
+    same("imu", "sensor_combined", f_x_m_s2="accelerometer_m_s2[0]", f_z_m_s2="accelerometer_m_s2[2]",
+         w_x_rad_s="gyro_rad[0]", w_z_rad_s="gyro_rad[2]")  # fmt: skip
+    field = whole.get_dataset("vehicle_magnetometer").data["magnetometer_ga[1]"]
+    near(log.parts["magnetometer"].columns, 0, field_y_ut=field.astype(float) * 100)
     truth = whole.get_dataset("vehicle_attitude").data
-    assert np.allclose(q, np.stack([truth[f"q[{k}]"] for k in range(4)], axis=1), atol=1e-6)
+    near(log.parts["poses"].columns, 1e-6, **{f"q_{axis}": truth[f"q[{k}]"] for k, axis in enumerate("wxyz")})
     # UTC, to what the receiver's own stamps scatter by.
     gps = whole.get_dataset("vehicle_gps_position").data
-    assert np.abs(log.parts["gnss"].columns["time_s"] - gps["time_utc_usec"] / 1e6).max() < 0.05
+    near(log.parts["gnss"].columns, 0.05, time_s=gps["time_utc_usec"] / 1e6)
 
 
 def test_a_crash_is_read_to_its_end(shared_data):
-    path = shared_data("logs", "px4_quad_ekf_failure", "ekf_failure.ulg")
-    log = reader.read(path, path.read_bytes())
+    log = read(shared_data("logs", *SAMPLES[1]).read_bytes())
     poses = log.parts["poses"].columns
     assert poses["roll_deg"].min() == pytest.approx(-112.8, abs=0.1)
     first = poses["time_log_s"][np.abs(poses["roll_deg"]) > 60][0]
     assert first == pytest.approx(114.7, abs=0.1)
     assert poses["time_log_s"][-1] > 126
     assert log.vehicle == "PX4 v1.15.0 (beta) on NXP_MR_TROPIC"
-    assert np.nanmedian(poses["height_ellipsoid_m"] - poses["height_sea_m"]) == pytest.approx(45.05, abs=0.05)
+
+
+def used(log: Any, part: str) -> dict[str, Any]:
+    """The columns of the rows of use."""
+    return {name: values[log.parts[part].used] for name, values in log.parts[part].columns.items()}
 
 
 def test_one_height_for_both_names(shared_data):
@@ -183,20 +163,14 @@ def test_the_local_frame_keeps_distance_and_bearing_on_the_sphere():
 
 def test_poses():
     log = read(ulog(flight(), {"sys_name": "PX4", "ver_hw": "BOARD", "ver_sw_release": 0x010E02FF}))
-    check(log)
     assert log.vehicle == "PX4 v1.14.2 on BOARD"
-    poses = log.parts["poses"]
-    assert poses.used.sum() == 49  # the first sample is older than the first place
-    columns = {name: values[poses.used] for name, values in poses.columns.items()}
-    rows = np.arange(1, 50)
-    assert np.allclose(columns["yaw_deg"], 30, atol=1e-4)
+    columns, rows = used(log, "poses"), np.arange(1, 50)  # the first sample is older than the first place
     # Attitudes are of 0.4 ms before their stamps.
-    assert np.allclose(columns["time_log_s"], 100 + 0.1 * rows - 4e-4, atol=1e-9)
-    assert np.allclose(columns["time_s"], START_S + 0.1 * rows - 4e-4, atol=1e-5)
-    assert np.allclose(columns["latitude_deg"], LAT + 1e-6 * (rows - 4e-3), atol=1e-10)
-    assert np.allclose(columns["height_sea_m"], 120 + rows - 4e-3, atol=1e-4)
-    assert np.allclose(columns["sd_horizontal_m"], 0.5)
-    assert np.allclose(columns["sd_vertical_m"], 0.7)
+    near(columns, time_log_s=100 + 0.1 * rows - 4e-4)
+    near(columns, 1e-5, time_s=START_S + 0.1 * rows - 4e-4)
+    near(columns, 1e-10, latitude_deg=LAT + 1e-6 * (rows - 4e-3))
+    near(columns, 1e-4, yaw_deg=30, height_sea_m=120 + rows - 4e-3)
+    near(columns, 1e-7, sd_horizontal_m=0.5, sd_vertical_m=0.7)
 
 
 def test_poses_from_the_local_frame_alone():
@@ -206,14 +180,9 @@ def test_poses_from_the_local_frame_alone():
     ]
     topics = flight(vehicle_local_position=(LOCAL, rows))
     del topics["vehicle_global_position"]
-    log = read(ulog(topics))
-    check(log)
-    poses = log.parts["poses"]
-    columns = {name: values[poses.used] for name, values in poses.columns.items()}
-    assert np.allclose(columns["height_sea_m"], 105)
-    assert np.allclose(columns["v_north_m_s"], 10)
-    assert np.allclose(columns["sd_heading_deg"], np.degrees(0.1), atol=1e-4)
-    assert np.allclose(columns["sd_tilt_deg"], np.degrees(0.01), atol=1e-4)
+    columns = used(read(ulog(topics)), "poses")
+    near(columns, height_sea_m=105, v_north_m_s=10)
+    near(columns, 1e-4, sd_heading_deg=np.degrees(0.1), sd_tilt_deg=np.degrees(0.01))
     metres = (columns["latitude_deg"] - LAT) * np.pi / 180 * 6371000
     assert np.allclose(metres, np.arange(1, 50) - 4e-3, atol=1e-5)
 
@@ -225,14 +194,10 @@ def test_old_names_and_integers():
         where = (round(LAT * 1e7), round(LON * 1e7), 120_500, 161_000)
         rows.append((utc, us(2 * k), *where, 0.2, 0.9, 1.5, 0.8, 5.0, 1.0, 0.0, -50_000, 3, True, 14))
     log = read(ulog(flight(vehicle_gps_position=(OLD_GPS, rows))))
-    check(log)
     columns = log.parts["gnss"].columns
-    assert np.allclose(columns["latitude_deg"], LAT, atol=1e-9)
-    assert np.allclose(columns["height_sea_m"], 120.5)
-    assert np.allclose(columns["height_ellipsoid_m"], 161.0)
-    assert np.allclose(columns["v_east_m_s"], 1.0)
+    near(columns, latitude_deg=LAT, height_sea_m=120.5, height_ellipsoid_m=161.0, v_east_m_s=1.0)
     # UTC is of 50 ms before the message.
-    assert np.allclose(columns["time_s"], START_S + 0.2 * np.arange(25), atol=1e-5)
+    near(columns, 1e-5, time_s=START_S + 0.2 * np.arange(25))
     assert log.clock.base == "UTC of the receiver"
     assert log.clock.rate == pytest.approx(1.0, abs=1e-7)
 
@@ -254,14 +219,14 @@ def test_old_names_and_integers():
 def test_fixes_that_cannot_be_true(other, reason):
     form, rows = new_gps()
     rows[12] = new_gps(**other)[1][12]
-    part = read(ulog(flight(vehicle_gps_position=(form, rows)))).parts["gnss"]
+    part = part_of("gnss", vehicle_gps_position=(form, rows))
     assert part.columns["why"][12] == reason
     assert part.used.sum() == 24
 
 
-def test_velocity_that_is_not_valid_is_none():
-    columns = read(ulog(flight(vehicle_gps_position=new_gps(valid=False)))).parts["gnss"].columns
-    assert "v_north_m_s" not in columns
+def test_values_that_are_not_valid_or_not_known_are_none():
+    assert "v_north_m_s" not in part_of("gnss", vehicle_gps_position=new_gps(valid=False)).columns
+    assert "height_ellipsoid_m" not in part_of("gnss", vehicle_gps_position=new_gps(ellipsoid=0.0)).columns
 
 
 def test_wrong_stamps_cost_their_rows_alone():
@@ -269,16 +234,13 @@ def test_wrong_stamps_cost_their_rows_alone():
     rows[20] = (us(20) + (1 << 40), 0, *rows[20][2:])
     rows[30] = (rows[29][1], 0, *rows[30][2:])
     rows[40] = (us(3), 0, *rows[40][2:])
-    poses = read(ulog(flight(vehicle_attitude=(form, rows)))).parts["poses"]
-    assert poses.used.sum() == 46
-    check(read(ulog(flight(vehicle_attitude=(form, rows)))))
+    assert part_of("poses", vehicle_attitude=(form, rows)).used.sum() == 46
 
 
 def test_without_utc_there_is_the_time_since_start():
     topics = flight()
     del topics["vehicle_gps_position"]
     log = read(ulog(topics))
-    check(log)
     assert log.clock.base == ""
     assert np.isnan(log.parts["poses"].columns["time_s"]).all()
     assert log.parts["poses"].used.sum() == 49
@@ -301,53 +263,46 @@ def test_first_instance_is_read():
     wrong = [(row[0], 1.0, *row[2:]) for row in rows]
     del (topics := flight())["vehicle_gps_position"]
     log = read(ulog({"sensor_gps#1": (form, wrong), "sensor_gps#0": (form, rows), **topics}))
-    assert np.allclose(log.parts["gnss"].columns["latitude_deg"], LAT, atol=1e-5)
+    near(log.parts["gnss"].columns, 1e-5, latitude_deg=LAT)
 
 
 def test_inertial_sensor_and_magnetometers():
     rows = [(us(k, 0.01), 0.1, 0.2, 0.3, 0.0, 0.0, np.nan if k == 9 else -9.8, 0) for k in range(400)]
     field = ("uint64_t timestamp;float x;float y;float z;", [(us(k), 0.1, 0.2, 0.4) for k in range(40)])
     log = read(ulog(flight(sensor_combined=(COMBINED, rows), sensor_mag=field)))
-    check(log)
     imu = log.parts["imu"]
     assert imu.columns["why"][9] == "not a number"
     assert imu.used.sum() == 399
-    assert np.allclose(imu.columns["w_z_rad_s"], 0.3)
-    assert np.allclose(log.parts["magnetometer"].columns["field_z_ut"], 40)
+    near(imu.columns, 1e-7, w_z_rad_s=0.3)
+    near(log.parts["magnetometer"].columns, 1e-5, field_z_ut=40)
 
 
 def test_triggers():
     form = (
         "uint64_t timestamp;uint64_t timestamp_utc;uint32_t seq;double lat;double lon;float alt;float[4] q;"
     )
-    rows = [(us(k), 0, k, LAT if k else 0.0, LON if k else 0.0, 130.0, 1.0, 0.0, 0.0, 0.0) for k in range(10)]
-    part = read(ulog(flight(camera_capture=(form, rows)))).parts["triggers"]
-    assert part.used.all()
-    assert (part.columns["number"] == np.arange(10)).all()
-    assert np.isnan(part.columns["latitude_deg"][0])
-    assert np.allclose(part.columns["height_sea_m"][1:], 130)
+    k = np.arange(10)
+    rows = [(us(i), 0, i, LAT if i else 0.0, LON if i else 0.0, 130.0, 1.0, 0.0, 0.0, 0.0) for i in range(10)]
+    part = part_of("triggers", camera_capture=(form, rows))
+    assert part.used.all() and np.isnan(part.columns["latitude_deg"][0])
+    near(part.columns, number=k, height_sea_m=[np.nan] + [130.0] * 9)
     form = "uint64_t timestamp;uint32_t seq;bool feedback;"
-    part = read(ulog(flight(camera_trigger=(form, [(us(k), k, False) for k in range(10)])))).parts["triggers"]
-    assert np.allclose(part.columns["time_s"], START_S + 0.1 * np.arange(10), atol=1e-5)
+    part = part_of("triggers", camera_trigger=(form, [(us(i), i, False) for i in range(10)]))
+    near(part.columns, 1e-5, time_s=START_S + 0.1 * k)
 
 
-@pytest.mark.parametrize(("flags", "yaw"), [(0, 30.0), (32, 30.0), (64, 0.0), (16, 0.0)])
-def test_gimbal_device(flags, yaw):
-    form = "uint64_t timestamp;float[4] q;uint16_t device_flags;"
+@pytest.mark.parametrize(("flags", "yaw"), [(0, 30.0), (32, 30.0), (64, 0.0), (16, 0.0), (None, 40.0)])
+def test_gimbal(flags, yaw):
+    """By its quaternion, whose flags say what the yaw counts from, or by angles (None)."""
     half = np.radians(-45) / 2
-    rows = [(us(k), np.cos(half), 0.0, np.sin(half), 0.0, flags) for k in range(2, 40)]
-    part = read(ulog(flight(gimbal_device_attitude_status=(form, rows)))).parts["gimbal"]
+    form, topic = "uint64_t timestamp;float[4] q;uint16_t device_flags;", "gimbal_device_attitude_status"
+    rows: list[Any] = [(us(k), np.cos(half), 0.0, np.sin(half), 0.0, flags) for k in range(2, 40)]
+    if flags is None:
+        form, topic = "uint64_t timestamp;float[3] attitude_euler_angle;", "mount_orientation"
+        rows = [(us(k), 0.0, np.radians(-45), np.radians(10)) for k in range(2, 40)]
+    part = part_of("gimbal", **{topic: (form, rows)})
     assert part.used.all()
-    assert np.allclose(part.columns["pitch_world_deg"], -45, atol=1e-4)
-    assert np.allclose(part.columns["yaw_world_deg"], yaw, atol=1e-3)
-
-
-def test_mount_orientation():
-    form = "uint64_t timestamp;float[3] attitude_euler_angle;"
-    rows = [(us(k), 0.0, np.radians(-60), np.radians(10)) for k in range(2, 40)]
-    part = read(ulog(flight(mount_orientation=(form, rows)))).parts["gimbal"]
-    assert np.allclose(part.columns["pitch_world_deg"], -60, atol=1e-4)
-    assert np.allclose(part.columns["yaw_world_deg"], 40, atol=1e-3)
+    near(part.columns, 1e-3, pitch_world_deg=-45, yaw_world_deg=yaw)
 
 
 def test_fields_in_another_order_extra_and_missing():
@@ -357,7 +312,7 @@ def test_fields_in_another_order_extra_and_missing():
     other = ("uint64_t timestamp;float new;", [(us(1), 2.0)])
     log = read(ulog(flight(vehicle_attitude=(form, body), vehicle_air_data=other)))
     assert log.parts["poses"].used.sum() == 50
-    assert np.allclose(log.parts["poses"].columns["roll_deg"], 0)
+    near(log.parts["poses"].columns, roll_deg=0)
     # Without the fields that a part is made of, there is no such part.
     bare = ("uint64_t timestamp;float else;", [(us(k), 0.0) for k in range(50)])
     log = read(ulog(flight(vehicle_attitude=bare, sensor_combined=bare, vehicle_magnetometer=bare)))
@@ -380,3 +335,100 @@ def test_padding_may_be_left_away():
     log = read(shorter)
     assert log.lost == ()
     assert log.parts["poses"].used.sum() == 49
+
+
+def test_dropouts_are_counted():
+    log = read(ulog(flight(), after=message("O", struct.pack("<H", 250)) * 3))
+    assert any("3 times" in one and "0.750 s" in one for one in log.notes)
+
+
+def test_appended_data_is_read():
+    plain = ulog(flight())
+    broken = plain + message("D", bytes(60))[:30]
+    flags = bytes(8) + b"\x01" + bytes(7) + struct.pack("<3Q", len(broken), 0, 0)
+    late = message("D", struct.pack("<H", 0) + struct.pack("<QQ4f", us(50), 0, 1.0, 0.0, 0.0, 0.0))
+    log = read(ulog(flight(), flags=flags)[: len(plain)] + broken[len(plain) :] + late)
+    assert len(log.parts["poses"]) == 51
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "does not begin"),
+        (b"ULog\x01\x12\x36" + bytes(100), "does not begin"),
+        (
+            ulog({"battery_status": ("uint64_t timestamp;float voltage_v;", [(us(1), 12.0)])}),
+            "holds no message",
+        ),
+        (ulog(flight(), flags=bytes(8) + b"\x04" + bytes(31)), r"\(flags 0x4\)"),
+    ],
+)
+def test_what_cannot_be_read_is_refused(data, words):
+    with pytest.raises(WildlabError, match=words):
+        read(data)
+
+
+def test_rows_of_a_topic_that_lost_its_introduction_are_left_out():
+    data = bytearray(ulog(flight()))
+    data[data.index(b"vehicle_attitude", data.index(b"A\x00\x00\x00"))] ^= 1
+    assert "poses" not in read(bytes(data)).parts
+
+
+def claims(form: str, before: bytes = b"") -> Any:
+    topics, name = flight(), b"vehicle_attitude"
+    del topics["vehicle_attitude"]
+    claimed = message("F", name + f":{form}".encode()) + message("A", struct.pack("<BH", 0, 77) + name)
+    return read(ulog(topics, before=before, after=claimed + message("D", struct.pack("<H", 77) + bytes(100))))
+
+
+def test_many_definitions_take_little_time_and_memory():
+    """Within each other, and as many instances of one that is wide."""
+    nested = [message("F", f"n{k}:{f'n{k + 1}' if k < 6 else 'float'}[60000] x;".encode()) for k in range(7)]
+    wide = message("F", b"sensor_mag:uint64_t timestamp;uint8_t[2000] x;")
+    many = [message("A", struct.pack("<BH", 0, number) + b"sensor_mag") for number in range(100, 20_100)]
+    began = time.monotonic()
+    assert "poses" not in claims("uint64_t timestamp;n0 q;", before=b"".join(nested)).parts
+    assert "gnss" in read(ulog(flight(), before=wide + b"".join(many))).parts
+    assert time.monotonic() - began < 7.0
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "uint64_t timestamp;uint8_t[99999] q;",
+        "uint64_t timestamp;uint8_t[65535] q;",
+        "uint64_t timestamp;vehicle_attitude again;",
+        "uint64_t timestamp;absent q;",
+        "float[4] q;",
+        "uint64_t timestamp;float q;float q;",
+        "uint64_t timestamp;float[4q;",
+        "",
+    ],
+)
+def test_absurd_definitions_are_left_out_and_said(form):
+    log = claims(form)
+    assert "poses" not in log.parts and "gnss" in log.parts
+    assert any("'vehicle_attitude'" in one for one in log.lost)
+
+
+def test_damage_anywhere():
+    assert survives(reader.read, ulog(flight(), {"sys_name": "PX4"})) > 0.65
+
+
+def test_one_wrong_length_costs_one_message():
+    data = bytearray(ulog(flight()))
+    at = data.index(struct.pack("<HB", 34, ord("D")), len(data) // 2)
+    data[at] ^= 0x10
+    log = read(bytes(data))
+    assert len(log.parts["poses"]) == 49
+    assert any(one.startswith(f"37 of {len(data)}") for one in log.lost)
+
+
+@pytest.mark.parametrize(
+    "unit", [b"\x02\x00D", b"\x00", b"\xff", b"\x03\x00A\x00\x09\x09", b"\x10\x00Q" + bytes(16)]
+)
+def test_no_input_takes_long(unit):
+    began = time.monotonic()
+    log = read(ulog(flight(), after=unit * (300_000 // len(unit))))
+    assert time.monotonic() - began < 10.0
+    assert len(log.parts["poses"]) == 50

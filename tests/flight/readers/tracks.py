@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs.log import PARTS, TIMES, RawLog
 
 Reader = Callable[[Path, bytes, str | None], RawLog]
+Columns = dict[str, Any]
 
 
 def damaged(data: bytes, cuts: int = 20, flips: int = 40) -> Iterator[bytes]:
@@ -27,20 +29,33 @@ def damaged(data: bytes, cuts: int = 20, flips: int = 40) -> Iterator[bytes]:
 def check(log: RawLog) -> None:
     """Rows of use are finite where a flight needs them to be, and in order of time."""
     for name, stream in log.parts.items():
-        assert set(stream.columns) <= {*PARTS[name], *TIMES, "use", "why"}
+        columns, used = stream.columns, stream.used
+        assert set(columns) <= {*PARTS[name], *TIMES, "use", "why"}
         assert len(stream) == len(stream.rows) > 0
-        used = stream.used
-        assert ((stream.columns["why"] == "") == used).all()
-        if "latitude_deg" in stream.columns:
-            assert np.isfinite(stream.columns["latitude_deg"][used]).all()
-            assert np.isfinite(stream.columns["longitude_deg"][used]).all()
-            heights = [stream.columns[one][used] for one in stream.columns if one.startswith("height")]
+        assert ((columns["why"] == "") == used).all()
+        if "latitude_deg" in columns:
+            assert np.isfinite(columns["latitude_deg"][used]).all()
+            assert np.isfinite(columns["longitude_deg"][used]).all()
+            heights = [columns[one][used] for one in columns if one.startswith("height")]
             if heights and np.isfinite(heights).any():
                 assert np.isfinite(heights).any(axis=0).all()
-        time = stream.columns["time_s"]
+        time = columns["time_s"]
         if np.isfinite(time).any():
             assert np.isfinite(time[used]).all()
             assert (np.diff(time[used]) > 0).all()
+
+
+def columns_of(reader: Any, data: str | bytes, part: str = "gnss", zone: str | None = None) -> Columns:
+    """Columns of a part of a log, of which all holds that must."""
+    log = reader.read(Path("x"), data.encode() if isinstance(data, str) else data, zone)
+    check(log)
+    return dict(log.parts[part].columns)
+
+
+def near(columns: Columns, atol: float = 1e-9, **expected: Any) -> None:
+    """Each column is as expected, row by row or in all rows, to within so much."""
+    for name, values in expected.items():
+        np.testing.assert_allclose(columns[name], values, rtol=0, atol=atol, err_msg=name)
 
 
 def survives(read: Reader, data: bytes, cuts: int = 20, flips: int = 40) -> float:
