@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: struct's letter and the factor of each format character.
-LETTERS: dict[str, tuple[str, float]] = {
-    **{"b": ("b", 1), "B": ("B", 1), "h": ("h", 1), "H": ("H", 1), "i": ("i", 1), "I": ("I", 1)},
-    **{"f": ("f", 1), "d": ("d", 1), "q": ("q", 1), "Q": ("Q", 1), "M": ("B", 1), "g": ("e", 1)},
-    **{"c": ("h", 100), "C": ("H", 100), "e": ("i", 100), "E": ("I", 100), "L": ("i", 1e7)},
-    **{"n": ("4s", 0), "N": ("16s", 0), "Z": ("64s", 0)},
+#: Format characters, struct's letter for each, and a factor; texts have none.
+LETTERS_TABLE = """
+    b b 1    B B 1    h h 1    H H 1    i i 1    I I 1    f f 1    d d 1    q q 1    Q Q 1    M B 1    g e 1
+    c h 100  C H 100  e i 100  E I 100  L i 1e7  n 4s 0   N 16s 0  Z 64s 0
+"""
+LETTERS = {
+    character: (letter, float(factor))
+    for character, letter, factor in zip(*[iter(LETTERS_TABLE.split())] * 3, strict=True)
 }
 
 
@@ -31,13 +33,19 @@ def fmt(kind: int, name: str, characters: str, columns: str, length: int | None 
 
 @dataclass
 class Log:
-    """Messages with values in their units; each is defined where it is used first."""
+    """Messages with values in their units; each is defined where it is used first.
 
+    `forms`: a line for each kind of message, with its name, format characters and columns.
+    """
+
+    forms: str = ""
     kinds: dict[str, tuple[int, str, str]] = field(default_factory=dict)
     messages: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
 
-    def define(self, name: str, characters: str, columns: str) -> None:
-        self.kinds[name] = (len(self.kinds) + 1, characters, columns)
+    def __post_init__(self) -> None:
+        for number, line in enumerate(self.forms.split("\n"), 1):
+            if words := line.split():
+                self.kinds[words[0]] = (number, words[1], words[2])
 
     def add(self, name: str, *values: Any) -> None:
         assert len(values) == len(self.kinds[name][1]), name
@@ -49,11 +57,10 @@ class Log:
         for value, character in zip(values, characters, strict=True):
             letter, factor = LETTERS[character]
             if factor == 0:
-                made += struct.pack("<" + letter, str(value).encode())
-            elif letter in "fde":
-                made += struct.pack("<" + letter, value)
-            else:
-                made += struct.pack("<" + letter, round(value * factor))
+                value = str(value).encode()
+            elif letter not in "fde":
+                value = round(value * factor)
+            made += struct.pack("<" + letter, value)
         return b"\xa3\x95" + bytes([kind]) + made
 
     def pieces(self) -> list[bytes]:
@@ -104,17 +111,29 @@ class Truth:
         week, rest = divmod(gps, 604800.0)
         return int(week), round(rest * 1e3)
 
-    def latitude(self, stamp: Any) -> Any:
-        return LATITUDE + 1e-4 * (np.asarray(stamp) - self.boot_s)
+    def place(self, stamp: Any) -> tuple[Any, Any, Any]:
+        """Latitude, longitude and height."""
+        t = np.asarray(stamp) - self.boot_s
+        return LATITUDE + 1e-4 * t, LONGITUDE - 1e-4 * t, HEIGHT + 0.5 * t
 
-    def longitude(self, stamp: Any) -> Any:
-        return LONGITUDE - 1e-4 * (np.asarray(stamp) - self.boot_s)
+    def heights(self, stamp: float) -> tuple[float, float, float]:
+        """Above sea level, home, and sea level as the receiver has it."""
+        height = self.place(stamp)[2]
+        return height, height - HOME, height
 
-    def height(self, stamp: Any) -> Any:
-        return HEIGHT + 0.5 * (np.asarray(stamp) - self.boot_s)
+    def attitude(self, stamp: Any) -> tuple[Any, Any, Any]:
+        t = np.asarray(stamp) - self.boot_s
+        return 5.0 + 0 * t, -2.0 + 0 * t, 90.0 + 0.5 * t
 
-    def attitude(self, stamp: float) -> tuple[float, float, float]:
-        return 5.0, -2.0, 90.0 + 0.5 * (stamp - self.boot_s)
+
+FIRST = """
+    MSG Z Message
+    ATT IccccCC TimeMS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw
+    IMU Iffffff TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ
+    MAG Ihhhhhhhhh TimeMS,MagX,MagY,MagZ,OfsX,OfsY,OfsZ,MOfsX,MOfsY,MOfsZ
+    GPS BIHBcLLeeEefI Status,TimeMS,Week,NSats,HDop,Lat,Lng,RelAlt,Alt,Spd,GCrs,VZ,T
+    CAM IHLLeccC GPSTime,GPSWeek,Lat,Lng,Alt,Roll,Pitch,Yaw
+"""
 
 
 def _run(log: Log, truth: Truth, seconds: float, steps: dict[float, Callable[[float], None]]) -> None:
@@ -130,13 +149,7 @@ def _run(log: Log, truth: Truth, seconds: float, steps: dict[float, Callable[[fl
 
 def first_generation(truth: Truth, seconds: float = 40.0) -> Log:
     """TimeMS everywhere; GPS has ms of the week as TimeMS and the stamp as T; CAM has GPS time only."""
-    log = Log()
-    log.define("MSG", "Z", "Message")
-    log.define("ATT", "IccccCC", "TimeMS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw")
-    log.define("IMU", "Iffffff", "TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
-    log.define("MAG", "Ihhhhhhhhh", "TimeMS,MagX,MagY,MagZ,OfsX,OfsY,OfsZ,MOfsX,MOfsY,MOfsZ")
-    log.define("GPS", "BIHBcLLeeEefI", "Status,TimeMS,Week,NSats,HDop,Lat,Lng,RelAlt,Alt,Spd,GCrs,VZ,T")
-    log.define("CAM", "IHLLeccC", "GPSTime,GPSWeek,Lat,Lng,Alt,Roll,Pitch,Yaw")
+    log = Log(FIRST)
     log.add("MSG", "ArduCopter V3.1.3 (92cdd2a3)")
 
     def fast(t: float) -> None:
@@ -148,29 +161,34 @@ def first_generation(truth: Truth, seconds: float = 40.0) -> Log:
 
     def slow(t: float) -> None:
         week, ms = truth.week_ms(t)
-        where = (truth.latitude(t), truth.longitude(t), truth.height(t) - HOME, truth.height(t))
+        latitude, longitude, height = truth.place(t)
+        where = (latitude, longitude, height - HOME, height)
         log.add("GPS", 3, ms, week, 9, 1.5, *where, 14.0, 315.0, -0.5, round(t * 1e3))
 
     def photo(t: float) -> None:
         week, ms = truth.week_ms(t)
-        log.add("CAM", ms, week, truth.latitude(t), truth.longitude(t), 30.0, *truth.attitude(t))
+        log.add("CAM", ms, week, *truth.place(t)[:2], 30.0, *truth.attitude(t))
 
     _run(log, truth, seconds, {0.1: fast, 0.2: slow, 5.0: photo})
     return log
 
 
+SECOND = """
+    MSG QZ TimeUS,Message
+    ORGN QBLLe TimeUS,Type,Lat,Lng,Alt
+    ATT QccccCCCC TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw
+    NKF1 QccCfffffffccce TimeUS,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH
+    IMU2 Qffffff TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ
+    IMU Qffffff TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ
+    GPS QBIHBcLLefffB TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,U
+    GPA QCCCCBIH TimeUS,VDop,HAcc,VAcc,SAcc,VV,SMS,Delta
+    TRIG QIHLLeeeccC TimeUS,GPSTime,GPSWeek,Lat,Lng,Alt,RelAlt,GPSAlt,Roll,Pitch,Yaw
+"""
+
+
 def second_generation(truth: Truth, seconds: float = 40.0, origin: bool = True) -> Log:
     """TimeUS; one message name per sensor; positions by POS or by NKF1 and ORGN."""
-    log = Log()
-    log.define("MSG", "QZ", "TimeUS,Message")
-    log.define("ORGN", "QBLLe", "TimeUS,Type,Lat,Lng,Alt")
-    log.define("ATT", "QccccCCCC", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw")
-    log.define("NKF1", "QccCfffffffccce", "TimeUS,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH")
-    log.define("IMU2", "Qffffff", "TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
-    log.define("IMU", "Qffffff", "TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
-    log.define("GPS", "QBIHBcLLefffB", "TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,U")
-    log.define("GPA", "QCCCCBIH", "TimeUS,VDop,HAcc,VAcc,SAcc,VV,SMS,Delta")
-    log.define("TRIG", "QIHLLeeeccC", "TimeUS,GPSTime,GPSWeek,Lat,Lng,Alt,RelAlt,GPSAlt,Roll,Pitch,Yaw")
+    log = Log(SECOND)
     began = round(truth.boot_s * 1e6)
     log.add("MSG", began, "ArduPlane V3.8.2-dev (8178ab40)")
     if origin:
@@ -185,60 +203,48 @@ def second_generation(truth: Truth, seconds: float = 40.0, origin: bool = True) 
         log.add("IMU2", us, 9, 9, 9, 9, 9, 9)
         log.add("IMU", us, 0.01, 0.02, 0.03, 0.1, 0.2, -9.8)
         log.add("ATT", us, 0, roll, 0, pitch, 0, yaw, 0, 0)
-        step = truth.latitude(t) - LATITUDE
-        east = (truth.longitude(t) - LONGITUDE) * degree * np.cos(np.radians(LATITUDE + step / 2))
-        velocity = (9.9, -9.9, -0.5)
-        log.add(
-            "NKF1",
-            us,
-            roll,
-            pitch,
-            yaw,
-            *velocity,
-            0,
-            step * degree,
-            east,
-            HOME - truth.height(t),
-            0,
-            0,
-            0,
-            0,
-        )
+        latitude, longitude, height = truth.place(t)
+        step = latitude - LATITUDE
+        east = (longitude - LONGITUDE) * degree * np.cos(np.radians(LATITUDE + step / 2))
+        moved = (9.9, -9.9, -0.5, 0, step * degree, east, HOME - height)
+        log.add("NKF1", us, roll, pitch, yaw, *moved, 0, 0, 0, 0)
 
     def slow(t: float) -> None:
         us, (week, ms) = round(t * 1e6), truth.week_ms(t)
-        where = (truth.latitude(t), truth.longitude(t), truth.height(t))
-        log.add("GPS", us, 3, ms, week, 11, 0.77, *where, 14.0, 315.0, -0.5, 1)
+        log.add("GPS", us, 3, ms, week, 11, 0.77, *truth.place(t), 14.0, 315.0, -0.5, 1)
         log.add("GPA", us, 1.2, 1.61, 2.41, 0.51, 1, round(t * 1e3), 200)
 
     def photo(t: float) -> None:
         us, (week, ms) = round(t * 1e6), truth.week_ms(t)
-        above = (truth.height(t), truth.height(t) - HOME, truth.height(t))
-        log.add("TRIG", us, ms, week, truth.latitude(t), truth.longitude(t), *above, *truth.attitude(t))
+        log.add("TRIG", us, ms, week, *truth.place(t)[:2], *truth.heights(t), *truth.attitude(t))
 
     _run(log, truth, seconds, {0.1: fast, 0.2: slow, 5.0: photo})
     return log
 
 
+# Columns of ATT stand in another order than any release had them.
+THIRD = """
+    UNIT QbZ TimeUS,Id,Label
+    MULT Qbd TimeUS,Id,Mult
+    FMTU QBNN TimeUS,FmtType,UnitIds,MultIds
+    VER QBZ TimeUS,Maj,FWS
+    ATT cQCc Pitch,TimeUS,Yaw,Roll
+    XKQ QBffff TimeUS,C,Q1,Q2,Q3,Q4
+    XKF1 QBfff TimeUS,C,VN,VE,VD
+    POS QLLfff TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt
+    ACC QBQfff TimeUS,I,SampleUS,AccX,AccY,AccZ
+    GYR QBQfff TimeUS,I,SampleUS,GyrX,GyrY,GyrZ
+    MAG QBhhhBI TimeUS,I,MagX,MagY,MagZ,Health,S
+    GPS QBBIHBcLLeffffB TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw,U
+    GPA QBCCCCfBIHf TimeUS,I,VDop,HAcc,VAcc,SAcc,YAcc,VV,SMS,Delta,Und
+    MNT QBffffffff TimeUS,I,DesRoll,Roll,DesPitch,Pitch,DesYawB,YawB,DesYawE,YawE
+    CAM QBHIHLLeeefff TimeUS,I,Img,GPSTime,GPSWeek,Lat,Lng,Alt,RelAlt,GPSAlt,R,P,Y
+"""
+
+
 def third_generation(truth: Truth, seconds: float = 40.0, attitude: bool = True) -> Log:
     """An instance per sensor, units beside, ACC and GYR apart, a gimbal, images numbered; no fix at first."""
-    log = Log()
-    log.define("UNIT", "QbZ", "TimeUS,Id,Label")
-    log.define("MULT", "Qbd", "TimeUS,Id,Mult")
-    log.define("FMTU", "QBNN", "TimeUS,FmtType,UnitIds,MultIds")
-    log.define("VER", "QBZ", "TimeUS,Maj,FWS")
-    # Its columns stand in another order than any release had them.
-    log.define("ATT", "cQCc", "Pitch,TimeUS,Yaw,Roll")
-    log.define("XKQ", "QBffff", "TimeUS,C,Q1,Q2,Q3,Q4")
-    log.define("XKF1", "QBfff", "TimeUS,C,VN,VE,VD")
-    log.define("POS", "QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt")
-    log.define("ACC", "QBQfff", "TimeUS,I,SampleUS,AccX,AccY,AccZ")
-    log.define("GYR", "QBQfff", "TimeUS,I,SampleUS,GyrX,GyrY,GyrZ")
-    log.define("MAG", "QBhhhBI", "TimeUS,I,MagX,MagY,MagZ,Health,S")
-    log.define("GPS", "QBBIHBcLLeffffB", "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw,U")
-    log.define("GPA", "QBCCCCfBIHf", "TimeUS,I,VDop,HAcc,VAcc,SAcc,YAcc,VV,SMS,Delta,Und")
-    log.define("MNT", "QBffffffff", "TimeUS,I,DesRoll,Roll,DesPitch,Pitch,DesYawB,YawB,DesYawE,YawE")
-    log.define("CAM", "QBHIHLLeeefff", "TimeUS,I,Img,GPSTime,GPSWeek,Lat,Lng,Alt,RelAlt,GPSAlt,R,P,Y")
+    log = Log(THIRD)
     began = round(truth.boot_s * 1e6)
     units = {"-": "", "s": "s", "#": "instance", "G": "Gauss", "d": "deg", "h": "degheading", "k": "deg/s"}
     for letter, label in units.items():
@@ -250,6 +256,7 @@ def third_generation(truth: Truth, seconds: float = 40.0, attitude: bool = True)
     # Rates in degrees: no release logs them so, but the format can say it.
     log.add("FMTU", began, log.kinds["GYR"][0], "s#skkk", "F-F000")
     log.add("VER", began, 4, "ArduPlane V4.2.3 (55685c43)")
+    fix = truth.boot_s + 10
 
     def fast(t: float) -> None:
         us = round(t * 1e6)
@@ -257,39 +264,32 @@ def third_generation(truth: Truth, seconds: float = 40.0, attitude: bool = True)
         if attitude:
             log.add("ATT", pitch, us, yaw, roll)
         half = np.radians(yaw) / 2
-        for core in (0, 1):
-            log.add("XKQ", us, core, np.cos(half), 0, 0, np.sin(half))
-            log.add("XKF1", us, core, 9.9 + core, -9.9, -0.5)
-        for sensor in (0, 1):
-            log.add("ACC", us + 900, sensor, us, 0.1 + sensor, 0.2, -9.8)
-            log.add("GYR", us + 1000, sensor, us + 500, *np.degrees([0.01, 0.02, 0.03]))
+        for each in (0, 1):
+            log.add("XKQ", us, each, np.cos(half), 0, 0, np.sin(half))
+            log.add("XKF1", us, each, 9.9 + each, -9.9, -0.5)
+            log.add("ACC", us + 900, each, us, 0.1 + each, 0.2, -9.8)
+            log.add("GYR", us + 1000, each, us + 500, *np.degrees([0.01, 0.02, 0.03]))
         log.add("MAG", us, 0, 200, -100, 400, 1, 0)
         log.add("MNT", us, 0, 0, 1.0, 0, -60.0, 0, 20.0, 0, 110.0)
-        known = t >= truth.boot_s + 10
-        above = truth.height(t)
-        where = (truth.latitude(t), truth.longitude(t)) if known else (0, 0)
-        log.add("POS", us, *where, above, above - HOME, above - HOME if known else float("nan"))
+        sea, home, _ = truth.heights(t)
+        where = truth.place(t)[:2] if t >= fix else (0, 0)
+        log.add("POS", us, *where, sea, home, home if t >= fix else float("nan"))
 
     def slow(t: float) -> None:
-        us, (week, ms) = round(t * 1e6), truth.week_ms(t)
-        known = t >= truth.boot_s + 10
-        where = (truth.latitude(t), truth.longitude(t), truth.height(t)) if known else (60.9, -97.0, 17836.0)
+        us, (week, ms), known = round(t * 1e6), truth.week_ms(t), t >= fix
+        where = truth.place(t) if known else (60.9, -97.0, 17836.0)
+        sds = (1.5, 2.5, 0.5) if known else (655.35, 655.35, 655.35)
         for receiver in (0, 1):
-            status = 3 if known and receiver else 1
-            shown = (6, 1.2) if status == 3 else (0, 99.99)
-            log.add(
-                "GPS", us, receiver, status, ms, week if known else 0, *shown, *where, 14, 315, -0.5, 0, 1
-            )
-            sds = (1.5, 2.5, 0.5) if known else (655.35, 655.35, 655.35)
+            shown = (3, ms, week, 6, 1.2) if known and receiver else (1, ms, week if known else 0, 0, 99.99)
+            log.add("GPS", us, receiver, *shown, *where, 14, 315, -0.5, 0, 1)
             log.add("GPA", us, receiver, 1.2, *sds, 0, 1, round(t * 1e3), 200, -48.5)
 
     number = iter(range(1, 1000))
 
     def photo(t: float) -> None:
         us, (week, ms) = round(t * 1e6), truth.week_ms(t)
-        above = (truth.height(t), truth.height(t) - HOME, truth.height(t))
-        place = (truth.latitude(t), truth.longitude(t))
-        log.add("CAM", us, 0, next(number), ms, week, *place, *above, *truth.attitude(t))
+        shown = (*truth.place(t)[:2], *truth.heights(t), *truth.attitude(t))
+        log.add("CAM", us, 0, next(number), ms, week, *shown)
 
     _run(log, truth, seconds, {0.1: fast, 0.2: slow, 5.0: photo})
     return log

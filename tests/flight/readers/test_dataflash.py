@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +22,11 @@ from tests.flight.readers.dataflash_logs import (
     second_generation,
     third_generation,
 )
+from tests.flight.readers.tracks import check
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.ardupilot import binary as dataflash
 from wildlab.flight.readers.ardupilot import text as dataflash_text
 from wildlab.flight.readers.ardupilot.records import read_records
-from wildlab.flight.readers.logs.log import RawLog
 
 REAL = (
     "copter_2014_joey/2014-10-18 20-04-24.bin",
@@ -82,15 +83,13 @@ def test_made_up_logs_too(tmp_path, make):
 
 
 def test_every_format_character(tmp_path):
-    log = Log()
     characters = "bBhHiIfdcCeELMqQ"
-    log.define("ALL", characters, ",".join(f"A{i}" for i in range(len(characters))))
-    log.define("TXT", "nNZg", "Name,Long,Text,Half")
+    columns = ",".join(f"A{i}" for i in range(len(characters)))
+    log = Log(f"ALL {characters} {columns}\nTXT nNZg Name,Long,Text,Half")
     rng = np.random.default_rng(1)
     for _ in range(20):
-        log.add(
-            "ALL", *rng.integers(0, 100, 6), *rng.normal(size=2), *rng.uniform(0, 90, 5).round(2), 3, 4, 5
-        )
+        numbers = (*rng.integers(0, 100, 6), *rng.normal(size=2), *rng.uniform(0, 90, 5).round(2))
+        log.add("ALL", *numbers, 3, 4, 5)
         log.add("TXT", "abcd", "sixteen letters!", "æ ø", 0.5)
     path = tmp_path / "all.bin"
     path.write_bytes(log.binary())
@@ -98,16 +97,19 @@ def test_every_format_character(tmp_path):
     assert read_records(log.binary()).tables["TXT"].texts("Long")[0] == "sixteen letters!"
 
 
+def texts_and_numbers(count: int, a: str = "QZ TimeUS,Text") -> Log:
+    """Messages A, and B with their numbers as W, in turns."""
+    log = Log(f"A {a}\nB QB TimeUS,W")
+    for i in range(count):
+        log.add("A", i, "a text" if "Z" in a else i / 2)
+        log.add("B", i, i)
+    return log
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.binary(max_size=30).map(lambda one: one.replace(b"\xa3", b"")), min_size=8, max_size=8))
 def test_nothing_between_messages_hides_them(garbage):
-    log = Log()
-    log.define("A", "Qf", "TimeUS,V")
-    log.define("B", "QB", "TimeUS,W")
-    for i in range(4):
-        log.add("A", i, i / 2)
-        log.add("B", i, i)
-    pieces = log.pieces()
+    pieces = texts_and_numbers(4, "Qf TimeUS,V").pieces()
     # The definitions come first: what follows is 8 messages with something in front of each.
     ahead = [one for one in pieces if one[2] == 128]
     behind = [one for one in pieces if one[2] != 128]
@@ -120,29 +122,18 @@ def test_nothing_between_messages_hides_them(garbage):
 
 
 def test_heads_within_messages_are_not_believed():
-    log = Log()
-    log.define("A", "QZ", "TimeUS,Text")
-    log.define("B", "QB", "TimeUS,W")
-    for i in range(50):
-        log.add("A", i, "a text")
-        log.add("B", i, i)
-    kind = log.kinds["B"][0]
+    log = texts_and_numbers(50)
     # In each text stands what looks like the head of a B.
-    data = log.binary().replace(b"a text", b"at\xa3\x95" + bytes([kind]) + b"t")
-    found = read_records(data)
+    found = read_records(log.binary().replace(b"a text", b"at\xa3\x95" + bytes([log.kinds["B"][0]]) + b"t"))
     assert found.lost_bytes == 0
     assert found.tables["B"].numbers("W").tolist() == list(range(50))
 
 
 def test_a_message_whose_kind_was_damaged_costs_itself():
-    log = Log()
-    log.define("A", "QZ", "TimeUS,Text")
-    log.define("B", "QB", "TimeUS,W")
-    for i in range(20):
-        log.add("B", i, i)
-    log.add("A", 0, "text")
-    pieces = log.pieces()
+    log = texts_and_numbers(20)
     longer, shorter = log.kinds["A"][0], log.kinds["B"][0]
+    log.messages.sort(reverse=True, key=lambda one: one[0])
+    pieces = log.pieces()
     at = next(i for i, one in enumerate(pieces) if one[2] == shorter) + 5
     pieces[at] = pieces[at][:2] + bytes([longer]) + pieces[at][3:]
     found = read_records(b"".join(pieces))
@@ -151,17 +142,18 @@ def test_a_message_whose_kind_was_damaged_costs_itself():
 
 
 def test_definitions_that_change_hold_from_there_on():
-    log = Log()
-    log.define("A", "QB", "TimeUS,W")
+    log, other = Log("A QB TimeUS,W"), Log("A Qff TimeUS,V,W")
     log.add("A", 1, 7)
-    other = Log()
-    other.define("A", "Qff", "TimeUS,V,W")
     other.add("A", 2, 0.25, 8)
     found = read_records(log.binary() + other.binary())
     assert found.lost_bytes == 0
     table = found.tables["A"]
     assert table.numbers("W").tolist() == [7, 8]
     np.testing.assert_array_equal(table.numbers("V"), [np.nan, 0.25])
+
+
+def lengths(data: bytes) -> dict[str, int]:
+    return {name: len(part) for name, part in dataflash.read(Path("x.bin"), data).parts.items()}
 
 
 def test_definitions_that_change_without_end_are_not_followed():
@@ -186,11 +178,8 @@ def test_definitions_that_change_without_end_are_not_followed():
 )
 def test_absurd_definitions_are_passed_over(definition):
     data = second_generation(Truth(2025), 3.0).binary()
-    kept = dataflash.read(Path("x.bin"), definition + data)
     assert "BAD" not in read_records(definition + data).tables
-    assert {name: len(part) for name, part in kept.parts.items()} == {
-        name: len(part) for name, part in dataflash.read(Path("x.bin"), data).parts.items()
-    }
+    assert lengths(definition + data) == lengths(data)
 
 
 def test_filling_at_the_end_is_no_loss_and_a_cut_message_is():
@@ -213,13 +202,11 @@ def test_what_holds_nothing_is_refused(data):
 
 
 def test_other_logs_with_the_same_heads_are_refused():
-    log = Log()
-    log.define("PARM", "Nf", "Name,Value")
+    log = Log("PARM Nf Name,Value")
     log.add("PARM", "SYSID", 1)
     with pytest.raises(WildlabError, match="no message of attitude"):
         dataflash.read(Path("flight.bin"), log.binary())
-    log = Log()
-    log.define("ATT", "fffffff", "qw,qx,qy,qz,Roll,Pitch,Yaw")
+    log = Log("ATT fffffff qw,qx,qy,qz,Roll,Pitch,Yaw")
     log.add("ATT", 1, 0, 0, 0, 0, 0, 0)
     for reader, data in ((dataflash, log.binary()), (dataflash_text, log.text())):
         with pytest.raises(WildlabError, match="sdlog2"):
@@ -228,52 +215,34 @@ def test_other_logs_with_the_same_heads_are_refused():
 
 def test_a_file_is_known_by_its_content():
     log = second_generation(Truth(2025), 3.0)
-    assert dataflash.recognise(log.binary()[:8192], "x")
     assert dataflash.recognise(b"\0\0lost" + log.binary()[:8192], "x")
-    assert not dataflash.recognise(log.text()[:8192], "x.bin")
     assert dataflash_text.recognise(log.text()[:8192], "x")
-    assert not dataflash_text.recognise(log.binary()[:8192], "x.log")
-    for other in (b"", b"$GPGGA,1,2,3", b"\xa3\x95\x80 nothing", b"ULog\x01\x12\x35", b"<gpx>"):
-        assert not dataflash.recognise(other, "x.bin")
-        assert not dataflash_text.recognise(other, "x.log")
+    others = (b"", b"$GPGGA,1,2,3", b"\xa3\x95\x80 nothing", b"ULog\x01\x12\x35", b"<gpx>")
+    assert not any(dataflash.recognise(one, "x.bin") for one in (*others, log.text()[:8192]))
+    assert not any(dataflash_text.recognise(one, "x.log") for one in (*others, log.binary()[:8192]))
 
 
-def consistent(log: RawLog) -> None:
-    """What the format promises of rows that are used, whatever the file was."""
-    for name, part in log.parts.items():
-        used = part.used
-        known = log.clock is not None and log.clock.base
-        stamps = part.columns["time_s" if known else "time_log_s"][used]
-        if log.clock is not None:
-            assert np.isfinite(stamps).all() and (np.diff(stamps) > 0).all(), name
-        if name in ("poses", "gnss"):
-            assert np.isfinite(part.columns["latitude_deg"][used]).all()
-            assert (np.abs(part.columns["latitude_deg"][used]) <= 90).all()
-        for turned in {"roll_deg", "pitch_deg", "yaw_deg", "f_x_m_s2", "w_x_rad_s"} & set(part.columns):
-            if name != "triggers":
-                assert np.isfinite(part.columns[turned][used]).all()
-
-
-def damaged(data: bytes, rng: np.random.Generator) -> list[bytes]:
-    cut = [data[: int(at)] for at in rng.integers(0, len(data), 10)]
-    flipped = []
+def read_damaged(data: bytes, text: bool) -> None:
+    rng, begun = np.random.default_rng(14), time.monotonic()
+    every = [data[: int(at)] for at in rng.integers(0, len(data), 10)]
     for _ in range(6):
         other = bytearray(data)
         for at in rng.integers(0, len(data), 100):
             other[at] ^= int(rng.integers(1, 256))
-        flipped.append(bytes(other))
-    return cut + flipped
+        every.append(bytes(other))
+    for one in every:
+        read_any(one, text)
+    assert time.monotonic() - begun < 5 * len(every)
 
 
-def read_damaged(data: bytes, text: bool) -> None:
-    reader = dataflash_text if text else dataflash
-    for one in damaged(data, np.random.default_rng(14)):
-        begun = time.monotonic()
-        try:
-            consistent(reader.read(Path("x"), one))
-        except WildlabError as error:
-            assert "\n" not in str(error)
-        assert time.monotonic() - begun < 5
+def read_any(data: bytes, text: bool) -> None:
+    try:
+        log = (dataflash_text if text else dataflash).read(Path("x"), data)
+    except WildlabError as error:
+        assert "\n" not in str(error)
+        return
+    # Images may have no place.
+    check(replace(log, parts={name: part for name, part in log.parts.items() if name != "triggers"}))
 
 
 @pytest.mark.parametrize("name", [*REAL, "damaged/nan.log"])
@@ -289,15 +258,8 @@ def test_made_up_logs_damaged(make, text):
 
 
 @settings(max_examples=40, deadline=None)
-@given(st.binary(max_size=2000))
-def test_any_bytes(data):
-    for reader in (dataflash, dataflash_text):
-        for start in (
-            b"",
-            fmt(1, "ATT", "Qccc", "TimeUS,Roll,Pitch,Yaw"),
-            b"FMT, 1, 2, ATT, QB, TimeUS,Roll\nATT,",
-        ):
-            try:
-                consistent(reader.read(Path("x"), start + data))
-            except WildlabError:
-                continue
+@given(st.binary(max_size=2000), st.booleans())
+def test_any_bytes(data, text):
+    starts = (b"", fmt(1, "ATT", "Qccc", "TimeUS,Roll,Pitch,Yaw"), b"FMT, 1, 2, ATT, QB, TimeUS,Roll\nATT,")
+    for start in starts:
+        read_any(start + data, text)

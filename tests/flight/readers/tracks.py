@@ -34,11 +34,14 @@ def check(log: RawLog) -> None:
         assert len(stream) == len(stream.rows) > 0
         assert ((columns["why"] == "") == used).all()
         if "latitude_deg" in columns:
-            assert np.isfinite(columns["latitude_deg"][used]).all()
+            assert (np.abs(columns["latitude_deg"][used]) <= 90).all()
             assert np.isfinite(columns["longitude_deg"][used]).all()
             heights = [columns[one][used] for one in columns if one.startswith("height")]
             if heights and np.isfinite(heights).any():
                 assert np.isfinite(heights).any(axis=0).all()
+        if name in ("poses", "imu"):
+            for one in {"roll_deg", "pitch_deg", "yaw_deg", "f_x_m_s2", "w_x_rad_s"} & set(columns):
+                assert np.isfinite(columns[one][used]).all()
         time = columns["time_s"]
         if np.isfinite(time).any():
             assert np.isfinite(time[used]).all()
