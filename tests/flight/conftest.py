@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import copy
+import io
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,22 +20,28 @@ from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.flight.toml import dump_toml
 
-MANIFEST: dict[str, Any] = {
-    "name": "small-flight",
-    "kind": "logged",
-    "origin": {"latitude_deg": 63.4, "longitude_deg": 10.4, "height_m": 40.0},
-    "platform": {"name": "X8"},
-    "camera": {
-        "name": "Tau2",
-        "width_px": 640,
-        "height_px": 512,
-        "fx_px": 1100.0,
-        "fy_px": 1100.0,
-        "cx_px": 320.0,
-        "cy_px": 256.0,
-    },
-    "time": {"kind": "utc", "epoch": "2024-07-25T04:05:57Z"},
-}
+MANIFEST: dict[str, Any] = tomllib.loads("""
+name = "small-flight"
+kind = "logged"
+origin = {latitude_deg = 63.4, longitude_deg = 10.4, height_m = 40.0}
+platform = {name = "X8"}
+time = {kind = "utc", epoch = "2024-07-25T04:05:57Z"}
+
+[camera]
+name = "Tau2"
+width_px = 640
+height_px = 512
+fx_px = 1100.0
+fy_px = 1100.0
+cx_px = 320.0
+cy_px = 256.0
+""")
+
+
+def table(text: str) -> pd.DataFrame:
+    """A table as its lines have it; what names or sorts is text."""
+    texts = dict.fromkeys(("frame_id", "detection_id", "target_id", "source", "kind", "sensor"), str)
+    return pd.read_csv(io.StringIO(text), dtype=texts, keep_default_na=False, na_values=["nan"])
 
 
 @pytest.fixture
@@ -47,50 +54,24 @@ def make_flight() -> Callable[..., Flight]:
     """``make_flight(clocks={"camera_offset_s": 0.5})``: the small flight, its manifest changed."""
 
     def make(**changes: Any) -> Flight:
-        times = np.arange(0.0, 10.0, 0.5)
-        n = len(times)
-        nav = pd.DataFrame(
-            {
-                "time_s": times,
-                "north_m": 20.0 * times,
-                "east_m": -3.0 * times,
-                "down_m": np.full(n, -100.0),
-                "q_w": np.cos(0.05 * times),
-                "q_x": np.zeros(n),
-                "q_y": np.zeros(n),
-                "q_z": np.sin(0.05 * times),
-            }
-        )
-        covariance = pd.DataFrame(0.0, index=range(n), columns=list(COVARIANCE_COLUMNS))
+        t = np.arange(0.0, 10.0, 0.5)
+        nav = pd.DataFrame({"time_s": t, "north_m": 20.0 * t, "east_m": -3.0 * t, "down_m": -100.0})
+        nav = nav.assign(q_w=np.cos(0.05 * t), q_x=0.0, q_y=0.0, q_z=np.sin(0.05 * t))
+        covariance = pd.DataFrame(0.0, index=range(len(t)), columns=list(COVARIANCE_COLUMNS))
         for i, sd in enumerate([2.0, 2.0, 3.0, 0.02, 0.02, 0.04]):
             covariance[f"cov_{i}{i}"] = sd**2
-        frames = pd.DataFrame({"frame_id": ["A", "B", "C"], "time_s": [1.0, 2.25, 8.0]})
-        detections = pd.DataFrame(
-            {
-                "detection_id": ["1", "2", "3"],
-                "frame_id": ["A", "A", "C"],
-                "source": "click",
-                "kind": "pixel",
-                "u_px": [10.0, 600.0, 320.0],
-                "v_px": [20.0, 500.0, 256.0],
-                "target_id": ["buoy", "", "boat"],
-                "plane_down_m": 0.0,
-            }
-        )
-        truth = pd.DataFrame(
-            {
-                "target_id": ["buoy", "boat", "boat"],
-                "time_s": [np.nan, 0.0, 10.0],
-                "north_m": [50.0, 0.0, 100.0],
-                "east_m": [5.0, 0.0, 10.0],
-                "down_m": [0.0, 0.0, 0.0],
-            }
-        )
-        return Flight(
-            make_manifest({**copy.deepcopy(MANIFEST), **changes}),
-            {"autopilot": pd.concat([nav, covariance], axis=1)},
-            {"frames": frames, "detections": detections, "truth": truth},
-        )
+        tables = {
+            "frames": "frame_id,time_s\nA,1.0\nB,2.25\nC,8.0\n",
+            "detections": "detection_id,frame_id,u_px,v_px,target_id\n"
+            "1,A,10.0,20.0,buoy\n2,A,600.0,500.0,\n3,C,320.0,256.0,boat\n",
+            "truth": "target_id,time_s,north_m,east_m\n"
+            "buoy,nan,50.0,5.0\nboat,0.0,0.0,0.0\nboat,10.0,100.0,10.0\n",
+        }
+        made = {name: table(text) for name, text in tables.items()}
+        made["detections"] = made["detections"].assign(source="click", kind="pixel", plane_down_m=0.0)
+        made["truth"]["down_m"] = 0.0
+        manifest = make_manifest({**copy.deepcopy(MANIFEST), **changes})
+        return Flight(manifest, {"autopilot": pd.concat([nav, covariance], axis=1)}, made)
 
     return make
 
@@ -123,15 +104,60 @@ class Raw:
         self.tables[table] = self.tables[table].replace(old, new)
 
     def set(self, dotted: str, value: Any) -> None:
-        """``set("poses.log.position.latitude.unit", "rad")``; None takes the key out."""
+        """``set("poses.log.position.latitude.unit", "rad")``; TOML makes a table, None takes the key out."""
         here: Any = self.recipe
         *parents, last = dotted.split(".")
         for parent in parents:
             here = here[int(parent)] if isinstance(here, list) else here.setdefault(parent, {})
         if value is None:
             del here[last]
+        elif isinstance(value, str) and "=" in value:
+            here[last] = tomllib.loads(value)
         else:
             here[last] = value
+
+
+RECIPE = """
+name = "small"
+platform = {name = "X8"}
+time = {kind = "utc", epoch = 2024-06-12T09:30:00Z}
+frames = {file = "photos.csv", id = "photo", time = {column = "time"}}
+
+[poses.log]
+file = "nav.csv"
+time = {column = "time"}
+attitude = {quaternion = ["qw", "qx", "qy", "qz"], order = "wxyz"}
+[poses.log.position]
+latitude = {column = "lat", unit = "deg"}
+longitude = {column = "lon", unit = "deg"}
+height = {column = "height", unit = "m"}
+
+[[detections]]
+source = "click"
+file = "clicks.csv"
+frame = "photo"
+target = "what"
+pixel = {u = {column = "x", unit = "px"}, v = {column = "y", unit = "px"}}
+ground = {height = {value = 40.0, unit = "m"}}
+
+[[truth]]
+file = "buoy.csv"
+id = "id"
+sd_horizontal = {column = "sd", unit = "m"}
+[truth.position]
+latitude = {column = "lat", unit = "deg"}
+longitude = {column = "lon", unit = "deg"}
+height = {column = "height", unit = "m"}
+
+[[truth]]
+file = "boat.csv"
+target = "boat"
+time = {column = "t", format = "elapsed"}
+[truth.position]
+latitude = {column = "lat", unit = "deg"}
+longitude = {column = "lon", unit = "deg"}
+height = {column = "height", unit = "m"}
+"""
 
 
 @pytest.fixture
@@ -148,45 +174,5 @@ def raw(tmp_path: Path) -> Raw:
         "buoy.csv": "id,lat,lon,height,sd\nbuoy,63.44,10.401,40,0.02\n",
         "boat.csv": "t,lat,lon,height\n0,63.44,10.4,40\n4,63.4401,10.4,40\n",
     }
-    degrees = {name: {"column": name[:3], "unit": "deg"} for name in ("latitude", "longitude")}
-    position = {**degrees, "height": {"column": "height", "unit": "m"}}
-    recipe = {
-        "name": "small",
-        "platform": {"name": "X8"},
-        "camera": copy.deepcopy(MANIFEST["camera"]),
-        "time": {"kind": "utc", "epoch": datetime(2024, 6, 12, 9, 30, tzinfo=UTC)},
-        "frames": {"file": "photos.csv", "id": "photo", "time": {"column": "time"}},
-        "poses": {
-            "log": {
-                "file": "nav.csv",
-                "time": {"column": "time"},
-                "position": copy.deepcopy(position),
-                "attitude": {"quaternion": ["qw", "qx", "qy", "qz"], "order": "wxyz"},
-            }
-        },
-        "detections": [
-            {
-                "source": "click",
-                "file": "clicks.csv",
-                "frame": "photo",
-                "target": "what",
-                "pixel": {"u": {"column": "x", "unit": "px"}, "v": {"column": "y", "unit": "px"}},
-                "ground": {"height": {"value": 40.0, "unit": "m"}},
-            }
-        ],
-        "truth": [
-            {
-                "file": "buoy.csv",
-                "id": "id",
-                "position": copy.deepcopy(position),
-                "sd_horizontal": {"column": "sd", "unit": "m"},
-            },
-            {
-                "file": "boat.csv",
-                "target": "boat",
-                "time": {"column": "t", "format": "elapsed"},
-                "position": copy.deepcopy(position),
-            },
-        ],
-    }
+    recipe = tomllib.loads(RECIPE) | {"camera": copy.deepcopy(MANIFEST["camera"])}
     return Raw(tmp_path, tables, recipe)

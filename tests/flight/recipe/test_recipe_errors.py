@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -30,177 +30,127 @@ def both(*changes: Change) -> Change:
 
 
 @pytest.mark.parametrize(
-    ("change", "file", "field", "said"),
+    ("change", "said"),
     [
-        (lambda raw: raw.tables.pop("nav.csv"), "nav.csv", "poses.log.file", "no such file"),
+        (lambda raw: raw.tables.pop("nav.csv"), "nav.csv, poses.log.file: no such file"),
         (
             in_table("clicks.csv", ",what", ",label"),
-            "clicks.csv",
-            "what (in [detections[0].target])",
-            "column is missing",
+            "clicks.csv, what (in [detections[0].target]): column is missing",
         ),
         (
             in_table("nav.csv", "qw,qx", "qw,qw"),
-            "nav.csv",
-            "qw (in [poses.log.attitude.quaternion])",
-            "two columns",
+            "nav.csv, qw (in [poses.log.attitude.quaternion]): two columns",
         ),
         (
             in_recipe("poses.log.position.latitude.unit", "degree"),
-            "recipe.toml",
-            "poses.log.position.latitude",
-            "'degree' is not a unit",
+            "recipe.toml, poses.log.position.latitude: 'degree' is not a unit",
         ),
         (
             in_recipe("poses.log.position.height.unit", "deg"),
-            "recipe.toml",
-            "poses.log.position.height",
-            "not of length",
+            "recipe.toml, poses.log.position.height: not of length",
         ),
         (
             in_table("nav.csv", ",140,1,0,0,0\n2024-06-12T09:30:04Z", ",,1,0,0,0\n2024-06-12T09:30:04Z"),
-            "nav.csv",
-            "height",
-            "line 5: this cell is empty",
+            "nav.csv, height: line 5: this cell is empty",
         ),
-        (in_table("nav.csv", "63.440200", "nan"), "nav.csv", "lat", "line 4: 'nan'"),
-        (in_table("nav.csv", "63.440200", "634.4"), "nav.csv", "lat", "no latitude"),
-        (in_table("nav.csv", "63.440200,10.4,", "0,0,"), "nav.csv", "lat", "both 0"),
+        (in_table("nav.csv", "63.440200", "nan"), "nav.csv, lat: line 4: 'nan'"),
+        (in_table("nav.csv", "63.440200", "634.4"), "nav.csv, lat: no latitude"),
+        (in_table("nav.csv", "63.440200,10.4,", "0,0,"), "nav.csv, lat: both 0"),
         (
             in_table(
                 "nav.csv", "10.4,140,1,0,0,0\n2024-06-12T09:30:04Z", "10.4,140,1,1,0,0\n2024-06-12T09:30:04Z"
             ),
-            "nav.csv",
-            "qw, qx, qy, qz",
-            "length is 1.414",
+            "nav.csv, qw, qx, qy, qz: length is 1.414",
         ),
-        (in_recipe("camera.fx_px", 0.0), "recipe.toml", "camera.fx_px", "length is 0"),
+        (in_recipe("camera.fx_px", 0.0), "recipe.toml, camera.fx_px: length is 0"),
         (
             both(
                 in_recipe("camera.file", "buoy.csv"),
                 in_recipe("camera.fx_px", "sd"),
                 in_table("buoy.csv", "0.02", "0"),
             ),
-            "buoy.csv",
-            "sd (in [camera.fx_px])",
-            "length is 0",
+            "buoy.csv, sd (in [camera.fx_px]): length is 0",
         ),
         (
             in_table("nav.csv", "09:30:03Z", "09:30:01Z"),
-            "nav.csv",
-            "time_s (from [poses.log])",
-            "followed by 1.000 s",
+            "nav.csv, time_s (from [poses.log]): followed by 1.000 s",
         ),
         (
             in_table("photos.csv", "09:30:03Z", "09:30:01Z"),
-            "photos.csv",
-            "time_s (from [frames])",
-            "not increasing",
+            "photos.csv, time_s (from [frames]): not increasing",
         ),
         (
-            lambda raw: raw.tables.update({"photos.csv": raw.tables["photos.csv"].replace("T09", "T11")}),
-            "nav.csv",
-            "time_s (from [poses.log])",
-            "do not overlap",
+            in_table("photos.csv", "T09", "T11"),
+            "nav.csv, time_s (from [poses.log]): do not overlap",
         ),
         (
             in_table("photos.csv", "2024-06-12T09:30:02.0Z", "noon"),
-            "photos.csv",
-            "time (in [frames.time])",
-            "'noon' has no time zone",
+            "photos.csv, time (in [frames.time]): 'noon' has no time zone",
         ),
         (
-            lambda raw: raw.tables.update({"photos.csv": raw.tables["photos.csv"].replace("Z", "")}),
-            "photos.csv",
-            "time",
-            "has no time zone",
+            in_table("photos.csv", "Z", ""),
+            "photos.csv, time: has no time zone",
         ),
-        (in_recipe("time.zone", "Europe/Trondheim"), "recipe.toml", "time.zone", "'Europe/Trondheim'"),
+        (in_recipe("time.zone", "Europe/Trondheim"), "recipe.toml, time.zone: 'Europe/Trondheim'"),
         (
             both(in_recipe("truth.1.time.format", "unix"), in_table("boat.csv", "\n4,", "\n1718184602000,")),
-            "boat.csv",
-            "t",
-            "centuries away",
+            "boat.csv, t: centuries away",
         ),
-        (in_recipe("time.epoch", None), "recipe.toml", None, "since an epoch"),
+        (in_recipe("time.epoch", None), "recipe.toml: since an epoch"),
         (
             in_table("buoy.csv", "63.44,10.401", "10.401,63.44"),
-            "buoy.csv",
-            "north_m (from [truth])",
-            "far from the flight",
+            "buoy.csv, north_m (from [truth]): far from the flight",
         ),
-        (in_table("clicks.csv", "\nC,", "\nD,"), "clicks.csv", "frame_id (from [detections])", "first 'D'"),
-        (in_table("photos.csv", "\nB,", "\nA,"), "photos.csv", "frame_id (from [frames])", "'A' stands"),
-        (in_recipe("detections.0.frame", None), "clicks.csv", "frame (in [detections[0]])", "which frame"),
+        (in_table("clicks.csv", "\nC,", "\nD,"), "clicks.csv, frame_id (from [detections]): first 'D'"),
+        (in_table("photos.csv", "\nB,", "\nA,"), "photos.csv, frame_id (from [frames]): 'A' stands"),
+        (in_recipe("detections.0.frame", None), "clicks.csv, frame (in [detections[0]]): which frame"),
         (
             in_recipe("detections.0.ground.height.value", 500.0),
-            "clicks.csv",
-            "plane_down_m (from [detections])",
-            "3 of 3 ground",
+            "clicks.csv, plane_down_m (from [detections]): 3 of 3 ground",
         ),
-        (in_recipe("detections.0.pixels", 1), "recipe.toml", "detections[0].pixels", "Did you mean 'pixel'"),
-        (in_recipe("poses", {}), "recipe.toml", None, "no poses"),
+        (in_recipe("detections.0.pixels", 1), "recipe.toml, detections[0].pixels: Did you mean 'pixel'"),
+        (in_recipe("poses", {}), "recipe.toml: no poses"),
         (
             lambda raw: raw.recipe["poses"].update({"../x": raw.recipe["poses"].pop("log")}),
-            "recipe.toml",
-            "poses",
-            "name a nav",
+            "recipe.toml, poses: name a nav",
         ),
         (
             in_recipe("poses.log.file", "../../etc/passwd"),
-            "recipe.toml",
-            "poses.log.file",
-            "leaves the folder",
+            "recipe.toml, poses.log.file: leaves the folder",
         ),
-        (in_recipe("files", {"../secret.txt": ""}), "recipe.toml", "files.file", "leaves the folder"),
-        (in_recipe("poses.log.file", "."), "raw", "poses.log.file", "is a folder"),
-        (in_recipe("poses.log.attitude.order", None), "recipe.toml", "poses.log.attitude", "with its order"),
+        (in_recipe("files", {"../secret.txt": ""}), "recipe.toml, files.file: leaves the folder"),
+        (in_recipe("poses.log.file", "."), "raw, poses.log.file: is a folder"),
+        (in_recipe("poses.log.attitude.order", None), "recipe.toml, poses.log.attitude: with its order"),
         (
-            in_recipe("poses.log.attitude", {"roll": {"value": 0.0, "unit": "deg"}}),
-            "recipe.toml",
-            "poses.log.attitude",
-            "roll",
+            in_recipe("poses.log.attitude", "roll = {value = 0.0, unit = 'deg'}"),
+            "recipe.toml, poses.log.attitude: roll",
         ),
-        (in_recipe("poses.log.time", None), "recipe.toml", None, "neither a time"),
+        (in_recipe("poses.log.time", None), "recipe.toml: neither a time"),
         (
             in_recipe(
                 "poses.log.position",
-                {name: {"value": 0.0, "unit": "m"} for name in ("north", "east", "down")},
+                "".join(f"{one}.value = 0.0\n{one}.unit = 'm'\n" for one in ("north", "east", "down")),
             ),
-            "recipe.toml",
-            None,
-            "no origin",
+            "recipe.toml: no origin",
         ),
         (
-            in_recipe("vertical", {"correction_m": 5.0, "taken_off": ["poses"]}),
-            "recipe.toml",
-            "vertical",
-            "no note says why",
+            in_recipe("vertical", "correction_m = 5.0\ntaken_off = ['poses']"),
+            "recipe.toml, vertical: no note says why",
         ),
-        (in_table("nav.csv", "2024-06-12T09:30:03Z,", ""), "nav.csv", None, "line 5 has 7"),
-        (lambda raw: raw.tables.update({"nav.csv": "time,lat\n"}), "nav.csv", None, "no rows"),
-        (lambda raw: raw.tables.update({"nav.csv": ""}), "nav.csv", None, "no rows"),
+        (in_table("nav.csv", "2024-06-12T09:30:03Z,", ""), "nav.csv: line 5 has 7"),
+        (lambda raw: raw.tables.update({"nav.csv": "time,lat\n"}), "nav.csv: no rows"),
+        (lambda raw: raw.tables.update({"nav.csv": ""}), "nav.csv: no rows"),
         (
-            lambda raw: raw.tables.update({"nav.csv": raw.tables["nav.csv"].replace(",", ";")}),
-            "nav.csv",
-            "lat",
-            "single name",
+            in_table("nav.csv", ",", ";"),
+            "nav.csv, lat: single name",
         ),
     ],
 )
-def test_one_thing_wrong(raw, change, file, field, said):
+def test_one_thing_wrong(raw, change, said):
     change(raw)
-    with pytest.raises(WildlabError) as caught:
+    with pytest.raises(WildlabError, match=".*".join(map(re.escape, re.split(", |: ", said)))) as caught:
         raw.run()
-    error = caught.value
-    assert error.exit_code == 2
-    assert file in [Path(name).name for name in (error.file or "").split(" and ")]
-    if field is None:
-        assert error.field is None or error.field
-    else:
-        assert (error.field or "").startswith(field)
-    assert said in str(error)
-    assert error.fix
-    assert "\n" not in str(error)
+    assert caught.value.exit_code == 2 and caught.value.fix
+    assert "\n" not in str(caught.value)
     assert not raw.into.exists()
     assert sorted(path.name for path in raw.folder.iterdir()) == ["raw", "recipe.toml"]
