@@ -109,12 +109,11 @@ class Raw:
         *parents, last = dotted.split(".")
         for parent in parents:
             here = here[int(parent)] if isinstance(here, list) else here.setdefault(parent, {})
+        key: Any = int(last) if isinstance(here, list) else last
         if value is None:
-            del here[last]
-        elif isinstance(value, str) and "=" in value:
-            here[last] = tomllib.loads(value)
+            del here[key]
         else:
-            here[last] = value
+            here[key] = tomllib.loads(value) if isinstance(value, str) and "=" in value else value
 
 
 RECIPE = """
