@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import io
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -42,6 +43,11 @@ def table(text: str) -> pd.DataFrame:
     """A table as its lines have it; what names or sorts is text."""
     texts = dict.fromkeys(("frame_id", "detection_id", "target_id", "source", "kind", "sensor"), str)
     return pd.read_csv(io.StringIO(text), dtype=texts, keep_default_na=False, na_values=["nan"])
+
+
+def fault(said: str) -> str:
+    """What an error matches that says ``"file, field: problem"``; each may have more about it."""
+    return ".*".join(map(re.escape, re.split(", |: ", said)))
 
 
 @pytest.fixture

@@ -1,14 +1,16 @@
-"""Whatever is wrong with tables or recipe is one sentence with file, field and fix; nothing is written."""
+"""Whatever is wrong with tables, files or recipe is a sentence with file, field and fix; nothing is written."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
+from tests.flight.conftest import fault
 from wildlab.errors import WildlabError
+from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.store import load_flight
 
 Change = Callable[[Any], None]
 
@@ -148,9 +150,51 @@ def both(*changes: Change) -> Change:
 )
 def test_one_thing_wrong(raw, change, said):
     change(raw)
-    with pytest.raises(WildlabError, match=".*".join(map(re.escape, re.split(", |: ", said)))) as caught:
+    with pytest.raises(WildlabError, match=fault(said)) as caught:
         raw.run()
     assert caught.value.exit_code == 2 and caught.value.fix
     assert "\n" not in str(caught.value)
     assert not raw.into.exists()
     assert sorted(path.name for path in raw.folder.iterdir()) == ["raw", "recipe.toml"]
+
+
+def test_a_link_out_of_the_source_folder(raw):
+    path = raw.write()
+    (raw.folder / "secret.csv").write_text(raw.tables["nav.csv"])
+    (raw.folder / "raw" / "nav.csv").unlink()
+    (raw.folder / "raw" / "nav.csv").symlink_to(raw.folder / "secret.csv")
+    with pytest.raises(WildlabError, match="leaves the folder"):
+        import_flight(path, raw.folder / "raw", raw.into)
+    assert not raw.into.exists()
+
+
+def test_an_hour_that_is_there_twice(raw):
+    raw.set("time.zone", "Europe/Oslo")
+    raw.set("time.epoch", None)
+    raw.recipe["truth"].pop()
+    for name in ("nav.csv", "photos.csv"):
+        raw.tables[name] = raw.tables[name].replace("2024-06-12T09", "2024-10-27T02").replace("Z", "")
+    with pytest.raises(WildlabError, match="exists twice"):
+        raw.run()
+    raw.set("time.zone", "+02:00")
+    assert str(raw.run().manifest.time.epoch) == "2024-10-27 00:30:00+00:00"
+
+
+def test_a_flight_that_is_there_stays(raw):
+    raw.run()
+    raw.set("description", "second")
+    with pytest.raises(WildlabError, match="already"):
+        raw.run()
+    assert load_flight(raw.into).manifest.description == ""
+    flight = import_flight(raw.write(), raw.folder / "raw", raw.into, overwrite=True)
+    assert flight.manifest.description == "second"
+    with pytest.raises(WildlabError, match="holds other things"):
+        import_flight(raw.write(), raw.folder / "raw", raw.folder / "raw", overwrite=True)
+
+
+def test_names_of_columns_cannot_command_a_terminal(raw):
+    raw.replace("clicks.csv", "x,y,what", "\x1b[2J,y,what")
+    with pytest.raises(WildlabError) as caught:
+        raw.run()
+    assert "\x1b" not in str(caught.value)
+    assert "'\\x1b[2J'" in str(caught.value)

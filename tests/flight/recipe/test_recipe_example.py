@@ -1,4 +1,4 @@
-"""The worked example of `data/recipes/README.md`, imported exactly as it stands there."""
+"""The worked example of `data/recipes/README.md`, imported as it stands there, and with its camera in a file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wildlab.errors import WildlabError
 from wildlab.files import sha256
+from wildlab.flight.camera_file import CameraFile, read_camera, write_camera
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, truth_at
 from wildlab.flight.files import check_model
@@ -96,3 +98,77 @@ def test_the_other_parts_of_the_readme_are_what_a_recipe_may_say():
     assert recipe.magnetometer.field.z.unit == "mG"
     assert set(recipe.tables) == {"log", "gps"}
     assert recipe.detections[-1].counts_from == "bow"
+
+
+CONTENT = tomllib.loads("""
+board = {pattern = "chessboard", columns = 9, rows = 6, spacing_m = 0.025}
+evidence = {images = 30, views = 28, points = 1512, lens = "k1", rms_px = 0.3, covered = 0.9}
+covariance = [[4.0]]
+parameter = [{name = "k1", value = -0.1, sd = 0.01, low = -0.12, high = -0.08}]
+view = [{name = "a.png", rms_px = 0.3, inverted = true}]
+
+[camera]
+name = "Tau2"
+width_px = 640
+height_px = 512
+fx_px = 1159.2
+fy_px = 1167.8
+cx_px = 313.0
+cy_px = 265.0
+k1 = -0.1
+""")
+
+
+@pytest.fixture
+def folder(example):
+    """The example of the recipes' README, its camera in a file."""
+    recipe = (example / "recipe.toml").read_text(encoding="utf-8")
+    recipe = re.sub(r"\[camera\].*?\n\n", "", recipe, count=1, flags=re.DOTALL)
+    (example / "recipe.toml").write_text(f'camera = "camera.toml"\n{recipe}', encoding="utf-8")
+    write_camera(CameraFile.model_validate(CONTENT), example / "camera.toml")
+    return example
+
+
+def test_it_comes_back_as_it_was_written(folder):
+    assert read_camera(folder / "camera.toml") == CameraFile.model_validate(CONTENT)
+
+
+def test_a_recipe_takes_it(folder):
+    import_flight(folder / "recipe.toml", None, folder / "flight")
+    manifest = load_flight(folder / "flight").manifest
+    camera = manifest.geometry_camera()
+    assert (camera.fx, camera.cy, camera.distortion[0]) == (1159.2, 265.0, -0.1)
+    assert manifest.camera.name == "Tau2"
+    hashes = {source.file: source.sha256 for source in manifest.sources}
+    assert hashes["camera.toml"] == sha256(folder / "camera.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("fx_px = 1159.2", "fx_px = -1.0", "is -1 px"),
+        ("[[4.0]]", "[[4.0, 1.0]]", "covariance"),
+        ("cy_px", "cz_px", "camera.cz_px"),
+        ("format = 1", "format = 2", "camera.toml, format"),
+        ("[board]", "[board", "is not valid TOML"),
+    ],
+)
+def test_a_wrong_one_is_a_sentence(folder, old, new, said):
+    path = folder / "camera.toml"
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(WildlabError) as error:
+        import_flight(folder / "recipe.toml", None, folder / "flight")
+    assert said in str(error.value) and not (folder / "flight").exists()
+
+
+def test_one_that_is_not_there_and_one_that_lies_elsewhere_are_sentences(folder):
+    recipe = folder / "recipe.toml"
+    (folder / "camera.toml").rename(folder / "other.toml")
+    for old, new, problem in (
+        ("camera.toml", "camera.toml", "no such file"),
+        ('"camera.toml"', '"../camera.toml"', "leaves the folder"),
+        ("camera =", "camera_file =", "Write camera"),
+    ):
+        recipe.write_text(recipe.read_text().replace(old, new))
+        with pytest.raises(WildlabError, match=problem):
+            import_flight(recipe, None, folder / "flight")
