@@ -1,12 +1,9 @@
-"""Boxes of COCO, YOLO and MegaDetector: the same boxes out of each, and a sentence for whatever is wrong."""
+"""Boxes of COCO, YOLO, MegaDetector and tables: the same out of each, and a sentence for what is wrong."""
 
 from __future__ import annotations
 
-import copy
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,35 +13,37 @@ from wildlab.flight.readers import label_yolo
 from wildlab.flight.readers.labels import Labels, read_labels
 
 #: Two animals and a car in an image of 200 x 100 pixels, and an image in which nothing is.
-COCO: dict[str, Any] = {
-    "images": [
-        {"id": 7, "file_name": "day/a.png", "width": 200, "height": 100, "site": "north"},
-        {"id": 9, "file_name": "b.png", "site": "south"},
-    ],
-    "categories": [{"id": 1, "name": "deer"}, {"id": 3, "name": "car"}, {"id": 4, "name": "boar"}],
-    "annotations": [
-        {"id": 1, "image_id": 7, "category_id": 1, "bbox": [20, 10, 40, 30]},
-        {"id": 2, "image_id": 7, "category_id": 3, "bbox": [100, 50, 20.5, 10]},
-        {"id": 3, "image_id": 7, "category_id": 1, "bbox": [0, 0, 200, 5], "iscrowd": 1},
-    ],
-}
-RESULTS: list[dict[str, Any]] = [
-    {"image_id": 7, "category_id": 1, "bbox": [20, 10, 40, 30], "score": 0.9},
-    {"image_id": 9, "category_id": 3, "bbox": [1, 2, 3, 4], "score": 0.25},
-]
-BATCH: dict[str, Any] = {
-    "info": {"detector": "md_v5a"},
-    "detection_categories": {"1": "animal", "2": "person"},
-    "images": [
-        {"file": "day/a.png", "detections": [{"category": "1", "conf": 0.8, "bbox": [0.1, 0.1, 0.2, 0.3]}]},
-        {"file": "b.png", "detections": []},
-        {"file": "c.png", "failure": "Failure image access", "detections": None},
-    ],
-}
+COCO = """{
+  "images": [
+    {"id": 7, "file_name": "day/a.png", "width": 200, "height": 100, "site": "north"},
+    {"id": 9, "file_name": "b.png", "site": "south"}
+  ],
+  "categories": [{"id": 1, "name": "deer"}, {"id": 3, "name": "car"}, {"id": 4, "name": "boar"}],
+  "annotations": [
+    {"id": 1, "image_id": 7, "category_id": 1, "bbox": [20, 10, 40, 30]},
+    {"id": 2, "image_id": 7, "category_id": 3, "bbox": [100, 50, 20.5, 10]},
+    {"id": 3, "image_id": 7, "category_id": 1, "bbox": [0, 0, 200, 5], "iscrowd": 1}
+  ]
+}"""
+RESULTS = """[
+  {"image_id": 7, "category_id": 1, "bbox": [20, 10, 40, 30], "score": 0.9},
+  {"image_id": 9, "category_id": 3, "bbox": [1, 2, 3, 4], "score": 0.25}
+]"""
+BATCH = """{
+  "info": {"detector": "md_v5a"},
+  "detection_categories": {"1": "animal", "2": "person"},
+  "images": [
+    {"file": "day/a.png", "detections": [{"category": "1", "conf": 0.8, "bbox": [0.1, 0.1, 0.2, 0.3]}]},
+    {"file": "b.png", "detections": []},
+    {"file": "c.png", "failure": "Failure image access", "detections": null}
+  ]
+}"""
 
 
-def write(path: Path, content: Any) -> Path:
-    path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
+def write(path: Path, content: str, old: str = "", new: str = "") -> Path:
+    """A file of that content, with one part of it replaced."""
+    assert content.count(old) == 1 or not old
+    path.write_text(content.replace(old, new) if old else content, encoding="utf-8")
     return path
 
 
@@ -77,16 +76,17 @@ def test_coco_has_its_boxes_classes_crowds_and_empty_images(tmp_path):
 
 def test_results_of_coco_are_named_by_the_truth_or_by_their_ids(tmp_path):
     truth = read_labels(write(tmp_path / "t.json", COCO))
-    strange = [*RESULTS, {**RESULTS[0], "image_id": 1234}]
-    found = read_labels(write(tmp_path / "r.json", strange), truth=truth, classes=("deer",))
+    path = tmp_path / "r.json"
+    strange = '[{"image_id": 1234, "category_id": 1, "bbox": [20, 10, 40, 30], "score": 0.9},'
+    found = read_labels(write(path, RESULTS, "[\n", strange), truth=truth, classes=("deer",))
     assert in_px(found, "a.png") == [[20, 10, 40, 30]] and found.scores["day/a.png"].tolist() == [0.9]
     assert found.marked.left_out == {"result of an image that the labels do not have": 1}
-    alone = read_labels(write(tmp_path / "r.json", RESULTS))
+    alone = read_labels(write(path, RESULTS))
     assert in_px(alone, "000007.png") == [[20, 10, 40, 30]] and alone.name_of("000008.png") is None
     assert in_px(alone, "clip#000009") == [[1, 2, 3, 4]]
-    named = [{**RESULTS[0], "image_id": "IMG_7"}]
-    assert in_px(read_labels(write(tmp_path / "r.json", named)), "IMG_7.JPG") == [[20, 10, 40, 30]]
-    assert read_labels(write(tmp_path / "r.json", [])).boxes == {}
+    named = read_labels(write(path, RESULTS, '"image_id": 7', '"image_id": "IMG_7"'))
+    assert in_px(named, "IMG_7.JPG") == [[20, 10, 40, 30]]
+    assert read_labels(write(path, "[]")).boxes == {}
 
 
 def test_megadetector_has_shares_of_the_image_and_says_where_it_failed(tmp_path):
@@ -131,16 +131,17 @@ def test_names_of_yolo_lie_beside_the_text_files_or_above(tmp_path, name, text, 
 def test_one_truth_in_three_formats_is_one_truth(tmp_path):
     """Written out of the same numbers, the boxes of the three formats are the same to rounding."""
     rng = np.random.default_rng(3)
-    low, size = rng.uniform(0, 60, (20, 2)), rng.uniform(1, 40, (20, 2))
-    boxes = np.concatenate([low, size], axis=1)
-    share = boxes / [200, 100, 200, 100]
-    coco = {**COCO, "annotations": [{"image_id": 9, "category_id": 1, "bbox": list(one)} for one in boxes]}
-    md = copy.deepcopy(BATCH)
-    md["images"][1]["detections"] = [{"category": "1", "conf": 1, "bbox": list(one)} for one in share]
+    boxes = np.concatenate([rng.uniform(0, 60, (20, 2)), rng.uniform(1, 40, (20, 2))], axis=1)
+    share = (boxes / [200, 100, 200, 100]).tolist()
+    coco = [{"image_id": 9, "category_id": 1, "bbox": one} for one in boxes.tolist()]
+    md = [{"category": "1", "conf": 1, "bbox": one} for one in share]
     lines = "".join(f"0 {a + w / 2} {b + h / 2} {w} {h}\n" for a, b, w, h in share)
-    read = [read_labels(write(tmp_path / "c", coco)), read_labels(write(tmp_path / "m", md))]
-    for labels in (*read, read_labels(yolo(tmp_path / "y", b=lines))):
-        assert np.allclose(in_px(labels, "b.png"), boxes, atol=1e-9)
+    for path in (
+        write(tmp_path / "c", json.dumps({**json.loads(COCO), "annotations": coco})),
+        write(tmp_path / "m", BATCH, '"b.png", "detections": []', f'"b.png", "detections": {json.dumps(md)}'),
+        yolo(tmp_path / "y", b=lines),
+    ):
+        assert np.allclose(in_px(read_labels(path), "b.png"), boxes, atol=1e-9)
 
 
 def test_images_of_another_size_are_told(tmp_path):
@@ -151,40 +152,34 @@ def test_images_of_another_size_are_told(tmp_path):
 
 
 def test_an_image_with_a_class_and_no_box_is_not_judged(tmp_path):
-    coco = copy.deepcopy(COCO)
-    del coco["annotations"][0]["bbox"]
-    labels = read_labels(write(tmp_path / "t.json", coco))
+    without = COCO.replace(', "bbox": [20, 10, 40, 30]', "")
+    labels = read_labels(write(tmp_path / "t.json", without))
     assert list(labels.boxes) == ["b.png"] and sum(labels.marked.left_out.values()) == 1
-    coco["categories"][0]["name"] = "empty"
-    assert list(read_labels(write(tmp_path / "t.json", coco)).boxes) == ["day/a.png", "b.png"]
-
-
-def changed(source: Any, change: Callable[[Any], Any]) -> Any:
-    found = copy.deepcopy(source)
-    return change(found) or found
+    labels = read_labels(write(tmp_path / "t.json", without, "deer", "empty"))
+    assert list(labels.boxes) == ["day/a.png", "b.png"]
 
 
 @pytest.mark.parametrize(
-    ("source", "change", "word"),
+    ("source", "old", "new", "word"),
     [
-(COCO, lambda c: c["annotations"][1].update(bbox=[1, 2, -3, 4]), r"\[1\].bbox"),
-(COCO, lambda c: c["annotations"][1].update(bbox=[1, 2, 3, "4"]), "four numbers"),
-(COCO, lambda c: c["annotations"][1].update(image_id=8), "image_id: is 8"),
-(COCO, lambda c: c["annotations"][1].update(category_id=2), "categories has 1, 3"),
-(COCO, lambda c: c["images"].append(c["images"][0]), "7 stands"),
-(COCO, lambda c: c.pop("categories") and None, "categories: is missing"),
-(COCO, lambda c: c.update(images=[], annotations=[]), "names no image"),
-(RESULTS, lambda c: c[1].pop("score") and None, "has a score"),
-(RESULTS, lambda c: c[1].update(score=float("inf")), "is inf"),
-(BATCH, lambda c: c["images"][0]["detections"][0].update(bbox=[9, 9, 2, 3]), "shares of the image"),
-(BATCH, lambda c: c["images"][0]["detections"][0].update(category="9"), "_categories has 1, 2"),
-(BATCH, lambda c: c.pop("detection_categories") and None, "categories are called"),
-(COCO, lambda c: {"a": 1, "b\x1b": 2}, r"'b\\x1b'"),
-(COCO, lambda c: '{"images": [', "like JSON"),
-],
-)  # fmt: skip
-def test_what_is_wrong_in_json_is_named(tmp_path, source, change, word):
-    path = write(tmp_path / "l.json", changed(source, change))
+        (COCO, "[100, 50, 20.5, 10]", "[1, 2, -3, 4]", r"\[1\].bbox"),
+        (COCO, "[100, 50, 20.5, 10]", '[1, 2, 3, "4"]', "four numbers"),
+        (COCO, '"id": 2, "image_id": 7', '"id": 2, "image_id": 8', "image_id: is 8"),
+        (COCO, '"image_id": 7, "category_id": 3', '"image_id": 7, "category_id": 2', "categories has 1, 3"),
+        (COCO, '"id": 9', '"id": 7', "7 stands"),
+        (COCO, '"categories"', '"kinds"', "categories: is missing"),
+        ('{"images": [], "categories": [], "annotations": []}', "", "", "names no image"),
+        (RESULTS, ', "score": 0.25', "", "has a score"),
+        (RESULTS, "0.25", "Infinity", "is inf"),
+        (BATCH, "[0.1, 0.1, 0.2, 0.3]", "[9, 9, 2, 3]", "shares of the image"),
+        (BATCH, '"category": "1"', '"category": "9"', "_categories has 1, 2"),
+        (BATCH, '"detection_categories"', '"kinds"', "categories are called"),
+        (r'{"a": 1, "b\u001b": 2}', "", "", r"'b\\x1b'"),
+        ('{"images": [', "", "", "like JSON"),
+    ],
+)
+def test_what_is_wrong_in_json_is_named(tmp_path, source, old, new, word):
+    path = write(tmp_path / "l.json", source, old, new)
     with pytest.raises(WildlabError, match=word) as error:
         read_labels(path)
     assert str(path) in str(error.value) and error.value.fix
@@ -223,16 +218,114 @@ def test_folders_that_are_none_of_yolo_are_refused(tmp_path, monkeypatch):
 
 
 def test_groups_classes_and_crowded_images(tmp_path):
-    coco = write(tmp_path / "t.json", COCO)
-    with pytest.raises(WildlabError, match="no such field"):
-        read_labels(coco, group="clip")
-    with pytest.raises(WildlabError, match="nothing of groups"):
-        read_labels(write(tmp_path / "r.json", RESULTS), group="clip")
-    with pytest.raises(WildlabError, match="class 'wolf'"):
-        read_labels(coco, classes=("wolf",))
-    with pytest.raises(WildlabError, match="none of 1"):
-        read_labels(write(tmp_path / "r.json", [{**RESULTS[0], "image_id": 1}]), truth=read_labels(coco))
-    with pytest.raises(WildlabError, match="is 8"):
-        read_labels(write(tmp_path / "r.json", [{**RESULTS[0], "category_id": 8}]), truth=read_labels(coco))
-    with pytest.raises(WildlabError, match="3,001 boxes"):
-        read_labels(yolo(tmp_path / "labels", a="0 0.5 0.5 0.1 0.1\n" * 3001))
+    coco, path = write(tmp_path / "t.json", COCO), tmp_path / "r.json"
+    truth = read_labels(coco)
+    one = '[{"image_id": 7, "category_id": 1, "bbox": [20, 10, 40, 30], "score": 0.9}]'
+    for file, given, problem in (
+        (coco, {"group": "clip"}, "no such field"),
+        (write(path, one), {"group": "clip"}, "nothing of groups"),
+        (coco, {"classes": ("wolf",)}, "class 'wolf'"),
+        (write(tmp_path / "1.json", one, '"image_id": 7', '"image_id": 1'), {"truth": truth}, "none of 1"),
+        (write(tmp_path / "8.json", one, '"category_id": 1', '"category_id": 8'), {"truth": truth}, "is 8"),
+        (yolo(tmp_path / "labels", a="0 0.5 0.5 0.1 0.1\n" * 3001), {}, "3,001 boxes"),
+    ):
+        with pytest.raises(WildlabError, match=problem):
+            read_labels(file, **given)
+
+
+def table(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["image,x,y,w,h\na.png,1,2,3,4\n", "file,x_min,y_min,x_max,y_max\na.png,1,2,4,6\n",
+     "\ufefffilename,x0,y0,x1,y1\na.png,1,2,4,6\n"],
+)  # fmt: skip
+def test_boxes_in_any_of_the_ways(tmp_path, text):
+    assert read_labels(table(tmp_path / "l.csv", text)).boxes["a.png"].tolist() == [[1, 2, 3, 4]]
+
+
+def test_points_empty_frames_classes_and_groups(tmp_path):
+    text = "image,u_px,v_px,class,clip\na.png,1,2,deer,x\na.png,5,6,car,x\n"
+    text += "b.png,,,deer,y\na.png,7,8,DontCare,x\n"
+    path = table(tmp_path / "l.csv", text)
+    every = read_labels(path)
+    assert every.boxes["a.png"].tolist() == [[1, 2, 0, 0], [5, 6, 0, 0]] and every.boxes["b.png"].shape == (
+        0,
+        4,
+    )
+    assert every.ignore["a.png"].tolist() == [[7, 8, 0, 0]] and every.group["b.png"] == "b.png"
+    deer = read_labels(path, classes=("deer",), group="clip")
+    assert len(deer.boxes["a.png"]) == 1 and len(deer.ignore["a.png"]) == 2 and deer.group["b.png"] == "y"
+
+
+def test_a_clip_is_ten_stretches_unless_a_column_says_otherwise(tmp_path):
+    rows = "".join(f"{number},1,2,3,4,{number % 2}\n" for number in range(7, 47))
+    path = table(tmp_path / "l.csv", f"frame0,x,y,w,h,clip\n{rows}")
+    group = read_labels(path).group
+    assert [group[str(one)] for one in (7, 10, 11, 46)] == [
+        "stretch 0",
+        "stretch 0",
+        "stretch 1",
+        "stretch 9",
+    ]
+    assert read_labels(path, group="clip").group["8"] == "0"
+
+
+def test_numbers_of_a_clip_and_names_without_ending(tmp_path):
+    clip = read_labels(table(tmp_path / "l.csv", "frame0,x,y,w,h\n12,1,2,3,4\n"))
+    assert clip.name_of("a#000012") == "12" and clip.name_of("a#000013") is None
+    stems = read_labels(table(tmp_path / "m.csv", "image,x,y,w,h\na,1,2,3,4\n"))
+    assert stems.name_of("a.png") == "a" and stems.name_of("b.png") is None
+    files = read_labels(
+        table(tmp_path / "n.csv", "image,x,y,w,h\na.png,1,2,3,4\nb.png,1,2,3,4\nb.jpg,1,2,3,4\n")
+    )
+    assert files.name_of("a") == "a.png" and files.name_of("b") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("x,y,w,h\n1,2,3,4\n", "names the image"),
+        ("image,a\nb.png,3\n", "no columns"),
+        ("image,x,y,w,h\n", "has no row"),
+        ("image,x,y,w,h\na.png,1,2,3,4\na.png,1,2,-3,4\n", "line 3 has no box"),
+        ("image,x,y,w,h\na.png,1,?,3,4\n", "line 2 has no box"),
+        ("frame0,x,y,w,h\na,1,2,3,4\n", "line 2 has no number"),
+        ("", "has no row"),
+        ("image,x,y,w,h\na.png,1,2,3,4,5,6\n", "7 values"),
+        ("image,x,y,w,h\na.png,.1,.2,.3,.4\n", "shares"),
+        ("image,x_min,y_min,x_max,y_max\na.png,5,2,3,4\n", "x_min 5"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path, text, word):
+    with pytest.raises(WildlabError, match=word):
+        read_labels(table(tmp_path / "l.csv", text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "image;x;y;w;h\na.png;1,5;2;3;4\n",
+        "image\tx\ty\tw\th\na.png\t1.5\t2\t3\t4\n",
+        "# drawn by hand\n\nimage, x, y, w, h\na.png, 1.5, 2, 3, 4\n",
+        "Image,X,Y,W,H\na.png,1.5,2,3,4\n",
+        "\ufeffimage,xmin,ymin,xmax,ymax\r\na.png,1.5,2,4.5,6\r\n",
+        "image,x,y,w,h\nC:\\day 1\\a.png,1.5,2,3,4\n",
+    ],
+)
+def test_tables_as_other_programs_write_them(tmp_path, text):
+    labels = read_labels(table(tmp_path / "l.csv", text))
+    name = labels.name_of("a.png")
+    assert name is not None
+    assert labels.boxes[name].tolist() == [[1.5, 2, 3, 4]]
+
+
+def test_a_row_that_stands_twice_counts_once_and_is_told(tmp_path):
+    labels = read_labels(
+        table(tmp_path / "l.csv", "image,x,y,w,h\n" + 2 * "a.png,1,2,3,4\n" + "a.png,1,2,3,5\n")
+    )
+    assert len(labels.boxes["a.png"]) == 2
+    assert labels.marked.left_out == {"a row that stands in the file twice": 1}

@@ -26,6 +26,17 @@ def damaged(data: bytes, cuts: int = 20, flips: int = 40) -> Iterator[bytes]:
     yield bytes(spoilt)
 
 
+def spoilt(data: bytes, copies: int = 20, bytes_each: int = 100) -> Iterator[bytes]:
+    """Cut at random places, and with many bytes changed at once."""
+    rng = np.random.default_rng(14)
+    for at in rng.integers(0, len(data), copies):
+        yield data[:at]
+    for _ in range(copies):
+        one = np.frombuffer(data, np.uint8).copy()
+        one[rng.integers(0, len(data), bytes_each)] = rng.integers(0, 256, bytes_each)
+        yield one.tobytes()
+
+
 def check(log: RawLog) -> None:
     """Rows of use are finite where a flight needs them to be, and in order of time."""
     for name, stream in log.parts.items():
