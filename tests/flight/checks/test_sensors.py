@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import looks_of_others, sensors
-from wildlab.flight.manifest import Manifest, make_manifest, replace_in_manifest
+from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.scans import scans_of
 
@@ -23,15 +24,12 @@ def detected(
 ) -> Flight:
     """A flight whose looks are of the sensors named, and whose detections are (look, source)."""
     flight = make()
-    first, last = flight.table("frames")["time_s"].iloc[[0, -1]]
-    times = np.linspace(first, last, len(looks))
-    frames = pd.DataFrame({"frame_id": [f"look-{i}" for i in range(len(looks))], "time_s": times})
+    ids = [f"look-{i}" for i in range(len(looks))]
+    frames = pd.DataFrame({"frame_id": ids, "time_s": np.linspace(1.0, 8.0, len(looks))})
     flight.tables["frames"] = frames.assign(sensor=list(looks)) if named else frames
-    rows = [
-        {"detection_id": f"d-{k}", "frame_id": f"look-{look}", "source": source, "kind": "position"}
-        for k, (look, source) in enumerate(seen)
-    ]
-    flight.tables["detections"] = pd.DataFrame(rows).assign(north_m=1.0, east_m=2.0, down_m=0.0)
+    rows = [(f"d-{k}", f"look-{look}", source) for k, (look, source) in enumerate(seen)]
+    detections = pd.DataFrame(rows, columns=["detection_id", "frame_id", "source"])
+    flight.tables["detections"] = detections.assign(kind="position", north_m=1.0, east_m=2.0, down_m=0.0)
     return flight
 
 
@@ -69,11 +67,12 @@ def test_the_rows_in_looks_of_others_are_given(make_flight):
 
 
 def test_a_misspelt_sensor_is_named(make_flight):
-    seen = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar"), (2, "radar")])
+    flight = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar"), (2, "radar")])
     told = {"sensors": {"radra": {"rate_hz": 2.0}, "lidar": {"rate_hz": 2.0}}}
-    flight = Flight(replace_in_manifest(seen.manifest, told), seen.nav, seen.tables)
-    found = [one for one in check_flight(flight) if one.field.startswith("sensors.")]
-    assert [(one.level, one.field) for one in found] == [("warning", "sensors.radra")]
+    found = check_flight(replace(flight, manifest=replace_in_manifest(flight.manifest, told)))
+    assert [(one.level, one.field) for one in found if one.field.startswith("sensors.")] == [
+        ("warning", "sensors.radra")
+    ]
 
 
 def test_several_sources_in_one_look_are_good_to_know(make_flight):
@@ -90,29 +89,35 @@ def test_what_agrees_or_is_not_said_is_no_finding(make_flight):
     assert said(detected(make_flight, LOOKS, [(0, "radar"), (1, "radar")], named=False)) == []
 
 
-def test_two_sensors_may_look_at_once_and_one_may_not_look_twice(make_flight):
-    def repeated(times: list[float], flight: Flight) -> list[str]:
-        flight.tables["frames"] = flight.tables["frames"].assign(time_s=times)
-        found = [one for one in check_flight(flight) if (one.table, one.field) == ("frames", "time_s")]
-        return [one.sentence.split()[2] for one in found]
+@pytest.mark.parametrize(
+    ("times", "named", "repeated"),
+    [
+        ([1.0, 1.0, 2.0, 2.0], True, []),
+        ([1.0, 1.0, 1.0, 2.0], True, ["1"]),
+        ([1.0, 1.0, 2.0, 2.0], False, ["2"]),
+    ],
+)
+def test_two_sensors_may_look_at_once_and_one_may_not_look_twice(make_flight, times, named, repeated):
+    flight = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar")], named)
+    flight.tables["frames"]["time_s"] = times
+    found = [one for one in check_flight(flight) if (one.table, one.field) == ("frames", "time_s")]
+    assert [one.sentence.split()[2] for one in found] == repeated
 
+
+@pytest.mark.parametrize(
+    ("camera", "stated", "silent"),
+    [
+        (True, {}, []),
+        (False, {}, [["lidar", "radar"]]),
+        (False, {"radar": {"clock_offset_s": 0.0}}, [["lidar"]]),
+        (False, {"radar": {"clock_offset_s": -0.5}, "lidar": {"clock_offset_s": -0.5}}, []),
+    ],
+)
+def test_without_a_camera_it_is_the_sensors_whose_clocks_are_taken_to_agree(
+    make_flight, camera, stated, silent
+):
     flight = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar")])
-    assert repeated([1.0, 1.0, 2.0, 2.0], flight) == []
-    assert repeated([1.0, 1.0, 1.0, 2.0], flight) == ["1"]
-    flight.tables["frames"] = flight.tables["frames"].drop(columns="sensor")
-    assert repeated([1.0, 1.0, 2.0, 2.0], flight) == ["2"]
-
-
-def test_without_a_camera_it_is_the_sensors_whose_clocks_are_taken_to_agree(make_flight):
-    def silent(manifest: Manifest) -> list[list[str]]:
-        found = check_flight(Flight(manifest, flight.nav, flight.tables))
-        return [re.findall("'([a-z]+)'", one.sentence) for one in found if one.field == "sensors"]
-
-    flight = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar")])
-    assert silent(flight.manifest) == []
-    without = make_manifest(flight.manifest.model_dump(exclude={"camera"}))
-    assert silent(without) == [["lidar", "radar"]]
-    stated = {"radar": {"clock_offset_s": 0.0}}
-    assert silent(replace_in_manifest(without, {"sensors": stated})) == [["lidar"]]
-    both = {name: {"clock_offset_s": -0.5} for name in ("radar", "lidar")}
-    assert silent(replace_in_manifest(without, {"sensors": both})) == []
+    data = flight.manifest.model_dump(exclude=set() if camera else {"camera"})
+    manifest = replace_in_manifest(make_manifest(data), {"sensors": stated})
+    found = check_flight(replace(flight, manifest=manifest))
+    assert [re.findall("'([a-z]+)'", one.sentence) for one in found if one.field == "sensors"] == silent

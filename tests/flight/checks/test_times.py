@@ -1,4 +1,4 @@
-"""Poses, frames and truth of the same time: what is outside, what lies in a gap, and why."""
+"""Poses, frames and truth of the same time: what is outside, what lies in a gap, what stands there twice."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.flight.checks.watching import level_poses, watch
+from tests.flight.conftest import table
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.twice import twice
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.store import Flight
 
@@ -18,29 +21,18 @@ Make = Callable[..., Flight]
 
 def flown(make: Make, seconds: float = 120.0) -> Flight:
     """Poses five times a second, a look of a radar every two seconds with three bearings in each."""
-    flight = make()
-    t = np.arange(0.0, seconds + 0.1, 0.2)
-    flight.nav.clear()
-    nav = pd.DataFrame({"time_s": t, "north_m": t, "east_m": 0.0, "down_m": 0.0, "q_w": 1.0})
-    flight.nav["log"] = nav.assign(q_x=0.0, q_y=0.0, q_z=0.0)
-    looks = np.arange(1.0, seconds, 2.0)
-    ids = [f"l{k}" for k in range(len(looks))]
-    flight.tables["frames"] = pd.DataFrame({"frame_id": ids, "time_s": looks, "sensor": "radar"})
-    detections = pd.DataFrame({"frame_id": np.repeat(ids, 3), "source": "radar", "kind": "range-bearing"})
-    n = len(detections)
-    detections = detections.assign(azimuth_rad=np.linspace(-3, 3, n), range_m=300.0 + np.arange(n))
-    detections["detection_id"] = [str(k) for k in range(n)]
-    flight.tables["detections"] = detections
-    del flight.tables["truth"]
-    return flight
+    t, looks = np.arange(0.0, seconds + 0.1, 0.2), np.arange(1.0, seconds, 2.0)
+    seen = [{"azimuth_rad": np.linspace(-3, 3, len(looks)), "range_m": 300.0 + k} for k in range(3)]
+    return watch(make, level_poses(t, t), looks, *seen)
 
 
 def of_truths(flight: Flight, spans: dict[str, tuple[float, float]]) -> list[Finding]:
     rows = [
-        pd.DataFrame({"target_id": name, "time_s": np.arange(low, high + 0.5), "north_m": 900.0})
+        pd.DataFrame({"target_id": name, "time_s": np.arange(low, high + 0.5)})
         for name, (low, high) in spans.items()
     ]
-    flight.tables["truth"] = pd.concat(rows, ignore_index=True).assign(east_m=50.0, down_m=0.0)
+    truth = pd.concat(rows, ignore_index=True).assign(north_m=900.0, east_m=50.0, down_m=0.0)
+    flight.tables["truth"] = truth
     found = [one for one in check_flight(flight) if (one.table, one.field) == ("truth", "time_s")]
     return [one for one in found if one.level != "note"]
 
@@ -68,10 +60,76 @@ def test_a_hole_in_the_poses_is_told_with_its_looks_detections_and_seconds(make_
 def test_poses_as_slow_as_their_own_rate_have_no_hole(make_flight):
     flight = flown(make_flight)
     assert of_poses(flight) == []
-    flight.nav["log"] = flight.nav["log"].iloc[::30].reset_index(drop=True)  # one in six seconds
+    whole = flight.nav["log"]
+    flight.nav["log"] = whole.iloc[::30].reset_index(drop=True)  # one in six seconds
     assert of_poses(flight) == []
-    flight.nav["log"] = flight.nav["log"].iloc[:1]  # of a mast
+    flight.nav["log"] = whole.iloc[:1]  # of a mast
     assert not any("without a pose" in one.sentence for one in of_poses(flight))
+
+
+def doubles(flight: Flight) -> list[str]:
+    found = [one for one in check_flight(flight) if one.field == "detection_id"]
+    assert all(one.level == "warning" for one in found)
+    return [one.sentence for one in found]
+
+
+def seen(make: Make) -> Flight:
+    """Four detections in three looks, three of which have the same place."""
+    flight = make()
+    flight.tables["detections"] = table(
+        "detection_id,frame_id,north_m,target_id\na,A,10.0,\nb,A,20.0,\nc,B,10.0,\nd,C,10.0,\n"
+    ).assign(source="radar", kind="position", east_m=2.0, down_m=0.0)
+    return flight
+
+
+def with_more(flight: Flight, more: pd.DataFrame) -> Flight:
+    tables = {**flight.tables, "detections": pd.concat([flight.table("detections"), more], ignore_index=True)}
+    return Flight(flight.manifest, flight.nav, tables)
+
+
+def test_rows_that_stand_there_again_are_counted(make_flight):
+    flight = seen(make_flight)
+    again = flight.table("detections").iloc[[0, 2, 3]].assign(detection_id=["x", "y", "z"], target_id="boat")
+    (sentence,) = doubles(with_more(flight, again))
+    assert "3 of 7" in sentence and "3 looks, first 'x'" in sentence
+
+
+def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_flight):
+    flight = seen(make_flight)
+    once = flight.table("detections")
+    assert doubles(flight) == []
+    assert doubles(with_more(flight, once.assign(source="lidar", detection_id=list("efgh")))) == []
+    # Without a look nobody knows whether it was at the same time.
+    flight.tables["detections"] = once.assign(frame_id="", north_m=1.0)
+    assert doubles(flight) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "rows", "later", "copied"),
+    [
+        ("radar", 20, 0.0, True),
+        ("radar-2", 20, 0.0, True),
+        ("radar-2", 12, 0.0, True),
+        # Few that are alike, and those of other times, are no copy.
+        ("radar-2", 0, 0.0, False),
+        ("radar-2", 5, 0.0, False),
+        ("radar-2", 20, 0.05, False),
+    ],
+)
+def test_a_log_that_was_read_twice_is_a_problem(make_flight, source, rows, later, copied):
+    """The first looks once more, under other names, as from a copy of the log that ends earlier."""
+    t = np.linspace(1, 8, 20)
+    place = {"north_m": np.random.default_rng(1).normal(0, 50, 20), "east_m": 3.0, "down_m": 0.0}
+    flight = watch(make_flight, level_poses(t, t), t, place, kind="position")
+    frames = flight.table("frames").drop(columns="sensor")
+    more = frames.iloc[:rows].assign(frame_id="again " + frames["frame_id"], time_s=frames["time_s"] + later)
+    both = pd.concat([frames, more]).sort_values("time_s", kind="stable", ignore_index=True)
+    once = flight.table("detections").iloc[:rows]
+    again = with_more(flight, once.assign(frame_id="again " + once["frame_id"], source=source))
+    again.tables["frames"] = both
+    found = list(twice(again))
+    assert [one.level for one in found] == ["problem"] * copied
+    assert not copied or f"{rows} of {rows}" in found[0].sentence
 
 
 def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight):

@@ -12,6 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.flight.checks.watching import add_sensor, level_poses, watch
+from tests.flight.conftest import table
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense.looks import Scan, seen_at
@@ -24,50 +26,34 @@ from wildlab.geometry.frames import wrap
 Make = Callable[..., Flight]
 
 #: Where five boats are at first, and how fast they go, m and m/s, north and east.
-BOATS = np.array(
-    [
-        [150.0, -120.0, 1.0, 3.0],
-        [150.0, 140.0, 1.2, -3.0],
-        [320.0, -90.0, 1.0, 2.0],
-        [330.0, 100.0, 1.0, -2.2],
-        [60.0, 80.0, 2.0, 0.0],
-    ]
-)
+BOATS = {
+    "a": (150.0, -120.0, 1.0, 3.0),
+    "b": (150.0, 140.0, 1.2, -3.0),
+    "c": (320.0, -90.0, 1.0, 2.0),
+    "d": (330.0, 100.0, 1.0, -2.2),
+    "e": (60.0, 80.0, 2.0, 0.0),
+}
 
 
-def watched(make: Make, off_deg: float = 0.0, late_s: float = 0.0, clutter: int = 1) -> Flight:
+def watched(make: Make, off_deg: float = 0.0, late_s: float = 0.0) -> Flight:
     """Five moving boats and clutter in 60 looks of a radar; bearings are too large by `off_deg`, and the
     truth has the stamps of `late_s` before."""
     rng = np.random.default_rng(2)
     t = np.arange(0.0, 120.0, 2.0)
-    flight = make()
-    flight.nav.clear()
     # The way bends, or all could as well be mirrored about it.
     aside = 60 * np.sin(t / 25)
-    nav = pd.DataFrame({"time_s": t, "north_m": 2.0 * t, "east_m": aside, "down_m": 0.0, "q_w": 1.0})
-    flight.nav["compass"] = nav.assign(q_x=0.0, q_y=0.0, q_z=0.0)
-    frames = pd.DataFrame({"frame_id": [f"l{k}" for k in range(len(t))], "time_s": t, "sensor": "radar"})
-    flight.tables["frames"] = frames
     truth, seen = [], []
-    for name, (north, east, v_north, v_east) in zip("abcde", BOATS, strict=True):
+    for name, (north, east, v_north, v_east) in BOATS.items():
         # Boats turn, so that no shift in time is a turn about the radar.
-        sway = 15 * np.sin(t / 9 + ord(name))
-        place = {"north_m": north + v_north * t, "east_m": east + v_east * t + sway, "down_m": 0.0}
-        truth.append(pd.DataFrame({"target_id": name, "time_s": t - late_s, **place}))
-        to = np.arctan2(place["east_m"] - aside, place["north_m"] - 2.0 * t)
-        distance = np.hypot(place["east_m"] - aside, place["north_m"] - 2.0 * t)
-        seen.append((to + rng.normal(0, np.radians(0.4), len(t)), distance))
-    seen += [(rng.uniform(-np.pi, np.pi, len(t)), 300.0) for _ in range(clutter)]
+        p = north + v_north * t, east + v_east * t + 15 * np.sin(t / 9 + ord(name))
+        table = pd.DataFrame({"target_id": name, "time_s": t - late_s, "north_m": p[0], "east_m": p[1]})
+        truth.append(table.assign(down_m=0.0))
+        to = p[0] - 2.0 * t, p[1] - aside
+        seen.append((np.arctan2(to[1], to[0]) + rng.normal(0, np.radians(0.4), len(t)), np.hypot(*to)))
+    seen.append((rng.uniform(-np.pi, np.pi, len(t)), 300.0 + 0 * t))
+    rows = [{"azimuth_rad": bearing + np.radians(off_deg), "range_m": r} for bearing, r in seen]
+    flight = watch(make, level_poses(t, 2.0 * t, aside), t, *rows)
     flight.tables["truth"] = pd.concat(truth, ignore_index=True)
-    rows = [
-        pd.DataFrame(
-            {"frame_id": frames["frame_id"], "azimuth_rad": bearing + np.radians(off_deg), "range_m": r}
-        )
-        for bearing, r in seen
-    ]
-    detections = pd.concat(rows, ignore_index=True).assign(source="radar", kind="range-bearing")
-    detections["detection_id"] = [str(k) for k in range(len(detections))]
-    flight.tables["detections"] = detections
     return flight
 
 
@@ -98,13 +84,7 @@ def test_a_clock_that_is_off_is_told_from_a_heading(make_flight, late_s):
 def test_the_clock_of_one_of_two_sensors_is_named_with_what_to_state(make_flight):
     """The other one sees all where it is: it is neither the truth nor a heading."""
     flight = watched(make_flight)
-    frames, seen = flight.table("frames"), flight.table("detections")
-    other = seen.assign(
-        frame_id="e" + seen["frame_id"], detection_id="e" + seen["detection_id"], source="eye"
-    )
-    looks = frames.assign(frame_id="e" + frames["frame_id"], sensor="eye", time_s=frames["time_s"] + 0.5)
-    flight.tables["frames"] = pd.concat([frames, looks], ignore_index=True)
-    flight.tables["detections"] = pd.concat([seen, other], ignore_index=True)
+    add_sensor(flight, "eye", flight.table("detections"), 0.5)
     assert said(flight) == []
     stated = replace_in_manifest(flight.manifest, {"sensors": {"radar": {"clock_offset_s": 20.0}}})
     (found,) = said(replace(flight, manifest=stated))
@@ -114,30 +94,48 @@ def test_the_clock_of_one_of_two_sensors_is_named_with_what_to_state(make_flight
 
 def test_only_the_sensor_that_is_turned_is_named(make_flight):
     flight = watched(make_flight)
-    good, bad = flight.table("detections"), watched(make_flight, 5.0).table("detections")
-    frames = flight.table("frames")
-    flight.tables["frames"] = pd.concat(
-        [frames, frames.assign(frame_id="h" + frames["frame_id"], sensor="horizon")], ignore_index=True
-    ).sort_values("time_s", kind="stable", ignore_index=True)
-    bad = bad.assign(source="horizon", frame_id="h" + bad["frame_id"], detection_id="h" + bad["detection_id"])
-    flight.tables["detections"] = pd.concat([good, bad], ignore_index=True)
+    add_sensor(flight, "horizon", watched(make_flight, 5.0).table("detections"))
     (found,) = said(flight)
     assert found.causes == ("heading off",) and "[sensors.horizon." in found.fix
 
 
-def test_one_look_full_of_clutter_is_no_mistake(make_flight):
+def test_one_look_full_of_clutter_is_no_mistake_and_hides_none(make_flight):
     flight = watched(make_flight)
-    rng = np.random.default_rng(3)
-    azimuth = rng.uniform(-np.pi, np.pi, 4000)
-    clutter = pd.DataFrame({"frame_id": "l15", "azimuth_rad": azimuth, "range_m": 300.0, "source": "radar"})
-    clutter = clutter.assign(kind="range-bearing", detection_id=[f"x{k}" for k in range(4000)])
-    flight.tables["detections"] = pd.concat([flight.table("detections"), clutter], ignore_index=True)
-    assert said(flight) == []
-    # And a mistake is as plain beside it as without.
     detections = flight.table("detections")
+    azimuth = np.random.default_rng(3).uniform(-np.pi, np.pi, 4000)
+    clutter = detections.iloc[[15] * 4000].assign(azimuth_rad=azimuth, range_m=300.0)
+    clutter["detection_id"] = [f"x{k}" for k in range(4000)]
+    detections = pd.concat([detections, clutter], ignore_index=True)
+    flight.tables["detections"] = detections
+    assert said(flight) == []
     detections["azimuth_rad"] += np.radians(4.0)
     (found,) = said(flight)
     assert found.causes == ("heading off",)
+
+
+@pytest.mark.parametrize(
+    ("reads", "factor", "cause"),
+    [
+        (lambda bearing, yaw: bearing - yaw, 1.0, "counts from the bow"),
+        (lambda bearing, yaw: 2 * yaw - bearing, 1.0, "to the left"),
+        (lambda bearing, yaw: bearing - np.pi / 2, 1.0, "from east"),
+        (lambda bearing, yaw: bearing, 0.3048, "in m,"),
+        (lambda bearing, yaw: bearing, 1 / 0.3048, "in ft,"),
+        (lambda bearing, yaw: bearing, 1.0, None),
+    ],
+)
+def test_what_bearings_count_from_and_ranges_are_in_is_named(make_flight, reads, factor, cause):
+    """A boat turns by 150 deg and sees a buoy and clutter."""
+    rng, t = np.random.default_rng(4), np.arange(0.0, 100.0)
+    yaw = np.radians(20 + 1.5 * t)
+    to_buoy = np.arctan2(300.0, 100.0 - 2.0 * t) + rng.normal(0, np.radians(0.3), 100)
+    distance = np.hypot(300.0, 100.0 - 2.0 * t) + rng.normal(0, 2.0, 100)
+    seen = ((to_buoy, distance), (rng.uniform(-np.pi, np.pi, 100), np.full(100, 300.0)))
+    rows = [{"azimuth_rad": reads(bearing, yaw), "range_m": factor * r} for bearing, r in seen]
+    flight = watch(make_flight, level_poses(t, 2.0 * t, yaw=yaw), t, *rows)
+    flight.tables["truth"] = table("target_id,time_s,north_m,east_m,down_m\nbuoy,nan,100.0,300.0,0.0\n")
+    found = {one for each in check_flight(flight) if each.field == "azimuth_rad" for one in each.causes}
+    assert len(found) == (cause is not None) and all(cause in one for one in found)
 
 
 @given(by=st.floats(-20.0, 20.0))
