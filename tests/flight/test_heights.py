@@ -17,14 +17,23 @@ from wildlab.flight.readers.logs.log import Stream, make_stream
 GEOID = 40.0
 
 
+def ellipsoid(height: float, **more: object) -> Stream:
+    return positions(height_ellipsoid_m=height, **more)
+
+
+def sea(height: object, **more: object) -> Stream:
+    return positions(height_sea_m=height, **more)
+
+
+def home(height: object, **more: object) -> Stream:
+    return positions(height_home_m=height, **more)
+
+
 def positions(unusable: np.ndarray | None = None, **columns: object) -> Stream:
     """Ten rows at one place; heights as given, a number for all."""
+    columns = {"time_s": np.arange(10.0), "latitude_deg": 10.0, "longitude_deg": 20.0, **columns}
     rows = {name: np.broadcast_to(np.asarray(value, float), 10) for name, value in columns.items()}
-    time = {"time_s": np.arange(10.0)} if "time_s" not in rows else {}
-    place = {"latitude_deg": np.full(10, 10.0), "longitude_deg": np.full(10, 20.0)}
-    return make_stream(
-        "gnss", {**time, **place, **rows}, unusable={"no fix": unusable} if unusable is not None else {}
-    )
+    return make_stream("gnss", rows, unusable={} if unusable is None else {"no fix": unusable})
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +42,7 @@ def no_grid(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def grid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def grid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The whole world, 30 m above the ellipsoid at 0, 0 and a tenth more for each degree of latitude."""
     from pyproj import datadir
 
@@ -44,7 +53,7 @@ def grid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     before = datadir.get_data_dir()
     monkeypatch.undo()
     datadir.append_data_dir(str(tmp_path))
-    yield
+    yield tmp_path / "egm96_15.gtx"
     datadir.set_data_dir(before)
 
 
@@ -52,9 +61,7 @@ def test_undulation_by_the_grid(grid):
     found = undulation([10.0, -20.25, 45.5], [20.0, 170.0, -75.3])
     assert found is not None
     assert found == pytest.approx([31.0, 27.975, 34.55], abs=1e-4)
-    plan = choose_reference(
-        {"track": positions(height_sea_m=100.0), "marks": positions(height_ellipsoid_m=7.0)}
-    )
+    plan = choose_reference({"track": sea(100.0), "marks": ellipsoid(7.0)})
     assert plan.reference == "ellipsoid"
     assert plan.uses["track"].add_m == pytest.approx(31.0, abs=1e-4)
 
@@ -63,97 +70,54 @@ def test_without_a_grid_there_is_none_and_nothing_is_fetched():
     assert undulation(10.0, 20.0) is None
 
 
-def test_a_file_that_is_no_grid_is_none(tmp_path, monkeypatch):
-    from pyproj import datadir
-
-    (tmp_path / "egm96_15.gtx").write_bytes(b"no grid")
-    before = datadir.get_data_dir()
-    monkeypatch.undo()
-    datadir.append_data_dir(str(tmp_path))
-    try:
-        assert undulation(10.0, 20.0) is None
-    finally:
-        datadir.set_data_dir(before)
+def test_a_file_that_is_no_grid_is_none(grid):
+    grid.write_bytes(b"no grid")
+    assert undulation(10.0, 20.0) is None
 
 
-def test_all_on_the_ellipsoid_stay_there():
-    plan = choose_reference({"a": positions(height_ellipsoid_m=5.0), "b": positions(height_ellipsoid_m=8.0)})
-    assert plan.reference == "ellipsoid"
-    assert {use.add_m for use in plan.uses.values()} == {0.0}
+GNSS = sea(60.0, undulation_m=GEOID)
+UNUSABLE = np.arange(10) < 3
+FIXES = sea(np.where(UNUSABLE, -9.0, 150.0 + np.arange(10)), unusable=UNUSABLE)
+# At 3 s the fix says 153 m, and the log 2.5 m above take-off.
+LOG = home(np.arange(10.0), time_s=np.arange(10) + 0.5)
 
 
 @pytest.mark.parametrize(
-    "receiver",
+    ("streams", "stated", "reference", "added"),
     [
-        {"height_sea_m": 60.0, "undulation_m": GEOID},
-        {"height_sea_m": 60.0, "height_ellipsoid_m": 60.0 + GEOID},
+        ({"a": ellipsoid(5.0), "b": ellipsoid(8.0)}, {}, "ellipsoid", [0.0, 0.0]),
+        # A receiver's own geoid serves all, a stated one comes first, a placeholder is none.
+        ({"a": GNSS, "b": sea(61.0)}, {}, "ellipsoid", [GEOID, GEOID]),
+        ({"a": sea(60.0, height_ellipsoid_m=60.0 + GEOID), "b": sea(61.0)}, {}, "ellipsoid", [0.0, GEOID]),
+        ({"a": GNSS}, {"geoid_m": 25.0}, "ellipsoid", [25.0]),
+        ({"a": sea(60.0, undulation_m=0.0)}, {}, "sea", [0.0]),
+        ({"a": sea(60.0, undulation_m=np.nan)}, {}, "sea", [0.0]),
+        ({"a": sea(60.0, undulation_m=500.0)}, {}, "sea", [0.0]),
+        ({"a": sea(60.0), "b": sea(3.0)}, {}, "sea", [0.0, 0.0]),
+        ({"a": sea(2.0), "b": ellipsoid(44.0)}, {"geoid_m": GEOID}, "ellipsoid", [GEOID, 0.0]),
+        # Take-off is tied by the first used fix, and with a geoid on to the ellipsoid.
+        ({"a": LOG, "b": FIXES}, {"own": "ab"}, "sea", [150.5, 0.0]),
+        ({"a": LOG, "b": FIXES}, {"own": "ab", "geoid_m": GEOID}, "ellipsoid", [150.5 + GEOID, GEOID]),
+        ({"a": home(0.0), "b": ellipsoid(77.0)}, {"own": "ab"}, "ellipsoid", [77.0, 0.0]),
+        ({"a": home(50.0), "b": sea(1.0)}, {"own": "a", "home_sea_m": 12.0}, "sea", [12.0, 0.0]),
+        ({"a": sea(1.0), "marks": positions()}, {}, "sea", [0.0]),
     ],
 )
-def test_a_receiver_s_own_geoid_serves_all(receiver):
-    plan = choose_reference({"gnss": positions(**receiver), "poses": positions(height_sea_m=61.0)})
-    assert plan.reference == "ellipsoid"
-    assert plan.uses["poses"] == (
-        "height_sea_m", GEOID, "counts from sea level, and the geoid's height as gnss has it is added",
-    )  # fmt: skip
-    use = plan.uses["gnss"]
-    assert float(receiver[use.column]) + use.add_m == pytest.approx(100.0)
-
-
-def test_a_stated_geoid_comes_first():
-    streams = {"gnss": positions(height_sea_m=60.0, undulation_m=GEOID)}
-    assert choose_reference(streams, geoid_m=25.0).uses["gnss"].add_m == 25.0
-
-
-def test_sea_level_where_nothing_leads_to_the_ellipsoid():
-    streams = {"a": positions(height_sea_m=60.0), "b": positions(height_sea_m=3.0)}
-    plan = choose_reference(streams)
-    assert plan.reference == "sea"
-    assert all(use[:2] == ("height_sea_m", 0.0) for use in plan.uses.values())
+def test_what_heights_count_from(streams, stated, reference, added):
+    plan = choose_reference(streams, **stated)
+    assert plan.reference == reference
+    assert [use.add_m for use in plan.uses.values()] == pytest.approx(added)
+    assert plan.without == tuple(name for name in streams if name not in plan.uses)
 
 
 @pytest.mark.parametrize(
-    "nothing", [{"undulation_m": 0.0}, {"undulation_m": np.nan}, {"undulation_m": 500.0}]
+    ("streams", "own", "problem"),
+    [
+        ({"boat": sea(2.0), "marks": ellipsoid(44.0)}, "", "boat count from sea"),
+        # Another vehicle's fix ties nothing.
+        ({"drone": home(50.0), "boat": sea(1.0)}, "drone", "drone count from take-off"),
+    ],
 )
-def test_a_placeholder_is_no_geoid(nothing):
-    assert choose_reference({"a": positions(height_sea_m=60.0, **nothing)}).reference == "sea"
-
-
-def test_mixed_without_a_geoid_is_refused():
-    streams = {"boat": positions(height_sea_m=2.0), "marks": positions(height_ellipsoid_m=44.0)}
-    with pytest.raises(WildlabError, match="boat count from sea"):
-        choose_reference(streams)
-    assert choose_reference(streams, geoid_m=GEOID).reference == "ellipsoid"
-
-
-def test_take_off_is_tied_by_the_first_used_fix():
-    unusable = np.arange(10) < 3
-    gnss = positions(unusable, height_sea_m=np.where(unusable, -9.0, 150.0 + np.arange(10)))
-    poses = positions(height_home_m=np.arange(10.0), time_s=np.arange(10) + 0.5)
-    plan = choose_reference({"poses": poses, "gnss": gnss}, own=["poses", "gnss"])
-    assert plan.reference == "sea"
-    # At 3 s the fix says 153 m, and the log 2.5 m above take-off.
-    assert plan.uses["poses"].column == "height_home_m"
-    assert plan.uses["poses"].add_m == pytest.approx(150.5)
-    # With a geoid, on to the ellipsoid.
-    plan = choose_reference({"poses": poses, "gnss": gnss}, own=["poses", "gnss"], geoid_m=GEOID)
-    assert plan.uses["poses"].add_m == pytest.approx(150.5 + GEOID)
-
-
-def test_another_vehicle_s_fix_ties_nothing():
-    streams = {"drone": positions(height_home_m=50.0), "boat": positions(height_sea_m=1.0)}
-    with pytest.raises(WildlabError, match="drone count from take-off"):
-        choose_reference(streams, own=["drone"])
-    plan = choose_reference(streams, own=["drone"], home_sea_m=12.0)
-    assert plan.uses["drone"].add_m == 12.0 and plan.reference == "sea"
-
-
-def test_a_fix_on_the_ellipsoid_ties_too():
-    streams = {"poses": positions(height_home_m=0.0), "gnss": positions(height_ellipsoid_m=77.0)}
-    plan = choose_reference(streams, own=["poses", "gnss"])
-    assert plan.reference == "ellipsoid" and plan.uses["poses"].add_m == pytest.approx(77.0)
-
-
-def test_streams_without_heights_are_named():
-    streams = {"marks": positions(), "track": positions(height_sea_m=1.0)}
-    plan = choose_reference(streams)
-    assert plan.without == ("marks",) and list(plan.uses) == ["track"]
+def test_heights_that_cannot_be_compared_are_refused(streams, own, problem):
+    with pytest.raises(WildlabError, match=problem):
+        choose_reference(streams, own=[own])

@@ -1,15 +1,18 @@
-"""The usual mistakes about pixels, calibration, mount and poses, each named by clicks on known points."""
+"""The usual mistakes about pixels, calibration, mount, poses and the clock, named by clicks on known points."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pymap3d
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wildlab.flight.checks.sense.constants import HARD, clock_fit, clock_mistakes
 from wildlab.flight.checks.sense.seen import judge
 from wildlab.flight.checks.sense.sightings import Look, Sightings
 from wildlab.geometry.camera import Camera
@@ -23,21 +26,27 @@ SIZE = np.array([640.0, 512.0])
 Change = Callable[[Sightings], Sightings]
 
 
+def straight_down(
+    lens: Camera, p: Any, R: Any, points: Any, uv: Any, image: Any, sd: list[float], v: Any = 0.0
+) -> Sightings:
+    """Clicks on known points, seen straight down from poses that move with `v`."""
+    zero, names = np.zeros(len(p)), np.arange(len(p)).astype(str).astype(object)
+    return Sightings(
+        "log", lens, Mount("down"), zero, zero, uv, p, R, points[None], image, np.tile(sd, (len(p), 1)),
+        (np.radians(PLACE[0]), np.radians(PLACE[1]), PLACE[2]),
+        lambda shift: Look(p + shift * v, R, points[None], zero, zero), image.astype(str).astype(object), names,
+    )  # fmt: skip
+
+
 def sightings() -> Sightings:
-    """Four clicks in each of 20 images, 0.5 px off, straight down from about 90 m above uneven ground."""
+    """Four clicks in each of 20 images, 0.5 px off, from about 90 m above uneven ground."""
     rng = np.random.default_rng(3)
-    n, mount = 80, Mount("down")
-    image = np.arange(n) // 4
+    n, image = 80, np.arange(80) // 4
     p = np.column_stack([rng.uniform(-200, 200, (20, 2)), rng.uniform(-110, -80, 20)])[image]
     R = euler_to_matrix(*rng.uniform(-0.2, 0.2, (2, 20)), rng.uniform(-3, 3, 20))[image]
     points = np.column_stack([p[:, :2] + rng.uniform(-25, 25, (n, 2)), rng.uniform(-9, 0, n)])
-    uv = ground_to_pixel(LENS, points, *camera_pose(mount, p, R)) + rng.normal(0, 0.5, (n, 2))
-    zero, name = np.zeros(n), np.arange(n).astype(str).astype(object)
-    return Sightings(
-        "log", LENS, mount, zero, zero, uv, p, R, points[None], image,
-        np.tile([0.002, 0.5, 0.5, 0.002], (n, 1)), (np.radians(PLACE[0]), np.radians(PLACE[1]), PLACE[2]),
-        lambda shift: Look(p, R, points[None], zero, zero), image.astype(str).astype(object), name,
-    )  # fmt: skip
+    uv = ground_to_pixel(LENS, points, *camera_pose(Mount("down"), p, R)) + rng.normal(0, 0.5, (n, 2))
+    return straight_down(LENS, p, R, points, uv, image, [0.002, 0.5, 0.5, 0.002])
 
 
 def pixels(change: Callable[[np.ndarray], np.ndarray]) -> Change:
@@ -109,3 +118,43 @@ def test_a_mistake_is_named(make_flight, cause):
     flight = make_flight(time={"kind": "sequence"})
     found = [one.causes for one in judge(flight, MISTAKES[cause](sightings()))]
     assert any(cause in one for one in found), found
+
+
+# -- the clock of the camera, and turns that look like it
+
+IMAGES, EACH, SPEED, OFF_M = 60, 3, 20.0, 0.5
+
+
+def flown(*, forward: bool, late: float = 0.0, off_m: float = 0.0) -> Sightings:
+    """In every direction; the wind blows the same speed from anywhere, or it flies forward."""
+    rng = np.random.default_rng(5)
+    image, n = np.arange(IMAGES * EACH) // EACH, IMAGES * EACH
+    heading = rng.uniform(-np.pi, np.pi, IMAGES)[image]
+    course = heading if forward else rng.uniform(-np.pi, np.pi, IMAGES)[image]
+    p = np.column_stack([rng.uniform(-200, 200, (n, 2)), np.full(n, -90.0)])
+    v = SPEED * np.column_stack([np.cos(course), np.sin(course), np.zeros(n)])
+    R = euler_to_matrix(np.zeros(n), np.zeros(n), heading)
+    points = np.column_stack([p[:, :2] + rng.uniform(-10, 10, (n, 2)), np.zeros(n)])
+    lens = Camera(640, 512, 700.0, 700.0, 320.0, 256.0)
+    uv = ground_to_pixel(lens, points, *camera_pose(Mount("down"), p + late * v, R))
+    points[:, :2] += rng.normal(0, off_m, (IMAGES, 2))[image]
+    return straight_down(lens, p, R, points, uv, image, [0.02, 2.0, 2.0], v)
+
+
+def test_forward_flight_alone_does_not_tell_a_clock_from_a_tilt():
+    alike, apart = clock_fit(flown(forward=True), 0.0), clock_fit(flown(forward=False), 0.0)
+    assert alike is None or alike.correlation > 0.95
+    assert apart is not None and apart.correlation < 0.3
+
+
+def test_the_interval_is_that_of_as_many_images():
+    """Each image says where it was along its course to so many metres."""
+    found = clock_fit(flown(forward=False, late=0.5, off_m=OFF_M), 0.5)
+    assert found.sd_s == pytest.approx(OFF_M / SPEED / np.sqrt(IMAGES), rel=0.3)
+
+
+@pytest.mark.parametrize("late", [0.5, -0.5])
+def test_the_advice_has_the_interval(late):
+    first = next(clock_mistakes(flown(forward=False, late=late, off_m=4 * OFF_M), 0.0))
+    low, high, alike = (float(x) for x in re.findall(r"\d\.\d+", first.said)[1:4])
+    assert low < abs(late) < high and high - low < 0.1 and alike < HARD
