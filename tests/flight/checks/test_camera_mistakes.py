@@ -1,4 +1,4 @@
-"""The usual mistakes about pixels, calibration, mount, poses and the clock, named by clicks on known points."""
+"""Usual mistakes about pixels, calibration, mount, poses and clock, named by clicks on known points."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ def straight_down(
     return Sightings(
         "log", lens, Mount("down"), zero, zero, uv, p, R, points[None], image, np.tile(sd, (len(p), 1)),
         (np.radians(PLACE[0]), np.radians(PLACE[1]), PLACE[2]),
-        lambda shift: Look(p + shift * v, R, points[None], zero, zero), image.astype(str).astype(object), names,
+        lambda shift: Look(p + shift * v, R, points[None], zero, zero),
+        image.astype(str).astype(object), names,
     )  # fmt: skip
 
 

@@ -10,10 +10,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.flight.checks.watching import level_poses, watch
+from tests.flight.conftest import table
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import looks_of_others, sensors
+from wildlab.flight.checks.twice import twice
+from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.scans import scans_of
@@ -121,3 +125,144 @@ def test_without_a_camera_it_is_the_sensors_whose_clocks_are_taken_to_agree(
     manifest = replace_in_manifest(make_manifest(data), {"sensors": stated})
     found = check_flight(replace(flight, manifest=manifest))
     assert [re.findall("'([a-z]+)'", one.sentence) for one in found if one.field == "sensors"] == silent
+
+
+Make = Callable[..., Flight]
+
+
+def flown(make: Make, seconds: float = 120.0) -> Flight:
+    """Poses five times a second, a look of a radar every two seconds with three bearings in each."""
+    t, looks = np.arange(0.0, seconds + 0.1, 0.2), np.arange(1.0, seconds, 2.0)
+    seen = [{"azimuth_rad": np.linspace(-3, 3, len(looks)), "range_m": 300.0 + k} for k in range(3)]
+    return watch(make, level_poses(t, t), looks, *seen)
+
+
+def of_truths(flight: Flight, spans: dict[str, tuple[float, float]]) -> list[Finding]:
+    rows = [
+        pd.DataFrame({"target_id": name, "time_s": np.arange(low, high + 0.5)})
+        for name, (low, high) in spans.items()
+    ]
+    truth = pd.concat(rows, ignore_index=True).assign(north_m=900.0, east_m=50.0, down_m=0.0)
+    flight.tables["truth"] = truth
+    found = [one for one in check_flight(flight) if (one.table, one.field) == ("truth", "time_s")]
+    return [one for one in found if one.level != "note"]
+
+
+def of_poses(flight: Flight) -> list[Finding]:
+    return [one for one in check_flight(flight) if (one.table, one.field) == ("nav/log", "time_s")]
+
+
+def test_a_hole_in_the_poses_is_told_with_its_looks_detections_and_seconds(make_flight):
+    flight = flown(make_flight)
+    nav = flight.nav["log"]
+    flight.nav["log"] = nav[(nav["time_s"] < 30.1) | (nav["time_s"] > 89.9)].reset_index(drop=True)
+    # At the last pose before the hole, and the first behind it.
+    flight.tables["frames"].loc[[14, 45], "time_s"] = flight.nav["log"]["time_s"][[150, 151]].to_numpy()
+    (found,) = of_poses(flight)
+    assert found.level == "warning"
+    # Looks at 31, 33, ..., 89 s, three detections each.
+    for counted in ("30 of 60", "from 30.000 s to 90.000 s", "90 of 180"):
+        assert counted in found.sentence
+    # It is as those who place them find it.
+    p, _, _ = poses_at(flight.nav["log"], flight.table("frames")["time_s"])
+    assert np.isnan(p[:, 0]).sum() == 30
+
+
+def test_poses_as_slow_as_their_own_rate_have_no_hole(make_flight):
+    flight = flown(make_flight)
+    assert of_poses(flight) == []
+    whole = flight.nav["log"]
+    flight.nav["log"] = whole.iloc[::30].reset_index(drop=True)  # one in six seconds
+    assert of_poses(flight) == []
+    flight.nav["log"] = whole.iloc[:1]  # of a mast
+    assert not any("without a pose" in one.sentence for one in of_poses(flight))
+
+
+def doubles(flight: Flight) -> list[str]:
+    found = [one for one in check_flight(flight) if one.field == "detection_id"]
+    assert all(one.level == "warning" for one in found)
+    return [one.sentence for one in found]
+
+
+def seen(make: Make) -> Flight:
+    """Four detections in three looks, three of which have the same place."""
+    flight = make()
+    flight.tables["detections"] = table(
+        "detection_id,frame_id,north_m,target_id\na,A,10.0,\nb,A,20.0,\nc,B,10.0,\nd,C,10.0,\n"
+    ).assign(source="radar", kind="position", east_m=2.0, down_m=0.0)
+    return flight
+
+
+def with_more(flight: Flight, more: pd.DataFrame) -> Flight:
+    tables = {**flight.tables, "detections": pd.concat([flight.table("detections"), more], ignore_index=True)}
+    return Flight(flight.manifest, flight.nav, tables)
+
+
+def test_rows_that_stand_there_again_are_counted(make_flight):
+    flight = seen(make_flight)
+    again = flight.table("detections").iloc[[0, 2, 3]].assign(detection_id=["x", "y", "z"], target_id="boat")
+    (sentence,) = doubles(with_more(flight, again))
+    assert "3 of 7" in sentence and "3 looks, first 'x'" in sentence
+
+
+def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_flight):
+    flight = seen(make_flight)
+    once = flight.table("detections")
+    assert doubles(flight) == []
+    assert doubles(with_more(flight, once.assign(source="lidar", detection_id=list("efgh")))) == []
+    # Without a look nobody knows whether it was at the same time.
+    flight.tables["detections"] = once.assign(frame_id="", north_m=1.0)
+    assert doubles(flight) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "rows", "later", "copied"),
+    [
+        ("radar", 20, 0.0, True),
+        ("radar-2", 20, 0.0, True),
+        ("radar-2", 12, 0.0, True),
+        # Few that are alike, and those of other times, are no copy.
+        ("radar-2", 0, 0.0, False),
+        ("radar-2", 5, 0.0, False),
+        ("radar-2", 20, 0.05, False),
+    ],
+)
+def test_a_log_that_was_read_twice_is_a_problem(make_flight, source, rows, later, copied):
+    """The first looks once more, under other names, as from a copy of the log that ends earlier."""
+    t = np.linspace(1, 8, 20)
+    place = {"north_m": np.random.default_rng(1).normal(0, 50, 20), "east_m": 3.0, "down_m": 0.0}
+    flight = watch(make_flight, level_poses(t, t), t, place, kind="position")
+    frames = flight.table("frames").drop(columns="sensor")
+    more = frames.iloc[:rows].assign(frame_id="again " + frames["frame_id"], time_s=frames["time_s"] + later)
+    both = pd.concat([frames, more]).sort_values("time_s", kind="stable", ignore_index=True)
+    once = flight.table("detections").iloc[:rows]
+    again = with_more(flight, once.assign(frame_id="again " + once["frame_id"], source=source))
+    again.tables["frames"] = both
+    found = list(twice(again))
+    assert [one.level for one in found] == ["problem"] * copied
+    assert not copied or f"{rows} of {rows}" in found[0].sentence
+
+
+def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight):
+    names = [f"collar {k}" for k in range(7)]
+    (found,) = of_truths(flown(make_flight), {name: (0.0, 90.0 + 0.3 * k) for k, name in enumerate(names)})
+    assert found.level == "warning"
+    assert "between 90.000 and 92.000 s" in found.sentence
+    assert "15 of 60" in found.sentence and "29.0 s" in found.fix  # 91 to 119 s, of the first to end
+
+
+def test_receivers_of_different_times_are_told_apart(make_flight):
+    found = of_truths(flown(make_flight), {"a": (0.0, 90.0), "b": (0.0, 40.0), "c": (0.0, 91.0)})
+    assert ["'b'" in one.sentence for one in found] == [False, True]
+
+
+@pytest.mark.parametrize(("begins_s", "zone"), [(900.0, True), (930.0, True), (1200.0, False)])
+def test_the_zone_is_named_near_quarters_of_an_hour(make_flight, begins_s, zone):
+    (found,) = of_truths(flown(make_flight, 2400.0), {"boat": (begins_s, 2500.0)})
+    assert ("zone" in found.fix) == zone
+    assert (f"{begins_s - 1:.1f} s after" in found.fix) != zone
+
+
+def test_truth_of_another_day_is_a_problem_that_names_the_zone(make_flight):
+    found = of_truths(flown(make_flight), {"boat": (7200.0, 7300.0)})[0]
+    assert found.level == "problem" and "time zone" in found.fix

@@ -15,7 +15,11 @@ def level_poses(t: Any, north: Any, east: Any = 0.0, yaw: Any = 0.0, down: Any =
 
 
 def watch(
-    make: Callable[..., Flight], nav: pd.DataFrame, looks: Any, *seen: dict[str, Any], kind: str = "range-bearing"
+    make: Callable[..., Flight],
+    nav: pd.DataFrame,
+    looks: Any,
+    *seen: dict[str, Any],
+    kind: str = "range-bearing",
 ) -> Flight:
     """The small flight with poses `log`, looks ``l0``, ``l1``, ... of a radar at those times, and no truth.
 

@@ -1,4 +1,4 @@
-"""Frames out of folders and files: what they measure, where they are valid, what bad ones say."""
+"""Frames out of folders, cards and files: what they measure, where they are valid, what bad ones say."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.clicking import write_images
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
+from wildlab.flight.readers.frames.below import images_below
 from wildlab.flight.readers.frames.flir import Planck, gather_pieces, read_records, to_kelvin
 from wildlab.flight.readers.frames.valid import find_clipped, find_no_data, find_overlay
+from wildlab.flight.readers.stills import still_files
+from wildlab.replay.shots import read_shots
 
 
 def scene(seed: int = 1, shape: tuple[int, int] = (96, 128)) -> np.ndarray:
@@ -281,3 +285,45 @@ def test_djis_own_thermal_data_are_counts_or_the_preview_and_it_is_said_which(tm
     assert preview.unit == "grey" and preview.image.shape == (100, 128)
     assert preview.note and other.unit == "grey" and other.note == ""
     assert open_frames(tmp_path / "a.jpg").kept.notes == (raw.note,)
+
+
+def card(folder: Path) -> Path:
+    write_images(folder / "100CANON", "IMG_1.png", "IMG_2.png", "IMG_9.png")
+    write_images(folder / "101CANON", "IMG_3.png")
+    write_images(folder / ".trash", "IMG_1.png")
+    return folder
+
+
+def test_frames_are_found_by_their_names_in_any_folder_below(tmp_path):
+    there = card(tmp_path / "DCIM")
+    for ids in (["IMG_1", "IMG_2", "IMG_3"], ["IMG_1.png", "IMG_2.png", "IMG_3.png"]):
+        found = [one.relative_to(there).as_posix() for one in images_below(there, ids)]
+        assert found == ["100CANON/IMG_1.png", "100CANON/IMG_2.png", "101CANON/IMG_3.png"]
+        assert [one.name for one in open_frames(there, ids=ids).files] == [Path(one).name for one in found]
+    assert sorted(read_shots(there, ["IMG_3", "no such", "IMG_1"], None).by_row) == [0, 2]
+    assert images_below(there, ["DJI_1"]) == []
+    with pytest.raises(WildlabError, match="no images"):
+        open_frames(there, ids=["DJI_1"])
+
+
+def test_of_two_files_of_one_name_nobody_can_tell_the_flights(tmp_path):
+    there = card(tmp_path / "DCIM")
+    write_images(there / "101CANON", "IMG_2.png", "IMG_9.png")
+    assert len(images_below(there, ["IMG_1", "IMG_3"])) == 2
+    with pytest.raises(WildlabError, match=r"IMG_2\.png.*100CANON and in 101CANON"):
+        open_frames(there, ids=["IMG_1", "IMG_2"])
+
+
+def test_folders_are_read_in_order_and_once(tmp_path):
+    for name in ("b.png", "a.JPG", "c.txt", "a.tif"):
+        (tmp_path / name).write_bytes(b"x")
+    (tmp_path / "d.png").mkdir()
+    found = still_files([tmp_path, tmp_path / "b.png"])
+    assert [one.name for one in found] == ["a.JPG", "a.tif", "b.png"]
+
+
+def test_what_is_not_there_and_an_empty_folder_are_sentences(tmp_path):
+    with pytest.raises(WildlabError, match="no such file"):
+        still_files([tmp_path / "none.png"])
+    with pytest.raises(WildlabError, match="no images"):
+        still_files([tmp_path])

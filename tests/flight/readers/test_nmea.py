@@ -3,16 +3,24 @@
 import math
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pynmea2
 import pytest
 
-from tests.flight.readers.tracks import check, near, survives
-from wildlab.errors import WildlabError
+from tests.flight.readers.tracks import Columns, columns_of, near
 from wildlab.flight.readers.tracks import nmea
 
 KNOT = 1852 / 3600
+
+
+def read(*lines: str) -> Columns:
+    return columns_of(nmea, "".join(lines))
+
+
+def bodies(*found: str) -> Columns:
+    return read(*map(said, found))
 
 
 def said(body: str) -> str:
@@ -54,10 +62,8 @@ def test_equals_pynmea2(shared_data):
     path = shared_data("logs", "target_boat_nmea", "bundg_zeus_9.log")
     data = path.read_bytes()
     assert nmea.recognise(data[:8192], path.name)
-    log = nmea.read(path, data)
-    check(log)
-    stream = log.parts["gnss"]
-    by_time: dict[float, dict[str, object]] = {}
+    columns = columns_of(nmea, data)
+    by_time: dict[float, dict[str, Any]] = {}
     for line in data.decode("utf-8", "replace").splitlines():
         try:
             one = pynmea2.parse(line, check=True)
@@ -66,98 +72,69 @@ def test_equals_pynmea2(shared_data):
         if one.sentence_type in ("GGA", "RMC", "GLL"):
             at = datetime.combine(datetime(2018, 8, 20).date(), one.timestamp.replace(tzinfo=UTC))
             by_time.setdefault(at.timestamp(), {}).setdefault(one.sentence_type, one)
-    columns = stream.columns
     first = {at: k for k, at in reversed(list(enumerate(columns["time_s"])))}
     assert set(first) == set(by_time)
     for at, k in first.items():
-        seen = by_time[at]
-        best = seen.get("GGA") or seen.get("RMC") or seen["GLL"]
-        assert columns["latitude_deg"][k] == pytest.approx(best.latitude, abs=1e-12)
-        assert columns["longitude_deg"][k] == pytest.approx(best.longitude, abs=1e-12)
-        if "GGA" in seen:
-            assert columns["height_sea_m"][k] == float(seen["GGA"].altitude)
-            assert columns["undulation_m"][k] == float(seen["GGA"].geo_sep)
-            assert columns["hdop"][k] == float(seen["GGA"].horizontal_dil)
-        if "RMC" in seen:
-            speed = math.hypot(columns["v_north_m_s"][k], columns["v_east_m_s"][k])
-            assert speed == pytest.approx(seen["RMC"].spd_over_grnd * KNOT, abs=1e-12)
+        gga, rmc, gll = map(by_time[at].get, ("GGA", "RMC", "GLL"))
+        row, best = {name: values[k] for name, values in columns.items()}, gga or rmc or gll
+        near(row, 1e-12, latitude_deg=best.latitude, longitude_deg=best.longitude)
+        if gga:
+            near(row, 0, height_sea_m=float(gga.altitude), undulation_m=float(gga.geo_sep))
+            near(row, 0, hdop=float(gga.horizontal_dil))
+        if rmc:
+            speed = math.hypot(row["v_north_m_s"], row["v_east_m_s"])
+            assert speed == pytest.approx(rmc.spd_over_grnd * KNOT, abs=1e-12)
 
 
 @pytest.mark.parametrize("without", [(), ("GST",)])
 def test_over_midnight_from_any_sentence(without):
     start = datetime(2025, 12, 31, 23, 59, 58, tzinfo=UTC)
-    data = track(start, 20, without=without)
+    lines = track(start, 20, without=without).decode().splitlines(keepends=True)
     # The date stands in one sentence only, and comes late.
-    lines = data.decode().splitlines(keepends=True)
     kept = [line for k, line in enumerate(lines) if "RMC" not in line or k > 50 - 20 * len(without)]
-    for text in ("".join(lines), "".join(kept)):
-        log = nmea.read(Path("x"), text.encode())
-        check(log)
-        expected = start.timestamp() + 0.2 * np.arange(20)
-        near(log.parts["gnss"].columns, 1e-06, time_s=expected)
-        assert log.parts["gnss"].used.all()
+    for text in (lines, kept):
+        columns = read(*text)
+        near(columns, 1e-6, time_s=start.timestamp() + 0.2 * np.arange(20))
+        assert columns["use"].all()
 
 
 def test_values():
-    log = nmea.read(Path("x"), track(datetime(2014, 5, 1, tzinfo=UTC), 3, speed=10.0, course=30.0))
-    columns = log.parts["gnss"].columns
-    near(columns, 1e-09, latitude_deg=63.4 + 1e-06 * np.arange(3), longitude_deg=10.4 - 2e-06 * np.arange(3))
-    near(
-        columns,
-        v_north_m_s=10 * KNOT * math.cos(math.pi / 6),
-        v_east_m_s=10 * KNOT * 0.5,
-        height_sea_m=12.5,
-        undulation_m=40.1,
-        sd_horizontal_m=math.sqrt((0.3**2 + 0.4**2) / 2),
-        sd_vertical_m=0.9,
-    )
-    assert columns["fix"].tolist() == [6.0] * 3
-    assert columns["satellites"].tolist() == [12.0] * 3
-
-
-def test_south_and_west():
-    data = burst(datetime(2014, 5, 1, tzinfo=UTC), -33.9, -70.25).encode()
-    columns = nmea.read(Path("x"), data).parts["gnss"].columns
-    assert columns["latitude_deg"][0] == pytest.approx(-33.9, abs=1e-9)
-    assert columns["longitude_deg"][0] == pytest.approx(-70.25, abs=1e-9)
+    k = np.arange(3)
+    columns = columns_of(nmea, track(datetime(2014, 5, 1, tzinfo=UTC), 3, speed=10.0, course=30.0))
+    near(columns, latitude_deg=63.4 + 1e-6 * k, longitude_deg=10.4 - 2e-6 * k)
+    near(columns, v_north_m_s=10 * KNOT * math.cos(math.pi / 6), v_east_m_s=10 * KNOT * 0.5)
+    near(columns, height_sea_m=12.5, undulation_m=40.1, fix=6, satellites=12)
+    near(columns, sd_horizontal_m=math.sqrt((0.3**2 + 0.4**2) / 2), sd_vertical_m=0.9)
+    south_west = read(burst(datetime(2014, 5, 1, tzinfo=UTC), -33.9, -70.25))
+    near(south_west, latitude_deg=-33.9, longitude_deg=-70.25)
 
 
 def test_no_fix_no_dilution_and_repeated():
+    cases = [
+        (0, {}, ""),
+        (1, {"quality": 0}, "no fix"),
+        (2, {"hdop": 99.99}, "no dilution of precision"),
+        (3, {"at": (0.0, 0.0)}, "position is a placeholder"),
+        (4, {}, ""),
+        (4, {}, "repeated stamp"),
+        (5, {"quality": 6}, "estimated, not measured"),
+    ]
     start = datetime(2020, 1, 1, tzinfo=UTC)
-    at = [start + timedelta(seconds=k) for k in range(6)]
-    texts = [
-        burst(at[0], 63.4, 10.4),
-        burst(at[1], 63.4, 10.4, quality=0),
-        burst(at[2], 63.4, 10.4, hdop=99.99),
-        burst(at[3], 0.0, 0.0),
-        burst(at[4], 63.4, 10.4),
-        burst(at[4], 63.4, 10.4),
-        burst(at[5], 63.4, 10.4, quality=6),
-    ]
-    log = nmea.read(Path("x"), "".join(texts).encode())
-    check(log)
-    assert log.parts["gnss"].columns["why"].tolist() == [
-        *("", "no fix", "no dilution of precision", "position is a placeholder"),
-        *("", "repeated stamp", "estimated, not measured"),
-    ]
+    columns = read(
+        *(burst(start + timedelta(seconds=k), *more.pop("at", (63.4, 10.4)), **more) for k, more, _ in cases)
+    )
+    assert columns["why"].tolist() == [why for _, _, why in cases]
 
 
 def test_gns_gll_vtg_and_old_vtg():
-    def read(*bodies: str) -> dict[str, np.ndarray]:
-        return nmea.read(Path("x"), "".join(map(said, bodies)).encode()).parts["gnss"].columns
-
     zda = "GNZDA,101010.00,05,06,2022,00,00"
     gns = "GNGNS,101010.00,6300.0,N,01030.0,E,NRA,17,0.5,55.2,39.1,,"
-    one = read(zda, gns, "GNVTG,90.0,T,,M,10.0,N,18.52,K,A")
-    assert one["fix"][0] == 6.0
-    assert one["time_s"][0] == datetime(2022, 6, 5, 10, 10, 10, tzinfo=UTC).timestamp()
-    assert (one["height_sea_m"][0], one["undulation_m"][0]) == (55.2, 39.1)
-    assert one["v_east_m_s"][0] == pytest.approx(10 * KNOT)
-    old = read(zda, gns, "GPVTG,90.0,,10.0,18.52")
-    assert old["v_east_m_s"][0] == pytest.approx(10 * KNOT)
-    other = read(zda, gns, "GPVTG,180.0,,,,,,18.0,K")
-    assert other["v_north_m_s"][0] == pytest.approx(-5.0)
-    gll = read(zda, "GPGLL,6300.0,N,01030.0,E,101011.00,V,N", "GPGLL,6300.0,N,01030.0,E,101012.00,A,D")
+    one = bodies(zda, gns, "GNVTG,90.0,T,,M,10.0,N,18.52,K,A")
+    near(one, time_s=datetime(2022, 6, 5, 10, 10, 10, tzinfo=UTC).timestamp(), fix=6)
+    near(one, height_sea_m=55.2, undulation_m=39.1, v_east_m_s=10 * KNOT)
+    near(bodies(zda, gns, "GPVTG,90.0,,10.0,18.52"), v_east_m_s=10 * KNOT)
+    near(bodies(zda, gns, "GPVTG,180.0,,,,,,18.0,K"), v_north_m_s=-5.0)
+    gll = bodies(zda, *(f"GPGLL,6300.0,N,01030.0,E,1010{rest}" for rest in ("11.00,V,N", "12.00,A,D")))
     assert gll["why"].tolist() == ["no fix", ""]
     assert gll["fix"].tolist() == [0.0, 4.0]
     assert "height_sea_m" not in gll
@@ -165,25 +142,24 @@ def test_gns_gll_vtg_and_old_vtg():
 
 def test_talkers():
     start = datetime(2020, 1, 1, tzinfo=UTC)
-    both = "".join(
-        burst(start + timedelta(seconds=k), 63.4, 10.4, talker="GN" if k % 3 else "GP")
-        + burst(start + timedelta(seconds=k), 63.5, 10.4, talker="II", without=("GGA", "GST"))
-        for k in range(9)
+    at = [start + timedelta(seconds=k) for k in range(9)]
+    both = read(
+        *(
+            burst(one, 63.4, 10.4, talker="GN" if k % 3 else "GP")
+            + burst(one, 63.5, 10.4, talker="II", without=("GGA", "GST"))
+            for k, one in enumerate(at)
+        )
     )
-    log = nmea.read(Path("x"), both.encode())
-    assert log.parts["gnss"].used.all()
-    near(log.parts["gnss"].columns, latitude_deg=63.4)
+    assert both["use"].all()
+    near(both, latitude_deg=63.4)
     plotter = burst(start, 63.5, 10.4, talker="II") + burst(start, 63.4, 10.4, talker="SD", without=("RMC",))
-    log = nmea.read(Path("x"), plotter.encode())
-    near(log.parts["gnss"].columns, latitude_deg=63.5)
+    near(read(plotter), latitude_deg=63.5)
 
 
 def test_no_date():
-    start = datetime(2020, 1, 1, 23, 59, 59, tzinfo=UTC)
-    log = nmea.read(Path("x"), track(start, 10, without=("RMC",)))
-    stream = log.parts["gnss"]
-    assert np.isnan(stream.columns["time_s"]).all()
-    near(stream.columns, 1e-06, time_log_s=86399 + 0.2 * np.arange(10))
+    log = nmea.read(Path("x"), track(datetime(2020, 1, 1, 23, 59, 59, tzinfo=UTC), 10, without=("RMC",)))
+    columns = log.parts["gnss"].columns
+    near(columns, 1e-6, time_s=np.nan, time_log_s=86399 + 0.2 * np.arange(10))
     assert log.clock is None
 
 
@@ -200,16 +176,3 @@ def test_prefixes_comments_unknown_and_checksums():
     assert log.lost[0].startswith("1 ")
     bare = "".join(line.partition("*")[0] + "\n" for line in lines)
     assert nmea.read(Path("x"), bare.encode()).parts["gnss"].used.sum() == 5
-
-
-def test_nothing_in_it():
-    with pytest.raises(WildlabError, match="1 sentence"):
-        nmea.read(Path("x"), said("GPHDT,12.0,T").encode())
-    assert not nmea.recognise(b"$GP is a currency, $100,000", "x.txt")
-    assert not nmea.recognise(b"", "x.nmea")
-
-
-def test_damage(shared_data):
-    assert survives(nmea.read, track(datetime(2020, 1, 1, tzinfo=UTC), 40)) > 0.89
-    data = shared_data("logs", "target_boat_nmea", "bundg_zeus_9.log").read_bytes()
-    assert survives(nmea.read, data, 4, 6) > 0.62

@@ -1,4 +1,4 @@
-"""Whatever is wrong with tables, files or recipe is a sentence with file, field and fix; nothing is written."""
+"""Whatever is wrong with tables, files or recipe is one sentence with its fix; nothing is written."""
 
 from __future__ import annotations
 

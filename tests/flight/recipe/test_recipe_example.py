@@ -1,4 +1,4 @@
-"""The worked example of `data/recipes/README.md`, imported as it stands there, and with its camera in a file."""
+"""The worked example of `data/recipes/README.md`, as it stands there, and with its camera in a file."""
 
 from __future__ import annotations
 

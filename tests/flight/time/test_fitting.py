@@ -1,6 +1,8 @@
-"""One clock against another: simulated clocks, whose rate and offset are known."""
+"""Clocks against each other: simulated ones, whose rate, offset and steps are known."""
 
 from __future__ import annotations
+
+import re
 
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.flight.time.fitting import SURE, ClockFit, fit_clock, rate_is_off, shortfall
+from wildlab.flight.time.steady import fit_steady
+from wildlab.flight.time.steps import fit_stretches, step_sentences, unwrap_counter
 
 EPOCH = 1.7e9
 
@@ -150,3 +154,112 @@ def test_coarse_stamps_do_not_hide_the_rate():
     own = np.floor((true / 1.0013 + 0.004) / 0.02) * 0.02
     fit = fit_clock(own, true, resolution_s=0.02)
     assert fit.rate == pytest.approx(1.0013, abs=SURE * fit.rate_sd) and fit.used.all()
+
+
+UTC = 1.7e9
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000), rate=st.floats(0.9, 1.1), offset=st.floats(0.05, 5.0))
+def test_offset_and_rate_under_jittered_receipts(seed, rate, offset):
+    rng = np.random.default_rng(seed)
+    own = 700 + np.sort(rng.uniform(0, 600, 5000))
+    received = UTC + offset + rate * own + rng.exponential(0.2, 5000)
+    fit = fit_steady(own, received, late=True)
+    ends = own[[0, -1]]
+    assert np.abs(fit.to_reference(ends) - UTC - offset - rate * ends).max() < 0.01
+    assert abs(fit.rate - rate) < 1e-4
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_short_log_does_not_tell_the_rate(late):
+    rng = np.random.default_rng(5)
+    own = 300 + np.arange(0, 12, 0.2)
+    noise = rng.exponential(0.3, len(own)) if late else rng.normal(0, 0.02, len(own))
+    fit = fit_steady(own, UTC + own + noise, late)
+    assert abs(fit.rate - 1) < 1e-4
+    assert abs(fit.to_reference(306.0) - UTC - 306) < 0.03
+    assert np.allclose(fit.residual, UTC + own + noise - fit.to_reference(own), atol=1e-6)
+
+
+def test_early_receipts_of_a_short_log_are_outliers():
+    own = 300 + np.arange(0, 10, 0.2)
+    received = UTC + own + np.linspace(0, 0.2, 50) % 0.07
+    received[20] -= 40.0
+    fit = fit_steady(own, received, late=True)
+    assert abs(fit.rate - 1) < 1e-4
+    assert not fit.used[20]
+    assert abs(fit.to_reference(305.0) - UTC - 305) < 0.01
+
+
+def test_one_pair_gives_an_offset_and_none_an_error():
+    fit = fit_steady([5.0], [UTC])
+    assert (fit.rate, fit.offset_s) == (1.0, UTC - 5)
+    with pytest.raises(WildlabError, match="no stamp"):
+        fit_steady([np.nan], [1.0], late=True)
+
+
+@pytest.mark.parametrize("jump", [-300.0, -1.0, 0.5, 3600.0])
+@pytest.mark.parametrize("rate", [0.92, 1.0, 1.08])
+def test_a_clock_set_anew_is_found_and_said(jump, rate):
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        true = np.sort(rng.uniform(0, 600, 1500))
+        at = int(rng.integers(200, 1300))
+        own = (true - 3.0) / rate
+        own[at:] += jump
+        stretches = fit_stretches(own, 1.7e9 + true + rng.normal(0, 0.02, 1500))
+        assert len(stretches) == 2
+        assert abs(stretches[1].first - at) <= 2
+        for one in stretches:
+            rows = slice(max(one.first, 0) + 3, one.last - 2)
+            assert np.abs(one.fit.to_reference(own[rows]) - 1.7e9 - true[rows]).max() < 0.02
+        (said,) = step_sentences(stretches, "the camera's clock")
+        amount = re.search(r" by (\S+) s before", said)
+        assert amount is not None and float(amount[1]) == pytest.approx(abs(jump), abs=0.02, rel=0.01)
+        assert ("forward" if jump > 0 else "back") in said
+
+
+@pytest.mark.parametrize("noise", ["normal", "late", "outliers", "none"])
+def test_no_step_where_there_is_none(noise):
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        own = np.sort(rng.uniform(0, 600, 1200))
+        y = 1.7e9 + rng.uniform(0.9, 1.1) * own
+        if noise == "normal":
+            y += rng.normal(0, 0.05, 1200)
+        elif noise == "late":
+            y += rng.uniform(0, 0.85, 1200)
+        elif noise == "outliers":
+            y += rng.normal(0, 0.02, 1200) + (rng.random(1200) < 0.1) * rng.normal(0, 50, 1200)
+        stretches = fit_stretches(own, y, late=noise == "late")
+        assert len(stretches) == 1
+        assert (stretches[0].first, stretches[0].last) == (0, 1199)
+        assert step_sentences(stretches) == []
+
+
+def test_two_steps_and_missing_stamps():
+    rng = np.random.default_rng(4)
+    true = np.arange(0, 300, 0.5)
+    own = true + np.select([true < 100, true < 200], [0.0, 5.0], -40.0)
+    own[::17] = np.nan
+    stretches = fit_stretches(own, true + rng.normal(0, 0.01, len(true)))
+    assert [one.first for one in stretches] == pytest.approx([0, 200, 400], abs=2)
+    assert len(step_sentences(stretches)) == 2
+    with pytest.raises(WildlabError, match="no stamp"):
+        fit_stretches([np.nan, 1.0], [1.0, np.nan])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**31), st.sampled_from([2.0**16, 2.0**32, 604800.0]))
+def test_a_counter_that_begins_again_goes_on(seed, period):
+    rng = np.random.default_rng(seed)
+    true = np.cumsum(rng.uniform(0, 0.4 * period, 50)) + rng.uniform(0, period)
+    out = unwrap_counter(true % period, period)
+    assert out - out[0] == pytest.approx(true - true[0], abs=1e-6 * period)
+
+
+def test_a_start_anew_is_no_wrap_and_nan_stays():
+    stamps = np.array([100.0, 101.0, np.nan, 0.0, 1.0])
+    assert unwrap_counter(stamps, 4294.967296)[[0, 1, 3, 4]].tolist() == [100.0, 101.0, 0.0, 1.0]
+    assert np.isnan(unwrap_counter(stamps, 4294.967296)[2])

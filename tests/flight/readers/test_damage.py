@@ -1,0 +1,99 @@
+"""Tracks and tables: what holds nothing is refused, others are not taken for them, damage costs little."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.flight.readers import test_airdata as of_airdata
+from tests.flight.readers import test_gpx as of_gpx
+from tests.flight.readers import test_nmea as of_nmea
+from tests.flight.readers import test_rtklib_pos as of_pos
+from tests.flight.readers.test_dji_mrk import row
+from tests.flight.readers.test_dji_srt import new, subtitles
+from tests.flight.readers.test_ubx import message, old, pvt
+from tests.flight.readers.tracks import survives
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.dji import airdata, mrk, srt
+from wildlab.flight.readers.tracks import gpx, nmea, rtklib_pos, ubx
+
+AIRDATA = of_airdata.table(of_airdata.rows(120))
+
+
+@pytest.mark.parametrize(
+    ("reader", "data", "words"),
+    [
+        (ubx, message("NAV-DOP", iTOW=5), "1 message"),
+        (ubx, b"", "0 messages of u-blox"),
+        (nmea, of_nmea.said("GPHDT,12.0,T"), "1 sentence"),
+        (mrk, "hello", "1 line"),
+        (srt, subtitles("hello", "GPS(n/a, n/a, 0)"), "2 subtitles"),
+        (gpx, '<gpx version="1.1"><wpt lat="1" lon="2"/></gpx>', "no point"),
+        (gpx, '<gpx version="1.1"><trk><trkseg><trkpt lat="1" lon="2">', "1 are broken"),
+        (gpx, of_gpx.document(of_gpx.point(0, inside="<a>" * 100000 + "</a>" * 100000)), "more than 64"),
+        (
+            rtklib_pos,
+            of_pos.WAYS["UTC"].replace(of_pos.LLH, "e-baseline(m) n-baseline(m) u-baseline(m)"),
+            "baselines",
+        ),
+        (rtklib_pos, "%  GPST latitude(deg) longitude(deg) height(m)\nhello\n1,2\n", "no position; 2 lines"),
+        (airdata, "time(millisecond),longitude\n1,2\n", "column 'latitude'"),
+        (airdata, of_airdata.table([]), "no row"),
+        (airdata, AIRDATA.replace("takeoff(meters)", "takeoff(cubits)"), "unit 'cubits'"),
+    ],
+)
+def test_what_holds_nothing_is_refused(reader, data, words):
+    with pytest.raises(WildlabError, match=words):
+        reader.read(Path("x"), data.encode() if isinstance(data, str) else data)
+
+
+@pytest.mark.parametrize(
+    ("reader", "head", "name"),
+    [
+        (ubx, b"\xb5\x62" * 100, "x.ubx"),
+        (nmea, b"$GP is a currency, $100,000", "x.txt"),
+        (nmea, b"", "x.nmea"),
+        (mrk, b"1 2 3\n", "x.MRK"),
+        (srt, subtitles("Hello there").encode(), "film.srt"),
+        # A baseline without a header cannot be told from a place but by its digits.
+        (rtklib_pos, f"{of_pos.GPST[0]} 12.3456 5.6789 1.2345 1 12\n".encode(), "x.pos"),
+        (airdata, b"time,x,y\n1,2,3\n", "x.csv"),
+    ],
+)
+def test_others_are_not_taken_for_them(reader, head, name):
+    assert not reader.recognise(head, name)
+
+
+@pytest.mark.parametrize(
+    ("reader", "data", "share"),
+    [
+        (ubx, b"".join(map(pvt, range(30))), 0.89),
+        (ubx, b"".join(map(old, range(10))), 0.83),
+        (nmea, of_nmea.track(of_nmea.datetime(2020, 1, 1, tzinfo=of_nmea.UTC), 40), 0.89),
+        (mrk, "".join(map(row, range(1, 30))).encode(), 0.89),
+        (srt, subtitles(*map(new, range(30))).encode(), 0.89),
+        (gpx, of_gpx.document(of_gpx.track(40)), 0.64),
+        (rtklib_pos, of_pos.WAYS["calendar GPST"].encode(), 0.89),
+        (rtklib_pos, of_pos.WAYS["ecef"].encode(), 0.89),
+        (airdata, AIRDATA.encode(), 0.83),
+    ],
+)
+def test_damage(reader, data, share):
+    assert survives(reader.read, data) > share
+    if reader is srt:
+        assert survives(lambda path, data, zone: srt.read(path, data, "UTC"), data) > share
+
+
+@pytest.mark.parametrize(
+    ("reader", "name", "share"),
+    [
+        (ubx, "target_ubx_m8l/ublox-neo-m8l.log", 0.85),
+        (nmea, "target_boat_nmea/bundg_zeus_9.log", 0.62),
+        (srt, "dji_srt/p4_rtk.SRT", 0.89),
+        (gpx, "target_gpx/around-visnjan-with-car.gpx", 0.63),
+        (rtklib_pos, "target_car_rtk_pos/demo5_b34f_f.pos", 0.78),
+        (airdata, "dji_airdata_p4rtk/Jul-7th-2022-11-10AM-Flight-Airdata.csv", 0.72),
+    ],
+)
+def test_damaged_files_of_receivers(shared_data, reader, name, share):
+    data = shared_data("logs", *name.split("/")).read_bytes()[:200_000]
+    assert survives(reader.read, data, 4, 6) > share
