@@ -1,6 +1,7 @@
 """Telemetry logs: values against pymavlink's own decoding, clocks against the truth, damage of all kinds."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
 from tests.flight.readers.mavlink_logs import BOOT_S, ORIGIN, START_S, frame, joined, made, telemetry
-from tests.flight.readers.tracks import check, damaged, near
+from tests.flight.readers.tracks import check, near, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs.formats import recognise
 from wildlab.flight.readers.mavlink import telemetry as tlog
@@ -21,7 +22,9 @@ PATH = Path("flight.tlog")
 
 
 def read(data: bytes) -> Any:
-    return tlog.read(PATH, data)
+    log = tlog.read(PATH, data)
+    check(replace(log, parts={name: part for name, part in log.parts.items() if name != "triggers"}))
+    return log
 
 
 def decoded(data: bytes) -> list[tuple[float, Any]]:
@@ -57,51 +60,32 @@ def same_as_pymavlink(data: bytes) -> int:
     return compared
 
 
-def test_every_field_of_the_sample_is_pymavlinks(shared_data):
+def test_sample(shared_data):
     data = shared_data("logs", "cuav2018_sar", "flight.tlog").read_bytes()
     assert same_as_pymavlink(data) > 150_000
-
-
-def test_sample(shared_data):
-    path = shared_data("logs", "cuav2018_sar", "flight.tlog")
-    data = path.read_bytes()
     assert recognise(data[:8192], "unnamed") == "tlog"
-    log = tlog.read(path, data)
-    check(log)
-    assert {name: len(part) for name, part in log.parts.items()} == {
-        "poses": 604,
-        "gnss": 732,
-        "imu": 771,
-        "magnetometer": 771,
-    }
-    assert log.lost == ()
-    assert log.clock.base == "times of receipt"
+    log = read(data)
+    sizes = {"poses": 604, "gnss": 732, "imu": 771, "magnetometer": 771}
+    assert {name: len(part) for name, part in log.parts.items()} == sizes
+    assert (log.lost, log.clock.base) == ((), "times of receipt")
     # Receipts are never early, and were up to 0.9 s late.
     receipts = {m.time_boot_ms: at for at, m in decoded(data) if m.get_type() == "ATTITUDE"}
     poses = log.parts["poses"].columns
     late = np.array([receipts[round(ms * 1e3)] for ms in poses["time_log_s"]]) - poses["time_s"]
-    assert -0.005 < late.min() < 0.01
-    assert 0.8 < late.max() < 1.0
-    force = log.parts["imu"].columns
-    assert np.median(force["f_z_m_s2"]) == pytest.approx(-9.8, abs=2.0)
+    assert -0.005 < late.min() < 0.01 and 0.8 < late.max() < 1.0
+    assert np.median(log.parts["imu"].columns["f_z_m_s2"]) == pytest.approx(-9.8, abs=2.0)
 
 
 @pytest.mark.parametrize("version_1", [False, True])
 def test_straight_flight(version_1):
-    log = read(joined(telemetry(version_1=version_1)))
-    check(log)
-    poses = log.parts["poses"].columns
-    used = log.parts["poses"].used
+    poses = read(joined(telemetry(version_1=version_1))).parts["poses"]
     # Before the first place there is none.
-    assert used.sum() == len(used) - 1
-    at = poses["time_log_s"][used] - BOOT_S
-    assert np.allclose(poses["time_s"][used], START_S + at, atol=0.01)
-    north = (poses["latitude_deg"][used] - ORIGIN[0]) * 111_412
-    assert np.allclose(north, 10 * at, atol=0.02)
-    assert np.allclose(poses["height_sea_m"][used], 150)
-    assert np.allclose(poses["height_home_m"][used], 50)
-    near(poses, 1e-05, roll_deg=np.degrees(0.1))
-    assert np.allclose(poses["v_north_m_s"][used], 10)
+    assert poses.used.sum() == len(poses) - 1
+    columns = {name: values[poses.used] for name, values in poses.columns.items()}
+    at = columns["time_log_s"] - BOOT_S
+    near(columns, 0.01, time_s=START_S + at)
+    assert np.allclose((columns["latitude_deg"] - ORIGIN[0]) * 111_412, 10 * at, atol=0.02)
+    near(columns, 1e-5, height_sea_m=150, height_home_m=50, roll_deg=np.degrees(0.1), v_north_m_s=10)
 
 
 @settings(max_examples=8, deadline=None)
@@ -125,28 +109,26 @@ def test_clock_along_the_earliest_receipts(offset, ppm, jitter, seed):
 
 
 def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts():
-    flight = telemetry()
     told = []
     for row in range(30):
-        unix = START_S + row + 3.0
-        text = made("SYSTEM_TIME", time_boot_ms=round((BOOT_S + row) * 1e3), time_unix_usec=round(unix * 1e6))
+        boot, unix = round((BOOT_S + row) * 1e3), round((START_S + row + 3.0) * 1e6)
+        text = made("SYSTEM_TIME", time_boot_ms=boot, time_unix_usec=unix)
         told.append((START_S + row + 0.2, frame(text, START_S + row + 0.2)))
-    log = read(joined(flight, told))
+    log = read(joined(telemetry(), told))
     assert log.clock.base == "UTC of the messages SYSTEM_TIME"
     poses = log.parts["poses"].columns
-    near(poses, 0.001, time_s=START_S + 3 + poses["time_log_s"] - BOOT_S)
+    near(poses, 1e-3, time_s=START_S + 3 + poses["time_log_s"] - BOOT_S)
 
 
 def test_restart_has_a_clock_of_its_own():
     log = read(joined(telemetry(300), telemetry(100, boot_s=5.0, start_s=START_S + 100, heartbeat=False)))
-    check(log)
-    poses = log.parts["poses"].columns
-    later = poses["time_log_s"] < BOOT_S
+    poses = log.parts["poses"]
+    later = poses.columns["time_log_s"] < BOOT_S
     assert later.sum() == 100
-    wanted = START_S + 100 + poses["time_log_s"][later] - 5.0
-    assert np.allclose(poses["time_s"][later], wanted, atol=0.02)
+    after = {name: values[later] for name, values in poses.columns.items()}
+    near(after, 0.02, time_s=START_S + 100 + after["time_log_s"] - 5.0)
     # No place is made up between the two.
-    assert log.parts["poses"].used.sum() == 398
+    assert poses.used.sum() == 398
 
 
 def test_busiest_vehicle_is_read_and_the_others_are_named():
@@ -156,50 +138,39 @@ def test_busiest_vehicle_is_read_and_the_others_are_named():
 
 
 def test_gaps_in_places_are_not_bridged():
-    flight = telemetry()
-    cut = [
-        item
-        for item in flight
-        if not (START_S + 10 < item[0] < START_S + 14 and b"\x21\x00\x00" in item[1][:20])
-    ]
-    assert len(cut) < len(flight)
-    log = read(joined(cut))
-    poses = log.parts["poses"]
-    inside = (poses.columns["time_s"] > START_S + 10.5) & (poses.columns["time_s"] < START_S + 13.5)
+    gap = START_S + 10, START_S + 14
+    cut = [one for one in telemetry() if not (gap[0] < one[0] < gap[1] and b"\x21\x00\x00" in one[1][:20])]
+    poses = read(joined(cut)).parts["poses"]
+    inside = (poses.columns["time_s"] > gap[0] + 0.5) & (poses.columns["time_s"] < gap[1] - 0.5)
     assert inside.sum() > 10
     assert not poses.used[inside].any()
     assert set(poses.columns["why"][inside]) == {"no position within reach"}
 
 
-def gnss(**fields: Any) -> Any:
-    log_rows = []
+USUAL = {
+    **{"lat": round(ORIGIN[0] * 1e7), "lon": round(ORIGIN[1] * 1e7), "alt": 100_000, "fix_type": 3},
+    **{"eph": 80, "vel": 500, "cog": 9000, "satellites_visible": 12},
+}
+
+
+def gnss(only: int | None = None, **fields: Any) -> Any:
+    """Twenty fixes, all of them or `only` one with other fields: numbers, or functions of the row."""
+    rows = []
     for row in range(20):
         at = START_S + row * 0.2 + 0.01
-        given = {"lat": round(ORIGIN[0] * 1e7) + row, "lon": round(ORIGIN[1] * 1e7), "alt": 100_000}
-        given |= {"fix_type": 3, "eph": 80, "vel": 500, "cog": 9000, "satellites_visible": 12}
-        given["time_usec"] = round((BOOT_S + row * 0.2) * 1e6)
-        given |= {name: value(row) if callable(value) else value for name, value in fields.items()}
-        log_rows.append((at, frame(made("GPS_RAW_INT", **given), at)))
-    return read(joined(telemetry(40, jitter_s=0.0), log_rows)).parts["gnss"]
+        given = USUAL | {"lat": USUAL["lat"] + row, "time_usec": round((BOOT_S + row * 0.2) * 1e6)}
+        if only in (None, row):
+            given |= {name: value(row) if callable(value) else value for name, value in fields.items()}
+        rows.append((at, frame(made("GPS_RAW_INT", **given), at)))
+    return read(joined(telemetry(40, jitter_s=0.0), rows)).parts["gnss"]
 
 
 def test_gnss_values():
     part = gnss(h_acc=900, v_acc=1500, vel_acc=200, alt_ellipsoid=141_000)
     assert part.used.all()
-    columns = part.columns
-    near(columns, 1e-09, v_north_m_s=0)
-    near(columns, v_east_m_s=5)
-    near(
-        columns,
-        0,
-        height_sea_m=100,
-        height_ellipsoid_m=141,
-        sd_horizontal_m=0.9,
-        sd_vertical_m=1.5,
-        sd_velocity_m_s=0.2,
-        hdop=0.8,
-    )
-    near(columns, 0.001, time_s=START_S + np.arange(20) * 0.2)
+    near(part.columns, v_north_m_s=0, v_east_m_s=5, height_sea_m=100, height_ellipsoid_m=141, hdop=0.8)
+    near(part.columns, sd_horizontal_m=0.9, sd_vertical_m=1.5, sd_velocity_m_s=0.2)
+    near(part.columns, 1e-3, time_s=START_S + np.arange(20) * 0.2)
 
 
 @pytest.mark.parametrize(
@@ -210,53 +181,37 @@ def test_gnss_values():
         ({"lat": 0, "lon": 0}, "no position"),
         ({"lat": 910_000_000}, "no position"),
         ({"alt": -2_000_000_000}, "an impossible height"),
-        ({"time_usec": round(BOOT_S * 1e6)}, "a repeated stamp"),
+        ({"time_usec": round((BOOT_S + 1.2) * 1e6)}, "a repeated stamp"),
         ({"time_usec": round(5 * BOOT_S * 1e6)}, "a stamp that its receipt contradicts"),
     ],
 )
 def test_gnss_rows_that_cannot_be_true(fields, reason):
-    usual = {"fix_type": 3, "lat": round(ORIGIN[0] * 1e7), "lon": round(ORIGIN[1] * 1e7), "alt": 100_000}
-    spoilt = {
-        name: (lambda row, name=name, value=value: value if row == 7 else gnss_usual(name, row, usual))
-        for name, value in fields.items()
-    }
-    part = gnss(**spoilt)
+    part = gnss(7, **fields)
     assert part.columns["why"][7] == reason
     assert part.used.sum() == 19
 
 
-def gnss_usual(name: str, row: int, usual: dict[str, int]) -> int:
-    return round((BOOT_S + row * 0.2) * 1e6) if name == "time_usec" else usual[name]
-
-
 def test_gnss_stamps_in_utc_and_none_that_is_known():
+    stamps = START_S + np.arange(20) * 0.2
     part = gnss(time_usec=lambda row: round((START_S + 0.2 * row + 40) * 1e6))
-    near(part.columns, time_s=START_S + np.arange(20) * 0.2 + 40)
+    near(part.columns, 1e-5, time_s=stamps + 40)
     part = gnss(time_usec=0)
     assert part.used.all()
-    near(part.columns, time_s=START_S + np.arange(20) * 0.2 + 0.01)
-    assert np.isnan(part.columns["time_log_s"]).all()
+    near(part.columns, 1e-5, time_s=stamps + 0.01, time_log_s=np.nan)
 
 
-def test_unknown_quality_is_no_number():
+def test_what_is_not_known_is_no_number():
     columns = gnss(eph=65535, vel=65535, satellites_visible=255).columns
     assert not {"hdop", "v_north_m_s", "satellites", "sd_horizontal_m", "height_ellipsoid_m"} & set(columns)
+    # One number for both heights is of one of them.
+    assert "height_ellipsoid_m" not in gnss(alt_ellipsoid=100_000).columns
 
 
-def test_one_number_for_both_heights():
-    rows = []
-    for row in range(10):
-        text = made("GPS_RAW_INT", lat=634_000_000, lon=104_000_000, alt=9000, alt_ellipsoid=9000, fix_type=3)
-        rows.append((START_S + row, frame(text, START_S + row)))
-    log = read(joined(telemetry(20), rows))
-    assert "height_ellipsoid_m" not in log.parts["gnss"].columns
-
-
-def test_vehicle_by_its_own_words_or_its_heartbeat():
-    flight = telemetry(20)
-    assert read(joined(flight)).vehicle == "ardupilotmega (fixed wing)"
-    text = frame(made("STATUSTEXT", text=b"ArduPlane V4.1.2 (\x1b[2J)"), START_S)
-    assert read(joined(flight, [(START_S, text)])).vehicle == repr("ArduPlane V4.1.2 (\x1b[2J)")
+@pytest.mark.parametrize("text", [b"", b"ArduPlane V4.1.2 (\x1b[2J)"], ids=["heartbeat", "its own words"])
+def test_vehicle_by_its_own_words_or_its_heartbeat(text):
+    said = [(START_S, frame(made("STATUSTEXT", text=text), START_S))] if text else []
+    named = repr(text.decode()) if text else "ardupilotmega (fixed wing)"
+    assert read(joined(telemetry(20), said)).vehicle == named
 
 
 def test_fields_that_old_senders_leave_away_and_new_ones_append():
@@ -289,11 +244,14 @@ def test_signed_frames_and_unknown_messages_are_passed():
     assert read(joined(telemetry(20)) + bytes(unknown) + plain).lost
 
 
-def test_what_is_no_log_is_refused():
-    for data in (b"", b"\x00" * 500, b"\xfe" * 500, b"$GPGGA,1\n" * 100):
-        assert not tlog.recognise(data[:8192], "a.tlog")
-        with pytest.raises(WildlabError, match="no sound"):
-            read(data)
+@pytest.mark.parametrize("data", [b"", b"\x00" * 500, b"\xfe" * 500, b"$GPGGA,1\n" * 100])
+def test_what_is_no_log_is_refused(data):
+    assert not tlog.recognise(data[:8192], "a.tlog")
+    with pytest.raises(WildlabError, match="no sound"):
+        read(data)
+
+
+def test_a_station_alone_is_no_vehicle():
     beat = frame(made("HEARTBEAT", type=6, autopilot=8), START_S, 255)
     with pytest.raises(WildlabError, match="holds 5 messages"):
         read(beat * 5)
@@ -313,11 +271,7 @@ def test_losses_are_counted():
 
 def test_damage_anywhere():
     data = joined(telemetry(60), [(START_S, frame(made("SYSTEM_TIME", time_boot_ms=5), START_S))])
-    for spoilt in damaged(data):
-        try:
-            check(read(spoilt))
-        except WildlabError as error:
-            assert "flight.tlog" in str(error)
+    assert survives(tlog.read, data) > 0.8
 
 
 @pytest.mark.parametrize("unit", [b"\x00\x06" * 4 + b"\xfe", b"\x00" * 7 + b"\xfd\xff", b"\xfe", b"\x00"])
@@ -339,32 +293,25 @@ def test_clocks_without_end_take_no_time():
 
 
 def with_messages(make: Any, count: int = 50, component: int = 1) -> Any:
-    rows = [
-        (
-            START_S + row * 0.2 + 0.02,
-            frame(make(row, round((BOOT_S + row * 0.2) * 1e3)), START_S + row * 0.2 + 0.02, 1, component),
-        )
-        for row in range(count)
-    ]
+    rows = []
+    for row in range(count):
+        at = START_S + row * 0.2 + 0.02
+        rows.append((at, frame(make(row, round((BOOT_S + row * 0.2) * 1e3)), at, 1, component)))
     return read(joined(telemetry(60, jitter_s=0.0), rows))
 
 
 @pytest.mark.parametrize("name", ["SCALED_IMU", "RAW_IMU", "HIGHRES_IMU"])
 def test_inertial_units(name):
-    si = name == "HIGHRES_IMU"
+    acc, rate, field = (9.80665, 0.5, 0.4) if name == "HIGHRES_IMU" else (1000, 500, 400)
 
     def make(row: int, ms: int) -> Any:
         stamp = {"time_boot_ms": ms} if name == "SCALED_IMU" else {"time_usec": ms * 1000}
-        acc = 9.80665 if si else 1000
-        rate, field = (0.5, 0.4) if si else (500, 400)
         return made(name, **stamp, zacc=-acc, xgyro=rate, ymag=field)
 
-    log = with_messages(make)
-    check(log)
-    near(log.parts["imu"].columns, 1e-05, f_z_m_s2=-9.80665)
-    near(log.parts["imu"].columns, w_x_rad_s=0.5)
-    near(log.parts["magnetometer"].columns, 0.0001, field_y_ut=40)
-    near(log.parts["imu"].columns, 0.002, time_s=START_S + np.arange(50) * 0.2)
+    parts = with_messages(make).parts
+    near(parts["imu"].columns, 1e-5, f_z_m_s2=-9.80665, w_x_rad_s=0.5)
+    near(parts["magnetometer"].columns, 1e-4, field_y_ut=40)
+    near(parts["imu"].columns, 2e-3, time_s=START_S + np.arange(50) * 0.2)
 
 
 def test_raw_counts_are_no_inertial_units():
@@ -375,30 +322,19 @@ def test_raw_counts_are_no_inertial_units():
 def test_camera_feedback():
     def make(row: int, ms: int) -> Any:
         where = {"lat": 634_000_000, "lng": 104_000_000} if row else {}
-        return made(
-            "CAMERA_FEEDBACK",
-            time_usec=round((START_S + row * 0.2) * 1e6),
-            img_idx=row,
-            alt_msl=120.0,
-            alt_rel=20.0,
-            yaw=90.0,
-            **where,
-        )
+        above = {"alt_msl": 120.0, "alt_rel": 20.0, "yaw": 90.0}
+        usec = round((START_S + row * 0.2) * 1e6)
+        return made("CAMERA_FEEDBACK", time_usec=usec, img_idx=row, **above, **where)
 
-    part = with_messages(make).parts["triggers"]
+    part, k = with_messages(make).parts["triggers"], np.arange(50)
     assert part.used.all()
-    near(part.columns, 0, number=np.arange(50))
-    near(part.columns, time_s=START_S + np.arange(50) * 0.2)
-    assert np.isnan(part.columns["latitude_deg"][0])
-    assert np.allclose(part.columns["latitude_deg"][1:], 63.4)
-    assert (part.columns["height_home_m"][1:] == 20).all()
+    near(part.columns, 1e-5, number=k, time_s=START_S + k * 0.2)
+    near(part.columns, latitude_deg=np.where(k, 63.4, np.nan), height_home_m=np.where(k, 20, np.nan))
 
 
 def test_camera_trigger_since_start():
-    part = with_messages(lambda row, ms: made("CAMERA_TRIGGER", time_usec=ms * 1000, seq=row)).parts[
-        "triggers"
-    ]
-    near(part.columns, 0.002, time_s=START_S + np.arange(50) * 0.2)
+    log = with_messages(lambda row, ms: made("CAMERA_TRIGGER", time_usec=ms * 1000, seq=row))
+    near(log.parts["triggers"].columns, 2e-3, time_s=START_S + np.arange(50) * 0.2)
 
 
 def yaw_of_vehicle(count: int) -> Any:
