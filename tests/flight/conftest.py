@@ -1,7 +1,5 @@
 """A small flight that is right in every respect, for tests that make one thing wrong."""
 
-from __future__ import annotations
-
 import copy
 import io
 import re

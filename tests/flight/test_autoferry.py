@@ -1,7 +1,5 @@
 """The Autoferry JSON: its three spellings of a measurement, hostile files, and the published scenarios."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

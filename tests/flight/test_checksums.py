@@ -1,7 +1,5 @@
 """A byte of a flight that changed by itself is found; a change on purpose is accepted, nothing else."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable
 from pathlib import Path

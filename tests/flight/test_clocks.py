@@ -1,7 +1,5 @@
 """Synchronisation against motions whose pose is known at every time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What heights count from: made-up streams, and a made-up grid of the geoid."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from pathlib import Path

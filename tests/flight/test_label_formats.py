@@ -1,7 +1,5 @@
 """Boxes of COCO, YOLO, MegaDetector and tables: the same out of each, and a sentence for what is wrong."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Thor 75 and X-8 through their recipes: counts, rates, ranges, what the logs hide, and no false alarm."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

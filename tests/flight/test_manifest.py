@@ -1,7 +1,5 @@
 """The manifest: what it refuses, and that it reads back what it wrote."""
 
-from __future__ import annotations
-
 import copy
 import math
 import tomllib

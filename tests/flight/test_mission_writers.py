@@ -65,17 +65,6 @@ def check_plan(plan):
     return flown["items"]
 
 
-def test_waypoints_read_back():
-    flown = mission()
-    rows = read_wpl(waypoints_text(flown))
-    assert rows[:, 3].tolist() == [16, 22, 178, *[16] * 5, 20]
-    assert rows[0, [2, 8, 9, 10]].tolist() == [0, *HOME]
-    assert rows[1, [2, 8, 9, 10]].tolist() == [3, HOME[0], HOME[1], 64.0]
-    assert rows[2, 5] == 9.5
-    assert np.allclose(rows[3:8, 8:10], np.column_stack([flown.latitude, flown.longitude]), atol=1e-8, rtol=0)
-    assert np.allclose(rows[3:8, 10], flown.above_home) and set(rows[3:8, 2]) == {3}
-
-
 def test_heights_may_be_above_the_ground():
     flown = mission(heights="ground")
     rows = read_wpl(waypoints_text(flown))
@@ -110,10 +99,14 @@ def test_pymavlink_reads_the_waypoints(tmp_path):
     path.write_text(waypoints_text(flown))
     loader = mavwp.MAVWPLoader()
     assert loader.load(str(path)) == 10 + 1
-    points = [loader.wp(k) for k in range(loader.count())]
+    home, takeoff, speed, _, *way, _, _ = points = [loader.wp(k) for k in range(loader.count())]
     assert [one.command for one in points] == [16, 22, 178, 206, *[16] * 5, 206, 20]
-    assert np.allclose([one.x for one in points[4:9]], flown.latitude, atol=1e-8)
-    assert np.allclose([one.z for one in points[4:9]], flown.above_home)
+    assert (home.frame, home.x, home.y, home.z) == (0, *HOME)
+    assert (takeoff.frame, takeoff.x, takeoff.y, takeoff.z) == (3, HOME[0], HOME[1], 64.0)
+    assert speed.param2 == 9.5
+    found = np.array([(one.frame, one.x, one.y, one.z) for one in way])
+    expected = np.column_stack([[3] * 5, flown.latitude, flown.longitude, flown.above_home])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
 
 
 def outlined():
@@ -148,13 +141,15 @@ def test_kml_is_xml_whose_areas_read_back(tmp_path):
     assert "relativeToGround" in line and "16.46000000,58.66000000,60.000" in line
 
 
-def test_what_is_no_flight_is_refused():
-    with pytest.raises(WildlabError, match="one value"):
-        mission(above_ground=np.zeros(3))
-    with pytest.raises(WildlabError, match="no place on the Earth"):
-        mission(above_home=np.full(5, np.nan))
-    with pytest.raises(WildlabError, match="no place on the Earth"):
-        mission(n=40_000)
-    flown = mission(n=MOST_ITEMS)
-    with pytest.raises(WildlabError, match="has 703 items"):
-        mission_items(flown)
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        ({"above_ground": np.zeros(3)}, "one value"),
+        ({"above_home": np.full(5, np.nan)}, "no place on the Earth"),
+        ({"n": 40_000}, "no place on the Earth"),
+        ({"n": MOST_ITEMS}, "has 703 items"),
+    ],
+)
+def test_what_is_no_flight_is_refused(given, problem):
+    with pytest.raises(WildlabError, match=problem):
+        mission_items(mission(**given))

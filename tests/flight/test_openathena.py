@@ -1,7 +1,5 @@
 """The two shipped recipes on the real data: counts, recovered azimuths, and errors known from elsewhere."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Flights on disk: they survive the trip, whole or not at all, and hostile folders stay outside."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Elevation maps under flights: what is read, how it comes into n, and every kind of map that is refused."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 from collections.abc import Callable

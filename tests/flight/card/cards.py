@@ -1,7 +1,5 @@
 """Memory cards for tests: images whose pixels are known by an independent projection, and tracks."""
 
-from __future__ import annotations
-
 import math
 from datetime import UTC, datetime
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A card in, a flight out: what is seen where it truly is, by an independent projection."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from datetime import UTC, datetime

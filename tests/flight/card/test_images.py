@@ -1,7 +1,5 @@
 """How images meet the log: by the records of their triggers, by UTC, by a zone, or not at all."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Logs on their way into a flight: real ones, and what is said of their clocks and rates."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Which role each log has: by what it holds, where it was and when."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

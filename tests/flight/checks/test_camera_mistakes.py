@@ -1,7 +1,5 @@
 """Usual mistakes about pixels, calibration, mount, poses and clock, named by clicks on known points."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

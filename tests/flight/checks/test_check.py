@@ -1,7 +1,5 @@
 """`check_flight`: one thing wrong at a time, and each is found where it is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`check_flight` on inertial and satellite measurements: right ones pass, one fault at a time is found."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Means of inertial samples, speeds and courses: what tells the heading, and where nothing may be said."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any

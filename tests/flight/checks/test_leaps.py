@@ -1,7 +1,5 @@
 """A leap of a position is told from a clock that is off, on flights with one, the other, or both."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

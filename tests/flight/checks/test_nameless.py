@@ -1,7 +1,5 @@
 """Pixels without names: mistakes show by how many meet a known target, and right ones are not accused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A photo is called off beyond what stated errors allow for so many photos, and not for a wrong detection."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

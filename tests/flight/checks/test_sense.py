@@ -1,7 +1,5 @@
 """The parts of the sense checks by themselves: rule, pairs, bounds, each with a right and a wrong one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

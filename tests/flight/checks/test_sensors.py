@@ -1,7 +1,5 @@
 """Sensors of detections: frames.sensor and detections.source have to agree."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace

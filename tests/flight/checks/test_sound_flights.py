@@ -1,7 +1,5 @@
 """Sound flights are accused of nothing, and a mistake made in one is named, alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A heading that is off by some degrees is said as such, and other mistakes are still found beside it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

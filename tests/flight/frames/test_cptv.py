@@ -1,7 +1,5 @@
 """CPTV: a writer made from the format's description; what is read of its files, and of broken ones."""
 
-from __future__ import annotations
-
 import gzip
 import struct
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Frames out of folders, cards and files: what they measure, where they are valid, what bad ones say."""
 
-from __future__ import annotations
-
 import os
 import struct
 import zlib

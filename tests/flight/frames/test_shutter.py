@@ -1,7 +1,5 @@
 """Frames of a closed shutter or a held picture, dead pixels and dark corners: found, and not invented."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

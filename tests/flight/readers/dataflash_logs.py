@@ -1,7 +1,5 @@
 """A small writer of DataFlash logs, binary and as text, and one flight in three generations of names."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Images that no camera took, with the tags that cameras write: for tests of their reader."""
 
-from __future__ import annotations
-
 import io
 import struct
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Clicks and boxes of other programs: the same pixels out of each, and a sentence for whatever is wrong."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """DataFlash: messages as pymavlink finds them, whatever stands between them, and files that lie."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What messages of ArduPilot mean in three generations of names, against the flight they were made from."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Surveyed points out of KML, GeoJSON and tables: the same points out of each, and sentences for the rest."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Raw tables: text read block by block as Python's own reader has it, and angles that can be no radians."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

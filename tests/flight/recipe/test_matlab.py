@@ -1,7 +1,5 @@
 """MATLAB files as tables of a recipe, and what is said about those that cannot be read."""
 
-from __future__ import annotations
-
 import struct
 import tomllib
 import zlib

@@ -1,7 +1,5 @@
 """What a recipe converts: frames, units, signs, times, groups; against numbers from elsewhere."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Whatever is wrong with tables, files or recipe is one sentence with its fix; nothing is written."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

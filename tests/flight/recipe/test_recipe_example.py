@@ -1,7 +1,5 @@
 """The worked example of `data/recipes/README.md`, as it stands there, and with its camera in a file."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Sensors on board through a recipe: axes, units, rows that do not count, flights without poses or images."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """Clocks against each other: simulated ones, whose rate, offset and steps are known."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

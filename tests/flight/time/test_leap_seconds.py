@@ -1,7 +1,5 @@
 """GPS time and UTC, against the table of leap seconds as the world has it."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 
 import numpy as np

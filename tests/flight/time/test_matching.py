@@ -1,7 +1,5 @@
 """Images and triggers: made-up flights, whose pairs are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment

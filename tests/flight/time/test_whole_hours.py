@@ -1,7 +1,5 @@
 """Whole and half hours between two clocks are found by overlap, and said with what to type."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
