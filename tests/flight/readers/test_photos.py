@@ -15,6 +15,7 @@ from PIL import ExifTags, Image
 from scipy.spatial.transform import Rotation
 
 from tests.flight.readers import made_up_photos as made
+from tests.flight.readers.tracks import near
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs.log import RawLog
 from wildlab.flight.readers.photos import tags as photo_tags
@@ -23,6 +24,14 @@ from wildlab.flight.readers.photos.folder import camera_of, is_photos, read_phot
 from wildlab.flight.readers.photos.values import from_nadir
 
 NOON = datetime(2024, 6, 12, 11, 30, tzinfo=UTC).timestamp()
+
+
+def photo(folder: Path, zone: str | None = None, name: str = "a.jpg", **what: Any) -> dict[str, Any]:
+    """The columns of the one image of a folder, as numbers and texts."""
+    made.write(folder, name, **what)
+    log = read_photos(folder, zone)
+    assert [len(part) for part in log.parts.values()] == [1]
+    return {name: values[0] for name, values in log.parts["photos"].columns.items()}
 
 
 def column(log: RawLog, name: str) -> list[Any]:
@@ -38,55 +47,34 @@ def test_what_a_dji_says(tmp_path):
         made.write(tmp_path, f"DJI_{number}.JPG", **made.dji(number))
     assert is_photos(tmp_path)
     log = read_photos(tmp_path)
+    columns = log.parts["photos"].columns
     assert column(log, "file") == ["DJI_1.JPG", "DJI_9.JPG", "DJI_10.JPG"]
-    expected = {
-        "latitude_deg": 61.5,
-        "longitude_deg": -15.25,
-        "height_sea_m": 345.5,
-        "height_home_m": 80.0,
-        "roll_deg": -1.2,
-        "pitch_deg": 3.4,
-        "yaw_deg": 139.1,
-        "roll_world_deg": 0.0,
-        "pitch_world_deg": -89.9,
-        "yaw_world_deg": 140.7,
-        "focal_mm": 4.5,
-        "focal_35mm": 24.0,
-        "width_px": 40.0,
-        "height_px": 30.0,
-    }
-    for name, value in expected.items():
-        assert column(log, name) == pytest.approx([value] * 3, abs=1e-9), name
-    assert "height_ellipsoid_m" not in log.parts["photos"].columns
-    assert column(log, "time_log_s") == [NOON + 1, NOON + 9, NOON + 10]
+    near(columns, latitude_deg=61.5, longitude_deg=-15.25, height_sea_m=345.5, height_home_m=80.0)
+    near(columns, roll_deg=-1.2, pitch_deg=3.4, yaw_deg=139.1)
+    near(columns, roll_world_deg=0.0, pitch_world_deg=-89.9, yaw_world_deg=140.7)
+    near(columns, focal_mm=4.5, focal_35mm=24.0, width_px=40.0, height_px=30.0)
+    near(columns, time_log_s=NOON + np.array([1, 9, 10]), use=1)
+    assert "height_ellipsoid_m" not in columns
     assert column(log, "camera") == ["DJI FC6310"] * 3
-    assert log.parts["photos"].used.all()
 
 
 def test_local_time_without_a_zone_costs_no_place(tmp_path):
-    made.write(tmp_path, "a.jpg", **made.dji(1))
-    log = read_photos(tmp_path)
-    assert log.clock.base == "local time without a zone"
-    assert np.isnan(column(log, "time_s")).all()
-    assert column(log, "use") == [1.0]
-    in_oslo = read_photos(tmp_path, "Europe/Oslo")
-    assert column(in_oslo, "time_s") == [NOON + 1 - 7200]
+    row = photo(tmp_path, **made.dji(1))
+    assert np.isnan(row["time_s"]) and row["use"] == 1
+    assert read_photos(tmp_path).clock.base == "local time without a zone"
+    assert photo(tmp_path, "Europe/Oslo", **made.dji(1))["time_s"] == NOON + 1 - 7200
     with pytest.raises(WildlabError, match="is not a time zone"):
         read_photos(tmp_path, "Middle/Earth")
 
 
 def test_rtk_has_its_height_above_the_ellipsoid_its_spread_and_fix(tmp_path):
-    given_ = {"RtkFlag": 50, "RtkStdLat": 0.03, "RtkStdLon": 0.04, "RtkStdHgt": 0.05}
+    rtk = {"RtkFlag": 50, "RtkStdLat": 0.03, "RtkStdLon": 0.04, "RtkStdHgt": 0.05}
     more = {"GpsLatitude": "61.123456789", "GpsLongtitude": "-15.987654321"}
-    made.write(tmp_path, "a.jpg", **made.dji(1, CalibratedFocalLength="3666.67", **given_, **more))
-    log = read_photos(tmp_path)
-    assert column(log, "height_ellipsoid_m") == [345.5]
-    assert column(log, "fix") == [6.0]
-    assert column(log, "sd_horizontal_m") == pytest.approx([math.sqrt((0.03**2 + 0.04**2) / 2)])
-    assert column(log, "sd_vertical_m") == [0.05]
+    row = photo(tmp_path, **made.dji(1, CalibratedFocalLength="3666.67", **rtk, **more))
+    near(row, height_ellipsoid_m=345.5, fix=6, sd_horizontal_m=math.hypot(0.03, 0.04) / math.sqrt(2))
     # The maker's own digits, its misspelt tag too, are more than those of EXIF.
-    assert (column(log, "latitude_deg"), column(log, "longitude_deg")) == ([61.123456789], [-15.987654321])
-    camera = camera_of(log)
+    near(row, sd_vertical_m=0.05, latitude_deg=61.123456789, longitude_deg=-15.987654321)
+    camera = camera_of(read_photos(tmp_path))
     assert (camera["focal_px"], camera["how"]) == (3666.67, "calibrated by the maker")
 
 
@@ -117,58 +105,54 @@ def test_hemispheres_and_sides_of_heights(latitude, longitude, side):
     ],
 )
 def test_places_that_cannot_be_used(tmp_path, gps, why):
-    made.write(tmp_path, "a.jpg", exif=made.exif_of({0x010F: "Some"}, gps=gps))
-    log = read_photos(tmp_path)
-    assert (column(log, "why"), column(log, "use")) == ([why], [0.0])
+    row = photo(tmp_path, exif=made.exif_of({0x010F: "Some"}, gps=gps))
+    assert (row["why"], row["use"]) == (why, 0.0)
 
 
-def test_zones_parts_of_seconds_and_gps_time(tmp_path):
+def test_zones_and_parts_of_seconds(tmp_path):
     own = {0x9003: "2024:06:12 11:30:05", 0x9291: "25", 0x9011: "+02:00"}
-    made.write(tmp_path, "a.jpg", exif=made.exif_of(own=own, gps=made.gps_of(61, 15, 9)))
+    row = photo(tmp_path, exif=made.exif_of(own=own, gps=made.gps_of(61, 15, 9)))
+    near(row, 1e-6, time_s=NOON + 5.25 - 7200)
+    assert read_photos(tmp_path).clock.base == "zones that the images state"
+
+
+def test_a_camera_beside_gps_time(tmp_path):
+    """A camera three seconds and two hours off, with parts of seconds; GPS cuts them off."""
+    wall = NOON + 3.4 + 2.5 * np.arange(6)
+    for number, at in enumerate(wall):
+        whole, sky = (datetime.fromtimestamp(int(one), UTC) for one in (at, at - 7203))
+        own = {0x9003: f"{whole:%Y:%m:%d %H:%M:%S}", 0x9291: f"{at % 1:.3f}"[2:]}
+        clock = (float(sky.hour), float(sky.minute), float(sky.second))
+        gps = made.gps_of(61, 15, 9, date=f"{sky:%Y:%m:%d}", clock=clock)
+        made.write(tmp_path, f"{number}.jpg", exif=made.exif_of(own=own, gps=gps))
     log = read_photos(tmp_path)
-    assert column(log, "time_s") == pytest.approx([NOON + 5.25 - 7200], abs=1e-6)
-    assert log.clock.base == "zones that the images state"
-    # A camera three seconds and two hours off, with parts of seconds; GPS cuts them off.
-    folder = tmp_path / "gps"
-    folder.mkdir()
-    for number in range(6):
-        wall = NOON + 3.4 + 2.5 * number
-        whole = datetime.fromtimestamp(int(wall), UTC)
-        sky = datetime.fromtimestamp(int(wall - 7203), UTC)
-        own = {0x9003: f"{whole:%Y:%m:%d %H:%M:%S}", 0x9291: f"{wall % 1:.3f}"[2:]}
-        gps = made.gps_of(
-            61, 15, 9, date=f"{sky:%Y:%m:%d}", clock=(float(sky.hour), float(sky.minute), float(sky.second))
-        )
-        made.write(folder, f"{number}.jpg", exif=made.exif_of(own=own, gps=gps))
-    log = read_photos(folder)
     time = np.array(column(log, "time_s"))
     assert np.diff(time) == pytest.approx([2.5] * 5, abs=1e-6)
-    assert np.abs(time - (NOON + 3.4 + 2.5 * np.arange(6) - 7203)).max() <= 1.0
-    assert log.clock.base == "GPS time of the images"
-    assert log.clock.pairs == 6
+    assert np.abs(time - (wall - 7203)).max() <= 1.0
+    assert (log.clock.base, log.clock.pairs) == ("GPS time of the images", 6)
 
 
 def test_the_makers_own_utc_goes_before_a_stamp_of_gps(tmp_path):
-    made.write(tmp_path, "a.jpg", **made.dji(1, UTCAtExposure="2024-06-12T09:30:01.123456"))
-    assert column(read_photos(tmp_path), "time_s") == pytest.approx([NOON - 7200 + 1.123456], abs=1e-5)
+    row = photo(tmp_path, **made.dji(1, UTCAtExposure="2024-06-12T09:30:01.123456"))
+    near(row, 1e-5, time_s=NOON - 7200 + 1.123456)
 
 
 def test_parrots_and_pix4ds_tags(tmp_path):
-    tags = {"Camera:Yaw": "45", "Camera:Pitch": "60", "Camera:Roll": "0", "Camera:GPSXYAccuracy": "3/2"}
-    tags |= {"Camera:GPSZAccuracy": "2.5"}
-    exif = made.exif_of({0x010F: "Parrot", 0x0110: "Sequoia"}, gps=made.gps_of(47.0, 8.5, 500.0))
-    made.write(tmp_path, "a.jpg", exif=exif, xmp=made.xmp_of(made.PIX4D, tags))
-    anafi = {
-        f"drone-parrot:Camera{one}Degree": value for one, value in (("Roll", 0), ("Pitch", -30), ("Yaw", 45))
+    pix4d = {"Camera:Yaw": "45", "Camera:Pitch": "60", "Camera:Roll": "0", "Camera:GPSXYAccuracy": "3/2"}
+    tags = {
+        "CameraRoll": 0,
+        "CameraPitch": -30,
+        "CameraYaw": 45,
+        "DroneRoll": 1,
+        "DronePitch": 2,
+        "DroneYaw": 3,
     }
-    anafi |= {
-        f"drone-parrot:Drone{one}Degree": value for one, value in (("Roll", 1), ("Pitch", 2), ("Yaw", 3))
-    }
-    exif = made.exif_of({0x010F: "Parrot", 0x0110: "Anafi"}, gps=made.gps_of(47.0, 8.5, 500.0))
-    made.write(tmp_path, "b.jpg", exif=exif, xmp=made.xmp_of(made.PARROT, anafi))
+    anafi = {f"drone-parrot:{name}Degree": value for name, value in tags.items()}
+    for model, space, found in (("Sequoia", made.PIX4D, pix4d), ("Anafi", made.PARROT, anafi)):
+        exif = made.exif_of({0x010F: "Parrot", 0x0110: model}, gps=made.gps_of(47.0, 8.5, 500.0))
+        made.write(tmp_path, f"{space[6:9]}.jpg", exif=exif, xmp=made.xmp_of(space, found))
     log = read_photos(tmp_path)
-    for name, value in (("roll", 0.0), ("pitch", -30.0), ("yaw", 45.0)):
-        assert column(log, f"{name}_world_deg") == pytest.approx([value] * 2, abs=1e-9)
+    near(log.parts["photos"].columns, roll_world_deg=0.0, pitch_world_deg=-30.0, yaw_world_deg=45.0)
     assert column(log, "roll_deg")[1] == 1.0
     assert column(log, "sd_horizontal_m")[0] == 1.5
     with pytest.raises(WildlabError, match="2 cameras: Parrot"):
@@ -187,13 +171,11 @@ def test_angles_from_nadir_are_the_same_rotation(roll, pitch, yaw):
     assert ahead[:, 2] == pytest.approx(-down[:, 0], abs=1e-6)
 
 
-def test_the_makers_calibration_goes_before_its_design(tmp_path):
+@pytest.mark.parametrize("more", [{}, {"DewarpFlag": 1}])
+def test_the_makers_calibration_goes_before_its_design(tmp_path, more):
     data = "2018-09-04;3678.87,3671.84,10.1,27.29,-0.268652,0.114663,0.0000152,-0.000046,-0.0350261"
-    for number, more in enumerate(({}, {"DewarpFlag": 1})):
-        tags = made.dji(number, DewarpData=data, CalibratedFocalLength="3666.666504", **more)
-        made.write(tmp_path, f"{number}.jpg", **tags)
-    log = read_photos(tmp_path)
-    assert column(log, "focal_px") == pytest.approx([math.sqrt(3678.87 * 3671.84)] * 2)
+    row = photo(tmp_path, **made.dji(1, DewarpData=data, CalibratedFocalLength="3666.666504", **more))
+    near(row, focal_px=math.sqrt(3678.87 * 3671.84))
 
 
 def test_images_that_lost_rtk_are_told(tmp_path):
@@ -208,11 +190,9 @@ def test_place_and_stamp_of_xmp_alone(tmp_path):
     tags = {"exif:GPSLatitude": "53,26.85617N", "exif:GPSLongitude": "2,48,44.17W"}
     tags["xmp:CreateDate"] = "2024-06-12T11:30:05.5+02:00"
     spaces = 'xmlns:exif="http://ns.adobe.com/exif/1.0/" xmlns:xmp="http://ns.adobe.com/xap/1.0/"'
-    made.write(tmp_path, "a.jpg", xmp=made.xmp_of(spaces, tags))
-    log = read_photos(tmp_path)
-    assert column(log, "latitude_deg") == pytest.approx([53 + 26.85617 / 60])
-    assert column(log, "longitude_deg") == pytest.approx([-(2 + 48 / 60 + 44.17 / 3600)])
-    assert column(log, "time_s") == pytest.approx([NOON + 5.5 - 7200])
+    row = photo(tmp_path, xmp=made.xmp_of(spaces, tags))
+    near(row, latitude_deg=53 + 26.85617 / 60, longitude_deg=-(2 + 48 / 60 + 44.17 / 3600))
+    near(row, 1e-6, time_s=NOON + 5.5 - 7200)
 
 
 def test_focal_length_by_the_equivalent_over_the_diagonal(tmp_path):
@@ -241,22 +221,21 @@ def test_pixel_pitch_is_never_guessed(tmp_path):
 )
 def test_focal_length_by_the_sensor(tmp_path, x, y, unit, focal, note):
     own = {0x920A: 13.0, 0xA20E: x, 0xA20F: y, 0xA210: unit}
-    made.write(tmp_path, "a.jpg", size=(640, 512), exif=made.exif_of(own=own))
-    log = read_photos(tmp_path)
-    assert column(log, "focal_px") == pytest.approx([focal], rel=1e-5, nan_ok=True)
-    assert note in said(log)
+    row = photo(tmp_path, size=(640, 512), exif=made.exif_of(own=own))
+    assert row["focal_px"] == pytest.approx(focal, rel=1e-5, nan_ok=True)
+    assert note in said(read_photos(tmp_path))
 
 
-def test_a_zoom_and_two_sizes_are_no_one_camera(tmp_path):
-    for folder, sizes, film in (("zoom", (40, 40), (24, 48)), ("sizes", (40, 60), (24, 24))):
-        (tmp_path / folder).mkdir()
-        for number in range(2):
-            exif = made.exif_of({0x0110: "One"}, {0xA405: film[number]})
-            made.write(tmp_path / folder, f"{number}.jpg", size=(sizes[number], 30), exif=exif)
-    with pytest.raises(WildlabError, match="the lens zooms"):
-        camera_of(read_photos(tmp_path / "zoom"))
-    with pytest.raises(WildlabError, match="2 cameras: One"):
-        camera_of(read_photos(tmp_path / "sizes"))
+@pytest.mark.parametrize(
+    ("sizes", "film", "problem"),
+    [((40, 40), (24, 48), "the lens zooms"), ((40, 60), (24, 24), "2 cameras: One")],
+)
+def test_a_zoom_and_two_sizes_are_no_one_camera(tmp_path, sizes, film, problem):
+    for number, (size, equivalent) in enumerate(zip(sizes, film, strict=True)):
+        exif = made.exif_of({0x0110: "One"}, {0xA405: equivalent})
+        made.write(tmp_path, f"{number}.jpg", size=(size, 30), exif=exif)
+    with pytest.raises(WildlabError, match=problem):
+        camera_of(read_photos(tmp_path))
 
 
 def test_cameras_beside_each_other_are_told_apart_by_their_names(tmp_path):
@@ -271,10 +250,8 @@ def test_tags_in_png_and_tiff(tmp_path):
     exif = made.exif_of({0x010F: "Cam"}, {0x9003: "2024:06:12 11:30:05"}, made.gps_of(-12.25, 34.5, 56.0))
     Image.new("L", (12, 8)).save(tmp_path / "a.png", exif=exif)
     (tmp_path / "b.tif").write_bytes(made.tiff(exif))
-    log = read_photos(tmp_path)
-    assert column(log, "latitude_deg") == pytest.approx([-12.25] * 2)
-    assert column(log, "time_log_s") == [NOON + 5] * 2
-    assert column(log, "height_sea_m") == [56.0] * 2
+    columns = read_photos(tmp_path).parts["photos"].columns
+    near(columns, latitude_deg=[-12.25] * 2, time_log_s=NOON + 5, height_sea_m=56.0)
 
 
 def test_no_image(tmp_path):
@@ -292,12 +269,12 @@ def test_no_image(tmp_path):
 
 def test_an_xt2_by_what_is_known_of_it(shared_data):
     log = read_photos(shared_data("imagery", "deervision_rjpeg"))
-    camera = camera_of(log)
+    camera, columns = camera_of(log), log.parts["photos"].columns
     assert (camera["width_px"], camera["height_px"]) == (640, 512)
     assert camera["focal_px"] == pytest.approx(764.7, abs=0.05)
-    assert all(-78 < one < -77 for one in column(log, "longitude_deg"))
-    assert column(log, "height_home_m") == pytest.approx([100.0] * 4, abs=0.2)
-    assert column(log, "pitch_world_deg") == pytest.approx([-89.9] * 4, abs=1e-4)
+    near(columns, 0.5, longitude_deg=-77.5)
+    near(columns, 0.2, height_home_m=[100.0] * 4)
+    near(columns, 1e-4, pitch_world_deg=-89.9)
 
 
 @pytest.mark.parametrize(
