@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from pydantic import Field
 
 import wildlab.flight.store as store
+from tests.flight.conftest import fault
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight import files
@@ -80,29 +81,23 @@ def test_whole_numbers_become_float_and_the_caller_keeps_his_table():
 
 
 @pytest.mark.parametrize(
-    ("table", "change", "field", "said"),
+    ("table", "change", "said"),
     [
-        ("frames", lambda d: d.drop(columns="time_s"), "time_s", "is missing"),
-        ("frames", lambda d: d.assign(time_s="soon"), "time_s", "numbers are expected"),
-        ("frames", lambda d: d.assign(time_s=[True, False, True]), "time_s", "bool"),
-        ("frames", lambda d: d.assign(frame_id=[1, 2, 3]), "frame_id", "holds 1"),
-        ("frames", lambda d: d.assign(pan_rad=0.0), "tilt_rad", "'pan_rad'"),
-        ("detections", lambda d: d.assign(kind="bearing"), "azimuth_rad", "is missing"),
-        ("detections", lambda d: d.assign(kind="guess"), "kind", "not a kind"),
+        ("frames", lambda d: d.drop(columns="time_s"), "time_s: is missing"),
+        ("frames", lambda d: d.assign(time_s="soon"), "time_s: numbers are expected"),
+        ("frames", lambda d: d.assign(time_s=[True, False, True]), "time_s: bool"),
+        ("frames", lambda d: d.assign(frame_id=[1, 2, 3]), "frame_id: holds 1"),
+        ("frames", lambda d: d.assign(pan_rad=0.0), "tilt_rad: 'pan_rad'"),
+        ("detections", lambda d: d.assign(kind="bearing"), "azimuth_rad: is missing"),
+        ("detections", lambda d: d.assign(kind="guess"), "kind: not a kind"),
     ],
 )
-def test_a_table_that_does_not_fit_is_refused_and_nothing_written(
-    make_flight, tmp_path, table, change, field, said
-):
+def test_a_table_that_does_not_fit_is_refused_and_nothing_written(make_flight, tmp_path, table, change, said):
     flight = make_flight()
     flight.tables[table] = change(flight.tables[table])
-    with pytest.raises(WildlabError) as caught:
+    with pytest.raises(WildlabError, match=fault(f"{table}, {said}")) as caught:
         save_flight(flight, tmp_path / "flight")
-    assert caught.value.field == field
-    assert said in str(caught.value)
-    assert table in (caught.value.file or "")
-    assert caught.value.fix
-    assert list(tmp_path.iterdir()) == []
+    assert caught.value.fix and list(tmp_path.iterdir()) == []
 
 
 def test_partial_covariance_is_refused():

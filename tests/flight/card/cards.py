@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pymap3d
-from PIL import Image
+
+from tests.flight.readers.made_up_photos import DJI, exif_of, jpeg, xmp_of
 
 #: The corner of the world that all of it is in, deg and m above the ellipsoid.
 LATITUDE, LONGITUDE, GROUND = 59.05, 10.12, 40.0
@@ -14,15 +15,6 @@ WIDTH, HEIGHT, FOCAL = 640, 512, 800.0
 #: By clock time of the camera, UTC.
 TAKEN = datetime(2026, 5, 1, 8, 0, 0, tzinfo=UTC)
 MARKS = {"north-west": (20.0, -15.0), "pole": (5.0, 12.0), "=HYPERLINK(1)": (-18.0, 3.0)}
-
-_XMP = """<?xpacket begin="" id="W5M0MpCehiHzreSzNTczkc9d"?>
-<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
-<rdf:Description xmlns:drone-dji="http://www.dji.com/drone-dji/1.0/"
- drone-dji:GpsLatitude="{lat:.9f}" drone-dji:GpsLongitude="{lon:.9f}" drone-dji:AbsoluteAltitude="{high:+.3f}"
- drone-dji:RelativeAltitude="{above:+.3f}" drone-dji:GimbalRollDegree="{roll:+.2f}"
- drone-dji:GimbalPitchDegree="{pitch:+.2f}" drone-dji:GimbalYawDegree="{yaw:+.2f}"
- drone-dji:CalibratedFocalLength="{focal:.3f}" drone-dji:RtkFlag="50" drone-dji:RtkStdLon="0.01"
- drone-dji:RtkStdLat="0.01" drone-dji:RtkStdHgt="0.02"/></rdf:RDF></x:xmpmeta><?xpacket end="w"?>"""
 
 
 def geodetic(north: float, east: float) -> tuple[float, float]:
@@ -70,18 +62,15 @@ def write_photo(
 ) -> None:
     """A JPEG with what a drone with RTK writes into it."""
     lat, lon, height = place(camera)
-    exif = Image.Exif()
-    exif[271], exif[272] = "DJI", "FC6310R"
-    stamp = when.strftime("%Y:%m:%d %H:%M:%S")
-    exif[306] = stamp
-    inner = exif.get_ifd(0x8769)
-    inner[36867] = stamp
-    inner[37521] = f"{when.microsecond // 1000:03d}"
-    roll, pitch, yaw = angles
-    xmp = _XMP.format(
-        lat=lat, lon=lon, high=height, above=camera[2], roll=roll, pitch=pitch, yaw=yaw, focal=focal
-    )
-    Image.new("RGB", size, (90, 120, 90)).save(path, exif=exif, xmp=xmp.encode())
+    values = {"GpsLatitude": f"{lat:.9f}", "GpsLongitude": f"{lon:.9f}", "AbsoluteAltitude": f"{height:+.3f}"}
+    values |= {"RelativeAltitude": f"{camera[2]:+.3f}", "CalibratedFocalLength": f"{focal:.3f}"}
+    values |= {"RtkFlag": 50, "RtkStdLon": 0.01, "RtkStdLat": 0.01, "RtkStdHgt": 0.02}
+    turns = zip(("Roll", "Pitch", "Yaw"), angles, strict=True)
+    values |= {f"Gimbal{axis}Degree": f"{angle:+.2f}" for axis, angle in turns}
+    own = {36867: f"{when:%Y:%m:%d %H:%M:%S}", 37521: f"{when.microsecond // 1000:03d}"}
+    exif = exif_of({271: "DJI", 272: "FC6310R"}, own)
+    xmp = xmp_of(DJI, {f"drone-dji:{name}": value for name, value in values.items()})
+    path.write_bytes(jpeg(size, exif, xmp))
 
 
 def write_card(folder: Path, images: int = 4) -> None:

@@ -21,6 +21,29 @@ POSES = "nav/autopilot"
 Change = Callable[[Flight], Flight]
 
 
+def turning(
+    t: np.ndarray, speed: float, turn: float, seed: int, *, banked: bool, late_s: float = 0.0
+) -> Felt:
+    """Steady turns by a late receiver; attitude and accelerometer are wrong by what they usually are.
+
+    The nose goes along and the airframe banks, or it stays where it is.
+    """
+    rng = np.random.default_rng(seed)
+
+    def acceleration(t: np.ndarray) -> np.ndarray:
+        return speed * turn * np.stack([-np.sin(turn * t), np.cos(turn * t), 0 * t], axis=1)
+
+    true = Rotation.identity(len(t))
+    if banked:
+        bank = Rotation.from_euler("X", np.arctan(turn * speed / 9.81))
+        true = Rotation.from_euler("Z", (turn * t)[:, None]) * bank
+    force = true.inv().apply(acceleration(t) - [0.0, 0.0, 9.81])
+    force += rng.normal(0, 1.0, 3) + rng.normal(0, 0.1, force.shape)
+    R = (true * Rotation.from_rotvec(rng.normal(0, np.radians(1.5), force.shape))).as_matrix()
+    a = acceleration(t - late_s) + rng.normal(0, 0.1, force.shape)
+    return Felt(R[:-1], R[1:], np.diff(t), 0 * force[1:], force, R, a, t)
+
+
 def manifest_of(flight: Flight, **parts: dict[str, Any]) -> Flight:
     return replace(flight, manifest=replace_in_manifest(flight.manifest, parts))
 
@@ -130,30 +153,12 @@ def test_gravity_in_a_tilted_sensor_on_a_circle_is_no_heading():
 @pytest.mark.parametrize("late_s", [0.2, 0.35])
 @pytest.mark.parametrize("turn", [0.25, 0.6])
 def test_a_late_receiver_in_steady_turns_is_no_heading(turn, late_s):
-    """The nose stays where it is; attitude and accelerometer are wrong by what they usually are."""
-    t, rng = np.arange(300.0), np.random.default_rng(3)
-
-    def acceleration(t: np.ndarray) -> np.ndarray:
-        return 10 * turn * np.stack([-np.sin(turn * t), np.cos(turn * t), 0 * t], axis=1)
-
-    true = Rotation.from_rotvec(rng.normal(0, np.radians(1.5), (300, 3)))
-    force = acceleration(t) - [0.0, 0.0, 9.81] + rng.normal(0, 1.0, 3) + rng.normal(0, 0.1, (300, 3))
-    a = acceleration(t - late_s) + rng.normal(0, 0.1, (300, 3))
-    R = true.as_matrix()
-    assert heading_error(Felt(R[:-1], R[1:], np.ones(299), 0 * R[1:, 0], force, R, a, t)) is None
+    assert heading_error(turning(np.arange(300.0), 10.0, turn, 3, banked=False, late_s=late_s)) is None
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_no_heading_is_told_from_steady_coordinated_turns(seed):
-    t, rng, turn = np.arange(0.0, 1200.0), np.random.default_rng(seed), 0.25
-    course = turn * t
-    v = 12 * np.stack([np.cos(course), np.sin(course), 0 * t], axis=1)
-    a = turn * np.stack([-v[:, 1], v[:, 0], 0 * t], axis=1)
-    true = Rotation.from_euler("Z", course[:, None]) * Rotation.from_euler("X", np.arctan(turn * 12 / 9.81))
-    force = true.inv().apply(a - [0.0, 0.0, 9.81]) + rng.normal(0, 1.0, 3) + rng.normal(0, 0.1, v.shape)
-    R = (true * Rotation.from_rotvec(rng.normal(0, np.radians(1.5), v.shape))).as_matrix()
-    a = a + rng.normal(0, 0.1, v.shape)
-    assert heading_error(Felt(R[:-1], R[1:], np.diff(t), 0 * v[1:], force, R, a, t)) is None
+    assert heading_error(turning(np.arange(0.0, 1200.0), 12.0, 0.25, seed, banked=True)) is None
 
 
 @pytest.mark.parametrize(("pitch_deg", "roll_deg"), [(5.6, 0.0), (15.0, 0.0), (-3.0, 8.0)])
