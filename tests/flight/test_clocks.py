@@ -1,6 +1,7 @@
 """Synchronisation against motions whose pose is known at every time."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -33,6 +34,39 @@ component = st.floats(-1.5, 1.5)
 vectors = st.tuples(component, component, component).map(np.array)
 
 
+def _still(stamps: list[float]) -> pd.DataFrame:
+    """A body at 5 m + the time in each direction, that does not turn."""
+    return _turning(np.zeros(3), np.ones(3), np.array(stamps), np.zeros(3))
+
+
+def _known(nav: pd.DataFrame, times: list[float], **more: Any) -> list[bool]:
+    p, R, _ = poses_at(nav, times, **more)
+    known = np.isfinite(p).all(axis=1)
+    assert (known == np.isfinite(R).all(axis=(1, 2))).all()
+    return known.tolist()
+
+
+def test_outside_in_gaps_and_beside_nan_there_is_no_pose():
+    nav = _still([0.0, 0.5, 5.0, 5.5])
+    times = [-0.01, 0.0, 0.25, 0.5, 0.6, 4.9, 5.0, 5.5, 5.51, np.nan]
+    known = [False, True, True, True, False, False, True, True, False, False]
+    assert _known(nav, times, max_gap_s=1.0) == known
+    p, _, _ = poses_at(nav, [0.6], max_gap_s=5.0)
+    np.testing.assert_allclose(p, [[5.6, 5.6, 5.6]])
+    nav = _still([0.0, 1.0, 2.0, 3.0])
+    nav.loc[1, ["north_m", "q_x"]] = np.nan
+    assert _known(nav, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]) == [True, False, False, False, True, True]
+    assert _known(_still([2.0]), [1.0, 2.0, 3.0]) == [False, True, False]
+
+
+@pytest.mark.parametrize("find", [lambda nav: poses_at(nav, [0.5]), pose_finder])
+def test_repeated_stamps_and_no_poses_are_refused(find):
+    with pytest.raises(WildlabError, match="do not increase"):
+        find(_still([0.0, 1.0, 1.0]))
+    with pytest.raises(WildlabError, match="empty"):
+        find(_still([2.0]).iloc[:0])
+
+
 def _turning(rate: Array, velocity: Array, stamps: Array, start: Array) -> pd.DataFrame:
     """A body that moves straight and turns at a constant rate about an axis fixed in it."""
     R = rotation_vector_to_matrix(start[None]) @ rotation_vector_to_matrix(stamps[:, None] * rate)
@@ -56,39 +90,6 @@ def test_constant_rate_is_met_exactly(rate, velocity, start, times):
     assert covariance is None
 
 
-def test_outside_and_in_gaps_there_is_no_pose():
-    nav = _turning(np.zeros(3), np.ones(3), np.array([0.0, 0.5, 5.0, 5.5]), np.zeros(3))
-    times = [-0.01, 0.0, 0.25, 0.5, 0.6, 4.9, 5.0, 5.5, 5.51, np.nan]
-    p, R, _ = poses_at(nav, times, max_gap_s=1.0)
-    known = [False, True, True, True, False, False, True, True, False, False]
-    assert list(np.isfinite(p).all(axis=1)) == known
-    assert list(np.isfinite(R).all(axis=(1, 2))) == known
-    p, _, _ = poses_at(nav, [0.6], max_gap_s=5.0)
-    np.testing.assert_allclose(p, [[5.6, 5.6, 5.6]])
-
-
-def test_a_nan_row_only_spoils_its_neighbourhood():
-    nav = _turning(np.zeros(3), np.ones(3), np.array([0.0, 1.0, 2.0, 3.0]), np.zeros(3))
-    nav.loc[1, ["north_m", "q_x"]] = np.nan
-    p, R, _ = poses_at(nav, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5])
-    assert list(np.isfinite(p[:, 0])) == [True, False, False, False, True, True]
-    assert list(np.isfinite(R[:, 0, 0])) == [True, False, False, False, True, True]
-
-
-def test_repeated_stamps_are_refused():
-    nav = _turning(np.zeros(3), np.ones(3), np.array([0.0, 1.0, 1.0]), np.zeros(3))
-    with pytest.raises(WildlabError, match="do not increase"):
-        poses_at(nav, [0.5])
-
-
-def test_one_row_and_none():
-    nav = _turning(np.zeros(3), np.ones(3), np.array([2.0]), np.zeros(3))
-    p, _, _ = poses_at(nav, [1.0, 2.0, 3.0])
-    assert list(np.isfinite(p[:, 0])) == [False, True, False]
-    with pytest.raises(WildlabError, match="the table is empty"):
-        poses_at(nav.iloc[:0], [1.0])
-
-
 def test_poses_that_belong_to_frames_are_not_interpolated():
     nav = _turning(np.ones(3), np.ones(3), np.array([0.0, 0.0, 7.0]), np.zeros(3)).assign(
         frame_id=["b", "a", "c"]
@@ -96,6 +97,8 @@ def test_poses_that_belong_to_frames_are_not_interpolated():
     p, R, _ = poses_at(nav, frame_ids=["c", "b", "x", "c"])
     np.testing.assert_allclose(p[:, 0], [12.0, 5.0, np.nan, 12.0])
     assert list(np.isfinite(R[:, 0, 0])) == [True, True, False, True]
+    # A finder does not look at times.
+    np.testing.assert_array_equal(pose_finder(nav, ["c", "b", "x", "c"])(np.zeros(4))[0], p)
     with pytest.raises(WildlabError, match="no times are given"):
         poses_at(nav.drop(columns="frame_id"), frame_ids=["c"])
 
@@ -184,16 +187,6 @@ def test_a_finder_finds_what_is_found_at_once(rate, velocity, start, times):
         p_once, R_once, _ = poses_at(nav, times, max_gap_s=longest)
         np.testing.assert_array_equal(p, p_once)
         np.testing.assert_array_equal(R, R_once)
-
-
-def test_a_finder_of_frames_does_not_look_at_times_and_refuses_what_poses_at_refuses():
-    nav = _turning(np.zeros(3), np.ones(3), np.arange(3.0), np.zeros(3)).assign(frame_id=["a", "b", "c"])
-    p, _ = pose_finder(nav, ["c", "x", "a"])(np.zeros(3))
-    np.testing.assert_array_equal(p[:, 0], [7.0, np.nan, 5.0])
-    with pytest.raises(WildlabError, match="empty"):
-        pose_finder(nav.iloc[:0])
-    with pytest.raises(WildlabError, match="do not increase"):
-        pose_finder(nav.iloc[[0, 0, 1]])
 
 
 def two_sources(poses: str) -> Flight:

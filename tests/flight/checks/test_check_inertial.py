@@ -31,6 +31,18 @@ DURATION = 240.0
 Change = Callable[[Flight], None]
 
 
+@pytest.mark.parametrize(("imu", "gnss", "value"), [(FORCE[0], NED[0], np.nan), ("time_s", "time_s", 0.0)])
+def test_what_is_no_number_or_out_of_order_is_left_to_others(right, imu, gnss, value):
+    flight = _copy(right)
+    flight.tables["imu"].loc[100, imu] = value
+    flight.tables["gnss"].loc[3, gnss] = value
+    expected = {("imu", imu), ("gnss", gnss)}
+    assert {(one.table, one.field) for one in _found(flight)} == expected
+    if imu != "time_s":
+        flight.tables["imu"].loc[:, imu] = value
+        assert {(one.table, one.field) for one in _found(flight)} == expected
+
+
 def _eight(times: Array) -> tuple[Array, Array, Array]:
     """A figure of eight over 200 m by 120 m in 40 s, briskly up and down, never twice alike."""
     size = np.array([100.0, 60.0, 6.0, 5.0])
@@ -248,22 +260,6 @@ def test_an_offset_without_velocities(offset):
     _shift("gnss", -offset)(flight)
     (found,) = _found(flight)
     assert f"gnss_offset_s = {offset:.1f}" in found.fix
-
-
-def test_values_that_are_no_numbers_are_left_to_others(right):
-    flight = _copy(right)
-    flight.tables["imu"].loc[100, FORCE[0]] = np.nan
-    flight.tables["gnss"].loc[3, NED[0]] = np.nan
-    assert {one.field for one in _found(flight)} == {FORCE[0], NED[0]}
-    flight.tables["imu"].loc[:, FORCE[0]] = np.nan
-    assert {one.field for one in _found(flight)} == {FORCE[0], NED[0]}
-
-
-def test_times_that_do_not_increase_are_left_to_others(right):
-    flight = _copy(right)
-    flight.tables["imu"].loc[100, "time_s"] = 0.0
-    flight.tables["gnss"].loc[3, "time_s"] = 0.0
-    assert {(one.table, one.field) for one in _found(flight)} == {("imu", "time_s"), ("gnss", "time_s")}
 
 
 def test_a_few_samples_say_nothing(right):

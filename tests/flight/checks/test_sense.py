@@ -22,38 +22,37 @@ ORIGIN = (np.radians(63.4), np.radians(10.4), 40.0)
 Make = Callable[..., Flight]
 
 
-def _mistake(cause: str, factor: float, *, fitted: bool = False) -> trial.Mistake[float]:
-    return trial.Mistake(cause, cause, cause, lambda x: x * factor, fitted)
+def _mistake(cause: str, factor: float) -> trial.Mistake[float]:
+    return trial.Mistake(cause, cause, cause, lambda x: x * factor, cause == "fitted")
 
 
-def _misfit(x: float) -> np.ndarray:
-    return np.full((2, 3), x)
+@pytest.mark.parametrize(
+    ("factors", "named"),
+    [
+        # Only what is far better; of two that explain alike both, and the fitted one last.
+        ({"little": 0.7, "much": 0.2, "worse": 3.0}, ["much"]),
+        ({"little": 0.7}, []),
+        ({"fitted": 0.2, "plain": 0.22, "third": 0.4}, ["plain", "fitted"]),
+    ],
+)
+def test_which_mistakes_are_named(factors, named):
+    ways = [_mistake(cause, factor) for cause, factor in factors.items()]
+    found = trial.explain(lambda x: np.full((2, 3), x), 4.0, ways)
+    assert [(one.mistake.cause, one.before) for one in found] == [(cause, 4.0) for cause in named]
 
 
-def test_only_what_is_far_better_is_named():
-    named = trial.explain(
-        _misfit, 4.0, [_mistake("little", 0.7), _mistake("much", 0.2), _mistake("worse", 3.0)]
-    )
-    assert [(one.mistake.cause, one.before) for one in named] == [("much", 4.0)]
-    assert trial.explain(_misfit, 4.0, [_mistake("little", 0.7)]) == []
-
-
-def test_two_that_explain_alike_are_both_named_and_the_fitted_one_last():
-    ways = [_mistake("fitted", 0.2, fitted=True), _mistake("plain", 0.22), _mistake("third", 0.4)]
-    named = trial.explain(_misfit, 4.0, ways)
-    assert [one.mistake.cause for one in named] == ["plain", "fitted"]
-
-
-def test_a_half_that_gets_worse_is_no_cause():
-    before, after = np.full((2, 3), 9.0), np.full((2, 3), 1.0)
-    assert trial.far_better(before, after)
-    after[:, 2] = 8.0
-    assert not trial.far_better(before, after)
-
-
-def test_what_is_left_has_to_be_like_noise():
-    assert not trial.far_better(np.full((2, 3), 20.0), np.full((2, 3), 5.0))
-    assert trial.far_better(np.full((2, 3), 20.0), np.full((2, 3), 2.0))
+@pytest.mark.parametrize(
+    ("before", "after", "better"),
+    [
+        (9.0, [1.0, 1.0, 1.0], True),
+        # A half that gets worse is no cause, and what is left has to be like noise.
+        (9.0, [1.0, 1.0, 8.0], False),
+        (20.0, [5.0, 5.0, 5.0], False),
+        (20.0, [2.0, 2.0, 2.0], True),
+    ],
+)
+def test_what_is_far_better(before, after, better):
+    assert trial.far_better(np.full((2, 3), before), np.array([after] * 2)) == better
 
 
 def test_every_attitude_mistake_gives_rotations():
