@@ -15,7 +15,7 @@ from rasterio.transform import Affine
 from rasterio.windows import Window
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import make_manifest
+from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.flight.terrain.laying import lay_terrain
 from wildlab.flight.terrain_model import TerrainSays
@@ -57,10 +57,8 @@ def write_map(
     y = transform.d * columns + transform.e * rows + transform.f
     longitude, latitude = there.transform(x, y, direction="INVERSE")
     values = height(np.asarray(longitude), np.asarray(latitude))
-    given = {"crs": crs, "transform": transform, "dtype": "float32", "count": 1} | more
-    given = {key: value for key, value in given.items() if value is not None}
-    units = given.pop("units", None)
-    given["crs"] = given.pop("local", given["crs"])
+    units, stated = more.pop("units", None), more.pop("stated", crs)
+    given = {"crs": stated, "transform": transform, "dtype": "float32", "count": 1} | more
     with rasterio.open(path, "w", driver="GTiff", width=side, height=side, **given) as data:
         for band in range(given["count"]):
             data.write(values.astype(given["dtype"]), band + 1)
@@ -165,21 +163,22 @@ def test_heights_count_from_what_is_said(tmp_path, flown):
     path = write_map(tmp_path / "dem.tif")
     plain, above = lay(flown(), path), lay(flown(), path, heights=20.0)
     np.testing.assert_allclose(above.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 20.0, atol=1e-3)
-    assert above.manifest.terrain.heights == "geoid" and above.manifest.terrain.added_m == 20.0
-    assert above.manifest.terrain.error_rms_m == pytest.approx(plain.manifest.terrain.error_rms_m, abs=1e-4)
+    found = above.manifest.terrain
+    assert (found.heights, found.added_m) == ("geoid", 20.0)
+    assert found.error_rms_m == pytest.approx(plain.manifest.terrain.error_rms_m, abs=1e-4)
     recorded = flown()
-    vertical = {"reference": "barometer", "correction_m": -30.0}
-    data = recorded.manifest.model_dump(exclude_none=True) | {"vertical": vertical}
-    recorded.manifest = make_manifest(data)
+    vertical = {"vertical": {"reference": "barometer", "correction_m": -30.0}}
+    recorded.manifest = replace_in_manifest(recorded.manifest, vertical)
     same = lay(recorded, path, heights="flight")
     np.testing.assert_allclose(same.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 30.0, atol=1e-3)
-    with pytest.raises(WildlabError, match="heights count from"):
-        lay(flown(), path, heights=None)
     egm = write_map(tmp_path / "egm.tif", crs="EPSG:32633+5773")
-    with pytest.raises(WildlabError, match="EGM96 height"):
-        lay(flown(), egm)
-    with pytest.raises(WildlabError, match="the grid"):
-        lay(flown(), egm, heights=None)
+    for file, says, words in (
+        (path, {"heights": None}, "heights count from"),
+        (egm, {}, "EGM96 height"),
+        (egm, {"heights": None}, "the grid"),
+    ):
+        with pytest.raises(WildlabError, match=words):
+            lay(flown(), file, **says)
     three = write_map(tmp_path / "three.tif", crs=4979, cell=4e-5)
     assert lay(flown(), three, heights=None).manifest.terrain.heights == "ellipsoid"
 
@@ -218,56 +217,36 @@ def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path, flown):
 @pytest.mark.parametrize(
     ("origin", "written", "words"),
     [
+        # A map of elsewhere.
         ({"latitude_deg": 47.8}, {}, r"nearest cell is 110\."),
         ({"latitude_deg": -LATITUDE}, {}, "sign of latitude"),
         ({}, {"off": (0.0, 1e7)}, "other hemisphere"),
         ({"height_m": 400.0}, {}, "below the ground"),
+        # No map of heights.
+        ({}, {"stated": None}, "states no CRS"),
+        ({}, {"stated": 'LOCAL_CS["site",UNIT["metre",1]]'}, "places on Earth"),
+        ({}, {"count": 2}, "2 bands"),
+        ({}, {"height": lambda x, y: 1e5 + x}, r"heights of 100\d"),
     ],
 )
-def test_a_map_of_elsewhere_is_refused(tmp_path, flown, origin, written, words):
+def test_a_map_that_does_not_fit_is_refused(tmp_path, flown, origin, written, words):
     with pytest.raises(WildlabError, match=words):
         lay(flown(**origin), write_map(tmp_path / "dem.tif", **written))
 
 
-@pytest.mark.parametrize(
-    ("written", "words"),
-    [
-        ({"crs": None}, "states no CRS"),
-        ({"count": 2}, "2 bands"),
-        ({"height": lambda x, y: 1e5 + x}, r"heights of 100\d"),
-    ],
-)
-def test_what_is_no_map_of_heights_is_refused(tmp_path, flown, written, words):
-    if written.get("crs", UTM) is None:
-        path = write_map(tmp_path / "dem.tif")
-        with rasterio.open(path) as data:
-            values, transform = data.read(1), data.transform
-        given = {"width": 400, "height": 400, "count": 1, "dtype": "float32", "transform": transform}
-        with rasterio.open(tmp_path / "bare.tif", "w", driver="GTiff", **given) as data:
-            data.write(values, 1)
-        path = tmp_path / "bare.tif"
-    else:
-        path = write_map(tmp_path / "dem.tif", **written)
-    with pytest.raises(WildlabError, match=words):
-        lay(flown(), path)
-
-
 def test_what_is_no_file_or_damaged_is_refused(tmp_path, flown):
     path = write_map(tmp_path / "dem.tif", compress="deflate", tiled=True, blockxsize=64, blockysize=64)
-    whole = path.read_bytes()
-    with pytest.raises(WildlabError, match="no such file"):
-        lay(flown(), tmp_path / "gone.tif")
-    (tmp_path / "cut.tif").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(
-        WildlabError, match=r"is not a GeoTIFF or PNG that can be read|breaks off or is damaged"
+    cut, whole = tmp_path / "cut.tif", path.read_bytes()
+    cut.write_bytes(whole[: len(whole) // 2])
+    damaged = "is not a GeoTIFF or PNG that can be read|breaks off or is damaged"
+    for file, says, words in (
+        (tmp_path / "gone.tif", {}, "no such file"),
+        (cut, {}, damaged),
+        (path, {"crs": "nonsense"}, "CRS nonsense"),
+        (path, {"crs": "EPSG:32634"}, "zone 33N"),
     ):
-        lay(flown(), tmp_path / "cut.tif")
-    with pytest.raises(WildlabError, match="CRS nonsense"):
-        lay(flown(), path, crs="nonsense")
-    with pytest.raises(WildlabError, match="zone 33N"):
-        lay(flown(), path, crs="EPSG:32634")
-    with pytest.raises(WildlabError, match="places on Earth"):
-        lay(flown(), write_map(tmp_path / "site.tif", local='LOCAL_CS["site",UNIT["metre",1]]'))
+        with pytest.raises(WildlabError, match=words):
+            lay(flown(), file, **says)
 
 
 def test_a_claim_beyond_belief_is_refused(tmp_path, flown):
