@@ -1,4 +1,4 @@
-"""Synchronisation against motions whose pose is known at every time."""
+"""Synchronisation against motions whose pose is known, and mounts that belong to one source of poses."""
 
 from dataclasses import replace
 from typing import Any

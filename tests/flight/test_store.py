@@ -1,4 +1,4 @@
-"""Flights on disk: they survive the trip, whole or not at all, and hostile folders stay outside."""
+"""Flights on disk survive, whole or not at all; hostile folders, and files that are none, stay outside."""
 
 import os
 from pathlib import Path

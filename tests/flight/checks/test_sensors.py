@@ -1,4 +1,4 @@
-"""Sensors of detections: frames.sensor and detections.source have to agree."""
+"""Sensors, poses, frames and truth of a flight: what disagrees, lies in a gap or stands there twice."""
 
 import re
 from collections.abc import Callable, Sequence
