@@ -68,7 +68,8 @@ def test_the_recipe_beside_a_flight_makes_it_again(card, tmp_path):
 def test_a_track_beside_the_images_is_a_target_once(card, tmp_path):
     for name, seconds in (("fox <b>.gpx", 40), ("fox <b>2.gpx", 40), ("fox cut.gpx", 25)):
         (card / name).write_text(fox(seconds))
-    flight = import_card(read(card, geoid_m=0.0), tmp_path / "flight")
+    assert call(card, "--into", tmp_path / "flight", "--zone", "UTC", "--geoid", 0).exit_code == 0
+    flight = load_flight(tmp_path / "flight")
     tracks = flight.truth[flight.truth["time_s"].notna()]
     assert set(tracks["target_id"]) == {"fox-b"}
     assert np.allclose(np.diff(tracks["north_m"]), 0.5, atol=1e-3)

@@ -66,7 +66,7 @@ def test_a_log_on_the_bench_keeps_only_true_fixes(shared_data, tmp_path):
     assert np.ptp(flight.gnss["down_m"]) < 200
 
 
-@pytest.mark.parametrize("name", ["mavic_mini.SRT", "mavic_air2.srt"])
+@pytest.mark.parametrize("name", ["mavic_mini.SRT", "mavic_air2.srt", "p4_rtk.SRT"])
 def test_subtitles_come_in(shared_data, tmp_path, name):
     """Their clocks are local or none at all: with what the user states, they are flights."""
     start = datetime(2020, 1, 1, tzinfo=UTC)
