@@ -52,6 +52,14 @@ def test_records_of_triggers_give_whole_seconds_their_fractions():
     np.testing.assert_allclose(stamped.columns["time_s"], TAKEN)
 
 
+def test_images_without_a_record_have_no_time():
+    records = triggers(np.delete(TAKEN, [3, 20]))
+    stamped = stamped_by(photos_of(images(TAKEN + 12.25)), records, Path("x"))
+    lost = np.isnan(stamped.columns["time_s"])
+    assert stamped.columns["file"][lost].tolist() == ["a3.jpg", "a20.jpg"]
+    np.testing.assert_allclose(stamped.columns["time_s"][~lost], np.delete(TAKEN, [3, 20]))
+
+
 def test_even_records_that_fit_at_many_offsets_are_not_believed():
     even = START + 2.0 * np.arange(40)
     files = [f"a{i}.jpg" for i in range(30)]
