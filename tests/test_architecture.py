@@ -273,12 +273,12 @@ def left_undone(root: Path) -> list[str]:
 
 
 @pytest.mark.slow
-def test_rooms_import_only_what_lies_below() -> None:
+def test_rooms_import_only_what_lies_below():
     assert violations(paths.ROOT) == []
 
 
 @pytest.mark.slow
-def test_nothing_imports_in_a_circle() -> None:
+def test_nothing_imports_in_a_circle():
     graph = import_graph(paths.ROOT)
     assert "wildlab.geometry.frames" in graph["wildlab.geometry.flodell"]
     assert circles(graph) == []
@@ -286,7 +286,7 @@ def test_nothing_imports_in_a_circle() -> None:
 
 
 @pytest.mark.slow
-def test_a_trial_imports_no_other_part_of_the_studies() -> None:
+def test_a_trial_imports_no_other_part_of_the_studies():
     """Kept numbers of a seed stay as long as the trials and what lies below them do."""
     for module, names in import_graph(paths.ROOT).items():
         if module.startswith("wildlab.studies.") and ".trial" in module:
@@ -295,25 +295,25 @@ def test_a_trial_imports_no_other_part_of_the_studies() -> None:
 
 
 @pytest.mark.slow
-def test_what_is_imported_is_asked_for() -> None:
+def test_what_is_imported_is_asked_for():
     assert undeclared(paths.ROOT) == []
 
 
-def test_the_rules_cover_what_is_there() -> None:
+def test_the_rules_cover_what_is_there():
     entries = (paths.ROOT / "wildlab").iterdir()
     there = {path.stem for path in entries if path.is_dir() or path.suffix == ".py"} - {"__pycache__"}
     assert {"geometry", "flight", "reporting", "studies", "runner"} <= there <= set(MAY_IMPORT)
 
 
-def test_files_stay_short() -> None:
+def test_files_stay_short():
     assert too_long(paths.ROOT) == []
 
 
-def test_nothing_is_put_off() -> None:
+def test_nothing_is_put_off():
     assert left_undone(paths.ROOT) == []
 
 
-def test_no_copyleft_in_the_lock() -> None:
+def test_no_copyleft_in_the_lock():
     names = {pin.name.lower() for pin in doctor.read_lock(paths.LOCK)}
     assert names
     assert not names & {name.lower() for name in COPYLEFT}
@@ -354,7 +354,7 @@ def test_no_copyleft_in_the_lock() -> None:
         ("flight/a.py", "import numpy\nnumpy.load('x', allow_pickle=1)", "allow_pickle=True"),
     ],
 )
-def test_a_breach_is_found(tmp_path: Path, file: str, source: str, problem: str) -> None:
+def test_a_breach_is_found(tmp_path, file, source, problem):
     path = tmp_path / "wildlab" / file
     path.parent.mkdir(parents=True)
     path.write_text(source, encoding="utf-8")

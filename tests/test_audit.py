@@ -1,10 +1,7 @@
 """What the audit of packages says of an answer, and where there is none."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -19,12 +16,12 @@ UNKNOWN = {"name": "c", "skip_reason": "not found"}
 
 
 @pytest.mark.parametrize(("packages", "code"), [([CLEAN], 0), ([CLEAN, FAULTY], 1), ([CLEAN, UNKNOWN], 2)])
-def test_the_exit_code(packages: list[dict[str, Any]], code: int) -> None:
+def test_the_exit_code(packages, code):
     said, found = audit.report({"dependencies": packages})
     assert found == code and any("CVE-1" in line for line in said) == (code == 1)
 
 
-def test_a_tool_that_does_not_run_is_no_clean_audit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tool_that_does_not_run_is_no_clean_audit(monkeypatch):
     class Ran:
         stdout, stderr = "", "trying\nno route to host\n"
 

@@ -8,8 +8,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import click
@@ -20,7 +18,7 @@ from tests.flight.conftest import make_flight
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab import cli
 from wildlab.errors import RunFailed, WildlabError, system_error
-from wildlab.flight.store import Flight, save_flight
+from wildlab.flight.store import save_flight
 from wildlab.runner.run import Outcome
 
 __all__ = ["make_flight"]
@@ -47,7 +45,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.mark.parametrize("name", cli.wildlab.commands)
-def test_every_command_shows_an_example(capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_every_command_shows_an_example(capsys, name):
     code, out, _ = call(capsys, name, "--help")
     assert code == 0 and f"wildlab {name}" in out.split("Example")[1]
 
@@ -59,7 +57,7 @@ def test_every_command_shows_an_example(capsys: pytest.CaptureFixture[str], name
         ("list", {"pandas", "scipy", "matplotlib", "papermill", "rich", "pooch"}),
     ],
 )
-def test_what_only_tells_imports_no_heavy_package(argument: str, heavy: set[str], tmp_path: Path) -> None:
+def test_what_only_tells_imports_no_heavy_package(argument, heavy, tmp_path):
     program = (
         "import sys\nfrom wildlab.cli import main\n"
         f"try:\n    main([{argument!r}])\nexcept SystemExit:\n    pass\n"
@@ -71,7 +69,7 @@ def test_what_only_tells_imports_no_heavy_package(argument: str, heavy: set[str]
     assert time.monotonic() - began < 3
 
 
-def test_list_as_a_table_and_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_list_as_a_table_and_as_json(capsys, tmp_path):
     code, out, _ = call(capsys, "list", "--out", str(tmp_path))
     assert code == 0 and "consistency-bounds" in out
     code, out, _ = call(capsys, "list", "--json", "--out", str(tmp_path))
@@ -95,14 +93,12 @@ def test_list_as_a_table_and_as_json(capsys: pytest.CaptureFixture[str], tmp_pat
         (["simulate", "static-antenna"], "--into"),
     ],
 )
-def test_wrong_use_has_exit_code_2(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], about: str
-) -> None:
+def test_wrong_use_has_exit_code_2(capsys, arguments, about):
     code, _, err = call(capsys, *arguments)
     assert code == 2 and about in err and "Traceback" not in err
 
 
-def test_a_folder_that_is_no_flight_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_folder_that_is_no_flight_is_refused(capsys, tmp_path):
     for command in ("check", "evaluate"):
         code, _, err = call(capsys, command, str(tmp_path / "nothing"))
         assert code == 2 and "nothing" in err and "Traceback" not in err
@@ -120,13 +116,13 @@ def test_a_folder_that_is_no_flight_is_refused(capsys: pytest.CaptureFixture[str
     ],
 )
 def test_errors_become_sentences(
-    capfd: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    failing: Any,
-    error: BaseException,
-    code: int,
-    sentence: str,
-) -> None:
+    capfd,
+    monkeypatch,
+    failing,
+    error,
+    code,
+    sentence,
+):
     monkeypatch.delenv("WILDLAB_DEBUG", raising=False)
     if isinstance(error, BrokenPipeError):
         monkeypatch.setattr(cli.os, "dup2", lambda *_: None)
@@ -135,16 +131,14 @@ def test_errors_become_sentences(
     assert found == code and sentence in err and "Traceback" not in err
 
 
-def test_debugging_shows_where(monkeypatch: pytest.MonkeyPatch, failing: Any) -> None:
+def test_debugging_shows_where(monkeypatch, failing):
     monkeypatch.setenv("WILDLAB_DEBUG", "1")
     failing(KeyError("x"))
     with pytest.raises(KeyError):
         cli.main(["list"])
 
 
-def test_run_prints_the_ledger_and_fails_if_one_failed(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_run_prints_the_ledger_and_fails_if_one_failed(capsys, monkeypatch, tmp_path):
     given: dict[str, Any] = {}
 
     def run_studies(names: Any, **options: Any) -> list[Outcome]:
@@ -157,9 +151,7 @@ def test_run_prints_the_ledger_and_fails_if_one_failed(
     assert (given["names"], given["seed"], given["timeout_s"]) == (("a", "b"), 7, 30.0)
 
 
-def test_doctor_fails_where_something_is_wrong(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_doctor_fails_where_something_is_wrong(capsys, monkeypatch):
     from wildlab.doctor import Finding
 
     findings = [Finding(True, "Python", "3.11"), Finding(False, "disk", "full", "Make room.")]
@@ -173,16 +165,14 @@ def test_doctor_fails_where_something_is_wrong(
     }
 
 
-def test_fetch_without_a_name_lists_the_data_sets(capsys: pytest.CaptureFixture[str]) -> None:
+def test_fetch_without_a_name_lists_the_data_sets(capsys):
     code, out, _ = call(capsys, "fetch", "--json")
     assert code == 0 and {"dataset", "fetched", "title"} <= set(json.loads(out)[0])
     code, _, err = call(capsys, "fetch", "nonsense")
     assert code == 2 and "nonsense" in err
 
 
-def test_check_tells_what_a_flight_can_be_used_for(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, make_flight: Callable[..., Flight]
-) -> None:
+def test_check_tells_what_a_flight_can_be_used_for(capsys, tmp_path, make_flight):
     save_flight(make_flight(), tmp_path / "flight")
     code, out, _ = call(capsys, "check", "--json", str(tmp_path / "flight"))
     usable = {use["purpose"]: use["usable"] for use in json.loads(out)["usable_for"]}
@@ -191,9 +181,7 @@ def test_check_tells_what_a_flight_can_be_used_for(
     assert code == 0 and ": yes" in out
 
 
-def test_check_does_not_call_a_flight_usable_that_contradicts_itself(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_check_does_not_call_a_flight_usable_that_contradicts_itself(capsys, tmp_path):
     flight = simulate(Survey(images=8))
     nav = flight.nav["logged"]
     for axis, sign in (("north", -1.0), ("east", 1.0), ("down", 1.0)):
@@ -211,16 +199,14 @@ def test_check_does_not_call_a_flight_usable_that_contradicts_itself(
         (errno.ENAMETOOLONG, "shorter"),
     ],
 )
-def test_what_the_system_says_is_a_sentence_with_the_file(
-    capsys: pytest.CaptureFixture[str], failing: Any, tmp_path: Path, number: int, fix: str
-) -> None:
+def test_what_the_system_says_is_a_sentence_with_the_file(capsys, failing, tmp_path, number, fix):
     failing(OSError(number, os.strerror(number), str(tmp_path / "not" / "there")))
     code, _, err = call(capsys, "list")
     assert code == 2 and err.count("\n") == 1
     assert err.startswith(f"wildlab: {tmp_path}/not/there: ") and os.strerror(number) in err and fix in err
 
 
-def test_a_full_disk_is_named_by_where_it_is_mounted(tmp_path: Path) -> None:
+def test_a_full_disk_is_named_by_where_it_is_mounted(tmp_path):
     place = tmp_path
     while not os.path.ismount(place):
         place = place.parent

@@ -65,7 +65,7 @@ def wait_saved(page: Any) -> None:
     page.wait_for_selector('#saved:text-is("Saved")')
 
 
-def test_clicks_keys_and_a_second_opening(browser: Any, images: Path, serve: Any) -> None:
+def test_clicks_keys_and_a_second_opening(browser, images, serve):
     faults: list[str] = []
     session = open_session(images)
     page = open_page(browser, serve(session).address, faults)
@@ -115,7 +115,7 @@ def test_clicks_keys_and_a_second_opening(browser: Any, images: Path, serve: Any
     assert faults == []
 
 
-def test_many_quick_clicks_are_all_saved(browser: Any, images: Path, serve: Any) -> None:
+def test_many_quick_clicks_are_all_saved(browser, images, serve):
     session = open_session(images)
     page = open_page(browser, serve(session).address, [])
     for number in range(12):
@@ -125,7 +125,7 @@ def test_many_quick_clicks_are_all_saved(browser: Any, images: Path, serve: Any)
     assert [round(one.u) for one in saved] == [4 * one + 3 for one in range(12)]
 
 
-def test_finishing_ends_the_server(browser: Any, images: Path) -> None:
+def test_finishing_ends_the_server(browser, images):
     server = open_server(open_session(images))
     thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
     thread.start()
@@ -138,7 +138,7 @@ def test_finishing_ends_the_server(browser: Any, images: Path) -> None:
     server.server_close()
 
 
-def test_an_image_that_cannot_be_read_says_so(browser: Any, images: Path, serve: Any) -> None:
+def test_an_image_that_cannot_be_read_says_so(browser, images, serve):
     (images / "a1.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
     server = serve(open_session(images))
     page = browser.new_page()
@@ -151,20 +151,20 @@ def test_an_image_that_cannot_be_read_says_so(browser: Any, images: Path, serve:
 # -- the table
 
 
-def test_a_table_that_cannot_be_read_is_not_written_over(images: Path) -> None:
+def test_a_table_that_cannot_be_read_is_not_written_over(images):
     table = table_of(images)
     table.write_text("image,name,u_px,v_px\na2.png,A,1,2\na2.png,B,x,2\n", encoding="utf-8")
     with pytest.raises(Exception, match="line 3"):
         open_session(images)
 
 
-def test_points_are_checked_by_value() -> None:
+def test_points_are_checked_by_value():
     assert check_points([[" A ", 1, 2.344]]) == [("A", 1.0, 2.34)]
     assert isinstance(check_points({"a": 1}), str)
     assert isinstance(check_points([["A", float("nan"), 1]]), str)
 
 
-def test_where_images_are_looked_for(tmp_path: Path) -> None:
+def test_where_images_are_looked_for(tmp_path):
     (tmp_path / "empty").mkdir()
     err = refuse("click", tmp_path / "empty")
     assert "no images" in err
@@ -179,7 +179,7 @@ def test_where_images_are_looked_for(tmp_path: Path) -> None:
     ]
 
 
-def test_images_of_a_flight_are_looked_for_in_the_folders_of_a_card(tmp_path: Path) -> None:
+def test_images_of_a_flight_are_looked_for_in_the_folders_of_a_card(tmp_path):
     flight = simulate(Survey(images=4))
     save_flight(flight, tmp_path / "flight")
     names = [f"{one}.png" for one in flight.table("frames")["frame_id"]]
@@ -207,7 +207,7 @@ def start(*arguments: Any) -> tuple[subprocess.Popen[str], str]:
     return process, process.stdout.readline().strip()
 
 
-def test_from_a_flight_to_its_detections(tmp_path: Path) -> None:
+def test_from_a_flight_to_its_detections(tmp_path):
     flight = simulate(Survey(images=4))
     frames = flight.table("frames")["frame_id"].tolist()
     targets = list(dict.fromkeys(flight.table("truth")["target_id"]))
@@ -241,7 +241,7 @@ def test_from_a_flight_to_its_detections(tmp_path: Path) -> None:
     assert (folder / "images" / "extra.png").is_file()
 
 
-def test_a_port_that_is_taken(images: Path) -> None:
+def test_a_port_that_is_taken(images):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -249,7 +249,7 @@ def test_a_port_that_is_taken(images: Path) -> None:
         assert f"port {port}" in refuse("click", images, "--port", port)
 
 
-def test_taking_what_is_not_there(tmp_path: Path, images: Path) -> None:
+def test_taking_what_is_not_there(tmp_path, images):
     folder = tmp_path / "flight"
     save_flight(simulate(Survey(images=4)), folder)
     assert "no point" in refuse("click", folder, "--take")
@@ -263,7 +263,7 @@ def test_taking_what_is_not_there(tmp_path: Path, images: Path) -> None:
     refuse("click", images, "--take")
 
 
-def test_half_open_links_take_few_threads_and_a_click_is_still_served(tmp_path: Path) -> None:
+def test_half_open_links_take_few_threads_and_a_click_is_still_served(tmp_path):
     session = open_session(write_images(tmp_path / "images", "a.png"))
     with serving(session) as server:
         before = threading.active_count()
@@ -292,7 +292,7 @@ def test_half_open_links_take_few_threads_and_a_click_is_still_served(tmp_path: 
                 link.close()
 
 
-def test_only_who_knows_the_address_is_answered(images: Path, serve: Any) -> None:
+def test_only_who_knows_the_address_is_answered(images, serve):
     session = open_session(images)
     server = serve(session)
     own = f"/{server.token}/"
@@ -331,7 +331,7 @@ def test_only_who_knows_the_address_is_answered(images: Path, serve: Any) -> Non
         *("../state/..", "image/0/../1", "static/x", "image//etc/passwd", "image/٣"),
     ],
 )
-def test_no_way_out_of_the_folder(images: Path, serve: Any, path: str) -> None:
+def test_no_way_out_of_the_folder(images, serve, path):
     (images.parent / "secret").write_text("secret", encoding="utf-8")
     server = serve(open_session(images))
     link = socket.create_connection(("127.0.0.1", server.server_port), timeout=20)
@@ -361,14 +361,14 @@ def test_no_way_out_of_the_folder(images: Path, serve: Any, path: str) -> None:
         ([], 400),
     ],
 )
-def test_what_a_page_may_not_send(images: Path, serve: Any, body: Any, status: int) -> None:
+def test_what_a_page_may_not_send(images, serve, body, status):
     session = open_session(images)
     server = serve(session)
     assert ask(server, "POST", f"/{server.token}/clicks", body)[0] == status
     assert not session.table.exists()
 
 
-def test_a_page_may_not_send_without_end(images: Path, serve: Any) -> None:
+def test_a_page_may_not_send_without_end(images, serve):
     server = serve(open_session(images))
     link = socket.create_connection(("127.0.0.1", server.server_port), timeout=20)
     head = f"POST /{server.token}/clicks HTTP/1.1\r\nHost: localhost:{server.server_port}\r\n"
@@ -378,7 +378,7 @@ def test_a_page_may_not_send_without_end(images: Path, serve: Any) -> None:
     assert answer.startswith(b"HTTP/1.1 400")
 
 
-def test_policy_forbids_everything_but_the_pages_own(images: Path, serve: Any) -> None:
+def test_policy_forbids_everything_but_the_pages_own(images, serve):
     server = serve(open_session(images))
     _, body, headers = ask(server, "GET", f"/{server.token}/")
     policy = headers["content-security-policy"]
@@ -393,7 +393,7 @@ def test_policy_forbids_everything_but_the_pages_own(images: Path, serve: Any) -
     assert b"http" not in body.replace(b"charset", b"")
 
 
-def test_images_of_16_bits_are_stretched_and_others_are_as_they_are(images: Path, serve: Any) -> None:
+def test_images_of_16_bits_are_stretched_and_others_are_as_they_are(images, serve):
     server = serve(open_session(images))
     shown = [
         cv2.imdecode(np.frombuffer(ask(server, "GET", f"/{server.token}/image/{number}")[1], np.uint8), -1)
@@ -407,7 +407,7 @@ def test_images_of_16_bits_are_stretched_and_others_are_as_they_are(images: Path
     assert (np.diff(shown[1].ravel()[order].astype(int)) >= 0).all()
 
 
-def test_a_large_colour_image_keeps_its_pixels(tmp_path: Path) -> None:
+def test_a_large_colour_image_keeps_its_pixels(tmp_path):
     rows, columns = np.indices((2100, 2000))
     image = np.stack([rows % 256, columns // 8 % 256, (rows + columns) // 16 % 256], axis=-1).astype(np.uint8)
     image = cv2.GaussianBlur(image, (0, 0), 2)

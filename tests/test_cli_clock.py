@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -35,12 +34,12 @@ def clock(sentence: str, certain: bool) -> CameraClock:
     ],
 )
 def test_known_points_tell_it_where_motion_does_not(
-    motion: CameraClock | None,
-    points: CameraClock | None,
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    motion,
+    points,
+    said,
+    tmp_path,
+    monkeypatch,
+):
     save_flight(simulate(Survey(images=4)), tmp_path / "flight")
     write_images(tmp_path / "images", "a.png")
 

@@ -62,7 +62,7 @@ def reports(tmp_path: Path) -> Path:
     return folder
 
 
-def test_the_page_and_the_table_have_every_flight(reports: Path) -> None:
+def test_the_page_and_the_table_have_every_flight(reports):
     folders = [reports / f"{name}-overview" for name in ("monday", "tuesday", "friday")]
     out = succeed("compare", *folders, "--out", reports)
     assert out.strip().endswith("comparison/report.html")
@@ -79,7 +79,7 @@ def test_the_page_and_the_table_have_every_flight(reports: Path) -> None:
         assert (table[f"{quantity.key}_why"].isna() == known).all(), quantity.key
 
 
-def test_one_of_several_tracks_does_not_stand_for_all(reports: Path) -> None:
+def test_one_of_several_tracks_does_not_stand_for_all(reports):
     leave(reports, "monday", "-tracking", numbers={("rmse", f"radar/{one}/ekf"): 4.0 for one in "ab"})
     leave(reports, "tuesday", "-tracking", numbers={("rmse", "radar/a/ekf"): 4.0})
     table = flights_table(own_flights(reports, ())).set_index("flight")
@@ -87,7 +87,7 @@ def test_one_of_several_tracks_does_not_stand_for_all(reports: Path) -> None:
     assert np.isnan(table.loc["monday", "track_rmse_m"])
 
 
-def test_a_crash_is_not_sound_and_the_attitude_is_that_of_the_page(tmp_path: Path) -> None:
+def test_a_crash_is_not_sound_and_the_attitude_is_that_of_the_page(tmp_path):
     """Of the receiver's noise as found, where the page on the navigation speaks of it."""
     crash = counts(0, 0, 0, 1) | {("broken", "flight"): 1}
     leave(tmp_path, "monday", numbers=crash)
@@ -99,7 +99,7 @@ def test_a_crash_is_not_sound_and_the_attitude_is_that_of_the_page(tmp_path: Pat
     assert table.loc["tuesday", "yaw_deg"] == 6.8
 
 
-def test_into_another_folder_has_no_links_that_lead_nowhere(reports: Path, tmp_path: Path) -> None:
+def test_into_another_folder_has_no_links_that_lead_nowhere(reports, tmp_path):
     folders = [reports / "monday", reports / "tuesday-overview"]
     out = succeed("compare", *folders, "--out", reports, "--into", tmp_path / "a" / "b")
     assert out.strip().endswith("a/b/report.html")
@@ -117,13 +117,13 @@ def test_into_another_folder_has_no_links_that_lead_nowhere(reports: Path, tmp_p
         (("monday-overview", "nowhere"), "neither a flight"),
     ],
 )
-def test_what_cannot_be_compared_is_refused(reports: Path, named: tuple[str, ...], said: str) -> None:
+def test_what_cannot_be_compared_is_refused(reports, named, said):
     err = refuse("compare", *(reports / name for name in named), "--out", reports)
     assert said in err.lower()
     assert not (reports / "comparison").exists()
 
 
-def test_names_out_of_logs_are_only_text(reports: Path) -> None:
+def test_names_out_of_logs_are_only_text(reports):
     (reports / "monday-overview" / "provenance.json").write_text(
         json.dumps({"flight": {"name": "<b>x", "kind": "<i>"}, "parameters": {"lacking": ["<script>"]}})
     )
@@ -134,7 +134,7 @@ def test_names_out_of_logs_are_only_text(reports: Path) -> None:
         assert "&lt;b&gt;x" in text and "<b>x" not in text and "<script" not in text and "<i>" not in text
 
 
-def test_the_list_of_flights_links_their_reports_and_leaves_studies_out(reports: Path) -> None:
+def test_the_list_of_flights_links_their_reports_and_leaves_studies_out(reports):
     (reports / "schmidt-monday").mkdir()
     for name in ("status.json", "provenance.json", "report.html", "metrics.json"):
         (reports / "schmidt-monday" / name).write_text((reports / "monday-overview" / name).read_text())
@@ -155,7 +155,7 @@ def test_the_list_of_flights_links_their_reports_and_leaves_studies_out(reports:
 
 
 @pytest.mark.parametrize("damage", ["status.json", "provenance.json", "metrics.json"])
-def test_a_damaged_report_does_not_spoil_the_list(reports: Path, damage: str) -> None:
+def test_a_damaged_report_does_not_spoil_the_list(reports, damage):
     (reports / "monday-overview" / damage).write_text("{")
     build_ledger(reports, {})
     page = (reports / "flights.html").read_text(encoding="utf-8")
@@ -163,7 +163,7 @@ def test_a_damaged_report_does_not_spoil_the_list(reports: Path, damage: str) ->
 
 
 @pytest.mark.slow
-def test_a_flight_without_reports_is_evaluated_first(reports: Path, tmp_path: Path) -> None:
+def test_a_flight_without_reports_is_evaluated_first(reports, tmp_path):
     flight = simulate_twin("large-ship", 1)
     for name in ("detections", "truth", "frames"):
         flight.tables.pop(name, None)

@@ -34,14 +34,14 @@ def report_of(flight: Path, place: Path) -> Path:
     return place
 
 
-def test_a_flight_is_written(flight: Path, tmp_path: Path) -> None:
+def test_a_flight_is_written(flight, tmp_path):
     out = succeed("replay", flight, "--into", tmp_path / "out", *POSES)
     assert out.strip() == str(tmp_path / "out" / "replay.rrd")
     assert [one.name for one in (tmp_path / "out").iterdir()] == ["replay.rrd"]
     assert not (flight / "replay.rrd").exists()
 
 
-def test_a_report_finds_its_flight_and_shows_its_tracks(flight: Path, tmp_path: Path) -> None:
+def test_a_report_finds_its_flight_and_shows_its_tracks(flight, tmp_path):
     report = report_of(flight, flight.parents[1] / "reports" / "ship-tracking")
     succeed("replay", report)
     found = read_recording(report / "replay.rrd")
@@ -54,7 +54,7 @@ def test_a_report_finds_its_flight_and_shows_its_tracks(flight: Path, tmp_path: 
     assert "changed" in refuse("replay", other)
 
 
-def test_what_is_refused(flight: Path, tmp_path: Path) -> None:
+def test_what_is_refused(flight, tmp_path):
     assert "no such folder" in refuse("replay", tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
     assert "neither a flight" in refuse("replay", tmp_path / "empty")

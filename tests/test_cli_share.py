@@ -29,21 +29,21 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     return calls
 
 
-def test_the_most_careful_is_the_default(asked: list[dict[str, Any]]) -> None:
+def test_the_most_careful_is_the_default(asked):
     result = CliRunner().invoke(wildlab, ["share", "reports/mine"])
     assert result.exit_code == 0, result.output
     assert (asked[0]["tier"], asked[0]["password"], asked[0]["overwrite"]) == ("public", None, False)
 
 
 def test_what_was_removed_is_for_the_terminal_and_the_file_for_the_next_command(
-    asked: list[dict[str, Any]],
-) -> None:
+    asked,
+):
     result = CliRunner().invoke(wildlab, ["share", "reports/mine"])
     assert result.stdout == "flight-public.html\n"
     assert "origin: '1, 2' -> withheld" in result.stderr and "told.txt" in result.stderr
 
 
-def test_a_password_comes_from_the_environment_or_is_asked_for_twice(asked: list[dict[str, Any]]) -> None:
+def test_a_password_comes_from_the_environment_or_is_asked_for_twice(asked):
     words = "four words that differ"
     CliRunner().invoke(wildlab, ["share", "reports/mine", "--encrypt"], env={VARIABLE: words})
     typed = CliRunner().invoke(
@@ -54,7 +54,7 @@ def test_a_password_comes_from_the_environment_or_is_asked_for_twice(asked: list
 
 
 @pytest.mark.slow
-def test_without_a_terminal_the_variable_is_named(tmp_path: Path) -> None:
+def test_without_a_terminal_the_variable_is_named(tmp_path):
     """In a process of its own session, which has no terminal: one sentence, no warning of Python's."""
     done = subprocess.run(
         [sys.executable, "-m", "wildlab", "share", "reports/mine", "--encrypt"],
@@ -65,13 +65,13 @@ def test_without_a_terminal_the_variable_is_named(tmp_path: Path) -> None:
     assert VARIABLE in done.stderr and "Warning" not in done.stderr
 
 
-def test_no_option_takes_a_password(asked: list[dict[str, Any]]) -> None:
+def test_no_option_takes_a_password(asked):
     """Others on the machine can read what is typed after a command."""
     result = CliRunner().invoke(wildlab, ["share", "reports/mine", "--password", "x"])
     assert result.exit_code == 2 and not asked
 
 
-def test_a_report_that_is_not_there_is_wrong_use(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_report_that_is_not_there_is_wrong_use(tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["share", str(tmp_path / "none")])
     assert ended.value.code == 2

@@ -40,9 +40,7 @@ def surveyed(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "flight", write_slope(tmp_path / "dem.tif", 61.0, 15.0, 300.0 - down, 0.1)
 
 
-def test_a_map_is_laid_under_a_flight_and_its_points_lie_on_it(
-    surveyed: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_a_map_is_laid_under_a_flight_and_its_points_lie_on_it(surveyed, tmp_path):
     folder, dem = surveyed
     succeed("georeference", folder, "--into", tmp_path / "level.csv")
     succeed("terrain", folder, dem, "--heights", "ellipsoid", "--sd", "0.3")
@@ -59,7 +57,7 @@ def test_a_map_is_laid_under_a_flight_and_its_points_lie_on_it(
     succeed("check", folder)
 
 
-def test_a_geojson_has_the_places(surveyed: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_geojson_has_the_places(surveyed, tmp_path):
     folder, _ = surveyed
     succeed("georeference", folder, "--into", tmp_path / "p.csv")
     succeed("georeference", folder, "--into", tmp_path / "p.geojson")
@@ -75,7 +73,7 @@ def test_a_geojson_has_the_places(surveyed: tuple[Path, Path], tmp_path: Path) -
     assert ".geojson" in refuse("georeference", folder, "--into", tmp_path / "p.shp")
 
 
-def test_wrong_use_leaves_the_flight_as_it_is(surveyed: tuple[Path, Path], tmp_path: Path) -> None:
+def test_wrong_use_leaves_the_flight_as_it_is(surveyed, tmp_path):
     folder, dem = surveyed
     before = (folder / "flight.toml").read_bytes()
     for options, words in (

@@ -25,7 +25,7 @@ def numbers(report: Path) -> dict[tuple[str, str], float]:
 
 
 @pytest.mark.slow
-def test_a_heading_that_is_off_is_seen_through_by_the_command_line_alone(tmp_path: Path) -> None:
+def test_a_heading_that_is_off_is_seen_through_by_the_command_line_alone(tmp_path):
     flight = kept(tmp_path, seed=1, heading_off_deg=2.0, heading_sd_deg=2.0)
     succeed("track", flight, "--into", tmp_path / "out", "--smooth")
     found = numbers(tmp_path / "out")
@@ -40,7 +40,7 @@ def test_a_heading_that_is_off_is_seen_through_by_the_command_line_alone(tmp_pat
 
 
 @pytest.mark.slow
-def test_tuned_on_one_flight_and_judged_on_another(tmp_path: Path) -> None:
+def test_tuned_on_one_flight_and_judged_on_another(tmp_path):
     one = kept(tmp_path, seed=1, name="monday", truth=False)
     other = kept(tmp_path, seed=2, name="tuesday", truth=False)
     succeed("track", other, "--tune", one, "--into", tmp_path / "out")
@@ -48,7 +48,7 @@ def test_tuned_on_one_flight_and_judged_on_another(tmp_path: Path) -> None:
     assert not any(name == "nees" for name, _ in numbers(tmp_path / "out"))
 
 
-def test_what_is_refused(tmp_path: Path) -> None:
+def test_what_is_refused(tmp_path):
     flight = kept(tmp_path)
     assert "target 'ship'" in refuse("track", flight, "--target", "ship")
     assert "sensor 'sonar'" in refuse("track", flight, "--sensor", "sonar")
@@ -66,7 +66,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
     assert "flight.toml" in refuse("track", tmp_path)
 
 
-def test_a_flight_without_detections_is_refused(tmp_path: Path) -> None:
+def test_a_flight_without_detections_is_refused(tmp_path):
     flight = robot_flight()
     del flight.tables["detections"]
     save_flight(flight, tmp_path / "empty")
@@ -74,7 +74,7 @@ def test_a_flight_without_detections_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_all_targets_at_once_without_a_name(tmp_path: Path) -> None:
+def test_all_targets_at_once_without_a_name(tmp_path):
     flight = kept(tmp_path, kind="position", clutter=2, labelled=False)
     succeed("track", flight, "--many", "--into", tmp_path / "out")
     assert numbers(tmp_path / "out")["tracked", "target-1"] > 0.9
@@ -84,7 +84,7 @@ def test_all_targets_at_once_without_a_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "option", [("--tune", "other"), ("--filter", "ekf"), ("--target", "boat"), ("--smooth",)]
 )
-def test_options_that_do_not_go_with_many(tmp_path: Path, option: tuple[str, ...]) -> None:
+def test_options_that_do_not_go_with_many(tmp_path, option):
     flight = kept(tmp_path, kind="position")
     (tmp_path / "other").mkdir()
     given = [tmp_path / one if one == "other" else one for one in option]

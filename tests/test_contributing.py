@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import textwrap
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,7 @@ from wildlab.paths import ROOT
 
 
 @pytest.mark.skipif(ROOT is None, reason="CONTRIBUTING.md stands in a checkout")
-def test_the_filter_of_the_walk_passes_its_own_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_filter_of_the_walk_passes_its_own_test(tmp_path, monkeypatch):
     assert ROOT is not None
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     walk = text[text.index("\n## A filter\n") :]

@@ -1,15 +1,11 @@
 """Tables for spreadsheets: names come from files of strangers."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pandas as pd
 
 from wildlab.files import write_csv
 
 
-def test_no_name_is_a_formula(tmp_path: Path):
+def test_no_name_is_a_formula(tmp_path):
     names = ["=HYPERLINK(1)", "+1", "-2", "@x", "buoy", "a=b", ""]
     write_csv(tmp_path / "a.csv", pd.DataFrame({"name": names, "value": range(-3, 4)}), "%.1f")
     read = pd.read_csv(tmp_path / "a.csv", keep_default_na=False)

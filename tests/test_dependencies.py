@@ -49,5 +49,5 @@ def complaints(root: Path, reasons: dict[str, str]) -> list[str]:
     return sorted(missing + stale + gone)
 
 
-def test_what_is_asked_for_is_used_or_has_a_reason() -> None:
+def test_what_is_asked_for_is_used_or_has_a_reason():
     assert complaints(paths.ROOT, NOT_IMPORTED) == []

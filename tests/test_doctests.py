@@ -33,14 +33,14 @@ def run_examples(module: ModuleType) -> tuple[int, str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("room", [room for room in WITH_EXAMPLES if room.count(".") < 2])
-def test_examples_come_out(room: str) -> None:
+def test_examples_come_out(room):
     for name in modules_of(room):
         failures, said = run_examples(importlib.import_module(name))
         assert failures == 0, said
 
 
 @pytest.mark.parametrize("room", DOCUMENTED)
-def test_what_a_room_offers_is_documented(room: str) -> None:
+def test_what_a_room_offers_is_documented(room):
     found = [fault for name, thing in offered(room) for fault in lacking(f"{room}.{name}", thing)]
     found += [
         f"{name}: nothing said"

@@ -42,13 +42,13 @@ def write_pyproject(folder: Path, *dependencies: str, extra: str = "affine") -> 
     return path
 
 
-def test_examines_this_checkout() -> None:
+def test_examines_this_checkout():
     findings = doctor.examine()
     assert len({finding.name for finding in findings}) == len(findings) == 11
     assert all(finding.found and (finding.ok or finding.fix) for finding in findings)
 
 
-def test_examines_an_installed_wildlab(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_examines_an_installed_wildlab(monkeypatch, tmp_path):
     """Without a checkout there is no make, no git and no lock that the environment has to follow."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("PYTHONPATH", raising=False)
@@ -60,21 +60,21 @@ def test_examines_an_installed_wildlab(monkeypatch: pytest.MonkeyPatch, tmp_path
     assert not [finding for finding in findings.values() if "make " in finding.found + finding.fix]
 
 
-def test_what_an_installed_wildlab_asks_for() -> None:
+def test_what_an_installed_wildlab_asks_for():
     wishes = ["Affine>=3", "numpy>=2", "polars", "ruff; extra == 'dev'", "colorama; python_version < '3'"]
     finding = doctor.check_requirements(wishes, INSTALLED | {"affine": "2.4"})
     assert not finding.ok and "'Affine>=3' 'polars'" in finding.fix
     assert doctor.check_requirements(wishes[:2], INSTALLED).ok
 
 
-def test_other_versions_than_those_tested_are_a_note(lock: Path, tmp_path: Path) -> None:
+def test_other_versions_than_those_tested_are_a_note(lock, tmp_path):
     assert doctor.check_tested_versions(lock, {"affine": "3.0.1"}).fix == ""
     finding = doctor.check_tested_versions(lock, {"numpy": "2.4.7"})
     assert finding.ok and finding.fix
     assert not doctor.check_tested_versions(tmp_path / "gone", {}).ok
 
 
-def test_this_environment_is_what_its_lock_says() -> None:
+def test_this_environment_is_what_its_lock_says():
     """The tests are meant to run where ``make`` put the packages; elsewhere their results prove little."""
     if Path(sys.prefix).resolve() != (paths.ROOT / ".venv").resolve():
         pytest.skip("not running in the project's own environment")
@@ -83,7 +83,7 @@ def test_this_environment_is_what_its_lock_says() -> None:
     assert doctor.check_kernel().ok
 
 
-def test_resources_python_disk_and_mirror(tmp_path: Path) -> None:
+def test_resources_python_disk_and_mirror(tmp_path):
     for well, ill in (
         (doctor.check_resources(paths.RESOURCES), doctor.check_resources(tmp_path)),
         (doctor.check_python((3, 11, 0)), doctor.check_python((3, 10, 13))),
@@ -96,9 +96,7 @@ def test_resources_python_disk_and_mirror(tmp_path: Path) -> None:
         assert well.ok and not ill.ok and ill.fix, ill.name
 
 
-def test_an_environment_of_another_python_or_with_foreign_packages(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_environment_of_another_python_or_with_foreign_packages(tmp_path, monkeypatch):
     monkeypatch.delenv("PYTHONPATH", raising=False)
     monkeypatch.delenv("PYTHONHOME", raising=False)
     own = str(tmp_path / ".venv")
@@ -109,11 +107,11 @@ def test_an_environment_of_another_python_or_with_foreign_packages(
     assert not finding.ok and "PYTHONPATH" in finding.fix
 
 
-def test_lock_is_read_with_markers(lock: Path) -> None:
+def test_lock_is_read_with_markers(lock):
     assert [pin.name for pin in doctor.read_lock(lock)] == ["affine", "numpy", "Send2Trash"]
 
 
-def test_packages_that_drifted_are_named(lock: Path) -> None:
+def test_packages_that_drifted_are_named(lock):
     assert doctor.check_packages(lock, INSTALLED).ok
     finding = doctor.check_packages(lock, {"affine": "3.0.1", "numpy": "2.4.7"})
     assert not finding.ok and "Send2Trash" in finding.found and "numpy 2.4.7" in finding.found
@@ -121,7 +119,7 @@ def test_packages_that_drifted_are_named(lock: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["not a requirement at all !!\n", None])
-def test_unreadable_lock(tmp_path: Path, text: str | None) -> None:
+def test_unreadable_lock(tmp_path, text):
     lock = tmp_path / "environment.lock"
     if text is not None:
         lock.write_text(text, encoding="utf-8")
@@ -129,7 +127,7 @@ def test_unreadable_lock(tmp_path: Path, text: str | None) -> None:
     assert not doctor.check_lock(lock, write_pyproject(tmp_path, "affine>=3")).ok
 
 
-def test_lock_behind_pyproject(lock: Path, tmp_path: Path) -> None:
+def test_lock_behind_pyproject(lock, tmp_path):
     assert doctor.check_lock(lock, write_pyproject(tmp_path, "affine>=3", "send2trash", "numpy>=2")).ok
     assert doctor.check_lock(lock, write_pyproject(tmp_path, "colorama; python_version < '3'")).ok
     for wanted, extra in (("affine>=3.1", "numpy"), ("polars", "numpy"), ("affine>=3", "ruff>=0.6")):
@@ -139,9 +137,7 @@ def test_lock_behind_pyproject(lock: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("program", "ok"), [("/usr/bin/python3", False), ("python", True), (sys.executable, True)]
 )
-def test_kernel_of_this_python_or_another(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str, ok: bool
-) -> None:
+def test_kernel_of_this_python_or_another(tmp_path, monkeypatch, program, ok):
     kernel = tmp_path / "kernels" / "python3"
     kernel.mkdir(parents=True)
     argv = [program, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
@@ -150,7 +146,7 @@ def test_kernel_of_this_python_or_another(
     assert doctor.check_kernel().ok == ok
 
 
-def test_reports_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reports_folder(tmp_path, monkeypatch):
     assert doctor.check_reports_folder(tmp_path / "reports").ok
     (tmp_path / "file").touch()
     assert not doctor.check_reports_folder(tmp_path / "file").ok
@@ -159,7 +155,7 @@ def test_reports_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     assert not doctor.check_reports_folder(tmp_path).ok
 
 
-def test_git_and_a_browser_are_optional_but_missed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_git_and_a_browser_are_optional_but_missed(tmp_path, monkeypatch):
     monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/git")
     assert doctor.check_git(tmp_path).fix
     (tmp_path / ".git").mkdir()

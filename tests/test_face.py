@@ -43,21 +43,21 @@ def ship() -> Flight:
     return simulate_twin("large-ship", 1)
 
 
-def test_rooms_are_light_until_something_is_asked_of_them() -> None:
+def test_rooms_are_light_until_something_is_asked_of_them():
     rooms = "\n".join(f"import {room}" for room in LAZY)
     loaded = loaded_by(f"{rooms}\nassert 'track' in dir(wildlab)")
     assert "wildlab.lazy" in loaded
     assert not loaded & set(HEAVY)
 
 
-def test_a_name_loads_only_its_own_room() -> None:
+def test_a_name_loads_only_its_own_room():
     loaded = loaded_by("import wildlab\nwildlab.load_flight")
     assert {"pandas", "wildlab.flight.store"} <= loaded
     assert not loaded & {"matplotlib", "numba", "wildlab.simulation", "wildlab.tracking", "wildlab.api"}
 
 
 @pytest.mark.parametrize("room", LAZY)
-def test_the_three_lists_of_a_room_agree(room: str) -> None:
+def test_the_three_lists_of_a_room_agree(room):
     module = importlib.import_module(room)
     assert module.__file__ is not None
     tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
@@ -77,14 +77,14 @@ def test_the_three_lists_of_a_room_agree(room: str) -> None:
         _ = module.nonsense
 
 
-def test_no_name_hides_a_module() -> None:
+def test_no_name_hides_a_module():
     for room in LAZY:
         module = importlib.import_module(room)
         folder = Path(str(module.__file__)).parent
         assert not {path.stem for path in folder.iterdir()} & set(module.__all__), room
 
 
-def test_a_printed_flight_names_no_place(ship: Flight) -> None:
+def test_a_printed_flight_names_no_place(ship):
     secret = {"latitude_deg": 61.23456, "longitude_deg": 11.98765, "height_m": 123.4}
     manifest = replace_in_manifest(
         ship.manifest, {"origin": secret, "locations": {"sensitivity": "withheld"}}
@@ -98,7 +98,7 @@ def test_a_printed_flight_names_no_place(ship: Flight) -> None:
     assert not {f"{place:.1f}" for place in places} & set(re.findall(r"-?\d+\.\d", text)) - {"240.0"}
 
 
-def test_hostile_names_are_harmless(ship: Flight) -> None:
+def test_hostile_names_are_harmless(ship):
     evil = "<script>alert(1)</script>\x1b[2J"
     flight = Flight(ship.manifest, {evil: ship.nav["truth"]}, {})
     assert "<script" not in flight._repr_html_() and "\x1b" not in flight._repr_html_()
@@ -107,13 +107,13 @@ def test_hostile_names_are_harmless(ship: Flight) -> None:
     assert "<script" not in points._repr_html_() and "\x1b" not in repr(points)
 
 
-def test_long_summaries_are_cut() -> None:
+def test_long_summaries_are_cut():
     summary = Summary("t", [("a" * 10_000, "b")] * (MOST_ROWS + 3), ("what", "is"))
     for text in (as_text(summary), as_html(summary)):
         assert "a" * LONGEST not in text
 
 
-def test_points_and_their_errors(ship: Flight) -> None:
+def test_points_and_their_errors(ship):
     points = wildlab.georeference(ship)
     errors = wildlab.evaluate_points(points)
     assert errors.summary.n == len(ship.table("detections")) == len(points.table)
@@ -126,7 +126,7 @@ def test_points_and_their_errors(ship: Flight) -> None:
         wildlab.georeference(two, source="other")
 
 
-def test_what_cannot_be_done_is_refused(ship: Flight) -> None:
+def test_what_cannot_be_done_is_refused(ship):
     for call, about in (
         (lambda: wildlab.track(ship, source="autopilot", filter="magic"), "filter 'magic'"),
         (lambda: wildlab.navigate(ship, method="magic"), "method 'magic'"),  # type: ignore[arg-type]
@@ -137,7 +137,7 @@ def test_what_cannot_be_done_is_refused(ship: Flight) -> None:
             call()
 
 
-def test_correlated_values_are_worth_less() -> None:
+def test_correlated_values_are_worth_less():
     rng = np.random.default_rng(1)
     white = rng.chisquare(2, 2000)
     slow = np.repeat(rng.chisquare(2, 40), 50)
@@ -149,7 +149,7 @@ def test_correlated_values_are_worth_less() -> None:
     assert mean.high - mean.low > 10 * (lambda band: band[1] - band[0])(chi_square_interval(2, runs=2000)) / 2
 
 
-def test_every_result_has_a_figure(ship: Flight) -> None:
+def test_every_result_has_a_figure(ship):
     points = wildlab.georeference(ship, source="autopilot")
     track = wildlab.track(ship, source="autopilot")
     for result in (ship, points, wildlab.evaluate_points(points), track, wildlab.consistency(track)):
@@ -158,7 +158,7 @@ def test_every_result_has_a_figure(ship: Flight) -> None:
         assert all(len(ax.lines) + len(ax.patches) for ax in figure.axes)
 
 
-def test_only_the_part_that_counts_is_judged() -> None:
+def test_only_the_part_that_counts_is_judged():
     times, nothing = np.arange(4.0), np.full((4, 9), np.nan)
     squares = {"position": times, "velocity": times + 10, "attitude": np.full(4, np.nan)}
     found = navigation_series(Errors(times, nothing, nothing, squares), 1.0, 3.0)
@@ -168,7 +168,7 @@ def test_only_the_part_that_counts_is_judged() -> None:
     ]
 
 
-def test_an_ellipse_lies_as_its_covariance(ship: Flight) -> None:
+def test_an_ellipse_lies_as_its_covariance(ship):
     row = {"north_m": [0.0], "east_m": [0.0], "cov_nn": [100.0], "cov_ne": [0.0], "cov_ee": [1.0]}
     (patch,) = wildlab.plot(Points(ship, "truth", pd.DataFrame(row))).axes[0].patches
     box = patch.get_path().transformed(patch.get_patch_transform()).get_extents()
@@ -177,7 +177,7 @@ def test_an_ellipse_lies_as_its_covariance(ship: Flight) -> None:
 
 
 @pytest.mark.slow
-def test_the_script_in_the_readme_runs(tmp_path: Path) -> None:
+def test_the_script_in_the_readme_runs(tmp_path):
     readme = (paths.ROOT / "README.md").read_text(encoding="utf-8")
     (script,) = re.findall(r"```python\n(.*?)```", readme, re.S)
     assert len([line for line in script.splitlines() if line]) <= 11
@@ -193,7 +193,7 @@ def test_the_script_in_the_readme_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_navigation_is_judged_where_it_flies() -> None:
+def test_navigation_is_judged_where_it_flies():
     flight = simulate_twin("fast-vessel", 1)
     before = set(flight.nav)
     nav = wildlab.navigate(flight)

@@ -106,7 +106,7 @@ def calls(checkout: Path) -> list[str]:
     return file.read_text(encoding="utf-8").splitlines() if file.exists() else []
 
 
-def test_help_comes_first_and_lists_every_target(make: Run) -> None:
+def test_help_comes_first_and_lists_every_target(make):
     done = make()
     text = (paths.ROOT / "Makefile").read_text(encoding="utf-8")
     phony = re.search(r"^\.PHONY: (.*)$", text, re.MULTILINE)
@@ -116,7 +116,7 @@ def test_help_comes_first_and_lists_every_target(make: Run) -> None:
     assert listed == phony.group(1).split()
 
 
-def test_environment_is_made_once(make: Run, checkout: Path) -> None:
+def test_environment_is_made_once(make, checkout):
     done = make("environment")
     assert done.returncode == 0, done.stderr
     packages, own = calls(checkout)
@@ -128,7 +128,7 @@ def test_environment_is_made_once(make: Run, checkout: Path) -> None:
     assert len(calls(checkout)) == 2
 
 
-def test_changed_lock_updates_and_changed_project_reinstalls_wildlab_alone(make: Run, checkout: Path) -> None:
+def test_changed_lock_updates_and_changed_project_reinstalls_wildlab_alone(make, checkout):
     make("environment")
     (checkout / "pyproject.toml").write_text("[project]\nname = 'x'\n", encoding="utf-8")
     make("environment")
@@ -142,7 +142,7 @@ def test_changed_lock_updates_and_changed_project_reinstalls_wildlab_alone(make:
     assert make("environment").stdout == ""
 
 
-def test_failed_installation_is_not_taken_for_a_whole_one(make: Run, checkout: Path) -> None:
+def test_failed_installation_is_not_taken_for_a_whole_one(make, checkout):
     sentence_of(make("environment", FAULT="no-network"))
     assert not (checkout / ".venv" / "installed").exists()
     make("environment")
@@ -153,7 +153,7 @@ def test_failed_installation_is_not_taken_for_a_whole_one(make: Run, checkout: P
     assert not (checkout / ".venv" / "installed").exists()
 
 
-def test_interrupted_installation_is_not_taken_for_a_whole_one(make: Run, checkout: Path) -> None:
+def test_interrupted_installation_is_not_taken_for_a_whole_one(make, checkout):
     running = subprocess.Popen(
         ["make", "environment"],
         cwd=checkout,
@@ -177,7 +177,7 @@ def test_interrupted_installation_is_not_taken_for_a_whole_one(make: Run, checko
     assert (checkout / ".venv" / "installed").is_dir()
 
 
-def test_moved_checkout_gets_a_new_environment(make: Run, checkout: Path) -> None:
+def test_moved_checkout_gets_a_new_environment(make, checkout):
     make("environment")
     moved = checkout.rename(checkout.with_name("moved"))
     checkout.symlink_to(moved)
@@ -199,13 +199,11 @@ def test_moved_checkout_gets_a_new_environment(make: Run, checkout: Path) -> Non
         ([], {"FAULT": "other"}, "ERROR: something else"),
     ],
 )
-def test_what_goes_wrong_is_one_sentence(
-    make: Run, arguments: list[str], more: dict[str, str], about: str
-) -> None:
+def test_what_goes_wrong_is_one_sentence(make, arguments, more, about):
     assert about in sentence_of(make("environment", *arguments, **more))
 
 
-def test_no_python_new_enough(make: Run, checkout: Path) -> None:
+def test_no_python_new_enough(make, checkout):
     """Every Python on the path is too old, or there is none."""
     tools = checkout.parent / "tools"
     tools.mkdir()
@@ -216,7 +214,7 @@ def test_no_python_new_enough(make: Run, checkout: Path) -> None:
     assert "3.10.13" in sentence_of(make("environment", PATH=str(tools), FAKE_VERSION="3.10.13"))
 
 
-def test_foreign_settings_are_kept_out(make: Run, checkout: Path) -> None:
+def test_foreign_settings_are_kept_out(make, checkout):
     make("environment")
     with (checkout / "Makefile").open("a", encoding="utf-8") as file:
         file.write('\nshow:\n\t@echo "[$$PYTHONPATH$$PYTHONHOME$$JUPYTER_PATH] $$JUPYTER_PREFER_ENV_PATH"\n')
@@ -224,7 +222,7 @@ def test_foreign_settings_are_kept_out(make: Run, checkout: Path) -> None:
     assert done.stdout == "[] 1\n"
 
 
-def test_lock_names_no_index_and_hashes_everything() -> None:
+def test_lock_names_no_index_and_hashes_everything():
     text = paths.LOCK.read_text(encoding="utf-8")
     assert not re.search(r"https?:|file:|--(?:extra-)?index-url|--find-links|@ ", text)
     blocks = re.split(r"^(?=[A-Za-z0-9])", text, flags=re.MULTILINE)[1:]
@@ -240,7 +238,7 @@ def commands_in_readme() -> str:
     return "\n".join(re.findall(r"`[^`\n]+`|^    .*$", text, re.MULTILINE))
 
 
-def test_readme_names_only_targets_that_exist() -> None:
+def test_readme_names_only_targets_that_exist():
     makefile = (paths.ROOT / "Makefile").read_text(encoding="utf-8")
     named = set(re.findall(r"\bmake ([a-z][a-z-]*)", commands_in_readme()))
     assert {"reports", "test"} <= named
@@ -248,7 +246,7 @@ def test_readme_names_only_targets_that_exist() -> None:
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
 
 
-def test_readme_table_lists_every_command() -> None:
+def test_readme_table_lists_every_command():
     from wildlab.cli import wildlab
 
     text = (paths.ROOT / "README.md").read_text(encoding="utf-8")

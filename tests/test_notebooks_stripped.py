@@ -67,7 +67,7 @@ def problems(notebook: dict[str, Any], tutorial: bool = False) -> list[str]:
     return found
 
 
-def test_tracked_notebooks() -> None:
+def test_tracked_notebooks():
     notebooks = tracked_notebooks(paths.ROOT)
     assert notebooks, "no notebook found"
     found = {

@@ -1,16 +1,12 @@
 """Where things lie, in a checkout and without one. `test_wheel.py` looks at a real installation."""
 
-from __future__ import annotations
-
 from pathlib import Path
-
-import pytest
 
 from wildlab import paths
 from wildlab.flight import catalog
 
 
-def test_a_checkout_is_known_by_what_lies_beside_the_package(tmp_path: Path) -> None:
+def test_a_checkout_is_known_by_what_lies_beside_the_package(tmp_path):
     package = tmp_path / "wildlab"
     (tmp_path / "notebooks").mkdir()
     assert paths.find_checkout(package) is None
@@ -20,16 +16,14 @@ def test_a_checkout_is_known_by_what_lies_beside_the_package(tmp_path: Path) -> 
     assert paths.find_checkout(package) == tmp_path
 
 
-def test_here_all_is_in_the_checkout() -> None:
+def test_here_all_is_in_the_checkout():
     assert Path(__file__).resolve().parents[1] == paths.ROOT
     assert (paths.NOTEBOOKS, paths.DATA) == (paths.ROOT / "notebooks", paths.ROOT / "data")
     assert (paths.REPORTS, paths.fetched()) == (paths.ROOT / "reports", paths.ROOT / "data" / "fetched")
     assert paths.LOCK.is_file()
 
 
-def test_public_data_of_an_installed_wildlab_go_to_the_cache(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_public_data_of_an_installed_wildlab_go_to_the_cache(tmp_path, monkeypatch):
     monkeypatch.setattr(paths, "ROOT", None)
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / ".cache"))

@@ -36,7 +36,7 @@ def printed() -> list[str]:
     return sorted({command.strip() for command in found if "{" not in command and "..." not in command})
 
 
-def test_every_command_that_is_printed_can_be_typed() -> None:
+def test_every_command_that_is_printed_can_be_typed():
     commands, wrong = printed(), []
     assert len(commands) > 60
     for command in commands:
@@ -56,9 +56,7 @@ def test_every_command_that_is_printed_can_be_typed() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("twin", ["slow-vessel", "static-antenna", "gondola", "uav-search"])
-def test_a_simulated_flight_is_evaluated_tracked_and_shared_as_it_is(
-    twin: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_simulated_flight_is_evaluated_tracked_and_shared_as_it_is(twin, tmp_path, monkeypatch):
     """A vessel, a known point, a wildlife twin and a survey twin: what would run, and under which name."""
     monkeypatch.chdir(tmp_path)
     folder, reports = Path("flights/trial"), tmp_path / "reports"
@@ -93,7 +91,7 @@ def test_a_simulated_flight_is_evaluated_tracked_and_shared_as_it_is(
 
 
 @pytest.mark.slow
-def test_the_front_pages_own_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_front_pages_own_commands_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     out = str(tmp_path / "reports")
     for line in (

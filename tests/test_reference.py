@@ -7,7 +7,6 @@ import inspect
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -50,7 +49,7 @@ def requests(page: str) -> list[str]:
 
 
 @pytest.mark.slow
-def test_the_reference_is_whole_and_offline(reference: Path) -> None:
+def test_the_reference_is_whole_and_offline(reference):
     pages = sorted(reference.rglob("*.html"))
     assert reference / "index.html" in pages and len(pages) > 60
     for path in pages:
@@ -68,7 +67,7 @@ def test_the_reference_is_whole_and_offline(reference: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("room", DOCUMENTED)
-def test_every_name_that_is_offered_has_its_place(reference: Path, room: str) -> None:
+def test_every_name_that_is_offered_has_its_place(reference, room):
     page = (reference / f"{room.replace('.', '/')}.html").read_text(encoding="utf-8")
     soup = BeautifulSoup(page, "html.parser")
     for name, thing in offered(room):
@@ -80,7 +79,7 @@ def test_every_name_that_is_offered_has_its_place(reference: Path, room: str) ->
 
 
 @pytest.mark.slow
-def test_the_first_page_opens_in_a_browser(reference: Path, faults: Callable[..., list[str]]) -> None:
+def test_the_first_page_opens_in_a_browser(reference, faults):
     index = (reference / "index.html").read_text(encoding="utf-8")
     assert all(f">{room}</a>" in index for room in DOCUMENTED if room.count(".") < 2)
     for page in ("index.html", "wildlab.html", "wildlab/flight.html", "wildlab/pipeline/track.html"):

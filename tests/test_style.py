@@ -17,10 +17,10 @@ def run(*command: str) -> None:
         pytest.fail(f"{' '.join(command[2:])}:\n{done.stdout}{done.stderr}", pytrace=False)
 
 
-def test_ruff() -> None:
+def test_ruff():
     run("ruff", "check", "--quiet", "--output-format", "concise", ".")
 
 
 @pytest.mark.slow
-def test_mypy() -> None:
+def test_mypy():
     run("mypy")

@@ -8,7 +8,7 @@ import importlib
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -74,14 +74,14 @@ def _allowed(module: str, name: str = "") -> bool:
     return name in offered if offered is not None and len(rest) < 2 else not name.startswith("_")
 
 
-def test_there_are_tutorials_and_they_are_numbered() -> None:
+def test_there_are_tutorials_and_they_are_numbered():
     assert TUTORIALS
     numbers = [int(path.stem.partition("-")[0]) for path in TUTORIALS]
     assert numbers == list(range(1, len(TUTORIALS) + 1))
 
 
 @pytest.mark.parametrize("notebook", TUTORIALS, ids=lambda path: path.stem)
-def test_how_a_tutorial_is_written(notebook: Path) -> None:
+def test_how_a_tutorial_is_written(notebook):
     code = list(cells(notebook, "code"))
     lengths = [len([line for line in source.splitlines() if line.strip()]) for source in code]
     assert max(lengths) <= MOST_LINES, code[lengths.index(max(lengths))]
@@ -91,7 +91,7 @@ def test_how_a_tutorial_is_written(notebook: Path) -> None:
 
 
 @pytest.mark.parametrize("notebook", TUTORIALS, ids=lambda path: path.stem)
-def test_its_formulas_can_be_translated(notebook: Path) -> None:
+def test_its_formulas_can_be_translated(notebook):
     text = "\n\n".join(cells(notebook, "markdown"))
     formulas = re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", text, re.DOTALL)
     for block, within in formulas:
@@ -118,9 +118,7 @@ def picture(alt: str = "A line.") -> dict[str, Any]:
     }
 
 
-def test_a_page_shows_code_prints_values_and_pictures(
-    tmp_path: Path, faults: Callable[[Path], list[str]]
-) -> None:
+def test_a_page_shows_code_prints_values_and_pictures(tmp_path, faults):
     table = "<style scoped>td { color: red }</style><table border='1'><tr><td>7</td></tr></table>"
     node = executed(
         {"output_type": "stream", "name": "stdout", "text": "a <pri"},
@@ -147,7 +145,7 @@ def test_a_page_shows_code_prints_values_and_pictures(
     assert faults(path) == []
 
 
-def test_a_page_without_alt_text_or_with_an_error_is_refused() -> None:
+def test_a_page_without_alt_text_or_with_an_error_is_refused():
     with pytest.raises(WildlabError, match="no alt text"):
         tutorial_page(executed(picture(" ")), name="x")
     error = {"output_type": "error", "ename": "ValueError", "evalue": "", "traceback": []}
@@ -173,7 +171,7 @@ def small(folder: Path, **tutorial: str) -> Path:
     return folder / "notebooks"
 
 
-def test_links_are_to_pages_that_are_there(tmp_path: Path) -> None:
+def test_links_are_to_pages_that_are_there(tmp_path):
     notebooks = small(tmp_path, b="1", a="2")
     assert tutorials.tutorial_links(tmp_path, notebooks) == []
     (tmp_path / "tutorials").mkdir()
@@ -184,7 +182,7 @@ def test_links_are_to_pages_that_are_there(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_pages_are_kept_and_a_failure_stops_no_other(tmp_path: Path) -> None:
+def test_pages_are_kept_and_a_failure_stops_no_other(tmp_path):
     notebooks, reports = small(tmp_path, good="print(6 * 7)", bad="1 / 0"), tmp_path / "reports"
     (reports / "tutorials").mkdir(parents=True)
     (reports / "tutorials" / "bad.html").write_text("of other code")
@@ -210,7 +208,7 @@ def test_pages_are_kept_and_a_failure_stops_no_other(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_all_run_and_their_pages_have_no_faults(tmp_path: Path, faults: Callable[[Path], list[str]]) -> None:
+def test_all_run_and_their_pages_have_no_faults(tmp_path, faults):
     outcomes = tutorials.run_tutorials(tmp_path, parallel=2)
     assert [(one.name, one.reason) for one in outcomes if one.state != "done"] == []
     pages = [tmp_path / "tutorials" / f"{path.stem}.html" for path in TUTORIALS]

@@ -109,7 +109,7 @@ def shipped(wheel: Path) -> set[str]:
         return set(archive.namelist())
 
 
-def test_what_is_in_the_wheel(installed: Installed) -> None:
+def test_what_is_in_the_wheel(installed):
     names = shipped(installed.wheel)
     resources = {name.removeprefix("wildlab/resources/") for name in names if "/resources/" in name}
     assert "wildlab/py.typed" in names
@@ -122,7 +122,7 @@ def test_what_is_in_the_wheel(installed: Installed) -> None:
     assert len(tops) == 2 and "wildlab" in tops and min(tops - {"wildlab"}).endswith(".dist-info")
 
 
-def test_all_that_git_holds_is_in_the_wheel(installed: Installed) -> None:
+def test_all_that_git_holds_is_in_the_wheel(installed):
     """Also a kind of file that nobody has told `setup.py` about."""
     if shutil.which("git") is None or not (paths.ROOT / ".git").exists():
         pytest.skip("needs a git checkout")
@@ -133,7 +133,7 @@ def test_all_that_git_holds_is_in_the_wheel(installed: Installed) -> None:
     assert len(tracked) > 100 and tracked - names == set()
 
 
-def test_the_installed_code_is_what_runs_and_its_numbers_keep(installed: Installed) -> None:
+def test_the_installed_code_is_what_runs_and_its_numbers_keep(installed):
     program = (
         f"import json, wildlab; from wildlab import paths; from {code_key.__module__} import code_key\n"
         "print(json.dumps([wildlab.__file__, str(paths.ROOT), str(paths.fetched()), code_key()]))"
@@ -146,7 +146,7 @@ def test_the_installed_code_is_what_runs_and_its_numbers_keep(installed: Install
     assert key == code_key(), "seeds computed by a checkout and by its wheel are the same"
 
 
-def test_commands_work_from_any_folder(installed: Installed) -> None:
+def test_commands_work_from_any_folder(installed):
     before = installed.files()
     assert "static-point" in installed.wildlab("list")
     assert "openathena" in installed.wildlab("fetch")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -84,7 +83,7 @@ def filters(monkeypatch: pytest.MonkeyPatch) -> dict[str, Stand]:
     return both
 
 
-def test_navigation_is_the_reference_minus_what_was_found(flight: Flight, filters: dict[str, Stand]) -> None:
+def test_navigation_is_the_reference_minus_what_was_found(flight, filters):
     nav = wildlab.navigate(flight, tuning=PUBLISHED_LIKE)
     assert filters["mekf"].asked["tuning"] is PUBLISHED_LIKE and not filters["observer"].asked
     assert nav.reference == "truth-payload" and nav.errors is not None
@@ -95,9 +94,7 @@ def test_navigation_is_the_reference_minus_what_was_found(flight: Flight, filter
     assert nav.flight.nav["mekf"] is nav.found.nav
 
 
-def test_poses_are_found_at_frames_and_where_they_are_compared(
-    flight: Flight, filters: dict[str, Stand]
-) -> None:
+def test_poses_are_found_at_frames_and_where_they_are_compared(flight, filters):
     wildlab.navigate(flight)
     asked = filters["mekf"].asked["times"]
     frames, compared = frame_times(flight), comparison_times(flight, "truth-payload")
@@ -105,15 +102,13 @@ def test_poses_are_found_at_frames_and_where_they_are_compared(
     assert not np.isin(compared, frames).all() and not np.isin(frames, compared).all()
 
 
-def test_the_observer_is_another_filter_and_source(flight: Flight, filters: dict[str, Stand]) -> None:
+def test_the_observer_is_another_filter_and_source(flight, filters):
     nav = wildlab.navigate(flight, "observer")
     assert filters["observer"].asked and not filters["mekf"].asked
     assert nav.source == "observer" and "observer" in nav.flight.nav and "mekf" not in nav.flight.nav
 
 
-def test_only_the_truth_judges_and_only_in_the_part_that_counts(
-    flight: Flight, filters: dict[str, Stand]
-) -> None:
+def test_only_the_truth_judges_and_only_in_the_part_that_counts(flight, filters):
     nav = wildlab.navigate(flight)
     (what, begin, end), errors = nav.part, nav.errors
     assert errors is not None and what == "in the air"
@@ -134,7 +129,7 @@ TUNING = CvTuning(acceleration=0.2, position_0=15.0, velocity_0=3.0, measurement
 SETTINGS = {"targets": {"acceleration_m_s_sqrt_s": 0.2}}
 
 
-def test_a_track_is_the_commands(ship: Flight) -> None:
+def test_a_track_is_the_commands(ship):
     """What `wildlab track` writes is the table of the same function, see tests of that command."""
     found = follow_targets(ship, settings=check_model(Settings, SETTINGS, None))
     table = estimates_table(found.tracks, found.scans)
@@ -148,7 +143,7 @@ def test_a_track_is_the_commands(ship: Flight) -> None:
     assert left_out.filter == "schmidt", "there is an uncertainty to consider"
 
 
-def test_settings_come_as_a_file_too(ship: Flight, tmp_path: Path) -> None:
+def test_settings_come_as_a_file_too(ship, tmp_path):
     file = tmp_path / "settings.toml"
     file.write_text("[targets]\nacceleration_m_s_sqrt_s = 0.2\n")
     one, other = (wildlab.track(ship, filter="ekf", settings=told) for told in (file, SETTINGS))
@@ -158,7 +153,7 @@ def test_settings_come_as_a_file_too(ship: Flight, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["kf", "ekf", "schmidt"])
-def test_a_tuning_is_that_of_the_studies(ship: Flight, name: str) -> None:
+def test_a_tuning_is_that_of_the_studies(ship, name):
     one = wildlab.track(ship, source="autopilot", filter=name, tuning=TUNING)
     seen = sighting(ship, "autopilot")
     if name == "schmidt":
@@ -172,7 +167,7 @@ def test_a_tuning_is_that_of_the_studies(ship: Flight, name: str) -> None:
     assert one.numbers["rmse"] > one.numbers["mae"] + 0.01
 
 
-def test_of_several_targets_the_one_asked_for_is_followed(ship: Flight) -> None:
+def test_of_several_targets_the_one_asked_for_is_followed(ship):
     seen = ship.table("detections").copy()
     rows = len(seen)
     seen.loc[rows // 3 :, "target_id"] = "another"
@@ -187,7 +182,7 @@ def test_of_several_targets_the_one_asked_for_is_followed(ship: Flight) -> None:
     assert wildlab.track(two, "another").target == "another"
 
 
-def test_what_is_not_there_is_refused(ship: Flight) -> None:
+def test_what_is_not_there_is_refused(ship):
     for wrong in (
         {"filter": "kalman"},
         {"filter": "imm", "tuning": TUNING},
@@ -198,7 +193,7 @@ def test_what_is_not_there_is_refused(ship: Flight) -> None:
             wildlab.track(ship, **wrong)
 
 
-def test_without_a_truth_a_track_is_not_judged_by_it(ship: Flight) -> None:
+def test_without_a_truth_a_track_is_not_judged_by_it(ship):
     elsewhere = ship.table("truth").assign(time_s=lambda truth: truth["time_s"] + 1e5)
     blind = Flight(ship.manifest, ship.nav, ship.tables | {"truth": elsewhere})
     for told in ({"filter": "kf", "tuning": TUNING, "source": "autopilot"}, {"filter": "ekf"}):
@@ -207,14 +202,14 @@ def test_without_a_truth_a_track_is_not_judged_by_it(ship: Flight) -> None:
         assert list(wildlab.consistency(track).means) == ["NIS"]
 
 
-def test_measured_places_are_those_of_the_detections_used(ship: Flight) -> None:
+def test_measured_places_are_those_of_the_detections_used(ship):
     track = wildlab.track(ship, filter="ekf", settings=SETTINGS)
     assert np.array_equal(track.used, np.isfinite(track.measured[:, 0]))
     apart = np.hypot(*(track.measured - track.truth[:, :2])[track.used].T)
     assert np.nanmedian(apart) < 60.0
 
 
-def test_consistency_is_over_all_runs_with_two_degrees_of_freedom(ship: Flight) -> None:
+def test_consistency_is_over_all_runs_with_two_degrees_of_freedom(ship):
     one, other = (
         wildlab.track(ship, source="autopilot", filter="kf", tuning=TUNING._replace(measurement=metres))
         for metres in (15.0, 40.0)
@@ -236,7 +231,7 @@ def test_consistency_is_over_all_runs_with_two_degrees_of_freedom(ship: Flight) 
         assert (mean.low, mean.high) == chi_square_interval(2, runs=mean.worth)
 
 
-def test_anybodys_filter_by_its_errors_and_covariances() -> None:
+def test_anybodys_filter_by_its_errors_and_covariances():
     """NEES of white errors is chi-square: the mean of a right filter lies in its interval, of others not."""
     rng = np.random.default_rng(4)
     P = np.tile(np.diag([4.0, 1.0, 9.0]), (8, 400, 1, 1))
@@ -257,9 +252,7 @@ def test_anybodys_filter_by_its_errors_and_covariances() -> None:
 
 @pytest.mark.parametrize(("worth", "hedged"), [(FEW_INDEPENDENT - 1, True), (FEW_INDEPENDENT + 1, False)])
 @pytest.mark.parametrize(("mean", "verdict"), [(9.0, "overconfident"), (0.1, "too cautious")])
-def test_a_verdict_on_few_independent_values_says_so(
-    worth: float, hedged: bool, mean: float, verdict: str
-) -> None:
+def test_a_verdict_on_few_independent_values_says_so(worth, hedged, mean, verdict):
     low, high = chi_square_interval(2, runs=worth)
     series = Series("NIS", 2, np.arange(2.0), np.full(2, mean))
     average = Average(mean, low, high, 100, worth)

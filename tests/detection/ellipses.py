@@ -1,7 +1,5 @@
 """Ellipses drawn by the pixels whose centres lie within them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """The centre of what the border cuts, H (4.7)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Are the stated covariances of the centres honest? On scenes whose seeds were used for nothing else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import binomtest

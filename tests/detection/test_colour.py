@@ -37,7 +37,7 @@ def found_in(image: np.ndarray, **kinds: Any) -> Detections:
     return find_coloured(image, all_of(image), Colour(**kinds))
 
 
-def test_the_limits_are_those_of_another_conversion_of_colours() -> None:
+def test_the_limits_are_those_of_another_conversion_of_colours():
     rng = np.random.default_rng(1)
     image = rng.integers(0, 256, (60, 80, 3), dtype=np.uint8)
     image[:30, :, 0] //= 6
@@ -51,7 +51,7 @@ def test_the_limits_are_those_of_another_conversion_of_colours() -> None:
     assert mask.sum() > 100 and (mask == inside)[~near].all()
 
 
-def test_only_the_largest_is_found() -> None:
+def test_only_the_largest_is_found():
     image = scene([(200, 180), (400, 180)], (20, 12), (360, 640))
     image[170:190, 100:160] = BLUE
     assert found_in(image).uv.tolist() == [[129.5, 179.5]]
@@ -62,7 +62,7 @@ def test_only_the_largest_is_found() -> None:
     assert len(found_in(image)) == 0
 
 
-def test_what_is_too_small_or_outside_of_the_scene_is_not_found() -> None:
+def test_what_is_too_small_or_outside_of_the_scene_is_not_found():
     image = scene([(300, 180)], (6, 5), (360, 640))
     assert len(found_in(image)) == 0
     assert len(found_in(image, smallest_px=20)) == 1
@@ -72,7 +72,7 @@ def test_what_is_too_small_or_outside_of_the_scene_is_not_found() -> None:
     assert len(find_coloured(image, valid)) == 0
 
 
-def test_red_goes_through_zero() -> None:
+def test_red_goes_through_zero():
     image = np.full((360, 640, 3), 90, np.uint8)
     image[150:170, 300:330] = (250, 10, 30)
     assert len(found_in(image, hue=(170, 10))) == 1
@@ -80,7 +80,7 @@ def test_red_goes_through_zero() -> None:
 
 
 @pytest.mark.slow
-def test_centres_lie_in_their_ellipses_as_often_as_they_say() -> None:
+def test_centres_lie_in_their_ellipses_as_often_as_they_say():
     rng = np.random.default_rng(5)
     squares, apart = [], []
     for _ in range(300):
@@ -97,7 +97,7 @@ def test_centres_lie_in_their_ellipses_as_often_as_they_say() -> None:
     assert np.abs(np.mean(apart, axis=0)).max() < 0.06
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_what_cannot_be_is_refused():
     for call, about in (
         (lambda: find_coloured(np.zeros((20, 30), np.uint8), np.ones((20, 30), bool)), "no colours"),
         (lambda: Colour(saturation=(0.9, 0.1)), "saturation"),
@@ -109,7 +109,7 @@ def test_what_cannot_be_is_refused() -> None:
 
 
 @pytest.mark.parametrize("factor", [2, 3])
-def test_an_image_of_larger_pixels_gives_all_lengths_times_their_size(factor: int) -> None:
+def test_an_image_of_larger_pixels_gives_all_lengths_times_their_size(factor):
     """Each pixel made a block of pixels: what was found is the same, about the middle of the block."""
     small = scene([(40.3, 30.2)], (9.0, 5.0), (60, 80))
     large = np.repeat(np.repeat(small, factor, axis=0), factor, axis=1)
@@ -130,9 +130,7 @@ def test_an_image_of_larger_pixels_gives_all_lengths_times_their_size(factor: in
     ("inside", "outside"),
     [((30, 180), (29, 180)), ((609, 180), (610, 180)), ((300, 60), (300, 59)), ((300, 299), (300, 300))],
 )
-def test_a_centre_on_the_limit_of_the_border_is_inside(
-    inside: tuple[int, int], outside: tuple[int, int]
-) -> None:
+def test_a_centre_on_the_limit_of_the_border_is_inside(inside, outside):
     """The printed limits, 30 px and 60 px."""
     for (u, v), found in ((inside, 1), (outside, 0)):
         image = np.full((360, 640, 3), (60, 110, 70), np.uint8)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import cv2
@@ -45,7 +44,7 @@ def warm(image: np.ndarray, **thresholds: Any) -> Detections:
     return find_warm(image, EVERYWHERE, Warm(**thresholds))
 
 
-def test_shape_of_an_ellipse_comes_out() -> None:
+def test_shape_of_an_ellipse_comes_out():
     inside = ellipse(100, 80, 24, 9, 0.6)
     found = describe(inside.astype(np.int32), 5.0 + 10.0 * inside, EVERYWHERE)
     assert np.allclose(found.uv, [[100, 80]], atol=0.1)
@@ -58,7 +57,7 @@ def test_shape_of_an_ellipse_comes_out() -> None:
     ]  # fmt: skip
 
 
-def test_hu_moments_of_a_lopsided_shape_are_those_of_opencv() -> None:
+def test_hu_moments_of_a_lopsided_shape_are_those_of_opencv():
     inside = ellipse(60, 60, 20, 7, 0.4) | ellipse(75, 75, 9, 9)
     found = describe(inside.astype(np.int32), 1.0 * inside, EVERYWHERE)
     truth = cv2.HuMoments(cv2.moments(inside.astype(np.uint8), binaryImage=True)).ravel()
@@ -78,7 +77,7 @@ def drawn(u: float, v: float, a: float, b: float, angle: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("a", "b", "warmer"), [(9, 5, 20), (4, 3, 40), (18, 9, 60)])
-def test_ellipses_hold_the_true_centre_as_often_as_they_say(a: float, b: float, warmer: float) -> None:
+def test_ellipses_hold_the_true_centre_as_often_as_they_say(a, b, warmer):
     """Things that are seen whole, at places between pixels, blurred and in noise."""
     rng = np.random.default_rng(4)
     squared = []
@@ -94,7 +93,7 @@ def test_ellipses_hold_the_true_centre_as_often_as_they_say(a: float, b: float, 
     assert 0.5 < np.mean(squared) < 3.0
 
 
-def test_what_is_not_seen_widens_the_ellipse() -> None:
+def test_what_is_not_seen_widens_the_ellipse():
     image = ground()
     image[100:105, 90:110] += 60
     whole, part = (by_contrast(image, part=one) for one in (0.0, 0.2))
@@ -103,7 +102,7 @@ def test_what_is_not_seen_widens_the_ellipse() -> None:
     )
 
 
-def test_what_stands_out_is_found_and_what_is_too_small_too_large_or_too_long_is_not() -> None:
+def test_what_stands_out_is_found_and_what_is_too_small_too_large_or_too_long_is_not():
     image = ground()
     image[ellipse(50, 40, 9, 5)] += 40
     image[ellipse(120, 40, 1.2, 1.2)] += 60
@@ -113,7 +112,7 @@ def test_what_stands_out_is_found_and_what_is_too_small_too_large_or_too_long_is
     assert np.allclose(found.uv, [[50, 40]], atol=0.5)
 
 
-def test_two_animals_that_touch_are_two_with_a_share_of_the_peak() -> None:
+def test_two_animals_that_touch_are_two_with_a_share_of_the_peak():
     image = ground(noise=1.0)
     for u in (80, 96):
         image += 80 * np.exp(
@@ -123,7 +122,7 @@ def test_two_animals_that_touch_are_two_with_a_share_of_the_peak() -> None:
     assert len(by_contrast(image, of_peak=0.85)) == 2
 
 
-def test_cold_things_are_found_in_a_black_hot_image_only() -> None:
+def test_cold_things_are_found_in_a_black_hot_image_only():
     image = ground()
     image[ellipse(50, 40, 9, 5)] -= 40
     assert len(by_contrast(image)) == 0
@@ -134,7 +133,7 @@ def test_cold_things_are_found_in_a_black_hot_image_only() -> None:
 # -- F's chain
 
 
-def test_grey_enhancement_and_background_are_those_of_f() -> None:
+def test_grey_enhancement_and_background_are_those_of_f():
     colour = np.random.default_rng(1).integers(0, 256, (20, 30, 3), dtype=np.uint8)
     exact = colour @ np.array([0.299, 0.587, 0.114])
     assert np.abs(to_grey(colour) - exact).max() <= 0.51
@@ -146,7 +145,7 @@ def test_grey_enhancement_and_background_are_those_of_f() -> None:
         assert np.abs(left - np.clip(grey - level, 0, 255)).max() <= 1
 
 
-def test_a_constant_threshold_fails_where_the_background_changes_and_an_adaptive_one_copes() -> None:
+def test_a_constant_threshold_fails_where_the_background_changes_and_an_adaptive_one_copes():
     image = np.linspace(60, 180, 200)[None] + np.zeros((160, 1))
     for u in (30, 170):
         image[ellipse(u, 80, 9, 6)] += 45
@@ -158,7 +157,7 @@ def test_a_constant_threshold_fails_where_the_background_changes_and_an_adaptive
     assert sorted(np.round(found.uv[:, 0]).astype(int).tolist()) == pytest.approx([30, 170], abs=1)
 
 
-def test_block_and_gate_shrink_with_the_distance() -> None:
+def test_block_and_gate_shrink_with_the_distance():
     assert block_from_distance(30, 800) > block_from_distance(60, 800) > block_from_distance(120, 800)
     assert block_from_distance(1e6, 800) == 3
     near, far = gate_from_distance(50, 800), gate_from_distance(100, 800)
@@ -176,7 +175,7 @@ def at(uv: list[list[float]], score: list[float]) -> Detections:
     return describe(labels, 1.0 * (labels > 0), EVERYWHERE, score=score)
 
 
-def test_of_those_too_near_the_surest_stays_or_all_become_one() -> None:
+def test_of_those_too_near_the_surest_stays_or_all_become_one():
     found = at([[20, 20], [28, 20], [36, 20], [100, 20]], [1.0, 3.0, 2.0, 0.5])
     left = remove_near(found, 10)
     assert left.uv[:, 0].tolist() == [28, 100] and left.score.tolist() == [3.0, 0.5]
@@ -195,12 +194,12 @@ def test_of_those_too_near_the_surest_stays_or_all_become_one() -> None:
 
 
 @pytest.mark.parametrize("find", [warm, by_contrast])
-def test_an_even_image_has_nothing(find: Callable[..., Detections]) -> None:
+def test_an_even_image_has_nothing(find):
     assert len(find(np.full((160, 200), 100, np.uint8))) == 0
     assert len(join([no_detections(), no_detections()])) == 0
 
 
-def test_one_grey_level_on_even_ground_is_rounding_and_not_an_animal() -> None:
+def test_one_grey_level_on_even_ground_is_rounding_and_not_an_animal():
     image = np.full((160, 200), 100, np.uint8)
     image[60:70, 90:100] = 101
     assert len(by_contrast(image)) == 0
@@ -208,7 +207,7 @@ def test_one_grey_level_on_even_ground_is_rounding_and_not_an_animal() -> None:
     assert len(by_contrast(image)) == 1
 
 
-def test_what_is_too_hot_for_an_animal_is_left_out_in_kelvin() -> None:
+def test_what_is_too_hot_for_an_animal_is_left_out_in_kelvin():
     """F 8.4: a fire beside a deer, in an image of temperatures."""
     kelvin = np.full((160, 200), 280, np.float32)
     kelvin[ellipse(50, 80, 9, 6)] = 300
@@ -219,7 +218,7 @@ def test_what_is_too_hot_for_an_animal_is_left_out_in_kelvin() -> None:
     assert np.allclose(cool.uv, [[50, 80]], atol=0.1) and cool.intensity[0] == 300
 
 
-def test_f_in_a_black_hot_image_and_beside_a_border() -> None:
+def test_f_in_a_black_hot_image_and_beside_a_border():
     image = np.full((160, 200), 150, np.uint8)
     image[ellipse(50, 80, 9, 6)] = 40
     assert len(warm(image)) == 0
@@ -229,7 +228,7 @@ def test_f_in_a_black_hot_image_and_beside_a_border() -> None:
     assert len(find_warm(image, valid, Warm(warm_is_bright=False))) == 0
 
 
-def test_a_share_of_the_strongest_leaves_the_weak_out() -> None:
+def test_a_share_of_the_strongest_leaves_the_weak_out():
     image = ground(noise=1.0)
     image[ellipse(50, 40, 12, 10)] += 150
     image[ellipse(150, 100, 9, 6)] += 30
@@ -237,7 +236,7 @@ def test_a_share_of_the_strongest_leaves_the_weak_out() -> None:
     assert np.allclose(by_contrast(image, of_image=0.5).uv, [[50, 40]], atol=0.5)
 
 
-def test_noise_of_a_window_keeps_rough_ground_quiet() -> None:
+def test_noise_of_a_window_keeps_rough_ground_quiet():
     rng = np.random.default_rng(2)
     image = ground(noise=1.0)
     image[:, 100:] += cv2.GaussianBlur(rng.normal(0, 60, (160, 100)), (0, 0), 1.5)
@@ -247,7 +246,7 @@ def test_noise_of_a_window_keeps_rough_ground_quiet() -> None:
     assert len(by_window) < len(over_all) / 2 and np.abs(by_window.uv - [50, 80]).sum(axis=1).min() < 1
 
 
-def test_the_warmest_part_of_a_body_is_not_taken_for_all_of_it() -> None:
+def test_the_warmest_part_of_a_body_is_not_taken_for_all_of_it():
     """A hot end: the centre is off by as much as all that stands out lies beside it; the ellipse says so."""
     body, hot = ellipse(90, 80, 20, 6), ellipse(104, 80, 4, 4)
     image = np.full((160, 200), 100.0) + np.random.default_rng(1).normal(0, 1, (160, 200))
@@ -267,7 +266,7 @@ def test_the_warmest_part_of_a_body_is_not_taken_for_all_of_it() -> None:
     assert len(two) == 2 and two.covariance.max() < 0.5
 
 
-def test_limits_of_the_area_are_themselves_allowed() -> None:
+def test_limits_of_the_area_are_themselves_allowed():
     image = np.full((160, 200), 90, np.uint8)
     image[60:66, 40:50] = 200
     # A rectangle of 10 by 6 pixels has 60 of them, whatever its contour's polygon.
@@ -284,7 +283,7 @@ def test_limits_of_the_area_are_themselves_allowed() -> None:
 
 
 @pytest.mark.parametrize("sd", [4.0, 9.0])
-def test_the_ellipse_of_a_warm_animal_grows_with_the_noise_as_it_is(sd: float) -> None:
+def test_the_ellipse_of_a_warm_animal_grows_with_the_noise_as_it_is(sd):
     """With all else as it is, what noise adds goes with its square."""
     image = np.full((160, 200), 60, np.uint8)
     image[ellipse(90, 80, 10, 6)] = 220
@@ -296,7 +295,7 @@ def test_the_ellipse_of_a_warm_animal_grows_with_the_noise_as_it_is(sd: float) -
     assert np.allclose(np.diag(found), np.diag(stated), rtol=0.12)
 
 
-def test_what_touches_a_border_may_go_on_beyond_it_by_as_much_as_is_seen() -> None:
+def test_what_touches_a_border_may_go_on_beyond_it_by_as_much_as_is_seen():
     """Evenly spread over its own extent: a twelfth of its square, across the border that it touches."""
     image = np.full((160, 200), 10.0)
     covariances = []
@@ -309,7 +308,7 @@ def test_what_touches_a_border_may_go_on_beyond_it_by_as_much_as_is_seen() -> No
     assert np.allclose(cut - inside, np.diag([24**2 / 12, 0.0]))
 
 
-def test_an_empty_border_gives_nothing_and_hides_nothing() -> None:
+def test_an_empty_border_gives_nothing_and_hides_nothing():
     image, valid = ground(), EVERYWHERE.copy()
     valid[:30] = False
     valid[100:108, 60:72] = False

@@ -1,7 +1,5 @@
 """Moments of regions against closed forms; Hu's invariants are invariant."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The detector of floating objects, H 4.3, against a second writing of it by scipy, and its choices."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import ndimage

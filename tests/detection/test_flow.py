@@ -1,7 +1,5 @@
 """Features in two images of a known motion, and the velocity of a textured plane from a camera that flies."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import cv2

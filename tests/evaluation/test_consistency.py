@@ -1,7 +1,5 @@
 """NEES, NIS and their limits, against the print, scipy and the definition."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
@@ -24,20 +22,18 @@ from wildlab.evaluation.consistency import (
     ("dof", "runs", "printed", "digits"),
     [(4, 1, (0.48, 11.14), 2), (2, 1, (0.051, 7.38), 2), (2, 50, (1.5, 2.6), 1)],
 )
-def test_limits_as_printed_in_example_3_1(
-    dof: int, runs: int, printed: tuple[float, float], digits: int
-) -> None:
+def test_limits_as_printed_in_example_3_1(dof, runs, printed, digits):
     low, high = chi_square_interval(dof, runs=runs)
     assert (round(low, digits + (printed[0] == 0.051)), round(high, digits)) == printed
 
 
 @pytest.mark.parametrize("arguments", [(0,), (2, 1.0), (2, 0.0), (2, 0.95, 0)])
-def test_limits_that_do_not_exist_are_refused(arguments: tuple[float, ...]) -> None:
+def test_limits_that_do_not_exist_are_refused(arguments):
     with pytest.raises(WildlabError, match=r"(?i)one of each"):
         chi_square_interval(*arguments)  # type: ignore[arg-type]
 
 
-def test_nees_is_its_definition() -> None:
+def test_nees_is_its_definition():
     rng = np.random.default_rng(1)
     root = rng.standard_normal((50, 4, 4))
     P = root @ root.transpose(0, 2, 1) + np.eye(4) * 0.1
@@ -47,14 +43,14 @@ def test_nees_is_its_definition() -> None:
     np.testing.assert_allclose(nis(e, P[0]), [row @ np.linalg.inv(P[0]) @ row for row in e], rtol=1e-9)
 
 
-def test_moments_without_truth_stay_in_their_row() -> None:
+def test_moments_without_truth_stay_in_their_row():
     e = np.array([[1.0, 0.0], [np.nan, 0.0], [0.0, 2.0]])
     np.testing.assert_array_equal(nees(e, np.eye(2)), [1.0, np.nan, 4.0])
     assert share_inside([1.0, np.nan, 4.0], (0.5, 2.0)) == 0.5
     assert np.isnan(share_inside([np.nan], (0.0, 1.0)))
 
 
-def test_a_covariance_that_is_none_is_named_by_its_row() -> None:
+def test_a_covariance_that_is_none_is_named_by_its_row():
     P = np.array([np.eye(2), np.diag([1.0, -1.0])])
     with pytest.raises(WildlabError, match="row 1"):
         nees(np.ones((2, 2)), P)
@@ -63,7 +59,7 @@ def test_a_covariance_that_is_none_is_named_by_its_row() -> None:
 
 
 @pytest.mark.parametrize("claimed", [1.0, 0.5])
-def test_runs_are_those_of_filterpy(claimed: float) -> None:
+def test_runs_are_those_of_filterpy(claimed):
     found = simulate_filter_runs(np.random.default_rng(5), runs=2, steps=4, claimed_noise=claimed)
     rng, F = np.random.default_rng(5), np.kron([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
     push = np.kron([[0.5], [1.0]], np.eye(2)) * 0.3
@@ -81,7 +77,7 @@ def test_runs_are_those_of_filterpy(claimed: float) -> None:
             assert found.nis[run, step] == pytest.approx((kf.y.T @ kf.SI @ kf.y).item())
 
 
-def test_the_truth_has_an_uncertainty_of_its_own() -> None:
+def test_the_truth_has_an_uncertainty_of_its_own():
     rng = np.random.default_rng(6)
     P, own = np.array([[4.0, 1.0], [1.0, 2.0]]), np.diag([0.5, 3.0])
     e = rng.multivariate_normal([0, 0], P, 20_000) + rng.multivariate_normal([0, 0], own, 20_000)
@@ -92,7 +88,7 @@ def test_the_truth_has_an_uncertainty_of_its_own() -> None:
         nees(e, P, np.eye(4))
 
 
-def test_position_alone_is_the_marginal() -> None:
+def test_position_alone_is_the_marginal():
     rng = np.random.default_rng(7)
     root = rng.standard_normal((4, 4))
     P = root @ root.T + np.eye(4)
@@ -103,7 +99,7 @@ def test_position_alone_is_the_marginal() -> None:
     assert kstest(nees(e, P), chi2(4).cdf).pvalue > 0.01
 
 
-def test_whitened_errors_have_unit_covariance() -> None:
+def test_whitened_errors_have_unit_covariance():
     rng = np.random.default_rng(8)
     P = np.array([[9.0, -2.0], [-2.0, 1.0]])
     e = rng.multivariate_normal([0, 0], P, 50_000)
@@ -114,7 +110,7 @@ def test_whitened_errors_have_unit_covariance() -> None:
     np.testing.assert_allclose(np.sum(w[4:] ** 2, axis=1), nees(e, P)[4:])
 
 
-def test_an_average_knows_how_many_values_it_is_of() -> None:
+def test_an_average_knows_how_many_values_it_is_of():
     rng = np.random.default_rng(9)
     inside = [average(rng.chisquare(2, 40), 2).inside for _ in range(3000)]
     assert np.mean(inside) == pytest.approx(0.95, abs=0.012)
@@ -126,7 +122,7 @@ def test_an_average_knows_how_many_values_it_is_of() -> None:
     assert (none.n, none.worth, none.inside) == (0, 0.0, False)
 
 
-def test_values_that_repeat_each_other_are_worth_fewer() -> None:
+def test_values_that_repeat_each_other_are_worth_fewer():
     rng = np.random.default_rng(10)
     inside, naive = [], []
     for _ in range(2000):

@@ -1,7 +1,5 @@
 """Tracks with identities against targets: closed cases, what permutations leave alone, brute force."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
@@ -309,7 +307,7 @@ def test_scans_out_of_order_are_refused():
     assert compare_identities([one, one], CUTOFF).targets == {}
 
 
-def test_the_truth_own_error_is_beside_the_tracks() -> None:
+def test_the_truth_own_error_is_beside_the_tracks():
     """3 m off with 1 m of its own and a truth known to 2 m: 9 over 5 in one axis."""
     one = Scan(0.0, np.array([[3.0, 0.0]]), np.eye(2)[None], ["t"], np.zeros((1, 2)), ["a"], [True], [False],
                truth_sd=[2.0])  # fmt: skip

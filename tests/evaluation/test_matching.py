@@ -1,7 +1,5 @@
 """Detections beside labels: who belongs to whom, and what the shares are worth."""
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np
@@ -11,7 +9,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rule, match, rates
 
 
-def test_as_many_as_possible_belong_together_and_then_the_nearest() -> None:
+def test_as_many_as_possible_belong_together_and_then_the_nearest():
     """Against all assignments of small sets, tried one by one."""
     rng = np.random.default_rng(2)
     rule = Rule(tolerance_px=8, half_diagonal=False)
@@ -28,7 +26,7 @@ def test_as_many_as_possible_belong_together_and_then_the_nearest() -> None:
         assert sum(apart[a, b] for a, b in pairs) == pytest.approx(best[1])
 
 
-def test_a_large_label_reaches_further_and_a_region_is_not_judged() -> None:
+def test_a_large_label_reaches_further_and_a_region_is_not_judged():
     large = [[100, 100, 60, 80]]
     assert len(match([[110, 120]], large).pairs) == 1
     assert len(match([[110, 120]], large, Rule(half_diagonal=False)).pairs) == 0
@@ -38,13 +36,13 @@ def test_a_large_label_reaches_further_and_a_region_is_not_judged() -> None:
     assert len(match([[50, 50]], [[50, 50]], ignore=[[40, 40, 20, 20]]).pairs) == 1
 
 
-def test_overlap_of_boxes() -> None:
+def test_overlap_of_boxes():
     rule = Rule(by="iou", overlap=0.5)
     assert len(match([[0, 0, 10, 10]], [[0, 0, 10, 19]], rule).pairs) == 1
     assert len(match([[0, 0, 10, 10]], [[0, 0, 10, 21]], rule).pairs) == 0
 
 
-def test_shares_are_those_of_the_sums_and_clips_widen_the_intervals() -> None:
+def test_shares_are_those_of_the_sums_and_clips_widen_the_intervals():
     rng = np.random.default_rng(1)
     clip = np.repeat(np.arange(8), 25)
     good = np.repeat(rng.integers(2, 10, 8), 25)
@@ -56,7 +54,7 @@ def test_shares_are_those_of_the_sums_and_clips_widen_the_intervals() -> None:
     assert alone.precision.low < alone.precision.estimate < alone.precision.high
 
 
-def test_intervals_hold_what_they_should() -> None:
+def test_intervals_hold_what_they_should():
     rng = np.random.default_rng(3)
     held = 0
     for _ in range(200):
@@ -66,17 +64,17 @@ def test_intervals_hold_what_they_should() -> None:
     assert 0.90 <= held / 200 <= 0.99
 
 
-def test_few_clips_have_no_interval() -> None:
+def test_few_clips_have_no_interval():
     assert np.isnan(rates([[3, 1, 0]] * 4).f1.low) and np.isfinite(rates([[3, 1, 0]] * 5).f1.low)
 
 
-def test_nothing_at_all_is_no_number() -> None:
+def test_nothing_at_all_is_no_number():
     nothing = rates([[0, 0, 0]])
     assert np.isnan(nothing.f1.estimate) and np.isnan(nothing.f1.low)
     assert match([], []).counts.tolist() == [0, 0, 0] and match([], [[1, 1]]).missed.tolist() == [0]
 
 
-def test_what_cannot_be_boxes_is_refused() -> None:
+def test_what_cannot_be_boxes_is_refused():
     with pytest.raises(WildlabError, match="shape"):
         match([[1, 2, 3]], [])
     with pytest.raises(WildlabError, match="none"):
@@ -85,7 +83,7 @@ def test_what_cannot_be_boxes_is_refused() -> None:
         rates([[1, 0, 0], [1, 0, 0]], ["a"])
 
 
-def test_what_has_not_gone_wrong_yet_may_still() -> None:
+def test_what_has_not_gone_wrong_yet_may_still():
     """Draws of frames that are all alike have no spread: Wilson's interval of as many things stays."""
     z2 = 1.959963984540054**2
     all_found = rates([[2, 0, 0]] * 8)

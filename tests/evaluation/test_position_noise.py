@@ -14,7 +14,7 @@ def boat(t: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("sd", [0.02, 0.5])
-def test_white_noise_is_found_on_a_turning_boat_with_uneven_stamps(sd: float) -> None:
+def test_white_noise_is_found_on_a_turning_boat_with_uneven_stamps(sd):
     rng = np.random.default_rng(1)
     t = np.cumsum(rng.choice([0.04, 0.08, 0.12], 2000))
     found = estimate_position_noise(t, boat(t) + rng.normal(0, [sd, 2 * sd], (2000, 2)))
@@ -22,14 +22,14 @@ def test_white_noise_is_found_on_a_turning_boat_with_uneven_stamps(sd: float) ->
     assert found == pytest.approx([sd, 2 * sd], rel=4 / np.sqrt(1000))
 
 
-def test_rounded_positions_are_wrong_by_the_step_over_the_root_of_twelve() -> None:
+def test_rounded_positions_are_wrong_by_the_step_over_the_root_of_twelve():
     t = np.arange(0, 200, 0.2)
     assert estimate_position_noise(t, np.round(boat(t) / 0.1) * 0.1) == pytest.approx(
         [0.1 / np.sqrt(12)] * 2, rel=0.1
     )
 
 
-def test_of_what_wanders_only_the_part_between_samples_is_seen() -> None:
+def test_of_what_wanders_only_the_part_between_samples_is_seen():
     """White 0.1 m and a metre that wanders over a minute, 5 Hz: the metre is left out, by its closed form."""
     rng, left = np.random.default_rng(2), np.exp(-0.2 / 60)
     wander = [rng.normal(size=2)]
@@ -44,7 +44,7 @@ def test_of_what_wanders_only_the_part_between_samples_is_seen() -> None:
     assert estimate_position_noise(t, boat(t) + 5.0) == pytest.approx(estimate_position_noise(t, boat(t)))
 
 
-def test_gaps_repeated_stamps_and_missing_rows_are_left_out() -> None:
+def test_gaps_repeated_stamps_and_missing_rows_are_left_out():
     rng = np.random.default_rng(3)
     t = np.r_[np.arange(0, 40, 0.2), np.arange(300, 340, 0.2)]
     z = boat(t) + rng.normal(0, 0.1, (len(t), 2))

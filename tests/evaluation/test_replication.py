@@ -1,7 +1,5 @@
 """What a published number and ours come to: by cases made by hand, closed forms and simulation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -31,13 +29,11 @@ Pair = tuple[float, float]
         ("rate", 0.93, 0.9664, (0.925, 0.935), (0.92, 0.98), "not close, within"),
     ],
 )
-def test_two_answers_on_one_flight(
-    kind: str, here: float, published: float, centre: Pair | None, predicted: Pair | None, words: str
-) -> None:
+def test_two_answers_on_one_flight(kind, here, published, centre, predicted, words):
     assert r.compare_flight(kind, here, published, centre=centre, predicted=predicted).words == words
 
 
-def test_of_a_signed_mean_only_compatibility_is_asked_and_only_with_power() -> None:
+def test_of_a_signed_mean_only_compatibility_is_asked_and_only_with_power():
     found = r.compare_flight("signed mean", 3.0, 4.1, predicted=(0.1, 8.0), power=0.1)
     assert found.words == "no power" and found.ratio is None and found.reason == "power 0.10"
     assert r.compare_flight("signed mean", 3.0, 9.1, predicted=(0.1, 8.0), power=0.1).words == "outside"
@@ -51,8 +47,8 @@ def test_of_a_signed_mean_only_compatibility_is_asked_and_only_with_power() -> N
     st.floats(1e-3, 1e3),
 )
 def test_answers_do_not_depend_on_the_unit_nor_on_which_is_called_larger(
-    kind: str, here: float, published: float, down: float, up: float, unit: float
-) -> None:
+    kind, here, published, down, up, unit
+):
     bounds = here / down, here * up
     found = r.compare_flight(kind, here, published, centre=bounds, predicted=bounds).words
     scaled = (here / down * unit, here * up * unit)
@@ -64,7 +60,7 @@ def test_answers_do_not_depend_on_the_unit_nor_on_which_is_called_larger(
 
 
 @pytest.mark.parametrize("n", [5, 6, 19, 20, 100])
-def test_the_interval_of_the_median_holds_it_as_often_as_it_says(n: int) -> None:
+def test_the_interval_of_the_median_holds_it_as_often_as_it_says(n):
     """Coverage by the binomial distribution: the median lies between two order statistics."""
     low, high = order.median_interval(np.arange(1, n + 1))
     assert low + high == n + 1
@@ -74,7 +70,7 @@ def test_the_interval_of_the_median_holds_it_as_often_as_it_says(n: int) -> None
 
 
 @pytest.mark.parametrize("n", [19, 20, 100, 200])
-def test_one_more_flight_lies_outside_as_often_as_the_closed_form_says(n: int) -> None:
+def test_one_more_flight_lies_outside_as_often_as_the_closed_form_says(n):
     """Exact for any distribution: here one with a long tail."""
     flights = np.random.default_rng(n).lognormal(size=(4000, n + 1))
     ends = np.array([order.prediction_interval(one[1:]) for one in flights])
@@ -83,7 +79,7 @@ def test_one_more_flight_lies_outside_as_often_as_the_closed_form_says(n: int) -
     assert outside.mean() == pytest.approx(order.false_outside(n), abs=3 * (0.09 / 4000) ** 0.5)
 
 
-def test_too_few_flights_have_no_interval() -> None:
+def test_too_few_flights_have_no_interval():
     assert (
         np.isnan(order.prediction_interval(range(18))).all()
         and np.isnan(order.median_interval(range(4))).all()
@@ -92,7 +88,7 @@ def test_too_few_flights_have_no_interval() -> None:
     assert np.isnan(r.power_of(range(18), "error size"))
 
 
-def test_power_is_that_of_the_closed_form() -> None:
+def test_power_is_that_of_the_closed_form():
     """Log-normal sizes: a flight with half the errors lies below the interval with a normal probability."""
     for sd in (0.2, 0.42, 0.8):
         values = np.exp(stats.norm.ppf(np.linspace(0.0005, 0.9995, 1000), scale=sd))
@@ -106,7 +102,7 @@ def test_power_is_that_of_the_closed_form() -> None:
     assert r.power_of(sizes, "signed mean") < 0.15
 
 
-def test_operating_characteristics_are_those_of_closed_forms() -> None:
+def test_operating_characteristics_are_those_of_closed_forms():
     n, trials = 200, 400
     found = operating_characteristics(n, factors=(1.0, 1.5, 2.0), trials=trials).set_index(["kind", "factor"])
     close = found[["close", "not close", "cannot tell"]].sum(axis=1)
@@ -128,7 +124,7 @@ def test_operating_characteristics_are_those_of_closed_forms() -> None:
     assert (found.loc["signed mean", "within"] == 0).all() and found.loc[("error size", 2.0), "close"] == 0
 
 
-def test_means_are_compared_by_their_standard_errors() -> None:
+def test_means_are_compared_by_their_standard_errors():
     # The flights' own spread does not enter; a small difference is close, and still more than chance.
     assert r.compare_mean(0.882, 0.9664, 5e-5, 0.0008, 0.0008).words == "not close, outside"
     assert r.compare_mean(0.960, 0.9664, 5e-5, 0.0008, 0.0008).words == "close, outside"
@@ -138,7 +134,7 @@ def test_means_are_compared_by_their_standard_errors() -> None:
         assert r.compare_mean(0.964, 0.966, 5e-5, error, published).words == "not judged"
 
 
-def test_calculations_are_compared_by_what_rounding_leaves_open() -> None:
+def test_calculations_are_compared_by_what_rounding_leaves_open():
     assert r.compare_calculation(5.35, 5.3, 0.05).words == "close"
     off = r.compare_calculation(5.46, 5.3, 0.05)
     assert off.words == "not close" and off.reason.endswith("3.0 % off")
@@ -151,7 +147,7 @@ def test_calculations_are_compared_by_what_rounding_leaves_open() -> None:
 
 
 @given(st.lists(st.floats(-3, 3), min_size=2, max_size=2), st.floats(0, 0.2), st.floats(0, 0.2))
-def test_rounded_inputs_are_propagated(inputs: list[float], a: float, b: float) -> None:
+def test_rounded_inputs_are_propagated(inputs, a, b):
     """Of a sum exactly: the corners of the box."""
     low, high = r.propagate_rounding(lambda x: [x[0] ** 3 - 2 * x[1], x[1]], inputs, [a, b])
     x, y = inputs
@@ -160,7 +156,7 @@ def test_rounded_inputs_are_propagated(inputs: list[float], a: float, b: float) 
     assert (low[1], high[1]) == pytest.approx((y - b, y + b))
 
 
-def test_a_share_of_images_is_close_by_its_interval() -> None:
+def test_a_share_of_images_is_close_by_its_interval():
     """All of 4903 found stands for what a share of that many may be."""
     share = (0.99945, 1.0)
     for low, high, words in (
@@ -172,7 +168,7 @@ def test_a_share_of_images_is_close_by_its_interval() -> None:
         assert found.closeness == words
 
 
-def test_rounding_adds_to_what_is_close_and_to_what_is_within() -> None:
+def test_rounding_adds_to_what_is_close_and_to_what_is_within():
     """0.08 stands for 0.075 to 0.085."""
     near = {"centre": (0.1055, 0.106), "predicted": (0.0845, 0.2)}
     assert r.compare_flight("error size", 0.1058, 0.08, **near).words == "not close, outside"

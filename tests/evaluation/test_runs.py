@@ -1,7 +1,5 @@
 """Intervals for a mean and for a share of independent runs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import binomtest, ttest_1samp
@@ -11,7 +9,7 @@ from wildlab.evaluation import mean_interval, mean_share_interval, share_interva
 
 
 @pytest.mark.parametrize("probability", [0.5, 0.95])
-def test_mean_is_students(probability: float) -> None:
+def test_mean_is_students(probability):
     values = np.array([3.0, 5.0, 4.5, 9.0])
     known = ttest_1samp(values, 0.0).confidence_interval(probability)
     found = mean_interval([*values, np.nan], probability)
@@ -20,21 +18,21 @@ def test_mean_is_students(probability: float) -> None:
 
 @pytest.mark.parametrize(("count", "runs"), [(0, 8), (3, 8), (8, 8), (170, 200)])
 @pytest.mark.parametrize("probability", [0.9, 0.95])
-def test_share_is_that_of_wilson(count: int, runs: int, probability: float) -> None:
+def test_share_is_that_of_wilson(count, runs, probability):
     known = binomtest(count, runs).proportion_ci(probability, method="wilson")
     assert share_interval(count, runs, probability) == pytest.approx(
         (count / runs, known.low, known.high), abs=1e-9
     )
 
 
-def test_few_runs_have_a_mean_and_no_interval() -> None:
+def test_few_runs_have_a_mean_and_no_interval():
     for found in (mean_interval([1.0, np.nan]), mean_share_interval([1.0])):
         assert found.estimate == 1.0 and np.isnan(found[1:]).all()
     for nothing in (mean_interval([]), mean_share_interval([np.nan]), share_interval(0, 0)):
         assert np.isnan(nothing).all()
 
 
-def test_what_has_no_interval_is_refused() -> None:
+def test_what_has_no_interval_is_refused():
     with pytest.raises(WildlabError, match="probability 1"):
         mean_interval([1.0, 2.0], 1.0)
     for count, runs, probability in ((1, 0, 0.95), (-1, 5, 0.95), (6, 5, 0.95), (1, 5, 0.0)):

@@ -37,7 +37,7 @@ def drawn(seed: int, frames: int = 30) -> list[ScoredFrame]:
     return made
 
 
-def test_by_hand() -> None:
+def test_by_hand():
     """Three labels; right, wrong, right, wrong by falling score, one never found; COCO's mean of 101 recalls.
 
     Recall 1/3 with precision 1 up to recall 0.33 (34 points), 2/3 with precision 2/3 up to 0.66 (33 points).
@@ -52,7 +52,7 @@ def test_by_hand() -> None:
     assert np.isnan(curve.average_precision.low)  # of one frame there is no interval
 
 
-def test_each_level_is_what_matching_says_of_what_is_above_it() -> None:
+def test_each_level_is_what_matching_says_of_what_is_above_it():
     frames, rule = drawn(1), Rule(by="iou")
     curve = curve_along_score(frames, rule=rule)
     for row in (0, 7, len(curve.levels) - 1):
@@ -66,7 +66,7 @@ def test_each_level_is_what_matching_says_of_what_is_above_it() -> None:
     assert low < curve.average_precision.estimate < high
 
 
-def test_scores_that_are_stretched_change_nothing_and_reversed_ones_do() -> None:
+def test_scores_that_are_stretched_change_nothing_and_reversed_ones_do():
     frames = drawn(2)
     same = [one._replace(scores=np.exp(one.scores)) for one in frames]
     turned = [one._replace(scores=-one.scores) for one in frames]
@@ -74,7 +74,7 @@ def test_scores_that_are_stretched_change_nothing_and_reversed_ones_do() -> None
     assert areas[0] == areas[1] and areas[2].estimate < areas[0].low
 
 
-def test_nothing_found_nothing_labelled_and_no_score() -> None:
+def test_nothing_found_nothing_labelled_and_no_score():
     box, empty = np.array([[0.0, 0, 4, 4]]), np.zeros(0)
     assert curve_along_score([ScoredFrame(NONE, empty, box, NONE)]).average_precision.estimate == 0
     unlabelled = curve_along_score([ScoredFrame(box, np.ones(1), NONE, NONE)])
@@ -88,14 +88,14 @@ def test_nothing_found_nothing_labelled_and_no_score() -> None:
         curve_along_score([ScoredFrame(box, np.array([np.nan]), box, NONE)])
 
 
-def test_levels_keep_the_first_and_the_last() -> None:
+def test_levels_keep_the_first_and_the_last():
     scores = np.random.default_rng(1).random(5000)
     levels = score_levels(scores, 50)
     assert len(levels) == 50 and (levels[0], levels[-1]) == (scores.max(), scores.min())
     assert (np.diff(levels) < 0).all()
 
 
-def test_a_difference_is_of_the_same_draws() -> None:
+def test_a_difference_is_of_the_same_draws():
     """Two detectors that differ by nothing but one frame each: hard frames are hard for both."""
     rng = np.random.default_rng(1)
     counts = np.column_stack([rng.integers(0, 9, 40), rng.integers(0, 9, 40), rng.integers(0, 9, 40)])

@@ -1,7 +1,5 @@
 """OSPA and GOSPA: closed forms, the axioms of a metric, and each against its definition by brute force."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

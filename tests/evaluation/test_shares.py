@@ -1,7 +1,5 @@
 """What a share of flights allows to be said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import binom, ttest_rel
@@ -32,12 +30,12 @@ from wildlab.evaluation import shares as s
         (0, 1, s.UNDECIDED),
     ],
 )
-def test_the_interval_decides(count: int, flights: int, verdict: str) -> None:
+def test_the_interval_decides(count, flights, verdict):
     assert s.share_verdict(share_interval(count, flights)) == verdict
     assert s.decide(np.arange(flights) < count).verdict == verdict
 
 
-def test_a_denial_is_judged_as_the_mirror_of_its_claim() -> None:
+def test_a_denial_is_judged_as_the_mirror_of_its_claim():
     mirror = dict(zip(s.SHARE_VERDICTS, reversed(s.SHARE_VERDICTS), strict=True))
     for n in (7, 40, 200):
         for k in range(n + 1):
@@ -45,7 +43,7 @@ def test_a_denial_is_judged_as_the_mirror_of_its_claim() -> None:
             assert mirror[there] == back
 
 
-def test_only_flights_that_meet_the_premise_are_asked() -> None:
+def test_only_flights_that_meet_the_premise_are_asked():
     true, met = np.arange(100) < 50, np.arange(100) < 60
     found = s.decide(true, met)
     assert (found.true, found.met, found.flights) == (50, 60, 100)
@@ -54,13 +52,13 @@ def test_only_flights_that_meet_the_premise_are_asked() -> None:
     assert (none.verdict, none.share, none.met) == (s.NO_PREMISE, None, 49)
 
 
-def test_what_cannot_be_decided_is_refused() -> None:
+def test_what_cannot_be_decided_is_refused():
     for true, premise in (([], None), ([True, False], [True])):
         with pytest.raises(WildlabError, match="premise"):
             s.decide(true, premise)
 
 
-def test_a_measure_is_held_against_the_threshold() -> None:
+def test_a_measure_is_held_against_the_threshold():
     measured = np.array([0.1, 0.2, 0.3, np.nan])
     assert s.Check(measured=measured).holds(0.25).tolist() == [True, True, False, False]
     assert s.Check(measured=measured, above=True).holds(0.25).tolist() == [False, False, True, False]
@@ -73,7 +71,7 @@ def test_a_measure_is_held_against_the_threshold() -> None:
             check.holds()
 
 
-def test_a_threshold_may_say_what_is_counted() -> None:
+def test_a_threshold_may_say_what_is_counted():
     yes, no = np.array([True, True]), np.array([True, False])
     check = s.Check(by_threshold={5.0: no, 10.0: yes}, first=np.ones(2), second=np.zeros(2))
     assert check.holds(5).tolist() == [True, False] and check.holds(10).all()
@@ -83,13 +81,13 @@ def test_a_threshold_may_say_what_is_counted() -> None:
         check.holds(7)
 
 
-def test_a_threshold_at_the_end_of_what_can_be_measured_alone_gives_the_answer() -> None:
+def test_a_threshold_at_the_end_of_what_can_be_measured_alone_gives_the_answer():
     for above, reaches in ((True, [True, True, False]), (False, [False, True, True])):
         check = s.Check(measured=np.array([0.5]), above=above, reach=(0.0, 1.0))
         assert [check.reaches(threshold) for threshold in (0.0, 0.5, 1.0)] == reaches
 
 
-def test_a_paired_difference_has_students_interval() -> None:
+def test_a_paired_difference_has_students_interval():
     rng = np.random.default_rng(1)
     first, second = rng.normal(5, 2, 30), rng.normal(4, 2, 30)
     known = ttest_rel(first, second).confidence_interval(0.95)
@@ -99,7 +97,7 @@ def test_a_paired_difference_has_students_interval() -> None:
 
 
 @pytest.mark.parametrize("flights", [35, 40, 50, 60, 80, 100, 150, 200, 300])
-def test_how_often_chance_makes_a_verdict_wrong(flights: int) -> None:
+def test_how_often_chance_makes_a_verdict_wrong(flights):
     counts = np.arange(flights + 1)
     verdicts = np.array([s.share_verdict(share_interval(int(k), flights)) for k in counts])
     for border, wrong in ((0.9, [s.HOLDS]), (0.5, [s.HOLDS, s.MOSTLY]), (0.1, [s.FAILS])):
@@ -118,31 +116,29 @@ def test_how_often_chance_makes_a_verdict_wrong(flights: int) -> None:
         (0, 0, False, s.NO_PREMISE),
     ],
 )
-def test_images_together_are_held_against_the_threshold(
-    count: int, of: int, above: bool, verdict: str
-) -> None:
+def test_images_together_are_held_against_the_threshold(count, of, above, verdict):
     check = s.Check(measured=np.zeros(6), pooled=s.Pooled(count, of), above=above)
     assert s.decide_check(check, 0.01).verdict == verdict
 
 
-def test_images_together_need_a_threshold() -> None:
+def test_images_together_need_a_threshold():
     with pytest.raises(WildlabError, match="no threshold"):
         s.decide_check(s.Check(measured=np.zeros(6), pooled=s.Pooled(0, 48)))
 
 
-def test_a_calculation_holds_or_does_not_and_has_no_share() -> None:
+def test_a_calculation_holds_or_does_not_and_has_no_share():
     check = s.Check(measured=np.array([0.55, 0.57]), calculated=True)
     found = [s.decide_check(check, threshold) for threshold in (1.0, 0.5, 0.56)]
     assert [one.verdict for one in found] == [s.HOLDS, s.FAILS, s.UNDECIDED]
     assert all(one.share is None for one in found)
 
 
-def test_any_other_check_is_decided_by_flights() -> None:
+def test_any_other_check_is_decided_by_flights():
     true, premise = np.arange(40) < 30, np.arange(40) < 38
     assert s.decide_check(s.Check(true=true, premise=premise)) == s.decide(true, premise)
 
 
-def test_what_no_flight_measures_is_not_decided_and_a_flight_without_counts_against() -> None:
+def test_what_no_flight_measures_is_not_decided_and_a_flight_without_counts_against():
     none, few = np.full(40, np.nan), np.r_[np.full(30, np.nan), np.zeros(10)]
     assert s.decide_check(s.Check(measured=none), 1.0).verdict == s.NO_PREMISE
     found = s.decide_check(s.Check(measured=few), 1.0)

@@ -1,7 +1,5 @@
 """Track errors against geometry that can be done in the head."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

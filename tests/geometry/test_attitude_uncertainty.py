@@ -33,7 +33,7 @@ def attitudes(number: int, seed: int = 0) -> np.ndarray:
     return Rotation.random(number, np.random.default_rng(seed)).as_matrix()
 
 
-def test_the_axes_are_two_level_ones_and_the_vertical() -> None:
+def test_the_axes_are_two_level_ones_and_the_vertical():
     R = np.concatenate([attitudes(500), [np.eye(3), np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, 1.0, -1.0])]])
     A = level_axes(R)
     np.testing.assert_allclose(np.swapaxes(A, 1, 2) @ A, np.tile(np.eye(3), (len(R), 1, 1)), atol=1e-12)
@@ -42,7 +42,7 @@ def test_the_axes_are_two_level_ones_and_the_vertical() -> None:
     assert np.isnan(level_axes(np.full((2, 3, 3), np.nan))).all()
 
 
-def test_the_axes_stay_with_a_body_that_tilts() -> None:
+def test_the_axes_stay_with_a_body_that_tilts():
     """No jump on the way through straight down, as Euler angles have one."""
     pitch = np.radians(np.linspace(0, -170, 500))
     A = level_axes(euler_to_matrix(np.full(500, 0.02), pitch, np.full(500, 1.0)))
@@ -50,7 +50,7 @@ def test_the_axes_stay_with_a_body_that_tilts() -> None:
     np.testing.assert_allclose(level_axes(euler_to_matrix(0.0, 0.0, 2.0)), np.eye(3), atol=1e-12)
 
 
-def test_the_covariance_is_that_of_rotations_about_level_axes_and_the_vertical() -> None:
+def test_the_covariance_is_that_of_rotations_about_level_axes_and_the_vertical():
     R, tilt, heading = attitudes(200), 0.02, 0.05
     in_n = R @ attitude_covariance(tilt, heading, R) @ np.swapaxes(R, 1, 2)
     np.testing.assert_allclose(
@@ -60,7 +60,7 @@ def test_the_covariance_is_that_of_rotations_about_level_axes_and_the_vertical()
     np.testing.assert_allclose(A @ np.swapaxes(A, 1, 2), attitude_covariance(tilt, heading, R), atol=1e-15)
 
 
-def test_a_pose_has_a_position_too_and_the_two_are_independent() -> None:
+def test_a_pose_has_a_position_too_and_the_two_are_independent():
     R = attitudes(3)
     P = pose_covariance(2.0, 3.0, 0.02, 0.05, R)
     np.testing.assert_allclose(P[:, :3, :3], np.tile(np.diag([4.0, 4.0, 9.0]), (3, 1, 1)))
@@ -68,14 +68,14 @@ def test_a_pose_has_a_position_too_and_the_two_are_independent() -> None:
     assert (P[:, :3, 3:] == 0).all() and (P[:, 3:, :3] == 0).all()
 
 
-def test_what_is_read_from_a_covariance_is_what_was_put_in() -> None:
+def test_what_is_read_from_a_covariance_is_what_was_put_in():
     R, rng = attitudes(200), np.random.default_rng(1)
     tilt, heading = rng.uniform(0.001, 0.1, (2, 200))
     found = tilt_and_heading(attitude_covariance(tilt, heading, R), R)
     np.testing.assert_allclose(found, [tilt, heading], rtol=1e-9)
 
 
-def test_level_it_is_the_covariance_of_roll_pitch_and_yaw() -> None:
+def test_level_it_is_the_covariance_of_roll_pitch_and_yaw():
     """By finite differences of Euler angles, to first order in roll and pitch."""
     sd = np.radians([1.0, 1.0, 3.0])
     for roll, pitch, yaw in ((0.0, 0.0, 0.7), (0.02, -0.03, -2.0)):
@@ -174,7 +174,7 @@ def coverage(pitch: float, kind: str, on_hills: bool) -> tuple[float, np.ndarray
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("on_hills", [False, True])
-def test_ellipses_hold_what_they_say_at_every_pitch(kind: str, on_hills: bool) -> None:
+def test_ellipses_hold_what_they_say_at_every_pitch(kind, on_hills):
     shares = {pitch: coverage(pitch, kind, on_hills) for pitch in PITCHES}
     for pitch, (share, axes) in shares.items():
         where = "hills" if on_hills else "plane"
@@ -182,7 +182,7 @@ def test_ellipses_hold_what_they_say_at_every_pitch(kind: str, on_hills: bool) -
     assert all(0.87 <= share <= 0.93 for share, _ in shares.values()), shares
 
 
-def test_straight_down_an_isotropic_error_makes_a_circle() -> None:
+def test_straight_down_an_isotropic_error_makes_a_circle():
     """One degree at 60 m: 60 m * 1 deg * sqrt(-2 ln 0.1) = 2.25 m, both ways."""
     pose = CameraPoses(
         CAMERA, Mount("forward"), np.array([0.0, 0.0, -60.0]), euler_to_matrix(0.0, -np.pi / 2, 0.3)

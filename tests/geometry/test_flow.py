@@ -1,7 +1,5 @@
 """Flow and velocity: finite differences of the exact projection are the truth of every derivative."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Quantiles against scipy.stats, at every probability and number of degrees of freedom."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 
@@ -19,19 +17,19 @@ freedoms = st.floats(-2.0, 1e4) | st.integers(-1, 500) | st.just(float("nan"))
 
 @given(probabilities, freedoms)
 @example(0.975, 0)
-def test_quantiles_are_those_of_scipy_stats(probability: float, dof: float) -> None:
+def test_quantiles_are_those_of_scipy_stats(probability, dof):
     np.testing.assert_equal(chi2_quantile(probability, dof), float(stats.chi2.ppf(probability, dof)))
     np.testing.assert_equal(student_quantile(probability, dof), float(stats.t.ppf(probability, dof)))
     np.testing.assert_equal(normal_quantile(probability), float(stats.norm.ppf(probability)))
 
 
 @given(st.floats(-5.0, 1e4) | st.sampled_from([0.0, float("inf"), float("nan")]), freedoms)
-def test_the_tail_is_that_of_scipy_stats(value: float, dof: float) -> None:
+def test_the_tail_is_that_of_scipy_stats(value, dof):
     np.testing.assert_equal(chi2_beyond(value, dof), float(stats.chi2.sf(value, dof)))
 
 
 @pytest.mark.slow
-def test_a_report_does_without_scipy_stats() -> None:
+def test_a_report_does_without_scipy_stats():
     rooms = "reporting.report", "pipeline.accuracy", "pipeline.navigation_errors", "runner.processes.job"
     imports = "; ".join(f"import wildlab.{room}" for room in rooms)
     code = f"import sys; {imports}; print('scipy.stats' in sys.modules)"

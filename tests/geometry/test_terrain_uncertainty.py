@@ -53,7 +53,7 @@ def hills(rng: np.random.Generator, rough: float) -> Terrain:
 
 
 @pytest.mark.parametrize("slope", [(0.0, 0.0), (0.25, -0.5), (-0.125, 0.75)])
-def test_the_derivatives_are_those_of_finite_differences(slope) -> None:
+def test_the_derivatives_are_those_of_finite_differences(slope):
     terrain, pose, uv = sloping(*slope), looking(50.0, 100.0), np.array([[150.0, 400.0]])
     at = pixels_to_terrain(pose, uv, terrain).points
     J = terrain_jacobians(pose, uv, at, terrain.slopes_at(at[:, :2]))
@@ -93,7 +93,7 @@ def _place(terrain: Terrain) -> tuple[float, float, float]:
     return terrain.north, terrain.east, terrain.step
 
 
-def test_on_level_ground_it_is_what_a_plane_gives() -> None:
+def test_on_level_ground_it_is_what_a_plane_gives():
     terrain, uv = sloping(0.0, 0.0), np.array([[100.0, 50.0], [320.0, 256.0], [600.0, 500.0]])
     pose, e = looking(55.0, 120.0), errors()
     at = pixels_to_terrain(pose, uv, terrain).points
@@ -109,7 +109,7 @@ def test_on_level_ground_it_is_what_a_plane_gives() -> None:
     assert list(found.method) == ["linear"] * 3
 
 
-def test_samples_are_those_of_each_error_by_itself() -> None:
+def test_samples_are_those_of_each_error_by_itself():
     """One pixel, one pose, one terrain at a time: raised, turned and moved as the draws say."""
     rng = np.random.default_rng(3)
     terrain, pose, uv, e = hills(rng, 3.0), looking(45.0, 90.0), np.array([200.0, 300.0]), errors()
@@ -129,7 +129,7 @@ def test_samples_are_those_of_each_error_by_itself() -> None:
 
 
 @pytest.mark.parametrize(("rough", "flattest"), [(0.0, 20.0), (3.0, 45.0), (10.0, 20.0)])
-def test_ellipses_hold_nine_tenths_of_samples_on_slopes(rough: float, flattest: float) -> None:
+def test_ellipses_hold_nine_tenths_of_samples_on_slopes(rough, flattest):
     """Random hills and poses, samples of other seeds: 85 to 95 % of each, and 90 % of all together."""
     inside = []
     for seed in range(4):
@@ -160,7 +160,7 @@ def ridge(height: float = 12.0) -> Terrain:
     return Terrain(np.tile(wall[:, None], (1, 500)).astype(np.float32), -200.0, -500.0, 2.0)
 
 
-def test_over_a_ridge_samples_decide_and_it_is_said() -> None:
+def test_over_a_ridge_samples_decide_and_it_is_said():
     """A ray that just clears the wall: some of its like end on it, some far behind."""
     level = Mount("down", tilt=np.radians(60.0))
     e, uv = errors(0.3, 0.3), np.array([[320.0, 256.0]])
@@ -176,7 +176,7 @@ def test_over_a_ridge_samples_decide_and_it_is_said() -> None:
     assert clear.method[0] == "linear"
 
 
-def test_beyond_the_map_there_is_no_ellipse() -> None:
+def test_beyond_the_map_there_is_no_ellipse():
     """A hill's top before the sky, the end of the map before nothing: no ellipse pretends to know."""
     e, uv = errors(), np.array([[320.0, 256.0], [320.0, 256.0], [320.0, 256.0]])
     mount = Mount("down", tilt=np.radians(75.0))
@@ -187,7 +187,7 @@ def test_beyond_the_map_there_is_no_ellipse() -> None:
     assert np.isnan(found.covariance).all()
 
 
-def test_errors_of_another_number_are_refused() -> None:
+def test_errors_of_another_number_are_refused():
     e = errors()._replace(plane=np.ones(3))
     with pytest.raises(WildlabError, match="2 pixels"):
         terrain_covariance(looking(60.0, 50.0), np.ones((2, 2)), sloping(0, 0), e, np.random.default_rng(0))

@@ -21,13 +21,13 @@ def some_rows(count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 @given(st.integers(0, 10_000))
-def test_the_compiled_way_is_scipys(seed: int) -> None:
+def test_the_compiled_way_is_scipys(seed):
     q, rows = attitudes(30, seed), some_rows(30, seed)
     assert np.abs(between_attitudes(q, *rows) - between_attitudes_by_scipy(q, *rows)).max() < 1e-12
 
 
 @given(st.floats(1e-16, 1e-3), st.floats(0, 1))
-def test_small_turns_keep_their_digits(angle: float, share: float) -> None:
+def test_small_turns_keep_their_digits(angle, share):
     ends = Rotation.from_rotvec([[0.3, -0.2, 0.9], [0.3, -0.2, 0.9]])
     ends = ends * Rotation.from_rotvec([[0.0, 0.0, 0.0], [angle, 0.0, 0.0]])
     q = ends.as_quat(scalar_first=True)
@@ -37,7 +37,7 @@ def test_small_turns_keep_their_digits(angle: float, share: float) -> None:
     assert np.abs(turned - [share * angle, 0.0, 0.0]).max() < 8 * np.finfo(float).eps
 
 
-def test_an_even_turn_about_one_axis_has_a_closed_form() -> None:
+def test_an_even_turn_about_one_axis_has_a_closed_form():
     begin, end = 0.2, 2.9
     q = np.array([[np.cos(a / 2), 0.0, 0.0, np.sin(a / 2)] for a in (begin, end)])
     share = np.linspace(0, 1, 11)
@@ -45,14 +45,14 @@ def test_an_even_turn_about_one_axis_has_a_closed_form() -> None:
     assert np.allclose(np.arctan2(R[:, 1, 0], R[:, 0, 0]), begin + share * (end - begin), atol=1e-14)
 
 
-def test_a_quaternion_and_its_negative_are_the_same_attitude() -> None:
+def test_a_quaternion_and_its_negative_are_the_same_attitude():
     q, (before, after, share) = attitudes(30, 5), some_rows(30, 5)
     turned = q * np.where(np.arange(30) % 2, -1.0, 1.0)[:, None]
     same = between_attitudes(q, before, after, share) - between_attitudes(turned, before, after, share)
     assert np.abs(same).max() < 1e-12
 
 
-def test_what_is_not_known_is_nan_in_its_row() -> None:
+def test_what_is_not_known_is_nan_in_its_row():
     q = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [np.nan, 0, 0, 0], [0, 0, 0, 0.0], [np.inf, 0, 0, 0]])
     before, after = np.array([0, 0, 2, 3, 0, 4, 0]), np.array([0, 2, 0, 0, 1, 0, 1])
     R = between_attitudes(q, before, after, np.array([0.5, 0.5, 0.5, 0.5, np.nan, 0.5, 1.0]))

@@ -1,7 +1,5 @@
 """What a flight has seen, what hides a point, pixels on slopes, outlines: beside brute force and algebra."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Viewsheds of a real terrain beside those of GRASS and GDAL, where the data are at hand."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

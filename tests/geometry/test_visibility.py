@@ -1,7 +1,5 @@
 """What a camera sees of a terrain, beside lines followed in small steps and beside the whole map."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """What the navigation filters refuse: each error names the field, the row and what was found."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

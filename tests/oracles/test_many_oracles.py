@@ -1,7 +1,5 @@
 """Whose a measurement is, by Stone Soup's joint probabilistic data association on the same tracks."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 
 import numpy as np
@@ -13,7 +11,7 @@ from wildlab.tracking.many.update import compare
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_joint_probabilities_agree_with_stone_soup(seed: int) -> None:
+def test_joint_probabilities_agree_with_stone_soup(seed):
     pytest.importorskip("stonesoup")
     from stonesoup.dataassociator.probability import JPDA
     from stonesoup.hypothesiser.probability import PDAHypothesiser

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -48,7 +47,7 @@ def antenna() -> Flight:
 
 
 @pytest.mark.slow
-def test_within_20_ms_from_known_points(tracking: Flight) -> None:
+def test_within_20_ms_from_known_points(tracking):
     shift = -14.05
     found = camera_clock_by_points(late(tracking, shift), "autopilot")
     assert found.offset_s == pytest.approx(shift, abs=0.020)
@@ -60,7 +59,7 @@ def test_within_20_ms_from_known_points(tracking: Flight) -> None:
 
 
 @pytest.mark.slow
-def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna: Flight) -> None:
+def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna):
     """One degree for half a minute at 350 m: more than the clock's 20 ms can be told from."""
     found = camera_clock_by_points(late(antenna, 0.8), "autopilot-uncalibrated")
     assert found.certain
@@ -73,7 +72,7 @@ def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna: Flight) -
 
 
 @pytest.mark.slow
-def test_what_cannot_be_estimated_is_refused(tracking: Flight) -> None:
+def test_what_cannot_be_estimated_is_refused(tracking):
     nobody = changed(tracking, truth=tracking.table("truth").head(0))
     with refused("0 detections"):
         camera_clock_by_points(nobody, "autopilot")
@@ -107,7 +106,7 @@ def over_land(flight: Flight, first: int, count: int) -> Iterator[Frame]:
 
 
 @pytest.mark.slow
-def test_from_the_motion_of_images(antenna: Flight) -> None:
+def test_from_the_motion_of_images(antenna):
     found = by_motion_in_words(late(antenna, 1.3), over_land(antenna, 3000, 160), "autopilot")
     assert found.numbers["certain"], found.sentence
     assert found.numbers["offset_s"] == pytest.approx(1.3, abs=0.030)
@@ -117,7 +116,7 @@ def test_from_the_motion_of_images(antenna: Flight) -> None:
 
 
 @pytest.mark.slow
-def test_from_attitudes_where_there_is_no_gyro(antenna: Flight) -> None:
+def test_from_attitudes_where_there_is_no_gyro(antenna):
     bare = replace(antenna, tables={k: v for k, v in antenna.tables.items() if k != "imu"})
     bare = late(bare, -4.2)
     camera = antenna.manifest.geometry_camera()
@@ -127,7 +126,7 @@ def test_from_attitudes_where_there_is_no_gyro(antenna: Flight) -> None:
     assert found.certain and found.offset_s == pytest.approx(-4.2, abs=0.040)
 
 
-def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna: Flight) -> None:
+def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna):
     still = pd.DataFrame(antenna.table("frames")).iloc[3000:3040]
     rng = np.random.default_rng(1)
     pattern = rng.normal(120, 30, (512, 640))
@@ -144,7 +143,7 @@ def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna: Flight) ->
 
 
 @pytest.mark.slow
-def test_the_command_writes_a_curve_and_sets_the_offset(tracking: Flight, tmp_path: Path) -> None:
+def test_the_command_writes_a_curve_and_sets_the_offset(tracking, tmp_path):
     folder, curve = tmp_path / "flight", tmp_path / "curve.csv"
     save_flight(late(tracking, 0.25), folder)
 

@@ -108,7 +108,7 @@ def write_survey(folder: Path, kind: str, pitch_deg: float) -> pd.DataFrame:
     ("kind", "pitch_deg"),
     [("tilt and heading", -90.0), ("roll, pitch and yaw", -50.0), ("uncertainty", -90.0), ("nothing", -90.0)],
 )
-def test_ellipses_through_import_and_georeference(tmp_path: Path, kind: str, pitch_deg: float) -> None:
+def test_ellipses_through_import_and_georeference(tmp_path, kind, pitch_deg):
     marks = write_survey(tmp_path, kind, pitch_deg)
     recipe, flight_folder, points_file = (tmp_path / name for name in ("recipe.toml", "flight", "points.csv"))
     for call in (

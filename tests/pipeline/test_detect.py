@@ -50,7 +50,7 @@ def folder(path: Path, count: int = 6) -> Path:
     return path
 
 
-def test_tables_hold_what_was_put_in(tmp_path: Path) -> None:
+def test_tables_hold_what_was_put_in(tmp_path):
     frames = open_frames(folder(tmp_path / "in"))
     done = run_detection(frames, tmp_path / "out", "contrast", Contrast())
     assert len(done.detections) == 12 and len(done.frames) == 6 and done.kept == 0
@@ -62,9 +62,7 @@ def test_tables_hold_what_was_put_in(tmp_path: Path) -> None:
     assert (read["cov_uu_px2"] * read["cov_vv_px2"] > read["cov_uv_px2"] ** 2).all()
 
 
-def test_a_run_that_was_broken_off_goes_on_and_gives_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_was_broken_off_goes_on_and_gives_the_same(tmp_path, monkeypatch):
     monkeypatch.setattr(subject, "PART", 4)
     frames = open_frames(folder(tmp_path / "in", 11))
     whole = run_detection(frames, tmp_path / "whole", "contrast", Contrast())
@@ -91,7 +89,7 @@ def test_a_run_that_was_broken_off_goes_on_and_gives_the_same(
     assert run_detection(frames, tmp_path / "out", "contrast", Contrast(peak=10)).kept == 0
 
 
-def test_frames_that_cannot_be_used_stay_in_the_denominator(tmp_path: Path) -> None:
+def test_frames_that_cannot_be_used_stay_in_the_denominator(tmp_path):
     path = folder(tmp_path / "in")
     (path / "002.png").write_bytes((path / "002.png").read_bytes()[:300])
     (path / "005.png").unlink()
@@ -103,7 +101,7 @@ def test_frames_that_cannot_be_used_stay_in_the_denominator(tmp_path: Path) -> N
     assert sorted(judged.things["verdict"].unique()) == ["found", "missed"]
 
 
-def test_labels_of_other_frames_are_refused(tmp_path: Path) -> None:
+def test_labels_of_other_frames_are_refused(tmp_path):
     path = folder(tmp_path / "in")
     done = run_detection(open_frames(path), tmp_path / "out", "contrast", Contrast())
     (path / "other.csv").write_text("image,x,y,w,h\nnone.png,1,1,2,2\n")
@@ -111,7 +109,7 @@ def test_labels_of_other_frames_are_refused(tmp_path: Path) -> None:
         judge_detections(done.detections, done.frames, read_labels(path / "other.csv"))
 
 
-def test_thresholds_are_judged_where_they_were_not_chosen() -> None:
+def test_thresholds_are_judged_where_they_were_not_chosen():
     """Two clips whose animals differ in size: what suits one misses the other, and the fit has to say so."""
     rng = np.random.default_rng(1)
     samples = []
@@ -130,7 +128,7 @@ def test_thresholds_are_judged_where_they_were_not_chosen() -> None:
         fit_thresholds("contrast", samples[::2], tried=[small])
 
 
-def test_samples_keep_groups_and_stretches_of_a_clip_together(tmp_path: Path) -> None:
+def test_samples_keep_groups_and_stretches_of_a_clip_together(tmp_path):
     path = folder(tmp_path / "in", 8)
     grouped = samples_of(open_frames(path), read_labels(path / "labels.csv", group="scene"))
     assert [one.group for one in grouped] == [f"scene {n // 2}" for n in range(8)]
@@ -144,7 +142,7 @@ def test_samples_keep_groups_and_stretches_of_a_clip_together(tmp_path: Path) ->
     assert len(set(stretches)) == 10 and stretches == sorted(stretches, key=stretches.index)
 
 
-def test_thresholds_come_back_from_their_file(tmp_path: Path) -> None:
+def test_thresholds_come_back_from_their_file(tmp_path):
     write_thresholds(tmp_path / "t.json", "contrast", Contrast(peak=7))
     assert read_thresholds(tmp_path / "t.json", "contrast") == Contrast(peak=7)
     for kept in (FloatingThresholds(largest_area=None), FloatingThresholds(largest_area=900.0)):
@@ -168,12 +166,12 @@ def test_thresholds_come_back_from_their_file(tmp_path: Path) -> None:
         (FloatingThresholds, {"largest_area": (1.0, 2.0)}, "do not fit"),
     ],
 )
-def test_thresholds_that_there_are_not_are_refused(kind: type, given: dict[str, object], words: str) -> None:
+def test_thresholds_that_there_are_not_are_refused(kind, given, words):
     with refused(words):
         thresholds_from(kind, given)
 
 
-def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path: Path) -> None:
+def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path):
     """Animals and fence posts of the same area and warmth: the one is round, the other long."""
     samples = []
     for number in range(10):
@@ -196,20 +194,20 @@ def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path: Path) -
         detect_frame(samples[0].frame, "shape", Shape())
 
 
-def test_shapes_cannot_be_learnt_from_what_is_all_wanted_or_all_not() -> None:
+def test_shapes_cannot_be_learnt_from_what_is_all_wanted_or_all_not():
     with refused("0 of 5"):
         fit_shape(np.zeros((5, 9)), np.zeros(5), Shape().regions)
 
 
 @pytest.mark.parametrize(("method", "unturned"), [("contrast", 0), ("warm", 0), ("floating", 1)])
-def test_black_hot_frames_are_turned(tmp_path: Path, method: str, unturned: int) -> None:
+def test_black_hot_frames_are_turned(tmp_path, method, unturned):
     cv2.imwrite(str(tmp_path / "a.png"), 255 - picture([(50, 40)], 1, size=15, warmer=150))
     for polarity, wanted in (("black-hot", 1), ("white-hot", unturned)):
         frame = read_image(tmp_path / "a.png", polarity=polarity)  # type: ignore[arg-type]
         assert len(detect_frame(frame, method, METHODS[method].thresholds())) == wanted
 
 
-def test_areas_of_floating_objects_follow_from_the_distance(tmp_path: Path) -> None:
+def test_areas_of_floating_objects_follow_from_the_distance(tmp_path):
     cv2.imwrite(str(tmp_path / "sea.png"), picture([(40, 50)], 0, size=15, warmer=150))
     far, near = (for_distance("floating", FloatingThresholds(), d, 1000.0, 2.0) for d in (100.0, 10.0))
     assert (far.area_of, far.largest_area) == ("filled", 400.0)
@@ -219,7 +217,7 @@ def test_areas_of_floating_objects_follow_from_the_distance(tmp_path: Path) -> N
     assert len(detect_frame(read_image(tmp_path / "sea.png"), "floating", near)) == 0
 
 
-def test_colours_are_found_by_the_same_command(tmp_path: Path) -> None:
+def test_colours_are_found_by_the_same_command(tmp_path):
     image = np.full((360, 640, 3), 120, np.uint8)
     image[200:210, 300:330] = (255, 110, 0)  # OpenCV writes blue first
     (tmp_path / "ground").mkdir()
@@ -231,13 +229,13 @@ def test_colours_are_found_by_the_same_command(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("method", ["shape", "colour"])
-def test_a_distance_is_refused_where_no_length_follows_from_it(method: str) -> None:
+def test_a_distance_is_refused_where_no_length_follows_from_it(method):
     with refused(f"'{method}'"):
         for_distance(method, METHODS[method].thresholds(), 60.0, 765.0, 1.5)
 
 
 @pytest.mark.parametrize("method", list(METHODS))
-def test_what_a_method_says_of_itself_holds(method: str) -> None:
+def test_what_a_method_says_of_itself_holds(method):
     """Thresholds for dark warmth and for a distance are of the same kind, and others than the defaults."""
     how = METHODS[method]
     defaults = how.thresholds()
@@ -246,7 +244,7 @@ def test_what_a_method_says_of_itself_holds(method: str) -> None:
     assert all(type(one) is how.thresholds and one != defaults for one in changed)
 
 
-def test_stated_ellipses_are_held_against_the_middle_of_labels(tmp_path: Path) -> None:
+def test_stated_ellipses_are_held_against_the_middle_of_labels(tmp_path):
     count, covariance = 400, np.array([[4.0, 1.0], [1.0, 2.0]])
     off = np.random.default_rng(8).multivariate_normal([0, 0], covariance, count)
     frames = pd.DataFrame({"frame_id": [f"{n}.png" for n in range(count)]})

@@ -47,14 +47,14 @@ def at_night(shared_data: Callable[..., Path]) -> tuple[list[Sample], Fitted]:
     return some, fit_thresholds("warm", some, tried=candidates("warm", FEW))
 
 
-def test_people_at_night_by_thresholds_of_other_frames(at_night: tuple[list[Sample], Fitted]) -> None:
+def test_people_at_night_by_thresholds_of_other_frames(at_night):
     samples, fitted = at_night
     assert len(samples) == 12 and sum(len(one.boxes) for one in samples) == 137
     assert fitted.held_out.f1.estimate >= 0.74
     assert fitted.held_out.f1.estimate <= fitted.inside.f1.estimate
 
 
-def test_people_under_trees_by_the_shapes_of_the_other_line(shared_data: Callable[..., Path]) -> None:
+def test_people_under_trees_by_the_shapes_of_the_other_line(shared_data):
     def line(which: str) -> list[Sample]:
         folder = shared_data("imagery", "aos_f6")
         labels = read_labels(folder / "labels" / f"propagated_{which}.csv")
@@ -64,7 +64,7 @@ def test_people_under_trees_by_the_shapes_of_the_other_line(shared_data: Callabl
     assert judged(line("3"), "shape", fitted.thresholds).f1.estimate >= 0.70
 
 
-def test_targets_in_the_sky_by_thresholds_of_other_clips(shared_data: Callable[..., Path]) -> None:
+def test_targets_in_the_sky_by_thresholds_of_other_clips(shared_data):
     folder = shared_data("imagery", "ir_tracks")
     clips = sorted(folder.glob("*.mp4"))
     samples = [one for clip in clips for one in clip_samples(clip, 12)]
@@ -86,8 +86,8 @@ def clip_samples(clip: Path, step: int) -> list[Sample]:
 
 
 def test_ellipses_hold_labels_that_their_width_was_not_chosen_from(
-    at_night: tuple[list[Sample], Fitted],
-) -> None:
+    at_night,
+):
     samples, fitted = at_night
     fit = fit_part("warm", samples, fitted.thresholds)
     assert fit is not None and fit.labels > 80 and fit.held_out is not None

@@ -116,7 +116,7 @@ def truth(path: Path, count: int) -> Path:
     return path
 
 
-def test_frames_that_cannot_be_read_and_frames_without_a_word_are_told(tmp_path: Path) -> None:
+def test_frames_that_cannot_be_read_and_frames_without_a_word_are_told(tmp_path):
     labels = read_labels(truth(tmp_path / "l.csv", 4))
     lines = "".join(f"{n}.png,10,10,8,8\n" for n in (0, 3))
     (tmp_path / "other.csv").write_text(f"image,x,y,w,h\n{lines}")
@@ -132,7 +132,7 @@ def test_frames_that_cannot_be_read_and_frames_without_a_word_are_told(tmp_path:
     assert (len(table.told), len(yolo.told)) == (1, 2)
 
 
-def test_classes_of_another_detector(tmp_path: Path) -> None:
+def test_classes_of_another_detector(tmp_path):
     labels = read_labels(truth(tmp_path / "l.csv", 3), classes=("deer",))
     md = str(batch(tmp_path / "md.json"))
     every = read_others([md], labels, ("deer",))[0]
@@ -147,7 +147,7 @@ def test_classes_of_another_detector(tmp_path: Path) -> None:
         read_others([md, f"md={md}"], labels)
 
 
-def test_a_name_before_a_file(tmp_path: Path) -> None:
+def test_a_name_before_a_file(tmp_path):
     strange = tmp_path / "a=b.json"
     strange.write_text("[]")
     assert named_file(str(strange)) == ("a=b", strange)

@@ -1,7 +1,5 @@
 """How wide ellipses have to be: identities, draws with a known part, and labelled frames."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -50,11 +50,11 @@ GOOD = Evidence(lost=0.1, gain=0.02, possible=0.0, points=90, excess=(Interval(1
         ({"problems": 1, "broken": 1}, Verdict.ALARM),
     ],
 )
-def test_each_number_turns_the_verdict(changes: dict[str, object], verdict: Verdict) -> None:
+def test_each_number_turns_the_verdict(changes, verdict):
     assert verdict_of(GOOD._replace(**changes)) == verdict
 
 
-def test_of_nothing_there_is_no_verdict() -> None:
+def test_of_nothing_there_is_no_verdict():
     assert verdict_of(Evidence()) == Verdict.UNJUDGED
     # One report, and it could not judge: sound is said of no flight whose errors nobody measured.
     assert verdict_of(Evidence(judged=1, parts=(Verdict.UNJUDGED,))) == Verdict.UNJUDGED
@@ -64,14 +64,14 @@ verdicts = st.sampled_from(list(Verdict))
 
 
 @given(st.lists(verdicts, max_size=3), st.integers(0, 1), st.integers(0, 2))
-def test_no_part_presses_more_than_the_flight(parts: list[Verdict], problems: int, judged: int) -> None:
+def test_no_part_presses_more_than_the_flight(parts, problems, judged):
     whole = verdict_of(Evidence(problems=problems, judged=judged, parts=tuple(parts)))
     assert whole.level >= max((one.level for one in parts), default=-1)
     assert whole != Verdict.SOUND or not any(one.level > 0 for one in parts)
 
 
 @given(st.dictionaries(st.sampled_from(PARTS), verdicts))
-def test_what_a_report_records_is_what_the_flight_reads(parts: dict[str, Verdict]) -> None:
+def test_what_a_report_records_is_what_the_flight_reads(parts):
     numbers = {(VERDICT_LEVEL, about): {"value": float(one.level)} for about, one in parts.items()}
     assert parts_of(numbers) == parts
     assert {one.colour for one in Verdict} == {"bad", "warn", "good", "neutral"}
@@ -81,7 +81,7 @@ def test_what_a_report_records_is_what_the_flight_reads(parts: dict[str, Verdict
 
 
 @pytest.mark.parametrize("speeds", [True, False])
-def test_a_leap_is_found_with_and_without_speeds(speeds: bool) -> None:
+def test_a_leap_is_found_with_and_without_speeds(speeds):
     twin = simulate_twin("large-ship", 1)
     nav = twin.nav["autopilot"]
     if not speeds:
@@ -99,7 +99,7 @@ def test_a_leap_is_found_with_and_without_speeds(speeds: bool) -> None:
     assert trouble.spells == pytest.approx(nav["time_s"].to_numpy()[None, 199:201])
 
 
-def test_an_airframe_that_leans_as_nobody_flies_went_wrong() -> None:
+def test_an_airframe_that_leans_as_nobody_flies_went_wrong():
     twin = simulate_twin("large-ship", 1)
     nav = twin.nav["autopilot"].copy()
     half = np.radians(113.0) / 2
@@ -119,7 +119,7 @@ def shaken(size: float) -> pd.DataFrame:
     return pd.DataFrame({"time_s": t, "f_x_m_s2": force, "f_y_m_s2": 0.0, "f_z_m_s2": -9.81, **turns})
 
 
-def test_harmful_shaking_is_an_alarm() -> None:
+def test_harmful_shaking_is_an_alarm():
     flight = build(n_images=20)
     flight.tables["imu"] = shaken(150.0)
     (shaking,) = look_over(flight).alarms
@@ -128,7 +128,7 @@ def test_harmful_shaking_is_an_alarm() -> None:
     assert not look_over(flight).alarms
 
 
-def test_poses_that_contradict_the_satellites_are_an_alarm() -> None:
+def test_poses_that_contradict_the_satellites_are_an_alarm():
     flight = build(n_images=40)
     gnss = flight.tables["gnss"] = receiver(flight)
     assert not look_over(flight).alarms

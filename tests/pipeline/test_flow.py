@@ -1,7 +1,5 @@
 """Velocities of pairs of images by a flight's own tables; features are projected, not found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -73,7 +73,7 @@ def off_after(one: SensorTrack) -> float:
     return float(np.sqrt(np.mean(np.sum(one.error[again, :2] ** 2, axis=1))))
 
 
-def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch):
     on_ground = NOISE_PX / CAMERA.fx * HEIGHT / np.cos(TILT) ** 2
     tracks = follow()
     for one in tracks:
@@ -85,7 +85,7 @@ def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch: pytest.M
     assert off_after(without[0]) > 10 * off_after(tracks[0])
 
 
-def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silently() -> None:
+def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silently():
     tracks = follow()
     scans, _ = watched()
     sensor = {"camera": scans}, {"camera": beliefs(scans)}
@@ -113,9 +113,7 @@ def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silent
     ("share", "gap_s", "right"), [(1.02, 11.0, True), (0.98, 11.0, False), (9.0, 9.0, False)]
 )
 @pytest.mark.parametrize("where", ["then", "now"])
-def test_a_track_ends_where_more_is_left_out_than_stated_and_not_before_a_gap(
-    share: float, gap_s: float, right: bool, where: str
-) -> None:
+def test_a_track_ends_where_more_is_left_out_than_stated_and_not_before_a_gap(share, gap_s, right, where):
     """Of a range of 100 m: 3 s^4 / (4 d^2) is left out for a spread s across the line of sight."""
     D, s = np.array([[[0.0, 0.0], [0.0, 0.01]]]), 8.0
     bent = D, np.array([[3 * s**4 / (4 * 100.0**2)]]) / share
@@ -129,8 +127,8 @@ def test_a_track_ends_where_more_is_left_out_than_stated_and_not_before_a_gap(
 
 
 def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     with_ends = follow(0.0)
     monkeypatch.setattr(sensor_tracks, "ends_of", lambda *given: None)
     for one, other in zip(with_ends, follow(0.0), strict=True):
@@ -139,7 +137,7 @@ def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(
             assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
 
 
-def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there() -> None:
+def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there():
     scans, truth = watched()
     tracks = follow()
     rows = slice(int(tracks[0].starts[1]), len(scans.times))
@@ -151,7 +149,7 @@ def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there() -> None:
 
 
 @pytest.mark.parametrize("kind", ["position", "bearing"])
-def test_positions_and_bearings_alone_do_not_end_so(kind: str) -> None:
+def test_positions_and_bearings_alone_do_not_end_so(kind):
     near = "[sensors.radar]\nrange_m = 90.0\nrange_sd_m = 30.0\n"
     flight = paused(robot_flight(1, kind=kind), 40, 90)
     one = follow_targets(flight, settings=parse_settings(near + KNOWN)).tracks[0]
@@ -159,7 +157,7 @@ def test_positions_and_bearings_alone_do_not_end_so(kind: str) -> None:
 
 
 @pytest.mark.slow
-def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track() -> None:
+def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track():
     precise = {"range_sd": 0.1, "bearing_sd_deg": 0.1, "seconds": 180.0}
     flights = (robot_flight(k, sensor=name, **precise) for k, name in enumerate(("radar", "lidar"), 1))
     flight = joined(*(paused(one, 40, 130) for one in flights))
@@ -175,7 +173,7 @@ def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track(
         assert mine.times[mine.starts[1]] > 130
 
 
-def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen() -> None:
+def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen():
     followed = follow_targets(paused(robot_flight(3), 40, 90), settings=parse_settings(KNOWN))
     row = rows_of(followed).loc["ekf"]
     one = next(one for one in followed.tracks if one.filter == "ekf")
@@ -192,7 +190,7 @@ def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen() -> None
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_of_one_or_three_detections_nothing_is_judged(count: int) -> None:
+def test_of_one_or_three_detections_nothing_is_judged(count):
     flight = robot_flight(3)
     few = seen_only(flight, np.arange(len(flight.tables["frames"])) < count)
     rows = rows_of(follow_targets(few, settings=parse_settings(KNOWN)))
@@ -200,7 +198,7 @@ def test_of_one_or_three_detections_nothing_is_judged(count: int) -> None:
     assert (rows["used"] == count).all()
 
 
-def test_a_track_that_lost_its_target_is_judged_where_the_target_was_seen() -> None:
+def test_a_track_that_lost_its_target_is_judged_where_the_target_was_seen():
     """What a gate no longer lets in was seen all the same."""
     flight = robot_flight(3, labelled=False)
     flight.tables["detections"].loc[119:, "range_m"] += 6.0  # after a minute

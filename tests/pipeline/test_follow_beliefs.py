@@ -1,7 +1,5 @@
 """What filters are told of sensors and targets: stated, tuned on another flight, assumed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -68,7 +66,7 @@ def test_settings_stand_in_the_manifest_too():
         ("[targets", "TOML"),
     ],
 )
-def test_settings_that_make_no_sense_are_refused(text: str, said: str):
+def test_settings_that_make_no_sense_are_refused(text, said):
     with refused(said):
         parse_settings(text)
 
@@ -117,7 +115,7 @@ def test_noise_is_found_from_how_rough_detections_are():
 
 
 @pytest.mark.parametrize(("kind", "clutter"), [("range-bearing", 0), ("range-bearing", 4), ("position", 4)])
-def test_clutter_that_nobody_tells_from_a_target_makes_nothing_rough(kind: str, clutter: int):
+def test_clutter_that_nobody_tells_from_a_target_makes_nothing_rough(kind, clutter):
     """With as many false detections as four targets have, and no names: as with names and without any."""
     found, known = (
         [roughness(scans_of(robot_flight(seed, kind=kind, **one), "radar")) for seed in range(8)]
@@ -127,7 +125,7 @@ def test_clutter_that_nobody_tells_from_a_target_makes_nothing_rough(kind: str, 
 
 
 @pytest.mark.parametrize("kind", ["range-bearing", "position", "bearing"])
-def test_clutter_alone_says_nothing_of_noise(kind: str):
+def test_clutter_alone_says_nothing_of_noise(kind):
     for seed in range(5):
         scans = scans_of(robot_flight(seed, kind=kind, labelled=False, clutter=4), "radar")
         nobody = scans._replace(detections=scans.detections[:, 1:], labels=scans.labels[:, 1:])

@@ -22,7 +22,7 @@ from wildlab.pipeline.scans import KINDS, Scans, scans_of, truths_at
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_considered_heading_is_inside_the_bounds_where_the_white_filter_is_not(seed: int):
+def test_a_considered_heading_is_inside_the_bounds_where_the_white_filter_is_not(seed):
     off = 2.0 if seed % 2 else -2.0
     rows = rows_of(follow_targets(robot_flight(seed, heading_off_deg=off, heading_sd_deg=2.0)))
     assert list(rows.index[:2]) == ["ekf", "schmidt"]
@@ -33,7 +33,7 @@ def test_a_considered_heading_is_inside_the_bounds_where_the_white_filter_is_not
 
 
 @pytest.mark.parametrize("kind", ["range-bearing", "position"])
-def test_every_filter_follows(kind: str):
+def test_every_filter_follows(kind):
     flight = robot_flight(2, kind=kind, heading_sd_deg=1.0)
     settings = Settings(sensors={"radar": {"thinning_s": 2.0}})
     names = ("ekf", "ukf", "imm", "coloured", "schmidt", "thinned")
@@ -88,7 +88,7 @@ def test_velocities_help_positions_in_one_track():
 
 
 @pytest.mark.parametrize("kind", ["position", "range-bearing", "bearing"])
-def test_derivatives_for_what_is_considered_are_those_of_the_measurement(kind: str):
+def test_derivatives_for_what_is_considered_are_those_of_the_measurement(kind):
     """By finite differences: the platform moved or turned, the stamp wrong."""
     flight = robot_flight(kind=kind, heading_off_deg=0.0)
     flight.tables["detections"]["plane_down_m"] = 30.0

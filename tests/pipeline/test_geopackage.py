@@ -59,7 +59,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Flight, Any, Path]:
     return flight, points, path
 
 
-def test_the_file_is_what_the_standard_asks_for(made: tuple[Flight, Any, Path]) -> None:
+def test_the_file_is_what_the_standard_asks_for(made):
     base = sqlite3.connect(made[2])
     assert made[2].read_bytes()[:16] == b"SQLite format 3\0"
     assert base.execute("PRAGMA application_id").fetchone() == (int.from_bytes(b"GPKG", "big"),)
@@ -89,7 +89,7 @@ def test_the_file_is_what_the_standard_asks_for(made: tuple[Flight, Any, Path]) 
                 assert envelope == pytest.approx([left, right, low, high])
 
 
-def test_pyproj_reads_its_reference_system() -> None:
+def test_pyproj_reads_its_reference_system():
     from pyproj import CRS
 
     from wildlab.pipeline.geopackage import _DEFINITION
@@ -97,7 +97,7 @@ def test_pyproj_reads_its_reference_system() -> None:
     assert CRS.from_wkt(_DEFINITION).to_epsg() == 4326
 
 
-def test_points_lie_where_they_are_and_say_what_they_come_from(made: tuple[Flight, Any, Path]) -> None:
+def test_points_lie_where_they_are_and_say_what_they_come_from(made):
     flight, points, path = made
     rows = rows_of(sqlite3.connect(path), "SELECT * FROM detections")
     placed = points[points["north_m"].notna()]
@@ -112,7 +112,7 @@ def test_points_lie_where_they_are_and_say_what_they_come_from(made: tuple[Fligh
     assert "ellipsoid" in first["vertical_reference"]
 
 
-def test_polygons_are_the_ellipses_of_ninety_per_cent(made: tuple[Flight, Any, Path]) -> None:
+def test_polygons_are_the_ellipses_of_ninety_per_cent(made):
     """Each corner is as far away, by the covariance, as a normal distribution asks for."""
     flight, points, path = made
     rows = rows_of(sqlite3.connect(path), "SELECT * FROM ellipses")
@@ -135,7 +135,7 @@ def test_polygons_are_the_ellipses_of_ninety_per_cent(made: tuple[Flight, Any, P
         assert widest == pytest.approx(row["long_90_m"], rel=5e-3)
 
 
-def test_the_other_files_say_the_same(made: tuple[Flight, Any, Path], tmp_path: Path) -> None:
+def test_the_other_files_say_the_same(made, tmp_path):
     flight, points, path = made
     write_points(flight, points, tmp_path / "p.geojson", "autopilot")
     features = json.loads((tmp_path / "p.geojson").read_text())["features"]
@@ -151,7 +151,7 @@ def test_the_other_files_say_the_same(made: tuple[Flight, Any, Path], tmp_path: 
     assert "origin" in table[0]["vertical_reference"]
 
 
-def test_hostile_names_and_values_are_only_text(tmp_path: Path) -> None:
+def test_hostile_names_and_values_are_only_text(tmp_path):
     nasty = '\'; DROP TABLE gpkg_contents; -- "x" \0<b>'
     layer = Layer(
         "a", nasty, nasty, "POINT", [np.array([1.0, 2.0, 3.0])],
@@ -164,13 +164,13 @@ def test_hostile_names_and_values_are_only_text(tmp_path: Path) -> None:
     assert len(rows_of(base, "SELECT * FROM gpkg_contents")) == 1
 
 
-def test_a_map_without_a_point_is_still_a_map(tmp_path: Path) -> None:
+def test_a_map_without_a_point_is_still_a_map(tmp_path):
     write_geopackage(tmp_path / "none.gpkg", [Layer("a", "A", "", "POINT", [], {"x": ("TEXT", [])})])
     (row,) = rows_of(sqlite3.connect(tmp_path / "none.gpkg"), "SELECT * FROM gpkg_contents")
     assert row["min_x"] is None
     assert [one.name for one in tmp_path.iterdir()] == ["none.gpkg"]
 
 
-def test_an_ending_that_nobody_knows_is_refused(made: tuple[Flight, Any, Path], tmp_path: Path) -> None:
+def test_an_ending_that_nobody_knows_is_refused(made, tmp_path):
     with refused(r"'\.shp'"):
         write_points(made[0], made[1], tmp_path / "p.shp")

@@ -71,7 +71,7 @@ def flown(noise: float = 0.0, per_image: int = 6) -> Flight:
     return Flight(MANIFEST, {"logged": nav}, tables, None, ground)
 
 
-def test_with_exact_poses_points_are_the_marks() -> None:
+def test_with_exact_poses_points_are_the_marks():
     flight = flown()
     seen = observe(flight)
     points = georeference(flight, seen, np.random.default_rng(0))
@@ -88,7 +88,7 @@ def test_with_exact_poses_points_are_the_marks() -> None:
     assert shift.median > 3.0
 
 
-def test_ellipses_hold_what_they_should_over_hills() -> None:
+def test_ellipses_hold_what_they_should_over_hills():
     """Poses, pixels and nothing else are wrong, by what the manifest states."""
     flight = flown(noise=1.0, per_image=24)
     flight.terrain = replace(hills(), sd=1e-3)
@@ -99,7 +99,7 @@ def test_ellipses_hold_what_they_should_over_hills() -> None:
     assert summarise(errors_of(scored)).median < 3.0
 
 
-def test_the_map_decides_how_good_its_heights_are() -> None:
+def test_the_map_decides_how_good_its_heights_are():
     sizes = []
     for sd in (np.nan, 0.3, 6.0):
         flight = flown()
@@ -110,7 +110,7 @@ def test_the_map_decides_how_good_its_heights_are() -> None:
     assert sizes[2] > 3 * sizes[1]
 
 
-def test_rays_that_meet_no_ground_are_counted() -> None:
+def test_rays_that_meet_no_ground_are_counted():
     flight = flown()
     flight.terrain = holed()
     nav = flight.nav["logged"]
@@ -125,7 +125,7 @@ def test_rays_that_meet_no_ground_are_counted() -> None:
     assert set(points.loc[lost, "ellipse"]) == {"none"} and points.loc[lost, "cov_nn"].isna().all()
 
 
-def test_a_ray_without_ground_is_no_sighting() -> None:
+def test_a_ray_without_ground_is_no_sighting():
     flight = flown()
     flight.tables["detections"]["target_id"] = "m0-0"
     flight.terrain = holed()
@@ -138,7 +138,7 @@ def test_a_ray_without_ground_is_no_sighting() -> None:
     assert np.isnan(found.uv[rows]).all() and np.isnan(found.positions[rows]).all()
 
 
-def test_heights_left_in_raise_terrain_that_counts_alike() -> None:
+def test_heights_left_in_raise_terrain_that_counts_alike():
     record = {
         "source": "dem.tif", "sha256": "0" * 64, "crs": "EPSG:4326", "added_m": 0.0, "unit": "m",
         "cell_m": [6.0, 6.0], "step_m": 6.0, "rows": 150, "columns": 150, "holes": 0, "error_rms_m": 0.0,
@@ -155,7 +155,7 @@ def test_heights_left_in_raise_terrain_that_counts_alike() -> None:
     assert moved["flight"] < 1e-3 < 1.0 < moved["ellipsoid"]
 
 
-def test_a_check_holds_the_survey_against_the_map() -> None:
+def test_a_check_holds_the_survey_against_the_map():
     flight, ground = flown(), hills()
 
     def findings(height: np.ndarray, words: str) -> list[str]:
@@ -174,7 +174,7 @@ def test_a_check_holds_the_survey_against_the_map() -> None:
     assert findings(holed, "beyond the border") == []
 
 
-def test_without_terrain_it_is_said() -> None:
+def test_without_terrain_it_is_said():
     flight = flown()
     flight.terrain = None
     with refused("no terrain"):

@@ -170,7 +170,7 @@ def test_an_accelerometer_off_by_a_known_bias_is_the_same_as_none(flight):
     pd.testing.assert_frame_equal(mended.nav, navigate_observer(flight, times).nav, rtol=1e-6, atol=1e-6)
 
 
-def test_what_cannot_be_believed_says_so() -> None:
+def test_what_cannot_be_believed_says_so():
     flight = simulate_twin("fast-vessel", 1)
     assert navigate_mekf(flight).signs == ()
     flight.tables["imu"][["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]] *= 180 / np.pi  # deg/s for rad/s

@@ -70,7 +70,7 @@ def rms(values: np.ndarray) -> np.ndarray:
     return np.sqrt((values**2).mean(axis=0))
 
 
-def test_thor_in_the_air(thor) -> None:
+def test_thor_in_the_air(thor):
     flight, found = thor
     mekf = found["mekf"]
     off = rms(euler_differences(flight, mekf, *THOR_AIRBORNE))
@@ -84,20 +84,20 @@ def test_thor_in_the_air(thor) -> None:
     assert mekf.signs == ()
 
 
-def test_thor_by_the_observer(thor) -> None:
+def test_thor_by_the_observer(thor):
     """With the magnetic field as its second vector, and accelerometers calibrated by the filter's bias."""
     flight, found = thor
     off = rms(euler_differences(flight, found["observer"], *THOR_AIRBORNE))
     assert (off <= [2.0, 1.2, 4.0]).all()
 
 
-def test_thor_has_the_latency_that_its_own_fixes_make_likeliest(thor) -> None:
+def test_thor_has_the_latency_that_its_own_fixes_make_likeliest(thor):
     flight, _ = thor
     stated = flight.manifest.gnss.latency_s
     assert np.argmax(likelihoods_of_latency(flight, [stated - 0.02, stated, stated + 0.02])) == 1
 
 
-def test_x8_through_loops_and_rolls(shared_data: Callable[..., Path], tmp_path: Path) -> None:
+def test_x8_through_loops_and_rolls(shared_data, tmp_path):
     source = shared_data("logs", "inertialnav_x8")
     flight, samples = loaded("inertialnav-x8", source, tmp_path / "flight")
     found = navigate_mekf(flight, samples)

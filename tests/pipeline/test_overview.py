@@ -54,7 +54,7 @@ def values(content: dict[str, Any]) -> dict[tuple[str, str], float]:
     return {(one["name"], one["subject"]): one["value"] for one in content["metrics"]}
 
 
-def test_a_stream_with_a_hole_and_lost_samples_is_counted() -> None:
+def test_a_stream_with_a_hole_and_lost_samples_is_counted():
     t = np.arange(0, 100, 0.02)
     whole = pace_of(t, 1.0)
     assert (whole.n, whole.missing, len(whole.gaps), whole.unordered) == (5000, 0, 0, 0)
@@ -70,19 +70,19 @@ def test_a_stream_with_a_hole_and_lost_samples_is_counted() -> None:
     assert pace_of(mixed, 1.0).unordered == 1
 
 
-def test_what_is_triggered_now_and_then_has_no_rate() -> None:
+def test_what_is_triggered_now_and_then_has_no_rate():
     t = np.cumsum(np.random.default_rng(1).uniform(0.1, 5.0, 200))
     pace = pace_of(t, 100.0)
     assert not pace.even and pace.missing == 0
 
 
 @pytest.mark.parametrize("stamps", [[], [np.nan], [3.0], [3.0, 3.0]])
-def test_no_stream_is_too_short(stamps: list[float]) -> None:
+def test_no_stream_is_too_short(stamps):
     pace = pace_of(stamps, 1.0)
     assert len(pace.gaps) == 0 and pace.missing == 0 and np.isnan(pace.rate_hz)
 
 
-def test_runs_are_where_the_mask_is() -> None:
+def test_runs_are_where_the_mask_is():
     mask = np.random.default_rng(0).random(500) < 0.5
     t = np.arange(500.0)
     spells = runs_of(mask, t)
@@ -93,7 +93,7 @@ def test_runs_are_where_the_mask_is() -> None:
 
 
 @pytest.mark.parametrize(("hertz", "size"), [(10.0, 4.0), (35.0, 20.0), (90.0, 50.0)])
-def test_a_sine_shakes_by_what_theory_says(hertz: float, size: float) -> None:
+def test_a_sine_shakes_by_what_theory_says(hertz, size):
     """At a rate high enough for the continuous filter: its high pass, and the root mean square of a sine."""
     t = np.arange(0, 30, 1 / 2000)
     force = np.stack([0 * t, size * np.sin(2 * np.pi * hertz * t), 0 * t - 9.81], axis=1)
@@ -106,7 +106,7 @@ def test_a_sine_shakes_by_what_theory_says(hertz: float, size: float) -> None:
     assert found.rms[:, 0].max() < 1e-9
 
 
-def test_too_slow_or_too_few_samples_tell_nothing_of_shaking() -> None:
+def test_too_slow_or_too_few_samples_tell_nothing_of_shaking():
     t = np.arange(0, 100, 0.1)
     assert vibration_of(t, np.zeros((len(t), 3))) is None
     assert vibration_of(t[:50] / 10, np.zeros((50, 3))) is None
@@ -123,7 +123,7 @@ def level_images(places: list[tuple[float, float]], height: float = 100.0, lean_
     return Flight(manifest, {"logged": nav.assign(frame_id=frames["frame_id"])}, tables)
 
 
-def test_footprints_have_the_area_and_the_overlap_of_rectangles() -> None:
+def test_footprints_have_the_area_and_the_overlap_of_rectangles():
     """200 m wide and 100 m long from 100 m: two apart, and two that share half."""
     apart, _ = cover_images(level_images([(0.0, 0.0), (500.0, 0.0)]), "logged")
     assert apart.area_m2 == pytest.approx(2 * 200 * 100, rel=0.01)
@@ -135,7 +135,7 @@ def test_footprints_have_the_area_and_the_overlap_of_rectangles() -> None:
     assert half.looks == pytest.approx(4 / 3, abs=0.02)
 
 
-def test_footprints_on_level_terrain_are_those_on_the_plane() -> None:
+def test_footprints_on_level_terrain_are_those_on_the_plane():
     flight = level_images([(0.0, 0.0), (30.0, 20.0)])
     one, _ = cover_images(flight, "logged")
     other, _ = cover_images(replace(flight, terrain=FLAT), "logged")
@@ -143,14 +143,14 @@ def test_footprints_on_level_terrain_are_those_on_the_plane() -> None:
     assert other.outlines == pytest.approx(one.outlines, abs=1e-3)
 
 
-def test_an_image_of_the_horizon_has_no_footprint() -> None:
+def test_an_image_of_the_horizon_has_no_footprint():
     seen, _ = cover_images(level_images([(0.0, 0.0)], lean_deg=70.0), "logged")
     assert seen.flat.tolist() == [True] and not seen.placed.any()
     assert seen.area_m2 == 0 and np.isnan(seen.looks)
 
 
 @pytest.mark.parametrize("without", ["frames", "truth"])
-def test_without_images_or_a_height_of_the_ground_there_is_no_coverage(without: str) -> None:
+def test_without_images_or_a_height_of_the_ground_there_is_no_coverage(without):
     flight = level_images([(0.0, 0.0)])
     del flight.tables[without]
     assert cover_images(flight, "logged")[0] is None and cover_images(flight, None)[0] is None
@@ -168,7 +168,7 @@ def holed() -> Flight:
     return without_poses(flight, 10.05, 14.95)
 
 
-def test_what_is_wrong_along_the_path_is_found() -> None:
+def test_what_is_wrong_along_the_path_is_found():
     overview = look_over(holed())
     found = {one.what: one for one in overview.troubles}
     assert set(found) == {TROUBLES[0], TROUBLES[3], TROUBLES[4]}
@@ -183,7 +183,7 @@ def lost_of(flight: Flight, key: str) -> Recovered:
     return lost
 
 
-def test_images_in_a_hole_are_counted_with_the_reason() -> None:
+def test_images_in_a_hole_are_counted_with_the_reason():
     flight = holed()
     frames = flight.tables["frames"]
     inside = int(((frames["time_s"] > 10.0) & (frames["time_s"] < 15.0)).sum())
@@ -195,7 +195,7 @@ def test_images_in_a_hole_are_counted_with_the_reason() -> None:
     assert f"{after} before" in lost.why and str(inside) in lost.why
 
 
-def test_time_without_poses_is_that_of_the_record() -> None:
+def test_time_without_poses_is_that_of_the_record():
     flight = build(n_images=40)
     nav = flight.nav["logged"]
     flight.nav["logged"] = nav[(nav["time_s"] >= 20) & ((nav["time_s"] < 25) | (nav["time_s"] >= 30))]
@@ -206,7 +206,7 @@ def test_time_without_poses_is_that_of_the_record() -> None:
     assert lost.lost == pytest.approx(25, abs=0.6) and lost.of == pytest.approx(end, abs=0.6)
 
 
-def test_detections_whose_target_has_no_truth_are_counted() -> None:
+def test_detections_whose_target_has_no_truth_are_counted():
     flight = build(n_images=10)
     detections = flight.tables["detections"]
     detections.loc[:4, "target_id"] = "nobody"
@@ -230,7 +230,7 @@ def georeferenced(gain: float, after: float, low: float) -> dict[tuple[str, str]
     return numbers_of([{"metrics": metrics}])
 
 
-def test_only_what_was_measured_is_a_gain() -> None:
+def test_only_what_was_measured_is_a_gain():
     overview = look_over(holed())
     alone = gains_of(overview, {})
     assert alone and {one.unit for one in alone} == {"1"}
@@ -242,7 +242,7 @@ def test_only_what_was_measured_is_a_gain() -> None:
     assert [one.key for one in uncertain] == [one.key for one in alone]
 
 
-def test_gains_and_troubles_are_recorded_and_no_place_is_given_away(tmp_path: Path) -> None:
+def test_gains_and_troubles_are_recorded_and_no_place_is_given_away(tmp_path):
     flight = holed()
     html, content = page_of(flight, tmp_path, numbers=georeferenced(3.0, 1.0, 2.0), judged=1)
     found = values(content)
@@ -270,9 +270,7 @@ def without(flight: Flight, *, nav: bool = True, tables: tuple[str, ...] = ()) -
         (False, ()),
     ],
 )
-def test_a_flight_that_lacks_anything_has_its_page(
-    nav: bool, tables: tuple[str, ...], tmp_path: Path
-) -> None:
+def test_a_flight_that_lacks_anything_has_its_page(nav, tables, tmp_path):
     whole = simulate_twin("fast-vessel", 1)
     flight = without(whole, nav=nav, tables=tables)
     html, content = page_of(flight, tmp_path)
@@ -280,7 +278,7 @@ def test_a_flight_that_lacks_anything_has_its_page(
     assert values(content)["reports_beside", "flight"] == 0
 
 
-def test_poses_without_covariance_or_velocity_and_empty_tables_are_fine(tmp_path: Path) -> None:
+def test_poses_without_covariance_or_velocity_and_empty_tables_are_fine(tmp_path):
     whole = simulate_twin("large-ship", 1)
     nav = whole.nav["autopilot"]
     bare = nav[["time_s", "north_m", "east_m", "down_m", "q_w", "q_x", "q_y", "q_z"]]
@@ -291,7 +289,7 @@ def test_poses_without_covariance_or_velocity_and_empty_tables_are_fine(tmp_path
     assert ("duration", "flight") not in values(page_of(nothing, tmp_path)[1])
 
 
-def test_broken_rows_are_left_out_and_counted_as_problems() -> None:
+def test_broken_rows_are_left_out_and_counted_as_problems():
     whole = simulate_twin("large-ship", 1)
     nav = whole.nav["autopilot"].copy()
     nav.loc[10:20, "north_m"] = np.nan
@@ -300,14 +298,14 @@ def test_broken_rows_are_left_out_and_counted_as_problems() -> None:
     assert look_over(Flight(whole.manifest, {"autopilot": nav}, dict(whole.tables))).problems >= 2
 
 
-def test_photos_without_times_have_no_rates(tmp_path: Path) -> None:
+def test_photos_without_times_have_no_rates(tmp_path):
     flight = changed(level_images([(0.0, 0.0), (50.0, 0.0), (90.0, 10.0)]), {"time": {"kind": "sequence"}})
     _, content = page_of(flight, tmp_path)
     assert ("duration", "flight") not in values(content)
     assert values(content)["area_seen", "flight"] > 0
 
 
-def test_the_best_estimated_poses_come_first_and_others_are_refused() -> None:
+def test_the_best_estimated_poses_come_first_and_others_are_refused():
     table = pd.DataFrame({"time_s": [0.0]})
     names = ("truth", "observer", "autopilot", "rtk", "mekf", "autopilot-uncalibrated")
     flight = Flight(build(n_images=1).manifest, dict.fromkeys(names, table))
@@ -316,19 +314,19 @@ def test_the_best_estimated_poses_come_first_and_others_are_refused() -> None:
         look_over(flight, "other")
 
 
-def test_trouble_that_lasts_asks_for_a_closer_look() -> None:
+def test_trouble_that_lasts_asks_for_a_closer_look():
     flight = build(n_images=40)
     flight.tables["gnss"] = receiver(flight, satellites=lambda t: np.where(t < t[0] + 12, 4.0, 9.0))
     assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 1
 
 
-def test_poses_that_pause_shortly_count_as_trouble() -> None:
+def test_poses_that_pause_shortly_count_as_trouble():
     flight = build(n_images=80)
     assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 0
     assert counts_of(look_over(without_poses(flight, 10.05, 11.95)), [], 0, 1, None)["troubled"] == 1
 
 
-def test_points_that_are_far_out_are_listed_with_what_stays() -> None:
+def test_points_that_are_far_out_are_listed_with_what_stays():
     metrics = [
         entry("gain", "without-far-out", 0.5),
         entry("horizontal_error_mean", "without-far-out", 1.5),
@@ -340,7 +338,7 @@ def test_points_that_are_far_out_are_listed_with_what_stays() -> None:
 
 
 @pytest.mark.parametrize(("gain", "possible"), [(1.6, True), (0.3, False)])
-def test_a_gain_that_is_large_and_not_certain_is_possible(gain: float, possible: bool) -> None:
+def test_a_gain_that_is_large_and_not_certain_is_possible(gain, possible):
     metrics = [
         entry("gain", "winner", gain, low=0.28, high=2.88),
         entry("horizontal_error_mean", "logged-pose", 4.5),
@@ -350,7 +348,7 @@ def test_a_gain_that_is_large_and_not_certain_is_possible(gain: float, possible:
 
 
 @pytest.mark.parametrize("off_deg", [2.0, 0.0])
-def test_tracks_that_their_own_report_doubts_are_not_sound_here(off_deg: float, tmp_path: Path) -> None:
+def test_tracks_that_their_own_report_doubts_are_not_sound_here(off_deg, tmp_path):
     """The verdict of a true report on tracking, through its metrics.json, is read by the overview."""
     followed = follow_targets(
         robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=parse_settings(KNOWN)
@@ -365,7 +363,7 @@ def test_tracks_that_their_own_report_doubts_are_not_sound_here(off_deg: float, 
     )
 
 
-def test_detections_of_no_camera_are_not_held_against_the_ground(tmp_path: Path) -> None:
+def test_detections_of_no_camera_are_not_held_against_the_ground(tmp_path):
     flight = build(n_images=10)
     flight.tables["detections"] = flight.table("detections").assign(
         source="radar", kind="position", north_m=0.0, east_m=0.0, down_m=0.0
@@ -383,7 +381,7 @@ def test_detections_of_no_camera_are_not_held_against_the_ground(tmp_path: Path)
         ([np.nan, np.nan, -3.0, -2.0, -9.0], -3.0),
     ],
 )
-def test_level_ground_is_as_high_as_surveyed_points_or_tracks(downs: list[float], height: float) -> None:
+def test_level_ground_is_as_high_as_surveyed_points_or_tracks(downs, height):
     names, times = ["a", "b", *["walker"] * 3], [np.nan, np.nan, 1.0, 2.0, 3.0]
     truth = pd.DataFrame({"target_id": names, "time_s": times, "down_m": downs})
     flight: Any = SimpleNamespace(truth=truth, detections=None, manifest=SimpleNamespace(kind="logged"))

@@ -29,14 +29,14 @@ def flown(rate: float = 2.0, limit: float = 0.0, swing: float = 0.4):
     return times, headings, camera_on_course(CAMERA, p, headings, angles)
 
 
-def test_without_errors_the_flight_is_the_plan() -> None:
+def test_without_errors_the_flight_is_the_plan():
     times, headings, poses = flown()
     done = execute(FLAT, poses, headings, times, LOOKS, NONE, 2.0, np.random.default_rng(1))
     assert np.array_equal(done.planned.looks, done.flown.looks)
     assert np.array_equal(done.sure, done.planned.seen) and done.margin_px == 0 and done.held == 1
 
 
-def test_errors_have_their_size_and_last() -> None:
+def test_errors_have_their_size_and_last():
     _, headings, poses = flown()
     off, turned = [], []
     for seed in range(150):
@@ -57,7 +57,7 @@ def test_errors_have_their_size_and_last() -> None:
     )
 
 
-def test_a_margin_is_what_the_parts_make() -> None:
+def test_a_margin_is_what_the_parts_make():
     one = ExecutionErrors(3.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     assert margin_px(CAMERA, one, [50.0, 100.0], 2.0) == pytest.approx([2 * 800 * 3 / 50, 2 * 800 * 3 / 100])
     tilt = ExecutionErrors(0.0, 0.0, 1.0, 0.0, 0.02, 0.0, 1.0)
@@ -66,7 +66,7 @@ def test_a_margin_is_what_the_parts_make() -> None:
     assert margin_px(CAMERA, rest, 50.0, 1.0) == pytest.approx(400 * np.hypot(0.1, 0.03))
 
 
-def test_with_its_margin_a_plan_holds_and_without_one_it_does_not() -> None:
+def test_with_its_margin_a_plan_holds_and_without_one_it_does_not():
     times, headings, poses = flown()
     held, kept = [], []
     for seed in range(8):
@@ -77,7 +77,7 @@ def test_with_its_margin_a_plan_holds_and_without_one_it_does_not() -> None:
     assert np.mean(kept) < np.mean(held)
 
 
-def test_a_swing_too_fast_sees_nothing_sharply() -> None:
+def test_a_swing_too_fast_sees_nothing_sharply():
     """A rate of 6 rad/s at a half of it across the lens: 24 px, of 0.25 x 1.5 x 800 / 58 = 5 px allowed."""
     times, headings, poses = flown(rate=20.0, limit=0.8, swing=6.0)
     done = execute(FLAT, poses, headings, times, LOOKS, NONE, 2.0, np.random.default_rng(1))

@@ -42,22 +42,20 @@ def disturbed(exact: Sighting, degrees: float) -> Sighting:
 
 
 @pytest.mark.parametrize("degrees", [0.5, 1.0, 3.0])
-def test_errors_of_attitude_come_back_whatever_the_poses_state(
-    flight: Flight, exact: Sighting, degrees: float
-) -> None:
+def test_errors_of_attitude_come_back_whatever_the_poses_state(flight, exact, degrees):
     found = estimate_from_sighting(flight, disturbed(exact, degrees))
     assert np.degrees(found.sd["tilt"]) == pytest.approx(degrees, rel=0.2)
     assert found.factor["tilt"] < 1.2
 
 
-def test_what_a_target_cannot_tell_stays_where_the_poses_put_it(flight: Flight, exact: Sighting) -> None:
+def test_what_a_target_cannot_tell_stays_where_the_poses_put_it(flight, exact):
     """Position and pixel beside a degree of tilt from hundreds of metres."""
     found = estimate_from_sighting(flight, disturbed(exact, 3.0))
     assert found.sd["position_horizontal"] == pytest.approx(1.0, rel=0.5)
     assert found.factor["position_horizontal"] > 2
 
 
-def test_one_image_in_a_while_is_enough(flight: Flight, exact: Sighting) -> None:
+def test_one_image_in_a_while_is_enough(flight, exact):
     seen = disturbed(exact, 1.0)
     kept, last = np.zeros(len(seen.times), bool), -1
     for row in np.flatnonzero(seen.seen):
@@ -68,19 +66,19 @@ def test_one_image_in_a_while_is_enough(flight: Flight, exact: Sighting) -> None
     assert kept.sum() < 0.3 * seen.seen.sum()
 
 
-def test_the_covariance_is_that_of_the_deviations(flight: Flight, exact: Sighting) -> None:
+def test_the_covariance_is_that_of_the_deviations(flight, exact):
     found = estimate_from_sighting(flight, exact)
     level, vertical, tilt, yaw, _ = (found.sd[kind] for kind in KINDS)
     expected = np.square([level, level, vertical, tilt, tilt, yaw])
     np.testing.assert_allclose(covariance_of(found), np.diag(expected))
 
 
-def test_poses_that_state_nothing_are_refused(flight: Flight, exact: Sighting) -> None:
+def test_poses_that_state_nothing_are_refused(flight, exact):
     with refused("no covariance"):
         estimate_from_sighting(flight, exact._replace(poses=replace(exact.poses, covariance=None)))
 
 
-def test_a_target_that_is_known_in_two_images_is_refused(flight: Flight, exact: Sighting) -> None:
+def test_a_target_that_is_known_in_two_images_is_refused(flight, exact):
     truth = exact.truth.copy()
     rows = np.flatnonzero(exact.seen)
     truth[np.setdiff1d(np.arange(len(truth)), rows[[0, -1]])] = np.nan

@@ -45,7 +45,7 @@ def jumped(flight: Flight, rows: list[int]) -> Flight:
     return changed(flight, gnss=gnss)
 
 
-def test_a_fix_a_kilometre_off_is_no_noise(early: Flight) -> None:
+def test_a_fix_a_kilometre_off_is_no_noise(early):
     given = inputs_of(early, noise=imu_noise(early))
     assert [len(one.times) for one in without_gross(early, given).values()] == [
         len(one.times) for one in given.aiding.values()
@@ -59,13 +59,13 @@ def test_a_fix_a_kilometre_off_is_no_noise(early: Flight) -> None:
     assert np.allclose(found.nav["north_m"], as_it_was.nav["north_m"], atol=0.02)
 
 
-def test_a_filter_that_is_lost_is_nothing_to_learn_from(early: Flight) -> None:
+def test_a_filter_that_is_lost_is_nothing_to_learn_from(early):
     rows = list(range(60, len(early.table("gnss")), 5))
     with refused("lost"):
         receiver_noise(jumped(early, rows))
 
 
-def test_what_was_refused_is_kept_for_the_report(early: Flight) -> None:
+def test_what_was_refused_is_kept_for_the_report(early):
     few = early.table("gnss").iloc[::20].reset_index(drop=True)
     studied = study_navigation(changed(early, gnss=few))
     assert studied.receiver is None and "too few" in studied.refusal
@@ -77,7 +77,7 @@ def test_what_was_refused_is_kept_for_the_report(early: Flight) -> None:
     }
 
 
-def test_a_receiver_has_one_noise_for_all_its_antennas() -> None:
+def test_a_receiver_has_one_noise_for_all_its_antennas():
     p = positions([0.0, 1.0], np.zeros((2, 3)), sd=2.0)
     h = headings([0.0, 1.0], np.ones((2, 3)), sd=0.1)
     noise = ReceiverNoise(SourceNoise(0.5, 0.25, 1.0, 2.0, 30.0))
@@ -90,7 +90,7 @@ def test_a_receiver_has_one_noise_for_all_its_antennas() -> None:
     assert heard["heading"] is h
 
 
-def test_thinned_samples_are_means_of_neighbours() -> None:
+def test_thinned_samples_are_means_of_neighbours():
     t = np.arange(0, 1.0, 0.004)
     imu = ImuSamples(t, np.stack([t, 2 * t, 3 * t], -1), np.stack([t, t, t], -1))
     few = thinned(imu, 50.0)
@@ -101,7 +101,7 @@ def test_thinned_samples_are_means_of_neighbours() -> None:
 
 
 @pytest.mark.slow
-def test_innovations_of_a_logged_flight_are_of_the_right_level_and_white(shared_data, tmp_path) -> None:
+def test_innovations_of_a_logged_flight_are_of_the_right_level_and_white(shared_data, tmp_path):
     """With what is stated they are neither. The attitude found on board has no part in it."""
     import_flight(
         DATA / "recipes" / "umn-thor75.toml", shared_data("logs", "umn_thor75"), tmp_path / "flight"
@@ -127,7 +127,7 @@ def turning() -> Flight:
 
 
 @pytest.mark.slow
-def test_a_late_receiver_and_a_misplaced_antenna_are_found(turning: Flight) -> None:
+def test_a_late_receiver_and_a_misplaced_antenna_are_found(turning):
     arm = np.array(turning.manifest.gnss.lever_arm_m)
     right = place_receiver(turning, ReceiverNoise())
     found, truth = np.array([right.latency, *right.lever]), np.array([0.0, *arm])

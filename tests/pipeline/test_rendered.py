@@ -1,7 +1,5 @@
 """Detections out of rendered images: which exposure is which frame, what is moved, what takes whose place."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -55,7 +55,7 @@ def seen(flight: Flight) -> Sighting:
     return sighting(flight, "mekf")
 
 
-def test_the_truth_of_a_sighting_is_that_of_its_target(flight: Flight, seen: Sighting) -> None:
+def test_the_truth_of_a_sighting_is_that_of_its_target(flight, seen):
     truth = flight.table("truth")
     assert truth["target_id"].nunique() == 1
     inside = (seen.times >= truth["time_s"].min()) & (seen.times <= truth["time_s"].max())
@@ -67,15 +67,13 @@ def test_the_truth_of_a_sighting_is_that_of_its_target(flight: Flight, seen: Sig
         assert steps.sum() == pytest.approx(known[inside][-1] - known[inside][0], rel=0.1, abs=2.0)
 
 
-def test_the_sighting_holds_every_frame_between_first_and_last_detection(
-    flight: Flight, seen: Sighting
-) -> None:
+def test_the_sighting_holds_every_frame_between_first_and_last_detection(flight, seen):
     assert seen.seen.sum() == len(flight.table("detections"))
     assert seen.seen[0] and seen.seen[-1]
     assert np.median(np.diff(seen.times)) == pytest.approx(1 / 7.5, rel=0.02)
 
 
-def test_a_detection_seen_from_the_true_pose_lies_on_the_target() -> None:
+def test_a_detection_seen_from_the_true_pose_lies_on_the_target():
     # Only the detector's pixels and the error of the receiver on the target are left, where the camera is
     # what is said of it and does not turn against the airframe.
     exact = load_twin("fast-vessel").model_copy(update={"tolerance": None, "camera_sway": None})
@@ -83,7 +81,7 @@ def test_a_detection_seen_from_the_true_pose_lies_on_the_target() -> None:
     assert evaluate_measurements(sighting(flight, "truth"))["mae_georeferenced"] < 4.0
 
 
-def test_the_compiled_filters_are_the_readable_ones(seen: Sighting) -> None:
+def test_the_compiled_filters_are_the_readable_ones(seen):
     begin, assert_close = start(seen, TUNING), np.testing.assert_allclose
     of_pixel = seen.uv, np.eye(2) * TUNING.pixel**2, seen.sensor
     of_place = seen.positions, np.eye(2) * TUNING.measurement**2, positions()
@@ -100,14 +98,14 @@ def test_the_compiled_filters_are_the_readable_ones(seen: Sighting) -> None:
         np.testing.assert_array_equal(compiled.used, readable.used)
 
 
-def test_without_pose_uncertainty_schmidt_is_the_extended_filter(seen: Sighting) -> None:
+def test_without_pose_uncertainty_schmidt_is_the_extended_filter(seen):
     none = np.zeros((len(seen.times), 6, 6))
     np.testing.assert_allclose(
         follow_schmidt(seen, TUNING, none).x, follow_pixels(seen, TUNING).x, rtol=1e-9, atol=1e-7
     )
 
 
-def test_the_numbers_are_those_of_the_track(seen: Sighting) -> None:
+def test_the_numbers_are_those_of_the_track(seen):
     track = follow_positions(seen, TUNING)
     scored = evaluate_track(seen, track)
     e = seen.truth[:, :2] - track.x[:, :2]
@@ -117,17 +115,17 @@ def test_the_numbers_are_those_of_the_track(seen: Sighting) -> None:
     np.testing.assert_allclose(scored.nees, one, rtol=1e-9)
 
 
-def test_a_target_that_nothing_names_is_refused(flight: Flight) -> None:
+def test_a_target_that_nothing_names_is_refused(flight):
     with refused("'whale'"):
         sighting(flight, "truth", "whale")
 
 
-def test_several_targets_are_a_choice() -> None:
+def test_several_targets_are_a_choice():
     with refused("2 targets"):
         sighting(simulate_twin("crossing-vessels", 1, ("imu", "gnss")), "autopilot")
 
 
-def test_poses_without_covariance_are_no_input_for_schmidt(flight: Flight) -> None:
+def test_poses_without_covariance_are_no_input_for_schmidt(flight):
     with refused("no covariance"):
         follow_schmidt(sighting(flight, "autopilot"), TUNING)
 
@@ -140,7 +138,7 @@ def own(flight: Flight, seen: Sighting) -> Errors:
     return errors_against(flight.nav["truth"], flight.nav["mekf"], seen.times)
 
 
-def test_pauses_are_where_nothing_is_seen_for_long(seen: Sighting) -> None:
+def test_pauses_are_where_nothing_is_seen_for_long(seen):
     found = pauses(seen)
     assert found
     for rows in found:
@@ -150,12 +148,12 @@ def test_pauses_are_where_nothing_is_seen_for_long(seen: Sighting) -> None:
     assert len(others) and np.isin(others - 1, np.flatnonzero(seen.seen)).any()
 
 
-def test_means_and_roots_leave_out_what_is_not_known() -> None:
+def test_means_and_roots_leave_out_what_is_not_known():
     assert mean([1.0, np.nan, 3.0]) == 2.0 and rms(np.array([3.0, np.nan, 4.0])) == np.sqrt(12.5)
     assert np.isnan(mean([])) and np.isnan(rms(np.array([np.nan])))
 
 
-def test_numbers_of_poses_are_in_metres_and_degrees() -> None:
+def test_numbers_of_poses_are_in_metres_and_degrees():
     error, sd = np.zeros((4, 9)), np.ones((4, 9))
     error[:, 0], error[:, 6], sd[:, 8] = [1, -1, 1, np.nan], np.radians(3.0), np.radians(2.0)
     found = pose_numbers(Errors(np.arange(4.0), error, sd, {}))
@@ -163,7 +161,7 @@ def test_numbers_of_poses_are_in_metres_and_degrees() -> None:
     assert found["mean_sd_yaw"] == pytest.approx(2.0) and found["mean_sd_east"] == 1.0
 
 
-def test_errors_of_the_pose_move_the_target_in_the_image(flight: Flight, seen: Sighting, own: Errors) -> None:
+def test_errors_of_the_pose_move_the_target_in_the_image(flight, seen, own):
     """Against projecting it once with the poses and once with the true ones."""
     rows = np.flatnonzero(seen.seen)
     true = sighting(flight, "truth").poses.take(rows)
@@ -178,7 +176,7 @@ def test_errors_of_the_pose_move_the_target_in_the_image(flight: Flight, seen: S
     assert found["largest_shift_px"] == pytest.approx(np.hypot(*(uv[0] - uv[1]).T).max(), rel=0.05)
 
 
-def test_an_autopilot_that_agrees_has_no_differences(flight: Flight, seen: Sighting, own: Errors) -> None:
+def test_an_autopilot_that_agrees_has_no_differences(flight, seen, own):
     same = Flight(flight.manifest, flight.nav | {"autopilot": flight.nav["mekf"]}, flight.tables)
     found = premise_numbers(same, seen, "mekf", own)
     for name in ("difference_roll", "difference_yaw", "outside_pitch", "difference_turning"):
@@ -194,14 +192,14 @@ def test_an_autopilot_that_agrees_has_no_differences(flight: Flight, seen: Sight
     assert inside[0] <= real["difference_roll"] <= inside[1]
 
 
-def test_a_deviation_that_changes_has_a_spread(flight: Flight, seen: Sighting, own: Errors) -> None:
+def test_a_deviation_that_changes_has_a_spread(flight, seen, own):
     even = own._replace(sd=np.ones_like(own.sd))
     rising = own._replace(sd=even.sd * np.linspace(1, 3, len(own.times))[:, None] ** (np.arange(9) == 7))
     assert premise_numbers(flight, seen, "mekf", even)["sd_spread"] == 0
     assert premise_numbers(flight, seen, "mekf", rising)["sd_spread"] == pytest.approx(0.9, rel=0.01)
 
 
-def test_how_a_flight_was_flown(flight: Flight, seen: Sighting) -> None:
+def test_how_a_flight_was_flown(flight, seen):
     found = flight_numbers(flight, seen)
     assert found["detections"] == 264 and found["pauses"] == len(pauses(seen)) and found["moving"] == 1
     assert found["settled"] == pytest.approx(seen.times[0] - flight.table("imu")["time_s"].min())

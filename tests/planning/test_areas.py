@@ -1,7 +1,5 @@
 """Polygons: what is refused, what lies inside, ways that stay inside."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -34,13 +32,13 @@ U_SHAPE = [[0, 0], [100, 0], [100, 30], [30, 30], [30, 70], [100, 70], [100, 100
         ([[0, 0, 0], [1, 1, 1], [2, 0, 0]], "shape"),
     ],
 )
-def test_what_is_no_area_is_refused_by_name(corners: list[list[float]], problem: str) -> None:
+def test_what_is_no_area_is_refused_by_name(corners, problem):
     with pytest.raises(WildlabError, match="field") as caught:
         check_area(corners, "field")
     assert problem in caught.value.problem
 
 
-def test_either_sense_and_a_closed_ring_give_the_same_area() -> None:
+def test_either_sense_and_a_closed_ring_give_the_same_area():
     one, other = check_area(SQUARE), check_area([*SQUARE[::-1], SQUARE[-1]])
     assert {tuple(p) for p in one} == {tuple(p) for p in other}
     for fence in (one, other):
@@ -51,7 +49,7 @@ def test_either_sense_and_a_closed_ring_give_the_same_area() -> None:
     assert area_of(np.add(SQUARE, [6e6, 5e5])) == pytest.approx(100.0, rel=1e-9)
 
 
-def test_what_lies_inside_is_what_winds_round() -> None:
+def test_what_lies_inside_is_what_winds_round():
     """Against the winding number, whose sum of angles is another way to count."""
     rng = np.random.default_rng(2)
     angles = np.sort(rng.uniform(0, 2 * np.pi, 9))
@@ -64,7 +62,7 @@ def test_what_lies_inside_is_what_winds_round() -> None:
     assert not contains(star, [[np.nan, 0.0]]).any()
 
 
-def test_a_rectangle_has_its_sides_and_its_course() -> None:
+def test_a_rectangle_has_its_sides_and_its_course():
     corners = rectangle(3.0, 4.0, 20.0, 10.0, 0.3)
     assert is_convex(corners)
     assert np.allclose(corners.mean(axis=0), [3.0, 4.0])
@@ -73,11 +71,11 @@ def test_a_rectangle_has_its_sides_and_its_course() -> None:
     assert np.ptp(corners @ along) == pytest.approx(20.0)
 
 
-def test_distance_to_the_border() -> None:
+def test_distance_to_the_border():
     assert np.allclose(distance_to_border(SQUARE, [[5, 5], [5, 12], [-3, -4]]), [5, 2, 5])
 
 
-def test_a_way_along_the_border_is_inside_and_one_across_the_gap_is_not() -> None:
+def test_a_way_along_the_border_is_inside_and_one_across_the_gap_is_not():
     fence = check_area(U_SHAPE)
     assert not is_convex(fence) and is_convex(check_area(SQUARE))
     assert stays_inside(fence, [0, 0], [0, 100])
@@ -87,7 +85,7 @@ def test_a_way_along_the_border_is_inside_and_one_across_the_gap_is_not() -> Non
     assert not stays_inside(fence, [100, 30], [100, 70])
 
 
-def test_the_way_inside_goes_round_the_two_corners_of_the_gap() -> None:
+def test_the_way_inside_goes_round_the_two_corners_of_the_gap():
     way = way_inside(check_area(U_SHAPE), [90, 15], [90, 85])
     assert np.allclose(way, [[90, 15], [30, 30], [30, 70], [90, 85]])
     assert length(way) == pytest.approx(40 + 2 * np.hypot(60, 15))

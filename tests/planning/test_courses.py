@@ -20,7 +20,7 @@ def curvature(points: np.ndarray) -> np.ndarray:
     return np.abs(np.diff(heading)) / ((far[1:] + far[:-1]) / 2)
 
 
-def test_a_dubins_way_turns_no_tighter_and_keeps_both_headings() -> None:
+def test_a_dubins_way_turns_no_tighter_and_keeps_both_headings():
     rng = np.random.default_rng(1)
     for _ in range(200):
         end, a, b = rng.uniform(-60, 60, 2), *rng.uniform(-np.pi, np.pi, 2)
@@ -32,7 +32,7 @@ def test_a_dubins_way_turns_no_tighter_and_keeps_both_headings() -> None:
         assert np.allclose(way[-1], end)
 
 
-def test_no_way_of_random_turns_is_shorter() -> None:
+def test_no_way_of_random_turns_is_shorter():
     """Ways of up to four arcs and lines that happen to arrive bound the shortest one from above."""
     rng = np.random.default_rng(2)
     for _ in range(300):
@@ -50,14 +50,14 @@ def test_no_way_of_random_turns_is_shorter() -> None:
         assert length(way) <= flown + 1e-6
 
 
-def test_wind_along_and_across_a_leg() -> None:
+def test_wind_along_and_across_a_leg():
     leg = [[0.0, 0.0], [120.0, 0.0]]
     assert fly(leg, 10.0, wind=[2.0, 0.0]).duration == pytest.approx(10.0)
     assert fly(leg, 10.0, wind=[-4.0, 0.0]).duration == pytest.approx(20.0)
     assert fly(leg, 10.0, wind=[0.0, 6.0]).duration == pytest.approx(15.0)
 
 
-def test_stops_take_their_time_and_the_heading_turns_meanwhile() -> None:
+def test_stops_take_their_time_and_the_heading_turns_meanwhile():
     course = fly([[0.0, 0.0], [50.0, 0.0], [50.0, 20.0]], 5.0, turn_time=4.0)
     points, headings = course.at([9.0, 12.0, 14.0, 16.0])
     assert np.allclose(points, [[45, 0], [50, 0], [50, 0], [50, 10]])
@@ -66,7 +66,7 @@ def test_stops_take_their_time_and_the_heading_turns_meanwhile() -> None:
     assert course.on_row.tolist() == [True, False, True, False]
 
 
-def test_what_cannot_stop_flies_every_row_and_turns_between_no_tighter_than_it_can() -> None:
+def test_what_cannot_stop_flies_every_row_and_turns_between_no_tighter_than_it_can():
     pattern = lawn_mower(rectangle(0, 0, 300, 100, 0.3), 20.0)
     course = fly(pattern, 15.0, turn_radius=30.0, spacing=0.5)
     assert curvature(course.points).max() < 1 / 30.0 * 1.001
@@ -88,11 +88,11 @@ def test_what_cannot_stop_flies_every_row_and_turns_between_no_tighter_than_it_c
         (1, {"speed": 5.0}, "two"),
     ],
 )
-def test_what_cannot_be_flown_is_refused(points: int, arguments: dict[str, float], problem: str) -> None:
+def test_what_cannot_be_flown_is_refused(points, arguments, problem):
     with refused(problem):
         fly([[0.0, 0.0], [1.0, 0.0]][:points], **arguments)  # type: ignore[arg-type]
 
 
-def test_a_circle_without_a_radius_is_refused() -> None:
+def test_a_circle_without_a_radius_is_refused():
     with refused("radius"):
         dubins([0.0, 0.0], 0.0, [1.0, 0.0], 0.0, 0.0)

@@ -45,7 +45,7 @@ def poses_over(terrain: Terrain, seed: int, count: int = 40) -> CameraPoses:
 
 
 @pytest.mark.parametrize("holes", [False, True])
-def test_many_images_show_what_each_shows_alone(holes: bool) -> None:
+def test_many_images_show_what_each_shows_alone(holes):
     terrain = hills(3, holes)
     poses = poses_over(terrain, 4)
     found = see(terrain, poses, 150.0)
@@ -66,7 +66,7 @@ def flat_flight(times: NDArray[np.float64]) -> tuple[Terrain, CameraPoses]:
     return flat, CameraPoses(WIDE, Mount("down"), p, np.eye(3))
 
 
-def test_times_and_gaps_are_those_of_a_square_that_moves() -> None:
+def test_times_and_gaps_are_those_of_a_square_that_moves():
     times = np.arange(0.0, 61.0)
     flat, poses = flat_flight(times)
     shown = cover(flat, poses, times, furthest=100.0)
@@ -84,7 +84,7 @@ def test_times_and_gaps_are_those_of_a_square_that_moves() -> None:
     assert not shown.looks[:, 50 + 11].any() and shown.looks[:, 50 + 10].any()
 
 
-def test_probability_is_that_of_independent_looks() -> None:
+def test_probability_is_that_of_independent_looks():
     times = np.arange(0.0, 5.0)
     flat, poses = flat_flight(times)
     shown = cover(flat, poses, times, furthest=100.0, range_scale=12.0)
@@ -95,7 +95,7 @@ def test_probability_is_that_of_independent_looks() -> None:
     assert np.array_equal(perfect.detected, (perfect.looks > 0).astype(float))
 
 
-def test_a_blurred_image_is_not_counted_and_told() -> None:
+def test_a_blurred_image_is_not_counted_and_told():
     times = np.arange(0.0, 61.0)
     flat, poses = flat_flight(times)
     sharp = times < 30
@@ -111,7 +111,7 @@ def test_a_blurred_image_is_not_counted_and_told() -> None:
     assert share.looks == pytest.approx(shown.looks[:, 45:56][shown.looks[:, 45:56] > 0].mean())
 
 
-def test_a_border_is_a_smaller_image() -> None:
+def test_a_border_is_a_smaller_image():
     terrain = hills(5)
     poses = poses_over(terrain, 6)
     inner = replace(CAMERA, width=520, height=280, cx=256.0, cy=116.6)
@@ -125,7 +125,7 @@ def test_a_border_is_a_smaller_image() -> None:
     assert shown.looks.sum() == len(one.node)
 
 
-def test_trees_hide_the_ground_behind_and_below_them() -> None:
+def test_trees_hide_the_ground_behind_and_below_them():
     flat = Terrain(np.zeros((101, 101), np.float32), north=-50.0, east=-50.0, step=1.0)
     raised = flat.height.copy()
     raised[60:63, :] = 8.0
@@ -141,7 +141,7 @@ def test_trees_hide_the_ground_behind_and_below_them() -> None:
     assert hidden[:60, column].sum() == bare[:60, column].sum()
 
 
-def test_nodes_of_areas_have_their_area() -> None:
+def test_nodes_of_areas_have_their_area():
     flat = Terrain(np.zeros((401, 401), np.float32), north=-100.0, east=-100.0, step=0.5)
     fences = [rectangle(0, 0, 60, 40, 0.4), rectangle(40, 50, 30, 30, 1.0)]
     owner = nodes_in(flat, fences)
@@ -159,7 +159,7 @@ def test_nodes_of_areas_have_their_area() -> None:
         ({"sharp": [True]}, "sharpness"),
     ],
 )
-def test_wrong_use_is_refused(change: dict[str, object], problem: str) -> None:
+def test_wrong_use_is_refused(change, problem):
     flat, poses = flat_flight(np.array([0.0, 1.0]))
     given = {"times": [0.0, 1.0], "furthest": 100.0} | change
     times = given.pop("times")
@@ -173,7 +173,7 @@ def test_wrong_use_is_refused(change: dict[str, object], problem: str) -> None:
 FENCE = check_area([[0, 0], [0, 60], [30, 60], [30, 20], [80, 20], [80, 0]])
 
 
-def test_walks_stay_inside_and_begin_anywhere() -> None:
+def test_walks_stay_inside_and_begin_anywhere():
     ways = walks(FENCE, np.arange(200.0), 300, 0.5, 1.0, np.random.default_rng(1))
     assert ways.shape == (300, 200, 2)
     # Straight lines between steps may cut a concave corner; at whole steps every animal is inside.
@@ -182,13 +182,13 @@ def test_walks_stay_inside_and_begin_anywhere() -> None:
     assert share == pytest.approx(1000 / 2800, abs=3 * np.sqrt(0.36 * 0.64 / 300))
 
 
-def test_far_from_a_fence_the_spread_grows_with_the_root_of_time() -> None:
+def test_far_from_a_fence_the_spread_grows_with_the_root_of_time():
     big = rectangle(0, 0, 1e4, 1e4, 0.0)
     ways = walks(big, [0.0, 100.0], 2000, 0.5, 4.0, np.random.default_rng(2))
     assert (ways[:, 1] - ways[:, 0]).std() == pytest.approx(0.5 * 4.0 * 5, rel=0.05)
 
 
-def test_first_seen_is_the_first_sharp_image_with_the_nearest_node() -> None:
+def test_first_seen_is_the_first_sharp_image_with_the_nearest_node():
     flat = Terrain(np.zeros((5, 5), np.float32), north=0.0, east=0.0, step=10.0)
     found = Sightings(np.array([0, 1, 1, 2]), np.array([6, 7, 12, 7]), np.zeros(4), np.zeros(4))
     times = np.array([0.0, 5.0, 9.0])
@@ -206,6 +206,6 @@ def test_first_seen_is_the_first_sharp_image_with_the_nearest_node() -> None:
     assert np.isnan(first_seen(nothing, flat, times, sharp, ways)).all()
 
 
-def test_a_step_of_nothing_is_refused() -> None:
+def test_a_step_of_nothing_is_refused():
     with refused("0 s"):
         walks(FENCE, [0.0], 1, 0.5, 0, np.random.default_rng(1))

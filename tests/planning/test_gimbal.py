@@ -28,7 +28,7 @@ ALONE = camera_on_course(CAMERA, np.zeros((1, 3)), [0.0], look_down([0.0]))
 FLAT = Terrain(np.zeros((3, 3), np.float32), north=-500.0, east=-500.0, step=500.0)
 
 
-def test_a_swing_keeps_its_rate_and_its_limits() -> None:
+def test_a_swing_keeps_its_rate_and_its_limits():
     t = np.linspace(0, 20, 4001)
     angle = swing(t, 0.7, 0.35)
     assert np.abs(angle).max() == pytest.approx(0.7, abs=1e-3)
@@ -39,7 +39,7 @@ def test_a_swing_keeps_its_rate_and_its_limits() -> None:
     assert (swing(t, 0.0, 1.0) == 0).all()
 
 
-def test_where_the_lens_points() -> None:
+def test_where_the_lens_points():
     """Heading east: ahead is east, left is north."""
     axis = np.array([0.0, 0.0, 1.0])
     east = np.array([np.pi / 2])
@@ -57,7 +57,7 @@ def test_where_the_lens_points() -> None:
     assert np.allclose(camera_attitudes(east, look_down([0.0]))[0] @ [0, -1, 0], [0, 1, 0], atol=1e-12)
 
 
-def test_blur_is_angle_rate_times_exposure_times_focal_length() -> None:
+def test_blur_is_angle_rate_times_exposure_times_focal_length():
     t = np.arange(0.0, 4.0, 0.1)
     still = np.tile([0.0, 0.0, -50.0], (len(t), 1))
 
@@ -73,7 +73,7 @@ def test_blur_is_angle_rate_times_exposure_times_focal_length() -> None:
     assert np.allclose(blurred(still, 0.3 * t, look_down(t)), 0.3 * 0.02 * np.hypot(50, 40))
 
 
-def test_the_view_is_inside_as_its_corners_are() -> None:
+def test_the_view_is_inside_as_its_corners_are():
     """From 20 m the image is 10 m by 8 m (a top to the north, so 8 m along north)."""
     p = np.array([[0.0, 0.0, -20.0], [0.0, 8.0, -20.0], [900.0, 0.0, -20.0]])
     fences = [rectangle(0, 0, 20, 20, 0.0)]
@@ -84,7 +84,7 @@ def test_the_view_is_inside_as_its_corners_are() -> None:
     assert view_inside(CAMERA, p[1:2], [0.0], np.radians([20.0]), NADIR, fences, FLAT).all()
 
 
-def test_inside_the_camera_swings_to_the_maximum_and_outside_to_the_minimum() -> None:
+def test_inside_the_camera_swings_to_the_maximum_and_outside_to_the_minimum():
     t = np.arange(0.0, 400.0, 0.1)
     rolls = np.linspace(-1, 1, 21)
     for inside, limit in ((True, 0.9), (False, 0.3)):
@@ -98,7 +98,7 @@ def test_inside_the_camera_swings_to_the_maximum_and_outside_to_the_minimum() ->
         assert np.diff(turns).min() > 2 * limit / 0.2 / 0.1 * 0.9
 
 
-def test_at_a_fence_on_one_side_it_turns_round_on_that_side_alone() -> None:
+def test_at_a_fence_on_one_side_it_turns_round_on_that_side_alone():
     t = np.arange(0.0, 200.0, 0.1)
     rolls = np.linspace(-1, 1, 41)
     known = np.tile(rolls <= 0.5, (len(t), 1))
@@ -107,7 +107,7 @@ def test_at_a_fence_on_one_side_it_turns_round_on_that_side_alone() -> None:
     assert roll.min() == pytest.approx(-0.9, abs=0.021)
 
 
-def test_an_adaptive_swing_begins_where_a_swing_between_the_least_limits_does() -> None:
+def test_an_adaptive_swing_begins_where_a_swing_between_the_least_limits_does():
     t = np.arange(0.0, 20.0, 0.001)
     never = np.zeros((len(t), 3), bool)
     for start in (0.0, 0.1, 0.4, 0.7, 0.9):
@@ -115,7 +115,7 @@ def test_an_adaptive_swing_begins_where_a_swing_between_the_least_limits_does() 
         assert roll[:6000] == pytest.approx(swing(t, 0.3, 0.2, start)[:6000], abs=2e-3)
 
 
-def test_the_rate_brings_the_swing_round_while_the_image_passes() -> None:
+def test_the_rate_brings_the_swing_round_while_the_image_passes():
     rate = swing_rate(0.5, 12.0, 3.0, overlap=0.25)
     assert 4 * 0.5 / rate == pytest.approx(12.0 * 0.75 / 3.0)
 
@@ -132,7 +132,7 @@ def test_the_rate_brings_the_swing_round_while_the_image_passes() -> None:
         (lambda: blur(CAMERA, ALONE, [0.0], 1, 1), "1 instant"),
     ],
 )
-def test_wrong_use_is_refused(call: object, problem: str) -> None:
+def test_wrong_use_is_refused(call, problem):
     with pytest.raises(WildlabError) as caught:
         call()  # type: ignore[operator]
     assert problem in caught.value.problem

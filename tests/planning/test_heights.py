@@ -18,7 +18,7 @@ def rough(seed: int = 1) -> Terrain:
 WAY = [[0.0, 0.0], [180.0, 20.0], [60.0, 150.0]]
 
 
-def test_without_limits_it_follows_the_ground() -> None:
+def test_without_limits_it_follows_the_ground():
     way = follow_terrain(rough(), WAY, 40.0, spacing=2.0)
     assert np.allclose(way.above, 40.0)
     assert np.allclose(-way.points[:, 2], rough().heights_at(way.points[:, :2]) + 40)
@@ -28,7 +28,7 @@ def test_without_limits_it_follows_the_ground() -> None:
 
 
 @pytest.mark.parametrize(("climb", "descent"), [(0.2, 0.1), (0.1, np.inf), (np.inf, 0.3)])
-def test_it_is_the_lowest_way_within_the_limits(climb: float, descent: float) -> None:
+def test_it_is_the_lowest_way_within_the_limits(climb, descent):
     """Against a direct statement: the greatest of what every place asks for here."""
     way = follow_terrain(rough(), WAY, 40.0, climb=climb, descent=descent, spacing=2.0)
     far = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(way.points[:, :2], axis=0), axis=1))])
@@ -43,11 +43,11 @@ def test_it_is_the_lowest_way_within_the_limits(climb: float, descent: float) ->
     assert slope.max() <= climb + 1e-9 and slope.min() >= -descent - 1e-9
 
 
-def test_a_way_that_leaves_the_map_is_refused() -> None:
+def test_a_way_that_leaves_the_map_is_refused():
     with refused("off the map"):
         follow_terrain(rough(), [[0.0, 0.0], [500.0, 0.0]], 40.0)
 
 
-def test_a_height_of_nothing_is_refused() -> None:
+def test_a_height_of_nothing_is_refused():
     with refused("above"):
         follow_terrain(rough(), WAY, 0.0)

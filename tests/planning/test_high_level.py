@@ -1,7 +1,5 @@
 """The high-level planner: both objectives, the rules by which animals are lost, and what greed costs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -49,7 +49,7 @@ def away_from_rows(pattern: Pattern, points: NDArray[np.float64]) -> NDArray[np.
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("direction", [None, 0.0, 0.9])
-def test_every_point_is_beside_a_row_within_half_the_distance(seed: int, direction: float | None) -> None:
+def test_every_point_is_beside_a_row_within_half_the_distance(seed, direction):
     fence = star(seed)
     pattern = lawn_mower(fence, 25.0, direction=direction)
     points = np.random.default_rng(seed).uniform(-200, 200, (2000, 2))
@@ -58,7 +58,7 @@ def test_every_point_is_beside_a_row_within_half_the_distance(seed: int, directi
     assert away_from_rows(pattern, points).max() <= pattern.distance[0] / 2 + 1e-6
 
 
-def test_rows_that_end_at_a_slanted_fence_leave_its_tips() -> None:
+def test_rows_that_end_at_a_slanted_fence_leave_its_tips():
     """Why rows reach on: F's sentence on convex areas is not true of rows that end at the fence."""
     triangle = check_area([[0, 0], [0, 100], [100, 0]])
     points = np.random.default_rng(1).uniform(0, 100, (4000, 2))
@@ -70,13 +70,13 @@ def test_rows_that_end_at_a_slanted_fence_leave_its_tips() -> None:
 
 
 @pytest.mark.parametrize("shape", [U_SHAPE, *[star(seed).tolist() for seed in range(4)]])
-def test_a_way_that_is_to_stay_inside_stays_inside(shape: list[list[float]]) -> None:
+def test_a_way_that_is_to_stay_inside_stays_inside(shape):
     fence = check_area(shape)
     pattern = lawn_mower(fence, 22.0, ends="inside")
     assert all(stays_inside(fence, a, b) for a, b in itertools.pairwise(pattern.waypoints))
 
 
-def test_pieces_of_rows_make_blocks_that_are_flown_each_at_once() -> None:
+def test_pieces_of_rows_make_blocks_that_are_flown_each_at_once():
     pattern = lawn_mower(U_SHAPE, 10.0, direction=np.pi / 2)
     middles = pattern.rows.mean(axis=1)
     arm = np.where(middles[:, 0] < 30, 0, np.where(middles[:, 1] < 50, 1, 2))
@@ -85,26 +85,26 @@ def test_pieces_of_rows_make_blocks_that_are_flown_each_at_once() -> None:
     assert sorted(np.bincount(arm)) == [3, 7, 7]
 
 
-def test_rows_run_back_and_forth_and_keep_the_twins_count() -> None:
+def test_rows_run_back_and_forth_and_keep_the_twins_count():
     pattern = lawn_mower(rectangle(0, 0, 240, 180, np.pi / 2), 25.0, direction=np.pi / 2)
     assert len(pattern.rows) == 8 and pattern.distance[0] == pytest.approx(180 / 8)
     assert np.allclose(np.cos(np.diff(pattern.directions)), -1)
     assert pattern.length == pytest.approx(8 * 240 + 7 * 22.5)
 
 
-def test_the_chosen_direction_is_along_the_longer_side() -> None:
+def test_the_chosen_direction_is_along_the_longer_side():
     pattern = lawn_mower(rectangle(0, 0, 200, 60, 0.4), 20.0)
     assert np.abs(np.sin(pattern.directions - 0.4)).max() < 1e-9
 
 
-def test_the_start_says_at_which_corner_rows_begin() -> None:
+def test_the_start_says_at_which_corner_rows_begin():
     fence = rectangle(0, 0, 100, 40, 0.0)
     for corner in fence:
         pattern = lawn_mower(fence, 20.0, start=3 * corner)
         assert np.linalg.norm(pattern.waypoints[0] - corner) <= 10.0 + 1e-9
 
 
-def test_several_areas_are_visited_in_the_shortest_order() -> None:
+def test_several_areas_are_visited_in_the_shortest_order():
     """Against every order and every way, by hand."""
     rng = np.random.default_rng(5)
     ways = [[Way(np.zeros((0, 2, 2)), rng.uniform(0, 100, (2, 2))) for _ in range(2)] for _ in range(5)]
@@ -126,7 +126,7 @@ def test_several_areas_are_visited_in_the_shortest_order() -> None:
         assert flown(order, chosen, back, start) == pytest.approx(least)
 
 
-def test_many_areas_are_not_far_from_the_shortest() -> None:
+def test_many_areas_are_not_far_from_the_shortest():
     """Ten on a circle: the shortest way round is known."""
     angles = np.random.default_rng(3).permutation(10) * 2 * np.pi / 10
     spots = [np.tile([100 * np.cos(a), 100 * np.sin(a)], (2, 1)) for a in angles]
@@ -135,14 +135,14 @@ def test_many_areas_are_not_far_from_the_shortest() -> None:
     assert np.allclose(turned, 2 * np.pi / 10)
 
 
-def test_a_given_order_is_kept_and_a_wrong_one_refused() -> None:
+def test_a_given_order_is_kept_and_a_wrong_one_refused():
     fields = [rectangle(0.0, east, 100.0, 40.0, 0.0) for east in (0.0, 200.0, 100.0)]
     assert lawn_mowers(fields, 20.0, order=[1, 0, 2]).area.tolist() == [1, 1, 0, 0, 2, 2]
     with refused("once"):
         lawn_mowers(fields, 20.0, order=[0, 0, 2])
 
 
-def test_the_footprint_is_the_largest_rectangle_that_every_edge_allows() -> None:
+def test_the_footprint_is_the_largest_rectangle_that_every_edge_allows():
     """Its corners and the middles of its sides project into the image, and its sides touch the edges."""
     seen = footprint(CAMERA, 60.0)
     assert footprint(CAMERA, 30.0).width == pytest.approx(seen.width / 2)  # F 8.2: linear with altitude
@@ -169,13 +169,13 @@ def test_the_footprint_is_the_largest_rectangle_that_every_edge_allows() -> None
         (lambda: visit_order([[]]), "no way"),
     ],
 )
-def test_wrong_use_is_refused(call: object, problem: str) -> None:
+def test_wrong_use_is_refused(call, problem):
     with pytest.raises(WildlabError) as caught:
         call()  # type: ignore[operator]
     assert problem in caught.value.problem
 
 
-def test_rows_over_share_the_extent_evenly() -> None:
+def test_rows_over_share_the_extent_evenly():
     assert row_distance(20.0, 0.25) == 15.0
     rows, step = rows_over(check_area(U_SHAPE), 30.0, 0.0)
     assert step == 25.0 and [len(row) for row in rows] == [1, 1, 1, 1]

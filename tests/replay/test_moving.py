@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -32,7 +31,7 @@ def report_of(flight: Flight, out: str = "", leading: str = "") -> str:
     return "".join(report.parts)
 
 
-def test_the_arrays_are_those_of_the_flight(ship: Flight) -> None:
+def test_the_arrays_are_those_of_the_flight(ship):
     scene = scene_of(ship, ellipses=False)
     shown = moving_flight(scene)
     nav = ship.nav["autopilot"]
@@ -47,7 +46,7 @@ def test_the_arrays_are_those_of_the_flight(ship: Flight) -> None:
     assert np.isnan(scene.points.covariance).all()
 
 
-def test_it_is_in_the_report_without_a_script_and_not_too_large(ship: Flight) -> None:
+def test_it_is_in_the_report_without_a_script_and_not_too_large(ship):
     page = report_of(ship)
     assert "<svg" in page and "<script" not in page and len(page.encode()) < MOST_BYTES + 10_000
     assert "prefers-reduced-motion" in page
@@ -56,7 +55,7 @@ def test_it_is_in_the_report_without_a_script_and_not_too_large(ship: Flight) ->
     assert f"{way:.0f} m" in page
 
 
-def test_a_table_of_tracks_gives_ellipses_of_one_filter(ship: Flight, tmp_path: Path) -> None:
+def test_a_table_of_tracks_gives_ellipses_of_one_filter(ship, tmp_path):
     rows = {name: [0.5, 1.5, 2.5] * 2 for name in COLUMNS}
     rows |= {"target": ["ship"] * 6, "sensor": ["camera"] * 6, "filter": ["ekf"] * 3 + ["schmidt"] * 3}
     rows |= {"p_00": [4.0] * 6, "p_01": [0.0] * 6, "p_11": [4.0] * 6}
@@ -73,7 +72,7 @@ def test_a_table_of_tracks_gives_ellipses_of_one_filter(ship: Flight, tmp_path: 
         report_of(ship, str(tmp_path))
 
 
-def test_a_flight_without_a_path_or_times_gets_no_picture(ship: Flight) -> None:
+def test_a_flight_without_a_path_or_times_gets_no_picture(ship):
     assert report_of(replace(ship, nav={})) == ""
     assert report_of(replace(ship, nav={}, tables={})) == ""
     scene = replace(scene_of(ship, ellipses=False), timed=False)

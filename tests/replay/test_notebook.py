@@ -5,24 +5,19 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
 import rerun.notebook as widgets
 
 from wildlab.replay.notebook import show_replay
 from wildlab.simulation.twins import simulate_twin
 
 
-def test_without_the_widget_it_is_said_what_to_install(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_widget_it_is_said_what_to_install(capsys, monkeypatch):
     monkeypatch.setattr(widgets, "HAS_NOTEBOOK", False)
     show_replay(simulate_twin("large-ship", 1))
     assert "rerun-sdk[notebook]" in capsys.readouterr().out
 
 
-def test_the_widget_gets_the_flight(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_widget_gets_the_flight(capsys, monkeypatch):
     given: dict[str, Any] = {}
 
     def viewer(**arguments: Any) -> Any:

@@ -6,7 +6,6 @@ import base64
 import hashlib
 import re
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,7 +20,7 @@ from wildlab.simulation.twins import simulate_twin
 MADE_UP = Viewer("0", "var wasm_bindgen = '</script><script>alert(1)//<!--';", b"\0asm and more")
 
 
-def test_the_page_holds_all_and_allows_only_its_own_scripts() -> None:
+def test_the_page_holds_all_and_allows_only_its_own_scripts():
     text = page(b"\0recording\xff", MADE_UP, "</title><script>x", b"narrow")
     parts = {"viewer": MADE_UP.wasm, "recording": b"\0recording\xff", "narrow-layout": b"narrow"}
     assert dict(parts_of(text)) == parts
@@ -38,9 +37,7 @@ def test_the_page_holds_all_and_allows_only_its_own_scripts() -> None:
     assert not re.search(r"""(?:src|href)=(?!["']data:)""", text)
 
 
-def test_the_program_listens_to_this_machine_alone_and_counts_nobody(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_program_listens_to_this_machine_alone_and_counts_nobody(tmp_path, monkeypatch):
     import rerun_cli
 
     seen = tmp_path / "seen"
@@ -68,7 +65,7 @@ def graphics(launch: Callable[..., Any]) -> Iterator[Any]:
 
 
 @pytest.mark.slow
-def test_a_browser_without_a_network_plays_it(graphics: Any, tmp_path: Path) -> None:
+def test_a_browser_without_a_network_plays_it(graphics, tmp_path):
     save_flight(simulate_twin("large-ship", 1), tmp_path / "flight")
     written, _ = replay(tmp_path / "flight", into=tmp_path / "out", html=True)
     assert [one.name for one in written] == [RECORDING, PAGE]

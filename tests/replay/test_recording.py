@@ -49,7 +49,7 @@ def poses_of(flight: Flight, source: str) -> CameraPoses:
     return CameraPoses(m.geometry_camera(), m.geometry_mount(), p, R, *gimbal_angles(flight))
 
 
-def test_places_times_and_attitudes_are_those_of_the_flight(ship: Flight, tmp_path: Path) -> None:
+def test_places_times_and_attitudes_are_those_of_the_flight(ship, tmp_path):
     found = saved(ship, tmp_path)
     nav = ship.nav["autopilot"]
     begin = nav["time_s"].iloc[0]
@@ -71,7 +71,7 @@ def test_places_times_and_attitudes_are_those_of_the_flight(ship: Flight, tmp_pa
     assert np.allclose(np.linalg.det(turned), 1.0, atol=1e-5)
 
 
-def test_time_counts_from_the_first_pose_whatever_the_clock_shows(ship: Flight) -> None:
+def test_time_counts_from_the_first_pose_whatever_the_clock_shows(ship):
     def later(tables: dict[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
         return {
             name: table.assign(time_s=table["time_s"] + 1000.0) if "time_s" in table else table
@@ -86,7 +86,7 @@ def test_time_counts_from_the_first_pose_whatever_the_clock_shows(ship: Flight) 
     assert all(np.allclose(a.times, b.times) for a, b in zip(one.truth, other.truth, strict=True))
 
 
-def test_what_the_viewer_projects_lands_on_the_detection(ship: Flight, tmp_path: Path) -> None:
+def test_what_the_viewer_projects_lands_on_the_detection(ship, tmp_path):
     """Points on the ground, seen through the recording's own camera, are where the images have them."""
     found = saved(ship, tmp_path)
     camera = ship.manifest.geometry_camera()
@@ -107,7 +107,7 @@ def test_what_the_viewer_projects_lands_on_the_detection(ship: Flight, tmp_path:
     assert compared > 50
 
 
-def test_footprints_are_those_of_the_geometry(ship: Flight, tmp_path: Path) -> None:
+def test_footprints_are_those_of_the_geometry(ship, tmp_path):
     found = saved(ship, tmp_path)["/world/footprint", "LineStrips3D:strips"]
     poses, level = poses_of(ship, "autopilot"), ground_height(ship)
     assert level is not None
@@ -127,7 +127,7 @@ def test_footprints_are_those_of_the_geometry(ship: Flight, tmp_path: Path) -> N
     assert drawn > 0.9 * np.isfinite(poses.p_nc).all(axis=1).sum()
 
 
-def test_no_ray_past_the_horizon_makes_a_footprint(ship: Flight) -> None:
+def test_no_ray_past_the_horizon_makes_a_footprint(ship):
     level = replace_in_manifest(ship.manifest, {"mount": {"looks": "forward", "tilt_deg": 0.0}})
     poses = poses_of(replace(ship, manifest=level), "autopilot")
     assert np.isnan(footprints(replace(ship, manifest=level), poses)).all()
@@ -135,7 +135,7 @@ def test_no_ray_past_the_horizon_makes_a_footprint(ship: Flight) -> None:
     assert len(scene.lacks) > len(scene_of(ship).lacks)
 
 
-def test_ellipses_hold_what_they_say() -> None:
+def test_ellipses_hold_what_they_say():
     rng = np.random.default_rng(3)
     A = rng.normal(size=(40, 2, 2))
     P = A @ A.swapaxes(1, 2) + 0.1 * np.eye(2)
@@ -152,7 +152,7 @@ def test_ellipses_hold_what_they_say() -> None:
         )
 
 
-def test_errors_and_nees_are_those_of_the_tables(ship: Flight, tmp_path: Path) -> None:
+def test_errors_and_nees_are_those_of_the_tables(ship, tmp_path):
     found = saved(ship, tmp_path)
     points = scene_of(ship).points
     assert points is not None
@@ -174,7 +174,7 @@ def test_errors_and_nees_are_those_of_the_tables(ship: Flight, tmp_path: Path) -
     assert points.nees[k] == pytest.approx(e @ np.linalg.solve(points.covariance[k], e), rel=1e-6)
 
 
-def test_terrain_becomes_triangles_that_lie_on_it() -> None:
+def test_terrain_becomes_triangles_that_lie_on_it():
     rng = np.random.default_rng(1)
     height = np.cumsum(rng.normal(size=(30, 50)), axis=1).astype(np.float32)
     height[3, 4] = np.nan
@@ -217,7 +217,7 @@ def without(flight: Flight, *tables: str) -> Flight:
 
 
 @pytest.mark.parametrize("what", LACKING)
-def test_what_lacks_is_said_and_the_rest_is_shown(ship: Flight, tmp_path: Path, what: str) -> None:
+def test_what_lacks_is_said_and_the_rest_is_shown(ship, tmp_path, what):
     spoil, said, still = LACKING[what]
     flight = spoil(ship)
     scene = scene_of(flight)
@@ -226,13 +226,13 @@ def test_what_lacks_is_said_and_the_rest_is_shown(ship: Flight, tmp_path: Path, 
     assert any(entity == still for entity, _ in saved(flight, tmp_path))
 
 
-def test_a_flight_of_nothing_is_refused(ship: Flight, tmp_path: Path) -> None:
+def test_a_flight_of_nothing_is_refused(ship, tmp_path):
     empty = replace(ship, nav={}, tables={})
     with pytest.raises(WildlabError, match="nothing to play back"):
         scene_of(empty)
 
 
-def test_nothing_tells_where_when_or_by_whom(ship: Flight, tmp_path: Path) -> None:
+def test_nothing_tells_where_when_or_by_whom(ship, tmp_path):
     manifest = replace_in_manifest(
         ship.manifest,
         {"origin": {"latitude_deg": 12.345678, "longitude_deg": 98.765432, "height_m": 432.125}},
@@ -256,7 +256,7 @@ HOSTILE = [
 ]
 
 
-def test_names_of_strangers_stay_names(ship: Flight, tmp_path: Path) -> None:
+def test_names_of_strangers_stay_names(ship, tmp_path):
     names = pd.Series(HOSTILE)
     seen = ship.table("detections")
     seen = seen.assign(target_id=names.iloc[np.arange(len(seen)) % len(names)].to_numpy())
@@ -281,7 +281,7 @@ def test_names_of_strangers_stay_names(ship: Flight, tmp_path: Path) -> None:
     )
 
 
-def test_pictures_stand_at_their_frames_and_detections_in_their_pixels(ship: Flight, tmp_path: Path) -> None:
+def test_pictures_stand_at_their_frames_and_detections_in_their_pixels(ship, tmp_path):
     camera = ship.manifest.geometry_camera()
     size = round(camera.width / 2), round(camera.height / 2)
     jpeg = cv2.imencode(".jpg", np.full((size[1], size[0]), 90, np.uint8))[1].tobytes()
@@ -302,7 +302,7 @@ def test_pictures_stand_at_their_frames_and_detections_in_their_pixels(ship: Fli
     assert np.allclose((uv[:2] / uv[2]) / 0.5 - 0.5, project(camera, p)[0], atol=1e-3)
 
 
-def test_of_too_many_frames_those_that_saw_something_come_first(ship: Flight) -> None:
+def test_of_too_many_frames_those_that_saw_something_come_first(ship):
     n = 4 * MOST_FRAMES
     span = ship.nav["autopilot"]["time_s"]
     frames = pd.DataFrame(
@@ -319,7 +319,7 @@ def test_of_too_many_frames_those_that_saw_something_come_first(ship: Flight) ->
     assert len(scene.lacks) == 1 + len(scene_of(ship).lacks)
 
 
-def test_nothing_half_written_is_left(ship: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_half_written_is_left(ship, tmp_path, monkeypatch):
     (tmp_path / "replay.rrd").write_bytes(b"before")
 
     def broken(*_: object) -> None:

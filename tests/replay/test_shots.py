@@ -23,7 +23,7 @@ def picture(path: Path, level: int, size: tuple[int, int] = (64, 48)) -> None:
     Image.fromarray(pixels).save(path, exif=exif, comment=b"SECRET WORDS")
 
 
-def test_pixels_alone_come_along_and_stand_at_their_frames(tmp_path: Path) -> None:
+def test_pixels_alone_come_along_and_stand_at_their_frames(tmp_path):
     for i in range(3):
         picture(tmp_path / f"IMG_{i}.JPG", 40 + 80 * i)
     found = read_shots(tmp_path, ["IMG_2", "IMG_0.JPG", "other"], (64, 48))
@@ -35,7 +35,7 @@ def test_pixels_alone_come_along_and_stand_at_their_frames(tmp_path: Path) -> No
     assert levels[0] == pytest.approx(200, abs=3) and levels[1] == pytest.approx(40, abs=3)
 
 
-def test_images_of_another_shape_or_broken_ones_are_told(tmp_path: Path) -> None:
+def test_images_of_another_shape_or_broken_ones_are_told(tmp_path):
     picture(tmp_path / "a.jpg", 90)
     picture(tmp_path / "b.jpg", 91)
     picture(tmp_path / "c.jpg", 92, (48, 64))
@@ -45,13 +45,13 @@ def test_images_of_another_shape_or_broken_ones_are_told(tmp_path: Path) -> None
     assert len(found.lacks) == 2 and any("48 x 64" in one for one in found.lacks)
 
 
-def test_images_of_another_flight_are_refused(tmp_path: Path) -> None:
+def test_images_of_another_flight_are_refused(tmp_path):
     picture(tmp_path / "a.jpg", 90)
     with pytest.raises(WildlabError, match="none of these images"):
         read_shots(tmp_path, ["x", "y"], None)
 
 
-def test_all_of_them_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_of_them_fit(tmp_path, monkeypatch):
     rng = np.random.default_rng(0)
     for i in range(12):
         noise = rng.integers(0, 255, (480, 640)).astype(np.uint8)
@@ -67,7 +67,7 @@ def test_all_of_them_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert len({one.scale for one in found.by_row.values()}) == 1 and seen[-1] == (8, 8)
 
 
-def test_no_image_is_enlarged_and_none_is_longer_than_a_screen() -> None:
+def test_no_image_is_enlarged_and_none_is_longer_than_a_screen():
     assert reduction(320, 240, 1) == 1.0
     assert 4000 * reduction(4000, 3000, 1) == pytest.approx(LONGEST)
     assert reduction(4000, 3000, 900) < reduction(4000, 3000, 100)

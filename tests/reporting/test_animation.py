@@ -63,7 +63,7 @@ def values(svg: str, after: str, attribute: str) -> list[list[float]]:
     return [[float(one) for one in re.split(r"[ ,]", value)] for value in found[1].split(";")]
 
 
-def test_the_aircraft_is_where_it_was(tmp_path: Path) -> None:
+def test_the_aircraft_is_where_it_was(tmp_path):
     """By the scale drawn: it goes round a circle of 120 m, twice, its nose in the direction it goes."""
     svg = animated_flight(shown(), alt="A flight.")
     moving = svg[svg.index('class="moves"') :]
@@ -80,7 +80,7 @@ def test_the_aircraft_is_where_it_was(tmp_path: Path) -> None:
 
 @settings(max_examples=25)
 @given(st.floats(0.5, 400.0), st.floats(0.5, 400.0), st.floats(-0.9, 0.9))
-def test_ellipses_have_the_size_that_their_covariance_says(a: float, b: float, rho: float) -> None:
+def test_ellipses_have_the_size_that_their_covariance_says(a, b, rho):
     P = np.array([[a, rho * np.sqrt(a * b)], [rho * np.sqrt(a * b), b]])
     where = np.zeros((2, 2))
     held = Ellipses(np.array([0.0, 60.0]), where, np.stack([P, P]))
@@ -96,7 +96,7 @@ def test_ellipses_have_the_size_that_their_covariance_says(a: float, b: float, r
         assert along @ P @ along == pytest.approx(np.linalg.eigvalsh(P)[1], rel=0.01)
 
 
-def test_points_land_at_their_time_and_place() -> None:
+def test_points_land_at_their_time_and_place():
     points = Course(np.array([15.0, 30.0]), np.array([[0.0, 0.0], [0.0, 100.0]]))
     svg = animated_flight(shown(points=points), alt="x", seconds=20.0)
     circles = re.findall(r'<circle class="point" cx="([\d.]+)" cy="([\d.]+)".*?keyTimes="([^"]+)"', svg)
@@ -109,7 +109,7 @@ def test_points_land_at_their_time_and_place() -> None:
     assert 'dur="20.00s"' in svg
 
 
-def test_what_is_not_known_is_not_shown() -> None:
+def test_what_is_not_known_is_not_shown():
     gap = shown().truth[0].points.copy()
     gap[: len(gap) // 2] = np.nan
     svg = animated_flight(shown(truth=[Course(TIMES, gap)]), alt="x")
@@ -123,7 +123,7 @@ def test_what_is_not_known_is_not_shown() -> None:
     assert "<polygon" not in animated_flight(nothing, alt="x")
 
 
-def test_a_target_at_rest_has_a_cross_that_rests() -> None:
+def test_a_target_at_rest_has_a_cross_that_rests():
     antenna = Course(np.array([np.nan]), np.array([[5.0, 5.0]]))
     with pytest.raises(WildlabError, match="no increasing row of seconds"):
         animated_flight(shown(truth=[antenna]), alt="x")
@@ -144,20 +144,20 @@ def test_a_target_at_rest_has_a_cross_that_rests() -> None:
         ("ellipses", Ellipses(TIMES, circle().points, np.zeros((len(TIMES), 3, 2))), r"\(N, 2, 2\)"),
     ],
 )
-def test_arrays_that_do_not_fit_are_named(field: str, part: Any, sentence: str) -> None:
+def test_arrays_that_do_not_fit_are_named(field, part, sentence):
     with pytest.raises(WildlabError) as caught:
         animated_flight(shown(**{field: [part] if field == "ellipses" else part}), alt="x")
     assert re.search(sentence, f"{caught.value.problem} {caught.value.fix}") and caught.value.field == field
 
 
-def test_no_alt_text_no_picture() -> None:
+def test_no_alt_text_no_picture():
     with pytest.raises(WildlabError, match="no alt text"):
         animated_flight(shown(), alt=" ")
     assert 'aria-label="&lt;script&gt;&quot;"' in animated_flight(shown(), alt='<script>"')
 
 
 @pytest.mark.slow
-def test_a_long_flight_fits_into_its_bytes() -> None:
+def test_a_long_flight_fits_into_its_bytes():
     """25 minutes of rounds, with 3000 points and two targets."""
     t = np.arange(0.0, 1500.0, 0.5)
     round_ = 2 * np.pi * t / 37
@@ -200,7 +200,7 @@ def pictures(tab: Any) -> tuple[bytes, bytes]:
 
 
 @pytest.mark.parametrize("still", ["asked", "stopped", "paper"])
-def test_it_stands_still(browser: Any, tmp_path: Path, still: str) -> None:
+def test_it_stands_still(browser, tmp_path, still):
     tab = opened(browser, tmp_path, **({"reduced_motion": "reduce"} if still == "asked" else {}))
     if still == "stopped":
         tab.locator("summary").click()

@@ -59,7 +59,7 @@ def assert_readable(figure: Figure) -> None:
 PLAIN = np.full(N, 10.0)
 
 
-def test_gains_are_differences_of_distances_where_both_see_the_target() -> None:
+def test_gains_are_differences_of_distances_where_both_see_the_target():
     seen = np.arange(N) % 2 == 0
     plain, (one,) = beside_plain([track("ekf", PLAIN), track("schmidt", np.full(N, 4.0), seen)])
     assert plain == "ekf" and one.filter == "schmidt"
@@ -68,13 +68,13 @@ def test_gains_are_differences_of_distances_where_both_see_the_target() -> None:
     assert (one.nearer, one.farther, one.middle) == (1.0, 0.0, pytest.approx(6.0))
 
 
-def test_shares_count_looks_and_leave_out_what_is_alike() -> None:
+def test_shares_count_looks_and_leave_out_what_is_alike():
     off = np.repeat([10.05, 9.95, 12.0, 3.0], [40, 40, 30, 90])
     _, (one,) = beside_plain([track("ekf", PLAIN), track("coloured", off)])
     assert (one.nearer, one.farther) == (0.45, 0.15)
 
 
-def test_tracks_of_other_looks_are_held_together_by_time() -> None:
+def test_tracks_of_other_looks_are_held_together_by_time():
     _, (one,) = beside_plain([track("kf", np.arange(N) + 1.0), track("imm", np.ones(50), start=100)])
     assert one.times.tolist() == list(range(100, 150))
     assert one.gain == pytest.approx(np.arange(100.0, 150.0))
@@ -85,12 +85,12 @@ def test_tracks_of_other_looks_are_held_together_by_time() -> None:
 @pytest.mark.parametrize(
     "tracks", [[], [track("ekf", PLAIN)], [track("schmidt", PLAIN), track("coloured", PLAIN)]]
 )
-def test_without_a_plain_filter_and_another_there_is_no_figure(tracks: list[SensorTrack]) -> None:
+def test_without_a_plain_filter_and_another_there_is_no_figure(tracks):
     assert beside_plain(tracks)[1] == []
     assert not tracks or beside_plain_shown(tracks) is None
 
 
-def test_each_filter_has_a_strip_and_all_have_one_axis() -> None:
+def test_each_filter_has_a_strip_and_all_have_one_axis():
     names = ("schmidt", "coloured", "ukf", "imm", "thinned")
     tracks = [track("ekf", PLAIN), *(track(name, PLAIN - i - 1) for i, name in enumerate(names))]
     shown = beside_plain_shown(tracks)
@@ -104,7 +104,7 @@ def test_each_filter_has_a_strip_and_all_have_one_axis() -> None:
 
 
 @pytest.mark.parametrize("largest", [300.0, 1e8])
-def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest: float) -> None:
+def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest):
     plain = PLAIN.copy()
     plain[-5:] = largest
     shown = beside_plain_shown(
@@ -120,7 +120,7 @@ def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest: float) -> N
 
 
 @pytest.mark.parametrize(("worst", "scale"), [(12.0, "linear"), (5e6, "log")])
-def test_errors_of_one_that_is_lost_are_drawn_over_powers_of_ten(worst: float, scale: str) -> None:
+def test_errors_of_one_that_is_lost_are_drawn_over_powers_of_ten(worst, scale):
     plain = PLAIN.copy()
     plain[-5:] = worst
     rows = pd.DataFrame(
@@ -241,11 +241,11 @@ def circling(since: float, shaking: float = 0.0) -> Any:
     return SimpleNamespace(path=Path("poses", since + times, place, timed=True))
 
 
-def test_the_length_of_a_path_is_that_of_its_course_however_it_shakes() -> None:
+def test_the_length_of_a_path_is_that_of_its_course_however_it_shakes():
     assert way_of(circling(0.0)) == pytest.approx(2 * np.pi * 100, rel=1e-3)
     assert way_of(circling(0.0, shaking=0.5)) == pytest.approx(2 * np.pi * 100, rel=0.01)
 
 
 @given(st.floats(-1e5, 2e9))
-def test_no_clock_has_a_say_in_the_length_of_a_path(since: float) -> None:
+def test_no_clock_has_a_say_in_the_length_of_a_path(since):
     assert way_of(circling(since, 0.5)) == pytest.approx(way_of(circling(0.0, 0.5)), rel=1e-9)

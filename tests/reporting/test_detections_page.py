@@ -1,7 +1,5 @@
 """The page of a run of a detector has its numbers, and stays small and harmless."""
 
-from __future__ import annotations
-
 import re
 from html import unescape
 

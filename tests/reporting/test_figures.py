@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -18,7 +17,7 @@ from wildlab.reporting.figure_text import least_size
 from wildlab.reporting.pictures import PHONE_WIDTH
 
 
-def test_ellipse_holds_its_share_of_samples() -> None:
+def test_ellipse_holds_its_share_of_samples():
     rng = np.random.default_rng(0)
     covariance = np.array([[9.0, 4.0], [4.0, 3.0]])
     points = rng.multivariate_normal([10.0, -5.0], covariance, 40_000)
@@ -33,7 +32,7 @@ def test_ellipse_holds_its_share_of_samples() -> None:
     assert ax.get_xlim()[0] < 10 - shape.width / 4
 
 
-def test_nothing_is_drawn_where_nothing_is_known() -> None:
+def test_nothing_is_drawn_where_nothing_is_known():
     _, ax = figures.new_figure()
     assert figures.ellipse(ax, [np.nan, 0.0], np.eye(2)) is None
     assert figures.ellipse(ax, [0.0, 0.0], np.full((2, 2), np.nan)) is None
@@ -41,11 +40,11 @@ def test_nothing_is_drawn_where_nothing_is_known() -> None:
 
 
 @pytest.mark.parametrize(("about", "length"), [(7.3, 5), (10, 10), (0.024, 0.02), (1999, 1000)])
-def test_nice_length(about: float, length: float) -> None:
+def test_nice_length(about, length):
     assert figures.nice_length(about) == pytest.approx(length)
 
 
-def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path, monkeypatch):
     monkeypatch.delenv(figures.QUICK, raising=False)
     saved = []
     for name in ("1", "2", "3"):
@@ -60,7 +59,7 @@ def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path: Path, monkeypatch
     assert b"Date" not in saved[0][1] and b"matplotlib" not in saved[0][0].lower()
 
 
-def test_subjects_that_share_a_figure_have_different_colours() -> None:
+def test_subjects_that_share_a_figure_have_different_colours():
     for family in (("autopilot", "observer", "mekf"), ("kf", "ekf", "schmidt", "coloured", "ukf", "imm")):
         assert len({figures.colour(name) for name in (*family, "truth")}) == len(family) + 1
     assert figures.colour("logged-pose") != figures.colour("calibrated-pose") != figures.colour("recorded")
@@ -139,7 +138,7 @@ CHARTS: dict[str, Draw] = {
 
 
 @pytest.mark.parametrize("name", CHARTS)
-def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name: str) -> None:
+def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name):
     figure = CHARTS[name](np.random.default_rng(0))
     figures.png_bytes(figure)
     assert overlapping(figure) == []
@@ -147,7 +146,7 @@ def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name: str) -> N
     assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH
 
 
-def test_the_look_out_finds_what_is_wrong() -> None:
+def test_the_look_out_finds_what_is_wrong():
     figure, ax = figures.new_figure()
     ax.text(0.5, 0.5, "one")
     ax.text(0.5, 0.5, "other")
@@ -158,7 +157,7 @@ def test_the_look_out_finds_what_is_wrong() -> None:
     assert len(found) == 2
 
 
-def test_a_legend_and_names_at_ends_are_moved_until_they_fit() -> None:
+def test_a_legend_and_names_at_ends_are_moved_until_they_fit():
     figure, ax = figures.new_figure()
     for i in range(5):
         ax.plot([0, 1], [0, 1e-9 * i], label=f"the line number {i}")
@@ -173,7 +172,7 @@ def test_a_legend_and_names_at_ends_are_moved_until_they_fit() -> None:
 
 
 @pytest.mark.parametrize("unit", ["s", "m/s", "%", "°"])
-def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit: str) -> None:
+def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit):
     for much in range(0, 24, 6):
         figure, ax = figures.new_figure()
         ax.set_title(f"{'x' * much} pauses, of which the longest one, of all of the frames: 37.4 {unit}")
@@ -182,7 +181,7 @@ def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit: str) -> None
         assert len(lines) > 1 and lines[-1].endswith(f"37.4 {unit}")
 
 
-def test_every_line_stands_out_from_white() -> None:
+def test_every_line_stands_out_from_white():
     cycle = [str(one["color"]) for one in figures._STYLE["axes.prop_cycle"]]
     for colour in {*figures.COLOURS.values(), *cycle}:
         assert contrast(colour, "#ffffff") >= 3.0, colour

@@ -6,7 +6,6 @@ import base64
 import math
 import re
 from itertools import pairwise, product
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -46,7 +45,7 @@ def on_axis(ratio: float, width: float) -> float:
     st.lists(st.tuples(st.floats(1e-3, 1e3), st.sampled_from(VERDICTS)), max_size=60),
     st.sampled_from((1, 3, 5)),
 )
-def test_every_number_is_drawn_where_its_ratio_lies(given_: list[tuple[float, str]], levels: int) -> None:
+def test_every_number_is_drawn_where_its_ratio_lies(given_, levels):
     marks = ratios.arranged([number(*one) for one in given_], 320.0, levels)
     assert sorted((round(one.x, 6), one.closeness, one.beyond) for one in marks) == sorted(
         (round(on_axis(ratio, 320.0), 6), verdict, (ratio > 8) - (ratio < 1 / 8)) for ratio, verdict in given_
@@ -56,7 +55,7 @@ def test_every_number_is_drawn_where_its_ratio_lies(given_: list[tuple[float, st
 
 @settings(max_examples=60)
 @given(st.lists(st.floats(0.2, 5.0), max_size=14))
-def test_no_mark_hides_another_where_there_is_room(given_: list[float]) -> None:
+def test_no_mark_hides_another_where_there_is_room(given_):
     numbers = [number(one) for one in given_]
     levels = ratios.levels_for(numbers, 320.0, 29)
     marks = ratios.arranged(numbers, 320.0, levels)
@@ -65,7 +64,7 @@ def test_no_mark_hides_another_where_there_is_room(given_: list[float]) -> None:
         assert all(b - a >= 2 * 3.6 for a, b in pairwise(xs))
 
 
-def test_the_plot_shows_what_has_a_ratio_and_nothing_else() -> None:
+def test_the_plot_shows_what_has_a_ratio_and_nothing_else():
     numbers = [number(2.0), number(0.01, NOT_CLOSE), number(None), number(1.0, MISSING), number(-1.0)]
     drawn = ratios.plot(numbers, alt="<two>", width=320.0)
     at = dict(re.findall(r'translate\(([\d.]+) [^>]*><g class="mark \w*"><path class="(\w+)"', drawn))
@@ -82,7 +81,7 @@ def test_the_plot_shows_what_has_a_ratio_and_nothing_else() -> None:
     )
 
 
-def test_both_answers_show_without_colour() -> None:
+def test_both_answers_show_without_colour():
     names, paths = zip(*ratios.SHAPES.values(), strict=True)
     assert set(ratios.SHAPES) == set(VERDICTS) and len(set(names)) == len(set(paths)) == 5
     numbers = [number(1.0, *both, how) for both in product(Closeness, Compatibility) for how in ("", "x")]
@@ -106,7 +105,7 @@ def shrunk(picture: np.ndarray) -> np.ndarray:
     )
 
 
-def test_a_small_picture_looks_like_the_large_one() -> None:
+def test_a_small_picture_looks_like_the_large_one():
     large = np.zeros((600, 880, 4), np.uint8)
     large[:, :440] = (0, 0, 255, 255)  # red on the left; the right lets the paper through
     small = shrunk(large)
@@ -117,7 +116,7 @@ def test_a_small_picture_looks_like_the_large_one() -> None:
     assert grey.shape == (50, WIDE, 3) and np.abs(grey.astype(int) - 128).max() < 4
 
 
-def test_what_is_no_picture_gives_none() -> None:
+def test_what_is_no_picture_gives_none():
     whole = base64.b64decode(png(np.zeros((10, 10, 3), np.uint8)))
     huge = whole[:16] + (60_000).to_bytes(4, "big") * 2 + whole[24:]
     assert MOST_PIXELS < 60_000**2
@@ -126,7 +125,7 @@ def test_what_is_no_picture_gives_none() -> None:
     assert smaller("=") == ""
 
 
-def test_a_glimpse_is_plain_text(tmp_path: Path) -> None:
+def test_a_glimpse_is_plain_text(tmp_path):
     report = tmp_path / "report.html"
     assert read_glimpse(report) == ("", "", "", "")
     picture = png(np.zeros((10, 20, 3), np.uint8))

@@ -75,7 +75,7 @@ def test_the_title_of_the_scatter_follows_the_bias():
     assert georeferencing.span([50.6, 111.2, np.nan]) == "51 to 111"
 
 
-def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open() -> None:
+def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():
     tables = {name: pd.DataFrame() for name in ("Flight 1", "Flight  1", "north gate")}
     assert list(georeferencing.named(tables, "part", shown=False)) == ["part-1", "part-2", "part-3"]
     assert list(georeferencing.named(tables, "part", shown=True)) == [
@@ -113,9 +113,7 @@ def shown(made: tuple[Flight, Any], sensitivity: str) -> Report:
 
 
 @pytest.mark.parametrize("sensitivity", ["withheld", "generalised"])
-def test_metres_alone_are_handed_over_where_places_are_not_open(
-    made: tuple[Flight, Any], sensitivity: str
-) -> None:
+def test_metres_alone_are_handed_over_where_places_are_not_open(made, sensitivity):
     flight, points = made
     files = handed_over(shown(made, sensitivity))
     assert list(files) == ["points.csv"]
@@ -131,7 +129,7 @@ def test_metres_alone_are_handed_over_where_places_are_not_open(
     assert flight.name.encode() not in files["points.csv"]
 
 
-def test_places_are_handed_over_where_they_are_open(made: tuple[Flight, Any]) -> None:
+def test_places_are_handed_over_where_they_are_open(made):
     flight, points = made
     files = handed_over(shown(made, "open"))
     features = json.loads(files["points.geojson"])["features"]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from itertools import permutations
-from pathlib import Path
 
 import nbformat
 import pandas as pd
@@ -50,7 +48,7 @@ def hostile_report() -> Report:
     return report
 
 
-def test_hostile_names_stay_text(tmp_path: Path, faults: Callable[[Path], list[str]]) -> None:
+def test_hostile_names_stay_text(tmp_path, faults):
     whole = html.report_page(shown(hostile_report()), study=HOSTILE)
     assert "<script" not in whole and "<img src=x" not in whole
     path = tmp_path / "report.html"
@@ -62,7 +60,7 @@ def test_hostile_names_stay_text(tmp_path: Path, faults: Callable[[Path], list[s
     ("text", "theses"),
     [("H 5.6.1", "H"), ("H (7.35) and F tables 3.1", "HF"), ("the matrix H, the force F, H2O, CH 4", "")],
 )
-def test_a_report_names_the_theses_that_it_cites(text: str, theses: str) -> None:
+def test_a_report_names_the_theses_that_it_cites(text, theses):
     report = open_report(study="test", kind="twin", seed=1)
     report.head("Title")
     report.text(text)
@@ -71,9 +69,7 @@ def test_a_report_names_the_theses_that_it_cites(text: str, theses: str) -> None
     assert ("Helgesen" in footer, "Flodell" in footer) == ("H" in theses, "F" in theses)
 
 
-def test_failure_page_opens_offline_and_stays_text(
-    tmp_path: Path, faults: Callable[[Path], list[str]]
-) -> None:
+def test_failure_page_opens_offline_and_stays_text(tmp_path, faults):
     status = {"study": HOSTILE, "reason": HOSTILE, "seconds": 3.0}
     path = tmp_path / "report.html"
     path.write_text(
@@ -84,7 +80,7 @@ def test_failure_page_opens_offline_and_stays_text(
     assert faults(path) == []
 
 
-def test_code_prints_warnings_and_parameters_are_left_out() -> None:
+def test_code_prints_warnings_and_parameters_are_left_out():
     node = notebook("secret = 1")
     outputs = [
         nbformat.v4.new_output("stream", name="stderr", text="a warning"),
@@ -98,12 +94,12 @@ def test_code_prints_warnings_and_parameters_are_left_out() -> None:
     assert body == "<h1>Shown</h1>"
 
 
-def test_markdown_cells_have_their_maths_translated_and_their_html_escaped() -> None:
+def test_markdown_cells_have_their_maths_translated_and_their_html_escaped():
     body = html.notebook_body(notebook("# Title with $x_1 < 2$\n\n$$y$$\n\n<script>alert(1)</script>"))
     assert body.count("<math") == 2 and "$" not in body and "<script" not in body and "¶" not in body
 
 
-def test_page_says_what_browsers_may_do() -> None:
+def test_page_says_what_browsers_may_do():
     whole = page(title="a <b>", body="<h1>a</h1>")
     assert "default-src 'none'; img-src data:; style-src 'unsafe-inline'" in whole
     assert (
@@ -133,19 +129,19 @@ def test_page_says_what_browsers_may_do() -> None:
         ("<h1>a</h1>" + "x" * 5_000_000, "5 MB"),
     ],
 )
-def test_a_page_that_breaks_a_promise_is_refused(body: str, sentence: str) -> None:
+def test_a_page_that_breaks_a_promise_is_refused(body, sentence):
     with pytest.raises(WildlabError, match=f"report.html: .*{sentence}"):
         html.examine(page(title="a", body=body), "study")
 
 
-def test_a_file_that_is_no_notebook_is_named(tmp_path: Path) -> None:
+def test_a_file_that_is_no_notebook_is_named(tmp_path):
     (tmp_path / "a.ipynb").write_text("{}")
     with pytest.raises(WildlabError, match=r"a\.ipynb: this is not a notebook"):
         read_notebook(tmp_path / "a.ipynb")
 
 
 @pytest.mark.parametrize("to", ["ledger.html", "a-b/report.html#x", "100%25/report.html"])
-def test_pages_of_the_folder_may_lead_to_one_another(to: str) -> None:
+def test_pages_of_the_folder_may_lead_to_one_another(to):
     whole = page(title="a", body=f'<h1>a</h1><a href="{to}">x</a>')
     html.examine(whole, "index", alone=False)
     with pytest.raises(WildlabError, match="mailed alone"):
@@ -178,13 +174,13 @@ def contrast(one: str, other: str) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
-def test_contrast_is_that_of_the_standard() -> None:
+def test_contrast_is_that_of_the_standard():
     assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
     assert contrast("#767676", "#ffffff") == pytest.approx(4.54, abs=0.01)
 
 
 @pytest.mark.parametrize("scheme", [":root", "prefers-color-scheme: dark"])
-def test_every_colour_of_words_can_be_read(scheme: str) -> None:
+def test_every_colour_of_words_can_be_read(scheme):
     found = colours(":root") | colours(scheme)
     for behind in ("bg", "soft"):
         for word in WORDS:
@@ -196,7 +192,7 @@ def test_every_colour_of_words_can_be_read(scheme: str) -> None:
         assert contrast(found[mark], found["bg"]) >= 3.0
 
 
-def test_the_night_has_its_own_ground_and_leaves_paper_white() -> None:
+def test_the_night_has_its_own_ground_and_leaves_paper_white():
     assert luminance(colours("prefers-color-scheme: dark")["bg"]) < 0.02
     assert "@media screen and (prefers-color-scheme: dark)" in STYLE
     # A colour written outside the variables would stay as it is by night.
@@ -233,7 +229,7 @@ PARTS = {
 
 
 @given(st.permutations(list(PARTS)))
-def test_any_order_of_the_parts_becomes_the_one(names: list[str]) -> None:
+def test_any_order_of_the_parts_becomes_the_one(names):
     html = in_order(*(PARTS[name] for name in names))
     wanted = ["head</h1", "summary</p", "alert</p", "picture", "tiles</li", "advice", "do this"]
     wanted += ["limits", "doubt", "numbers</h2", "before", "after", "by</summary", "thus"]
@@ -242,7 +238,7 @@ def test_any_order_of_the_parts_becomes_the_one(names: list[str]) -> None:
     assert all(html.count(word) == 1 for word in wanted) and "data-part" not in html
 
 
-def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand() -> None:
+def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand():
     one = report()
     one.head("Title")
     one.section("Section")
@@ -257,7 +253,7 @@ def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand
     assert isinstance(first, Tag) and heading in first.find_all_next()
 
 
-def test_a_folded_picture_or_a_table_is_not_the_main_picture() -> None:
+def test_a_folded_picture_or_a_table_is_not_the_main_picture():
     folded = f"<details><summary>s</summary><figure>{IMAGE}</figure></details>"
     table = '<figure class="table"><table></table></figure>'
     html = in_order(PARTS["head"], "<h2>sec</h2>", table, folded, PARTS["tiles"])
@@ -265,7 +261,7 @@ def test_a_folded_picture_or_a_table_is_not_the_main_picture() -> None:
 
 
 @pytest.mark.parametrize(("level", "given"), [("good", "good"), ("bad", "bad")])
-def test_the_last_verdict_colours_the_bar(level: str, given: str) -> None:
+def test_the_last_verdict_colours_the_bar(level, given):
     verdicts = [
         f'<p class="verdict" data-part="verdict" data-level="{one}">{one} word</p>' for one in ("warn", level)
     ]
@@ -274,7 +270,7 @@ def test_the_last_verdict_colours_the_bar(level: str, given: str) -> None:
     assert box.get_text() == f"summary{given} word" and "data-level" not in str(box)
 
 
-def test_what_is_no_report_is_left_alone() -> None:
+def test_what_is_no_report_is_left_alone():
     for names in permutations(("limits", "numbers")):
         body = "\n".join(PARTS[name] for name in names)
         assert arranged(body) == body
@@ -288,7 +284,7 @@ def links(html: str) -> list[tuple[str, str]]:
     return [(str(link["href"]), link.get_text()) for link in soup.find_all("a", class_="word")]
 
 
-def test_the_first_use_is_linked_and_explained() -> None:
+def test_the_first_use_is_linked_and_explained():
     html = with_glossary("<p>Poses, and the mean NEES; a pose again, NEES.</p>", [A, B])
     assert links(html) == [("#word-pose", "Poses"), ("#word-nees", "NEES")]
     assert '<dt id="word-pose">pose</dt><dd>Where &amp; which way.</dd>' in html
@@ -306,17 +302,17 @@ def test_the_first_use_is_linked_and_explained() -> None:
         "<details><summary>NEES</summary></details>",
     ],
 )
-def test_headings_links_code_and_formulas_are_no_use(within: str) -> None:
+def test_headings_links_code_and_formulas_are_no_use(within):
     assert with_glossary(within, [A]) == within
     assert links(with_glossary(f"{within}<p>the NEES</p>", [A])) == [("#word-nees", "NEES")]
 
 
 @pytest.mark.parametrize("text", ["nees", "NEESES", "anNEES", "NEES-like", "self-NEES", "NEES_1"])
-def test_only_whole_words_count(text: str) -> None:
+def test_only_whole_words_count(text):
     assert with_glossary(f"<p>{text}</p>", [A]) == f"<p>{text}</p>"
 
 
-def test_what_is_folded_away_is_linked_only_where_there_is_no_other_use() -> None:
+def test_what_is_folded_away_is_linked_only_where_there_is_no_other_use():
     folded = "<details><summary>s</summary><p>NEES pose</p></details><p>NEES</p>"
     soup = BeautifulSoup(with_glossary(folded, [A, B]), "html.parser")
     assert [link.get_text() for link in soup.select("details a")] == ["pose"]
@@ -324,7 +320,7 @@ def test_what_is_folded_away_is_linked_only_where_there_is_no_other_use() -> Non
 
 
 @given(st.lists(st.integers(1, 4), min_size=1, max_size=14))
-def test_the_words_used_most_are_kept_and_every_link_has_its_anchor(counts: list[int]) -> None:
+def test_the_words_used_most_are_kept_and_every_link_has_its_anchor(counts):
     known = [Word(f"w{chr(97 + i)}", (f"w{chr(97 + i)}",), "t") for i in range(len(counts))]
     text = " ".join(" ".join([word.name] * n) for word, n in zip(known, counts, strict=True))
     html = with_glossary(f"<p>{text}</p>", known)
@@ -335,7 +331,7 @@ def test_the_words_used_most_are_kept_and_every_link_has_its_anchor(counts: list
     assert not left or max(left) <= min(n for w, n in zip(known, counts, strict=True) if w.anchor in kept)
 
 
-def test_every_word_we_have_is_linked() -> None:
+def test_every_word_we_have_is_linked():
     for word in words():
         assert links(with_glossary(f"<p>{word.match[0]}</p>")) == [(f"#{word.anchor}", word.match[0])]
 
@@ -352,7 +348,7 @@ def entry(name: str, match: str) -> str:
         (entry("a b", "x") + entry("a-b", "y"), "'word-a-b'.* twice"),
     ],
 )
-def test_a_faulty_glossary_is_refused(tmp_path: Path, toml: str, sentence: str) -> None:
+def test_a_faulty_glossary_is_refused(tmp_path, toml, sentence):
     file = tmp_path / "glossary.toml"
     file.write_text(toml, encoding="utf-8")
     with pytest.raises(WildlabError, match=sentence):

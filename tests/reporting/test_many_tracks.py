@@ -61,7 +61,7 @@ def made(
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", ["map", "identities", "wrong"])
-def test_letters_can_be_read_and_lie_on_no_others(name: str, seed: int) -> None:
+def test_letters_can_be_read_and_lie_on_no_others(name, seed):
     given = made(seed)
     figure = getattr(charts, f"{name}_shown")(*given[: 1 if name == "map" else 2])[0]
     figures.png_bytes(figure)
@@ -69,7 +69,7 @@ def test_letters_can_be_read_and_lie_on_no_others(name: str, seed: int) -> None:
     assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH
 
 
-def test_names_are_only_text_and_leave_room_for_the_picture() -> None:
+def test_names_are_only_text_and_leave_room_for_the_picture():
     followed, lives = made(1, name="<b>a$b_{{$^</b>" + "L" * 60 + "{}")
     figure = charts.identities_shown(followed, lives)[0]
     figures.png_bytes(figure)
@@ -77,7 +77,7 @@ def test_names_are_only_text_and_leave_room_for_the_picture() -> None:
     assert shown[0].startswith("<b>a$b_{$^") and all(len(one) <= charts.LONGEST_NAME for one in shown)
 
 
-def test_a_line_is_parted_where_its_track_was_absent() -> None:
+def test_a_line_is_parted_where_its_track_was_absent():
     way = np.array([[0.0, 1, 1], [0.0, 1, 2], [1.0, 2, 2], [4.0, 9, 9]])
     times = [0.0, 0.0, 1.0, 2.0, 3.0, 4.0]
     got = charts.parted(way, times)
@@ -138,16 +138,16 @@ FEW = {0: TrackLife(9, 4, 9.0, False, 4), 1: TrackLife(9, 9, np.nan, False, 0)}
         ({"targets": {"a": TargetLife(0, np.nan, np.nan, 0, 0)}}, "neutral", "not judged"),
     ],
 )
-def test_the_verdict_follows_from_lives(changes: dict[str, Any], level: str, word: str) -> None:
+def test_the_verdict_follows_from_lives(changes, level, word):
     assert level_of(followed(), lives(**changes)) == (level, word)
 
 
-def test_without_truth_or_tracks_nothing_is_judged() -> None:
+def test_without_truth_or_tracks_nothing_is_judged():
     assert level_of(followed(), None) == ("neutral", "not judged")
     assert level_of(followed(0), lives()) == ("bad", "no track")
 
 
-def test_numbers_of_the_summary() -> None:
+def test_numbers_of_the_summary():
     assert words.rms_error(lives()) == pytest.approx(3.0)
     assert words.on_target(lives()) == 2 * 61
     assert words.counts_of(followed()) == (2, 2.0)
@@ -156,14 +156,14 @@ def test_numbers_of_the_summary() -> None:
     assert words.on_target(never) == 0 and np.isnan(words.rms_error(never))
 
 
-def test_parts_of_gospa_add_up() -> None:
+def test_parts_of_gospa_add_up():
     far = gospa([[0.0, 0.0], [50.0, 0.0]], [[3.0, 0.0], [99.0, 3.0]], 20.0)
     table = words.parts_table([far])
     assert table["metres"].iloc[1:].pow(2).sum() == pytest.approx(table["metres"].iloc[0] ** 2)
     assert table["share"].iloc[1:].sum() == pytest.approx(100)
 
 
-def test_a_track_that_goes_on_without_its_target_is_seen() -> None:
+def test_a_track_that_goes_on_without_its_target_is_seen():
     """On a target for most of its looks, and on nothing at 40 of 100: no sound page."""
     on = gospa([[0.0, 0.0]], [[1.0, 0.0]], 20.0)
     off = gospa(np.empty((0, 2)), [[1.0, 0.0]], 20.0)
@@ -176,7 +176,7 @@ def test_a_track_that_goes_on_without_its_target_is_seen() -> None:
     assert level_of(followed(looks=100), gone) == ("warn", "look closer")
 
 
-def test_names_are_only_text_and_what_is_not_known_is_not_said() -> None:
+def test_names_are_only_text_and_what_is_not_known_is_not_said():
     values = [Said("targets", "kinds", "**bold** `code`", "stated"), Said("radar", "x", "1", "stated")]
     table = words.told_table([values[1], values[0], values[1]])
     assert table["of"].tolist() == ["radar", "radar", "targets"]
@@ -186,7 +186,7 @@ def test_names_are_only_text_and_what_is_not_known_is_not_said() -> None:
     assert "**" not in text and "nan" not in text
 
 
-def test_what_counts_as_on_a_target_must_hold_honest_errors_and_whole_hulls() -> None:
+def test_what_counts_as_on_a_target_must_hold_honest_errors_and_whole_hulls():
     """Three standard deviations of the tracks, and the longest hull: else a larger reach is advised."""
     for sd, hulls, reach in ((1.0, (), 0), (7.0, (), 21), (1.0, (Hull("ferry", 60.5, 12.0),), 61)):
         one = followed()

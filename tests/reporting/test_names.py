@@ -99,7 +99,7 @@ def drawing() -> Iterator[Path]:
     yield PACKAGE / "api/plot.py"
 
 
-def test_labels_of_figures_come_through_the_door() -> None:
+def test_labels_of_figures_come_through_the_door():
     lines = [f"{path}:{line}" for path in drawing() if "new_figure" in (text := path.read_text())
              for line in passed_by(text)]  # fmt: skip
     assert lines == []
@@ -113,12 +113,12 @@ def test_labels_of_figures_come_through_the_door() -> None:
     ["ax.plot(x, label=one.name)", "ax.set_yticks(at, list(names))", 'look = {"label": name}',
      'ax.plot(x, label=f"{name} m")', "ax.set_title(x, parse_math=True)"],
 )  # fmt: skip
-def test_the_lint_can_fail(bad: str) -> None:
+def test_the_lint_can_fail(bad):
     assert passed_by(bad) == [1]
     assert passed_by("ax.plot(x, label=figure_name(one.name))") == []
 
 
-def test_every_table_is_written_through_the_door() -> None:
+def test_every_table_is_written_through_the_door():
     writers = {
         str(path.relative_to(PACKAGE))
         for path in PACKAGE.rglob("*.py")
@@ -176,7 +176,7 @@ def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
 @settings(max_examples=1, deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
 @example("_$HOME `id` $(id)\u202e\x1b", "$x_{")
 @given(NAMES, NAMES)
-def test_figures_show_any_name(one: str, other: str) -> None:
+def test_figures_show_any_name(one, other):
     for figure, wanted in figures_of(one, other):
         _harmless_texts(figure)
         figure.draw_without_rendering()
@@ -196,13 +196,13 @@ def _seen(text: str) -> str:
     return "".join(c for c in text if c.isalnum() or c in "$_")
 
 
-def test_figures_of_strange_names_have_names_of_their_own() -> None:
+def test_figures_of_strange_names_have_names_of_their_own():
     names = [following.slug("map", one) for one in ("$", "å", "ä", "буй", "лес", "boat 1")]
     assert len(set(names)) == len(names) and names[-1] == "map-boat-1"
     assert all(one.isascii() and one.replace("-", "").isalnum() for one in names)
 
 
-def test_axes_of_powers_have_numbers_without_maths() -> None:
+def test_axes_of_powers_have_numbers_without_maths():
     from wildlab.reporting.figures import new_figure
 
     figure, ax = new_figure()
@@ -221,7 +221,7 @@ def test_axes_of_powers_have_numbers_without_maths() -> None:
 @given(
     st.lists(NAMES | st.text(st.characters(codec="utf-8", exclude_characters="\0")), min_size=1, max_size=5)
 )
-def test_tables_give_names_back_and_hold_no_formula(names: list[str]) -> None:
+def test_tables_give_names_back_and_hold_no_formula(names):
     names = [name.replace("\0", "") for name in names]
     table = pd.DataFrame({"name": names, "=x": range(-len(names), 0)})
     text = csv_text(table)
@@ -235,7 +235,7 @@ def test_tables_give_names_back_and_hold_no_formula(names: list[str]) -> None:
 
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.lists(NAMES, min_size=1, max_size=4))
-def test_detections_and_clicks_are_read_back_by_name(names: list[str]) -> None:
+def test_detections_and_clicks_are_read_back_by_name(names):
     from wildlab.flight.readers.clicks import clicks
     from wildlab.flight.readers.label_table import read_table_boxes
 

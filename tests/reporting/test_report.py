@@ -6,7 +6,6 @@ import base64
 import io
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +28,14 @@ def report(out: Path | None = None, study: str = "consistency-bounds") -> Report
     return open_report(study=study, kind="computed", seed=1, out=str(out or ""))
 
 
-def test_only_the_name_of_a_flight_folder_is_shown() -> None:
+def test_only_the_name_of_a_flight_folder_is_shown():
     one = open_report(study="s", kind="logged", flight="/home/someone/flights/tuesday")
     one.head("Title", "sub")
     assert "<b>tuesday</b>" in one.parts[0] and "someone" not in one.parts[0]
     assert "logged flight" in one.parts[0]
 
 
-def test_figure_is_shown_with_alt_and_written_as_pdf_and_png(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_figure_is_shown_with_alt_and_written_as_pdf_and_png(tmp_path, monkeypatch):
     monkeypatch.delenv(QUICK, raising=False)
     one = report(tmp_path)
     one.figure(new_figure(5, 3)[0], name="fig-5-04a", alt="A line.", caption="It **rises**.")
@@ -53,13 +50,13 @@ def test_figure_is_shown_with_alt_and_written_as_pdf_and_png(
     ("name", "alt", "sentence"),
     [("../escape", "a", "escape"), ("Fig 1", "a", "Fig 1"), ("fig", "  ", "alt")],
 )
-def test_figures_that_are_refused(tmp_path: Path, name: str, alt: str, sentence: str) -> None:
+def test_figures_that_are_refused(tmp_path, name, alt, sentence):
     with pytest.raises(WildlabError, match=sentence):
         report(tmp_path).figure(new_figure()[0], name=name, alt=alt)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_table_has_digits_and_says_what_is_not_known() -> None:
+def test_table_has_digits_and_says_what_is_not_known():
     one = report()
     frame = pd.DataFrame({"who": ["a", None], "error": [1.234, np.nan], "good": [True, False]})
     one.table(frame, columns={"good": "good", "who": "name", "error": "error (m)"}, digits={"error": 1})
@@ -70,7 +67,7 @@ def test_table_has_digits_and_says_what_is_not_known() -> None:
         one.table(frame, columns={"nope": "x"})
 
 
-def test_published_values_are_looked_up(tmp_path: Path) -> None:
+def test_published_values_are_looked_up(tmp_path):
     one = report(tmp_path)
     one.metric("interval_low", "nees-1-run", 0.4844, "")
     one.metric("interval_low", "something-else", 0.1, "m")
@@ -92,12 +89,12 @@ def test_published_values_are_looked_up(tmp_path: Path) -> None:
         (lambda: report().metric("interval_low", "nees-1-run", 0.4844, "m"), "published in ''"),
     ],
 )
-def test_mistakes_are_named(make: Callable[[], object], named: str) -> None:
+def test_mistakes_are_named(make, named):
     with pytest.raises(WildlabError, match=named):
         make()
 
 
-def test_a_number_that_is_not_known_is_nowhere_on_a_page(tmp_path: Path) -> None:
+def test_a_number_that_is_not_known_is_nowhere_on_a_page(tmp_path):
     one, nan = report(tmp_path), float("nan")
     fig, ax = new_figure(5, 3)
     ax.set_title(f"It is {nan:.1f} m off")
@@ -119,14 +116,14 @@ def whole(**changes: Any) -> dict[str, Any]:
     return document(**(given | changes))
 
 
-def test_round_trip(tmp_path: Path) -> None:
+def test_round_trip(tmp_path):
     content = whole(metrics=[metric("a", "b/c", np.float64(0.5), "m", n=3, low=0.1, high=0.9, source="H 1")])
     write_metrics(tmp_path / "metrics.json", content)
     assert read_metrics(tmp_path / "metrics.json") == content
     assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]
 
 
-def test_what_could_not_be_computed_is_null() -> None:
+def test_what_could_not_be_computed_is_null():
     assert metric("a", "b", math.nan, "m")["value"] is None
     assert metric("a", "b", None, "m")["value"] is None
     assert type(metric("a", "b", np.int64(3), "m")["value"]) in (int, float)
@@ -148,13 +145,13 @@ def test_what_could_not_be_computed_is_null() -> None:
         (lambda: whole(claims=[claim("c", "x", "holds")] * 2), "given twice"),
     ],
 )
-def test_refusals(make: Any, sentence: str) -> None:
+def test_refusals(make, sentence):
     with pytest.raises(WildlabError, match=f"(?i){sentence}"):
         make()
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"study": 1}', '{"metrics": NaN}', "\x00"])
-def test_a_file_that_is_none_is_named(tmp_path: Path, content: str) -> None:
+def test_a_file_that_is_none_is_named(tmp_path, content):
     path = tmp_path / "metrics.json"
     path.write_text(content)
     with pytest.raises(WildlabError, match=r"metrics\.json: this is not a metrics file"):
@@ -170,7 +167,7 @@ def content(link: str) -> str:
     return base64.b64decode(str(anchor["href"]).split(",", 1)[1]).decode("utf-8")
 
 
-def test_every_cell_says_which_column_it_is_of() -> None:
+def test_every_cell_says_which_column_it_is_of():
     frame = pd.DataFrame({"a": ["x", "y"], "b": [1, 2], "c": [0.5, np.nan], "d": [True, False]})
     soup = BeautifulSoup(table_html(frame, {"b": 'the **second** "b"'}, None), "html.parser")
     heads = [one.get_text() for one in soup.select("thead th")]
@@ -188,7 +185,7 @@ def test_every_cell_says_which_column_it_is_of() -> None:
     assert "many" not in table_html(frame[["a", "b"]], {}, None)
 
 
-def test_the_link_holds_the_table_to_the_last_digit() -> None:
+def test_the_link_holds_the_table_to_the_last_digit():
     rng = np.random.default_rng(0)
     frame = pd.DataFrame({"name": ["ä", "b,c", '"'], "value": rng.normal(size=3) * 1e5})
     back = pd.read_csv(io.StringIO(content(csv_link(frame, "Study/../x", "words"))))
@@ -196,28 +193,28 @@ def test_the_link_holds_the_table_to_the_last_digit() -> None:
     assert 'download="study-x.csv"' in csv_link(frame, "Study/../x", "words")
 
 
-def test_no_cell_and_no_column_is_a_formula() -> None:
+def test_no_cell_and_no_column_is_a_formula():
     text = content(csv_link(pd.DataFrame({"=1+1": ["@x", "-3"]}), "a"))
     assert text.splitlines() == ["'=1+1", "'@x", "'-3"]
 
 
 @pytest.mark.parametrize("column", ["lat", "lon_deg", "Latitude", "longitude", "utm_zone", "ecef_x", "mgrs"])
-def test_where_on_earth_something_is_gets_into_no_link(column: str) -> None:
+def test_where_on_earth_something_is_gets_into_no_link(column):
     assert csv_link(pd.DataFrame({"name": ["a"], column: [1.0]}), "a") == ""
 
 
-def test_local_metres_do_and_words_that_begin_alike() -> None:
+def test_local_metres_do_and_words_that_begin_alike():
     assert csv_link(pd.DataFrame({"north_m": [1.0], "later": [2.0], "long": [3.0]}), "a")
 
 
-def test_what_is_empty_or_large_is_not_embedded() -> None:
+def test_what_is_empty_or_large_is_not_embedded():
     assert csv_link(pd.DataFrame({"a": []}), "a") == ""
     assert data_link(b"x" * MOST_BYTES, "text/csv", "a.csv", "w")
     assert data_link(b"x" * (MOST_BYTES + 1), "text/csv", "a.csv", "w") == ""
 
 
 @given(st.text())
-def test_whatever_the_text_no_element_comes_out_of_it(text: str) -> None:
+def test_whatever_the_text_no_element_comes_out_of_it(text):
     shown = inline(text)
     for mark in ("<b>", "</b>", "<code>", '<code class="short">', "</code>"):
         shown = shown.replace(mark, "")
@@ -225,11 +222,11 @@ def test_whatever_the_text_no_element_comes_out_of_it(text: str) -> None:
     assert "<" not in escape(text) and "\x00" not in escape(text)
 
 
-def test_marks() -> None:
+def test_marks():
     assert inline("**2 m**, see `a<b`") == '<b>2 m</b>, see <code class="short">a&lt;b</code>'
 
 
-def test_prose_has_paragraphs_and_maths_but_no_html() -> None:
+def test_prose_has_paragraphs_and_maths_but_no_html():
     shown = prose("One <i>.\n\nTwo $x_k$ and\n\n$$P^{-1}$$\n\nThree costs \\$5.")
     assert shown.startswith("<p>One &lt;i&gt;.</p><p>Two <math")
     assert shown.count("<math") == 2 and "costs $5." in shown and "<p></p>" not in shown
@@ -238,7 +235,7 @@ def test_prose_has_paragraphs_and_maths_but_no_html() -> None:
 @pytest.mark.parametrize(
     "latex", [r"x^", r"\left( x", r"\nosuchcommand{x}", r"\text{<script>}", r"\text{a < b}"]
 )
-def test_maths_that_cannot_be_shown_is_refused(latex: str) -> None:
+def test_maths_that_cannot_be_shown_is_refused(latex):
     with pytest.raises(WildlabError, match="formula"):
         maths(latex)
 
@@ -258,23 +255,23 @@ def test_maths_that_cannot_be_shown_is_refused(latex: str) -> None:
         ("nonsense", 2, "–"),
     ],
 )
-def test_numbers(value: object, digits: int | None, shown: str) -> None:
+def test_numbers(value, digits, shown):
     assert number(value, digits) == shown
 
 
-def test_slug() -> None:
+def test_slug():
     assert slug("What most limits it?") == "what-most-limits-it"
     assert slug("<>") == "part"
 
 
 @given(st.floats(1e-8, 1 - 1e-8), st.integers(0, 2))
-def test_a_share_is_rounded_by_less_than_itself_and_never_to_all_or_none(share: float, digits: int) -> None:
+def test_a_share_is_rounded_by_less_than_itself_and_never_to_all_or_none(share, digits):
     shown = float(percent(share, digits).removesuffix(" %")) / 100
     assert 0 < shown < 1
     assert abs(shown - share) <= max(0.5 * 10.0 ** -(digits + 2), min(share, 1 - share)) + 1e-12
 
 
-def test_what_is_not_known_is_not_said() -> None:
+def test_what_is_not_known_is_not_said():
     assert percent(0.004, 0) == "0.4 %"
     for words in (percent(math.nan), percent(math.inf), percent_between([math.nan] * 3), f"{math.nan:.1f} m"):
         assert known(words) == "" and known(f"Two. It is {words} off; 3 m are left. H (5.1) is kept.") == (

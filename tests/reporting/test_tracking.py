@@ -30,7 +30,7 @@ def colour(rows: pd.DataFrame, pairs: list[Apart] | None = None) -> str:
     return words.summary(rows, pairs or [], None)[1].colour
 
 
-def test_the_best_consistent_filter_leads() -> None:
+def test_the_best_consistent_filter_leads():
     assert leading_filter(rows()) == "schmidt"
     # However much larger its error is than that of one which is not consistent.
     assert leading_filter(rows(rmse=8.0)) == "schmidt"
@@ -38,7 +38,7 @@ def test_the_best_consistent_filter_leads() -> None:
     assert leading_filter(both) == "ekf" == leading_filter(both.iloc[::-1])
 
 
-def test_where_no_filter_is_consistent_the_least_error_leads() -> None:
+def test_where_no_filter_is_consistent_the_least_error_leads():
     worse = rows(nees=50.0, verdict="overconfident", rmse=8.0)
     said, verdict = words.summary(worse, [], None)
     assert verdict.value == "look closer" and said[0] == words.NONE_CONSISTENT
@@ -48,7 +48,7 @@ def test_where_no_filter_is_consistent_the_least_error_leads() -> None:
 
 
 @pytest.mark.parametrize(("nis", "level"), [(4.0, "good"), (5.0, "warn"), (20.0, "warn")])
-def test_a_filter_that_its_detections_surprise_is_looked_at(nis: float, level: str) -> None:
+def test_a_filter_that_its_detections_surprise_is_looked_at(nis, level):
     # Of two elements: 1.5 times is 4.5.
     odd = rows(nis=nis, nis_verdict="overconfident")
     assert colour(odd) == level
@@ -65,7 +65,7 @@ def test_a_filter_that_its_detections_surprise_is_looked_at(nis: float, level: s
         ({"nees": 5.3, "verdict": "overconfident"}, "warn"),
     ],
 )
-def test_the_colour_of_the_verdict(changes: dict[str, object], level: str) -> None:
+def test_the_colour_of_the_verdict(changes, level):
     assert colour(rows(**changes)) == level
 
 
@@ -73,7 +73,7 @@ def blind() -> pd.DataFrame:
     return rows().assign(compared=0, rmse=np.nan, nees=np.nan, verdict="not judged")
 
 
-def test_without_truth_the_filter_leads_whose_innovations_are_as_it_expects() -> None:
+def test_without_truth_the_filter_leads_whose_innovations_are_as_it_expects():
     seen = blind().assign(nis=[1.99, 9.0])
     assert leading_filter(seen.assign(nis_verdict=["consistent", "overconfident"])) == "ekf"
     assert leading_filter(seen.assign(nis_verdict=["overconfident", "consistent"])) == "schmidt"
@@ -81,14 +81,14 @@ def test_without_truth_the_filter_leads_whose_innovations_are_as_it_expects() ->
     assert "rmse" not in words.columns_of(words.tracks_table(seen))
 
 
-def test_sensors_that_contradict_each_other_are_looked_at() -> None:
+def test_sensors_that_contradict_each_other_are_looked_at():
     pair = Apart("boat", "schmidt", "radar", "lidar", 3.0, 90, Average(8.0, 1.5, 2.5, 90, 60.0))
     agreeing = pair._replace(squares=Average(2.0, 1.5, 2.5, 90, 60.0))
     assert colour(blind(), [pair]) == "warn" != colour(blind(), [agreeing])
     assert "2.0 times" in words.apart_sentence(pair) and "3.0 m" in words.apart_sentence(pair)
 
 
-def test_a_smoothed_track_without_innovations_is_not_a_lost_one() -> None:
+def test_a_smoothed_track_without_innovations_is_not_a_lost_one():
     both = pd.concat([rows(), rows(filter="schmidt-smoothed", detections=0, nis=np.nan).iloc[1:]])
     assert not any("boat by" in one for one in words.summary(both, [], None)[0])
     lost = rows().assign(detections=0, compared=0, sensor="ir", nees=np.nan, verdict="not judged")
@@ -97,12 +97,12 @@ def test_a_smoothed_track_without_innovations_is_not_a_lost_one() -> None:
 
 
 @pytest.mark.parametrize(("nees", "few"), [(5.5, True), (7.4, True), (7.6, False), (2.0, False)])
-def test_few_values_are_an_excuse_near_the_band_only(nees: float, few: bool) -> None:
+def test_few_values_are_an_excuse_near_the_band_only(nees, few):
     row = rows(nees=nees, verdict="overconfident" if nees > 5 else "consistent").iloc[1]
     assert words.on_few(row) == few
 
 
-def test_time_without_the_target_is_a_number_of_its_own() -> None:
+def test_time_without_the_target_is_a_number_of_its_own():
     lost = rows(rmse=9.4, compared=263, without=1084, rmse_without=205.0, wait=67.7)
     said, _ = words.summary(lost, [], None)
     assert "263 of 1347" in said[0] and "205 m" in said[1]
@@ -111,13 +111,13 @@ def test_time_without_the_target_is_a_number_of_its_own() -> None:
 
 
 @pytest.mark.parametrize("used", [0, 1])
-def test_without_a_second_detection_nothing_is_judged(used: int) -> None:
+def test_without_a_second_detection_nothing_is_judged(used):
     one = rows().assign(detections=0, used=used, compared=0, verdict="not judged")
     assert colour(one) == "bad"
 
 
 @pytest.mark.parametrize(("rmse", "level"), [(261.0, "warn"), (4.9, "warn"), (4.7, "good"), (3.0, "good")])
-def test_all_sensors_together_must_not_be_worse_than_the_best_alone(rmse: float, level: str) -> None:
+def test_all_sensors_together_must_not_be_worse_than_the_best_alone(rmse, level):
     together = rows(rmse=rmse, nees=900.0, verdict="overconfident")
     both = pd.concat([rows(), together.assign(sensor="together", kind="together")])
     assert colour(both) == level

@@ -56,12 +56,12 @@ CLAIMS = st.lists(st.sampled_from([HOLDS, MOSTLY, FAILS, MOSTLY_NOT, UNDECIDED, 
         ([MISSED], [], ALONE),
     ],
 )
-def test_words(numbers: list[Comparison], claims: list[str], word: str) -> None:
+def test_words(numbers, claims, word):
     found = standing(numbers, claims)
     assert found.word == word and found.level == LEVELS[word]
 
 
-def test_the_reason_counts_numbers_fitted_ones_and_claims_apart() -> None:
+def test_the_reason_counts_numbers_fitted_ones_and_claims_apart():
     reason = standing([GOOD, GOOD, BAD, MISSED], [HOLDS, FAILS, FAILS, FAILS]).reason
     totals = [re.findall(r"\d+", part) for part in reason.split(";")]
     assert [int(part[0]) for part in totals] == [3, 1, 4]
@@ -69,9 +69,7 @@ def test_the_reason_counts_numbers_fitted_ones_and_claims_apart() -> None:
 
 
 @given(NUMBERS, CLAIMS)
-def test_one_more_that_is_contradicted_or_open_never_betters_the_word(
-    numbers: list[Comparison], claims: list[str]
-) -> None:
+def test_one_more_that_is_contradicted_or_open_never_betters_the_word(numbers, claims):
     order = [NOT_AS_PUBLISHED, IN_PART, AS_PUBLISHED]
     before = standing(numbers, claims).word
     after = standing([*numbers, BAD], claims).word
@@ -85,36 +83,36 @@ FLIGHTS = pd.Series(np.random.default_rng(1).permutation(np.arange(200.0)))
 
 
 @pytest.mark.parametrize("n", [2, 18, 19, 200])
-def test_few_flights_have_a_range_and_many_the_prediction_interval_of_one_more(n: int) -> None:
+def test_few_flights_have_a_range_and_many_the_prediction_interval_of_one_more(n):
     values, rank = FLIGHTS[:n], max((n + 1) // 20, 1)
     assert bounds_of(values) == (np.sort(values)[rank - 1], np.sort(values)[-rank])
     assert spread_words(n).key == ("lowest to highest" if n < 19 else "middle 90 %")
 
 
-def test_one_flight_has_no_spread() -> None:
+def test_one_flight_has_no_spread():
     assert np.isnan(bounds_of(FLIGHTS[:1])).all()
     assert spread_words(1).key == range_words(FLIGHTS[:1]) == range_clause(FLIGHTS[:1]) == ""
 
 
-def test_flights_without_a_value_are_left_out_and_still_counted() -> None:
+def test_flights_without_a_value_are_left_out_and_still_counted():
     few = pd.Series([np.nan, 3.0, 1.0])
     assert bounds_of(few) == (1.0, 3.0)
     many = pd.concat([FLIGHTS[:20], pd.Series([np.nan] * 10)])
     assert bounds_of(many) == (FLIGHTS[:20].min(), FLIGHTS[:20].max())
 
 
-def test_flights_on_a_printed_number_count_by_halves() -> None:
+def test_flights_on_a_printed_number_count_by_halves():
     values = pd.Series([1.0, 2.0, 2.0, 5.0, np.nan])
     assert [share_below(values, one) for one in (0.5, 2.0, 3.0, 9.0)] == [0.0, 0.5, 0.75, 1.0]
     assert np.isnan(share_below(values[:0], 1.0))
 
 
-def test_ranges_are_typeset_with_a_minus() -> None:
+def test_ranges_are_typeset_with_a_minus():
     assert range_words([-2.0, -1.0]) == "−2.0 to −1.0" and range_words([1.4, 3.6], 0) == "1 to 4"
 
 
 @pytest.mark.parametrize("n", [1, 2, 18, 19, 99])
-def test_metrics_and_tables_follow_the_number_of_flights(n: int) -> None:
+def test_metrics_and_tables_follow_the_number_of_flights(n):
     values = FLIGHTS[:n]
     spread = pd.DataFrame({("kf", "mae"): values})
     study = Study("x", ("kf",), metric_of=lambda subject, name: Metric(name, subject, "m"))
@@ -140,6 +138,6 @@ def test_metrics_and_tables_follow_the_number_of_flights(n: int) -> None:
         (None, 0.0, "0.00"),
     ],
 )
-def test_a_small_difference_is_not_said_as_none(ratio: float | None, difference: float, words: str) -> None:
+def test_a_small_difference_is_not_said_as_none(ratio, difference, words):
     compared = Comparison(Closeness.CLOSE, Compatibility.WITHIN, ratio, difference)
     assert comparison_words(compared) == words

@@ -36,19 +36,19 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...
     return calls
 
 
-def test_a_study_by_hand_makes_its_own_twin(made: list[tuple[Any, ...]], tmp_path: Path) -> None:
+def test_a_study_by_hand_makes_its_own_twin(made, tmp_path):
     assert by_hand.flight_for("schmidt-fast-vessel", "", 7) == tmp_path / "1"
     assert made == [("fast-vessel", 7, by_hand.REPORTS)]
 
 
-def test_a_study_by_hand_imports_all_flights_of_its_data_set(made: list[tuple[Any, ...]]) -> None:
+def test_a_study_by_hand_imports_all_flights_of_its_data_set(made):
     study = STUDIES["autoferry"]
     assert len(by_hand.flights_for("autoferry", "", [], 1)) == 1 + len(study.beside)
     assert [recipe for _, recipe, _ in made] == [study.recipe, *study.beside]
     assert {dataset for dataset, _, _ in made} == {"autoferry"}
 
 
-def test_a_flight_that_is_given_is_taken(made: list[tuple[Any, ...]], tmp_path: Path) -> None:
+def test_a_flight_that_is_given_is_taken(made, tmp_path):
     # The name is no study's: `wildlab evaluate` names reports after flights.
     assert by_hand.flight_for("tuesday", str(tmp_path), 1) == tmp_path
     assert by_hand.flights_for("tuesday", "a", ["b"], 1) == [Path("a"), Path("b")]
@@ -59,12 +59,12 @@ def test_a_flight_that_is_given_is_taken(made: list[tuple[Any, ...]], tmp_path: 
     ("study", "sentence"),
     [("static-pont", "'static-point'"), ("sensitivity", "no flight")],
 )
-def test_without_a_flight_a_sentence_says_what_to_do(study: str, sentence: str) -> None:
+def test_without_a_flight_a_sentence_says_what_to_do(study, sentence):
     with pytest.raises(WildlabError, match=f"(?i){sentence}"):
         by_hand.flight_for(study, "", 1)
 
 
-def test_without_its_data_set_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_its_data_set_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
     with pytest.raises(WildlabError, match="wildlab fetch openathena"):
         by_hand.flight_for("survey-markers", "", 1)
@@ -92,7 +92,7 @@ def by_notebook() -> dict[str, StudyEntry]:
     return found
 
 
-def test_every_study_notebook_names_a_study_that_it_shows() -> None:
+def test_every_study_notebook_names_a_study_that_it_shows():
     shown = by_notebook()
     assert {name: study.notebook for name, study in shown.items()} == {name: name for name in shown}
     assert set(shown) == {study.notebook for study in STUDIES.values()}
@@ -100,7 +100,7 @@ def test_every_study_notebook_names_a_study_that_it_shows() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["sensitivity.ipynb", "overview.ipynb", "tracking.ipynb"])
-def test_a_notebook_runs_by_hand(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_notebook_runs_by_hand(name, tmp_path, monkeypatch):
     study = STUDIES[OF_FLIGHTS[name]] if name in OF_FLIGHTS else by_notebook()[name]
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     # What it makes and computes is kept there, and not among the reports of this checkout.
@@ -125,7 +125,7 @@ def test_a_notebook_runs_by_hand(name: str, tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.mark.slow
-def test_a_kernel_of_jupyter_runs_a_notebook_too() -> None:
+def test_a_kernel_of_jupyter_runs_a_notebook_too():
     """As JupyterLab does; all others run without one."""
     shown = papermill.execute_notebook(
         nbformat.read(NOTEBOOKS / "consistency-bounds.ipynb", as_version=4),

@@ -59,7 +59,7 @@ def flipped(path: Path, place: int, bit: int) -> None:
     path.write_bytes(data)
 
 
-def test_the_lowest_bit_of_every_leading_digit_is_noticed(report: Path) -> None:
+def test_the_lowest_bit_of_every_leading_digit_is_noticed(report):
     path = report / "metrics.json"
     whole = path.read_bytes()
     places = [match.start() for match in re.finditer(rb"(?<![\d.])\d", whole)]
@@ -76,7 +76,7 @@ def test_the_lowest_bit_of_every_leading_digit_is_noticed(report: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["status.json", "metrics.json", "provenance.json", "report.html"])
-def test_any_flipped_bit_is_noticed_or_changes_nothing(report: Path, name: str) -> None:
+def test_any_flipped_bit_is_noticed_or_changes_nothing(report, name):
     random = np.random.default_rng(5)
     path = report / name
     whole, before = path.read_bytes(), shown(report)
@@ -90,7 +90,7 @@ def test_any_flipped_bit_is_noticed_or_changes_nothing(report: Path, name: str) 
     assert noticed > 60
 
 
-def test_a_flipped_bit_of_a_kept_seed_is_noticed_or_changes_nothing(report: Path) -> None:
+def test_a_flipped_bit_of_a_kept_seed_is_noticed_or_changes_nothing(report):
     random = np.random.default_rng(6)
     work = SeedWork(report.parent, "s", "case", {"a": 1}, "", "k" * 64, (2, 3))
     path = work.folder / "2.json"
@@ -112,7 +112,7 @@ def call(capsys: Any, *arguments: str) -> tuple[Any, str, str]:
     return ended.value.code, out, err
 
 
-def test_verify_says_what_does_not_fit(report: Path, capsys: Any) -> None:
+def test_verify_says_what_does_not_fit(report, capsys):
     code, out, _ = call(capsys, "verify", str(report))
     assert code == 0 and "No misfits" in out and "2 kept seeds" in out
     (report / "figures" / "a.png").unlink()
@@ -131,7 +131,7 @@ def test_verify_says_what_does_not_fit(report: Path, capsys: Any) -> None:
     assert shown(report)["state"] == "done" and "before digests" in shown(report)["reason"]
 
 
-def test_what_does_not_fit_is_left_out_and_named(report: Path) -> None:
+def test_what_does_not_fit_is_left_out_and_named(report):
     reports = report.parent
     for end in ("-overview", ""):
         folder = reports / f"tuesday{end}"
@@ -152,7 +152,7 @@ def test_what_does_not_fit_is_left_out_and_named(report: Path) -> None:
         compare_flights([reports / "tuesday", reports / "tuesday-overview"], reports=reports)
 
 
-def test_a_status_cannot_lose_its_digests_by_one_bit(report: Path) -> None:
+def test_a_status_cannot_lose_its_digests_by_one_bit(report):
     status = json.loads((report / "status.json").read_text())
     for key in ("files", "digest"):
         (report / "status.json").write_text(json.dumps({k: v for k, v in status.items() if k != key}))
@@ -160,7 +160,7 @@ def test_a_status_cannot_lose_its_digests_by_one_bit(report: Path) -> None:
         assert misfits(report, {k: v for k, v in status.items() if k != key})
 
 
-def test_a_changed_manifest_is_told_in_the_report(tmp_path: Path) -> None:
+def test_a_changed_manifest_is_told_in_the_report(tmp_path):
     folder = tmp_path / "flight"
     save_flight(canary(imu=False), folder)
     about: dict[str, Any] = {

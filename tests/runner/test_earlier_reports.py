@@ -24,7 +24,7 @@ def report(folder: Path, hour: int, table: str, beside: list[str] | None = None)
 
 
 @pytest.mark.parametrize("table", ["a", "b"])
-def test_what_was_not_made_again_is_of_an_earlier_evaluation(tmp_path: Path, table: str) -> None:
+def test_what_was_not_made_again_is_of_an_earlier_evaluation(tmp_path, table):
     for end in ("", "-navigation", "-tracking"):
         report(tmp_path / f"f{end}", 9, "a")
     report(tmp_path / "f-overview", 10, "a", ["f", "f-navigation", "f-tracking"])
@@ -38,7 +38,7 @@ def test_what_was_not_made_again_is_of_an_earlier_evaluation(tmp_path: Path, tab
     assert [one.folder for one in found.earlier] == ["f-navigation", "f-tracking"]
 
 
-def test_tracks_that_were_made_after_the_overview_are_current(tmp_path: Path) -> None:
+def test_tracks_that_were_made_after_the_overview_are_current(tmp_path):
     report(tmp_path / "f-overview", 10, "a", [])
     report(tmp_path / "f-tracking", 11, "a")
     (found,) = own_flights(tmp_path, ())

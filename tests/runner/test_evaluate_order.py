@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from tests.pipeline.robots import robot_flight
 from wildlab.flight.store import save_flight
 from wildlab.runner import evaluate
@@ -15,9 +13,7 @@ from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
 
 
-def test_long_ones_begin_first_and_the_overview_waits_for_all(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_long_ones_begin_first_and_the_overview_waits_for_all(tmp_path, monkeypatch):
     save_flight(robot_flight(1, heading_sd_deg=1.0), tmp_path / "flight")
     ran: list[tuple[list[str], int]] = []
 

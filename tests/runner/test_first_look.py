@@ -41,7 +41,7 @@ def leave_report(job: Job, **more: Any) -> None:
     (folder / "status.json").write_text(json.dumps(status | more))
 
 
-def test_a_first_look_takes_fewer_flights_and_the_same_ones(tmp_path: Path) -> None:
+def test_a_first_look_takes_fewer_flights_and_the_same_ones(tmp_path):
     (whole,), looks = jobs(tmp_path, "static-point")
     look = looks["static-point"]
     assert look.first_look == {"seeds": (FIRST_LOOK_SEEDS, 100)} and whole.first_look == {}
@@ -52,7 +52,7 @@ def test_a_first_look_takes_fewer_flights_and_the_same_ones(tmp_path: Path) -> N
     assert look.fingerprint != whole.fingerprint
 
 
-def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp_path: Path) -> None:
+def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp_path):
     assert jobs(tmp_path, "sensitivity", "consistency-bounds")[1] == {}
     look = make_job(STUDIES["static-point"], reports=tmp_path, seeds=7, first_look=True)
     assert look.first_look == {"seeds": (7, 100)} and look.parameters["seeds"] == 7
@@ -61,7 +61,7 @@ def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp
         assert make_job(STUDIES["static-point"], reports=tmp_path, seeds=enough).first_look == {}
 
 
-def test_first_looks_in_words() -> None:
+def test_first_looks_in_words():
     assert look_words({"seeds": (5, 200)}) == "5 of 200 flights" and look_words({}) == ""
     # No name of a parameter reaches a reader as it is.
     assert not [one for study in STUDIES.values() if "_" in (one := look_words(study.reductions()))]
@@ -78,21 +78,21 @@ def test_first_looks_in_words() -> None:
         ("[s.parameters]\nruns = 'x'\n[s.first_look]\nruns = 1", "'x'"),
     ],
 )
-def test_a_first_look_that_is_none_is_refused(tmp_path: Path, entry: str, sentence: str) -> None:
+def test_a_first_look_that_is_none_is_refused(tmp_path, entry, sentence):
     path = tmp_path / "studies.toml"
     path.write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
     with pytest.raises(WildlabError, match=sentence):
         load_studies(path)
 
 
-def test_first_every_page_and_then_the_full_numbers(tmp_path: Path) -> None:
+def test_first_every_page_and_then_the_full_numbers(tmp_path):
     whole, looks = jobs(tmp_path, "sensitivity", "static-point", "gating")
     first, second, kept = plan_passes(whole, looks)
     assert first == [whole[0], looks["static-point"], looks["gating"]]
     assert second == whole[1:] and kept == []
 
 
-def test_a_full_report_of_the_same_is_not_replaced_by_a_first_look(tmp_path: Path) -> None:
+def test_a_full_report_of_the_same_is_not_replaced_by_a_first_look(tmp_path):
     whole, looks = jobs(tmp_path, "static-point", "gating")
     for job in whole:
         leave_report(job)
@@ -103,7 +103,7 @@ def test_a_full_report_of_the_same_is_not_replaced_by_a_first_look(tmp_path: Pat
     ]
 
 
-def test_whatever_is_not_the_full_report_of_the_same_gives_way(tmp_path: Path) -> None:
+def test_whatever_is_not_the_full_report_of_the_same_gives_way(tmp_path):
     (whole,), looks = jobs(tmp_path, "gating")
     others: list[dict[str, Any]] = [
         {"fingerprint": "another"},
@@ -122,7 +122,7 @@ def test_whatever_is_not_the_full_report_of_the_same_gives_way(tmp_path: Path) -
     assert not has_whole_report(whole)
 
 
-def test_a_study_whose_flights_are_all_kept_is_run_in_full_at_once(tmp_path: Path) -> None:
+def test_a_study_whose_flights_are_all_kept_is_run_in_full_at_once(tmp_path):
     (whole,), looks = jobs(tmp_path, "static-point")
     assert whole.seeds is not None
     *most, last = whole.seeds.seeds
@@ -135,7 +135,7 @@ def test_a_study_whose_flights_are_all_kept_is_run_in_full_at_once(tmp_path: Pat
     assert plan_passes([whole], both).second == [whole], "its notebook takes its time as well"
 
 
-def test_the_quick_ones_go_first(tmp_path: Path) -> None:
+def test_the_quick_ones_go_first(tmp_path):
     names = ["static-point", "survey-markers", "sensitivity", "gating", "consistency-bounds"]
     chosen = [STUDIES[name] for name in names]
     assert [study.name for study in quick_first(chosen, tmp_path)] == [
@@ -201,7 +201,7 @@ def studies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Studies:
 LOOK = {"runs": (2, 9)}
 
 
-def test_all_studies_go_twice_and_one_that_is_named_once(studies: Studies) -> None:
+def test_all_studies_go_twice_and_one_that_is_named_once(studies):
     outcomes = studies.run(everything=True)
     assert studies.passes == [[("quick", {}), ("slow", LOOK), ("other", LOOK)], [("slow", {}), ("other", {})]]
     assert [(one.name, one.reason) for one in outcomes] == [(n, "whole") for n in ("quick", "slow", "other")]
@@ -210,7 +210,7 @@ def test_all_studies_go_twice_and_one_that_is_named_once(studies: Studies) -> No
     assert studies.passes == [[("slow", {}), ("quick", {})]]
 
 
-def test_a_first_look_alone(studies: Studies) -> None:
+def test_a_first_look_alone(studies):
     studies.run(everything=True, first_look=True)
     assert studies.passes == [[("quick", {}), ("slow", LOOK), ("other", LOOK)]]
     studies.passes.clear()
@@ -223,12 +223,12 @@ def test_a_first_look_alone(studies: Studies) -> None:
     assert "first look" not in studies.ledger().partition('id="other"')[2].partition("</section>")[0]
 
 
-def test_a_number_of_flights_is_one_pass(studies: Studies) -> None:
+def test_a_number_of_flights_is_one_pass(studies):
     studies.run(everything=True, seeds=7)
     assert studies.passes == [[("quick", {}), ("slow", {}), ("other", {})]]
 
 
-def test_the_ledger_is_there_before_anything_and_after_each_study(studies: Studies) -> None:
+def test_the_ledger_is_there_before_anything_and_after_each_study(studies):
     studies.run(everything=True)
     assert [text.count("not run yet") for text in studies.ledgers] == [3, 2, 1, 0, 0]
     # The words stand on the page itself and in the tile that counts them.
@@ -239,9 +239,7 @@ def test_the_ledger_is_there_before_anything_and_after_each_study(studies: Studi
 
 
 @pytest.mark.parametrize(("stop_after", "done", "looks", "not_run"), [(1, 1, 0, 2), (4, 2, 1, 0)])
-def test_broken_off_anywhere_the_ledger_says_what_is_there(
-    studies: Studies, stop_after: int, done: int, looks: int, not_run: int
-) -> None:
+def test_broken_off_anywhere_the_ledger_says_what_is_there(studies, stop_after, done, looks, not_run):
     studies.stop_after = stop_after
     with pytest.raises(KeyboardInterrupt):
         studies.run(everything=True)

@@ -42,7 +42,7 @@ def simulated(monkeypatch: pytest.MonkeyPatch, make_flight: Callable[..., Flight
     return calls
 
 
-def test_a_twin_is_simulated_once_per_seed(tmp_path: Path, simulated: list[tuple[str, int]]) -> None:
+def test_a_twin_is_simulated_once_per_seed(tmp_path, simulated):
     one = flights.twin_flight("antenna", 1, tmp_path)
     assert flights.twin_flight("antenna", 1, tmp_path) == one == tmp_path / ".flights" / "antenna-1"
     flights.twin_flight("antenna", 2, tmp_path)
@@ -53,9 +53,7 @@ def test_a_twin_is_simulated_once_per_seed(tmp_path: Path, simulated: list[tuple
     }
 
 
-def test_it_is_simulated_again_when_its_parameters_change(
-    tmp_path: Path, simulated: list[tuple[str, int]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_is_simulated_again_when_its_parameters_change(tmp_path, simulated, monkeypatch):
     monkeypatch.setattr(flights, "DATA", tmp_path / "data")
     (tmp_path / "data" / "twins").mkdir(parents=True)
     flights.twin_flight("antenna", 1, tmp_path)
@@ -68,7 +66,7 @@ def test_it_is_simulated_again_when_its_parameters_change(
     assert len(simulated) == 3
 
 
-def test_a_simulation_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_simulation_that_fails_leaves_nothing(tmp_path, monkeypatch):
     def fail(*_: Any) -> Flight:
         raise WildlabError("it is raining", "wait")
 
@@ -88,7 +86,7 @@ def studies(folder: Path) -> Path:
     return folder
 
 
-def test_absent_data_are_skipped_or_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_absent_data_are_skipped_or_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
     where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
     (outcome,) = run_studies(everything=True, **where)
@@ -99,7 +97,7 @@ def test_absent_data_are_skipped_or_an_error(tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.slow
-def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
+def test_any_flight_folder_can_be_evaluated(tmp_path, make_flight):
     folder = tmp_path / "tuesday"
     save_flight(make_flight(), folder)
     where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
@@ -129,9 +127,7 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
         "load_flight(flight[:-7] + 'monday')",
     ],
 )
-def test_no_folder_of_a_flight_gets_into_a_report(
-    tmp_path: Path, make_flight: Callable[..., Flight], cell: str
-) -> None:
+def test_no_folder_of_a_flight_gets_into_a_report(tmp_path, make_flight, cell):
     """Of where it lies only its own folder's name, by which it and its reports are called."""
     folder = tmp_path / "north-gate" / "october"
     save_flight(make_flight(), folder)
@@ -151,9 +147,7 @@ def test_no_folder_of_a_flight_gets_into_a_report(
         assert b"small-flight" not in content, path
 
 
-def test_poses_that_are_not_there_are_told_before_anything_runs(
-    tmp_path: Path, make_flight: Callable[..., Flight]
-) -> None:
+def test_poses_that_are_not_there_are_told_before_anything_runs(tmp_path, make_flight):
     flight = make_flight()
     first = next(iter(flight.nav.values()))
     flight.nav = {"autopilot": first, "observer": first, "truth": first}
@@ -171,7 +165,7 @@ def lacking(flight: Flight) -> str:
 
 
 @pytest.mark.slow
-def test_what_a_flight_lacks_for_its_navigation_is_said() -> None:
+def test_what_a_flight_lacks_for_its_navigation_is_said():
     """A reference, and how the sensor errs."""
     twin = simulate_twin("fast-vessel", 1)
     assert "studies of its own" in lacking(twin)
@@ -186,9 +180,7 @@ def test_what_a_flight_lacks_for_its_navigation_is_said() -> None:
     assert "inertial measurements" in lacking(Flight(logged, {}, {"gnss": tables["gnss"]}))
 
 
-def test_a_flight_named_like_a_study_would_replace_its_report(
-    tmp_path: Path, make_flight: Callable[..., Flight]
-) -> None:
+def test_a_flight_named_like_a_study_would_replace_its_report(tmp_path, make_flight):
     save_flight(make_flight(), tmp_path / "s")
     with pytest.raises(WildlabError, match="like a study"):
         evaluate_flight(tmp_path / "s", notebooks=studies(tmp_path / "notebooks"), reports=tmp_path / "out")
@@ -209,9 +201,7 @@ def shifted(flight: Flight, *, but: str = "") -> Flight:
     return flight
 
 
-def test_the_report_of_another_flight_of_the_same_name_is_not_replaced(
-    tmp_path: Path, make_flight: Callable[..., Flight]
-) -> None:
+def test_the_report_of_another_flight_of_the_same_name_is_not_replaced(tmp_path, make_flight):
     reports, one, other = tmp_path / "reports", tmp_path / "may" / "tuesday", tmp_path / "june" / "tuesday"
     (reports / "tuesday").mkdir(parents=True)
     save_flight(make_flight(), one)
@@ -229,9 +219,7 @@ def test_the_report_of_another_flight_of_the_same_name_is_not_replaced(
     refuse_other_flight(other, tmp_path / "elsewhere" / "tuesday")
 
 
-def test_flights_that_share_marks_and_terrain_alone_are_two(
-    tmp_path: Path, make_flight: Callable[..., Flight]
-) -> None:
+def test_flights_that_share_marks_and_terrain_alone_are_two(tmp_path, make_flight):
     reports, one, other = tmp_path / "reports", tmp_path / "may" / "tuesday", tmp_path / "june" / "tuesday"
     (reports / "tuesday").mkdir(parents=True)
     raw = {name: {"file": f"{name}.bin", "sha256": name * 64} for name in "abc"}
@@ -255,7 +243,7 @@ def test_flights_that_share_marks_and_terrain_alone_are_two(
         ("[s.parameters]\nothers = []", "'others'"),
     ],
 )
-def test_flights_beside_the_first_belong_to_a_recipe(tmp_path: Path, entry: str, problem: str) -> None:
+def test_flights_beside_the_first_belong_to_a_recipe(tmp_path, entry, problem):
     from wildlab.runner.catalogue import load_studies
 
     (tmp_path / "studies.toml").write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')

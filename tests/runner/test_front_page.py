@@ -6,7 +6,6 @@ import base64
 import json
 import re
 import tomllib
-from collections.abc import Callable
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -90,7 +89,7 @@ def page_of(studies: list[StudyStatus]) -> str:
     return front_page(studies, load_front_flight(), study_cards=made)
 
 
-def test_counts_are_those_of_the_files(some: list[StudyStatus], tmp_path: Path) -> None:
+def test_counts_are_those_of_the_files(some, tmp_path):
     """Counted once more from the files alone: a calculated number agrees within half of its last digit."""
     agree = differ = others = 0
     for path in (tmp_path / "published").glob("*.toml"):
@@ -113,7 +112,7 @@ def test_counts_are_those_of_the_files(some: list[StudyStatus], tmp_path: Path) 
     assert "14 of the 19" in BeautifulSoup(page_of(some), "html.parser").get_text(" ", strip=True)
 
 
-def test_cards_say_the_word_that_reports_say(some: list[StudyStatus]) -> None:
+def test_cards_say_the_word_that_reports_say(some):
     cards = {one.study.name: study_card(one, Glimpse(sentence="A first sentence.")) for one in some}
     expected = standing([n.compared for n in some[0].numbers if n.compared], [])
     assert expected.word in cards["done"].verdict and expected.reason in unescape(cards["done"].verdict)
@@ -122,7 +121,7 @@ def test_cards_say_the_word_that_reports_say(some: list[StudyStatus]) -> None:
     assert "&lt;b&gt;broke" in card_html(cards["failed"]) and "5 of 200" in cards["looked"].verdict
 
 
-def test_the_caption_follows_from_the_arrays() -> None:
+def test_the_caption_follows_from_the_arrays():
     """Numbers of the picture's caption, computed once more from the file, by hand."""
     content = json.loads(FILE.read_text())
     flown = np.array(content["path"]["0"])
@@ -141,7 +140,7 @@ def test_the_caption_follows_from_the_arrays() -> None:
 
 
 @pytest.mark.slow
-def test_the_flight_is_that_of_the_twin() -> None:
+def test_the_flight_is_that_of_the_twin():
     """The file is what the twin gives: a hundredth is rounding, a little more another machine."""
     made, kept = simulated(), json.loads(FILE.read_text())
     assert {key: made[key] for key in ("about", "twin")} == {key: kept[key] for key in ("about", "twin")}
@@ -165,7 +164,7 @@ def overview(reports: Path, folder: str, flight: str, **report: str) -> None:
     )
 
 
-def test_doors_lead_somewhere_before_anything_has_run(tmp_path: Path) -> None:
+def test_doors_lead_somewhere_before_anything_has_run(tmp_path):
     build_ledger(tmp_path, load_studies())
     soup = BeautifulSoup((tmp_path / "index.html").read_text(encoding="utf-8"), "html.parser")
     assert len(soup.select(".doors a")) == 4
@@ -187,7 +186,7 @@ def dead_links(reports: Path) -> list[str]:
     return dead
 
 
-def test_names_out_of_logs_are_only_text(tmp_path: Path) -> None:
+def test_names_out_of_logs_are_only_text(tmp_path):
     for k, folder in enumerate(("javascript:alert(1)", "a?b#c", "100%", 'q"uote', "it's `rm`")):
         overview(
             tmp_path, folder, f"{HOSTILE}{k}", sentence=f"Off &lt;script&gt; {k}.", alt="&quot; onerror=x"
@@ -221,12 +220,12 @@ def whole(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
-def test_pages_open_anywhere(whole: Path, name: str, faults: Callable[[Path], list[str]]) -> None:
+def test_pages_open_anywhere(whole, name, faults):
     assert faults(whole / name) == []
     html.examine((whole / name).read_text(encoding="utf-8"), name, alone=False)
 
 
-def test_damaged_front_flight_is_named(tmp_path: Path) -> None:
+def test_damaged_front_flight_is_named(tmp_path):
     path = tmp_path / "front-flight.json"
     for text in ("{", "[]", '{"path": 1}', json.dumps({"path": {}})):
         path.write_text(text)

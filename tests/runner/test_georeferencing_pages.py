@@ -1,9 +1,5 @@
 """The page of a flight that is lost and contradicts itself: made all the same, and not green."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from tests.notebooks import run_here
@@ -13,9 +9,7 @@ from wildlab.flight.store import save_flight
 
 
 @pytest.mark.parametrize("sensitivity", ["open", "withheld"])
-def test_what_does_not_fit_together_is_shown_only_where_places_are_open(
-    tmp_path: Path, sensitivity: str
-) -> None:
+def test_what_does_not_fit_together_is_shown_only_where_places_are_open(tmp_path, sensitivity):
     flight = simulate(Survey(images=8))
     changes = {"mount": {"tilt_deg": 120.0}, "locations": {"sensitivity": sensitivity}}
     flight.manifest = replace_in_manifest(flight.manifest, changes)

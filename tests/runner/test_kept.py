@@ -63,9 +63,7 @@ def rewrite(change: Callable[[dict[str, Any]], object]) -> Callable[[str], str]:
     place=st.integers(0, 10**6),
     bit=st.integers(0, 7),
 )
-def test_nor_is_one_in_any_numbers(
-    tmp_path_factory: pytest.TempPathFactory, values: dict[str, float], place: int, bit: int
-) -> None:
+def test_nor_is_one_in_any_numbers(tmp_path_factory, values, place, bit):
     one = work(tmp_path_factory.getbasetemp() / "bits", 1)
     write_seed(one, 1, values)
     turned = bytearray((one.folder / "1.json").read_bytes())
@@ -96,7 +94,7 @@ def test_nor_is_one_in_any_numbers(
         rewrite(lambda content: content.update(case="another")),
     ],
 )
-def test_whatever_was_done_to_a_file_it_is_not_read(tmp_path: Path, damage: Callable[[str], str]) -> None:
+def test_whatever_was_done_to_a_file_it_is_not_read(tmp_path, damage):
     one = work(tmp_path)
     write_seed(one, 1, VALUES)
     path = one.folder / "1.json"
@@ -107,7 +105,7 @@ def test_whatever_was_done_to_a_file_it_is_not_read(tmp_path: Path, damage: Call
     assert read_seed(one, 1) is None and take_stock(one).damaged == (1,) and missing_seeds(one) == [1, 2, 3]
 
 
-def test_a_file_of_another_key_study_or_seed_is_not_read(tmp_path: Path) -> None:
+def test_a_file_of_another_key_study_or_seed_is_not_read(tmp_path):
     one, other = work(tmp_path), work(tmp_path, key="another")
     for its in (one, other):
         for seed in its.seeds:
@@ -118,14 +116,14 @@ def test_a_file_of_another_key_study_or_seed_is_not_read(tmp_path: Path) -> None
     assert take_stock(replace(one, case="another")).damaged == (1, 2, 3)
 
 
-def test_a_file_without_a_digest_counts_as_absent(tmp_path: Path) -> None:
+def test_a_file_without_a_digest_counts_as_absent(tmp_path):
     one = work(tmp_path, 1)
     one.folder.mkdir(parents=True)
     (one.folder / "1.json").write_text('{"case": "case", "seed": 1, "values": {"a/b": 1.0}}')
     assert take_stock(one) == ((1,), (), ()) and read_seed(one, 1) is None
 
 
-def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path: Path) -> None:
+def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path):
     one = work(tmp_path, 1)
     turned = dict(reversed(VALUES.items()))
     assert seed_digest(one, 1, VALUES) == seed_digest(replace(one, study="b", code="c"), 1, turned)
@@ -141,7 +139,7 @@ def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path: Path) -> 
     assert len({seed_digest(one, 1, VALUES), *others}) == 8
 
 
-def test_provenance_lists_digests_and_what_was_damaged(tmp_path: Path) -> None:
+def test_provenance_lists_digests_and_what_was_damaged(tmp_path):
     one = work(tmp_path)
     for seed in one.seeds:
         write_seed(one, seed, {"a/b": float(seed)})
@@ -161,7 +159,7 @@ def test_provenance_lists_digests_and_what_was_damaged(tmp_path: Path) -> None:
     assert third["damaged"] == {"count": 1, "seeds": [3]} and third["digest"] == second["digest"]
 
 
-def test_what_is_computed_again_is_listed_by_seed(tmp_path: Path) -> None:
+def test_what_is_computed_again_is_listed_by_seed(tmp_path):
     one = work(tmp_path, *range(1, 13))
     for seed in one.seeds:
         write_seed(one, seed, VALUES if seed != 12 else {"a/b": 1.0})
@@ -221,7 +219,7 @@ def settled(
     return pool.asked, waiting.failures, told
 
 
-def test_a_seed_with_other_names_is_computed_again(tmp_path: Path) -> None:
+def test_a_seed_with_other_names_is_computed_again(tmp_path):
     one = work(tmp_path, 1, 2, 3, 4)
     for seed in (1, 2, 3):
         write_seed(one, seed, {"a/b": 1.0} if seed != 1 else {"a/b": 1.0, "a/c": 2.0})
@@ -230,14 +228,14 @@ def test_a_seed_with_other_names_is_computed_again(tmp_path: Path) -> None:
     assert take_stock(one).missing == ()
 
 
-def test_kept_numbers_that_fresh_ones_outvote_are_computed_again(tmp_path: Path) -> None:
+def test_kept_numbers_that_fresh_ones_outvote_are_computed_again(tmp_path):
     one = work(tmp_path, 1, 2)
     write_seed(one, 1, {"a/c": 1.0})
     asked, failures, told = settled(one, lambda seed: {"a/b": 1.0})
     assert asked == [2, 1] and failures == [] and told[0].endswith("1 seed (1)")
 
 
-def test_a_trial_that_gives_other_names_for_a_seed_is_an_error(tmp_path: Path) -> None:
+def test_a_trial_that_gives_other_names_for_a_seed_is_an_error(tmp_path):
     def trial(seed: int) -> dict[str, float]:
         return {"a/b": 1.0} if seed != 2 else {f"a/{letter}": 1.0 for letter in "cdef"}
 
@@ -252,7 +250,7 @@ def test_a_trial_that_gives_other_names_for_a_seed_is_an_error(tmp_path: Path) -
         assert part in failure.reason
 
 
-def test_a_damaged_seed_is_computed_again_and_said(tmp_path: Path) -> None:
+def test_a_damaged_seed_is_computed_again_and_said(tmp_path):
     one = work(tmp_path, 1, 2)
     for seed in one.seeds:
         write_seed(one, seed, VALUES)
@@ -262,7 +260,7 @@ def test_a_damaged_seed_is_computed_again_and_said(tmp_path: Path) -> None:
     assert one.provenance()["damaged"]["seeds"] == [2]
 
 
-def test_what_does_not_read_back_after_it_was_written_is_an_error(tmp_path: Path) -> None:
+def test_what_does_not_read_back_after_it_was_written_is_an_error(tmp_path):
     one = work(tmp_path, 1, 2)
     write_seed(one, 1, VALUES)
     (one.folder / "2.json").write_text("{}")
@@ -271,6 +269,6 @@ def test_what_does_not_read_back_after_it_was_written_is_an_error(tmp_path: Path
 
 
 @pytest.mark.parametrize("drawn", [1, 3, 9])
-def test_the_flight_that_is_drawn_is_one_of_as_many_as_are_asked_for(drawn: int) -> None:
+def test_the_flight_that_is_drawn_is_one_of_as_many_as_are_asked_for(drawn):
     seeds = other_seeds(drawn, 4)
     assert len({drawn, *seeds}) == 4 and list(seeds) == sorted(seeds)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +69,7 @@ def ran(reports: Path, *entries: dict[str, Any], study: str = "s", state: str = 
     return folder
 
 
-def test_the_shipped_files_are_in_order() -> None:
+def test_the_shipped_files_are_in_order():
     studies = load_studies()
     assert "consistency-bounds" in studies
     for name in studies:
@@ -78,7 +77,7 @@ def test_the_shipped_files_are_in_order() -> None:
         load_claims(name)
 
 
-def test_published_numbers_keep_the_digits_they_are_printed_with(tmp_path: Path) -> None:
+def test_published_numbers_keep_the_digits_they_are_printed_with(tmp_path):
     frame = load_published("s", published(tmp_path))
     assert frame["value"].tolist() == [7.9, 5.0] and frame["digits"].tolist() == [2, 0]
     assert frame["rounding"].tolist() == [0.15, 0.5]
@@ -99,7 +98,7 @@ def test_published_numbers_keep_the_digits_they_are_printed_with(tmp_path: Path)
         ("[[number]]", "[[number", "read"),
     ],
 )
-def test_published_files_that_are_wrong_are_named(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+def test_published_files_that_are_wrong_are_named(tmp_path, old, new, sentence):
     folder = published(tmp_path, PUBLISHED.replace(old, new, 1))
     with pytest.raises(WildlabError, match=sentence):
         load_published("s", folder)
@@ -120,21 +119,21 @@ def test_published_files_that_are_wrong_are_named(tmp_path: Path, old: str, new:
         ("[a", "read"),
     ],
 )
-def test_studies_that_are_wrong_are_named(tmp_path: Path, entry: str, sentence: str) -> None:
+def test_studies_that_are_wrong_are_named(tmp_path, entry, sentence):
     path = tmp_path / "studies.toml"
     path.write_text(entry)
     with pytest.raises(WildlabError, match=sentence):
         load_studies(path)
 
 
-def test_a_misspelt_study_gets_a_hint() -> None:
+def test_a_misspelt_study_gets_a_hint():
     with pytest.raises(WildlabError, match=r"(?i)did you mean 'sensitivity'"):
         find_study("sensitivty", {"sensitivity": a_study()})
     with pytest.raises(WildlabError, match="wildlab list"):
         find_study("xyz", {})
 
 
-def test_the_ledger_says_what_it_covers(tmp_path: Path) -> None:
+def test_the_ledger_says_what_it_covers(tmp_path):
     cases = load_cases()
     assert len(cases) == 23 and len({case.id for case in cases}) == 23
     one = study_status(a_study(case="gating"), tmp_path, published(tmp_path / "published"))
@@ -153,7 +152,7 @@ def tiles(page: str) -> list[tuple[str, list[str]]]:
     return [(value, re.findall(r"\d+", words)) for value, words in found]
 
 
-def test_only_what_holds_counts_as_holding(tmp_path: Path) -> None:
+def test_only_what_holds_counts_as_holding(tmp_path):
     """What is undecided is not held, what failed is not done, and ours are not the theses'."""
     verdicts = ["holds", "holds on most flights", "undecided", "premise not met", "does not hold", "holds"]
     text, claims = "", []
@@ -177,7 +176,7 @@ def test_only_what_holds_counts_as_holding(tmp_path: Path) -> None:
     assert "50 % (40 to 60) of 200 runs" in whole and "50 of 200 runs" in whole
 
 
-def test_without_tolerance_or_spread_no_difference_is_claimed(tmp_path: Path) -> None:
+def test_without_tolerance_or_spread_no_difference_is_claimed(tmp_path):
     ran(tmp_path / "reports", metrics.metric("error", "observer/all", 5.0, "m"))
     one = study_status(a_study(), tmp_path / "reports", published(tmp_path / "published"))
     assert one.numbers[1].answers == ("cannot tell", "too few flights")
@@ -193,7 +192,7 @@ def test_without_tolerance_or_spread_no_difference_is_claimed(tmp_path: Path) ->
     )
 
 
-def test_what_is_missing_says_why(tmp_path: Path) -> None:
+def test_what_is_missing_says_why(tmp_path):
     study = a_study(missing={"observer": "it follows with the navigation filters"})
     ran(tmp_path / "reports", metrics.metric("error", "kf/all", 7.9, "m"))
     one = study_status(study, tmp_path / "reports", published(tmp_path / "published"))
@@ -202,7 +201,7 @@ def test_what_is_missing_says_why(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["no status", "no metrics", "broken status", "status is a list"])
-def test_a_run_that_was_broken_off_counts_as_to_be_done_again(tmp_path: Path, damage: str) -> None:
+def test_a_run_that_was_broken_off_counts_as_to_be_done_again(tmp_path, damage):
     folder = ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m"))
     if damage == "no metrics":
         (folder / "metrics.json").unlink()
@@ -214,7 +213,7 @@ def test_a_run_that_was_broken_off_counts_as_to_be_done_again(tmp_path: Path, da
     assert one.state == "broken off" and not one.has_report
 
 
-def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[Path], list[str]]) -> None:
+def test_ledger_of_every_state_opens_offline(tmp_path, faults):
     first = PUBLISHED.split("[[number]]")[1]
     many = PUBLISHED + "".join(f"[[number]]{first}".replace("kf/all", f"kf/{i}") for i in range(15))
     folder = published(tmp_path / "published", many)
@@ -247,9 +246,7 @@ def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[P
         ("logged", None, 7, "middle 90 %"),  # draws with replacement from seven points: not flights
     ],
 )
-def test_a_band_is_called_what_it_is(
-    tmp_path: Path, kind: str, seeds: int | None, n: int, words: str
-) -> None:
+def test_a_band_is_called_what_it_is(tmp_path, kind, seeds, n, words):
     entry = metrics.metric("error", "kf/all", 7.9, "m", low=7, high=8, n=n)
     ran(tmp_path, entry, kind=kind, seeds=seeds)
     one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
@@ -265,7 +262,7 @@ def first_look(reports: Path, **more: Any) -> None:
     (folder / "status.json").write_text(json.dumps(status))
 
 
-def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
+def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path):
     folder = published(tmp_path / "published")
     first_look(tmp_path)
     one = study_status(a_study(), tmp_path, folder)
@@ -285,7 +282,7 @@ def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("said", [[1], {"seeds": 5}, {"seeds": [5]}, {"seeds": ["<b>", 1]}, "5", True])
-def test_nonsense_about_a_first_look_counts_as_no_full_report(tmp_path: Path, said: Any) -> None:
+def test_nonsense_about_a_first_look_counts_as_no_full_report(tmp_path, said):
     first_look(tmp_path, first_look=said)
     assert study_status(a_study(), tmp_path).state == "broken off"
     first_look(tmp_path, first_look=None)
@@ -302,7 +299,7 @@ def test_nonsense_about_a_first_look_counts_as_no_full_report(tmp_path: Path, sa
         ("status.json", "", "[" * 100_000),
     ],
 )
-def test_a_damaged_report_is_one_to_be_run_again(tmp_path: Path, name: str, old: str, new: str) -> None:
+def test_a_damaged_report_is_one_to_be_run_again(tmp_path, name, old, new):
     first_look(tmp_path, first_look={})
     (path,) = tmp_path.rglob(name)
     text = path.read_text(encoding="utf-8")

@@ -41,7 +41,7 @@ def contents(folder: Path) -> dict[str, str]:
     return {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
 
 
-def test_install_replaces_what_a_run_makes_and_leaves_what_is_not_ours(tmp_path: Path) -> None:
+def test_install_replaces_what_a_run_makes_and_leaves_what_is_not_ours(tmp_path):
     target = tmp_path / "s"
     old = outputs.install(
         work_folder(tmp_path, "report.html", "metrics.json", "figures/old.png"), target, DONE
@@ -58,7 +58,7 @@ def test_install_replaces_what_a_run_makes_and_leaves_what_is_not_ours(tmp_path:
     assert json.loads(found["status.json"])["state"] == "failed"
 
 
-def test_as_long_as_files_move_there_is_no_status(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_as_long_as_files_move_there_is_no_status(tmp_path, monkeypatch):
     target = tmp_path / "s"
     outputs.install(work_folder(tmp_path, "report.html", "metrics.json", text="old"), target, DONE)
     outputs.clear_folder(next(tmp_path.glob(".*.part")))
@@ -75,7 +75,7 @@ def test_as_long_as_files_move_there_is_no_status(tmp_path: Path, monkeypatch: p
     assert moved and not (target / "status.json").exists()
 
 
-def test_ctrl_c_waits_for_the_move(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_waits_for_the_move(tmp_path, monkeypatch):
     folder = work_folder(tmp_path, "report.html")
     real = outputs.seal
 
@@ -89,7 +89,7 @@ def test_ctrl_c_waits_for_the_move(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert set(contents(tmp_path / "s")) == {"report.html", "status.json"}
 
 
-def test_leftovers_of_killed_runners_are_swept_and_those_of_running_ones_are_not(tmp_path: Path) -> None:
+def test_leftovers_of_killed_runners_are_swept_and_those_of_running_ones_are_not(tmp_path):
     for name in (f".s.{os.getpid()}.part", ".s.999999999.part", ".other", ".young.999999999.part"):
         (tmp_path / name).mkdir()
         if "young" not in name:
@@ -102,7 +102,7 @@ def test_leftovers_of_killed_runners_are_swept_and_those_of_running_ones_are_not
     }
 
 
-def test_atomic_writing(tmp_path: Path) -> None:
+def test_atomic_writing(tmp_path):
     path = tmp_path / "a.json"
     write_json(path, {"a": 1})
     with pytest.raises(ValueError, match="not JSON compliant"):
@@ -114,13 +114,13 @@ def test_atomic_writing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cells", [0, 2])
-def test_a_notebook_needs_exactly_one_parameters_cell(tmp_path: Path, cells: int) -> None:
+def test_a_notebook_needs_exactly_one_parameters_cell(tmp_path, cells):
     path = write(tmp_path, "a.ipynb", notebook(parameters=cells))
     with pytest.raises(WildlabError, match=f"{cells} cells"):
         check_notebook(path, STANDARD_PARAMETERS)
 
 
-def test_an_unknown_parameter_is_an_error_before_anything_runs(tmp_path: Path) -> None:
+def test_an_unknown_parameter_is_an_error_before_anything_runs(tmp_path):
     path = write(tmp_path, "a.ipynb", notebook(more="runs = 3"))
     check_notebook(path, [*STANDARD_PARAMETERS, "runs"])
     with pytest.raises(WildlabError, match="rnus"):
@@ -129,7 +129,7 @@ def test_an_unknown_parameter_is_an_error_before_anything_runs(tmp_path: Path) -
         check_notebook(tmp_path / "b.ipynb", [])
 
 
-def test_parameters_become_plain() -> None:
+def test_parameters_become_plain():
     given = {
         "a": np.int64(3),
         "b": Path("x"),
@@ -145,7 +145,7 @@ def test_parameters_become_plain() -> None:
         plain_parameters({"h": {1}})
 
 
-def test_text_loses_the_paths_of_this_machine() -> None:
+def test_text_loses_the_paths_of_this_machine():
     text = f"{ROOT}/wildlab/a.py, {sys.prefix}/lib, {Path.home()}/x, /tmp/ipykernel_123/456.py \x1b[31mred"
     cleaned = privacy.clean_text(text)
     assert str(ROOT) not in cleaned and sys.prefix not in cleaned and "ipykernel" not in cleaned
@@ -153,7 +153,7 @@ def test_text_loses_the_paths_of_this_machine() -> None:
     assert "[wildlab]" not in privacy.clean_text(f"{ROOT}-else/x")
 
 
-def test_an_executed_notebook_can_be_passed_on(tmp_path: Path) -> None:
+def test_an_executed_notebook_can_be_passed_on(tmp_path):
     node = notebook("1 / 0")
     injected = nbformat.v4.new_code_cell(f'out = "{tmp_path}"')
     injected.metadata["tags"] = ["injected-parameters"]
@@ -169,7 +169,7 @@ def test_an_executed_notebook_can_be_passed_on(tmp_path: Path) -> None:
     assert str(tmp_path) in nbformat.writes(node), "the original stays as it was"
 
 
-def test_provenance_says_where_numbers_come_from_and_not_who_or_where(tmp_path: Path) -> None:
+def test_provenance_says_where_numbers_come_from_and_not_who_or_where(tmp_path):
     flight = tmp_path / "flight"
     flight.mkdir()
     manifest = (

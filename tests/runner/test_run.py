@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil
@@ -114,7 +113,7 @@ def gone(pids: list[int]) -> bool:
     return False
 
 
-def test_a_good_run_leaves_everything(ran: Ran) -> None:
+def test_a_good_run_leaves_everything(ran):
     reports, outcomes, log, _ = ran
     folder = reports / "good"
     assert outcomes["good"].state == "done", outcomes["good"].reason
@@ -131,7 +130,7 @@ def test_a_good_run_leaves_everything(ran: Ran) -> None:
     assert "done  good" in log and "failed  raises" in log
 
 
-def test_the_same_seed_gives_the_same_numbers_and_figures(ran: Ran) -> None:
+def test_the_same_seed_gives_the_same_numbers_and_figures(ran):
     reports = ran[0]
     one, two = (json.loads((reports / name / "metrics.json").read_text()) for name in ("good", "again"))
     assert one["metrics"] == two["metrics"]
@@ -150,7 +149,7 @@ def test_the_same_seed_gives_the_same_numbers_and_figures(ran: Ran) -> None:
         ("slow", "time limit of 45 seconds", "The hard part"),
     ],
 )
-def test_a_failed_run_says_so_in_words(ran: Ran, study: str, reason: str, step: str) -> None:
+def test_a_failed_run_says_so_in_words(ran, study, reason, step):
     reports, outcomes, _, _ = ran
     assert outcomes[study].state == "failed" and reason in outcomes[study].reason
     status = json.loads((reports / study / "status.json").read_text())
@@ -163,11 +162,11 @@ def test_a_failed_run_says_so_in_words(ran: Ran, study: str, reason: str, step: 
     assert (reports / study / "notebook.ipynb").is_file()
 
 
-def test_nothing_outlives_a_time_limit(ran: Ran) -> None:
+def test_nothing_outlives_a_time_limit(ran):
     assert len(ran[3]) == 2 and gone(ran[3])
 
 
-def test_nothing_is_left_lying_about(ran: Ran) -> None:
+def test_nothing_is_left_lying_about(ran):
     reports = ran[0]
     assert not list(reports.glob(".*.part")) and not list((reports.parent / "notebooks").glob("*ipc*"))
     assert {path.name for path in (reports.parent / "notebooks").iterdir()} == {
@@ -177,7 +176,7 @@ def test_nothing_is_left_lying_about(ran: Ran) -> None:
     }
 
 
-def test_no_path_of_this_machine_is_in_any_output(ran: Ran) -> None:
+def test_no_path_of_this_machine_is_in_any_output(ran):
     reports = ran[0]
     secrets = [str(reports.parent), str(ROOT), sys.prefix]
     secrets += [str(Path.home()) + "/"] if len(str(Path.home())) > 1 else []
@@ -189,13 +188,13 @@ def test_no_path_of_this_machine_is_in_any_output(ran: Ran) -> None:
     assert looked > 40
 
 
-def test_every_page_opens_offline(ran: Ran, faults: Callable[[Path], list[str]]) -> None:
+def test_every_page_opens_offline(ran, faults):
     pages = [ran[0] / "index.html", *(ran[0] / name / "report.html" for name in ("good", "raises", "slow"))]
     assert {page.parent.name: faults(page) for page in pages} == {page.parent.name: [] for page in pages}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path: Path, number: signal.Signals) -> None:
+def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path, number):
     pids, reports = tmp_path / "pids", tmp_path / "reports"
     notebooks = make_studies(tmp_path / "notebooks", pids)
     (reports / "slow").mkdir(parents=True)
@@ -259,7 +258,7 @@ if __name__ == "__main__":
 """
 
 
-def test_a_notebook_whose_runner_is_killed_does_not_end_before_its_folders_are_gone(tmp_path: Path) -> None:
+def test_a_notebook_whose_runner_is_killed_does_not_end_before_its_folders_are_gone(tmp_path):
     program, folders = tmp_path / "program.py", [tmp_path / "work", tmp_path / "runtime"]
     program.write_text(KILLED)
     for folder in folders:
@@ -276,7 +275,7 @@ def test_a_notebook_whose_runner_is_killed_does_not_end_before_its_folders_are_g
     assert not any(folder.exists() for folder in folders)
 
 
-def test_wrong_use_is_an_error_before_anything_runs(tmp_path: Path) -> None:
+def test_wrong_use_is_an_error_before_anything_runs(tmp_path):
     notebooks = make_studies(tmp_path / "notebooks", tmp_path / "pids")
     for names, more, sentence in (
         ([], {}, "no study was named"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import builtins
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -45,7 +44,7 @@ def work(folder: Path, count: int = 4) -> SeedWork:
 
 
 @given(value=st.floats(allow_nan=False))
-def test_every_float_is_read_back_as_it_was(tmp_path_factory: pytest.TempPathFactory, value: float) -> None:
+def test_every_float_is_read_back_as_it_was(tmp_path_factory, value):
     one = SeedWork(tmp_path_factory.getbasetemp() / "floats", "s", "n", {}, "c", "k", (1,))
     write_seed(one, 1, {"a/b": value, "a/nan": math.nan})
     read = read_seed(one, 1)
@@ -55,13 +54,13 @@ def test_every_float_is_read_back_as_it_was(tmp_path_factory: pytest.TempPathFac
 
 
 @given(drawn=st.integers(0, 40), count=st.integers(1, 40))
-def test_seeds_besides_the_one_drawn(drawn: int, count: int) -> None:
+def test_seeds_besides_the_one_drawn(drawn, count):
     seeds = other_seeds(drawn, count)
     assert len({drawn, *seeds}) == count and list(seeds) == sorted(seeds)
     assert not count > drawn > 0 or set(seeds) | {drawn} == set(range(1, count + 1))
 
 
-def test_the_key_follows_what_the_numbers_depend_on(tmp_path: Path) -> None:
+def test_the_key_follows_what_the_numbers_depend_on(tmp_path):
     first = work(tmp_path)
     assert first.parameters == {"twin": "static-antenna"}
     trial_key = fingerprint.trial_key
@@ -74,9 +73,7 @@ def test_the_key_follows_what_the_numbers_depend_on(tmp_path: Path) -> None:
     assert len(others | {first.key}) == 4
 
 
-def test_the_code_key_follows_code_twins_and_versions(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_code_key_follows_code_twins_and_versions(tmp_path, monkeypatch):
     files = (
         "wildlab/tracking/a.py",
         "wildlab/flight/readers/b.py",
@@ -101,7 +98,7 @@ def test_the_code_key_follows_code_twins_and_versions(
     assert len(set(keys)) == 7
 
 
-def test_sweeping_keeps_what_is_in_use(tmp_path: Path) -> None:
+def test_sweeping_keeps_what_is_in_use(tmp_path):
     new, old = work(tmp_path), replace(work(tmp_path), key="old")
     for one in (new, old, replace(new, study="another")):
         write_seed(one, 1, {"a/b": 1.0})
@@ -113,7 +110,7 @@ def test_sweeping_keeps_what_is_in_use(tmp_path: Path) -> None:
     assert left == {f"study/{new.key}/1.json", f"another/{new.key}/1.json"}
 
 
-def test_the_table_has_the_drawn_flight_first(tmp_path: Path) -> None:
+def test_the_table_has_the_drawn_flight_first(tmp_path):
     one = work(tmp_path)
     for seed in one.seeds:
         write_seed(one, seed, {"a/b": seed / 3})
@@ -126,9 +123,7 @@ def test_the_table_has_the_drawn_flight_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_notebook_opened_by_hand_computes_what_is_missing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_notebook_opened_by_hand_computes_what_is_missing(tmp_path, capsys):
     def table(seeds: int, twin: str) -> Any:
         return trials_table(
             "static-point", seeds, study="study", seed=2, drawn={}, out=str(tmp_path / "study"), twin=twin,
@@ -143,7 +138,7 @@ def test_a_notebook_opened_by_hand_computes_what_is_missing(
     assert read_seed(replace(work(tmp_path), seeds=(1,)), 1) == fresh
 
 
-def test_other_code_is_not_mixed_in() -> None:
+def test_other_code_is_not_mixed_in():
     kind, content = answer("static-point", 1, {}, "another")
     assert kind == "failed" and "are not those that the run began with" in content[0]
 
@@ -161,20 +156,20 @@ def test_other_code_is_not_mixed_in() -> None:
         (lambda: cluster.Cluster("tcp://127.0.0.1:1; ls"), "is no address of a scheduler"),
     ],
 )
-def test_wrong_use_is_a_sentence(call: Callable[[], object], sentence: str) -> None:
+def test_wrong_use_is_a_sentence(call, sentence):
     with pytest.raises(WildlabError, match=sentence):
         call()
 
 
 @pytest.mark.parametrize("given", [{}, {("a/b", "c"): 1.0}])
-def test_a_function_that_gives_no_numbers_is_refused(monkeypatch: pytest.MonkeyPatch, given: Any) -> None:
+def test_a_function_that_gives_no_numbers_is_refused(monkeypatch, given):
     empty = protocol.Study("static-point", (), lambda seed: given)
     monkeypatch.setattr("wildlab.studies.static_point.STUDY", empty)
     with pytest.raises(WildlabError, match="Give numbers by"):
         protocol.run_trial("static-point", 1, {})
 
 
-def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_scheduler_at_the_address(monkeypatch):
     pytest.importorskip("distributed", reason="needs dask.distributed (the extra `cluster`)")
     monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
     with pytest.raises(WildlabError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9") as caught:
@@ -182,7 +177,7 @@ def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
     assert caught.value.exit_code == 2
 
 
-def test_without_dask_a_sentence_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_dask_a_sentence_says_how_to_get_it(monkeypatch):
     real = builtins.__import__
 
     def without(name: str, *more: Any) -> Any:
@@ -195,7 +190,7 @@ def test_without_dask_a_sentence_says_how_to_get_it(monkeypatch: pytest.MonkeyPa
         cluster.Cluster("tcp://127.0.0.1:8786")
 
 
-def test_another_python_or_dask_on_the_cluster_is_refused() -> None:
+def test_another_python_or_dask_on_the_cluster_is_refused():
     def about(python: str = "3.11.7", dask: str = "2026.8.0") -> dict[str, Any]:
         return {"host": {"python": f"{python}.final.0"}, "packages": {"distributed": dask}}
 
@@ -207,7 +202,7 @@ def test_another_python_or_dask_on_the_cluster_is_refused() -> None:
         cluster._check_versions(same | {"scheduler": about(dask="1.0")}, "tcp://a")
 
 
-def test_what_has_no_effect_is_said() -> None:
+def test_what_has_no_effect_is_said():
     studies = load_studies(NOTEBOOKS / "studies.toml")
     chosen = [studies["static-point"], studies["sensitivity"]]
     assert _notes(chosen, None, None) == [] == _notes(chosen[:1], 5, "tcp://a:1")
@@ -223,25 +218,25 @@ def test_what_has_no_effect_is_said() -> None:
         ("seeds = 3\n[s.parameters]\nseeds = 4", "the number of seeds is given twice"),
     ],
 )
-def test_a_study_that_contradicts_itself_is_refused(tmp_path: Path, entry: str, sentence: str) -> None:
+def test_a_study_that_contradicts_itself_is_refused(tmp_path, entry, sentence):
     path = tmp_path / "studies.toml"
     path.write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
     with pytest.raises(WildlabError, match=sentence):
         load_studies(path)
 
 
-def test_failures_in_words() -> None:
+def test_failures_in_words():
     assert failed_seeds([(7, "It rains.")]) == "seed 7 failed: It rains"
     assert failed_seeds([(7, "b."), (3, "a.")]) == "seed 3 failed (so did 1 more: 7): a"
     assert "so did 10 more: 1, 2, 3, 4, 5, 6, 7, 8, ...)" in failed_seeds([(k, "a.") for k in range(11)])
 
 
-def test_an_idle_pool_has_no_processes() -> None:
+def test_an_idle_pool_has_no_processes():
     with WorkerPool() as pool:
         assert (pool.size, pool.pipes, pool.places(2), pool.collect()) == (0, [], 2, [])
 
 
-def test_one_bar_counts_seeds_and_cells() -> None:
+def test_one_bar_counts_seeds_and_cells():
     text = StringIO()
     console = Console(file=text, force_terminal=True, width=160)
     with shown(console) as tell:

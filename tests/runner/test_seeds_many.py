@@ -104,7 +104,7 @@ def alive(pids: set[int]) -> set[int]:
     }
 
 
-def test_the_same_numbers_for_any_number_of_processes(tmp_path: Path) -> None:
+def test_the_same_numbers_for_any_number_of_processes(tmp_path):
     folder = make(tmp_path)
     text = run(folder, "walks", "--out", "one", "--jobs", "1")
     assert "seeds walks: 7 to compute, 0 are there" in text and "done  walks" in text, text
@@ -120,7 +120,7 @@ def test_the_same_numbers_for_any_number_of_processes(tmp_path: Path) -> None:
     assert about["parameters"] == {"steps": 3000, "seconds": 0.0}
 
 
-def test_jobs_bounds_notebooks_and_seeds_together(tmp_path: Path) -> None:
+def test_jobs_bounds_notebooks_and_seeds_together(tmp_path):
     folder = make(tmp_path, seconds=0.2)
     program = start(folder, "walks", "once", "more-walks", "--jobs", "2")
     most = 0
@@ -140,7 +140,7 @@ def test_jobs_bounds_notebooks_and_seeds_together(tmp_path: Path) -> None:
     assert most == 2
 
 
-def test_more_seeds_cost_only_the_new_ones_and_other_parameters_all(tmp_path: Path) -> None:
+def test_more_seeds_cost_only_the_new_ones_and_other_parameters_all(tmp_path):
     folder = make(tmp_path)
     run(folder, "walks", "--seeds", "4")
     assert sorted(seed for seed, _ in flown(folder)) == [1, 2, 3]
@@ -158,7 +158,7 @@ def test_more_seeds_cost_only_the_new_ones_and_other_parameters_all(tmp_path: Pa
     assert len(after) == 1 and after != before, "what the old parameters left is swept"
 
 
-def test_damaged_numbers_are_computed_again_and_the_run_says_so(tmp_path: Path) -> None:
+def test_damaged_numbers_are_computed_again_and_the_run_says_so(tmp_path):
     folder = make(tmp_path)
     run(folder, "walks")
     before, whole = numbers(folder, "reports"), kept(folder, "reports")
@@ -178,7 +178,7 @@ def test_damaged_numbers_are_computed_again_and_the_run_says_so(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_run_that_is_broken_off_goes_on_where_it_stopped(tmp_path: Path, number: signal.Signals) -> None:
+def test_a_run_that_is_broken_off_goes_on_where_it_stopped(tmp_path, number):
     folder = make(tmp_path, seconds=0.4, seeds=12)
     program = start(folder, "walks", "--jobs", "2")
     wait_for(lambda: len(kept(folder, "reports")) >= 3)
@@ -200,7 +200,7 @@ def test_a_run_that_is_broken_off_goes_on_where_it_stopped(tmp_path: Path, numbe
         assert numbers(folder, "reports") == numbers(folder, "whole")
 
 
-def test_seeds_that_fail_are_named_and_the_others_kept(tmp_path: Path) -> None:
+def test_seeds_that_fail_are_named_and_the_others_kept(tmp_path):
     folder = make(tmp_path, seeds=7)
     text = run(folder, "troubled", "once", "--jobs", "2", "--timeout", "25")
     status = json.loads((folder / "reports" / "troubled" / "status.json").read_text())
@@ -265,7 +265,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
     one.end()
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path: Path, cluster: Cluster) -> None:
+def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path, cluster):
     folder = make(tmp_path, seconds=0.8, seeds=12)
     for _ in range(2):
         cluster.add_worker()
@@ -287,7 +287,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path: Path, cl
     assert kept(folder, "cluster") == kept(folder, "here")
 
 
-def test_a_seed_that_fails_on_a_cluster_is_named(tmp_path: Path, cluster: Cluster) -> None:
+def test_a_seed_that_fails_on_a_cluster_is_named(tmp_path, cluster):
     folder = make(tmp_path, seeds=3)
     cluster.add_worker()
     cluster.wait_for_workers(1)
@@ -297,7 +297,7 @@ def test_a_seed_that_fails_on_a_cluster_is_named(tmp_path: Path, cluster: Cluste
     assert len(kept(folder, "reports", "troubled")) == 1
 
 
-def test_a_scheduler_that_goes_away_is_a_sentence(tmp_path: Path, cluster: Cluster) -> None:
+def test_a_scheduler_that_goes_away_is_a_sentence(tmp_path, cluster):
     folder = make(tmp_path, seconds=0.4, seeds=50)
     cluster.add_worker()
     cluster.wait_for_workers(1)
@@ -310,7 +310,7 @@ def test_a_scheduler_that_goes_away_is_a_sentence(tmp_path: Path, cluster: Clust
     assert len(kept(folder, "reports")) >= 2
 
 
-def test_a_cluster_without_workers_is_refused(tmp_path: Path, cluster: Cluster) -> None:
+def test_a_cluster_without_workers_is_refused(tmp_path, cluster):
     text = run(make(tmp_path), "walks", "--scheduler", cluster.address)
     assert "has no workers" in text and f"dask worker {cluster.address}" in text
     assert not (tmp_path / "flown").exists()

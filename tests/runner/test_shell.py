@@ -58,7 +58,7 @@ def outputs(notebook: Any) -> list[Any]:
 
 
 @pytest.mark.slow
-def test_outputs_are_those_of_a_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_outputs_are_those_of_a_kernel(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     # In a thread of their own: a browser's tests may have left a loop running in this one.
     with ThreadPoolExecutor(1) as thread:
@@ -66,7 +66,7 @@ def test_outputs_are_those_of_a_kernel(tmp_path: Path, monkeypatch: pytest.Monke
     assert outputs(ours) == outputs(theirs)
 
 
-def test_a_cell_that_raises_is_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cell_that_raises_is_the_last(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     with pytest.raises(PapermillExecutionError) as raised:
         execute(["y = 1", "y / 0", "print('not reached')"], tmp_path, IN_PROCESS)
@@ -75,7 +75,7 @@ def test_a_cell_that_raises_is_the_last(tmp_path: Path, monkeypatch: pytest.Monk
     assert "not reached" not in str([cell.get("outputs") for cell in kept.cells])
 
 
-def test_what_fails_to_show_itself_is_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_fails_to_show_itself_is_the_last(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     with pytest.raises(PapermillExecutionError, match="ZeroDivisionError"):
         execute(
@@ -84,9 +84,7 @@ def test_what_fails_to_show_itself_is_the_last(tmp_path: Path, monkeypatch: pyte
     assert not (tmp_path / "late").exists()
 
 
-def test_parameters_and_the_folder_are_the_notebooks_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_parameters_and_the_folder_are_the_notebooks_own(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     cells = ["import os\nprint(speed, os.getcwd())"]
     main = sys.modules["__main__"]
@@ -105,7 +103,7 @@ def tell(pipe: connection.Connection, names: list[str]) -> None:
 
 
 @pytest.mark.parametrize("value", ["first", "second"])
-def test_a_process_has_the_environment_of_its_own_start(value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_has_the_environment_of_its_own_start(value, monkeypatch):
     monkeypatch.setenv("TOLD_TO_IT", value)
     ours, theirs = connection.Pipe(duplex=False)
     process = start_process("tells", tell, theirs, ["TOLD_TO_IT", *ONE_THREAD])

@@ -204,7 +204,7 @@ TOLD = {
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_study_and_its_page(name: str, reports: Path, faults: Faults) -> None:
+def test_a_study_and_its_page(name, reports, faults):
     page, entry = PAGES[name], STUDIES[name]
     folder = run(name, reports, seeds=page.seeds, first_look=True)
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
@@ -256,7 +256,7 @@ def trial_gives_what_is_asked(entry: StudyEntry, folder: Path) -> None:
         assert len(set(array.tolist())) == 1, "the same flight, the same verdict"
 
 
-def test_every_study_has_its_page_here() -> None:
+def test_every_study_has_its_page_here():
     of_logs = {name for name, entry in STUDIES.items() if entry.recipe is not None}
     # Of one notebook on three flights the first and the longest.
     left_out = {"end-to-end-slow", "navigation-slow-vessel-eight", "schmidt-slow-vessel-eight"}
@@ -272,9 +272,7 @@ def imported(folder: Path, recipe: str, raw: Path) -> Path:
     return folder / recipe
 
 
-def test_survey_markers_beside_the_published_accuracy(
-    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
-) -> None:
+def test_survey_markers_beside_the_published_accuracy(reports, tmp_path, shared_data, faults):
     flight = imported(tmp_path, "openathena", shared_data("georeferencing", "openathena"))
     folder = run("survey-markers", reports, flight=flight)
     found = values(folder)
@@ -295,9 +293,7 @@ def test_survey_markers_beside_the_published_accuracy(
     assert faults(folder / "report.html") == []
 
 
-def test_a_flight_with_labelled_markers_is_evaluated(
-    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
-) -> None:
+def test_a_flight_with_labelled_markers_is_evaluated(reports, tmp_path, shared_data, faults):
     flight = imported(tmp_path, "openathena-f1", shared_data("georeferencing", "openathena-f1"))
     _, outcome = evaluate_flight(flight, reports=reports)
     found = values(outcome.folder)
@@ -311,9 +307,7 @@ def test_a_flight_with_labelled_markers_is_evaluated(
     assert outcome.folder is not None and faults(outcome.folder / "report.html") == []
 
 
-def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(
-    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
-) -> None:
+def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(reports, tmp_path, shared_data, faults):
     flight = imported(tmp_path, "umn-thor75", shared_data("logs", "umn_thor75"))
     _, outcome = evaluate_flight(flight, reports=reports)
     assert outcome.name == "umn-thor75-navigation"
@@ -325,9 +319,7 @@ def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(
     assert outcome.folder is not None and faults(outcome.folder / "report.html") == []
 
 
-def test_navigation_of_a_logged_flight(
-    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
-) -> None:
+def test_navigation_of_a_logged_flight(reports, tmp_path, shared_data, faults):
     flight = imported(tmp_path, "umn-thor75", shared_data("logs", "umn_thor75"))
     folder = run("navigation-thor75", reports, flight=flight)
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
@@ -336,9 +328,7 @@ def test_navigation_of_a_logged_flight(
     assert faults(folder / "report.html") == []
 
 
-def test_sensors_of_a_ferry_judged_on_one_scenario(
-    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
-) -> None:
+def test_sensors_of_a_ferry_judged_on_one_scenario(reports, tmp_path, shared_data, faults):
     flight = imported(tmp_path, "autoferry-17", shared_data("tracking", "autoferry"))
     folder = run("autoferry", reports, flight=flight)
     found = values(folder)

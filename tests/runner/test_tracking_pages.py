@@ -12,7 +12,7 @@ def use_of(flight: Flight) -> Use:
     return next(use for use in usable_for(flight) if use.purpose == "tracking")
 
 
-def test_what_a_flight_lacks_for_tracking_is_said() -> None:
+def test_what_a_flight_lacks_for_tracking_is_said():
     flight = robot_flight()
     assert lacking_for_tracking(flight, use_of(flight)) == ""
     short = robot_flight(seconds=6.0)

@@ -6,7 +6,6 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,15 +18,13 @@ from wildlab.runner.typed import other_reports, typed, typed_in_report
 
 
 @given(st.lists(st.text(min_size=1).filter(lambda one: "\0" not in one)))
-def test_a_shell_reads_what_was_meant(words: list[str]) -> None:
+def test_a_shell_reads_what_was_meant(words):
     assert shlex.split(typed("wildlab track", *words, target=words)) == [
         "wildlab", "track", *words, *(one for word in words for one in ("--target", word)),
     ]  # fmt: skip
 
 
-def test_paths_are_from_here_and_what_was_left_out_is_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_paths_are_from_here_and_what_was_left_out_is_left_out(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     here = typed(
         "x", Path("my flights/one"), settings=tmp_path / "s.toml", source=None, smooth=False, filter=()
@@ -39,9 +36,7 @@ def test_paths_are_from_here_and_what_was_left_out_is_left_out(
     assert other_reports(REPORTS) is None and other_reports(tmp_path) == tmp_path
 
 
-def test_a_report_that_failed_is_asked_for_again_as_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_report_that_failed_is_asked_for_again_as_it_was(tmp_path, monkeypatch):
     """The flight's folder from here, and every option."""
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "flights" / "my boat"

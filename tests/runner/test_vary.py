@@ -1,9 +1,5 @@
 """`wildlab vary`: which verdicts turn when chosen parameters are moved."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -15,7 +11,7 @@ from wildlab.runner.vary import AS_IT_IS, Moved, turned_table, turned_words, var
 BASE = Moved(AS_IT_IS, 1.0, {"a": "holds", "b": "undecided"})
 
 
-def test_verdicts_that_are_others_than_as_it_is_have_turned() -> None:
+def test_verdicts_that_are_others_than_as_it_is_have_turned():
     moved = [
         BASE,
         Moved("wind: speed", 0.5, {"a": "holds", "b": "holds"}),
@@ -31,12 +27,12 @@ def test_verdicts_that_are_others_than_as_it_is_have_turned() -> None:
 
 
 @pytest.mark.parametrize("factors", [(), (0.0,), (-1.0,), (float("nan"),), (1.0,)])
-def test_factors_that_move_nothing_are_refused(factors: tuple[float, ...], tmp_path: Path) -> None:
+def test_factors_that_move_nothing_are_refused(factors, tmp_path):
     with pytest.raises(WildlabError, match="other than"):
         vary_study("coloured-noise-fast", factors=factors, reports=tmp_path)
 
 
-def test_what_is_not_simulated_is_refused(tmp_path: Path) -> None:
+def test_what_is_not_simulated_is_refused(tmp_path):
     with pytest.raises(WildlabError, match="nothing to move"):
         vary_study("sensitivity", reports=tmp_path)
     result = CliRunner().invoke(wildlab, ["vary", "coloured-noise-fast", "--by", "half"])

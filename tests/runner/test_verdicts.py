@@ -1,7 +1,5 @@
 """Verdicts on published numbers, from what a run recorded to what the ledger says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -31,9 +29,7 @@ SPREAD = {"low": 7.0, "high": 12.0, "flights": 100, "centre_low": 9.6, "centre_h
         ("one flight", None, {}, ("not reproduced yet",) * 2),
     ],
 )
-def test_both_answers_on_a_number(
-    tmp_path: Path, kind: str, value: float | None, spread: dict[str, float], answers: tuple[str, str]
-) -> None:
+def test_both_answers_on_a_number(tmp_path, kind, value, spread, answers):
     ran(tmp_path / "reports", metrics.metric("error", "kf/all", value, "m", **spread))
     folder = published(tmp_path / "published", f'kind = "{kind}"\n{PUBLISHED}')
     one = study_status(a_study(), tmp_path / "reports", folder)
@@ -50,9 +46,7 @@ def test_both_answers_on_a_number(
         (96.4, None, 10_000, ("not judged",) * 2),
     ],
 )
-def test_a_mean_of_runs_is_held_against_a_mean(
-    tmp_path: Path, here: float, error: float | None, n: int | None, answers: tuple[str, str]
-) -> None:
+def test_a_mean_of_runs_is_held_against_a_mean(tmp_path, here, error, n, answers):
     row = '[[number]]\nstudy = "s"\nname = "success_rate"\nsubject = "a"\nvalue = 96.64\nunit = "%"\n'
     row += 'source = "H table 1"\nruns = 10000\nkind = "mean of runs"\n'
     entries = [metrics.metric("success_rate", "a", here, "%", n=n, low=70, high=100)]
@@ -82,7 +76,7 @@ source = "H table 1"
 """
 
 
-def test_a_mean_whose_sign_nobody_defines_is_held_against_sizes(tmp_path: Path) -> None:
+def test_a_mean_whose_sign_nobody_defines_is_held_against_sizes(tmp_path):
     entries = [
         metrics.metric("mae", "kf", 9.4, "m", low=5, high=14),
         metrics.metric("mean_north", "kf", 0.1, "m", low=-5, high=5, below=0.1),
@@ -101,9 +95,7 @@ def test_a_mean_whose_sign_nobody_defines_is_held_against_sizes(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(("value", "within"), [("5.30", 0.005), ("5.3", 0.05), ("21", 0.5)])
-def test_a_calculation_is_granted_half_of_its_last_printed_digit(
-    tmp_path: Path, value: str, within: float
-) -> None:
+def test_a_calculation_is_granted_half_of_its_last_printed_digit(tmp_path, value, within):
     text = f'kind = "calculated"\n[[number]]\nstudy = "s"\nname = "error"\nsubject = "a"\nvalue = {value}\n'
     folder = published(tmp_path / "published", text + 'unit = "m"\nsource = "H 1"\n')
     for off, verdict in ((0.99, "close"), (-0.99, "close"), (1.1, "not close")):
@@ -111,7 +103,7 @@ def test_a_calculation_is_granted_half_of_its_last_printed_digit(
         assert study_status(a_study(), tmp_path, folder).numbers[0].answers[0] == verdict, off
 
 
-def test_in_tables_that_contradict_themselves_the_last_digit_is_granted(tmp_path: Path) -> None:
+def test_in_tables_that_contradict_themselves_the_last_digit_is_granted(tmp_path):
     text = 'kind = "calculated"\nlast_digit = "within one"\n' + "".join(
         f'[[number]]\nstudy = "s"\nname = "error"\nsubject = "{k}"\n'
         f'value = {value}\nunit = "m"\nsource = "H"\n'
@@ -121,7 +113,7 @@ def test_in_tables_that_contradict_themselves_the_last_digit_is_granted(tmp_path
     assert rows["rounding"].tolist() == [0.1, 0.1], "21 stands beside 5.3: its zero is left out"
 
 
-def test_a_number_is_counted_once_and_what_was_fitted_to_it_is_counted_apart(tmp_path: Path) -> None:
+def test_a_number_is_counted_once_and_what_was_fitted_to_it_is_counted_apart(tmp_path):
     number = PUBLISHED.split("[[number]]")[1].replace("within = 0.15\n", "")
     plain, tuned, twice = (number.replace("kf/all", who) for who in ("plain", "tuned", "twice"))
     text = f'[[number]]{plain}[[number]]{tuned}fitted = "tuned to it"\n[[number]]{twice}again = true\n'
@@ -138,7 +130,7 @@ def test_a_number_is_counted_once_and_what_was_fitted_to_it_is_counted_apart(tmp
     assert counts.groups[PREDICTED].chance == pytest.approx(0.1)
 
 
-def test_groups_add_up_to_all_numbers() -> None:
+def test_groups_add_up_to_all_numbers():
     """Of the real files, with nothing run."""
     statuses = [study_status(one, Path("nowhere")) for one in load_studies().values()]
     counts = counted(statuses)
@@ -149,7 +141,7 @@ def test_groups_add_up_to_all_numbers() -> None:
         assert (group_of(one) == PREDICTED) == predicted
 
 
-def test_each_number_that_is_not_counted_is_counted_elsewhere() -> None:
+def test_each_number_that_is_not_counted_is_counted_elsewhere():
     """In the same study, or where the same flight is printed again, but for the last digits."""
     studies = load_studies()
     rows = {name: load_published(name) for name in studies}

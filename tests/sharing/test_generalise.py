@@ -6,7 +6,6 @@ import dataclasses
 import math
 import re
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -53,7 +52,7 @@ def numbers_of(flight: Flight) -> dict[str, np.ndarray]:
     }
 
 
-def test_two_places_give_the_same_copy_where_the_place_is_withheld() -> None:
+def test_two_places_give_the_same_copy_where_the_place_is_withheld():
     """Nothing can be recovered of what the result does not depend on."""
     south = made(canary()).flight
     north = made(canary((69.6, -18.9, 1204.0), corner=(-300.0, 90.0, 40.0), field=(53.0, 9.2, 77.1))).flight
@@ -76,7 +75,7 @@ def test_two_places_give_the_same_copy_where_the_place_is_withheld() -> None:
     )
 
 
-def test_two_days_of_a_month_give_the_same_copy() -> None:
+def test_two_days_of_a_month_give_the_same_copy():
     one, other = made(canary()), made(canary(epoch=datetime(2023, 9, 2, 3, 0, 0, tzinfo=UTC)))
     assert one.flight.manifest == other.flight.manifest
     assert one.when == other.when == "September 2023 (UTC)"
@@ -84,7 +83,7 @@ def test_two_days_of_a_month_give_the_same_copy() -> None:
         np.testing.assert_array_equal(values, numbers_of(other.flight)[name])
 
 
-def test_the_day_is_told_only_where_the_table_says_so() -> None:
+def test_the_day_is_told_only_where_the_table_says_so():
     flight = canary(locations={"category": 3})
     assert made(flight, "public").when == "September 2023 (UTC)"
     assert made(flight, "partner").when == "17 September 2023 (UTC)"
@@ -93,7 +92,7 @@ def test_the_day_is_told_only_where_the_table_says_so() -> None:
 
 
 @pytest.mark.parametrize("category", [1, 2, 3, 4])
-def test_the_moved_sensors_feel_the_same_flight(category: int) -> None:
+def test_the_moved_sensors_feel_the_same_flight(category):
     """Dead reckoning over the copy, on the Earth of its origin, leads where the true one does."""
     flight = canary(locations={"category": category})
     copy = made(flight).flight
@@ -115,7 +114,7 @@ VELOCITY = ("v_north_m_s", "v_east_m_s", "v_down_m_s")
 QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 
 
-def test_the_magnetic_field_is_that_of_no_place() -> None:
+def test_the_magnetic_field_is_that_of_no_place():
     flight = canary()
     copy = made(flight).flight
     stated, iron = copy.manifest.magnetometer, copy.manifest.magnetometer.hard_iron_ut
@@ -129,7 +128,7 @@ def test_the_magnetic_field_is_that_of_no_place() -> None:
     np.testing.assert_allclose(seen, np.tile([25.0, 0.0, 50 * math.sqrt(0.75)], (len(seen), 1)), atol=1e-4)
 
 
-def test_a_field_of_which_nothing_is_stated_is_left_out() -> None:
+def test_a_field_of_which_nothing_is_stated_is_left_out():
     flight = canary(magnetometer={"declination_deg": -17.4})
     found = made(flight)
     assert "magnetometer" not in found.flight.tables
@@ -137,7 +136,7 @@ def test_a_field_of_which_nothing_is_stated_is_left_out() -> None:
     assert any(one.what == "table" and one.was == "magnetometer" for one in found.removed)
 
 
-def test_the_day_is_that_of_the_aircrafts_first_pose() -> None:
+def test_the_day_is_that_of_the_aircrafts_first_pose():
     """A tracker on the ground that was started before midnight moves no flight to the day before."""
     midnight = datetime(2023, 9, 17, tzinfo=UTC)
     flight = canary(epoch=midnight - timedelta(seconds=START - 60), locations={"category": 3})
@@ -152,7 +151,7 @@ def test_the_day_is_that_of_the_aircrafts_first_pose() -> None:
     assert first_stamp(copy.flight) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_nothing_of_where_when_and_who_is_in_the_copy(tmp_path: Path) -> None:
+def test_nothing_of_where_when_and_who_is_in_the_copy(tmp_path):
     flight = canary(locations={"category": 2})
     saved = save_flight(made(flight).flight, tmp_path / "flight")
     assert saved.folder is not None
@@ -171,7 +170,7 @@ def test_nothing_of_where_when_and_who_is_in_the_copy(tmp_path: Path) -> None:
     assert terrain is not None and terrain.cell_m == (40.0, 40.0)
 
 
-def test_kinds_of_hulls_have_no_names_in_the_copy() -> None:
+def test_kinds_of_hulls_have_no_names_in_the_copy():
     hulls = [{"name": "Thandi's dinghy", "length_m": 4.0}, {"name": "patrol", "length_m": 9.0}]
     many = made(canary(targets={"many": {"hulls": hulls}})).flight.manifest.targets.many
     assert many is not None
@@ -179,7 +178,7 @@ def test_kinds_of_hulls_have_no_names_in_the_copy() -> None:
 
 
 @pytest.mark.parametrize("named", [True, False])
-def test_a_sensors_clock_tells_no_zone_of_time(named: bool) -> None:
+def test_a_sensors_clock_tells_no_zone_of_time(named):
     """Its looks are when they were, whatever zone its clock was in."""
     frames = canary(imu=False).table("frames")
     own = frames.assign(time_s=frames["time_s"] - 1000.5, **({"sensor": "Ranger Jonas"} if named else {}))
@@ -196,14 +195,14 @@ def test_a_sensors_clock_tells_no_zone_of_time(named: bool) -> None:
     assert any(one.what == "clock offset of Ranger Jonas" and "7300.5" in one.was for one in two.removed)
 
 
-def test_what_was_added_to_stamps_is_known_whatever_else_was_moved() -> None:
+def test_what_was_added_to_stamps_is_known_whatever_else_was_moved():
     """Also where there is a magnetometer, whose field is moved."""
     found = made(canary(sensors={"Ranger Jonas": {"clock_offset_s": 7200.5}}))
     assert "magnetometer" in found.flight.tables and found.clocks == {"Ranger Jonas": 7200.0}
     assert made(canary()).clocks == {}
 
 
-def test_clocks_of_several_zones_are_refused_where_no_frame_says_whose_it_is() -> None:
+def test_clocks_of_several_zones_are_refused_where_no_frame_says_whose_it_is():
     flight = canary(imu=False, sensors={"Ranger Jonas": {"clock_offset_s": 7200.0}})
     seen = flight.table("detections")
     seen.loc[:9, "source"] = "radar"
@@ -211,7 +210,7 @@ def test_clocks_of_several_zones_are_refused_where_no_frame_says_whose_it_is() -
         made(flight)
 
 
-def test_stamps_begin_at_zero_and_keep_their_distances() -> None:
+def test_stamps_begin_at_zero_and_keep_their_distances():
     flight = canary()
     copy = made(flight).flight
     assert first_stamp(copy) == pytest.approx(0.0, abs=1e-9)
@@ -226,12 +225,12 @@ def test_stamps_begin_at_zero_and_keep_their_distances() -> None:
 
 @given(st.integers(-60, 60), st.floats(-449, 449))
 @settings(max_examples=40, deadline=None)
-def test_no_zone_of_time_is_left_in_an_offset(quarters: int, rest: float) -> None:
+def test_no_zone_of_time_is_left_in_an_offset(quarters, rest):
     flight = canary(imu=False, clocks={"truth_offset_s": quarters * QUARTER + rest})
     assert made(flight).flight.manifest.clocks.truth_offset_s == pytest.approx(rest, abs=1e-6)
 
 
-def test_what_is_computed_from_the_copy_is_what_is_computed_from_the_flight() -> None:
+def test_what_is_computed_from_the_copy_is_what_is_computed_from_the_flight():
     flight = canary()
     copy = made(flight).flight
     true, same = observe(flight), observe(copy)
@@ -247,7 +246,7 @@ def test_what_is_computed_from_the_copy_is_what_is_computed_from_the_flight() ->
     )
 
 
-def test_the_new_origin_follows_from_the_flight_alone() -> None:
+def test_the_new_origin_follows_from_the_flight_alone():
     one = canary()
     moved = canary(corner=(5_812.0, 9_545.0, -113.0))
     np.testing.assert_allclose(new_origin(moved) - new_origin(one), [5_000.0, 10_000.0, -100.0])
@@ -264,7 +263,7 @@ def test_the_new_origin_follows_from_the_flight_alone() -> None:
     assert reach(bare, np.zeros(3)) == pytest.approx(far) and far < reach(moved, np.zeros(3))
 
 
-def test_the_sender_is_told_each_thing() -> None:
+def test_the_sender_is_told_each_thing():
     told = {(one.what, one.was) for one in made(canary()).removed}
     assert {("flight", "kifaru-ridge"), ("target", "Sarah"), ("platform", "Kestrel of Olifants camp")} <= told
     values = " ".join(was for _, was in told)
@@ -272,7 +271,7 @@ def test_the_sender_is_told_each_thing() -> None:
     assert "kifaru_ridge_2023-09-17.bin" in values and "camera offset" in dict(told)
 
 
-def test_a_flight_without_positions_or_stamps_is_no_trouble() -> None:
+def test_a_flight_without_positions_or_stamps_is_no_trouble():
     flight = canary(imu=False, time={"kind": "sequence"})
     flight.nav, flight.terrain = {}, None
     flight.tables = {"frames": flight.table("frames")}
@@ -284,7 +283,7 @@ def test_a_flight_without_positions_or_stamps_is_no_trouble() -> None:
     assert EPOCH.year == 2023
 
 
-def test_poses_that_a_report_looks_up_keep_their_names() -> None:
+def test_poses_that_a_report_looks_up_keep_their_names():
     """By another name they would be held against another reference, and the verdict may turn round."""
     for name in (*REFERENCES, *PREFERRED):
         flight = canary()
@@ -300,7 +299,7 @@ def test_poses_that_a_report_looks_up_keep_their_names() -> None:
     assert "truth-Jonas" not in copied.nav
 
 
-def test_without_attitudes_gravity_is_still_that_of_no_place() -> None:
+def test_without_attitudes_gravity_is_still_that_of_no_place():
     flight = canary()
     flight.nav = {"Kestrel-log": flight.nav["Kestrel-log"].iloc[:1]}
     still = flight.table("imu").assign(f_x_m_s2=0.0, f_y_m_s2=0.0)

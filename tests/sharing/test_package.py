@@ -35,7 +35,7 @@ FILES = {"flight.html": b"<p>page</p>" * 50}
 WORDS = "correct horse battery"
 
 
-def test_the_same_files_give_the_same_bytes(tmp_path: Path) -> None:
+def test_the_same_files_give_the_same_bytes(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).write_bytes(zip_bytes(FILES))
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
@@ -47,7 +47,7 @@ def test_the_same_files_give_the_same_bytes(tmp_path: Path) -> None:
         assert zipped.read("flight.html") == FILES["flight.html"]
 
 
-def test_an_encrypted_zip_opens_with_its_password_and_not_without(tmp_path: Path) -> None:
+def test_an_encrypted_zip_opens_with_its_password_and_not_without(tmp_path):
     path = tmp_path / "a.zip"
     path.write_bytes(zip_bytes(FILES, WORDS))
     assert b"page" not in path.read_bytes()
@@ -62,15 +62,13 @@ def test_an_encrypted_zip_opens_with_its_password_and_not_without(tmp_path: Path
         assert zipped.infolist()[0].CRC == 0
 
 
-def test_a_password_that_can_be_tried_out_is_refused() -> None:
+def test_a_password_that_can_be_tried_out_is_refused():
     check_password("a" * 12)
     with pytest.raises(WildlabError, match="The password has 5 characters"):
         check_password("rhino")
 
 
-def test_a_folder_to_work_in_is_private_and_gone_afterwards(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_to_work_in_is_private_and_gone_afterwards(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with pytest.raises(KeyboardInterrupt), private_folder() as work:
         assert work.parent == tmp_path and work.stat().st_mode & 0o077 == 0
@@ -85,7 +83,7 @@ def test_a_folder_to_work_in_is_private_and_gone_afterwards(
     assert [one.name for one in tmp_path.iterdir()] == [f"wildlab-share-{os.getpid()}-other"]
 
 
-def test_what_a_killed_run_left_beside_a_copy_is_swept(tmp_path: Path) -> None:
+def test_what_a_killed_run_left_beside_a_copy_is_swept(tmp_path):
     (tmp_path / ".share.abc.part" / "pages").mkdir(parents=True)
     (tmp_path / ".share.abc.part" / "pages" / "flight.html").write_text("rhino")
     (tmp_path / ".copy.zip.abcd1234").write_text("half")
@@ -107,7 +105,7 @@ module.share(Path(sys.argv[1]), "team", out=Path(sys.argv[2]), password="correct
 
 
 @pytest.mark.slow
-def test_a_killed_run_leaves_no_page_that_can_be_read(tmp_path: Path) -> None:
+def test_a_killed_run_leaves_no_page_that_can_be_read(tmp_path):
     report = tmp_path / "reports" / "gating"
     report.mkdir(parents=True)
     said = "nobody may read this"
@@ -126,7 +124,7 @@ def test_a_killed_run_leaves_no_page_that_can_be_read(tmp_path: Path) -> None:
     assert not [one for one in left if said.encode() in one.read_bytes()]
 
 
-def test_nothing_is_overwritten_without_being_asked(tmp_path: Path) -> None:
+def test_nothing_is_overwritten_without_being_asked(tmp_path):
     there = tmp_path / "copy.html"
     there.write_text("old")
     with pytest.raises(WildlabError, match="there already"):
@@ -170,7 +168,7 @@ def whole(tmp_path: Path, *, exact: bool = False, times: int = 2) -> str:
     )
 
 
-def test_ids_are_each_once_and_links_lead_somewhere(tmp_path: Path) -> None:
+def test_ids_are_each_once_and_links_lead_somewhere(tmp_path):
     soup = BeautifulSoup(whole(tmp_path), "html.parser")
     ids = [tag["id"] for tag in soup.find_all(id=True)]
     assert len(ids) == len(set(ids)) and "r1-numbers" in ids and "r2-numbers" in ids
@@ -183,7 +181,7 @@ def test_ids_are_each_once_and_links_lead_somewhere(tmp_path: Path) -> None:
     assert "#r1-numbers { color: red }" in str(soup.style)
 
 
-def test_nothing_runs_asks_or_lies_beside(tmp_path: Path) -> None:
+def test_nothing_runs_asks_or_lies_beside(tmp_path):
     text = whole(tmp_path)
     assert "default-src 'none'" in text
     soup = BeautifulSoup(text, "html.parser")
@@ -202,14 +200,14 @@ def test_nothing_runs_asks_or_lies_beside(tmp_path: Path) -> None:
         assert secret not in text
 
 
-def test_the_foot_keeps_the_thesis_and_loses_hashes_and_date(tmp_path: Path) -> None:
+def test_the_foot_keeps_the_thesis_and_loses_hashes_and_date(tmp_path):
     text = whole(tmp_path)
     assert "Helgesen" in text
     assert "c247ba823b" not in text and "2026-11-23" not in text
     assert "c247ba823b" in whole(tmp_path, exact=True)
 
 
-def test_outsiders_are_not_told_what_to_type(tmp_path: Path) -> None:
+def test_outsiders_are_not_told_what_to_type(tmp_path):
     body = """<header><h1>x</h1></header>
 <p>2 of 9 values are <b>assumed.</b> State them in <code>flight.toml</code>, or with <code>--settings</code>.
 All else holds.</p>
@@ -237,7 +235,7 @@ State <code>reach_m = 60</code>.</p>"""
 @pytest.mark.parametrize(
     "text", [b"", b"<p>hello</p>", b"<html><body><main>no heading</main></body></html>", b"\xff\xfe\x00"]
 )
-def test_what_is_no_report_is_refused(text: bytes, tmp_path: Path) -> None:
+def test_what_is_no_report_is_refused(text, tmp_path):
     (tmp_path / "report.html").write_bytes(text)
     with pytest.raises(WildlabError, match=r"not a report|cannot be read"):
         read_part(tmp_path / "report.html", 1, exact=False)
@@ -256,7 +254,7 @@ def advice(folder: Path) -> str:
     return caught.value.fix
 
 
-def test_a_report_on_many_targets_goes_with_the_others_whichever_is_named(tmp_path: Path) -> None:
+def test_a_report_on_many_targets_goes_with_the_others_whichever_is_named(tmp_path):
     reports = tmp_path / "reports"
     done(reports / "kifaru-ridge-many", notebook=NOTEBOOK)
     done(reports / "kifaru-ridge-overview")
@@ -267,7 +265,7 @@ def test_a_report_on_many_targets_goes_with_the_others_whichever_is_named(tmp_pa
         assert source.logged and not left_out
 
 
-def test_one_on_many_targets_that_is_of_other_tables_does_not_go_along(tmp_path: Path) -> None:
+def test_one_on_many_targets_that_is_of_other_tables_does_not_go_along(tmp_path):
     reports = tmp_path / "reports"
     done(reports / "kifaru-ridge-many", notebook=NOTEBOOK, tables="older")
     done(reports / "kifaru-ridge-overview")
@@ -277,7 +275,7 @@ def test_one_on_many_targets_that_is_of_other_tables_does_not_go_along(tmp_path:
         assert any("kifaru-ridge-many" in line and "other tables" in line for line in left_out)
 
 
-def test_what_is_only_called_like_one_on_many_targets_cannot_be_drawn_again(tmp_path: Path) -> None:
+def test_what_is_only_called_like_one_on_many_targets_cannot_be_drawn_again(tmp_path):
     """`wildlab track` leaves the report on one target in whatever folder it is told."""
     reports = tmp_path / "reports"
     done(reports / "kifaru-ridge-many", notebook="tracking.ipynb")

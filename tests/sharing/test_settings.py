@@ -43,7 +43,7 @@ def known() -> Names:
     return names
 
 
-def test_the_filter_is_told_the_same_in_neutral_names() -> None:
+def test_the_filter_is_told_the_same_in_neutral_names():
     told = parse_settings(TOLD)
     found, left_out = neutral_settings(told, known(), {})
     assert left_out == ("Pafuri post",)
@@ -61,20 +61,20 @@ def test_the_filter_is_told_the_same_in_neutral_names() -> None:
     assert parse_settings(text) == found
 
 
-def test_an_offset_is_what_is_left_of_it_after_the_stamps_were_moved() -> None:
+def test_an_offset_is_what_is_left_of_it_after_the_stamps_were_moved():
     told = parse_settings('[sensors."Letaba mast"]\nclock_offset_s = 7198.5')
     found, _ = neutral_settings(told, known(), {"Letaba mast": 7200.0})
     assert found.sensors["sensor-1"].clock_offset_s == pytest.approx(-1.5)
 
 
-def test_an_offset_that_tells_a_zone_is_refused_with_what_to_do() -> None:
+def test_an_offset_that_tells_a_zone_is_refused_with_what_to_do():
     told = parse_settings('[sensors."Letaba mast"]\nclock_offset_s = 7198.5')
     with pytest.raises(WildlabError, match=r"add 7198\.5 s.*State this offset in flight\.toml") as caught:
         neutral_settings(told, known(), {})
     assert caught.value.field == "sensors.Letaba mast.clock_offset_s"
 
 
-def test_none_that_was_stated_is_one_where_the_stamps_were_moved() -> None:
+def test_none_that_was_stated_is_one_where_the_stamps_were_moved():
     """As settings are kept, each sensor states its offset, and over that of the flight."""
     told = parse_settings('[sensors."Letaba mast"]\nclock_offset_s = 0.0')
     with pytest.raises(WildlabError, match=r"add 0 s .* and flight\.toml about 7200 s, which tells a zone"):
@@ -83,5 +83,5 @@ def test_none_that_was_stated_is_one_where_the_stamps_were_moved() -> None:
 
 @given(st.integers(-60, 60), st.floats(-449, 449))
 @rounds(max_examples=50, deadline=None)
-def test_of_an_offset_whole_quarters_are_cut(quarters: int, rest: float) -> None:
+def test_of_an_offset_whole_quarters_are_cut(quarters, rest):
     assert whole_quarters(quarters * QUARTER + rest) == pytest.approx(quarters * QUARTER, abs=1e-6)

@@ -99,7 +99,7 @@ def then(monkeypatch: pytest.MonkeyPatch, change: Callable[[Path, Path], Iterabl
     monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
 
 
-def test_a_canary_is_in_no_copy_but_that_of_the_team(made: Path) -> None:
+def test_a_canary_is_in_no_copy_but_that_of_the_team(made):
     for tier in ("public", "partner"):
         copy = share(REPORT, tier)  # type: ignore[arg-type]
         assert copy.file.name == f"flight-{tier}.html"
@@ -114,7 +114,7 @@ def test_a_canary_is_in_no_copy_but_that_of_the_team(made: Path) -> None:
     assert "Olifants" in text and "873165" in text
 
 
-def test_the_sender_is_told_in_a_file_that_others_cannot_read(made: Path) -> None:
+def test_the_sender_is_told_in_a_file_that_others_cannot_read(made):
     copy = share(REPORT)
     told = copy.told.read_text(encoding="utf-8")
     for secret in ("kifaru-ridge", "-24.873165", "Thandi", "Kestrel of Olifants camp"):
@@ -126,7 +126,7 @@ def test_the_sender_is_told_in_a_file_that_others_cannot_read(made: Path) -> Non
     ]  # fmt: skip
 
 
-def test_a_zip_is_encrypted_and_lists_neutral_names(made: Path) -> None:
+def test_a_zip_is_encrypted_and_lists_neutral_names(made):
     words = "four words that differ"
     copy = share(REPORT, password=words)
     assert copy.file.name == "flight-public.zip"
@@ -141,9 +141,7 @@ def test_a_zip_is_encrypted_and_lists_neutral_names(made: Path) -> None:
 @pytest.mark.parametrize(
     "secret", ["-24.873165, 31.486297", "Thandi", "2023-09-17", HASH, "24°52'23.4\"S 31°29'10.7\"E"]
 )
-def test_what_slips_through_is_found_and_no_copy_is_left(
-    secret: str, made: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_slips_through_is_found_and_no_copy_is_left(secret, made, monkeypatch):
     then(
         monkeypatch,
         lambda _, reports: edit(reports / "flight/report.html", "</main>", f"<p>{escape(secret)}</p></main>"),
@@ -153,7 +151,7 @@ def test_what_slips_through_is_found_and_no_copy_is_left(
     assert_no_copy(made)
 
 
-def test_a_name_of_the_file_that_gives_the_place_away_is_refused(made: Path) -> None:
+def test_a_name_of_the_file_that_gives_the_place_away_is_refused(made):
     # That of its folder, by which reports are called, is a secret beside the one that it states.
     flight, mopani = made / "flights" / "mopani", made / "reports" / "mopani"
     shutil.copytree(made / "flights" / "kifaru-ridge", flight)
@@ -171,18 +169,14 @@ def test_a_name_of_the_file_that_gives_the_place_away_is_refused(made: Path) -> 
         (Mock(return_value=[Outcome("flight", "failed", 1.0, "no rays.")]), RunFailed, "no rays"),
     ],
 )
-def test_nothing_is_left_of_what_was_broken_off_or_failed(
-    stand_in: Mock, error: type[BaseException], said: str | None, made: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_left_of_what_was_broken_off_or_failed(stand_in, error, said, made, monkeypatch):
     monkeypatch.setattr(redrawn, "evaluate_flight", stand_in)
     with pytest.raises(error, match=said):
         share(REPORT)
     assert_no_copy(made)
 
 
-def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(
-    made: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(made, monkeypatch):
     """It fails there as it did here: the copy says that there is none, and not why."""
 
     def fail(folder: Path, reports: Path) -> list[Outcome]:
@@ -199,7 +193,7 @@ def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(
         share(REPORT, overwrite=True)
 
 
-def test_without_its_flight_a_report_is_refused(made: Path) -> None:
+def test_without_its_flight_a_report_is_refused(made):
     (made / "flights").rename(made / "elsewhere")
     with pytest.raises(WildlabError, match="--flight FOLDER"):
         share(REPORT)
@@ -212,14 +206,14 @@ def test_without_its_flight_a_report_is_refused(made: Path) -> None:
         share(REPORT, flight=made, overwrite=True)
 
 
-def test_a_category_that_was_stated_later_counts(made: Path) -> None:
+def test_a_category_that_was_stated_later_counts(made):
     """`flight.toml` may change without another evaluation; tables may not."""
     edit(made / "flights" / "kifaru-ridge" / "flight.toml", "category = 2", "category = 1")
     text = page_of(REPORT)
     assert "informationWithheld" in text and "° S" not in text
 
 
-def test_numbers_that_differ_are_said(made: Path) -> None:
+def test_numbers_that_differ_are_said(made):
     path = REPORT / "metrics.json"
     content = json.loads(path.read_text(encoding="utf-8"))
     content["metrics"][0]["value"] = 3.25 * 1.02
@@ -238,9 +232,7 @@ def test_numbers_that_differ_are_said(made: Path) -> None:
         ("sound", "truth-payload", ""),
     ],
 )
-def test_a_copy_that_says_otherwise_says_so_at_its_top(
-    original: str, against: str, said: str, made: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_copy_that_says_otherwise_says_so_at_its_top(original, against, said, made, monkeypatch):
     def judged(folder: Path, word: str, reference: str) -> None:
         pill = f'<p class="verdict"><span class="pill">{word}</span></p>'
         edit(folder / "report.html", "</h1>", f"</h1>{pill}")
@@ -270,7 +262,7 @@ def test_a_copy_that_says_otherwise_says_so_at_its_top(
         (lambda folder: folder.rename(folder.with_name("detected")), "no such report"),
     ],
 )
-def test_a_report_that_cannot_be_shared_is_refused(change: Any, said: str, made: Path) -> None:
+def test_a_report_that_cannot_be_shared_is_refused(change, said, made):
     change(REPORT)
     with pytest.raises(WildlabError, match=said):
         share(REPORT)
@@ -285,12 +277,12 @@ def test_a_report_that_cannot_be_shared_is_refused(change: Any, said: str, made:
         ("public", {"edition": "xx"}, "no language"),
     ],
 )
-def test_what_cannot_be_made_is_refused(tier: Any, options: dict[str, Any], said: str, made: Path) -> None:
+def test_what_cannot_be_made_is_refused(tier, options, said, made):
     with pytest.raises(WildlabError, match=said):
         share(REPORT, tier, **options)
 
 
-def test_a_study_is_copied_as_it_is(made: Path) -> None:
+def test_a_study_is_copied_as_it_is(made):
     """Simulated: it has no place to be hidden. Links, and what the machine is called, go."""
     folder = made / "reports" / "static-point"
     twin = {"name": "static-antenna-1", "kind": "twin", "files": {}, "sources": []}
@@ -311,7 +303,7 @@ def test_a_study_is_copied_as_it_is(made: Path) -> None:
         assert sorted(zipped.namelist()) == ["flight.html", "static-point.html"]
 
 
-def test_a_twin_that_does_not_come_with_wildlab_is_hidden_like_a_flight(made: Path) -> None:
+def test_a_twin_that_does_not_come_with_wildlab_is_hidden_like_a_flight(made):
     own = canary(locations={"category": 2}, imu=False)
     data = own.manifest.model_dump() | {"kind": "twin", "twin": {"name": "Olifants-patrol", "seed": 873165}}
     save_flight(
@@ -324,7 +316,7 @@ def test_a_twin_that_does_not_come_with_wildlab_is_hidden_like_a_flight(made: Pa
     assert all(secret not in text for secret in SECRETS) and "24.9° S" in text
 
 
-def test_a_twin_is_not_taken_for_a_study_of_its_name(made: Path) -> None:
+def test_a_twin_is_not_taken_for_a_study_of_its_name(made):
     """It is compared with where the packaged one is."""
     place = load_twin("static-antenna").place
     study = {"name": "static-antenna-1", "kind": "twin"}
@@ -341,13 +333,13 @@ def test_a_twin_is_not_taken_for_a_study_of_its_name(made: Path) -> None:
         assert of_a_study(study, reports) == packaged
 
 
-def test_a_copy_with_this_machines_folders_in_it_is_refused_even_for_the_team(made: Path) -> None:
+def test_a_copy_with_this_machines_folders_in_it_is_refused_even_for_the_team(made):
     edit(REPORT / "report.html", "</main>", f"<p>{Path.cwd()}</p></main>")
     with pytest.raises(RunFailed, match="there is no copy"):
         share(REPORT, "team")
 
 
-def test_one_sheet_stands_alone_or_beside_the_reports(made: Path) -> None:
+def test_one_sheet_stands_alone_or_beside_the_reports(made):
     text = page_of(REPORT, "partner", edition="en")
     assert text.count("<h1>") == 1 and "<h1>Report</h1>" not in text
     assert all(secret not in text for secret in SECRETS)
@@ -357,7 +349,7 @@ def test_one_sheet_stands_alone_or_beside_the_reports(made: Path) -> None:
         assert b'<html lang="sv">' in zipped.read("flight-one-sheet.html")
 
 
-def test_names_that_are_neutral_already_are_no_leak(made: Path) -> None:
+def test_names_that_are_neutral_already_are_no_leak(made):
     flight = canary(locations={"category": 1}, imu=False)
     neutral = {"Sarah": "target-2", "Thandi": "target-3", "7": "target-1"}
     for table in (flight.table("truth"), flight.table("detections")):
@@ -368,7 +360,7 @@ def test_names_that_are_neutral_already_are_no_leak(made: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_true_reports_of_a_canary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_true_reports_of_a_canary(tmp_path, monkeypatch):
     """Through the notebooks, twice: the numbers of the sender's own report, no secret, the same bytes."""
     monkeypatch.chdir(tmp_path)
     flight = canary(locations={"category": 3}, imu=False)

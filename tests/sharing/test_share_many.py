@@ -9,7 +9,6 @@ import base64
 import re
 import shutil
 import zipfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -126,7 +125,7 @@ def made(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_report_on_many_targets_is_a_part_and_tells_nothing(made: Path) -> None:
+def test_a_report_on_many_targets_is_a_part_and_tells_nothing(made):
     copy = share(made / "reports" / "kifaru-drift-many")
     text = copy.file.read_text(encoding="utf-8")
     for secret in SECRETS:
@@ -141,7 +140,7 @@ def test_a_report_on_many_targets_is_a_part_and_tells_nothing(made: Path) -> Non
     assert "'Pafuri post'" in lines and "'Thandis mokoro'" in lines
 
 
-def test_it_is_in_the_page_of_a_zip_and_in_the_copy_of_the_team(made: Path) -> None:
+def test_it_is_in_the_page_of_a_zip_and_in_the_copy_of_the_team(made):
     zipped = share(made / "reports", "partner", zipped=True)
     with zipfile.ZipFile(zipped.file) as inside:
         assert inside.namelist() == ["flight.html"]
@@ -176,20 +175,18 @@ def settings_left(monkeypatch: pytest.MonkeyPatch) -> None:
     [(hulls_left, "Shingwedzi"), (hulls_of_the_flight_left, "mokoro"), (settings_left, "Pafuri")],
 )
 def test_a_name_that_is_left_in_is_found_and_there_is_no_copy(
-    broken: Callable[[pytest.MonkeyPatch], None],
-    found: str,
-    made: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    broken,
+    found,
+    made,
+    monkeypatch,
+):
     broken(monkeypatch)
     with pytest.raises(RunFailed, match=rf"(?i)no copy.*{found}"):
         share(made / "reports" / "kifaru-drift-many")
     assert_no_copy(made)
 
 
-def test_one_that_is_refused_on_the_copy_stops_it_with_what_to_do(
-    made: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_that_is_refused_on_the_copy_stops_it_with_what_to_do(made, monkeypatch):
     def refused(*_: Any, **__: Any) -> Outcome:
         raise WildlabError("no sensor detects places", "follow one target", field="detections.kind")
 
@@ -207,7 +204,7 @@ def unpacked(data: bytes) -> bytes:
 
 
 @pytest.mark.slow
-def test_the_true_report_on_many_targets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_true_report_on_many_targets(tmp_path, monkeypatch):
     """Through the notebooks, twice: the sender's own numbers, no secret in any byte, the same bytes."""
     monkeypatch.chdir(tmp_path)
     flight = tmp_path / "flights" / "kifaru-drift"

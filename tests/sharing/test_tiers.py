@@ -25,14 +25,14 @@ GEOD = Geod(ellps="WGS84")
 @pytest.mark.parametrize(
     ("category", "cell"), [(1, None), (2, 0.1), (3, 0.01), (4, 0.001)], ids=["1", "2", "3", "4"]
 )
-def test_the_public_is_told_the_cell_of_the_guide(category: int, cell: float | None) -> None:
+def test_the_public_is_told_the_cell_of_the_guide(category, cell):
     """GBIF's guide, table 7."""
     for agreed in (None, 4):
         found = treatment_of(LocationsPart(category=category, agreed_category=agreed), "public")
         assert (found.cell_deg, found.date, found.exact, found.stated) == (cell, "month", False, True)
 
 
-def test_a_cell_is_as_far_off_as_the_guide_says_where_it_is_largest() -> None:
+def test_a_cell_is_as_far_off_as_the_guide_says_where_it_is_largest():
     """Chapman and Wieczorek, table 3: what one digit less adds at the equator, corner to corner, metres."""
     for size, added in ((0.1, 15_691), (0.01, 1_570), (0.001, 157)):
         assert 2 * half_diagonal(0.0, size) == pytest.approx(added, abs=1)
@@ -47,14 +47,12 @@ def test_a_cell_is_as_far_off_as_the_guide_says_where_it_is_largest() -> None:
         ({"sensitivity": "open"}, 4),
     ],
 )
-def test_without_a_category_the_most_careful_that_fits_is_assumed(
-    locations: dict[str, str], category: int
-) -> None:
+def test_without_a_category_the_most_careful_that_fits_is_assumed(locations, category):
     found = treatment_of(LocationsPart(**locations), "public")  # type: ignore[arg-type]
     assert (found.category, found.stated) == (category, False)
 
 
-def test_a_partner_is_told_what_was_agreed_and_else_what_the_public_is() -> None:
+def test_a_partner_is_told_what_was_agreed_and_else_what_the_public_is():
     found = treatment_of(LocationsPart(category=2, agreed_category=3), "partner")
     assert (found.category, found.cell_deg, found.date) == (3, 0.01, "day")
     for category in (1, 2, 3, 4):
@@ -64,12 +62,12 @@ def test_a_partner_is_told_what_was_agreed_and_else_what_the_public_is() -> None
         assert other.date == ("month" if category < 3 else "day")
 
 
-def test_what_is_agreed_cannot_be_more_careful_than_what_all_are_told() -> None:
+def test_what_is_agreed_cannot_be_more_careful_than_what_all_are_told():
     with pytest.raises(WildlabError, match="category 2 is agreed"):
         treatment_of(LocationsPart(category=3, agreed_category=2), "partner")
 
 
-def test_no_tier_is_told_less_than_a_more_careful_one() -> None:
+def test_no_tier_is_told_less_than_a_more_careful_one():
     order = ["month", "day", "exact"]
     for category in (1, 2, 3, 4):
         found = [treatment_of(LocationsPart(category=category), tier) for tier in TIERS]
@@ -81,9 +79,7 @@ def test_no_tier_is_told_less_than_a_more_careful_one() -> None:
 @given(
     st.floats(-89.9, 89.9), st.floats(-179.9, 179.9), st.sampled_from([0.1, 0.01, 0.001]), st.floats(0, 5e3)
 )
-def test_no_place_is_farther_from_the_named_point_than_is_said(
-    latitude: float, longitude: float, size: float, reach: float
-) -> None:
+def test_no_place_is_farther_from_the_named_point_than_is_said(latitude, longitude, size, reach):
     cell = cell_of(latitude, longitude, size, reach)
     _, _, away = GEOD.inv(longitude, latitude, cell.longitude_deg, cell.latitude_deg)
     assert away + reach <= cell.uncertainty_m * 1.0001
@@ -93,7 +89,7 @@ def test_no_place_is_farther_from_the_named_point_than_is_said(
     assert cell_of(cell.latitude_deg, cell.longitude_deg, size, reach) == cell
 
 
-def test_what_is_rounded_up_again_and_again_is_within_what_is_said() -> None:
+def test_what_is_rounded_up_again_and_again_is_within_what_is_said():
     """0.04455 goes to 0.045, to 0.05 and to 0.1: more than half a cell."""
     cell = cell_of(0.04455, 0.04455, 0.1)
     assert (cell.latitude_deg, cell.longitude_deg) == (0.1, 0.1)
@@ -101,7 +97,7 @@ def test_what_is_rounded_up_again_and_again_is_within_what_is_said() -> None:
 
 
 @given(st.floats(-90, 90), st.floats(-180, 180))
-def test_a_coarse_copy_beside_a_finer_one_tells_nothing_more(latitude: float, longitude: float) -> None:
+def test_a_coarse_copy_beside_a_finer_one_tells_nothing_more(latitude, longitude):
     """The coarse cell follows from the middle of the finer one."""
     for fine, coarse in ((0.001, 0.01), (0.01, 0.1), (0.001, 0.1)):
         inner, outer = cell_of(latitude, longitude, fine), cell_of(latitude, longitude, coarse)
@@ -110,18 +106,18 @@ def test_a_coarse_copy_beside_a_finer_one_tells_nothing_more(latitude: float, lo
 
 
 @given(st.floats(1e-3, 1e6))
-def test_an_uncertainty_is_never_rounded_down(metres: float) -> None:
+def test_an_uncertainty_is_never_rounded_down(metres):
     assert metres <= round_up(metres) * (1 + 1e-12) <= metres * 1.1001
     assert len(f"{round_up(metres):e}".split("e")[0].rstrip("0").replace(".", "")) <= 2
 
 
-def test_at_the_edges_of_the_map_cells_have_places_on_earth() -> None:
+def test_at_the_edges_of_the_map_cells_have_places_on_earth():
     assert cell_of(89.99, 0.0, 0.1).latitude_deg == 90.0
     assert cell_of(0.0, 179.99, 0.1).longitude_deg == -180.0
     assert math.isfinite(cell_of(-90.0, -180.0, 1.0).uncertainty_m)
 
 
-def test_the_terms_of_the_standard_say_what_was_done() -> None:
+def test_the_terms_of_the_standard_say_what_was_done():
     """Darwin Core's. Heights above ground are shown in every copy, those above the sea in none."""
     cell = Cell(-24.9, 31.5, 0.1, 7600.0)
     told, nothing = generalisation_words(cell, 2), generalisation_words(None, 1)
@@ -142,7 +138,7 @@ def test_the_terms_of_the_standard_say_what_was_done() -> None:
         (("open = 4\n", ""), "no row"),
     ],
 )
-def test_a_table_that_is_wrong_is_refused(change: tuple[str, str], said: str, tmp_path: Path) -> None:
+def test_a_table_that_is_wrong_is_refused(change, said, tmp_path):
     text = tiers.FILE.read_text(encoding="utf-8")
     assert change[0] in text
     path = tmp_path / "tiers.toml"
@@ -167,7 +163,7 @@ def public(folder: Path) -> tuple[int, int | None]:
     return found.category, found.unconfirmed
 
 
-def test_a_less_careful_category_counts_once_it_is_confirmed(careful: Path, tmp_path: Path) -> None:
+def test_a_less_careful_category_counts_once_it_is_confirmed(careful, tmp_path):
     path = tmp_path / FILE_NAME
     path.write_text((careful / FILE_NAME).read_text())
     assert public(tmp_path) == (1, None)
@@ -180,7 +176,7 @@ def test_a_less_careful_category_counts_once_it_is_confirmed(careful: Path, tmp_
     assert public(tmp_path) == (2, None)
 
 
-def test_no_turned_bit_names_a_place_that_was_withheld(careful: Path, tmp_path: Path) -> None:
+def test_no_turned_bit_names_a_place_that_was_withheld(careful, tmp_path):
     whole = (careful / FILE_NAME).read_bytes()
     begin = whole.index(b"[locations]")
     checksum = whole.index(b"locations =", begin)

@@ -1,7 +1,5 @@
 """What several tests of the simulation fly: trajectories with wind, control errors and gusts."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wildlab.simulation.attitudes import fixed_wing_trajectory

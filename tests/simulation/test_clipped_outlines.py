@@ -1,7 +1,5 @@
 """Cut polygons and their moments: identities, closed forms, and OpenCV's moments of filled pixels."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -36,7 +36,7 @@ def altitudes(twin: TwinParameters) -> tuple[float, float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", twin_names())
 @pytest.mark.parametrize("move", ["a fifth more wind", "a fifth slower"])
-def test_no_twin_breaks_in_another_wind_or_at_another_speed(name: str, move: str) -> None:
+def test_no_twin_breaks_in_another_wind_or_at_another_speed(name, move):
     written = load_twin(name)
     twin = scaled(written, MOVES[move])
     flight = quick(twin, 1)
@@ -74,7 +74,7 @@ def test_no_twin_breaks_in_another_wind_or_at_another_speed(name: str, move: str
 
 @pytest.mark.parametrize("name", ["fast-vessel", "slow-vessel", "drifting-vessel-eight"])
 @pytest.mark.parametrize("move", MOVES)
-def test_recording_begins_at_the_same_place_of_the_lap(name: str, move: str) -> None:
+def test_recording_begins_at_the_same_place_of_the_lap(name, move):
     """Against the target, which the course goes along with."""
     written = load_twin(name)
     begins = np.array([written.camera.recording_start.si])
@@ -88,7 +88,7 @@ def test_recording_begins_at_the_same_place_of_the_lap(name: str, move: str) -> 
     assert np.degrees(abs(np.angle(np.exp(1j * (course[0] - course[1]))))) < 25
 
 
-def test_what_is_not_moved_is_as_it_is_written() -> None:
+def test_what_is_not_moved_is_as_it_is_written():
     written = load_twin("fast-vessel")
     assert written.moved_from is None and scaled(written, {}) is written
     with varied({"flight.wind_speed": 0.5}):
@@ -100,7 +100,7 @@ def test_what_is_not_moved_is_as_it_is_written() -> None:
         assert ours.table(table).equals(theirs.table(table)), "moved to and fro, it is where it was"
 
 
-def test_of_a_moved_twin_at_most_the_printed_number_counts() -> None:
+def test_of_a_moved_twin_at_most_the_printed_number_counts():
     slower = quick(scaled(load_twin("fast-vessel"), {"flight.airspeed": 0.8}), 1)
     faster = quick(scaled(load_twin("fast-vessel"), {"flight.airspeed": 1.2}), 1)
     assert len(slower.table("detections")) == 264 > len(faster.table("detections")) > 150
@@ -111,13 +111,13 @@ def test_of_a_moved_twin_at_most_the_printed_number_counts() -> None:
     assert len(ship.table("frames")) < 441 and len(ship.table("detections")) <= len(ship.table("frames"))
 
 
-def test_one_that_never_sees_its_target_is_refused() -> None:
+def test_one_that_never_sees_its_target_is_refused():
     lost = scaled(load_twin("fast-vessel"), {"target.motion.speed": 3.0})
     with pytest.raises(WildlabError, match="in 0 images"):
         quick(lost, 1)
 
 
-def test_a_wind_that_cannot_be_flown_in_is_refused() -> None:
+def test_a_wind_that_cannot_be_flown_in_is_refused():
     written = load_twin("fast-vessel")
     with pytest.raises(WildlabError, match="wind_speed"):
         scaled(written, {"flight.wind_speed": 5.0})
@@ -131,7 +131,7 @@ def with_subset(first: int) -> TwinParameters:
     return with_values(scaled(load_twin("slow-vessel"), {"camera.images": 0.2}), subset__first=first)
 
 
-def test_a_subset_ends_with_the_last_detection_there_is() -> None:
+def test_a_subset_ends_with_the_last_detection_there_is():
     flight = quick(with_subset(500), 1)
     count = len(flight.table("detections"))
     assert 500 < count < 1750

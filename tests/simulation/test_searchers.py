@@ -1,7 +1,5 @@
 """What searches for animals: rows over enclosures, a gondola on its cable, a gimbal that swings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Errors of clocks, receivers and of a camera that sways have the statistics they are documented with."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

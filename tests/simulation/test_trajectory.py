@@ -1,7 +1,5 @@
 """A motion must not contradict itself: derivatives, circles in wind, courses between waypoints."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

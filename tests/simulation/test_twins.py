@@ -1,7 +1,5 @@
 """The twin of H 5.6.1 as a flight. No test here asks for the thesis's results: those are for the report."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The twins with vessels: counts and grouping as printed, marks on them, truth as its receiver logs it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

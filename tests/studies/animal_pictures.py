@@ -1,7 +1,5 @@
 """Small rendered pictures of animals on even ground."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -27,19 +27,19 @@ def tracks(scenario: Callable[[int], Flight], tunings: dict[str, SensorTuning]) 
     )
 
 
-def test_radar_stamps_are_late_by_one_to_three_seconds(tunings: dict[str, SensorTuning]) -> None:
+def test_radar_stamps_are_late_by_one_to_three_seconds(tunings):
     # So says who prepared the data set; the sensor stamps what it has finished, not what it has begun.
     assert -3.0 <= tunings["radar"].offset_s <= -1.0
     assert tunings["radar"].offset_low_s <= tunings["radar"].offset_s <= tunings["radar"].offset_high_s
 
 
-def test_errors_are_coloured(tunings: dict[str, SensorTuning]) -> None:
+def test_errors_are_coloured(tunings):
     for tuning in tunings.values():
         assert tuning.next_correlation > 0.5
         assert tuning.correlation_time_s > 2 * tuning.interval_s
 
 
-def test_every_sensor_boat_scenario_and_filter_has_a_row(tracks: pd.DataFrame) -> None:
+def test_every_sensor_boat_scenario_and_filter_has_a_row(tracks):
     sensors = {"lidar": "position", "radar": "position", "ir": "bearing", "eo": "bearing"}
     for sensor, kind in sensors.items():
         rows = tracks[tracks["sensor"] == sensor]
@@ -47,12 +47,12 @@ def test_every_sensor_boat_scenario_and_filter_has_a_row(tracks: pd.DataFrame) -
         assert set(rows["kind"]) == {kind}
 
 
-def test_the_cameras_alone_are_of_no_use_and_the_others_are(tracks: pd.DataFrame) -> None:
+def test_the_cameras_alone_are_of_no_use_and_the_others_are(tracks):
     use = of_use(tracks[tracks["case"] != 2]).set_index("sensor")["of_use"]
     assert use.to_dict() == {"lidar": True, "radar": True, "ir": False, "eo": False}
 
 
-def test_one_filter_is_judged_where_nothing_was_tuned(tracks: pd.DataFrame) -> None:
+def test_one_filter_is_judged_where_nothing_was_tuned(tracks):
     keys = ["sensor", "target", "case"]
     fixed = choose_filter(tracks[tracks["case"] == 2], keys)
     held = tracks[(tracks["case"] != 2) & (tracks["kind"] == "position")]

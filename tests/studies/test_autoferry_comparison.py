@@ -70,7 +70,7 @@ def cases(name: str = "schmidt") -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def test_every_track_has_exactly_one_outcome() -> None:
+def test_every_track_has_exactly_one_outcome():
     found = outcomes(cases(), KEYS, "schmidt").set_index("target")
     assert found["outcome"].to_dict() == {name: name for name in CASES}
     assert set(CASES) == set(OUTCOMES)
@@ -79,14 +79,14 @@ def test_every_track_has_exactly_one_outcome() -> None:
     assert found.index[~found["stays"]].tolist() == ["lost"] and found["stays_white"].all()
 
 
-def test_nearer_its_ideal_is_no_gain_outside_the_band() -> None:
+def test_nearer_its_ideal_is_no_gain_outside_the_band():
     """From 90 to 3.1 is much nearer 2, and still not honest."""
     table = pd.DataFrame([row("a", "kf", 90.0), row("a", "schmidt", 3.1)])
     assert beside_white(table, KEYS)["nearer"].all()
     assert outcomes(table, KEYS, "schmidt")["outcome"].tolist() == ["neither inside"]
 
 
-def test_a_track_that_never_began_is_lost_and_counted() -> None:
+def test_a_track_that_never_began_is_lost_and_counted():
     table = pd.DataFrame(
         [
             row("a", "kf", NAN, rmse=NAN, share=0.0),
@@ -101,13 +101,13 @@ def test_a_track_that_never_began_is_lost_and_counted() -> None:
     assert beside_white(table, KEYS).empty
 
 
-def test_a_track_that_only_white_noise_keeps_is_lost_with_the_other() -> None:
+def test_a_track_that_only_white_noise_keeps_is_lost_with_the_other():
     table = pd.DataFrame([row("a", "kf", 2.0), row("a", "schmidt", 2.0, share=0.3)])
     found = outcomes(table, KEYS, "schmidt").iloc[0]
     assert (found["outcome"], found["stays_white"], found["inside_white"]) == ("lost", True, True)
 
 
-def test_a_filter_that_is_not_for_bearings_is_judged_on_positions() -> None:
+def test_a_filter_that_is_not_for_bearings_is_judged_on_positions():
     camera = [
         row("a", "ekf", 9.0, sensor="eo", kind="bearing"),
         row("a", "schmidt", 2.0, sensor="eo", kind="bearing"),
@@ -117,7 +117,7 @@ def test_a_filter_that_is_not_for_bearings_is_judged_on_positions() -> None:
     assert outcomes(table, KEYS, "schmidt")["sensor"].tolist() == ["eo"]
 
 
-def test_hindsight_takes_whatever_gains() -> None:
+def test_hindsight_takes_whatever_gains():
     table = pd.concat(
         [
             cases("schmidt"),
@@ -132,7 +132,7 @@ def test_hindsight_takes_whatever_gains() -> None:
     assert found["gained"].sum() >= (outcomes(table, KEYS, "schmidt")["outcome"] == "gained").sum()
 
 
-def test_the_fixed_filter_is_the_nearest_its_ideal_that_is_cheap_enough() -> None:
+def test_the_fixed_filter_is_the_nearest_its_ideal_that_is_cheap_enough():
     def table(**anees_rmse: tuple[float, float]) -> pd.DataFrame:
         rows = [row("a", "kf", 9.0)]
         return pd.DataFrame(
@@ -166,7 +166,7 @@ def test_the_fixed_filter_is_the_nearest_its_ideal_that_is_cheap_enough() -> Non
     assert choose_filter(pd.concat([lost, kept]), KEYS) == "schmidt"
 
 
-def test_a_sensor_is_of_use_where_a_filter_keeps_most_of_its_tracks() -> None:
+def test_a_sensor_is_of_use_where_a_filter_keeps_most_of_its_tracks():
     def camera(kept: int, of: int) -> pd.DataFrame:
         shares = [1.0 if k < kept else 0.0 for k in range(of)]
         white = [
@@ -184,16 +184,16 @@ def test_a_sensor_is_of_use_where_a_filter_keeps_most_of_its_tracks() -> None:
         assert (found["filter"], found["rmse"]) == (("schmidt", 50.0) if kept else ("ekf", 80.0))
 
 
-def test_a_factor_too_small_is_as_wrong_as_one_too_large() -> None:
+def test_a_factor_too_small_is_as_wrong_as_one_too_large():
     np.testing.assert_allclose(off_ideal([2.0, 4.0, 1.0, 20.0]), [0, np.log(2), np.log(2), np.log(10)])
 
 
-def test_the_share_of_none_has_no_interval() -> None:
+def test_the_share_of_none_has_no_interval():
     assert share_interval(4, 20) == pytest.approx((0.081, 0.416), abs=5e-4)
     assert np.isnan(share_interval(0, 0)).all()
 
 
-def test_claims_are_decided_case_by_case_and_means_by_the_band_of_a_mean() -> None:
+def test_claims_are_decided_case_by_case_and_means_by_the_band_of_a_mean():
     table = pd.DataFrame(
         [
             row("a", "kf", 8.0, rmse=4.0, anis=2.4, lag1=0.6),
@@ -218,7 +218,7 @@ def test_claims_are_decided_case_by_case_and_means_by_the_band_of_a_mean() -> No
     assert checks["schmidt-as-accurate"].tolist() == [False, True]
 
 
-def test_only_cases_that_white_noise_keeps_decide() -> None:
+def test_only_cases_that_white_noise_keeps_decide():
     table = pd.DataFrame(
         [
             row("a", "kf", 2.0), row("a", "schmidt", 2.0, share=0.1),

@@ -17,7 +17,7 @@ OFFSETS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
 ERRORS = {name: Lasting(offset, 0.9, 20.0) for name, offset in OFFSETS.items()}
 
 
-def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
+def test_draws_are_those_of_their_seed_and_within_their_ranges():
     one, other = (draw(np.random.default_rng(3), ERRORS) for _ in range(2))
     assert one == other != draw(np.random.default_rng(4), ERRORS)
     for seed in range(50):
@@ -49,14 +49,14 @@ def rows() -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-def test_what_it_was_tuned_on_is_in_no_median() -> None:
+def test_what_it_was_tuned_on_is_in_no_median():
     middle = words.medians(rows(), "s1").set_index("mode")
     assert middle["best"].to_dict() == {"radar": 8.0, "lidar": 5.0, "both": 8.0}
     assert middle["most"].to_dict() == {"radar": 16.0, "lidar": 10.0, "both": 16.0}
     assert (middle["of"] == 2).all()
 
 
-def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first() -> None:
+def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first():
     settings = draw(np.random.default_rng(1), ERRORS)
     drawn = [
         Tuned(1, settings, 3.0, 9.0), Tuned(2, settings, 5.0, 1.9), Tuned(3, settings, 4.0, 0.6),
@@ -65,21 +65,21 @@ def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first() -> None:
     assert [one.number for one in sorted(drawn, key=order)] == [3, 5, 2, 4, 1]
 
 
-def test_what_is_assumed_of_the_truth_chooses_no_draw() -> None:
+def test_what_is_assumed_of_the_truth_chooses_no_draw():
     one = Scan(0.0, np.array([[3.0, 0.0]]), np.eye(2)[None], ["t"], np.zeros((1, 2)), ["a"], [True], [False])
     for sd in (0.0, 2.0):
         lives = compare_identities([one._replace(truth_sd=sd)], 5.0)
         assert anees_of(lives) == 9 / 2 and anees_of(lives, alone=False) == 9 / (1 + sd**2) / 2
 
 
-def test_the_table_of_draws_has_each_scenario_once() -> None:
+def test_the_table_of_draws_has_each_scenario_once():
     table = words.spread_table(rows(), "s1")
     assert list(table) == ["by", "draw", "s1 (tuned here)", "s2", "s3"] and len(table) == 6
     assert table["s2"].tolist() == [9.0, 18.0, 4.0, 8.0, 8.0, 16.0]
 
 
 @pytest.mark.slow
-def test_scenarios_are_followed_by_what_one_teaches(scenario, tunings, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_scenarios_are_followed_by_what_one_teaches(scenario, tunings, monkeypatch):  # type: ignore[no-untyped-def]
     monkeypatch.setattr(tuning, "tune_sensor", lambda flight, sensor: tunings[sensor])
     errors = tuning.errors_of(scenario(2))
     assert -2.5 < errors["radar"].offset_s < -1.5 and -1.5 < errors["lidar"].offset_s < -0.5

@@ -41,7 +41,7 @@ def one_boat(count: int = 30) -> list[Scan]:
     return scans
 
 
-def test_one_target_without_clutter_is_kalmans() -> None:
+def test_one_target_without_clutter_is_kalmans():
     pytest.importorskip("stonesoup")
     scans, given = one_boat(), choice()
     shown = run_stone_soup(scans, ["lidar", "radar"], given)
@@ -72,7 +72,7 @@ def dense() -> Choice:
     return choice(eyes=eyes, gate=3.0, held_s=3.0, patience_s=4.0, lost_m=20.0)
 
 
-def test_the_same_draw_gives_the_same_bytes_and_looks_out_no_farther_than_told() -> None:
+def test_the_same_draw_gives_the_same_bytes_and_looks_out_no_farther_than_told():
     pytest.importorskip("stonesoup")
     one, other = (run_stone_soup(harbour(), ["lidar", "radar"], dense()) for _ in range(2))
     for a, b in zip(one, other, strict=True):
@@ -85,14 +85,14 @@ def test_the_same_draw_gives_the_same_bytes_and_looks_out_no_farther_than_told()
     assert max(near[8:26]) < 6 and min(near[36:]) > 6
 
 
-def test_flights_of_empty_looks_have_no_tracks() -> None:
+def test_flights_of_empty_looks_have_no_tracks():
     pytest.importorskip("stonesoup")
     empty = [Scan(float(row), 0, np.zeros(2), np.zeros((0, 2)), R[:0]) for row in range(4)]
     assert [len(one.x) for one in run_stone_soup(empty, ["lidar"], dense())] == [0, 0, 0, 0]
     assert run_stone_soup([], ["lidar"], dense()) == []
 
 
-def test_what_stays_is_shown_only_where_a_draw_asks_for_no_move() -> None:
+def test_what_stays_is_shown_only_where_a_draw_asks_for_no_move():
     pytest.importorskip("stonesoup")
     buoy = [Scan(float(row), 0, np.zeros(2), np.array([[20.0, 20.0]]), R) for row in range(20)]
     still, moved = (run_stone_soup(buoy, ["lidar"], choice(moves_m=m)) for m in (0.0, 5.0))
@@ -109,7 +109,7 @@ def followed(scans: list[Scan], shown: list[Shown]) -> Followed:
     return Followed(scans, [frozenset()] * len(scans), shown, {}, sensors, None, truth, [], [])
 
 
-def test_it_is_judged_at_our_looks_by_our_truths(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_is_judged_at_our_looks_by_our_truths(monkeypatch):
     scans = harbour()
     none = [
         Shown(one.time, one.sensor, np.zeros(0, int), np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros(0),
@@ -155,14 +155,14 @@ def table(values: dict[str, tuple[float, ...]], spread: float = 1.0) -> pd.DataF
     )
 
 
-def test_its_gospa_stands_after_ours_and_with_its_own_scenario() -> None:
+def test_its_gospa_stands_after_ours_and_with_its_own_scenario():
     ours, other = table({"radar": (1, 2, 3, 4)}), table({"radar": (5, 6, 7, 8)}).iloc[::-1]
     joined, headings = beside.with_theirs(ours[ours["rank"] == 1], other)
     assert joined["theirs"].tolist() == [5, 6, 7, 8]
     assert list(headings)[2:4] == ["gospa", "theirs"] and set(headings) == {*HEADINGS, "theirs"}
 
 
-def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
+def test_draws_are_those_of_their_seed_and_within_their_ranges():
     one, same, other = (draw_choice(np.random.default_rng(n), beside.FAR_M) for n in (1, 1, 2))
     assert one == same != other
     for seed in range(50):
@@ -171,7 +171,7 @@ def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
         assert 2 <= drawn.hits <= 6 and (drawn.moves_m == 0 or 4 <= drawn.moves_m <= 12)
 
 
-def test_without_the_library_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_library_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr(stone_soup.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(WildlabError, match=r"\[oracles\]"):
         run_stone_soup([], [], dense())
@@ -189,7 +189,7 @@ def test_without_the_library_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, monkeypatch):  # type: ignore[no-untyped-def]
     pytest.importorskip("stonesoup")
     flights = {f"scenario-{n}": scenario(n) for n in (2, 17)}
     monkeypatch.setattr(beside, "FOR_EACH", 1)
@@ -211,7 +211,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, mo
     assert tuning.gospa_of(lives) == row["gospa"]
 
 
-def test_what_is_compared_are_medians_of_the_scenarios_that_nothing_is_tuned_on() -> None:
+def test_what_is_compared_are_medians_of_the_scenarios_that_nothing_is_tuned_on():
     ours, theirs = table({"radar": (1, 7, 8, 9)}), table({"radar": (9, 9, 9, 8)})
     (found,) = beside.compared(ours, theirs, "scenario-2").to_dict("records")
     assert (found["ours"], found["theirs"], found["smaller"], found["of"]) == (8.0, 9.0, 2, 3)

@@ -63,7 +63,7 @@ def recorded(report: Report) -> dict[tuple[str, str], float]:
     return {(m["name"], m["subject"]): m["value"] for m in report._metrics}
 
 
-def test_every_track_has_the_numbers_of_its_kind(report: Report, tracks: pd.DataFrame) -> None:
+def test_every_track_has_the_numbers_of_its_kind(report, tracks):
     tables.record_tracks(report, tracks)
     found = recorded(report)
     lidar = {name for name, subject in found if subject == "lidar/a/scenario-3/kf"}
@@ -77,7 +77,7 @@ def test_every_track_has_the_numbers_of_its_kind(report: Report, tracks: pd.Data
     report.save()
 
 
-def test_what_was_fitted_is_recorded_with_its_interval(report: Report) -> None:
+def test_what_was_fitted_is_recorded_with_its_interval(report):
     rows = tables.record_tunings(report, {"lidar": LIDAR, "eo": CAMERA})
     assert rows["offset"].tolist() == ["−0.90 (−1.1 to −0.8)", "−1.00 (−2.0 to 0.5)"]
     assert rows["sd"].tolist() == ["3.0 m", "2.0°"]
@@ -119,7 +119,7 @@ FEW = judged(
 )
 
 
-def test_nothing_of_use_is_a_page_all_the_same(report: Report) -> None:
+def test_nothing_of_use_is_a_page_all_the_same(report):
     rows = made("ir", ["lost"] * 2)
     use = of_use(rows)
     useful = rows[rows["sensor"].isin(use.loc[use["of_use"], "sensor"])]
@@ -132,7 +132,7 @@ def test_nothing_of_use_is_a_page_all_the_same(report: Report) -> None:
     charts.mean_nees_shown(rows, found, "schmidt")
 
 
-def test_tables_count_every_track() -> None:
+def test_tables_count_every_track():
     rows = tables.outcomes_table(FEW).set_index("sensor")
     assert rows["tracks"].to_dict() == {"lidar": 3, "radar": 1, "all": 4}
     assert rows.loc["all"].tolist() == [4, 1, 0, 0, 0, 2, 1]
@@ -145,7 +145,7 @@ def test_tables_count_every_track() -> None:
     assert every["near"].tolist()[-1] == "25 % of 40" and every["bound"].tolist()[0] == "1.0 to 3.0"
 
 
-def test_outcomes_are_recorded_with_their_denominator(report: Report) -> None:
+def test_outcomes_are_recorded_with_their_denominator(report):
     use = of_use(made("ir", ["lost"] * 5))
     tables.record_outcomes(report, FEW, use, "schmidt")
     found = {(m["name"], m["subject"]): (m["value"], m["n"]) for m in report._metrics}
@@ -156,7 +156,7 @@ def test_outcomes_are_recorded_with_their_denominator(report: Report) -> None:
     report.save()
 
 
-def test_overview_is_of_the_tracks_that_stay(tracks: pd.DataFrame) -> None:
+def test_overview_is_of_the_tracks_that_stay(tracks):
     rows = tables.overview(tracks).set_index(["sensor", "filter"])
     assert rows.loc[("lidar", "white noise"), "kept"] == "1 of 2"
     assert rows.loc[("lidar", "white noise"), "rmse"] == pytest.approx(4.0)
@@ -166,14 +166,14 @@ def test_overview_is_of_the_tracks_that_stay(tracks: pd.DataFrame) -> None:
     assert rows.loc[("colour camera", "Schmidt"), ["kept", "inside"]].tolist() == ["0 of 1", "—"]
 
 
-def test_tracks_have_their_counts_beside_every_share(tracks: pd.DataFrame) -> None:
+def test_tracks_have_their_counts_beside_every_share(tracks):
     rows = tables.tracks_table(tracks, "lidar").set_index(["target", "filter"])
     assert rows.loc[("a", "kf"), ["near", "kept"]].tolist() == ["100 % of 60", "yes"]
     assert rows.loc[("b", "kf"), ["near", "kept"]].tolist() == ["0 % of 60", "no"]
     assert rows.loc[("a", "kf"), "inside"] == "0 % of 60"
 
 
-def test_claims_sensor_by_sensor_on_the_tracks_that_stay(tracks: pd.DataFrame) -> None:
+def test_claims_sensor_by_sensor_on_the_tracks_that_stay(tracks):
     claims = load_claims("autoferry")
     texts = {claim["id"]: claim["text"] for claim in claims}
     rows = tables.claims_by_sensor(tracks, texts).set_index("claim")
@@ -185,9 +185,7 @@ def test_claims_sensor_by_sensor_on_the_tracks_that_stay(tracks: pd.DataFrame) -
     assert decided["count"].tolist()[0] == "2 of 3"
 
 
-def test_nees_over_time_shows_each_filter_and_the_band(
-    followed: list[SensorTrack], tracks: pd.DataFrame
-) -> None:
+def test_nees_over_time_shows_each_filter_and_the_band(followed, tracks):
     mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
     rows = tracks[(tracks["sensor"] == "lidar") & (tracks["target"] == "a")]
     figure, *_ = charts.nees_shown("lidar", mine, rows)
@@ -199,9 +197,7 @@ def test_nees_over_time_shows_each_filter_and_the_band(
     np.testing.assert_array_equal(labelled[0].get_ydata(), mine[0].nees)
 
 
-def test_innovations_beside_the_band_of_white_noise(
-    followed: list[SensorTrack], tracks: pd.DataFrame
-) -> None:
+def test_innovations_beside_the_band_of_white_noise(followed, tracks):
     mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
     rows = tracks[(tracks["sensor"] == "lidar") & (tracks["target"] == "a")]
     figure, *_ = charts.innovations_shown("lidar", mine, rows)
@@ -218,5 +214,5 @@ def test_innovations_beside_the_band_of_white_noise(
         (["gained"] * 6 + ["spoilt"] * 3, "neither"),
     ],
 )
-def test_what_is_gained_and_spoilt_decides_the_headline(outcome: list[str], said: str) -> None:
+def test_what_is_gained_and_spoilt_decides_the_headline(outcome, said):
     assert said in words.headline(judged(made("lidar", outcome)), "schmidt", "x")

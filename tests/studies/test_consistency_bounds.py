@@ -1,14 +1,12 @@
 """Verdicts of the report on consistency bounds, on opposed numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED
 from wildlab.studies.consistency_bounds import text
 
 
-def test_a_share_is_decided_by_its_interval() -> None:
+def test_a_share_is_decided_by_its_interval():
     runs = np.arange(2000)
     assert text.decide(runs < 1900)[0] == HOLDS
     assert text.decide(runs < 1860)[0] == FAILS and text.decide(runs < 2000)[0] == FAILS

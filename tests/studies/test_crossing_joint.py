@@ -1,7 +1,5 @@
 """Joint association of two that cross: swaps, and shared errors of the pose."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest

@@ -97,7 +97,7 @@ SHOTS = [
 ]  # fmt: skip
 
 
-def test_each_detection_has_the_vessel_that_it_was_judged_to_be() -> None:
+def test_each_detection_has_the_vessel_that_it_was_judged_to_be():
     spotted = spot(SHOTS, SHAPE)
     assert spotted.boat.tolist() == [1, 0, NONE, 0, 0, 1]
     assert spotted.exposure.tolist() == [3, 3, 3, 5, 5, 8]
@@ -108,7 +108,7 @@ def test_each_detection_has_the_vessel_that_it_was_judged_to_be() -> None:
     np.testing.assert_array_equal(spotted.frames, [3, 5, 6, 8, 9])
 
 
-def test_counts_are_those_by_hand() -> None:
+def test_counts_are_those_by_hand():
     counted = count(spot(SHOTS, SHAPE))
     assert (counted.frames, counted.false, counted.with_false) == (5, 1, 1)
     assert (counted.whole, counted.found, counted.joined, counted.missed) == (5, 3, 1, 1)
@@ -117,13 +117,13 @@ def test_counts_are_those_by_hand() -> None:
     assert counted.plus(counted).whole == 10 and counted.plus(counted).missed == 2
 
 
-def test_no_image_is_no_detection() -> None:
+def test_no_image_is_no_detection():
     spotted = spot([], SHAPE)
     assert len(spotted.boat) == len(spotted.uv) == len(spotted.frames) == 0
     assert set(count(spotted)) == {0}
 
 
-def test_some_detections_leave_what_was_to_see_as_it_was() -> None:
+def test_some_detections_leave_what_was_to_see_as_it_was():
     spotted = spot(SHOTS, SHAPE)
     some = spotted.of(~spotted.cut)
     assert some.boat.tolist() == spotted.boat.tolist()[:5] and len(some.uv) == len(some.area) == 5
@@ -143,7 +143,7 @@ def drawn_as_spotted(flight) -> Spotted:
     )  # fmt: skip
 
 
-def test_a_detector_that_finds_the_drawn_detections_gives_their_result(flight) -> None:
+def test_a_detector_that_finds_the_drawn_detections_gives_their_result(flight):
     placed, crossing = on_the_sea(flight, drawn_as_spotted(flight)), drawn_at_sea(flight)
     np.testing.assert_array_equal(placed.crossing.looks.image, crossing.looks.image)
     np.testing.assert_array_equal(placed.crossing.boat, crossing.boat)
@@ -155,7 +155,7 @@ def test_a_detector_that_finds_the_drawn_detections_gives_their_result(flight) -
     assert associate(placed, one).wrong == wrong_of(crossing, other).sum()
 
 
-def test_on_the_level_of_the_sea_places_are_those_of_the_study_but_for_the_receivers_heights(flight) -> None:
+def test_on_the_level_of_the_sea_places_are_those_of_the_study_but_for_the_receivers_heights(flight):
     """At the same heights they are the same to the last bit; heights are off by metres, and so are places."""
     here, there = drawn_at_sea(flight), gather(flight)
     np.testing.assert_array_equal(here.boat, there.boat)
@@ -166,7 +166,7 @@ def test_on_the_level_of_the_sea_places_are_those_of_the_study_but_for_the_recei
     np.testing.assert_array_equal(flat.looks.positions, here.looks.positions)
 
 
-def test_whose_a_detection_is_has_no_part_in_where_it_is_put(flight) -> None:
+def test_whose_a_detection_is_has_no_part_in_where_it_is_put(flight):
     spotted = drawn_as_spotted(flight)
     nobody = on_the_sea(flight, spotted._replace(boat=np.full(len(spotted.boat), NONE))).crossing
     crossing = drawn_at_sea(flight)
@@ -176,7 +176,7 @@ def test_whose_a_detection_is_has_no_part_in_where_it_is_put(flight) -> None:
 
 
 @pytest.mark.slow
-def test_frames_are_those_with_a_vessel_near_and_one_in_ten_others(rendering, flight) -> None:
+def test_frames_are_those_with_a_vessel_near_and_one_in_ten_others(rendering, flight):
     scenes = Photographer(TWIN, SEED).flight
     until, since = apart_times(drawn_at_sea(flight))
     assert rendering.span == (until - WINDOW_S, since + WINDOW_S)
@@ -191,7 +191,7 @@ def test_frames_are_those_with_a_vessel_near_and_one_in_ten_others(rendering, fl
 
 
 @pytest.mark.slow
-def test_a_detection_is_of_the_vessel_that_is_nearest_in_the_image(rendering) -> None:
+def test_a_detection_is_of_the_vessel_that_is_nearest_in_the_image(rendering):
     scenes, spotted = Photographer(TWIN, SEED).flight, rendering.spotted
     rows = np.flatnonzero((spotted.boat != NONE) & ~spotted.both)
     assert len(rows) > 30
@@ -205,7 +205,7 @@ def test_a_detection_is_of_the_vessel_that_is_nearest_in_the_image(rendering) ->
 
 
 @pytest.mark.slow
-def test_places_are_as_far_off_as_the_told_pose_makes_drawn_ones(rendering) -> None:
+def test_places_are_as_far_off_as_the_told_pose_makes_drawn_ones(rendering):
     """In one frame both have the same error of pose; nothing else is metres off."""
     places = {}
     for name, one in (("frames", rendering.frames.crossing), ("drawn", rendering.drawn.crossing)):
@@ -220,7 +220,7 @@ def test_places_are_as_far_off_as_the_told_pose_makes_drawn_ones(rendering) -> N
 
 
 @pytest.mark.slow
-def test_looks_are_the_detections_own(rendering, flight) -> None:
+def test_looks_are_the_detections_own(rendering, flight):
     spotted = rendering.spotted
     placed = on_the_sea(flight, spotted)
     row_of = {int(frame): k for k, frame in enumerate(spotted.frames)}
@@ -234,7 +234,7 @@ def test_looks_are_the_detections_own(rendering, flight) -> None:
 
 
 @pytest.mark.slow
-def test_all_ways_are_followed_by_every_rule(rendering) -> None:
+def test_all_ways_are_followed_by_every_rule(rendering):
     assert rendering.near == count(rendering.spotted)
     for one in (rendering.frames, rendering.inside, rendering.drawn):
         assert set(one.by_rule) == {*study.SUBJECTS, JOINT}
@@ -244,7 +244,7 @@ def test_all_ways_are_followed_by_every_rule(rendering) -> None:
     assert rendering.drawn.by_rule[DISTANCE].own == len(rendering.drawn.crossing.boat)
 
 
-def test_a_part_in_time_has_its_ends() -> None:
+def test_a_part_in_time_has_its_ends():
     crossing = passing(images=10)
     part = part_of(crossing, (1.0, 2.0))
     np.testing.assert_array_equal(part.times, [1.0, 1.5, 2.0])
@@ -276,7 +276,7 @@ def bank_of(crossing: Crossing, track: np.ndarray, started: list[int]) -> Bank:
     return Bank(track, np.array(started, int), images, x, P, np.arange(n), never, sure)
 
 
-def test_two_far_apart_are_two_tracks_and_nothing_is_wrong() -> None:
+def test_two_far_apart_are_two_tracks_and_nothing_is_wrong():
     done = follow(placed_of(passing()))
     one = done.by_rule[FEATURES]
     assert (one.own, one.wrong, one.mixed, one.tracks, one.by_false, one.by_cut) == (80, 0, 0, 2, 0, 0)
@@ -286,7 +286,7 @@ def test_two_far_apart_are_two_tracks_and_nothing_is_wrong() -> None:
     assert joint.wrong is joint.tracks is None and not joint.swapped
 
 
-def test_what_a_rule_did_is_counted_by_hand() -> None:
+def test_what_a_rule_did_is_counted_by_hand():
     crossing = passing(images=5)
     boat = crossing.boat.copy()
     boat[[4, 9]] = NONE
@@ -309,14 +309,14 @@ def test_what_a_rule_did_is_counted_by_hand() -> None:
     assert (right.own, right.wrong, right.by_cut) == (7, 1, 0), "of both is right on either's"
 
 
-def test_without_any_track_nothing_is_wrong() -> None:
+def test_without_any_track_nothing_is_wrong():
     crossing = passing(images=3)
     bank = bank_of(crossing, np.full(6, -1), [])
     assert not wrong_of(crossing, bank).any()
     assert associate(placed_of(crossing), bank).unassigned == 6
 
 
-def test_a_detection_of_nothing_shows_no_vessel() -> None:
+def test_a_detection_of_nothing_shows_no_vessel():
     crossing = passing(images=20)
     seen = crossing._replace(boat=np.tile([NONE, NONE], 20))
     bank = bank_of(seen, np.full(40, -1), [])
@@ -324,31 +324,31 @@ def test_a_detection_of_nothing_shows_no_vessel() -> None:
     assert any(life.visible > 0 for life in identities_of(crossing, bank).targets.values())
 
 
-def test_nothing_detected_is_refused(flight) -> None:
+def test_nothing_detected_is_refused(flight):
     with pytest.raises(WildlabError, match="nothing is detected") as found:
         on_the_sea(flight, spot(SHOTS, SHAPE).of(np.zeros(6, bool)))
     assert found.value.field == "detections"
 
 
-def test_frames_of_another_flight_are_refused(flight) -> None:
+def test_frames_of_another_flight_are_refused(flight):
     first = flight.table("frames").iloc[:1]
     with pytest.raises(WildlabError, match="exposure 3"):
         on_the_sea(replace(flight, tables=flight.tables | {"frames": first}), spot(SHOTS, SHAPE))
 
 
-def test_fewer_flights_than_none_are_refused() -> None:
+def test_fewer_flights_than_none_are_refused():
     with pytest.raises(WildlabError, match="-1 flights"):
         render_flights(TWIN, 6, -1, 8)
     assert render_flights(TWIN, 6, 0, 8) == []
 
 
-def test_flights_are_those_after_the_chosen_one(monkeypatch) -> None:
+def test_flights_are_those_after_the_chosen_one(monkeypatch):
     monkeypatch.setattr(study, "render_crossing", lambda twin, seed, images, tell: seed)
     assert render_flights(TWIN, 6, 2, 8) == [7, 8]
 
 
 @pytest.mark.slow
-def test_a_frame_is_the_same_when_it_is_seen_again(rendering) -> None:
+def test_a_frame_is_the_same_when_it_is_seen_again(rendering):
     exposure = charts.telling_exposures(rendering)[0]
     picture = charts.picture_of(TWIN, rendering, exposure)
     np.testing.assert_array_equal(

@@ -43,7 +43,7 @@ def flights(count: int, **ways: Followed) -> list[Rendering]:
     ]
 
 
-def test_the_table_of_detections_has_a_row_for_all_where_there_are_several() -> None:
+def test_the_table_of_detections_has_a_row_for_all_where_there_are_several():
     table = text.detected_table(flights(2))
     assert table["flight"].tolist() == ["7", "8", "all"]
     assert table["whole"][2].startswith("236 of 240") and table["missed"][2].startswith("4 of 240")
@@ -51,7 +51,7 @@ def test_the_table_of_detections_has_a_row_for_all_where_there_are_several() -> 
     assert text.detected_table(flights(1))["flight"].tolist() == ["7"]
 
 
-def test_the_table_of_tracks_never_adds_up_two_ways() -> None:
+def test_the_table_of_tracks_never_adds_up_two_ways():
     many = flights(2, frames=followed(DISTANCE))
     table = text.outcome_table(many)
     assert len(table) == len(NAMES) * len(text.WAYS)
@@ -64,7 +64,7 @@ def test_the_table_of_tracks_never_adds_up_two_ways() -> None:
     assert set(shared["flight-7"]) == {"not swapped"}, "no detection is one track's"
 
 
-def test_swaps_are_told_from_chance_only_where_enough_flights_differ() -> None:
+def test_swaps_are_told_from_chance_only_where_enough_flights_differ():
     many = text.swaps_words(flights(6, frames=followed(DISTANCE)))
     assert "more" in many and "cannot" not in many
     fewer = text.swaps_words(flights(6, drawn=followed(FEATURES)))

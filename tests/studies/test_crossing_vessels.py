@@ -1,7 +1,5 @@
 """The study of crossing vessels: known mistakes, and claims that turn with numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

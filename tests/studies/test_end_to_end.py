@@ -1,7 +1,5 @@
 """Drawn and rendered detections of the same flight: what is alike, and what is compared."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -149,7 +149,7 @@ def sentences(found: Any) -> set[str]:
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_few_flights_are_enough(name: str) -> None:
+def test_few_flights_are_enough(name):
     for rows in (1, 2, 3):
         called(FUNCTIONS[name], lambda key: 1.0, rows)
 
@@ -167,12 +167,12 @@ def said_of_nothing(function: Callable[..., Any]) -> set[str]:
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_what_is_not_known_is_not_said(name: str) -> None:
+def test_what_is_not_known_is_not_said(name):
     assert said_of_nothing(FUNCTIONS[name]) == set()
 
 
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if "check_claims" in name or "summary" in name])
-def test_what_one_subject_lacks_stops_nothing(name: str) -> None:
+def test_what_one_subject_lacks_stops_nothing(name):
     called(FUNCTIONS[name], lambda key: 1.0, 3)
     subjects = {key[0] for key in columns_of(FUNCTIONS[name])}
     for subject in subjects:

@@ -15,7 +15,7 @@ def numbers(*rows: tuple[str, str]) -> pd.DataFrame:
     return pd.DataFrame(list(rows), columns=["source", "fitted"])
 
 
-def test_tables_are_parted_once_each_in_their_order() -> None:
+def test_tables_are_parted_once_each_in_their_order():
     rows = numbers(("H table 5.5", ""), ("H table 5.4", "a"), ("H table 5.5", "b"), ("F table 1.1", ""))
     assert tables_apart(rows) == [
         Beside("H table 5.5", 1, 2, ("b",)),
@@ -43,7 +43,7 @@ def test_the_names_of_tables_are_those_of_the_published_numbers():
     assert [one.used for one in tables_apart(load_published("slow-vessel"))] == [0, 0]
 
 
-def test_numbers_of_tables_that_a_twin_was_fitted_to_are_not_judged() -> None:
+def test_numbers_of_tables_that_a_twin_was_fitted_to_are_not_judged():
     """What is typed with the published numbers is what the twins' parameters say."""
     for entry in load_studies().values():
         if entry.twin is None:

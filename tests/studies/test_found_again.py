@@ -1,7 +1,5 @@
 """Tracks of crossing vessels that are found again: known outcomes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -143,7 +141,7 @@ def test_intervals_are_those_of_flights():
     assert row["all right"] == row["none wrong"]
 
 
-def test_flights_with_nothing_to_find_count_nowhere() -> None:
+def test_flights_with_nothing_to_find_count_nowhere():
     """Half of eight flights have a track to find: of four, in each column."""
     parts = {text.RIGHT: [1.0] * 4 + [0.0] * 4, text.WRONG: 0.0, text.MISSED: 0.0, text.NEW: 0.0}
     table = pd.DataFrame({(way, name): np.broadcast_to(values, 8)

@@ -73,7 +73,7 @@ def warmed_up(scene: gating.Scene, run: int) -> KalmanFilter:
 
 
 @pytest.mark.parametrize("feed", FEEDS)
-def test_positions_as_another_filter_gates_them(over: Overflight, feed: str) -> None:
+def test_positions_as_another_filter_gates_them(over, feed):
     runs = streams(7, 4)
     scene, gated = draw_scene(over, runs), gate(over, Choices(updated_with=feed), runs)  # type: ignore[arg-type]
     for run in range(4):
@@ -106,7 +106,7 @@ def seen_angles(p_c: Array) -> Array:
         ("both", "assigned", "pixels"),
     ],
 )
-def test_pixels_and_angles_as_written_out(over: Overflight, form: str, feed: str, angles_update: str) -> None:
+def test_pixels_and_angles_as_written_out(over, form, feed, angles_update):
     """The extended filter of H (6.4)-(6.11) for single runs, its derivatives by differences."""
     runs = streams(11, 2)
     choices = Choices(updated_with=feed, angles_update=angles_update)  # type: ignore[arg-type]
@@ -157,7 +157,7 @@ def test_pixels_and_angles_as_written_out(over: Overflight, form: str, feed: str
             P = P - K @ H @ P
 
 
-def test_what_is_expected_is_what_tracking_expects() -> None:
+def test_what_is_expected_is_what_tracking_expects():
     """Measurements and derivatives of any camera, against the room that filters use."""
     rng = np.random.default_rng(3)
     camera = Camera(640, 512, 700.0, 690.0, 310.0, 260.0, skew=3.0)
@@ -176,7 +176,7 @@ def test_what_is_expected_is_what_tracking_expects() -> None:
         assert azimuth == pytest.approx(one, nan_ok=True)
 
 
-def test_what_is_behind_the_lens_or_on_its_axis_is_not_expected() -> None:
+def test_what_is_behind_the_lens_or_on_its_axis_is_not_expected():
     A, down, p = np.array([700.0, 700.0, 320.0, 256.0, 0.0]), np.eye(3), np.array([0.0, 0.0, -100.0])
     up = np.diag([1.0, -1.0, -1.0])
     for form in (kernels.PIXELS, kernels.ANGLES):
@@ -192,16 +192,14 @@ def test_what_is_behind_the_lens_or_on_its_axis_is_not_expected() -> None:
     ]
 
 
-def test_a_camera_that_distorts_is_refused(over: Overflight) -> None:
+def test_a_camera_that_distorts_is_refused(over):
     camera = replace(over.poses.camera, distortion=(0.1, 0.0, 0.0, 0.0, 0.0))
     bent = replace(over, poses=replace(over.poses, camera=camera))
     with pytest.raises(WildlabError, match="distorts"):
         gate(bent, Choices(), streams(1, 2))
 
 
-def test_without_noise_and_far_apart_nothing_goes_wrong(
-    over: Overflight, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_noise_and_far_apart_nothing_goes_wrong(over, monkeypatch):
     monkeypatch.setattr(gating, "POSE_SD", np.zeros(8))
     monkeypatch.setattr(gating, "PIXEL_SD", 0.0)
     monkeypatch.setattr(gating, "APART", (0.0, 120.0))
@@ -210,7 +208,7 @@ def test_without_noise_and_far_apart_nothing_goes_wrong(
     assert gated.right.all()
 
 
-def test_two_targets_in_one_place_are_a_toss_up(over: Overflight, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_targets_in_one_place_are_a_toss_up(over, monkeypatch):
     """Nothing but the noise of the detector tells them apart, and it favours neither."""
     monkeypatch.setattr(gating, "APART", (0.0, 0.0))
     monkeypatch.setattr(gating, "DISPLACED_M", 0.0)
@@ -220,14 +218,14 @@ def test_two_targets_in_one_place_are_a_toss_up(over: Overflight, monkeypatch: p
     assert rates.std(axis=1, ddof=1) == pytest.approx(100 * np.sqrt(0.25 / IMAGES), rel=0.3)
 
 
-def test_a_run_does_not_depend_on_the_others(over: Overflight) -> None:
+def test_a_run_does_not_depend_on_the_others(over):
     many = gating.success_rates(over, Choices(), 7, 3, chunk=3)
     assert many.shape == (len(GATES), 7)
     np.testing.assert_array_equal(many[:, :4], gating.success_rates(over, Choices(), 4, 3))
     assert (gating.success_rates(over, Choices(), 4, 4) != many[:, :4]).any()
 
 
-def test_readings_are_judged_on_the_same_draws(over: Overflight) -> None:
+def test_readings_are_judged_on_the_same_draws(over):
     found = outcomes(over, {name: one.choices for name, one in READINGS.items()}, 6, 3, chunk=4)
     for name, one in READINGS.items():
         np.testing.assert_array_equal(found[name].rate, gating.success_rates(over, one.choices, 6, 3))
@@ -236,7 +234,7 @@ def test_readings_are_judged_on_the_same_draws(over: Overflight) -> None:
     assert same.tolist() == [True, True, False, True]
 
 
-def test_mistakes_are_counted_apart_and_together(over: Overflight) -> None:
+def test_mistakes_are_counted_apart_and_together(over):
     gated = gate(over, Choices(), streams(5, 30))
     found = outcomes(over, {"": Choices()}, 30, 5)[""]
     pixels, angles = ~gated.right[1], ~gated.right[2]
@@ -251,7 +249,7 @@ def test_mistakes_are_counted_apart_and_together(over: Overflight) -> None:
     np.testing.assert_array_equal(gated.right[3][agree], gated.right[1][agree])
 
 
-def test_the_noise_is_that_of_the_tables(over: Overflight) -> None:
+def test_the_noise_is_that_of_the_tables(over):
     scene = draw_scene(over, streams(2, 3000))
     apart = scene.targets[:, 1] - scene.targets[:, 0]
     se = np.sqrt(200 / 3000)
@@ -265,7 +263,7 @@ def test_the_noise_is_that_of_the_tables(over: Overflight) -> None:
     assert np.sqrt((about**2).sum()) == pytest.approx(np.sqrt(1 + 1 + 4 + 1 + 1), rel=0.1)
 
 
-def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight: Flight, over: Overflight) -> None:
+def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight, over):
     np.testing.assert_allclose(np.diff(over.time_s), 0.1)
     assert len(over.time_s) == IMAGES
     nav = flight.nav["truth"]
@@ -284,7 +282,7 @@ def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight: Flight, over:
     )
 
 
-def test_what_is_printed_of_the_angles(over: Overflight) -> None:
+def test_what_is_printed_of_the_angles(over):
     c = over.poses.camera
     uv = np.array([[c.cx + 100, c.cy + 60], [c.cx - 100, c.cy + 60], [c.cx - 100, c.cy - 60]])
     u, v = (uv - (c.cx, c.cy)).T
@@ -299,7 +297,7 @@ def test_what_is_printed_of_the_angles(over: Overflight) -> None:
     np.testing.assert_allclose(sound[:, 0], np.arctan2(v, u), atol=1e-12)
 
 
-def test_what_feeds_the_track(over: Overflight) -> None:
+def test_what_feeds_the_track(over):
     runs = streams(1, 60)
     fed = {name: gate(over, Choices(updated_with=name), runs) for name in FEEDS}  # type: ignore[arg-type]
     own, nothing = fed["own"], fed["nothing"]
@@ -315,7 +313,7 @@ def test_what_feeds_the_track(over: Overflight) -> None:
     assert same.any() and not same.all()
 
 
-def test_images_that_do_not_show_both_can_be_left_out(flight: Flight) -> None:
+def test_images_that_do_not_show_both_can_be_left_out(flight):
     aside = overflight(flight, right=25.0)
     gated = gate(aside, Choices(in_image_only=True), streams(1, 30))
     assert 0 < gated.counted.mean() < 1
@@ -326,7 +324,7 @@ def test_images_that_do_not_show_both_can_be_left_out(flight: Flight) -> None:
     assert skipped.any() and bend[:, skipped].max() < 1e-9 < np.median(bend[:, ~skipped])
 
 
-def test_variations_change_one_thing_each(flight: Flight, over: Overflight) -> None:
+def test_variations_change_one_thing_each(flight, over):
     named = variations(flight, Choices())
     first = next(iter(named.values()))
     for name, (other, choices) in list(named.items())[1:]:
@@ -340,7 +338,7 @@ def test_variations_change_one_thing_each(flight: Flight, over: Overflight) -> N
     assert along[0] * aside[1] - along[1] * aside[0] > 0  # north to east is clockwise: right
 
 
-def test_a_table_of_variations(flight: Flight) -> None:
+def test_a_table_of_variations(flight):
     table = vary(flight, Choices(), 12, 1)
     assert list(table["variation"]) == list(variations(flight, Choices()))
     first = table.iloc[0]
@@ -352,11 +350,11 @@ def test_a_table_of_variations(flight: Flight) -> None:
     )
 
 
-def test_standard_error_leaves_out_what_is_missing() -> None:
+def test_standard_error_leaves_out_what_is_missing():
     assert standard_error(np.array([1.0, 3.0, np.nan])) == pytest.approx(1.0)
 
 
-def test_a_flight_without_truth_or_too_short(flight: Flight) -> None:
+def test_a_flight_without_truth_or_too_short(flight):
     with pytest.raises(WildlabError, match="no true poses"):
         overflight(Flight(flight.manifest, {"autopilot": flight.nav["autopilot"]}, flight.tables))
     with pytest.raises(WildlabError, match="in view for 14 s"):
@@ -372,7 +370,7 @@ def outcome(rates: Array, mistakes: tuple[float, float, float] = (1, 2, 1), same
     return Outcome(rates, np.tile(np.array(mistakes, float)[:, None], n), np.arange(n) < same * n)
 
 
-def test_claims_are_decided_run_by_run() -> None:
+def test_claims_are_decided_run_by_run():
     wobble = np.tile([-5.0, 5.0], 500)
     level = np.array([[96.6], [96.8], [96.0], [96.9]]) + wobble  # what the runs share blurs no difference
     margins = claim_margins(outcome(level, same=0.1))
@@ -387,7 +385,7 @@ def test_claims_are_decided_run_by_run() -> None:
     assert {verdict(margin) for margin in apart.values()} == {"does not hold"}
 
 
-def test_a_claim_wants_every_margin_and_chance_decides_none() -> None:
+def test_a_claim_wants_every_margin_and_chance_decides_none():
     sure, unsure, against = [1.0, 1.1, 0.9], [-1.0, 1.0, 0.5], [-1.0, -1.1, -0.9]
     assert verdict(np.array([sure, sure])) == "holds"
     assert verdict(np.array([sure, unsure])) == "cannot be decided"
@@ -398,11 +396,11 @@ def test_a_claim_wants_every_margin_and_chance_decides_none() -> None:
     assert verdict(claim_margins(outcome(rates))["angles-least-accurate"]) == "cannot be decided"
 
 
-def test_a_run_without_mistakes_says_nothing_of_where_they_fall() -> None:
+def test_a_run_without_mistakes_says_nothing_of_where_they_fall():
     margin = claim_margins(outcome(np.full((4, 6), 100.0), mistakes=(0, 0, 0), same=1.0))
     assert np.isnan(margin["mistakes-on-different-images"]).all()
 
 
-def test_a_gimbal_keeps_the_targets_in_view_longer(over: Overflight, flight: Flight) -> None:
+def test_a_gimbal_keeps_the_targets_in_view_longer(over, flight):
     at_rest = seconds_in_view(overflight(flight, gimbal="down"))
     assert 0 < at_rest < seconds_in_view(over) == IMAGES / 10

@@ -42,7 +42,7 @@ OPPOSED = found(outcome(70, 60, 80, 55), outcome(99, 99, 99, 99))
 LEVEL = found(outcome(90, 90, 90, 90))
 
 
-def test_a_mean_is_compared_by_both_standard_errors() -> None:
+def test_a_mean_is_compared_by_both_standard_errors():
     rates = LIKE_PRINT[DEFAULT].rate
     table = tables.rates_table(rates, PUBLISHED | {"angles": 95.99 + 0.3}).set_index("form")
     row = table.loc[words.NAMES["angles"]]
@@ -57,7 +57,7 @@ def test_a_mean_is_compared_by_both_standard_errors() -> None:
     assert (near["beyond"][2], far["beyond"][2]) == ("no", "yes")
 
 
-def test_claims_are_decided_by_the_default_reading() -> None:
+def test_claims_are_decided_by_the_default_reading():
     claims = load_claims("gating")
 
     def verdicts(of: dict[str, Outcome]) -> list[tuple[str, str]]:
@@ -79,7 +79,7 @@ def test_claims_are_decided_by_the_default_reading() -> None:
     assert table.loc["mistakes-on-different-images", ["verdict", "runs"]].tolist() == ["cannot be decided", 0]
 
 
-def test_every_mean_is_recorded_with_its_standard_error() -> None:
+def test_every_mean_is_recorded_with_its_standard_error():
     report = open_report(study="gating", kind="twin", flight="large-ship")
     tables.record_rates(report, LIKE_PRINT)
     metrics = {(m["name"], m["subject"]): m for m in report._metrics}

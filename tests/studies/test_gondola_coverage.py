@@ -58,20 +58,20 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
     return frame([row] * count)
 
 
-def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws: pd.DataFrame) -> None:
+def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws):
     for name in STRATEGIES:
         assert (draws[name, "held"] >= 0.95).all(), name
         assert (draws[name, "sure"] > 0.3).all(), name
 
 
-def test_numbers_agree_with_one_another(draws: pd.DataFrame) -> None:
+def test_numbers_agree_with_one_another(draws):
     for name in STRATEGIES:
         assert np.allclose(draws[name, "ground"], draws[name, "inside"] + draws[name, "outside"])
     assert (draws["roll-60", "ground"] > draws[DOWN, "ground"]).all()
     assert {subject for subject, _ in draws} == set(STUDY.subjects)
 
 
-def test_the_cabin_hangs_as_high_as_printed() -> None:
+def test_the_cabin_hangs_as_high_as_printed():
     land = land_of(2)
     there = ride(load_twin("gondola"), land, 1.0, 1.0)
     above = -there.places[:, 2] - land.heights_at(there.places[:, :2])
@@ -81,7 +81,7 @@ def test_the_cabin_hangs_as_high_as_printed() -> None:
     assert near_cable(land, there).sum() * 4.0 == pytest.approx(30 * 1.5 * there.times[-1], rel=0.03)
 
 
-def test_the_adaptive_camera_turns_round_earlier_outside_than_inside() -> None:
+def test_the_adaptive_camera_turns_round_earlier_outside_than_inside():
     twin, land = load_twin("gondola"), land_of(2)
     there = ride(twin, land, 5.0, 0.2)
     fences = fences_of(twin, 5)
@@ -95,7 +95,7 @@ def test_the_adaptive_camera_turns_round_earlier_outside_than_inside() -> None:
     assert np.degrees(begun) == pytest.approx([0.0, 15.0, -6.0])
 
 
-def test_what_the_adaptive_camera_does_and_sees_hardly_hangs_on_the_rate_of_images() -> None:
+def test_what_the_adaptive_camera_does_and_sees_hardly_hangs_on_the_rate_of_images():
     twin, land = load_twin("gondola"), land_of(2)
     fences = fences_of(twin, 5)
     rides = [ride(twin, land, rate, 0.1) for rate in (5.0, 6.0)]
@@ -106,7 +106,7 @@ def test_what_the_adaptive_camera_does_and_sees_hardly_hangs_on_the_rate_of_imag
     assert seen[0] == pytest.approx(seen[1], rel=0.03)
 
 
-def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
+def test_claims_are_those_published_and_turn_with_the_numbers():
     published = {one["id"]: one for one in load_claims("gondola-coverage")}
     checks = check_claims(made_up())
     assert set(checks) == set(published)
@@ -128,7 +128,7 @@ def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
     assert decide_check(check).verdict == HOLDS
 
 
-def test_what_is_shown_of_a_claim_is_the_comparison_that_decides_it() -> None:
+def test_what_is_shown_of_a_claim_is_the_comparison_that_decides_it():
     check = check_claims(made_up(**{"roll-75/seen": 0.15}))["larger-rotations-needed"]
     assert check.first is not None and check.second is not None and check.true is not None
     assert not check.true.any()

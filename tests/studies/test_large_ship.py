@@ -1,7 +1,5 @@
 """The study of the large ship: what is computed of a few images."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,7 +1,5 @@
 """The study of the line of sight: its trial beside even ground, and claims from opposed numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

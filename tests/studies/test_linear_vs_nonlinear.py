@@ -61,13 +61,13 @@ THRESHOLDS = {
 
 
 @pytest.mark.parametrize("claim", OPPOSED)
-def test_claims_on_tracks_are_decided_flight_by_flight(claim: str) -> None:
+def test_claims_on_tracks_are_decided_flight_by_flight(claim):
     checks = linear_vs_nonlinear.check_claims(flights({}, OPPOSED[claim]))
     assert set(checks) == set(OPPOSED)
     assert checks[claim].holds(THRESHOLDS.get(claim)).tolist() == [True, False]
 
 
-def test_flights_without_what_a_claim_is_about_are_not_asked() -> None:
+def test_flights_without_what_a_claim_is_about_are_not_asked():
     white = {("measurements", "lag1_autocorrelation_east"): 0.1}
     checks = linear_vs_nonlinear.check_claims(flights({}, white, {("ekf", "mae"): 150.0}))
     for claim in ("too-optimistic", "innovations-coloured"):
@@ -117,13 +117,13 @@ NOISY_OPPOSED = {
 
 
 @pytest.mark.parametrize("claim", NOISY_OPPOSED)
-def test_claims_on_correlated_noise_are_decided_flight_by_flight(claim: str) -> None:
+def test_claims_on_correlated_noise_are_decided_flight_by_flight(claim):
     checks = coloured_noise.check_claims(noisy({}, NOISY_OPPOSED[claim]))
     assert set(checks) == set(NOISY_OPPOSED)
     assert checks[claim].holds(THRESHOLDS.get(claim)).tolist() == [True, False]
 
 
-def test_another_twin_is_refused() -> None:
+def test_another_twin_is_refused():
     with pytest.raises(WildlabError, match=r"6\.4\.2"):
         linear_vs_nonlinear.trial(1, twin="static-antenna", beside="")
     with pytest.raises(WildlabError, match=r"7\.5\.1"):
@@ -131,7 +131,7 @@ def test_another_twin_is_refused() -> None:
 
 
 @pytest.mark.slow
-def test_over_detections_alone_is_over_every_frame() -> None:
+def test_over_detections_alone_is_over_every_frame():
     """Singer's model and constant velocity taken in frames: to a millimetre what predicting at each gives."""
     _, seen = linear_vs_nonlinear.fly_sighting("slow-vessel-eight", 2, "autopilot")
     tuning = coloured_noise.FAST
@@ -158,7 +158,7 @@ def test_over_detections_alone_is_over_every_frame() -> None:
 
 
 @pytest.mark.slow
-def test_neglected_noise_makes_filters_too_sure() -> None:
+def test_neglected_noise_makes_filters_too_sure():
     found = [coloured_noise.trial(1, twin="fast-vessel")]
     checks = coloured_noise.check_claims(pd.DataFrame(found))
     assert checks["nis-below-mean"].holds().all()

@@ -31,7 +31,7 @@ def recorded(report: Report, **columns: Any) -> pd.DataFrame:
     return spread
 
 
-def test_published_beside_flights(report: Report) -> None:
+def test_published_beside_flights(report):
     north = np.r_[1.0, np.linspace(-5, 5, 100)]
     spread = recorded(report, mae=np.r_[20.0, np.linspace(8, 12, 100)], mean_north=north)
     table = monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae", "mean_north"])
@@ -49,14 +49,14 @@ def test_published_beside_flights(report: Report) -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_digits_of_a_range_are_those_of_its_size(sign: float) -> None:
+def test_the_digits_of_a_range_are_those_of_its_size(sign):
     report = open_report(study="static-point", kind="twin")
     spread = pd.DataFrame({("observer", "mean_east"): sign * np.array([1.2098, 2.6001])})
     (row,) = monte_carlo.beside_published(report, spread, {"observer": "x"}, ["mean_east"])["range"]
     assert sorted(one.strip("\N{MINUS SIGN}") for one in row.split(" to ")) == ["1.2", "2.6"]
 
 
-def test_a_number_that_needs_what_is_not_printed_is_not_judged(report: Report) -> None:
+def test_a_number_that_needs_what_is_not_printed_is_not_judged(report):
     """Even where ours is the printed one: as printed and turned by a right angle it would say two things."""
     row = report.printed("mae", "ekf")
     assert row is not None
@@ -70,7 +70,7 @@ def test_a_number_that_needs_what_is_not_printed_is_not_judged(report: Report) -
     assert table["quantity"].tolist() == ["mean distance"] and table["ratio"].tolist() == ["0.00"]
 
 
-def test_what_is_recorded_is_what_is_judged(report: Report) -> None:
+def test_what_is_recorded_is_what_is_judged(report):
     recorded(report, mae=np.linspace(8, 12, 101), mean_north=np.linspace(-5, 5, 101))
     entries = report.recorded
     assert entries["mean_north", "ekf"]["value"] == pytest.approx(0)
@@ -84,9 +84,7 @@ def claims_of(monkeypatch: pytest.MonkeyPatch, *ids: str, **more: Any) -> None:
     monkeypatch.setattr(monte_carlo, "load_claims", lambda study: claims)
 
 
-def test_claims_are_decided_by_the_interval_of_their_share(
-    report: Report, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_claims_are_decided_by_the_interval_of_their_share(report, monkeypatch):
     claims_of(monkeypatch, "always", "never", "half")
     flights = np.arange(50)
     checks = {"always": flights >= 0, "never": flights < 0, "half": flights < 30}
@@ -98,12 +96,12 @@ def test_claims_are_decided_by_the_interval_of_their_share(
     assert monte_carlo.holding(report, "always") and not monte_carlo.holding(report, "always", "half")
 
 
-def test_three_flights_decide_nothing(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_three_flights_decide_nothing(report, monkeypatch):
     claims_of(monkeypatch, "a")
     assert monte_carlo.decide_claims(report, "x", {"a": [True] * 3})["verdict"].tolist() == ["undecided"]
 
 
-def test_a_threshold_is_shown_at_half_and_at_twice(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_threshold_is_shown_at_half_and_at_twice(report, monkeypatch):
     claims_of(monkeypatch, "a", threshold=2, reason="as far as one sees")
     measured = np.r_[np.full(50, 1.5), np.full(50, 3.0)]
     (row,) = monte_carlo.decide_claims(report, "x", {"a": Check(measured=measured)}).to_dict("records")
@@ -112,9 +110,7 @@ def test_a_threshold_is_shown_at_half_and_at_twice(report: Report, monkeypatch: 
     assert (report.claims[0]["half"], report.claims[0]["twice"]) == ("does not hold", "holds")
 
 
-def test_a_threshold_that_the_measure_cannot_reach_is_left_out(
-    report: Report, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_threshold_that_the_measure_cannot_reach_is_left_out(report, monkeypatch):
     claims_of(monkeypatch, "a", threshold=0.7)
     f1 = np.full(50, 0.9)
 
@@ -130,14 +126,14 @@ def test_a_threshold_that_the_measure_cannot_reach_is_left_out(
     assert row(Check(measured=f1, reach=(0.6, 1))) == "0.7"
 
 
-def test_a_measure_reaches_what_it_can_be_on_either_side_of() -> None:
+def test_a_measure_reaches_what_it_can_be_on_either_side_of():
     above, below = (Check(measured=np.ones(1), above=up, reach=(0, 1)) for up in (True, False))
     at = (-0.1, 0.0, 0.5, 1.0, 1.1)
     assert [above.reaches(one) for one in at] == [False, True, True, False, False]
     assert [below.reaches(one) for one in at] == [False, False, True, True, False]
 
 
-def test_a_premise_and_a_difference_are_said(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_premise_and_a_difference_are_said(report, monkeypatch):
     claims_of(monkeypatch, "a", premise="Errors grow in turns", own=True)
     met, true = np.arange(100) < 80, np.arange(100) < 40
     first, second = np.arange(100.0) % 7, np.zeros(100)
@@ -151,13 +147,13 @@ def test_a_premise_and_a_difference_are_said(report: Report, monkeypatch: pytest
     assert (row["verdict"], row["share"]) == ("premise not met", "20 of 100 flights meet the premise")
 
 
-def test_a_claim_without_a_check_is_named(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_claim_without_a_check_is_named(report, monkeypatch):
     claims_of(monkeypatch, "a")
     with pytest.raises(WildlabError, match="claim 'a'"):
         monte_carlo.decide_claims(report, "x", {})
 
 
-def test_shares_of_flights_are_pooled_by_their_images() -> None:
+def test_shares_of_flights_are_pooled_by_their_images():
     spread = pd.DataFrame({("x", "images"): [10.0, 30.0, 5.0], ("x", "rate"): [1.0, 0.5, np.nan]})
     share, images = image_shares.pooled_share(spread, "x", "rate")
     assert images == 40 and share == share_interval(25, 40)
@@ -166,6 +162,6 @@ def test_shares_of_flights_are_pooled_by_their_images() -> None:
     assert image_shares.pooled_share(spread * [0, 1], "x", "rate")[1] == 0
 
 
-def test_only_published_shares_of_images_have_a_table_of_them(report: Report) -> None:
+def test_only_published_shares_of_images_have_a_table_of_them(report):
     with pytest.raises(WildlabError, match="not published"):
         image_shares.shares_beside_published(report, {("rate", "nothing"): "x"})

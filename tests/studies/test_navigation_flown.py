@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -56,7 +55,7 @@ def show(flight: Flight, figures: int | None) -> dict[str, Any]:
     return report.figures
 
 
-def test_observations_are_images_with_a_named_target(make_flight: Callable[..., Flight]) -> None:
+def test_observations_are_images_with_a_named_target(make_flight):
     flight = make_flight()
     assert flown.observation_times(flight).tolist() == [1.0, 8.0]
     assert flown.tracking_period(flight) == (1.0, 8.0)
@@ -68,10 +67,10 @@ def test_observations_are_images_with_a_named_target(make_flight: Callable[..., 
 
 @pytest.mark.parametrize(("figures", "path"), [(23, "fig-7-22"), (33, "fig-7-32"), (13, "paths")])
 def test_counterparts_and_the_period_in_each_of_them(
-    make_flight: Callable[..., Flight],
-    figures: int,
-    path: str,
-) -> None:
+    make_flight,
+    figures,
+    path,
+):
     shown = show(make_flight(), figures)
     assert list(shown) == [path, *(f"fig-7-{figures + offset}" for offset in (0, 1, 4))]
     for name, one in shown.items():
@@ -82,13 +81,13 @@ def test_counterparts_and_the_period_in_each_of_them(
             assert black == [1.0, 8.0]
 
 
-def test_a_flight_without_target_has_no_map(make_flight: Callable[..., Flight]) -> None:
+def test_a_flight_without_target_has_no_map(make_flight):
     flight = make_flight()
     flight.tables["truth"] = flight.table("truth").iloc[:0]
     assert "fig-7-22" not in show(flight, 23)
 
 
-def test_lines_of_a_period_do_not_move_the_limits() -> None:
+def test_lines_of_a_period_do_not_move_the_limits():
     fig = speed_chart({"mekf": (np.arange(5.0), np.ones((5, 3)))}, "Speed")
     before = fig.axes[0].get_xlim()
     mark_period(fig, None)

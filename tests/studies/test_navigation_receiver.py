@@ -38,11 +38,11 @@ def receiver(noise: ReceiverNoise, gross: int = 0, scale: Scale = SCALE) -> Rece
         (0.2, 0.9, ("level", "colour")),
     ],
 )
-def test_what_is_left_is_level_or_colour_or_both_or_nothing(ratio, lag1, left) -> None:
+def test_what_is_left_is_level_or_colour_or_both_or_nothing(ratio, lag1, left):
     assert words.left_over(ratio, lag1) == left
 
 
-def test_tables_have_every_number_that_was_found_and_no_other() -> None:
+def test_tables_have_every_number_that_was_found_and_no_other():
     table = words.parameters_table(receiver(COLOURED)).set_index(["source", "what"])
     assert len(table) == 6 + 2
     white = table.loc[("position", "white noise, height")]
@@ -63,7 +63,7 @@ def test_tables_have_every_number_that_was_found_and_no_other() -> None:
     ("scale", "verdict"),
     [(0.5, "nearer to it"), (2.0, "farther from it"), (1.0, "neither nearer nor farther")],
 )
-def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict) -> None:
+def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict):
     rng = np.random.default_rng(1)
     times = np.arange(0.0, 900.0, 0.5)
 
@@ -76,12 +76,12 @@ def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict) ->
     assert verdict in said
 
 
-def test_thirds_are_equal_and_leave_nothing_out() -> None:
+def test_thirds_are_equal_and_leave_nothing_out():
     found = words.thirds(10.0, 40.0)
     assert [(begin, end) for _, begin, end in found] == [(10.0, 20.0), (20.0, 30.0), (30.0, 40.0)]
 
 
-def test_a_receiver_that_is_not_where_or_when_it_is_said_to_be_gets_advice() -> None:
+def test_a_receiver_that_is_not_where_or_when_it_is_said_to_be_gets_advice():
     sd = np.array([0.002, 0.05, 0.05, 0.05])
     as_stated = Placement(0.223, np.array([0.1, 0.0, -0.1]), sd, 0.4)
     said = words.words_on_placement(as_stated, [0.22, 0.0, 0.0, 0.0])

@@ -1,7 +1,5 @@
 """The verdict on a flight's attitude follows how its errors stand to what the filter states."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -18,7 +16,7 @@ FOUND |= {"mean_sd_roll": 0.6, "mean_sd_pitch": 0.8, "mean_sd_yaw": 2.4}
     ("errors", "ratio", "verdict"),
     [(1.0, "0.5", "not judged"), (3.9, "1.9", "not judged"), (4.2, "2.1", "look closer")],
 )
-def test_the_verdict_follows_the_ratio(errors: float, ratio: str, verdict: str, true: bool) -> None:
+def test_the_verdict_follows_the_ratio(errors, ratio, verdict, true):
     found = FOUND | {name: value * errors for name, value in FOUND.items() if name.startswith("rms")}
     sentences, given, reason = text.summary(found, "in the air", true)
     said = " ".join(sentences)
@@ -27,7 +25,7 @@ def test_the_verdict_follows_the_ratio(errors: float, ratio: str, verdict: str, 
     assert f"{1.3 * errors:.2f}" in said and "2.60" in said and f"{150 * np.radians(errors):.1f}" in said
 
 
-def test_the_middle_flight_speaks_for_all_of_them() -> None:
+def test_the_middle_flight_speaks_for_all_of_them():
     flights = [FOUND | {"rms_yaw": value} for value in (9.0, 1.2, 1.1)]
     spread = pd.DataFrame([{("mekf", name): value for name, value in one.items()} for one in flights])
     spread["observer", "rms_yaw"] = 50.0

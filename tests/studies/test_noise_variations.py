@@ -18,7 +18,7 @@ def flights(nees: dict[str, float], mae: dict[str, float], kept: float = 30.0) -
     return pd.DataFrame([row, row, row])
 
 
-def test_the_table_has_medians_the_filter_itself_first() -> None:
+def test_the_table_has_medians_the_filter_itself_first():
     spread = flights({"kf-thinned": 2.5}, {"kf-noise-by-tilt": 9.0})
     found = noise_variations.table(spread, "kf", 7.0)
     assert list(found.columns) == list(noise_variations.COLUMNS)

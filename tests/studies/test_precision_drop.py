@@ -1,7 +1,5 @@
 """What the study of the precision drop computes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

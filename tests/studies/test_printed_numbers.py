@@ -1,7 +1,5 @@
 """The arithmetic of printed numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -18,13 +18,13 @@ def shown_by(case: str) -> list[StudyEntry]:
     return [entry for entry in STUDIES.values() if entry.case == case]
 
 
-def test_every_study_names_a_case_and_every_case_is_shown() -> None:
+def test_every_study_names_a_case_and_every_case_is_shown():
     assert {entry.case for entry in STUDIES.values()} == set(CASES)
     assert {"schmidt", "navigation", "sensitivity", "autoferry"} <= set(CASES)
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_a_case_is_what_it_says(case: str) -> None:
+def test_a_case_is_what_it_says(case):
     study = CASES[case]
     assert isinstance(study, Study) and study.case == case
     given = shown_by(case)
@@ -42,7 +42,7 @@ def test_a_case_is_what_it_says(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_published_numbers_have_the_subjects_of_their_case(case: str) -> None:
+def test_published_numbers_have_the_subjects_of_their_case(case):
     subjects = CASES[case].subjects
     for entry in shown_by(case):
         for published in load_published(entry.name)["subject"]:

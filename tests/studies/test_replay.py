@@ -34,7 +34,7 @@ def ship() -> Flight:
     return simulate_twin("large-ship", 1)
 
 
-def test_captions_are_read_as_counts() -> None:
+def test_captions_are_read_as_counts():
     rows = [  # in view, detected, running, right: which screenshot
         (1, 1, 3, True, {ONE, SINGLE}),
         (1, 1, 1, True, {SINGLE}),
@@ -51,7 +51,7 @@ def test_captions_are_read_as_counts() -> None:
         assert moments.of(kind).tolist() == [kind in row[4] for row in rows]
 
 
-def test_what_is_detected_was_in_view_and_tracks_never_end() -> None:
+def test_what_is_detected_was_in_view_and_tracks_never_end():
     two = simulate_twin("crossing-vessels", 1, ("imu", "gnss"))
     moments = moments_of(two)
     seen = moments.detected > 0
@@ -65,7 +65,7 @@ def test_what_is_detected_was_in_view_and_tracks_never_end() -> None:
     assert moved.in_view.max() == 0 and not moved.of(ONE).any()
 
 
-def test_a_clock_is_set_to_the_nearest_step(ship: Flight) -> None:
+def test_a_clock_is_set_to_the_nearest_step(ship):
     assert {abs(off_of(seed)) <= OFF_S for seed in range(30)} == {True}
     assert len({off_of(seed) for seed in range(30)}) == 30
     # A whole number of steps is taken off whole.
@@ -74,7 +74,7 @@ def test_a_clock_is_set_to_the_nearest_step(ship: Flight) -> None:
     assert after == pytest.approx(right) and unset != pytest.approx(right)
 
 
-def test_a_track_is_the_mean_of_what_was_seen_and_spreads_as_a_walk_does(ship: Flight) -> None:
+def test_a_track_is_the_mean_of_what_was_seen_and_spreads_as_a_walk_does(ship):
     R = np.tile(9.0 * np.eye(2), (3, 1, 1))
     places = np.array([[0.0, 0.0, -1.0], [4.0, -2.0, -1.0], [2.0, 2.0, -1.0]])
     nan = np.full(3, np.nan)
@@ -99,7 +99,7 @@ def spread_of(gain: float, kinds: dict[str, float]) -> pd.DataFrame:
     return pd.DataFrame(columns | {(kind, "share_of_frames"): np.full(12, v) for kind, v in kinds.items()})
 
 
-def test_claims_follow_the_numbers() -> None:
+def test_claims_follow_the_numbers():
     all_there = {ONE: 0.1, SINGLE: 0.2, NONE: 0.7}
     checks = check_claims(spread_of(0.5, all_there | {NONE: 0.0}))
     truths = {id: bool(np.all(check.true)) for id, check in checks.items() if isinstance(check, Check)}
@@ -112,7 +112,7 @@ def test_claims_follow_the_numbers() -> None:
     assert not np.any(check_claims(spread_of(-0.5, all_there))["manual-sync-increases-precision"].true)
 
 
-def test_the_moment_shown_has_what_its_screenshot_shows() -> None:
+def test_the_moment_shown_has_what_its_screenshot_shows():
     ones = np.ones(3, int)
     moments = Moments(np.arange(3.0), np.array([0, 1, 2]), np.array([0, 1, 1]), 4 * ones, ones.astype(bool))
     assert text.moment_for(moments, NONE) == 0 and text.moment_for(moments, ONE) == 1

@@ -61,7 +61,7 @@ def tracks(flight: Flight, seen: Sighting) -> dict[str, Track]:
     return compare(seen, sheet_sighting(flight), NOISE)
 
 
-def test_the_other_block_is_zero_and_this_one_kept() -> None:
+def test_the_other_block_is_zero_and_this_one_kept():
     A = np.random.default_rng(0).normal(size=(5, 6, 6))
     P = A @ np.swapaxes(A, 1, 2)
     before = P.copy()
@@ -73,7 +73,7 @@ def test_the_other_block_is_zero_and_this_one_kept() -> None:
     np.testing.assert_array_equal(P, before)
 
 
-def test_position_uncertainty_of_centimetres_changes_next_to_nothing(tracks: dict[str, Track]) -> None:
+def test_position_uncertainty_of_centimetres_changes_next_to_nothing(tracks):
     """Which is the extended filter, the limit without any; and attitude uncertainty only adds to P."""
     at_end = {who: tracks[who].P[-1, :2, :2] for who in SUBJECTS}
     np.testing.assert_allclose(at_end["schmidt-position-only"], at_end["ekf"], rtol=0.02)
@@ -81,7 +81,7 @@ def test_position_uncertainty_of_centimetres_changes_next_to_nothing(tracks: dic
     assert (np.linalg.eigvalsh(added) > 0).all()
 
 
-def test_what_each_filter_is_told(tracks: dict[str, Track], seen: Sighting) -> None:
+def test_what_each_filter_is_told(tracks, seen):
     """One by one what all do together; and the more is stated of the poses, the more of the target."""
     P = seen.poses.covariance
     assert P is not None
@@ -100,11 +100,11 @@ def test_what_each_filter_is_told(tracks: dict[str, Track], seen: Sighting) -> N
     assert scaled(1) == "schmidt" and len(CURVE) == len(FACTORS)
 
 
-def test_an_estimated_covariance_is_that_of_position_and_attitude() -> None:
+def test_an_estimated_covariance_is_that_of_position_and_attitude():
     assert np.sqrt(np.diag(covariance_of(NOISE))).tolist() == pytest.approx([0.5, 0.5, 0.8, 0.02, 0.02, 0.05])
 
 
-def test_the_sheet_is_the_whole_sheet(flight: Flight) -> None:
+def test_the_sheet_is_the_whole_sheet(flight):
     """The same filter as the navigation study's, of the sensors' errors alone: its covariance holds."""
     times = sheet_sighting(flight).times
     nav, payload = flight.nav[SHEET], flight.nav["truth-payload"]
@@ -113,7 +113,7 @@ def test_the_sheet_is_the_whole_sheet(flight: Flight) -> None:
     assert 0.5 < rms / sd < 2.0
 
 
-def test_a_part_of_a_flight_ends_its_sensors_and_leaves_the_rest(flight: Flight) -> None:
+def test_a_part_of_a_flight_ends_its_sensors_and_leaves_the_rest(flight):
     part = first_part(flight, 60.0)
     end = flight.table("frames")["time_s"].min() + 60.0
     for name in ("imu", "gnss"):
@@ -122,13 +122,13 @@ def test_a_part_of_a_flight_ends_its_sensors_and_leaves_the_rest(flight: Flight)
     assert part.table("frames") is flight.table("frames")
 
 
-def test_poses_without_covariance_are_refused(seen: Sighting) -> None:
+def test_poses_without_covariance_are_refused(seen):
     bare = seen._replace(poses=replace(seen.poses, covariance=None))
     with pytest.raises(WildlabError, match="no covariance"):
         compare(bare, seen, NOISE)
 
 
-def test_a_logged_flight_is_refused(flight: Flight) -> None:
+def test_a_logged_flight_is_refused(flight):
     logged = Flight(flight.manifest.model_copy(update={"twin": None}), flight.nav, flight.tables)
     with pytest.raises(WildlabError, match="logged"):
         compare_flight(logged, 1)
@@ -151,7 +151,7 @@ def small(seen: Sighting) -> tuple[Sighting, Track]:
     return seen._replace(times=np.arange(10.0), uv=at, positions=at, truth=truth), track
 
 
-def test_numbers_of_pauses_on_a_flight_that_one_can_count(seen: Sighting) -> None:
+def test_numbers_of_pauses_on_a_flight_that_one_can_count(seen):
     few, track = small(seen)
     assert [rows.tolist() for rows in pauses(few)] == [[3, 4, 5]]
     found = evaluate(few, track, moment=0.45).numbers
@@ -168,7 +168,7 @@ def test_numbers_of_pauses_on_a_flight_that_one_can_count(seen: Sighting) -> Non
     assert found["rmse_speed_start"] == pytest.approx(np.sqrt(5) - np.sqrt(2))
 
 
-def test_a_flight_without_pauses_has_no_numbers_of_them(seen: Sighting) -> None:
+def test_a_flight_without_pauses_has_no_numbers_of_them(seen):
     few, track = small(seen)
     short = few._replace(times=0.1 * few.times)
     assert pauses(short) == []
@@ -180,13 +180,13 @@ def test_a_flight_without_pauses_has_no_numbers_of_them(seen: Sighting) -> None:
     }
 
 
-def test_calibration_flights_are_none_of_the_flights() -> None:
+def test_calibration_flights_are_none_of_the_flights():
     assert CALIBRATION > 100_000
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 4])
-def test_on_the_fast_flight_schmidt_is_consistent_and_the_extended_filter_far_less(seed: int) -> None:
+def test_on_the_fast_flight_schmidt_is_consistent_and_the_extended_filter_far_less(seed):
     found = trial(seed, twin="fast-vessel")
     asked = {(who, name) for who in SUBJECTS for name in NEES_NAMES}
     asked |= {(who, name) for who in FILTERS for name in NAMES}

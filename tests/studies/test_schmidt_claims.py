@@ -67,7 +67,7 @@ def false_with(**changed: float) -> set[str]:
 AT_FIRST = false_with()
 
 
-def test_what_the_tables_print_makes_all_claims_true_that_do_not_contradict_others() -> None:
+def test_what_the_tables_print_makes_all_claims_true_that_do_not_contradict_others():
     assert {"nis-differs", "nis-small", "ekf-mean-error-smaller", "schmidt-pessimistic"} == AT_FIRST
 
 
@@ -113,7 +113,7 @@ def test_what_the_tables_print_makes_all_claims_true_that_do_not_contradict_othe
         ({"mekf__difference_turning": 0.9}, {"largest-errors-in-turns"}),
     ],
 )
-def test_each_claim_is_lost_by_what_it_speaks_of_alone(changed: dict[str, float], lost: set[str]) -> None:
+def test_each_claim_is_lost_by_what_it_speaks_of_alone(changed, lost):
     assert false_with(**changed) - AT_FIRST == lost
 
 
@@ -126,7 +126,7 @@ def test_each_claim_is_lost_by_what_it_speaks_of_alone(changed: dict[str, float]
         ({"ekf__mean_north": 0.9}, "ekf-mean-error-smaller"),
     ],
 )
-def test_what_contradicts_a_claim_is_true_elsewhere(changed: dict[str, float], won: str) -> None:
+def test_what_contradicts_a_claim_is_true_elsewhere(changed, won):
     assert won not in false_with(**changed)
 
 
@@ -145,14 +145,14 @@ def test_what_contradicts_a_claim_is_true_elsewhere(changed: dict[str, float], w
         ({"flight__settled": 30.0}, "covariance-constant"),
     ],
 )
-def test_each_premise_is_lost_by_what_it_speaks_of(changed: dict[str, float], of: str) -> None:
+def test_each_premise_is_lost_by_what_it_speaks_of(changed, of):
     with_it, without = (check_claims(pd.DataFrame([flight_with(**one)]))[of].premise for one in ({}, changed))
     assert with_it is not None and with_it[0]
     assert without is not None and not without[0]
 
 
 @pytest.mark.parametrize("times", [0.2, 5.0])
-def test_premises_do_not_depend_on_what_the_filters_gave(times: float) -> None:
+def test_premises_do_not_depend_on_what_the_filters_gave(times):
     """Nor on how well the stated deviations of the poses fit their errors: that is what NEES measures."""
     first = flight_with()
     other = {
@@ -164,7 +164,7 @@ def test_premises_do_not_depend_on_what_the_filters_gave(times: float) -> None:
         assert np.array_equal(check.premise, after[name].premise), name  # type: ignore[arg-type]
 
 
-def test_comparisons_compare_what_they_name() -> None:
+def test_comparisons_compare_what_they_name():
     check = check_claims(pd.DataFrame([flight_with(ekf__mae=15.0, schmidt__mae=8.8)]))[
         "schmidt-more-accurate"
     ]
@@ -175,7 +175,7 @@ def test_comparisons_compare_what_they_name() -> None:
 
 
 @pytest.mark.parametrize("study", STUDIES)
-def test_every_claim_is_decided_and_every_number_has_its_subject(study: str) -> None:
+def test_every_claim_is_decided_and_every_number_has_its_subject(study):
     checks = check_claims(pd.DataFrame([flight_with()]))
     claims = load_claims(study)
     assert len(claims) > 15 and len({claim["id"] for claim in claims}) == len(claims)
@@ -189,7 +189,7 @@ def test_every_claim_is_decided_and_every_number_has_its_subject(study: str) -> 
     assert set(numbers["subject"]) == {"ekf", "schmidt"} and set(numbers["name"]) <= set(NAMES)
 
 
-def test_an_average_is_held_against_the_band_of_what_it_is_worth() -> None:
+def test_an_average_is_held_against_the_band_of_what_it_is_worth():
     low, high = chi_square_interval(2, runs=20)
     rows = [
         flight_with(schmidt__nees=value, schmidt__nees_worth=20.0) for value in (low, high, 0.9 * low, 5.0)
@@ -200,11 +200,11 @@ def test_an_average_is_held_against_the_band_of_what_it_is_worth() -> None:
     assert found.above.tolist() == [False, False, False, True]
 
 
-def test_apart_is_a_share_of_the_smaller() -> None:
+def test_apart_is_a_share_of_the_smaller():
     assert apart([1.0, 1.25], [1.25, 1.0]).tolist() == [0.25, 0.25]
 
 
-def test_no_share_is_asked_to_be_above_one() -> None:
+def test_no_share_is_asked_to_be_above_one():
     checks = check_claims(pd.DataFrame([flight_with()]))
     for one in ("ekf-overconfident-between", "high-nis-after-pauses"):
         assert checks[one].reaches(0.25) and not checks[one].reaches(1.0)

@@ -44,7 +44,7 @@ def drawn_times(factor: float) -> dict[str, Any]:
     ("factor", "verdict"),
     [(1.0, headline.CONSISTENT), (4.0, headline.OPTIMISTIC), (0.25, headline.PESSIMISTIC)],
 )
-def test_a_verdict_follows_the_test_over_flights(factor: float, verdict: str) -> None:
+def test_a_verdict_follows_the_test_over_flights(factor, verdict):
     spread = flights(**drawn_times(factor))
     found = headline.honesty(spread, "schmidt")
     assert found.verdict == verdict
@@ -54,13 +54,13 @@ def test_a_verdict_follows_the_test_over_flights(factor: float, verdict: str) ->
     assert len(table) == 1 + len(COVARIANCES) and table["verdict"].tolist()[1] == verdict
 
 
-def test_four_flights_tell_less_than_sixty() -> None:
+def test_four_flights_tell_less_than_sixty():
     few, many = (headline.honesty(flights(n, **drawn_times(0.5)), "schmidt") for n in (4, SIZE))
     assert few.verdict == headline.CONSISTENT and many.verdict == headline.PESSIMISTIC
     assert few.drawn.high > many.drawn.high
 
 
-def test_a_median_may_lie_on_the_other_side_of_the_test() -> None:
+def test_a_median_may_lie_on_the_other_side_of_the_test():
     rare = flights(
         schmidt__nees=lambda i, _: 1.0, schmidt__nees_drawn=lambda i, value: 90.0 if i % 10 == 0 else value
     )
@@ -68,7 +68,7 @@ def test_a_median_may_lie_on_the_other_side_of_the_test() -> None:
     assert found.ratio < 1 < found.overall and found.verdict == headline.OPTIMISTIC
 
 
-def test_the_thesis_yardstick_counts_averages_within_the_bounds_of_single_values() -> None:
+def test_the_thesis_yardstick_counts_averages_within_the_bounds_of_single_values():
     half = flights(schmidt__nees=lambda i, _: 7.3 if i % 2 else 7.5)
     assert headline.honesty(half, "schmidt").inside == 0.5
 
@@ -86,21 +86,21 @@ def falling(at_one: float) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("at_one", "where"), [(2.0, "1.4°"), (0.5, "0.7°"), (200.0, "above"), (0.005, "below")]
 )
-def test_the_curve_says_where_stated_and_true_error_match(at_one: float, where: str) -> None:
+def test_the_curve_says_where_stated_and_true_error_match(at_one, where):
     spread = flights(**falling(at_one))
     assert where in headline.curve_words(spread)[0]
     marks = charts.marks_of(spread)
     assert marks["schmidt"] == (pytest.approx(1.4), pytest.approx(at_one), marks["schmidt"][2])
 
 
-def test_one_to_two_degrees_are_judged_by_both_yardsticks() -> None:
+def test_one_to_two_degrees_are_judged_by_both_yardsticks():
     wrong = flights(**{"schmidt-1-deg__nees": lambda i, _: 20.0, "schmidt-1-deg__nees_drawn": 10.0})
     good, bad = (headline.honesty(spread, "schmidt-1-deg") for spread in (flights(), wrong))
     assert (good.inside, bad.inside) == (1.0, 0.0)
     assert (good.verdict, bad.verdict) == (headline.CONSISTENT, headline.OPTIMISTIC)
 
 
-def test_a_drawn_flight_is_typical_or_not() -> None:
+def test_a_drawn_flight_is_typical_or_not():
     def like(first: float) -> pd.DataFrame:
         """All that is shown as in the middle, but for one mean error."""
         changed = {f"{who}__{name}": lambda i, _: float(i or 30) for _, who, name, *_ in text.DRAWN}

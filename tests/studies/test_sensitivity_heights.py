@@ -1,7 +1,5 @@
 """What a wrong height of the ground costs, beside closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

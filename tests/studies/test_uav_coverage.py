@@ -65,19 +65,19 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
     return frame([row] * count)
 
 
-def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws: pd.DataFrame) -> None:
+def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws):
     """What has to be shown: 95 % of it at least, in every draw of every case."""
     for name in CASES | MORE:
         assert (draws[name, "held"] >= 0.95).all(), name
         assert (draws[name, "sure"] > 0.3).all(), name
 
 
-def test_a_plan_without_a_margin_promises_more_than_flights_show(draws: pd.DataFrame) -> None:
+def test_a_plan_without_a_margin_promises_more_than_flights_show(draws):
     assert (draws[LOW, "kept"] < draws[LOW, "held"]).all() and (draws[LOW, "kept"] < 0.95).any()
     assert (draws[LOW, "sure"] < draws[LOW, "flown"]).all()
 
 
-def test_numbers_agree_with_one_another(draws: pd.DataFrame) -> None:
+def test_numbers_agree_with_one_another(draws):
     fence = nodes_in(land_of(1), fences_of(load_twin("uav-search"), 1)) >= 0
     area = fence.sum() * 4.0
     for name in CASES | MORE:
@@ -89,7 +89,7 @@ def test_numbers_agree_with_one_another(draws: pd.DataFrame) -> None:
     assert {subject for subject, _ in draws} == set(STUDY.subjects)
 
 
-def test_the_platform_keeps_its_height_above_ground() -> None:
+def test_the_platform_keeps_its_height_above_ground():
     twin, land = load_twin("uav-search"), land_of(3)
     flown = plan(twin, land, Case(60.0, 25.0, False), 1, 1.0)
     above = -flown.poses.p_nc[:, 2] - land.heights_at(flown.poses.p_nc[:, :2])
@@ -97,7 +97,7 @@ def test_the_platform_keeps_its_height_above_ground() -> None:
     assert above.min() > 59.0 and np.median(above) < 65
 
 
-def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
+def test_claims_are_those_published_and_turn_with_the_numbers():
     published = {one["id"]: one for one in load_claims("uav-coverage")}
     checks = check_claims(made_up())
     assert set(checks) == set(published)
@@ -122,12 +122,12 @@ def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
     assert decide_check(check, 0.1).verdict == NO_PREMISE
 
 
-def test_closer_rows_that_do_not_help_are_no_proof() -> None:
+def test_closer_rows_that_do_not_help_are_no_proof():
     check = check_claims(made_up(**{f"{LOW_CLOSE}/seen": 0.82}))["lower-needs-closer"]
     assert decide_check(check, 0.02).verdict == FAILS
 
 
-def test_animals_that_stand_are_missed_where_no_image_shows_the_ground(draws: pd.DataFrame) -> None:
+def test_animals_that_stand_are_missed_where_no_image_shows_the_ground(draws):
     for spacing in SPACINGS:
         still, unseen = (draws[f"rows-{spacing:.0f}m", name] for name in ("missed_still", "unseen"))
         # 60 animals: three standard deviations of their share.
@@ -137,7 +137,7 @@ def test_animals_that_stand_are_missed_where_no_image_shows_the_ground(draws: pd
     assert (draws[last, "missed"] != draws[last, "missed_still"]).any()
 
 
-def test_larger_errors_show_less_of_what_is_surely_planned() -> None:
+def test_larger_errors_show_less_of_what_is_surely_planned():
     twin, land = load_twin("uav-search"), land_of(1)
     run = run_case(twin, land, LOW, 1, 1, 1.0)
     held = [with_larger_errors(twin, land, LOW, 1, run, factor) for factor in (0.0, 1.0, 4.0)]
@@ -145,11 +145,11 @@ def test_larger_errors_show_less_of_what_is_surely_planned() -> None:
     assert planned_coverage(twin, land, LOW, 1, 1.0).seen.sum() == run[1].planned.seen.sum()
 
 
-def test_a_twin_without_a_survey_is_refused() -> None:
+def test_a_twin_without_a_survey_is_refused():
     with pytest.raises(WildlabError, match="twin"):
         required(None, "survey")
 
 
-def test_a_case_that_did_not_hold_is_named() -> None:
+def test_a_case_that_did_not_hold_is_named():
     assert text.NAMES[LOW] not in text.held_words(made_up())
     assert text.NAMES[LOW] in text.held_words(made_up(**{f"{LOW}/held": 0.9}))

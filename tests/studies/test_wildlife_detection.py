@@ -1,7 +1,5 @@
 """What the study of warm animals computes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -39,8 +39,8 @@ def judged(samples: list[Sample], thresholds: Warm) -> Rates:
 
 
 def test_subtraction_and_enhancement_beat_a_constant_threshold_by_night_and_day_is_worse(
-    samples: list[Sample],
-) -> None:
+    samples,
+):
     night = [one for one in samples if one.frame.name.startswith("1_")]
     day = [one for one in samples if one.frame.name.startswith("0_")]
     assert (len(night), len(day)) == (22, 6)

@@ -1,7 +1,5 @@
 """What is found in single rendered pictures of animals, and what it counts as."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -53,7 +53,7 @@ FOLLOWED = Followed(
 )  # fmt: skip
 
 
-def test_what_frames_gave_is_counted_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_frames_gave_is_counted_by_hand(monkeypatch):
     monkeypatch.setattr("wildlab.studies.wildlife_tracking.rendered.off_px", lambda world, framed: 1.5)
     standing = np.array([True, True, False, True, False, True])
     world: World = None  # type: ignore[assignment]
@@ -66,7 +66,7 @@ def test_what_frames_gave_is_counted_by_hand(monkeypatch: pytest.MonkeyPatch) ->
     assert drawn.standing == 0 and np.isnan(drawn.off_px)
 
 
-def test_a_false_detection_is_no_sighting_and_mixes_a_track() -> None:
+def test_a_false_detection_is_no_sighting_and_mixes_a_track():
     truth, times = np.zeros((4, 2, 2)), np.arange(4) * 20.0
     one = Known(3, np.array([1, 2]), np.array([[3.0, 4.0], [9.0, 9.0]]), np.tile(np.eye(2), (2, 1, 1)))
     seen = [found(0, 1, 1, True), found(2, NONE, 2, True)]
@@ -88,20 +88,20 @@ def renderings(**images: Images) -> Renderings:
     return Renderings(world, empty, by)
 
 
-def test_the_frame_shown_has_a_false_detection_where_any_has() -> None:
+def test_the_frame_shown_has_a_false_detection_where_any_has():
     clean = images_of([0], [0], IN_VIEW)
     assert telling_image(renderings(dawn=clean)) == 0
     assert telling_image(renderings(dawn=clean, clouds=images_of([2, 3], [NONE, NONE], IN_VIEW))) == 2
 
 
-def test_the_hour_is_the_suns_at_the_place() -> None:
+def test_the_hour_is_the_suns_at_the_place():
     by_name = weathers(load_twin("uav-tracking"))
     # 04:00 UTC at 16.43 degrees east: 66 minutes later by the sun.
     assert by_name[DAWN].hour == pytest.approx(4 + 65.7 / 60, abs=0.01) and by_name[DAWN].clouds == 0
     assert by_name[CLOUDS].clouds == 1
 
 
-def test_no_frame_at_all_is_refused() -> None:
+def test_no_frame_at_all_is_refused():
     with pytest.raises(WildlabError, match="0 frames"):
         run_rendered(None, 1, 0)  # type: ignore[arg-type]
 
@@ -112,7 +112,7 @@ def beginning() -> Renderings:
 
 
 @pytest.mark.slow
-def test_frames_of_a_world_show_its_animals_where_it_has_them(beginning: Renderings) -> None:
+def test_frames_of_a_world_show_its_animals_where_it_has_them(beginning):
     drawn, by_weather = text.counts_of(beginning)
     assert set(by_weather) == {DAWN, CLOUDS}
     one = by_weather[DAWN]
@@ -123,7 +123,7 @@ def test_frames_of_a_world_show_its_animals_where_it_has_them(beginning: Renderi
 
 
 @pytest.mark.slow
-def test_a_frame_is_the_same_when_it_is_seen_again(beginning: Renderings) -> None:
+def test_a_frame_is_the_same_when_it_is_seen_again(beginning):
     run = beginning.by_weather[CLOUDS]
     images = run.framed.images
     k = int(images.image[0])

@@ -99,14 +99,12 @@ def verdict(claim: str, threshold: float | None = None, **changed: float) -> str
         ("closer-than-kalman-uav", None, {f"{UAV}-{KALMAN}__rmse": 10.0}),
     ],
 )
-def test_each_claim_turns_with_its_number(
-    claim: str, threshold: float | None, changed: dict[str, float]
-) -> None:
+def test_each_claim_turns_with_its_number(claim, threshold, changed):
     assert verdict(claim, threshold) == HOLDS
     assert verdict(claim, threshold, **changed) == FAILS
 
 
-def test_the_cost_decides_its_claim() -> None:
+def test_the_cost_decides_its_claim():
     spread = spread_of()
     assert decide_check(check_claims(spread, np.full(N, 9.0))["dearer-than-ekf"], 1.0).verdict == HOLDS
     assert decide_check(check_claims(spread, np.full(N, 0.5))["dearer-than-ekf"], 1.0).verdict == FAILS
@@ -114,13 +112,13 @@ def test_the_cost_decides_its_claim() -> None:
 
 
 @pytest.mark.parametrize(("anees", "said"), [(4.0, "too sure"), (1.2, "too cautious")])
-def test_a_filter_is_too_sure_or_too_cautious_by_its_anees(anees: float, said: str) -> None:
+def test_a_filter_is_too_sure_or_too_cautious_by_its_anees(anees, said):
     names = [f"{one}-{NEGATIVE}__{name}" for one in (GONDOLA, UAV) for name in ("anees", "anees_own")]
     told = text.consistency_words(spread_of(**dict.fromkeys(names, anees)))
     assert said in told and ("too sure" in told) != ("too cautious" in told)
 
 
-def test_worlds_without_a_number_count_neither_way() -> None:
+def test_worlds_without_a_number_count_neither_way():
     spread = spread_of()
     spread.loc[: N // 4, (f"{UAV}-{NEGATIVE}", "sd")] = np.nan
     spread.loc[: N // 4, (REVISITS, "fall")] = np.nan
@@ -131,7 +129,7 @@ def test_worlds_without_a_number_count_neither_way() -> None:
 
 
 @pytest.mark.parametrize(("wrong", "of", "holds"), [(5, 15, True), (1, 10, False), (2, 100, False)])
-def test_animals_seen_again_are_counted_of_all_worlds_together(wrong: int, of: int, holds: bool) -> None:
+def test_animals_seen_again_are_counted_of_all_worlds_together(wrong, of, holds):
     one = {f"{UAV}-{NEGATIVE}__later": of / N, f"{UAV}-{NEGATIVE}__right": (of - wrong) / N}
     checks = check_claims(spread_of(**one))
     share = share_interval(wrong, of)
@@ -152,7 +150,7 @@ def found(image: int, animal: int, track: int, **other: float) -> Found:
     return Found(image, animal, track, other == {}, **(base | other))  # type: ignore[arg-type]
 
 
-def test_out_of_sight_counts_by_hand() -> None:
+def test_out_of_sight_counts_by_hand():
     times = np.arange(0.0, 100.0, 10.0)
     truth = np.zeros((10, 2, 2))
     truth[:, 1] = [100.0, 0.0]
@@ -174,7 +172,7 @@ def test_out_of_sight_counts_by_hand() -> None:
     assert np.isnan(sight_numbers(out_of_sight(known, log, times, truth, 10.0))["rmse"])
 
 
-def test_the_next_lap_takes_each_animal_once() -> None:
+def test_the_next_lap_takes_each_animal_once():
     times = np.arange(0.0, 100.0, 10.0)
     log = [
         found(0, 0, 1), found(1, 1, 2), found(4, 0, 1, own=1, away=40.0),
@@ -186,7 +184,7 @@ def test_the_next_lap_takes_each_animal_once() -> None:
     assert [(one.animal, one.image, one.track == one.own) for one in back] == [(0, 6, False), (1, 9, True)]
 
 
-def test_a_visit_is_one_that_found_its_animal() -> None:
+def test_a_visit_is_one_that_found_its_animal():
     goal = np.array([SEARCH, 4, 4, SEARCH, 7, 7, 5])
     log = [
         found(2, 0, 4, own=4, away=60.0), found(3, 1, 9, own=9, away=60.0), found(5, 2, 7, own=6, away=60.0),
@@ -207,7 +205,7 @@ def runs() -> tuple[Runs, dict[tuple[str, str], float]]:
 
 
 @pytest.mark.slow
-def test_a_world_follows_as_it_should(runs: tuple[Runs, dict[tuple[str, str], float]]) -> None:
+def test_a_world_follows_as_it_should(runs):
     done, numbers = runs
     assert numbers[UAV, "seen_share"] > numbers[GONDOLA, "seen_share"] > 0.1
     # The Kalman filter of animals that are never mixed up: its covariance is that of their walk.
@@ -223,8 +221,8 @@ def test_a_world_follows_as_it_should(runs: tuple[Runs, dict[tuple[str, str], fl
 
 @pytest.mark.slow
 def test_a_fence_alone_tells_what_places_drawn_in_it_do(
-    runs: tuple[Runs, dict[tuple[str, str], float]],
-) -> None:
+    runs,
+):
     done, numbers = runs
     rng = np.random.default_rng(1)
     spreads = []

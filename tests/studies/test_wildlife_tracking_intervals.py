@@ -30,7 +30,7 @@ KINDS: dict[str, tuple[Draw, float]] = {
 
 @pytest.mark.parametrize("worlds", WORLDS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_interval_holds_the_mean_as_often_as_it_says(kind: str, worlds: int) -> None:
+def test_the_interval_holds_the_mean_as_often_as_it_says(kind, worlds):
     draw, mean = KINDS[kind]
     rows = draw(np.random.default_rng(3), (DRAWS, worlds))
     rows = rows[np.ptp(rows, axis=1) > 0]
@@ -47,14 +47,14 @@ def test_the_interval_holds_the_mean_as_often_as_it_says(kind: str, worlds: int)
     assert off <= others + 0.0035
 
 
-def test_too_few_have_none_and_worlds_that_are_all_alike_no_width() -> None:
+def test_too_few_have_none_and_worlds_that_are_all_alike_no_width():
     assert positive_interval([1.0, 2.0]) is None and positive_interval([np.nan, 1.0, 2.0]) is None
     assert positive_interval([4.0] * 9) == (4, 4, 4) and positive_interval([0.0] * 9) == (0, 0, 0)
     assert positive_interval([1.0, np.nan, 2.0, 4.0]) == positive_interval([1.0, 2.0, 4.0])
 
 
 @given(st.lists(st.floats(0, 1e6), min_size=3, max_size=12), st.floats(0.01, 100))
-def test_it_lies_about_the_mean_above_zero_and_goes_with_the_unit(values: list[float], unit: float) -> None:
+def test_it_lies_about_the_mean_above_zero_and_goes_with_the_unit(values, unit):
     found = positive_interval(values)
     assert found is not None
     if np.ptp(values) < 1e-6:
@@ -66,6 +66,6 @@ def test_it_lies_about_the_mean_above_zero_and_goes_with_the_unit(values: list[f
     assert scaled is not None and np.array(scaled) == pytest.approx(unit * np.array(found))
 
 
-def test_where_values_hardly_spread_it_is_students() -> None:
+def test_where_values_hardly_spread_it_is_students():
     values = 100 + np.random.default_rng(1).normal(0, 0.1, 20)
     assert np.array(positive_interval(values)) == pytest.approx(np.array(mean_interval(values)), abs=1e-4)

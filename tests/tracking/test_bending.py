@@ -24,7 +24,7 @@ def tilted(tilt: float, height: float = 60.0) -> tuple[Sensor, np.ndarray]:
 
 
 @given(POSE, PIXEL)
-def test_second_derivatives_are_those_of_the_pixels(pose: tuple, share: tuple) -> None:
+def test_second_derivatives_are_those_of_the_pixels(pose, share):
     poses = posed(pose, CROOKED)
     place = georeference_pixels(poses, np.array(share) * [640, 512], 0.0)
     assume(np.isfinite(place).all() and np.hypot(*place[:2] - poses.p_nc[:2]) < 600)
@@ -41,7 +41,7 @@ def test_second_derivatives_are_those_of_the_pixels(pose: tuple, share: tuple) -
     assert found == pytest.approx(sampled, rel=2e-3, abs=2e-3 * np.abs(found).max() + 1e-6)
 
 
-def test_a_tilted_camera_bends_by_its_tilt_and_one_that_looks_down_does_not() -> None:
+def test_a_tilted_camera_bends_by_its_tilt_and_one_that_looks_down_does_not():
     """Closed form on the axis: u = f x / (d + y sin a), v = f y cos a / (d + y sin a)."""
     tilt, s = 0.5, 4.0
     sensor, place = tilted(tilt)
@@ -54,7 +54,7 @@ def test_a_tilted_camera_bends_by_its_tilt_and_one_that_looks_down_does_not() ->
     assert left_out(1e6 * P, second_derivatives(*tilted(0.0)[:1], 0, tilted(0.0)[1])) == pytest.approx(0.0)
 
 
-def test_left_out_is_the_second_moment_of_the_second_order_part(rng: np.random.Generator) -> None:
+def test_left_out_is_the_second_moment_of_the_second_order_part(rng):
     D = second_derivatives(ranges_bearings([0.0, 0.0], 0.0), 0, [40.0, 30.0])
     e = rng.multivariate_normal([0, 0], SHAPE, 400_000)
     part = np.einsum("na,iab,nb->ni", e, D, e) / 2
@@ -64,13 +64,13 @@ def test_left_out_is_the_second_moment_of_the_second_order_part(rng: np.random.G
 
 
 @given(st.floats(1.1, 50.0))
-def test_the_share_grows_with_the_square_of_the_variance(factor: float) -> None:
+def test_the_share_grows_with_the_square_of_the_variance(factor):
     sensor, place = tilted(0.5)
     D, N = second_derivatives(sensor, 0, place), np.diag([4.0, 9.0])
     assert share_left_out(factor * SHAPE, D, N) == pytest.approx(factor**2 * share_left_out(SHAPE, D, N))
 
 
-def test_of_a_target_that_is_not_seen_nothing_is_said() -> None:
+def test_of_a_target_that_is_not_seen_nothing_is_said():
     sensor, _ = tilted(0.3)
     behind = second_derivatives(sensor, 0, [0.0, 1e5]), second_derivatives(sensor, 0, [0.0, -1e5])
     assert np.isnan([share_left_out(SHAPE, D, np.eye(2)) for D in behind]).sum() == 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -47,7 +46,7 @@ PROGRAM = (
 
 
 @pytest.mark.slow
-def test_copies_share_what_is_compiled_and_a_change_below_compiles_anew(tmp_path: Path) -> None:
+def test_copies_share_what_is_compiled_and_a_change_below_compiles_anew(tmp_path):
     def run(folder: str, factor: int) -> str:
         (tmp_path / folder).mkdir(exist_ok=True)
         (tmp_path / folder / "inner.py").write_text(INNER.format(factor))

@@ -1,7 +1,5 @@
 """Filters of positions and velocities against filterpy and the loop by hand; what every filter refuses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

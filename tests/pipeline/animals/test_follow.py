@@ -61,7 +61,7 @@ def particles(seed: int, speed_sd: float, fence: Array = FENCE) -> Particles:
     return Particles(walk_of(speed_sd, 1.0), fences, np.random.default_rng(seed), rules)
 
 
-def test_images_that_are_left_out_show_no_particle() -> None:
+def test_images_that_are_left_out_show_no_particle():
     images = over_and_over(1, 0.0)
     follower, clouds = particles(1, 0.0), list[tuple[float, Array]]()
 
@@ -91,7 +91,7 @@ def test_images_that_are_left_out_show_no_particle() -> None:
     assert asked > 10_000
 
 
-def test_every_image_with_a_detection_is_looked_at_and_every_station() -> None:
+def test_every_image_with_a_detection_is_looked_at_and_every_station():
     images = over_and_over(2, 0.5)
     done = follow(images, FLAT, DETECTOR, particles(2, 0.5), walk_of(0.5, 1.0))
     assert len(done.found) == len(images.z)
@@ -108,7 +108,7 @@ def every_image(images: Images, kalman: Kalman) -> Kalman:
     return kalman
 
 
-def test_a_kalman_filter_that_leaves_images_out_is_the_one_that_does_not() -> None:
+def test_a_kalman_filter_that_leaves_images_out_is_the_one_that_does_not():
     images = over_and_over(3, 0.5)
     motion = walk_of(0.5, 1.0)
     few = Kalman(motion, 0.99)
@@ -117,7 +117,7 @@ def test_a_kalman_filter_that_leaves_images_out_is_the_one_that_does_not() -> No
         assert np.allclose(one, other, rtol=1e-9)
 
 
-def test_a_kalman_track_is_the_textbooks() -> None:
+def test_a_kalman_track_is_the_textbooks():
     kalman, motion = Kalman(walk_of(0.5, 1.0), 0.99), walk_of(0.5, 1.0)
     first, second = np.array([[3.0, 4.0]]), np.array([[5.0, 4.5]])
     R = np.array([[[4.0, 1.0], [1.0, 2.0]]])
@@ -134,7 +134,7 @@ def test_a_kalman_track_is_the_textbooks() -> None:
     ).tolist() == [2, 0]
 
 
-def test_no_particle_leaves_the_fence_it_began_in() -> None:
+def test_no_particle_leaves_the_fence_it_began_in():
     cloud = particles(7, 2.0)
     look = Look(0.0, np.array([[70.0, 60.0]]), np.eye(2)[None], nowhere)
     cloud.step(look)
@@ -146,7 +146,7 @@ def test_no_particle_leaves_the_fence_it_began_in() -> None:
     assert cloud.herd.lost.tolist() == [True]
 
 
-def test_negative_information_moves_a_track_out_of_what_was_seen() -> None:
+def test_negative_information_moves_a_track_out_of_what_was_seen():
     cloud = particles(8, 0.5)
     whole = Look(0.0, np.array([[0.0, 0.0]]), 25 * np.eye(2)[None], nowhere)
     cloud.step(whole)
@@ -160,7 +160,7 @@ def test_negative_information_moves_a_track_out_of_what_was_seen() -> None:
     assert mean[0, 1] == pytest.approx(np.sqrt(2 / np.pi) * np.sqrt(25.25) * 9 / 11, rel=0.2)
 
 
-def test_a_ledger_knows_who_got_which_track_and_takes_a_false_detection_for_no_animal() -> None:
+def test_a_ledger_knows_who_got_which_track_and_takes_a_false_detection_for_no_animal():
     ledger = Ledger(3)
     ledger.enter(0, 0.0, np.arange(3), np.array([1, 2, 3]), {}, {1: 4.0, 2: 6.0, 3: 8.0})
     for image, time in ((1, 10.0), (2, 50.0)):
@@ -195,7 +195,7 @@ class Told:
     ("away", "motion", "told"),
     [(14.0, 0.0, True), (16.0, 0.0, False), (18.0, 0.5, True), (22.0, 0.5, False)],
 )
-def test_an_image_is_looked_at_where_an_animal_may_be_in_it(away: float, motion: float, told: bool) -> None:
+def test_an_image_is_looked_at_where_an_animal_may_be_in_it(away, motion, told):
     # A footprint of 10 m; an animal within 5 m of its track, which strays by 0.5 m in a second, four of it in
     # the four seconds up to the station.
     times = np.arange(6.0)
@@ -228,7 +228,7 @@ def flown(places: np.ndarray, visits: Visits, lives: int) -> Patrolled:
     )  # fmt: skip
 
 
-def test_rows_alone_reach_every_way_point_and_end() -> None:
+def test_rows_alone_reach_every_way_point_and_end():
     done = flown(np.array([[0.0, -100.0]]), VISITS._replace(worth_m2=np.inf), lives=2)
     assert (done.goal == SEARCH).all()
     length = 600.0
@@ -239,7 +239,7 @@ def test_rows_alone_reach_every_way_point_and_end() -> None:
     assert np.isinf(done.done).all() and not done.given_up
 
 
-def test_a_known_animal_is_gone_back_to_and_found_again() -> None:
+def test_a_known_animal_is_gone_back_to_and_found_again():
     done = flown(np.array([[-60.0, -100.0]]), VISITS, lives=2)
     visits = done.goal != SEARCH
     assert visits.any() and (done.goal[visits] == 1).all()
@@ -248,7 +248,7 @@ def test_a_known_animal_is_gone_back_to_and_found_again() -> None:
     assert all(done.goal[one.image] == 1 for one in back)
 
 
-def test_a_choice_is_the_greatest_of_f_5_2() -> None:
+def test_a_choice_is_the_greatest_of_f_5_2():
     done = flown(np.array([[-60.0, -100.0]]), VISITS, lives=2)
     reached = 0
     for k in range(1, len(done.times)):
@@ -264,13 +264,13 @@ def test_a_choice_is_the_greatest_of_f_5_2() -> None:
         assert (done.goal[k] != SEARCH) == bool(len(worth) and worth.max() > search)
 
 
-def test_an_enclosure_with_all_its_animals_is_left() -> None:
+def test_an_enclosure_with_all_its_animals_is_left():
     done = flown(np.array([[-60.0, -100.0], [40.0, -100.0]]), VISITS._replace(worth_m2=np.inf), lives=2)
     assert np.isfinite(done.done).all()
     assert done.times[-1] < done.done[0] + 2 and done.times[-1] < 60
 
 
-def test_a_search_ends_once_its_patience_does() -> None:
+def test_a_search_ends_once_its_patience_does():
     there = np.full((len(TIMES), 1, 2), [-60.0, -100.0])
     there[25:] = [140.0, 140.0]  # seen once, then across the field at once
     done = flown(there, VISITS, lives=3)
@@ -281,7 +281,7 @@ def test_a_search_ends_once_its_patience_does() -> None:
     assert ends < len(done.goal)  # and then flies on
 
 
-def test_what_is_seen_as_patience_ends_is_not_given_up() -> None:
+def test_what_is_seen_as_patience_ends_is_not_given_up():
     there = np.full((len(TIMES), 1, 2), [-60.0, -100.0])
     whole = flown(there, VISITS._replace(patience=0.0), lives=2)
     assert (whole.goal == 1).any() and not whole.given_up

@@ -70,9 +70,7 @@ VIEWS = [
 
 
 @pytest.mark.parametrize(("kind", "view"), list(zip(sorted(ANIMALS), [*VIEWS, *VIEWS], strict=False)))
-def test_an_animal_is_where_the_terrain_puts_it(
-    kind: str, view: tuple[tuple[float, float], float, float, float]
-) -> None:
+def test_an_animal_is_where_the_terrain_puts_it(kind, view):
     place, roll, pitch, yaw = view
     at = np.array(place)
     pose = looking_at(at, roll, pitch, yaw)
@@ -88,7 +86,7 @@ def test_an_animal_is_where_the_terrain_puts_it(
     assert np.linalg.norm(pixels.mean(axis=0) - want) < 0.15 * k.length * per_m + 0.5
 
 
-def test_an_animal_behind_a_ridge_does_not_show() -> None:
+def test_an_animal_behind_a_ridge_does_not_show():
     height = np.zeros((101, 101), np.float32)
     height[60] = 25.0
     ridge = Terrain(height, north=-100.0, east=-100.0, step=2.0)
@@ -102,7 +100,7 @@ def test_an_animal_behind_a_ridge_does_not_show() -> None:
     assert [frame.animal[seen.number] for seen in frame.view.seen] == [1]
 
 
-def test_strewn_things_lie_within_their_fences_and_are_the_same_for_the_same_seed() -> None:
+def test_strewn_things_lie_within_their_fences_and_are_the_same_for_the_same_seed():
     fence = np.array([[40.0, -80.0], [40.0, 60.0], [-60.0, 60.0], [-60.0, -80.0]])
     one, other = (furnish(HILLS, [fence], 3, NIGHT, np.random.default_rng(7)) for _ in range(2))
     assert one.animals == other.animals and one.others == other.others
@@ -125,7 +123,7 @@ def detections(*boxes: tuple[int, int, int, int]) -> Detections:
     )
 
 
-def test_detections_are_judged_by_what_is_under_them() -> None:
+def test_detections_are_judged_by_what_is_under_them():
     labels = np.zeros(SHAPE)
     labels[50:60, 100:120] = 1  # animal 4
     labels[150:160, 200:220] = 2  # a stone
@@ -161,7 +159,7 @@ def framed(labels: Array, find: Callable[[np.ndarray, float], Detections]) -> Fr
     )  # fmt: skip
 
 
-def test_detections_go_to_the_ground_from_the_told_pose() -> None:
+def test_detections_go_to_the_ground_from_the_told_pose():
     labels = np.zeros(SHAPE)
     labels[50:61, 100:121] = 1
     asked = []
@@ -185,12 +183,12 @@ def test_detections_go_to_the_ground_from_the_told_pose() -> None:
     assert (np.trace(images.R, axis1=1, axis2=2) > 2 * ((DETECTOR.sd * per_px) ** 2 + 0.5**2) * 0.99).all()
 
 
-def test_frames_without_detections_give_images_without() -> None:
+def test_frames_without_detections_give_images_without():
     found = framed(np.zeros(SHAPE), lambda counts, distance: detections())
     assert found.images.z.shape == (0, 2) and found.uv.shape == (0, 2) and not len(found.standing)
 
 
-def test_the_distance_to_the_ground_is_limited() -> None:
+def test_the_distance_to_the_ground_is_limited():
     assert ground_distance(HILLS, looking_at(np.array([10.0, 10.0]), 0, 0, 0)) == pytest.approx(60, abs=3)
     up = poses(np.array([0.0, 0.0, -90.0]), np.diag([1.0, -1.0, -1.0]) @ R_MC_DOWN)
     assert ground_distance(HILLS, up) == FURTHEST

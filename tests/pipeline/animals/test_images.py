@@ -46,9 +46,7 @@ places = st.floats(-60.0, 60.0)
 
 @settings(max_examples=40, deadline=None)
 @given(places, places, st.floats(5.0, 60.0), tilts, st.floats(-0.4, 0.4), st.floats(-3.1, 3.1))
-def test_all_that_an_image_shows_lies_in_its_circle(
-    north: float, east: float, above: float, roll: float, pitch: float, yaw: float
-) -> None:
+def test_all_that_an_image_shows_lies_in_its_circle(north, east, above, roll, pitch, yaw):
     one = pose(north, east, above, roll, pitch, yaw)
     middle, radius = footprint_circles(LAND, one)
     grid = np.stack(np.meshgrid(np.arange(-145, 145, 2.5), np.arange(-145, 145, 2.5)), axis=-1).reshape(-1, 2)
@@ -59,7 +57,7 @@ def test_all_that_an_image_shows_lies_in_its_circle(
     assert np.array_equal(sight(grid), seen.astype(float))
 
 
-def test_shown_is_what_projects_into_the_image_over_level_ground() -> None:
+def test_shown_is_what_projects_into_the_image_over_level_ground():
     R = euler_to_matrix(0.3, 0.1, 0.7) @ R_MC_DOWN
     p = np.array([5.0, -3.0, -50.0])
     grid = np.stack(np.meshgrid(np.arange(-60, 60, 3.0), np.arange(-60, 60, 3.0)), axis=-1).reshape(-1, 2)
@@ -70,7 +68,7 @@ def test_shown_is_what_projects_into_the_image_over_level_ground() -> None:
     assert 0 < seen.sum() < len(grid)
 
 
-def test_a_hill_hides_what_is_behind_it() -> None:
+def test_a_hill_hides_what_is_behind_it():
     ridge = with_wall(20, 30.0)
     R = euler_to_matrix(-1.2, 0.0, 0.0) @ R_MC_DOWN  # to the right, east
     p = np.array([0.0, 0.0, -12.0])
@@ -79,7 +77,7 @@ def test_a_hill_hides_what_is_behind_it() -> None:
     assert not shown(ridge, CAMERA, p, R, behind, EXACT).any()
 
 
-def test_without_errors_detections_are_where_the_animals_are() -> None:
+def test_without_errors_detections_are_where_the_animals_are():
     rng = np.random.default_rng(1)
     one = pose(10.0, 20.0, 40.0, 0.4, -0.1, 1.0)
     grid = np.stack(np.meshgrid(np.arange(-60, 100, 4.0), np.arange(-60, 100, 4.0)), axis=-1).reshape(-1, 2)
@@ -93,7 +91,7 @@ def test_without_errors_detections_are_where_the_animals_are() -> None:
 
 @pytest.mark.parametrize("heading", [0.6, 2.5])
 @pytest.mark.parametrize("errors", [SOME, ROLLS, PITCHES, NONE])
-def test_covariances_are_those_of_many_flights(heading: float, errors: ExecutionErrors) -> None:
+def test_covariances_are_those_of_many_flights(heading, errors):
     rng = np.random.default_rng(2)
     count = 6000
     R = euler_to_matrix(0.5, 0.1, heading) @ R_MC_DOWN
@@ -115,7 +113,7 @@ def test_covariances_are_those_of_many_flights(heading: float, errors: Execution
     assert drawn / scale == pytest.approx(said / scale, abs=0.08)
 
 
-def test_errors_of_a_way_are_the_drawn_ones() -> None:
+def test_errors_of_a_way_are_the_drawn_ones():
     one = pose(0.0, 0.0, 50.0, 0.1, 0.0, 0.3).take(np.zeros(50, int))
     headings = np.linspace(0, 3, 50)
     whole = with_errors(one, headings, SOME, 0.5, np.random.default_rng(4))
@@ -126,7 +124,7 @@ def test_errors_of_a_way_are_the_drawn_ones() -> None:
     assert np.allclose(alone.R_nc, whole.R_nc[row]) and np.allclose(alone.p_nc, whole.p_nc[row])
 
 
-def test_images_detect_only_what_they_show_and_so_often() -> None:
+def test_images_detect_only_what_they_show_and_so_often():
     rng = np.random.default_rng(5)
     T, A = 400, 6
     told = pose(0.0, 0.0, 50.0, 0.0, 0.0, 0.0).take(np.zeros(T, int))
@@ -149,7 +147,7 @@ def test_images_detect_only_what_they_show_and_so_often() -> None:
         np.testing.assert_array_equal(one, other)
 
 
-def test_a_covariance_is_that_of_the_distance_to_the_middle_of_the_animal() -> None:
+def test_a_covariance_is_that_of_the_distance_to_the_middle_of_the_animal():
     # Straight down from 4 m: an animal's middle is 3.3 m away, a pixel there that over the focal length.
     told = CameraPoses.at_lens(CAMERA, np.array([[0.0, 0.0, -4.0]]), R_MC_DOWN[None], np.eye(3))
     at, detector = np.zeros((1, 2)), EXACT._replace(sd=2.0)

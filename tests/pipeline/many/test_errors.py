@@ -61,7 +61,7 @@ sd_s = 0.5
 NOISE = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
 
 
-def test_a_place_moves_as_what_it_was_computed_from() -> None:
+def test_a_place_moves_as_what_it_was_computed_from():
     """Each error undone by hand: the place moves by what one standard deviation of it is said to do."""
     flight = robot_flight(seconds=20.0)
     found = places(flight, ALL)
@@ -80,7 +80,7 @@ def test_a_place_moves_as_what_it_was_computed_from() -> None:
             assert np.allclose(scan.shared[0, :, i], expected[name]), name
 
 
-def test_all_errors_of_a_look_move_its_detections_alike() -> None:
+def test_all_errors_of_a_look_move_its_detections_alike():
     flight = robot_flight(kind="position", clutter=3, seconds=20.0, labelled=False)
     text = "[sensors.radar.considered.platform_north]\nsd_m = 3.0\n"
     for scan in places(flight, text).scans:
@@ -110,7 +110,7 @@ def taken(flight: Flight, observed: Observations, lasting_s: float = np.inf) -> 
     return told, of_poses(flight, observed, told, belief, lasting_s)
 
 
-def test_an_error_stays_itself_along_the_flight() -> None:
+def test_an_error_stays_itself_along_the_flight():
     """From one look to the next as the Schmidt filter carries it; and a roll moves places as rays say."""
     flight, observed = _pixels()
     rows = np.flatnonzero(np.isfinite(observed.poses.p_nb).all(axis=1))[:300]
@@ -141,7 +141,7 @@ def test_an_error_stays_itself_along_the_flight() -> None:
         assert np.allclose(shared[linear][..., i], -by_hand[linear], rtol=0.02, atol=0.02)
 
 
-def test_errors_of_one_name_are_one_and_those_that_move_nothing_none() -> None:
+def test_errors_of_one_name_are_one_and_those_that_move_nothing_none():
     one = Errors(("heading", "a: bias", "idle"), (30.0, np.inf, 5.0))
     two = Errors(("heading",), (20.0,))
     J, K = np.ones((2, 2, 3)), 7 * np.ones((1, 2, 1))
@@ -153,7 +153,7 @@ def test_errors_of_one_name_are_one_and_those_that_move_nothing_none() -> None:
     assert laid_out([]) == ((), [])
 
 
-def test_a_heading_that_is_off_is_in_the_covariance_of_tracks() -> None:
+def test_a_heading_that_is_off_is_in_the_covariance_of_tracks():
     """Three degrees at 100 m are five metres for the whole flight."""
     nees = []
     flight = robot_flight(heading_off_deg=3.0, labelled=False)
@@ -167,7 +167,7 @@ def test_a_heading_that_is_off_is_in_the_covariance_of_tracks() -> None:
     assert nees[0] > 10 and 0.2 < nees[1] < 1.2
 
 
-def test_what_is_considered_of_a_camera_is_in_its_pose() -> None:
+def test_what_is_considered_of_a_camera_is_in_its_pose():
     """In place of what is assumed, on top of a covariance that poses have; pixels are as noisy as told."""
     flight, observed = _pixels()
     text = "[sensors.manual.noise]\npixel_px = 7.0\n[sensors.manual.considered.heading]\nsd_deg = 9.0\n"
@@ -188,7 +188,7 @@ def test_what_is_considered_of_a_camera_is_in_its_pose() -> None:
     assert np.allclose(in_n[seen], np.diag([0, 0, np.radians(9.0) ** 2]), atol=1e-12)
 
 
-def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it() -> None:
+def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it():
     def of(text: str) -> float:
         return lasting_of(parse_settings(text).sensors.get("eye"))
 
@@ -201,7 +201,7 @@ def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it() -> None:
     assert of("[sensors.eye.considered.clock]\nsd_s = 0.1\ncorrelation_time_s = 0.5\n") == 0.0
 
 
-def test_mount_and_ground_are_in_what_is_shared_and_stay() -> None:
+def test_mount_and_ground_are_in_what_is_shared_and_stay():
     flight, observed = _pixels()
     errors = pose_errors(flight, observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
     points = georeference(flight, observed, np.random.default_rng(0), errors)
@@ -214,7 +214,7 @@ def test_mount_and_ground_are_in_what_is_shared_and_stay() -> None:
     assert (np.abs(shared[linear][..., 6:]).max(axis=(0, 1)) > 0.01).all()
 
 
-def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one() -> None:
+def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one():
     flight, observed = _pixels()
     own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
     own[::3] = np.nan
@@ -224,7 +224,7 @@ def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one() -> N
     assert np.allclose(told.pose[::3], usual.pose[::3]) and np.allclose(told.pose[1::3], own[1::3])
 
 
-def test_tables_of_tracks_are_smoothed_by_what_lasts() -> None:
+def test_tables_of_tracks_are_smoothed_by_what_lasts():
     told = NOISE + "[sensors.radar.considered.heading]\nsd_deg = 3.0\ncorrelation_time_s = 5.0\n"
     followed = follow_all(robot_flight(labelled=False, seconds=60.0), settings=parse_settings(told))
     table = tracks_table(followed)
@@ -235,7 +235,7 @@ def test_tables_of_tracks_are_smoothed_by_what_lasts() -> None:
     assert not np.allclose(x, np.concatenate([x[:, 0] for x, _ in forever]))
 
 
-def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_last() -> None:
+def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_last():
     flight = robot_flight(labelled=False, seconds=30.0)
     covariances = []
     for more in ("", "[sensors.radar]\ncorrelation = 0.0\n", "[sensors.radar]\ncorrelation = 0.8\n"):
@@ -245,7 +245,7 @@ def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_la
     assert np.isnan(covariances[0]) and covariances[2] > 1.5 * covariances[1]
 
 
-def test_an_error_of_the_heading_stays_one_whichever_way_the_body_lies() -> None:
+def test_an_error_of_the_heading_stays_one_whichever_way_the_body_lies():
     """A turn about the vertical; and the whole is the covariance that poses without one are given."""
     angles = np.random.default_rng(5).uniform(-1, 1, (50, 3)) * np.pi
     angles[:5, 1] = -np.pi / 2
@@ -260,7 +260,7 @@ def test_an_error_of_the_heading_stays_one_whichever_way_the_body_lies() -> None
     assert np.allclose(roots[:, 3:, 5], by_hand * sd[5], atol=1e-6)
 
 
-def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places() -> None:
+def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places():
     """North, east and heading, by the same closed form: a radar on board has one and the same error."""
     flight, observed = _pixels()
     told, of_pose = taken(flight, observed, 30.0)
@@ -279,7 +279,7 @@ def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places() -> None:
     assert np.allclose(shared[known][..., 5], turned[known], rtol=1e-6, atol=1e-6)
 
 
-def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last() -> None:
+def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last():
     flight, observed = _pixels()
     radar = Errors(("heading", "radar: range_bias"), (np.inf, np.inf))
     for lasting_s, twice in ((0.0, True), (30.0, False)):
@@ -296,7 +296,7 @@ def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last() ->
     assert names == (*POSE[:5], "manual: heading")
 
 
-def test_one_error_of_two_sensors_lasts_as_long_as_the_shorter_says() -> None:
+def test_one_error_of_two_sensors_lasts_as_long_as_the_shorter_says():
     moves = [np.ones((1, 2, 1))]
     for times in ((10.0, 30.0), (30.0, 10.0)):
         lasting_s, _ = laid_out([(Errors(("heading",), (one,)), moves) for one in times])

@@ -1,7 +1,5 @@
 """All targets of a flight at once: found without names, beside the truth, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +11,7 @@ from wildlab.flight.following import parse_settings, settings_over
 from wildlab.pipeline.many.follow import complete_looks, follow_all, judged, known_looks, tracks_table
 
 
-def test_a_boat_among_clutter_is_found_without_its_name() -> None:
+def test_a_boat_among_clutter_is_found_without_its_name():
     flight = robot_flight(kind="position", clutter=2, labelled=False, seed=3)
     followed = follow_all(flight)
     lives = judged(followed)
@@ -27,19 +25,19 @@ def test_a_boat_among_clutter_is_found_without_its_name() -> None:
     assert (longest["existence"] > 0.5).all() and {"p_00", "p_33", "kind_1"} <= set(longest)
 
 
-def test_without_truth_there_is_nothing_to_compare() -> None:
+def test_without_truth_there_is_nothing_to_compare():
     followed = follow_all(robot_flight(kind="position", truth=False))
     assert judged(followed) is None and followed.truth == {} and followed.minutes > 1
 
 
-def test_a_target_out_of_reach_costs_nothing() -> None:
+def test_a_target_out_of_reach_costs_nothing():
     followed = follow_all(robot_flight(kind="position", labelled=False))
     lives = judged(followed, {"boat": 1.0})
     assert lives is not None and lives.targets["boat"].visible == 0
     assert max(one.distance for one in lives.gospa) == 0
 
 
-def test_bearings_help_where_places_are_known_and_begin_nothing_alone() -> None:
+def test_bearings_help_where_places_are_known_and_begin_nothing_alone():
     """They are exact here, and the places wrong by metres: across the line of sight tracks are nearer."""
     places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
     both = joined(places, bearings)
@@ -59,7 +57,7 @@ def test_bearings_help_where_places_are_known_and_begin_nothing_alone() -> None:
         follow_all(bearings)
 
 
-def test_bearings_whose_errors_last_are_thinned() -> None:
+def test_bearings_whose_errors_last_are_thinned():
     places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
     both = joined(places, bearings)
     followed = follow_all(both, settings=parse_settings("[sensors.eye]\nthinning_s = 5.0\n"))
@@ -83,12 +81,12 @@ HULL = "[[targets.many.hulls]]\nname = 'a'\n"
         ("[sensors.radar.many]\nnear_m = 300\nfar_m = 20\n", "far_m"),
     ],
 )
-def test_settings_that_nothing_can_satisfy_are_refused(text: str, words: str) -> None:
+def test_settings_that_nothing_can_satisfy_are_refused(text, words):
     with refused(words):
         follow_all(robot_flight(kind="position"), settings=parse_settings(text))
 
 
-def test_only_what_an_image_shows_or_a_detection_names_could_be_seen() -> None:
+def test_only_what_an_image_shows_or_a_detection_names_could_be_seen():
     followed = follow_all(robot_flight(kind="position", labelled=False))
     away = [scan._replace(sees=lambda at: np.zeros(len(at), bool)) for scan in followed.scans]
     lives = judged(followed._replace(scans=away))
@@ -98,13 +96,13 @@ def test_only_what_an_image_shows_or_a_detection_names_could_be_seen() -> None:
     assert lives is not None and lives.targets["boat"].visible == 30
 
 
-def test_no_track_leaves_an_empty_table() -> None:
+def test_no_track_leaves_an_empty_table():
     text = "[targets.many]\nhits = 1000\n"
     followed = follow_all(robot_flight(kind="position"), settings=parse_settings(text))
     assert list(tracks_table(followed)) == ["time_s", "sensor", "track", "north_m", "east_m"]
 
 
-def test_where_a_true_place_is_not_known_nothing_is_judged() -> None:
+def test_where_a_true_place_is_not_known_nothing_is_judged():
     """The truth ends half-way: a track on a boat that is still there is not false."""
     flight = robot_flight(kind="position", seconds=100.0)
     truth = flight.table("truth")
@@ -115,7 +113,7 @@ def test_where_a_true_place_is_not_known_nothing_is_judged() -> None:
     assert lives.false_tracks_per_minute == 0 and not any(one.n_false for one in lives.gospa)
 
 
-def test_where_some_true_places_are_known_tracks_on_others_are_not_judged() -> None:
+def test_where_some_true_places_are_known_tracks_on_others_are_not_judged():
     """Another boat's truth is known for half of the time: a track may be on it for the rest."""
     flight = robot_flight(kind="position", seconds=100.0)
     truth = flight.table("truth")
@@ -127,7 +125,7 @@ def test_where_some_true_places_are_known_tracks_on_others_are_not_judged() -> N
     assert lives.incomplete == int((~whole).sum()) and len(lives.gospa) == len(whole)
 
 
-def test_detections_that_are_no_sensors_are_told_and_not_left_out_in_silence() -> None:
+def test_detections_that_are_no_sensors_are_told_and_not_left_out_in_silence():
     flight = robot_flight()
     frames, seen = flight.table("frames").assign(sensor="radar"), flight.table("detections")
     some = seen.assign(source=np.where(np.arange(len(seen)) < 5, "rader", "radar"))
@@ -136,7 +134,7 @@ def test_detections_that_are_no_sensors_are_told_and_not_left_out_in_silence() -
     assert not any("are not used" in note for note in follow_all(flight).notes)
 
 
-def test_what_settings_say_in_vain_is_named_and_not_considered() -> None:
+def test_what_settings_say_in_vain_is_named_and_not_considered():
     text = "[sensors.rader.many]\ndetection = 0.7\n[sensors.radar.considered.clock]\nsd_s = 2.0\n"
     text += "[sensors.radar.considered.heading]\nsd_deg = 2.0\n"
     followed = follow_all(robot_flight(), settings=parse_settings(text))
@@ -146,20 +144,20 @@ def test_what_settings_say_in_vain_is_named_and_not_considered() -> None:
     assert followed.lasting_s == (np.inf,)  # of the heading alone
 
 
-def test_settings_for_many_are_merged_key_by_key() -> None:
+def test_settings_for_many_are_merged_key_by_key():
     own = parse_settings('[targets.many]\nhits = 4\n[[targets.many.hulls]]\nname = "ship"\n')
     many = settings_over(parse_settings("[targets.many]\ngate = 3.0\n"), own).targets.many
     assert many is not None and (many.gate, many.hits, many.hulls[0].name) == (3.0, 4, "ship")
 
 
-def test_calm_motions_are_used_where_they_are_stated() -> None:
+def test_calm_motions_are_used_where_they_are_stated():
     calm = parse_settings("[targets.many]\ncalm = 0.2\nstay_s = 12.0\n")
     found = follow_all(robot_flight(kind="position", seconds=20.0), settings=calm)
     assert (found.targets.calm, found.targets.stay_s) == (0.2, 12.0)
     assert found.shown[-1].kinds.shape == (1, 1)
 
 
-def test_what_the_truth_may_be_off_is_beside_the_tracks_own() -> None:
+def test_what_the_truth_may_be_off_is_beside_the_tracks_own():
     """Fixes of a receiver that is wrong by metres: without its own error tracks would be called wrong.
 
     Where nobody states it, it is estimated from how rough they are.
@@ -179,7 +177,7 @@ def test_what_the_truth_may_be_off_is_beside_the_tracks_own() -> None:
     assert followed.truth_estimated == ["boat"] and followed.truth_sd["boat"] == pytest.approx(5.0, rel=0.1)
 
 
-def test_how_near_a_track_counts_and_whether_others_are_about_is_stated() -> None:
+def test_how_near_a_track_counts_and_whether_others_are_about_is_stated():
     flight = robot_flight(kind="position", clutter=2, labelled=False, seed=3, heading_off_deg=8.0)
     near, far = (
         judged(follow_all(flight, settings=parse_settings(f"[targets]\nreach_m = {reach}\n")))

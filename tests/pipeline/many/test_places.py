@@ -30,7 +30,7 @@ def places(flight: Flight, text: str = "", sensor: str = "radar", source: str | 
     return places_of(flight, scans, belief, 0, source)
 
 
-def test_ranges_and_bearings_lie_where_the_boat_is() -> None:
+def test_ranges_and_bearings_lie_where_the_boat_is():
     found = places(robot_flight(range_sd=1e-9, bearing_sd_deg=1e-9))
     assert len(found.scans) > 200 and found.without == 0
     for scan in found.scans[::40]:
@@ -39,7 +39,7 @@ def test_ranges_and_bearings_lie_where_the_boat_is() -> None:
         assert scan.sees is None
 
 
-def test_covariances_are_those_of_errors_drawn_at_random() -> None:
+def test_covariances_are_those_of_errors_drawn_at_random():
     scan = places(robot_flight(seconds=30.0), NOISE).scans[20]
     off = scan.z[0] - scan.platform
     rng = np.random.default_rng(0)
@@ -49,7 +49,7 @@ def test_covariances_are_those_of_errors_drawn_at_random() -> None:
     assert np.allclose(scan.R[0], drawn, atol=0.03 * np.trace(drawn))
 
 
-def test_a_range_no_longer_than_the_drop_tells_no_place() -> None:
+def test_a_range_no_longer_than_the_drop_tells_no_place():
     """From 100 m up: below that it is noise, and just above it along the line of sight nobody knows much."""
     scans: Any = SimpleNamespace(
         detections=np.array([[[99.0, 0.3], [100.0, 0.3], [100.001, 0.3], [125.0, 0.3]]]),
@@ -65,7 +65,7 @@ def test_a_range_no_longer_than_the_drop_tells_no_place() -> None:
     assert np.allclose(along, [0.5 * 100.001 / np.sqrt(100.001**2 - 1e4), 0.5 * 125 / 75])
 
 
-def test_a_slant_range_tells_less_of_the_place_on_the_level() -> None:
+def test_a_slant_range_tells_less_of_the_place_on_the_level():
     """50 m to what lies 30 m below is 40 m on the level, which change by 5 m where the range does by 4 m."""
     flight = robot_flight(seconds=30.0)
     scans, belief = believed(flight, NOISE)
@@ -78,7 +78,7 @@ def test_a_slant_range_tells_less_of_the_place_on_the_level() -> None:
     assert np.allclose(towards @ scan.R[0] @ towards.T, np.diag([2.5, 40 * np.radians(1.5)]) ** 2)
 
 
-def test_positions_are_taken_as_they_are() -> None:
+def test_positions_are_taken_as_they_are():
     noise = "[sensors.radar.noise]\nposition_m = 1.5\n"
     found = places(robot_flight(kind="position", clutter=2, labelled=False), noise)
     assert np.allclose(found.scans[0].R, 1.5**2 * np.eye(2))
@@ -89,7 +89,7 @@ def test_positions_are_taken_as_they_are() -> None:
 
 
 @pytest.mark.slow
-def test_pixels_are_where_georeferencing_puts_them() -> None:
+def test_pixels_are_where_georeferencing_puts_them():
     flight = simulate_twin("large-ship", 1)
     scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
     found = places(flight, "", scans.sensor, "autopilot")
@@ -112,7 +112,7 @@ def looking(R_nb: np.ndarray, north_east: tuple[float, float], plane: float) -> 
 
 
 @pytest.mark.parametrize("tilt_deg", [10.0, 60.0, 85.0])
-def test_an_image_shows_what_lies_under_its_pixels(tilt_deg: float) -> None:
+def test_an_image_shows_what_lies_under_its_pixels(tilt_deg):
     """Also where its upper edge looks past the horizon: rays of pixels are the truth."""
     scans = looking(euler_to_matrix(0.0, np.radians(tilt_deg), 0.0), (5.0, -8.0), 3.0)
     sees = sees_of(scans, 0)
@@ -126,7 +126,7 @@ def test_an_image_shows_what_lies_under_its_pixels(tilt_deg: float) -> None:
     assert not sees(np.array([[-5000.0, -8.0]])).any(), "behind the camera"
 
 
-def test_how_much_ground_an_image_covers() -> None:
+def test_how_much_ground_an_image_covers():
     """Straight down from 60 m: 640 x 512 pixels of 60 / 700 m."""
     nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
     look = Scan(0.0, 0, np.zeros(2), *nothing, sees_of(looking(np.eye(3), (0.0, 0.0), 0.0), 0))
@@ -135,7 +135,7 @@ def test_how_much_ground_an_image_covers() -> None:
 
 
 @pytest.mark.parametrize("count", [3, 120])
-def test_the_ground_covered_is_that_of_most_looks(count: int) -> None:
+def test_the_ground_covered_is_that_of_most_looks(count):
     """The first one sees nothing, as before a camera is turned on, and the others everything."""
     nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
     looks = [
@@ -146,7 +146,7 @@ def test_the_ground_covered_is_that_of_most_looks(count: int) -> None:
     assert found.area(50.0) == pytest.approx(np.pi * 50.0**2)
 
 
-def test_bearings_are_taken_as_they_are() -> None:
+def test_bearings_are_taken_as_they_are():
     flight = robot_flight(kind="bearing")
     scans, belief = believed(flight)
     found = places(flight)
@@ -156,6 +156,6 @@ def test_bearings_are_taken_as_they_are() -> None:
     assert np.allclose(found.scans[row].R, belief.noise[0] ** 2) and found.scans[row].R.shape[1:] == (1, 1)
 
 
-def test_what_tells_no_place_is_refused() -> None:
+def test_what_tells_no_place_is_refused():
     with refused("nothing of a place"):
         places(robot_flight(kind="velocity"))

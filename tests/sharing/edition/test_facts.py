@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -26,7 +25,7 @@ ERROR = {
 }
 
 
-def test_errors_and_gains() -> None:
+def test_errors_and_gains():
     places = report("georeferencing", {
         **ERROR,
         ("gain", "winner"): {"value": 1.5, "n": 40, "low": 1.0, "high": 2.0},
@@ -49,14 +48,14 @@ def test_errors_and_gains() -> None:
     assert facts.possible is None and facts.lacking == ("tracking", "navigation")
 
 
-def test_a_gain_that_is_not_certain_is_possible() -> None:
+def test_a_gain_that_is_not_certain_is_possible():
     places = report("georeferencing", {**ERROR, ("gain", "winner"): {"value": 1.0, "low": -0.5, "high": 2.0}})
     facts = facts_of(flight(overview({"troubled": 1}), places))
     assert facts.possible is not None and (facts.possible.value, facts.possible.of) == (1.0, 4.0)
     assert facts.verdict == "look closer"
 
 
-def test_alarms_stand_in_order_and_troubles_by_time() -> None:
+def test_alarms_stand_in_order_and_troubles_by_time():
     facts = facts_of(flight(overview(
         {"broken": 1}, alarm__shakes={"value": 70.0, "n": 1}, alarm__jumps={"value": 9.0, "n": 2},
         **{"trouble__no-poses": {"value": 3.0}, "trouble__fewer-than-6-satellites": {"value": 30.0}},
@@ -66,7 +65,7 @@ def test_alarms_stand_in_order_and_troubles_by_time() -> None:
     assert facts.verdict == "went wrong"
 
 
-def test_tracks_of_the_filter_that_is_spoken_of() -> None:
+def test_tracks_of_the_filter_that_is_spoken_of():
     """Of two filters the one that its page leads with; the median over its tracks."""
 
     def track(sensor: str, name: str, rmse: float, nees: float) -> dict[tuple[str, str], dict[str, float]]:
@@ -88,13 +87,13 @@ def test_tracks_of_the_filter_that_is_spoken_of() -> None:
 
 
 @pytest.mark.parametrize(("pictured", "others"), [({"value": 0}, True), ({"value": 7}, False), (None, False)])
-def test_whether_a_camera_detected_anything(pictured: dict[str, int] | None, others: bool) -> None:
+def test_whether_a_camera_detected_anything(pictured, others):
     more = {} if pictured is None else {"detections_in_images": pictured}
     assert facts_of(flight(overview(detections={"value": 60}, **more))).other_sensors is others
 
 
 @pytest.mark.parametrize("off_deg", [2.0, 0.0])
-def test_a_filter_is_as_sure_as_the_tracking_report_found(off_deg: float, tmp_path: Path) -> None:
+def test_a_filter_is_as_sure_as_the_tracking_report_found(off_deg, tmp_path):
     """Through the report's own metrics.json: a filter that knows of no error of the heading."""
     settings = parse_settings(KNOWN)
     followed = follow_targets(robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=settings)
@@ -122,9 +121,7 @@ def test_a_filter_is_as_sure_as_the_tracking_report_found(off_deg: float, tmp_pa
         (118.0, None, False),
     ],
 )
-def test_only_what_moves_high_above_the_ground_is_known_to_fly(
-    height: float | None, way: float | None, flown: bool
-) -> None:
+def test_only_what_moves_high_above_the_ground_is_known_to_fly(height, way, flown):
     known = {"height_above_ground": height, "path_length": way}
     values = {name: {"value": value} for name, value in known.items() if value is not None}
     assert facts_of(flight(overview(**values))).flown == flown

@@ -38,7 +38,7 @@ def whole(path: Path) -> dict[str, Any]:
     return dict(leaves(tomllib.loads(path.read_text(encoding="utf-8"))))
 
 
-def test_all_files_have_the_same_keys_and_placeholders() -> None:
+def test_all_files_have_the_same_keys_and_placeholders():
     english = whole(ENGLISH)
     assert languages()[0] == "en" and {"nb", "sv"} <= set(languages())
     for code in languages():
@@ -76,7 +76,7 @@ def test_all_files_have_the_same_keys_and_placeholders() -> None:
         ("sv", Day(date(2026, 3, 14), False), "mars 2026 (UTC)"),
     ],
 )  # fmt: skip
-def test_numbers_and_dates(code: str, said: Any, shown: str) -> None:
+def test_numbers_and_dates(code, said, shown):
     text = say(load_language(code), said)
     assert text.replace(SPACE, " ") == shown.replace(SPACE, " ")
     if isinstance(said, Quantity):
@@ -84,19 +84,19 @@ def test_numbers_and_dates(code: str, said: Any, shown: str) -> None:
 
 
 @given(st.floats(-1e9, 1e9), st.sampled_from(["length", "number", "area", "duration"]))
-def test_no_number_is_shown_with_a_minus_and_nothing(value: float, kind: str) -> None:
+def test_no_number_is_shown_with_a_minus_and_nothing(value, kind):
     text = say(load_language("sv"), Quantity(kind, abs(value) if kind != "number" else value))
     assert text.strip() and not text.startswith("−0 ") and text != "−0"
 
 
-def test_one_and_many() -> None:
+def test_one_and_many():
     nb = load_language("nb")
     assert say(nb, Said("steps.some", {}, 1)) == "omtrent ett skritt"
     assert say(nb, Said("steps.some", {}, 4)) == "omtrent 4 skritt"
     assert say(load_language(), (Said("cause.any"),) * 3).count("something") == 3
 
 
-def test_a_value_is_no_template() -> None:
+def test_a_value_is_no_template():
     """A name that looks like a placeholder stays a name."""
     shown = say(load_language(), Said("page.title", {"name": "{name} {n} **x**"}))
     assert "{name} {n} **x**" in shown
@@ -108,7 +108,7 @@ def partners(tmp_path: Path, text: str) -> Path:
     return path
 
 
-def test_a_partner_adds_a_language(tmp_path: Path) -> None:
+def test_a_partner_adds_a_language(tmp_path):
     path = partners(tmp_path, '[verdict]\nsound = "Hakuna kosa"\n')
     own = load_language(path)
     assert own.code == "sw" and own.name == "Kiswahili"
@@ -132,14 +132,14 @@ def test_a_partner_adds_a_language(tmp_path: Path) -> None:
         ('[tile]\nseen = "' + "x" * 401 + '"', "tile.seen", "401"),
     ],
 )
-def test_a_text_that_cannot_be_used_is_named(tmp_path: Path, text: str, field: str, problem: str) -> None:
+def test_a_text_that_cannot_be_used_is_named(tmp_path, text, field, problem):
     path = partners(tmp_path, text)
     with pytest.raises(WildlabError, match=problem) as raised:
         load_language(path)
     assert raised.value.field == field and raised.value.file == str(path)
 
 
-def test_a_language_that_is_not_there() -> None:
+def test_a_language_that_is_not_there():
     for code in ("xx", "../edition/en"):
         with pytest.raises(WildlabError, match="no language"):
             load_language(code)
@@ -152,7 +152,7 @@ def test_a_language_that_is_not_there() -> None:
         ('[language]\ncode = "sw"', "name"),
     ],
 )
-def test_a_language_has_a_code_and_a_name(tmp_path: Path, head: str, problem: str) -> None:
+def test_a_language_has_a_code_and_a_name(tmp_path, head, problem):
     path = tmp_path / "x.toml"
     path.write_text(head, encoding="utf-8")
     with pytest.raises(WildlabError, match=problem):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,6 @@ from tests.flight.conftest import make_flight  # noqa: F401 - a fixture of anoth
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from tests.sharing.left import leave_report
 from wildlab.errors import WildlabError
-from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.georeference import observe
 from wildlab.reporting.metrics import metric
@@ -75,7 +74,7 @@ def pages(browser: Any, tmp_path: Path) -> Iterator[Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_seen_by_everybody(case: str, pages: Any) -> None:
+def test_seen_by_everybody(case, pages):
     facts, picture = CASES[case]
     html = edition_html(facts, name="f", place=Place("withheld"), picture=picture)
     for options in ({}, {"color_scheme": "dark"}):
@@ -100,21 +99,21 @@ def test_seen_by_everybody(case: str, pages: Any) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_it_asks_nobody_and_runs_nothing(case: str) -> None:
+def test_it_asks_nobody_and_runs_nothing(case):
     facts, picture = CASES[case]
     html = edition_html(facts, name="f", place=Place("withheld"), picture=picture)
     assert POLICY in html and "<script" not in html and "http" not in html.replace("http-equiv", "")
     assert len(html) < 200_000
 
 
-def test_names_are_harmless() -> None:
+def test_names_are_harmless():
     html = edition_html(
         WHOLE, name="<script>x</script>{p90}", place=Place("generalised", 1600.0, '<img src="x">')
     )
     assert "<script" not in html and "<img" not in html and "&lt;script&gt;x&lt;/script&gt;{p90}" in html
 
 
-def test_places_and_days_are_said_as_far_as_they_are_given() -> None:
+def test_places_and_days_are_said_as_far_as_they_are_given():
     told = edition_html(WHOLE, name="f", place=Place("generalised", 1600.0, "Rounded.", (-24.9, 31.5)))
     assert "24.9° S, 31.5° E" in told and "1.6\u00a0km" in told and "Rounded." in told and "2026" not in told
     month = edition_html(WHOLE, name="f", place=Place("withheld"), day=Day(date(2026, 3, 14), False))
@@ -144,7 +143,7 @@ def sound(reports: Path) -> None:
     leave(reports / "f-overview", **counts, reports_beside=("flight", 1.0))
 
 
-def test_the_page_of_a_folder_of_reports(tmp_path: Path) -> None:
+def test_the_page_of_a_folder_of_reports(tmp_path):
     sound(tmp_path)
     error = {"horizontal_error_median": ("logged-pose", 6.4), "horizontal_error_p90": ("logged-pose", 9.0)}
     leave(tmp_path / "f", **error)
@@ -153,7 +152,7 @@ def test_the_page_of_a_folder_of_reports(tmp_path: Path) -> None:
     assert "6,4\u00a0meter" in make_edition(tmp_path, "f", place=WITHHELD, language="nb")
 
 
-def test_a_flight_that_was_not_evaluated(tmp_path: Path) -> None:
+def test_a_flight_that_was_not_evaluated(tmp_path):
     with pytest.raises(WildlabError, match="'g'"):
         make_edition(tmp_path, "g", place=WITHHELD)
     sound(tmp_path)
@@ -161,7 +160,7 @@ def test_a_flight_that_was_not_evaluated(tmp_path: Path) -> None:
         make_edition(tmp_path, "g", place=WITHHELD)
 
 
-def test_the_map_of_a_flight(make_flight: Callable[..., Flight], tmp_path: Path) -> None:  # noqa: F811
+def test_the_map_of_a_flight(make_flight, tmp_path):  # noqa: F811
     flight = make_flight()
     drawn = map_of(flight)
     assert drawn is not None
@@ -191,7 +190,7 @@ def bar(html: str) -> float:
     return float(found[1])
 
 
-def test_circles_are_to_scale() -> None:
+def test_circles_are_to_scale():
     html = picture_html(None, WHOLE, EN)
     (_, _, inner), (_, _, outer) = circles(html, "ring median")[0], circles(html, "ring p90")[0]
     assert outer / inner == pytest.approx(9.57 / 3.47, rel=0.005)
@@ -199,7 +198,7 @@ def test_circles_are_to_scale() -> None:
     assert bar(html) / outer == pytest.approx(10 / 9.57, rel=0.005)
 
 
-def test_a_map_is_to_scale_with_north_up_and_east_right() -> None:
+def test_a_map_is_to_scale_with_north_up_and_east_right():
     path = np.array([[0.0, 0.0], [0.0, 100.0], [50.0, 100.0]])
     html = picture_html(
         MapPicture(path, np.array([[40.0, 80.0], [NAN, 1.0]]), np.array([[10.0, 80.0]])), EMPTY, EN
@@ -211,7 +210,7 @@ def test_a_map_is_to_scale_with_north_up_and_east_right() -> None:
     assert sx == pytest.approx(tx, abs=0.15) and (ty - sy) == pytest.approx(30 * scale, abs=0.3)
 
 
-def test_one_who_walked_elsewhere_does_not_shrink_the_map() -> None:
+def test_one_who_walked_elsewhere_does_not_shrink_the_map():
     """The flight and what was seen set the extent: a tracker may run for long before and after."""
     path = np.array([[0.0, 0.0], [0.0, 100.0], [50.0, 100.0]])
     walk = np.stack([np.linspace(0, 3000, 200), np.full(200, 50.0)], axis=1)
@@ -222,7 +221,7 @@ def test_one_who_walked_elsewhere_does_not_shrink_the_map() -> None:
     assert not circles(picture_html(MapPicture(path, NONE, walk + 9000.0), EMPTY, EN), "true")
 
 
-def test_what_is_drawn_where_less_is_known() -> None:
+def test_what_is_drawn_where_less_is_known():
     tracked = picture_html(None, WHOLE._replace(compared=3), EN)
     assert "4.1" in tracked and not circles(tracked, "ring p90")
     scattered = picture_html(None, EMPTY._replace(scatter=2.0, sightings=9), EN)
@@ -232,7 +231,7 @@ def test_what_is_drawn_where_less_is_known() -> None:
     assert picture_html(MapPicture(NONE, NONE, NONE), EMPTY, EN) == ""
 
 
-def test_an_image_goes_in_as_an_image() -> None:
+def test_an_image_goes_in_as_an_image():
     html = picture_html(ImagePicture(b"<svg xmlns='x'><script>alert(1)</script></svg>", 'a "map"'), EMPTY, EN)
     assert '<img src="data:image/svg+xml;base64,' in html and "<script" not in html
     assert 'alt="a &quot;map&quot;"' in html
@@ -243,7 +242,7 @@ def test_an_image_goes_in_as_an_image() -> None:
 
 
 @given(st.floats(1e-3, 1e7))
-def test_a_nice_length_is_round_and_most_of_the_room(most: float) -> None:
+def test_a_nice_length_is_round_and_most_of_the_room(most):
     found = nice_length(most)
     assert found <= most * (1 + 1e-9) and found > 0.39 * most
     assert f"{found:.0e}"[0] in "125"

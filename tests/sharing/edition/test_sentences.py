@@ -28,7 +28,7 @@ def keys(items: tuple[Said, ...]) -> list[str]:
     return [one.key for one in items]
 
 
-def test_a_flight_of_which_all_is_known() -> None:
+def test_a_flight_of_which_all_is_known():
     story = tell(WHOLE)
     assert keys(story.measured) == ["measured.error_steps", "measured.track", "measured.things"]
     assert keys(story.advice) == ["do.cause_boresight", "do.images_without_pose", "do.trouble_few_satellites"]
@@ -36,26 +36,26 @@ def test_a_flight_of_which_all_is_known() -> None:
     assert story.trusted and story.verdict.key == "verdict.fix" and story.next == story.advice[0]
 
 
-def test_an_alarm_comes_before_every_gain_and_takes_the_trust() -> None:
+def test_an_alarm_comes_before_every_gain_and_takes_the_trust():
     story = tell(WHOLE._replace(verdict="went wrong", alarms=(Alarm("jumps", 12.0, 2),)))
     assert story.why == Said("alarm.jumps", story.why.values, 2)
     assert keys(story.advice)[:2] == ["do.jumps", "do.cause_boresight"] and not story.trusted
 
 
-def test_a_part_that_failed_is_not_known_and_asked_for_again() -> None:
+def test_a_part_that_failed_is_not_known_and_asked_for_again():
     story = tell(EMPTY._replace(failed=("overview", "georeferencing")))
     assert keys(story.unknown) == ["unknown.failed_overview", "unknown.failed_georeferencing", "unknown.seen"]
     assert story.advice == (Said("do.failed", {}, 2),) and story.why.key == "why.failed"
 
 
-def test_few_points_say_nothing_of_accuracy() -> None:
+def test_few_points_say_nothing_of_accuracy():
     story = tell(WHOLE._replace(compared=9))
     assert "measured.error_steps" not in keys(story.measured) and "unknown.few" in keys(story.unknown)
     assert all(label.key != "tile.error" for _, label in story.tiles)
     assert "do.more_places" in keys(story.advice)
 
 
-def test_without_truth_sightings_are_held_against_each_other() -> None:
+def test_without_truth_sightings_are_held_against_each_other():
     story = tell(EMPTY._replace(verdict="sound", scatter=2.0, sightings=30, seen=40.0, placed=38.0))
     assert keys(story.measured) == ["measured.scatter", "measured.seen"]
     # 2 m along each axis is 2.35 m of median distance.
@@ -64,14 +64,14 @@ def test_without_truth_sightings_are_held_against_each_other() -> None:
 
 
 @pytest.mark.parametrize("language", LANGUAGES, ids=languages())
-def test_without_a_camera_no_picture_is_spoken_of(language: Any) -> None:
+def test_without_a_camera_no_picture_is_spoken_of(language):
     said = " ".join(say(language, one) for one in said_of(tell(RADAR))).lower()
     assert not any(word in said for word in ("picture", "camera", "bild", "kamera"))
     # A look of the camera is a picture all the same where a radar is beside it.
     assert "unknown.hidden" in keys(tell(RADAR._replace(pictured=900.0)).unknown)
 
 
-def test_tracks_against_true_places_are_no_ignorance() -> None:
+def test_tracks_against_true_places_are_no_ignorance():
     """How far off the followed are is said with the worst of them; only of the rest it is not known."""
     story = tell(RADAR)
     assert story.tiles[0] == (length(1.345), Said("tile.tracks", {"worst": length(10.83)}))
@@ -85,7 +85,7 @@ def test_tracks_against_true_places_are_no_ignorance() -> None:
     assert alone.tiles[0][1].key == "tile.track" and alone.measured[0].key == "measured.track"
 
 
-def test_what_does_not_fit_is_counted() -> None:
+def test_what_does_not_fit_is_counted():
     alarms = tuple(Alarm(what, 9.0, 1) for what in ALARMS)
     story = tell(WHOLE._replace(verdict="went wrong", alarms=alarms, gains=(), troubles=()))
     assert len(story.wrong) == 4 and story.wrong[-1] == story.advice[-1] == Said("page.more", {}, 1)
@@ -106,19 +106,19 @@ def test_what_does_not_fit_is_counted() -> None:
          "lost.cause", "do.images_without_pose"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_and_what_follows(changes: dict[str, Any], wrong: str, following: str) -> None:
+def test_what_is_wrong_and_what_follows(changes, wrong, following):
     story = tell(WHOLE._replace(**changes))
     assert (keys(story.wrong), story.next.key) == ([wrong], following)
 
 
 @pytest.mark.parametrize(("sure", "said"), [(1.6, True), (1.4, False), (NAN, False)])
-def test_tracks_that_are_too_sure(sure: float, said: bool) -> None:
+def test_tracks_that_are_too_sure(sure, said):
     """As in the report on tracks: what may be so by chance, where few values are independent, is not said."""
     assert ("wrong.too_sure" in keys(tell(WHOLE._replace(track_sure=sure, troubles=())).wrong)) is said
 
 
 @pytest.mark.parametrize("what", [*_TROUBLES.values(), "sure", "tracking", "navigation"])
-def test_what_is_told_to_be_wrong_has_advice(what: str) -> None:
+def test_what_is_told_to_be_wrong_has_advice(what):
     """Never a list of troubles, and then "fly as before"."""
     calm = WHOLE._replace(gains=(), troubles=(), verdict="look closer")
     changes = {"sure": {"track_sure": 5.0}, "tracking": {"doubted": ("tracking",)},
@@ -132,12 +132,12 @@ def test_what_is_told_to_be_wrong_has_advice(what: str) -> None:
     ("verdict", "trusted"),
     [("look closer", False), ("not judged", False), (None, False), ("worth fixing", True), ("sound", True)],
 )
-def test_only_what_was_judged_is_called_reliable(verdict: str | None, trusted: bool) -> None:
+def test_only_what_was_judged_is_called_reliable(verdict, trusted):
     assert tell(WHOLE._replace(verdict=verdict)).trusted == trusted
 
 
 @given(st.floats(0.0, 400.0))
-def test_steps_are_near_the_length(metres: float) -> None:
+def test_steps_are_near_the_length(metres):
     said = steps_of(metres)
     if said is None:
         assert metres > 200 * STEP_M
@@ -182,7 +182,7 @@ facts = st.builds(
 
 
 @given(facts)
-def test_whatever_is_known_every_text_is_there_and_filled(known: Facts) -> None:
+def test_whatever_is_known_every_text_is_there_and_filled(known):
     story = tell(known)
     assert story.measured and story.wrong and len(story.advice) <= 4
     for language in LANGUAGES:

@@ -8,7 +8,6 @@ import json
 import math
 import struct
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from wildlab.sharing.scan.look import Look
 
 
 @pytest.mark.parametrize("kind", PACKED)
-def test_planted_leaks_are_found(tmp_path: Path, kind: str) -> None:
+def test_planted_leaks_are_found(tmp_path, kind):
     file = tmp_path / "sent.bin"
     file.write_bytes(PACKED[kind]("; ".join(text for _, text in LEAKS.values())))
     found = scan([file], secrets())
@@ -37,7 +36,7 @@ def test_planted_leaks_are_found(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", PACKED)
-def test_the_same_without_a_leak_is_clean(tmp_path: Path, kind: str) -> None:
+def test_the_same_without_a_leak_is_clean(tmp_path, kind):
     file = tmp_path / "sent.bin"
     file.write_bytes(PACKED[kind]("the error is 6.41 m, 5.9 to 7.0 over 200 flights"))
     assert [str(finding) for finding in scan([file], secrets())] == []
@@ -146,7 +145,7 @@ PLANTED: dict[str, Callable[[], bytes]] = {
 
 
 @pytest.mark.parametrize("kind", PLANTED)
-def test_planted_numbers_are_found(tmp_path: Path, kind: str) -> None:
+def test_planted_numbers_are_found(tmp_path, kind):
     (tmp_path / "sent.bin").write_bytes(PLANTED[kind]())
     known = secrets()
     found = [str(finding) for finding in scan([tmp_path / "sent.bin"], known)]
@@ -162,9 +161,7 @@ def test_planted_numbers_are_found(tmp_path: Path, kind: str) -> None:
     kind=some.sampled_from("dfi"),
 )
 @settings(max_examples=40)
-def test_any_place_is_found_at_any_byte(
-    latitude: float, longitude: float, before: bytes, order: str, kind: str
-) -> None:
+def test_any_place_is_found_at_any_byte(latitude, longitude, before, order, kind):
     unit = 1e7 if kind == "i" else 1
     pair = [round(v * unit) if kind == "i" else v for v in (latitude, longitude)]
     data = before + struct.pack(order + 2 * kind, *pair) + bytes(9)
@@ -172,13 +169,13 @@ def test_any_place_is_found_at_any_byte(
     assert any(hit.kind == "place" and hit.start == len(before) for hit in found)
 
 
-def test_chance_bytes_are_no_place() -> None:
+def test_chance_bytes_are_no_place():
     """Pairs of four bytes agree less than once in so many."""
     data = np.random.default_rng(20).bytes(4_000_000)
     assert Look(secrets()).binary.found_in(data) == []
 
 
-def test_a_map_elsewhere_and_local_metres_are_none(tmp_path: Path) -> None:
+def test_a_map_elsewhere_and_local_metres_are_none(tmp_path):
     for name, data in {
         "elsewhere": _map("EPSG:32635", EAST + 50_000.5, NORTH + 20_000.5, 100.0),
         "local": _map("", -500.0, 500.0, 125.0),

@@ -45,7 +45,7 @@ def read(tmp_path: Path, text: str, known: Secrets) -> list[str]:
 
 
 @pytest.mark.parametrize("spelling", SPELLINGS)
-def test_each_spelling_is_found(tmp_path: Path, spelling: str) -> None:
+def test_each_spelling_is_found(tmp_path, spelling):
     for latitude, longitude in ((LATITUDE, LONGITUDE), (-24.113587, 31.472936), (19.436257, -99.131264)):
         text = f"<p>it was at {SPELLINGS[spelling](latitude, longitude)} then</p>"
         found = read(tmp_path, text, secrets(latitude, longitude))
@@ -57,7 +57,7 @@ ANYWHERE = sorted(one for one in SPELLINGS if "entities" not in one and "alone" 
 
 @given(latitude=LATITUDES, longitude=LONGITUDES)
 @settings(max_examples=15)
-def test_each_spelling_is_found_anywhere(latitude: float, longitude: float) -> None:
+def test_each_spelling_is_found_anywhere(latitude, longitude):
     look = Look(replace(secrets(latitude, longitude), moments=(), words=(), numbers=()))
     missed = [
         (spelling, text)
@@ -69,12 +69,12 @@ def test_each_spelling_is_found_anywhere(latitude: float, longitude: float) -> N
 
 
 @pytest.mark.parametrize("spelling", SPELLINGS)
-def test_a_place_elsewhere_is_none(spelling: str) -> None:
+def test_a_place_elsewhere_is_none(spelling):
     text = SPELLINGS[spelling](LATITUDE + 0.31, LONGITUDE - 0.27)
     assert places(text, secrets()) == [], text
 
 
-def test_how_near_is_near() -> None:
+def test_how_near_is_near():
     known = secrets()
     inside, outside = (f"{LATITUDE + off / 111_320:.6f} {LONGITUDE:.3f}" for off in (900, 1100))
     assert places(inside, known)
@@ -82,13 +82,13 @@ def test_how_near_is_near() -> None:
     assert places(outside, replace(known, near_m=1500.0))
 
 
-def test_the_latitude_of_one_place_and_the_longitude_of_another_are_none() -> None:
+def test_the_latitude_of_one_place_and_the_longitude_of_another_are_none():
     two = replace(secrets(), places=np.array([[LATITUDE, LONGITUDE, 0.0], [58.662064, 16.433337, 0.0]]))
     assert places(f"{LATITUDE:.3f} {LONGITUDE:.3f}", two) and places("58.662 16.433", two)
     assert not places(f"{LATITUDE:.3f} 16.433", two)
 
 
-def test_a_place_on_the_grid_of_what_may_be_told_is_none() -> None:
+def test_a_place_on_the_grid_of_what_may_be_told_is_none():
     known = replace(secrets(63.4003, 10.3997), near_m=20_000.0)
     told, finer = "63.40 N 10.40 E", "63.41 N 10.42 E"
     assert places(told, known)
@@ -101,7 +101,7 @@ def test_a_place_on_the_grid_of_what_may_be_told_is_none() -> None:
     ("code", "latitude", "longitude"),
     [("u4pruydqqvj", 57.64911, 10.40744), ("ezs42", 42.605, -5.603), ("6gkzwgjz", -25.38262, -49.26561)],
 )
-def test_geohash_as_published(code: str, latitude: float, longitude: float) -> None:
+def test_geohash_as_published(code, latitude, longitude):
     there = geohash_cell(code)
     assert abs(there[0] - latitude) <= there[2] + 6e-4 and abs(there[1] - longitude) <= there[3] + 6e-4
     assert geohash_of(there[0], there[1], len(code)) == code
@@ -118,13 +118,13 @@ def test_geohash_as_published(code: str, latitude: float, longitude: float) -> N
         ("4VCPPQGP", "Q9", -41.2730625, 174.7859375),
     ],
 )
-def test_plus_codes_as_published(before: str, after: str, latitude: float, longitude: float) -> None:
+def test_plus_codes_as_published(before, after, latitude, longitude):
     there = plus_cell(before, after)
     assert there[:2] == pytest.approx((latitude, longitude), abs=1e-9)
     assert plus_of(latitude, longitude) == before
 
 
-def test_locators_as_published() -> None:
+def test_locators_as_published():
     # Munich and Washington, of the locator's own description; Montevideo; the station W1AW.
     assert locator_of(48.14666, 11.60833) == "JN58td"
     assert locator_of(-34.91, -56.21166) == "GF15vc"
@@ -172,7 +172,7 @@ MGRS = {
 
 
 @pytest.mark.parametrize("code", MGRS)
-def test_mgrs_as_others_write_it(code: str) -> None:
+def test_mgrs_as_others_write_it(code):
     latitude, longitude = MGRS[code]
     known = replace(secrets(latitude, longitude), near_m=2.0)
     coarse = f"{code[:-10]} {code[-10:-7]} {code[-5:-2]}"
@@ -185,7 +185,7 @@ def test_mgrs_as_others_write_it(code: str) -> None:
         assert "MGRS" not in kinds(f"at {other}.", known), other
 
 
-def test_around_the_poles_places_are_found_as_metres_of_their_grid() -> None:
+def test_around_the_poles_places_are_found_as_metres_of_their_grid():
     # By GEOTRANS: ZGE 34188 52343, whose square begins 2 400 km east and 1 700 km north.
     assert places("E 2434188 N 1752343", secrets(85.5, 60.3))
     assert not places("E 2534188 N 1752343", secrets(85.5, 60.3))
@@ -194,7 +194,7 @@ def test_around_the_poles_places_are_found_as_metres_of_their_grid() -> None:
 
 @given(latitude=some.floats(-84, 84), longitude=some.floats(-179, 179))
 @settings(max_examples=20)
-def test_codes_are_found_anywhere(latitude: float, longitude: float) -> None:
+def test_codes_are_found_anywhere(latitude, longitude):
     known = secrets(latitude, longitude)
     assert "a geohash" in kinds(f"see {geohash_of(latitude, longitude, 9)}!", known)
     assert "a geohash" in kinds(geohash_of(latitude, longitude, 8).upper(), known)
@@ -221,15 +221,13 @@ def test_codes_are_found_anywhere(latitude: float, longitude: float) -> None:
         (-24.0, 31.5, {36}),
     ],
 )
-def test_the_zone_by_the_exceptions_of_norway_and_svalbard(
-    latitude: float, longitude: float, zones: set[int]
-) -> None:
+def test_the_zone_by_the_exceptions_of_norway_and_svalbard(latitude, longitude, zones):
     known = secrets(latitude, longitude)
     found = {zone for zone in range(1, 61) if "the zone of UTM" in kinds(f"EPSG:{32600 + zone}", known)}
     assert found == zones
 
 
-def test_numbers_that_follow_from_the_place_are_found() -> None:
+def test_numbers_that_follow_from_the_place_are_found():
     from wildlab.geometry.gravity import normal_gravity
 
     gravity = float(normal_gravity(np.radians(LATITUDE), 152.738))
@@ -239,7 +237,7 @@ def test_numbers_that_follow_from_the_place_are_found() -> None:
     assert "a number that locates" not in kinds("autopilot120010.00.00.0000.0–0frames", secrets())
 
 
-def test_the_zone_is_found_and_others_are_not() -> None:
+def test_the_zone_is_found_and_others_are_not():
     for text in ("EPSG:32632", "EPSG 25832", "UTM zone 32V", "utm32"):
         assert "the zone of UTM" in kinds(text, secrets()), text
     assert "the zone of UTM" not in kinds("EPSG:32634, UTM zone 3, UTM zone 322", secrets())

@@ -46,7 +46,7 @@ def _quine_like(times: int) -> bytes:
     return data
 
 
-def test_bombs_are_stopped() -> None:
+def test_bombs_are_stopped():
     zeros = bytes(50_000_000)
     for bomb in (gzip.compress(zeros), zlib.compress(zeros), zipped("a", zeros), _nested(zeros, 3)):
         said, size = trouble(bomb, 5_000_000)
@@ -54,7 +54,7 @@ def test_bombs_are_stopped() -> None:
         assert size < 12_000_000
 
 
-def test_what_is_packed_too_often_is_a_finding() -> None:
+def test_what_is_packed_too_often_is_a_finding():
     said = [part.trouble for part in unpacked(_quine_like(20), Budget()) if part.trouble]
     assert len(said) == 1 and "too many" in said[0]
     assert not [part for part in unpacked(_quine_like(5), Budget()) if part.trouble]
@@ -89,7 +89,7 @@ CLOSED: dict[str, Callable[[], bytes]] = {
 
 
 @pytest.mark.parametrize("kind", CLOSED)
-def test_what_cannot_be_looked_into_is_a_finding(tmp_path: Path, kind: str) -> None:
+def test_what_cannot_be_looked_into_is_a_finding(tmp_path, kind):
     assert "unreadable" in kinds(tmp_path, CLOSED[kind]())
 
 
@@ -97,14 +97,14 @@ def test_what_cannot_be_looked_into_is_a_finding(tmp_path: Path, kind: str) -> N
 @pytest.mark.parametrize(
     "make", [lambda: saved(picture(), "PNG"), lambda: zipped("a", b"b"), lambda: figure("x", "pdf")]
 )
-def test_nothing_damaged_raises(tmp_path: Path, make: Callable[[], bytes], cut: int) -> None:
+def test_nothing_damaged_raises(tmp_path, make, cut):
     data = bytearray(make())
     data[cut % len(data) :: 37] = b"\xff" * len(data[cut % len(data) :: 37])
     (tmp_path / "a").write_bytes(bytes(data))
     assert isinstance(scan([tmp_path / "a"], secrets()), list)
 
 
-def test_names_of_files_and_folders_are_looked_at(tmp_path: Path) -> None:
+def test_names_of_files_and_folders_are_looked_at(tmp_path):
     folder = tmp_path / "reports" / NAME.replace(" ", "_")
     folder.mkdir(parents=True)
     (folder / "page.html").write_text("nothing")
@@ -115,7 +115,7 @@ def test_names_of_files_and_folders_are_looked_at(tmp_path: Path) -> None:
     assert scan([folder / "page.html"], secrets()) == []
 
 
-def test_times_of_entries(tmp_path: Path) -> None:
+def test_times_of_entries(tmp_path):
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         archive.writestr(zipfile.ZipInfo("a", (WHEN.year, WHEN.month, WHEN.day, 1, 2, 4)), b"")
@@ -124,13 +124,13 @@ def test_times_of_entries(tmp_path: Path) -> None:
     assert kinds(tmp_path, gzip.compress(b"a", mtime=int(WHEN.timestamp()) + 40 * 86_400)) == set()
 
 
-def test_a_finding_hides_what_it_found() -> None:
+def test_a_finding_hides_what_it_found():
     finding = Finding("a.html", "line 1", "place", "latitude", "63.4179")
     assert "63.4179" not in repr(finding) and "63.4179" not in str(finding)
     assert "63.4" not in repr(secrets())
 
 
-def test_what_is_not_looked_for_is_said() -> None:
+def test_what_is_not_looked_for_is_said():
     said = not_searched(secrets().with_words("boat", "no", "12", "/home/kari/flights"))
     assert any("'boat'" in one for one in said) and any("'no'" in one for one in said)
     assert not any("kari" in one for one in said)
@@ -141,12 +141,12 @@ def test_what_is_not_looked_for_is_said() -> None:
     assert len(not_searched(replace(secrets(), words=numbers[:3]))) == len(many) + 1
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(WildlabError, match="no such"):
         scan([tmp_path / "none"], secrets())
 
 
-def test_many_small_parts_are_stopped() -> None:
+def test_many_small_parts_are_stopped():
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         for number in range(300):

@@ -26,7 +26,7 @@ def seen(
     return render_colour(ground, tarpaulin, CAMERA, [1.0, 2.0, -60.0], R, np.random.default_rng(1))
 
 
-def test_it_is_drawn_where_its_corners_are_projected() -> None:
+def test_it_is_drawn_where_its_corners_are_projected():
     view = seen(roll=0.15, pitch=-0.1)
     R = euler_to_matrix(0.15, -0.1, 0.4) @ R_MC_DOWN
     assert np.allclose(view.outline, ground_to_pixel(CAMERA, CLOTH.corners(), np.array([1.0, 2.0, -60.0]), R))
@@ -46,7 +46,7 @@ def test_it_is_drawn_where_its_corners_are_projected() -> None:
     assert np.allclose(view.centre, ground_to_pixel(CAMERA, middle, np.array([1.0, 2.0, -60.0]), R)[0])
 
 
-def test_the_border_cuts_it_and_behind_the_camera_it_is_nowhere() -> None:
+def test_the_border_cuts_it_and_behind_the_camera_it_is_nowhere():
     half = seen(replace(CLOTH, north=1.0, east=2.0, course=0.4), pitch=np.arctan(89.5 / 260.0))
     assert half.share == pytest.approx(0.5, abs=0.05) and half.labels.any()
     away = seen(replace(CLOTH, north=500.0))
@@ -56,7 +56,7 @@ def test_the_border_cuts_it_and_behind_the_camera_it_is_nowhere() -> None:
     assert (nothing.image == np.rint(EVEN.colour)).all()
 
 
-def test_the_rim_fades_to_the_ground_and_light_dims_everything() -> None:
+def test_the_rim_fades_to_the_ground_and_light_dims_everything():
     full, faded = (
         seen(replace(CLOTH, rim=rim, faded=1.0, course=0.4, north=1.0, east=2.0)) for rim in (0, 2)
     )
@@ -67,7 +67,7 @@ def test_the_rim_fades_to_the_ground_and_light_dims_everything() -> None:
     assert np.allclose(dim.image, seen().image / 2, atol=0.51)
 
 
-def test_the_sky_begins_at_the_horizon_and_grows_deeper() -> None:
+def test_the_sky_begins_at_the_horizon_and_grows_deeper():
     view = seen(pitch=np.pi / 2 - 0.05)
     rows = np.flatnonzero(view.sky.all(axis=1))
     assert rows.min() == 0 and rows.max() + 1 == pytest.approx(90 - 260 * np.tan(0.05), abs=0.5)
@@ -76,7 +76,7 @@ def test_the_sky_begins_at_the_horizon_and_grows_deeper() -> None:
     assert red[0] == EVEN.sky[0]
 
 
-def test_patches_stay_on_the_ground_and_noise_follows_its_generator() -> None:
+def test_patches_stay_on_the_ground_and_noise_follows_its_generator():
     rough = Ground(patch_sd=15.0, patch_length=4.0, noise_sd=0.0)
     here = render_colour(rough, None, CAMERA, [0, 0, -60.0], R_MC_DOWN, np.random.default_rng(1)).image
     there = render_colour(rough, None, CAMERA, [3.0, 0, -60.0], R_MC_DOWN, np.random.default_rng(1)).image
@@ -87,7 +87,7 @@ def test_patches_stay_on_the_ground_and_noise_follows_its_generator() -> None:
     assert seen(None, noisy).image.std(axis=(0, 1)) == pytest.approx([6.0] * 3, rel=0.05)
 
 
-def test_wrong_use_is_refused() -> None:
+def test_wrong_use_is_refused():
     with pytest.raises(WildlabError, match="0 m above"):
         render_colour(EVEN, None, CAMERA, [0, 0, 0], R_MC_DOWN, np.random.default_rng(1))
     with pytest.raises(WildlabError, match="0 x 2 m"):

@@ -1,7 +1,5 @@
 """Land and scenes on it: closed forms, the surface itself, the sun's way, and the heights of a terrain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -200,27 +198,25 @@ LAND = land_on(TERRAIN, COVERS)
 
 @settings(max_examples=80, deadline=None)
 @given(st.floats(-60.0, 60.0), st.floats(-130.0, 130.0))
-def test_heights_are_those_of_the_terrain(north: float, east: float) -> None:
+def test_heights_are_those_of_the_terrain(north, east):
     want = TERRAIN.heights_at([[north, east]])[0]
     assert height_at(LAND, [north, east]) == pytest.approx(want, abs=1e-4)
 
 
 @pytest.mark.parametrize("north, east", [(500.0, -300.0), (-1036.0, 412.0), (8.0, -12.0)])
-def test_a_terrain_far_from_the_origin_keeps_its_place(
-    north: float, east: float, rng: np.random.Generator
-) -> None:
+def test_a_terrain_far_from_the_origin_keeps_its_place(north, east, rng):
     far = Terrain(rng.uniform(0, 9, (20, 31)).astype(np.float32), north=north, east=east, step=4.0)
     land = land_on(far, COVERS)
     for place in rng.uniform([north, east], [north + 76.0, east + 120.0], (20, 2)):
         assert height_at(land, place) == pytest.approx(far.heights_at([place])[0], abs=1e-4)
 
 
-def test_beyond_the_terrain_it_is_as_high_as_its_border() -> None:
+def test_beyond_the_terrain_it_is_as_high_as_its_border():
     for beyond, border in (((75.0, 10.0), (60.0, 10.0)), ((-20.0, -160.0), (-20.0, -130.0))):
         assert height_at(LAND, beyond) == pytest.approx(TERRAIN.heights_at([border])[0], abs=1e-4)
 
 
-def test_covers_keep_their_shares_and_their_places() -> None:
+def test_covers_keep_their_shares_and_their_places():
     assert LAND.weather == COVERS.weather
     for one in range(3):
         assert (LAND.cover == one).mean() == pytest.approx((COVERS.cover == one).mean(), abs=0.02)
@@ -230,7 +226,7 @@ def test_covers_keep_their_shares_and_their_places() -> None:
         assert LAND.cover[i, j] == COVERS.cover[int(at[0]), int(at[1])]
 
 
-def test_a_terrain_with_a_hole_beside_its_grid_or_too_large_is_refused() -> None:
+def test_a_terrain_with_a_hole_beside_its_grid_or_too_large_is_refused():
     holed = np.zeros((4, 4), np.float32)
     holed[1, 2] = np.nan
     for terrain, about in (

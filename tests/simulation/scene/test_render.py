@@ -1,7 +1,5 @@
 """Scenes against what is known in closed form: outlines, areas, temperatures, horizon; and their layers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

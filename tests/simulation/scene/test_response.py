@@ -1,7 +1,5 @@
 """What a camera makes of a scene, parts of its images, and what is on a deck."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Which is which over a matrix: every permutation tried, features, and tracks that are recognised."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -55,7 +55,7 @@ def by_counting(
 
 
 @given(GENERATORS, st.integers(1, 3), st.integers(0, 3), shares)
-def test_every_state_of_the_world_counted(rng: np.random.Generator, n: int, m: int, d: float) -> None:
+def test_every_state_of_the_world_counted(rng, n, m, d):
     r, v = rng.uniform(0.02, 0.98, n), rng.uniform(0.02, 0.98, n)
     L, c = np.exp(rng.normal(-3, 3, (n, m))) * (rng.random((n, m)) > 0.3), 1e-2
     p = association_probabilities(*weights(r, v, d, L, c))
@@ -64,7 +64,7 @@ def test_every_state_of_the_world_counted(rng: np.random.Generator, n: int, m: i
 
 
 @given(shares, shares, st.lists(st.floats(0, 5), min_size=0, max_size=4))
-def test_one_target_that_can_be_seen_has_the_closed_form(r: float, d: float, L: list[float]) -> None:
+def test_one_target_that_can_be_seen_has_the_closed_form(r, d, L):
     """Musicki, Evans and Stankovic 1994, (14): the textbook's data association with existence."""
     c = 0.3
     p = association_probabilities(*weights([r], [1.0], d, [L], c))
@@ -74,7 +74,7 @@ def test_one_target_that_can_be_seen_has_the_closed_form(r: float, d: float, L: 
     assert visible[0] == pytest.approx(1.0)
 
 
-def test_what_is_hidden_is_not_missed() -> None:
+def test_what_is_hidden_is_not_missed():
     """A scan without a measurement ends the belief that it can be seen before that in its existence."""
     r, v = np.array([0.9]), np.array([0.5])
     for _ in range(10):
@@ -86,14 +86,14 @@ def test_what_is_hidden_is_not_missed() -> None:
     assert after_scan([1.0], [0.0], 0.9, certain)[0][0] == 1.0
 
 
-def test_what_cannot_be_there_stays_away() -> None:
+def test_what_cannot_be_there_stays_away():
     p = association_probabilities(*weights([0.0], [1.0], 1.0, [[3.0]], 1.0))
     existence, _, own = after_scan([0.0], [1.0], 1.0, p)
     assert existence[0] == 0 and own[0].tolist() == [1.0, 0.0]
 
 
 @given(shares, st.floats(0.1, 100), st.floats(0.1, 100), st.floats(0, 50), st.floats(0, 50))
-def test_two_waits_are_one(v: float, visible_s: float, hidden_s: float, one: float, two: float) -> None:
+def test_two_waits_are_one(v, visible_s, hidden_s, one, two):
     at_once = visible_later(v, one + two, visible_s, hidden_s)
     in_two = visible_later(visible_later(v, one, visible_s, hidden_s), two, visible_s, hidden_s)
     assert np.allclose(at_once, in_two, atol=1e-12)
@@ -104,7 +104,7 @@ def test_two_waits_are_one(v: float, visible_s: float, hidden_s: float, one: flo
     assert visible_later(1.0, soon, visible_s, hidden_s) == pytest.approx(1 - soon / visible_s, abs=1e-11)
 
 
-def test_existence_decays_with_its_lifetime() -> None:
+def test_existence_decays_with_its_lifetime():
     assert still_there(0.8, 50.0, 50.0) == pytest.approx(0.8 / np.e)
 
 
@@ -203,7 +203,7 @@ def weights_of(seed: int, n: int, m: int, empty: float = 0.4) -> tuple[np.ndarra
 
 
 @given(st.integers(0, 10_000), st.integers(0, 4), st.integers(0, 4))
-def test_sums_are_those_of_every_way(seed: int, n: int, m: int) -> None:
+def test_sums_are_those_of_every_way(seed, n, m):
     w, w0 = weights_of(seed, n, m)
     found = association_probabilities(w, w0)
     assert found.shape == (n, 1 + m)
@@ -211,7 +211,7 @@ def test_sums_are_those_of_every_way(seed: int, n: int, m: int) -> None:
 
 
 @given(st.integers(0, 10_000))
-def test_no_measurement_is_given_away_twice(seed: int) -> None:
+def test_no_measurement_is_given_away_twice(seed):
     w, w0 = weights_of(seed, 7, 9, empty=0.6)
     found = association_probabilities(w, w0)
     assert np.allclose(found.sum(axis=1), 1) and (found >= 0).all()
@@ -220,7 +220,7 @@ def test_no_measurement_is_given_away_twice(seed: int) -> None:
 
 
 @given(st.integers(0, 10_000), st.floats(1e-8, 1e8))
-def test_a_targets_weights_may_be_scaled(seed: int, factor: float) -> None:
+def test_a_targets_weights_may_be_scaled(seed, factor):
     w, w0 = weights_of(seed, 4, 4)
     before = association_probabilities(w, w0)
     w[1] *= factor
@@ -228,7 +228,7 @@ def test_a_targets_weights_may_be_scaled(seed: int, factor: float) -> None:
     assert np.allclose(association_probabilities(w, w0), before, atol=1e-9)
 
 
-def test_many_targets_in_one_cluster_lose_no_digits() -> None:
+def test_many_targets_in_one_cluster_lose_no_digits():
     w = np.full((40, 10), 1e-3)
     found = association_probabilities(w, np.full(40, 0.5))
     # All alike: each measurement is shared by all.
@@ -236,7 +236,7 @@ def test_many_targets_in_one_cluster_lose_no_digits() -> None:
 
 
 @given(GENERATORS)
-def test_messages_are_exact_where_nothing_competes_in_a_loop(rng: np.random.Generator) -> None:
+def test_messages_are_exact_where_nothing_competes_in_a_loop(rng):
     """A chain: each target shares one measurement with the next."""
     w = np.zeros((5, 6))
     for i in range(5):
@@ -245,7 +245,7 @@ def test_messages_are_exact_where_nothing_competes_in_a_loop(rng: np.random.Gene
     assert np.allclose(belief_propagation(w, w0), association_probabilities(w, w0), atol=1e-7)
 
 
-def test_messages_are_near_where_loops_are() -> None:
+def test_messages_are_near_where_loops_are():
     """Of 200 crowded clusters the mean difference is below a percent, and large ones take this way."""
     rng, off = np.random.default_rng(1), []
     for _ in range(200):
@@ -267,17 +267,17 @@ def test_messages_are_near_where_loops_are() -> None:
         ([[1.0], [1.0]], [0.0, 0.0], "no way to deal them out"),
     ],
 )
-def test_what_cannot_be_is_said(weights: list[list[float]], missed: list[float], words: str) -> None:
+def test_what_cannot_be_is_said(weights, missed, words):
     with pytest.raises(WildlabError, match=words):
         association_probabilities(weights, missed)
 
 
-def test_messages_need_targets_that_can_be_missed() -> None:
+def test_messages_need_targets_that_can_be_missed():
     with pytest.raises(WildlabError, match="cannot be missed"):
         belief_propagation([[1.0]], [0.0])
 
 
-def test_a_target_that_nothing_is_of_has_none_whatever_others_have() -> None:
+def test_a_target_that_nothing_is_of_has_none_whatever_others_have():
     """Also one that cannot be missed, and whether few or many are summed at once."""
     for count in (2, 9):
         weights = np.zeros((count, count))

@@ -19,7 +19,7 @@ def turned(angle: float) -> np.ndarray:
     return np.array([[c, -s], [s, c]])
 
 
-def test_a_hull_is_longer_along_its_heading() -> None:
+def test_a_hull_is_longer_along_its_heading():
     sensor = LONG._replace(rough_m=(0.0, 1.5), along_m=(0.0, 6.0))
     fast = np.array([[[0.0, 0.0, 50.0, 0.0]] * 2])
     assert np.allclose(hull_noise(fast, sensor)[0, 1], np.diag([1.5**2 + 6.0**2, 1.5**2]), rtol=1e-3)
@@ -31,7 +31,7 @@ def test_a_hull_is_longer_along_its_heading() -> None:
 
 
 @given(st.floats(-np.pi, np.pi), st.integers(0, 1000))
-def test_it_is_the_same_wherever_north_is(angle: float, seed: int) -> None:
+def test_it_is_the_same_wherever_north_is(angle, seed):
     rng, T = np.random.default_rng(seed), turned(angle)
     x, platform = rng.normal(0, 5, (3, 2, 4)), rng.normal(0, 50, 2)
     rotated = np.concatenate([x[..., :2] @ T.T, x[..., 2:] @ T.T], axis=-1)
@@ -39,14 +39,14 @@ def test_it_is_the_same_wherever_north_is(angle: float, seed: int) -> None:
     assert np.allclose(near_side(rotated, T @ platform, LONG), near_side(x, platform, LONG) @ T.T)
 
 
-def test_what_is_seen_lies_towards_the_platform_and_not_beyond_its_half() -> None:
+def test_what_is_seen_lies_towards_the_platform_and_not_beyond_its_half():
     x = np.array([[[10.0, 0.0, 1.0, 0.0]] * 2, [[0.0, -4.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 1.0, 0.0]] * 2])
     found = near_side(x, np.zeros(2), LONG)
     assert np.allclose(found[0], [[0, 0], [-3, 0]]) and np.allclose(found[1], [[0, 0], [0, 2]])
     assert np.allclose(found[2], 0)
 
 
-def test_the_near_side_of_a_ship_is_that_of_an_ellipse() -> None:
+def test_the_near_side_of_a_ship_is_that_of_an_ellipse():
     """Its side from abeam, its end from ahead or astern; else, as of one at rest, a mean of squares."""
     ship = LONG._replace(near_side_m=(0.0, 3.0), near_end_m=(0.0, 12.0))
 
@@ -79,7 +79,7 @@ def along(*north: float, likely: float, clutter: float = 1e-5) -> Gathered:
     return gathered(np.array([[one, 0.0] for one in north]), likely, [0.5, 0.5], clutter=clutter)
 
 
-def test_parts_of_a_hull_count_as_they_are_likely() -> None:
+def test_parts_of_a_hull_count_as_they_are_likely():
     """The stern, seen now and then, does not pull a track aft whose superstructure is seen always."""
     z = np.array([[0.0, 1.0], [-20.0, 0.0], [300.0, 0.0]])
     found = gathered(z, [0.03, 0.01, 0.0], [0.1, 0.9])
@@ -93,7 +93,7 @@ def test_parts_of_a_hull_count_as_they_are_likely() -> None:
     assert np.allclose(gathered(z, 0.0, [0.1, 0.9]).z, [[300.0, 0.0], [-5.0, 0.5]])
 
 
-def test_each_further_measurement_tells_of_a_ship_and_the_first_does_not() -> None:
+def test_each_further_measurement_tells_of_a_ship_and_the_first_does_not():
     """On its hull they are three times as dense as clutter; the first one any target has."""
     clutter = 1 / (3 * SHIP.length_m * SHIP.beam_m)
     assert np.allclose(along(0.0, likely=0.01, clutter=clutter).kinds, [[1 / 2, 1 / 2]])
@@ -101,28 +101,28 @@ def test_each_further_measurement_tells_of_a_ship_and_the_first_does_not() -> No
     assert np.allclose(along(-5.0, 0.0, 5.0, likely=0.01, clutter=clutter).kinds, [[1 / 10, 9 / 10]])
 
 
-def test_what_is_farther_apart_than_a_ship_is_long_is_not_one() -> None:
+def test_what_is_farther_apart_than_a_ship_is_long_is_not_one():
     """All of it lies in the gate of the one track."""
     assert np.allclose(along(-14.5, 14.5, likely=0.01).z, [[0.0, 0.0]])
     apart = along(-15.5, 15.5, likely=0.01)
     assert len(apart.z) == 2 and np.allclose(apart.kinds, 0.5)
 
 
-def test_what_no_gate_takes_is_of_a_ship_up_to_a_little_more_than_its_half() -> None:
+def test_what_no_gate_takes_is_of_a_ship_up_to_a_little_more_than_its_half():
     """Within a length of each other both times: 17 m from the middle may be its bow, 20 m is beyond it."""
     assert np.allclose(along(-5.0, 17.0, likely=0.0).z, [[6.0, 0.0]])
     beyond = along(-5.0, 20.0, likely=0.0)
     assert len(beyond.z) == 2 and np.allclose(beyond.kinds, 0.5)
 
 
-def test_bearings_of_one_hull_are_not_merged() -> None:
+def test_bearings_of_one_hull_are_not_merged():
     """The mean of two on either side of south would be north."""
     z = np.array([[np.pi - 0.01], [0.01 - np.pi]])
     found = gathered(z, 1.0, [0.1, 0.9], bearings=True)
     assert np.array_equal(found.z, z) and np.array_equal(found.kinds, [[0.1, 0.9]])
 
 
-def test_a_new_track_is_where_its_measurement_would_be_seen() -> None:
+def test_a_new_track_is_where_its_measurement_would_be_seen():
     z, platform = np.array([[60.0, 5.0], [-20.0, 80.0]]), np.array([3.0, -9.0])
     R = np.tile(np.eye(2), (2, 1, 1))
     tracks = begin(z, R, 2.0, platform, (LONG,), 0, BOTH, 7, np.zeros((2, 2, 0)))
@@ -141,6 +141,6 @@ def test_a_new_track_is_where_its_measurement_would_be_seen() -> None:
         ([20.0, 0.0, 1.0, 0.0], False),  # slower
     ],
 )
-def test_two_ends_of_one_hull_and_two_ships(other: list[float], one: bool) -> None:
+def test_two_ends_of_one_hull_and_two_ships(other, one):
     assert on_one_hull([0.0, 0.0, 3.0, 0.0], other, SHIP) == one
     assert not on_one_hull([0.0, 0.0, 0.1, 0.0], [5.0, 0.0, 0.1, 0.0], SHIP), "at rest nobody knows the line"

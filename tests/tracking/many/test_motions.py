@@ -25,7 +25,7 @@ BOTH = (Hull("boat", 6.0, 2.0, 0.6), Hull("ship", 30.0, 8.0, 0.4))
 
 @given(GENERATORS, st.floats(0.05, 0.9), st.floats(2.0, 60.0))
 @settings(max_examples=20, deadline=None)
-def test_one_target_is_the_filter_of_one_target(rng: np.random.Generator, calm: float, stay_s: float) -> None:
+def test_one_target_is_the_filter_of_one_target(rng, calm, stay_s):
     way = np.cumsum(np.cumsum(rng.normal(0, 0.5, (12, 1, 2)), axis=0), axis=0)
     scans = looks(way, rng)
     targets = OPEN._replace(density=0.8, calm=calm, stay_s=stay_s)
@@ -41,7 +41,7 @@ def test_one_target_is_the_filter_of_one_target(rng: np.random.Generator, calm: 
         assert np.allclose(x[0], right.track.x[k]) and np.allclose(P[0], right.track.P[k])
 
 
-def test_one_motion_is_none_beside_another() -> None:
+def test_one_motion_is_none_beside_another():
     targets = POINTS._replace(calm=1.0)
     assert each_motion([SURE], targets) == ((SURE,), targets)
     eyes, told = each_motion(
@@ -57,7 +57,7 @@ def test_one_motion_is_none_beside_another() -> None:
 
 
 @given(GENERATORS, st.floats(0.0, 100.0))
-def test_mixing_keeps_hulls_means_and_what_is_shared(rng: np.random.Generator, dt: float) -> None:
+def test_mixing_keeps_hulls_means_and_what_is_shared(rng, dt):
     """The mixture of both motions has the same mean, covariance and cross-covariance before and after."""
     x, C, kinds = rng.normal(size=(2, 4, 4)), rng.normal(size=(2, 4, 4, 3)), rng.dirichlet(np.ones(4), 2)
     root = rng.normal(size=(2, 4, 4, 4))
@@ -83,7 +83,7 @@ def test_mixing_keeps_hulls_means_and_what_is_shared(rng: np.random.Generator, d
     assert np.allclose(long[3][:, 0], long[3][:, 1]) and np.allclose(long[0][:, 0], long[0][:, 1])
 
 
-def test_no_hull_is_ruled_out_and_a_motion_may_be() -> None:
+def test_no_hull_is_ruled_out_and_a_motion_may_be():
     targets = POINTS._replace(hulls=BOTH, calm=0.5)
     found = at_least(np.array([[0.9, 0.1, 0.0, 0.0], [0.2, 0.2, 0.6, 0.0]]), 0.02, targets)
     assert np.allclose(found, [[0.9, 0.1, 0.01, 0.01], [0.2, 0.2, 0.6, 0.0]])

@@ -48,12 +48,12 @@ def lines(starts: np.ndarray, velocities: np.ndarray, steps: int) -> np.ndarray:
     return starts + velocities * np.arange(steps)[:, None, None]
 
 
-def test_clutter_alone_is_no_target(rng: np.random.Generator) -> None:
+def test_clutter_alone_is_no_target(rng):
     scans = looks(np.zeros((100, 0, 2)), rng, clutter=4)
     assert sum(len(one.identity) for one in run_many(scans, [EYE], POINTS)) <= 4
 
 
-def test_what_hides_for_a_while_keeps_its_name(rng: np.random.Generator) -> None:
+def test_what_hides_for_a_while_keeps_its_name(rng):
     scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 60), rng)
     scans = [s if not 30 <= s.time < 38 else look(s.time) for s in scans]
     shown = run_many(scans, [EYE], POINTS)
@@ -61,7 +61,7 @@ def test_what_hides_for_a_while_keeps_its_name(rng: np.random.Generator) -> None
     assert shown[29].identity.tolist() == shown[45].identity.tolist() != []
 
 
-def test_what_is_not_in_view_is_not_missed() -> None:
+def test_what_is_not_in_view_is_not_missed():
     """The camera turns away for ten looks: a target that was sure stays as sure."""
     scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 30), np.random.default_rng(7))
     away, blind = (
@@ -73,7 +73,7 @@ def test_what_is_not_in_view_is_not_missed() -> None:
     assert existence[0][-1] == pytest.approx(existence[0][14]) and existence[1][-1] < 0.9
 
 
-def test_a_target_gets_older_by_the_time_that_it_is_looked_at() -> None:
+def test_a_target_gets_older_by_the_time_that_it_is_looked_at():
     """Two sensors that look in turn make it no older than one; the time that nobody looked does not count."""
     targets = POINTS._replace(lifetime_s=20.0, hidden_s=1e-9)
     places = lines(np.array([[0.0, 0.0]]), np.array([[0.5, 0.0]]), 12)
@@ -98,7 +98,7 @@ def test_a_target_gets_older_by_the_time_that_it_is_looked_at() -> None:
     assert away == pytest.approx(start * np.exp(-1 / 20), rel=1e-6)
 
 
-def test_bearings_neither_confirm_nor_end_a_track() -> None:
+def test_bearings_neither_confirm_nor_end_a_track():
     """Two sightings of three that are asked for: bearings add none, and without them none is missed."""
     seen = looks(lines(np.array([[0.0, 0.0]]), np.array([[0.5, 0.0]]), 2), np.random.default_rng(3))
     eyes = [EYE, EYE._replace(bearings=True, clutter=1e-3)]
@@ -120,14 +120,14 @@ def test_bearings_neither_confirm_nor_end_a_track() -> None:
     [(9.0, 12.0, False, False), (11.0, 12.0, False, True), (7.0, 12.0, True, True), (5.0, 12.0, True, False),
      (5.0, 6.0, True, True), (11.0, 30.0, False, False), (5.0, 12.0, False, False)],
 )  # fmt: skip
-def test_what_moves(gone: float, lasted: float, before: bool, right: bool) -> None:
+def test_what_moves(gone, lasted, before, right):
     """10 m within 14 s; slower than half a metre a second it stays; in between it does as before."""
     trail = np.array([[0.0, 0.0, 0.0], [lasted, 0.0, gone]])
     assert moves(trail, before, 10.0, 14.0) is right
     assert moves(trail[:1], before, 10.0, 14.0) is before
 
 
-def test_a_track_is_shown_as_long_as_the_sensor_that_saw_it_has_patience() -> None:
+def test_a_track_is_shown_as_long_as_the_sensor_that_saw_it_has_patience():
     """A slow sensor saw it; a fast one with little patience, which cannot, does not make it flicker."""
     slow = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 12), np.random.default_rng(7))
     fast = [look(t, sensor=1) for t in np.arange(0.25, 12, 0.25)]
@@ -136,14 +136,14 @@ def test_a_track_is_shown_as_long_as_the_sensor_that_saw_it_has_patience() -> No
     assert {len(one.identity) for one in shown} == {1}
 
 
-def test_order_of_scans_does_not_matter(rng: np.random.Generator) -> None:
+def test_order_of_scans_does_not_matter(rng):
     scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 20), rng, clutter=2)
     shuffled = [scans[i] for i in rng.permutation(len(scans))]
     for one, other in zip(run_many(scans, [EYE], POINTS), run_many(shuffled, [EYE], POINTS), strict=True):
         assert one.time == other.time and np.array_equal(one.x, other.x)
 
 
-def test_many_at_once_and_none(rng: np.random.Generator) -> None:
+def test_many_at_once_and_none(rng):
     """A scan of hundreds, twice, an empty one, and places that are no numbers."""
     crowd = rng.uniform(-1000, 1000, (300, 2))
     crowd[7] = np.nan
@@ -171,7 +171,7 @@ def ship(seed: int, steps: int = 40) -> tuple[np.ndarray, list[Scan]]:
     return middle, scans
 
 
-def test_a_long_hull_is_one_target_and_its_middle_is_found() -> None:
+def test_a_long_hull_is_one_target_and_its_middle_is_found():
     as_one, off = [], []
     for seed in range(4):
         middle, scans = ship(seed)
@@ -185,7 +185,7 @@ def test_a_long_hull_is_one_target_and_its_middle_is_found() -> None:
     assert np.mean(as_one) > 0.9 and np.mean(off) < 5.0
 
 
-def test_a_measurement_is_compared_however_far_apart_two_kinds_have_a_target() -> None:
+def test_a_measurement_is_compared_however_far_apart_two_kinds_have_a_target():
     """The measurement is where one kind has it, which is far from the middle of both."""
     targets = POINTS._replace(hulls=(POINT, POINT._replace(name="other")))
     eye, platform = EYE._replace(rough_m=(0.0,) * 2, along_m=(0.0,) * 2, near_side_m=(0.0,) * 2), np.zeros(2)
@@ -199,7 +199,7 @@ def test_a_measurement_is_compared_however_far_apart_two_kinds_have_a_target() -
     assert after.kinds[0, 1] > 0.9
 
 
-def test_bow_and_stern_of_a_known_ship_begin_no_target() -> None:
+def test_bow_and_stern_of_a_known_ship_begin_no_target():
     """15 m off its middle, in no gate, and at a speed at which no track that begins there is a double."""
     targets = POINTS._replace(hulls=(SHIP,))
     tracks = begin(np.zeros((1, 2)), R[None], 0.0, PLATFORM, (EYE,), 0, targets, 0, np.zeros((1, 2, 0)))
@@ -212,7 +212,7 @@ def test_bow_and_stern_of_a_known_ship_begin_no_target() -> None:
 
 
 @pytest.mark.parametrize(("change", "words"), [({"time": np.nan}, "no time"), ({"sensor": 3}, "there are 1")])
-def test_scans_that_cannot_be_are_said(change: dict[str, float], words: str) -> None:
+def test_scans_that_cannot_be_are_said(change, words):
     scan = look(0.0, [0.0, 0.0])
     with pytest.raises(WildlabError, match=words):
         run_many([scan._replace(**change)], [EYE], POINTS)

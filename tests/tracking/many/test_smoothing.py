@@ -44,7 +44,7 @@ def filtered(seed: int, density: float) -> Track:
 
 @given(st.integers(0, 10_000), st.floats(0.05, 2.0))
 @settings(max_examples=30, deadline=None)
-def test_each_track_is_smoothed_by_itself_and_on_either_side_of_an_absence(seed: int, density: float) -> None:
+def test_each_track_is_smoothed_by_itself_and_on_either_side_of_an_absence(seed, density):
     one = filtered(seed, density)
     other = one.x[::-1], one.P[::-1]
     alone = smooth(one, partial(white_acceleration, density=density))
@@ -66,7 +66,7 @@ def test_each_track_is_smoothed_by_itself_and_on_either_side_of_an_absence(seed:
         assert np.allclose(after[k][0][orders[k].index(2)], other[0][k])
 
 
-def test_what_was_given_is_not_changed_and_nothing_stays_nothing() -> None:
+def test_what_was_given_is_not_changed_and_nothing_stays_nothing():
     looks = [shown(t, [1], np.array([t, 0, 1, 0]), np.eye(4)) for t in (0.0, 1.0)]
     kept = [one.x.copy() for one in looks]
     smooth_many(looks, 0.5)
@@ -77,7 +77,7 @@ def test_what_was_given_is_not_changed_and_nothing_stays_nothing() -> None:
 
 @given(GENERATORS)
 @settings(max_examples=8, deadline=None)
-def test_covariances_are_those_of_the_errors_of_smoothed_tracks(rng: np.random.Generator) -> None:
+def test_covariances_are_those_of_the_errors_of_smoothed_tracks(rng):
     """Errors that fade, each at its own rate: everything is a sum of sources of variance one, and exact."""
     looks, k = 6, 2
     lasting = rng.choice([0.0, 1.0, 5.0, 40.0, np.inf], k)
@@ -112,7 +112,7 @@ def test_covariances_are_those_of_the_errors_of_smoothed_tracks(rng: np.random.G
 
 
 @pytest.mark.slow
-def test_errors_are_as_large_as_tracks_of_two_sensors_say() -> None:
+def test_errors_are_as_large_as_tracks_of_two_sensors_say():
     """Which part of a hull is seen lasts, another one of each sensor: before and after smoothing."""
     boat, share, lasting, own, rough = Hull("boat", 6.0, 2.0), 0.8, (20.0, 60.0), (0.7, 1.5), (2.0, 1.0)
     eyes = [
@@ -154,7 +154,7 @@ def test_errors_are_as_large_as_tracks_of_two_sensors_say() -> None:
     assert np.mean(means["white"]) > 2 * high
 
 
-def test_each_sensor_has_two_errors_of_its_own_behind_all_shared_ones() -> None:
+def test_each_sensor_has_two_errors_of_its_own_behind_all_shared_ones():
     alone, own = SURE, SURE._replace(correlation=0.5, lasting_s=7.0)
     eyes = [own, alone, own]
     assert own_lasting(eyes) == (7.0,) * 4

@@ -31,7 +31,7 @@ def spread(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 
 @given(st.integers(0, 10_000))
-def test_a_bearing_is_the_extended_kalman_filter(seed: int) -> None:
+def test_a_bearing_is_the_extended_kalman_filter(seed):
     """Its Jacobian by central differences of the direction from the platform, noise and errors included."""
     rng = np.random.default_rng(seed)
     x, C, noise = 20 * rng.normal(size=4), rng.normal(size=(4, 2)), spread(rng, 2)
@@ -69,7 +69,7 @@ def test_a_bearing_is_the_extended_kalman_filter(seed: int) -> None:
     assert compare_bearings(*given_, [[z + 1.0]], [[[R]]], 1e-3).likelihood[0, 0, 0] == 0
 
 
-def test_a_bearing_from_near_makes_no_track_too_sure() -> None:
+def test_a_bearing_from_near_makes_no_track_too_sure():
     """Places known to 5 m, bearings to 3 deg; to first order alone NEES / 2 would be 33 at 8 m."""
     rng, distance = np.random.default_rng(5), 8.0
     values = []
@@ -88,14 +88,14 @@ def test_a_bearing_from_near_makes_no_track_too_sure() -> None:
     assert np.mean(values) < 1.2
 
 
-def test_what_is_at_the_platform_is_in_no_direction() -> None:
+def test_what_is_at_the_platform_is_in_no_direction():
     x, P = np.zeros((1, 1, 4)), np.eye(4)[None, None]
     compared = compare_bearings(x, P, np.zeros((1, 1, 2, 2)), np.array([0.3, 0.0]), [[1.0]], [[[0.1]]], 9.0)
     assert compared.likelihood[0, 0, 0] == 0 and np.isfinite(compared.S).all()
 
 
 @given(GENERATORS)
-def test_the_mixture_has_the_moments_of_its_parts(rng: np.random.Generator) -> None:
+def test_the_mixture_has_the_moments_of_its_parts(rng):
     """Each way alone by a Schmidt filter, weighed by Bayes' rule, summed: moments and kinds."""
     K, M, n = 2, 3, 2
     x, C = rng.normal(size=(K, 4)), rng.normal(size=(K, 4, n))
@@ -126,7 +126,7 @@ def test_the_mixture_has_the_moments_of_its_parts(rng: np.random.Generator) -> N
 
 
 @given(GENERATORS)
-def test_likelihoods_are_densities_of_the_gate(rng: np.random.Generator) -> None:
+def test_likelihoods_are_densities_of_the_gate(rng):
     x, P = rng.normal(size=(2, 1, 4)), spread(rng, 2, 1, 4)
     z, R = 3 * rng.normal(size=(4, 2)), spread(rng, 4, 2)
     gate = 1.2
@@ -167,7 +167,7 @@ def moved(
 
 @given(GENERATORS, st.integers(0, 4))
 @settings(max_examples=30)
-def test_one_target_is_the_schmidt_filter(rng: np.random.Generator, k: int) -> None:
+def test_one_target_is_the_schmidt_filter(rng, k):
     """Without errors the Kalman filter; also where how errors move a measurement changes, and they fade."""
     lasting = rng.choice([0.0, 3.0, np.inf], k)
     scans = [
@@ -238,7 +238,7 @@ def _both(compared: Compared, seen: float, clutter: float) -> tuple[np.ndarray, 
 
 
 @pytest.mark.slow
-def test_together_is_near_the_sum_over_all_ways() -> None:
+def test_together_is_near_the_sum_over_all_ways():
     """Each target by itself is far off, where all are moved by more than they are apart."""
     rng = np.random.default_rng(1)
     off = []
@@ -252,13 +252,13 @@ def test_together_is_near_the_sum_over_all_ways() -> None:
 
 @given(st.integers(0, 10_000))
 @settings(max_examples=25)
-def test_an_error_that_moves_nothing_changes_nothing(seed: int) -> None:
+def test_an_error_that_moves_nothing_changes_nothing(seed):
     compared = _drawn(np.random.default_rng(seed), 3, 2, 0.0, 0.0)
     alone, together = _both(compared, 0.9, 1e-4)
     assert np.allclose(alone, together) and np.allclose(alone, _enumerated(compared, 0.9, 1e-4))
 
 
-def test_what_others_tell_is_the_least_squares_of_them(rng: np.random.Generator) -> None:
+def test_what_others_tell_is_the_least_squares_of_them(rng):
     """Sure associations: the errors' posterior is that of all other targets' innovations at once."""
     compared = _drawn(rng, 4, 3, 2.0)
     mean, covariance = told_by_others(compared, np.eye(4)[:, None])
@@ -274,7 +274,7 @@ def test_what_others_tell_is_the_least_squares_of_them(rng: np.random.Generator)
         assert np.allclose(covariance[t], np.eye(3) - gain @ g)
 
 
-def test_what_nobody_is_sure_of_tells_little() -> None:
+def test_what_nobody_is_sure_of_tells_little():
     """Two measurements that may be a target's: their middle, as unsure as they lie apart, and probable."""
     nu = np.array([[4.0, 0.0], [0.0, 2.0]])
     S, G = np.tile(5.0 * np.eye(2), (2, 1, 1)), np.tile(2.0 * np.eye(2), (2, 1, 1))
@@ -291,7 +291,7 @@ def test_what_nobody_is_sure_of_tells_little() -> None:
     assert np.allclose(mean, right @ (probable * 2.0 * np.linalg.solve(spread, middle)))
 
 
-def test_who_lies_far_off_by_what_is_shared_is_compared_too() -> None:
+def test_who_lies_far_off_by_what_is_shared_is_compared_too():
     """A place known to a metre, and a look that is wrong by thirty: sixty is no reason to leave it out."""
     known = looks(np.zeros((4, 1, 2)), np.random.default_rng(0))
     off = look(4.0, [60.0, 0.0])
@@ -303,7 +303,7 @@ def test_who_lies_far_off_by_what_is_shared_is_compared_too() -> None:
         assert hits[0] == (5 if met else 4)
 
 
-def test_targets_that_are_moved_together_are_told_apart() -> None:
+def test_targets_that_are_moved_together_are_told_apart():
     """Two metres apart and moved by three for long: who knows that they are moved together keeps them."""
     starts = 2.0 * np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
     truth = lines(starts, np.array([[0.3, 0.2]] * 3), 40)
@@ -322,7 +322,7 @@ def test_targets_that_are_moved_together_are_told_apart() -> None:
     assert kept[True] >= 3 > 1 >= kept[False]
 
 
-def test_a_track_is_not_lost_for_what_all_are_wrong_by() -> None:
+def test_a_track_is_not_lost_for_what_all_are_wrong_by():
     """A hundred metres that all share, where 50 m is what a place may be unknown by: new ones count."""
     truth = lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 15)
     for lasting, kept in ((np.inf, True), (0.0, False)):
@@ -332,7 +332,7 @@ def test_a_track_is_not_lost_for_what_all_are_wrong_by() -> None:
         assert (last.identity.tolist() == [0]) == kept
 
 
-def test_shared_errors_that_nobody_told_of_are_refused() -> None:
+def test_shared_errors_that_nobody_told_of_are_refused():
     scan = look(0.0, [1.0, 1.0], shared=np.zeros((1, 2, 3)))
     with pytest.raises(WildlabError, match="shared errors"):
         run_many([scan], [EYE], POINTS, [1.0])

@@ -1,7 +1,5 @@
 """Clouds of particles: weights, moments, starts, moves, draws and counts, by closed forms and by numpy."""
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import product
 

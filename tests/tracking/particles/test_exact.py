@@ -1,7 +1,5 @@
 """Particles against exact answers: Kalman's filter, a grid, and pairs by trying all."""
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import permutations
 

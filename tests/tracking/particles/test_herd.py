@@ -1,7 +1,5 @@
 """Many animals image after image: who is seen, lost, found again, and how many there are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -238,7 +236,7 @@ SMALL = 0.04 * np.eye(2)
 SPARSE = RULES._replace(moves=free, particles=500, gate_probability=0.999)
 
 
-def test_it_is_what_a_kalman_filter_would_have() -> None:
+def test_it_is_what_a_kalman_filter_would_have():
     off, covariances, means = 20.0, [], []
     for seed in range(40):
         rng = np.random.default_rng(seed)
@@ -256,7 +254,7 @@ def test_it_is_what_a_kalman_filter_would_have() -> None:
     assert min(np.linalg.eigvalsh(one).min() for one in covariances) > 0.02
 
 
-def test_a_handful_of_particles_is_not_taken_for_what_is_known() -> None:
+def test_a_handful_of_particles_is_not_taken_for_what_is_known():
     """Of n points drawn from a distribution the variance about their own mean is 1 - 1/n of its own.
 
     After 32 s an animal may be sqrt(8) m off: of 500 particles the detection leaves 2 * 500 * 0.04 / 8 = 5.
@@ -270,7 +268,7 @@ def test_a_handful_of_particles_is_not_taken_for_what_is_known() -> None:
     assert np.trace(np.mean(covariances, axis=0)) == pytest.approx(2 * 0.04 * 8.04 / 8.08, rel=0.05)
 
 
-def test_a_cloud_with_particles_enough_stays_its_own(rng: np.random.Generator) -> None:
+def test_a_cloud_with_particles_enough_stays_its_own(rng):
     wide = 4.0 * np.eye(2)
     herd, _ = step_nearest(no_herd(SPARSE), look(0.0, [0.0, 0.0], noise=wide), SPARSE, rng)
     before = herd.cloud.x.copy()

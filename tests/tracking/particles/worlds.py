@@ -1,7 +1,5 @@
 """Small worlds for trackers: a fence, animals that walk, an aircraft with a view, a block that hides."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wildlab.tracking.particles import Look, Rules, move, stay_inside, walk_of
