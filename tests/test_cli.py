@@ -51,16 +51,16 @@ def test_every_command_shows_an_example(capsys, name):
 
 
 @pytest.mark.parametrize(
-    ("argument", "heavy"),
+    ("arguments", "heavy"),
     [
-        ("--help", {"numpy", "pandas", "matplotlib", "papermill", "rich", "pydantic"}),
-        ("list", {"pandas", "scipy", "matplotlib", "papermill", "rich", "pooch"}),
+        (["--help"], {"numpy", "pandas", "matplotlib", "papermill", "rich", "pydantic"}),
+        (["list", "--out", "none"], {"pandas", "scipy", "matplotlib", "papermill", "rich", "pooch"}),
     ],
 )
-def test_what_only_tells_imports_no_heavy_package(argument, heavy, tmp_path):
+def test_what_only_tells_imports_no_heavy_package(arguments, heavy, tmp_path):
     program = (
         "import sys\nfrom wildlab.cli import main\n"
-        f"try:\n    main([{argument!r}])\nexcept SystemExit:\n    pass\n"
+        f"try:\n    main({arguments!r})\nexcept SystemExit:\n    pass\n"
         f"assert not (found := {heavy!r} & set(sys.modules)), found"
     )
     began = time.monotonic()
