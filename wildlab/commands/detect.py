@@ -84,8 +84,8 @@ def detect(
     even: bool,
     as_json: bool,
 ) -> None:
-    """Find warm or floating things in IMAGES: a folder of images, one image, a video (MP4, MOV, AVI, MKV,
-    CPTV), or a flight with a folder images.
+    """Find warm or floating things in IMAGES: a folder of images, one image, a video (MP4, MOV, AVI,
+    MKV), or a flight with a folder images.
 
     contrast takes what stands out from what lies about it, warm is the chain of F 3.2, shape a classifier
     that has to be learnt with --fit first, floating the chain of H 4.3 for what floats on an even sea, and
@@ -103,7 +103,6 @@ def detect(
       wildlab detect images --fit labels.csv --class Person --into found
       wildlab detect images --labels coco.json --also megadetector=batch.json --also yolo=labels --into found
       wildlab detect sea --method floating --into found
-      wildlab detect trap.cptv --method warm --even --into found
     """
     from wildlab.flight.files import printable
     from wildlab.pipeline.detecting.command import Wanted, detect_images

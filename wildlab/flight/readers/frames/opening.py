@@ -18,7 +18,6 @@ from wildlab.flight.files import printable
 from wildlab.flight.readers.frames import image as images
 from wildlab.flight.readers.frames import video as videos
 from wildlab.flight.readers.frames.below import images_below
-from wildlab.flight.readers.frames.cptv import SUFFIX, open_cptv, read_cptv
 from wildlab.flight.readers.frames.frame import Frame, Polarity, frame_name, spoilt
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.flight.readers.frames.pixels import (
@@ -34,8 +33,6 @@ from wildlab.flight.readers.frames.video import open_video, read_video
 #: Images of a folder that are looked at, and those that are read, each with the next one, to find what stays:
 #: burnt-in text, dead pixels, dark corners.
 MOST_FILES, SAMPLE = 1_000_000, 12
-#: Frames of a CPTV file among which that sample is taken: they come one after another.
-FIRST = 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +138,6 @@ class Frames:
             for number, path in enumerate(self.files):
                 if wanted(number):
                     yield read_image(path, polarity=self.polarity)
-        elif self.path.suffix.lower() == SUFFIX:
-            yield from read_cptv(self.path, wanted, polarity=self.polarity)
         else:
             yield from read_video(self.path, wanted, polarity=self.polarity)
 
@@ -219,8 +214,6 @@ class Frames:
     def _some(self) -> Iterator[tuple[Frame, Frame | None]]:
         """Some frames, each with the one after it."""
         count = self.count or 1
-        if self.path.suffix.lower() == SUFFIX and not self.files:
-            count = min(self.count or FIRST, FIRST)
         numbers = np.unique(np.linspace(0, max(count - 1, 0), SAMPLE).round().astype(int)).tolist()
         if self.files:
             for number in numbers:
@@ -229,12 +222,6 @@ class Frames:
                     read_image(self.files[number], polarity=self.polarity),
                     next((read_image(path, polarity=self.polarity) for path in after), None),
                 )
-            return
-        if self.path.suffix.lower() == SUFFIX:
-            found = list(islice(read_cptv(self.path, lambda number: number < count), count))
-            for number in numbers:
-                if number < len(found):
-                    yield found[number], next(iter(found[number + 1 : number + 2]), None)
             return
         capture = open_video(self.path)
         try:
@@ -278,15 +265,13 @@ def open_frames(
     WildlabError
         Where there is nothing, or nothing that is an image or a video; as `images_below`.
     """
-    kinds = ", ".join(sorted(images.SUFFIXES | videos.SUFFIXES | {SUFFIX}))
+    kinds = ", ".join(sorted(images.SUFFIXES | videos.SUFFIXES))
     if path.is_dir():
         found = sorted(one for one in path.iterdir() if one.suffix.lower() in images.SUFFIXES)[:MOST_FILES]
         if not found and ids:
             found = images_below(path, ids)
         if not found:
-            clips = sorted(
-                one.name for one in path.iterdir() if one.suffix.lower() in videos.SUFFIXES | {SUFFIX}
-            )
+            clips = sorted(one.name for one in path.iterdir() if one.suffix.lower() in videos.SUFFIXES)
             fix = (
                 f"name one of its videos, {clips[0]} for instance"
                 if clips
@@ -307,8 +292,6 @@ def open_frames(
         capture.release()
         known = np.isfinite(claimed) and 0 < claimed <= videos.MOST_FRAMES
         return Frames(path, (), int(claimed) if known else None, polarity, even=even)
-    if path.suffix.lower() == SUFFIX:
-        return Frames(path, (), open_cptv(path).frames, polarity, even=even)
     raise WildlabError(
         f"the name ends in {path.suffix!r}", f"give a folder, or a file in one of {kinds}", file=path
     )
