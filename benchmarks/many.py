@@ -17,17 +17,17 @@ from benchmarks.timing import best_of
 from wildlab.geometry.frames import Array
 from wildlab.tracking.many import (
     POINT,
+    ManySensorModel,
+    ManyTargetModel,
     Scan,
-    SensorBeliefs,
-    TargetBeliefs,
     association_probabilities,
     run_many,
 )
 from wildlab.tracking.many.probabilities import association_probabilities_by_enumeration
 
 TARGETS, MEASUREMENTS, SCANS = 50, 100, 60
-EYE = SensorBeliefs("eye", 0.9, 50 / 1e6, 0.0, 1e9, 5.0, (0.0,), (0.0,), (0.0,))
-POINTS = TargetBeliefs(
+EYE = ManySensorModel("eye", 0.9, 50 / 1e6, 0.0, 1e9, 5.0, (0.0,), (0.0,), (0.0,))
+POINTS = ManyTargetModel(
     (POINT,), density=0.1, start_speed_m_s=3.0, lifetime_s=600.0, birth=0.05, visible_s=100.0, hidden_s=5.0,
     gate=4.0, confirmed=0.95, hits=3, shown=0.5, forgotten=0.02, lost_m=30.0, fastest_m_s=30.0, moves_m=0.0,
     over_s=15.0, apart_m=2.0,

@@ -23,7 +23,7 @@ from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.tracking import measurement
-from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
@@ -130,7 +130,7 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
     last = best_of(lambda: run_batch(times, gaps, R, MOTION, START, rows=[-1]), repeats=5)
     rows.append(("KF, wildlab, the same, last estimates kept", last, last / theirs, ""))
 
-    noise, view = 4.0 * np.eye(2), View(poses, 0.0)
+    noise, view = 4.0 * np.eye(2), BatchCamera(poses, 0.0)
     sensor = measurement.pixels(poses, 0.0)
     for name, uncertainty in (("pixel EKF", None), ("pixel Schmidt", pose)):
 

@@ -25,7 +25,7 @@ from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
 from wildlab.pipeline.navigate import PUBLISHED_LIKE
-from wildlab.pipeline.navigation_errors import Errors
+from wildlab.pipeline.navigation_errors import NavigationErrors
 from wildlab.simulation.twins import simulate_twin
 
 HEAVY = ("numpy", "pandas", "matplotlib", "scipy", "numba", "cv2", "pydantic", "pyarrow", "click")
@@ -161,7 +161,7 @@ def test_every_result_has_a_figure(ship):
 def test_only_the_part_that_counts_is_judged():
     times, nothing = np.arange(4.0), np.full((4, 9), np.nan)
     squares = {"position": times, "velocity": times + 10, "attitude": np.full(4, np.nan)}
-    found = navigation_series(Errors(times, nothing, nothing, squares), 1.0, 3.0)
+    found = navigation_series(NavigationErrors(times, nothing, nothing, squares), 1.0, 3.0)
     assert [(one.name, list(one.values)) for one in found] == [
         ("NEES position", [1.0, 2.0]),
         ("NEES velocity", [11.0, 12.0]),

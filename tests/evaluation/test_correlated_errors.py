@@ -6,7 +6,7 @@ from scipy.stats import f
 
 from wildlab.evaluation.correlated_errors import (
     Covariance,
-    Places,
+    KnownPlaces,
     PosePoints,
     WanderNoise,
     degrees_of_freedom,
@@ -58,7 +58,9 @@ def test_it_is_the_dense_covariance(place_sd):
             S = Z.T @ expected @ Z
             determinant += np.linalg.slogdet(S)[1]
             expected = expected - expected @ Z @ np.linalg.solve(S, Z.T @ expected)
-    inner, logarithm = Covariance(points, NOISE, None if place_sd is None else Places(of, place_sd)).weigh(B)
+    inner, logarithm = Covariance(
+        points, NOISE, None if place_sd is None else KnownPlaces(of, place_sd)
+    ).weigh(B)
     columns = B.reshape(2 * n, 3)
     np.testing.assert_allclose(inner, columns.T @ expected @ columns, rtol=1e-9, atol=1e-7)
     assert logarithm == pytest.approx(determinant)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.identities import Scan, compare_identities, scan_gospa
+from wildlab.evaluation.identities import Moment, compare_identities, scan_gospa
 from wildlab.evaluation.sets import gospa
 
 CUTOFF = 20.0
@@ -16,7 +16,7 @@ CUTOFF = 20.0
 
 def scan(time, tracks, targets, hidden=(), ignored=(), P=4.0):
     """Tracks and targets by name, each at (x, y)."""
-    return Scan(
+    return Moment(
         time,
         np.array(list(tracks.values()), float).reshape(-1, 2),
         np.broadcast_to(P * np.eye(2), (len(tracks), 2, 2)),
@@ -309,7 +309,7 @@ def test_scans_out_of_order_are_refused():
 
 def test_the_truth_own_error_is_beside_the_tracks():
     """3 m off with 1 m of its own and a truth known to 2 m: 9 over 5 in one axis."""
-    one = Scan(0.0, np.array([[3.0, 0.0]]), np.eye(2)[None], ["t"], np.zeros((1, 2)), ["a"], [True], [False],
-               truth_sd=[2.0])  # fmt: skip
+    place, truth = np.array([[3.0, 0.0]]), np.zeros((1, 2))
+    one = Moment(0.0, place, np.eye(2)[None], ["t"], truth, ["a"], [True], [False], truth_sd=[2.0])
     found = compare_identities([one], 5.0).tracks["t"]
     assert (found.anees, found.anees_alone, found.compared) == (pytest.approx(9 / 5), pytest.approx(9), 1)

@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from wildlab.evaluation.identities import Scan, compare_identities
+from wildlab.evaluation.identities import Moment, compare_identities
 
 CUTOFF = 20.0
 
@@ -20,7 +20,7 @@ def wandering(rng, scans=25, targets=3):
         there = rng.random(targets) < 0.8
         truth = start + t * speed
         x = (truth + rng.normal(0, 6, truth.shape))[there]
-        yield Scan(
+        yield Moment(
             float(t),
             x,
             np.broadcast_to(np.eye(2), (len(x), 2, 2)),

@@ -10,8 +10,8 @@ import pandas as pd
 from tests.pipeline.building import manifest_of, poses_table
 from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.beliefs import Beliefs, of_flight, of_sensor
-from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.following.beliefs import NoiseModel, of_flight, of_sensor
+from wildlab.pipeline.following.follow import TrackingResult
 from wildlab.pipeline.following.judged import judged
 from wildlab.pipeline.scans import Scans, scans_of
 
@@ -134,7 +134,7 @@ def paused(flight: Flight, begin: float, end: float) -> Flight:
 
 def believed(
     flight: Flight, text: str = "", sensor: str = "radar", source: str | None = None
-) -> tuple[Scans, Beliefs]:
+) -> tuple[Scans, NoiseModel]:
     """A sensor's scans, and what filters believe of it by a flight and a file of settings."""
     scans = scans_of(flight, sensor, 0.0, source)
     return scans, of_sensor(flight, scans, of_flight(flight, parse_settings(text)))[0]
@@ -151,6 +151,6 @@ start_speed_m_s = 1.0
 """
 
 
-def rows_of(followed: Followed, sensor: str = "radar") -> pd.DataFrame:
+def rows_of(followed: TrackingResult, sensor: str = "radar") -> pd.DataFrame:
     rows = judged(followed)
     return rows[rows["sensor"] == sensor].set_index("filter")

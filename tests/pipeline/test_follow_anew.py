@@ -19,16 +19,16 @@ from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.pipeline.following import sensor_tracks
 from wildlab.pipeline.following.anew import Geometry, ends_by, part_of
-from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
+from wildlab.pipeline.following.beliefs import NoiseModel, TargetModel
 from wildlab.pipeline.following.estimates import estimates_table
-from wildlab.pipeline.following.follow import Followed, follow_targets
+from wildlab.pipeline.following.follow import TrackingResult, follow_targets
 from wildlab.pipeline.following.judged import UNKNOWN, judged, seen_of, used_of
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.pipeline.scans import Scans, Truth
 
 CAMERA = Camera(640, 512, 1100.0, 1100.0, 320.0, 256.0)
 HEIGHT, TILT, NOISE_PX = 60.0, 0.6, 2.0
-TARGETS = TargetBeliefs(0.5, 5.0, 0.99, 10.0, 20.0, 0.1, float("nan"), None)
+TARGETS = TargetModel(0.5, 5.0, 0.99, 10.0, 20.0, 0.1, float("nan"), None)
 FILTERS = ("ekf", "ukf", "imm", "coloured")
 
 
@@ -57,9 +57,9 @@ def watched(pause_s: float = 200.0) -> tuple[Scans, Truth]:
     return scans, Truth("deer", place, velocity, 0.0)
 
 
-def beliefs(scans: Scans) -> Beliefs:
+def beliefs(scans: Scans) -> NoiseModel:
     nan, sd = float("nan"), np.full(2, NOISE_PX)
-    return Beliefs("camera", scans.kind, 0.0, sd, sd, (), 0.0, 1.0, nan, nan, nan, scans.interval_s)
+    return NoiseModel("camera", scans.kind, 0.0, sd, sd, (), 0.0, 1.0, nan, nan, nan, scans.interval_s)
 
 
 def follow(pause_s: float = 200.0) -> list[SensorTrack]:
@@ -89,7 +89,7 @@ def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silent
     tracks = follow()
     scans, _ = watched()
     sensor = {"camera": scans}, {"camera": beliefs(scans)}
-    rows = judged(Followed(tracks, *sensor, TARGETS, [], [], True))
+    rows = judged(TrackingResult(tracks, *sensor, TARGETS, [], [], True))
     first = tracks[0]
     for one in tracks:
         assert (np.isfinite(one.estimate) == np.isfinite(first.estimate)).all()

@@ -6,7 +6,7 @@ import pytest
 from tests.refused import refused
 from wildlab.detection.detections import no_detections
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.pipeline.rendered import Judged, Photographer, Shot, exposures_of, marks_of, with_detections
+from wildlab.pipeline.rendered import ImageScore, Photographer, Shot, exposures_of, marks_of, with_detections
 from wildlab.simulation.twins import simulate_twin
 
 TWIN, SEED = "large-ship", 2
@@ -71,7 +71,7 @@ def test_centres_of_what_the_border_cuts_are_moved_where_the_length_is_known(cam
 
 
 def test_an_image_without_the_target_has_no_mark(camera, shots):
-    none = Shot(3, (), no_detections(), Judged({}, set(), 2))
+    none = Shot(3, (), no_detections(), ImageScore({}, set(), 2))
     marks = marks_of([none, shots[0]], shape_of(camera))
     assert marks.found.tolist() == [False, True]
     assert marks.share[0] == 0
@@ -92,7 +92,9 @@ def test_rendered_detections_take_the_place_of_the_drawn_ones(flight, camera, sh
 
 
 def test_a_target_that_is_found_nowhere_and_an_image_of_another_flight_are_refused(flight, camera, shots):
-    nothing = [shot._replace(judged=Judged({1: []}, set(), 0), detections=no_detections()) for shot in shots]
+    nothing = [
+        shot._replace(judged=ImageScore({1: []}, set(), 0), detections=no_detections()) for shot in shots
+    ]
     with refused("none of 4"):
         with_detections(flight, marks_of(nothing, shape_of(camera)), "ship")
     marks = marks_of(shots, shape_of(camera))

@@ -12,7 +12,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera import project
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.pipeline.navigate import PUBLISHED_LIKE, navigate_mekf
-from wildlab.pipeline.navigation_errors import Errors, errors_against
+from wildlab.pipeline.navigation_errors import NavigationErrors, errors_against
 from wildlab.pipeline.sighting_errors import (
     PAUSE_S,
     TURNING,
@@ -134,7 +134,7 @@ def test_poses_without_covariance_are_no_input_for_schmidt(flight):
 
 
 @pytest.fixture(scope="module")
-def own(flight: Flight, seen: Sighting) -> Errors:
+def own(flight: Flight, seen: Sighting) -> NavigationErrors:
     return errors_against(flight.nav["truth"], flight.nav["mekf"], seen.times)
 
 
@@ -156,7 +156,7 @@ def test_means_and_roots_leave_out_what_is_not_known():
 def test_numbers_of_poses_are_in_metres_and_degrees():
     error, sd = np.zeros((4, 9)), np.ones((4, 9))
     error[:, 0], error[:, 6], sd[:, 8] = [1, -1, 1, np.nan], np.radians(3.0), np.radians(2.0)
-    found = pose_numbers(Errors(np.arange(4.0), error, sd, {}))
+    found = pose_numbers(NavigationErrors(np.arange(4.0), error, sd, {}))
     assert found["rms_north"] == 1.0 and found["rms_roll"] == pytest.approx(3.0) and found["rms_down"] == 0.0
     assert found["mean_sd_yaw"] == pytest.approx(2.0) and found["mean_sd_east"] == 1.0
 

@@ -21,7 +21,7 @@ from wildlab.planning.patterns import (
     row_distance,
     rows_over,
 )
-from wildlab.planning.visits import Way, visit_order
+from wildlab.planning.visits import AreaWay, visit_order
 
 U_SHAPE = [[0, 0], [100, 0], [100, 30], [30, 30], [30, 70], [100, 70], [100, 100], [0, 100]]
 CAMERA = Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6, 0.0, (0.446, 0.0, 0.0, 0.0, 0.0))
@@ -107,7 +107,7 @@ def test_the_start_says_at_which_corner_rows_begin():
 def test_several_areas_are_visited_in_the_shortest_order():
     """Against every order and every way, by hand."""
     rng = np.random.default_rng(5)
-    ways = [[Way(np.zeros((0, 2, 2)), rng.uniform(0, 100, (2, 2))) for _ in range(2)] for _ in range(5)]
+    ways = [[AreaWay(np.zeros((0, 2, 2)), rng.uniform(0, 100, (2, 2))) for _ in range(2)] for _ in range(5)]
 
     def flown(order: tuple[int, ...], chosen: tuple[int, ...], back: bool, start: bool) -> float:
         points = np.concatenate([ways[k][w].points for k, w in zip(order, chosen, strict=True)])
@@ -130,7 +130,7 @@ def test_many_areas_are_not_far_from_the_shortest():
     """Ten on a circle: the shortest way round is known."""
     angles = np.random.default_rng(3).permutation(10) * 2 * np.pi / 10
     spots = [np.tile([100 * np.cos(a), 100 * np.sin(a)], (2, 1)) for a in angles]
-    order = [k for k, _ in visit_order([[Way(np.zeros((0, 2, 2)), spot)] for spot in spots])]
+    order = [k for k, _ in visit_order([[AreaWay(np.zeros((0, 2, 2)), spot)] for spot in spots])]
     turned = np.abs(np.angle(np.exp(1j * np.diff(angles[order]))))
     assert np.allclose(turned, 2 * np.pi / 10)
 

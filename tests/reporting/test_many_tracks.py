@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from tests.figure_text import overlapping
-from wildlab.evaluation.identities import Identities, Scan, TargetLife, TrackLife, compare_identities
+from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackLife, compare_identities
 from wildlab.evaluation.sets import gospa
-from wildlab.pipeline.following.beliefs import Said
+from wildlab.pipeline.following.beliefs import ToldValue
 from wildlab.reporting import figures
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
@@ -47,7 +47,7 @@ def made(
         x[on, :2] = ways[there[on], t]
         shown.append(shown_at(t, there, x, np.eye(4)))
         P = shown[-1].P[:, :2, :2]
-        compared.append(Scan(float(t), x[:, :2], P, there.tolist(), ways[:, t], names, flags, ~flags))
+        compared.append(Moment(float(t), x[:, :2], P, there.tolist(), ways[:, t], names, flags, ~flags))
     platform = rng.normal(0, size / 50, (looks, 2)).cumsum(axis=0)
     followed = SimpleNamespace(
         shown=shown,
@@ -177,7 +177,10 @@ def test_a_track_that_goes_on_without_its_target_is_seen():
 
 
 def test_names_are_only_text_and_what_is_not_known_is_not_said():
-    values = [Said("targets", "kinds", "**bold** `code`", "stated"), Said("radar", "x", "1", "stated")]
+    values = [
+        ToldValue("targets", "kinds", "**bold** `code`", "stated"),
+        ToldValue("radar", "x", "1", "stated"),
+    ]
     table = words.told_table([values[1], values[0], values[1]])
     assert table["of"].tolist() == ["radar", "radar", "targets"]
     assert not set("*`") & set(table["value"].iloc[2])

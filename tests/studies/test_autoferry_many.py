@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.evaluation.identities import Scan, compare_identities
+from wildlab.evaluation.identities import Moment, compare_identities
 from wildlab.flight.following import parse_settings
 from wildlab.flight.toml import dump_toml
 from wildlab.studies.autoferry_many import judged as words
@@ -66,7 +66,9 @@ def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first():
 
 
 def test_what_is_assumed_of_the_truth_chooses_no_draw():
-    one = Scan(0.0, np.array([[3.0, 0.0]]), np.eye(2)[None], ["t"], np.zeros((1, 2)), ["a"], [True], [False])
+    one = Moment(
+        0.0, np.array([[3.0, 0.0]]), np.eye(2)[None], ["t"], np.zeros((1, 2)), ["a"], [True], [False]
+    )
     for sd in (0.0, 2.0):
         lives = compare_identities([one._replace(truth_sd=sd)], 5.0)
         assert anees_of(lives) == 9 / 2 and anees_of(lives, alone=False) == 9 / (1 + sd**2) / 2

@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.pipeline.many.follow import Followed, follow_all, judged
+from wildlab.pipeline.many.follow import ManyTracks, follow_all, judged
 from wildlab.studies.autoferry_many import beside, stone_soup, tuning
 from wildlab.studies.autoferry_many.judged import HEADINGS
 from wildlab.studies.autoferry_many.stone_soup import Choice, Eye, draw_choice, run_stone_soup
 from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many import Scan, SensorBeliefs, Shown
+from wildlab.tracking.many import ManySensorModel, Scan, Shown
 from wildlab.tracking.maritime import white_acceleration
 
 R = np.full((1, 2, 2), np.nan)  # of a scan: never used, since noise is one of the choices
@@ -102,11 +102,11 @@ def test_what_stays_is_shown_only_where_a_draw_asks_for_no_move():
     assert shown[:3] == [0, 0, 0] and shown[6:] == [1] * 14
 
 
-def followed(scans: list[Scan], shown: list[Shown]) -> Followed:
+def followed(scans: list[Scan], shown: list[Shown]) -> ManyTracks:
     truth = {"Havfruen": np.array([[30 + one.time, 10.0] for one in scans])}
     truth["Havfruen"][3] = np.nan
-    sensors = [SensorBeliefs(name, 0.9, 1e-5, 0, 60, 4, (0,), (0,), (0,)) for name in ("lidar", "radar")]
-    return Followed(scans, [frozenset()] * len(scans), shown, {}, sensors, None, truth, [], [])
+    sensors = [ManySensorModel(name, 0.9, 1e-5, 0, 60, 4, (0,), (0,), (0,)) for name in ("lidar", "radar")]
+    return ManyTracks(scans, [frozenset()] * len(scans), shown, {}, sensors, None, truth, [], [])
 
 
 def test_it_is_judged_at_our_looks_by_our_truths(monkeypatch):

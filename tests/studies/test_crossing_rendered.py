@@ -10,8 +10,8 @@ import pytest
 from wildlab.detection.detections import Detections, no_detections
 from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.pipeline.rendered import Judged, Photographer, Shot, exposures_of
-from wildlab.simulation.scene.render import Seen
+from wildlab.pipeline.rendered import ImageScore, Photographer, Shot, exposures_of
+from wildlab.simulation.scene.render import SeenBody
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import rendered as study
 from wildlab.studies.crossing_vessels import rendered_charts as charts
@@ -68,14 +68,14 @@ def things(uv: list[list[float]], box: list[list[float]] | None = None) -> Detec
     )  # fmt: skip
 
 
-def in_view(number: int, share: float = 1.0) -> Seen:
+def in_view(number: int, share: float = 1.0) -> SeenBody:
     nothing = np.zeros(2)
-    return Seen(
+    return SeenBody(
         number, "vessel", nothing, nothing, nothing, np.zeros((3, 2)), share * 100, share, share * 100
     )
 
 
-def shot(exposure: int, found: Detections, judged: Judged, *seen: Seen) -> Shot:
+def shot(exposure: int, found: Detections, judged: ImageScore, *seen: SeenBody) -> Shot:
     return Shot(exposure, seen, found, judged)
 
 
@@ -84,16 +84,16 @@ SHOTS = [
     shot(
         3,
         things([[50, 50], [90, 50], [20, 20]]),
-        Judged({2: [0], 1: [1]}, set(), 1),
+        ImageScore({2: [0], 1: [1]}, set(), 1),
         in_view(1),
         in_view(2),
     ),
     # Both as one, and a second piece of boat 1.
-    shot(5, things([[50, 50], [80, 50]]), Judged({1: [0, 1], 2: []}, {2}, 0), in_view(1), in_view(2)),
-    shot(6, no_detections(), Judged({1: []}, set(), 0), in_view(1)),
+    shot(5, things([[50, 50], [80, 50]]), ImageScore({1: [0, 1], 2: []}, {2}, 0), in_view(1), in_view(2)),
+    shot(6, no_detections(), ImageScore({1: []}, set(), 0), in_view(1)),
     # Cut by the left border.
-    shot(8, things([[4, 50]]), Judged({2: [0]}, set(), 0), in_view(2, 0.7)),
-    shot(9, no_detections(), Judged({}, set(), 0)),
+    shot(8, things([[4, 50]]), ImageScore({2: [0]}, set(), 0), in_view(2, 0.7)),
+    shot(9, no_detections(), ImageScore({}, set(), 0)),
 ]  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wildlab.studies.crossing_vessels import rendered_text as text
-from wildlab.studies.crossing_vessels.rendered import Associated, Followed, Rendering
+from wildlab.studies.crossing_vessels.rendered import Associated, CrossingTracks, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
 from wildlab.studies.crossing_vessels.text import NAMES
 from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES
@@ -26,16 +26,16 @@ SWAPPED = GOOD._replace(wrong=59, wrong_inside=50, swapped=True, swaps=2)
 SHARED = Associated(swapped=False, swaps=0)
 
 
-def followed(swapped: str = "") -> Followed:
+def followed(swapped: str = "") -> CrossingTracks:
     """By every rule without a mistake, but for the one that swaps the vessels."""
     looks = Looks(np.arange(4), np.zeros((4, 2)), 0.5)
     truth = np.array([np.zeros((4, 2)), np.full((4, 2), 3.0)])
     crossing = Crossing(looks, np.zeros(4, int), np.arange(4) * 0.5, truth)
     by_rule = {name: SWAPPED if name == swapped else GOOD for name in NAMES} | {JOINT: SHARED}
-    return Followed(crossing, np.full(4, 10.0), by_rule)
+    return CrossingTracks(crossing, np.full(4, 10.0), by_rule)
 
 
-def flights(count: int, **ways: Followed) -> list[Rendering]:
+def flights(count: int, **ways: CrossingTracks) -> list[Rendering]:
     three = {"frames": followed(), "inside": followed(), "drawn": followed()} | ways
     return [
         Rendering(7 + number, (0.0, 60.0), 400, None, NEAR, SEA, **three)  # type: ignore[arg-type]

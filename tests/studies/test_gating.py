@@ -61,7 +61,7 @@ def motion(dt: float, sd: float) -> tuple[Array, Array]:
     return F, sd**2 * G @ G.T
 
 
-def warmed_up(scene: gating.Scene, run: int) -> KalmanFilter:
+def warmed_up(scene: gating.GatingScene, run: int) -> KalmanFilter:
     kf = KalmanFilter(dim_x=4, dim_z=2)
     kf.F, kf.Q = motion(0.1, 0.01)
     kf.H, kf.R, kf.P = np.eye(2, 4), 100.0 * np.eye(2), np.diag([100.0, 100.0, 20.0, 20.0])

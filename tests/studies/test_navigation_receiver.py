@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise
-from wildlab.pipeline.navigation_errors import Errors
+from wildlab.pipeline.navigation_errors import NavigationErrors
 from wildlab.pipeline.receiver import Placement, Receiver
 from wildlab.studies.navigation import receiver as words
 
@@ -67,10 +67,10 @@ def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict):
     rng = np.random.default_rng(1)
     times = np.arange(0.0, 900.0, 0.5)
 
-    def errors(size: float) -> Errors:
+    def errors(size: float) -> NavigationErrors:
         e = np.full((len(times), 9), np.nan)
         e[:, 6:] = np.radians(size * rng.standard_normal((len(times), 3)))
-        return Errors(times, e, np.ones_like(e), {})
+        return NavigationErrors(times, e, np.ones_like(e), {})
 
     said = words.words_on_attitude(errors(1.0), errors(scale), 0.0, 900.0)
     assert verdict in said

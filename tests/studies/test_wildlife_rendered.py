@@ -8,7 +8,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.pipeline.animals.follow import Followed, Found, Known
+from wildlab.pipeline.animals.follow import FollowedAnimals, Found, Known
 from wildlab.pipeline.animals.frames import NONE, Framed
 from wildlab.pipeline.animals.images import Images
 from wildlab.simulation.parameters import load_twin
@@ -45,7 +45,7 @@ def found(image: int, animal: int, track: int, started: bool) -> Found:
 IN_VIEW = [[1, 1], [1, 0], [0, 1], [0, 0]]
 #: Of animal 0 twice in one image, once of animal 1 while it is not in view, and three of none.
 IMAGES = images_of([0, 0, 0, 1, 1, 3], [0, 0, NONE, NONE, NONE, 1], IN_VIEW)
-FOLLOWED = Followed(
+FOLLOWED = FollowedAnimals(
     [],
     [found(0, 0, 1, True), found(0, 0, 1, False), found(0, NONE, 2, True), found(1, NONE, 2, False),
      found(1, NONE, 3, True), found(3, 1, 4, True)],
@@ -80,7 +80,7 @@ def test_a_false_detection_is_no_sighting_and_mixes_a_track():
 
 def renderings(**images: Images) -> Renderings:
     world = World(*[None] * len(World._fields))._replace(images=images_of([], [], IN_VIEW))  # type: ignore[arg-type]
-    empty = Followed([], [], 0, 0)
+    empty = FollowedAnimals([], [], 0, 0)
     by = {
         name: Rendered(None, Framed(one, None, None), empty, None, None, None)  # type: ignore[arg-type]
         for name, one in images.items()

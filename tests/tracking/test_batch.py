@@ -12,7 +12,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.tracking import measurement as m
 from wildlab.tracking import schmidt
-from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.batch_kernels import limit_one
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
@@ -93,7 +93,7 @@ def test_pixels(gate):
     plane = np.linspace(0, 1, N)
     start = Start(-0.5, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     R = np.diag([4.0, 6.0])
-    batch = run_batch(times, z, R, CV, start, view=View(poses, plane), gate_probability=gate)
+    batch = run_batch(times, z, R, CV, start, view=BatchCamera(poses, plane), gate_probability=gate)
     for run in (0, 1, 33, 66):
         sensor = m.pixels(poses.take(run), plane)
         agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate_probability=gate), but=TWICE)
@@ -111,7 +111,7 @@ def test_schmidt(correlation_time, rng):
     start = Start(0.0, np.zeros(4), np.tile(np.diag([25.0, 25, 9, 9]), (runs, 1, 1)))
     R = np.tile(np.diag([4.0, 6.0]), (N, 1, 1))
     pose = PoseUncertainty(covariance, correlation_time)
-    batch = run_batch(times, z, R, CV, start, view=View(poses, 0.0), pose=pose, gate_probability=0.999)
+    batch = run_batch(times, z, R, CV, start, view=BatchCamera(poses, 0.0), pose=pose, gate_probability=0.999)
     for run in (0, 3, 4, 5, 33, 65):
         own = start._replace(P=start.P[run])
         track = run_filter(
@@ -139,7 +139,7 @@ def test_the_cross_covariance_is_limited_alike(rng):
 def test_only_the_rows_asked_for_are_kept():
     times, z, poses = flight(66)
     start = Start(times[1], np.ones(4), np.diag([25.0, 25, 9, 9]), row=1)
-    arguments = dict(view=View(poses, 0.0), gate_probability=0.99)
+    arguments = dict(view=BatchCamera(poses, 0.0), gate_probability=0.99)
     full = run_batch(times, z, np.eye(2), CV, start, **arguments)
     rows = [0, 1, 17, N - 1]
     some = run_batch(times, z, np.eye(2), CV, start, rows=rows, **arguments)
@@ -159,7 +159,7 @@ def test_bad_input_is_named():
     with pytest.raises(WildlabError, match="runs, times, 2"):
         run_batch(times, z[0], R, CV, start)
     with pytest.raises(WildlabError, match="distorts"):
-        run_batch(times, z, R, CV, start, view=View(replace(poses, camera=CROOKED), 0.0))
+        run_batch(times, z, R, CV, start, view=BatchCamera(replace(poses, camera=CROOKED), 0.0))
     with pytest.raises(WildlabError, match="row 3 at"):
         run_batch(np.where(np.arange(N) == 3, -1.0, times), z, R, CV, start)
     bad = np.tile(R, (3, N, 1, 1))
@@ -182,7 +182,7 @@ def test_covariances_of_poses_that_differ_by_a_factor(change, monkeypatch, rng):
     bent = P.copy()
     bent[7:, 3, 3] *= 1.1
     told = np.array([P, 0.01 * P, bent, 9 * P])
-    view, start = View(poses, 0.0), Start(times[0], np.zeros(4), np.diag([50.0, 50, 9, 9]))
+    view, start = BatchCamera(poses, 0.0), Start(times[0], np.zeros(4), np.diag([50.0, 50, 9, 9]))
     z = np.tile(uv, (4, 1, 1))
     computed = []
     whole = schmidt.transitions_of_pose

@@ -17,7 +17,7 @@ from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking import measurement as m
 from wildlab.tracking import predictions as p
-from wildlab.tracking.combined import Seen, combined, merge
+from wildlab.tracking.combined import SensorMeasurements, combined, merge
 from wildlab.tracking.considered import Considered, consider, consider_all, errors_of
 from wildlab.tracking.considering import considering, renamed
 from wildlab.tracking.following import follow
@@ -300,9 +300,9 @@ def crew(seed=0, n=20):
     mast = m.predict_range_bearing(np.tile(truth, (n, 1)), FAR, 0.0).z[:, 1:] + rng.normal(0, 0.02, (n, 1))
     fixes = truth + rng.normal(0, 3, (n, 2))
     return [
-        Seen(times[0], radar, np.diag([1.0, 1e-4]), ranges_bearings([0.0, 0.0], 0.3)),
-        Seen(times[1], mast, [[4e-4]], bearings(np.tile(FAR, (n, 1)), 0.0)),
-        Seen(times[2], fixes, 9 * np.eye(2), m.positions()),
+        SensorMeasurements(times[0], radar, np.diag([1.0, 1e-4]), ranges_bearings([0.0, 0.0], 0.3)),
+        SensorMeasurements(times[1], mast, [[4e-4]], bearings(np.tile(FAR, (n, 1)), 0.0)),
+        SensorMeasurements(times[2], fixes, 9 * np.eye(2), m.positions()),
     ]
 
 
@@ -401,8 +401,14 @@ def test_errors_are_shared_by_name_and_apart_by_another():
         (lambda: combined([bearings(np.zeros((3, 2)), 0.0)], [0, 0]), "3 rows"),
         (lambda: combined([combined([m.positions()], [0])], [0]), "combined"),
         (lambda: merge([]), "no sensor"),
-        (lambda: merge([Seen([0.0], [[1.0]], np.eye(2), m.positions())]), "measurements of sensor 0"),
-        (lambda: merge([Seen([0.0], [[1.0, 2.0]], np.eye(3), m.positions())]), "R of the shape"),
+        (
+            lambda: merge([SensorMeasurements([0.0], [[1.0]], np.eye(2), m.positions())]),
+            "measurements of sensor 0",
+        ),
+        (
+            lambda: merge([SensorMeasurements([0.0], [[1.0, 2.0]], np.eye(3), m.positions())]),
+            "R of the shape",
+        ),
     ],
 )
 def test_combinations_that_are_refused(act, words):

@@ -12,7 +12,7 @@ from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
 from wildlab.tracking import measurement as m
 from wildlab.tracking.association import nearest_within
-from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.coloured import run_coloured
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.kalman import filter_at_rest, predict, update
@@ -442,9 +442,9 @@ def test_a_camera_pose_for_each_row_of_many_runs():
     _, _, poses, _ = overflight(N + 1)
     many = np.tile(NOTHING, (3, 1, 1))
     with pytest.raises(WildlabError, match=r"^measurements: 5 rows"):
-        run_batch(INSTANTS, many, R, CV, KNOWN, view=View(poses, 0.0))
+        run_batch(INSTANTS, many, R, CV, KNOWN, view=BatchCamera(poses, 0.0))
     with pytest.raises(WildlabError, match=r"^view\.plane_down: 4 rows"):
-        run_batch(INSTANTS, many, R, CV, KNOWN, view=View(poses.take(slice(N)), np.zeros(N - 1)))
+        run_batch(INSTANTS, many, R, CV, KNOWN, view=BatchCamera(poses.take(slice(N)), np.zeros(N - 1)))
     with pytest.raises(WildlabError, match=r"^plane_down: "):
         m.pixels(poses, np.zeros(N))
     with pytest.raises(WildlabError, match=r"^yaw: "):

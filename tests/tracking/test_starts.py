@@ -10,7 +10,7 @@ from tests.tracking.poses import disturbed, posed
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.tracking import measurement as m
-from wildlab.tracking.combined import Seen, merge
+from wildlab.tracking.combined import SensorMeasurements, merge
 from wildlab.tracking.considered import consider
 from wildlab.tracking.considering import considering
 from wildlab.tracking.noise import own_noise
@@ -170,7 +170,8 @@ def test_start_from_rays_of_a_camera_and_of_several_sensors():
     other = bearings([-100.0, 100.0], 0.0)
     z_other = np.array([np.arctan2(40.0 - 100, 95.0 + 100)])
     both = merge([
-        Seen([0.0, 2.0], [z_one, z_one], 4 * np.eye(2), one), Seen([1.0], [z_other], [[1e-4]], other)
+        SensorMeasurements([0.0, 2.0], [z_one, z_one], 4 * np.eye(2), one),
+        SensorMeasurements([1.0], [z_other], [[1e-4]], other),
     ])  # fmt: skip
     start = start_from_rays(both.times, both.measurements, both.R, both.sensor, n=2)
     np.testing.assert_allclose(start.x, target, atol=1e-6)

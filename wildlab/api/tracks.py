@@ -20,7 +20,7 @@ from wildlab.flight.following import Settings, read_settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series
 from wildlab.pipeline.following.filters import SMOOTHED
-from wildlab.pipeline.following.follow import TOGETHER, WHITE, Followed, follow_targets
+from wildlab.pipeline.following.follow import TOGETHER, WHITE, TrackingResult, follow_targets
 from wildlab.pipeline.following.judged import FEW_INDEPENDENT, verdict
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.pipeline.georeference import (
@@ -32,7 +32,7 @@ from wildlab.pipeline.georeference import (
 from wildlab.pipeline.navigate import MekfTuning, Navigated, navigate_mekf, navigate_observer
 from wildlab.pipeline.navigation_errors import (
     REFERENCES,
-    Errors,
+    NavigationErrors,
     comparison_times,
     errors_against,
     flown_part,
@@ -68,7 +68,7 @@ class Navigation(Brief):
     source: str
     found: Navigated
     reference: str | None
-    errors: Errors | None
+    errors: NavigationErrors | None
     part: tuple[str, float, float]
 
     def brief(self) -> Summary:
@@ -302,7 +302,7 @@ def track(
     return _as_followed(flight, found, by_filter[wanted], source)
 
 
-def _as_followed(flight: Flight, found: Followed, one: SensorTrack, source: str | None) -> Tracked:
+def _as_followed(flight: Flight, found: TrackingResult, one: SensorTrack, source: str | None) -> Tracked:
     about = [each for each in found.said if each.subject in ("targets", one.sensor)]
     told = tuple((each.what, f"{each.value} ({each.source})") for each in about)
     measured = np.full((len(one.times), 2), np.nan)

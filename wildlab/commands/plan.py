@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from wildlab.pipeline.plans.wanted import Gimbal
 
 
-class Pair(click.ParamType[tuple[float, float]]):
+class TwoNumbers(click.ParamType[tuple[float, float]]):
     """Two numbers with something between them: 640x512, or 58.66,16.46."""
 
     name = "A,B"
@@ -40,7 +40,9 @@ class Pair(click.ParamType[tuple[float, float]]):
 @click.command(short_help="Plan a search flight: way points, times, and what speaks against it.")
 @click.argument("area", type=FILE)
 @click.option("--camera", type=FILE, help="What `wildlab camera` wrote.")
-@click.option("--image", type=Pair("xX×", "640x512"), help="Without --camera: columns x rows of the image.")
+@click.option(
+    "--image", type=TwoNumbers("xX×", "640x512"), help="Without --camera: columns x rows of the image."
+)
 @click.option("--focal", type=float, help="With --image: focal length, px.")
 @click.option("--view", type=float, help="With --image, in place of --focal: field of view across, deg.")
 @click.option("--terrain", type=FILE, help="Map of heights (GeoTIFF): heights follow it, and it hides.")
@@ -90,7 +92,7 @@ class Pair(click.ParamType[tuple[float, float]]):
     "--max-height", type=float, default=120.0, show_default=True, help="Above the ground by the rules, m."
 )
 @click.option(
-    "--home", type=Pair(",; ", "58.66,16.46"), help="Take-off: latitude,longitude.  [default: row 1]"
+    "--home", type=TwoNumbers(",; ", "58.66,16.46"), help="Take-off: latitude,longitude.  [default: row 1]"
 )
 @click.option("--animals", type=float, help="How many live in each area that does not say itself.")
 @click.option("--density", type=float, help="Or how many on a square kilometre.")

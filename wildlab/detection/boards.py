@@ -65,7 +65,7 @@ class Board:
         return np.column_stack([x, row, np.zeros(len(row))]) * self.spacing
 
 
-class Seen(NamedTuple):
+class BoardImage(NamedTuple):
     """A board in an image: pixels (M, 2) of its points, and whether the image had to be inverted first."""
 
     uv: Array
@@ -108,7 +108,7 @@ def grey8(image: ArrayLike, valid: ArrayLike | None = None) -> Grey:
     return np.asarray(np.rint(stretched), np.uint8)
 
 
-def find_board(grey: Grey, board: Board) -> Seen | None:
+def find_board(grey: Grey, board: Board) -> BoardImage | None:
     """The points of a board, to a fraction of a pixel.
 
     Parameters
@@ -129,9 +129,9 @@ def find_board(grey: Grey, board: Board) -> Seen | None:
             uv = find(255 - grey if inverted else grey, board)
             if uv is not None:
                 if board.pattern != "chessboard":
-                    return Seen(uv, inverted)
+                    return BoardImage(uv, inverted)
                 # Squares are dark and light in turn: which way round they were found says nothing of them.
-                return Seen(_refined(uv, grey, board), inverted and find is _by_grid)
+                return BoardImage(_refined(uv, grey, board), inverted and find is _by_grid)
     return None
 
 

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
         scatter_by_image,
         summarise,
     )
-    from wildlab.evaluation.identities import Identities, Scan, compare_identities, scan_gospa
+    from wildlab.evaluation.identities import Identities, Moment, compare_identities, scan_gospa
     from wildlab.evaluation.outliers import Outlier, find_outliers
     from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
     from wildlab.evaluation.position_noise import estimate_position_noise
@@ -86,12 +86,12 @@ __all__ = [
     "Identities",
     "Interval",
     "Linear",
+    "Moment",
     "Neighbours",
     "Ospa",
     "Outlier",
     "PoseNoise",
     "Ranked",
-    "Scan",
     "Scatter",
     "Spread",
     "TrackErrors",

@@ -18,7 +18,13 @@ from scipy.special import fdtrc
 
 from wildlab.evaluation.ambiguity import ODDS
 from wildlab.evaluation.blocks import PROBABILITY, Labels, block_mean
-from wildlab.evaluation.correlated_errors import Covariance, Places, PosePoints, WanderNoise, fit_generalised
+from wildlab.evaluation.correlated_errors import (
+    Covariance,
+    KnownPlaces,
+    PosePoints,
+    WanderNoise,
+    fit_generalised,
+)
 from wildlab.evaluation.runs import Interval
 
 Array = NDArray[np.float64]
@@ -70,7 +76,7 @@ class Fold(NamedTuple):
 
 
 def leave_out(
-    groups: Labels, used: Mask, points: PosePoints, noise: WanderNoise, places: Places | None = None
+    groups: Labels, used: Mask, points: PosePoints, noise: WanderNoise, places: KnownPlaces | None = None
 ) -> list[Fold]:
     """Each group of points left out in turn.
 

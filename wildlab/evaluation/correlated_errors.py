@@ -56,7 +56,7 @@ class PosePoints(NamedTuple):
         return PosePoints(*(values[rows] for values in self))
 
 
-class Places(NamedTuple):
+class KnownPlaces(NamedTuple):
     """What N points are of, and how well it is known where that is.
 
     Attributes
@@ -70,7 +70,7 @@ class Places(NamedTuple):
     of: NDArray[np.generic]
     sd: float
 
-    def take(self, rows: NDArray[np.bool_]) -> Places:
+    def take(self, rows: NDArray[np.bool_]) -> KnownPlaces:
         """Of some of the points."""
         return self._replace(of=self.of[rows])
 
@@ -141,7 +141,7 @@ class Covariance:
     [[0.5]]
     """
 
-    def __init__(self, points: PosePoints, noise: WanderNoise, places: Places | None = None) -> None:
+    def __init__(self, points: PosePoints, noise: WanderNoise, places: KnownPlaces | None = None) -> None:
         when, image = np.unique(points.time, return_inverse=True)
         self._order = np.argsort(image, kind="stable")
         self._image = image[self._order]
@@ -235,7 +235,7 @@ def estimate_wander(
     J: ArrayLike,
     assumed: dict[str, float],
     lasts: tuple[float, float] = LASTS_S,
-    places: Places | None = None,
+    places: KnownPlaces | None = None,
 ) -> WanderFit:
     """Most likely noise behind residuals, whatever constants are behind them too.
 
@@ -283,7 +283,7 @@ def estimate_wander(
 
 
 def degrees_of_freedom(
-    J: Array, x: Array, points: PosePoints, found: WanderFit, places: Places | None = None
+    J: Array, x: Array, points: PosePoints, found: WanderFit, places: KnownPlaces | None = None
 ) -> float:
     """Degrees of freedom of a test of constants, for the noise is only estimated (Satterthwaite 1946).
 

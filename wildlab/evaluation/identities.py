@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Pairs = list[tuple[int, int]]
 
 
-class Scan(NamedTuple):
+class Moment(NamedTuple):
     """Tracks and targets at one moment, positions in one frame and unit (m).
 
     Attributes
@@ -165,7 +165,7 @@ class _Checked(NamedTuple):
     truth_sd: Array
 
 
-def scan_gospa(scan: Scan, cutoff: float, order: float = 2.0) -> Gospa:
+def scan_gospa(scan: Moment, cutoff: float, order: float = 2.0) -> Gospa:
     """GOSPA of one scan, in which tracks on targets that nobody asks for cost nothing.
 
     The tracks are assigned to all targets as in `gospa`. Those on targets that are not visible or don't-care
@@ -192,7 +192,7 @@ def scan_gospa(scan: Scan, cutoff: float, order: float = 2.0) -> Gospa:
     return _gospa(_checked(scan), cutoff, order)
 
 
-def compare_identities(scans: Sequence[Scan], cutoff: float, order: float = 2.0) -> Identities:
+def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.0) -> Identities:
     """What became of tracks and targets over scans in the order of time.
 
     Who follows whom is settled with the memory of CLEAR MOT (Bernardin and Stiefelhagen 2008), for a moment's
@@ -264,7 +264,7 @@ def compare_identities(scans: Sequence[Scan], cutoff: float, order: float = 2.0)
     )
 
 
-def _checked(scan: Scan) -> _Checked:
+def _checked(scan: Moment) -> _Checked:
     x, truth = (np.asarray(points, float) for points in (scan.positions, scan.truth))
     size = max(points.shape[1] if points.ndim == 2 else 0 for points in (x, truth))
     x, truth = (points.reshape(0, size) if points.size == 0 else points for points in (x, truth))

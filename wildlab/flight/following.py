@@ -49,7 +49,7 @@ class HullPart(Strict):
 
 
 class ManyTargetsPart(Strict):
-    """What a tracker of many targets is told of them, see `wildlab.tracking.many.beliefs.TargetBeliefs`."""
+    """What a tracker of many targets is told of them, see `wildlab.tracking.many.beliefs.ManyTargetModel`."""
 
     hulls: Annotated[tuple[HullPart, ...], Field(max_length=MOST_HULLS)] = ()
     lifetime_s: Above | None = None
@@ -72,8 +72,8 @@ class ManyTargetsPart(Strict):
 
 
 class ManySensorPart(Strict):
-    """What it is told of a sensor, see `wildlab.tracking.many.beliefs.SensorBeliefs`; those of hulls have one
-    number for each kind."""
+    """What it is told of a sensor, see `wildlab.tracking.many.beliefs.ManySensorModel`; those of hulls have
+    one number for each kind."""
 
     detection: Probability | None = None
     clutter_per_m2: Above | None = None

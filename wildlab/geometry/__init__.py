@@ -205,7 +205,13 @@ if TYPE_CHECKING:
         hidden_by,
         viewshed,
     )
-    from wildlab.geometry.visibility import Seen, image_border, lines_clear, visible_nodes, widest_view
+    from wildlab.geometry.visibility import (
+        VisibleBlock,
+        image_border,
+        lines_clear,
+        visible_nodes,
+        widest_view,
+    )
 else:
     __getattr__, __dir__ = offer(__name__)
 
@@ -244,7 +250,6 @@ __all__ = [
     "PosesAt",
     "Projected",
     "RobustFit",
-    "Seen",
     "Terrain",
     "TerrainCovariance",
     "TerrainJacobians",
@@ -252,6 +257,7 @@ __all__ = [
     "Velocity",
     "Views",
     "Viewshed",
+    "VisibleBlock",
     "apply_calibration",
     "arc_bend",
     "attitude_covariance",

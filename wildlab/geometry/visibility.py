@@ -20,7 +20,7 @@ SHORT_OF = 1e-7
 BORDER_RAYS = 9
 
 
-class Seen(NamedTuple):
+class VisibleBlock(NamedTuple):
     """A block of nodes of a terrain, and which of them a camera sees.
 
     Attributes
@@ -86,7 +86,9 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
         return np.asarray(clear_all(terrain.height, blocks, shapes, lenses, ends, SHORT_OF, terrain._top))
 
 
-def visible_nodes(terrain: Terrain, poses: CameraPoses, above: float = 0.0, furthest: float = np.inf) -> Seen:
+def visible_nodes(
+    terrain: Terrain, poses: CameraPoses, above: float = 0.0, furthest: float = np.inf
+) -> VisibleBlock:
     """Which nodes of a terrain one image shows.
 
     Parameters
@@ -139,7 +141,7 @@ def visible_nodes(terrain: Terrain, poses: CameraPoses, above: float = 0.0, furt
     visible = np.zeros(len(points), bool)
     if len(which):
         visible[which] = lines_clear(terrain, points[which], p)
-    return Seen(rows, columns, visible.reshape(height.shape))
+    return VisibleBlock(rows, columns, visible.reshape(height.shape))
 
 
 def _in_view(camera: Camera, points: Array, p: Array, R: Array) -> NDArray[np.bool_]:

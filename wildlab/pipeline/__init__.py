@@ -35,7 +35,7 @@ if TYPE_CHECKING:
         navigate_mekf,
         navigate_observer,
     )
-    from wildlab.pipeline.navigation_errors import Errors, errors_against
+    from wildlab.pipeline.navigation_errors import NavigationErrors, errors_against
     from wildlab.pipeline.receiver import Placement, Receiver, place_receiver, receiver_noise
     from wildlab.pipeline.repeats import Repeats, judge_repeats
     from wildlab.pipeline.track import (
@@ -59,9 +59,9 @@ __all__ = [
     "Applied",
     "Calibrated",
     "CvTuning",
-    "Errors",
     "MekfTuning",
     "Navigated",
+    "NavigationErrors",
     "Observations",
     "Placement",
     "Receiver",

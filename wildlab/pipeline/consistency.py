@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import Average, average
 from wildlab.evaluation.whiteness import effective_sample_size
-from wildlab.pipeline.navigation_errors import BLOCKS, Errors
+from wildlab.pipeline.navigation_errors import BLOCKS, NavigationErrors
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def mean_of_runs(runs: Sequence[Series]) -> Average:
     return average(values, runs[0].dof, sum(worth(run.values) for run in runs))
 
 
-def navigation_series(errors: Errors, begin: float = -np.inf, end: float = np.inf) -> list[Series]:
+def navigation_series(errors: NavigationErrors, begin: float = -np.inf, end: float = np.inf) -> list[Series]:
     """NEES of position, velocity and attitude, three degrees of freedom each, of a part of a flight.
 
     Parameters

@@ -32,8 +32,8 @@ from wildlab.evaluation.correlated_errors import (
     LASTS_IMAGES,
     LASTS_S,
     Covariance,
+    KnownPlaces,
     LinearFit,
-    Places,
     PosePoints,
     degrees_of_freedom,
     estimate_wander,
@@ -185,7 +185,7 @@ class _Search:
         self.names_of = scored["truth_id"].to_numpy(str)
         self.things = None if places_known else self.names_of
         sd = _survey_error(flight, self.names_of) if places_known else np.inf
-        self.places = Places(self.names_of, sd) if sd > 0 else None
+        self.places = KnownPlaces(self.names_of, sd) if sd > 0 else None
         self.blocks, self.ellipses = blocks_of(flight, scored), covariances_of(scored)
         self.poses_at = _poses(flight, source, chosen, self.names_of)
         timed = flight.manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]

@@ -46,7 +46,7 @@ SETTLING_S = 60.0
 CALIBRATED = 0.1
 AXES = ("roll", "pitch", "yaw")
 PLACES = ("north", "east", "down")
-#: Blocks of an error: columns of `Errors.error`, and what they are called.
+#: Blocks of an error: columns of `NavigationErrors.error`, and what they are called.
 BLOCKS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6, 9)}
 #: The filter with the tunings that are compared with print, by the subject of their numbers.
 TUNINGS = {
@@ -56,7 +56,7 @@ TUNINGS = {
 }
 
 
-class Errors(NamedTuple):
+class NavigationErrors(NamedTuple):
     """Errors (K, 9) at K times: position (m) and velocity (m/s) in n, attitude (rad) in b; see the module.
 
     ``sd`` (K, 9) is what the estimate states of them and ``nees`` has (K,) for each block, not divided by its
@@ -81,7 +81,7 @@ class Studied(NamedTuple):
     reference: str
     times: Array
     found: dict[str, Navigated]
-    scored: dict[str, Errors]
+    scored: dict[str, NavigationErrors]
     receiver: Receiver | None = None
     refusal: str = ""
 
@@ -132,7 +132,7 @@ def errors_against(
     nav: pd.DataFrame,
     times: ArrayLike,
     velocity_covariance: Array | None = None,
-) -> Errors:
+) -> NavigationErrors:
     """Errors of one nav table against another at given times (K,).
 
     Parameters
@@ -171,7 +171,7 @@ def errors_against(
     if velocity_covariance is not None:
         P[at, 3:6, 3:6] = velocity_covariance[rows[at]]
     blocks = {name: nees(error[:, part], P[:, part, part]) for name, part in BLOCKS.items()}
-    return Errors(t, error, np.sqrt(np.diagonal(P, axis1=1, axis2=2)), blocks)
+    return NavigationErrors(t, error, np.sqrt(np.diagonal(P, axis1=1, axis2=2)), blocks)
 
 
 def _velocities(nav: pd.DataFrame, times: Array) -> Array:
@@ -183,7 +183,7 @@ def _velocities(nav: pd.DataFrame, times: Array) -> Array:
     )
 
 
-def summarise(errors: Errors, begin: float = -np.inf, end: float = np.inf) -> dict[str, float]:
+def summarise(errors: NavigationErrors, begin: float = -np.inf, end: float = np.inf) -> dict[str, float]:
     """Numbers of a part of a flight, by the names under which they are recorded.
 
     ``rms_...`` and ``mean_sd_...`` of position (m) and attitude (degrees) about each axis, ``rms_velocity``
@@ -270,7 +270,7 @@ def navigate_all(flight: Flight, times: ArrayLike) -> dict[str, Navigated]:
 
 def evaluate_all(
     flight: Flight, found: Mapping[str, Navigated], times: ArrayLike, reference: str
-) -> dict[str, Errors]:
+) -> dict[str, NavigationErrors]:
     """Errors of each estimate against the reference, and on a twin those of its autopilot.
 
     The autopilot is scored by the airframe it sits on, not by the payload with the IMU and the antennas.
@@ -340,7 +340,7 @@ def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tupl
     return numbers
 
 
-def shares_within(errors: Errors, begin: float = -np.inf) -> dict[str, float]:
+def shares_within(errors: NavigationErrors, begin: float = -np.inf) -> dict[str, float]:
     """Share of the errors within two of the stated standard deviations, of ``roll``, ``pitch``, ``yaw`` and
     ``velocity`` (all three axes), from a time on."""
     late = errors.times >= begin
@@ -351,7 +351,7 @@ def shares_within(errors: Errors, begin: float = -np.inf) -> dict[str, float]:
     return shares | {"inside_velocity": float(_mean(inside[:, 3:6].ravel()))}
 
 
-def against_autopilot(studied: Studied, subject: str) -> Errors:
+def against_autopilot(studied: Studied, subject: str) -> NavigationErrors:
     """Differences of an estimate from the autopilot, as H 7.5 has them: neither of the two is the truth."""
     one = studied.found[subject]
     return errors_against(studied.flight.nav["autopilot"], one.nav, studied.times, one.velocity_covariance)

@@ -24,15 +24,15 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene.flights import Look, SceneFlight, Window, corner_of
-from wildlab.simulation.scene.render import Seen, View
+from wildlab.simulation.scene.flights import SceneFlight, VesselLook, Window, corner_of
+from wildlab.simulation.scene.render import RenderedView, SeenBody
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 
 #: Of the pixels of a detection, the share on an object from which on it is one of that object.
 OVERLAP = 0.25
 
 
-class Judged(NamedTuple):
+class ImageScore(NamedTuple):
     """What detections of an image are worth.
 
     Attributes
@@ -50,7 +50,7 @@ class Judged(NamedTuple):
     false: int
 
 
-def judge(view: View, objects: FloatingObjects) -> Judged:
+def judge(view: RenderedView, objects: FloatingObjects) -> ImageScore:
     """Which detection is of which body, by the pixels that they share.
 
     Parameters
@@ -76,7 +76,7 @@ def judge(view: View, objects: FloatingObjects) -> Judged:
             inside |= {n for n in found if n < len(count) and 2 * count[n] > (view.labels == n).sum()}
         else:
             false += 1
-    return Judged(found, {n for n in inside if not found[n]}, false)
+    return ImageScore(found, {n for n in inside if not found[n]}, false)
 
 
 class Shot(NamedTuple):
@@ -95,9 +95,9 @@ class Shot(NamedTuple):
     """
 
     exposure: int
-    seen: tuple[Seen, ...]
+    seen: tuple[SeenBody, ...]
     detections: Detections
-    judged: Judged
+    judged: ImageScore
 
 
 class Photographer:
@@ -109,14 +109,14 @@ class Photographer:
         The flight as scenes, with the camera's true poses.
     """
 
-    def __init__(self, twin: str, seed: int, look: Look | None = None) -> None:
+    def __init__(self, twin: str, seed: int, look: VesselLook | None = None) -> None:
         self.flight = SceneFlight(load_twin(twin), seed, look)
         self.response = CameraResponse()
         camera = self.flight.poses.camera
         self._seed = seed
         self._sensor = sensor_of(self.response, (camera.height, camera.width), stream(seed, "thermal sensor"))
 
-    def image(self, exposure: int, window: Window | None = None) -> tuple[View, NDArray[np.uint16]]:
+    def image(self, exposure: int, window: Window | None = None) -> tuple[RenderedView, NDArray[np.uint16]]:
         """The scene with its labels, and the counts of the camera (H, W).
 
         Parameters
@@ -166,7 +166,7 @@ class Photographer:
             exposure = int(number)
             window = None if margin is None else self.flight.window(exposure, margin)
             if margin is not None and window is None:
-                yield Shot(exposure, (), no_detections(), Judged({}, set(), 0))
+                yield Shot(exposure, (), no_detections(), ImageScore({}, set(), 0))
                 continue
             view, counts = self.image(exposure, window)
             objects = find_objects(counts, thresholds=thresholds)
@@ -179,7 +179,7 @@ class Photographer:
             )
 
 
-def _seen_from(seen: Seen, corner: Array) -> Seen:
+def _seen_from(seen: SeenBody, corner: Array) -> SeenBody:
     return seen._replace(
         uv=seen.uv + corner,
         centre=seen.centre + corner,

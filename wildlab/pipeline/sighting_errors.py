@@ -10,7 +10,7 @@ from wildlab.flight.clocks import poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_euler, wrap
 from wildlab.geometry.uncertainty import ground_jacobians
-from wildlab.pipeline.navigation_errors import AXES, PLACES, Errors, errors_against
+from wildlab.pipeline.navigation_errors import AXES, PLACES, NavigationErrors, errors_against
 from wildlab.pipeline.navigation_inputs import VELOCITY
 from wildlab.pipeline.track import Sighting
 
@@ -18,7 +18,7 @@ from wildlab.pipeline.track import Sighting
 PAUSE_S = 2.0
 #: From this bank on an airframe turns, rad.
 TURNING = np.radians(20.0)
-#: Columns of `wildlab.pipeline.navigation_errors.Errors` that are a pose's, and what they are called.
+#: Columns of `wildlab.pipeline.navigation_errors.NavigationErrors` that are a pose's, and their names.
 _POSE = [0, 1, 2, 6, 7, 8]
 NAMES = (*PLACES, *AXES)
 
@@ -41,7 +41,7 @@ def pauses(seen: Sighting) -> list[NDArray[np.intp]]:
     return [np.arange(rows[i] + 1, rows[i + 1]) for i in long]
 
 
-def pose_numbers(own: Errors) -> dict[str, float]:
+def pose_numbers(own: NavigationErrors) -> dict[str, float]:
     """What poses state of themselves and how far they are off; m and degrees.
 
     Parameters
@@ -62,7 +62,7 @@ def pose_numbers(own: Errors) -> dict[str, float]:
     return numbers
 
 
-def premise_numbers(flight: Flight, seen: Sighting, source: str, own: Errors) -> dict[str, float]:
+def premise_numbers(flight: Flight, seen: Sighting, source: str, own: NavigationErrors) -> dict[str, float]:
     """What sentences on the poses speak of; degrees.
 
     Parameters

@@ -24,7 +24,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.georeference import observe
-from wildlab.tracking.batch import View, as_tracks, run_batch
+from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
 from wildlab.tracking.measurement import Sensor, pixels
 from wildlab.tracking.motion import Motion, constant_velocity
 from wildlab.tracking.run import Start, Track, start_from_first
@@ -236,7 +236,7 @@ def follow_pixels(seen: Sighting, tuning: CvTuning) -> Track:
     Track
         (N, 4) states as from `follow_positions`; innovations in pixels.
     """
-    view = View(seen.poses, seen.plane_down)
+    view = BatchCamera(seen.poses, seen.plane_down)
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, None)
 
 
@@ -275,7 +275,7 @@ def follow_schmidt(
         raise WildlabError(
             "the poses have no covariance", "use those of the MEKF: navigate_mekf(flight)", field="nav"
         )
-    view = View(seen.poses, seen.plane_down)
+    view = BatchCamera(seen.poses, seen.plane_down)
     pose = PoseUncertainty(own, correlation_time, change)
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, pose)
 
@@ -289,7 +289,12 @@ FILTERS: dict[str, Callable[[Sighting, CvTuning], Track]] = {
 
 
 def _compiled(
-    seen: Sighting, z: Array, R: Array, tuning: CvTuning, view: View | None, pose: PoseUncertainty | None
+    seen: Sighting,
+    z: Array,
+    R: Array,
+    tuning: CvTuning,
+    view: BatchCamera | None,
+    pose: PoseUncertainty | None,
 ) -> Track:
     """One run of the compiled filters, which a test holds against the readable ones."""
     return as_tracks(

@@ -61,9 +61,10 @@ from wildlab.planning.patterns import (
     rows_over,
 )
 from wildlab.planning.sightings import Sightings, see
-from wildlab.planning.visits import Way, visit_order
+from wildlab.planning.visits import AreaWay, visit_order
 
 __all__ = [
+    "AreaWay",
     "Course",
     "Coverage",
     "Footprint",
@@ -72,7 +73,6 @@ __all__ = [
     "Profile",
     "Share",
     "Sightings",
-    "Way",
     "adapt_roll",
     "area_of",
     "blur",

@@ -20,7 +20,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.planning.areas import check_area, edge_directions, way_inside
-from wildlab.planning.visits import Way, visit_order
+from wildlab.planning.visits import AreaWay, visit_order
 
 Ends = Literal["cover", "inside"]
 #: More rows than this over one area are a slip of a unit.
@@ -331,7 +331,7 @@ def rows_over(
 
 def _block_ways(
     fence: Array, distance: float, direction: float | None, ends: Ends, turn: float
-) -> tuple[list[Way], float]:
+) -> tuple[list[AreaWay], float]:
     """Ways over one area, each with its own entrance and exit, and the distance between its rows."""
     angle = _best_direction(fence, distance, ends, turn) if direction is None else float(direction)
     rows, step = rows_over(fence, distance, angle, ends)
@@ -388,14 +388,14 @@ def _four_ways(block: Array) -> list[Array]:
     return ways
 
 
-def _way(rows: Array, fence: Array, ends: Ends) -> Way:
+def _way(rows: Array, fence: Array, ends: Ends) -> AreaWay:
     """The way through rows, round the corners of the fence where it has to stay inside."""
     points = [rows[0, 0]]
     for k, row in enumerate(rows):
         if k:
             points += list(way_inside(fence, points[-1], row[0])[1:] if ends == "inside" else row[:1])
         points.append(row[1])
-    return Way(rows, np.array(points))
+    return AreaWay(rows, np.array(points))
 
 
 def _chords(turned: Array, at: float) -> list[Array]:

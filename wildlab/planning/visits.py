@@ -19,7 +19,7 @@ EXACT = 9
 MOST_WAYS = 20_000
 
 
-class Way(NamedTuple):
+class AreaWay(NamedTuple):
     """One way over an area.
 
     Attributes
@@ -35,7 +35,7 @@ class Way(NamedTuple):
 
 
 def visit_order(
-    ways: Sequence[Sequence[Way]],
+    ways: Sequence[Sequence[AreaWay]],
     *,
     start: ArrayLike | None = None,
     back: bool = False,
@@ -92,7 +92,7 @@ class _Costs:
     """Lengths between all ways, and orders by them."""
 
     def __init__(
-        self, ways: Sequence[Sequence[Way]], start: ArrayLike | None, back: bool, fence: Array | None
+        self, ways: Sequence[Sequence[AreaWay]], start: ArrayLike | None, back: bool, fence: Array | None
     ) -> None:
         flat = [(k, w) for k, each in enumerate(ways) for w in range(len(each))]
         self.flat = flat

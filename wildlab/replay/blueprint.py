@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from wildlab.replay.scene import Scene, heights
+from wildlab.replay.scene import ReplayScene, heights
 
 #: Seconds for which ellipses of single detections stay, and playback takes for a long flight, at least.
 STAY_S, PLAYED_S = 10.0, 120.0
 
 
-def blueprint_of(scene: Scene, *, narrow: bool = False) -> Any:
+def blueprint_of(scene: ReplayScene, *, narrow: bool = False) -> Any:
     """The layout of a scene, with rerun's panels folded but for the time line.
 
     Parameters
@@ -90,7 +90,7 @@ def blueprint_of(scene: Scene, *, narrow: bool = False) -> Any:
     )
 
 
-def _plots(rrb: Any, scene: Scene) -> list[Any]:
+def _plots(rrb: Any, scene: ReplayScene) -> list[Any]:
     edge = rrb.TimeRangeBoundary
     if scene.timed:
         margin = 0.02 * scene.length

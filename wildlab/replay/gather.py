@@ -17,7 +17,7 @@ from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import Observations, covariances_of, georeference, observe
 from wildlab.pipeline.overviews.image_coverage import FLATTEST, ground_height
 from wildlab.pipeline.overviews.lost import POSITION, ordered
-from wildlab.replay.scene import Array, Estimates, Path, Points, Scene, Sightings, Target, Views
+from wildlab.replay.scene import Array, Estimates, Path, Points, ReplayScene, Sightings, Target, Views
 
 #: More are not shown: a picture on a screen does not have them, and files grow.
 MOST_POSES, MOST_FRAMES, MOST_POINTS = 6000, 3000, 6000
@@ -31,7 +31,7 @@ def scene_of(
     estimates: pd.DataFrame | None = None,
     *,
     ellipses: bool = True,
-) -> Scene:
+) -> ReplayScene:
     """What a replay shows of a flight.
 
     Parameters
@@ -76,7 +76,7 @@ def scene_of(
     level = ground_height(flight)
     if flight.terrain is None and level is None:
         lacks.append("the ground: neither terrain nor truth says how high it lies")
-    return Scene(
+    return ReplayScene(
         name=flight.name,
         kind=flight.manifest.kind,
         timed=flight.manifest.time.kind == "utc",

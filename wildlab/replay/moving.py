@@ -9,7 +9,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.following.estimates import read_estimates
 from wildlab.pipeline.following.judged import LEADING
 from wildlab.replay.gather import scene_of
-from wildlab.replay.scene import Estimates, Scene
+from wildlab.replay.scene import Estimates, ReplayScene
 from wildlab.replay.words import minutes, plain
 from wildlab.reporting.animation import Course, Ellipses, Outlines, ShownFlight
 from wildlab.reporting.report import Report
@@ -46,7 +46,7 @@ def show_moving(report: Report, flight: Flight, source: str | None = None) -> No
     report.animation(shown, alt=alt(scene), most_bytes=MOST_BYTES)
 
 
-def moving_flight(scene: Scene) -> ShownFlight:
+def moving_flight(scene: ReplayScene) -> ShownFlight:
     """The arrays of an animation of a scene.
 
     Parameters
@@ -93,7 +93,7 @@ def one_filter(tracks: tuple[Estimates, ...]) -> tuple[Estimates, ...]:
     return tuple(one for one in tracks if one.filter == chosen)[:MOST_TARGETS]
 
 
-def said(scene: Scene) -> str:
+def said(scene: ReplayScene) -> str:
     """The sentence above the picture: what moves in it."""
     parts = ["the aircraft"]
     if scene.views is not None and np.isfinite(scene.views.outlines).any():
@@ -111,7 +111,7 @@ def said(scene: Scene) -> str:
     return f"{minutes(scene.length)} of flight, over and over: {listed}. North is up."
 
 
-def alt(scene: Scene) -> str:
+def alt(scene: ReplayScene) -> str:
     """What the picture shows, in numbers, for who cannot see it."""
     assert scene.path is not None  # noqa: S101 - for the type checker
     low, high = scene.path.places[:, :2].min(axis=0), scene.path.places[:, :2].max(axis=0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from wildlab.geometry.frames import ned_to_enu
 from wildlab.replay.colours import FLOWN, GROUND, SIGHTING, TRUTH, VIEW, of_filter, rgba
-from wildlab.replay.scene import Array, Estimates, Points, Scene, heights
+from wildlab.replay.scene import Array, Estimates, Points, ReplayScene, heights
 from wildlab.replay.shapes import ellipse_rings, mesh
 from wildlab.replay.shots import Shot
 from wildlab.replay.words import about, path_part, plain
@@ -31,7 +31,7 @@ NEES_BAND = (0.05063561596857975, 7.377758908227871)
 
 
 def save_recording(
-    scene: Scene,
+    scene: ReplayScene,
     into: FilePath,
     shots: Mapping[int, Shot] | None = None,
     tell: Callable[[str], None] = lambda _: None,
@@ -70,7 +70,7 @@ def save_recording(
         raise
 
 
-def narrow_layout(scene: Scene) -> bytes:
+def narrow_layout(scene: ReplayScene) -> bytes:
     """The layout for a narrow screen, which a viewer may be given after the recording."""
     from wildlab.replay.blueprint import blueprint_of
 
@@ -80,7 +80,7 @@ def narrow_layout(scene: Scene) -> bytes:
         return file.read_bytes()
 
 
-def log_scene(scene: Scene) -> Any:
+def log_scene(scene: ReplayScene) -> Any:
     """A scene as a stream of rerun that a widget shows; nothing is written.
 
     Parameters
@@ -109,7 +109,7 @@ def _stream(rr: Any) -> Any:
 class _Writer:
     """Logs the parts of a scene, each once."""
 
-    def __init__(self, rr: Any, stream: Any, scene: Scene) -> None:
+    def __init__(self, rr: Any, stream: Any, scene: ReplayScene) -> None:
         self.rr, self.stream, self.scene = rr, stream, scene
         low, high = scene.extent
         #: Sizes on the ground that can be seen: a share of what is shown.
@@ -388,7 +388,7 @@ class _Writer:
             self.columns(f"{entity}/now", one.times, *rr.Points3D.columns(positions=enu))
 
 
-def _corner(scene: Scene) -> tuple[float, float]:
+def _corner(scene: ReplayScene) -> tuple[float, float]:
     assert scene.terrain is not None  # noqa: S101 - for the type checker
     return scene.terrain.north, scene.terrain.east
 

@@ -115,7 +115,7 @@ class Target(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Scene:
+class ReplayScene:
     """All that a replay shows.
 
     Attributes
@@ -169,7 +169,7 @@ class Scene:
         return known.min(axis=0), known.max(axis=0)
 
 
-def heights(scene: Scene) -> Array:
+def heights(scene: ReplayScene) -> Array:
     """Heights (N,) m of the path above the ground that is known, else above the origin of n; never NaN.
 
     Parameters

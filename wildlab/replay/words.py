@@ -6,7 +6,7 @@ import re
 import unicodedata
 from math import isfinite
 
-from wildlab.replay.scene import Scene
+from wildlab.replay.scene import ReplayScene
 
 #: Letters of a name that are shown, at most.
 MOST_LETTERS = 60
@@ -59,7 +59,7 @@ def minutes(seconds: float) -> str:
     return f"{whole // 60} min {whole % 60} s" if whole >= 60 else f"{whole} s"
 
 
-def about(scene: Scene, pictures: int) -> str:
+def about(scene: ReplayScene, pictures: int) -> str:
     """The panel of words beside the views, as Markdown."""
     shown = []
     if scene.path is not None:

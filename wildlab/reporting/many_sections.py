@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from wildlab.evaluation.identities import Identities
 from wildlab.pipeline.many.errors import OF_COVARIANCE, counted_twice, of_platform
-from wildlab.pipeline.many.follow import Followed
+from wildlab.pipeline.many.follow import ManyTracks
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.georeferencing_cause import listed
 from wildlab.reporting.report import Report
 
 
-def head_section(report: Report, followed: Followed, lives: Identities | None) -> None:
+def head_section(report: Report, followed: ManyTracks, lives: Identities | None) -> None:
     """Title and summary."""
     by = ", ".join(followed.places)
     report.head("Who is where, and who is who?", f"All targets at once, by {by}")
@@ -21,7 +21,7 @@ def head_section(report: Report, followed: Followed, lives: Identities | None) -
         report.points(followed.notes)
 
 
-def pictures_section(report: Report, followed: Followed, lives: Identities | None) -> None:
+def pictures_section(report: Report, followed: ManyTracks, lives: Identities | None) -> None:
     """The map, and with truth who is on whom and what is wrong when."""
     figure, name, alt, caption = charts.map_shown(followed)
     report.figure(figure, name=name, alt=alt, caption=caption, main=True)
@@ -36,7 +36,7 @@ def pictures_section(report: Report, followed: Followed, lives: Identities | Non
 MOST_SHOWN = 25
 
 
-def tables_section(report: Report, followed: Followed, lives: Identities | None) -> None:
+def tables_section(report: Report, followed: ManyTracks, lives: Identities | None) -> None:
     """Targets, tracks, and what GOSPA is made of."""
     if lives is not None and lives.targets:
         report.section("Every target")
@@ -74,14 +74,14 @@ def tables_section(report: Report, followed: Followed, lives: Identities | None)
     )
 
 
-def told_section(report: Report, followed: Followed) -> None:
+def told_section(report: Report, followed: ManyTracks) -> None:
     """What the tracker was told, and by whom."""
     report.section("What the tracker was told", words.assumed_sentence(followed.said))
     headings = {"of": "of", "what": "what", "value": "value", "source": "from"}
     report.table(words.told_table(followed.said), columns=headings)
 
 
-def _truth_words(followed: Followed) -> str:
+def _truth_words(followed: ManyTracks) -> str:
     """Whose errors the truth's are."""
     words = []
     known = {name: sd for name, sd in followed.truth_sd.items() if sd > 0}
@@ -100,7 +100,7 @@ def _truth_words(followed: Followed) -> str:
     return " ".join(words)
 
 
-def _smoothed_words(followed: Followed) -> list[str]:
+def _smoothed_words(followed: ManyTracks) -> list[str]:
     """Why smoothed places have no covariance, where they have none."""
     if not followed.unknown_lasting:
         return []
@@ -110,7 +110,7 @@ def _smoothed_words(followed: Followed) -> list[str]:
     ]
 
 
-def pose_limits(followed: Followed) -> list[str]:
+def pose_limits(followed: ManyTracks) -> list[str]:
     """What is not said of errors of the platform and of bearings, in sentences."""
     kinds = {one.kind for one in followed.places.values()}
     said = []
@@ -147,7 +147,7 @@ def pose_limits(followed: Followed) -> list[str]:
     return said
 
 
-def end_section(report: Report, followed: Followed) -> None:
+def end_section(report: Report, followed: ManyTracks) -> None:
     """What is not said, and how it was computed."""
     hulls = " Each track is of every kind of hull at once, which differ in where on the hull it is seen."
     judged = [

@@ -9,10 +9,10 @@ import pandas as pd
 
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
-from wildlab.pipeline.following.beliefs import Said
+from wildlab.pipeline.following.beliefs import ToldValue
 from wildlab.pipeline.following.judged import FEWEST
 from wildlab.pipeline.many.beliefs import HERE
-from wildlab.pipeline.many.follow import CUTOFF_M, Followed
+from wildlab.pipeline.many.follow import CUTOFF_M, ManyTracks
 from wildlab.reporting.report import Report
 from wildlab.reporting.tracking import length
 from wildlab.tracking.particles import Count, count_interval, count_probabilities
@@ -27,13 +27,13 @@ SMALLEST, LARGEST = 0.5, 2.0
 NOTHING = "–"
 
 
-def counts_of(shown: Followed) -> tuple[int, float]:
+def counts_of(shown: ManyTracks) -> tuple[int, float]:
     """How many tracks there are in all, and at a look in the mean."""
     names = {int(one) for look in shown.shown for one in look.identity}
     return len(names), float(np.mean([len(look.identity) for look in shown.shown])) if shown.shown else 0.0
 
 
-def most_at_once(followed: Followed) -> Count:
+def most_at_once(followed: ManyTracks) -> Count:
     """How many targets there are at the look that has most, with a 90 % interval, as tracks may be false."""
     expected = [float(look.existence.sum()) for look in followed.shown]
     if not expected:
@@ -64,7 +64,7 @@ def on_target(lives: Identities) -> int:
     return could - sum(one.n_missed for one in lives.gospa)
 
 
-def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], str]:
+def summary(followed: ManyTracks, lives: Identities | None) -> tuple[list[str], str]:
     """The first sentences of the page, and its level."""
     tracks, at_once = counts_of(followed)
     looks, minutes = len(followed.scans), followed.minutes
@@ -111,7 +111,7 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
     return said, _level(lives, shares)
 
 
-def _wide_words(followed: Followed) -> str:
+def _wide_words(followed: ManyTracks) -> str:
     """Where tracks may well be farther off than what counts as on a target; "" else."""
     covariances = [look.P[:, :2, :2] for look in followed.shown if len(look.P)]
     if not covariances:
@@ -126,7 +126,7 @@ def _wide_words(followed: Followed) -> str:
     )
 
 
-def _long_words(followed: Followed) -> str:
+def _long_words(followed: ManyTracks) -> str:
     """Where a target is longer than what counts as on it; "" else."""
     longest = max((hull.length_m for hull in followed.targets.hulls), default=0.0)
     if longest <= followed.cutoff_m:
@@ -167,7 +167,7 @@ def _level(lives: Identities, shares: dict[object, float]) -> str:
     return "good"
 
 
-def verdict_of(followed: Followed, lives: Identities | None, level: str) -> tuple[str, str]:
+def verdict_of(followed: ManyTracks, lives: Identities | None, level: str) -> tuple[str, str]:
     """The word that goes with the level, and its reason."""
     tracks, _ = counts_of(followed)
     if not tracks:
@@ -238,7 +238,7 @@ TARGETS = {
 }  # fmt: skip
 
 
-def tracks_table(followed: Followed, lives: Identities | None) -> pd.DataFrame:
+def tracks_table(followed: ManyTracks, lives: Identities | None) -> pd.DataFrame:
     """A row for each track: when it was shown, of which kind it is, and whether it was on a true target."""
     rows = []
     hulls = [hull.name for hull in followed.targets.hulls]
@@ -295,7 +295,7 @@ def parts_table(found: Sequence[Gospa]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def told_table(said: Sequence[Said]) -> pd.DataFrame:
+def told_table(said: Sequence[ToldValue]) -> pd.DataFrame:
     """Every value, subject by subject; a name in it is only text."""
     subjects = list(dict.fromkeys(one.subject for one in said))
     return pd.DataFrame(
@@ -311,7 +311,7 @@ def plain(text: str) -> str:
     return text.replace("*", "∗").replace("`", "ˋ")
 
 
-def assumed_sentence(said: Sequence[Said]) -> str:
+def assumed_sentence(said: Sequence[ToldValue]) -> str:
     """How much of what the tracker was told is assumed or estimated from what it then followed."""
     assumed = sum(one.source.startswith("assumed") for one in said)
     here = sum(one.source.startswith(HERE) for one in said)
@@ -324,7 +324,7 @@ def assumed_sentence(said: Sequence[Said]) -> str:
     )
 
 
-def record(report: Report, followed: Followed, lives: Identities | None) -> None:
+def record(report: Report, followed: ManyTracks, lives: Identities | None) -> None:
     """The numbers, for ``metrics.json``."""
     tracks, at_once = counts_of(followed)
     report.metric("tracks", "all", tracks, "1", n=len(followed.scans))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.following.beliefs import ROUGH, Said
+from wildlab.pipeline.following.beliefs import ROUGH, ToldValue
 from wildlab.pipeline.following.follow import TOGETHER
 from wildlab.pipeline.following.judged import (
     CAUTIOUS,
@@ -372,7 +372,7 @@ def columns_of(table: pd.DataFrame) -> dict[str, str]:
     return {name: words for name, words in HEADINGS.items() if name in table}
 
 
-def said_table(said: Sequence[Said]) -> pd.DataFrame:
+def said_table(said: Sequence[ToldValue]) -> pd.DataFrame:
     """What filters were told, first what is assumed or estimated on this flight."""
     ordered = sorted(said, key=lambda one: not (one.source.startswith("assumed") or one.source == ROUGH))
     return pd.DataFrame(
@@ -380,7 +380,7 @@ def said_table(said: Sequence[Said]) -> pd.DataFrame:
     )
 
 
-def assumed_sentence(said: Sequence[Said]) -> str:
+def assumed_sentence(said: Sequence[ToldValue]) -> str:
     """How much of what filters were told is assumed; nothing where none is."""
     assumed = sum(one.source.startswith("assumed") for one in said)
     here = sum(one.source == ROUGH for one in said)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.pipeline.following.beliefs import LONGEST_GAP_LOOKS, LONGEST_GAP_S
-from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.following.follow import TrackingResult
 from wildlab.reporting.report import Report
 
 #: So many times of new starts are listed; the rest is counted.
@@ -46,7 +46,7 @@ def summary_sentences(rows: pd.DataFrame) -> list[str]:
     ]
 
 
-def anew_table(followed: Followed, rows: pd.DataFrame) -> pd.DataFrame:
+def anew_table(followed: TrackingResult, rows: pd.DataFrame) -> pd.DataFrame:
     """A row for each target and sensor whose track ended and started anew."""
     found = []
     for _, row in _pairs(rows).iterrows():

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.following.follow import TrackingResult
 from wildlab.pipeline.following.judged import Apart, leading_filter, verdict
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.pipeline.overviews.verdict import VERDICT_LEVEL
@@ -21,7 +21,7 @@ MOST_DRAWN = 4
 
 
 def head_section(
-    report: Report, followed: Followed, rows: pd.DataFrame, pairs: list[Apart], tuned: Tuned | None
+    report: Report, followed: TrackingResult, rows: pd.DataFrame, pairs: list[Apart], tuned: Tuned | None
 ) -> None:
     """Title and summary."""
     targets, sensors = rows["target"].nunique(), len(followed.scans)
@@ -39,7 +39,7 @@ def head_section(
         report.points(followed.notes)
 
 
-def tracks_section(report: Report, followed: Followed, rows: pd.DataFrame) -> None:
+def tracks_section(report: Report, followed: TrackingResult, rows: pd.DataFrame) -> None:
     """The table of all tracks."""
     intro = (
         "The mean NEES compares the errors of a track with what its filter says of them: 2 is right, more is "
@@ -80,7 +80,7 @@ def tracks_section(report: Report, followed: Followed, rows: pd.DataFrame) -> No
 
 
 def pictures_section(
-    report: Report, flight: Flight, followed: Followed, rows: pd.DataFrame, source: str | None
+    report: Report, flight: Flight, followed: TrackingResult, rows: pd.DataFrame, source: str | None
 ) -> None:
     """Maps, and squares, errors and whiteness over time."""
     shown = rows[rows["detections"] > 0]
@@ -148,7 +148,7 @@ def apart_section(report: Report, pairs: list[Apart]) -> None:
     report.table(table, columns=headings, digits={"rms": 1})
 
 
-def told_section(report: Report, followed: Followed, tuned: Tuned | None) -> None:
+def told_section(report: Report, followed: TrackingResult, tuned: Tuned | None) -> None:
     """What the filters were told, and by whom."""
     intro = words.assumed_sentence(followed.said)
     if tuned is not None:
@@ -159,7 +159,7 @@ def told_section(report: Report, followed: Followed, tuned: Tuned | None) -> Non
     report.table(words.said_table(followed.said), columns=headings)
 
 
-def end_section(report: Report, followed: Followed) -> None:
+def end_section(report: Report, followed: TrackingResult) -> None:
     """What the page does not tell, and how it was computed."""
     limits = [
         "Where the truth has no standard deviation of its own, its error counts as the filter's.",

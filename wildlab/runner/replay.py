@@ -22,7 +22,7 @@ from wildlab.pipeline.following.estimates import read_estimates
 from wildlab.replay.gather import scene_of
 from wildlab.replay.page import page
 from wildlab.replay.recording import narrow_layout, save_recording
-from wildlab.replay.scene import Scene
+from wildlab.replay.scene import ReplayScene
 from wildlab.replay.shots import Shot, read_shots
 from wildlab.replay.viewer import read_viewer
 from wildlab.runner.evaluate import tell_source
@@ -40,7 +40,7 @@ def replay(
     html: bool = False,
     reports: Path = REPORTS,
     console: Console | None = None,
-) -> tuple[list[Path], Scene]:
+) -> tuple[list[Path], ReplayScene]:
     """Write the replay of a flight.
 
     Parameters
@@ -97,7 +97,9 @@ def replay(
     return written, scene
 
 
-def _with_images(scene: Scene, flight: Path, images: Path | None, tell: Any) -> tuple[Scene, dict[int, Shot]]:
+def _with_images(
+    scene: ReplayScene, flight: Path, images: Path | None, tell: Any
+) -> tuple[ReplayScene, dict[int, Shot]]:
     own = flight / "images"
     place = images or (own if own.is_dir() else None)
     if scene.views is None:

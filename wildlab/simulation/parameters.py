@@ -42,7 +42,7 @@ from wildlab.simulation.sensor_parameters import (
     TwinCamera,
     TwinMount,
 )
-from wildlab.simulation.target_parameters import Animals, Enclosure, Pair, Segments, Subset, Target
+from wildlab.simulation.target_parameters import Animals, Enclosure, MarkedPair, Segments, Subset, Target
 
 TWINS = DATA / "twins"
 PARTS = TWINS / "parts"
@@ -67,7 +67,7 @@ class TwinParameters(Strict):
     cable: Cable | None = None
     target: Target | None = None
     second_target: Target | None = None
-    pair: Pair | None = None
+    pair: MarkedPair | None = None
     subset: Subset | None = None
     segments: Segments | None = None
     land: Land | None = None

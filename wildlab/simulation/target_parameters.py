@@ -114,7 +114,7 @@ class Target(Strict):
         return self
 
 
-class Pair(Strict):
+class MarkedPair(Strict):
     """Images in which both targets are marked."""
 
     both: Annotated[Parameter, quantity("1", 0, 1e6, whole=True)]

@@ -20,9 +20,9 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
 """
 
 from wildlab.tracking.association import distances, nearest_within
-from wildlab.tracking.batch import BatchTracks, View, run_batch
+from wildlab.tracking.batch import BatchCamera, BatchTracks, run_batch
 from wildlab.tracking.coloured import run_coloured, thin
-from wildlab.tracking.combined import Merged, Seen, combined, merge
+from wildlab.tracking.combined import Merged, SensorMeasurements, combined, merge
 from wildlab.tracking.considered import Considered, consider, consider_all
 from wildlab.tracking.considering import considering, renamed
 from wildlab.tracking.following import FILTERS, follow
@@ -57,6 +57,7 @@ from wildlab.tracking.unscented import run_unscented
 
 __all__ = [
     "FILTERS",
+    "BatchCamera",
     "BatchTracks",
     "Considered",
     "Crossing",
@@ -64,11 +65,10 @@ __all__ = [
     "ModeTrack",
     "Motion",
     "PoseUncertainty",
-    "Seen",
     "Sensor",
+    "SensorMeasurements",
     "Start",
     "Track",
-    "View",
     "azimuths_elevations",
     "bearings",
     "combined",

@@ -40,7 +40,7 @@ class BatchTracks(NamedTuple):
     limited: NDArray[np.bool_]  # (B, N), see `run.Track`
 
 
-class View(NamedTuple):
+class BatchCamera(NamedTuple):
     """The camera of all runs: what `wildlab.tracking.measurement.pixels` takes.
 
     The rows of ``poses`` are those of all runs alike, (N,), or (B, N): each has its own. ``plane_down`` is a
@@ -58,7 +58,7 @@ def run_batch(
     motion: Motion,
     start: Start,
     *,
-    view: View | None = None,
+    view: BatchCamera | None = None,
     pose: PoseUncertainty | None = None,
     gate_probability: float = 1.0,
     rows: ArrayLike | None = None,
@@ -268,7 +268,7 @@ def _singular(row: int) -> WildlabError:
 
 
 def _camera_arrays(
-    view: View | None, runs: int, n_rows: int
+    view: BatchCamera | None, runs: int, n_rows: int
 ) -> tuple[Array | None, Array | None, Array, Array, Array]:
     """Poses, R_bc, lever arm, planes and intrinsics for the kernel; without a camera no poses, and zeros."""
     if view is None:

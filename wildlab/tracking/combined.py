@@ -14,7 +14,7 @@ from wildlab.tracking.predictions import Prediction
 from wildlab.tracking.sensors import Sensor, on_state
 
 
-class Seen(NamedTuple):
+class SensorMeasurements(NamedTuple):
     """What one sensor measured.
 
     Attributes
@@ -135,7 +135,7 @@ def combined(sensors: Sequence[Sensor], which: ArrayLike) -> Sensor:
     )  # fmt: skip
 
 
-def merge(parts: Sequence[Seen]) -> Merged:
+def merge(parts: Sequence[SensorMeasurements]) -> Merged:
     """What several sensors measured, in one order of time; at equal times in the order of the sensors.
 
     Parameters

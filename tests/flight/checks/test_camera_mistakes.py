@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.flight.checks.sense.constants import HARD, clock_fit, clock_mistakes
 from wildlab.flight.checks.sense.seen import judge
-from wildlab.flight.checks.sense.sightings import Look, Sightings
+from wildlab.flight.checks.sense.sightings import SightingGeometry, Sightings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
@@ -32,7 +32,7 @@ def straight_down(
     return Sightings(
         "log", lens, Mount("down"), zero, zero, uv, p, R, points[None], image, np.tile(sd, (len(p), 1)),
         (np.radians(PLACE[0]), np.radians(PLACE[1]), PLACE[2]),
-        lambda shift: Look(p + shift * v, R, points[None], zero, zero),
+        lambda shift: SightingGeometry(p + shift * v, R, points[None], zero, zero),
         image.astype(str).astype(object), names,
     )  # fmt: skip
 

@@ -10,7 +10,7 @@ from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.flight.checks.sense import bounds, camera, ground, motion, origin, stamps, targets, trial
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
 from wildlab.flight.checks.sense.felt import Felt, axes_words, felt_mistakes, other_axes
-from wildlab.flight.checks.sense.field import Seen, field_mistakes
+from wildlab.flight.checks.sense.field import FieldStep, field_mistakes
 from wildlab.flight.checks.sense.places import place_mistakes
 from wildlab.flight.checks.sense.sightings import sightings
 from wildlab.flight.manifest import replace_in_manifest
@@ -233,5 +233,5 @@ def test_axes_are_undone_as_the_words_say():
         undone = mistake.undo(Felt(turns, turns, np.ones(5), read, read, turns, right, np.arange(5.0)))
         assert np.allclose(undone.rate, right) and np.array_equal(undone.force, read)
         (mistake,) = [one for one in field_mistakes("log") if one.cause.endswith(f"magnetometer: {words}")]
-        seen = mistake.undo(Seen(read, read, turns, turns, None))
+        seen = mistake.undo(FieldStep(read, read, turns, turns, None))
         assert seen is not None and np.allclose(seen.before, right) and np.allclose(seen.after, right)

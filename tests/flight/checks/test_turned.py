@@ -14,7 +14,7 @@ from tests.flight.checks.watching import add_sensor, level_poses, watch
 from tests.flight.conftest import table
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sense.looks import Scan, seen_at
+from wildlab.flight.checks.sense.looks import SourceLooks, seen_at
 from wildlab.flight.checks.sense.scans import _stamped
 from wildlab.flight.checks.sense.turned import best_turn, turned
 from wildlab.flight.manifest import replace_in_manifest
@@ -143,7 +143,7 @@ def test_places_and_bearings_are_turned_alike(by):
     rng = np.random.default_rng(5)
     own, places = rng.normal(0, 50, (9, 3)), rng.normal(0, 200, (9, 3))
     nothing = np.zeros((1, 9, 3))
-    scan = Scan("a", places, None, own, nothing, lambda t: (own, nothing), np.zeros(9), np.arange(9))
+    scan = SourceLooks("a", places, None, own, nothing, lambda t: (own, nothing), np.zeros(9), np.arange(9))
     bearings = replace(scan, places=None, azimuth=seen_at(scan))
     np.testing.assert_allclose(wrap(seen_at(turned(scan, by)) - seen_at(turned(bearings, by))), 0, atol=1e-9)
     new = turned(scan, by).places
@@ -157,7 +157,9 @@ def test_positions_are_turned_about_the_own_place():
     own = np.column_stack([np.linspace(0, 200, 80), np.zeros((80, 2))])
     targets = np.tile([[[150.0, 120.0, 0.0]], [[30.0, -160.0, 0.0]]], (1, 80, 1))
     places = targets[rng.integers(0, 2, 80), np.arange(80)] + rng.normal(0, 0.5, (80, 3))
-    scan = Scan("lidar", places, None, own, targets, lambda t: (own, targets), np.zeros(80), np.arange(80))
+    scan = SourceLooks(
+        "lidar", places, None, own, targets, lambda t: (own, targets), np.zeros(80), np.arange(80)
+    )
     found = best_turn((turned(scan, 6.0),), [])
     assert found is not None and abs(found + 6.0) < 0.3
     assert best_turn((scan,), []) is None
@@ -176,7 +178,7 @@ def test_what_a_sensor_places_goes_with_its_platform_where_its_clock_is_moved():
         return own + np.array([2.0 * by, 0, 0]), targets + np.array([0, by, 0]), np.full(4, 0.1 * by)
 
     at = stamped(0.0)
-    scan = Scan("a", places, None, *at[:2], lambda t: at[:2], at[2], np.arange(4), stamped)
+    scan = SourceLooks("a", places, None, *at[:2], lambda t: at[:2], at[2], np.arange(4), stamped)
     later = _stamped(scan, 3.0)
     assert later.places is not None
     assert np.allclose(later.places - later.own, places) and np.allclose(later.own[:, 0], 6.0)

@@ -27,7 +27,7 @@ from wildlab.planning.areas import inside_of, rectangle
 from wildlab.planning.gimbal import look_down
 from wildlab.planning.high_level import SEARCH
 from wildlab.planning.moving import walks
-from wildlab.tracking.particles import Look, Rules, walk_of
+from wildlab.tracking.particles import ImageLook, Rules, walk_of
 from wildlab.tracking.particles.clouds import Inside
 from wildlab.tracking.particles.herd import Moves
 
@@ -70,7 +70,7 @@ def test_images_that_are_left_out_show_no_particle():
 
         known, reach = follower.known, follower.reach
 
-        def step(self, look: Look) -> np.ndarray:
+        def step(self, look: ImageLook) -> np.ndarray:
             names = follower.step(look)
             clouds.append((look.time, follower.herd.cloud.x[..., :2].reshape(-1, 2).copy()))
             return names
@@ -104,7 +104,7 @@ def test_every_image_with_a_detection_is_looked_at_and_every_station():
 def every_image(images: Images, kalman: Kalman) -> Kalman:
     for k, time in enumerate(images.times.tolist()):
         z, R, _ = images.taken(k)
-        kalman.step(Look(time, z, R, nowhere))
+        kalman.step(ImageLook(time, z, R, nowhere))
     return kalman
 
 
@@ -121,8 +121,8 @@ def test_a_kalman_track_is_the_textbooks():
     kalman, motion = Kalman(walk_of(0.5, 1.0), 0.99), walk_of(0.5, 1.0)
     first, second = np.array([[3.0, 4.0]]), np.array([[5.0, 4.5]])
     R = np.array([[[4.0, 1.0], [1.0, 2.0]]])
-    kalman.step(Look(0.0, first, R, nowhere))
-    assert kalman.step(Look(10.0, second, R, nowhere)).tolist() == [1]
+    kalman.step(ImageLook(0.0, first, R, nowhere))
+    assert kalman.step(ImageLook(10.0, second, R, nowhere)).tolist() == [1]
     P = R[0] + motion(10.0)[1]
     # In the form of information: precisions add.
     after = np.linalg.inv(np.linalg.inv(P) + np.linalg.inv(R[0]))
@@ -130,13 +130,13 @@ def test_a_kalman_track_is_the_textbooks():
     _, got, covariance = kalman.known()
     assert got[0] == pytest.approx(mean) and covariance[0] == pytest.approx(after)
     assert kalman.step(
-        Look(11.0, np.array([[90.0, 0.0], [np.nan, 0.0]]), np.tile(R, (2, 1, 1)), nowhere)
+        ImageLook(11.0, np.array([[90.0, 0.0], [np.nan, 0.0]]), np.tile(R, (2, 1, 1)), nowhere)
     ).tolist() == [2, 0]
 
 
 def test_no_particle_leaves_the_fence_it_began_in():
     cloud = particles(7, 2.0)
-    look = Look(0.0, np.array([[70.0, 60.0]]), np.eye(2)[None], nowhere)
+    look = ImageLook(0.0, np.array([[70.0, 60.0]]), np.eye(2)[None], nowhere)
     cloud.step(look)
     cloud.step(blind(900.0))
     assert cloud.home.tolist() == [0]
@@ -148,13 +148,13 @@ def test_no_particle_leaves_the_fence_it_began_in():
 
 def test_negative_information_moves_a_track_out_of_what_was_seen():
     cloud = particles(8, 0.5)
-    whole = Look(0.0, np.array([[0.0, 0.0]]), 25 * np.eye(2)[None], nowhere)
+    whole = ImageLook(0.0, np.array([[0.0, 0.0]]), 25 * np.eye(2)[None], nowhere)
     cloud.step(whole)
 
     def west(places: Array) -> Array:
         return 0.9 * (places[..., 1] < 0)
 
-    cloud.step(Look(1.0, np.zeros((0, 2)), np.zeros((0, 2, 2)), west))
+    cloud.step(ImageLook(1.0, np.zeros((0, 2)), np.zeros((0, 2, 2)), west))
     _, mean, _ = cloud.known()
     # Half a normal distribution at 10 % of its weight: the mean is 0.8 sd times 9/11.
     assert mean[0, 1] == pytest.approx(np.sqrt(2 / np.pi) * np.sqrt(25.25) * 9 / 11, rel=0.2)
@@ -181,7 +181,7 @@ def test_a_ledger_knows_who_got_which_track_and_takes_a_false_detection_for_no_a
 class Told:
     """A follower with one track at the origin, whose animal is within 5 m of it."""
 
-    def step(self, look: Look) -> np.ndarray:
+    def step(self, look: ImageLook) -> np.ndarray:
         return np.zeros(0, np.int64)
 
     def known(self) -> tuple[np.ndarray, Array, Array]:

@@ -23,7 +23,7 @@ from wildlab.pipeline.georeference import (
 )
 from wildlab.pipeline.many.errors import (
     OF_COVARIANCE,
-    Errors,
+    LastingErrors,
     OfPose,
     _pose_roots,
     counted_twice,
@@ -142,8 +142,8 @@ def test_an_error_stays_itself_along_the_flight():
 
 
 def test_errors_of_one_name_are_one_and_those_that_move_nothing_none():
-    one = Errors(("heading", "a: bias", "idle"), (30.0, np.inf, 5.0))
-    two = Errors(("heading",), (20.0,))
+    one = LastingErrors(("heading", "a: bias", "idle"), (30.0, np.inf, 5.0))
+    two = LastingErrors(("heading",), (20.0,))
     J, K = np.ones((2, 2, 3)), 7 * np.ones((1, 2, 1))
     J[..., 1], J[..., 2] = 2, 0
     lasting, (first, second) = laid_out([(one, [J, None]), (two, [K])])
@@ -281,15 +281,15 @@ def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places():
 
 def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last():
     flight, observed = _pixels()
-    radar = Errors(("heading", "radar: range_bias"), (np.inf, np.inf))
+    radar = LastingErrors(("heading", "radar: range_bias"), (np.inf, np.inf))
     for lasting_s, twice in ((0.0, True), (30.0, False)):
         told, of_pose = taken(flight, observed, lasting_s)
-        camera = Errors(of_pose.names, (lasting_s,) * 6)
+        camera = LastingErrors(of_pose.names, (lasting_s,) * 6)
         assert counted_twice(camera, radar) is twice
         known = replace(observed, poses=replace(observed.poses, covariance=told.pose))
         of_pose = of_poses(flight, known, told, believed(flight, "", *MANUAL)[1], lasting_s)
-        assert counted_twice(Errors(of_pose.names, (lasting_s,) * 6), radar)
-        assert not counted_twice(camera, Errors(("radar: range_bias",), (np.inf,)))
+        assert counted_twice(LastingErrors(of_pose.names, (lasting_s,) * 6), radar)
+        assert not counted_twice(camera, LastingErrors(("radar: range_bias",), (np.inf,)))
     text = "[sensors.manual]\ncorrelation_time_s = 9.0\n[sensors.manual.considered.heading]\nsd_deg = 3.0\n"
     apart = believed(flight, text + "shared = false\n", *MANUAL)[1]
     names = of_poses(flight, observed, told, apart, 9.0).names
@@ -299,5 +299,5 @@ def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last():
 def test_one_error_of_two_sensors_lasts_as_long_as_the_shorter_says():
     moves = [np.ones((1, 2, 1))]
     for times in ((10.0, 30.0), (30.0, 10.0)):
-        lasting_s, _ = laid_out([(Errors(("heading",), (one,)), moves) for one in times])
+        lasting_s, _ = laid_out([(LastingErrors(("heading",), (one,)), moves) for one in times])
         assert lasting_s == (10.0,)

@@ -17,7 +17,7 @@ from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
 from wildlab.pipeline.georeference import georeference, observe
-from wildlab.pipeline.many.places import Places, _of_ranges, places_of, sees_of
+from wildlab.pipeline.many.places import PlacedLooks, _of_ranges, places_of, sees_of
 from wildlab.pipeline.scans import Scans, scans_of
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.many import Scan
@@ -25,7 +25,7 @@ from wildlab.tracking.many import Scan
 NOISE = "[sensors.radar.noise]\nrange_m = 2.0\nazimuth_deg = 1.5\n"
 
 
-def places(flight: Flight, text: str = "", sensor: str = "radar", source: str | None = None) -> Places:
+def places(flight: Flight, text: str = "", sensor: str = "radar", source: str | None = None) -> PlacedLooks:
     scans, belief = believed(flight, text, sensor, source)
     return places_of(flight, scans, belief, 0, source)
 
@@ -130,7 +130,7 @@ def test_how_much_ground_an_image_covers():
     """Straight down from 60 m: 640 x 512 pixels of 60 / 700 m."""
     nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
     look = Scan(0.0, 0, np.zeros(2), *nothing, sees_of(looking(np.eye(3), (0.0, 0.0), 0.0), 0))
-    found = Places("eye", "pixel", [look], [frozenset()], 1.0, 0)
+    found = PlacedLooks("eye", "pixel", [look], [frozenset()], 1.0, 0)
     assert found.area(50.0) == pytest.approx(640 * 512 * (60 / 700) ** 2, rel=0.02)
 
 
@@ -142,7 +142,7 @@ def test_the_ground_covered_is_that_of_most_looks(count):
         Scan(float(k), 0, np.zeros(2), *nothing, lambda at, shows=k > 0: np.full(len(at), shows))
         for k in range(count)
     ]
-    found = Places("eye", "pixel", looks, [frozenset()] * count, 1.0, 0)
+    found = PlacedLooks("eye", "pixel", looks, [frozenset()] * count, 1.0, 0)
     assert found.area(50.0) == pytest.approx(np.pi * 50.0**2)
 
 

@@ -20,7 +20,7 @@ from wildlab.sharing.edition.language import (
     placeholders,
     say,
 )
-from wildlab.sharing.edition.said import Day, Quantity, Said, duration, length, number, share
+from wildlab.sharing.edition.said import Day, Message, Quantity, duration, length, number, share
 
 ENGLISH = FOLDER / "en.toml"
 SPACE = "\u00a0"
@@ -91,14 +91,14 @@ def test_no_number_is_shown_with_a_minus_and_nothing(value, kind):
 
 def test_one_and_many():
     nb = load_language("nb")
-    assert say(nb, Said("steps.some", {}, 1)) == "omtrent ett skritt"
-    assert say(nb, Said("steps.some", {}, 4)) == "omtrent 4 skritt"
-    assert say(load_language(), (Said("cause.any"),) * 3).count("something") == 3
+    assert say(nb, Message("steps.some", {}, 1)) == "omtrent ett skritt"
+    assert say(nb, Message("steps.some", {}, 4)) == "omtrent 4 skritt"
+    assert say(load_language(), (Message("cause.any"),) * 3).count("something") == 3
 
 
 def test_a_value_is_no_template():
     """A name that looks like a placeholder stays a name."""
-    shown = say(load_language(), Said("page.title", {"name": "{name} {n} **x**"}))
+    shown = say(load_language(), Message("page.title", {"name": "{name} {n} **x**"}))
     assert "{name} {n} **x**" in shown
 
 
@@ -112,8 +112,8 @@ def test_a_partner_adds_a_language(tmp_path):
     path = partners(tmp_path, '[verdict]\nsound = "Hakuna kosa"\n')
     own = load_language(path)
     assert own.code == "sw" and own.name == "Kiswahili"
-    assert say(own, Said("verdict.sound")) == "Hakuna kosa"
-    assert say(own, Said("verdict.look")) == say(load_language(), Said("verdict.look"))
+    assert say(own, Message("verdict.sound")) == "Hakuna kosa"
+    assert say(own, Message("verdict.look")) == say(load_language(), Message("verdict.look"))
     assert "verdict.look" in own.missing and "verdict.sound" not in own.missing
     assert load_language(str(path)) == own
 

@@ -14,7 +14,7 @@ from wildlab.pipeline.overviews.verdict import PARTS, Verdict
 from wildlab.pipeline.overviews.worth_fixing import CAUSES
 from wildlab.sharing.edition.facts import _TROUBLES, Alarm, Facts, Gain
 from wildlab.sharing.edition.language import languages, load_language, say
-from wildlab.sharing.edition.said import Said, length
+from wildlab.sharing.edition.said import Message, length
 from wildlab.sharing.edition.sentences import STEP_M, Story, steps_of, tell
 
 LANGUAGES = [load_language(code) for code in languages()]
@@ -24,7 +24,7 @@ RADAR = EMPTY._replace(
 POSSIBLE = Gain("possible", (), 1.0, 4.0, 0.25)
 
 
-def keys(items: tuple[Said, ...]) -> list[str]:
+def keys(items: tuple[Message, ...]) -> list[str]:
     return [one.key for one in items]
 
 
@@ -38,14 +38,14 @@ def test_a_flight_of_which_all_is_known():
 
 def test_an_alarm_comes_before_every_gain_and_takes_the_trust():
     story = tell(WHOLE._replace(verdict="went wrong", alarms=(Alarm("jumps", 12.0, 2),)))
-    assert story.why == Said("alarm.jumps", story.why.values, 2)
+    assert story.why == Message("alarm.jumps", story.why.values, 2)
     assert keys(story.advice)[:2] == ["do.jumps", "do.cause_boresight"] and not story.trusted
 
 
 def test_a_part_that_failed_is_not_known_and_asked_for_again():
     story = tell(EMPTY._replace(failed=("overview", "georeferencing")))
     assert keys(story.unknown) == ["unknown.failed_overview", "unknown.failed_georeferencing", "unknown.seen"]
-    assert story.advice == (Said("do.failed", {}, 2),) and story.why.key == "why.failed"
+    assert story.advice == (Message("do.failed", {}, 2),) and story.why.key == "why.failed"
 
 
 def test_few_points_say_nothing_of_accuracy():
@@ -74,7 +74,7 @@ def test_without_a_camera_no_picture_is_spoken_of(language):
 def test_tracks_against_true_places_are_no_ignorance():
     """How far off the followed are is said with the worst of them; only of the rest it is not known."""
     story = tell(RADAR)
-    assert story.tiles[0] == (length(1.345), Said("tile.tracks", {"worst": length(10.83)}))
+    assert story.tiles[0] == (length(1.345), Message("tile.tracks", {"worst": length(10.83)}))
     assert keys(story.measured) == ["measured.tracks", "measured.detected"]
     assert "unknown.error_sightings" in keys(story.unknown)
     assert not {"do.known_places", "do.known_tracks"} & set(keys(story.advice))
@@ -88,7 +88,7 @@ def test_tracks_against_true_places_are_no_ignorance():
 def test_what_does_not_fit_is_counted():
     alarms = tuple(Alarm(what, 9.0, 1) for what in ALARMS)
     story = tell(WHOLE._replace(verdict="went wrong", alarms=alarms, gains=(), troubles=()))
-    assert len(story.wrong) == 4 and story.wrong[-1] == story.advice[-1] == Said("page.more", {}, 1)
+    assert len(story.wrong) == 4 and story.wrong[-1] == story.advice[-1] == Message("page.more", {}, 1)
 
 
 @pytest.mark.parametrize(

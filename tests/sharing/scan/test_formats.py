@@ -22,7 +22,7 @@ from rasterio.transform import from_origin
 from tests.sharing.scan.packed import PACKED, parquet, picture, recording, saved, sqlite
 from tests.sharing.scan.spelt import LATITUDE, LEAKS, LONGITUDE, WHEN, ecef, secrets, sexagesimal, utm
 from wildlab.sharing.scan import scan
-from wildlab.sharing.scan.look import Look
+from wildlab.sharing.scan.look import SoughtPlaces
 
 
 @pytest.mark.parametrize("kind", PACKED)
@@ -165,14 +165,14 @@ def test_any_place_is_found_at_any_byte(latitude, longitude, before, order, kind
     unit = 1e7 if kind == "i" else 1
     pair = [round(v * unit) if kind == "i" else v for v in (latitude, longitude)]
     data = before + struct.pack(order + 2 * kind, *pair) + bytes(9)
-    found = Look(secrets(latitude, longitude)).binary.found_in(data)
+    found = SoughtPlaces(secrets(latitude, longitude)).binary.found_in(data)
     assert any(hit.kind == "place" and hit.start == len(before) for hit in found)
 
 
 def test_chance_bytes_are_no_place():
     """Pairs of four bytes agree less than once in so many."""
     data = np.random.default_rng(20).bytes(4_000_000)
-    assert Look(secrets()).binary.found_in(data) == []
+    assert SoughtPlaces(secrets()).binary.found_in(data) == []
 
 
 def test_a_map_elsewhere_and_local_metres_are_none(tmp_path):

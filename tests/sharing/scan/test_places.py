@@ -19,7 +19,7 @@ from wildlab.sharing.scan.codes import (
     plus_cell,
     plus_of,
 )
-from wildlab.sharing.scan.look import Look
+from wildlab.sharing.scan.look import SoughtPlaces
 
 # Off the equator and the meridian, where a coordinate is a small number like any other.
 # A round number says nothing of a place either: 2.0 stands everywhere.
@@ -31,11 +31,11 @@ LATITUDES, LONGITUDES = (
 
 
 def kinds(text: str, known: Secrets) -> set[str]:
-    return {hit.written for hit in Look(replace(known, moments=(), words=())).in_text(text)}
+    return {hit.written for hit in SoughtPlaces(replace(known, moments=(), words=())).in_text(text)}
 
 
 def places(text: str, known: Secrets) -> list[str]:
-    found = Look(replace(known, moments=(), words=(), numbers=())).in_text(text)
+    found = SoughtPlaces(replace(known, moments=(), words=(), numbers=())).in_text(text)
     return [hit.written for hit in found if hit.kind == "place"]
 
 
@@ -58,7 +58,7 @@ ANYWHERE = sorted(one for one in SPELLINGS if "entities" not in one and "alone" 
 @given(latitude=LATITUDES, longitude=LONGITUDES)
 @settings(max_examples=15)
 def test_each_spelling_is_found_anywhere(latitude, longitude):
-    look = Look(replace(secrets(latitude, longitude), moments=(), words=(), numbers=()))
+    look = SoughtPlaces(replace(secrets(latitude, longitude), moments=(), words=(), numbers=()))
     missed = [
         (spelling, text)
         for spelling in ANYWHERE

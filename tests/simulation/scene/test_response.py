@@ -16,7 +16,7 @@ from wildlab.simulation.scene import (
     to_kelvin,
 )
 from wildlab.simulation.scene.bodies import fitted_out, vessel
-from wildlab.simulation.scene.flights import Look, SceneFlight
+from wildlab.simulation.scene.flights import SceneFlight, VesselLook
 
 SHAPE = (120, 160)
 
@@ -109,7 +109,7 @@ def test_a_sensor_of_another_size_is_refused():
 
 @pytest.fixture(scope="module")
 def flight():
-    return SceneFlight(load_twin("gimballed-ship"), 1, Look(lengths=(70.0,), slender=5.0, fittings=10))
+    return SceneFlight(load_twin("gimballed-ship"), 1, VesselLook(lengths=(70.0,), slender=5.0, fittings=10))
 
 
 def test_a_window_shows_what_the_whole_image_shows_there(flight):
@@ -142,7 +142,7 @@ def test_fittings_are_on_the_deck_and_as_warm_as_they_should_be():
 
 
 def test_without_fittings_a_deck_is_as_it_was(flight):
-    bare = SceneFlight(load_twin("gimballed-ship"), 1, Look(lengths=(70.0,), slender=5.0))
+    bare = SceneFlight(load_twin("gimballed-ship"), 1, VesselLook(lengths=(70.0,), slender=5.0))
     assert len(bare.bodies(0)[0].layers[-2].hot) == 1
     assert len(flight.bodies(0)[0].layers[-2].hot) == 11
     assert flight.sea == bare.sea

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
+from wildlab.tracking.many.beliefs import POINT, Hull, ManySensorModel, ManyTargetModel, Scan
 from wildlab.tracking.many.run import follow_many, run_many, step
 from wildlab.tracking.many.tracks import begin, moves
 
-EYE = SensorBeliefs("eye", 0.9, 1e-4, 0.0, 1e6, 3.0, (0.0,), (0.0,), (0.0,))
-POINTS = TargetBeliefs(
+EYE = ManySensorModel("eye", 0.9, 1e-4, 0.0, 1e6, 3.0, (0.0,), (0.0,), (0.0,))
+POINTS = ManyTargetModel(
     (POINT,), density=0.1, start_speed_m_s=3.0, lifetime_s=500.0, birth=0.1, visible_s=100.0, hidden_s=5.0,
     gate=4.5, confirmed=0.9, hits=3, shown=0.5, forgotten=0.01, lost_m=50.0, fastest_m_s=30.0, moves_m=0.0,
     over_s=15.0, apart_m=1.0,
@@ -155,7 +155,7 @@ def test_many_at_once_and_none(rng):
 
 SHIP = Hull("ship", 30.0, 8.0, 0.4)
 BOTH = POINTS._replace(hulls=(POINT._replace(share=0.6), SHIP), apart_m=4.0)
-LONG = SensorBeliefs("long", 0.9, 1e-5, 0.0, 1e6, 3.0, (0.0, 1.0), (0.0, 6.0), (0.0, 3.0), several=True)
+LONG = ManySensorModel("long", 0.9, 1e-5, 0.0, 1e6, 3.0, (0.0, 1.0), (0.0, 6.0), (0.0, 3.0), several=True)
 
 
 def ship(seed: int, steps: int = 40) -> tuple[np.ndarray, list[Scan]]:

@@ -9,7 +9,7 @@ from wildlab.evaluation import share_interval
 from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking import kalman
 from wildlab.tracking.particles import (
-    Look,
+    ImageLook,
     count_interval,
     count_probabilities,
     effective_size,
@@ -44,7 +44,9 @@ def begun(step, rules, rng, **more):
 
 
 def look(time, *z, sight=lambda p: np.zeros(p.shape[:-1]), clutter=0.0, noise=R):
-    return Look(time, np.reshape(z, (-1, 2)).astype(float), np.tile(noise, (len(z), 1, 1)), sight, clutter)
+    return ImageLook(
+        time, np.reshape(z, (-1, 2)).astype(float), np.tile(noise, (len(z), 1, 1)), sight, clutter
+    )
 
 
 @pytest.mark.parametrize("step", [step_nearest, step_counting])

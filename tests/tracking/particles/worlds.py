@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wildlab.tracking.particles import Look, Rules, move, stay_inside, walk_of
+from wildlab.tracking.particles import ImageLook, Rules, move, stay_inside, walk_of
 
 SIZE = np.array([120.0, 90.0])
 WALK = walk_of(0.5, 1.0)
@@ -52,5 +52,7 @@ def world(rng, animals, images=30, dt=4.0, probability=0.8, clutter=2e-5):
         low, high = np.maximum(middle - VIEW, 0), np.minimum(middle + VIEW, SIZE)
         false = rng.uniform(low, high, (rng.poisson(clutter * np.prod(high - low)), 2))
         both = rng.permutation(np.concatenate([z, false]))
-        looks.append(Look(k * dt, both, np.tile(NOISE**2 * np.eye(2), (len(both), 1, 1)), sight, clutter))
+        looks.append(
+            ImageLook(k * dt, both, np.tile(NOISE**2 * np.eye(2), (len(both), 1, 1)), sight, clutter)
+        )
     return looks

@@ -51,7 +51,7 @@ class Choice:
     target: str = ""
 
 
-class Way(NamedTuple):
+class LoggedPath(NamedTuple):
     """Where a log says that it was: times (N,) s since 1970, latitude and longitude (N, 2) in radians, and by
     what they count from heights (N,) in m."""
 
@@ -272,7 +272,7 @@ def _other(one: Found, own: Found | None, images: Found | None) -> Choice:
     )
 
 
-def _by_hours(one: Found, mine: Way, theirs: Way) -> str:
+def _by_hours(one: Found, mine: LoggedPath, theirs: LoggedPath) -> str:
     """That another log's clock is off by whole or half hours, and what to write; nothing where it is not."""
     by = whole_hours((theirs.times[0], theirs.times[-1]), (mine.times[0], mine.times[-1]))
     if by is None:
@@ -305,7 +305,7 @@ def _apart(a: tuple[float, float] | None, b: tuple[float, float] | None) -> floa
     return 0.0 if a is None or b is None else max(0.0, a[0] - b[1], b[0] - a[1])
 
 
-def way_of(one: Found) -> Way | None:
+def way_of(one: Found) -> LoggedPath | None:
     """Where a log says that it was, rows that can be used; None where it does not say."""
     for name in ("gnss", "poses"):
         stream = one.part(name)
@@ -319,7 +319,7 @@ def way_of(one: Found) -> Way | None:
             heights: dict[str, Array] = {
                 key: c[key][good] for key in ("height_ellipsoid_m", "height_sea_m") if key in c
             }
-            return Way(c["time_s"][good], place[good], heights)
+            return LoggedPath(c["time_s"][good], place[good], heights)
     return None
 
 
@@ -328,7 +328,7 @@ def _level(place: Array, origin: tuple[float, float, float]) -> Array:
     return np.asarray(geodetic_to_ned(place[:, 0], place[:, 1], np.zeros(len(place)), origin))
 
 
-def _distance(mine: Way, theirs: Way) -> tuple[float, float]:
+def _distance(mine: LoggedPath, theirs: LoggedPath) -> tuple[float, float]:
     """Median level distance at their times, and median height of mine above them, m; NaN: not comparable."""
     order = np.argsort(mine.times)
     both = (theirs.times >= mine.times[0]) & (theirs.times <= mine.times[-1])

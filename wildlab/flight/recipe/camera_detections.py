@@ -35,7 +35,7 @@ class Group(Strict):
         return self
 
 
-class Frames(Series):
+class FramesPart(Series):
     """The images: one per row with its `id`, or one per `unique` combination of columns.
 
     `sensor` names the column that says which of several sensors looked; such frames need no camera.

@@ -22,7 +22,7 @@ from wildlab.flight.learnt import read_learnt, refuse_other_camera
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.flight.manifest_parts import CameraPart, GnssPart, ImuPart, MagnetometerPart
 from wildlab.flight.recipe.model import Recipe, read_recipe
-from wildlab.flight.recipe.poses import Fixes, Places, PoseRows, read_poses
+from wildlab.flight.recipe.poses import Fixes, LocalFrame, PoseRows, read_poses
 from wildlab.flight.recipe.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
 from wildlab.flight.recipe.sensors import SensorRows, read_sensors
 from wildlab.flight.recipe.tables import (
@@ -198,7 +198,7 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
         raise rows.fail(error.problem, error.fix, named, f"camera.{name}", 0) from None
 
 
-def _places(recipe: Recipe, poses: dict[str, PoseRows], sensors: dict[str, SensorRows]) -> Places:
+def _places(recipe: Recipe, poses: dict[str, PoseRows], sensors: dict[str, SensorRows]) -> LocalFrame:
     """What takes positions to frame n; without an origin in the recipe, the first pose is it, or the first
     satellite position where there are no poses."""
     vertical = recipe.vertical
@@ -212,7 +212,7 @@ def _places(recipe: Recipe, poses: dict[str, PoseRows], sensors: dict[str, Senso
         latitude, longitude, height = first.values[0]
         off = vertical.correction_m if what in vertical.taken_off else 0.0
         origin = (float(latitude), float(longitude), float(height) - off)
-    return Places(origin, vertical.correction_m, vertical.taken_off)
+    return LocalFrame(origin, vertical.correction_m, vertical.taken_off)
 
 
 def _fixes(recipe: Recipe, tables: dict[str, pd.DataFrame]) -> Fixes | None:
@@ -264,7 +264,7 @@ def _manifest(
     recipe: Recipe,
     raw: RawFiles,
     camera: CameraPart | None,
-    places: Places,
+    places: LocalFrame,
     epoch: datetime | None,
     description: str,
 ) -> Manifest:

@@ -23,7 +23,7 @@ from wildlab.flight.manifest_parts import (
     ScoringPart,
     UncertaintyPart,
 )
-from wildlab.flight.recipe.camera_detections import Detections, Frames, Truth
+from wildlab.flight.recipe.camera_detections import Detections, FramesPart, Truth
 from wildlab.flight.recipe.parts import (
     Attitude,
     Position,
@@ -163,7 +163,7 @@ class Recipe(Strict):
     files: dict[str, str] = Field(default_factory=dict)
     tables: dict[str, MatlabTable] = Field(default_factory=dict)
     logs: dict[str, LogTable] = Field(default_factory=dict)
-    frames: Frames | None = None
+    frames: FramesPart | None = None
     poses: dict[str, Poses] = Field(default_factory=dict)
     imu: Inertial | None = None
     gnss: Satellite | None = None

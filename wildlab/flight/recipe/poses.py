@@ -51,7 +51,7 @@ class RawPosition:
 
 
 @dataclass(frozen=True)
-class Places:
+class LocalFrame:
     """What takes raw positions to frame n: the origin, and the metres to take off heights."""
 
     origin: Origin
@@ -98,7 +98,7 @@ class PoseRows:
     ids: Text | None
     note: str
 
-    def nav(self, time_s: Array, places: Places, fixes: Fixes | None) -> pd.DataFrame:
+    def nav(self, time_s: Array, places: LocalFrame, fixes: Fixes | None) -> pd.DataFrame:
         """The nav table, its positions in n; without those poses that `fixes` have no position for."""
         if self.position is not None:
             p = places.ned(self.position, "poses")

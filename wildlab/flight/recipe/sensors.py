@@ -8,7 +8,7 @@ import pandas as pd
 
 from wildlab.flight.recipe.model import Recipe
 from wildlab.flight.recipe.parts import Stamp
-from wildlab.flight.recipe.poses import Places, RawPosition, read_position, read_velocity
+from wildlab.flight.recipe.poses import LocalFrame, RawPosition, read_position, read_velocity
 from wildlab.flight.recipe.raw import Array, Nanoseconds, RawFiles, RawTable, numbers, plain_numbers, times
 
 
@@ -20,7 +20,7 @@ class SensorRows:
     stamps: Nanoseconds
     position: RawPosition | None = None
 
-    def table(self, start: int, places: Places) -> pd.DataFrame:
+    def table(self, start: int, places: LocalFrame) -> pd.DataFrame:
         """The table of the flight; `start` is its epoch in nanoseconds since 1970."""
         columns: dict[str, Array] = {"time_s": (self.stamps - start) / 1e9}
         if self.position is not None:

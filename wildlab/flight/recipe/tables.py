@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from wildlab.flight.recipe.camera_detections import Detections, Frames, Ground, Truth
+from wildlab.flight.recipe.camera_detections import Detections, FramesPart, Ground, Truth
 from wildlab.flight.recipe.model import Recipe
-from wildlab.flight.recipe.poses import Places, read_position
+from wildlab.flight.recipe.poses import LocalFrame, read_position
 from wildlab.flight.recipe.raw import (
     Array,
     Nanoseconds,
@@ -84,7 +84,7 @@ def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
     return FrameRows(table, None if stamps is None else stamps[first], of_row)
 
 
-def _groups(rows: RawTable, block: Frames) -> Text:
+def _groups(rows: RawTable, block: FramesPart) -> Text:
     group = block.group
     if group is None or not group.edges:
         return texts(rows, group.column if group else "", "frames.group")
@@ -129,7 +129,7 @@ def read_detections(
     recipe: Recipe,
     part: str,
     frames: FrameRows,
-    places: Places,
+    places: LocalFrame,
     image: tuple[float, float],
     lens: pd.DataFrame,
 ) -> pd.DataFrame:
@@ -212,7 +212,7 @@ def _headings(rows: RawTable, frame: Text | None, lens: pd.DataFrame, part: str)
     return np.asarray(heading, np.float64)
 
 
-def _ground(rows: RawTable, ground: Ground, part: str, places: Places, under: Array) -> Array:
+def _ground(rows: RawTable, ground: Ground, part: str, places: LocalFrame, under: Array) -> Array:
     """Down coordinate of the ground at each detection; `under` (N, 3) is the platform above it."""
     off = places.off("ground")
     if ground.down is not None:
@@ -229,7 +229,7 @@ def _ground(rows: RawTable, ground: Ground, part: str, places: Places, under: Ar
 
 
 def read_truth(
-    block: Truth, raw: RawFiles, recipe: Recipe, part: str, places: Places, start: int
+    block: Truth, raw: RawFiles, recipe: Recipe, part: str, places: LocalFrame, start: int
 ) -> pd.DataFrame:
     """Where targets were; `start` is the epoch in nanoseconds since 1970.
 

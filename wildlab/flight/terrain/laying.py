@@ -15,7 +15,7 @@ from wildlab.flight.readers.terrain import ElevationMap, open_elevation
 from wildlab.flight.store import Flight
 from wildlab.flight.terrain.resampling import (
     Extent,
-    Places,
+    MapPlaces,
     bilinear,
     lattice_of,
     places_of,
@@ -161,7 +161,7 @@ class CutOut(NamedTuple):
     largest: float
 
 
-def _cut_out(places: Places, positions: Array, margin: float, says: TerrainSays) -> CutOut:
+def _cut_out(places: MapPlaces, positions: Array, margin: float, says: TerrainSays) -> CutOut:
     """The part of a map that is near positions (N, 3), resampled into n."""
     elevation, path = places.map, places.map.path
     low, high = positions[:, :2].min(axis=0) - margin, positions[:, :2].max(axis=0) + margin
@@ -258,7 +258,7 @@ def _geoid_by_grid(elevation: ElevationMap, flight: Flight) -> float:
     return undulation
 
 
-def _above_ground(places: Places, poses: Array) -> Array:
+def _above_ground(places: MapPlaces, poses: Array) -> Array:
     """Heights of poses above the ground, of those that are over it."""
     some = poses[:: max(1, len(poses) // LOOKED_UP)]
     found = places.of_points(some)
@@ -275,7 +275,7 @@ def _above_ground(places: Places, poses: Array) -> Array:
     return np.asarray(above[np.isfinite(above)])
 
 
-def _cell_sides(places: Places, positions: Array) -> tuple[float, float]:
+def _cell_sides(places: MapPlaces, positions: Array) -> tuple[float, float]:
     """Sides of the map's cell nearest to the middle of the flight, metres: across columns, across rows."""
     column, row, _ = places.of_points(positions.mean(axis=0)[None])[0]
     rows, columns = places.map.shape
@@ -293,7 +293,7 @@ def _cell_sides(places: Places, positions: Array) -> tuple[float, float]:
     return float(sides[0]), float(sides[1])
 
 
-def _within(places: Places, extent: Extent) -> Extent:
+def _within(places: MapPlaces, extent: Extent) -> Extent:
     """The part of an extent that the map reaches, which lies over some of it."""
     rows, columns = places.map.shape
     edge = np.linspace(0, 1, 65)
@@ -342,7 +342,7 @@ def _cropped(terrain: Terrain) -> Terrain:
     return Terrain(height, terrain.north + i * terrain.step, terrain.east + j * terrain.step, terrain.step)
 
 
-def _window(places: Places, extent: Extent, every: int, path: Path) -> tuple[int, int, int, int]:
+def _window(places: MapPlaces, extent: Extent, every: int, path: Path) -> tuple[int, int, int, int]:
     """Row, column, rows and columns of the file that lie under an extent."""
     edge = np.linspace(0, 1, 33)
     north = extent.north + edge * (extent.far_north - extent.north)
@@ -367,7 +367,10 @@ def _window(places: Places, extent: Extent, every: int, path: Path) -> tuple[int
 
 
 def _refuse_elsewhere(
-    places: Places, positions: Array, what: str = "the flight does not lie", also: str = "the flight's origin"
+    places: MapPlaces,
+    positions: Array,
+    what: str = "the flight does not lie",
+    also: str = "the flight's origin",
 ) -> None:
     """Refuse a map that no position of the flight lies over, and say how far off it is."""
     rows, columns = places.map.shape
@@ -401,7 +404,7 @@ def _refuse_elsewhere(
     )
 
 
-def _mirrored(places: Places) -> str:
+def _mirrored(places: MapPlaces) -> str:
     """A clause where the flight would lie over the map with another sign of a coordinate, or another zone."""
     latitude, longitude, _ = (math.degrees(value) for value in places.origin)
     rows, columns = places.map.shape

@@ -38,7 +38,7 @@ class Extent(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class MapPlaces:
     """Where points of n lie in a map, and the other way round.
 
     Attributes
@@ -67,7 +67,7 @@ class Places:
         return geodetic_to_ned(np.radians(latitude), np.radians(longitude), heights + self.added, self.origin)
 
 
-def places_of(elevation: ElevationMap, origin: Origin, added: float) -> Places:
+def places_of(elevation: ElevationMap, origin: Origin, added: float) -> MapPlaces:
     """The way between n and a map.
 
     Parameters
@@ -87,12 +87,12 @@ def places_of(elevation: ElevationMap, origin: Origin, added: float) -> Places:
 
     there = Transformer.from_crs(CRS.from_epsg(4326), elevation.crs, always_xy=True)
     back = Transformer.from_crs(elevation.crs, CRS.from_epsg(4326), always_xy=True)
-    return Places(elevation, origin, added, there.transform, back.transform)
+    return MapPlaces(elevation, origin, added, there.transform, back.transform)
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """`Places.of_points` of an even lattice at two depths: (2, A, B, 3)."""
+    """`MapPlaces.of_points` of an even lattice at two depths: (2, A, B, 3)."""
 
     extent: Extent
     downs: tuple[float, float]
@@ -116,7 +116,7 @@ class Lattice:
         return between(self.values[0]), between(self.values[1])
 
 
-def lattice_of(places: Places, extent: Extent, heights: tuple[float, float], cell: float) -> Lattice:
+def lattice_of(places: MapPlaces, extent: Extent, heights: tuple[float, float], cell: float) -> Lattice:
     """A lattice over an extent for ground between two heights of the map, metres.
 
     Parameters
@@ -154,7 +154,7 @@ def lattice_of(places: Places, extent: Extent, heights: tuple[float, float], cel
         spacing /= 2
 
 
-def _lattice(places: Places, extent: Extent, downs: tuple[float, float], spacing: float) -> Lattice:
+def _lattice(places: MapPlaces, extent: Extent, downs: tuple[float, float], spacing: float) -> Lattice:
     e = extent
     a, b = (int(np.ceil(side / spacing)) + 1 for side in (e.far_north - e.north, e.far_east - e.east))
     north, east = np.linspace(e.north, e.far_north, max(a, 2)), np.linspace(e.east, e.far_east, max(b, 2))
@@ -234,7 +234,7 @@ def bilinear(heights: Heights, rows: Array, columns: Array) -> Array:
 
 
 def resampling_error(
-    terrain: Terrain, places: Places, cells: NDArray[np.int64], heights: Heights
+    terrain: Terrain, places: MapPlaces, cells: NDArray[np.int64], heights: Heights
 ) -> tuple[float, float]:
     """How far a grid in n lies from the map's own nodes: root mean square, and the largest, metres.
 

@@ -17,7 +17,7 @@ from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.animals.images import Detector, Images, footprint_circles, sight_from
 from wildlab.tracking.kalman import update
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.particles import Look, Rules, mahalanobis_squared, moments, nearest_animal, no_herd
+from wildlab.tracking.particles import ImageLook, Rules, mahalanobis_squared, moments, nearest_animal, no_herd
 from wildlab.tracking.particles.clouds import Cloud, Inside
 from wildlab.tracking.particles.moves import move, stay_inside
 from wildlab.tracking.particles.steps import step_nearest
@@ -82,7 +82,7 @@ class Found(NamedTuple):
     away: float
 
 
-class Followed(NamedTuple):
+class FollowedAnimals(NamedTuple):
     """A way with its tracks.
 
     Attributes
@@ -106,7 +106,7 @@ class Followed(NamedTuple):
 class Follower(Protocol):
     """Tracks that go on image by image."""
 
-    def step(self, look: Look) -> NDArray[np.int64]:
+    def step(self, look: ImageLook) -> NDArray[np.int64]:
         """One image; (M,) the track that each detection was given."""
 
     def known(self) -> tuple[NDArray[np.int64], Array, Array]:
@@ -143,7 +143,7 @@ class Particles:
                 inside[mine] = fence(places[mine])
         return inside
 
-    def step(self, look: Look) -> NDArray[np.int64]:
+    def step(self, look: ImageLook) -> NDArray[np.int64]:
         """As `Follower` has it."""
         self.herd, names = step_nearest(self.herd, look, self.rules, self._rng)
         self._moments = moments(self.herd.cloud)
@@ -192,7 +192,7 @@ class Kalman:
         self._time = np.nan
         self._mean, self._P = np.zeros((0, 2)), np.zeros((0, 2, 2))
 
-    def step(self, look: Look) -> NDArray[np.int64]:
+    def step(self, look: ImageLook) -> NDArray[np.int64]:
         """As `Follower` has it."""
         if len(self._mean):
             F, Q = self._motion(look.time - self._time)
@@ -224,7 +224,7 @@ class Kalman:
 
 
 class Ledger:
-    """Which detections went where: what `Followed` is made of, kept while the tracks go on."""
+    """Which detections went where: what `FollowedAnimals` is made of, kept while the tracks go on."""
 
     def __init__(self, animals: int) -> None:
         self.found: list[Found] = []
@@ -268,7 +268,7 @@ def traces_of(follower: Follower) -> dict[int, float]:
 
 def follow(
     images: Images, terrain: Terrain, detector: Detector, follower: Follower, motion: Motion
-) -> Followed:
+) -> FollowedAnimals:
     """Take a follower through all images that can tell its tracks anything.
 
     Parameters
@@ -300,11 +300,11 @@ def follow(
     ledger, known = Ledger(images.truth.shape[1]), list[Known]()
     steps, k, tells = 0, 0, True
 
-    def look(k: int) -> Look:
+    def look(k: int) -> ImageLook:
         z, R, _ = images.taken(k)
         p, circle = images.poses, (middle[k], float(radius[k]))
         sight = sight_from(terrain, p.camera, p.p_nc[k], p.R_nc[k], circle, detector)
-        return Look(float(times[k]), z, R, sight)
+        return ImageLook(float(times[k]), z, R, sight)
 
     while k < T:
         steps += 1
@@ -321,12 +321,12 @@ def follow(
             known.append(Known(k, *follower.known()))
         k, tells = next_look(follower, k, times, middle, radius, detected | stations, motion)
     tracks = max((one.track for one in ledger.found), default=0)
-    return Followed(known, ledger.found, steps, tracks)
+    return FollowedAnimals(known, ledger.found, steps, tracks)
 
 
-def blind(time: float) -> Look:
+def blind(time: float) -> ImageLook:
     """An image that shows nothing of the ground."""
-    return Look(time, np.zeros((0, 2)), np.zeros((0, 2, 2)), lambda places: np.zeros(places.shape[:-1]))
+    return ImageLook(time, np.zeros((0, 2)), np.zeros((0, 2, 2)), lambda places: np.zeros(places.shape[:-1]))
 
 
 def next_look(

@@ -199,14 +199,14 @@ def _half_height(body: Body) -> float:
     return max(layer.height for layer in body.layers) / 2
 
 
-class Judged(NamedTuple):
+class FrameMatch(NamedTuple):
     """Of D detections of a frame: whose each is, `NONE` for no animal's; and if anything stands there."""
 
     animal: NDArray[np.intp]
     standing: NDArray[np.bool_]
 
 
-def judge(frame: Frame, found: Detections) -> Judged:
+def judge(frame: Frame, found: Detections) -> FrameMatch:
     """Whose each detection is: the animal's on whose pixels, or near them, its centroid lies.
 
     Where pixels of several bodies are there, that which has most of them; no animal's is a detection that is
@@ -222,7 +222,7 @@ def judge(frame: Frame, found: Detections) -> Judged:
         standing[row] = near[best] > 0
         if standing[row] and found.area[row] <= TOO_LARGE * int((labels == best).sum()):
             animal[row] = frame.animal[best]
-    return Judged(animal, standing)
+    return FrameMatch(animal, standing)
 
 
 def ground_distance(terrain: Terrain, told: CameraPoses) -> float:
@@ -271,7 +271,7 @@ def take_frames(
     -------
     Framed
     """
-    uv, image, judged = list[Array](), list[NDArray[np.intp]](), list[Judged]()
+    uv, image, judged = list[Array](), list[NDArray[np.intp]](), list[FrameMatch]()
     for k in range(len(images.times)):
         shot = frame(k)
         found = find(shot.counts, ground_distance(terrain, images.poses.take(np.array([k]))))

@@ -21,7 +21,7 @@ from wildlab.pipeline.animals.images import Detector, footprint_circles, put_on_
 from wildlab.pipeline.plans.flown import ExecutionErrors, displaced, drawn_errors
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course
 from wildlab.planning.high_level import SEARCH, all_positioned, best_goal
-from wildlab.tracking.particles import Look
+from wildlab.tracking.particles import ImageLook
 
 
 class Aircraft(NamedTuple):
@@ -220,5 +220,5 @@ def _see(
     sight = sight_from(
         terrain, told.camera, told.p_nc[0], told.R_nc[0], (middle[0], float(radius[0])), detector
     )
-    names = follower.step(Look(time, z, R, sight))
+    names = follower.step(ImageLook(time, z, R, sight))
     ledger.enter(k, time, seen, names, before, traces_of(follower))

@@ -32,7 +32,7 @@ from wildlab.pipeline.detecting.compared import (
 from wildlab.pipeline.detecting.detect import Detected, run_detection
 from wildlab.pipeline.detecting.fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
 from wildlab.pipeline.detecting.judged import (
-    Judged,
+    DetectorScore,
     ellipse_sentence,
     judge_detections,
     labels_sentences,
@@ -294,7 +294,7 @@ def _result(
     wanted: Wanted,
     thresholds: Any,
     detected: Detected,
-    judged: Judged | None,
+    judged: DetectorScore | None,
     fitted: Fitted | None,
     part: PartFit | None,
     pictures: dict[str, int],

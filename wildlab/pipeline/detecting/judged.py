@@ -23,7 +23,7 @@ _BOX = ["left_px", "top_px", "width_px", "height_px"]
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class DetectorScore:
     """What a run is worth on labelled frames.
 
     Attributes
@@ -188,7 +188,7 @@ def labels_sentences(labels: Labels) -> list[str]:
 
 def judge_detections(
     detections: pd.DataFrame, frames: pd.DataFrame, labels: Labels, rule: Rule | None = None
-) -> Judged:
+) -> DetectorScore:
     """Hold the detections of a run against labels.
 
     Parameters
@@ -250,7 +250,7 @@ def judge_detections(
         )
     things = pd.DataFrame(rows, columns=["frame_id", "verdict", *_BOX, "score"])
     absent = tuple(sorted(set(labels.boxes) - named))
-    return Judged(
+    return DetectorScore(
         rates(np.array(counts), groups), things, len(counts), len(frames) - len(counts), unusable, absent,
         outside, _share(inside),
     )  # fmt: skip

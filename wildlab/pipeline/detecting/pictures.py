@@ -133,8 +133,8 @@ def write_pictures(
     names
         Of all frames, in order.
     things
-        ``frame_id``, ``verdict``, the box and ``score``; from `wildlab.pipeline.detection_judged.Judged`, or
-        all ``detected``.
+        ``frame_id``, ``verdict``, the box and ``score``; from
+        `wildlab.pipeline.detecting.judged.DetectorScore`, or all ``detected``.
     into
         Folder: ``overlays/NAME.jpg``, ``missed.jpg``, ``invented.jpg``, and ``found.jpg``, or
         ``detected.jpg`` where nothing is judged.

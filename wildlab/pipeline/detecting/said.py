@@ -6,13 +6,13 @@ from wildlab.flight.files import printable
 from wildlab.flight.readers.frames import Frames, Polarity
 from wildlab.flight.readers.frames.shutter import CORRECTIONS
 from wildlab.pipeline.detecting.detect import Detected
-from wildlab.pipeline.detecting.judged import Judged
+from wildlab.pipeline.detecting.judged import DetectorScore
 
 #: Detections an image from which on defaults are said to fit badly: more than anyone looks through.
 MANY = 10
 
 
-def not_judged(judged: Judged) -> list[str]:
+def not_judged(judged: DetectorScore) -> list[str]:
     """Sentences on frames and labels that say nothing, or count as missed for a reason of their own.
 
     Parameters

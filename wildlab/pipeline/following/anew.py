@@ -5,11 +5,11 @@ by a filter whose linearisation does not hold, and throw the track to where the 
 ends, and a new one starts on the next detection, in the same way as the first.
 
 It ends at the first look at which it was without a detection for longer than a filter on differences would
-wait (`Beliefs.longest_gap_s`), and what a linearisation leaves out of a detection, by the geometry in which
-the target was last seen, is more than all that the detection may be wrong by: its noise and the considered
-errors (`wildlab.tracking.bending`). Where it is seen again sooner but from nearer, the geometry of that look
-decides too. The filter with white noise decides for all, as it chooses the detections for all: they are
-compared over the same looks.
+wait (`NoiseModel.longest_gap_s`), and what a linearisation leaves out of a detection, by the geometry in
+which the target was last seen, is more than all that the detection may be wrong by: its noise and the
+considered errors (`wildlab.tracking.bending`). Where it is seen again sooner but from nearer, the geometry of
+that look decides too. The filter with white noise decides for all, as it chooses the detections for all: they
+are compared over the same looks.
 
 Positions are not bent. One bearing says no place to start on, and a track by bearings alone does not end so.
 Of several sensors together, that which saw the target last and that which sees it again decide.
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.following.beliefs import Beliefs
+from wildlab.pipeline.following.beliefs import NoiseModel
 from wildlab.pipeline.following.considering import errors_of
 from wildlab.pipeline.following.expected import SLOTS, sensor_of
 from wildlab.pipeline.following.starts import place_of
@@ -59,7 +59,7 @@ class Geometry(NamedTuple):
     now: Callable[[int], tuple[Array, Array] | None]
 
 
-def geometry_of(scans: Scans, seen: Array, beliefs: Beliefs) -> Geometry | None:
+def geometry_of(scans: Scans, seen: Array, beliefs: NoiseModel) -> Geometry | None:
     """Of a sensor whose detections ``seen`` (N, K, m) may be of the target; None where nothing is bent, or a
     detection says no place to start on."""
     alone = scans.kind == "bearing" and len(scans.elements) == 1
@@ -87,7 +87,7 @@ def geometry_of(scans: Scans, seen: Array, beliefs: Beliefs) -> Geometry | None:
     return Geometry(at, now)
 
 
-def ends_of(scans: Scans, seen: Array, beliefs: Beliefs) -> Ends | None:
+def ends_of(scans: Scans, seen: Array, beliefs: NoiseModel) -> Ends | None:
     """When a track by this sensor ends, for `run_filter`; None for a sensor by which it never does.
 
     Parameters

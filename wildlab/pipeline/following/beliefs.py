@@ -50,7 +50,7 @@ STATED, ASSUMED = "stated", "assumed"
 ROUGH = "estimated here: how rough its detections are"
 
 
-class Considered(NamedTuple):
+class ConsideredError(NamedTuple):
     """An error that lasts: its standard deviation (m, rad, s), for how long (s), whether sensors share it."""
 
     name: str
@@ -59,7 +59,7 @@ class Considered(NamedTuple):
     shared: bool
 
 
-class Beliefs(NamedTuple):
+class NoiseModel(NamedTuple):
     """Of one sensor.
 
     Attributes
@@ -86,7 +86,7 @@ class Beliefs(NamedTuple):
     offset_s: float
     white: Array
     noise: Array
-    considered: tuple[Considered, ...]
+    considered: tuple[ConsideredError, ...]
     lasting: float | None
     fading: float
     thinning_s: float
@@ -100,7 +100,7 @@ class Beliefs(NamedTuple):
         return max(LONGEST_GAP_S, LONGEST_GAP_LOOKS * self.interval_s)
 
 
-class TargetBeliefs(NamedTuple):
+class TargetModel(NamedTuple):
     """Of the targets, see `wildlab.flight.following.TargetsPart`; ``reach_...`` and ``size_m`` may be NaN."""
 
     density: float
@@ -117,7 +117,7 @@ class TargetBeliefs(NamedTuple):
         return self.reach_rad if kind in ("bearing", "pixel") else self.reach_m
 
 
-class Said(NamedTuple):
+class ToldValue(NamedTuple):
     """A value that filters use, in words, and where it is from."""
 
     subject: str
@@ -126,7 +126,7 @@ class Said(NamedTuple):
     source: str
 
 
-def of_targets(stated: TargetsPart) -> tuple[TargetBeliefs, list[Said]]:
+def of_targets(stated: TargetsPart) -> tuple[TargetModel, list[ToldValue]]:
     """What is stated of the targets, else the usual."""
     usual = read_settings(DATA / "settings" / "usual.toml").targets
     said = []
@@ -136,10 +136,10 @@ def of_targets(stated: TargetsPart) -> tuple[TargetBeliefs, list[Said]]:
         value = other if own is None else own
         if value is None:
             return float("nan")
-        said.append(Said("targets", words, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
+        said.append(ToldValue("targets", words, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
         return float(value)
 
-    found = TargetBeliefs(
+    found = TargetModel(
         one("acceleration_m_s_sqrt_s", "acceleration, SD of the velocity that grows in a second", " m/s"),
         one("start_speed_m_s", "speed at the start, SD of each axis", " m/s"),
         one("gate_probability", _GATE, ""),
@@ -158,14 +158,14 @@ def of_flight(flight: Flight, stated: Settings | None = None) -> Settings:
     return own if stated is None else settings_over(stated, own)
 
 
-def from_tuning(tuning: SensorTuning) -> Beliefs:
+def from_tuning(tuning: SensorTuning) -> NoiseModel:
     """What a flight with truth says of a sensor."""
     lasting = [
-        Considered(name, sd, tuning.correlation_time_s, True)
+        ConsideredError(name, sd, tuning.correlation_time_s, True)
         for name, sd in tuning.considered.items()
         if sd > 0
     ]
-    return Beliefs(
+    return NoiseModel(
         tuning.sensor,
         tuning.kind,
         tuning.offset_s,
@@ -187,7 +187,7 @@ def of_sensor(
     settings: Settings,
     tuned: SensorTuning | None = None,
     tuned_on: str = "",
-) -> tuple[Beliefs, list[Said]]:
+) -> tuple[NoiseModel, list[ToldValue]]:
     """What filters believe of one sensor of a flight, and what to say of it.
 
     Parameters
@@ -205,10 +205,10 @@ def of_sensor(
         Where the noise is not stated and cannot be found.
     """
     part = settings.sensors.get(scans.sensor)
-    said: list[Said] = []
+    said: list[ToldValue] = []
 
     def tell(what: str, value: str, source: str) -> None:
-        said.append(Said(scans.sensor, what, value, source))
+        said.append(ToldValue(scans.sensor, what, value, source))
 
     found = None if tuned is None else from_tuning(tuned)
     by_tuning = f"tuned on {tuned_on}"
@@ -235,7 +235,7 @@ def of_sensor(
         tell("to be added to its stamps", f"{offset:.2f} s", by_tuning)
     elif stated_clock:
         tell("to be added to its stamps", f"{offset:.2f} s", STATED)
-    base = found or Beliefs(
+    base = found or NoiseModel(
         scans.sensor, scans.kind, 0.0, noise, noise, (), None, 1.0,
         float("nan"), float("nan"), float("nan"), scans.interval_s,
     )  # fmt: skip
@@ -252,7 +252,7 @@ def of_sensor(
         lasting = lasting if part.correlation is None else part.correlation
         thinning = thinning if part.thinning_s is None else part.thinning_s
     return (
-        Beliefs(
+        NoiseModel(
             scans.sensor,
             scans.kind,
             offset,
@@ -271,7 +271,7 @@ def of_sensor(
 
 
 def _noise(
-    flight: Flight, scans: Scans, settings: Settings, found: Beliefs | None, by_tuning: str
+    flight: Flight, scans: Scans, settings: Settings, found: NoiseModel | None, by_tuning: str
 ) -> tuple[Array, list[str]]:
     """(m,) standard deviations of what is new at each look, and where each is from."""
     part = settings.sensors.get(scans.sensor)
@@ -307,8 +307,8 @@ def _noise(
 
 
 def _considered(
-    flight: Flight, scans: Scans, settings: Settings, found: Beliefs | None, by_tuning: str
-) -> tuple[tuple[Considered, ...], str]:
+    flight: Flight, scans: Scans, settings: Settings, found: NoiseModel | None, by_tuning: str
+) -> tuple[tuple[ConsideredError, ...], str]:
     part = settings.sensors.get(scans.sensor)
     if part is not None and part.considered:
         stated = []
@@ -322,7 +322,9 @@ def _considered(
                 )
             sd = np.radians(one.sd) if CONSIDERED[name] == "deg" else one.sd
             time = np.inf if one.correlation_time_s is None else one.correlation_time_s
-            stated += [Considered(each, float(sd), float(time), one.shared) for each in errors_named(name)]
+            stated += [
+                ConsideredError(each, float(sd), float(time), one.shared) for each in errors_named(name)
+            ]
         return tuple(stated), STATED
     if found is not None and found.considered:
         return found.considered, by_tuning
@@ -335,7 +337,7 @@ def _considered(
         assumed = getattr(flight.manifest.uncertainty, key)
         if assumed is not None:
             sd = float(np.radians(assumed)) if key.endswith("deg") else float(assumed)
-            errors += [Considered(each, sd, np.inf, True) for each in errors_named(name)]
+            errors += [ConsideredError(each, sd, np.inf, True) for each in errors_named(name)]
     return tuple(errors), "[uncertainty] of flight.toml"
 
 
@@ -361,6 +363,6 @@ def _amount(element: str, value: float) -> str:
     return f"{value:.2g} {unit.replace('m_s', 'm/s')}"
 
 
-def _in_unit(error: Considered) -> str:
+def _in_unit(error: ConsideredError) -> str:
     unit = "deg" if error.name in TOGETHER["attitude"] else CONSIDERED[error.name]
     return f"{np.degrees(error.sd):.2g}°" if unit == "deg" else f"{error.sd:.2g} {unit}"

@@ -6,14 +6,14 @@ import numpy as np
 
 from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.following.beliefs import Beliefs
+from wildlab.pipeline.following.beliefs import NoiseModel
 from wildlab.pipeline.following.expected import SLOTS
 from wildlab.pipeline.scans import Scans
 from wildlab.tracking.considered import Considered
 from wildlab.tracking.predictions import POSE
 
 
-def errors_of(scans: Scans, beliefs: Beliefs) -> Considered | None:
+def errors_of(scans: Scans, beliefs: NoiseModel) -> Considered | None:
     """Those considered; of poses that have a covariance, that and what is considered beside it."""
     names, blocks, times, shared = [], [], [], []
     poses = scans.poses
@@ -47,7 +47,7 @@ def errors_of(scans: Scans, beliefs: Beliefs) -> Considered | None:
     return Considered(tuple(names), covariance, tuple(times), "bias", tuple(shared))
 
 
-def spread_of(scans: Scans, beliefs: Beliefs, H_pose: Array) -> Array | None:
+def spread_of(scans: Scans, beliefs: NoiseModel, H_pose: Array) -> Array | None:
     """(N, m, m) what the errors add to measurements with derivatives (N, m, k); None where there are none."""
     errors = errors_of(scans, beliefs)
     if errors is None:

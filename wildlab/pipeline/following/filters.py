@@ -20,7 +20,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
+from wildlab.pipeline.following.beliefs import NoiseModel, TargetModel
 from wildlab.pipeline.following.considering import errors_of, spread_of
 from wildlab.pipeline.following.expected import predict_scan, sensor_of
 from wildlab.pipeline.following.starts import place_of
@@ -42,12 +42,12 @@ NAMES = ("ekf", "ukf", "imm", "coloured", "schmidt", "thinned")
 CALM, STAY_S = 1 / 3, 30.0
 
 
-def motion_of(targets: TargetBeliefs, share: float = 1.0) -> Motion:
+def motion_of(targets: TargetModel, share: float = 1.0) -> Motion:
     """Constant velocity with white acceleration."""
     return partial(white_acceleration, density=share * targets.density)
 
 
-def possible(scans: Scans, beliefs: Beliefs) -> dict[str, str]:
+def possible(scans: Scans, beliefs: NoiseModel) -> dict[str, str]:
     """Filters that a sensor's detections can go through: ``""``, or why they cannot."""
     considered = errors_of(scans, beliefs) is not None
     placed = "range" in scans.elements or scans.kind in ("position", "pixel")
@@ -69,8 +69,8 @@ def white_noise(scans: Scans, sds: Array) -> Array:
 def choose(
     scans: Scans,
     seen: Array,
-    beliefs: Beliefs,
-    targets: TargetBeliefs,
+    beliefs: NoiseModel,
+    targets: TargetModel,
     begin: Start,
     *,
     gate: bool = True,
@@ -92,8 +92,8 @@ def follow_with(
     scans: Scans,
     own: Array,
     first: Track,
-    beliefs: Beliefs,
-    targets: TargetBeliefs,
+    beliefs: NoiseModel,
+    targets: TargetModel,
     begin: Start,
 ) -> Track:
     """One filter on the detections (N, m) that the white one, ``first``, chose.
@@ -146,7 +146,7 @@ def without_innovations(track: Track) -> Track:
     )
 
 
-def _coloured(scans: Scans, own: Array, beliefs: Beliefs, motion: Motion, begin: Start) -> Track:
+def _coloured(scans: Scans, own: Array, beliefs: NoiseModel, motion: Motion, begin: Start) -> Track:
     positions, R = _positions(scans, own, beliefs)
     gap, F_c = beliefs.longest_gap_s, beliefs.fading
     used = np.flatnonzero(np.isfinite(positions[:, 0]))
@@ -163,7 +163,7 @@ def _coloured(scans: Scans, own: Array, beliefs: Beliefs, motion: Motion, begin:
     return run_coloured(scans.times, positions, R_w, motion, begin, F_c=np.eye(2) * F_c, longest_gap=gap)
 
 
-def _positions(scans: Scans, own: Array, beliefs: Beliefs) -> tuple[Array, Array]:
+def _positions(scans: Scans, own: Array, beliefs: NoiseModel) -> tuple[Array, Array]:
     """North and east (N, 2) of measurements (N, m), and the covariances (N, 2, 2) that white noise gives."""
     n = len(own)
     if scans.kind == "position":
@@ -181,7 +181,7 @@ def _positions(scans: Scans, own: Array, beliefs: Beliefs) -> tuple[Array, Array
     return places, R
 
 
-def _lasting(scans: Scans, positions: Array, beliefs: Beliefs) -> Array:
+def _lasting(scans: Scans, positions: Array, beliefs: NoiseModel) -> Array:
     """(N, 2, 2) what considered errors do to positions."""
     expected = predict_scan(scans, positions, np.zeros_like(positions))
     inverse = np.linalg.pinv(np.nan_to_num(expected.H_position[..., :2]))

@@ -13,9 +13,9 @@ from wildlab.flight.following import Settings, absent_sensors
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import (
     OF_UNNAMED,
-    Beliefs,
-    Said,
-    TargetBeliefs,
+    NoiseModel,
+    TargetModel,
+    ToldValue,
     of_flight,
     of_sensor,
     of_targets,
@@ -33,7 +33,7 @@ WHITE = "ekf"
 TOGETHER = "together"
 
 
-class Followed(NamedTuple):
+class TrackingResult(NamedTuple):
     """Targets followed through a flight.
 
     Attributes
@@ -52,9 +52,9 @@ class Followed(NamedTuple):
 
     tracks: list[SensorTrack]
     scans: dict[str, Scans]
-    beliefs: dict[str, Beliefs]
-    targets: TargetBeliefs
-    said: list[Said]
+    beliefs: dict[str, NoiseModel]
+    targets: TargetModel
+    said: list[ToldValue]
     notes: list[str]
     truth: bool
 
@@ -69,7 +69,7 @@ def follow_targets(
     sensors: Sequence[str] = (),
     source: str | None = None,
     smooth: bool = False,
-) -> Followed:
+) -> TrackingResult:
     """Follow targets by each sensor.
 
     Parameters
@@ -101,7 +101,7 @@ def follow_targets(
     wanted = sensors_with_detections(flight, sensors)
     notes = [*notes_of_absent(flight, told), *notes_of_sources(flight)]
     scans: dict[str, Scans] = {}
-    beliefs: dict[str, Beliefs] = {}
+    beliefs: dict[str, NoiseModel] = {}
     tracks: list[SensorTrack] = []
     known: set[str] = set()
     any_truth = False
@@ -142,7 +142,7 @@ def follow_targets(
                 continue
             parts = {name: (scans[name], beliefs[name], looked[name]) for name in wanted}
             tracks += follow_together(flight, parts, target, believed, list(dict.fromkeys([WHITE, *names])))
-    return Followed(tracks, scans, beliefs, believed, said, notes, any_truth)
+    return TrackingResult(tracks, scans, beliefs, believed, said, notes, any_truth)
 
 
 def refuse_without_times(flight: Flight) -> None:
@@ -223,7 +223,7 @@ def sensors_with_detections(flight: Flight, wanted: Sequence[str] = ()) -> list[
     return found
 
 
-def chosen_filters(scans: Scans, beliefs: Beliefs, wanted: Sequence[str]) -> tuple[list[str], list[str]]:
+def chosen_filters(scans: Scans, beliefs: NoiseModel, wanted: Sequence[str]) -> tuple[list[str], list[str]]:
     """The filters for a sensor, the white one first: those wanted, or what there is data for.
 
     Returns

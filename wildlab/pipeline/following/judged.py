@@ -22,7 +22,7 @@ from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.filters import SMOOTHED
-from wildlab.pipeline.following.follow import TOGETHER, Followed
+from wildlab.pipeline.following.follow import TOGETHER, TrackingResult
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 
 #: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
@@ -72,7 +72,7 @@ def worth_of_errors(errors: Array, covariances: Array) -> float:
     return float(max(1.0, n / (1 + 2 * float(np.sum(r**2)))))
 
 
-def judged(followed: Followed) -> pd.DataFrame:
+def judged(followed: TrackingResult) -> pd.DataFrame:
     """One row for each track.
 
     ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used after the start, and ``used`` with it;
@@ -122,7 +122,7 @@ def leading_filter(rows: pd.DataFrame) -> str:
     return str(min(dict.fromkeys(of), key=order))
 
 
-def kind_of(followed: Followed, sensor: str) -> str:
+def kind_of(followed: TrackingResult, sensor: str) -> str:
     """What a sensor detects; several at once are ``together``."""
     return followed.scans[sensor].kind if sensor in followed.scans else TOGETHER
 
@@ -217,7 +217,7 @@ class Apart(NamedTuple):
     squares: Average
 
 
-def apart(followed: Followed) -> list[Apart]:
+def apart(followed: TrackingResult) -> list[Apart]:
     """Every two sensors that follow the same target by the same filter, at the looks of the first."""
     found = []
     groups: dict[tuple[str, str], list[SensorTrack]] = {}

@@ -13,7 +13,7 @@ from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.anew import part_of
-from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.beliefs import NoiseModel, TargetModel, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.expected import sensor_of
 from wildlab.pipeline.following.filters import motion_of, white_noise
 from wildlab.pipeline.following.sensor_tracks import choose_in_pieces
@@ -35,7 +35,7 @@ class _Case(NamedTuple):
     sensor: str
     scans: Scans
     own: Array
-    beliefs: Beliefs
+    beliefs: NoiseModel
     begin: Start
 
 
@@ -101,7 +101,7 @@ def tune_by_innovations(
 
 
 def _cases(
-    flight: Flight, sensor: str, told: Settings, targets: TargetBeliefs, source: str | None
+    flight: Flight, sensor: str, told: Settings, targets: TargetModel, source: str | None
 ) -> list[_Case]:
     looks = identified(scans_of(flight, sensor, 0.0, source), targets)
     beliefs, _ = of_sensor(flight, looks, told)
@@ -123,7 +123,7 @@ def _cases(
     return found
 
 
-def _log_likelihood(case: _Case, targets: TargetBeliefs, factor: float) -> float:
+def _log_likelihood(case: _Case, targets: TargetModel, factor: float) -> float:
     last = int(np.flatnonzero(np.isfinite(case.own[:, 0]))[-1]) + 1 if np.isfinite(case.own).any() else 0
     rows = slice(0, max(last, case.begin.row + 1))
     n = len(case.scans.times)

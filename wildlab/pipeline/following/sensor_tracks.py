@@ -33,7 +33,7 @@ from wildlab.pipeline.following.anew import (
     starts_of,
     truth_of,
 )
-from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs, from_tuning
+from wildlab.pipeline.following.beliefs import NoiseModel, TargetModel, from_tuning
 from wildlab.pipeline.following.expected import errors_near
 from wildlab.pipeline.following.filters import choose, follow_with
 from wildlab.pipeline.following.sensor_tuning import SensorTuning
@@ -100,7 +100,7 @@ class SensorTrack(NamedTuple):
 
 
 def follow_flight(
-    flight: Flight, tunings: Mapping[str, SensorTuning], targets: TargetBeliefs
+    flight: Flight, tunings: Mapping[str, SensorTuning], targets: TargetModel
 ) -> list[SensorTrack]:
     """Every target with truth, by every sensor that has a tuning, with every filter of a study.
 
@@ -124,8 +124,8 @@ def follow_flight(
 def follow(
     scans: Scans,
     truth: Truth,
-    beliefs: Beliefs,
-    targets: TargetBeliefs,
+    beliefs: NoiseModel,
+    targets: TargetModel,
     filters: Sequence[str],
     others: Sequence[Truth] = (),
 ) -> list[SensorTrack]:
@@ -177,8 +177,8 @@ def follow(
 def choose_in_pieces(
     scans: Scans,
     truth: Truth,
-    beliefs: Beliefs,
-    targets: TargetBeliefs,
+    beliefs: NoiseModel,
+    targets: TargetModel,
     others: Sequence[Truth] = (),
 ) -> tuple[Array, list[Piece], Track | None]:
     """The filter with white noise, which chooses detections and says when a track ends.
@@ -211,8 +211,8 @@ def choose_in_pieces(
 def begin_of_target(
     scans: Scans,
     truth: Truth,
-    beliefs: Beliefs,
-    targets: TargetBeliefs,
+    beliefs: NoiseModel,
+    targets: TargetModel,
     others: Sequence[Truth] = (),
 ) -> tuple[Array, Start | None]:
     """Detections (N, K, m) that may be of a target, and where its track starts, see the module."""
@@ -253,7 +253,7 @@ def scored(
     track: Track,
     begun: NDArray[np.bool_],
     last: int,
-    targets: TargetBeliefs,
+    targets: TargetModel,
     ids: NDArray[np.object_],
 ) -> SensorTrack:
     """A filter's track as far as it goes, beside the truth; ``begun`` (N,) and before ``last``."""
@@ -277,7 +277,7 @@ def scored(
     )  # fmt: skip
 
 
-def no_track(scans: Scans, truth: Truth, name: str, targets: TargetBeliefs) -> SensorTrack:
+def no_track(scans: Scans, truth: Truth, name: str, targets: TargetModel) -> SensorTrack:
     """Of a target that was never found."""
     n, m = len(scans.times), scans.detections.shape[-1]
     empty = np.full((n, 4), np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
+from wildlab.pipeline.following.beliefs import NoiseModel, TargetModel
 from wildlab.pipeline.following.considering import errors_of
 from wildlab.pipeline.following.expected import SLOTS, errors_near, sensor_of
 from wildlab.pipeline.scans import Scans, Truth
@@ -18,7 +18,7 @@ from wildlab.tracking.starts import start_from_rays
 
 
 def start_near(
-    scans: Scans, truth: Truth, beliefs: Beliefs, targets: TargetBeliefs, others: Sequence[Truth] = ()
+    scans: Scans, truth: Truth, beliefs: NoiseModel, targets: TargetModel, others: Sequence[Truth] = ()
 ) -> Start | None:
     """A start at the first detection within reach of the target's true place; None where there is none.
 
@@ -50,7 +50,7 @@ def start_near(
     return None
 
 
-def start_first(scans: Scans, own: Array, beliefs: Beliefs, targets: TargetBeliefs) -> Start | None:
+def start_first(scans: Scans, own: Array, beliefs: NoiseModel, targets: TargetModel) -> Start | None:
     """A start on the first usable row of ``own`` (N, m), which is used up; None where there is none.
 
     Bearings whose distance nobody knows start where the first of them meet that cross.
@@ -64,7 +64,7 @@ def start_first(scans: Scans, own: Array, beliefs: Beliefs, targets: TargetBelie
     return None
 
 
-def _start_from_rays(scans: Scans, own: Array, beliefs: Beliefs, targets: TargetBeliefs) -> Start | None:
+def _start_from_rays(scans: Scans, own: Array, beliefs: NoiseModel, targets: TargetModel) -> Start | None:
     there = np.asarray(np.isfinite(scans.platform).all(axis=1))
     usable = np.where(there[:, None], own, np.nan)
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
@@ -76,14 +76,14 @@ def _start_from_rays(scans: Scans, own: Array, beliefs: Beliefs, targets: Target
         return None  # all near parallel, or they settle on no place
 
 
-def at_rest(time: float, place: Array, P: Array, targets: TargetBeliefs, row: int = -1) -> Start:
+def at_rest(time: float, place: Array, P: Array, targets: TargetModel, row: int = -1) -> Start:
     """A start at rest, with the covariance (2, 2) of the place."""
     both = np.zeros((4, 4))
     both[:2, :2], both[2:, 2:] = P, np.eye(2) * targets.start_speed_m_s**2
     return Start(time, np.concatenate([place, np.zeros(2)]), both, row)
 
 
-def place_of(scans: Scans, row: int, z: Array, beliefs: Beliefs) -> tuple[Array, Array] | None:
+def place_of(scans: Scans, row: int, z: Array, beliefs: NoiseModel) -> tuple[Array, Array] | None:
     """North and east that a measurement (m,) says, with what noise and considered errors leave uncertain.
 
     None where it does not say: a velocity, a ray that meets no ground, a bearing whose distance nobody knows.
@@ -110,7 +110,7 @@ def place_of(scans: Scans, row: int, z: Array, beliefs: Beliefs) -> tuple[Array,
     return place, np.asarray(inverse @ R @ inverse.T)
 
 
-def _place(scans: Scans, row: int, z: Array, beliefs: Beliefs) -> Array | None:
+def _place(scans: Scans, row: int, z: Array, beliefs: NoiseModel) -> Array | None:
     if scans.kind == "position":
         return np.asarray(z[:2])
     if scans.kind == "pixel" and scans.poses is not None:

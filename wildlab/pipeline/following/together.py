@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.anew import ends_by, geometry_of, joined, one_after_another, starts_of
-from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
+from wildlab.pipeline.following.beliefs import NoiseModel, TargetModel
 from wildlab.pipeline.following.considering import errors_of
 from wildlab.pipeline.following.expected import sensor_of
 from wildlab.pipeline.following.filters import (
@@ -34,7 +34,7 @@ from wildlab.pipeline.following.sensor_tracks import (
     scored,
 )
 from wildlab.pipeline.scans import Scans, Truth, truths_at
-from wildlab.tracking.combined import Merged, Seen, merge
+from wildlab.tracking.combined import Merged, SensorMeasurements, merge
 from wildlab.tracking.considered import Considered, consider_all
 from wildlab.tracking.considering import renamed
 from wildlab.tracking.imm import run_imm
@@ -50,11 +50,11 @@ ABLE = ("ekf", "ukf", "imm", "schmidt")
 OWN = ("clock", "range_bias")
 
 #: By sensor: its looks, what is believed of it, and the targets that it may follow.
-Parts = Mapping[str, tuple[Scans, Beliefs, list[Truth]]]
+Parts = Mapping[str, tuple[Scans, NoiseModel, list[Truth]]]
 
 
 def follow_together(
-    flight: Flight, parts: Parts, target: str, targets: TargetBeliefs, filters: Sequence[str]
+    flight: Flight, parts: Parts, target: str, targets: TargetModel, filters: Sequence[str]
 ) -> list[SensorTrack]:
     """One target by all sensors that may see it, with each of the filters; nothing by fewer than two."""
     mine = {name: part for name, part in parts.items() if any(one.target == target for one in part[2])}
@@ -146,7 +146,11 @@ def _merged(mine: Parts, seen: Mapping[str, Array], drift: Mapping[str, Array], 
     parts = []
     for name, (scans, beliefs, _) in mine.items():
         sds = beliefs.white if white else beliefs.noise
-        parts.append(Seen(scans.times, seen[name], white_noise(scans, sds), _named(mine, name, drift[name])))
+        parts.append(
+            SensorMeasurements(
+                scans.times, seen[name], white_noise(scans, sds), _named(mine, name, drift[name])
+            )
+        )
     return merge(parts)
 
 
@@ -156,7 +160,7 @@ def _named(mine: Parts, name: str, drift: Array) -> Sensor:
     return renamed(sensor_of(scans, drift), {one: _name(mine, name, one) for one in _errors(scans, beliefs)})
 
 
-def _errors(scans: Scans, beliefs: Beliefs) -> tuple[str, ...]:
+def _errors(scans: Scans, beliefs: NoiseModel) -> tuple[str, ...]:
     errors = errors_of(scans, beliefs)
     return () if errors is None else errors.names
 
@@ -245,7 +249,7 @@ def _truth(flight: Flight, looks: Scans, target: str) -> Truth:
 
 
 def _run(
-    name: str, mine: Parts, merged: Merged, own: Array, first: Track, targets: TargetBeliefs, begin: Start
+    name: str, mine: Parts, merged: Merged, own: Array, first: Track, targets: TargetModel, begin: Start
 ) -> Track | None:
     """One filter on the chosen detections (N, m); None where there is nothing to consider."""
     base, smoothed, motion = name.removesuffix(SMOOTHED), name.endswith(SMOOTHED), motion_of(targets)

@@ -13,7 +13,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checksums import checksums_of
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.beliefs import Said, TargetBeliefs, of_flight, of_targets
+from wildlab.pipeline.following.beliefs import TargetModel, ToldValue, of_flight, of_targets
 from wildlab.pipeline.following.likelihood import tune_by_innovations
 from wildlab.pipeline.following.sensor_tuning import SensorTuning, tune
 
@@ -32,10 +32,10 @@ class Tuned(NamedTuple):
     sensors: dict[str, SensorTuning]
     density: float | None = None
 
-    def said_of_density(self) -> Said:
+    def said_of_density(self) -> ToldValue:
         """For the table of what filters were told."""
         words = "acceleration, SD of the velocity that grows in a second"
-        return Said("targets", words, f"{self.density or 0.0:.3g} m/s", f"tuned on {self.flight}")
+        return ToldValue("targets", words, f"{self.density or 0.0:.3g} m/s", f"tuned on {self.flight}")
 
 
 def tuned_text(tuned: Tuned) -> str:
@@ -83,7 +83,7 @@ def tune_flight(
     if against == "innovations" or not has_truth:
         found, density = tune_by_innovations(flight, sensors, settings, source)
         return Tuned(flight.name, "innovations", found, density)
-    targets: TargetBeliefs = of_targets(of_flight(flight, settings).targets)[0]
+    targets: TargetModel = of_targets(of_flight(flight, settings).targets)[0]
     found = {sensor: tune(flight, sensor, targets.reach, source) for sensor in sensors}
     return Tuned(flight.name, "truth", found)
 

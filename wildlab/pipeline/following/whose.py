@@ -6,14 +6,14 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.beliefs import TargetBeliefs
+from wildlab.pipeline.following.beliefs import TargetModel
 from wildlab.pipeline.scans import Scans, Truth, truths_at
 
 #: What a target is called of which nobody says a name.
 UNNAMED = "target"
 
 
-def identified(scans: Scans, targets: TargetBeliefs) -> Scans:
+def identified(scans: Scans, targets: TargetModel) -> Scans:
     """The scans with labels as far as they are to be believed."""
     if targets.identified in ("gate", "one"):
         return scans._replace(labels=np.full(scans.labels.shape, "", object))

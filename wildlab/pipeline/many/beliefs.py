@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.following import HullPart, ManyTargetsPart, SensorPart, Settings, read_settings
 from wildlab.paths import DATA
-from wildlab.pipeline.following.beliefs import ASSUMED, STATED, Said
-from wildlab.pipeline.following.beliefs import TargetBeliefs as Following
-from wildlab.pipeline.many.places import PLACED, Places
-from wildlab.tracking.many import Hull, SensorBeliefs, TargetBeliefs
+from wildlab.pipeline.following.beliefs import ASSUMED, STATED, ToldValue
+from wildlab.pipeline.following.beliefs import TargetModel as Following
+from wildlab.pipeline.many.places import PLACED, PlacedLooks
+from wildlab.tracking.many import Hull, ManySensorModel, ManyTargetModel
 
 Array = NDArray[np.float64]
 
@@ -58,12 +58,12 @@ _HULLS = {
 class Told(NamedTuple):
     """Of the targets, of each sensor in its order, and of each value where it is from."""
 
-    targets: TargetBeliefs
-    sensors: list[SensorBeliefs]
-    said: list[Said]
+    targets: ManyTargetModel
+    sensors: list[ManySensorModel]
+    said: list[ToldValue]
 
 
-def of_many(settings: Settings, following: Following, places: list[Places]) -> Told:
+def of_many(settings: Settings, following: Following, places: list[PlacedLooks]) -> Told:
     """What the tracker is told.
 
     Parameters
@@ -82,7 +82,7 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
     """
     refuse_unfit(settings)
     stated, usual = settings.targets.many or ManyTargetsPart(), _usual()
-    said: list[Said] = []
+    said: list[ToldValue] = []
     told: dict[str, Any] = {}
 
     def one(name: str) -> float:
@@ -90,12 +90,12 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
         value = float(getattr(usual, name) if own is None else own)
         what, unit = _WORDS[name]
         if name != "stay_s" or told["calm"] < 1:
-            said.append(Said("targets", what, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
+            said.append(ToldValue("targets", what, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
         return value
 
     hulls = tuple(_hull(part) for part in stated.hulls or usual.hulls)
     said.append(
-        Said(
+        ToldValue(
             "targets",
             "kinds by size",
             ", ".join(f"{hull.name} {hull.length_m:g} m" if hull.length_m else hull.name for hull in hulls),
@@ -105,7 +105,7 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
     for name in _WORDS:
         told[name] = one(name)
     told["hits"] = int(told["hits"])
-    targets = TargetBeliefs(hulls, following.density, following.start_speed_m_s, **told)
+    targets = ManyTargetModel(hulls, following.density, following.start_speed_m_s, **told)
     sensors = []
     farthest = max((float(looks.distances().max(initial=0.0)) for looks in places), default=0.0)
     for looks in places:
@@ -120,17 +120,17 @@ def _hull(part: HullPart) -> Hull:
 
 
 def _of_sensor(
-    settings: Settings, looks: Places, kinds: int, farthest: float
-) -> tuple[SensorBeliefs, list[Said]]:
+    settings: Settings, looks: PlacedLooks, kinds: int, farthest: float
+) -> tuple[ManySensorModel, list[ToldValue]]:
     """``farthest``: m, the farthest detection of any sensor, for one that knows no distances."""
     part = settings.sensors.get(looks.sensor)
     stated = None if part is None else part.many
-    said: list[Said] = []
+    said: list[ToldValue] = []
 
     def one(name: str, what: str, unit: str, other: float, source: str) -> float:
         own = None if stated is None else getattr(stated, name)
         value = other if own is None else float(own)
-        said.append(Said(looks.sensor, what, f"{value:.3g}{unit}", source if own is None else STATED))
+        said.append(ToldValue(looks.sensor, what, f"{value:.3g}{unit}", source if own is None else STATED))
         return value
 
     if looks.bearings and stated is not None and stated.several:
@@ -156,7 +156,7 @@ def _of_sensor(
     interval = looks.interval_s
     hull_values = {name: getattr(stated, name, ()) or (0.0,) * kinds for name in _HULLS}
     hull_values["near_end_m"] = getattr(stated, "near_end_m", ()) or hull_values["near_side_m"]
-    found = SensorBeliefs(
+    found = ManySensorModel(
         looks.sensor,
         one("detection", "probability that what is in view is detected", "", DETECTION, ASSUMED),
         one(
@@ -186,14 +186,14 @@ def _of_sensor(
         share, lasts = lasting_share(part)
         words = f"{share:.2g}, for {lasts:.3g} s" if share else "0"
         source = ASSUMED if part is None or part.correlation is None else STATED
-        said.append(Said(looks.sensor, "share of the errors' variance that lasts", words, source))
+        said.append(ToldValue(looks.sensor, "share of the errors' variance that lasts", words, source))
         found = found._replace(correlation=share, lasting_s=lasts)
     for name, what in _HULLS.items():
         own = stated is not None and bool(getattr(stated, name))
         values = ", ".join(f"{value:.3g}" for value in hull_values[name])
-        said.append(Said(looks.sensor, what, f"{values} m", STATED if own else ASSUMED))
+        said.append(ToldValue(looks.sensor, what, f"{values} m", STATED if own else ASSUMED))
     said.append(
-        Said(
+        ToldValue(
             looks.sensor,
             "whether one hull may give several detections",
             "yes" if found.several else "no",
@@ -210,7 +210,7 @@ def lasting_share(part: SensorPart | None) -> tuple[float, float]:
     return part.correlation, part.correlation_time_s or np.inf
 
 
-def unknown_lasting(settings: Settings, places: Mapping[str, Places]) -> list[str]:
+def unknown_lasting(settings: Settings, places: Mapping[str, PlacedLooks]) -> list[str]:
     """Sensors of which nobody says how long their errors last.
 
     It is said by ``correlation``, zero too, or considered errors; of a camera's pixels by

@@ -18,7 +18,7 @@ from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.terrain import pixels_to_terrain
 from wildlab.geometry.terrain_uncertainty import terrain_jacobians
 from wildlab.geometry.uncertainty import PoseErrors, ground_jacobians
-from wildlab.pipeline.following.beliefs import ASSUMED, STATED, Beliefs, Said, errors_named
+from wildlab.pipeline.following.beliefs import ASSUMED, STATED, NoiseModel, ToldValue, errors_named
 from wildlab.pipeline.following.considering import errors_of
 from wildlab.pipeline.following.expected import SLOTS, predict_scan
 from wildlab.pipeline.georeference import (
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 UNKNOWN_EFFECT = "clock"
 
 
-class Errors(NamedTuple):
+class LastingErrors(NamedTuple):
     """Of one sensor: ``names`` (k,) and for how long each lasts, s, (k,)."""
 
     names: tuple[str, ...]
@@ -64,10 +64,10 @@ _OF_THE_MOUNT_AND_GROUND = ("misalignment_deg", "plane_height_m")
 #: Errors of a pose that has a covariance of its own, of which no single one has a name.
 OF_COVARIANCE = tuple(f"pose {i}" for i in range(1, 7))
 #: None at all.
-NO_ERRORS = Errors((), ())
+NO_ERRORS = LastingErrors((), ())
 
 
-def told_errors(flight: Flight, observed: Observations, beliefs: Beliefs) -> PoseErrors:
+def told_errors(flight: Flight, observed: Observations, beliefs: NoiseModel) -> PoseErrors:
     """What georeferenced pixels may be wrong by, as filters of one target are told.
 
     That is `pose_errors` with the noise of pixels that the sensor is believed to have. Errors of the pose
@@ -88,7 +88,7 @@ def told_errors(flight: Flight, observed: Observations, beliefs: Beliefs) -> Pos
     return errors._replace(pose=pose)
 
 
-def stated_deviations(flight: Flight, beliefs: Beliefs) -> Array:
+def stated_deviations(flight: Flight, beliefs: NoiseModel) -> Array:
     """(6,) of the errors of `POSE`, m and rad, of poses without a covariance of their own."""
     usual = assumed_deviations(flight)
     found = [np.radians(usual[key]) if name in _DEGREES else usual[key] for name, key in _OF_PLATFORM.items()]
@@ -120,26 +120,26 @@ def stated_roots(R_nb: Array, sd: Array) -> Array:
     return roots
 
 
-def said_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> list[Said]:
+def said_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> list[ToldValue]:
     """What is believed of the errors that all pixels of an image share, and who says so."""
     said, stated = [], flight.manifest.uncertainty
     stated_names = {} if part is None else part.considered
     taken = {_OF_PLATFORM.get(each) for name in stated_names for each in errors_named(name)}
     own = scans.poses is not None and scans.poses.covariance is not None
     if own:
-        said.append(Said(scans.sensor, "errors of the pose", "as the poses say", "the poses' own"))
+        said.append(ToldValue(scans.sensor, "errors of the pose", "as the poses say", "the poses' own"))
     for key, value in assumed_deviations(flight).items():
         if key not in _SHARED or key in taken or (own and key not in _OF_THE_MOUNT_AND_GROUND):
             continue
         unit = "°" if key.endswith("deg") else " m"
         source = ASSUMED if getattr(stated, key) is None else STATED
-        said.append(Said(scans.sensor, _SHARED[key], f"{value:.3g}{unit}", source))
+        said.append(ToldValue(scans.sensor, _SHARED[key], f"{value:.3g}{unit}", source))
     lasts = lasting_of(part)
     words = (
         "another at each look" if lasts == 0 else "the whole flight" if np.isinf(lasts) else f"{lasts:.3g} s"
     )
     said.append(
-        Said(scans.sensor, "how long errors of the pose last", words, ASSUMED if lasts == 0 else STATED)
+        ToldValue(scans.sensor, "how long errors of the pose last", words, ASSUMED if lasts == 0 else STATED)
     )
     return said
 
@@ -156,7 +156,7 @@ def of_poses(
     flight: Flight,
     observed: Observations,
     errors: PoseErrors,
-    beliefs: Beliefs,
+    beliefs: NoiseModel,
     lasting_s: float,
 ) -> OfPose:
     """What the poses of pixels are wrong by, error by error.
@@ -171,21 +171,21 @@ def of_poses(
     return OfPose(stated_roots(observed.poses.R_nb, stated_deviations(flight, beliefs)), tuple(names))
 
 
-def of_platform(errors: Errors) -> set[str]:
+def of_platform(errors: LastingErrors) -> set[str]:
     """Which errors of `POSE` stand among a sensor's, by whatever name."""
     if OF_COVARIANCE[0] in errors.names:
         return set(POSE)
     return {name.split(": ")[-1] for name in errors.names} & set(POSE)
 
 
-def counted_twice(errors: Errors, other: Errors) -> bool:
+def counted_twice(errors: LastingErrors, other: LastingErrors) -> bool:
     """Whether errors of the platform that another sensor considers stand among these under other names."""
     return bool((of_platform(errors) & set(other.names)) - set(errors.names))
 
 
 def of_pixels(
     observed: Observations, errors: PoseErrors, of_pose: OfPose, total: Array, lasting_s: float
-) -> tuple[Array, Array, Errors]:
+) -> tuple[Array, Array, LastingErrors]:
     """What georeferenced pixels have of their own and in common.
 
     Parameters
@@ -228,10 +228,10 @@ def of_pixels(
         whole = (axes * np.maximum(values, 0.0)) @ axes.T
         shared[row] = transition_of_pose(first[row], whole, "bias") @ shared[row]
     names = [*of_pose.names, *(f"mount {i}" for i in range(1, 4)), "ground"]
-    return own, shared, Errors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
+    return own, shared, LastingErrors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
 
 
-def of_elements(scans: Scans, beliefs: Beliefs, places: Array) -> tuple[Array, Errors]:
+def of_elements(scans: Scans, beliefs: NoiseModel, places: Array) -> tuple[Array, LastingErrors]:
     """What considered errors do to the places (N, K, 2) of detections: (N, K, 2, k), m."""
     stated = errors_of(scans, beliefs)
     if stated is None:
@@ -251,7 +251,7 @@ def of_elements(scans: Scans, beliefs: Beliefs, places: Array) -> tuple[Array, E
     times = np.broadcast_to(np.asarray(stated.correlation_time, float), len(stated.names))
     common = stated.shared or (True,) * len(stated.names)
     own = tuple(name if common[i] else f"{scans.sensor}: {name}" for i, name in zip(kept, names, strict=True))
-    return shared, Errors(own, tuple(float(times[i]) for i in kept))
+    return shared, LastingErrors(own, tuple(float(times[i]) for i in kept))
 
 
 def lasting_of(part: SensorPart | None) -> float:
@@ -300,7 +300,9 @@ def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
     return roots
 
 
-def laid_out(parts: list[tuple[Errors, list[Array | None]]]) -> tuple[tuple[float, ...], list[list[Array]]]:
+def laid_out(
+    parts: list[tuple[LastingErrors, list[Array | None]]],
+) -> tuple[tuple[float, ...], list[list[Array]]]:
     """Errors of several sensors side by side: those of one name are one error.
 
     Parameters

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.identities import Identities, compare_identities
-from wildlab.evaluation.identities import Scan as Compared
+from wildlab.evaluation.identities import Moment as Compared
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.beliefs import STATED, Said, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.beliefs import STATED, ToldValue, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.follow import (
     notes_of_absent,
     notes_of_sources,
@@ -24,13 +24,13 @@ from wildlab.pipeline.following.follow import (
 )
 from wildlab.pipeline.many.beliefs import of_many, unknown_lasting
 from wildlab.pipeline.many.errors import UNKNOWN_EFFECT, laid_out, lasting_of, said_of_pixels
-from wildlab.pipeline.many.places import ABLE, Places, places_of, thinned
+from wildlab.pipeline.many.places import ABLE, PlacedLooks, places_of, thinned
 from wildlab.pipeline.scans import scans_of, truth_deviations, truths_at
 from wildlab.tracking.many import (
+    ManySensorModel,
+    ManyTargetModel,
     Scan,
-    SensorBeliefs,
     Shown,
-    TargetBeliefs,
     own_lasting,
     run_many,
     smooth_many,
@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 CUTOFF_M = 20.0
 
 
-class Followed(NamedTuple):
+class ManyTracks(NamedTuple):
     """All targets of a flight.
 
     Attributes
@@ -80,11 +80,11 @@ class Followed(NamedTuple):
     scans: list[Scan]
     named: list[frozenset[str]]
     shown: list[Shown]
-    places: dict[str, Places]
-    sensors: list[SensorBeliefs]
-    targets: TargetBeliefs
+    places: dict[str, PlacedLooks]
+    sensors: list[ManySensorModel]
+    targets: ManyTargetModel
     truth: dict[str, Array]
-    said: list[Said]
+    said: list[ToldValue]
     notes: list[str]
     lasting_s: tuple[float, ...] = ()
     cutoff_m: float = CUTOFF_M
@@ -105,7 +105,7 @@ def follow_all(
     settings: Settings | None = None,
     sensors: Sequence[str] = (),
     source: str | None = None,
-) -> Followed:
+) -> ManyTracks:
     """Follow all targets by all sensors at once, whatever detections name.
 
     Parameters
@@ -129,7 +129,7 @@ def follow_all(
     said = [one for one in said if one.what.startswith(("acceleration", "speed"))]
     left_out = notes_of_sources(flight)
     notes = [*notes_of_absent(flight, told), *left_out]
-    places: dict[str, Places] = {}
+    places: dict[str, PlacedLooks] = {}
     for name in sensors_with_detections(flight, sensors):
         looks = scans_of(flight, name, 0.0, source)
         if looks.kind not in ABLE and not sensors:
@@ -188,7 +188,7 @@ def follow_all(
         known = truths_at(flight, times)
         truth = {one.target: one.position for one in known}
         truth_sd, estimated = truth_deviations(flight)
-    return Followed(
+    return ManyTracks(
         scans,
         [names for _, names in pairs],
         shown,
@@ -207,7 +207,7 @@ def follow_all(
     )
 
 
-def _considered_apart(said: list[Said], kind: str) -> tuple[list[Said], list[Said]]:
+def _considered_apart(said: list[ToldValue], kind: str) -> tuple[list[ToldValue], list[ToldValue]]:
     """What a sensor of this kind is told, and which considered errors have no part in it.
 
     What [uncertainty] says of a camera's pose is said with all that pixels share, and is in neither.
@@ -218,24 +218,24 @@ def _considered_apart(said: list[Said], kind: str) -> tuple[list[Said], list[Sai
     return [one for one in said if one not in unused and one not in elsewhere], unused
 
 
-def known_looks(followed: Followed) -> NDArray[np.bool_]:
+def known_looks(followed: ManyTracks) -> NDArray[np.bool_]:
     """(N,) looks at which any target's true place is known: elsewhere nothing is judged."""
     return np.asarray(_true_places(followed).any(axis=0))
 
 
-def complete_looks(followed: Followed) -> NDArray[np.bool_]:
+def complete_looks(followed: ManyTracks) -> NDArray[np.bool_]:
     """(N,) looks at which every target's true place is known: elsewhere no track is false."""
     return known_looks(followed) & _true_places(followed).all(axis=0) & (not followed.others)
 
 
-def _true_places(followed: Followed) -> NDArray[np.bool_]:
+def _true_places(followed: ManyTracks) -> NDArray[np.bool_]:
     """(M, N) where they are known."""
     ways = [np.isfinite(way).all(axis=1) for way in followed.truth.values()]
     return np.array(ways, bool).reshape(-1, len(followed.scans))
 
 
 def judged(
-    followed: Followed, reach: Mapping[str, float] | None = None, at: Sequence[str] = ()
+    followed: ManyTracks, reach: Mapping[str, float] | None = None, at: Sequence[str] = ()
 ) -> Identities | None:
     """Tracks against the true targets at the looks of `known_looks`; None where there are none, or no truth.
 
@@ -286,7 +286,7 @@ def judged(
     return compare_identities(compared, followed.cutoff_m)
 
 
-def tracks_table(followed: Followed) -> pd.DataFrame:
+def tracks_table(followed: ManyTracks) -> pd.DataFrame:
     """Every track at every look at which it was shown.
 
     Returns

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image, project
-from wildlab.pipeline.following.beliefs import Beliefs
+from wildlab.pipeline.following.beliefs import NoiseModel
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
 from wildlab.pipeline.many.errors import (
     NO_ERRORS,
-    Errors,
+    LastingErrors,
     of_elements,
     of_pixels,
     of_poses,
@@ -45,7 +45,7 @@ def _disc(count: int) -> Array:
 _DISC = _disc(PLACES)
 
 
-class Places(NamedTuple):
+class PlacedLooks(NamedTuple):
     """Looks of one sensor.
 
     Attributes
@@ -70,7 +70,7 @@ class Places(NamedTuple):
     named: list[frozenset[str]]
     interval_s: float
     without: int
-    errors: Errors = NO_ERRORS
+    errors: LastingErrors = NO_ERRORS
 
     @property
     def bearings(self) -> bool:
@@ -98,8 +98,8 @@ class Places(NamedTuple):
 
 
 def places_of(
-    flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source: str | None, lasting_s: float = 0.0
-) -> Places:
+    flight: Flight, scans: Scans, beliefs: NoiseModel, order: int, source: str | None, lasting_s: float = 0.0
+) -> PlacedLooks:
     """The looks of a sensor as places, what each is wrong by alone, and what they have in common.
 
     Parameters
@@ -151,10 +151,10 @@ def places_of(
         looks.append(Scan(time, order, platform, z[row][good], R[row][good], sees, common))
         named.append(frozenset(str(one) for one in scans.labels[row] if one))
     without += int(np.isfinite(scans.detections[~usable]).all(axis=-1).sum())
-    return Places(scans.sensor, scans.kind, looks, named, scans.interval_s, without, errors)
+    return PlacedLooks(scans.sensor, scans.kind, looks, named, scans.interval_s, without, errors)
 
 
-def thinned(places: Places, apart_s: float) -> Places:
+def thinned(places: PlacedLooks, apart_s: float) -> PlacedLooks:
     """Only looks at least so far apart, see `wildlab.tracking.coloured.thin`."""
     kept = np.flatnonzero(thin([scan.time for scan in places.scans], apart_s))
     return places._replace(
@@ -162,7 +162,7 @@ def thinned(places: Places, apart_s: float) -> Places:
     )
 
 
-def _of_ranges(scans: Scans, beliefs: Beliefs) -> tuple[Array, Array]:
+def _of_ranges(scans: Scans, beliefs: NoiseModel) -> tuple[Array, Array]:
     """Range on the level and bearing from north as a place; the covariance to first order.
 
     A range no longer than the drop tells no place: NaN.
@@ -182,8 +182,8 @@ def _of_ranges(scans: Scans, beliefs: Beliefs) -> tuple[Array, Array]:
 
 
 def _of_pixels(
-    flight: Flight, scans: Scans, beliefs: Beliefs, source: str | None, lasting_s: float
-) -> tuple[Array, Array, Array, Errors]:
+    flight: Flight, scans: Scans, beliefs: NoiseModel, source: str | None, lasting_s: float
+) -> tuple[Array, Array, Array, LastingErrors]:
     """Rays where they meet the ground, what each is wrong by alone, and what the poses do to all."""
     observed = observe(flight, source, clock_shift=beliefs.offset_s)
     told = told_errors(flight, observed, beliefs)

@@ -9,7 +9,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plans.heights import Followed, clear_of
+from wildlab.pipeline.plans.heights import HeightProfile, clear_of
 from wildlab.pipeline.plans.sorties import Sortie
 from wildlab.pipeline.plans.wanted import Wanted
 
@@ -136,7 +136,7 @@ def refuse_near(sorties: Sequence[Sortie], terrain: Terrain | None, wanted: Want
     return nearest
 
 
-def nearest_ground(way: Followed, terrain: Terrain, trees: float = 0.0) -> float:
+def nearest_ground(way: HeightProfile, terrain: Terrain, trees: float = 0.0) -> float:
     """Least distance in space between a way and the ground, not only straight down.
 
     Parameters

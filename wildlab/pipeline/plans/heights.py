@@ -23,7 +23,7 @@ RINGS, DIRECTIONS = (0.25, 0.5, 0.75, 0.97), 16
 MOST_PLACES = 100_000
 
 
-class Followed(NamedTuple):
+class HeightProfile(NamedTuple):
     """A way in three dimensions.
 
     Attributes
@@ -85,7 +85,7 @@ def follow(
     most_above: float = math.inf,
     steepest: float = math.inf,
     trees: float = 0.0,
-) -> Followed:
+) -> HeightProfile:
     """Way points that follow the ground.
 
     Parameters
@@ -113,7 +113,7 @@ def follow(
     """
     if terrain is None:
         zero, high = np.zeros(len(way)), np.full(len(way), above)
-        return Followed(way, zero, high, np.arange(len(way)), above, above, way[0], 0.0)
+        return HeightProfile(way, zero, high, np.arange(len(way)), above, above, way[0], 0.0)
     places, corner, along = _places(way, max(SPACING, terrain.step / 2))
     ground = terrain.heights_at(places)
     known = np.isfinite(ground)
@@ -141,7 +141,9 @@ def follow(
     flown = np.interp(along, along[kept], wanted[kept])
     over = flown - ground
     least, most, highest = float(over.min()), float(over.max()), places[int(over.argmax())]
-    return Followed(places[kept], ground[kept], wanted[kept], corner[kept], least, most, highest, unknown)
+    return HeightProfile(
+        places[kept], ground[kept], wanted[kept], corner[kept], least, most, highest, unknown
+    )
 
 
 def _clear(places: Array, terrain: Terrain, distance: float) -> Array:

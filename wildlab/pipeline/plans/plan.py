@@ -19,7 +19,7 @@ from wildlab.pipeline.plans.directions import directions
 from wildlab.pipeline.plans.forbidden import refuse_heights, refuse_near, refuse_take_off
 from wildlab.pipeline.plans.outlines import simplified, sizes_alone
 from wildlab.pipeline.plans.sorties import Sortie, split_rows
-from wildlab.pipeline.plans.view import FURTHEST, View, look
+from wildlab.pipeline.plans.view import FURTHEST, GroundView, look
 from wildlab.pipeline.plans.wanted import CLEARANCE, Wanted
 from wildlab.planning.areas import contains
 from wildlab.planning.patterns import Pattern, lawn_mowers, row_distance
@@ -70,7 +70,7 @@ class Plan:
     wanted: Wanted
     areas: Areas
     terrain: Terrain | None
-    view: View
+    view: GroundView
     height: float
     strip: float
     pattern: Pattern
@@ -164,7 +164,7 @@ def make_plan(wanted: Wanted, terrain: Terrain | None = None) -> Plan:
     return Plan(wanted, areas, terrain, view, height, strip, pattern, home, sorties, nearest, cut)
 
 
-def _height(wanted: Wanted, view: View) -> float:
+def _height(wanted: Wanted, view: GroundView) -> float:
     """The height that was asked for, or the one from which the animal has the pixels it shall have."""
     most, least = wanted.max_height_m, wanted.trees_m + CLEARANCE if wanted.trees_m > 0 else 0.0
     if wanted.height_m is not None:

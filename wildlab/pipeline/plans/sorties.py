@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plans.heights import Followed, follow
+from wildlab.pipeline.plans.heights import HeightProfile, follow
 from wildlab.pipeline.plans.wanted import Wanted
 from wildlab.planning.courses import Course, fly
 from wildlab.planning.patterns import Pattern
@@ -48,7 +48,7 @@ class Sortie(NamedTuple):
     rows: NDArray[np.intp]
     course: Course
     row_of: NDArray[np.intp]
-    way: Followed
+    way: HeightProfile
     duration: float
     steepest: float
 
@@ -189,7 +189,9 @@ def _corners(course: Course, radius: float) -> NDArray[np.intp]:
     return np.asarray(kept[np.array(chosen)])
 
 
-def _times(course: Course, corners: NDArray[np.intp], way: Followed, wanted: Wanted) -> tuple[float, float]:
+def _times(
+    course: Course, corners: NDArray[np.intp], way: HeightProfile, wanted: Wanted
+) -> tuple[float, float]:
     """Seconds with climbing, and the greatest vertical speed that the way would need."""
     at = np.flatnonzero(way.corner >= 0)
     arrival = course.times[corners[way.corner[at]]]

@@ -22,7 +22,7 @@ FURTHEST = 4.0
 _LENS = np.array([0.0, 0.0, -1.0])
 
 
-class View(NamedTuple):
+class GroundView(NamedTuple):
     """What is seen from a height, all in heights: multiply by the height for metres.
 
     Attributes
@@ -52,7 +52,7 @@ class View(NamedTuple):
         return math.sqrt(camera.fx * camera.fy) * length / (self.slant * height)
 
 
-def look(camera: Camera, tilt_deg: float, gimbal: str = "fixed", swing_deg: float = 0.0) -> View:
+def look(camera: Camera, tilt_deg: float, gimbal: str = "fixed", swing_deg: float = 0.0) -> GroundView:
     """What a camera sees of flat ground.
 
     Parameters
@@ -103,7 +103,7 @@ def look(camera: Camera, tilt_deg: float, gimbal: str = "fixed", swing_deg: floa
         width = float(np.ptp(points[middle, :, 1]))
     ahead = points[rows, :, 0]
     centre = points[middle, SAMPLES // 2]
-    return View(
+    return GroundView(
         width,
         (float(ahead.min()), float(ahead.max())),
         float(slant[middle, SAMPLES // 2]),

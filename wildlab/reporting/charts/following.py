@@ -14,7 +14,7 @@ from wildlab.evaluation.whiteness import autocorrelation, white_bound
 from wildlab.geometry.frames import Array
 from wildlab.names import figure_name
 from wildlab.pipeline.following.filters import SMOOTHED
-from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.following.follow import TrackingResult
 from wildlab.pipeline.following.judged import whitened
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.reporting.charts.tracks import innovation_correlations
@@ -63,7 +63,9 @@ def slug(*words: str) -> str:
     return f"{plain}-{hashlib.sha256(text.encode()).hexdigest()[:6]}" if strange else plain
 
 
-def map_shown(followed: Followed, target: str, name: str, truth: Array, platforms: dict[str, Array]) -> Shown:
+def map_shown(
+    followed: TrackingResult, target: str, name: str, truth: Array, platforms: dict[str, Array]
+) -> Shown:
     """The way of one target as each sensor's track by one filter has it; north up, local metres.
 
     Parameters

@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
 from wildlab.names import figure_name
-from wildlab.pipeline.many.follow import Followed, known_looks
+from wildlab.pipeline.many.follow import ManyTracks, known_looks
 from wildlab.reporting.charts.following import SENSOR_COLOURS, Shown
 from wildlab.reporting.figures import GREY, INK, VERMILLION, map_axes, mark_gaps, new_figure
 
@@ -20,7 +20,7 @@ LONGEST_NAME = 14
 PAUSE = 8.0
 
 
-def ways_of(followed: Followed) -> dict[int, Array]:
+def ways_of(followed: ManyTracks) -> dict[int, Array]:
     """(L, 3) times and places of every track, the longest first."""
     ways: dict[int, list[tuple[float, float, float]]] = {}
     for look in followed.shown:
@@ -51,14 +51,14 @@ def _times(count: int) -> str:
     return "once" if count == 1 else f"{count} times"
 
 
-def colours_of(followed: Followed) -> dict[object, str]:
+def colours_of(followed: ManyTracks) -> dict[object, str]:
     """By identity: the longest tracks have a colour of their own in every chart, the others that of ink."""
     names = list(ways_of(followed))
     own = dict(zip(names, SENSOR_COLOURS[:MOST_NAMED], strict=False))
     return {name: own.get(name, INK) for name in names}
 
 
-def map_shown(followed: Followed) -> Shown:
+def map_shown(followed: ManyTracks) -> Shown:
     """Where every track went, in local metres, north up, beside the true ways."""
     fig, ax = new_figure(5.6, 5.4)
     for way in followed.truth.values():
@@ -91,7 +91,7 @@ def map_shown(followed: Followed) -> Shown:
     return fig, "map", alt, f"A dot is where a track was first believed.{rest}"
 
 
-def identities_shown(followed: Followed, lives: Identities) -> Shown:
+def identities_shown(followed: ManyTracks, lives: Identities) -> Shown:
     """Which track is on each target, over time."""
     names = [name for name, life in lives.targets.items() if life.visible]
     fig, ax = new_figure(5.8, 1.6 + 0.5 * len(names))
@@ -116,7 +116,7 @@ def identities_shown(followed: Followed, lives: Identities) -> Shown:
     return fig, "identities", alt, f"A mark is a look with a track on the target; {colours}."
 
 
-def wrong_shown(followed: Followed, lives: Identities) -> Shown:
+def wrong_shown(followed: ManyTracks, lives: Identities) -> Shown:
     """GOSPA at each look, and how many targets are missed and tracks false."""
     fig, axes = new_figure(5.8, 4.2, rows=2, sharex=True)
     times = (np.array([scan.time for scan in followed.scans]) - followed.scans[0].time)[known_looks(followed)]

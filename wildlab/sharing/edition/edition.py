@@ -12,7 +12,7 @@ from wildlab.reporting.text import escape, inline
 from wildlab.sharing.edition.facts import Facts
 from wildlab.sharing.edition.language import Language, load_language, of_unflown, say
 from wildlab.sharing.edition.picture import IN_STEPS, ImagePicture, MapPicture, picture_html
-from wildlab.sharing.edition.said import Day, Said, Value, length
+from wildlab.sharing.edition.said import Day, Message, Value, length
 from wildlab.sharing.edition.sentences import Story, tell
 from wildlab.sharing.edition.style import STYLE
 
@@ -88,32 +88,32 @@ def edition_html(
     def said(one: Value) -> str:
         return inline(say(words, one))
 
-    kicker = [said(Said("page.kicker")), escape(name), *([said(day)] if day is not None else [])]
+    kicker = [said(Message("page.kicker")), escape(name), *([said(day)] if day is not None else [])]
     drawn = picture_html(picture, facts, words)
     # What a step is taken as is said where steps are.
-    told = [value for one in story.measured for value in one.values.values() if isinstance(value, Said)]
+    told = [value for one in story.measured for value in one.values.values() if isinstance(value, Message)]
     steps = IN_STEPS in drawn or any(value.key.startswith("steps.") for value in told)
-    footer = f"{said(Said('page.footer'))} {said(Said('page.footer_steps')) if steps else ''}"
+    footer = f"{said(Message('page.footer'))} {said(Message('page.footer_steps')) if steps else ''}"
     body = [
         f'<header><p class="kicker">{" · ".join(kicker)}</p>',
-        f"<h1>{said(Said('page.question'))}</h1></header>",
+        f"<h1>{said(Message('page.question'))}</h1></header>",
         "<main>",
-        f'<p class="twin">{said(Said("page.twin"))}</p>' if facts.twin else "",
+        f'<p class="twin">{said(Message("page.twin"))}</p>' if facts.twin else "",
         f'<div class="verdict {level}"><span class="sign" aria-hidden="true">{SIGNS[level]}</span>',
         f'<p class="word">{said(story.verdict)}</p><p>{said(story.why)}</p>',
-        f'<p class="next">{said(Said("page.next"))}: {said(story.next)}</p></div>',
+        f'<p class="next">{said(Message("page.next"))}: {said(story.next)}</p></div>',
         f'<div class="top{"" if drawn else " alone"}">{drawn}{_tiles(story, said)}</div>',
         '<div class="parts">',
         _section(said, "heading.trusted" if story.trusted else "heading.measured", story.measured),
         _section(said, "heading.wrong", story.wrong),
-        _section(said, "heading.advice", story.advice or (Said("next.nothing"),), ranked=True),
+        _section(said, "heading.advice", story.advice or (Message("next.nothing"),), ranked=True),
         _section(said, "heading.unknown", story.unknown),
         "</div>",
         f'<p class="place">{_place(place, words, said)}</p>',
         "</main>",
         f"<footer><p>{footer} {_untranslated(words, said)}</p></footer>",
     ]
-    title = escape(say(words, Said("page.title", {"name": name})))
+    title = escape(say(words, Message("page.title", {"name": name})))
     return (
         f'<!doctype html>\n<html lang="{escape(words.code)}">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -135,36 +135,38 @@ def _tiles(story: Story, said: _Say) -> str:
     return f'<ul class="tiles">{items}</ul>'
 
 
-def _section(said: _Say, heading: str, items: Sequence[Said], *, ranked: bool = False) -> str:
+def _section(said: _Say, heading: str, items: Sequence[Message], *, ranked: bool = False) -> str:
     more = [one for one in items if one.key == "page.more"]
     kept = [one for one in items if one.key != "page.more"]
     tag = "ol" if ranked and len(kept) > 1 else "ul"
     listed = "".join(f"<li>{said(one)}</li>" for one in kept)
     below = "".join(f'<p class="more">{said(one)}</p>' for one in more)
     name = "do" if ranked else "tell"
-    return f'<section class="{name}"><h2>{said(Said(heading))}</h2><{tag}>{listed}</{tag}>{below}</section>'
+    return (
+        f'<section class="{name}"><h2>{said(Message(heading))}</h2><{tag}>{listed}</{tag}>{below}</section>'
+    )
 
 
 def _place(place: Place, words: Language, said: _Say) -> str:
     note = f" {escape(place.note)}" if place.note else ""
     if place.kind != "generalised":
-        return said(Said(f"place.{place.kind}")) + note
+        return said(Message(f"place.{place.kind}")) + note
     if place.middle_deg is None:
-        return said(Said("place.withheld")) + note
+        return said(Message("place.withheld")) + note
     latitude, longitude = place.middle_deg
     values: dict[str, Value] = {
         "latitude": _side(latitude, "north", "south", words),
         "longitude": _side(longitude, "east", "west", words),
         "uncertainty": length(place.uncertainty_m),
     }
-    return said(Said("place.generalised", values)) + note
+    return said(Message("place.generalised", values)) + note
 
 
-def _side(value: float, positive: str, negative: str, words: Language) -> Said:
+def _side(value: float, positive: str, negative: str, words: Language) -> Message:
     """A coordinate with the letter of its side: all its digits, since these say how coarse it is."""
     digits = f"{abs(value):.6f}".rstrip("0").rstrip(".").replace(".", str(words.texts["format.decimal"]))
-    return Said(f"format.{positive if value >= 0 else negative}", {"degrees": digits})
+    return Message(f"format.{positive if value >= 0 else negative}", {"degrees": digits})
 
 
 def _untranslated(words: Language, said: _Say) -> str:
-    return said(Said("page.untranslated", {}, len(words.missing))) if words.missing else ""
+    return said(Message("page.untranslated", {}, len(words.missing))) if words.missing else ""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_toml
 from wildlab.paths import DATA
-from wildlab.sharing.edition.said import Day, Quantity, Said, Value
+from wildlab.sharing.edition.said import Day, Message, Quantity, Value
 
 #: Where the files are, one for each language, named by its code.
 FOLDER = DATA / "edition"
@@ -239,7 +239,7 @@ def say(language: Language, said: Value) -> str:
         return _quantity(language, said)
     if isinstance(said, Day):
         return _day(language, said)
-    if isinstance(said, Said):
+    if isinstance(said, Message):
         text = language.texts[said.key]
         if isinstance(text, Mapping):
             text = text["one" if said.n == 1 else "many"]
@@ -278,7 +278,7 @@ def _quantity(language: Language, quantity: Quantity) -> str:
         return shown
     one = float(f"{size:.{digits}f}") == 1
     # A number and its unit stay on one line.
-    return say(language, Said(f"unit.{unit}", {"n": shown}, 1 if one else 2)).replace(" ", "\u00a0")
+    return say(language, Message(f"unit.{unit}", {"n": shown}, 1 if one else 2)).replace(" ", "\u00a0")
 
 
 def _unit(kind: str, value: float) -> tuple[str, float, int]:

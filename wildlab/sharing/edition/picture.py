@@ -17,7 +17,7 @@ from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.text import escape
 from wildlab.sharing.edition.facts import Facts
 from wildlab.sharing.edition.language import Language, say
-from wildlab.sharing.edition.said import Said, length, number
+from wildlab.sharing.edition.said import Message, length, number
 from wildlab.sharing.edition.sentences import MEDIAN_DISTANCE, STEP_M
 
 Array = NDArray[np.float64]
@@ -162,17 +162,17 @@ def _map(picture: MapPicture, language: Language) -> str:
     wide = length(float(size[1]))
     alt = say(
         language,
-        Said("picture.map_alt", {"way": wide, "seen": number(len(seen))})
+        Message("picture.map_alt", {"way": wide, "seen": number(len(seen))})
         if len(seen)
-        else Said("picture.map_alt_way", {"way": wide}),
+        else Message("picture.map_alt_way", {"way": wide}),
     )
     keys = [("way", "path"), ("start", "start")] * bool(len(begin)) + [("seen", "seen")] * bool(len(seen))
     keys += [("true", "truth")] * bool(true)
     legend = "".join(
-        f'<li><i class="{name}"></i>{escape(say(language, Said(f"picture.{key}")))}</li>'
+        f'<li><i class="{name}"></i>{escape(say(language, Message(f"picture.{key}")))}</li>'
         for name, key in keys
     )
-    caption = f'<ul class="legend">{legend}</ul>{escape(say(language, Said("picture.map")))}'
+    caption = f'<ul class="legend">{legend}</ul>{escape(say(language, Message("picture.map")))}'
     return _figure(_svg("".join(drawn), alt), caption)
 
 
@@ -219,7 +219,7 @@ def _bar(scale: float, language: Language, steps: bool = False) -> str:
     count = round(metres / STEP_M)
     shows = ""
     if steps and 1 <= count <= 200:
-        said += f" ({say(language, Said('steps.some', {}, count))})"
+        said += f" ({say(language, Message('steps.some', {}, count))})"
         shows = f" {IN_STEPS}"
     return (
         f'<path class="scale" d="M{x:g} {y - 6:g}v12M{x:g} {y:g}h{wide:.1f}M{x + wide:.1f} {y - 6:g}v12"/>'
@@ -231,21 +231,21 @@ def _drawn(facts: Facts, language: Language) -> str:
     """Circles of how far off things are, by the best that is known; else the sightings with a place."""
     if facts.compared >= FEW and facts.error_p90 > 0:
         words = {"median": length(facts.error_median), "p90": length(facts.error_p90)}
-        alt, caption = Said("picture.errors_alt", words), Said("picture.errors")
+        alt, caption = Message("picture.errors_alt", words), Message("picture.errors")
         return _circles([(facts.error_median, "median"), (facts.error_p90, "p90")], alt, caption, language)
     if facts.tracks and facts.track_error > 0:
-        alt = Said("picture.track_alt", {"error": length(facts.track_error)})
-        return _circles([(facts.track_error, "about")], alt, Said("picture.track"), language)
+        alt = Message("picture.track_alt", {"error": length(facts.track_error)})
+        return _circles([(facts.track_error, "about")], alt, Message("picture.track"), language)
     if facts.scatter > 0:
         radius = MEDIAN_DISTANCE * facts.scatter
-        alt = Said("picture.scatter_alt", {"apart": length(radius)})
-        return _circles([(radius, "about")], alt, Said("picture.scatter"), language)
+        alt = Message("picture.scatter_alt", {"apart": length(radius)})
+        return _circles([(radius, "about")], alt, Message("picture.scatter"), language)
     if facts.seen > 0 and math.isfinite(facts.placed):
         return _share(facts, language)
     return ""
 
 
-def _circles(rings: list[tuple[float, str]], alt: Said, caption: Said, language: Language) -> str:
+def _circles(rings: list[tuple[float, str]], alt: Message, caption: Message, language: Language) -> str:
     biggest = max(radius for radius, _ in rings)
     scale = ((HEIGHT - FOOT) / 2 - 14) / biggest
     x, y = 0.36 * WIDTH, (HEIGHT - FOOT) / 2
@@ -260,7 +260,7 @@ def _circles(rings: list[tuple[float, str]], alt: Said, caption: Said, language:
         last = at
         edge = x + math.sqrt(max(0.0, r * r - min(r, abs(y - at)) ** 2))
         said = escape(say(language, length(radius)))
-        legend += f'<li><i class="{key}"></i>{escape(say(language, Said(f"picture.{key}")))}</li>'
+        legend += f'<li><i class="{key}"></i>{escape(say(language, Message(f"picture.{key}")))}</li>'
         drawn.append(f'<path class="lead" d="M{edge:.1f} {at:.1f}H{0.69 * WIDTH:.1f}"/>')
         drawn.append(f'<text x="{0.7 * WIDTH:.1f}" y="{at + 5:.1f}">{said}</text>')
     drawn.append(f'<path class="cross" d="M{x - 9:g} {y:g}h18M{x:g} {y - 9:g}v18"/>')
@@ -280,6 +280,6 @@ def _share(facts: Facts, language: Language) -> str:
     )
     words = {"placed": number(facts.placed), "seen": number(facts.seen)}
     return _figure(
-        _svg(drawn, say(language, Said("picture.share_alt", words))),
-        escape(say(language, Said("picture.share"))),
+        _svg(drawn, say(language, Message("picture.share_alt", words))),
+        escape(say(language, Message("picture.share"))),
     )

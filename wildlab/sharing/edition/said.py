@@ -29,7 +29,7 @@ class Day(NamedTuple):
     whole: bool
 
 
-class Said(NamedTuple):
+class Message(NamedTuple):
     """One text of the page.
 
     Attributes
@@ -48,7 +48,7 @@ class Said(NamedTuple):
 
 
 #: What may stand for a placeholder: a quantity, a date, another text, a list of texts, or text as it is.
-Value = Union[Quantity, Day, Said, tuple[Said, ...], str]  # noqa: UP007 - refers to what comes later
+Value = Union[Quantity, Day, Message, tuple[Message, ...], str]  # noqa: UP007 - refers to what comes later
 
 
 def length(metres: float) -> Quantity:

@@ -10,7 +10,7 @@ from wildlab.pipeline.overviews.worth_fixing import MOST
 from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.tracking import NEAR_THE_BAND
 from wildlab.sharing.edition.facts import Alarm, Facts, Gain
-from wildlab.sharing.edition.said import Quantity, Said, Value, duration, length, number, share
+from wildlab.sharing.edition.said import Message, Quantity, Value, duration, length, number, share
 
 #: A step of somebody who walks, m, and beyond how many nobody counts them.
 STEP_M, MOST_STEPS = 0.75, 200
@@ -52,15 +52,15 @@ class Story(NamedTuple):
         says how many.
     """
 
-    verdict: Said
-    why: Said
-    next: Said
+    verdict: Message
+    why: Message
+    next: Message
     trusted: bool
-    tiles: tuple[tuple[Value, Said], ...]
-    measured: tuple[Said, ...]
-    wrong: tuple[Said, ...]
-    advice: tuple[Said, ...]
-    unknown: tuple[Said, ...]
+    tiles: tuple[tuple[Value, Message], ...]
+    measured: tuple[Message, ...]
+    wrong: tuple[Message, ...]
+    advice: tuple[Message, ...]
+    unknown: tuple[Message, ...]
 
 
 def tell(facts: Facts) -> Story:
@@ -80,7 +80,7 @@ def tell(facts: Facts) -> Story:
     key = VERDICTS[facts.verdict]
     advice = _advice(facts)
     return Story(
-        Said(f"verdict.{key}"),
+        Message(f"verdict.{key}"),
         _why(facts),
         _next(facts, advice),
         facts.verdict in (Verdict.FIX, Verdict.SOUND),
@@ -92,13 +92,13 @@ def tell(facts: Facts) -> Story:
     )
 
 
-def _cut(items: tuple[Said, ...]) -> tuple[Said, ...]:
+def _cut(items: tuple[Message, ...]) -> tuple[Message, ...]:
     """The first of them, and how many more there are: nothing is left out in silence."""
     rest = len(items) - MOST
-    return items if rest <= 0 else (*items[:MOST], Said("page.more", {}, rest))
+    return items if rest <= 0 else (*items[:MOST], Message("page.more", {}, rest))
 
 
-def steps_of(metres: float) -> Said | None:
+def steps_of(metres: float) -> Message | None:
     """A length in steps, roughly; None where nobody would count them.
 
     Parameters
@@ -115,71 +115,71 @@ def steps_of(metres: float) -> Said | None:
     if not steps <= MOST_STEPS:
         return None
     if steps < 0.75:
-        return Said("steps.none")
+        return Message("steps.none")
     to = 1 if steps < 20 else 5 if steps < 100 else 10
-    return Said("steps.some", {}, to * max(1, round(steps / to)))
+    return Message("steps.some", {}, to * max(1, round(steps / to)))
 
 
-def _why(facts: Facts) -> Said:
+def _why(facts: Facts) -> Message:
     if facts.verdict == Verdict.ALARM or (facts.verdict == Verdict.LOOK and facts.alarms):
-        return _alarm(facts.alarms[0]) if facts.alarms else Said("why.alarm")
+        return _alarm(facts.alarms[0]) if facts.alarms else Message("why.alarm")
     if facts.verdict == Verdict.MEND and not facts.problems and facts.doubted:
-        return Said(f"why.doubt_{facts.doubted[0]}")
+        return Message(f"why.doubt_{facts.doubted[0]}")
     if facts.verdict == Verdict.MEND:
-        return Said("wrong.problems", {}, facts.problems)
+        return Message("wrong.problems", {}, facts.problems)
     if facts.verdict == Verdict.FIX:
         worth = [gain for gain in facts.gains if gain.share >= WORTH]
-        return Said("why.fix", {"first": _gained(worth[0])}, len(worth)) if worth else Said("why.alarm")
+        return Message("why.fix", {"first": _gained(worth[0])}, len(worth)) if worth else Message("why.alarm")
     if facts.verdict == Verdict.LOOK:
         for what, seconds in facts.troubles:
             lasting = facts.length_s > 0 and seconds >= WORTH * facts.length_s
             if lasting or what == "poses":
                 return _trouble(facts, what, seconds)
         if facts.possible is not None:
-            return Said(
+            return Message(
                 "why.possible", {"gain": length(facts.possible.value), "of": length(facts.possible.of)}
             )
         if _too_sure(facts):
-            return Said("wrong.too_sure")
-        return Said(f"why.doubt_{facts.doubted[0]}" if facts.doubted else "why.alarm")
+            return Message("wrong.too_sure")
+        return Message(f"why.doubt_{facts.doubted[0]}" if facts.doubted else "why.alarm")
     if facts.verdict == Verdict.SOUND:
         measured = facts.compared > 0 or facts.tracks > 0
-        return Said("why.sound" if measured else "why.sound_unmeasured", {"share": share(WORTH)})
-    return Said("why.failed" if "overview" in facts.failed else "why.unjudged")
+        return Message("why.sound" if measured else "why.sound_unmeasured", {"share": share(WORTH)})
+    return Message("why.failed" if "overview" in facts.failed else "why.unjudged")
 
 
-def _next(facts: Facts, advice: tuple[Said, ...]) -> Said:
+def _next(facts: Facts, advice: tuple[Message, ...]) -> Message:
     if facts.verdict in (Verdict.ALARM, Verdict.MEND, Verdict.LOOK):
-        return Said(f"next.{VERDICTS[facts.verdict]}")
+        return Message(f"next.{VERDICTS[facts.verdict]}")
     if facts.verdict == Verdict.FIX and facts.gains:
         # The thing itself: the list stands far below.
         return _do(facts.gains[0])
-    listed: dict[str, Value] = {"list": Said("heading.advice")}
+    listed: dict[str, Value] = {"list": Message("heading.advice")}
     if facts.verdict == Verdict.SOUND:
-        return Said("next.sound_more", listed) if advice else Said("next.sound")
-    return Said("next.unjudged", listed) if advice else Said("next.nothing")
+        return Message("next.sound_more", listed) if advice else Message("next.sound")
+    return Message("next.unjudged", listed) if advice else Message("next.nothing")
 
 
-def _tiles(facts: Facts) -> tuple[tuple[Value, Said], ...]:
-    found: list[tuple[Value, Said]] = []
+def _tiles(facts: Facts) -> tuple[tuple[Value, Message], ...]:
+    found: list[tuple[Value, Message]] = []
     if facts.compared >= FEW and math.isfinite(facts.error_median):
-        found.append((length(facts.error_median), Said("tile.error")))
+        found.append((length(facts.error_median), Message("tile.error")))
     elif facts.tracks and math.isfinite(facts.track_error):
         worst: dict[str, Value] = {"worst": length(facts.track_worst)}
-        label = Said("tile.tracks", worst) if _unlike(facts) else Said("tile.track")
+        label = Message("tile.tracks", worst) if _unlike(facts) else Message("tile.track")
         found.append((length(facts.track_error), label))
     if facts.seen > 0:
         pictured = not math.isfinite(facts.pictured) or facts.pictured == facts.seen
-        found.append((number(facts.seen), Said("tile.seen" if pictured else "tile.detected")))
+        found.append((number(facts.seen), Message("tile.seen" if pictured else "tile.detected")))
     if math.isfinite(facts.length_s):
-        found.append((duration(facts.length_s), Said("tile.length")))
+        found.append((duration(facts.length_s), Message("tile.length")))
     if math.isfinite(facts.area_m2):
-        found.append((Quantity("area", facts.area_m2), Said("tile.area")))
+        found.append((Quantity("area", facts.area_m2), Message("tile.area")))
     return tuple(found)
 
 
-def _measured(facts: Facts) -> tuple[Said, ...]:
-    found: list[Said] = []
+def _measured(facts: Facts) -> tuple[Message, ...]:
+    found: list[Message] = []
     if facts.compared >= FEW and math.isfinite(facts.error_median) and math.isfinite(facts.error_p90):
         values: dict[str, Value] = {
             "median": length(facts.error_median),
@@ -187,33 +187,33 @@ def _measured(facts: Facts) -> tuple[Said, ...]:
             "compared": number(facts.compared),
         }
         steps = steps_of(facts.error_median)
-        found.append(Said("measured.error_steps", {**values, "steps": steps}) if steps else
-                     Said("measured.error", values))  # fmt: skip
+        found.append(Message("measured.error_steps", {**values, "steps": steps}) if steps else
+                     Message("measured.error", values))  # fmt: skip
     elif math.isfinite(facts.scatter):
         apart = length(MEDIAN_DISTANCE * facts.scatter)
-        found.append(Said("measured.scatter", {"apart": apart, "sightings": number(facts.sightings)}))
+        found.append(Message("measured.scatter", {"apart": apart, "sightings": number(facts.sightings)}))
     if facts.tracks and math.isfinite(facts.track_error):
         off: dict[str, Value] = {"error": length(facts.track_error)}
         if _unlike(facts):
             off |= {"n": number(facts.tracks), "worst": length(facts.track_worst)}
-            found.append(Said("measured.tracks", off))
+            found.append(Message("measured.tracks", off))
         else:
-            found.append(Said("measured.track", off, facts.tracks))
+            found.append(Message("measured.track", off, facts.tracks))
     if facts.other_sensors:
         if math.isfinite(facts.things):
-            found.append(Said("measured.things_detected", {"seen": number(facts.seen)}, int(facts.things)))
+            found.append(Message("measured.things_detected", {"seen": number(facts.seen)}, int(facts.things)))
         else:
-            found.append(Said("measured.detected", {}, int(facts.seen)))
+            found.append(Message("measured.detected", {}, int(facts.seen)))
     elif facts.seen > 0 and math.isfinite(facts.placed):
         if math.isfinite(facts.things):
             seen: dict[str, Value] = {"seen": number(facts.seen), "placed": number(facts.placed)}
-            found.append(Said("measured.things", seen, int(facts.things)))
+            found.append(Message("measured.things", seen, int(facts.things)))
         else:
-            found.append(Said("measured.seen", {"placed": number(facts.placed)}, int(facts.seen)))
+            found.append(Message("measured.seen", {"placed": number(facts.placed)}, int(facts.seen)))
     if math.isfinite(facts.area_m2) and math.isfinite(facts.height_m):
-        found.append(Said("measured.area", {"area": Quantity("area", facts.area_m2),
+        found.append(Message("measured.area", {"area": Quantity("area", facts.area_m2),
                                             "height": length(round(facts.height_m))}))  # fmt: skip
-    return tuple(found) or (Said("measured.nothing"),)
+    return tuple(found) or (Message("measured.nothing"),)
 
 
 def _unlike(facts: Facts) -> bool:
@@ -226,22 +226,22 @@ def _followed_alone(facts: Facts) -> bool:
     return facts.other_sensors and facts.tracks > 0 and math.isfinite(facts.track_error)
 
 
-def _alarm(alarm: Alarm) -> Said:
+def _alarm(alarm: Alarm) -> Message:
     if alarm.what == "jumps":
-        return Said("alarm.jumps", {"size": length(alarm.size)}, alarm.often)
+        return Message("alarm.jumps", {"size": length(alarm.size)}, alarm.often)
     if alarm.what == "leans":
-        return Said("alarm.leans", {"size": Quantity("angle", math.radians(alarm.size))})
+        return Message("alarm.leans", {"size": Quantity("angle", math.radians(alarm.size))})
     if alarm.what == "shakes":
-        return Said("alarm.shakes", {"times": number(alarm.size / 9.81)})
-    return Said("alarm.apart", {"size": length(alarm.size)})
+        return Message("alarm.shakes", {"times": number(alarm.size / 9.81)})
+    return Message("alarm.apart", {"size": length(alarm.size)})
 
 
-def _trouble(facts: Facts, what: str, seconds: float) -> Said:
+def _trouble(facts: Facts, what: str, seconds: float) -> Message:
     values: dict[str, Value] = {"time": duration(seconds)}
     if facts.length_s > 0:
         values["share"] = share(min(1.0, seconds / facts.length_s))
-        return Said(f"trouble.{what}", values)
-    return Said(f"trouble_time.{what}", values)
+        return Message(f"trouble.{what}", values)
+    return Message(f"trouble_time.{what}", values)
 
 
 def _too_sure(facts: Facts) -> bool:
@@ -258,18 +258,18 @@ def _lasting(facts: Facts) -> list[tuple[str, float]]:
     ]
 
 
-def _wrong(facts: Facts) -> tuple[Said, ...]:
+def _wrong(facts: Facts) -> tuple[Message, ...]:
     found = [_alarm(one) for one in facts.alarms]
     if facts.problems:
-        found.append(Said("wrong.problems", {}, facts.problems))
+        found.append(Message("wrong.problems", {}, facts.problems))
     if "georeferencing" in facts.doubted:
-        found.append(Said("why.doubt_georeferencing"))
+        found.append(Message("why.doubt_georeferencing"))
     if _too_sure(facts):
-        found.append(Said("wrong.too_sure"))
+        found.append(Message("wrong.too_sure"))
     elif "tracking" in facts.doubted:
-        found.append(Said("why.doubt_tracking"))
+        found.append(Message("why.doubt_tracking"))
     if "navigation" in facts.doubted:
-        found.append(Said("why.doubt_navigation"))
+        found.append(Message("why.doubt_navigation"))
     found += [_trouble(facts, what, seconds) for what, seconds in _lasting(facts)]
     # What the verdict says already is not said again, nor what the troubles say of time.
     gains = facts.gains[1 if facts.verdict == Verdict.FIX else 0 :]
@@ -282,77 +282,79 @@ def _wrong(facts: Facts) -> tuple[Said, ...]:
     if found:
         return tuple(found)
     if facts.verdict is None:
-        return (Said("wrong.unlooked"),)
+        return (Message("wrong.unlooked"),)
     if facts.verdict in (Verdict.FIX, Verdict.LOOK, Verdict.ALARM, Verdict.MEND):
-        return (Said("wrong.above"),)
+        return (Message("wrong.above"),)
     small = bool(facts.gains) or facts.possible is not None
-    return (Said("wrong.small", {"share": share(WORTH)}),) if small else (Said("wrong.none"),)
+    return (Message("wrong.small", {"share": share(WORTH)}),) if small else (Message("wrong.none"),)
 
 
-def _gained(gain: Gain) -> Said:
+def _gained(gain: Gain) -> Message:
     """What it is, in a sentence."""
     if gain.key == "cause":
-        causes = tuple(Said(f"cause.{cause.replace(chr(39), '').replace(' ', '_')}") for cause in gain.causes)
+        causes = tuple(
+            Message(f"cause.{cause.replace(chr(39), '').replace(' ', '_')}") for cause in gain.causes
+        )
         if not math.isfinite(gain.value):
-            return Said("lost.cause_share", {"share": share(gain.share)})
+            return Message("lost.cause_share", {"share": share(gain.share)})
         values: dict[str, Value] = {"gain": length(gain.value), "of": length(gain.of)}
-        return Said("lost.cause", {**values, "causes": causes or Said("cause.any")})
+        return Message("lost.cause", {**values, "causes": causes or Message("cause.any")})
     if not math.isfinite(gain.value):
-        return Said(f"lost_share.{gain.key}", {"share": share(gain.share)})
+        return Message(f"lost_share.{gain.key}", {"share": share(gain.share)})
     if gain.key == "far_out":
-        return Said("lost.far_out", {"gain": length(gain.value), "of": length(gain.of)})
+        return Message("lost.far_out", {"gain": length(gain.value), "of": length(gain.of)})
     if gain.key.startswith("time"):
-        return Said(f"lost.{gain.key}", {"time": duration(gain.value), "of": duration(gain.of)})
-    return Said(f"lost.{gain.key}", {"of": number(gain.of)}, int(gain.value))
+        return Message(f"lost.{gain.key}", {"time": duration(gain.value), "of": duration(gain.of)})
+    return Message(f"lost.{gain.key}", {"of": number(gain.of)}, int(gain.value))
 
 
-def _advice(facts: Facts) -> tuple[Said, ...]:
+def _advice(facts: Facts) -> tuple[Message, ...]:
     """What to do, what comes before all gains first."""
-    found = [Said(f"do.{one.what}") for one in facts.alarms]
+    found = [Message(f"do.{one.what}") for one in facts.alarms]
     if facts.problems:
-        found.append(Said("do.problems", {}, facts.problems))
+        found.append(Message("do.problems", {}, facts.problems))
     found += [_do(gain) for gain in facts.gains]
     if facts.possible is not None:
-        found.append(Said("do.possible", {"gain": length(facts.possible.value)}))
+        found.append(Message("do.possible", {"gain": length(facts.possible.value)}))
     if not facts.compared and "georeferencing" not in facts.failed:
         if not _followed_alone(facts):
-            found.append(Said("do.known_tracks" if facts.other_sensors else "do.known_places"))
+            found.append(Message("do.known_tracks" if facts.other_sensors else "do.known_places"))
     elif facts.compared < FEW and facts.compared:
-        found.append(Said("do.more_places", {"few": number(FEW)}))
+        found.append(Message("do.more_places", {"few": number(FEW)}))
     if facts.failed:
-        found.append(Said("do.failed", {}, len(facts.failed)))
+        found.append(Message("do.failed", {}, len(facts.failed)))
     # What a gain asks for already is not asked for twice.
     asked = {one.key.removeprefix("do.") for one in found}
     for what, _ in _lasting(facts):
         if _SAME_REMEDY.get(what) not in asked and what not in asked:
-            found.append(Said(f"do.trouble_{what}"))
-    found += [Said("do.tracks")] if _too_sure(facts) or "tracking" in facts.doubted else []
-    found += [Said("do.navigation")] if "navigation" in facts.doubted else []
+            found.append(Message(f"do.trouble_{what}"))
+    found += [Message("do.tracks")] if _too_sure(facts) or "tracking" in facts.doubted else []
+    found += [Message("do.navigation")] if "navigation" in facts.doubted else []
     return tuple(found)
 
 
-def _do(gain: Gain) -> Said:
+def _do(gain: Gain) -> Message:
     """What to do about one thing."""
     key = gain.key
     if key == "cause":
         one = gain.causes[0].replace("'", "").replace(" ", "_") if len(gain.causes) == 1 else ""
         key = f"cause_{one}" if one else "causes"
-    return Said(f"do.{key}", {"share": share(gain.share)})
+    return Message(f"do.{key}", {"share": share(gain.share)})
 
 
-def _unknown(facts: Facts) -> tuple[Said, ...]:
-    found = [Said(f"unknown.failed_{part}") for part in facts.failed]
+def _unknown(facts: Facts) -> tuple[Message, ...]:
+    found = [Message(f"unknown.failed_{part}") for part in facts.failed]
     if not facts.compared and "georeferencing" not in facts.failed:
         tracked = facts.tracks > 0 and math.isfinite(facts.track_error)
-        found.append(Said("unknown.error_sightings" if tracked else "unknown.error"))
+        found.append(Message("unknown.error_sightings" if tracked else "unknown.error"))
     elif 0 < facts.compared < FEW:
         values: dict[str, Value] = {"median": length(facts.error_median)}
-        found.append(Said("unknown.few", values, facts.compared))
+        found.append(Message("unknown.few", values, facts.compared))
     if not facts.seen > 0:
-        found.append(Said("unknown.seen"))
+        found.append(Message("unknown.seen"))
     elif not math.isfinite(facts.things):
-        found.append(Said("unknown.things"))
+        found.append(Message("unknown.things"))
     if facts.seen > 0:
-        found.append(Said("unknown.hidden_detected" if facts.other_sensors else "unknown.hidden"))
-    found += [Said("unknown.another_day")] if facts.compared >= FEW else []
+        found.append(Message("unknown.hidden_detected" if facts.other_sensors else "unknown.hidden"))
+    found += [Message("unknown.another_day")] if facts.compared >= FEW else []
     return tuple(found)

@@ -11,7 +11,7 @@ from wildlab.errors import WildlabError, system_error
 from wildlab.sharing.scan.findings import MOST_OF_A_KIND, Finding, Kind
 from wildlab.sharing.scan.hits import Hit
 from wildlab.sharing.scan.inside.kinds import unpacked
-from wildlab.sharing.scan.look import Look, excerpt
+from wildlab.sharing.scan.look import SoughtPlaces, excerpt
 from wildlab.sharing.scan.parts import Budget, Part
 from wildlab.sharing.scan.secrets import Secrets
 from wildlab.sharing.scan.texts import is_text, texts_of
@@ -66,7 +66,7 @@ def scan_contents(files: Iterable[tuple[str, bytes]], secrets: Secrets) -> list[
     -------
     list
     """
-    look = Look(secrets)
+    look = SoughtPlaces(secrets)
     findings: list[Finding] = []
     for name, data in files:
         findings += _named(look, name)
@@ -113,11 +113,11 @@ def _contents(files: Iterable[tuple[Path, str]]) -> Iterator[tuple[str, bytes]]:
             raise system_error(error, path, cannot="be read") from error
 
 
-def _named(look: Look, name: str) -> list[Finding]:
+def _named(look: SoughtPlaces, name: str) -> list[Finding]:
     return [Finding(name, "the name of the file", hit.kind, hit.written, name) for hit in look.in_text(name)]
 
 
-def _in_file(look: Look, name: str, data: bytes) -> list[Finding]:
+def _in_file(look: SoughtPlaces, name: str, data: bytes) -> list[Finding]:
     found: dict[tuple[str, str, str], list[Finding]] = {}
     for part in unpacked(data, Budget()):
         for finding in _in_part(look, name, part):
@@ -132,7 +132,7 @@ def _in_file(look: Look, name: str, data: bytes) -> list[Finding]:
     return findings
 
 
-def _in_part(look: Look, name: str, part: Part) -> Iterator[Finding]:
+def _in_part(look: SoughtPlaces, name: str, part: Part) -> Iterator[Finding]:
     where = part.where or "the whole file"
     if part.trouble:
         yield Finding(name, where, "unreadable", part.trouble)

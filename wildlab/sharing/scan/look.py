@@ -29,7 +29,7 @@ from wildlab.sharing.scan.words import Words
 PIECE, OVERLAP = 8_000_000, 2_000
 
 
-class Look:
+class SoughtPlaces:
     """What is looked for, prepared once for all files."""
 
     def __init__(self, secrets: Secrets) -> None:

@@ -38,7 +38,7 @@ from wildlab.simulation.scene.ground import (
 )
 from wildlab.simulation.scene.land import LandScene, LandView, ground_points, height_at, render_land
 from wildlab.simulation.scene.on_terrain import land_on
-from wildlab.simulation.scene.render import Scene, Seen, View, outline_of, render
+from wildlab.simulation.scene.render import RenderedView, Scene, SeenBody, outline_of, render
 from wildlab.simulation.scene.response import (
     IDEAL,
     CameraResponse,
@@ -72,12 +72,12 @@ __all__ = [
     "LandScene",
     "LandView",
     "Layer",
+    "RenderedView",
     "Scene",
     "Sea",
-    "Seen",
+    "SeenBody",
     "Sensor",
     "Tarpaulin",
-    "View",
     "Wake",
     "Weather",
     "animal",

@@ -20,14 +20,14 @@ from wildlab.simulation.clipped_outlines import visible_part
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.scene.bodies import Body, fitted_out, vessel
-from wildlab.simulation.scene.render import Scene, View, outline_of, render
+from wildlab.simulation.scene.render import RenderedView, Scene, outline_of, render
 from wildlab.simulation.scene.sea import Sea
 from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.twin_trajectory import twin_trajectory
 
 
 @dataclass(frozen=True)
-class Look:
+class VesselLook:
     """What a twin does not say of its vessels: how they look. All chosen.
 
     Attributes
@@ -94,8 +94,8 @@ class SceneFlight:
         The camera's true poses at these.
     """
 
-    def __init__(self, twin: TwinParameters, seed: int, look: Look | None = None) -> None:
-        flown, look = as_flown(twin, seed), look or Look()
+    def __init__(self, twin: TwinParameters, seed: int, look: VesselLook | None = None) -> None:
+        flown, look = as_flown(twin, seed), look or VesselLook()
         trajectory = twin_trajectory(twin, stream(seed, "trajectory"))
         exposures = Exposures(flown, camera_motion(twin, trajectory, exposure_times(twin), seed))
         self.times: Array = exposures.times
@@ -139,7 +139,7 @@ class SceneFlight:
     def near(self) -> NDArray[np.bool_]:
         """(N, targets): at which exposures a target's middle is within its own length of the image.
 
-        Quick, to choose which exposures to render; what an image shows is in `View.seen`.
+        Quick, to choose which exposures to render; what an image shows is in `RenderedView.seen`.
         """
         camera, found = self.poses.camera, []
         size = np.array([camera.width, camera.height], float)
@@ -181,7 +181,7 @@ class SceneFlight:
             return None
         return Window(int(left), int(top), int(right - left), int(bottom - top))
 
-    def view(self, exposure: int, *, waves_move: bool = True, window: Window | None = None) -> View:
+    def view(self, exposure: int, *, waves_move: bool = True, window: Window | None = None) -> RenderedView:
         """The image of an exposure in kelvin, with its labels.
 
         Waves that stand still are quicker, and as good for single images: each shows another place. Of a

@@ -17,7 +17,7 @@ from wildlab.geometry.frames import Array
 from wildlab.simulation.scene import ground_kernels as kernels
 from wildlab.simulation.scene.bodies import Body
 from wildlab.simulation.scene.ground import CLOUDS, SHADOW_DEPTH, SUNLIT_UNEVEN, UNEVEN, Land
-from wildlab.simulation.scene.render import Seen, check_above, draw_bodies, pixel_coordinates
+from wildlab.simulation.scene.render import SeenBody, check_above, draw_bodies, pixel_coordinates
 
 #: How much colder than the air a clear sky is, and a closed cover of clouds, K.
 CLEAR_SKY, CLOUDED_SKY = 35.0, 4.0
@@ -49,7 +49,7 @@ class LandView(NamedTuple):
     kelvin: NDArray[np.float32]
     labels: NDArray[np.int16]
     ground: NDArray[np.bool_]
-    seen: tuple[Seen, ...]
+    seen: tuple[SeenBody, ...]
 
     def visible(self, number: int) -> float:
         """Which share of a body shows: neither beyond the image nor behind another, by pixels' centres."""

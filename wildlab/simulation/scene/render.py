@@ -36,7 +36,7 @@ class Scene:
     bodies: tuple[Body, ...] = ()
 
 
-class Seen(NamedTuple):
+class SeenBody(NamedTuple):
     """What an image shows of a body.
 
     Attributes
@@ -77,7 +77,7 @@ class Seen(NamedTuple):
         return self.share > 1 - 1e-9
 
 
-class View(NamedTuple):
+class RenderedView(NamedTuple):
     """A rendered image.
 
     Attributes
@@ -95,10 +95,10 @@ class View(NamedTuple):
     kelvin: NDArray[np.float32]
     labels: NDArray[np.int16]
     water: NDArray[np.bool_]
-    seen: tuple[Seen, ...]
+    seen: tuple[SeenBody, ...]
 
 
-def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time: float = 0.0) -> View:
+def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time: float = 0.0) -> RenderedView:
     """A scene as a camera sees it.
 
     Parameters
@@ -147,7 +147,7 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
     labels = np.zeros(kelvin.shape, np.int16)
     places = [p] * len(scene.bodies)
     seen = draw_bodies(scene.bodies, camera, places, R, time, sea.temperature, kelvin, labels)
-    return View(kelvin, labels, water, seen)
+    return RenderedView(kelvin, labels, water, seen)
 
 
 def check_above(p: Array, what: str, height: float = 0.0) -> None:
@@ -185,7 +185,7 @@ def draw_bodies(
     temperature: float,
     kelvin: NDArray[np.float32],
     labels: NDArray[np.int16],
-) -> tuple[Seen, ...]:
+) -> tuple[SeenBody, ...]:
     """Draws bodies over an image, the farther ones first.
 
     Parameters
@@ -226,7 +226,7 @@ def draw_bodies(
         whole = visible_part(found - found.min(axis=0), np.inf, np.inf)
         uv = ground_to_pixel(camera, body.centre(time)[None], p, R)[0]
         seen.append(
-            Seen(
+            SeenBody(
                 k + 1, body.kind, uv, whole.centre + found.min(axis=0), size.centre - 0.5, found, size.area,
                 min(size.area / whole.area, 1.0), covered,
             )

@@ -11,7 +11,7 @@ import pandas as pd
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
-from wildlab.pipeline.many.follow import Followed, follow_all, judged
+from wildlab.pipeline.many.follow import ManyTracks, follow_all, judged
 from wildlab.reporting.charts.following import Shown
 from wildlab.reporting.figures import BLUE, ORANGE, new_figure
 from wildlab.reporting.report import Report
@@ -67,7 +67,7 @@ def modes_beside() -> list[str]:
     return [mode for mode, sensors in MODES.items() if set(sensors) <= set(FAR_M)]
 
 
-def follow_beside(followed: Followed, choice: Choice) -> Followed:
+def follow_beside(followed: ManyTracks, choice: Choice) -> ManyTracks:
     """What our tracker was given, with what Stone Soup shows in place of ours: same looks, same truths."""
     names = [one.name for one in followed.sensors]
     return followed._replace(shown=run_stone_soup(followed.scans, names, choice))

@@ -100,7 +100,7 @@ class Associated(NamedTuple):
     by_cut: int | None = None
 
 
-class Followed(NamedTuple):
+class CrossingTracks(NamedTuple):
     """Detections, drawn or from frames, and what each rule made of them.
 
     Attributes
@@ -144,9 +144,9 @@ class Rendering(NamedTuple):
     spotted: Spotted
     near: Counted
     sea: Counted
-    frames: Followed
-    inside: Followed
-    drawn: Followed
+    frames: CrossingTracks
+    inside: CrossingTracks
+    drawn: CrossingTracks
 
 
 def on_the_sea(flight: Flight, spotted: Spotted, source: str = "autopilot") -> Placed:
@@ -245,7 +245,7 @@ def associate(placed: Placed, bank: Bank) -> Associated:
     )
 
 
-def follow(placed: Placed) -> Followed:
+def follow(placed: Placed) -> CrossingTracks:
     """The same detections by every rule, and shared by probability."""
     crossing = placed.crossing
     by_rule = {rule: associate(placed, follow_by(crossing, rule, placed.appearance)) for rule in SUBJECTS}
@@ -253,7 +253,7 @@ def follow(placed: Placed) -> Followed:
     by_rule[JOINT] = Associated(swapped=bool(joint[JOINT, "swapped"]), swaps=int(joint[JOINT, "swaps"]))
     at = np.unique(crossing.looks.image, return_inverse=True)[1]
     off = np.linalg.norm(crossing.looks.positions - crossing.truth[crossing.boat, at], axis=1)
-    return Followed(crossing, np.where(crossing.boat == NONE, np.nan, off), by_rule)
+    return CrossingTracks(crossing, np.where(crossing.boat == NONE, np.nan, off), by_rule)
 
 
 def frames_in(scenes: SceneFlight, span: tuple[float, float]) -> tuple[Index, Index]:

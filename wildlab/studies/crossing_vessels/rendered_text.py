@@ -11,8 +11,8 @@ import pandas as pd
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.pipeline.rendered import OVERLAP
 from wildlab.reporting.georeferencing_cause import listed
-from wildlab.simulation.scene.flights import Look
-from wildlab.studies.crossing_vessels.rendered import SEA_EVERY, Associated, Followed, Rendering
+from wildlab.simulation.scene.flights import VesselLook
+from wildlab.studies.crossing_vessels.rendered import SEA_EVERY, Associated, CrossingTracks, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
 from wildlab.studies.crossing_vessels.text import NAMES, beyond_chance, counted
 from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES
@@ -20,7 +20,7 @@ from wildlab.studies.crossing_vessels.trial.crossing import APART_M, WINDOW_S
 from wildlab.studies.crossing_vessels.trial.joint import JOINT
 
 #: What is tracked, and how it is taken from a flight.
-WAYS: dict[str, Callable[[Rendering], Followed]] = {
+WAYS: dict[str, Callable[[Rendering], CrossingTracks]] = {
     "drawn detections": lambda one: one.drawn,
     "rendered frames": lambda one: one.frames,
     "the same, none at the border": lambda one: one.inside,
@@ -271,7 +271,7 @@ def limit_words(flights: Sequence[Rendering]) -> str:
     """What the rendered frames leave out."""
     n = len(flights)
     nearest = min(float(np.nanmin(one.frames.crossing.apart)) for one in flights)
-    long, short = Look().lengths
+    long, short = VesselLook().lengths
     return (
         f"Rendered frames are of {n} flight{'s' * (n != 1)} about the crossing; the study's parameter "
         "rendered says how many, each about a minute's work. By their receivers the two come as near as "

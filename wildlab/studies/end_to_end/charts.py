@@ -13,7 +13,7 @@ from wildlab.studies.end_to_end.trial import (
     DRAWN,
     MARGIN,
     RENDERED,
-    Pair,
+    FlightPair,
     PixelErrors,
     followed_by,
 )
@@ -22,7 +22,7 @@ from wildlab.studies.end_to_end.trial import (
 Shown = tuple[Figure, str, str, str]
 
 
-def frame_shown(pair: Pair) -> Shown:
+def frame_shown(pair: FlightPair) -> Shown:
     """A frame about the vessel, with what is drawn, what is found and where its outline's centre is."""
     rows = np.flatnonzero(pair.marks.found)
     row = int(rows[len(rows) // 2])

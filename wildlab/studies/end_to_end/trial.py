@@ -56,7 +56,7 @@ PIXEL_UNITS = {
 }  # fmt: skip
 
 
-class Pair(NamedTuple):
+class FlightPair(NamedTuple):
     """One flight with both kinds of detections.
 
     Attributes
@@ -96,7 +96,7 @@ def source_of(twin: str) -> str:
     raise WildlabError(f"the twin {twin!r} has no case to compare", f"use one of {', '.join(known)}")
 
 
-def fly(twin: str, seed: int, every: int = 1) -> Pair:
+def fly(twin: str, seed: int, every: int = 1) -> FlightPair:
     """A flight, and its images where the twin marks its target, rendered and searched.
 
     Parameters
@@ -122,7 +122,7 @@ def fly(twin: str, seed: int, every: int = 1) -> Pair:
     target = str(drawn["target_id"].iloc[0])
     other = with_detections(flight, marks, target, float(drawn["plane_down_m"].iloc[0]), all_frames=True)
     flights = {DRAWN: flight, RENDERED: other}
-    return Pair(
+    return FlightPair(
         flights,
         {kind: sighting(one, source) for kind, one in flights.items()},
         marks,
@@ -138,7 +138,7 @@ class PixelErrors(NamedTuple):
     rendered: Array
 
 
-def pixel_errors(pair: Pair, twin: str, seed: int) -> PixelErrors:
+def pixel_errors(pair: FlightPair, twin: str, seed: int) -> PixelErrors:
     """How far detections are from the target's point, along the target's own axes in the image."""
     target = load_twin(twin).targets[0]
     scenes = pair.camera.flight
@@ -158,7 +158,7 @@ def pixel_errors(pair: Pair, twin: str, seed: int) -> PixelErrors:
     return PixelErrors(*both)
 
 
-def detection_numbers(pair: Pair, twin: str, seed: int) -> Numbers:
+def detection_numbers(pair: FlightPair, twin: str, seed: int) -> Numbers:
     """What the detections themselves are worth, by kind and the names of `PIXEL_UNITS`."""
     result: Numbers = {}
     for kind, errors in pixel_errors(pair, twin, seed)._asdict().items():
@@ -184,7 +184,7 @@ def detection_numbers(pair: Pair, twin: str, seed: int) -> Numbers:
     }
 
 
-def _inside_with_true_poses(pair: Pair, twin: str, seed: int) -> NDArray[np.bool_]:
+def _inside_with_true_poses(pair: FlightPair, twin: str, seed: int) -> NDArray[np.bool_]:
     """(K,) whether the detector's ellipses, put on the water by true poses, hold the true target."""
     rows = pair.marks.found
     scenes, exposure = pair.camera.flight, pair.marks.exposure[rows]
@@ -201,7 +201,7 @@ def _inside_with_true_poses(pair: Pair, twin: str, seed: int) -> NDArray[np.bool
     return np.asarray(inside_ellipse(off, found.covariance, 0.9))
 
 
-def _inside_as_flown(pair: Pair, source: str) -> NDArray[np.bool_]:
+def _inside_as_flown(pair: FlightPair, source: str) -> NDArray[np.bool_]:
     """Whether the ellipses with the flight's own poses and what is stated of them hold the receiver: (K,)."""
     flight = pair.flights[RENDERED]
     seen = observe(flight, source)
@@ -229,7 +229,7 @@ def track_numbers(seen: Sighting, twin: str) -> Numbers:
     return result
 
 
-def numbers_of(pair: Pair, twin: str, seed: int) -> Numbers:
+def numbers_of(pair: FlightPair, twin: str, seed: int) -> Numbers:
     """Everything that is compared, by (subject, name); a filter's subject begins with the kind."""
     result = detection_numbers(pair, twin, seed)
     for kind in KINDS:

@@ -118,7 +118,7 @@ class Gated(NamedTuple):
     targets: Array  # (N, 2, 2) true positions
 
 
-class Scene(NamedTuple):
+class GatingScene(NamedTuple):
     """Draws of N runs as things: targets (N, 2, 2), warm-up, detected pixels, and poses as they are known."""
 
     targets: Array
@@ -201,7 +201,7 @@ def streams(seed: int, runs: int) -> list[np.random.SeedSequence]:
     return np.random.SeedSequence(seed).spawn(runs)
 
 
-def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> Scene:
+def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> GatingScene:
     """Targets, detections and known poses of runs, with the noise of H table 6.4."""
     normal = np.stack([np.random.default_rng(run).standard_normal(sum(_DRAWS)) for run in runs])
     around, start, warm_up, pose, pixel = np.split(normal, np.cumsum(_DRAWS)[:-1], axis=1)
@@ -222,7 +222,7 @@ def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> Scene:
         tilt=tilt + off[..., 7],
     )
     main = targets[:, 0]
-    return Scene(
+    return GatingScene(
         targets,
         main + np.sqrt(START_P[0, 0]) * start,
         main[:, None] + WARM_UP_M * warm_up.reshape(N, WARM_UP, 2),
@@ -310,7 +310,7 @@ def share_in_image(over: Overflight, runs: int, seed: int) -> float:
     return float(in_image(over.poses.camera, pixels).all(axis=-1).mean())
 
 
-def _warm_up(scene: Scene, choices: Choices) -> tuple[Array, Array]:
+def _warm_up(scene: GatingScene, choices: Choices) -> tuple[Array, Array]:
     """State (N, 4) and covariance (4, 4) after the iterations on positions: the same for all three forms."""
     x = np.concatenate([scene.start, np.zeros_like(scene.start)], axis=-1)
     P = START_P
@@ -323,7 +323,7 @@ def _warm_up(scene: Scene, choices: Choices) -> tuple[Array, Array]:
     return x, P
 
 
-def _gate(scene: Scene, choices: Choices) -> Gated:
+def _gate(scene: GatingScene, choices: Choices) -> Gated:
     camera, p_nc, R_nc = scene.poses.camera, scene.poses.p_nc, scene.poses.R_nc
     if camera.distorts:
         raise WildlabError(

@@ -31,7 +31,7 @@ from wildlab.studies.information_planning.trial import (
     SEARCHERS,
     STATIONS,
     SWING,
-    Scene,
+    PlanningScene,
     Situation,
 )
 
@@ -41,7 +41,7 @@ COLOURS = {INFORMATION: BLUE, FIXED: PURPLE, ROWS: ORANGE, SWING: GREEN, CHANCE:
 _STYLES = {INFORMATION: "-", FIXED: "--", ROWS: "-", SWING: "-", CHANCE: ":"}
 
 
-def way_shown(scene: Scene, found: Searched, who: str) -> Shown:
+def way_shown(scene: PlanningScene, found: Searched, who: str) -> Shown:
     """The way of one planner over one world, until all were found or the time was up."""
     fig, ax = new_figure(5.6, 3.9)
     _ground(ax, scene)
@@ -81,7 +81,7 @@ def percent_seen(found: Searched) -> str:
     return percent(float(found.covered[-1]))
 
 
-def _ground(ax: Axes, scene: Scene) -> None:
+def _ground(ax: Axes, scene: PlanningScene) -> None:
     terrain = scene.world.terrain
     south, north, west, east = terrain.extent
     every = 4

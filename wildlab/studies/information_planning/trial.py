@@ -120,7 +120,7 @@ class Tuned(NamedTuple):
     swing: tuple[float, ...] = (15.0, -15.0)
 
 
-class Scene(NamedTuple):
+class PlanningScene(NamedTuple):
     """A world and all that every planner is given.
 
     Attributes
@@ -149,7 +149,7 @@ class Scene(NamedTuple):
     first: int
 
 
-def draw_scene(seed: int, twin: str) -> Scene:
+def draw_scene(seed: int, twin: str) -> PlanningScene:
     """The world of a seed: land, two enclosures, and animals that walk in them.
 
     Camera, height, speed, sizes of enclosures, how many animals each holds and how they walk are the twin's;
@@ -188,7 +188,7 @@ def draw_scene(seed: int, twin: str) -> Scene:
     start = Platform(corner, heading, look_attitude(heading, 0.0, 0.0))
     half = (given_half(given, "width"), given_half(given, "height"))
     sensor = SearchSensor(*half, sd=Tuned().sd, reach=REACH_M, nearest=CELL_M / 2)
-    return Scene(world, grid, area_of, start, sensor, flying, _step_sd(given, flying) ** 2, first)
+    return PlanningScene(world, grid, area_of, start, sensor, flying, _step_sd(given, flying) ** 2, first)
 
 
 def given_half(given: TwinParameters, side: str) -> float:
@@ -233,7 +233,9 @@ def _walks(
     return np.asarray(middle + x[..., None] * along + y[..., None] * np.array([-along[1], along[0]]))
 
 
-def searchers(scene: Scene, seed: int, tuned: Tuned | None = None) -> dict[str, Callable[[], Searcher]]:
+def searchers(
+    scene: PlanningScene, seed: int, tuned: Tuned | None = None
+) -> dict[str, Callable[[], Searcher]]:
     """Each planner by its name, made anew when called."""
     t = tuned or Tuned()
     looks = tuple((float(np.radians(side)), float(np.radians(ahead))) for side, ahead in t.looks)
@@ -258,7 +260,9 @@ def searchers(scene: Scene, seed: int, tuned: Tuned | None = None) -> dict[str, 
     }
 
 
-def search_all(seed: int, twin: str, only: tuple[str, ...] = SEARCHERS) -> tuple[Scene, dict[str, Searched]]:
+def search_all(
+    seed: int, twin: str, only: tuple[str, ...] = SEARCHERS
+) -> tuple[PlanningScene, dict[str, Searched]]:
     """The world of a seed and what each planner made of it."""
     scene = draw_scene(seed, twin)
     each = searchers(scene, seed)
@@ -307,7 +311,7 @@ class Situation(NamedTuple):
     ahead: Tour
 
 
-def draw_situation(seed: int, scene: Scene) -> Situation:
+def draw_situation(seed: int, scene: PlanningScene) -> Situation:
     """The animals of the first enclosure, last seen at random times; platform and way point anywhere."""
     rng = stream(seed, "situation")
     of = scene.world.area_of == scene.first
@@ -324,7 +328,7 @@ def draw_situation(seed: int, scene: Scene) -> Situation:
     return Situation(positions, covariances, platform, way_point, greedy, ahead)
 
 
-def survey_rows(seed: int, scene: Scene) -> Surveyed:
+def survey_rows(seed: int, scene: PlanningScene) -> Surveyed:
     """Rows over the world of a seed, and going back to animals by F (5.2)-(5.3), until all are positioned."""
     order = (scene.first, 1 - scene.first)
     rows = SearchInRows(scene.world, scene.flying, Tuned().rows, order)

@@ -19,7 +19,7 @@ from wildlab.studies.large_ship.trial import (
     follow,
     numbers_of_track,
 )
-from wildlab.tracking.batch import View, as_tracks, run_batch
+from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
 
 #: A rectangle's length over the full axis of the ellipse with its moments.
 BOX = float(np.sqrt(3) / 2)
@@ -69,7 +69,7 @@ def with_own_covariance(taken: Photographs, marks: Marks) -> Tracked:
         own,
         TUNING.motion,
         start(seen, TUNING),
-        view=View(seen.poses, seen.plane_down),
+        view=BatchCamera(seen.poses, seen.plane_down),
         pose=None,
     )
     return plain._replace(track=as_tracks(batch)[0])

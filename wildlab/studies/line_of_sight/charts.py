@@ -32,7 +32,7 @@ from wildlab.studies.line_of_sight.trial import (
     TOLERANCE,
     TREES,
     WHOLE_RAYS,
-    View,
+    TerrainView,
 )
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
@@ -145,7 +145,7 @@ def trees_shown(spread: pd.DataFrame) -> Shown:
     )  # fmt: skip
 
 
-def map_shown(land: Terrain, view: View) -> Shown:
+def map_shown(land: Terrain, view: TerrainView) -> Shown:
     """One view on the map: what is seen, and where both ways of F say something else."""
     exact = lines_clear(land, view.points, view.p_nc)
     ways = {

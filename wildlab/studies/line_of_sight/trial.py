@@ -50,7 +50,7 @@ FEWEST = 30
 MARGIN = 50.0
 
 
-class View(NamedTuple):
+class TerrainView(NamedTuple):
     """The camera above land, and the grid points in its field of view.
 
     Attributes
@@ -76,7 +76,7 @@ def camera_of(twin: str) -> Camera:
     return Camera(width, height, found.fx.si, found.fy.si, width / 2, height / 2)
 
 
-def look(land: Terrain, camera: Camera, rng: np.random.Generator, height: float, tilt: float) -> View:
+def look(land: Terrain, camera: Camera, rng: np.random.Generator, height: float, tilt: float) -> TerrainView:
     """The camera at a place and with a heading that are drawn: over the map, and looking at it.
 
     Parameters
@@ -103,7 +103,7 @@ def look(land: Terrain, camera: Camera, rng: np.random.Generator, height: float,
     R_nc = camera_rotation(0.0, np.radians(tilt - 90.0), heading)
     nodes, points = nodes_of(land)
     inside = in_field_of_view(field_of_view(camera), points, p_nc, R_nc)
-    return View(p_nc, R_nc, nodes[inside], points[inside])
+    return TerrainView(p_nc, R_nc, nodes[inside], points[inside])
 
 
 def nodes_of(land: Terrain) -> tuple[NDArray[np.int64], Array]:
@@ -113,7 +113,7 @@ def nodes_of(land: Terrain) -> tuple[NDArray[np.int64], Array]:
     return nodes, np.column_stack([north_east, -land.height[tuple(nodes.T)].astype(float)])
 
 
-def width_on_ground(land: Terrain, camera: Camera, view: View) -> float:
+def width_on_ground(land: Terrain, camera: Camera, view: TerrainView) -> float:
     """How far the middles of the left and the right side of the image are apart on the ground, metres."""
     pose = CameraPoses.at_lens(camera, view.p_nc, view.R_nc, np.eye(3))
     outline = footprint(land, pose, per_side=2).points
@@ -174,7 +174,7 @@ def settings() -> list[tuple[str, float, float]]:
     return heights + [(f"{tilt}deg", float(HEIGHT), float(tilt)) for tilt in TILTS if tilt != TILT]
 
 
-def compare(land: Terrain, views: list[View]) -> dict[tuple[str, str], float]:
+def compare(land: Terrain, views: list[TerrainView]) -> dict[tuple[str, str], float]:
     """What the ways say of the grid points of all views together, by (subject, name); see `trial`.
 
     NaN where fewer than `FEWEST` points are in view.
@@ -203,7 +203,7 @@ def compare(land: Terrain, views: list[View]) -> dict[tuple[str, str], float]:
     return numbers
 
 
-def with_other_steps(land: Terrain, views: list[View]) -> dict[tuple[str, str], float]:
+def with_other_steps(land: Terrain, views: list[TerrainView]) -> dict[tuple[str, str], float]:
     """Agreement of ray casting with the exact line of sight with the steps and tolerances of `OTHERS`."""
     exact = np.concatenate([lines_clear(land, one.points, one.p_nc) for one in views])
     known = len(exact) >= FEWEST

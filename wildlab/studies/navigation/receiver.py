@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike
 
 from wildlab.evaluation.blocks import PROBABILITY, block_mean, time_blocks
 from wildlab.navigation.receiver import SIZE, Candidate, SourceNoise
-from wildlab.pipeline.navigation_errors import AXES, Errors, Studied, summarise, summarise_innovations
+from wildlab.pipeline.navigation_errors import (
+    AXES,
+    NavigationErrors,
+    Studied,
+    summarise,
+    summarise_innovations,
+)
 from wildlab.pipeline.receiver import Placement, Receiver, place_receiver
 from wildlab.reporting.report import Report
 
@@ -182,7 +188,7 @@ _LEFT = {
 }
 
 
-def words_on_attitude(before: Errors, after: Errors, begin: float, end: float) -> str:
+def words_on_attitude(before: NavigationErrors, after: NavigationErrors, begin: float, end: float) -> str:
     """Whether the attitude came nearer to the reference by the noise that was found, between two times, s."""
     inside = (before.times >= begin) & (before.times < end)
     squares = [np.degrees(one.error[inside, 6:]) ** 2 @ np.ones(3) for one in (before, after)]

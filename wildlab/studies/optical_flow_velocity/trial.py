@@ -23,7 +23,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.quantiles import student_quantile
 from wildlab.pipeline.flow import FramePair, Reading, pair_velocities
 from wildlab.pipeline.rendered import Photographer
-from wildlab.simulation.scene.flights import Look, SceneFlight, corner_of
+from wildlab.simulation.scene.flights import SceneFlight, VesselLook, corner_of
 from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
 
 #: Images of the flight.
@@ -58,7 +58,7 @@ WITHIN_M_S = 1.0
 #: The ship: as long as the one of H 6.4.1, and five times its beam. H 5.6.3 does not print how long its ship
 #: was; the other large one whose length H prints, in figure 4.3, has 55 m. What is on its deck is chosen:
 #: without anything no feature detector would find more than corners.
-SHIP = Look(lengths=(70.0,), slender=5.0, fittings=30)
+SHIP = VesselLook(lengths=(70.0,), slender=5.0, fittings=30)
 #: Around the ship, what of an image is rendered, px.
 MARGIN = 40
 

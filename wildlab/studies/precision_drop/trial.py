@@ -56,7 +56,7 @@ FEW_PX = 3.0
 MARGIN_PX, NEAR_PX = 60.0, 10.0
 
 
-class Look(NamedTuple):
+class GroundLook(NamedTuple):
     """How ground and tarpaulin look, as `look_of` draws it."""
 
     ground: Ground
@@ -90,7 +90,7 @@ class Drop(NamedTuple):
         How many images without the tarpaulin were looked at, too.
     """
 
-    look: Look
+    look: GroundLook
     exposures: NDArray[np.intp]
     uv: Array
     true: Array
@@ -103,7 +103,7 @@ class Drop(NamedTuple):
     empty: int
 
 
-def look_of(seed: int) -> Look:
+def look_of(seed: int) -> GroundLook:
     """How ground, sky and tarpaulin look on the flight of a seed. All chosen; nothing of it is printed.
 
     The tarpaulin is of a blue within the printed limits and fades towards its rim (H 4.4.2), a few metres
@@ -125,10 +125,12 @@ def look_of(seed: int) -> Look:
         light=float(rng.uniform(0.9, 1.0)),
         seed=int(rng.integers(2**31)),
     )
-    return Look(ground, tarpaulin)
+    return GroundLook(ground, tarpaulin)
 
 
-def view_of(flight: SceneFlight, look: Look, exposure: int, seed: int, *, shown: bool = True) -> ColourView:
+def view_of(
+    flight: SceneFlight, look: GroundLook, exposure: int, seed: int, *, shown: bool = True
+) -> ColourView:
     """The image of an exposure, without the tarpaulin where it is not `shown`."""
     pose, rng = flight.poses.take(exposure), stream(seed, f"noise of image {exposure}")
     tarpaulin = look.tarpaulin if shown else None
@@ -136,7 +138,12 @@ def view_of(flight: SceneFlight, look: Look, exposure: int, seed: int, *, shown:
 
 
 def search(
-    flight: SceneFlight, look: Look, seed: int, wanted: int, empty: int, thresholds: Colour | None = None
+    flight: SceneFlight,
+    look: GroundLook,
+    seed: int,
+    wanted: int,
+    empty: int,
+    thresholds: Colour | None = None,
 ) -> Drop:
     """Look through the images as they come until enough was found.
 
@@ -216,7 +223,7 @@ def with_detections(flight: Flight, drop: Drop) -> Flight:
     )
 
 
-def horizon_views(camera: Camera, look: Look, seed: int, images: int) -> list[ColourView]:
+def horizon_views(camera: Camera, look: GroundLook, seed: int, images: int) -> list[ColourView]:
     """Images without the tarpaulin, from 100 m, of a camera that is turned up until it sees the horizon.
 
     The horizon lies in the upper half of the image, anywhere with equal chance, and level.

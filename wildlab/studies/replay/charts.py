@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
-from wildlab.replay.scene import Scene
+from wildlab.replay.scene import ReplayScene
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -23,7 +23,7 @@ from wildlab.reporting.figures import (
 AROUND = 170.0
 
 
-def operator_view(scene: Scene, t: float, title: str) -> Figure:
+def operator_view(scene: ReplayScene, t: float, title: str) -> Figure:
     """The map about the aircraft, and beside it the image.
 
     Parameters
@@ -83,7 +83,7 @@ def _at(times: np.ndarray, places: np.ndarray, t: float, *, still: bool) -> np.n
     return np.array([np.interp(t, times, places[:, k]) for k in range(3)])
 
 
-def _contours(ax: object, scene: Scene, here: np.ndarray) -> None:
+def _contours(ax: object, scene: ReplayScene, here: np.ndarray) -> None:
     terrain = scene.terrain
     assert terrain is not None  # noqa: S101
     rows, columns = terrain.height.shape

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.runs import mean_interval
-from wildlab.replay.scene import Scene
+from wildlab.replay.scene import ReplayScene
 from wildlab.reporting.text import percent
 from wildlab.studies.replay.trial import CLOCK, NONE, ONE, SEVERAL, SINGLE, Moments
 
@@ -45,7 +45,7 @@ def _count(n: int) -> str:
     return "no animal" if n == 0 else "1 animal" if n == 1 else f"{n} animals"
 
 
-def alt(scene: Scene, moments: Moments, row: int) -> str:
+def alt(scene: ReplayScene, moments: Moments, row: int) -> str:
     """What a view shows, for who cannot see it."""
     return (
         f"Map about the aircraft {moments.times[row]:.0f} s into the flight, with what its camera sees, "

@@ -44,7 +44,7 @@ from wildlab.pipeline.track import (
     start,
 )
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.batch import View, as_tracks, run_batch
+from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
 from wildlab.tracking.run import Track
 from wildlab.tracking.schmidt import PoseUncertainty
 
@@ -211,7 +211,7 @@ def _follow_each(seen: Sighting, covariances: list[Array]) -> list[Track]:
         np.eye(2) * TUNING.pixel**2,
         TUNING.motion,
         start(seen, TUNING),
-        view=View(seen.poses, seen.plane_down),
+        view=BatchCamera(seen.poses, seen.plane_down),
         pose=PoseUncertainty(np.stack(covariances)),
     )
     return as_tracks(found)

@@ -22,7 +22,7 @@ from wildlab.pipeline.rendered import judge
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight
-from wildlab.simulation.scene.render import Seen, View
+from wildlab.simulation.scene.render import RenderedView, SeenBody
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 
 #: The ship, in whatever part; the boats with their whole contour in view, and cut; images without any.
@@ -45,7 +45,7 @@ class Image(NamedTuple):
     """One image of a flight: what it is of, what there is to see, and the camera's counts."""
 
     subject: str
-    view: View
+    view: RenderedView
     counts: NDArray[np.uint16]
 
 
@@ -154,7 +154,7 @@ def tally(images: list[Image], thresholds: FloatingThresholds) -> tuple[pd.DataF
     )
 
 
-def _inside(seen: Seen, result: FloatingObjects, rows: list[int]) -> float:
+def _inside(seen: SeenBody, result: FloatingObjects, rows: list[int]) -> float:
     """Whether the ellipse of the largest piece holds the centre of the outline: 1, 0, NaN where not found."""
     if not rows:
         return np.nan

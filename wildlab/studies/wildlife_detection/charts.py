@@ -34,7 +34,7 @@ from wildlab.studies.wildlife_detection.trial import (
     SUBTRACTED,
     VIEWS,
     WEATHERS,
-    Judged,
+    DetectionScore,
     Picture,
     find,
     judge,
@@ -67,7 +67,7 @@ def _panel(ax: Axes, image: NDArray[Any], title: str) -> None:
     ax.grid(False)
 
 
-def _boxes(ax: Axes, picture: Picture, thresholds: Warm, frame: bool = True) -> Judged:
+def _boxes(ax: Axes, picture: Picture, thresholds: Warm, frame: bool = True) -> DetectionScore:
     found = find(picture, thresholds)
     judged = judge(picture, found)
     right = {row for rows in judged.rows.values() for row in rows[:1]}
@@ -80,7 +80,7 @@ def _boxes(ax: Axes, picture: Picture, thresholds: Warm, frame: bool = True) -> 
     return judged
 
 
-def _said(judged: Judged) -> str:
+def _said(judged: DetectionScore) -> str:
     found, invented, missed = judged.counts
     return f"{found:.0f} of {found + missed:.0f} found, {invented:.0f} false"
 

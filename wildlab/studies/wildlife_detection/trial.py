@@ -161,7 +161,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Judged:
+class DetectionScore:
     """What detections are worth: rows by animal, and how many are of nothing."""
 
     rows: dict[int, list[int]]
@@ -175,7 +175,7 @@ class Judged:
         return np.array([found, self.false + extra, len(self.rows) - found], float)
 
 
-def judge(picture: Picture, found: Detections) -> Judged:
+def judge(picture: Picture, found: Detections) -> DetectionScore:
     """Which detection is of which animal: that on whose pixels, or near them, its centroid lies.
 
     Detections of animals that hardly show count neither way.
@@ -193,7 +193,7 @@ def judge(picture: Picture, found: Detections) -> Judged:
             rows[best].append(row)
         elif best not in hidden:
             false += 1
-    return Judged(rows, false)
+    return DetectionScore(rows, false)
 
 
 def find(picture: Picture, thresholds: Warm) -> Detections:
@@ -347,7 +347,7 @@ def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], 
     """What `trial` gives, from pictures."""
     numbers: dict[tuple[str, str], float] = {}
 
-    def tally(subject: str, at: str, picture: Picture, thresholds: Warm) -> Judged:
+    def tally(subject: str, at: str, picture: Picture, thresholds: Warm) -> DetectionScore:
         judged = judge(picture, find(picture, thresholds))
         for name, value in zip(COUNTS, judged.counts, strict=True):
             numbers[subject, f"{name}_{at}"] = float(value)

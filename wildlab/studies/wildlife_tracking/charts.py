@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 
 from wildlab.evaluation.runs import mean_interval
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.animals.follow import Followed, Known
+from wildlab.pipeline.animals.follow import FollowedAnimals, Known
 from wildlab.pipeline.animals.frames import NONE
 from wildlab.pipeline.animals.images import FURTHEST
 from wildlab.pipeline.animals.revisit import Patrolled
@@ -47,7 +47,7 @@ KEY = (
 
 
 def map_shown(
-    world: World, followed: Followed, share: float, name: str, what: str, counterpart: str, seed: int
+    world: World, followed: FollowedAnimals, share: float, name: str, what: str, counterpart: str, seed: int
 ) -> Shown:
     """Animals, tracks and the way up to a share of the first lap.
 
@@ -195,7 +195,7 @@ def visit_shown(world: World, flown: Patrolled) -> Shown | None:
     )  # fmt: skip
 
 
-def most_seen(followed: Followed, out: float) -> int | None:
+def most_seen(followed: FollowedAnimals, out: float) -> int | None:
     """The animal that came back into sight most often, after being out of it for so long, s."""
     back = [one.animal for one in followed.found if np.isfinite(one.away) and one.away > out]
     return int(np.bincount(back).argmax()) if back else None
@@ -230,7 +230,7 @@ def covariance_shown(runs: Runs) -> Shown | None:
     )  # fmt: skip
 
 
-def sd_of(world: World, followed: Followed, animal: int) -> tuple[Array, Array]:
+def sd_of(world: World, followed: FollowedAnimals, animal: int) -> tuple[Array, Array]:
     """Times (K,) s and the stated standard deviation (K,) m of an animal's track at the stations."""
     own, row, times, sd = 0, 0, list[float](), list[float]()
     for known in followed.known:

@@ -19,12 +19,12 @@ from wildlab.detection.warm import find_warm, gate_from_distance, to_grey
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.pipeline.animals.follow import Followed, follow
+from wildlab.pipeline.animals.follow import FollowedAnimals, follow
 from wildlab.pipeline.animals.frames import (
     NONE,
     Frame,
     Framed,
-    Judged,
+    FrameMatch,
     Thermal,
     furnish,
     ground_distance,
@@ -66,7 +66,7 @@ class Rendered(NamedTuple):
 
     weather: Weather
     framed: Framed
-    followed: Followed
+    followed: FollowedAnimals
     frame: Callable[[int], Frame]
     grey: Callable[[NDArray[np.uint16]], NDArray[np.uint8]]
     find: Callable[[NDArray[np.uint16], float], Detections]
@@ -86,7 +86,7 @@ class Renderings(NamedTuple):
     """
 
     world: World
-    drawn: Followed
+    drawn: FollowedAnimals
     by_weather: dict[str, Rendered]
 
 
@@ -157,7 +157,7 @@ def run_rendered(world: World, seed: int, count: int) -> Renderings:
     return Renderings(part, _followed(part, part.images, seed), by_weather)
 
 
-def _followed(world: World, images: Images, seed: int) -> Followed:
+def _followed(world: World, images: Images, seed: int) -> FollowedAnimals:
     follower = follower_of(NEGATIVE, world, seed)
     return follow(images, world.land, world.detector, follower, world.motion)
 
@@ -189,7 +189,7 @@ def _in_weather(world: World, seed: int, weather: Weather) -> Rendered:
     return Rendered(weather, framed, _followed(world, framed.images, seed), frame, grey, find)
 
 
-def counted(world: World, images: Images, followed: Followed, framed: Framed | None = None) -> Counted:
+def counted(world: World, images: Images, followed: FollowedAnimals, framed: Framed | None = None) -> Counted:
     """What came of images, drawn or rendered.
 
     Parameters
@@ -248,7 +248,7 @@ def telling_image(runs: Renderings) -> int:
     return int((in_view.sum(axis=1) + (in_view.shape[1] + 1) * with_false).argmax())
 
 
-def seen_again(world: World, run: Rendered, k: int) -> tuple[NDArray[np.uint8], Detections, Judged]:
+def seen_again(world: World, run: Rendered, k: int) -> tuple[NDArray[np.uint8], Detections, FrameMatch]:
     """A frame as the operator sees it, with its detections and whose each is."""
     shot = run.frame(k)
     found = run.find(shot.counts, ground_distance(world.land, world.images.poses.take(np.array([k]))))

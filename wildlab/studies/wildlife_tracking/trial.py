@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.animals.follow import Followed, Follower, Kalman, Particles, follow
+from wildlab.pipeline.animals.follow import FollowedAnimals, Follower, Kalman, Particles, follow
 from wildlab.pipeline.animals.images import Detector, Images, take_images
 from wildlab.pipeline.animals.measures import (
     found_on_visits,
@@ -136,7 +136,7 @@ def herds(twin: TwinParameters, fences: list[Array], times: Array, seed: int) ->
     return np.swapaxes(np.concatenate(each), 0, 1)
 
 
-class Way(NamedTuple):
+class Lap(NamedTuple):
     """One lap: times (T,) s, headings (T,) rad, poses as told, and how long it takes, s."""
 
     times: Array
@@ -145,11 +145,11 @@ class Way(NamedTuple):
     lap: float
 
 
-def gondola_way(twin: TwinParameters, land: Terrain, fences: list[Array], seed: int, rate: float) -> Way:
+def gondola_way(twin: TwinParameters, land: Terrain, fences: list[Array], seed: int, rate: float) -> Lap:
     """Once round with the adaptive roll rotation (F 7.5.2)."""
     there = gondola.ride(twin, land, rate, 1.0)
     poses = gondola.poses_of(STRATEGY, twin, land, fences, there, seed)
-    return Way(there.times, there.headings, poses, there.duration)
+    return Lap(there.times, there.headings, poses, there.duration)
 
 
 def rolling(twin: TwinParameters) -> Callable[[Array], GimbalAngles]:
@@ -158,7 +158,7 @@ def rolling(twin: TwinParameters) -> Callable[[Array], GimbalAngles]:
     return lambda times: swing_roll(times, g.limit.si, 4 * g.limit.si / g.period.si)
 
 
-def uav_way(twin: TwinParameters, land: Terrain, fences: list[Array], rate: float) -> Way:
+def uav_way(twin: TwinParameters, land: Terrain, fences: list[Array], rate: float) -> Lap:
     """Rows over all enclosures, and back, 50 m above the ground (F 7.5.1)."""
     pattern = rows_of(twin, fences)
     s = uav.required(twin.survey, "survey")
@@ -168,7 +168,7 @@ def uav_way(twin: TwinParameters, land: Terrain, fences: list[Array], rate: floa
     way = follow_terrain(land, pattern.waypoints, twin.flight.altitude.si, climb=uav.CLIMB, descent=uav.CLIMB)
     p = np.column_stack([places, -way.at(course.distances(times))])
     poses = camera_on_course(uav.camera_of(twin), p, headings, rolling(twin)(times))
-    return Way(times, headings, poses, course.duration)
+    return Lap(times, headings, poses, course.duration)
 
 
 def rows_of(twin: TwinParameters, fences: list[Array]) -> Pattern:
@@ -242,7 +242,7 @@ def follower_of(name: str, world: World, seed: int) -> Follower:
     return particles_of(world, seed, name == NEGATIVE)
 
 
-def run_filter(name: str, world: World, seed: int) -> Followed:
+def run_filter(name: str, world: World, seed: int) -> FollowedAnimals:
     """A world followed by one of `FILTERS`."""
     return follow(world.images, world.land, world.detector, follower_of(name, world, seed), world.motion)
 
@@ -263,7 +263,7 @@ def run_patrol(world: World, seed: int, visits: Visits) -> Patrolled:
     )  # fmt: skip
 
 
-def filter_numbers(world: World, followed: Followed) -> dict[str, float]:
+def filter_numbers(world: World, followed: FollowedAnimals) -> dict[str, float]:
     """What is compared of a filter, by name."""
     images = world.images
     later = next_lap(followed.found, images.times, world.lap)
@@ -338,7 +338,7 @@ class Runs(NamedTuple):
     """
 
     worlds: dict[str, World]
-    followed: dict[tuple[str, str], Followed]
+    followed: dict[tuple[str, str], FollowedAnimals]
     patrolled: dict[str, Patrolled]
 
 

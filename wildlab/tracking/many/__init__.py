@@ -16,7 +16,7 @@ from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
 from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
 from wildlab.tracking.many.bank_life import Life
 from wildlab.tracking.many.bank_rules import Appearance
-from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs, own_lasting
+from wildlab.tracking.many.beliefs import POINT, Hull, ManySensorModel, ManyTargetModel, Scan, own_lasting
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
 from wildlab.tracking.many.found_again import look_differences, place_costs, reachable, recognise
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
@@ -35,10 +35,10 @@ __all__ = [
     "Hull",
     "Life",
     "Looks",
+    "ManySensorModel",
+    "ManyTargetModel",
     "Scan",
-    "SensorBeliefs",
     "Shown",
-    "TargetBeliefs",
     "Tuning",
     "association_probabilities",
     "belief_propagation",

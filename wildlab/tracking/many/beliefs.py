@@ -30,7 +30,7 @@ class Hull(NamedTuple):
     share: float = 1.0
 
 
-class SensorBeliefs(NamedTuple):
+class ManySensorModel(NamedTuple):
     """One sensor. Those with K elements have one for each kind of hull.
 
     Attributes
@@ -82,7 +82,7 @@ class SensorBeliefs(NamedTuple):
     lasting_s: float = 0.0
 
 
-class TargetBeliefs(NamedTuple):
+class ManyTargetModel(NamedTuple):
     """The targets.
 
     Attributes
@@ -140,7 +140,7 @@ class TargetBeliefs(NamedTuple):
     stay_s: float = 30.0
 
 
-def own_lasting(sensors: Sequence[SensorBeliefs]) -> tuple[float, ...]:
+def own_lasting(sensors: Sequence[ManySensorModel]) -> tuple[float, ...]:
     """For how long errors last that each target has of its own.
 
     Parameters
@@ -156,7 +156,7 @@ def own_lasting(sensors: Sequence[SensorBeliefs]) -> tuple[float, ...]:
     return tuple(one.lasting_s for one in sensors if one.correlation > 0 for _ in range(2))
 
 
-def own_columns(sensors: Sequence[SensorBeliefs], sensor: int, errors: int) -> slice:
+def own_columns(sensors: Sequence[ManySensorModel], sensor: int, errors: int) -> slice:
     """Which of so many errors are a target's own by this sensor; the first sensor's are behind all shared."""
     first = errors - len(own_lasting(sensors[sensor:]))
     return slice(first, first + len(own_lasting(sensors[sensor : sensor + 1])))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.tracking.many.beliefs import Hull, SensorBeliefs
+from wildlab.tracking.many.beliefs import Hull, ManySensorModel
 from wildlab.tracking.many.motions import largest_of
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ MOST_TOLD = 20.0
 LEAST_KIND = 0.02
 
 
-def near_side(x: ArrayLike, platform: ArrayLike, sensor: SensorBeliefs) -> Array:
+def near_side(x: ArrayLike, platform: ArrayLike, sensor: ManySensorModel) -> Array:
     """Where on its hull a target is seen, from the hull's middle: the near side of an ellipse.
 
     ``sensor.near_side_m`` is how far that is where the hull is seen from its side, ``near_end_m`` where it is
@@ -52,7 +52,7 @@ def near_side(x: ArrayLike, platform: ArrayLike, sensor: SensorBeliefs) -> Array
     return np.asarray(np.divide(to, distance, out=np.zeros_like(to), where=distance > 0) * length)
 
 
-def hull_noise(x: ArrayLike, sensor: SensorBeliefs) -> Array:
+def hull_noise(x: ArrayLike, sensor: ManySensorModel) -> Array:
     """Covariances (T, K, 2, 2), m^2, of which part of a hull is seen; ``x`` (T, K, 4).
 
     Along the hull it is longer. Where a target hardly moves its heading is not known: half of it is then
@@ -101,7 +101,7 @@ def gather(
     kinds: Array,
     established: NDArray[np.bool_],
     likelihood: Array,
-    sensor: SensorBeliefs,
+    sensor: ManySensorModel,
     hulls: tuple[Hull, ...],
 ) -> Gathered:
     """Merge the measurements of a scan that lie along one large hull to one of the part that is followed.

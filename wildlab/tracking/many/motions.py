@@ -10,19 +10,19 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.tracking.many.beliefs import Hull, SensorBeliefs, TargetBeliefs
+from wildlab.tracking.many.beliefs import Hull, ManySensorModel, ManyTargetModel
 
 Array = NDArray[np.float64]
 
 
-def densities_of(targets: TargetBeliefs) -> tuple[float, ...]:
+def densities_of(targets: ManyTargetModel) -> tuple[float, ...]:
     """Of each of the M motions: the usual one and, where there is one, the calm one."""
     return (targets.density,) if targets.calm >= 1 else (targets.density, targets.calm * targets.density)
 
 
 def each_motion(
-    sensors: Sequence[SensorBeliefs], targets: TargetBeliefs
-) -> tuple[tuple[SensorBeliefs, ...], TargetBeliefs]:
+    sensors: Sequence[ManySensorModel], targets: ManyTargetModel
+) -> tuple[tuple[ManySensorModel, ...], ManyTargetModel]:
     """The same with a column for each motion of each hull."""
     count = len(densities_of(targets))
     if count == 1:
@@ -44,7 +44,7 @@ def each_motion(
     return eyes, targets._replace(hulls=hulls)
 
 
-def of_hulls(kinds: Array, targets: TargetBeliefs) -> Array:
+def of_hulls(kinds: Array, targets: ManyTargetModel) -> Array:
     """(T, K) of columns as (T, H) of hulls."""
     count = len(densities_of(targets))
     return np.asarray(kinds.reshape(len(kinds), kinds.shape[1] // count, count).sum(axis=-1))
@@ -56,7 +56,7 @@ def largest_of(hulls: tuple[Hull, ...]) -> NDArray[np.bool_]:
     return np.array([hull == largest for hull in hulls], bool)
 
 
-def at_least(kinds: Array, least: float, targets: TargetBeliefs) -> Array:
+def at_least(kinds: Array, least: float, targets: ManyTargetModel) -> Array:
     """(T, K) with no hull less probable than that, beside another; sums may exceed one."""
     count = len(densities_of(targets))
     parts = kinds.reshape(len(kinds), kinds.shape[1] // count, count)

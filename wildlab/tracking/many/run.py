@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from wildlab.errors import WildlabError
-from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs, own_columns, own_lasting
+from wildlab.tracking.many.beliefs import ManySensorModel, ManyTargetModel, Scan, own_columns, own_lasting
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
 from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
 from wildlab.tracking.many.motions import at_least, each_motion, largest_of, of_hulls
@@ -64,8 +64,8 @@ class Shown(NamedTuple):
 
 def run_many(
     scans: Sequence[Scan],
-    sensors: Sequence[SensorBeliefs],
-    targets: TargetBeliefs,
+    sensors: Sequence[ManySensorModel],
+    targets: ManyTargetModel,
     lasting_s: Sequence[float] = (),
 ) -> list[Shown]:
     """Follow all targets of all sensors, by joint integrated data association with visibility and hulls.
@@ -98,8 +98,8 @@ def run_many(
 
 def follow_many(
     scans: Sequence[Scan],
-    sensors: Sequence[SensorBeliefs],
-    targets: TargetBeliefs,
+    sensors: Sequence[ManySensorModel],
+    targets: ManyTargetModel,
     lasting_s: Sequence[float] = (),
 ) -> Iterator[tuple[Tracks, Shown]]:
     """The same scan by scan, with all tracks: also those that are not believed yet.
@@ -151,8 +151,8 @@ def step(
     scan: Scan,
     dt: float,
     own_dt: float,
-    sensors: tuple[SensorBeliefs, ...],
-    targets: TargetBeliefs,
+    sensors: tuple[ManySensorModel, ...],
+    targets: ManyTargetModel,
     first: int,
     lasting_s: Sequence[float] = (),
 ) -> tuple[Tracks, int]:
@@ -180,7 +180,7 @@ def step(
 
 
 def _corrected(
-    tracks: Tracks, seen: Measured, scan: Scan, sensors: tuple[SensorBeliefs, ...], targets: TargetBeliefs
+    tracks: Tracks, seen: Measured, scan: Scan, sensors: tuple[ManySensorModel, ...], targets: ManyTargetModel
 ) -> tuple[Tracks, Measured, Array]:
     """Tracks after the measurements, these with those of one hull merged, and how much of each is taken."""
     if not tracks.number:
@@ -253,7 +253,7 @@ def _compared(
     noise: Array,
     seen: Measured,
     scan: Scan,
-    sensor: SensorBeliefs,
+    sensor: ManySensorModel,
     gate: float,
     own: slice,
 ) -> tuple[Compared, NDArray[np.intp], Array]:
@@ -291,7 +291,7 @@ def _compared(
     return compared, near, of_all(compared.likelihood, near, M)
 
 
-def _within_reach(scan: Scan, sensor: SensorBeliefs, errors: int) -> Measured:
+def _within_reach(scan: Scan, sensor: ManySensorModel, errors: int) -> Measured:
     size = 1 if sensor.bearings else 2
     z, R = np.asarray(scan.z, float).reshape(-1, size), np.asarray(scan.R, float).reshape(-1, size, size)
     if sensor.bearings:
@@ -310,13 +310,13 @@ def in_reach(z: Array, platform: Array, near_m: float, far_m: float) -> NDArray[
     return np.asarray((distance > near_m) & (distance < far_m))
 
 
-def _sees(places: Array, scan: Scan, sensor: SensorBeliefs) -> NDArray[np.bool_]:
+def _sees(places: Array, scan: Scan, sensor: ManySensorModel) -> NDArray[np.bool_]:
     """(N,) places that are looked at: others are not missed."""
     near = np.asarray(np.linalg.norm(places - scan.platform, axis=1) < sensor.far_m)
     return near if scan.sees is None else near & scan.sees(places)
 
 
-def _on_a_known_one(z: Array, tracks: Tracks, targets: TargetBeliefs) -> NDArray[np.bool_]:
+def _on_a_known_one(z: Array, tracks: Tracks, targets: ManyTargetModel) -> NDArray[np.bool_]:
     """(M,) measurements on a confirmed target's hull: parts of it, and no targets of their own."""
     sure = np.flatnonzero(tracks.confirmed)
     if not len(sure) or not len(z):
@@ -327,7 +327,9 @@ def _on_a_known_one(z: Array, tracks: Tracks, targets: TargetBeliefs) -> NDArray
     return np.asarray((apart < np.maximum(0.7 * length, targets.apart_m)).any(axis=1))
 
 
-def _shown(tracks: Tracks, scan: Scan, sensors: tuple[SensorBeliefs, ...], targets: TargetBeliefs) -> Shown:
+def _shown(
+    tracks: Tracks, scan: Scan, sensors: tuple[ManySensorModel, ...], targets: ManyTargetModel
+) -> Shown:
     mean, _ = tracks.estimate()
     reach = max(sensor.far_m for sensor in sensors)
     rows = np.flatnonzero(

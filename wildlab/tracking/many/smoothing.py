@@ -39,7 +39,7 @@ def smooth_many(
     shown
         From `run_many`.
     density
-        `TargetBeliefs.density` that it was run with.
+        `ManyTargetModel.density` that it was run with.
     lasting_s
         As `run_many` was given, and behind it `wildlab.tracking.many.beliefs.own_lasting` of its sensors.
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from wildlab.tracking.many.beliefs import SensorBeliefs, TargetBeliefs, own_columns
+from wildlab.tracking.many.beliefs import ManySensorModel, ManyTargetModel, own_columns
 from wildlab.tracking.many.hulls import lasting_part, near_side, on_one_hull
 from wildlab.tracking.many.motions import densities_of, interact, largest_of
 from wildlab.tracking.maritime import white_acceleration
@@ -103,7 +103,7 @@ def both(tracks: Tracks, more: Tracks) -> Tracks:
     return Tracks._make([*parts, tracks.trail + more.trail])
 
 
-def later(tracks: Tracks, dt: float, targets: TargetBeliefs, lasting_s: ArrayLike = ()) -> Tracks:
+def later(tracks: Tracks, dt: float, targets: ManyTargetModel, lasting_s: ArrayLike = ()) -> Tracks:
     """Estimates ``dt`` s later, driven by white acceleration; shared errors last for (k,) s in the mean."""
     densities, x, P, C, kinds = densities_of(targets), tracks.x, tracks.P, tracks.C, tracks.kinds
     if len(densities) > 1:
@@ -120,9 +120,9 @@ def begin(
     R: Array,
     time: float,
     platform: ArrayLike,
-    sensors: tuple[SensorBeliefs, ...],
+    sensors: tuple[ManySensorModel, ...],
     sensor: int,
-    targets: TargetBeliefs,
+    targets: ManyTargetModel,
     first: int,
     shared: Array,
 ) -> Tracks:
@@ -166,7 +166,7 @@ def begin(
     )
 
 
-def alive(tracks: Tracks, targets: TargetBeliefs) -> Tracks:
+def alive(tracks: Tracks, targets: ManyTargetModel) -> Tracks:
     """Those that may exist, whose place is known at all, and whose speed is possible.
 
     What all measurements are wrong by together makes no track hard to find again: it is left out.
@@ -180,7 +180,7 @@ def alive(tracks: Tracks, targets: TargetBeliefs) -> Tracks:
     return tracks.only(np.flatnonzero(good))
 
 
-def without_doubles(tracks: Tracks, targets: TargetBeliefs, several: bool) -> Tracks:
+def without_doubles(tracks: Tracks, targets: ManyTargetModel, several: bool) -> Tracks:
     """One track for each target: of two on one place or, where ``several``, on one hull, the older stays.
 
     Parameters
@@ -225,7 +225,7 @@ def _is_of(
     kinds: Array,
     row: int,
     one: int,
-    targets: TargetBeliefs,
+    targets: ManyTargetModel,
     several: bool,
     largest: Flags,
 ) -> bool:
@@ -261,7 +261,7 @@ def moves(trail: Array, before: bool, moves_m: float, over_s: float) -> bool:
     before
         Whether it did until now: in between, and where there is no way to judge by, it still does.
     moves_m, over_s
-        As in `TargetBeliefs`.
+        As in `ManyTargetModel`.
     """
     if len(trail) < 2:
         return before
@@ -272,7 +272,7 @@ def moves(trail: Array, before: bool, moves_m: float, over_s: float) -> bool:
     return before and not (lasted > 0.8 * over_s and gone < 0.6 * moves_m)
 
 
-def judged_by_motion(tracks: Tracks, time: float, targets: TargetBeliefs) -> Tracks:
+def judged_by_motion(tracks: Tracks, time: float, targets: ManyTargetModel) -> Tracks:
     """Which of them move: what stays is a buoy, a moored boat or the shore."""
     moving, trails = tracks.moving.copy(), []
     for row, trail in enumerate(tracks.trail):

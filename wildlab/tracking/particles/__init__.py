@@ -42,7 +42,7 @@ from wildlab.tracking.particles.counting import (
     existence_after,
 )
 from wildlab.tracking.particles.grid import Grid, grid_moments, grid_over, grid_weigh, walk_matrix
-from wildlab.tracking.particles.herd import Herd, Look, Rules, expect, no_herd
+from wildlab.tracking.particles.herd import Herd, ImageLook, Rules, expect, no_herd
 from wildlab.tracking.particles.likelihoods import log_likelihood, sight_of
 from wildlab.tracking.particles.moves import drift, move, move_by_sight, stay_inside, walk_of
 from wildlab.tracking.particles.resampling import SCHEMES, draw, resample
@@ -54,7 +54,7 @@ __all__ = [
     "Count",
     "Grid",
     "Herd",
-    "Look",
+    "ImageLook",
     "Rules",
     "Weighed",
     "count_interval",

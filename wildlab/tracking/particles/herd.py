@@ -18,7 +18,7 @@ from wildlab.tracking.particles.resampling import FLODELL_THRESHOLD
 Moves = Callable[[Cloud, NDArray[np.bool_], float, np.random.Generator], Cloud]
 
 
-class Look(NamedTuple):
+class ImageLook(NamedTuple):
     """One image.
 
     Attributes
@@ -180,7 +180,7 @@ def expect(
     return no_herd(rules)._replace(unseen=cloud, expected_unseen=float(animals))
 
 
-def moved(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> Herd:
+def moved(herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator) -> Herd:
     """All tracks, and those never seen, at the time of an image."""
     dt = 0.0 if np.isnan(herd.time) else look.time - herd.time
     if not dt >= 0:

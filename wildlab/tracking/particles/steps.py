@@ -26,7 +26,7 @@ from wildlab.tracking.particles.clouds import (
     weigh_unseen,
 )
 from wildlab.tracking.particles.counting import existence_after
-from wildlab.tracking.particles.herd import Herd, Look, Rules, kept, moved, start_tracks, with_new
+from wildlab.tracking.particles.herd import Herd, ImageLook, Rules, kept, moved, start_tracks, with_new
 from wildlab.tracking.particles.likelihoods import log_likelihood
 from wildlab.tracking.particles.resampling import resample
 
@@ -40,7 +40,9 @@ LEAST_EFFECTIVE = 10.0
 LEAST_DENSITY = 1e-100
 
 
-def step_nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
+def step_nearest(
+    herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator
+) -> tuple[Herd, Integers]:
     """F's tracking, one image on: modified nearest neighbour, (4.11), negative update, both lost rules.
 
     Detections that no track takes start one each: F does not say whether the second one of a group takes the
@@ -70,7 +72,7 @@ def step_nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator)
     return _of_usable(_nearest, herd, look, rules, rng)
 
 
-def _nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
+def _nearest(herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
     herd = moved(herd, look, rules, rng)
     mean, covariance = moments(herd.cloud)
     squared = mahalanobis_squared(mean, covariance, look.z, look.R)
@@ -103,7 +105,7 @@ def _nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> 
 
 
 def _revived(
-    cloud: Cloud, seen: NDArray[np.bool_], mean: Array, covariance: Array, taken: Integers, look: Look,
+    cloud: Cloud, seen: NDArray[np.bool_], mean: Array, covariance: Array, taken: Integers, look: ImageLook,
     rng: np.random.Generator,
 ) -> Cloud:  # fmt: skip
     """Clouds of which a detection leaves hardly a particle, drawn anew about it.
@@ -127,7 +129,9 @@ def _revived(
     return Cloud(x, w)
 
 
-def step_counting(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
+def step_counting(
+    herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator
+) -> tuple[Herd, Integers]:
     """Tracking that counts, one image on: one detection at most for a track, and each with its probability.
 
     A detection is of a track, of an animal that was never seen, or false: each pair gains the logarithm of
@@ -161,7 +165,7 @@ def step_counting(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator
     return _of_usable(_counting, herd, look, rules, rng)
 
 
-def _counting(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
+def _counting(herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
     herd = moved(herd, look, rules, rng)
     A, M = len(herd.identity), len(look.z)
     sight, of_unseen = look.sight(herd.cloud.x[..., :2]), look.sight(herd.unseen.x[0, :, :2])
@@ -211,9 +215,9 @@ def _counting(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) ->
 
 
 def _of_usable(
-    step: Callable[[Herd, Look, Rules, np.random.Generator], tuple[Herd, Integers]],
+    step: Callable[[Herd, ImageLook, Rules, np.random.Generator], tuple[Herd, Integers]],
     herd: Herd,
-    look: Look,
+    look: ImageLook,
     rules: Rules,
     rng: np.random.Generator,
 ) -> tuple[Herd, Integers]:

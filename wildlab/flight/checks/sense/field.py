@@ -31,7 +31,7 @@ STEP_S = 2.0
 
 
 @dataclass(frozen=True)
-class Seen:
+class FieldStep:
     """Field before and after a step (N, 3) in b, attitudes then (N, 3, 3), and the direction of the Earth's
     field in n (3,) where the manifest says it."""
 
@@ -42,17 +42,17 @@ class Seen:
     earth: Array | None
 
 
-def _turned(s: Seen, rows: NDArray[np.bool_]) -> Array:
+def _turned(s: FieldStep, rows: NDArray[np.bool_]) -> Array:
     return np.asarray(np.swapaxes(s.R_after[rows], 1, 2) - np.swapaxes(s.R_before[rows], 1, 2))
 
 
-def _fit(s: Seen, rows: NDArray[np.bool_]) -> Array:
+def _fit(s: FieldStep, rows: NDArray[np.bool_]) -> Array:
     """The field in n (3,): the one whose turns in b are those seen. What is magnetic on board falls out."""
     A, change = _turned(s, rows).reshape(-1, 3), (s.after - s.before)[rows].ravel()
     return np.asarray(np.linalg.solve(A.T @ A + 1e-9 * np.eye(3), A.T @ change))
 
 
-def misfit(s: Seen) -> Misfit:
+def misfit(s: FieldStep) -> Misfit:
     """Share of the turning that no field in n explains (first row), and how far its direction is off."""
     half = np.arange(len(s.before)) // 10 % 2 == 0
     result = np.empty((2, 3))
@@ -119,7 +119,7 @@ def field(flight: Flight) -> Iterator[Finding]:
             )
 
 
-def seen_by(values: Array, nav: pd.DataFrame, earth: Array | None) -> Seen | None:
+def seen_by(values: Array, nav: pd.DataFrame, earth: Array | None) -> FieldStep | None:
     """Steps of the field (N, 4; time first) with the attitudes of a nav table; None of too few."""
     t = values[:, 0]
     first = np.unique(np.linspace(0, len(t) - 1, MOST).astype(int))
@@ -131,7 +131,7 @@ def seen_by(values: Array, nav: pd.DataFrame, earth: Array | None) -> Seen | Non
     if len(both) < ENOUGH:
         return None
     R = [turns[np.searchsorted(rows, both)] for rows, turns in at]
-    return Seen(values[first[both], 1:], values[last[both], 1:], R[0], R[1], earth)
+    return FieldStep(values[first[both], 1:], values[last[both], 1:], R[0], R[1], earth)
 
 
 def _earth(flight: Flight) -> Array | None:
@@ -142,7 +142,7 @@ def _earth(flight: Flight) -> Array | None:
     return np.array([np.cos(i) * np.cos(d), np.cos(i) * np.sin(d), np.sin(i)])
 
 
-def field_mistakes(source: str) -> Iterator[Mistake[Seen]]:
+def field_mistakes(source: str) -> Iterator[Mistake[FieldStep]]:
     """Axes of the magnetometer that are exchanged or count the other way, and a yaw from elsewhere."""
     for a in attitude_mistakes(f"poses.{source}"):
         yield a.within("attitude", _attitude(a.undo), change_attitude(source, a.undo))
@@ -155,8 +155,8 @@ def field_mistakes(source: str) -> Iterator[Mistake[Seen]]:
         )
 
 
-def _attitude(undo: Callable[[Array], Array | None]) -> Callable[[Seen], Seen | None]:
-    def change(s: Seen) -> Seen | None:
+def _attitude(undo: Callable[[Array], Array | None]) -> Callable[[FieldStep], FieldStep | None]:
+    def change(s: FieldStep) -> FieldStep | None:
         before, after = undo(s.R_before), undo(s.R_after)
         return None if before is None or after is None else replace(s, R_before=before, R_after=after)
 

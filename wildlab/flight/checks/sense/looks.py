@@ -25,7 +25,7 @@ USUAL, NONE = 0.25, 0.01
 
 
 @dataclass(frozen=True)
-class Scan:
+class SourceLooks:
     """What one source saw: places (N, 3) in n or azimuths (N,), from where (N, 3), and the targets (M, N, 3);
     own place and targets had the truth been later by so much; where the bow pointed, (N,) rad from north
     towards east; the number of the look (N,), counted from 0 without gaps; own place, targets and bow had the
@@ -43,7 +43,7 @@ class Scan:
     distance: Array | None = None
 
 
-def scans_of(flight: Flight) -> list[Scan]:
+def scans_of(flight: Flight) -> list[SourceLooks]:
     """The sources of positions and bearings, with enough detections each."""
     detections, frames, truth = flight.detections, flight.frames, flight.truth
     if detections is None or frames is None or truth is None or not len(truth) or not flight.nav:
@@ -87,7 +87,7 @@ def scans_of(flight: Flight) -> list[Scan]:
             continue
         position = kind == "position"
         found.append(
-            Scan(
+            SourceLooks(
                 str(source),
                 rows[["north_m", "east_m", "down_m"]].to_numpy(float) if position else None,
                 None if position else rows["azimuth_rad"].to_numpy(float),
@@ -103,7 +103,7 @@ def scans_of(flight: Flight) -> list[Scan]:
     return found
 
 
-Scans = tuple[Scan, ...]
+Scans = tuple[SourceLooks, ...]
 
 
 def _some_of_each_look(rows: pd.DataFrame) -> pd.DataFrame:
@@ -115,7 +115,7 @@ def _some_of_each_look(rows: pd.DataFrame) -> pd.DataFrame:
     return mixed[mixed.groupby("frame_id").cumcount() < max(1, MOST // len(looks))].sort_index()
 
 
-def hits(s: Scan) -> Array:
+def hits(s: SourceLooks) -> Array:
     """Whether each detection is where a target is, (N,), 0 or 1."""
     away = s.targets - s.own
     distance = np.hypot(away[..., 0], away[..., 1])
@@ -132,12 +132,12 @@ def hits(s: Scan) -> Array:
     return np.asarray(near.any(axis=0), float)
 
 
-def shares(s: Scan) -> Array:
+def shares(s: SourceLooks) -> Array:
     """Of every look, the share of its detections that are where a target is, (L,)."""
     return np.asarray(np.bincount(s.look, hits(s)) / np.bincount(s.look))
 
 
-def misfit(scans: tuple[Scan, ...]) -> Misfit:
+def misfit(scans: tuple[SourceLooks, ...]) -> Misfit:
     """The usual share of hits over the one there is, (2, 3), the mean of all sources; both rows alike.
 
     The share is the mean of those of all looks; halves are every other look, NaN where there is one alone.
@@ -151,7 +151,7 @@ def misfit(scans: tuple[Scan, ...]) -> Misfit:
     return USUAL * np.tile(np.exp(-result), (2, 1))
 
 
-def seen_at(s: Scan) -> Array:
+def seen_at(s: SourceLooks) -> Array:
     """Towards where each detection is, (N,) rad from true north towards east."""
     if s.azimuth is not None:
         return s.azimuth

@@ -28,7 +28,7 @@ HOURS = tuple(float(h) for h in np.arange(-14.0, 14.5, 0.5) if h)
 
 
 @dataclass(frozen=True)
-class Pair:
+class PositionPair:
     """Positions (N, 3) of both, what is usual of their difference (N, 3), attitudes and the lever arm; and
     the nav positions at other times."""
 
@@ -40,7 +40,7 @@ class Pair:
     at: Callable[[float], tuple[Array, Array]]
 
 
-def pair_of(flight: Flight, source: str) -> Pair | None:
+def pair_of(flight: Flight, source: str) -> PositionPair | None:
     """Nav source and receiver at the times of the fixes; None where they have too little in common."""
     table = fixes(flight)
     nav = flight.nav[source]
@@ -66,11 +66,11 @@ def pair_of(flight: Flight, source: str) -> Pair | None:
     vertical = np.full(len(t), stated.position_vertical_m or VERTICAL)
     usual = np.maximum(np.column_stack([level, level, vertical]), [1.0, 1.0, 2.0])
     lever = np.array(flight.manifest.gnss.lever_arm_m, float)
-    found = Pair(there, p, R, lever, usual, at)
+    found = PositionPair(there, p, R, lever, usual, at)
     return found if np.isfinite(there).all(axis=1).sum() >= ENOUGH else None
 
 
-def misfit(pair: Pair) -> Misfit:
+def misfit(pair: PositionPair) -> Misfit:
     """How far both are apart, (2, 3), in units of what is usual: less a constant, and as it is."""
     left = pair.gnss - np.einsum("nij,j->ni", pair.R_nb, pair.lever) - pair.nav
     good = np.isfinite(left).all(axis=1)
@@ -122,18 +122,20 @@ def positions(flight: Flight) -> Iterator[Finding]:
             )
 
 
-def _apart(pair: Pair) -> str:
+def _apart(pair: PositionPair) -> str:
     left = pair.gnss - np.einsum("nij,j->ni", pair.R_nb, pair.lever) - pair.nav
     level, vertical = np.nanmedian(np.hypot(left[:, 0], left[:, 1])), np.nanmedian(np.abs(left[:, 2]))
     return f"{words.number(float(level))} m level and {words.number(float(vertical))} m in height"
 
 
-def position_mistakes(flight: Flight, source: str, pair: Pair) -> Iterator[Mistake[Pair]]:
+def position_mistakes(flight: Flight, source: str, pair: PositionPair) -> Iterator[Mistake[PositionPair]]:
     """Mistakes about the places of both, a constant height, and clocks."""
     origin = flight.manifest.origin_tuple()
 
-    def of(which: str, undo: Callable[[Array], Array | None]) -> Callable[[Pair], Pair | None]:
-        def change(p: Pair) -> Pair | None:
+    def of(
+        which: str, undo: Callable[[Array], Array | None]
+    ) -> Callable[[PositionPair], PositionPair | None]:
+        def change(p: PositionPair) -> PositionPair | None:
             moved = undo(getattr(p, which))
             if moved is None:
                 return None
@@ -184,6 +186,6 @@ def position_mistakes(flight: Flight, source: str, pair: Pair) -> Iterator[Mista
         )
 
 
-def _shifted(pair: Pair, by: float) -> Pair:
+def _shifted(pair: PositionPair, by: float) -> PositionPair:
     nav, R = pair.at(by)
     return replace(pair, nav=nav, R_nb=R)

@@ -9,7 +9,7 @@ import numpy as np
 
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense import words
-from wildlab.flight.checks.sense.looks import USUAL, Scan, Scans, misfit, scans_of
+from wildlab.flight.checks.sense.looks import USUAL, Scans, SourceLooks, misfit, scans_of
 from wildlab.flight.checks.sense.places import LENGTHS, place_mistakes
 from wildlab.flight.checks.sense.trial import ALIKE, Mistake, explain
 from wildlab.flight.checks.sense.turned import best_turn, turned_finding
@@ -73,7 +73,7 @@ def common_mistakes(flight: Flight) -> Iterator[Mistake[Scans]]:
 
     def of(which: str, undo: Callable[[Array], Array | None]) -> Callable[[Scans], Scans | None]:
         def change(given: Scans) -> Scans | None:
-            done: list[Scan] = []
+            done: list[SourceLooks] = []
             for s in given:
                 moved = undo(s.targets if which == "targets" else s.own)
                 if moved is None:
@@ -103,18 +103,18 @@ def common_mistakes(flight: Flight) -> Iterator[Mistake[Scans]]:
         )
 
 
-def _later(s: Scan, by: float) -> Scan:
+def _later(s: SourceLooks, by: float) -> SourceLooks:
     own, targets = s.at(by)
     return replace(s, own=own, targets=targets)
 
 
-def _offset(flight: Flight, one: Scan) -> float:
+def _offset(flight: Flight, one: SourceLooks) -> float:
     """What is stated of its clock, s."""
     stated = flight.manifest.sensors.get(one.source)
     return 0.0 if stated is None else stated.clock_offset_s
 
 
-def source_mistakes(one: Scan, offset_s: float = 0.0) -> Iterator[Mistake[Scans]]:
+def source_mistakes(one: SourceLooks, offset_s: float = 0.0) -> Iterator[Mistake[Scans]]:
     """Mistakes about the positions, the bearings or the clock of one source.
 
     Parameters
@@ -127,7 +127,7 @@ def source_mistakes(one: Scan, offset_s: float = 0.0) -> Iterator[Mistake[Scans]
     yield from _clock_mistakes(one, offset_s)
     block = f'the [[detections]] with source = "{one.source}"'
 
-    def each(change: Callable[[Scan], Scan]) -> Callable[[Scans], Scans]:
+    def each(change: Callable[[SourceLooks], SourceLooks]) -> Callable[[Scans], Scans]:
         return lambda given: tuple(change(s) for s in given)
 
     if one.places is not None:
@@ -250,7 +250,7 @@ def source_mistakes(one: Scan, offset_s: float = 0.0) -> Iterator[Mistake[Scans]
     )
 
 
-def _clock_mistakes(one: Scan, offset_s: float) -> Iterator[Mistake[Scans]]:
+def _clock_mistakes(one: SourceLooks, offset_s: float) -> Iterator[Mistake[Scans]]:
     """The clock of the sensor alone: what it saw stays, and all else is where it was at other times."""
     if one.stamped is None:
         return
@@ -265,7 +265,7 @@ def _clock_mistakes(one: Scan, offset_s: float) -> Iterator[Mistake[Scans]]:
         )
 
 
-def _stamped(s: Scan, by: float) -> Scan:
+def _stamped(s: SourceLooks, by: float) -> SourceLooks:
     if s.stamped is None:
         return s
     own, targets, heading = s.stamped(by)

@@ -35,7 +35,7 @@ ROUNDS = 4
 LEAST_ATTITUDE = np.radians(0.3)
 
 
-class Look(NamedTuple):
+class SightingGeometry(NamedTuple):
     """What changes with time: poses, points (M, N, 3), angles of the gimbal."""
 
     p_nb: Array
@@ -90,7 +90,7 @@ class Sightings:
     image: NDArray[np.intp]
     sd: Array
     origin: Origin
-    looked: Callable[[float], Look]
+    looked: Callable[[float], SightingGeometry]
     labels: NDArray[np.object_]
     frames: NDArray[np.object_]
     own_gimbal: bool = False
@@ -99,9 +99,11 @@ class Sightings:
     def take(self, rows: NDArray[np.bool_]) -> Sightings:
         """Some of the rows; the poses at other times go with them."""
 
-        def looked(shift: float) -> Look:
+        def looked(shift: float) -> SightingGeometry:
             at = self.looked(shift)
-            return Look(at.p_nb[rows], at.R_nb[rows], at.points[:, rows], at.pan[rows], at.tilt[rows])
+            return SightingGeometry(
+                at.p_nb[rows], at.R_nb[rows], at.points[:, rows], at.pan[rows], at.tilt[rows]
+            )
 
         return replace(
             self,
@@ -169,13 +171,13 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         still = tuple(angle[frame] for angle in gimbal_angles(flight))
         moving = None if "pan_rad" in frames else flight.gimbal
 
-        def looked(shift: float) -> Look:
+        def looked(shift: float) -> SightingGeometry:
             p, R, _ = poses_at(brief, times + shift, ids)
             pan, tilt = still
             if moving is not None:
                 turns = np.unwrap(moving[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
                 pan, tilt = between(moving["time_s"].to_numpy(float), turns, times + shift, "gimbal").T
-            return Look(p, R, _points(tracks, times + shift, labels), pan, tilt)
+            return SightingGeometry(p, R, _points(tracks, times + shift, labels), pan, tilt)
 
         p, R, points, pan, tilt = looked(0.0)
         _, _, P = poses_at(nav, times, ids)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sense.looks import NEAR_M, Scan, scans_of
+from wildlab.flight.checks.sense.looks import NEAR_M, SourceLooks, scans_of
 from wildlab.flight.checks.sense.trial import FAR_BETTER_ALONE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
@@ -70,7 +70,7 @@ def targets(flight: Flight) -> Iterator[Finding]:
                 break
 
 
-def _near(scan: Scan, number: int) -> Array:
+def _near(scan: SourceLooks, number: int) -> Array:
     if scan.places is None:
         return np.empty((0, 2))
     others = np.linalg.norm((scan.targets - scan.places)[..., :2], axis=2)

@@ -9,7 +9,7 @@ import numpy as np
 
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense import words
-from wildlab.flight.checks.sense.looks import USUAL, Scan, Scans, hits, misfit, seen_at, shares
+from wildlab.flight.checks.sense.looks import USUAL, Scans, SourceLooks, hits, misfit, seen_at, shares
 from wildlab.flight.checks.sense.trial import far_better
 from wildlab.geometry.frames import Array, wrap
 
@@ -20,7 +20,7 @@ TURNS = np.arange(-20.0, 20.5, 0.5)
 CLEARLY = 2.0
 
 
-def turned(s: Scan, by_deg: float) -> Scan:
+def turned(s: SourceLooks, by_deg: float) -> SourceLooks:
     """The same looks with all bearings, or all places about the own one, turned clockwise."""
     by = np.radians(by_deg)
     if s.azimuth is not None:
@@ -68,7 +68,7 @@ def best_turn(given: Scans, rivals: Sequence[Scans]) -> float | None:
     return None if any(_clearly_more(other, done) for other in rivals) else by
 
 
-def _off(s: Scan) -> Array:
+def _off(s: SourceLooks) -> Array:
     """By how much (rad, clockwise) each detection that is where a target is would have to be turned."""
     good = hits(s) > 0
     away = (s.targets - s.own)[:, good]

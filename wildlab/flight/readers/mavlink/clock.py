@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.flight.readers.logs.log import Clock
-from wildlab.flight.readers.mavlink.frames import Frames, Messages, messages
+from wildlab.flight.readers.mavlink.frames import MavlinkFrames, Messages, messages
 from wildlab.flight.time.fitting import ClockFit
 from wildlab.flight.time.steady import fit_steady
 
@@ -59,7 +59,7 @@ class Boot(NamedTuple):
         return np.maximum(np.searchsorted(self.first, number, side="right") - 1, 0)
 
 
-def find_boot(frames: Frames, system: int, component: int) -> Boot | None:
+def find_boot(frames: MavlinkFrames, system: int, component: int) -> Boot | None:
     """The clock of an autopilot; None where nothing that it sent has a stamp."""
     kinds = [messages(frames, name, system, component) for name in _STAMPED]
     number = np.concatenate([one.number for one in kinds])

@@ -29,7 +29,7 @@ _TYPES = {
 }
 
 
-class Frames(NamedTuple):
+class MavlinkFrames(NamedTuple):
     """Sound frames of known messages in the order of the file, (N,) each; `data` is the whole file.
 
     `received_s`: s since 1970. `number`: which frame of the file it is, from 1. `at`, `size`: of the payload.
@@ -74,7 +74,7 @@ def names(enumeration: str, value: int) -> str:
     return "" if entry is None else entry.name.removeprefix(enumeration + "_").replace("_", " ").lower()
 
 
-def walk(data: bytes) -> Frames:
+def walk(data: bytes) -> MavlinkFrames:
     """All frames of a telemetry log.
 
     Parameters
@@ -123,7 +123,7 @@ def walk(data: bytes) -> Frames:
     received, *table = np.array(rows, dtype=np.int64).reshape(-1, 7).T
     numbers, kinds, systems, components, at, sizes = table
     lost = (damaged, dict(unknown), skipped, places, length - covered)
-    return Frames(data, received / 1e6, numbers, kinds, systems, components, at, sizes, *lost)
+    return MavlinkFrames(data, received / 1e6, numbers, kinds, systems, components, at, sizes, *lost)
 
 
 def _begins(data: bytes, at: int) -> bool:
@@ -177,7 +177,9 @@ class Messages:
         return Messages(kept, received, number, self.system[chosen], self.component[chosen])
 
 
-def messages(frames: Frames, name: str, system: int | None = None, component: int | None = None) -> Messages:
+def messages(
+    frames: MavlinkFrames, name: str, system: int | None = None, component: int | None = None
+) -> Messages:
     """Messages of one kind.
 
     Parameters

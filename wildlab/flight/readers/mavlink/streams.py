@@ -11,7 +11,7 @@ from wildlab.flight.readers.logs.log import Stream
 from wildlab.flight.readers.logs.places import ONE_HEIGHT, impossible_places, one_height, placed
 from wildlab.flight.readers.logs.stamps import places_that_hold, running_stream
 from wildlab.flight.readers.mavlink.clock import Boot, Flags, times
-from wildlab.flight.readers.mavlink.frames import Frames, Messages, messages
+from wildlab.flight.readers.mavlink.frames import MavlinkFrames, Messages, messages
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _FIX_SPACE, _FIX_PLANE = 3, 2
 
 
 def read_parts(
-    frames: Frames, system: int, component: int, boot: Boot | None
+    frames: MavlinkFrames, system: int, component: int, boot: Boot | None
 ) -> tuple[dict[str, Stream], list[str]]:
     """All parts that there are rows of, and sentences on what a user should know of them.
 
@@ -184,7 +184,12 @@ def _triggers(
 
 
 def _gimbal_device(
-    frames: Frames, system: int, component: int, boot: Boot | None, poses: Stream | None, notes: list[str]
+    frames: MavlinkFrames,
+    system: int,
+    component: int,
+    boot: Boot | None,
+    poses: Stream | None,
+    notes: list[str],
 ) -> Stream | None:
     found = messages(frames, "GIMBAL_DEVICE_ATTITUDE_STATUS", system)
     if not len(found):
@@ -195,7 +200,12 @@ def _gimbal_device(
 
 
 def _mount_orientation(
-    frames: Frames, system: int, component: int, boot: Boot | None, poses: Stream | None, notes: list[str]
+    frames: MavlinkFrames,
+    system: int,
+    component: int,
+    boot: Boot | None,
+    poses: Stream | None,
+    notes: list[str],
 ) -> Stream | None:
     found = messages(frames, "MOUNT_ORIENTATION", system)
     if not len(found):
@@ -210,7 +220,12 @@ def _mount_orientation(
 
 
 def _mount_status(
-    frames: Frames, system: int, component: int, boot: Boot | None, poses: Stream | None, notes: list[str]
+    frames: MavlinkFrames,
+    system: int,
+    component: int,
+    boot: Boot | None,
+    poses: Stream | None,
+    notes: list[str],
 ) -> Stream | None:
     found = messages(frames, "MOUNT_STATUS", system)
     if not len(found):

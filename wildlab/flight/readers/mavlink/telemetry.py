@@ -15,7 +15,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import printable
 from wildlab.flight.readers.logs.log import RawLog
 from wildlab.flight.readers.mavlink.clock import find_boot
-from wildlab.flight.readers.mavlink.frames import Frames, may_hold, messages, names, walk
+from wildlab.flight.readers.mavlink.frames import MavlinkFrames, may_hold, messages, names, walk
 from wildlab.flight.readers.mavlink.streams import read_parts
 
 #: So many sound frames say what a file is, where its name does not.
@@ -89,7 +89,7 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     )
 
 
-def _systems(frames: Frames) -> tuple[list[tuple[int, int]], set[int]]:
+def _systems(frames: MavlinkFrames) -> tuple[list[tuple[int, int]], set[int]]:
     """(system, component) of the autopilots, the busiest first, and systems that are none."""
     beats = messages(frames, "HEARTBEAT")
     no = (beats["autopilot"] == _NO_AUTOPILOT) | (beats["type"] == _GROUND_STATION)
@@ -112,7 +112,7 @@ def _systems(frames: Frames) -> tuple[list[tuple[int, int]], set[int]]:
     return list(first.values()), everyone - set(first)
 
 
-def _vehicle(frames: Frames, system: int, component: int) -> str:
+def _vehicle(frames: MavlinkFrames, system: int, component: int) -> str:
     texts = messages(frames, "STATUSTEXT", system, component)
     for text in texts.texts("text"):
         if _FIRMWARE.match(text):
@@ -128,7 +128,7 @@ def _vehicle(frames: Frames, system: int, component: int) -> str:
     return " ".join(one for one in (*said, kind and f"({kind})") if one)
 
 
-def _lost(frames: Frames) -> list[str]:
+def _lost(frames: MavlinkFrames) -> list[str]:
     total = len(frames.data)
     lost = []
     if frames.damaged:

@@ -17,7 +17,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs.log import Array, Clock, RawLog, Stream, make_stream
 from wildlab.flight.readers.tracks import nmea
 from wildlab.flight.readers.tracks.judging import Mask, gaps, judge, plural
-from wildlab.flight.readers.tracks.ubx_frames import Frames, Rows, between, frames, rows
+from wildlab.flight.readers.tracks.ubx_frames import Rows, UbxFrames, between, frames, rows
 from wildlab.flight.time.fitting import fit_clock
 from wildlab.flight.time.leap_seconds import WEEK_S, week_to_utc
 from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
@@ -79,7 +79,7 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     return RawLog("ubx", parts, clock=_clock(gnss), lost=lost, notes=notes)
 
 
-def _lost(found: Frames, rest: bytes) -> tuple[str, ...]:
+def _lost(found: UbxFrames, rest: bytes) -> tuple[str, ...]:
     strange = len(rest.translate(None, _TEXT))
     said = []
     if found.broken:
@@ -144,7 +144,7 @@ def _place(row: Rows) -> dict[str, Array]:
     return columns
 
 
-def _more_digits(data: bytes, found: Frames, columns: dict[str, Array]) -> None:
+def _more_digits(data: bytes, found: UbxFrames, columns: dict[str, Array]) -> None:
     row, _ = rows(data, found, _HPPOSLLH)
     if not len(row):
         return
@@ -164,7 +164,7 @@ def _more_digits(data: bytes, found: Frames, columns: dict[str, Array]) -> None:
     columns["undulation_m"] = columns["height_ellipsoid_m"] - columns["height_sea_m"]
 
 
-def _of_pvt(data: bytes, found: Frames, kind: tuple[int, int]) -> Stream | None:
+def _of_pvt(data: bytes, found: UbxFrames, kind: tuple[int, int]) -> Stream | None:
     """`gnss` of NAV-PVT, or of HNR-PVT, which has course and speed instead of a velocity."""
     row, which = rows(data, found, kind)
     if not len(row):
@@ -203,7 +203,7 @@ def _of_pvt(data: bytes, found: Frames, kind: tuple[int, int]) -> Stream | None:
     return make_stream("gnss", columns, which, "message", judge(columns, reasons))
 
 
-def _of_old(data: bytes, found: Frames) -> Stream | None:
+def _of_old(data: bytes, found: UbxFrames) -> Stream | None:
     row, which = rows(data, found, _POSLLH)
     if not len(row):
         return None
@@ -236,7 +236,7 @@ def _of_old(data: bytes, found: Frames) -> Stream | None:
     return make_stream("gnss", columns, which, "message", judge(columns, reasons))
 
 
-def _weeks_to_utc(data: bytes, found: Frames, own: Array) -> Array:
+def _weeks_to_utc(data: bytes, found: UbxFrames, own: Array) -> Array:
     """UTC of times of week, by the nearest message that knows both."""
     pairs: list[tuple[Array, Array]] = []
     row, _ = rows(data, found, _TIMEUTC)
@@ -262,7 +262,7 @@ def _weeks_to_utc(data: bytes, found: Frames, own: Array) -> Array:
     return np.full(len(own), np.nan)
 
 
-def _poses(data: bytes, found: Frames, gnss: Stream) -> Stream | None:
+def _poses(data: bytes, found: UbxFrames, gnss: Stream) -> Stream | None:
     """Attitude of HNR-ATT at the positions of HNR-PVT, or of NAV-ATT at those of `gnss`."""
     place = gnss
     row, _ = rows(data, found, _HNR_ATT)

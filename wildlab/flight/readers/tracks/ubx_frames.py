@@ -66,7 +66,7 @@ LAYOUTS: dict[tuple[int, int], Any] = {
 CLASSES = (*(0x01, 0x02, 0x04, 0x05, 0x06, 0x09, 0x0A, 0x0B, 0x0C, 0x0D, 0x10), *(0x13, 0x21, 0x27, 0x28))
 
 
-class Frames(NamedTuple):
+class UbxFrames(NamedTuple):
     """Messages whose checksum holds, in the order of the file.
 
     Attributes
@@ -85,7 +85,7 @@ class Frames(NamedTuple):
     broken: int
 
 
-def frames(data: bytes) -> Frames:
+def frames(data: bytes) -> UbxFrames:
     """Messages in any stream of bytes, whatever else is in it. A length that lies costs one message.
 
     Sums of all bytes before each place give the checksum of any stretch at once, so that no stretch is read
@@ -120,10 +120,10 @@ def frames(data: bytes) -> Frames:
     place = np.searchsorted(starts, bad, side="right") - 1
     inside = (place >= 0) & (bad < stops[np.maximum(place, 0)]) if len(starts) else np.zeros(len(bad), bool)
     kind = raw[starts + 2].astype(np.int64) * 256 + raw[starts + 3] if len(starts) else starts
-    return Frames(starts, stops, kind, int((~inside).sum()))
+    return UbxFrames(starts, stops, kind, int((~inside).sum()))
 
 
-def rows(data: bytes, found: Frames, kind: tuple[int, int]) -> tuple[Rows, NDArray[np.int64]]:
+def rows(data: bytes, found: UbxFrames, kind: tuple[int, int]) -> tuple[Rows, NDArray[np.int64]]:
     """Fields of all messages of a kind (structured, (N,)), and which of the file's they are, from 1."""
     layout = np.dtype(LAYOUTS[kind])
     size = found.stop - found.start - _HEADER - _CHECK
@@ -133,7 +133,7 @@ def rows(data: bytes, found: Frames, kind: tuple[int, int]) -> tuple[Rows, NDArr
     return np.ascontiguousarray(bytes_).view(layout).reshape(-1), which + 1
 
 
-def between(data: bytes, found: Frames) -> bytes:
+def between(data: bytes, found: UbxFrames) -> bytes:
     """What is not in any message, in order."""
     ends = np.r_[0, found.stop]
     begins = np.r_[found.start, len(data)]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.evaluation.identities import Identities, Scan, compare_identities
+from wildlab.evaluation.identities import Identities, Moment, compare_identities
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.rendered import Photographer, exposures_of
@@ -142,7 +142,7 @@ def identities_of(crossing: Crossing, bank: Bank) -> Identities:
         known = np.isfinite(crossing.truth[:, row]).all(axis=1)
         there = np.flatnonzero(np.isfinite(bank.x[row, :, 0]))
         scans.append(
-            Scan(
+            Moment(
                 float(crossing.times[row]), bank.x[row, there, :2], bank.P[row, there, :2, :2],
                 there.tolist(), crossing.truth[known, row], [BOATS[k] for k in np.flatnonzero(known)],
                 shown[row, known], ignored[known],

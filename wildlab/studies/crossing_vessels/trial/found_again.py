@@ -24,7 +24,7 @@ MAX_AGE_S = 10.0
 SURE, GUESS = 19.0, 1.0 + 1e-6
 
 
-class Way(NamedTuple):
+class ReacquisitionRule(NamedTuple):
     """How tracks are found again: by which rule, and by which ratio of likelihoods."""
 
     rule: str
@@ -33,10 +33,10 @@ class Way(NamedTuple):
 
 #: By distance alone and with looks; where it is no guess, and whichever is the likeliest.
 WAYS = {
-    "again-without-features": Way(rules.DISTANCE, SURE),
-    "again-with-features": Way(rules.FEATURES, SURE),
-    "again-guessed-without-features": Way(rules.DISTANCE, GUESS),
-    "again-guessed-with-features": Way(rules.FEATURES, GUESS),
+    "again-without-features": ReacquisitionRule(rules.DISTANCE, SURE),
+    "again-with-features": ReacquisitionRule(rules.FEATURES, SURE),
+    "again-guessed-without-features": ReacquisitionRule(rules.DISTANCE, GUESS),
+    "again-guessed-with-features": ReacquisitionRule(rules.FEATURES, GUESS),
 }
 #: Names of the numbers that are recorded, and their units: tracks, by `Outcome`.
 UNITS = {"found_right": "1", "found_wrong": "1", "not_found": "1", "rightly_new": "1"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wildlab.evaluation.identities import Identities, Scan, compare_identities
+from wildlab.evaluation.identities import Identities, Moment, compare_identities
 from wildlab.studies.crossing_vessels.trial.crossing import (
     APART_M,
     BOATS,
@@ -15,7 +15,7 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     Numbers,
     apart_times,
 )
-from wildlab.tracking.many import POINT, SensorBeliefs, TargetBeliefs, run_many
+from wildlab.tracking.many import POINT, ManySensorModel, ManyTargetModel, run_many
 from wildlab.tracking.many import Scan as Look
 
 #: Joint integrated data association beside them, by distance alone (H 8.2 names it as what would come next).
@@ -23,11 +23,11 @@ JOINT = "jipda"
 #: What joint association is told: the printed noise of `TUNING`, as white acceleration of the same strength.
 #: Chosen, once: nearly all that is in view is detected and hardly anything else is; a vessel is in view for
 #: some seconds in each lap and then for half a minute not, and both are there for good.
-SENSOR = SensorBeliefs(
+SENSOR = ManySensorModel(
     name="camera", detection=0.95, clutter=1e-8, near_m=0.0, far_m=np.inf, patience_s=np.inf,
     rough_m=(0.0,), along_m=(0.0,), near_side_m=(0.0,),
 )  # fmt: skip
-TARGETS = TargetBeliefs(
+TARGETS = ManyTargetModel(
     hulls=(POINT,), density=TUNING.acceleration, start_speed_m_s=TUNING.velocity_0, lifetime_s=1e6, birth=0.9,
     visible_s=5.0, hidden_s=30.0, gate=float(np.sqrt(TUNING.gate)), confirmed=0.9, hits=2, shown=0.5,
     forgotten=1e-3, lost_m=1e4, fastest_m_s=np.inf, moves_m=0.0, over_s=0.0, apart_m=0.0,
@@ -50,7 +50,7 @@ def joint_of(crossing: Crossing, density: float) -> Identities:
         known = np.isfinite(crossing.truth[:, k]).all(axis=1)
         shown = np.isin([0, 1], crossing.boat[number == k])
         scans.append(
-            Scan(
+            Moment(
                 one.time, one.x[:, :2], one.P[:, :2, :2], one.identity.tolist(), crossing.truth[known, k],
                 [BOATS[n] for n in np.flatnonzero(known)], shown[known], ignored[known],
             )
