@@ -20,7 +20,7 @@ from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.published import published_rows
-from wildlab.reporting.report import open_report
+from wildlab.reporting.report import Report, open_report
 from wildlab.reporting.text import slug
 from wildlab.reporting.verdicts import judge
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
@@ -263,3 +263,11 @@ def _verdicts(study: StudyEntry, case: Study, work: SeedWork, told: dict[str, An
         if compared is not None:
             found[f"{row['name']} of {row['subject']}"] = compared.words
     return found
+
+
+def choices_section(report: Report, study: str, out: str = "") -> None:
+    """The section of a report on what hangs on a twin's chosen parameters; arguments as of `kept_table`."""
+    kept = kept_table(study, out)
+    report.section("What hangs on what was chosen", turned_words(kept, study))
+    if kept is not None:
+        report.table(kept[0], columns=COLUMNS, digits={"factor": 2, "turned": 0}, fold="Every move")

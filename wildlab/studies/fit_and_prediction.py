@@ -8,7 +8,16 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from wildlab.simulation.parameters import TwinParameters, each_parameter, fitted_to, load_twin
+from wildlab.reporting.published import load_published
+from wildlab.reporting.report import Report
+from wildlab.simulation.parameters import (
+    TwinParameters,
+    each_parameter,
+    fitted_to,
+    load_twin,
+    parameters_table,
+    status_words,
+)
 
 
 class Beside(NamedTuple):
@@ -102,3 +111,28 @@ _NOT_KNOWN = "sizes were chosen by how near they bring these tables; what causes
 
 def _listed(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def simulated_section(report: Report, *twins: str, study: str = "", about: str = "") -> None:
+    """The section of a report on what was simulated: every parameter of its twins, folded away.
+
+    Parameters
+    ----------
+    twins
+        Their names.
+    study
+        Left out where no published table stands beside the twin.
+    about
+        What to say of it.
+    """
+    report.section("What was simulated", about)
+    for twin in twins:
+        twin_table(report, twin, study)
+
+
+def twin_table(report: Report, twin: str, study: str = "") -> None:
+    """The table of `simulated_section` alone, for one twin."""
+    table = parameters_table(twin)
+    fitted = f" {fit_words(load_published(study), twin)}" if study else ""
+    told = f"The twin {twin}: {status_words(table)}"
+    report.table(table, fold=told, caption=f"Every parameter of the twin.{fitted}")

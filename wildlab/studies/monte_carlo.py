@@ -309,6 +309,14 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
     return pd.DataFrame(rows)
 
 
+def claims_section(
+    report: Report, study: str, checks: Mapping[str, Check | ArrayLike], about: str = ""
+) -> None:
+    """The section of a report on the claims of a study, by `decide_claims`; ``about`` precedes the rule."""
+    report.section("Claims of the thesis", f"{about} {CLAIMS_EXPLAINED}".strip())
+    report.table(decide_claims(report, study, checks), columns=CLAIM_COLUMNS, digits=0)
+
+
 def holding(report: Report, *ids: str) -> bool:
     """Whether every one of these claims has come out as one that holds; `decide_claims` has to have run."""
     verdicts = {claim["id"]: claim["verdict"] for claim in report.claims}
