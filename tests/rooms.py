@@ -16,7 +16,7 @@ LAZY = (
     "wildlab.flight.checks",
     "wildlab.flight.recipe",
     "wildlab.geometry",
-    "wildlab.pipeline",
+    "wildlab.analysis",
     "wildlab.reporting",
 )
 #: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.

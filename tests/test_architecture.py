@@ -21,7 +21,7 @@ from packaging.utils import canonicalize_name
 
 from wildlab import doctor, paths
 
-BELOW_PIPELINE = {
+BELOW_ANALYSIS = {
     "geometry", "navigation", "detection", "tracking", "planning", "flight", "simulation", "evaluation",
 }  # fmt: skip
 
@@ -35,18 +35,18 @@ MAY_IMPORT: dict[str, set[str]] = {
     "flight": {"geometry"},
     "simulation": {"geometry", "flight"},
     "evaluation": {"geometry", "tracking"},
-    "pipeline": BELOW_PIPELINE,
-    "reporting": BELOW_PIPELINE | {"pipeline"},
-    "replay": BELOW_PIPELINE | {"pipeline", "reporting"},
-    "studies": BELOW_PIPELINE | {"pipeline", "reporting", "replay"},
-    "runner": BELOW_PIPELINE | {"pipeline", "reporting", "replay", "studies"},
-    "sharing": BELOW_PIPELINE | {"pipeline", "reporting", "studies", "runner"},
+    "analysis": BELOW_ANALYSIS,
+    "reporting": BELOW_ANALYSIS | {"analysis"},
+    "replay": BELOW_ANALYSIS | {"analysis", "reporting"},
+    "studies": BELOW_ANALYSIS | {"analysis", "reporting", "replay"},
+    "runner": BELOW_ANALYSIS | {"analysis", "reporting", "replay", "studies"},
+    "sharing": BELOW_ANALYSIS | {"analysis", "reporting", "studies", "runner"},
     # What `import wildlab` offers; nothing of wildlab imports it.
-    "api": BELOW_PIPELINE | {"pipeline", "reporting", "replay"},
-    "commands": BELOW_PIPELINE | {"pipeline", "reporting", "studies", "runner", "sharing", "terminal"},
-    "cli": BELOW_PIPELINE | {"pipeline", "reporting", "studies", "runner", "commands", "doctor", "terminal"},
+    "api": BELOW_ANALYSIS | {"analysis", "reporting", "replay"},
+    "commands": BELOW_ANALYSIS | {"analysis", "reporting", "studies", "runner", "sharing", "terminal"},
+    "cli": BELOW_ANALYSIS | {"analysis", "reporting", "studies", "runner", "commands", "doctor", "terminal"},
     "__main__": {"cli"},
-    "brief": set(),
+    "summary_table": set(),
     "doctor": set(),
     "lazy": set(),
     "terminal": set(),
@@ -58,7 +58,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__init__": {"api", "flight"},
 }
 #: These know nothing about flights and may be used by all.
-FOR_ALL = {"brief", "errors", "files", "lazy", "names", "paths", "__version__"}
+FOR_ALL = {"summary_table", "errors", "files", "lazy", "names", "paths", "__version__"}
 
 NOTEBOOK_PACKAGES = {
     "papermill", "nbconvert", "nbclient", "nbformat", "IPython", "ipykernel", "jupyter_client",
@@ -339,11 +339,11 @@ def test_no_copyleft_in_the_lock():
         ("geometry/a.py", "def f():\n    import wildlab.flight", "a.py:2: geometry may not import flight"),
         ("geometry/deep/a.py", "from ...flight import store", "geometry may not import flight"),
         ("geometry/a.py", "import importlib\nimportlib.import_module('wildlab.flight')", "import flight"),
-        ("pipeline/a.py", "from wildlab.reporting import page", "pipeline may not import reporting"),
+        ("analysis/a.py", "from wildlab.reporting import page", "analysis may not import reporting"),
         ("attic/a.py", "x = 1", "the room attic is not in MAY_IMPORT"),
         ("flight/a.py", "from IPython.display import display", "know about notebooks"),
         ("studies/autoferry_many/beside.py", "import stonesoup.tracker", "is an oracle"),
-        ("pipeline/a.py", "from osgeo import gdal", "is an oracle"),
+        ("analysis/a.py", "from osgeo import gdal", "is an oracle"),
         ("detection/a.py", "from ultralytics import YOLO", "copyleft"),
         ("flight/a.py", "import pickle", "can run code"),
         ("flight/a.py", "eval('1')", "eval()"),

@@ -14,8 +14,8 @@ import click
 import numpy as np
 import pytest
 
+from tests.analysis.survey_twin import Survey, simulate
 from tests.flight.conftest import make_flight
-from tests.pipeline.survey_twin import Survey, simulate
 from wildlab import cli
 from wildlab.errors import RunFailed, WildlabError, system_error
 from wildlab.flight.store import save_flight

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from tests.analysis.survey_twin import Survey, simulate
 from tests.commands import refuse, succeed
-from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
 from wildlab.evaluation.runs import Interval
 from wildlab.flight.learnt import parse_learnt, read_learnt, write_learnt
@@ -48,7 +48,7 @@ def learn(monkeypatch, **found):
     """Have the command find this, and write nothing."""
     learnt = SimpleNamespace(gain=None, parameter=())
     both = learnt, SimpleNamespace(**found)
-    monkeypatch.setattr("wildlab.pipeline.learn.learn_flight", lambda *_: both)
+    monkeypatch.setattr("wildlab.analysis.learn.learn_flight", lambda *_: both)
     monkeypatch.setattr("wildlab.flight.learnt.write_learnt", lambda *_: None)
 
 

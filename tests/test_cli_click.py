@@ -20,15 +20,15 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.clicking import HOSTILE, ask, serving, write_images
+from tests.analysis.survey_twin import Survey, simulate
+from tests.annotation import HOSTILE, ask, serving, write_images
 from tests.commands import call, refuse
-from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.flight.readers.clicks import clicks as click_files
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.runner.clicking.pictures import Picture, picture_of
-from wildlab.runner.clicking.server import HEADER_S, MOST_LINKS, ClickServer, open_server
-from wildlab.runner.clicking.session import Session, check_points, open_session, read_points, table_of
+from wildlab.runner.annotation.pictures import Picture, picture_of
+from wildlab.runner.annotation.server import HEADER_S, MOST_LINKS, ClickServer, open_server
+from wildlab.runner.annotation.session import Session, check_points, open_session, read_points, table_of
 
 
 @pytest.fixture

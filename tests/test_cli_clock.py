@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from tests.clicking import write_images
-from tests.pipeline.survey_twin import Survey, simulate
+from tests.analysis.survey_twin import Survey, simulate
+from tests.annotation import write_images
+from wildlab.analysis import camera_clock
+from wildlab.analysis.camera_clock import CameraClock
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.store import save_flight
-from wildlab.pipeline import camera_clock
-from wildlab.pipeline.camera_clock import CameraClock
 
 
 def clock(sentence: str, certain: bool) -> CameraClock:

@@ -13,12 +13,12 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+from tests.analysis.test_detect import folder, picture
 from tests.commands import refuse, succeed
-from tests.pipeline.test_detect import folder, picture
 from tests.test_cli_camera import huge_png
 from wildlab import cli
+from wildlab.analysis.detecting.said import too_few_or_many
 from wildlab.flight.store import save_flight
-from wildlab.pipeline.detecting.said import too_few_or_many
 from wildlab.simulation.twins import simulate_twin
 
 

@@ -9,9 +9,9 @@ import pytest
 import rasterio
 
 from tests import commands
+from tests.analysis.test_plan import FIELD
 from tests.flight.test_area import LAT, LON, collection, feature, polygon
 from tests.flight.test_mission_writers import check_plan, read_wpl
-from tests.pipeline.test_plan import FIELD
 
 call, succeed, refuse = (partial(one, "plan") for one in (commands.call, commands.succeed, commands.refuse))
 SHEET = ("--image", "640x512", "--view", "45")

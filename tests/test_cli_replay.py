@@ -10,8 +10,8 @@ import pytest
 
 from tests.commands import refuse, succeed
 from tests.replay.recordings import read_recording
+from wildlab.analysis.following.estimates import COLUMNS
 from wildlab.flight.store import save_flight
-from wildlab.pipeline.following.estimates import COLUMNS
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.simulation.twins import simulate_twin
 

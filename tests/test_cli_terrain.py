@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 from pyproj import Transformer
 
+from tests.analysis.survey_twin import Survey, simulate
 from tests.commands import refuse, succeed
-from tests.pipeline.survey_twin import Survey, simulate
 from tests.test_cli_plan import write_map
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight

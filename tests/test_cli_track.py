@@ -8,8 +8,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from tests.analysis.robots import robot_flight
 from tests.commands import refuse, succeed
-from tests.pipeline.robots import robot_flight
 from wildlab.flight.store import save_flight
 
 

@@ -18,15 +18,15 @@ from scipy.stats import chi2
 import wildlab
 from tests.rooms import LAZY
 from wildlab import paths
+from wildlab.analysis.consistency import Series, mean_of_runs, navigation_series, worth
+from wildlab.analysis.navigate import PUBLISHED_LIKE
+from wildlab.analysis.navigation_errors import NavigationErrors
 from wildlab.api.points import Points
-from wildlab.brief import LONGEST, MOST_ROWS, Summary, as_html, as_text
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
-from wildlab.pipeline.navigate import PUBLISHED_LIKE
-from wildlab.pipeline.navigation_errors import NavigationErrors
 from wildlab.simulation.twins import simulate_twin
+from wildlab.summary_table import LONGEST, MOST_ROWS, Summary, as_html, as_text
 
 HEAVY = ("numpy", "pandas", "matplotlib", "scipy", "numba", "cv2", "pydantic", "pyarrow", "click")
 

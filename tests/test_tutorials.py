@@ -38,7 +38,7 @@ ROOMS = (
     "tracking",
     "simulation",
     "evaluation",
-    "pipeline",
+    "analysis",
     "reporting",
 )
 

@@ -26,7 +26,7 @@ INTO = ROOT / "reports" / "reference"
 #: themselves are read in their reports; `wildlab --help` tells the runner and the command line.
 ROOMS = (
     *("api", "geometry", "flight", "navigation", "tracking", "simulation", "detection"),
-    *("planning", "evaluation", "pipeline"),
+    *("planning", "evaluation", "analysis"),
     *("reporting", "replay", "sharing"),
 )
 

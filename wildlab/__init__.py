@@ -32,7 +32,7 @@ else:
     __getattr__, __dir__ = offer(
         __name__,
         folders=(
-            *("geometry", "flight", "navigation", "tracking", "simulation", "evaluation", "pipeline"),
+            *("geometry", "flight", "navigation", "tracking", "simulation", "evaluation", "analysis"),
             *("reporting", "studies"),
         ),
     )

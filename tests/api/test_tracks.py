@@ -9,6 +9,13 @@ import pandas as pd
 import pytest
 
 import wildlab
+from wildlab.analysis.consistency import Series
+from wildlab.analysis.following.estimates import STATE, estimates_table
+from wildlab.analysis.following.follow import follow_targets
+from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
+from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated
+from wildlab.analysis.navigation_errors import comparison_times
+from wildlab.analysis.track import FILTERS, CvTuning, evaluate_track, follow_schmidt, sighting
 from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
 from wildlab.evaluation.consistency import Average, chi_square_interval
@@ -17,13 +24,6 @@ from wildlab.flight.files import check_model
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_quaternion
-from wildlab.pipeline.consistency import Series
-from wildlab.pipeline.following.estimates import STATE, estimates_table
-from wildlab.pipeline.following.follow import follow_targets
-from wildlab.pipeline.georeference import assumed_deviations, assumed_pose_covariance
-from wildlab.pipeline.navigate import PUBLISHED_LIKE, Navigated
-from wildlab.pipeline.navigation_errors import comparison_times
-from wildlab.pipeline.track import FILTERS, CvTuning, evaluate_track, follow_schmidt, sighting
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate, simulate_twin
 

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.pipeline.survey_twin import Survey, simulate
+from tests.analysis.survey_twin import Survey, simulate
+from wildlab.analysis.georeference import observe
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.sense.sightings import sightings
@@ -28,7 +29,6 @@ from wildlab.flight.clocks import (
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_quaternion, rotation_vector_to_matrix
-from wildlab.pipeline.georeference import observe
 
 component = st.floats(-1.5, 1.5)
 vectors = st.tuples(component, component, component).map(np.array)

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.following.estimates import COLUMNS
+from wildlab.analysis.following.judged import LEADING
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.estimates import COLUMNS
-from wildlab.pipeline.following.judged import LEADING
 from wildlab.replay.gather import scene_of
 from wildlab.replay.moving import MOST_BYTES, moving_flight, show_moving
 from wildlab.reporting.report import open_report

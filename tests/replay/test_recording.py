@@ -12,13 +12,13 @@ import pandas as pd
 import pytest
 
 from tests.replay.recordings import Logged, read_recording
+from wildlab.analysis.overviews.image_coverage import ground_height
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry import CameraPoses, Terrain, inside_ellipse, project
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.pipeline.overviews.image_coverage import ground_height
 from wildlab.replay.gather import MOST_FRAMES, footprints, scene_of
 from wildlab.replay.recording import save_recording
 from wildlab.replay.shapes import ellipse_rings, mesh

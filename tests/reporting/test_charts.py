@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from tests.figure_text import overlapping
+from wildlab.analysis.following.sensor_tracks import Array, SensorTrack
+from wildlab.analysis.overviews.overview import Path
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.pipeline.following.sensor_tracks import Array, SensorTrack
-from wildlab.pipeline.overviews.overview import Path
 from wildlab.reporting.charts.beside import beside_plain, beside_plain_shown
 from wildlab.reporting.charts.following import errors_shown
 from wildlab.reporting.charts.navigation import (

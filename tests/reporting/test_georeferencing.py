@@ -15,11 +15,11 @@ import pymap3d
 import pytest
 from bs4 import BeautifulSoup
 
+from wildlab.analysis.georeference import georeference, observe
 from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.pipeline.georeference import georeference, observe
 from wildlab.reporting import georeferencing
 from wildlab.reporting.georeferencing import noise_table
 from wildlab.reporting.georeferencing_left import remaining_parts

@@ -7,6 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.diagnosis import Diagnosis
+from wildlab.analysis.overviews.recommendations import CAUSES, causes_told, gains_of, possible_gain
+from wildlab.analysis.overviews.verdict import WORTH, Evidence, verdict_of
 from wildlab.evaluation.axes import AlongAxis
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
@@ -14,9 +17,6 @@ from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.outliers import Outlier
 from wildlab.evaluation.runs import Interval
 from wildlab.geometry.calibration import Calibration
-from wildlab.pipeline.diagnosis import Diagnosis
-from wildlab.pipeline.overviews.verdict import WORTH, Evidence, verdict_of
-from wildlab.pipeline.overviews.worth_fixing import CAUSES, causes_told, gains_of, possible_gain
 from wildlab.reporting import georeferencing_cause as cause
 from wildlab.reporting import georeferencing_left as left
 from wildlab.reporting.georeferencing_sections import verdict_words

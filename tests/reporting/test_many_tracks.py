@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from tests.figure_text import overlapping
+from wildlab.analysis.following.noise_model import ToldValue
 from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackLife, compare_identities
 from wildlab.evaluation.sets import gospa
-from wildlab.pipeline.following.beliefs import ToldValue
 from wildlab.reporting import figures
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts

@@ -19,16 +19,16 @@ from matplotlib.figure import Figure
 import wildlab
 from tests.reporting.test_charts import track
 from tests.reporting.test_many_tracks import made
+from wildlab.analysis.detecting.detect import TABLE_COLUMNS
 from wildlab.files import csv_text, read_csv
 from wildlab.names import FORMULA
-from wildlab.pipeline.detecting.detect import TABLE_COLUMNS
 from wildlab.reporting.charts import comparison, following, georeferencing, many, navigation, overview, tracks
 from wildlab.reporting.charts.beside import beside_plain_shown
 from wildlab.reporting.detectors_compared import curves_shown
 from wildlab.reporting.figure_text import _harmless as _harmless_texts
 from wildlab.reporting.figure_text import fit_text
 from wildlab.reporting.tables import csv_link
-from wildlab.runner.clicking.session import Point, Session
+from wildlab.runner.annotation.session import Point, Session
 
 PACKAGE = Path(wildlab.__file__).parent
 HOSTILE = [

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.following.judged import Apart, leading_filter
 from wildlab.evaluation.consistency import Average
-from wildlab.pipeline.following.judged import Apart, leading_filter
 from wildlab.reporting import tracking as words
 
 

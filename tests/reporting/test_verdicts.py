@@ -12,9 +12,7 @@ from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, UNDECIDED
-from wildlab.reporting.report import open_report
-from wildlab.reporting.spread import bounds_of, range_clause, range_words, share_below, spread_words
-from wildlab.reporting.standing import (
+from wildlab.reporting.flight_status import (
     ALONE,
     AS_PUBLISHED,
     IN_PART,
@@ -23,6 +21,8 @@ from wildlab.reporting.standing import (
     OPEN,
     standing,
 )
+from wildlab.reporting.report import open_report
+from wildlab.reporting.spread import bounds_of, range_clause, range_words, share_below, spread_words
 from wildlab.reporting.verdicts import comparison_words
 from wildlab.studies import monte_carlo, single_target
 from wildlab.studies.protocol import Metric, Study

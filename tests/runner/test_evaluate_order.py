@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tests.pipeline.robots import robot_flight
+from tests.analysis.robots import robot_flight
 from wildlab.flight.store import save_flight
 from wildlab.runner import evaluate
 from wildlab.runner.processes.job import Job

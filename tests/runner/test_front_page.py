@@ -19,12 +19,12 @@ from bs4 import BeautifulSoup
 from tests.runner.test_ledger import a_study, ran
 from wildlab.reporting import html, metrics
 from wildlab.reporting.counts import CALCULATIONS, counted
+from wildlab.reporting.flight_status import standing
 from wildlab.reporting.front.cards import card_html, study_card
 from wildlab.reporting.front.flight import FILE, load_front_flight, simulated
 from wildlab.reporting.front.glimpse import Glimpse
 from wildlab.reporting.front.index import flight_words, front_page
 from wildlab.reporting.published import published_rows
-from wildlab.reporting.standing import standing
 from wildlab.reporting.status import StudyStatus
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.record.front_page import build_ledger

@@ -2,8 +2,8 @@
 
 import pytest
 
+from tests.analysis.survey_twin import Survey, simulate
 from tests.notebooks import run_here
-from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import save_flight
 

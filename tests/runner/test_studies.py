@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.navigation_errors import TUNINGS
 from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import white_bound
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.paths import DATA
-from wildlab.pipeline.navigation_errors import TUNINGS
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import evaluate_flight

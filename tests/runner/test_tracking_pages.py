@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.pipeline.robots import robot_flight
+from tests.analysis.robots import robot_flight
 from wildlab.flight.checks.check import Use, usable_for
 from wildlab.flight.store import Flight
 from wildlab.runner.evaluate import lacking_for_tracking

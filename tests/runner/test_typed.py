@@ -9,7 +9,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.pipeline.robots import robot_flight
+from tests.analysis.robots import robot_flight
 from wildlab.flight.store import save_flight
 from wildlab.paths import REPORTS
 from wildlab.runner import evaluate, track, track_many

@@ -15,14 +15,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tests.sharing.canary import EPOCH, HASH, HERE, START, canary, place, velocity
+from wildlab.analysis.georeference import observe
+from wildlab.analysis.navigation_errors import REFERENCES, reference_of
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import PREFERRED, Flight, save_flight
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.strapdown import integrate_strapdown
 from wildlab.navigation.timeline import ImuSamples
-from wildlab.pipeline.georeference import observe
-from wildlab.pipeline.navigation_errors import REFERENCES, reference_of
 from wildlab.sharing.generalise import (
     NOWHERE,
     QUARTER,

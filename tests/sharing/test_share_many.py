@@ -17,7 +17,7 @@ from urllib.parse import unquote_to_bytes
 import pytest
 from bs4 import BeautifulSoup
 
-from tests.pipeline.robots import robot_flight
+from tests.analysis.robots import robot_flight
 from tests.sharing.left import everything, leave_report
 from tests.sharing.test_share import assert_no_copy
 from wildlab.errors import RunFailed, WildlabError

@@ -1,4 +1,4 @@
-"""What several studies share: the small flight of the pipeline's tests, and a ferry's logged scenarios."""
+"""What several studies share: the small flight of the tests of analysis, and a ferry's logged scenarios."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.pipeline.conftest import make_flight
+from tests.analysis.conftest import make_flight
+from wildlab.analysis.following.sensor_tuning import SensorTuning
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
 from wildlab.paths import DATA
-from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.studies.autoferry.boats import tune_sensor
 
 __all__ = ["make_flight"]

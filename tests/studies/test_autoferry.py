@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pandas as pd
 import pytest
 
+from wildlab.analysis.following.sensor_tracks import FILTERS, follow_flight, table
+from wildlab.analysis.following.sensor_tuning import SensorTuning
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.sensor_tracks import FILTERS, follow_flight, table
-from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.studies.autoferry.boats import BOATS
 from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.many.follow import ManyTracks, judged, track_targets
 from wildlab.errors import WildlabError
-from wildlab.pipeline.many.follow import ManyTracks, follow_all, judged
 from wildlab.studies.autoferry_many import beside, stone_soup, tuning
 from wildlab.studies.autoferry_many.judged import HEADINGS
 from wildlab.studies.autoferry_many.stone_soup import Choice, Eye, draw_choice, run_stone_soup
@@ -205,7 +205,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, mo
     # One of them by hand, from the flight on.
     row = rows[(rows["case"] == "scenario-17") & (rows["mode"] == "radar") & (rows["rank"] == 2)].iloc[0]
     drawn = draw_choice(np.random.default_rng(1).spawn(2)[row["draw"] - 1], beside.FAR_M)
-    given = follow_all(scenario(17), settings=settings, sensors=["radar"])
+    given = track_targets(scenario(17), settings=settings, sensors=["radar"])
     shown = run_stone_soup(given.scans, ["radar"], drawn)
     lives = judged(given._replace(shown=shown), tuning.reach_of(scenario(17), "radar"))
     assert tuning.gospa_of(lives) == row["gospa"]

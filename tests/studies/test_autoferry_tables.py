@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.following.sensor_tracks import COLUMNS, SensorTrack, table
+from wildlab.analysis.following.sensor_tuning import SensorTuning
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.pipeline.following.sensor_tracks import COLUMNS, SensorTrack, table
-from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.reporting.published import load_claims
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies.autoferry import charts, tables

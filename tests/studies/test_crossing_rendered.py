@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wildlab.analysis.rendered import ImageScore, Photographer, Shot, exposures_of
 from wildlab.detection.detections import Detections, no_detections
 from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.pipeline.rendered import ImageScore, Photographer, Shot, exposures_of
 from wildlab.simulation.scene.render import SeenBody
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import rendered as study

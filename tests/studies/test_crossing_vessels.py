@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
+from wildlab.analysis.georeference import observe
 from wildlab.geometry.validation import gate_threshold
-from wildlab.pipeline.georeference import observe
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import STUDY, text

@@ -24,9 +24,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from wildlab import studies
+from wildlab.analysis.navigation_errors import AXES, PLACES
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import UNDECIDED
-from wildlab.pipeline.navigation_errors import AXES, PLACES
 from wildlab.reporting.report import Report, open_report
 from wildlab.reporting.text import known
 from wildlab.studies.end_to_end.trial import check_claims as end_to_end_claims  # asks what columns there are

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.search import rows_at
 from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
-from wildlab.pipeline.search import rows_at
 from wildlab.planning.areas import contains
 from wildlab.planning.planner import Horizon
 from wildlab.reporting.published import load_claims

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.track import follow_positions, start
 from wildlab.errors import WildlabError
-from wildlab.pipeline.track import follow_positions, start
 from wildlab.reporting.published import load_claims
 from wildlab.studies.coloured_noise import trial as coloured_noise
 from wildlab.studies.linear_vs_nonlinear import trial as linear_vs_nonlinear

@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from tests.flight.conftest import make_flight  # noqa: F401 - a fixture
+from wildlab.analysis.navigation_errors import Studied
 from wildlab.flight.store import Flight
-from wildlab.pipeline.navigation_errors import Studied
 from wildlab.reporting.charts.navigation import mark_period, speed_chart
 from wildlab.reporting.report import Report
 from wildlab.studies.navigation import flown

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wildlab.analysis.navigation_errors import NavigationErrors
+from wildlab.analysis.receiver import Placement, Receiver
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise
-from wildlab.pipeline.navigation_errors import NavigationErrors
-from wildlab.pipeline.receiver import Placement, Receiver
 from wildlab.studies.navigation import receiver as words
 
 SCALE = Scale(np.array([2.0, 4.0]), np.array([0.2, 0.5]), 1.0, 300.0)

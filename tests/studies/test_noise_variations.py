@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from wildlab.pipeline.measurement_noise import VARIATIONS
+from wildlab.analysis.measurement_noise import VARIATIONS
 from wildlab.studies import noise_variations
 
 SUBJECTS = ("kf", *(f"kf-{name}" for name in VARIATIONS))

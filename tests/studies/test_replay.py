@@ -13,7 +13,7 @@ from wildlab.flight.store import Flight
 from wildlab.replay.scene import Points
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.replay import text
-from wildlab.studies.replay.tracks import EVERY_S, WALK, follow_all
+from wildlab.studies.replay.tracks import EVERY_S, WALK, track_targets
 from wildlab.studies.replay.trial import (
     CLOCK,
     NONE,
@@ -80,7 +80,7 @@ def test_a_track_is_the_mean_of_what_was_seen_and_spreads_as_a_walk_does(ship):
     nan = np.full(3, np.nan)
     names = np.array(["a", "a", "b"], object)
     points = Points(np.array([10.0, 10.0, 12.0]), places, R, names, nan, nan)
-    first, second = follow_all(replace(ship, tables={}), points, 0.0, 50.0)
+    first, second = track_targets(replace(ship, tables={}), points, 0.0, 50.0)
     assert (first.target, second.target) == ("a", "b")
     assert first.times[0] == 10.0 and first.times[-1] == pytest.approx(50.0, abs=EVERY_S)
     assert first.places[-1, :2] == pytest.approx([4 / 2, -2 / 2])

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wildlab.analysis.navigation_errors import SETTLING_S, errors_against
+from wildlab.analysis.pose_noise import covariance_of
+from wildlab.analysis.sighting_errors import pauses
+from wildlab.analysis.track import Sighting, follow_schmidt
 from wildlab.errors import WildlabError
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.store import Flight
-from wildlab.pipeline.navigation_errors import SETTLING_S, errors_against
-from wildlab.pipeline.pose_noise import covariance_of
-from wildlab.pipeline.sighting_errors import pauses
-from wildlab.pipeline.track import Sighting, follow_schmidt
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.schmidt.trial import (
     BOUNDS,

@@ -7,6 +7,11 @@ and 17.26 m published for all four.
 import numpy as np
 import pytest
 
+from wildlab.analysis.calibrate import calibrate_flight
+from wildlab.analysis.diagnose import diagnose
+from wildlab.analysis.evaluate import errors_of, recorded_answers, score_points
+from wildlab.analysis.georeference import georeference, heights_left_in, observe
+from wildlab.analysis.pose_noise import evaluate_with_estimated_noise
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.geometry.frames import (
@@ -16,11 +21,6 @@ from wildlab.geometry.frames import (
     quaternion_to_matrix,
 )
 from wildlab.paths import DATA
-from wildlab.pipeline.calibrate import calibrate_flight
-from wildlab.pipeline.diagnose import diagnose
-from wildlab.pipeline.evaluate import errors_of, recorded_answers, score_points
-from wildlab.pipeline.georeference import georeference, heights_left_in, observe
-from wildlab.pipeline.pose_noise import evaluate_with_estimated_noise
 
 
 @pytest.fixture(scope="module")

@@ -4,13 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import FloatingObjects, find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.pipeline.rendered import judge
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.reporting.report import open_report
 from wildlab.simulation.parameters import load_twin

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wildlab.analysis.detecting.command import samples_of
+from wildlab.analysis.detecting.fit import Sample
 from wildlab.detection.warm import Warm, find_warm
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.labels import read_labels
-from wildlab.pipeline.detecting.command import samples_of
-from wildlab.pipeline.detecting.fit import Sample
 from wildlab.studies.wildlife_detection.trial import CONSTANT, ENHANCED, METHODS, SUBTRACTED, read_as
 
 pytestmark = pytest.mark.slow

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wildlab.analysis.animals.follow import FollowedAnimals, Found, Known
+from wildlab.analysis.animals.frames import NONE, Framed
+from wildlab.analysis.animals.images import Images
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.pipeline.animals.follow import FollowedAnimals, Found, Known
-from wildlab.pipeline.animals.frames import NONE, Framed
-from wildlab.pipeline.animals.images import Images
 from wildlab.simulation.parameters import load_twin
 from wildlab.studies.wildlife_tracking import rendered_text as text
 from wildlab.studies.wildlife_tracking.rendered import (

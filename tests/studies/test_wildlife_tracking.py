@@ -6,17 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.evaluation.runs import share_interval
-from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
-from wildlab.pipeline.animals.follow import Found, Known
-from wildlab.pipeline.animals.measures import (
+from wildlab.analysis.animals.follow import Found, Known
+from wildlab.analysis.animals.measures import (
     found_on_visits,
     next_lap,
     out_of_sight,
     sight_numbers,
     turns,
 )
-from wildlab.pipeline.animals.revisit import Patrolled
+from wildlab.analysis.animals.revisit import Patrolled
+from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
 from wildlab.planning.high_level import SEARCH
 from wildlab.studies.wildlife_tracking import text
 from wildlab.studies.wildlife_tracking.claims import check_claims

@@ -14,7 +14,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import wrap
 from wildlab.tracking import measurement as m
 from wildlab.tracking.coloured import difference_model, run_coloured, thin
-from wildlab.tracking.considered import consider
+from wildlab.tracking.consider_parameters import consider
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.motion import constant_velocity, rest, singer

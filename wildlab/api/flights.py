@@ -6,10 +6,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from wildlab.brief import Brief, Summary
 from wildlab.flight.checks import Finding, Use, check_flight, usable_for
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
+from wildlab.summary_table import Brief, Summary
 
 
 def simulate(twin: str | Path, seed: int = 1, without: Collection[str] = ()) -> Flight:

@@ -8,13 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from wildlab.analysis.georeference import covariances_of
 from wildlab.api.points import PointErrors, Points
 from wildlab.api.tracks import Consistency, Navigation, Tracked
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.store import Flight
 from wildlab.names import figure_name
-from wildlab.pipeline.georeference import covariances_of
 from wildlab.reporting.charts.navigation import error_bands
 from wildlab.reporting.charts.tracks import track_map
 from wildlab.reporting.figures import (

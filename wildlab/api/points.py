@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from wildlab.brief import Brief, Summary
+from wildlab.analysis.evaluate import errors_of, score_points
+from wildlab.analysis.georeference import covariances_of, observe
+from wildlab.analysis.georeference import georeference as to_ground
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.store import Flight
 from wildlab.geometry.quantiles import chi2_quantile
-from wildlab.pipeline.evaluate import errors_of, score_points
-from wildlab.pipeline.georeference import covariances_of, observe
-from wildlab.pipeline.georeference import georeference as to_ground
+from wildlab.summary_table import Brief, Summary
 
 
 @dataclass(frozen=True, repr=False)
@@ -25,7 +25,7 @@ class Points(Brief):
     flight, source
         Where they come from: the flight, and the name of the poses.
     table
-        One row for each detection: see `wildlab.pipeline.georeference.georeference`.
+        One row for each detection: see `wildlab.analysis.georeference.georeference`.
     """
 
     flight: Flight
@@ -52,7 +52,7 @@ def georeference(flight: Flight, source: str | None = None, seed: int = 0) -> Po
 
     Poses and ground come from the flight, the ground being its terrain where it has one; standard deviations
     from the log where it has them, else from the manifest, else usual ones
-    (`wildlab.pipeline.georeference.USUAL`).
+    (`wildlab.analysis.georeference.USUAL`).
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class PointErrors(Brief):
     points
         What was scored.
     table
-        Those of them that can be judged: see `wildlab.pipeline.evaluate.score_points`.
+        Those of them that can be judged: see `wildlab.analysis.evaluate.score_points`.
     summary
         Of the horizontal errors, m.
     inside_90

@@ -10,27 +10,19 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.brief import Brief, Summary
-from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import Average, nees, position_nees
-from wildlab.evaluation.track_errors import summarise_track, track_errors
-from wildlab.flight.clocks import frame_times
-from wildlab.flight.files import check_model
-from wildlab.flight.following import Settings, read_settings
-from wildlab.flight.store import Flight
-from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series
-from wildlab.pipeline.following.filters import SMOOTHED
-from wildlab.pipeline.following.follow import TOGETHER, WHITE, TrackingResult, follow_targets
-from wildlab.pipeline.following.judged import FEW_INDEPENDENT, verdict
-from wildlab.pipeline.following.sensor_tracks import SensorTrack
-from wildlab.pipeline.georeference import (
+from wildlab.analysis.consistency import Series, mean_of_runs, navigation_series
+from wildlab.analysis.following.filters import SMOOTHED
+from wildlab.analysis.following.follow import TOGETHER, WHITE, TrackingResult, follow_targets
+from wildlab.analysis.following.judged import FEW_INDEPENDENT, verdict
+from wildlab.analysis.following.sensor_tracks import SensorTrack
+from wildlab.analysis.georeference import (
     assumed_deviations,
     assumed_pose_covariance,
     georeference,
     observe,
 )
-from wildlab.pipeline.navigate import MekfTuning, Navigated, navigate_mekf, navigate_observer
-from wildlab.pipeline.navigation_errors import (
+from wildlab.analysis.navigate import MekfTuning, Navigated, navigate_mekf, navigate_observer
+from wildlab.analysis.navigation_errors import (
     REFERENCES,
     NavigationErrors,
     comparison_times,
@@ -38,7 +30,15 @@ from wildlab.pipeline.navigation_errors import (
     flown_part,
     summarise,
 )
-from wildlab.pipeline.track import FILTERS, CvTuning, follow_schmidt, sighting
+from wildlab.analysis.track import FILTERS, CvTuning, follow_schmidt, sighting
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import Average, nees, position_nees
+from wildlab.evaluation.track_errors import summarise_track, track_errors
+from wildlab.flight.clocks import frame_times
+from wildlab.flight.files import check_model
+from wildlab.flight.following import Settings, read_settings
+from wildlab.flight.store import Flight
+from wildlab.summary_table import Brief, Summary
 
 Array = NDArray[np.float64]
 Method = Literal["mekf", "observer"]
@@ -107,7 +107,7 @@ def navigate(flight: Flight, method: Method = "mekf", tuning: MekfTuning | None 
         observer of H 5.5, without.
     tuning
         Noise that the filter is told of in place of what the manifest states, for instance
-        `wildlab.pipeline.navigate.PUBLISHED_LIKE`; for ``"mekf"`` only.
+        `wildlab.analysis.navigate.PUBLISHED_LIKE`; for ``"mekf"`` only.
 
     Returns
     -------
@@ -239,7 +239,7 @@ def track(
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
     filter
-        Of `wildlab.pipeline.following.filters`: ``"ekf"``, ``"schmidt"``, ``"ukf"``, ``"imm"``,
+        Of `wildlab.analysis.following.filters`: ``"ekf"``, ``"schmidt"``, ``"ukf"``, ``"imm"``,
         ``"coloured"``, ``"thinned"``. Left out: the Schmidt filter where there are errors to consider, else
         the extended one. With a ``tuning``: ``"schmidt"``, ``"ekf"`` on pixels (H 7.4, 6.3), or ``"kf"`` on
         georeferenced positions (H 6.2).

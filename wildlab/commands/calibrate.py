@@ -35,10 +35,10 @@ def calibrate(
     """
     import numpy as np
 
+    from wildlab.analysis.learn import learn_flight
     from wildlab.flight.checks.sense.sense import sense_sentences
     from wildlab.flight.learnt import write_learnt
     from wildlab.flight.store import load_flight
-    from wildlab.pipeline.learn import learn_flight
     from wildlab.reporting.georeferencing_cause import causes_in_words, simplest_rivals
 
     if into.exists() and not overwrite:

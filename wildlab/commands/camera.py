@@ -99,11 +99,11 @@ def camera(
         raise WildlabError("this file is there already", "name another, or add --overwrite", file=into)
     from rich.progress import track
 
+    from wildlab.analysis.camera import calibrate_images, camera_file
+    from wildlab.analysis.camera_text import sentences
     from wildlab.detection.boards import Board
     from wildlab.flight.camera_file import write_camera
     from wildlab.flight.readers.stills import still_files
-    from wildlab.pipeline.camera import calibrate_images, camera_file
-    from wildlab.pipeline.camera_text import sentences
 
     columns, rows = board or circles or (0, 0)
     pattern = "chessboard" if board else "staggered circles" if staggered else "circles"

@@ -12,8 +12,8 @@ from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, shown
 
 if TYPE_CHECKING:
+    from wildlab.analysis.camera_clock import CameraClock
     from wildlab.flight.store import Flight
-    from wildlab.pipeline.camera_clock import CameraClock
 
 
 @click.command(short_help="The offset of the camera's clock: estimate it, or set it.")
@@ -78,7 +78,7 @@ def clock(
 
 
 def _estimate(flight: Flight, images: Path | None, source: str | None) -> CameraClock:
-    from wildlab.pipeline.camera_clock import by_motion_in_words, by_points_in_words
+    from wildlab.analysis.camera_clock import by_motion_in_words, by_points_in_words
 
     if images is None:
         return by_points_in_words(flight, source)
@@ -103,7 +103,7 @@ def _estimate(flight: Flight, images: Path | None, source: str | None) -> Camera
 
 def _by_points(flight: Flight, source: str | None) -> CameraClock | None:
     """The estimate from known points; None where there is none."""
-    from wildlab.pipeline.camera_clock import by_points_in_words
+    from wildlab.analysis.camera_clock import by_points_in_words
 
     try:
         return by_points_in_words(flight, source)

@@ -104,8 +104,8 @@ def detect(
       wildlab detect images --labels coco.json --also megadetector=batch.json --also yolo=labels --into found
       wildlab detect sea --method floating --into found
     """
+    from wildlab.analysis.detecting.command import Wanted, detect_images
     from wildlab.flight.files import printable
-    from wildlab.pipeline.detecting.command import Wanted, detect_images
 
     wanted = Wanted(
         images,

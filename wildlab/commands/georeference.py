@@ -35,11 +35,11 @@ def georeference(flight: Path, into: Path, overwrite: bool, source: str | None, 
     """
     import numpy as np
 
+    from wildlab.analysis.georeference import georeference as to_ground
+    from wildlab.analysis.georeference import observe
+    from wildlab.analysis.ground import ground_sentences
+    from wildlab.analysis.ground_file import SUFFIXES, write_points
     from wildlab.flight.store import load_flight
-    from wildlab.pipeline.georeference import georeference as to_ground
-    from wildlab.pipeline.georeference import observe
-    from wildlab.pipeline.ground import ground_sentences
-    from wildlab.pipeline.ground_file import SUFFIXES, write_points
     from wildlab.runner.evaluate import tell_source
 
     if into.suffix not in SUFFIXES:

@@ -14,8 +14,8 @@ from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, shown
 
 if TYPE_CHECKING:
+    from wildlab.analysis.plans.wanted import Gimbal
     from wildlab.geometry.camera import Camera
-    from wildlab.pipeline.plans.wanted import Gimbal
 
 
 class TwoNumbers(click.ParamType[tuple[float, float]]):
@@ -164,10 +164,10 @@ def plan(
       wildlab plan fence.geojson --camera camera.toml --terrain dem.tif --animals 5 --into flight
       wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --into flight
     """
+    from wildlab.analysis.plans.command import plan_flight
+    from wildlab.analysis.plans.files import PAGE
+    from wildlab.analysis.plans.wanted import Wanted
     from wildlab.files import write_atomic
-    from wildlab.pipeline.plans.command import plan_flight
-    from wildlab.pipeline.plans.files import PAGE
-    from wildlab.pipeline.plans.wanted import Wanted
 
     wanted = Wanted(
         area,

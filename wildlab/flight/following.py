@@ -1,7 +1,7 @@
 """What a tracking filter is told of sensors and targets: ``[sensors.NAME]`` and ``[targets]`` of a flight, or
 a file of its own.
 
-Nothing of it has to be stated: `wildlab.pipeline.following.beliefs` says what is assumed in its place.
+Nothing of it has to be stated: `wildlab.analysis.following.noise_model` says what is assumed in its place.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class HullPart(Strict):
 
 
 class ManyTargetsPart(Strict):
-    """What a tracker of many targets is told of them, see `wildlab.tracking.many.beliefs.ManyTargetModel`."""
+    """What a tracker of many targets is told, see `wildlab.tracking.many.target_model.ManyTargetModel`."""
 
     hulls: Annotated[tuple[HullPart, ...], Field(max_length=MOST_HULLS)] = ()
     lifetime_s: Above | None = None
@@ -72,8 +72,8 @@ class ManyTargetsPart(Strict):
 
 
 class ManySensorPart(Strict):
-    """What it is told of a sensor, see `wildlab.tracking.many.beliefs.ManySensorModel`; those of hulls have
-    one number for each kind."""
+    """What it is told of a sensor, see `wildlab.tracking.many.target_model.ManySensorModel`; those of hulls
+    have one number for each kind."""
 
     detection: Probability | None = None
     clutter_per_m2: Above | None = None

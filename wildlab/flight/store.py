@@ -16,7 +16,6 @@ import pandas as pd
 import pyarrow
 import pyarrow.parquet
 
-from wildlab.brief import Brief, Summary
 from wildlab.errors import WildlabError
 from wildlab.flight.checksums import CALIBRATION, TERRAIN, checksums_of, verify, with_checksums
 from wildlab.flight.files import flight_name, inside, is_safe_name, regular_size
@@ -25,6 +24,7 @@ from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_man
 from wildlab.flight.schema import NAV, TABLES, Table, conform
 from wildlab.flight.terrain_file import read_terrain, write_terrain
 from wildlab.geometry.terrain import Terrain
+from wildlab.summary_table import Brief, Summary
 
 # pyarrow carries no types.
 #: Estimated poses, best first: as logged, by RTK, by the filters of `wildlab.navigation`, found on board.

@@ -162,7 +162,7 @@ if TYPE_CHECKING:
         mount_rotation,
     )
     from wildlab.geometry.mounting import Mounting, mounting_from_points
-    from wildlab.geometry.ray_ends import BECAME
+    from wildlab.geometry.ray_ends import RAY_STATUS
     from wildlab.geometry.robust import (
         RobustFit,
         fit_linear,
@@ -216,7 +216,6 @@ else:
     __getattr__, __dir__ = offer(__name__)
 
 __all__ = [
-    "BECAME",
     "BORESIGHT",
     "BOUNDS",
     "EARTH_RATE",
@@ -226,6 +225,7 @@ __all__ = [
     "NO_DISTORTION",
     "PARAMETERS",
     "PINHOLE",
+    "RAY_STATUS",
     "Array",
     "Calibration",
     "Camera",

@@ -3,7 +3,7 @@
 HIT, MISSED, NO_DATA, BELOW, NOT_KNOWN = 0, 1, 2, 3, 4
 
 #: The same in words.
-BECAME = {
+RAY_STATUS = {
     HIT: "met the ground",
     MISSED: "left the map without meeting the ground",
     NO_DATA: "came to where the map has no height",

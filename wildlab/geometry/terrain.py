@@ -16,7 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import matching, pixel_rays
-from wildlab.geometry.ray_ends import BECAME
+from wildlab.geometry.ray_ends import RAY_STATUS
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,15 +139,15 @@ class Met(NamedTuple):
     points
         (N, 3) metres in n; NaN where a ray did not meet it.
     became
-        (N,) a key of `BECAME`.
+        (N,) a key of `RAY_STATUS`.
     """
 
     points: Array
     became: NDArray[np.int8]
 
     def counts(self) -> dict[str, int]:
-        """How many rays became what, in the words of `BECAME`; those that none became are left out."""
-        return {words: n for key, words in BECAME.items() if (n := int((self.became == key).sum()))}
+        """How many rays became what, in the words of `RAY_STATUS`; those that none became are left out."""
+        return {words: n for key, words in RAY_STATUS.items() if (n := int((self.became == key).sum()))}
 
 
 def intersect_terrain(terrain: Terrain, rays: ArrayLike, p_nc: ArrayLike, furthest: float = np.inf) -> Met:

@@ -177,7 +177,7 @@ class Footprint(NamedTuple):
         (K, 2) metres north and east, in order about the image, not closed; NaN where a ray of the border
         ends nowhere and nothing is cut.
     became
-        (K,) what became of the ray, a key of `BECAME`.
+        (K,) what became of the ray, a key of `RAY_STATUS`.
     cut
         (K,) bool, whether the point stands on the circle of the furthest distance, in place of a ray that
         comes no nearer.

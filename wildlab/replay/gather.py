@@ -6,6 +6,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.evaluate import score_points
+from wildlab.analysis.georeference import Observations, covariances_of, georeference, observe
+from wildlab.analysis.overviews.image_coverage import FLATTEST, ground_height
+from wildlab.analysis.overviews.lost import POSITION, ordered
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at
@@ -13,10 +17,6 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import georeference_pixels, pixel_rays
 from wildlab.geometry.terrain import pixels_to_terrain
-from wildlab.pipeline.evaluate import score_points
-from wildlab.pipeline.georeference import Observations, covariances_of, georeference, observe
-from wildlab.pipeline.overviews.image_coverage import FLATTEST, ground_height
-from wildlab.pipeline.overviews.lost import POSITION, ordered
 from wildlab.replay.scene import Array, Estimates, Path, Points, ReplayScene, Sightings, Target, Views
 
 #: More are not shown: a picture on a screen does not have them, and files grow.
@@ -41,7 +41,7 @@ def scene_of(
     source
         Name of the ``nav`` table; left out, the best known one.
     estimates
-        A table of tracks, as `wildlab.pipeline.following.estimates.estimates_table` makes it.
+        A table of tracks, as `wildlab.analysis.following.estimates.estimates_table` makes it.
 
     ellipses
         Whether points on the ground get their covariance, which takes most of the time.

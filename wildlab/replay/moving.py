@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from wildlab.analysis.following.estimates import read_estimates
+from wildlab.analysis.following.judged import LEADING
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.estimates import read_estimates
-from wildlab.pipeline.following.judged import LEADING
 from wildlab.replay.gather import scene_of
 from wildlab.replay.scene import Estimates, ReplayScene
 from wildlab.replay.words import minutes, plain

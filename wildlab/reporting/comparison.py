@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.following.judged import LEADING
-from wildlab.pipeline.overviews.verdict import Verdict
+from wildlab.analysis.following.judged import LEADING
+from wildlab.analysis.overviews.verdict import Verdict
 from wildlab.reporting.arrange import LIMITS, arranged
 from wildlab.reporting.charts.comparison import dots_chart
 from wildlab.reporting.georeferencing_cause import listed, metres

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.detecting.judged import ellipse_sentence, rate_words
 from wildlab.detection.detections import PART
-from wildlab.pipeline.detecting.judged import ellipse_sentence, rate_words
 from wildlab.reporting.detectors_compared import compared_section
 from wildlab.reporting.figures import BLUE, new_figure, png_bytes
 from wildlab.reporting.glossary import with_glossary
@@ -54,7 +54,7 @@ def detections_page(
     name
         What was looked at: the name of a folder, never its path.
     result
-        From `wildlab.pipeline.detecting.command.detect_images`.
+        From `wildlab.analysis.detecting.command.detect_images`.
     frames
         One row for each, with ``frame_id``, ``detections`` and ``problem``.
     sheets
@@ -64,7 +64,7 @@ def detections_page(
     thresholds
         By name, as plain values.
     curves
-        Of detectors that are compared, as of `wildlab.pipeline.detection_compared.curve_table`; None where
+        Of detectors that are compared, as of `wildlab.analysis.detection_compared.curve_table`; None where
         there is only ours.
 
     Returns

@@ -9,8 +9,8 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
+from wildlab.analysis.detecting.judged import rate_words
 from wildlab.names import figure_name
-from wildlab.pipeline.detecting.judged import rate_words
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure, png_bytes
 from wildlab.reporting.text import NOTHING, escape
 
@@ -23,9 +23,9 @@ def compared_section(compared: Sequence[Mapping[str, Any]], curves: pd.DataFrame
     Parameters
     ----------
     compared
-        From `wildlab.pipeline.detection_compared.Compared.as_plain`, ours first.
+        From `wildlab.analysis.detection_compared.Compared.as_plain`, ours first.
     curves
-        From `wildlab.pipeline.detection_compared.curve_table`.
+        From `wildlab.analysis.detection_compared.curve_table`.
 
     Returns
     -------

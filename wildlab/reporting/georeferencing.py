@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.accuracy import Accuracy
+from wildlab.analysis.evaluate import errors_of
+from wildlab.analysis.overviews.verdict import FEW_POINTS
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.pipeline.accuracy import Accuracy
-from wildlab.pipeline.evaluate import errors_of
-from wildlab.pipeline.overviews.verdict import FEW_POINTS
 from wildlab.reporting import known_positions as truths
 from wildlab.reporting.report import Report
 

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.diagnosis import CAUSES, Diagnosis
+from wildlab.analysis.overviews.recommendations import is_possible
+from wildlab.analysis.overviews.verdict import MANY_LOST, WORTH, Evidence
 from wildlab.evaluation.axes import AlongAxis
 from wildlab.evaluation.blocks import Neighbours
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary
 from wildlab.geometry.calibration import BORESIGHT, PARAMETERS, Calibration
-from wildlab.pipeline.diagnosis import CAUSES, Diagnosis
-from wildlab.pipeline.overviews.verdict import MANY_LOST, WORTH, Evidence
-from wildlab.pipeline.overviews.worth_fixing import is_possible
 from wildlab.reporting.report import Report
 
 #: A gain below this share of the error is called small, and above half of it most of the error.
@@ -101,7 +101,7 @@ def evidence_of(
     logged, lost
         Errors of the points that have a position, and how many have none.
     ellipses, diagnosis
-        As `wildlab.pipeline.accuracy.judge_accuracy` found them; None: nobody could look for a cause.
+        As `wildlab.analysis.accuracy.judge_accuracy` found them; None: nobody could look for a cause.
     amiss
         What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.ground_file import points_geojson, with_axes
 from wildlab.files import csv_text
 from wildlab.flight.store import Flight
-from wildlab.pipeline.ground_file import points_geojson, with_axes
 from wildlab.reporting.report import Report
 from wildlab.reporting.tables import MOST_BYTES, data_link
 
@@ -21,7 +21,7 @@ def points_table(points: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     points
-        From `wildlab.pipeline.georeference.georeference`.
+        From `wildlab.analysis.georeference.georeference`.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def points_section(report: Report, flight: Flight, points: pd.DataFrame, source:
     flight
         Whose they are. Only where its locations are open is there a GeoJSON with places.
     points
-        From `wildlab.pipeline.georeference.georeference`.
+        From `wildlab.analysis.georeference.georeference`.
     source
         The poses that they come from; "" where the flight has one.
     """

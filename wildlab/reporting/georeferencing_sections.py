@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wildlab.analysis.accuracy import Accuracy
+from wildlab.analysis.diagnosis import Diagnosis
+from wildlab.analysis.overviews.verdict import MANY_LOST, VERDICT_LEVEL, Verdict, verdict_of
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary
-from wildlab.pipeline.accuracy import Accuracy
-from wildlab.pipeline.diagnosis import Diagnosis
-from wildlab.pipeline.overviews.verdict import MANY_LOST, VERDICT_LEVEL, Verdict, verdict_of
 from wildlab.reporting import georeferencing as words
 from wildlab.reporting import georeferencing_cause as cause
 from wildlab.reporting import georeferencing_left as left

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.evaluate import blocks_of, score_points
+from wildlab.analysis.georeference import Observations, georeference
+from wildlab.analysis.ground import ground_sentences, on_level, shift_from_level
 from wildlab.evaluation.errors import bootstrap_interval
 from wildlab.flight.store import Flight
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.evaluate import blocks_of, score_points
-from wildlab.pipeline.georeference import Observations, georeference
-from wildlab.pipeline.ground import ground_sentences, on_level, shift_from_level
 from wildlab.reporting.report import Report
 
 #: Fewer images than this give no interval.

@@ -47,7 +47,7 @@ def known_positions(flight: Flight, scored: pd.DataFrame) -> KnownPositions:
     flight
         With truth.
     scored
-        From `wildlab.pipeline.evaluate.score_points`, of it.
+        From `wildlab.analysis.evaluate.score_points`, of it.
 
     Returns
     -------

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from wildlab.analysis.many.errors import OF_COVARIANCE, counted_twice, of_platform
+from wildlab.analysis.many.follow import ManyTracks
 from wildlab.evaluation.identities import Identities
-from wildlab.pipeline.many.errors import OF_COVARIANCE, counted_twice, of_platform
-from wildlab.pipeline.many.follow import ManyTracks
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.georeferencing_cause import listed

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.following.judged import FEWEST
+from wildlab.analysis.following.noise_model import ToldValue
+from wildlab.analysis.many.follow import CUTOFF_M, ManyTracks
+from wildlab.analysis.many.target_model import HERE
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
-from wildlab.pipeline.following.beliefs import ToldValue
-from wildlab.pipeline.following.judged import FEWEST
-from wildlab.pipeline.many.beliefs import HERE
-from wildlab.pipeline.many.follow import CUTOFF_M, ManyTracks
 from wildlab.reporting.report import Report
 from wildlab.reporting.tracking import length
 from wildlab.tracking.particles import Count, count_interval, count_probabilities

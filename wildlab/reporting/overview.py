@@ -6,13 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wildlab.evaluation.vibration import FLOOR_HZ, HARMFUL, SMOOTH_HZ
-from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
-from wildlab.pipeline.overviews.alarms import APART_M, APART_SD, APART_SHARE, JUMP, JUMP_M, LEANT_DEG
-from wildlab.pipeline.overviews.image_coverage import FLATTEST
-from wildlab.pipeline.overviews.overview import Overview, troubled_for
-from wildlab.pipeline.overviews.verdict import WORTH, Numbers, evidence_of, verdict_of
-from wildlab.pipeline.overviews.worth_fixing import (
+from wildlab.analysis.overviews.alarms import APART_M, APART_SD, APART_SHARE, JUMP, JUMP_M, LEANT_DEG
+from wildlab.analysis.overviews.image_coverage import FLATTEST
+from wildlab.analysis.overviews.overview import Overview, troubled_for
+from wildlab.analysis.overviews.recommendations import (
     LISTED,
     MOST,
     Gain,
@@ -20,6 +17,9 @@ from wildlab.pipeline.overviews.worth_fixing import (
     error_measured,
     possible_gain,
 )
+from wildlab.analysis.overviews.verdict import WORTH, Numbers, evidence_of, verdict_of
+from wildlab.evaluation.vibration import FLOOR_HZ, HARMFUL, SMOOTH_HZ
+from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
 from wildlab.reporting import overview_sections as sections
 from wildlab.reporting import overview_words as words
 from wildlab.reporting.arrange import ADVICE
@@ -42,9 +42,9 @@ def show_overview(
     report
         Is added to.
     overview
-        From `wildlab.pipeline.overviews.overview.look_over`.
+        From `wildlab.analysis.overviews.overview.look_over`.
     gains, numbers
-        From `wildlab.pipeline.overviews.worth_fixing`, and the numbers of the other reports behind them.
+        From `wildlab.analysis.overviews.recommendations`, and the numbers of the other reports behind them.
     amiss
         What does not fit together: `wildlab.flight.checks.sense.sense.sense_sentences`.
     lacking

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.overviews.alarms import beside_satellites
+from wildlab.analysis.overviews.overview import Overview
+from wildlab.analysis.overviews.verdict import Numbers
 from wildlab.evaluation.vibration import FINE, HARMFUL
 from wildlab.flight.clocks import gnss_times
-from wildlab.pipeline.overviews.alarms import beside_satellites
-from wildlab.pipeline.overviews.overview import Overview
-from wildlab.pipeline.overviews.verdict import Numbers
 from wildlab.reporting import overview_words as words
 from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.report import Report

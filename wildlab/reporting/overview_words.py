@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.overviews.alarms import Alarm
+from wildlab.analysis.overviews.image_coverage import Coverage
+from wildlab.analysis.overviews.overview import Issue, Overview, troubled_for
+from wildlab.analysis.overviews.recommendations import MOST, Gain
+from wildlab.analysis.overviews.verdict import WORTH, Verdict
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
-from wildlab.pipeline.overviews.alarms import Alarm
-from wildlab.pipeline.overviews.image_coverage import Coverage
-from wildlab.pipeline.overviews.overview import Overview, Trouble, troubled_for
-from wildlab.pipeline.overviews.verdict import WORTH, Verdict
-from wildlab.pipeline.overviews.worth_fixing import MOST, Gain
 from wildlab.reporting.georeferencing_cause import listed, metres
 from wildlab.reporting.text import percent
 
@@ -122,7 +122,7 @@ def reason_words(
     """Why the verdict is what it is: what was counted, most pressing first.
 
     ``possible``: a gain that is not certain, one of those that are ``troubled``; ``doubts``: from
-    `wildlab.pipeline.overviews.worth_fixing.doubted`.
+    `wildlab.analysis.overviews.recommendations.doubted`.
     """
     troubled -= possible is not None
     said = [
@@ -234,7 +234,7 @@ def _problem_words(problems: int) -> str:
     return "one thing" if problems == 1 else f"{problems} things"
 
 
-def _lasting(overview: Overview, trouble: Trouble) -> str:
+def _lasting(overview: Overview, trouble: Issue) -> str:
     share = trouble_share(overview, trouble)
     if trouble.seconds and share.startswith("0 "):
         return f"{trouble.what} for {trouble.seconds:.1f} s"
@@ -340,7 +340,7 @@ _SHORT = {
 INSTANT = "an instant"
 
 
-def trouble_share(overview: Overview, trouble: Trouble) -> str:
+def trouble_share(overview: Overview, trouble: Issue) -> str:
     """Share of the time; an instant has none."""
     if not trouble.seconds or not overview.length_s > 0:
         return INSTANT

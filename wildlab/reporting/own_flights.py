@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
-from wildlab.pipeline.overviews.verdict import Verdict, evidence_of, verdict_of
+from wildlab.analysis.overviews.verdict import Verdict, evidence_of, verdict_of
 from wildlab.reporting.overview_words import duration_words
 from wildlab.reporting.page import TAGS, page
 from wildlab.reporting.text import NOTHING, escape

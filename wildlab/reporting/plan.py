@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 
+from wildlab.analysis.plans.coverage import Covered
+from wildlab.analysis.plans.files import origin_text
+from wildlab.analysis.plans.plan import Plan
+from wildlab.analysis.plans.said import count, head_count, hectares, minutes, percent
 from wildlab.flight.readers.area import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.names import figure_name
-from wildlab.pipeline.plans.coverage import Covered
-from wildlab.pipeline.plans.files import origin_text
-from wildlab.pipeline.plans.plan import Plan
-from wildlab.pipeline.plans.said import count, head_count, hectares, minutes, percent
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.figures import png_bytes as png
 from wildlab.reporting.glossary import with_glossary
@@ -46,11 +46,11 @@ def plan_page(
     Parameters
     ----------
     plan
-        From `wildlab.pipeline.plans.plan.make_plan`.
+        From `wildlab.analysis.plans.plan.make_plan`.
     covered
-        Of each area, from `wildlab.pipeline.plan_coverage.cover`.
+        Of each area, from `wildlab.analysis.plan_coverage.cover`.
     result
-        From `wildlab.pipeline.plan_said.plan_result`.
+        From `wildlab.analysis.plan_said.plan_result`.
     exact
         Whether it may tell where on the Earth this is.
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wildlab.pipeline.overviews.verdict import MANY_LOST, Evidence, Verdict, verdict_of
-from wildlab.pipeline.repeats import Repeats
+from wildlab.analysis.overviews.verdict import MANY_LOST, Evidence, Verdict, verdict_of
+from wildlab.analysis.repeats import Repeats
 from wildlab.reporting.georeferencing import short_length
 from wildlab.reporting.georeferencing_cause import amiss_sentence, cause_sentence, lost_sentence
 

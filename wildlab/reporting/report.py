@@ -31,10 +31,10 @@ from wildlab.reporting.animation import ShownFlight, animated_flight, pausable
 from wildlab.reporting.animation.drawing import PAUSE_STYLE
 from wildlab.reporting.arrange import ALERT, LIMITS, METHOD, VERDICT
 from wildlab.reporting.figures import png_bytes, save_figure
+from wildlab.reporting.flight_status import Standing, standing
 from wildlab.reporting.page import TAGS
 from wildlab.reporting.pictures import figure_html
 from wildlab.reporting.published import load_claims, published_rows
-from wildlab.reporting.standing import Standing, standing
 from wildlab.reporting.tables import csv_link, table_html
 from wildlab.reporting.text import escape, inline, known, maths, prose, slug
 from wildlab.reporting.verdicts import judge

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.following.beliefs import ROUGH, ToldValue
-from wildlab.pipeline.following.follow import TOGETHER
-from wildlab.pipeline.following.judged import (
+from wildlab.analysis.following.follow import TOGETHER
+from wildlab.analysis.following.judged import (
     CAUTIOUS,
     CONSISTENT,
     FEW_INDEPENDENT,
@@ -21,11 +20,12 @@ from wildlab.pipeline.following.judged import (
     leading_filter,
     verdict,
 )
-from wildlab.pipeline.following.tuned import Tuned
-from wildlab.pipeline.overviews.verdict import Evidence, Verdict, verdict_of
+from wildlab.analysis.following.noise_model import ROUGH, ToldValue
+from wildlab.analysis.following.tuned import Tuned
+from wildlab.analysis.overviews.verdict import Evidence, Verdict, verdict_of
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import NOTHING
-from wildlab.reporting.tracking_anew import summary_sentences
+from wildlab.reporting.tracking_reinitialisation import summary_sentences
 
 #: Errors nearer to what is stated than by this factor are "about as large".
 ALIKE = 1.2

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.following.follow import TrackingResult
+from wildlab.analysis.following.judged import Apart, leading_filter, verdict
+from wildlab.analysis.following.tuned import Tuned
+from wildlab.analysis.overviews.verdict import VERDICT_LEVEL
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.follow import TrackingResult
-from wildlab.pipeline.following.judged import Apart, leading_filter, verdict
-from wildlab.pipeline.following.tuned import Tuned
-from wildlab.pipeline.overviews.verdict import VERDICT_LEVEL
 from wildlab.reporting import tracking as words
-from wildlab.reporting import tracking_anew as anew
+from wildlab.reporting import tracking_reinitialisation as anew
 from wildlab.reporting.charts import following as charts
 from wildlab.reporting.charts.beside import beside_plain_shown
 from wildlab.reporting.report import Report

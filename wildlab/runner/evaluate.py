@@ -10,15 +10,15 @@ from typing import Any
 import pandas as pd
 from rich.console import Console
 
+from wildlab.analysis.following.follow import refuse_unusable
+from wildlab.analysis.following.sensor_tuning import FEWEST
+from wildlab.analysis.navigation_errors import reference_of
+from wildlab.analysis.navigation_inputs import imu_noise
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.learnt import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.pipeline.following.follow import refuse_unusable
-from wildlab.pipeline.following.sensor_tuning import FEWEST
-from wildlab.pipeline.navigation_errors import reference_of
-from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome

@@ -13,12 +13,12 @@ import pandas as pd
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from wildlab.analysis.following.estimates import read_estimates
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import REPORTS
-from wildlab.pipeline.following.estimates import read_estimates
 from wildlab.replay.gather import scene_of
 from wildlab.replay.page import page
 from wildlab.replay.recording import narrow_layout, save_recording

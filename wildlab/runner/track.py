@@ -9,13 +9,13 @@ from typing import Any, cast
 
 from rich.console import Console
 
+from wildlab.analysis.following.follow import refuse_unusable, sensors_with_detections
+from wildlab.analysis.following.tuned import Against, Tuned, refuse_same, tune_flight, tuned_text
 from wildlab.errors import WildlabError
 from wildlab.flight.following import Settings, read_settings
 from wildlab.flight.store import Flight, load_flight
 from wildlab.flight.toml import dump_toml
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.pipeline.following.follow import refuse_unusable, sensors_with_detections
-from wildlab.pipeline.following.tuned import Against, Tuned, refuse_same, tune_flight, tuned_text
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import refuse_other_flight, tell_source
 from wildlab.runner.processes.job import Job
@@ -52,7 +52,7 @@ def track_flight(
     against
         ``"truth"`` or ``"innovations"``: how it is tuned; truth where there is any, if left out.
     filters, targets, sensors, source
-        As `wildlab.pipeline.following.follow.follow_targets`.
+        As `wildlab.analysis.following.follow.follow_targets`.
     settings
         A settings file.
     into

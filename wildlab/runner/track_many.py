@@ -8,15 +8,15 @@ from typing import Any
 
 from rich.console import Console
 
+from wildlab.analysis.following.follow import refuse_unusable
+from wildlab.analysis.following.noise_model import of_flight
+from wildlab.analysis.many.target_model import refuse_unfit as refuse_unfit_settings
+from wildlab.analysis.scans import sensors_of
 from wildlab.errors import WildlabError
 from wildlab.flight.following import read_settings
 from wildlab.flight.store import load_flight
 from wildlab.flight.toml import dump_toml
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.pipeline.following.beliefs import of_flight
-from wildlab.pipeline.following.follow import refuse_unusable
-from wildlab.pipeline.many.beliefs import refuse_unfit as refuse_unfit_settings
-from wildlab.pipeline.scans import sensors_of
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import tell_source
 from wildlab.runner.processes.scheduling import Outcome
@@ -61,7 +61,7 @@ def track_many(
     Parameters
     ----------
     sensors, source
-        As `wildlab.pipeline.many.follow.follow_all`.
+        As `wildlab.analysis.many.follow.track_targets`.
     settings
         A settings file.
     into

@@ -35,7 +35,7 @@ from wildlab.runner.seeds.fingerprint import code_key
 _SHOWING = (
     "api/*.py",
     "reporting/**/*.py",
-    "brief.py",
+    "summary_table.py",
     "runner/tutorials.py",
     "runner/processes/notebook_process.py",
 )

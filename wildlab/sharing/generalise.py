@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.overviews.image_coverage import ground_height
 from wildlab.errors import WildlabError
 from wildlab.flight.following import SensorPart
 from wildlab.flight.learnt import Learnt
@@ -22,7 +23,6 @@ from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import local_earth
-from wildlab.pipeline.overviews.image_coverage import ground_height
 from wildlab.sharing.cells import Cell, cell_of
 from wildlab.sharing.inertial import USUAL_DECLINATION_DEG, USUAL_INCLINATION_DEG, moved_field, moved_imu
 from wildlab.sharing.names import Names, learn_names, renamed

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import pandas as pd
 
+from wildlab.analysis.navigation_errors import REFERENCES
 from wildlab.flight.schema import NAV, TABLES
 from wildlab.flight.store import PREFERRED
-from wildlab.pipeline.navigation_errors import REFERENCES
 
 #: Names that say what a thing is and nothing of where: wildlab's own, and those of kinds of sensors. Poses
 #: that a report looks up by name keep it: by another name they would be held against another reference.

@@ -16,8 +16,8 @@ from wildlab.simulation.sensor_parameters import Gnss, Imu, TwinMount
 def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
     """What `flight.toml` of the twin says: its sensors' sheets and what one would assume, not the truth.
 
-    The truth of a flight is drawn about it (`wildlab.simulation.as_flown`). Of a twin as flown, camera and
-    mount are the real ones.
+    The truth of a flight is drawn about it (`wildlab.simulation.perturbed_flight`). Of a twin as flown,
+    camera and mount are the real ones.
     """
     c, m, assumed = twin.camera, twin.mount, twin.assumed
     calibrated = m.calibrated is None or m.calibrated.text == "yes"

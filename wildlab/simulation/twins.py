@@ -16,7 +16,6 @@ from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.simulation.animal_motion import animals_truth
-from wildlab.simulation.as_flown import as_flown
 from wildlab.simulation.camera_detections import exposure_times, frames_and_detections
 from wildlab.simulation.camera_sway import camera_motion
 from wildlab.simulation.error_models import stream
@@ -32,6 +31,7 @@ from wildlab.simulation.onboard_sensors import (
     sample_times,
 )
 from wildlab.simulation.parameters import TwinParameters, load_twin
+from wildlab.simulation.perturbed_flight import as_flown
 from wildlab.simulation.target_motion import truth_table
 from wildlab.simulation.trajectory import Motion, turned
 from wildlab.simulation.twin_trajectory import twin_trajectory

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.measurement_noise import FRACTION, NOISES, THINNED, VARIATIONS
+from wildlab.analysis.measurement_noise import FRACTION, NOISES, THINNED, VARIATIONS
 from wildlab.studies.track_text import accuracy_words, stated_words
 
 #: Words for the variations, by the end of their subject.

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.track import Sighting
 from wildlab.evaluation.consistency import ERROR_CONVENTION, chi_square_interval
 from wildlab.evaluation.whiteness import Whiteness, innovation_whiteness
-from wildlab.pipeline.track import Sighting
 from wildlab.reporting.charts.tracks import (
     GAP_S,
     error_over_time,

@@ -23,10 +23,11 @@ from wildlab.tracking.association import distances, nearest_within
 from wildlab.tracking.batch import BatchCamera, BatchTracks, run_batch
 from wildlab.tracking.coloured import run_coloured, thin
 from wildlab.tracking.combined import Merged, SensorMeasurements, combined, merge
-from wildlab.tracking.considered import Considered, consider, consider_all
+from wildlab.tracking.consider_parameters import Considered, consider, consider_all
 from wildlab.tracking.considering import considering, renamed
 from wildlab.tracking.following import FILTERS, follow
 from wildlab.tracking.imm import ModeTrack, run_imm
+from wildlab.tracking.initiation import start_from_measurement, start_from_position, start_from_rays
 from wildlab.tracking.kalman import filter_at_rest
 from wildlab.tracking.measurement import (
     Sensor,
@@ -52,7 +53,6 @@ from wildlab.tracking.rays import Crossing, intersect_rays
 from wildlab.tracking.run import Start, Track, run_filter, start_from_first
 from wildlab.tracking.schmidt import PoseUncertainty
 from wildlab.tracking.smoothing import run_smoothed, smooth
-from wildlab.tracking.starts import start_from_measurement, start_from_position, start_from_rays
 from wildlab.tracking.unscented import run_unscented
 
 __all__ = [

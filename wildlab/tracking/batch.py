@@ -17,7 +17,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman, schmidt
-from wildlab.tracking.batch_kernels import Flags, run_lanes
+from wildlab.tracking.batch_kernels import Flags, filter_batch
 from wildlab.tracking.inputs import check_rows, check_start, checked
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.records import Start, Track
@@ -149,7 +149,7 @@ def run_batch(
     poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, B, N)
     kind = "Schmidt" if pose is not None else "Kalman" if view is None else "extended Kalman"
     with announced(f"the {kind} filter for many runs"):
-        singular = run_lanes(
+        singular = filter_batch(
             F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
             np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
             np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),

@@ -305,7 +305,7 @@ def load(source: Array, row: int, first: int, target: Array) -> None:
 
 
 @compiled
-def run_lanes(
+def filter_batch(
     F: Array, Q: Array, left: Array, phis: Array | None, z: Array, R: Array, poses: Array | None,
     R_bc: Array | None, P_poses: Array | None, lever: Array, planes: Array, A: Array, x0: Array, P0: Array,
     start: int, threshold: float, slots: Integers,

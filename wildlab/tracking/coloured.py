@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
-from wildlab.tracking.considered import Considers, Errors, errors_of
+from wildlab.tracking.consider_parameters import Considers, Errors, errors_of
 from wildlab.tracking.inputs import check_rows, check_start, checked
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.measurement import positions as positions_sensor

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array
-from wildlab.tracking.considered import TOGETHER
+from wildlab.tracking.consider_parameters import TOGETHER
 from wildlab.tracking.predictions import POSE, Prediction
 from wildlab.tracking.sensors import Sensor, row_of
 

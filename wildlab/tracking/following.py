@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.tracking.coloured import run_coloured
-from wildlab.tracking.considered import Considers
+from wildlab.tracking.consider_parameters import Considers
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.records import Start, Track

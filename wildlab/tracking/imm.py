@@ -16,7 +16,7 @@ from scipy.linalg import expm
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
-from wildlab.tracking.considered import Considers, Errors, errors_of
+from wildlab.tracking.consider_parameters import Considers, Errors, errors_of
 from wildlab.tracking.inputs import check_rows, check_start, checked, single_detection
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import Motion

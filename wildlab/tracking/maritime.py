@@ -1,7 +1,7 @@
 """Boats seen from a boat: a motion model for sensors of any rate, and sensors whose clock may be wrong too.
 
-Of the errors that `wildlab.tracking.considered` knows, a level platform has `NORTH` and `EAST` of its
-position (and of the part of the hull that is seen), and `YAW`, its heading. Down moves nothing on a level
+Of the errors that `wildlab.tracking.consider_parameters` knows, a level platform has `NORTH` and `EAST` of
+its position (and of the part of the hull that is seen), and `YAW`, its heading. Down moves nothing on a level
 sea; its place among the six of a pose is taken by `CLOCK`, the error of the stamp in seconds. `CONSIDERED`
 has their names.
 """

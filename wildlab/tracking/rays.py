@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, skew
-from wildlab.tracking.considered import Considered
+from wildlab.tracking.consider_parameters import Considered
 from wildlab.tracking.predictions import POSE
 
 #: rad. Rays that cross at less are near parallel: an error of them is some ten times as long along them.

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from wildlab.geometry.frames import Array
 from wildlab.tracking import schmidt
 from wildlab.tracking.association import nearest_detection
-from wildlab.tracking.considered import Considers, Errors, errors_of
+from wildlab.tracking.consider_parameters import Considers, Errors, errors_of
+from wildlab.tracking.initiation import start_from_first as start_from_first
 from wildlab.tracking.inputs import check_cross, check_rows, check_start, checked
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import Motion
@@ -24,7 +25,6 @@ from wildlab.tracking.records import Start as Start
 from wildlab.tracking.records import State, predict_by_motion, record, step_through
 from wildlab.tracking.records import Track as Track
 from wildlab.tracking.sensors import Sensor, angles_at, check_states, on_state
-from wildlab.tracking.starts import start_from_first as start_from_first
 
 #: Row, the row of the detection that was used last, the estimate then, covariance now -> whether the track
 #: ends here, before anything of this row is used.

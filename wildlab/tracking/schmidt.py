@@ -2,7 +2,7 @@
 
 Beside the target's covariance ``P`` (n, n) the filter keeps its cross-covariance ``C`` (n, 6) with the errors
 of the pose, whose own covariance ``P^o`` (6, 6) comes anew from the navigation filter at every frame. Nothing
-here asks for six: other errors, by name and in any number, are in `wildlab.tracking.considered`.
+here asks for six: other errors, by name and in any number, are in `wildlab.tracking.consider_parameters`.
 
 With ``F^o = I`` H (7.32) keeps ``C`` from frame to frame while ``P^o`` changes. Where ``P^o`` grows that is
 the model of an error with a random walk, and sound. Where it shrinks, ``[P C; C' P^o]`` stops being a

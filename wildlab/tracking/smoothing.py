@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.tracking.considered import Considers, Errors
+from wildlab.tracking.consider_parameters import Considers, Errors
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.records import Start, Track
 from wildlab.tracking.run import Step, filter_in_steps

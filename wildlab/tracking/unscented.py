@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
-from wildlab.tracking.considered import Considers, errors_of
+from wildlab.tracking.consider_parameters import Considers, errors_of
 from wildlab.tracking.inputs import check_rows, check_start, checked, single_detection
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.records import Start, State, Track, predict_by_motion, record, step_through

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from tests.pipeline.survey_twin import CAMERA, Survey, simulate
+from tests.analysis.survey_twin import CAMERA, Survey, simulate
 from wildlab.flight.checks.sense.seen import _off, seen
 from wildlab.flight.store import Flight
 

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.pipeline.survey_twin import Survey, simulate
+from tests.analysis.survey_twin import Survey, simulate
 from wildlab.flight.checks.sense import bounds, camera, ground, motion, origin, stamps, targets, trial
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
-from wildlab.flight.checks.sense.felt import Felt, axes_words, felt_mistakes, other_axes
 from wildlab.flight.checks.sense.field import FieldStep, field_mistakes
+from wildlab.flight.checks.sense.inertial_checks import Felt, axes_words, felt_mistakes, other_axes
 from wildlab.flight.checks.sense.places import place_mistakes
 from wildlab.flight.checks.sense.sightings import sightings
 from wildlab.flight.manifest import replace_in_manifest

@@ -10,15 +10,15 @@ import pytest
 
 from tests.flight.checks.watching import level_poses, watch
 from tests.flight.conftest import table
+from wildlab.analysis.scans import scans_of
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
+from wildlab.flight.checks.duplicates import twice
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import looks_of_others, sensors
-from wildlab.flight.checks.twice import twice
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.pipeline.scans import scans_of
 
 
 def detected(

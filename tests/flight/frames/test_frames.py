@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.clicking import write_images
+from tests.annotation import write_images
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.frames.below import images_below

@@ -6,12 +6,12 @@ import math
 
 import pytest
 
-from tests.pipeline.robots import KNOWN, robot_flight
+from tests.analysis.robots import KNOWN, robot_flight
 from tests.sharing.edition.flights import flight, overview, report
+from wildlab.analysis.following.follow import follow_targets
+from wildlab.analysis.following.judged import judged
+from wildlab.analysis.overviews.recommendations import numbers_of
 from wildlab.flight.following import parse_settings
-from wildlab.pipeline.following.follow import follow_targets
-from wildlab.pipeline.following.judged import judged
-from wildlab.pipeline.overviews.worth_fixing import numbers_of
 from wildlab.reporting import tracking
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.report import open_report

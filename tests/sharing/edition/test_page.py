@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from tests.flight.conftest import make_flight  # noqa: F401 - a fixture of another room
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from tests.sharing.left import leave_report
+from wildlab.analysis.georeference import observe
 from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.pipeline.georeference import observe
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.page import POLICY
 from wildlab.sharing.edition.edition import Place, edition_html

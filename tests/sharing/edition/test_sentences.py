@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
-from wildlab.pipeline.overviews.alarms import ALARMS
-from wildlab.pipeline.overviews.verdict import PARTS, Verdict
-from wildlab.pipeline.overviews.worth_fixing import CAUSES
+from wildlab.analysis.overviews.alarms import ALARMS
+from wildlab.analysis.overviews.recommendations import CAUSES
+from wildlab.analysis.overviews.verdict import PARTS, Verdict
 from wildlab.sharing.edition.facts import _TROUBLES, Alarm, Facts, Gain
 from wildlab.sharing.edition.language import languages, load_language, say
 from wildlab.sharing.edition.said import Message, length

@@ -13,7 +13,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
-from wildlab.tracking.many.found_again import look_differences, place_costs, reachable, recognise
+from wildlab.tracking.many.reacquisition import look_differences, place_costs, reachable, recognise
 
 entries = st.one_of(st.integers(-5, 30), st.sampled_from([np.nan, np.inf]))
 matrices = st.tuples(st.integers(0, 4), st.integers(0, 4)).flatmap(

@@ -12,13 +12,13 @@ from wildlab.flight.checks import camera as findings_seen
 from wildlab.flight.checks import findings
 from wildlab.flight.checks import inertial as findings_inertial
 from wildlab.flight.checks.corrections import report_alone
+from wildlab.flight.checks.duplicates import twice
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.flown import why_no_start
 from wildlab.flight.checks.sense.sense import contradictions
 from wildlab.flight.checks.sensors import sensors
 from wildlab.flight.checks.terrain import terrain_findings
 from wildlab.flight.checks.times import gaps, overlap
-from wildlab.flight.checks.twice import twice
 from wildlab.flight.checksums import locations_confirmed, manifest_changed
 from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.ticker import NullLocator
 
+from wildlab.analysis.following.filters import SMOOTHED
+from wildlab.analysis.following.judged import seen_of
+from wildlab.analysis.following.sensor_tracks import SensorTrack
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.following.filters import SMOOTHED
-from wildlab.pipeline.following.judged import seen_of
-from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.reporting.charts.following import UNEVEN, Shown, few, slug
 from wildlab.reporting.figure_text import Powers
 from wildlab.reporting.figures import INK, colour, new_figure, thinned

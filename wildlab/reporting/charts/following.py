@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from wildlab.analysis.following.filters import SMOOTHED
+from wildlab.analysis.following.follow import TrackingResult
+from wildlab.analysis.following.judged import whitened
+from wildlab.analysis.following.sensor_tracks import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
 from wildlab.geometry.frames import Array
 from wildlab.names import figure_name
-from wildlab.pipeline.following.filters import SMOOTHED
-from wildlab.pipeline.following.follow import TrackingResult
-from wildlab.pipeline.following.judged import whitened
-from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.reporting.charts.tracks import innovation_correlations
 from wildlab.reporting.figure_text import Powers
 from wildlab.reporting.figures import (

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from wildlab.analysis.many.follow import ManyTracks, known_looks
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
 from wildlab.names import figure_name
-from wildlab.pipeline.many.follow import ManyTracks, known_looks
 from wildlab.reporting.charts.following import SENSOR_COLOURS, Shown
 from wildlab.reporting.figures import GREY, INK, VERMILLION, map_axes, mark_gaps, new_figure
 

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.analysis.overviews.image_coverage import Coverage
+from wildlab.analysis.overviews.overview import TROUBLES, Issue, Path
 from wildlab.evaluation.streams import Pace
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
 from wildlab.names import figure_name
-from wildlab.pipeline.overviews.image_coverage import Coverage
-from wildlab.pipeline.overviews.overview import TROUBLES, Path, Trouble
 from wildlab.reporting.figures import (
     BLUE,
     COLOURS,
@@ -58,7 +58,7 @@ class Clock:
         return np.asarray((np.asarray(times, float) - self.begin) / self.unit)
 
 
-def path_chart(path: Path, troubles: Sequence[Trouble], title: str) -> Figure:
+def path_chart(path: Path, troubles: Sequence[Issue], title: str) -> Figure:
     """The path in local metres, coloured by what is wrong, worst on top."""
     fig, ax = new_figure(4.7, 5.0)
     north, east = path.place[:, 0], path.place[:, 1]
@@ -123,7 +123,7 @@ def _room(ax: Axes, east: Array, north: Array) -> None:
     ax.autoscale_view()
 
 
-def _spell_words(trouble: Trouble) -> str:
+def _spell_words(trouble: Issue) -> str:
     count = len(trouble.spells)
     times = "once" if count == 1 else f"{count} times"
     return f"{times}, {trouble.seconds:.0f} s" if trouble.seconds >= 1 else times

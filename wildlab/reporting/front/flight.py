@@ -120,15 +120,15 @@ def simulated() -> dict[str, Any]:
     dict
         For JSON.
     """
-    from wildlab.pipeline.georeference import (
+    from wildlab.analysis.georeference import (
         assumed_deviations,
         assumed_pose_covariance,
         covariances_of,
         georeference,
         observe,
     )
-    from wildlab.pipeline.overviews.image_coverage import cover_images
-    from wildlab.pipeline.track import CvTuning, follow_schmidt, sighting
+    from wildlab.analysis.overviews.image_coverage import cover_images
+    from wildlab.analysis.track import CvTuning, follow_schmidt, sighting
     from wildlab.simulation.twins import simulate_twin
 
     flight = simulate_twin(TWIN, SEED, ("imu", "gnss"))

@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from wildlab.analysis.overviews.recommendations import numbers_of
 from wildlab.flight.manifest import FILE_NAME
-from wildlab.pipeline.overviews.worth_fixing import numbers_of
 from wildlab.reporting.own_flights import OwnFlight, OwnReport
 from wildlab.runner.record.beside import finished_metrics
 from wildlab.runner.record.digests import read_status

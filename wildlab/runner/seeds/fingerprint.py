@@ -22,7 +22,7 @@ ROOMS = (
     "tracking",
     "planning",
     "evaluation",
-    "pipeline",
+    "analysis",
 )
 #: Of the studies their trials can; how they are shown and said cannot.
 TRIALS = ("studies/*/trial.py", "studies/*/trial/*.py")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from wildlab.pipeline.overviews.verdict import Verdict
+from wildlab.analysis.overviews.verdict import Verdict
 from wildlab.reporting.page import POLICY
 from wildlab.reporting.text import escape, inline
 from wildlab.sharing.edition.facts import Facts

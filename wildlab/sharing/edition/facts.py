@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from wildlab.pipeline.overviews.alarms import ALARMS
-from wildlab.pipeline.overviews.overview import TROUBLES
-from wildlab.pipeline.overviews.verdict import WORTH
-from wildlab.pipeline.overviews.worth_fixing import causes_told, doubted, error_left, possible_gain
+from wildlab.analysis.overviews.alarms import ALARMS
+from wildlab.analysis.overviews.overview import TROUBLES
+from wildlab.analysis.overviews.recommendations import causes_told, doubted, error_left, possible_gain
+from wildlab.analysis.overviews.verdict import WORTH
 from wildlab.reporting.own_flights import OwnFlight
 
 NAN = math.nan
@@ -35,7 +35,7 @@ class Alarm(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """One thing to fix, as `wildlab.pipeline.overviews.worth_fixing.Gain`: ``value`` of ``of``."""
+    """One thing to fix, as `wildlab.analysis.overviews.recommendations.Gain`: ``value`` of ``of``."""
 
     key: str
     causes: tuple[str, ...]
@@ -52,7 +52,7 @@ class Facts(NamedTuple):
     twin
         Whether nobody flew it.
     verdict
-        A key of `wildlab.pipeline.overviews.verdict.Verdict`; None where the flight was not looked over.
+        A key of `wildlab.analysis.overviews.verdict.Verdict`; None where the flight was not looked over.
     problems
         Things in its records that cannot be used or contradict each other.
     length_s, height_m, area_m2
@@ -217,7 +217,7 @@ def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
     report = flight.report("tracking")
     if report is None:
         return []
-    from wildlab.pipeline.following.judged import LEADING
+    from wildlab.analysis.following.judged import LEADING
     from wildlab.reporting.tracking import band_name
 
     rows = [(subject, entry) for (name, subject), entry in report.numbers.items() if name == "rmse"]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.analysis.georeference import observe
+from wildlab.analysis.overviews.overview import look_over
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.pipeline.georeference import observe
-from wildlab.pipeline.overviews.overview import look_over
 from wildlab.sharing.edition.picture import MapPicture
 
 Array = NDArray[np.float64]

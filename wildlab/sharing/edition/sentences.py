@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wildlab.pipeline.overviews.verdict import WORTH, Verdict
-from wildlab.pipeline.overviews.worth_fixing import MOST
+from wildlab.analysis.overviews.recommendations import MOST
+from wildlab.analysis.overviews.verdict import WORTH, Verdict
 from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.tracking import NEAR_THE_BAND
 from wildlab.sharing.edition.facts import Alarm, Facts, Gain

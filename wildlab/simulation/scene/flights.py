@@ -12,13 +12,13 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.simulation.as_flown import as_flown
 from wildlab.simulation.camera_detections import exposure_times
 from wildlab.simulation.camera_sway import camera_motion
 from wildlab.simulation.camera_view import Exposures
 from wildlab.simulation.clipped_outlines import visible_part
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.perturbed_flight import as_flown
 from wildlab.simulation.scene.bodies import Body, fitted_out, vessel
 from wildlab.simulation.scene.render import RenderedView, Scene, outline_of, render
 from wildlab.simulation.scene.sea import Sea

@@ -9,10 +9,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from wildlab.analysis.following.sensor_tracks import FILTERS, SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.sensor_tracks import FILTERS, SensorTrack
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.pipeline.following.sensor_tracks import COLUMNS, FILTERS
-from wildlab.pipeline.following.sensor_tuning import SensorTuning
+from wildlab.analysis.following.sensor_tracks import COLUMNS, FILTERS
+from wildlab.analysis.following.sensor_tuning import SensorTuning
 from wildlab.reporting.report import Report
 from wildlab.studies.autoferry.comparison import (
     OUTCOMES,

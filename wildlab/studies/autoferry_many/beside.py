@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.many.follow import ManyTracks, judged, track_targets
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
-from wildlab.pipeline.many.follow import ManyTracks, follow_all, judged
 from wildlab.reporting.charts.following import Shown
 from wildlab.reporting.figures import BLUE, ORANGE, new_figure
 from wildlab.reporting.report import Report
@@ -98,7 +98,7 @@ def judge_beside(
     choices = [draw_choice(rng, FAR_M) for rng in generators]
     for mode in modes_beside():
         given = {
-            case: follow_all(flight, settings=settings[mode], sensors=MODES[mode])
+            case: track_targets(flight, settings=settings[mode], sensors=MODES[mode])
             for case, flight in flights.items()
         }
         reach = {case: reach_of(flight, mode) for case, flight in flights.items()}

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from wildlab.analysis.many.follow import judged, track_targets
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.following import (
     HullPart,
@@ -18,7 +19,6 @@ from wildlab.flight.following import (
     TargetsPart,
 )
 from wildlab.flight.store import Flight
-from wildlab.pipeline.many.follow import follow_all, judged
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST
 from wildlab.studies.autoferry.boats import tune_sensor
 from wildlab.studies.autoferry_many.drawing import even, scale
@@ -198,7 +198,7 @@ def gospa_of(lives: Identities | None) -> float:
 def follow_mode(flight: Flight, mode: str, settings: Settings) -> Identities | None:
     """A scenario by the sensors of a mode, beside its true boats."""
     return judged(
-        follow_all(flight, settings=settings, sensors=MODES[mode]), reach_of(flight, mode), JUDGED_AT
+        track_targets(flight, settings=settings, sensors=MODES[mode]), reach_of(flight, mode), JUDGED_AT
     )
 
 

@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.track import CvTuning, Sighting, evaluate_track, follow_positions
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
-from wildlab.pipeline.track import CvTuning, Sighting, evaluate_track, follow_positions
 from wildlab.studies.linear_vs_nonlinear.trial import (
     OBSERVER,
     Numbers,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from wildlab.studies.crossing_vessels import trial
 from wildlab.studies.crossing_vessels.claims import check_claims
-from wildlab.studies.crossing_vessels.trial import found_again as again
 from wildlab.studies.crossing_vessels.trial import joint
+from wildlab.studies.crossing_vessels.trial import reacquisition as again
 from wildlab.studies.protocol import Metric, Study
 
 

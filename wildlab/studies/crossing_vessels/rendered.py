@@ -15,11 +15,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.georeference import observe
+from wildlab.analysis.rendered import Photographer, Shot, exposures_of
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.pipeline.georeference import observe
-from wildlab.pipeline.rendered import Photographer, Shot, exposures_of
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels.spotted import Counted, Spotted, count, spot

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from wildlab.pipeline.rendered import Photographer
+from wildlab.analysis.rendered import Photographer
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, VERMILLION, new_figure
 from wildlab.studies.crossing_vessels.charts import Shown
 from wildlab.studies.crossing_vessels.rendered import Rendering

@@ -8,8 +8,8 @@ from functools import reduce
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.rendered import OVERLAP
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.pipeline.rendered import OVERLAP
 from wildlab.reporting.georeferencing_cause import listed
 from wildlab.simulation.scene.flights import VesselLook
 from wildlab.studies.crossing_vessels.rendered import SEA_EVERY, Associated, CrossingTracks, Rendering

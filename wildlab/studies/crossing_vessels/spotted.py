@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.analysis.rendered import Shot
 from wildlab.detection.centres import cut_sides
-from wildlab.pipeline.rendered import Shot
 from wildlab.studies.crossing_vessels.trial.crossing import BOATS, NONE
 
 Array = NDArray[np.float64]

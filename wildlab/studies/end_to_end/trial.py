@@ -13,6 +13,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.georeference import observe, pose_errors
+from wildlab.analysis.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
+from wildlab.analysis.track import Sighting, sighting
 from wildlab.detection.ground import RISE
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
@@ -20,9 +23,6 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
-from wildlab.pipeline.georeference import observe, pose_errors
-from wildlab.pipeline.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
-from wildlab.pipeline.track import Sighting, sighting
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
 from wildlab.studies.coloured_noise import trial as coloured

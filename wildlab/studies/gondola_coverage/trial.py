@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.plans.flown import Executed, ExecutionErrors, as_planned, execute, held_with
 from wildlab.evaluation.shares import Check
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plans.flown import Executed, ExecutionErrors, as_planned, execute, held_with
 from wildlab.planning.courses import fly
 from wildlab.planning.coverage import Coverage, nodes_in, share_seen
 from wildlab.planning.gimbal import (

@@ -7,8 +7,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from wildlab.analysis.search import Searched, rows_at
 from wildlab.evaluation.runs import mean_share_interval
-from wildlab.pipeline.search import Searched, rows_at
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.pipeline.search import Searcher, search
+from wildlab.analysis.search import Searcher, search
 from wildlab.planning.legs import Leg, Platform
 from wildlab.studies.information_planning.trial import INFORMATION, draw_scene, searchers
 

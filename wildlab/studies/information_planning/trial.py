@@ -10,10 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
-from wildlab.geometry.frames import Array
-from wildlab.pipeline.search import (
+from wildlab.analysis.search import (
     SearchByChance,
     SearchByInformation,
     Searched,
@@ -23,7 +20,10 @@ from wildlab.pipeline.search import (
     grid_over,
     search,
 )
-from wildlab.pipeline.survey import Rules, Surveyed, survey
+from wildlab.analysis.survey import Rules, Surveyed, survey
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
+from wildlab.geometry.frames import Array
 from wildlab.planning.areas import rectangle
 from wildlab.planning.high_level import Tour, greedy_tour, shortest_tour
 from wildlab.planning.information import SearchSensor, initial_information

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.rendered import Marks, Shot
-from wildlab.pipeline.track import start
+from wildlab.analysis.rendered import Marks, Shot
+from wildlab.analysis.track import start
 from wildlab.studies.large_ship.trial import (
     TUNING,
     WITH,

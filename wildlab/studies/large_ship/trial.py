@@ -11,12 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.flight.store import Flight
-from wildlab.geometry.ellipses import inside_ellipse
-from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.uncertainty import ground_covariance
-from wildlab.pipeline.georeference import observe, pose_errors
-from wildlab.pipeline.rendered import (
+from wildlab.analysis.georeference import observe, pose_errors
+from wildlab.analysis.rendered import (
     Marks,
     Photographer,
     Shot,
@@ -24,7 +20,11 @@ from wildlab.pipeline.rendered import (
     marks_of,
     with_detections,
 )
-from wildlab.pipeline.track import CvTuning, Sighting, follow_pixels, sighting
+from wildlab.analysis.track import CvTuning, Sighting, follow_pixels, sighting
+from wildlab.flight.store import Flight
+from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.uncertainty import ground_covariance
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.run import Track

@@ -15,13 +15,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
-from wildlab.evaluation.whiteness import white_bound
-from wildlab.flight.store import Flight
-from wildlab.pipeline.measurement_noise import follow_variations
-from wildlab.pipeline.navigate import navigate_observer
-from wildlab.pipeline.track import (
+from wildlab.analysis.measurement_noise import follow_variations
+from wildlab.analysis.navigate import navigate_observer
+from wildlab.analysis.track import (
     CvTuning,
     Scored,
     Sighting,
@@ -32,6 +28,10 @@ from wildlab.pipeline.track import (
     sighting,
     start,
 )
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
+from wildlab.evaluation.whiteness import white_bound
+from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.measurement import Sensor, pixels
@@ -174,7 +174,7 @@ def _interacting(seen: Sighting, tuning: CvTuning) -> Track:
 
 
 def start_on_detections(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
-    """As `wildlab.pipeline.track.start`, its row counted among the detections alone."""
+    """As `wildlab.analysis.track.start`, its row counted among the detections alone."""
     rows = np.flatnonzero(seen.seen)
     begin = start(seen, tuning, n, **more)
     return begin._replace(row=int(np.searchsorted(rows, begin.row)))
@@ -216,7 +216,7 @@ def numbers_of(seen: Sighting, followed: dict[str, ScoredTrack]) -> Numbers:
 def numbers_beside(seen: Sighting, tuning: CvTuning, base: str, followed: ScoredTrack) -> Numbers:
     """Numbers of a filter on the ground with the noise that H 8.2 proposes, and with fewer detections.
 
-    The subjects are ``base`` and one of `wildlab.pipeline.measurement_noise.VARIATIONS`; ``detections`` says
+    The subjects are ``base`` and one of `wildlab.analysis.measurement_noise.VARIATIONS`; ``detections`` says
     how many each was given. ``followed`` is what the filter itself made of the sighting.
     """
     result: Numbers = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wildlab.pipeline.navigation_errors import TUNINGS, unit_of
+from wildlab.analysis.navigation_errors import TUNINGS, unit_of
 from wildlab.studies.navigation import trial
 from wildlab.studies.protocol import Metric, Study
 

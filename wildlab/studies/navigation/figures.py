@@ -8,11 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab.evaluation.whiteness import innovation_whiteness
-from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
-from wildlab.pipeline.navigate import likelihoods_of_latency
-from wildlab.pipeline.navigation_errors import (
+from wildlab.analysis.navigate import likelihoods_of_latency
+from wildlab.analysis.navigation_errors import (
     AXES,
     PLACES,
     Studied,
@@ -23,7 +20,10 @@ from wildlab.pipeline.navigation_errors import (
     summarise,
     summarise_innovations,
 )
-from wildlab.pipeline.navigation_inputs import heading_from
+from wildlab.analysis.navigation_inputs import heading_from
+from wildlab.evaluation.whiteness import innovation_whiteness
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.navigation import (
     NAMES,
     bias_chart,

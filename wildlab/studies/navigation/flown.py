@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.navigation_errors import Studied
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
-from wildlab.pipeline.navigation_errors import Studied
 from wildlab.reporting.charts.georeferencing import aircraft_map
 from wildlab.reporting.charts.navigation import (
     NAMES,

@@ -11,16 +11,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab.evaluation.blocks import PROBABILITY, block_mean, time_blocks
-from wildlab.navigation.receiver import SIZE, Candidate, SourceNoise
-from wildlab.pipeline.navigation_errors import (
+from wildlab.analysis.navigation_errors import (
     AXES,
     NavigationErrors,
     Studied,
     summarise,
     summarise_innovations,
 )
-from wildlab.pipeline.receiver import Placement, Receiver, place_receiver
+from wildlab.analysis.receiver import Placement, Receiver, place_receiver
+from wildlab.evaluation.blocks import PROBABILITY, block_mean, time_blocks
+from wildlab.navigation.receiver import SIZE, Candidate, SourceNoise
 from wildlab.reporting.report import Report
 
 #: Mean NIS over its ideal within this is of the right level; correlations at lag 1 below that are no colour.

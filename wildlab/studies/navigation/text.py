@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.navigation_errors import AXES
-from wildlab.pipeline.overviews.verdict import Evidence, Verdict, verdict_of
+from wildlab.analysis.navigation_errors import AXES
+from wildlab.analysis.overviews.verdict import Evidence, Verdict, verdict_of
 
 #: A difference that is so many times what the filter states is more than it can answer for.
 TOO_SURE = 2.0

@@ -14,6 +14,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.analysis.flow import FramePair, Reading, pair_velocities
+from wildlab.analysis.rendered import Photographer
 from wildlab.detection.floating import find_objects
 from wildlab.detection.flow import Features, filled_outlines, find_features, match_features
 from wildlab.errors import WildlabError
@@ -21,8 +23,6 @@ from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
 from wildlab.geometry.quantiles import student_quantile
-from wildlab.pipeline.flow import FramePair, Reading, pair_velocities
-from wildlab.pipeline.rendered import Photographer
 from wildlab.simulation.scene.flights import SceneFlight, VesselLook, corner_of
 from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
 
@@ -169,7 +169,7 @@ def look(twin: str, seed: int, pairs: int) -> Looked:
 
 
 def readings(looked: Looked) -> dict[str, pd.DataFrame]:
-    """Velocities by each of `READINGS`, as `wildlab.pipeline.flow.pair_velocities` gives them."""
+    """Velocities by each of `READINGS`, as `wildlab.analysis.flow.pair_velocities` gives them."""
     times, poses = looked.scene.times, looked.scene.poses
     exact = pd.DataFrame({"time_s": times, "pan_rad": poses.pan, "tilt_rad": poses.tilt})
     known = replace(looked.flight, tables=looked.flight.tables | {"gimbal": exact})

@@ -13,6 +13,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.evaluate import errors_of, score_points
+from wildlab.analysis.georeference import georeference, observe
 from wildlab.detection.colour import Colour, find_coloured
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
@@ -22,8 +24,6 @@ from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.pipeline.evaluate import errors_of, score_points
-from wildlab.pipeline.georeference import georeference, observe
 from wildlab.simulation.camera_view import marks, numbered
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin

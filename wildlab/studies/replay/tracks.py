@@ -28,7 +28,7 @@ def random_walk(dt: float) -> tuple[Array, Array]:
     return np.eye(2), WALK * dt * np.eye(2)
 
 
-def follow_all(flight: Flight, points: Points, begin: float, end: float) -> tuple[Estimates, ...]:
+def track_targets(flight: Flight, points: Points, begin: float, end: float) -> tuple[Estimates, ...]:
     """A track for each target that detections name, from its first detection to the end.
 
     Parameters

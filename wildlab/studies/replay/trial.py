@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.georeference import observe, truth_of
 from wildlab.evaluation.shares import Check
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
@@ -19,7 +20,6 @@ from wildlab.geometry import CameraPoses, in_image, widest_view
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.geometry.terrain import pixels_to_terrain
-from wildlab.pipeline.georeference import observe, truth_of
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
 

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
+from wildlab.analysis.track import Sighting
 from wildlab.evaluation.consistency import ERROR_CONVENTION, share_inside
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.track_errors import SLOWEST_M_S
-from wildlab.pipeline.track import Sighting
 from wildlab.reporting.charts.tracks import (
     error_over_time,
     nees_over_flights,

@@ -3,7 +3,7 @@
 A premise is about the flight and its poses, never about what the claim measures.
 
 A time average is held against the band of such an average: as many independent values as it is worth
-(`wildlab.pipeline.consistency.worth`). Single values are held against the band of single values. What vague
+(`wildlab.analysis.consistency.worth`). Single values are held against the band of single values. What vague
 words are taken to mean stands with the claims, in ``data/published/schmidt.toml``.
 """
 
@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.analysis.navigation_errors import SETTLING_S
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.shares import Check
-from wildlab.pipeline.navigation_errors import SETTLING_S
 from wildlab.studies.schmidt.trial import DEGREES, METRES, SOURCE, TUNING, constant
 
 Array = NDArray[np.float64]

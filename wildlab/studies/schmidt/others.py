@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.pipeline.track import Sighting
+from wildlab.analysis.track import Sighting
 from wildlab.studies.schmidt.trial import TUNING
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.measurement import pixels

@@ -14,18 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import chi_square_interval, position_nees, share_inside
-from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.evaluation.track_errors import summarise_track, track_errors
-from wildlab.flight.clocks import frame_times
-from wildlab.flight.store import Flight
-from wildlab.pipeline.consistency import worth
-from wildlab.pipeline.navigate import PUBLISHED_LIKE, navigate_mekf
-from wildlab.pipeline.navigation_errors import errors_against
-from wildlab.pipeline.pose_noise import covariance_of, estimate_from_sighting
-from wildlab.pipeline.sighting_errors import NAMES as POSE_NAMES
-from wildlab.pipeline.sighting_errors import (
+from wildlab.analysis.consistency import worth
+from wildlab.analysis.navigate import PUBLISHED_LIKE, navigate_mekf
+from wildlab.analysis.navigation_errors import errors_against
+from wildlab.analysis.pose_noise import covariance_of, estimate_from_sighting
+from wildlab.analysis.sighting_errors import NAMES as POSE_NAMES
+from wildlab.analysis.sighting_errors import (
     flight_numbers,
     mean,
     pauses,
@@ -33,7 +27,7 @@ from wildlab.pipeline.sighting_errors import (
     premise_numbers,
     shown,
 )
-from wildlab.pipeline.track import (
+from wildlab.analysis.track import (
     CvTuning,
     Scored,
     Sighting,
@@ -43,6 +37,12 @@ from wildlab.pipeline.track import (
     sighting,
     start,
 )
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import chi_square_interval, position_nees, share_inside
+from wildlab.evaluation.pose_noise import PoseNoise
+from wildlab.evaluation.track_errors import summarise_track, track_errors
+from wildlab.flight.clocks import frame_times
+from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
 from wildlab.tracking.run import Track

@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.evaluate import errors_of, score_points
+from wildlab.analysis.georeference import georeference, observe
+from wildlab.analysis.navigate import navigate_observer
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
-from wildlab.pipeline.evaluate import errors_of, score_points
-from wildlab.pipeline.georeference import georeference, observe
-from wildlab.pipeline.navigate import navigate_observer
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.twins import simulate_twin

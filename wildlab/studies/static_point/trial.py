@@ -6,15 +6,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.analysis.evaluate import errors_of, score_points
+from wildlab.analysis.georeference import covariances_of, georeference, observe
+from wildlab.analysis.navigate import navigate_observer
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
-from wildlab.pipeline.evaluate import errors_of, score_points
-from wildlab.pipeline.georeference import covariances_of, georeference, observe
-from wildlab.pipeline.navigate import navigate_observer
 from wildlab.simulation.onboard_sensors import as_mounted, mounted_imu
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin

@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import find_edges, find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import share_interval
-from wildlab.pipeline.rendered import judge
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
 from wildlab.reporting.text import percent
 from wildlab.studies.vessel_detection import text as words

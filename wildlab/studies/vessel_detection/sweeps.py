@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
-from wildlab.pipeline.rendered import judge
 from wildlab.simulation.scene.bodies import KINDS
 from wildlab.simulation.scene.drawn import Draw, Drawn, draw_scene
 from wildlab.simulation.scene.render import Scene, render

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.analysis.animals.frames import NEAR, TOO_LARGE
 from wildlab.detection.detections import Detections
 from wildlab.detection.warm import (
     Warm,
@@ -21,7 +22,6 @@ from wildlab.detection.warm import (
     to_grey,
 )
 from wildlab.geometry.camera import Camera
-from wildlab.pipeline.animals.frames import NEAR, TOO_LARGE
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.parameters import load_twin

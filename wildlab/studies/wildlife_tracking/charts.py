@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from wildlab.analysis.animals.follow import FollowedAnimals, Known
+from wildlab.analysis.animals.frames import NONE
+from wildlab.analysis.animals.images import FURTHEST
+from wildlab.analysis.animals.revisit import Patrolled
 from wildlab.evaluation.runs import mean_interval
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.animals.follow import FollowedAnimals, Known
-from wildlab.pipeline.animals.frames import NONE
-from wildlab.pipeline.animals.images import FURTHEST
-from wildlab.pipeline.animals.revisit import Patrolled
 from wildlab.reporting.figures import (
     BLUE,
     GREY,

@@ -14,13 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.detection.detections import Detections
-from wildlab.detection.warm import find_warm, gate_from_distance, to_grey
-from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
-from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.pipeline.animals.follow import FollowedAnimals, follow
-from wildlab.pipeline.animals.frames import (
+from wildlab.analysis.animals.follow import FollowedAnimals, follow
+from wildlab.analysis.animals.frames import (
     NONE,
     Frame,
     Framed,
@@ -32,8 +27,13 @@ from wildlab.pipeline.animals.frames import (
     render_frame,
     take_frames,
 )
-from wildlab.pipeline.animals.images import Images
-from wildlab.pipeline.animals.measures import out_of_sight, sight_numbers
+from wildlab.analysis.animals.images import Images
+from wildlab.analysis.animals.measures import out_of_sight, sight_numbers
+from wildlab.detection.detections import Detections
+from wildlab.detection.warm import find_warm, gate_from_distance, to_grey
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.scene.ground import Weather

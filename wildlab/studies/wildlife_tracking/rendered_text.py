@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.animals.frames import NEAR, STONES, TOO_LARGE, TREES
+from wildlab.analysis.animals.images import FURTHEST
 from wildlab.evaluation.runs import share_interval
-from wildlab.pipeline.animals.frames import NEAR, STONES, TOO_LARGE, TREES
-from wildlab.pipeline.animals.images import FURTHEST
 from wildlab.simulation.scene.animals import ANIMALS
 from wildlab.studies.wildlife_detection.trial import AREA
 from wildlab.studies.wildlife_tracking.rendered import CLOUDS, DAWN, Counted, Renderings, counted

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.animals.follow import STATION_S
+from wildlab.analysis.animals.measures import OUT_OF_SIGHT
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.shares import Check
-from wildlab.pipeline.animals.follow import STATION_S
-from wildlab.pipeline.animals.measures import OUT_OF_SIGHT
 from wildlab.reporting.text import percent
 from wildlab.studies.wildlife_tracking.intervals import (
     FEWEST,

@@ -8,7 +8,7 @@ from time import process_time
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.animals.follow import follow
+from wildlab.analysis.animals.follow import follow
 from wildlab.studies.wildlife_tracking.trial import (
     KALMAN,
     POSITIVE,

@@ -13,20 +13,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array
-from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.animals.follow import FollowedAnimals, Follower, Kalman, Particles, follow
-from wildlab.pipeline.animals.images import Detector, Images, take_images
-from wildlab.pipeline.animals.measures import (
+from wildlab.analysis.animals.follow import FollowedAnimals, Follower, Kalman, Particles, follow
+from wildlab.analysis.animals.images import Detector, Images, take_images
+from wildlab.analysis.animals.measures import (
     found_on_visits,
     next_lap,
     out_of_sight,
     sight_numbers,
     turns,
 )
-from wildlab.pipeline.animals.revisit import Aircraft, Patrolled, Visits, patrol
-from wildlab.pipeline.plans.flown import ExecutionErrors, with_errors
+from wildlab.analysis.animals.revisit import Aircraft, Patrolled, Visits, patrol
+from wildlab.analysis.plans.flown import ExecutionErrors, with_errors
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain
 from wildlab.planning.areas import check_area, inside_of
 from wildlab.planning.courses import fly
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course, swing_roll
@@ -40,7 +40,7 @@ from wildlab.studies.uav_coverage import trial as uav
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.particles import Rules, walk_of
 from wildlab.tracking.particles.clouds import Inside
-from wildlab.tracking.particles.herd import Moves
+from wildlab.tracking.particles.particle_sets import Moves
 
 #: The platforms; and by what animals are followed.
 GONDOLA, UAV = "gondola", "uav"

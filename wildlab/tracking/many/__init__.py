@@ -16,13 +16,20 @@ from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
 from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
 from wildlab.tracking.many.bank_life import Life
 from wildlab.tracking.many.bank_rules import Appearance
-from wildlab.tracking.many.beliefs import POINT, Hull, ManySensorModel, ManyTargetModel, Scan, own_lasting
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
-from wildlab.tracking.many.found_again import look_differences, place_costs, reachable, recognise
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
 from wildlab.tracking.many.probabilities import association_probabilities, belief_propagation
+from wildlab.tracking.many.reacquisition import look_differences, place_costs, reachable, recognise
 from wildlab.tracking.many.run import Shown, follow_many, run_many
 from wildlab.tracking.many.smoothing import smooth_many
+from wildlab.tracking.many.target_model import (
+    POINT,
+    Hull,
+    ManySensorModel,
+    ManyTargetModel,
+    Scan,
+    own_lasting,
+)
 
 __all__ = [
     "CONFIRMED",

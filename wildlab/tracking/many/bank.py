@@ -40,8 +40,8 @@ from wildlab.tracking.many.bank_rules import (
     has_room,
     limits_of,
 )
-from wildlab.tracking.many.beliefs import Sees
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, pair_scans
+from wildlab.tracking.many.target_model import Sees
 from wildlab.tracking.motion import constant_velocity, in_steps
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.tracking.kalman import predict
-from wildlab.tracking.many.beliefs import Sees
-from wildlab.tracking.many.found_again import look_differences, place_costs, reachable, recognise
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, judge_start, outlived
+from wildlab.tracking.many.reacquisition import look_differences, place_costs, reachable, recognise
+from wildlab.tracking.many.target_model import Sees
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.tracking.many.beliefs import Hull, ManySensorModel
 from wildlab.tracking.many.motions import largest_of
+from wildlab.tracking.many.target_model import Hull, ManySensorModel
 
 Array = NDArray[np.float64]
 

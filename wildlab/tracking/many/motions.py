@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.tracking.many.beliefs import Hull, ManySensorModel, ManyTargetModel
+from wildlab.tracking.many.target_model import Hull, ManySensorModel, ManyTargetModel
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from wildlab.errors import WildlabError
-from wildlab.tracking.many.beliefs import ManySensorModel, ManyTargetModel, Scan, own_columns, own_lasting
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
 from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
 from wildlab.tracking.many.motions import at_least, each_motion, largest_of, of_hulls
 from wildlab.tracking.many.probabilities import association_probabilities
+from wildlab.tracking.many.target_model import (
+    ManySensorModel,
+    ManyTargetModel,
+    Scan,
+    own_columns,
+    own_lasting,
+)
 from wildlab.tracking.many.together import moved_together, of_all
 from wildlab.tracking.many.tracks import (
     Tracks,

@@ -41,7 +41,7 @@ def smooth_many(
     density
         `ManyTargetModel.density` that it was run with.
     lasting_s
-        As `run_many` was given, and behind it `wildlab.tracking.many.beliefs.own_lasting` of its sensors.
+        As `run_many` was given; behind it `wildlab.tracking.many.target_model.own_lasting` of its sensors.
 
     Returns
     -------

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from wildlab.tracking.many.beliefs import ManySensorModel, ManyTargetModel, own_columns
 from wildlab.tracking.many.hulls import lasting_part, near_side, on_one_hull
 from wildlab.tracking.many.motions import densities_of, interact, largest_of
+from wildlab.tracking.many.target_model import ManySensorModel, ManyTargetModel, own_columns
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.schmidt import fade
 
@@ -38,7 +38,7 @@ class Tracks(NamedTuple):
     C
         (T, K, 4, k) covariance of a track's error, truth minus estimate, with each of k errors of sensors, in
         their standard deviations: those that all measurements of a look share (`Scan.shared`), and behind
-        them those that each target has of its own (`wildlab.tracking.many.beliefs.own_lasting`).
+        them those that each target has of its own (`wildlab.tracking.many.target_model.own_lasting`).
     kinds
         (T, K) probabilities.
     existence

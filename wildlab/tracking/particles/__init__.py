@@ -42,9 +42,9 @@ from wildlab.tracking.particles.counting import (
     existence_after,
 )
 from wildlab.tracking.particles.grid import Grid, grid_moments, grid_over, grid_weigh, walk_matrix
-from wildlab.tracking.particles.herd import Herd, ImageLook, Rules, expect, no_herd
 from wildlab.tracking.particles.likelihoods import log_likelihood, sight_of
 from wildlab.tracking.particles.moves import drift, move, move_by_sight, stay_inside, walk_of
+from wildlab.tracking.particles.particle_sets import Herd, ImageLook, Rules, expect, no_herd
 from wildlab.tracking.particles.resampling import SCHEMES, draw, resample
 from wildlab.tracking.particles.steps import step_counting, step_nearest
 

@@ -26,8 +26,16 @@ from wildlab.tracking.particles.clouds import (
     weigh_unseen,
 )
 from wildlab.tracking.particles.counting import existence_after
-from wildlab.tracking.particles.herd import Herd, ImageLook, Rules, kept, moved, start_tracks, with_new
 from wildlab.tracking.particles.likelihoods import log_likelihood
+from wildlab.tracking.particles.particle_sets import (
+    Herd,
+    ImageLook,
+    Rules,
+    kept,
+    moved,
+    start_tracks,
+    with_new,
+)
 from wildlab.tracking.particles.resampling import resample
 
 Integers = NDArray[np.int64]

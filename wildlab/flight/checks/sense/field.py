@@ -13,7 +13,7 @@ from wildlab.flight.checks.corrections import change_attitude
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.inertial_data import airframe_sources, attitudes_near
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
-from wildlab.flight.checks.sense.felt import axes_words, other_axes
+from wildlab.flight.checks.sense.inertial_checks import axes_words, other_axes
 from wildlab.flight.checks.sense.trial import Misfit, Mistake, corrections_of, explain
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array

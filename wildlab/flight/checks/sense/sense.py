@@ -8,10 +8,10 @@ from wildlab.flight.checks.corrections import report_alone
 from wildlab.flight.checks.findings import Finding, whole
 from wildlab.flight.checks.sense.bounds import bounds
 from wildlab.flight.checks.sense.camera import lens
-from wildlab.flight.checks.sense.felt import forces
 from wildlab.flight.checks.sense.field import field
 from wildlab.flight.checks.sense.ground import ground
 from wildlab.flight.checks.sense.heading import heading
+from wildlab.flight.checks.sense.inertial_checks import forces
 from wildlab.flight.checks.sense.leaps import told_from_leaps
 from wildlab.flight.checks.sense.motion import motion
 from wildlab.flight.checks.sense.origin import origin, together

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.analysis.rendered import Photographer, exposures_of
 from wildlab.evaluation.identities import Identities, Moment, compare_identities
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.pipeline.rendered import Photographer, exposures_of
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.crossing_vessels.trial import found_again as again
+from wildlab.studies.crossing_vessels.trial import reacquisition as again
 from wildlab.studies.crossing_vessels.trial.crossing import (
     APART_M,
     BOATS,

@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.analysis.georeference import (
+    Observations,
+    observe,
+)
+from wildlab.analysis.rendered import exposures_of
+from wildlab.analysis.track import truth_states
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.validation import gate_threshold
-from wildlab.pipeline.georeference import (
-    Observations,
-    observe,
-)
-from wildlab.pipeline.rendered import exposures_of
-from wildlab.pipeline.track import truth_states
 from wildlab.tracking.many.bank import Looks, Tuning
 
 Array = NDArray[np.float64]

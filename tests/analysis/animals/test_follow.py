@@ -1,0 +1,287 @@
+"""Animals followed through images: what is left out changes nothing, and what is written down is so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.planning.ground import FLAT
+from wildlab.analysis.animals.follow import (
+    STATION_S,
+    Kalman,
+    Ledger,
+    Particles,
+    blind,
+    follow,
+    next_look,
+)
+from wildlab.analysis.animals.frames import NONE
+from wildlab.analysis.animals.images import Detector, Images, footprint_circles, sight_from, take_images
+from wildlab.analysis.animals.revisit import Aircraft, Patrolled, Visits, patrol
+from wildlab.analysis.plans.flown import ExecutionErrors
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.planning.areas import inside_of, rectangle
+from wildlab.planning.gimbal import look_down
+from wildlab.planning.high_level import SEARCH
+from wildlab.planning.moving import walks
+from wildlab.tracking.particles import ImageLook, Rules, walk_of
+from wildlab.tracking.particles.clouds import Inside
+from wildlab.tracking.particles.particle_sets import Moves
+
+CAMERA = Camera(640, 480, 1267.0, 1117.0, 356.0, 216.6)
+DETECTOR = Detector(detected=0.9, sd=1.0, border=0.0, height=0.7)
+ERRORS = ExecutionErrors(0.2, 0.2, 300.0, 0.002, 0.002, 0.005, 60.0)
+FENCE = rectangle(0.0, 0.0, 200.0, 160.0, 0.0)
+
+
+def nowhere(places: Array) -> Array:
+    """What an image shows that shows nothing."""
+    return np.zeros(places.shape[:-1])
+
+
+def over_and_over(seed: int, speed_sd: float, seconds: float = 300.0) -> Images:
+    """A camera 50 m up that goes back and forth over a field with eight animals."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(0.0, seconds, 0.5)
+    p = np.column_stack([90 * np.sin(times / 15), 60 * np.sin(times / 47), np.full(len(times), -50.0)])
+    R = np.tile(euler_to_matrix(0.0, 0.0, 0.0) @ R_MC_DOWN, (len(times), 1, 1))
+    told = CameraPoses.at_lens(CAMERA, p, R, np.eye(3))
+    truth = np.swapaxes(walks(FENCE, times, 8, speed_sd, 1.0, rng), 0, 1)
+    return take_images(FLAT, told, told, np.zeros(len(times)), times, truth, ERRORS, DETECTOR, rng)
+
+
+def particles(seed: int, speed_sd: float, fence: Array = FENCE) -> Particles:
+    def rules(moves: Moves) -> Rules:
+        return Rules(moves, particles=300, scheme="systematic")
+
+    fences: list[Inside] = [inside_of(fence)]
+    return Particles(walk_of(speed_sd, 1.0), fences, np.random.default_rng(seed), rules)
+
+
+def test_images_that_are_left_out_show_no_particle():
+    images = over_and_over(1, 0.0)
+    follower, clouds = particles(1, 0.0), list[tuple[float, Array]]()
+
+    class Spied:
+        """Keeps where the particles were after each look."""
+
+        known, reach = follower.known, follower.reach
+
+        def step(self, look: ImageLook) -> np.ndarray:
+            names = follower.step(look)
+            clouds.append((look.time, follower.herd.cloud.x[..., :2].reshape(-1, 2).copy()))
+            return names
+
+    follow(images, FLAT, DETECTOR, Spied(), walk_of(0.0, 1.0))
+    looked = np.array([time for time, _ in clouds])
+    left_out = np.flatnonzero(~np.isin(images.times, looked))
+    assert len(left_out) > 50
+    middle, radius = footprint_circles(FLAT, images.poses)
+    asked = 0
+    for k in left_out:
+        # Nothing moves: the particles are where the look before has left them.
+        places = clouds[int(np.searchsorted(looked, images.times[k], side="right")) - 1][1]
+        p, R = images.poses.p_nc[k], images.poses.R_nc[k]
+        sight = sight_from(FLAT, CAMERA, p, R, (middle[k], float(radius[k])), DETECTOR)
+        assert not sight(places).any()
+        asked += len(places)
+    assert asked > 10_000
+
+
+def test_every_image_with_a_detection_is_looked_at_and_every_station():
+    images = over_and_over(2, 0.5)
+    done = follow(images, FLAT, DETECTOR, particles(2, 0.5), walk_of(0.5, 1.0))
+    assert len(done.found) == len(images.z)
+    times = images.times[[one.image for one in done.known]]
+    assert np.diff(times).max() <= STATION_S + 0.5 and times[-1] == images.times[-1]
+    assert done.tracks == max(one.track for one in done.found)
+    assert done.steps < len(images.times)
+
+
+def every_image(images: Images, kalman: Kalman) -> Kalman:
+    for k, time in enumerate(images.times.tolist()):
+        z, R, _ = images.taken(k)
+        kalman.step(ImageLook(time, z, R, nowhere))
+    return kalman
+
+
+def test_a_kalman_filter_that_leaves_images_out_is_the_one_that_does_not():
+    images = over_and_over(3, 0.5)
+    motion = walk_of(0.5, 1.0)
+    few = Kalman(motion, 0.99)
+    follow(images, FLAT, DETECTOR, few, motion)
+    for one, other in zip(few.known(), every_image(images, Kalman(motion, 0.99)).known(), strict=True):
+        assert np.allclose(one, other, rtol=1e-9)
+
+
+def test_a_kalman_track_is_the_textbooks():
+    kalman, motion = Kalman(walk_of(0.5, 1.0), 0.99), walk_of(0.5, 1.0)
+    first, second = np.array([[3.0, 4.0]]), np.array([[5.0, 4.5]])
+    R = np.array([[[4.0, 1.0], [1.0, 2.0]]])
+    kalman.step(ImageLook(0.0, first, R, nowhere))
+    assert kalman.step(ImageLook(10.0, second, R, nowhere)).tolist() == [1]
+    P = R[0] + motion(10.0)[1]
+    # In the form of information: precisions add.
+    after = np.linalg.inv(np.linalg.inv(P) + np.linalg.inv(R[0]))
+    mean = after @ (np.linalg.solve(P, first[0]) + np.linalg.solve(R[0], second[0]))
+    _, got, covariance = kalman.known()
+    assert got[0] == pytest.approx(mean) and covariance[0] == pytest.approx(after)
+    assert kalman.step(
+        ImageLook(11.0, np.array([[90.0, 0.0], [np.nan, 0.0]]), np.tile(R, (2, 1, 1)), nowhere)
+    ).tolist() == [2, 0]
+
+
+def test_no_particle_leaves_the_fence_it_began_in():
+    cloud = particles(7, 2.0)
+    look = ImageLook(0.0, np.array([[70.0, 60.0]]), np.eye(2)[None], nowhere)
+    cloud.step(look)
+    cloud.step(blind(900.0))
+    assert cloud.home.tolist() == [0]
+    assert inside_of(FENCE)(cloud.herd.cloud.x[..., :2]).all()
+    assert np.ptp(cloud.herd.cloud.x[..., 0]) > 100
+    cloud.give_up(1)
+    assert cloud.herd.lost.tolist() == [True]
+
+
+def test_negative_information_moves_a_track_out_of_what_was_seen():
+    cloud = particles(8, 0.5)
+    whole = ImageLook(0.0, np.array([[0.0, 0.0]]), 25 * np.eye(2)[None], nowhere)
+    cloud.step(whole)
+
+    def west(places: Array) -> Array:
+        return 0.9 * (places[..., 1] < 0)
+
+    cloud.step(ImageLook(1.0, np.zeros((0, 2)), np.zeros((0, 2, 2)), west))
+    _, mean, _ = cloud.known()
+    # Half a normal distribution at 10 % of its weight: the mean is 0.8 sd times 9/11.
+    assert mean[0, 1] == pytest.approx(np.sqrt(2 / np.pi) * np.sqrt(25.25) * 9 / 11, rel=0.2)
+
+
+def test_a_ledger_knows_who_got_which_track_and_takes_a_false_detection_for_no_animal():
+    ledger = Ledger(3)
+    ledger.enter(0, 0.0, np.arange(3), np.array([1, 2, 3]), {}, {1: 4.0, 2: 6.0, 3: 8.0})
+    for image, time in ((1, 10.0), (2, 50.0)):
+        ledger.enter(image, time, np.array([NONE]), np.array([4]), {3: 8.0}, {3: 8.0, 4: 9.0})
+    before = {1: 50.0, 2: 60.0, 3: 7.0}
+    ledger.enter(9, 90.0, np.array([1, 2, 0]), np.array([1, 3, 0]), before, {1: 5.0, 2: 60.0, 3: 4.0})
+    first, _, _, false, again, third, last = ledger.found
+    assert first.started and first.away == np.inf and first.own == 0 and np.isnan(first.before)
+    assert (third.animal, third.track, third.own, third.away) == (1, 1, 2, 90.0)
+    assert (third.before, third.after, third.after_last, third.own_before) == (50.0, 5.0, 4.0, 60.0)
+    assert not third.started
+    assert (false.animal, false.started, false.own, false.away) == (NONE, True, 0, np.inf)
+    assert np.isnan(false.own_before) and again.away == np.inf and again.own == 0
+    # The last animal's own track and time are not those of the detections that are nobody's.
+    assert (last.own, last.away, last.own_before) == (3, 90.0, 7.0)
+
+
+class Told:
+    """A follower with one track at the origin, whose animal is within 5 m of it."""
+
+    def step(self, look: ImageLook) -> np.ndarray:
+        return np.zeros(0, np.int64)
+
+    def known(self) -> tuple[np.ndarray, Array, Array]:
+        return np.array([1]), np.zeros((1, 2)), np.eye(2)[None]
+
+    def reach(self) -> Array:
+        return np.array([5.0])
+
+
+@pytest.mark.parametrize(
+    ("away", "motion", "told"),
+    [(14.0, 0.0, True), (16.0, 0.0, False), (18.0, 0.5, True), (22.0, 0.5, False)],
+)
+def test_an_image_is_looked_at_where_an_animal_may_be_in_it(away, motion, told):
+    # A footprint of 10 m; an animal within 5 m of its track, which strays by 0.5 m in a second, four of it in
+    # the four seconds up to the station.
+    times = np.arange(6.0)
+    middle = np.full((6, 2), 500.0)
+    middle[3] = [away, 0.0]
+    wanted = np.zeros(6, bool)
+    wanted[4] = True
+    found = next_look(Told(), 0, times, middle, np.full(6, 10.0), wanted, walk_of(motion, 1.0))
+    assert found == ((3, True) if told else (4, False))
+
+
+# -- a search that its tracks steer: rows alone, visits, animals that are not there any more
+
+FIELD = rectangle(0.0, 0.0, 300.0, 300.0, 0.0)
+AIRCRAFT = Aircraft(
+    Camera(640, 480, 600.0, 600.0, 320.0, 240.0), look_down, 50.0, 5.0,
+    ExecutionErrors(0.1, 0.1, 300.0, 0.001, 0.001, 0.001, 60.0), Detector(1.0, 1.0, 0.0, 0.7),
+)  # fmt: skip
+ROWS = np.array([[-100.0, -100.0], [100.0, -100.0], [100.0, 100.0], [-100.0, 100.0]])
+TIMES = np.arange(0.0, 600.0)
+VISITS = Visits(alpha=1.0, c=5.0, worth_m2=20.0, patience=10.0)
+
+
+def flown(places: np.ndarray, visits: Visits, lives: int) -> Patrolled:
+    """Animals that stand at places (A, 2), or walk where there are times."""
+    truth = np.broadcast_to(places, (len(TIMES), *places.shape[-2:]))
+    return patrol(
+        FLAT, AIRCRAFT, ROWS, np.zeros(4, int), np.array([lives]), TIMES, truth, particles(1, 0.5, FIELD),
+        visits, np.random.default_rng(2),
+    )  # fmt: skip
+
+
+def test_rows_alone_reach_every_way_point_and_end():
+    done = flown(np.array([[0.0, -100.0]]), VISITS._replace(worth_m2=np.inf), lives=2)
+    assert (done.goal == SEARCH).all()
+    length = 600.0
+    assert done.times[-1] == pytest.approx(length / AIRCRAFT.speed, abs=4)
+    for point in ROWS:
+        assert np.linalg.norm(done.p_nc[:, :2] - point, axis=1).min() < 1e-6
+    assert done.p_nc[:, 2] == pytest.approx(-50.0)
+    assert np.isinf(done.done).all() and not done.given_up
+
+
+def test_a_known_animal_is_gone_back_to_and_found_again():
+    done = flown(np.array([[-60.0, -100.0]]), VISITS, lives=2)
+    visits = done.goal != SEARCH
+    assert visits.any() and (done.goal[visits] == 1).all()
+    back = [one for one in done.found if one.away > 20 and np.isfinite(one.away)]
+    assert back and all(one.after < one.before / 2 for one in back)
+    assert all(done.goal[one.image] == 1 for one in back)
+
+
+def test_a_choice_is_the_greatest_of_f_5_2():
+    done = flown(np.array([[-60.0, -100.0]]), VISITS, lives=2)
+    reached = 0
+    for k in range(1, len(done.times)):
+        known = done.known[k - 1]
+        here = done.p_nc[k - 1, :2]
+        while reached < 4 and np.linalg.norm(here - ROWS[reached]) < 1e-6 and done.goal[k - 1] == SEARCH:
+            reached += 1
+        if reached == 4:
+            break
+        spread = np.trace(known.covariance, axis1=1, axis2=2)
+        worth = np.where(spread >= 20, spread / np.linalg.norm(known.mean - here, axis=1), 0.0)
+        search = VISITS.c / np.linalg.norm(ROWS[reached] - here)
+        assert (done.goal[k] != SEARCH) == bool(len(worth) and worth.max() > search)
+
+
+def test_an_enclosure_with_all_its_animals_is_left():
+    done = flown(np.array([[-60.0, -100.0], [40.0, -100.0]]), VISITS._replace(worth_m2=np.inf), lives=2)
+    assert np.isfinite(done.done).all()
+    assert done.times[-1] < done.done[0] + 2 and done.times[-1] < 60
+
+
+def test_a_search_ends_once_its_patience_does():
+    there = np.full((len(TIMES), 1, 2), [-60.0, -100.0])
+    there[25:] = [140.0, 140.0]  # seen once, then across the field at once
+    done = flown(there, VISITS, lives=3)
+    first = int(np.flatnonzero(done.goal == 1)[0])
+    ends = first + int(np.argmax(done.goal[first:] != 1))
+    # On the way over a field of 300 m at 5 m/s, and then patience; images that miss it move where it may be.
+    assert 1 in done.given_up and ends - first < 60 + VISITS.patience + 2
+    assert ends < len(done.goal)  # and then flies on
+
+
+def test_what_is_seen_as_patience_ends_is_not_given_up():
+    there = np.full((len(TIMES), 1, 2), [-60.0, -100.0])
+    whole = flown(there, VISITS._replace(patience=0.0), lives=2)
+    assert (whole.goal == 1).any() and not whole.given_up

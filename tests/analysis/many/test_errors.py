@@ -1,0 +1,303 @@
+"""What detections of a look have in common: by moving the platform, by whole covariances, and end to end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from tests.analysis.many.test_places import places
+from tests.analysis.robots import believed, boat, robot_flight
+from wildlab.analysis.georeference import (
+    Observations,
+    assumed_pose_covariance,
+    covariances_of,
+    georeference,
+    observe,
+    pose_errors,
+)
+from wildlab.analysis.many.errors import (
+    OF_COVARIANCE,
+    LastingErrors,
+    OfPose,
+    _pose_roots,
+    counted_twice,
+    laid_out,
+    lasting_of,
+    of_elements,
+    of_pixels,
+    of_poses,
+    stated_roots,
+    told_errors,
+)
+from wildlab.analysis.many.follow import track_targets, tracks_table
+from wildlab.analysis.scans import scans_of
+from wildlab.flight.following import parse_settings
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, rotation_vector_to_matrix
+from wildlab.geometry.uncertainty import PoseErrors
+from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.many import smooth_many
+from wildlab.tracking.predictions import POSE
+from wildlab.tracking.schmidt import transition_of_pose
+
+ALL = """
+[sensors.radar.considered.heading]
+sd_deg = 2.0
+correlation_time_s = 30.0
+[sensors.radar.considered.platform_north]
+sd_m = 3.0
+[sensors.radar.considered.platform_east]
+sd_m = 4.0
+[sensors.radar.considered.range_bias]
+sd_m = 5.0
+shared = false
+[sensors.radar.considered.clock]
+sd_s = 0.5
+"""
+
+
+NOISE = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
+
+
+def test_a_place_moves_as_what_it_was_computed_from():
+    """Each error undone by hand: the place moves by what one standard deviation of it is said to do."""
+    flight = robot_flight(seconds=20.0)
+    found = places(flight, ALL)
+    names = ("platform_north", "platform_east", "heading", "radar: range_bias")
+    assert set(found.errors.names) == set(names) and len(found.errors.names) == 4
+    assert dict(zip(*found.errors, strict=True))["heading"] == 30.0
+    scans = scans_of(flight, "radar")
+    for row, scan in enumerate(found.scans):
+        r, azimuth = scans.detections[row, 0]
+        toward = np.array([np.cos(azimuth), np.sin(azimuth)])
+        across = np.array([-np.sin(azimuth), np.cos(azimuth)])
+        # What is added to the known value for the true one comes off the place; a bias was measured too.
+        expected = {"platform_north": [-3.0, 0.0], "platform_east": [0.0, -4.0],
+                    "heading": -r * across * np.radians(2.0), "radar: range_bias": 5.0 * toward}  # fmt: skip
+        for i, name in enumerate(found.errors.names):
+            assert np.allclose(scan.shared[0, :, i], expected[name]), name
+
+
+def test_all_errors_of_a_look_move_its_detections_alike():
+    flight = robot_flight(kind="position", clutter=3, seconds=20.0, labelled=False)
+    text = "[sensors.radar.considered.platform_north]\nsd_m = 3.0\n"
+    for scan in places(flight, text).scans:
+        assert scan.shared.shape == (4, 2, 1)
+        assert np.allclose(np.abs(scan.shared[:, 0, 0]), 3.0) and np.allclose(scan.shared[:, 1], 0.0)
+        assert len(np.unique(np.sign(scan.shared[:, 0, 0]))) == 1
+    scans, belief = believed(flight)
+    assert of_elements(scans, belief, scans.detections)[0].shape[-1] == 0
+
+
+@cache
+def _pixels() -> tuple[Flight, Observations]:
+    """The last quarter of a twin's detections: more than a hundred."""
+    flight = simulate_twin("static-antenna", 3)
+    seen = flight.table("detections")
+    flight.tables["detections"] = seen.iloc[-len(seen) // 4 :].reset_index(drop=True)
+    return flight, observe(flight, "autopilot")
+
+
+#: The twin's only source, and the poses that are taken for it.
+MANUAL = "manual", "autopilot"
+
+
+def taken(flight: Flight, observed: Observations, lasting_s: float = np.inf) -> tuple[PoseErrors, OfPose]:
+    belief = believed(flight, "", *MANUAL)[1]
+    told = told_errors(flight, observed, belief)
+    return told, of_poses(flight, observed, told, belief, lasting_s)
+
+
+def test_an_error_stays_itself_along_the_flight():
+    """From one look to the next as the Schmidt filter carries it; and a roll moves places as rays say."""
+    flight, observed = _pixels()
+    rows = np.flatnonzero(np.isfinite(observed.poses.p_nb).all(axis=1))[:300]
+    some = np.zeros(len(observed.uv), bool)
+    some[rows] = True
+    observed = observed.take(some)
+    errors = pose_errors(flight, observed)
+    roots = _pose_roots(observed, errors)
+    assert np.allclose(roots @ np.swapaxes(roots, 1, 2), errors.pose, atol=1e-12)
+    order = np.argsort(observed.table["time_s"].to_numpy(float), kind="stable")
+    for a, b in zip(order[:-1:20], order[1::20], strict=False):
+        phi = transition_of_pose(errors.pose[a], errors.pose[b], "bias")
+        assert np.allclose(phi @ roots[a], roots[b], atol=1e-9)
+    points = georeference(flight, observed, np.random.default_rng(0))
+    linear = points["ellipse"].to_numpy(str) == "linear"
+    of_pose = OfPose(roots, OF_COVARIANCE)
+    _, shared, _ = of_pixels(observed, errors, of_pose, covariances_of(points), np.inf)
+    small = 1e-4
+    for i in (0, 4, 5):
+        turn = rotation_vector_to_matrix(small * roots[:, 3:, i])
+        poses = replace(
+            observed.poses,
+            p_nb=observed.poses.p_nb + small * roots[:, :3, i],
+            R_nb=observed.poses.R_nb @ turn,
+        )
+        moved = georeference(flight, replace(observed, poses=poses), np.random.default_rng(0))
+        by_hand = (moved[["north_m", "east_m"]] - points[["north_m", "east_m"]]).to_numpy(float) / small
+        assert np.allclose(shared[linear][..., i], -by_hand[linear], rtol=0.02, atol=0.02)
+
+
+def test_errors_of_one_name_are_one_and_those_that_move_nothing_none():
+    one = LastingErrors(("heading", "a: bias", "idle"), (30.0, np.inf, 5.0))
+    two = LastingErrors(("heading",), (20.0,))
+    J, K = np.ones((2, 2, 3)), 7 * np.ones((1, 2, 1))
+    J[..., 1], J[..., 2] = 2, 0
+    lasting, (first, second) = laid_out([(one, [J, None]), (two, [K])])
+    assert lasting == (20.0, np.inf)
+    assert np.array_equal(first[0], J[..., :2]) and first[1].shape == (0, 2, 2)
+    assert np.array_equal(second[0][..., 0], K[..., 0]) and not second[0][..., 1].any()
+    assert laid_out([]) == ((), [])
+
+
+def test_a_heading_that_is_off_is_in_the_covariance_of_tracks():
+    """Three degrees at 100 m are five metres for the whole flight."""
+    nees = []
+    flight = robot_flight(heading_off_deg=3.0, labelled=False)
+    for considered in ("", "[sensors.radar.considered.heading]\nsd_deg = 3.0\n"):
+        followed = track_targets(flight, settings=parse_settings(NOISE + considered))
+        own = []
+        for one in followed.shown[20:]:
+            e = one.x[:, :2] - boat(np.array([one.time]))
+            own += [float(a @ np.linalg.solve(P[:2, :2], a) / 2) for a, P in zip(e, one.P, strict=True)]
+        nees.append(np.mean(own))
+    assert nees[0] > 10 and 0.2 < nees[1] < 1.2
+
+
+def test_what_is_considered_of_a_camera_is_in_its_pose():
+    """In place of what is assumed, on top of a covariance that poses have; pixels are as noisy as told."""
+    flight, observed = _pixels()
+    text = "[sensors.manual.noise]\npixel_px = 7.0\n[sensors.manual.considered.heading]\nsd_deg = 9.0\n"
+    text += "[sensors.manual.considered.platform_east]\nsd_m = 4.0\n"
+    belief = believed(flight, text, *MANUAL)[1]
+    usual, told = pose_errors(flight, observed), told_errors(flight, observed, belief)
+    assert np.allclose(told.pixel, 49.0 * np.eye(2))
+    assert np.allclose(told.pose[:, 1, 1], 16.0) and np.allclose(told.pose[:, 0, 0], usual.pose[:, 0, 0])
+    level = np.abs(observed.poses.R_nb[:, 2, 2]) > 0.999
+    assert np.allclose(told.pose[level][:, 5, 5], np.radians(9.0) ** 2, rtol=0.02)
+    own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
+    known = replace(observed, poses=replace(observed.poses, covariance=own))
+    on_top = told_errors(flight, known, belief).pose - own
+    R = observed.poses.R_nb
+    assert np.allclose(on_top[:, :3, :3], np.diag([0, 16.0, 0]))
+    in_n = R @ on_top[:, 3:, 3:] @ np.swapaxes(R, 1, 2)
+    seen = np.isfinite(R).all(axis=(1, 2))
+    assert np.allclose(in_n[seen], np.diag([0, 0, np.radians(9.0) ** 2]), atol=1e-12)
+
+
+def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it():
+    def of(text: str) -> float:
+        return lasting_of(parse_settings(text).sensors.get("eye"))
+
+    assert of("") == of("[sensors.eye.noise]\npixel_px = 2.0\n") == 0.0
+    assert of("[sensors.eye]\ncorrelation_time_s = 40.0\n") == 40.0
+    heading = "[sensors.eye.considered.heading]\nsd_deg = 3.0\n"
+    assert of(heading) == np.inf
+    assert of(heading + "[sensors.eye.considered.roll]\nsd_deg = 1.0\ncorrelation_time_s = 9.0\n") == 9.0
+    # An error of the clock is no error of the pose.
+    assert of("[sensors.eye.considered.clock]\nsd_s = 0.1\ncorrelation_time_s = 0.5\n") == 0.0
+
+
+def test_mount_and_ground_are_in_what_is_shared_and_stay():
+    flight, observed = _pixels()
+    errors = pose_errors(flight, observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
+    points = georeference(flight, observed, np.random.default_rng(0), errors)
+    linear = points["ellipse"].to_numpy(str) == "linear"
+    of_pose = OfPose(_pose_roots(observed, errors), OF_COVARIANCE)
+    R, shared, found = of_pixels(observed, errors, of_pose, np.full((len(observed.uv), 2, 2), np.nan), 7.0)
+    whole = R + shared @ np.swapaxes(shared, 1, 2)
+    assert linear.sum() > 100 and np.allclose(whole[linear], covariances_of(points)[linear], rtol=1e-6)
+    assert found.lasting_s == (7.0,) * 6 + (np.inf,) * 4
+    assert (np.abs(shared[linear][..., 6:]).max(axis=(0, 1)) > 0.01).all()
+
+
+def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one():
+    flight, observed = _pixels()
+    own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
+    own[::3] = np.nan
+    known = replace(observed, poses=replace(observed.poses, covariance=own))
+    belief = believed(flight, "", *MANUAL)[1]
+    told, usual = told_errors(flight, known, belief._replace(considered=())), pose_errors(flight, observed)
+    assert np.allclose(told.pose[::3], usual.pose[::3]) and np.allclose(told.pose[1::3], own[1::3])
+
+
+def test_tables_of_tracks_are_smoothed_by_what_lasts():
+    told = NOISE + "[sensors.radar.considered.heading]\nsd_deg = 3.0\ncorrelation_time_s = 5.0\n"
+    followed = track_targets(robot_flight(labelled=False, seconds=60.0), settings=parse_settings(told))
+    table = tracks_table(followed)
+    after = smooth_many(followed.shown, followed.targets.density, followed.lasting_s)
+    forever = smooth_many(followed.shown, followed.targets.density, [np.inf])
+    x = np.concatenate([x[:, 0] for x, _ in after])
+    assert followed.lasting_s == (5.0,) and np.allclose(table["smoothed_north_m"], x)
+    assert not np.allclose(x, np.concatenate([x[:, 0] for x, _ in forever]))
+
+
+def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_last():
+    flight = robot_flight(labelled=False, seconds=30.0)
+    covariances = []
+    for more in ("", "[sensors.radar]\ncorrelation = 0.0\n", "[sensors.radar]\ncorrelation = 0.8\n"):
+        table = tracks_table(track_targets(flight, settings=parse_settings(more + NOISE)))
+        assert np.isfinite(table["smoothed_north_m"]).all()
+        covariances.append(float(table["smoothed_p_00"].mean()) if "smoothed_p_00" in table else np.nan)
+    assert np.isnan(covariances[0]) and covariances[2] > 1.5 * covariances[1]
+
+
+def test_an_error_of_the_heading_stays_one_whichever_way_the_body_lies():
+    """A turn about the vertical; and the whole is the covariance that poses without one are given."""
+    angles = np.random.default_rng(5).uniform(-1, 1, (50, 3)) * np.pi
+    angles[:5, 1] = -np.pi / 2
+    R = euler_to_matrix(*angles.T)
+    sd = np.array([2.0, 2.0, 3.0, *np.radians([1.5, 1.5, 4.0])])
+    roots = stated_roots(R, sd)
+    usual = {"position_horizontal_m": 2.0, "position_vertical_m": 3.0, "tilt_deg": 1.5, "heading_deg": 4.0}
+    assert np.allclose(roots @ np.swapaxes(roots, 1, 2), assumed_pose_covariance(R, usual))
+    h = 1e-6
+    turned = euler_to_matrix(0.0, 0.0, h) @ R
+    by_hand = matrix_to_rotation_vector(np.swapaxes(R, 1, 2) @ turned) / h
+    assert np.allclose(roots[:, 3:, 5], by_hand * sd[5], atol=1e-6)
+
+
+def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places():
+    """North, east and heading, by the same closed form: a radar on board has one and the same error."""
+    flight, observed = _pixels()
+    told, of_pose = taken(flight, observed, 30.0)
+    assert of_pose.names == POSE
+    nothing = np.full((len(observed.uv), 2, 2), np.nan)
+    _, shared, errors = of_pixels(observed, told, of_pose, nothing, 30.0)
+    assert errors.names[:6] == POSE and set(errors.lasting_s[:6]) == {30.0}
+    sd = flight.manifest.uncertainty
+    points = georeference(flight, observed, np.random.default_rng(0), told)
+    away = points[["north_m", "east_m"]].to_numpy(float) - observed.poses.p_nb[:, :2]
+    known = np.isfinite(shared).all(axis=(1, 2))
+    assert known.sum() > 100
+    assert np.allclose(shared[known][..., 0], [-sd.position_horizontal_m, 0.0])
+    assert np.allclose(shared[known][..., 1], [0.0, -sd.position_horizontal_m])
+    turned = -np.radians(sd.heading_deg) * np.stack([-away[:, 1], away[:, 0]], axis=-1)
+    assert np.allclose(shared[known][..., 5], turned[known], rtol=1e-6, atol=1e-6)
+
+
+def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last():
+    flight, observed = _pixels()
+    radar = LastingErrors(("heading", "radar: range_bias"), (np.inf, np.inf))
+    for lasting_s, twice in ((0.0, True), (30.0, False)):
+        told, of_pose = taken(flight, observed, lasting_s)
+        camera = LastingErrors(of_pose.names, (lasting_s,) * 6)
+        assert counted_twice(camera, radar) is twice
+        known = replace(observed, poses=replace(observed.poses, covariance=told.pose))
+        of_pose = of_poses(flight, known, told, believed(flight, "", *MANUAL)[1], lasting_s)
+        assert counted_twice(LastingErrors(of_pose.names, (lasting_s,) * 6), radar)
+        assert not counted_twice(camera, LastingErrors(("radar: range_bias",), (np.inf,)))
+    text = "[sensors.manual]\ncorrelation_time_s = 9.0\n[sensors.manual.considered.heading]\nsd_deg = 3.0\n"
+    apart = believed(flight, text + "shared = false\n", *MANUAL)[1]
+    names = of_poses(flight, observed, told, apart, 9.0).names
+    assert names == (*POSE[:5], "manual: heading")
+
+
+def test_one_error_of_two_sensors_lasts_as_long_as_the_shorter_says():
+    moves = [np.ones((1, 2, 1))]
+    for times in ((10.0, 30.0), (30.0, 10.0)):
+        lasting_s, _ = laid_out([(LastingErrors(("heading",), (one,)), moves) for one in times])
+        assert lasting_s == (10.0,)

@@ -1,0 +1,159 @@
+"""The offset of a camera's clock, on twins whose stamps were shifted by a known amount."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.analysis.conftest import changed
+from tests.refused import refused
+from wildlab.analysis.camera_clock import (
+    by_motion_in_words,
+    camera_clock_by_motion,
+    camera_clock_by_points,
+    image_motions,
+)
+from wildlab.cli import wildlab
+from wildlab.errors import WildlabError
+from wildlab.flight.clocks import poses_at
+from wildlab.flight.readers.frames import Frame
+from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.simulation.twins import simulate_twin
+
+
+def late(flight: Flight, shift: float) -> Flight:
+    """The same flight by a camera whose stamps are early by so many seconds."""
+    frames = flight.table("frames")
+    return changed(flight, frames=frames.assign(time_s=frames["time_s"] - shift))
+
+
+@pytest.fixture(scope="module")
+def tracking() -> Flight:
+    """Static and moving points under a gimballed camera, a quarter of 1800 sightings."""
+    flight = simulate_twin("uav-tracking", 1)
+    return changed(flight, detections=flight.table("detections").iloc[::4].reset_index(drop=True))
+
+
+@pytest.fixture(scope="module")
+def antenna() -> Flight:
+    return simulate_twin("static-antenna", 1)
+
+
+@pytest.mark.slow
+def test_within_20_ms_from_known_points(tracking):
+    shift = -14.05
+    found = camera_clock_by_points(late(tracking, shift), "autopilot")
+    assert found.offset_s == pytest.approx(shift, abs=0.020)
+    # Half of it of four times as many sightings.
+    assert found.sd_s < 0.020 and abs(found.offset_s - shift) < 4 * found.sd_s
+    assert found.certain
+    best = found.offsets[np.nanargmin(found.cost)]
+    assert best == pytest.approx(shift, abs=0.1)
+
+
+@pytest.mark.slow
+def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna):
+    """One degree for half a minute at 350 m: more than the clock's 20 ms can be told from."""
+    found = camera_clock_by_points(late(antenna, 0.8), "autopilot-uncalibrated")
+    assert found.certain
+    assert 0.02 < found.sd_s < 0.1
+    assert abs(found.offset_s - 0.8) < 3 * found.sd_s
+    # An offset that the manifest states is part of the one that is found.
+    stated = changed(late(antenna, 0.8), {"clocks": {"camera_offset_s": 0.5}})
+    true = camera_clock_by_points(stated, "truth")
+    assert true.offset_s == pytest.approx(0.8, abs=0.020)
+
+
+@pytest.mark.slow
+def test_what_cannot_be_estimated_is_refused(tracking):
+    nobody = changed(tracking, truth=tracking.table("truth").head(0))
+    with refused("0 detections"):
+        camera_clock_by_points(nobody, "autopilot")
+    with refused("fewer than four"):
+        camera_clock_by_points(late(tracking, 1e6), "autopilot")
+
+
+def over_land(flight: Flight, first: int, count: int) -> Iterator[Frame]:
+    """Images of level ground with a texture, as the true poses have it."""
+    rng = np.random.default_rng(7)
+    side, cell = 2048, 1.0
+    ground = np.zeros((side, side), np.float32)
+    for octave in (4, 8, 16, 64):
+        small = rng.normal(0, 1, (side // octave, side // octave)).astype(np.float32)
+        ground += cv2.resize(small, (side, side), interpolation=cv2.INTER_CUBIC)
+    frames, camera = flight.table("frames"), flight.manifest.geometry_camera()
+    p, R, _ = poses_at(flight.nav["truth"], frames["time_s"].to_numpy(float)[first : first + count])
+    poses = CameraPoses(camera, flight.manifest.geometry_mount(), p, R)
+    middle = poses.p_nc[:, :2].mean(axis=0)
+    for k in range(count):
+        # Column and row of the texture -> north, east -> pixel.
+        plane = np.array([[0, cell, middle[0] - side / 2 * cell], [cell, 0, middle[1] - side / 2 * cell]])
+        to_n = np.vstack([plane, [0, 0, 0], [0, 0, 1]])
+        to_c = poses.R_nc[k].T @ np.hstack([np.eye(3), -poses.p_nc[k][:, None]])
+        H = camera.matrix @ to_c @ to_n
+        seen = cv2.warpPerspective(ground, H, (camera.width, camera.height), borderMode=cv2.BORDER_REFLECT)
+        noisy = 120 + 30 * seen + rng.normal(0, 2, seen.shape)
+        grey = np.clip(noisy, 0, 255).astype(np.uint8)
+        name = f"{frames['frame_id'].iloc[first + k]}.png"
+        yield Frame(name, None, grey, "grey", "white-hot", np.ones(grey.shape, bool))
+
+
+@pytest.mark.slow
+def test_from_the_motion_of_images(antenna):
+    found = by_motion_in_words(late(antenna, 1.3), over_land(antenna, 3000, 160), "autopilot")
+    assert found.numbers["certain"], found.sentence
+    assert found.numbers["offset_s"] == pytest.approx(1.3, abs=0.030)
+    assert found.numbers["gain"] == pytest.approx(1.0, abs=0.3)
+    at = found.curve["correlation"].idxmax()
+    assert found.curve["offset_s"][at] == pytest.approx(1.3, abs=0.05)
+
+
+@pytest.mark.slow
+def test_from_attitudes_where_there_is_no_gyro(antenna):
+    bare = replace(antenna, tables={k: v for k, v in antenna.tables.items() if k != "imu"})
+    bare = late(bare, -4.2)
+    camera = antenna.manifest.geometry_camera()
+    pairs, motion = image_motions(over_land(antenna, 3000, 160), antenna, camera)
+    assert len(pairs) == 159 and np.isfinite(motion).all(axis=1).mean() > 0.95
+    found = camera_clock_by_motion(bare, pairs, motion, "autopilot")
+    assert found.certain and found.offset_s == pytest.approx(-4.2, abs=0.040)
+
+
+def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna):
+    still = pd.DataFrame(antenna.table("frames")).iloc[3000:3040]
+    rng = np.random.default_rng(1)
+    pattern = rng.normal(120, 30, (512, 640))
+
+    def frames() -> Iterator[Frame]:
+        for name in still["frame_id"]:
+            grey = np.clip(pattern + rng.normal(0, 2, pattern.shape), 0, 255).astype(np.uint8)
+            yield Frame(f"{name}.png", None, grey, "grey", "unknown", np.ones(grey.shape, bool))
+
+    found = by_motion_in_words(antenna, frames(), "autopilot")
+    assert not found.numbers["certain"]
+    with refused("0 of 0"):
+        by_motion_in_words(antenna, iter(()), "autopilot")
+
+
+@pytest.mark.slow
+def test_the_command_writes_a_curve_and_sets_the_offset(tracking, tmp_path):
+    folder, curve = tmp_path / "flight", tmp_path / "curve.csv"
+    save_flight(late(tracking, 0.25), folder)
+
+    def run(*options: str) -> Result:
+        return CliRunner().invoke(wildlab, ["clock", str(folder), *options])
+
+    assert run("--source", "autopilot", "--set", "--curve", str(curve)).exit_code == 0
+    assert load_flight(folder).manifest.clocks.camera_offset_s == pytest.approx(0.25, abs=0.020)
+    table = pd.read_csv(curve)
+    assert table["offset_s"][table["cost"].idxmin()] == pytest.approx(0.25, abs=0.1)
+    assert run("--offset", "0.5", "--set").exit_code == 0
+    assert load_flight(folder).manifest.clocks.camera_offset_s == 0.5
+    assert isinstance(run("--offset", "1", "--curve", str(curve)).exception, WildlabError)

@@ -1,0 +1,170 @@
+"""Another detector beside ours: same frames, same labels, same rule, and what is not judged is told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.analysis.test_detect import folder
+from tests.refused import refused
+from tests.test_cli_detect import call
+from wildlab.analysis.detecting.compared import compare_detectors, named_file, read_others
+from wildlab.flight.readers.labels import read_labels
+
+#: Of the frames of `folder`.
+WIDTH, HEIGHT = 128, 96
+
+
+def batch(path: Path, frames: int = 6) -> Path:
+    """A batch of MegaDetector: of each frame the animal that does not move, and something that is none."""
+    box, wrong = [97.5 / WIDTH, 67.5 / HEIGHT, 5 / WIDTH, 5 / HEIGHT], [0.9, 0.02, 0.05, 0.05]
+    images = [
+        {
+            "file": f"cam/{number:03d}.png",
+            "detections": [
+                {"category": "1", "conf": 0.9, "bbox": box},
+                {"category": "1", "conf": 0.2, "bbox": wrong},
+                {"category": "3", "conf": 0.99, "bbox": wrong},
+            ],
+        }
+        for number in range(frames)
+    ]
+    content = {"images": images, "detection_categories": {"1": "animal", "3": "vehicle"}}
+    path.write_text(json.dumps(content))
+    return path
+
+
+def test_a_batch_is_judged_beside_ours(capsys, tmp_path):
+    """Six of twelve animals found; with the low scores six things that are none, without them none."""
+    path = folder(tmp_path / "in")
+    md = batch(tmp_path / "md.json", 7)
+    code, out, err = call(
+        capsys, "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv", "--also",
+        f"md={md}", "--also-class", "animal", "--json",
+    )  # fmt: skip
+    assert code == 0, err
+    result = json.loads(out)
+    ours, other = result["compared"]
+    assert (ours["name"], ours["f1"]["estimate"], ours["f1_beyond_ours"]["estimate"]) == (
+        "wildlab contrast",
+        1,
+        0,
+    )
+    assert ours["f1"] == result["judged"]["f1"]
+    assert (other["found"], other["invented"], other["missed"], other["groups"]) == (6, 6, 6, 6)
+    # Precision 1 up to a recall of a half: 51 of 101 recalls.
+    assert other["average_precision"]["estimate"] == round(51 / 101, 4)
+    assert other["f1_beyond_ours"] == {"estimate": -0.5, "low": -0.5, "high": -0.5}
+    assert other["told"]  # of the image that is not among those judged
+    table = pd.read_csv(tmp_path / "out" / "compared.csv")
+    rows = table[table["detector"] == "md"]
+    assert rows[["score", "found", "invented", "missed"]].to_numpy().tolist() == [
+        [0.9, 6, 0, 6],
+        [0.2, 6, 6, 6],
+    ]
+
+
+def test_our_own_table_as_another_detector_is_ours(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    assert call(capsys, "detect", path, "--into", tmp_path / "one")[0] == 0
+    (tmp_path / "l.csv").write_text((path / "labels.csv").read_text().replace(",5,5,", ",3,2,"))
+    code, out, err = call(
+        capsys, "detect", path, "--into", tmp_path / "two", "--labels", tmp_path / "l.csv", "--also",
+        tmp_path / "one" / "detections.csv", "--json",
+    )  # fmt: skip
+    assert code == 0, err
+    ours, other = json.loads(out)["compared"]
+    assert other.pop("name") == "detections" and ours.pop("name")
+    assert ours.pop("lowest_score") == pytest.approx(other.pop("lowest_score"))
+    assert ours == other
+
+
+def write_yolo(path: Path, frame: str, boxes: np.ndarray) -> None:
+    """Boxes in px (left, top, width, height), in shares of the image about their middles."""
+    path.mkdir(exist_ok=True)
+    shares = np.column_stack([boxes[:, :2] + boxes[:, 2:] / 2, boxes[:, 2:]]) / [WIDTH, HEIGHT, WIDTH, HEIGHT]
+    np.savetxt(path / f"{Path(frame).stem}.txt", shares, "0 %.17g %.17g %.17g %.17g")
+
+
+def test_labels_in_shares_of_the_image_judge_alike(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    table = pd.read_csv(path / "labels.csv")
+    for name, rows in table.groupby("image"):
+        write_yolo(tmp_path / "yolo", str(name), rows[["x", "y", "w", "h"]].to_numpy())
+    judged = []
+    for labels in (path / "labels.csv", tmp_path / "yolo"):
+        code, out, err = call(
+            capsys, "detect", path, "--into", tmp_path / "out", "--labels", labels, "--json"
+        )  # fmt: skip
+        assert code == 0, err
+        judged.append(json.loads(out)["judged"])
+    assert judged[0] == judged[1] and judged[0]["found"] == 12
+
+
+def frames(count: int = 3, unusable: int = 0) -> pd.DataFrame:
+    rows = [(f"{n}.png", WIDTH, HEIGHT, "") for n in range(count)]
+    rows += [(f"{n}.png", 0, 0, "Cut off.") for n in range(count, count + unusable)]
+    return pd.DataFrame(rows, columns=["frame_id", "width_px", "height_px", "problem"])
+
+
+def truth(path: Path, count: int) -> Path:
+    path.write_text("image,x,y,w,h,class\n" + "".join(f"{n}.png,10,10,8,8,deer\n" for n in range(count)))
+    return path
+
+
+def test_frames_that_cannot_be_read_and_frames_without_a_word_are_told(tmp_path):
+    labels = read_labels(truth(tmp_path / "l.csv", 4))
+    lines = "".join(f"{n}.png,10,10,8,8\n" for n in (0, 3))
+    (tmp_path / "other.csv").write_text(f"image,x,y,w,h\n{lines}")
+    for n in (0, 3):
+        write_yolo(tmp_path / "yolo", f"{n}.png", np.array([[10, 10, 8, 8]]))
+    others = read_others([str(tmp_path / "other.csv"), str(tmp_path / "yolo")], labels)
+    empty = pd.DataFrame(columns=["frame_id"])
+    ours, table, yolo = compare_detectors("ours", empty, others, frames(3, 1), labels)
+    assert (ours.rates.found, ours.rates.missed) == (0, 4) and ours.curve is not None
+    # In px a box can be judged on an image that could not be read, in shares of it it cannot.
+    assert (table.rates.found, table.rates.missed, table.curve) == (2, 2, None)
+    assert (yolo.rates.found, yolo.rates.missed) == (1, 3)
+    assert (len(table.told), len(yolo.told)) == (1, 2)
+
+
+def test_classes_of_another_detector(tmp_path):
+    labels = read_labels(truth(tmp_path / "l.csv", 3), classes=("deer",))
+    md = str(batch(tmp_path / "md.json"))
+    every = read_others([md], labels, ("deer",))[0]
+    assert len(every.boxes.boxes["cam/000.png"]) == 3
+    chosen = read_others([md], labels, ("deer",), ("animal", "deer"))[0]
+    assert len(chosen.boxes.boxes["cam/000.png"]) == 2 and chosen.told == ()
+    (tmp_path / "plain.csv").write_text("image,x,y,w,h\n0.png,1,2,3,4\n")
+    assert read_others([str(tmp_path / "plain.csv")], labels, ("deer",))[0].told == ()
+    with refused("wolf"):
+        read_others([md], labels, (), ("wolf",))
+    with refused("'md'"):
+        read_others([md, f"md={md}"], labels)
+
+
+def test_a_name_before_a_file(tmp_path):
+    strange = tmp_path / "a=b.json"
+    strange.write_text("[]")
+    assert named_file(str(strange)) == ("a=b", strange)
+    assert named_file(f"mine={strange}") == ("mine", strange)
+    assert named_file("x=" + "y" * 5000)[0] == "x"
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--also", "md.json"], "labels"),
+        (["--also-class", "animal"], "no other detector"),
+        (["--labels", "labels.csv", "--also", "md.json"], "no such file"),
+    ],
+)
+def test_wrong_use_is_refused(capsys, tmp_path, monkeypatch, more, words):
+    path = folder(tmp_path / "in")
+    monkeypatch.chdir(path)
+    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "o", *more)
+    assert code == 2 and words in err

@@ -1,0 +1,253 @@
+"""Targets followed by any sensor, on made-up flights whose every number is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.analysis.robots import boat, joined, paused, robot, robot_flight, rows_of
+from tests.refused import refused
+from wildlab.analysis.following.estimates import estimates_table, write_estimates
+from wildlab.analysis.following.expected import SLOTS, predict_scan
+from wildlab.analysis.following.follow import follow_targets
+from wildlab.analysis.following.judged import apart, judged, worth_of_errors
+from wildlab.analysis.following.noise_model import errors_named
+from wildlab.analysis.scans import KINDS, Scans, scans_of, truths_at
+from wildlab.flight.following import CONSIDERED, Settings
+from wildlab.flight.manifest import make_manifest
+from wildlab.flight.store import Flight
+
+# --- a heading that is off ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_considered_heading_is_inside_the_bounds_where_the_white_filter_is_not(seed):
+    off = 2.0 if seed % 2 else -2.0
+    rows = rows_of(follow_targets(robot_flight(seed, heading_off_deg=off, heading_sd_deg=2.0)))
+    assert list(rows.index[:2]) == ["ekf", "schmidt"]
+    assert rows.loc["schmidt", "verdict"] == "consistent"
+    assert rows.loc["ekf", "verdict"] == "overconfident" and rows.loc["ekf", "nees"] > 20
+    # Both are as far off: nothing estimates the heading.
+    assert rows.loc["schmidt", "rmse"] == pytest.approx(rows.loc["ekf", "rmse"], rel=0.1)
+
+
+@pytest.mark.parametrize("kind", ["range-bearing", "position"])
+def test_every_filter_follows(kind):
+    flight = robot_flight(2, kind=kind, heading_sd_deg=1.0)
+    settings = Settings(sensors={"radar": {"thinning_s": 2.0}})
+    names = ("ekf", "ukf", "imm", "coloured", "schmidt", "thinned")
+    rows = rows_of(follow_targets(flight, filters=names, settings=settings, smooth=True))
+    assert set(names) <= set(rows.index)
+    assert {"ekf-smoothed", "schmidt-smoothed"} <= set(rows.index) and "coloured-smoothed" not in rows.index
+    assert (rows["rmse"] < 3.0).all()
+    assert rows.loc["ekf-smoothed", "rmse"] <= rows.loc["ekf", "rmse"]
+    # Innovations of a smoothed track are the filter's, and not counted twice.
+    assert rows.loc["ekf-smoothed", "detections"] == 0
+    assert rows.loc["thinned", "detections"] < rows.loc["ekf", "detections"] / 3
+
+
+# --- kinds of detections ------------------------------------------------------------------------------------
+
+
+def test_a_range_along_the_line_of_sight_knows_how_far_below_the_target_is():
+    high = 60.0
+    flight = robot_flight(3)
+    flight.nav["own"]["down_m"] = -high
+    seen = flight.tables["detections"]
+    level = seen["range_m"].to_numpy(float)
+    seen["range_m"] = np.hypot(level, high)
+    truth = follow_targets(flight)
+    assert rows_of(truth).loc["ekf", "rmse"] < 1.5
+    # With an elevation nothing has to be known of heights.
+    seen["elevation_rad"] = -np.arctan2(high, level)
+    flight.tables["truth"]["down_m"] = 500.0
+    assert rows_of(follow_targets(flight)).loc["ekf", "rmse"] < 1.5
+
+
+def test_bearings_with_elevation_start_where_they_meet_the_plane():
+    high = 60.0
+    flight = robot_flight(3, kind="bearing")
+    flight.nav["own"]["down_m"] = -high
+    seen, t = flight.tables["detections"], flight.tables["frames"]["time_s"].to_numpy()
+    distance = np.hypot(*(boat(t) - robot(t)).T)
+    noise = np.random.default_rng(0).normal(0, np.radians(0.3), len(t))
+    seen["elevation_rad"] = -np.arctan2(high, distance) + noise
+    rows = rows_of(follow_targets(flight))
+    assert rows.loc["ekf", "rmse"] < 4.0 and rows.loc["ekf", "detections"] > 230
+
+
+def test_velocities_help_positions_in_one_track():
+    """They say how fast, the others where."""
+    flight = joined(
+        robot_flight(1, kind="position", position_sd=5.0),
+        robot_flight(2, kind="velocity", sensor="flow"),
+    )
+    rows = judged(follow_targets(flight, sensors=["radar", "flow"])).set_index(["sensor", "filter"])
+    assert rows.loc[("together", "ekf"), "rmse"] < 0.7 * rows.loc[("radar", "ekf"), "rmse"]
+
+
+@pytest.mark.parametrize("kind", ["position", "range-bearing", "bearing"])
+def test_derivatives_for_what_is_considered_are_those_of_the_measurement(kind):
+    """By finite differences: the platform moved or turned, the stamp wrong."""
+    flight = robot_flight(kind=kind, heading_off_deg=0.0)
+    flight.tables["detections"]["plane_down_m"] = 30.0
+    scans = scans_of(flight, "radar")
+    n = len(scans.times)
+    p = np.tile([55.0, -20.0], (n, 1))
+    v = np.tile([1.0, -2.0], (n, 1))
+    seen, step = predict_scan(scans, p, v), 1e-5
+
+    def shifted(**changes: np.ndarray) -> np.ndarray:
+        return predict_scan(scans._replace(**changes), p, v).z
+
+    for i, name in enumerate(("platform_north", "platform_east")):
+        if kind == "position":
+            continue  # its own position is in what it publishes
+        off = np.zeros(2)
+        off[i] = step
+        column = (shifted(platform=scans.platform + off) - seen.z) / step
+        np.testing.assert_allclose(seen.H_pose[..., SLOTS[kind].index(name)], column, atol=1e-4, err_msg=name)
+    later = predict_scan(scans, p + step * (v - scans.platform_velocity), v).z
+    np.testing.assert_allclose(
+        seen.H_pose[..., SLOTS[kind].index("clock")], (later - seen.z) / step, atol=1e-3
+    )
+
+
+def test_every_kind_has_its_errors_and_units():
+    assert set(SLOTS) == set(KINDS)
+    stated = {each for name in CONSIDERED for each in errors_named(name)}
+    assert {name for names in SLOTS.values() for name in names} == stated
+
+
+# --- whose detection it is ----------------------------------------------------------------------------------
+
+
+def test_without_names_the_nearest_in_the_gate_is_taken_from_near_the_truth_on():
+    flight = robot_flight(4, labelled=False, clutter=3)
+    followed = follow_targets(flight)
+    rows = rows_of(followed)
+    assert rows.loc["ekf", "rmse"] < 1.5
+    own = followed.tracks[0].detection
+    assert all(name.endswith("-0") for name in own[own != ""])  # the boat's, never clutter's
+
+
+def test_without_names_and_truth_all_are_of_one():
+    followed = follow_targets(robot_flight(4, labelled=False, truth=False))
+    assert not followed.truth and [one.target for one in followed.tracks] == ["target"]
+    assert rows_of(followed).loc["ekf", "detections"] > 230
+
+
+def test_names_may_be_left_aside():
+    flight = robot_flight(4, clutter=3)
+    settings = Settings(targets={"identified": "gate"})
+    assert rows_of(follow_targets(flight, settings=settings)).loc["ekf", "rmse"] < 1.5
+    with refused("names its target"):
+        follow_targets(robot_flight(labelled=False), settings=Settings(targets={"identified": "label"}))
+
+
+def test_a_named_target_is_found_again_after_a_pause_and_an_unnamed_one_is_not():
+    named, unnamed = (
+        follow_targets(paused(robot_flight(5, labelled=labelled), 31, 61)).tracks[0]
+        for labelled in (True, False)
+    )
+    assert np.isfinite(named.estimate[-1]).all() and np.isnan(unnamed.estimate[-1]).all()
+
+
+# --- order --------------------------------------------------------------------------------------------------
+
+
+def test_late_looks_are_put_in_order_and_change_nothing():
+    flight = robot_flight(6)
+    straight = follow_targets(flight)
+    frames = flight.tables["frames"]
+    order = np.arange(len(frames))
+    order[10:13] = [12, 10, 11]
+    flight.tables["frames"] = frames.iloc[order].reset_index(drop=True)
+    late = follow_targets(flight)
+    np.testing.assert_array_equal(straight.tracks[0].estimate, late.tracks[0].estimate)
+    assert len(late.notes) == 1 and straight.notes == []
+
+
+# --- several sensors ----------------------------------------------------------------------------------------
+
+
+def test_two_sensors_in_one_track_share_what_the_platform_has_wrong():
+    one = robot_flight(1, heading_off_deg=2.0, heading_sd_deg=2.0)
+    other = robot_flight(51, kind="position", heading_off_deg=2.0, sensor="lidar")
+    followed = follow_targets(joined(one, other))
+    rows = rows_of(followed, "together")
+    assert rows.loc["schmidt", "verdict"] == "consistent"
+    assert rows.loc["ekf", "verdict"] == "overconfident"
+    assert rows.loc["ekf", "detections"] > 470
+    (pair,) = (pair for pair in apart(followed) if pair.filter == "schmidt")
+    assert (pair.one, pair.other) == ("radar", "lidar") and pair.rms < 2.0
+
+
+# --- refusals -----------------------------------------------------------------------------------------------
+
+
+def test_what_is_not_there_is_said():
+    flight = robot_flight()
+    for name, unknown in (("targets", "ship"), ("sensors", "sonar"), ("filters", "magic")):
+        with refused(f"'{unknown}'"):
+            follow_targets(flight, **{name: [unknown]})
+    with refused("'boat'"):
+        follow_targets(robot_flight(labelled=False, truth=False), targets=["boat"])
+    flight.tables["detections"] = flight.tables["detections"].iloc[:0]
+    with refused("no detections"):
+        follow_targets(flight)
+    sequence = make_manifest(
+        {**robot_flight().manifest.model_dump(exclude_none=True), "time": {"kind": "sequence"}}
+    )
+    with refused("no time"):
+        follow_targets(Flight(sequence, flight.nav, flight.tables))
+
+
+def test_a_filter_that_detections_cannot_go_through_is_left_out_with_the_reason():
+    settings = Settings(sensors={"radar": {"range_m": 90.0, "range_sd_m": 30.0}})
+    followed = follow_targets(robot_flight(kind="bearing"), filters=["coloured"], settings=settings)
+    assert list(rows_of(followed).index) == ["ekf"]
+    assert "'coloured'" in followed.notes[0]
+    wrong = Settings(sensors={"radar": {"considered": {"range_bias": {"sd_m": 2.0}}}})
+    with refused("'range_bias'"):
+        follow_targets(robot_flight(kind="bearing"), settings=wrong)
+
+
+# --- out ----------------------------------------------------------------------------------------------------
+
+
+def test_estimates_say_what_was_used_and_how_sure_they_are(tmp_path):
+    flight = robot_flight(2, heading_sd_deg=1.0)
+    followed = follow_targets(flight)
+    table = estimates_table(followed.tracks, followed.scans)
+    write_estimates(table, tmp_path)
+    read = pd.read_parquet(tmp_path / "estimates.parquet")
+    pd.testing.assert_frame_equal(read, table)
+    assert len(pd.read_csv(tmp_path / "estimates.csv")) == len(table)
+    ekf = table[table["filter"] == "ekf"]
+    used = ekf[ekf["detection"] != ""]
+    assert set(used["detection"]) <= set(flight.tables["detections"]["detection_id"])
+    S = np.stack([[used["s_00"], used["s_01"]], [used["s_01"], used["s_11"]]]).transpose(2, 0, 1)
+    nu = used[["innovation_range_m", "innovation_azimuth_rad"]].to_numpy()
+    known = np.isfinite(nu).all(axis=1)
+    nis = np.einsum("ni,nij,nj->n", nu[known], np.linalg.inv(S[known]), nu[known])
+    np.testing.assert_allclose(nis, used["nis"].to_numpy()[known])
+    P = ekf[["p_00", "p_01", "p_11"]].to_numpy()
+    assert (P[:, 0] * P[:, 2] > P[:, 1] ** 2).all()
+    truth = truths_at(flight, ekf["time_s"])[0].position
+    np.testing.assert_allclose(truth[:, 0] - ekf["north_m"], ekf["error_north_m"], atol=1e-9)
+
+
+def test_a_standing_error_is_one_independent_value():
+    rng = np.random.default_rng(0)
+    eye = np.tile(np.eye(2), (400, 1, 1))
+    assert worth_of_errors(rng.normal(size=(400, 2)), eye) > 200
+    standing = np.tile(rng.normal(size=2), (400, 1)) + rng.normal(0, 0.05, (400, 2))
+    assert worth_of_errors(standing, eye) < 3
+
+
+def test_scans_of_one_platform_pose_hold_at_all_times():
+    scans = scans_of(robot_flight(fixed=True), "radar")
+    assert isinstance(scans, Scans) and np.isfinite(scans.platform).all()
+    np.testing.assert_array_equal(scans.platform_velocity, 0.0)

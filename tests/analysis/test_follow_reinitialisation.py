@@ -1,0 +1,206 @@
+"""A target out of sight for long: its track ends when it is too uncertain, and another finds it again.
+
+A track is judged where its target was seen; where it was not is a number of its own.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.analysis.robots import KNOWN, joined, paused, robot_flight, rows_of, seen_only
+from wildlab.analysis.following import sensor_tracks
+from wildlab.analysis.following.estimates import estimates_table
+from wildlab.analysis.following.follow import TrackingResult, follow_targets
+from wildlab.analysis.following.judged import UNKNOWN, judged, seen_of, used_of
+from wildlab.analysis.following.noise_model import NoiseModel, TargetModel
+from wildlab.analysis.following.reinitialisation import Geometry, ends_by, part_of
+from wildlab.analysis.following.sensor_tracks import SensorTrack
+from wildlab.analysis.scans import Scans, Truth
+from wildlab.flight.following import parse_settings
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import Mount
+
+CAMERA = Camera(640, 512, 1100.0, 1100.0, 320.0, 256.0)
+HEIGHT, TILT, NOISE_PX = 60.0, 0.6, 2.0
+TARGETS = TargetModel(0.5, 5.0, 0.99, 10.0, 20.0, 0.1, float("nan"), None)
+FILTERS = ("ekf", "ukf", "imm", "coloured")
+
+
+@cache
+def watched(pause_s: float = 200.0) -> tuple[Scans, Truth]:
+    """A hovering camera sees an animal that wanders for ten seconds, and again after a pause."""
+    rng = np.random.default_rng(0)
+    times = np.arange(0.0, 20.0 + pause_s, 0.2)
+    middle = np.array([0.0, -HEIGHT * np.tan(TILT)])
+    place = middle + np.column_stack([3 * np.sin(times / 5), 2 * np.cos(times / 7)])
+    velocity = np.column_stack([0.6 * np.cos(times / 5), -2 / 7 * np.sin(times / 7)])
+    n = len(times)
+    R_nb = np.tile(euler_to_matrix(TILT, 0.0, 0.0), (n, 1, 1))
+    poses = CameraPoses(CAMERA, Mount(), np.tile([0.0, 0.0, -HEIGHT], (n, 1)), R_nb)
+    uv = ground_to_pixel(CAMERA, np.column_stack([place, np.zeros(n)]), poses.p_nc, poses.R_nc)
+    assert np.isfinite(uv).all()
+    uv += rng.normal(0, NOISE_PX, uv.shape)
+    uv[(times > 10) & (times < 10 + pause_s)] = np.nan
+    labels = np.where(np.isfinite(uv[:, :1]), "deer", "").astype(object)
+    ids = np.array([[f"d{k}"] for k in range(n)], object)
+    still = np.zeros((n, 2))
+    scans = Scans(
+        "camera", "pixel", times, uv[:, None], still, still, ("u", "v"), labels, ids,
+        drop=np.full(n, HEIGHT), plane_down=np.zeros(n), poses=poses,
+    )  # fmt: skip
+    return scans, Truth("deer", place, velocity, 0.0)
+
+
+def beliefs(scans: Scans) -> NoiseModel:
+    nan, sd = float("nan"), np.full(2, NOISE_PX)
+    return NoiseModel("camera", scans.kind, 0.0, sd, sd, (), 0.0, 1.0, nan, nan, nan, scans.interval_s)
+
+
+def follow(pause_s: float = 200.0) -> list[SensorTrack]:
+    scans, truth = watched(pause_s)
+    return sensor_tracks.follow(scans, truth, beliefs(scans), TARGETS, FILTERS)
+
+
+def off_after(one: SensorTrack) -> float:
+    """Root mean square distance where the target is seen again, m."""
+    again = seen_of(one) & (one.times > 100)
+    return float(np.sqrt(np.mean(np.sum(one.error[again, :2] ** 2, axis=1))))
+
+
+def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch):
+    on_ground = NOISE_PX / CAMERA.fx * HEIGHT / np.cos(TILT) ** 2
+    tracks = follow()
+    for one in tracks:
+        assert len(one.starts) == 2 and one.times[one.starts[1]] == pytest.approx(210.0)
+        assert off_after(one) < 2 * np.sqrt(2) * on_ground
+    monkeypatch.setattr(sensor_tracks, "ends_of", lambda *given: None)
+    without = follow()
+    assert len(without[0].starts) == 1
+    assert off_after(without[0]) > 10 * off_after(tracks[0])
+
+
+def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silently():
+    tracks = follow()
+    scans, _ = watched()
+    sensor = {"camera": scans}, {"camera": beliefs(scans)}
+    rows = judged(TrackingResult(tracks, *sensor, TARGETS, [], [], True))
+    first = tracks[0]
+    for one in tracks:
+        assert (np.isfinite(one.estimate) == np.isfinite(first.estimate)).all()
+        assert (one.starts == first.starts).all() and (one.detection == first.detection).all()
+    for _, row in rows.iterrows():
+        assert row["anew"] == 1 and row["gone_seen"] == 0
+        assert row["compared"] + row["without"] + row["gone"] == row["spanned"]
+        assert row["compared"] == seen_of(first).sum() == row["used"]
+        assert row["detections"] == row["used"] - 2  # the two that tracks were put on
+        # The table says which of the two a row is of.
+        table = estimates_table([one], sensor[0])
+        times = one.times[one.starts]
+        right = 1 + (table["time_s"] >= times[1]).to_numpy(int)
+        assert (table["track"] == right).all() and set(right) == {1, 2}
+    # The track ends within the pause, and not at once.
+    ended = first.times[np.flatnonzero(first.without)[0]]
+    assert 11.0 < ended < 60.0 and first.without.sum() > 0.7 * 5 * 200
+
+
+@pytest.mark.parametrize(
+    ("share", "gap_s", "right"), [(1.02, 11.0, True), (0.98, 11.0, False), (9.0, 9.0, False)]
+)
+@pytest.mark.parametrize("where", ["then", "now"])
+def test_a_track_ends_where_more_is_left_out_than_stated_and_not_before_a_gap(share, gap_s, right, where):
+    """Of a range of 100 m: 3 s^4 / (4 d^2) is left out for a spread s across the line of sight."""
+    D, s = np.array([[[0.0, 0.0], [0.0, 0.01]]]), 8.0
+    bent = D, np.array([[3 * s**4 / (4 * 100.0**2)]]) / share
+    flat = D, np.array([[1e6]])
+    shape = Geometry(
+        lambda row, place: bent if where == "then" else flat, lambda row: bent if where == "now" else None
+    )
+    ends = ends_by(np.array([0.0, gap_s]), 10.0, lambda row: (shape, row))
+    P = np.diag([0.0, s**2, 1.0, 1.0])
+    assert ends(1, 0, np.array([100.0, 0.0, 0.0, 0.0]), P) is right
+
+
+def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(
+    monkeypatch,
+):
+    with_ends = follow(0.0)
+    monkeypatch.setattr(sensor_tracks, "ends_of", lambda *given: None)
+    for one, other in zip(with_ends, follow(0.0), strict=True):
+        assert len(one.starts) == 1 and not one.without.any()
+        for name in ("estimate", "covariance", "innovation", "S", "nis", "nees"):
+            assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
+
+
+def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there():
+    scans, truth = watched()
+    tracks = follow()
+    rows = slice(int(tracks[0].starts[1]), len(scans.times))
+    later = truth._replace(position=truth.position[rows], velocity=truth.velocity[rows])
+    alone = sensor_tracks.follow(part_of(scans, rows), later, beliefs(scans), TARGETS, FILTERS)
+    for one, other in zip(tracks, alone, strict=True):
+        assert np.array_equal(one.estimate[rows], other.estimate, equal_nan=True)
+        assert np.array_equal(one.nis[rows], other.nis, equal_nan=True)
+
+
+@pytest.mark.parametrize("kind", ["position", "bearing"])
+def test_positions_and_bearings_alone_do_not_end_so(kind):
+    near = "[sensors.radar]\nrange_m = 90.0\nrange_sd_m = 30.0\n"
+    flight = paused(robot_flight(1, kind=kind), 40, 90)
+    one = follow_targets(flight, settings=parse_settings(near + KNOWN)).tracks[0]
+    assert len(one.starts) == 1 and not one.without.any()
+
+
+@pytest.mark.slow
+def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track():
+    precise = {"range_sd": 0.1, "bearing_sd_deg": 0.1, "seconds": 180.0}
+    flights = (robot_flight(k, sensor=name, **precise) for k, name in enumerate(("radar", "lidar"), 1))
+    flight = joined(*(paused(one, 40, 130) for one in flights))
+    noise = "".join(f"[sensors.{n}.noise]\nrange_m = 0.1\nazimuth_deg = 0.1\n" for n in ("radar", "lidar"))
+    settings = parse_settings(noise + "[targets]\nacceleration_m_s_sqrt_s = 0.5\nstart_speed_m_s = 2.0\n")
+    found = follow_targets(flight, settings=settings, filters=["ekf", "ukf", "imm"], smooth=True)
+    rows = rows_of(found, "together")
+    assert set(rows.index) == {"ekf", "ekf-smoothed", "ukf", "ukf-smoothed", "imm"}
+    assert (rows["anew"] == 1).all() and (rows["gone"] > 0).all() and (rows["gone_seen"] == 0).all()
+    assert (rows["compared"] + rows["without"] + rows["gone"] == rows["spanned"]).all()
+    assert (rows["rmse"] < 0.5).all()
+    for mine in (track for track in found.tracks if track.sensor == "together"):
+        assert mine.times[mine.starts[1]] > 130
+
+
+def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen():
+    followed = follow_targets(paused(robot_flight(3), 40, 90), settings=parse_settings(KNOWN))
+    row = rows_of(followed).loc["ekf"]
+    one = next(one for one in followed.tracks if one.filter == "ekf")
+    away, used = np.hypot(*one.error[:, :2].T), used_of(one)
+    known = np.isfinite(away)
+    assert row["rmse"] == pytest.approx(np.sqrt(np.mean(away[used & known] ** 2)))
+    assert row["rmse_without"] == pytest.approx(np.sqrt(np.mean(away[~used & known] ** 2)))
+    assert row["rmse"] < 1.5 < 3 < row["rmse_without"]
+    assert row["nees"] == pytest.approx(np.nanmean(one.nees[used]))
+    assert row["compared"] == (used & known).sum()
+    # The track ends within the wait: looks without one are counted, and are in neither number.
+    assert row["without"] + row["gone"] == 101 and row["gone"] > 0 and row["anew"] == 1
+    assert row["wait"] == pytest.approx(51.0, abs=1.1)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_of_one_or_three_detections_nothing_is_judged(count):
+    flight = robot_flight(3)
+    few = seen_only(flight, np.arange(len(flight.tables["frames"])) < count)
+    rows = rows_of(follow_targets(few, settings=parse_settings(KNOWN)))
+    assert set(rows["verdict"]) == {UNKNOWN} and set(rows["nis_verdict"]) == {UNKNOWN}
+    assert (rows["used"] == count).all()
+
+
+def test_a_track_that_lost_its_target_is_judged_where_the_target_was_seen():
+    """What a gate no longer lets in was seen all the same."""
+    flight = robot_flight(3, labelled=False)
+    flight.tables["detections"].loc[119:, "range_m"] += 6.0  # after a minute
+    row = rows_of(follow_targets(flight, settings=parse_settings(KNOWN))).loc["ekf"]
+    assert row["compared"] > row["used"]

@@ -1,0 +1,150 @@
+"""Nothing is tuned where it is judged, what was not tuned is not said to be, and a smoother knows no more
+than its track: each held against numbers computed here."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from filterpy.kalman import KalmanFilter
+
+from tests.analysis.conftest import changed
+from tests.analysis.robots import boat, joined, paused, robot_flight, rows_of, seen_only
+from tests.refused import refused
+from wildlab.analysis.following.follow import follow_targets
+from wildlab.analysis.following.judged import _between, apart
+from wildlab.analysis.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
+from wildlab.flight.following import parse_settings
+from wildlab.flight.store import Flight
+from wildlab.tracking.maritime import white_acceleration
+
+
+def later(flight: Flight, seconds: float) -> Flight:
+    frames = flight.tables["frames"]
+    return changed(flight, frames=frames.assign(time_s=frames["time_s"] + seconds))
+
+
+def by_filterpy(z, t, density, sd, x, P):
+    """Its filter after the last of positions z, and at each its state, covariance, NIS and log-likelihood."""
+    kf = KalmanFilter(4, 2)
+    kf.x, kf.P, kf.R, kf.H = x, P, np.diag(sd**2), np.eye(2, 4)
+    steps = [(x, P, 0.0, 0.0)]
+    for dt, position in zip(np.diff(t), z[1:], strict=True):
+        kf.F = np.eye(4) + dt * np.eye(4, k=2)
+        kf.Q = density**2 * np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.eye(2))
+        kf.predict()
+        kf.update(position)
+        steps.append((kf.x, kf.P, kf.mahalanobis**2, kf.log_likelihood))
+    return kf, *(np.array(one) for one in zip(*steps, strict=True))
+
+
+def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
+    """Tuned on one flight, judged on another: filterpy's filter and smoother, and sums written out."""
+    tuned = tune_flight(robot_flight(1, kind="position", position_sd=1.0), ["radar"], None, "innovations")
+    flight = robot_flight(2, kind="position", position_sd=1.0, name="judged")
+    followed = follow_targets(flight, tuned=tuned, smooth=True, filters=["ekf"])
+    track, back = followed.tracks
+    scans = followed.scans["radar"]
+    z, t, sd = scans.detections[:, 0], scans.times, np.array(tuned.sensors["radar"].own_sds)
+    kf, xs, Ps, nis, _ = by_filterpy(z, t, tuned.density, sd, track.estimate[0], track.covariance[0])
+    np.testing.assert_allclose(track.estimate, xs, atol=1e-7)
+    smoothed, covariance, *_ = kf.rts_smoother(xs, Ps)  # all steps are alike
+    np.testing.assert_allclose(back.estimate, smoothed, atol=1e-6)
+    np.testing.assert_allclose(back.covariance, covariance, atol=1e-6)
+    rows = rows_of(followed)
+    for name, x, P in (("ekf", xs, Ps), ("ekf-smoothed", smoothed, covariance)):
+        e = boat(t) - x[:, :2]
+        shown = rows.loc[name]
+        assert shown["rmse"] == pytest.approx(np.sqrt((e**2).sum(axis=1).mean()), rel=1e-3)
+        with_truth = P[:, :2, :2] + 0.05**2 * np.eye(2)
+        nees = np.einsum("ni,nij,nj->n", e, np.linalg.inv(with_truth), e)
+        assert shown["nees"] == pytest.approx(nees.mean(), rel=0.02)
+    assert rows.loc["ekf", "nis"] == pytest.approx(nis[1:].mean(), rel=1e-6)
+    # A smoother is never fed to NIS or to whiteness.
+    assert np.isnan(rows.loc["ekf-smoothed", "nis"]) and rows.loc["ekf-smoothed", "detections"] == 0
+    assert np.isnan(back.nis).all() and np.isnan(back.innovation).all() and np.isnan(back.S).all()
+
+
+def test_innovations_are_likeliest_at_what_was_tuned():
+    flight = robot_flight(1, kind="position", position_sd=1.0)
+    tuned = tune_flight(flight, ["radar"], None, "innovations")
+    scans = follow_targets(flight, tuned=tuned).scans["radar"]
+    z, t = scans.detections[:, 0], scans.times
+
+    def log_likelihood(density, sd):
+        start = np.array([*z[0], 0.0, 0.0]), np.diag([*sd**2, 25.0, 25.0])
+        return by_filterpy(z, t, density, sd, *start)[-1].sum()
+
+    assert repr(read_tuned(tuned_text(tuned))) == repr(tuned)
+    sd, density = np.array(tuned.sensors["radar"].own_sds), tuned.density
+    best = log_likelihood(density, sd)
+    for by in (0.7, 1.4):
+        assert log_likelihood(by * density, sd) < best + 0.1
+        assert log_likelihood(density, by * sd) < best + 0.1
+
+
+def test_part_of_the_flight_that_is_judged_teaches_nothing():
+    flight = robot_flight(1)
+    seen = flight.tables["detections"]
+    part = changed(flight, detections=seen.iloc[20:90].assign(target_id="x"))
+    with refused("70", field="--tune"):
+        refuse_same(flight, part)
+    with refused("judged"):
+        refuse_same(flight, robot_flight(1, name="renamed"))
+    refuse_same(flight, robot_flight(2))
+
+
+@pytest.mark.slow
+def test_a_clock_that_nothing_tells_of_is_not_said_to_be_tuned():
+    flight, other = robot_flight(1, seconds=60.0), robot_flight(2, name="other", seconds=60.0)
+    by_truth = tune_flight(flight, ["radar"])
+    by_innovations = tune_flight(flight, ["radar"], None, "innovations")
+    assert by_truth.sensors["radar"].clock_tuned
+    for tuned, said in ((by_truth, True), (by_innovations, False)):
+        told = follow_targets(other, tuned=read_tuned(tuned_text(tuned))).said
+        assert any(one.what == "to be added to its stamps" for one in told) is said
+
+
+@pytest.mark.slow
+def test_a_clock_further_off_than_is_looked_is_refused_and_not_tuned_at_the_edge():
+    for off in (3.0, -6.0):
+        with refused("further"):
+            tune_flight(later(robot_flight(1, kind="position", seconds=60.0), -off), ["radar"])
+    # Ranges and bearings are of where the robot was: late stamps are undone as a whole.
+    late = tune_flight(later(robot_flight(1, seconds=90.0), 1.0), ["radar"]).sensors["radar"]
+    assert late.offset_s == pytest.approx(-1.0, abs=0.3)
+
+
+@pytest.mark.slow
+def test_a_stated_clock_holds_while_innovations_are_tuned():
+    stated = parse_settings("[sensors.radar]\nclock_offset_s = 2.0\n")
+    flight = robot_flight(1, seconds=40.0)
+    right = tune_flight(flight, ["radar"], None, "innovations")
+    moved = tune_flight(later(flight, -2.0), ["radar"], stated, "innovations")
+    assert moved.sensors["radar"].sds == pytest.approx(right.sensors["radar"].sds, rel=0.02)
+
+
+def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_track():
+    whole, short = (robot_flight(3, kind="position", labelled=False, truth=False) for _ in range(2))
+    torn, short = paused(whole, 50, 90), seen_only(short, short.tables["frames"]["time_s"] < 50)
+    settings = parse_settings(
+        "[sensors.radar.noise]\nposition_m = 1.0\n[targets]\npatience_s = 10.0\ngate_probability = 0.9999\n"
+    )
+    followed = [follow_targets(f, settings=settings, smooth=True, filters=["ekf"]) for f in (torn, short)]
+    one, two = (each.tracks[1] for each in followed)
+    assert one.filter == "ekf-smoothed" and np.isfinite(one.estimate[:, 0]).sum() > 60
+    known = np.isfinite(two.estimate[:, 0])
+    np.testing.assert_allclose(one.estimate[: len(known)][known], two.estimate[known])
+
+
+def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
+    track = follow_targets(robot_flight(1, kind="position"), filters=["ekf"]).tracks[0]
+    for dt in (0.0, 0.3):
+        P = _between(track, track.times[20:21] + dt, 0.7)[1][0]
+        F, Q = white_acceleration(dt, 0.7)
+        np.testing.assert_allclose(P, (F @ track.covariance[20] @ F.T + Q)[:2, :2], rtol=1e-9)
+
+
+def test_smoothed_tracks_are_not_held_against_each_other():
+    both = joined(*(robot_flight(k, kind="position", sensor=f"radar-{k}") for k in (1, 2)))
+    names = {one.filter for one in apart(follow_targets(both, smooth=True, filters=["ekf"]))}
+    assert names == {"ekf"}

@@ -1,0 +1,181 @@
+"""Detections on terrain: marks on hills are found where they are, and every ray is accounted for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from scipy.ndimage import gaussian_filter
+
+from tests.analysis.building import manifest_of, poses_table, surveyed
+from tests.analysis.conftest import changed, score
+from tests.refused import refused
+from wildlab.analysis.evaluate import errors_of
+from wildlab.analysis.georeference import georeference, heights_left_in, observe
+from wildlab.analysis.ground import on_level, rays_of, shift_from_level
+from wildlab.analysis.track import sighting
+from wildlab.evaluation.errors import summarise
+from wildlab.flight.checks.check import check_flight
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
+from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+
+MANIFEST = manifest_of(
+    Camera(640, 512, 700.0, 700.0, 320.0, 256.0),
+    time={"kind": "sequence"},
+    origin={"latitude_deg": 61.0, "longitude_deg": 15.0, "height_m": 300.0},
+    mount={"looks": "down", "tilt_deg": 40.0},
+    uncertainty={"pixel_px": 1.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
+                 "tilt_deg": 0.5, "heading_deg": 1.0, "plane_height_m": 0.3},
+)  # fmt: skip
+
+
+def hills(seed: int = 0) -> Terrain:
+    height = 40 * 14 * gaussian_filter(np.random.default_rng(seed).normal(size=(150, 150)), 12)
+    return Terrain(height.astype(np.float32), -450.0, -450.0, 6.0)
+
+
+def holed() -> Terrain:
+    height = hills().height.copy()
+    height[60:95, 60:] = np.nan
+    return replace(hills(), height=height)
+
+
+def flown(noise: float = 0.0, per_image: int = 6) -> Flight:
+    """Marks on hills in 25 images, poses wrong by noise times what is stated."""
+    ground, n = hills(), 25
+    rng = np.random.default_rng(5)
+    at = rng.uniform(-120, 120, (n, 2))
+    p = np.column_stack([at, -(ground.heights_at(at) + 80)])
+    R = euler_to_matrix(np.zeros(n), np.zeros(n), rng.uniform(-3, 3, n))
+    poses = CameraPoses(MANIFEST.geometry_camera(), MANIFEST.geometry_mount(), p, R)
+    rows, marks = [], []
+    for i in range(n):
+        uv = rng.uniform([20, 20], [620, 490], (per_image, 2))
+        points = pixels_to_terrain(poses.take(np.full(per_image, i)), uv, ground).points
+        for k in np.flatnonzero(np.isfinite(points[:, 0])):
+            rows.append((f"d{i}-{k}", f"f{i}", "pixel", *uv[k], f"m{i}-{k}"))
+            marks.append(points[k])
+    logged_p = p + noise * rng.normal(0, 1.0, p.shape)
+    turn = rng.normal(0, 1, (n, 3)) * np.radians([0.5, 0.5, 1.0]) * noise
+    nav = poses_table(np.arange(float(n)), logged_p, R @ rotation_vector_to_matrix(turn))
+    nav["frame_id"] = [f"f{i}" for i in range(n)]
+    names = ["detection_id", "frame_id", "kind", "u_px", "v_px", "target_id"]
+    detections = pd.DataFrame(rows, columns=names).assign(source="click")
+    detections[["u_px", "v_px"]] += noise * rng.normal(0, 1.0, (len(rows), 2))
+    truth = surveyed(detections["target_id"].tolist(), np.array(marks))
+    tables = {"frames": nav[["frame_id", "time_s"]].copy(), "detections": detections, "truth": truth}
+    return Flight(MANIFEST, {"logged": nav}, tables, None, ground)
+
+
+def test_with_exact_poses_points_are_the_marks():
+    flight = flown()
+    seen = observe(flight)
+    points = georeference(flight, seen, np.random.default_rng(0))
+    marks = flight.table("truth")[["north_m", "east_m", "down_m"]].to_numpy()
+    np.testing.assert_allclose(points[["north_m", "east_m", "down_m"]].to_numpy(), marks, atol=1e-6)
+    assert rays_of(seen).counts() == {"met the ground": len(points)}
+    # Targets' own heights are the best that level ground can have; without them it lies under the camera.
+    assert shift_from_level(seen, points).largest < 1e-6
+    unknown = replace(seen, level=np.full(len(points), np.nan))
+    shift = shift_from_level(unknown, points)
+    level = georeference(flight, on_level(unknown), np.random.default_rng(0))
+    off = np.hypot(level["north_m"] - points["north_m"], level["east_m"] - points["east_m"])
+    assert shift == (int(off.notna().sum()), float(off.median()), float(off.max()))
+    assert shift.median > 3.0
+
+
+def test_ellipses_hold_what_they_should_over_hills():
+    """Poses, pixels and nothing else are wrong, by what the manifest states."""
+    flight = flown(noise=1.0, per_image=24)
+    flight.terrain = replace(hills(), sd=1e-3)
+    scored = score(flight)
+    assert len(scored) > 500
+    # 25 poses are drawn: 90 % of their points, give or take what so few decide.
+    assert 0.8 <= scored["inside_90"].mean() <= 0.97
+    assert summarise(errors_of(scored)).median < 3.0
+
+
+def test_the_map_decides_how_good_its_heights_are():
+    sizes = []
+    for sd in (np.nan, 0.3, 6.0):
+        flight = flown()
+        flight.terrain = replace(hills(), sd=sd)
+        points = georeference(flight, observe(flight), np.random.default_rng(0))
+        sizes.append(float((points["cov_nn"] + points["cov_ee"]).median()))
+    assert sizes[0] == sizes[1]  # 0.3 m is what the manifest assumes where the map is silent
+    assert sizes[2] > 3 * sizes[1]
+
+
+def test_rays_that_meet_no_ground_are_counted():
+    flight = flown()
+    flight.terrain = holed()
+    nav = flight.nav["logged"]
+    nav.loc[[0, 2, 3, 4], "down_m"] = 500.0
+    nav.loc[1, "east_m"] = 4000.0
+    seen = observe(flight)
+    points = georeference(flight, seen, np.random.default_rng(0))
+    counts = rays_of(seen).counts()
+    lost = points["north_m"].isna()
+    assert len(counts) == 4  # of each fate some
+    assert counts["met the ground"] == (~lost).sum() and sum(counts.values()) == len(points)
+    assert set(points.loc[lost, "ellipse"]) == {"none"} and points.loc[lost, "cov_nn"].isna().all()
+
+
+def test_a_ray_without_ground_is_no_sighting():
+    flight = flown()
+    flight.tables["detections"]["target_id"] = "m0-0"
+    flight.terrain = holed()
+    lost = np.isnan(observe(flight).plane_down)
+    found = sighting(flight, "logged")
+    assert lost.any() and np.isnan(found.positions[:, 0]).any()
+    frames = flight.table("detections")["frame_id"].to_numpy()
+    whole = {f for f in set(frames) if lost[frames == f].all()}
+    rows = flight.table("frames")["frame_id"].isin(whole).to_numpy()
+    assert np.isnan(found.uv[rows]).all() and np.isnan(found.positions[rows]).all()
+
+
+def test_heights_left_in_raise_terrain_that_counts_alike():
+    record = {
+        "source": "dem.tif", "sha256": "0" * 64, "crs": "EPSG:4326", "added_m": 0.0, "unit": "m",
+        "cell_m": [6.0, 6.0], "step_m": 6.0, "rows": 150, "columns": 150, "holes": 0, "error_rms_m": 0.0,
+        "error_max_m": 0.0,
+    }  # fmt: skip
+    moved = {}
+    for heights in ("flight", "ellipsoid"):
+        vertical = {"reference": "x", "correction_m": 20.0}
+        flight = changed(flown(), {"terrain": record | {"heights": heights}, "vertical": vertical})
+        seen = observe(flight)
+        raised = heights_left_in(flight, seen)
+        before, after = (georeference(flight, o, np.random.default_rng(0)) for o in (seen, raised))
+        moved[heights] = np.nanmedian(np.abs(after["north_m"] - before["north_m"]))
+    assert moved["flight"] < 1e-3 < 1.0 < moved["ellipsoid"]
+
+
+def test_a_check_holds_the_survey_against_the_map():
+    flight, ground = flown(), hills()
+
+    def findings(height: np.ndarray, words: str) -> list[str]:
+        flight.terrain = replace(ground, height=height)
+        return [one.level for one in check_flight(flight) if words in one.sentence and one.level != "note"]
+
+    assert findings(ground.height, "known points") == []
+    assert findings(ground.height + 25, "25.0 m below") == ["warning"]
+    assert set(findings(ground.height + 500, "100 %")) == {"problem"}
+    assert findings(ground.height[:60], "beyond the border") == ["warning"]
+    assert findings(ground.height[:60], "a hole") == []
+    # A hole is no border: the map reaches, and knows nothing there.
+    holed = ground.height.copy()
+    holed[60:] = np.nan
+    assert findings(holed, "a hole") == ["warning"]
+    assert findings(holed, "beyond the border") == []
+
+
+def test_without_terrain_it_is_said():
+    flight = flown()
+    flight.terrain = None
+    with refused("no terrain"):
+        rays_of(observe(flight))

@@ -1,0 +1,181 @@
+"""What is learnt on one flight is kept in a file, helps the next, and is refused where it does not belong."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.analysis.conftest import changed, score
+from tests.analysis.survey_twin import Survey, simulate
+from tests.refused import refused
+from wildlab.analysis.diagnose import diagnose
+from wildlab.analysis.georeference import georeference, observe
+from wildlab.analysis.learn import apply_learnt, corrected_flight, learn_flight
+from wildlab.flight.checks.sense.sense import sense_sentences
+from wildlab.flight.learnt import LearntParameter, learnt_toml, parse_learnt, read_learnt, write_learnt
+
+
+def tuesday(**more):
+    return simulate(Survey(tilt_deg=5.0, clock_s=0.3, **more))
+
+
+def named(flight, name):
+    return changed(flight, {"name": name})
+
+
+@cache
+def learnt():
+    return learn_flight(named(tuesday(), "tuesday"), np.random.default_rng(0))[0]
+
+
+def test_it_comes_back_from_its_file_as_it_was(tmp_path):
+    write_learnt(learnt(), tmp_path / "calibration.toml")
+    assert read_learnt(tmp_path / "calibration.toml") == learnt() == parse_learnt(learnt_toml(learnt()))
+    values = {one.name: one for one in learnt().parameter}
+    assert {"tilt", "clock"} <= set(values) <= {"roll", "tilt", "pan", "clock"}
+    assert values["tilt"].low <= -5.0 <= values["tilt"].high and values["tilt"].unit == "deg"
+    assert values["clock"].low <= 0.3 <= values["clock"].high
+    assert (learnt().learnt_on.flight, learnt().learnt_on.images) == ("tuesday", 40)
+    assert learnt().conditions.height_m[0] == pytest.approx(55.0, abs=3.0)
+    # The place of a flight is in no calibration.
+    assert "latitude" not in learnt_toml(learnt())
+
+
+def only(name, value, half, unit):
+    """The calibration with one parameter alone."""
+    one = LearntParameter(name=name, value=value, low=value - half, high=value + half, unit=unit)
+    return learnt().model_copy(update={"parameter": (one,), "covariance": ((half**2 / 4,),)})
+
+
+def test_a_corrected_flight_says_what_the_applied_calibration_says():
+    flight = named(tuesday(seed=5), "wednesday")
+    applied = apply_learnt(flight, None, observe(flight), learnt())
+    corrected = corrected_flight(flight, None, learnt())
+    rng = np.random.default_rng(0)
+    np.testing.assert_allclose(
+        georeference(corrected, observe(corrected), rng)[["north_m", "east_m"]],
+        georeference(flight, applied.observations, rng)[["north_m", "east_m"]],
+        atol=1e-6,
+    )
+    # So it does of the lens.
+    of_lens = only("radial", 0.1, 0.01, "1")
+    camera = apply_learnt(flight, None, observe(flight), of_lens).observations.poses.camera
+    assert camera == observe(corrected_flight(flight, None, of_lens)).poses.camera
+    assert camera.distortion == (0.1, 0.0, 0.0, 0.0, 0.0)
+    # What the calibration takes off is no contradiction any more.
+    late = simulate(Survey(seed=5, clock_s=1.0))
+    assert len(sense_sentences(late)) == 1
+    assert sense_sentences(corrected_flight(late, None, only("clock", 1.0, 0.1, "s"))) == []
+    nothing = learnt().model_copy(update={"parameter": (), "covariance": ()})
+    assert corrected_flight(flight, None, nothing) is flight
+
+
+def test_only_another_height_than_that_of_the_calibration_is_said():
+    """A fifth lower or higher is the same height, a half is not."""
+    flight = named(tuesday(seed=5, images=10), "wednesday")
+    logged = observe(flight)
+    height = logged.plane_down - logged.poses.p_nc[:, 2]
+    for factor, other_height in ((1.2, False), (1.5, True)):
+        for low, high in ((factor * height.min(), 1e3), (1.0, height.max() / factor)):
+            near = learnt().conditions.model_copy(update={"height_m": (low, high)})
+            other = learnt().model_copy(update={"conditions": near})
+            assert ("another height" in apply_learnt(flight, None, logged, other).sentence) == other_height
+
+
+def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
+    flight = named(tuesday(seed=5), "wednesday")
+    logged = observe(flight)
+    applied = apply_learnt(flight, None, logged, learnt())
+    after = score(flight, applied.observations, applied.deviations)
+    well = simulate(Survey(seed=5))
+    untouched = score(well)
+    assert score(flight, logged)["error_m"].mean() > 10.0
+    assert after["error_m"].mean() <= 1.1 * untouched["error_m"].mean()
+    assert 0.83 < after["inside_90"].mean() < 0.97
+    assert "this very flight" not in applied.sentence
+
+
+def test_on_the_very_flight_it_was_learnt_on_that_is_said():
+    # By its clicks and poses, whatever its name is.
+    renamed = named(tuesday(), "friday")
+    assert "this very flight" in apply_learnt(renamed, None, observe(renamed), learnt()).sentence
+    other = named(tuesday(seed=5), "tuesday")
+    assert "this very flight" not in apply_learnt(other, None, observe(other), learnt()).sentence
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"camera": {"fx_px": 2500.0}}, "fx_px"),
+        ({"camera": {"width_px": 640}}, "width_px"),
+        ({"camera": {"k1": 0.1}}, "k1"),
+        ({"mount": {"looks": "down"}}, "looks"),
+        ({"mount": {"tilt_deg": -30.0}}, "tilt_deg"),
+    ],
+)
+def test_another_camera_or_mount_is_refused(change, words):
+    flight = changed(tuesday(images=8), change)
+    with refused(words):
+        apply_learnt(flight, None, observe(flight), learnt())
+
+
+@pytest.mark.slow
+def test_what_was_applied_is_not_found_again():
+    """Diagnosed with its calibration applied, a flight has no cause left, its clock included."""
+    flight = named(tuesday(seed=5), "wednesday")
+    flight.nav["logged"]["east_m"] += 6.0
+    own = learn_flight(flight, np.random.default_rng(0))[0]
+    assert {"east", "clock", "tilt"} <= {one.name for one in own.parameter}
+    applied = apply_learnt(flight, None, observe(flight), own)
+    scored = score(flight, applied.observations)
+    again = diagnose(flight, applied.observations, scored)
+    assert not again.counts
+    clock = next(model for model in again.models if model.causes == ("clock",))
+    assert abs(clock.fit.values[0]) < 0.02
+    place = next(model for model in again.models if model.causes == ("position",))
+    assert np.abs(place.fit.values).max() < 0.5
+
+
+def test_where_nothing_gains_for_certain_the_noise_alone_is_kept():
+    found, diagnosis = learn_flight(simulate(Survey(seed=1)), np.random.default_rng(0))
+    assert not diagnosis.counts
+    assert found.parameter == () and found.gain is None
+    assert 0.4 < found.noise.tilt_deg < 1.1
+    assert parse_learnt(learnt_toml(found)) == found
+    flight = named(tuesday(seed=5), "wednesday")
+    applied = apply_learnt(flight, None, observe(flight), found)
+    assert np.allclose(applied.observations.poses.p_nb, observe(flight).poses.p_nb)
+
+
+def test_noise_of_roll_pitch_and_yaw_in_older_files_is_read_as_tilt_and_heading():
+    text = learnt_toml(learnt())
+    noise = learnt().noise
+    older = text.replace(f"tilt_deg = {noise.tilt_deg!r}", "roll_deg = 1.0\npitch_deg = 7.0")
+    older = older.replace(f"heading_deg = {noise.heading_deg!r}", "yaw_deg = 3.0")
+    found = parse_learnt(older).noise
+    assert (found.tilt_deg, found.heading_deg) == (pytest.approx(5.0), 3.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('unit = "deg"', 'unit = "rad"', "'rad'"),
+        ("covariance = [[", "covariance = [[0.0], [", "covariance"),
+        ('name = "clock"', 'name = "tilt"', "tilt"),
+        ("format = 1", "format = 2", "format"),
+        ("format = 1", "format = 1\nshoe = 3", "shoe"),
+        ("format = 1", "format = ", "TOML"),
+    ],
+)
+def test_a_damaged_file_is_refused(old, new, words):
+    text = learnt_toml(learnt())
+    assert old in text
+    with refused(words):
+        parse_learnt(text.replace(old, new, 1))
+
+
+def test_files_that_cannot_be_read_or_written_are_refused(tmp_path):
+    with refused("no such file"):
+        read_learnt(tmp_path / "none.toml")
+    with refused("cannot be written"):
+        write_learnt(learnt(), tmp_path / "nowhere" / "calibration.toml")

@@ -1,0 +1,210 @@
+"""What a plan says will be seen, beside what is known otherwise: shares by hand, hiding by brute force."""
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.analysis.test_plan import CAMERA, hills, plan
+from tests.flight.test_area import collection, feature, polygon
+from wildlab.analysis.plans.coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
+from wildlab.analysis.plans.outlines import simplified
+from wildlab.analysis.plans.plan import make_plan
+from wildlab.analysis.plans.said import animals_in, plan_result
+from wildlab.analysis.plans.wanted import Wanted
+from wildlab.geometry.camera import normalise, project
+
+HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
+FIELD = [[0, 0], [0, 160], [200, 160], [200, 0], [0, 0]]
+
+
+@pytest.fixture(scope="module")
+def field(tmp_path_factory):
+    path = tmp_path_factory.mktemp("areas") / "field.geojson"
+    path.write_text(json.dumps(collection(feature(polygon(FIELD, HOLE), name="field", animals=12))))
+    return path
+
+
+def over(area, terrain, **given):
+    return make_plan(Wanted(area, CAMERA, **given), terrain)
+
+
+def test_with_overlap_all_of_a_flat_field_is_seen_and_its_hole_is_not_asked(field):
+    made = plan(field, height_m=50.0)
+    (found,) = cover(made)
+    assert found.seen == 1.0
+    area = float(found.inside.sum()) * found.step**2
+    assert area == pytest.approx(160 * 200 - 40 * 40, rel=0.02)
+    rows, columns = np.indices(found.inside.shape)
+    north, east = found.north + found.step * rows, found.east + found.step * columns
+    in_hole = (abs(north - (70 - 100)) < 19) & (abs(east - (70 - 80)) < 19)
+    assert in_hole.any() and not found.inside[in_hole].any()
+
+
+def test_photos_that_are_far_apart_leave_ground_out(field):
+    """Straight down from 50 m an image is 25.6 m long, less its edges: 23 m of each 100 m are seen."""
+    made = plan(field, height_m=50.0, photo_m=100.0)
+    found = cover(made)
+    length = made.view.length * made.height
+    assert 0.1 < found[0].seen < 1.6 * length / 100.0
+    near = plan(field, height_m=50.0, photo_m=5.0)
+    assert cover(near)[0].seen > 0.9
+
+
+def test_the_edge_of_an_image_is_left_out_and_nothing_else_changes(field):
+    made = plan(field, height_m=50.0)
+    inner = images_of(made, made.sorties[0]).poses.camera
+    assert (inner.width, inner.height) == (640 - 50, 512 - 50)
+    corners = np.array([[0.0, 0.0], [590.0, 462.0]])
+    assert np.allclose(normalise(inner, corners), normalise(CAMERA, corners + 25.0))
+
+
+def test_a_tilted_camera_flies_its_rows_so_that_their_ends_are_seen(field):
+    for direction in (0.0, 90.0, 215.0):
+        made = plan(field, height_m=50.0, tilt_deg=50.0, direction_deg=direction)
+        assert cover(made)[0].seen > 0.998
+
+
+def test_without_overlap_what_lies_at_the_edges_of_images_is_missed(field):
+    # Rows to the north; of 640 columns, 25 on either side do not count.
+    made = plan(field, height_m=50.2, overlap=0.0, direction_deg=0.0)
+    (found,) = cover(made)
+    distance = float(made.pattern.distance[0])
+    width = made.strip * (640 - 50) / 639
+    assert width < distance
+    assert found.seen == pytest.approx(width / distance, abs=0.02)
+    assert found.share(found.hidden) == 0 and found.share(found.blurred) == 0
+
+
+@pytest.mark.parametrize("tilt", [90.0, 30.0])
+def test_what_is_hidden_is_hidden_by_brute_force(field, tilt):
+    terrain = hills(step=8.0)
+    steep = replace(terrain, height=5.0 * terrain.height)
+    made = over(field, steep, height_m=40.0, tilt_deg=tilt)
+    (found,) = cover(made)
+    images = images_of(made, made.sorties[0])
+    p, R = images.poses.p_nc, images.poses.R_nc
+    rng = np.random.default_rng(1)
+    rows, columns = np.nonzero(found.inside)
+    some = rng.choice(len(rows), 60, replace=False)
+    t = np.linspace(0.0, 1.0, 2001)[1:-1, None]
+    agreed = 0
+    for i, j in zip(rows[some], columns[some], strict=True):
+        ne = np.array([found.north + found.step * i, found.east + found.step * j])
+        point = np.array([*ne, -steep.heights_at(ne[None])[0] - 0.1])
+        camera = images.poses.camera
+        offset = np.einsum("nij,ni->nj", R, point - p)
+        u, v = project(camera, offset).T
+        with np.errstate(invalid="ignore"):
+            inside = (u >= 0) & (v >= 0) & (u <= camera.width) & (v <= camera.height)
+        inside &= np.linalg.norm(point - p, axis=1) <= FURTHEST * 40.0
+        shown = False
+        for k in np.flatnonzero(inside):
+            line = p[k] + t * (point - p[k])
+            if images.sharp[k] and (-line[:, 2] > steep.heights_at(line[:, :2])).all():
+                shown = True
+                break
+        agreed += shown == (found.looks[i, j] > 0)
+    assert agreed >= 59  # a line that grazes the ground may fall either way between its steps
+    assert found.seen < 1.0 or tilt == 90.0
+
+
+def test_images_are_near_enough_that_none_is_needed_between(field):
+    made = plan(field, height_m=50.0, tilt_deg=60.0)
+    images = images_of(made, made.sorties[0])
+    steps = np.linalg.norm(np.diff(images.poses.p_nc, axis=0), axis=1)
+    assert np.median(steps) <= 0.26 * made.view.length * made.height
+    # They reach both ends of every row, and turns blur none of them.
+    assert images.sharp.all()
+    for end in made.pattern.rows.reshape(-1, 2):
+        assert np.linalg.norm(images.poses.p_nc[:, :2] - end, axis=1).min() < 0.1
+    # The camera looks 60 degrees below the horizon, along the row.
+    lens = images.poses.R_nc[:, :, 2]
+    assert np.allclose(lens[:, 2], math.sin(math.radians(60)), atol=1e-9)
+    row = made.pattern.rows[made.sorties[0].rows[0]]
+    ahead = (row[1] - row[0]) / np.linalg.norm(row[1] - row[0])
+    assert np.allclose(lens[0, :2], ahead * math.cos(math.radians(60)), atol=1e-6)
+
+
+@pytest.mark.parametrize(("direction", "wind_from"), [(0.0, 270.0), (35.0, 300.0), (250.0, 20.0)])
+def test_a_fixed_wing_points_its_camera_where_its_nose_is(field, direction, wind_from):
+    """Through the air along the nose, and with the wind: that is the way over the ground."""
+    wind = {"wind_m_s": 6.0, "wind_from_deg": wind_from}
+    made = plan(field, height_m=60.0, turn_radius_m=30.0, direction_deg=direction, **wind)
+    nose = -images_of(made, made.sorties[0]).poses.R_nc[:, :2, 1]  # up in the image
+    over_ground = made.wanted.speed_m_s * nose + made.wanted.wind
+    along = np.radians(direction)
+    ahead, aside = over_ground @ [np.cos(along), np.sin(along)], over_ground @ [-np.sin(along), np.cos(along)]
+    assert np.abs(aside).max() < 1e-6 and np.abs(ahead).min() > 1.0
+    assert (ahead > 0).any() and (ahead < 0).any()
+
+
+@pytest.mark.parametrize("gimbal", ["yaw", "roll", "adaptive"])
+def test_a_camera_that_swings_sees_a_wider_strip(field, gimbal):
+    given = dict(height_m=50.0, tilt_deg=60.0, gimbal=gimbal, swing_deg=30.0, exposure_s=0.001, speed_m_s=5.0)
+    made, still = plan(field, **given), plan(field, height_m=50.0, tilt_deg=60.0)
+    assert made.strip > 1.3 * still.strip and len(made.pattern.rows) < len(still.pattern.rows)
+    assert gimbal_rate(still) == 0 < gimbal_rate(made)
+    (found,) = cover(made)
+    assert found.seen > 0.9
+    (blurred,) = cover(plan(field, **{**given, "exposure_s": 0.5}))
+    assert blurred.seen < 0.1 and blurred.share(blurred.blurred) > 0.8 and not blurred.hidden.any()
+
+
+def covered(seen=0, hidden=0, blurred=0, missed=0):
+    """An area of a hundred nodes."""
+    kinds = np.repeat([0, 1, 2, 3], [seen, hidden, blurred, missed]).reshape(10, 10)
+    return Covered(0.0, 0.0, 1.0, np.ones((10, 10), bool), (kinds == 0).astype(int), kinds == 1, kinds == 2)
+
+
+def test_finds_are_animals_times_what_is_seen(field):
+    made = plan(field, height_m=50.0, detection=0.8, animals=99)
+    result = plan_result(made, [covered(seen=50, missed=50)])
+    # What the file says of an area goes before what is said of all.
+    assert result["animals"] == 12 and result["expected_finds"] == pytest.approx(12 * 0.5 * 0.8)
+    assert result["seen"] == 0.5 and result["areas"][0]["expected_finds"] == pytest.approx(4.8)
+
+
+def test_animals_may_be_said_for_each_area_or_by_density(tmp_path):
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps(collection(feature(polygon(FIELD)))))
+    for given, number in (({}, math.nan), ({"animals": 5}, 5), ({"density_km2": 250}, 8.0)):
+        made = plan(path, height_m=50.0, **given)
+        assert animals_in(made, made.areas.areas[0]) == pytest.approx(number, rel=1e-3, nan_ok=True)
+    result = plan_result(plan(path, height_m=50.0), [covered(seen=100)])
+    assert result["expected_finds"] is None
+
+
+# -- outlines
+
+
+def test_simpler_outlines_stay_within_the_tolerance():
+    angle = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
+    radius = 300 * (1 + 0.15 * np.sin(3 * angle))
+    ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    simple = simplified(ring, 1.5)
+    assert 10 < len(simple) < 100
+    a, b = simple, np.roll(simple, -1, axis=0)
+    for point in ring[::13]:
+        t = np.clip(((point - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum(axis=1), 0, 1)
+        assert np.linalg.norm(a + t[:, None] * (b - a) - point, axis=1).min() <= 1.5 + 1e-9
+    square = np.array([[0.0, 0], [0, 9], [9, 9], [9, 0]])
+    assert simplified(square, 5.0) is square
+
+
+def test_a_swing_that_blurs_everything_names_a_speed_that_does_not(field):
+    """Checked by flying that speed, and one step faster."""
+    given = {"height_m": 100.0, "gimbal": "roll", "swing_deg": 30.0}
+    made = plan(field, **given)
+    found = cover(made)
+    result = plan_result(made, found)
+    speed = float(re.search(r"--speed ([\d.]+)\)", " ".join(result["warnings"])).group(1))
+    assert 1.0 < speed < 10.0
+    slow = plan(field, speed_m_s=speed, **given)
+    slower = plan_result(slow, cover(slow))
+    assert slower["seen"] > 0.9 and "--speed" not in " ".join(slower["warnings"])
+    faster = plan(field, speed_m_s=speed + 0.5, **given)
+    assert images_of(faster, faster.sorties[0]).sharp.mean() < 0.95

@@ -1,0 +1,403 @@
+"""What to add to the stamps of a flight's images: from points that were seen, or from their motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.analysis.diagnosis import nonzero
+from wildlab.analysis.evaluate import blocks_of
+from wildlab.analysis.flow import Reading, camera_poses_at
+from wildlab.analysis.georeference import georeference, observe, truth_of
+from wildlab.analysis.repeats import compare_sightings, judge_repeats
+from wildlab.detection.image_motion import as_grey, image_motion
+from wildlab.errors import WildlabError
+from wildlab.flight.clocks import frame_times
+from wildlab.flight.readers.frames import Frame
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.clock_by_motion import FEWEST, ClockByMotion, clock_by_motion
+from wildlab.geometry.clock_by_points import ClockByPoints, clock_by_points
+from wildlab.geometry.frames import matrix_to_rotation_vector
+
+Array = NDArray[np.float64]
+
+#: Images further apart in time (s) are not compared: between them the camera may have turned to and fro.
+LONGEST_PAIR_S = 1.0
+
+
+def refuse_without_clock(flight: Flight, source: str | None = None) -> None:
+    """Refuse a flight whose images have no clock of their own.
+
+    Raises
+    ------
+    WildlabError
+        Where its times merely number the images, or its poses belong to images by name.
+    """
+    if flight.manifest.time.kind == "sequence":
+        raise WildlabError(
+            "the images carry no time, so there is no clock to estimate",
+            "import with times if the images have any",
+            file=flight.folder,
+            field="time.kind",
+        )
+    name, nav = flight.pose_source(source)
+    if "frame_id" in nav:
+        raise WildlabError(
+            "these poses belong to images by name, whatever their clock says",
+            "choose other poses with --source, if there are any",
+            file=flight.folder,
+            field=f"nav/{name}",
+        )
+
+
+def sightings_of(flight: Flight) -> pd.DataFrame:
+    """Pixel detections that name a target whose position is known: the rows of ``detections``.
+
+    Parameters
+    ----------
+    flight
+        Any.
+
+    Returns
+    -------
+    DataFrame
+        Empty where there are none.
+    """
+    detections, truth = flight.detections, flight.truth
+    if detections is None or truth is None or "target_id" not in detections:
+        return pd.DataFrame()
+    known = detections["target_id"].isin(set(truth["target_id"]))
+    return detections[(detections["kind"] == "pixel") & known].reset_index(drop=True)
+
+
+def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockByPoints:
+    """What to add to the stamps of the images so that known points appear where they were seen.
+
+    Parameters
+    ----------
+    flight
+        With frames, poses, pixel detections that name targets, and truth of these.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+
+    Returns
+    -------
+    ClockByPoints
+        All its offsets are whole ones, as ``clocks.camera_offset_s`` has them: not on top of the manifest's.
+
+    Raises
+    ------
+    WildlabError
+        Where the images have no clock, or fewer than four sightings have a pose.
+    """
+    refuse_without_clock(flight, source)
+    pixels = sightings_of(flight)
+    frames = flight.table("frames")
+    if len(pixels):
+        pixels = pixels[pixels["frame_id"].isin(set(frames["frame_id"]))].reset_index(drop=True)
+    if len(pixels) < 4:
+        raise WildlabError(
+            f"{len(pixels)} detections are of a target whose position is known, at least 4 are needed",
+            "name the targets of detections and add their truth, or give the images with --images",
+            file=flight.folder,
+            field="detections",
+        )
+    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
+    stated = flight.manifest.clocks.camera_offset_s
+    times = frame_times(flight)[at]
+    table = pd.DataFrame({"target_id": pixels["target_id"].to_numpy(object), "frame_id": pixels["frame_id"]})
+
+    def seen_at(offset: float) -> tuple[CameraPoses, Array]:
+        poses = camera_poses_at(flight, times + offset, Reading(source=source))
+        if "pan_rad" in frames:
+            angles = {name: frames[f"{name}_rad"].to_numpy(float)[at] for name in ("pan", "tilt")}
+            poses = replace(poses, **angles)
+        return poses, truth_of(flight, table.assign(time_s=times + offset))
+
+    found = clock_by_points(
+        seen_at,
+        pixels[["u_px", "v_px"]].to_numpy(float),
+        pixels["frame_id"].to_numpy(object),
+        blocks_of(flight, table.assign(time_s=times)),
+    )
+    if found is None:
+        raise WildlabError(
+            "fewer than four sightings of known points have a pose, with any offset of the camera's clock",
+            "check that images and poses are of the same time: wildlab check says what overlaps",
+            file=flight.folder,
+            field="detections",
+        )
+    return found._replace(
+        offset_s=found.offset_s + stated, offsets=found.offsets + stated, rival_s=found.rival_s + stated
+    )
+
+
+def image_motions(
+    frames: Iterable[Frame], flight: Flight, camera: Camera, progress: Callable[[], None] | None = None
+) -> tuple[NDArray[np.intp], Array]:
+    """How the scene moved from each image of a flight to the next that follows it closely.
+
+    Parameters
+    ----------
+    frames
+        Images in any order of names that the flight's frames have: by file name, with or without its ending.
+    flight
+        With frames.
+    camera
+        Its lens.
+    progress
+        Called after each image.
+
+    Returns
+    -------
+    (pairs, motion)
+        (N, 2) rows of the table ``frames``, and (N, 3) as from `image_motion`.
+    """
+    names = flight.table("frames")["frame_id"].astype(str)
+    rows = {name: number for number, name in enumerate(names)}
+    for number, name in enumerate(names):
+        rows.setdefault(Path(name).stem, number)
+    stamps = flight.table("frames")["time_s"].to_numpy(float)
+    pairs: list[tuple[int, int]] = []
+    motion: list[Array] = []
+    before: tuple[int, NDArray[np.uint8], NDArray[np.bool_]] | None = None
+    for frame in frames:
+        row = rows.get(frame.name, rows.get(Path(frame.name).stem))
+        if progress is not None:
+            progress()
+        if row is None or not frame.usable:
+            before = None
+            continue
+        grey = as_grey(frame.image, frame.valid)
+        if before is not None and before[1].shape == grey.shape:
+            apart = stamps[row] - stamps[before[0]]
+            if 0 < apart <= LONGEST_PAIR_S:
+                pairs.append((before[0], row))
+                motion.append(image_motion(before[1], grey, camera, before[2]))
+        before = row, grey, frame.valid
+    return np.array(pairs, np.intp).reshape(-1, 2), np.array(motion, float).reshape(-1, 3)
+
+
+def camera_clock_by_motion(
+    flight: Flight, pairs: NDArray[np.intp], motion: Array, source: str | None = None
+) -> ClockByMotion:
+    """What to add to the stamps of the images so that they moved as the log says that the camera turned.
+
+    Parameters
+    ----------
+    flight
+        With frames and poses; gyros are used where it has them and the camera is fixed to the airframe.
+    pairs, motion
+        From `image_motions`.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+
+    Returns
+    -------
+    ClockByMotion
+        All its offsets are whole ones, as ``clocks.camera_offset_s`` has them.
+
+    Raises
+    ------
+    WildlabError
+        Where the images have no clock, or too few of them could be followed within the log.
+    """
+    refuse_without_clock(flight, source)
+    times, turned, moved = _camera_motion(flight, source)
+    spans = frame_times(flight)[pairs].reshape(-1, 2)
+    found = clock_by_motion(spans, motion, times, turned, moved)
+    if found is None:
+        followed = int(np.isfinite(motion).all(axis=1).sum())
+        raise WildlabError(
+            f"{followed} of {len(pairs)} pairs of images that follow each other within {LONGEST_PAIR_S:g} s "
+            f"could be followed, and {FEWEST} within the log are needed",
+            "give more images of a stretch in which the camera turns, or state the offset",
+            file=flight.folder,
+            field="frames",
+        )
+    stated = flight.manifest.clocks.camera_offset_s
+    return found._replace(
+        offset_s=found.offset_s + stated, offsets=found.offsets + stated, rival_s=found.rival_s + stated
+    )
+
+
+def _camera_motion(flight: Flight, source: str | None) -> tuple[Array, Array, Array]:
+    """Times (T,), and integrals (T, 3) of the camera's angular velocity and velocity in c."""
+    _, nav = flight.pose_source(source)
+    t = nav["time_s"].to_numpy(float)
+    poses = camera_poses_at(flight, t, Reading(source=source))
+    good = np.isfinite(poses.p_nc).all(axis=1) & np.isfinite(poses.R_nc).all(axis=(1, 2))
+    t, p, R = t[good], poses.p_nc[good], poses.R_nc[good]
+    if len(t) < 2:
+        raise WildlabError(
+            "the poses are too few to tell how the camera turned", "import more of the log", field="nav"
+        )
+    steps = matrix_to_rotation_vector(np.einsum("nji,njk->nik", R[:-1], R[1:]))
+    turned = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    moved = np.vstack([np.zeros(3), np.cumsum(np.einsum("nji,nj->ni", R[:-1], np.diff(p, axis=0)), axis=0)])
+    if flight.imu is None or flight.gimbal is not None or "pan_rad" in flight.table("frames"):
+        return t, turned, moved
+    imu = flight.imu
+    rates = imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float)
+    at = imu["time_s"].to_numpy(float)
+    known = np.isfinite(rates).all(axis=1) & np.isfinite(at) & (at >= t[0]) & (at <= t[-1])
+    if known.sum() < len(t):
+        return t, turned, moved
+    at, rates = at[known], rates[known] @ camera_rotation(flight)
+    between = (rates[1:] + rates[:-1]) / 2 * np.diff(at)[:, None]
+    by_gyro = np.vstack([np.zeros(3), np.cumsum(between, axis=0)])
+    return at, by_gyro, np.stack([np.interp(at, t, one) for one in moved.T], axis=1)
+
+
+def camera_rotation(flight: Flight) -> Array:
+    """(3, 3) `R_bc` of a camera that is fixed to the airframe."""
+    still = CameraPoses(
+        flight.manifest.geometry_camera(), flight.manifest.geometry_mount(), np.zeros((1, 3)), np.eye(3)
+    )
+    return np.asarray(np.asarray(still.R_bc).reshape(-1, 3, 3)[0])
+
+
+class CameraClock(NamedTuple):
+    """An estimate in numbers and in words.
+
+    Attributes
+    ----------
+    numbers
+        ``offset_s`` (for ``clocks.camera_offset_s``), ``sd_s``, ``certain``, ``method``, the next best offset
+        ``rival_s`` and what the estimate rests on.
+    curve
+        ``offset_s``, and ``cost`` or ``correlation``.
+    sentence
+        The same in words.
+    """
+
+    numbers: dict[str, object]
+    curve: pd.DataFrame
+    sentence: str
+
+
+def by_points_in_words(flight: Flight, source: str | None = None) -> CameraClock:
+    """`camera_clock_by_points` with its words; without truth, from things that several images show.
+
+    Raises
+    ------
+    WildlabError
+        As that, or where neither truth nor names of things are there.
+    """
+    refuse_without_clock(flight, source)
+    if flight.truth is None and flight.detections is not None:
+        return _by_sightings(flight, source)
+    found = camera_clock_by_points(flight, source)
+    rests = {"points": found.points, "images": found.images, "blocks": found.draws}
+    numbers = {**_numbers(found, "known points"), **rests}
+    by = f"{found.points} sightings of known points in {found.images} images"
+    curve = pd.DataFrame({"offset_s": found.offsets, "cost": found.cost})
+    return CameraClock(numbers, curve, _sentence(found, by))
+
+
+def _by_sightings(flight: Flight, source: str | None) -> CameraClock:
+    """The clock under which sightings of the same things from different images lie closest together.
+
+    It is certain where the search for a constant error finds it so: see `wildlab.analysis.diagnose`.
+    """
+    observations, rng = observe(flight, source), np.random.default_rng(0)
+    diagnosis = judge_repeats(flight, observations, rng, source).diagnosis
+    if diagnosis is None:
+        raise WildlabError(
+            "fewer than six images show a thing that another image shows too",
+            "name the targets of more detections, or give the images with --images",
+            file=flight.folder,
+            field="detections",
+        )
+    alone = next((one for one in diagnosis.models if one.causes == ("clock",)), None)
+    best = diagnosis.winner if "clock" in diagnosis.winner.fit.names else alone
+    if best is None:
+        raise WildlabError(
+            "an offset of the camera's clock would not show in these sightings",
+            "give the images with --images, or state the offset",
+            file=flight.folder,
+            field="detections",
+        )
+    place, stated = best.fit.names.index("clock"), flight.manifest.clocks.camera_offset_s
+    offset = float(best.fit.values[place])
+    certain = diagnosis.counts and best is diagnosis.winner and "clock" in nonzero(diagnosis.calibration)
+    numbers: dict[str, object] = {
+        "offset_s": offset + stated,
+        "sd_s": float(np.sqrt(best.covariance[place, place])),
+        "certain": certain,
+        "method": "repeated sightings",
+        "inseparable": list(diagnosis.inseparable),
+        "points": diagnosis.calibration.n_points,
+        "images": diagnosis.calibration.n_images,
+        "apart_without_m": best.gain.without,
+        "apart_m": best.gain.with_,
+    }
+    tried = offset + np.arange(-1.0, 1.01, 0.1)
+    apart = [
+        compare_sightings(georeference(flight, observe(flight, source, clock_shift=float(one)), rng))[
+            "error_m"
+        ]
+        for one in tried
+    ]
+    curve = pd.DataFrame({"offset_s": tried + stated, "cost": [one.mean() for one in apart]})
+    by = f"{len(diagnosis.scored)} sightings of things whose places are not known"
+    if certain:
+        sentence = (
+            f"The stamps of the images get {offset + stated:+.3f} s (SD {numbers['sd_s']:.3f} s), by {by}."
+        )
+    else:
+        sentence = (
+            f"The offset of the camera's clock cannot be told by {by}: {offset + stated:+.3f} s fits best."
+        )
+    return CameraClock(numbers, curve, sentence)
+
+
+def by_motion_in_words(
+    flight: Flight,
+    frames: Iterable[Frame],
+    source: str | None = None,
+    progress: Callable[[], None] | None = None,
+) -> CameraClock:
+    """`camera_clock_by_motion` of images, with its words.
+
+    Raises
+    ------
+    WildlabError
+        As that.
+    """
+    refuse_without_clock(flight, source)
+    pairs, motion = image_motions(frames, flight, flight.manifest.geometry_camera(), progress)
+    found = camera_clock_by_motion(flight, pairs, motion, source)
+    rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
+    numbers = {**_numbers(found, "image motion"), **rests, "gain": found.gain}
+    by = f"the motion between {found.pairs} pairs of images (correlation {found.peak:.2f}"
+    by += f", next best {found.rival_correlation:.2f}, gain {found.gain:.2f})"
+    curve = pd.DataFrame({"offset_s": found.offsets, "correlation": found.correlation})
+    return CameraClock(numbers, curve, _sentence(found, by))
+
+
+def _numbers(found: ClockByPoints | ClockByMotion, method: str) -> dict[str, object]:
+    return {
+        "offset_s": found.offset_s,
+        "sd_s": found.sd_s,
+        "certain": found.certain,
+        "method": method,
+        "rival_s": found.rival_s,
+    }
+
+
+def _sentence(found: ClockByPoints | ClockByMotion, by: str) -> str:
+    if found.certain:
+        return f"The stamps of the images get {found.offset_s:+.3f} s (SD {found.sd_s:.3f} s), by {by}."
+    return (
+        f"The offset of the camera's clock cannot be told by {by}: {found.offset_s:+.3f} s fits best, and "
+        f"does not stand out against others, as {found.rival_s:+.2f} s."
+    )

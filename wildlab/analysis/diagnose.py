@@ -1,0 +1,445 @@
+"""What is constantly wrong with a flight's georeferencing? Nested models against noise correlated in time.
+
+The models are constant errors of the position, the height, the boresight, the camera's clock and the lens,
+and their sums as far as the data tell these apart: see `wildlab.evaluation.causes` for how they are compared.
+What takes a correction beyond `wildlab.geometry.corrections.BOUNDS` is not offered. Places may be known
+(truth), or things seen from several images, whose places are then estimated along with everything else.
+
+What is far out is kept out of the search, or a few wrong clicks would look like a cause: it is looked for
+with all parameters that the data determine taken off, so that no constant error passes for outliers, and
+once more with what was found. Gains are of the points that are left; that of all points stands beside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.analysis.diagnosis import (
+    CAUSES,
+    FEWEST_IMAGES,
+    Diagnosis,
+    Model,
+    count_images,
+    find_implausible,
+    nonzero,
+    order_models,
+    score_model,
+    search_models,
+    sort_in,
+)
+from wildlab.analysis.evaluate import blocks_of, known_points
+from wildlab.analysis.georeference import (
+    Observations,
+    covariances_of,
+    pose_errors,
+    shifting_poses,
+    truth_of,
+)
+from wildlab.errors import WildlabError
+from wildlab.evaluation.causes import (
+    Linear,
+    chance_of,
+    gain_of,
+    held_out,
+    leave_out,
+)
+from wildlab.evaluation.correlated_errors import (
+    LASTS_IMAGES,
+    LASTS_S,
+    Covariance,
+    KnownPlaces,
+    LinearFit,
+    PosePoints,
+    degrees_of_freedom,
+    estimate_wander,
+    fit_generalised,
+)
+from wildlab.evaluation.outliers import Outlier, find_outliers
+from wildlab.evaluation.pose_noise import KINDS
+from wildlab.flight.store import Flight
+from wildlab.geometry.calibration import (
+    BOUNDS,
+    PARAMETERS,
+    Calibration,
+    Fit,
+    calibrated_poses,
+    differentiate,
+    fit_points,
+    georeference_calibrated,
+    undetermined_parameter,
+)
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.robust import student_scale, student_weights
+from wildlab.geometry.uncertainty import ground_jacobians
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+#: Over which a target's speed is measured, either way, s.
+STEP_S = 0.1
+
+#: Searches at most: another where, with the cause taken off, other points are far out than were kept out.
+SEARCHES = 3
+
+#: Images left out one by one where places are not known; of more, so many groups.
+MOST_FOLDS = 40
+#: Models of the least score that are tried once more with only what is told from zero.
+REDUCED = 3
+#: Poses at shifted stamps that are kept: the clocks that every fit with one is begun from, and their steps.
+_SHIFTS = 64
+#: Steps of an estimate, and how often one that makes it worse is halved.
+_STEPS, _HALVINGS = 8, 4
+#: A parameter is tried where the data determine it to so many usual sizes: it may explain what others do.
+BROAD = 3.0
+#: Deviance that is not worth another step.
+SETTLED = 0.02
+#: From a robust estimate that is further from zero than this (usual sizes) fits are begun too.
+FAR_START = 0.4
+#: Least standard deviations: two of positions (m), two of angles (rad), and of the pixel (px).
+LEAST = (0.01, 0.01, 1e-4, 1e-4, 0.05)
+
+
+def diagnose(
+    flight: Flight,
+    observations: Observations,
+    scored: pd.DataFrame,
+    source: str | None = None,
+    places_known: bool = True,
+) -> Diagnosis:
+    """Find what is constantly wrong with the poses, the camera or its clock.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+    observations
+        From `observe`, or with a calibration applied.
+    scored
+        From `score_points`, or `wildlab.analysis.repeats.compare_sightings`, of these observations.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+    places_known
+        Whether the places that the points are of are known (truth). Otherwise only their names are used.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    WildlabError
+        Where fewer than six images have a point with an error and an ellipse.
+    """
+    scored = scored[np.isfinite(scored["error_m"]) & np.isfinite(scored["cov_nn"])].reset_index(drop=True)
+    images = scored["frame_id"].nunique()
+    if images < FEWEST_IMAGES:
+        raise WildlabError(
+            f"the error of a point is known in {images} images, too few to find a cause",
+            f"mark known points in at least {FEWEST_IMAGES} images",
+            file=flight.folder,
+            field="detections",
+        )
+    if places_known:
+        chosen, known = known_points(flight, observations, scored)
+    else:
+        chosen = observations.take(observations.table["detection_id"].isin(scored["detection_id"]).to_numpy())
+        known = np.column_stack([np.zeros((len(chosen.uv), 2)), chosen.plane_down])
+    scored = scored.set_index("detection_id").loc[chosen.table["detection_id"]].reset_index()
+    search = _Search(flight, chosen, known, scored, source, places_known)
+    largest = search.fit_robustly(np.ones(len(scored), bool))
+    outliers, inliers = search.far_out(largest)
+    if count_images(scored, inliers) < FEWEST_IMAGES:
+        # Too few to search by without what is far out: that is said, and no cause is certain.
+        return replace(search.run(np.ones(len(scored), bool)), outliers=outliers, inliers=inliers)
+    for _ in range(SEARCHES):
+        found, said = search.run(inliers), outliers
+        outliers, rest = search.far_out(found.shown.fit)
+        if (rest == inliers).all():
+            return replace(found, outliers=outliers)
+        if count_images(scored, rest) < FEWEST_IMAGES:
+            break
+        inliers = rest
+    return replace(found, outliers=said)
+
+
+class _Search:
+    """What is shared by the searches of one flight: N points, their poses, and how they are placed."""
+
+    def __init__(
+        self,
+        flight: Flight,
+        chosen: Observations,
+        known: Array,
+        scored: pd.DataFrame,
+        source: str | None,
+        places_known: bool,
+    ) -> None:
+        self.scored, self.chosen, self.known, self.places_known = scored, chosen, known, places_known
+        self.names_of = scored["truth_id"].to_numpy(str)
+        self.things = None if places_known else self.names_of
+        sd = _survey_error(flight, self.names_of) if places_known else np.inf
+        self.places = KnownPlaces(self.names_of, sd) if sd > 0 else None
+        self.blocks, self.ellipses = blocks_of(flight, scored), covariances_of(scored)
+        self.poses_at = _poses(flight, source, chosen, self.names_of)
+        timed = flight.manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
+        self.causes = [cause for cause in CAUSES if timed or cause != "clock"]
+        if not places_known:
+            self.causes.remove("position")  # moves all sightings alike
+        seconds = flight.manifest.time.kind == "utc" and bool(np.isfinite(scored["time_s"]).all())
+        frames = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(scored["frame_id"]))
+        order = scored["time_s"].to_numpy(float) if seconds else frames.astype(float)
+        self.lasts = LASTS_S if seconds else LASTS_IMAGES
+        self.flight, self.order = flight, order
+        self.assumed = _pose_points(flight, chosen, order)[1]
+        self.logged = self.place((), np.zeros(0))
+        self._robust: tuple[Mask, Fit] | None = None
+        images = np.unique(order, return_inverse=True)[1]
+        self.groups = self.blocks
+        if not places_known:
+            self.groups = images * min(MOST_FOLDS, int(images.max()) + 1) // (int(images.max()) + 1)
+
+    def place(self, names: tuple[str, ...], scaled: Array) -> Array:
+        """Errors (N, 2) m with corrections in their usual sizes; positions where places are not known."""
+        values = scaled * np.array([PARAMETERS[name] for name in names])
+        trial = Calibration(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
+        ground = georeference_calibrated(trial, self.poses_at, self.chosen.uv, self.known[:, 2])
+        return np.asarray(ground[:, :2] - self.known[:, :2])
+
+    def fit_robustly(self, inliers: Mask) -> Fit:
+        """All parameters that the data determine, by their robust likelihood."""
+        if self._robust is not None and (self._robust[0] == inliers).all():
+            return self._robust[1]
+        largest = {name for cause in self.causes for name in CAUSES[cause]}
+        kept = np.where(inliers[:, None, None], self.ellipses, np.nan)
+        fit = fit_points(self.poses_at, self.chosen.uv, self.known, tuple(largest), kept, self.things)
+        self._robust = inliers, fit
+        return fit
+
+    def far_out(self, fit: Fit) -> tuple[tuple[Outlier, ...], Mask]:
+        """What is far out with a fit taken off, and which points (N,) are not."""
+        off, logged = (self._about_things(self.place(*_scaled(one))) for one in (fit, None))
+        # A ray that a correction tips over the horizon is out in any case.
+        off = np.where(np.isfinite(off), off, np.where(np.isfinite(logged), logged, 0.0))
+        whitened = np.einsum("nij,nj->ni", np.linalg.inv(np.linalg.cholesky(self.ellipses)), off)
+        # Nothing tells a wrong mark where places are not known.
+        marks = self.names_of if self.places_known else np.full(len(off), "")
+        return find_outliers(whitened, off, self.scored["frame_id"].to_numpy(str), marks)
+
+    def _about_things(self, positions: Array) -> Array:
+        if self.places_known:
+            return positions
+        middle = pd.DataFrame(positions).groupby(self.names_of).transform("median").to_numpy()
+        return np.asarray(positions - middle)
+
+    def run(self, inliers: Mask) -> Diagnosis:
+        """Search for the cause of the errors of the inliers (N,)."""
+        robust = self.fit_robustly(inliers)
+        used = inliers & robust.usable & np.isfinite(self.logged).all(axis=1)
+        if not self.places_known:
+            # A thing that is left with one sighting says nothing.
+            count = pd.Series(used).groupby(self.names_of).transform("sum").to_numpy()
+            used &= count > 1
+        squared = (robust.r**2).sum(axis=1)
+        weights = np.ones(len(used))
+        weights[robust.usable] = np.clip(student_weights(squared, student_scale(squared)), 0.05, 1.0)
+        names, start = _scaled(robust)
+        bounds = np.array([BOUNDS[name] / PARAMETERS[name] for name in names])
+        start = np.clip(start, -bounds, bounds)
+        # Derivatives with what is constant taken off: at logged poses a large error would look like another.
+        values = start * np.array([PARAMETERS[name] for name in names])
+        off = Calibration(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
+        corrected = replace(self.chosen, poses=calibrated_poses(off, self.poses_at))
+        points = _pose_points(self.flight, corrected, self.order)[0].take(used)
+        # A ray that this tips over the horizon has the derivatives that it was logged with.
+        over = ~np.isfinite(points.derivatives).all(axis=(1, 2))
+        if over.any():
+            logged = _pose_points(self.flight, self.chosen, self.order)[0].take(used)
+            points = PosePoints(
+                *(
+                    np.where(over.reshape(-1, *[1] * (a.ndim - 1)), b, a)
+                    for a, b in zip(points, logged, strict=True)
+                )
+            )
+        points = points._replace(
+            own=points.own / weights[used, None, None], pixel=points.pixel / weights[used, None, None]
+        )
+        places = None if self.places is None else self.places.take(used)
+
+        def residuals(of: tuple[str, ...], scaled: Array) -> Array:
+            # A trial that tips a ray over the horizon is far off; a large residual turns it back.
+            return np.asarray(np.nan_to_num(self.place(of, scaled)[used], nan=1e4))
+
+        def derivatives(of: tuple[str, ...], scaled: Array) -> Array:
+            J = differentiate(lambda x: self.place(of, x)[used], of, scaled)
+            return np.nan_to_num(J)
+
+        r, J = residuals(names, start), derivatives(names, start)
+        wander = estimate_wander(points, r, J * bounds, self.assumed, self.lasts, places)
+        noise = wander.noise
+        covariance = Covariance(points, noise, places)
+        folds = leave_out(self.groups, used, points, noise, places)
+        without = held_out(
+            Linear(J[..., :0], r, np.zeros(0), lambda x: self.place((), x)), folds, used, self.things
+        )
+
+        def descend(of: tuple[str, ...], scaled: Array) -> tuple[Linear, LinearFit]:
+            """Where the deviance is least, and the linear fit there."""
+            r, here = residuals(of, scaled), np.inf
+            for _ in range(_STEPS):
+                J = derivatives(of, scaled)
+                fit = fit_generalised(J, r, covariance)
+                now = _deviance(r, covariance)
+                gained, here = here - now, now
+                # Steps that the deviance does not show are not taken.
+                if gained < SETTLED or here - fit.deviance < SETTLED:
+                    break
+                for halved in range(_HALVINGS):
+                    trial = scaled + fit.x / 2**halved
+                    there = residuals(of, trial)
+                    if _deviance(there, covariance) <= here:
+                        scaled, r = trial, there
+                        break
+                else:
+                    break
+            return Linear(J, r, scaled, lambda x: self.place(of, x)), fit._replace(deviance=here)
+
+        def model(causes: tuple[str, ...], only: tuple[str, ...] = ()) -> Model:
+            wanted = only or {name for cause in causes for name in CAUSES[cause]}
+            of, lost = tuple(name for name in PARAMETERS if name in wanted), dict[str, tuple[str, ...]]()
+            while True:
+                begin = [np.zeros(len(of))]
+                robustly = np.array([start[names.index(n)] if n in names else 0.0 for n in of])
+                if (np.abs(robustly) > FAR_START).any():
+                    begin.append(robustly)
+                linear, fit = min((descend(of, x) for x in begin), key=lambda found: found[1].deviance)
+                blurred = undetermined_parameter(of, _root(fit.information), 1 / BROAD)
+                if blurred is None:
+                    break
+                lost[blurred[0]] = blurred[1]
+                of = tuple(name for name in of if name != blurred[0])
+            size = np.array([PARAMETERS[name] for name in of])
+            held = held_out(linear, folds, used, self.things)
+            return Model(
+                causes,
+                Fit(of, linear.values * size, lost, used, linear.J / size, linear.r),
+                np.asarray(np.linalg.inv(fit.information) * np.outer(size, size), float),
+                fit.deviance,
+                1.0,
+                held,
+                gain_of(without[inliers], held[inliers], self.blocks[inliers]),
+                gain_of(without, held, self.blocks),
+            )
+
+        images = count_images(self.scored, used)
+        models, wild, alike = search_models(model, self.causes, images)
+        for one in sorted(models, key=lambda one: score_model(one, images))[:REDUCED]:
+            told = nonzero(self._calibration(one, used))
+            if told and not any(set(other.fit.names) == set(told) for other in models):
+                sort_in(model(tuple(c for c in one.causes if set(CAUSES[c]) & set(told)), told), models, wild)
+        ranked = order_models(models, images)
+        winner = models[ranked.winner]
+        implausible = find_implausible(winner, models, wild, images)
+        calibration = self._calibration(winner, used)
+        if winner.causes:
+            freedom = degrees_of_freedom(winner.fit.J, winner.fit.values, points, wander, places)
+            wald = float(winner.fit.values @ np.linalg.solve(winner.covariance, winner.fit.values))
+            chance = chance_of(wald, len(winner.fit.names), freedom, len(models) + len(wild))
+            models[ranked.winner] = replace(winner, chance=chance)
+            calibration = replace(calibration, n_draws=max(2, round(freedom) + 1))
+        return Diagnosis(
+            self.scored, self.blocks, tuple(models), ranked, calibration, tuple(alike), (), inliers,
+            implausible, noise, self.places_known,
+        )  # fmt: skip
+
+    def _calibration(self, model: Model, used: Mask) -> Calibration:
+        return Calibration(
+            model.fit.names,
+            model.fit.values,
+            model.covariance,
+            model.fit.undetermined,
+            int(used.sum()),
+            count_images(self.scored, used),
+            len(np.unique(self.blocks[used])),
+        )
+
+
+def _pose_points(flight: Flight, chosen: Observations, order: Array) -> tuple[PosePoints, dict[str, float]]:
+    """Points as their covariance depends on them, and the standard deviations that log or manifest state."""
+    J, stated = ground_jacobians(chosen.poses, chosen.uv, chosen.plane_down), pose_errors(flight, chosen)
+    R = np.broadcast_to(chosen.poses.R_nb, (len(order), 3, 3))
+    in_n = J.pose.copy()
+    in_n[..., 3:] = J.pose[..., 3:] @ np.swapaxes(R, 1, 2)
+    pose = np.broadcast_to(stated.pose, (len(order), 6, 6))
+    turned = R @ pose[:, 3:, 3:] @ np.swapaxes(R, 1, 2)
+    place, turn = (np.nanmean(np.diagonal(of, axis1=1, axis2=2), axis=0) for of in (pose[:, :3, :3], turned))
+    pixel = np.trace(np.atleast_2d(stated.pixel)) / 2
+    variances = [place[:2].mean(), place[2], turn[:2].mean(), turn[2], pixel]
+    assumed = {
+        kind: max(float(np.sqrt(variance)), least)
+        for kind, variance, least in zip(KINDS, variances, LEAST, strict=True)
+    }
+    own = stated.plane * J.plane[:, :, None] * J.plane[:, None, :]
+    return PosePoints(in_n, J.pixel @ np.swapaxes(J.pixel, 1, 2), own, order), assumed
+
+
+def _survey_error(flight: Flight, names: NDArray[np.str_]) -> float:
+    """Standard deviation of the known places along either axis, m, as stated; zero where it is not."""
+    truth = flight.truth
+    if truth is None or "sd_horizontal_m" not in truth:
+        return 0.0
+    stated = truth.loc[truth["target_id"].isin(set(names)), "sd_horizontal_m"].to_numpy(float)
+    return float(np.nan_to_num(np.sqrt(np.nanmean(stated**2)))) if np.isfinite(stated).any() else 0.0
+
+
+def _scaled(fit: Fit | None) -> tuple[tuple[str, ...], Array]:
+    """Names and values in their usual sizes; nothing for the poses as logged."""
+    if fit is None:
+        return (), np.zeros(0)
+    return fit.names, fit.values / np.array([PARAMETERS[name] for name in fit.names])
+
+
+def _root(information: Array) -> Array:
+    """A matrix (P, P) whose square, transposed first, is the information."""
+    values, vectors = np.linalg.eigh(information)
+    return np.asarray(np.sqrt(np.clip(values, 0, None))[:, None] * vectors.T)
+
+
+def _deviance(r: Array, covariance: Covariance) -> float:
+    return float(covariance.weigh(r[..., None])[0][0, 0])
+
+
+def _poses(
+    flight: Flight, source: str | None, chosen: Observations, targets: NDArray[np.str_]
+) -> Callable[[float], CameraPoses]:
+    """Poses at shifted stamps, as seen from each point's target, which moves on at its speed at the time.
+
+    Those as they are, and the last few, are not interpolated again. What a calibration has added to the
+    position stays added.
+    """
+    named = chosen.table.assign(target_id=targets)
+    shifted = shifting_poses(flight, source, chosen)
+
+    @lru_cache(maxsize=_SHIFTS)
+    def at(shift: float) -> CameraPoses:
+        if shift == 0:
+            return chosen.poses
+        poses = shifted(shift)
+        place = poses.p_nb + added
+        return replace(poses, p_nb=place - shift * velocity)
+
+    added = chosen.poses.p_nb - shifted(0.0).p_nb
+    velocity = np.zeros_like(added)
+    if flight.truth is not None and flight.truth["time_s"].notna().any():
+        after, before = (
+            truth_of(flight, named.assign(time_s=named["time_s"] + s)) for s in (STEP_S, -STEP_S)
+        )
+        # At the end of a track its target is taken to stand still.
+        velocity[:, :2] = np.nan_to_num((after - before)[:, :2] / (2 * STEP_S))
+    return at

@@ -1,0 +1,256 @@
+"""How far to believe tracks: errors and NEES by the truth, NIS and whiteness, two sensors side by side."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.analysis.following.filters import SMOOTHED
+from wildlab.analysis.following.follow import TOGETHER, TrackingResult
+from wildlab.analysis.following.sensor_tracks import SensorTrack
+from wildlab.evaluation.consistency import (
+    Average,
+    average,
+    chi_square_interval,
+    nees,
+    share_inside,
+    whiten,
+)
+from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.track_errors import summarise_track, track_errors
+from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound
+from wildlab.geometry.frames import Array
+
+#: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
+FEW_INDEPENDENT = 30.0
+#: Of fewer values than this nothing is judged: nearly any filter would pass.
+FEWEST = 5
+#: The metric whose subject is the filter that a page speaks of.
+LEADING = "leading_filter"
+CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN = "consistent", "overconfident", "too cautious", "not judged"
+
+
+def verdict(mean: Average) -> str:
+    """Whether a filter is consistent, by the 95 % band of its mean NEES or NIS."""
+    if mean.n < FEWEST:
+        return UNKNOWN
+    return CONSISTENT if mean.inside else OVERCONFIDENT if mean.mean > mean.high else CAUTIOUS
+
+
+def worth(values: Array) -> float:
+    """How many independent values a series with NaN is worth."""
+    known = values[np.isfinite(values)]
+    return effective_sample_size(known, len(known) - 1) if len(known) > 3 else float(len(known))
+
+
+def mean_of(values: Array, dof: float) -> Average:
+    """The mean with the band for as many independent values as there are."""
+    return average(values, dof, worth(values))
+
+
+def worth_of_errors(errors: Array, covariances: Array) -> float:
+    """How many independent errors (N, 2) with their covariances there are.
+
+    Of errors in units of their own standard deviation, about zero and not about their mean: an error that is
+    the same throughout is one, however steady its square is.
+    """
+    white = np.asarray(whiten(errors, covariances))
+    white = white[np.isfinite(white).all(axis=1)]
+    n = len(white)
+    if n < 4:
+        return float(n)
+    padded = np.fft.rfft(white, 2 * n, axis=0)
+    products = np.fft.irfft(np.abs(padded) ** 2, axis=0)[:n].sum(axis=1)
+    r = products[1:] / products[0] * n / (n - np.arange(1, n))
+    stop = np.flatnonzero(r[: n // 2] <= 0)
+    r = r[: stop[0]] if len(stop) else r[: n // 2]
+    # Of squares, whose correlation is the square of that of the errors.
+    return float(max(1.0, n / (1 + 2 * float(np.sum(r**2)))))
+
+
+def judged(followed: TrackingResult) -> pd.DataFrame:
+    """One row for each track.
+
+    ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used after the start, and ``used`` with it;
+    ``wait``, s: the longest from one to the next; ``rmse``, ``mae`` and ``rmse_speed`` beside the truth, of
+    ``compared`` looks at which the target was seen, and ``rmse_without`` of the ``without`` others; of those
+    seen: ``nees`` with ``nees_low``, ``nees_high`` and ``nees_worth``
+    independent values, its ``verdict``; ``inside``, the share of looks in the band of single values, with
+    ``inside_low``, ``inside_high``; the same of ``nis``, its degrees of freedom ``dof`` and ``nis_verdict``;
+    ``lag1``: the largest autocorrelation of an element of the whitened innovations from one detection to the
+    next, with ``lag1_bound``, what white noise stays below; ``followed``: the share of looks with truth that
+    have a track; ``anew``: how often a track ended and another started, and ``gone``: looks
+    without a track, of ``spanned`` from the first start to the end of the last, ``gone_seen`` of them with
+    the target in sight.
+    """
+    return pd.DataFrame([_row(one, kind_of(followed, one.sensor)) for one in followed.tracks])
+
+
+def leading_filter(rows: pd.DataFrame) -> str:
+    """The filter that is spoken of: of those with most consistent tracks the one of least error.
+
+    Parameters
+    ----------
+    rows
+        From `judged`. Without truth NIS takes the place of errors and of
+        NEES; smoothed tracks, and those of all sensors together where there are others, do not count.
+
+    Returns
+    -------
+    str
+    """
+    alone = rows[~rows["filter"].str.endswith(SMOOTHED)]
+    alone = alone if (alone["kind"] == TOGETHER).all() else alone[alone["kind"] != TOGETHER]
+    truth = bool((alone["compared"] > 0).any())
+    ratio = (alone["nis"] / alone["dof"]).where(alone["nis"] > 0)
+    off = alone["rmse"] if truth else pd.Series(np.abs(np.log(ratio)), alone.index)
+    # Beside the best filter on the same target: filters need not have the same tracks.
+    least = off.groupby([alone["sensor"], alone["target"]]).transform("min")
+    of = alone["filter"]
+    consistent = (alone["verdict" if truth else "nis_verdict"] == CONSISTENT).groupby(of).sum()
+    worse = (off - least if not truth else off / least).groupby(of).median().fillna(np.inf)
+
+    def order(name: str) -> tuple[int, bool, float, bool]:
+        # Innovations do not show an error that lasts: without truth the white filter comes after its equals.
+        white = name == "ekf"
+        return -consistent[name], white and not truth and consistent[name] > 0, worse[name], white
+
+    return str(min(dict.fromkeys(of), key=order))
+
+
+def kind_of(followed: TrackingResult, sensor: str) -> str:
+    """What a sensor detects; several at once are ``together``."""
+    return followed.scans[sensor].kind if sensor in followed.scans else TOGETHER
+
+
+def _row(one: SensorTrack, kind: str) -> dict[str, object]:
+    looked, used = seen_of(one), used_of(one)
+    summary = summarise_track(track_errors((one.estimate + one.error)[looked], one.estimate[looked]))
+    away = np.hypot(*one.error[~looked, :2].T)
+    away = away[np.isfinite(away)]
+    m, squares = one.dof, one.nees[looked]
+    of_nees, of_nis = mean_of(squares, 2), mean_of(one.nis, m)
+    if of_nees.n:
+        independent = worth_of_errors(one.error[looked, :2], one.covariance[looked, :2, :2])
+        of_nees = average(squares, 2, min(of_nees.worth, independent))
+    inside = share_inside(squares, chi_square_interval(2))
+    band = (np.nan, np.nan)
+    if of_nees.n and of_nees.worth >= 1:
+        band = share_interval(inside * of_nees.worth, of_nees.worth)[1:]
+    white = whitened(one)
+    lags = [float(autocorrelation(column, 1)[1]) for column in white.T] if len(white) > 3 else []
+    return {
+        "sensor": one.sensor,
+        "kind": kind,
+        "target": one.target,
+        "filter": one.filter,
+        "detections": int(np.isfinite(one.nis).sum()),
+        "used": int(used.sum()),
+        "anew": max(len(one.starts) - 1, 0),
+        "gone": int(one.without.sum()),
+        "spanned": int(one.last - one.starts[0]) if len(one.starts) else 0,
+        "gone_seen": int((one.without & looked).sum()),
+        "wait": float(np.diff(one.times[used]).max()) if used.sum() > 1 else np.nan,
+        "compared": of_nees.n,
+        "rmse": summary.rmse,
+        "without": len(away),
+        "rmse_without": float(np.sqrt(np.mean(away**2))) if len(away) else np.nan,
+        "mae": summary.mae,
+        "rmse_speed": summary.rmse_speed,
+        "nees": of_nees.mean,
+        "nees_low": of_nees.low,
+        "nees_high": of_nees.high,
+        "nees_worth": of_nees.worth,
+        "verdict": verdict(of_nees) if used.sum() >= FEWEST else UNKNOWN,
+        "inside": inside,
+        "inside_low": band[0],
+        "inside_high": band[1],
+        "nis": of_nis.mean,
+        "nis_low": of_nis.low,
+        "nis_high": of_nis.high,
+        "nis_worth": of_nis.worth,
+        "nis_verdict": verdict(of_nis),
+        "dof": m,
+        "lag1": max(lags, key=abs, default=np.nan),
+        "lag1_bound": white_bound(len(white)) if len(white) else np.nan,
+        "followed": float(np.isfinite(one.error[:, 0]).sum() / one.known.sum())
+        if one.known.any()
+        else np.nan,
+    }
+
+
+def used_of(one: SensorTrack) -> NDArray[np.bool_]:
+    """(N,) looks whose detection a track took, that of its start among them."""
+    return np.isfinite(one.nis) | (one.detection != "" if len(one.detection) else False)
+
+
+def seen_of(one: SensorTrack) -> NDArray[np.bool_]:
+    """(N,) looks at which the target was seen, whether or not its track took the detection."""
+    return one.near | used_of(one)
+
+
+def whitened(one: SensorTrack) -> Array:
+    """(K, m) innovations of the detections used, each in units of its own standard deviation."""
+    used = np.isfinite(one.nis)
+    if len(one.sizes):
+        return np.empty((0, 0))  # looks of several sensors have no elements in common
+    return np.asarray(whiten(one.innovation[used], one.S[used])) if used.any() else one.innovation[used]
+
+
+class Apart(NamedTuple):
+    """Two sensors' tracks of one target by one filter: how far apart, and how far they say they may be.
+
+    ``rms`` m over ``n`` looks; ``squares``: the mean of the squared distance in units of both covariances,
+    two where both are right and their errors have nothing to do with each other.
+    """
+
+    target: str
+    filter: str
+    one: str
+    other: str
+    rms: float
+    n: int
+    squares: Average
+
+
+def apart(followed: TrackingResult) -> list[Apart]:
+    """Every two sensors that follow the same target by the same filter, at the looks of the first."""
+    found = []
+    groups: dict[tuple[str, str], list[SensorTrack]] = {}
+    for track in followed.tracks:
+        groups.setdefault((track.target, track.filter), []).append(track)
+    for (target, name), tracks in groups.items():
+        # Smoothed ones lean on the motion that both assume, twice: their distance proves little.
+        apart_from = [one for one in tracks if one.sensor in followed.scans and not name.endswith(SMOOTHED)]
+        for a, b in combinations(apart_from, 2):
+            x, P = _between(b, a.times, followed.targets.density)
+            gap = a.estimate[:, :2] - x
+            both = np.isfinite(gap).all(axis=1)
+            if not both.any():
+                continue
+            squares = np.full(len(gap), np.nan)
+            squares[both] = nees(gap[both], (a.covariance[:, :2, :2] + P)[both])
+            rms = float(np.sqrt(np.mean(np.sum(gap[both] ** 2, axis=1))))
+            found.append(Apart(target, name, a.sensor, b.sensor, rms, int(both.sum()), mean_of(squares, 2)))
+    return found
+
+
+def _between(one: SensorTrack, times: Array, density: float) -> tuple[Array, Array]:
+    """Position (N, 2) and its covariance at other times: carried on from the look before, and the
+    less certain the longer, as the filters believe."""
+    row = np.searchsorted(one.times, times, side="right") - 1
+    there = row >= 0
+    row = np.maximum(row, 0)
+    dt = (times - one.times[row])[:, None]
+    x = one.estimate[row, :2] + dt * one.estimate[row, 2:4]
+    F = np.tile(np.eye(2, 4), (len(times), 1, 1))
+    F[:, 0, 2] = F[:, 1, 3] = dt[:, 0]
+    P = F @ one.covariance[row] @ np.swapaxes(F, 1, 2)
+    P[:, :2, :2] += (density**2 * np.maximum(dt[:, 0], 0.0) ** 3 / 3)[:, None, None] * np.eye(2)
+    ended = ~there | (times > one.times[-1])
+    x[ended] = np.nan
+    return x, P

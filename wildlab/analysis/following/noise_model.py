@@ -1,0 +1,368 @@
+"""What a filter believes of a sensor and of targets: stated, tuned elsewhere, or assumed.
+
+Stated is what ``flight.toml`` or a settings file says. What nobody says is assumed: the noise of pixels and
+the errors of the platform from ``[uncertainty]``, other noise from how rough the detections are from one look
+to the next, targets from ``data/settings/usual.toml``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wildlab.analysis.following.expected import SLOTS
+from wildlab.analysis.following.roughness import roughness
+from wildlab.analysis.following.sensor_tuning import SensorTuning
+from wildlab.analysis.georeference import assumed_deviations
+from wildlab.analysis.scans import Scans
+from wildlab.errors import WildlabError
+from wildlab.flight.following import CONSIDERED, Settings, TargetsPart, read_settings, settings_over
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
+from wildlab.paths import DATA
+from wildlab.tracking.consider_parameters import TOGETHER
+
+#: Of which noise each element of a measurement has its standard deviation, and in what the file has it.
+NOISE_OF = {
+    "north": "position_m", "east": "position_m", "range": "range_m", "azimuth": "azimuth_deg",
+    "elevation": "elevation_deg", "u": "pixel_px", "v": "pixel_px", "v_north": "velocity_m_s",
+    "v_east": "velocity_m_s",
+}  # fmt: skip
+#: Parts of [uncertainty] that say how wrong a platform may be.
+_OF_PLATFORM = {
+    "platform_north": "position_horizontal_m",
+    "platform_east": "position_horizontal_m",
+    "platform_down": "position_vertical_m",
+    "tilt": "tilt_deg",
+    "heading": "heading_deg",
+}  # fmt: skip
+#: H 7.2.2: measurements further apart than this (s) are taken for independent; but the next look of a slow
+#: sensor is no gap, so it is one and a half looks at least.
+LONGEST_GAP_S, LONGEST_GAP_LOOKS = 1.0, 1.5
+
+_GATE, _PATIENCE = "probability that its own detection is let in", "a track ends without a detection for"
+_REACH, _REACH_OF_RAYS = "a detection of its own is within", "a ray to it is within"
+#: What is not asked of targets that detections name.
+OF_UNNAMED = (_GATE, _PATIENCE, _REACH, _REACH_OF_RAYS)
+STATED, ASSUMED = "stated", "assumed"
+#: Of a noise that nobody states: it is estimated where it is judged, and the page says so.
+ROUGH = "estimated here: how rough its detections are"
+
+
+class ConsideredError(NamedTuple):
+    """An error that lasts: its standard deviation (m, rad, s), for how long (s), whether sensors share it."""
+
+    name: str
+    sd: float
+    correlation_time_s: float
+    shared: bool
+
+
+class NoiseModel(NamedTuple):
+    """Of one sensor.
+
+    Attributes
+    ----------
+    white
+        (m,) standard deviations by which the filters without considered errors go.
+    noise
+        (m,) what is new at every look, beside errors that are considered.
+    considered
+        Errors of the platform, the clock and the range; empty where poses have their covariance.
+    lasting
+        Share of the variance of the errors that successive looks have in common; None: what the considered
+        errors make of it.
+    fading
+        What is left of the lasting part from one look to the next.
+    thinning_s
+        How far apart detections are whose errors are new; NaN where that is not known.
+    range_m, range_sd_m
+        How far away targets are when a bearing is all that is known; NaN where that is not known.
+    """
+
+    sensor: str
+    kind: str
+    offset_s: float
+    white: Array
+    noise: Array
+    considered: tuple[ConsideredError, ...]
+    lasting: float | None
+    fading: float
+    thinning_s: float
+    range_m: float
+    range_sd_m: float
+    interval_s: float
+
+    @property
+    def longest_gap_s(self) -> float:
+        """Of a filter on differences."""
+        return max(LONGEST_GAP_S, LONGEST_GAP_LOOKS * self.interval_s)
+
+
+class TargetModel(NamedTuple):
+    """Of the targets, see `wildlab.flight.following.TargetsPart`; ``reach_...`` and ``size_m`` may be NaN."""
+
+    density: float
+    start_speed_m_s: float
+    gate_probability: float
+    patience_s: float
+    reach_m: float
+    reach_rad: float
+    size_m: float
+    identified: str | None
+
+    def reach(self, kind: str) -> float:
+        """How near to the true place of a target its detection lies, in m, or in rad of a ray."""
+        return self.reach_rad if kind in ("bearing", "pixel") else self.reach_m
+
+
+class ToldValue(NamedTuple):
+    """A value that filters use, in words, and where it is from."""
+
+    subject: str
+    what: str
+    value: str
+    source: str
+
+
+def of_targets(stated: TargetsPart) -> tuple[TargetModel, list[ToldValue]]:
+    """What is stated of the targets, else the usual."""
+    usual = read_settings(DATA / "settings" / "usual.toml").targets
+    said = []
+
+    def one(name: str, words: str, unit: str) -> float:
+        own, other = getattr(stated, name), getattr(usual, name)
+        value = other if own is None else own
+        if value is None:
+            return float("nan")
+        said.append(ToldValue("targets", words, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
+        return float(value)
+
+    found = TargetModel(
+        one("acceleration_m_s_sqrt_s", "acceleration, SD of the velocity that grows in a second", " m/s"),
+        one("start_speed_m_s", "speed at the start, SD of each axis", " m/s"),
+        one("gate_probability", _GATE, ""),
+        one("patience_s", _PATIENCE, " s"),
+        one("reach_m", _REACH, " m"),
+        float(np.radians(one("reach_deg", _REACH_OF_RAYS, "°"))),
+        one("size_m", "a track is with it within", " m"),
+        stated.identified,
+    )
+    return found, said
+
+
+def of_flight(flight: Flight, stated: Settings | None = None) -> Settings:
+    """What a settings file states, and where it says nothing, ``flight.toml``."""
+    own = Settings(sensors=flight.manifest.sensors, targets=flight.manifest.targets)
+    return own if stated is None else settings_over(stated, own)
+
+
+def from_tuning(tuning: SensorTuning) -> NoiseModel:
+    """What a flight with truth says of a sensor."""
+    lasting = [
+        ConsideredError(name, sd, tuning.correlation_time_s, True)
+        for name, sd in tuning.considered.items()
+        if sd > 0
+    ]
+    return NoiseModel(
+        tuning.sensor,
+        tuning.kind,
+        tuning.offset_s,
+        tuning.sds,
+        tuning.sds * np.sqrt(1 - tuning.next_correlation),
+        tuple(lasting),
+        tuning.next_correlation,
+        tuning.fading,
+        tuning.thinning_s,
+        tuning.range_m,
+        tuning.range_sd_m,
+        tuning.interval_s,
+    )
+
+
+def of_sensor(
+    flight: Flight,
+    scans: Scans,
+    settings: Settings,
+    tuned: SensorTuning | None = None,
+    tuned_on: str = "",
+) -> tuple[NoiseModel, list[ToldValue]]:
+    """What filters believe of one sensor of a flight, and what to say of it.
+
+    Parameters
+    ----------
+    scans
+        Of the sensor, by its clock as it is.
+    settings
+        From `of_flight`; what it states goes before what was tuned.
+    tuned, tuned_on
+        What another flight says of the sensor, and that flight's name.
+
+    Raises
+    ------
+    WildlabError
+        Where the noise is not stated and cannot be found.
+    """
+    part = settings.sensors.get(scans.sensor)
+    said: list[ToldValue] = []
+
+    def tell(what: str, value: str, source: str) -> None:
+        said.append(ToldValue(scans.sensor, what, value, source))
+
+    found = None if tuned is None else from_tuning(tuned)
+    by_tuning = f"tuned on {tuned_on}"
+    noise, sources = _noise(flight, scans, settings, found, by_tuning)
+    told = dict.fromkeys(
+        (_noise_words(name), _amount(name, float(noise[i])), sources[i])
+        for i, name in enumerate(scans.elements)
+    )
+    for one in told:
+        tell(*one)
+    stated_noise = part is not None and any(source == STATED for source in sources)
+    considered, source = _considered(flight, scans, settings, found, by_tuning)
+    errors = {}
+    for error in considered:
+        name = "tilt" if error.name in TOGETHER["tilt"] else error.name.replace("_", " ")
+        lasts = "constant" if np.isinf(error.correlation_time_s) else f"for {error.correlation_time_s:.3g} s"
+        errors[name] = f"{_in_unit(error)}, {lasts}"
+    for name, value in errors.items():
+        tell(f"considered error: {name}", value, source)
+    offset = part.clock_offset_s if part is not None else 0.0
+    stated_clock = part is not None and "clock_offset_s" in part.model_fields_set
+    if tuned is not None and tuned.clock_tuned and not stated_clock:
+        offset = tuned.offset_s
+        tell("to be added to its stamps", f"{offset:.2f} s", by_tuning)
+    elif stated_clock:
+        tell("to be added to its stamps", f"{offset:.2f} s", STATED)
+    base = found or NoiseModel(
+        scans.sensor, scans.kind, 0.0, noise, noise, (), None, 1.0,
+        float("nan"), float("nan"), float("nan"), scans.interval_s,
+    )  # fmt: skip
+    interval = base.interval_s if part is None or part.rate_hz is None else 1 / part.rate_hz
+    fading, lasting, thinning = base.fading, base.lasting, base.thinning_s
+    times = [one.correlation_time_s for one in considered]
+    if found is None and times:
+        fading = float(np.exp(-interval / min(times)))
+        thinning = min(times) if np.isfinite(min(times)) else thinning
+    if part is not None:
+        if part.correlation_time_s is not None:
+            fading = float(np.exp(-interval / part.correlation_time_s))
+            thinning = part.correlation_time_s
+        lasting = lasting if part.correlation is None else part.correlation
+        thinning = thinning if part.thinning_s is None else part.thinning_s
+    return (
+        NoiseModel(
+            scans.sensor,
+            scans.kind,
+            offset,
+            noise if found is None or stated_noise else found.white,
+            noise,
+            considered,
+            lasting,
+            fading,
+            thinning,
+            base.range_m if part is None or part.range_m is None else part.range_m,
+            base.range_sd_m if part is None or part.range_sd_m is None else part.range_sd_m,
+            interval,
+        ),
+        said,
+    )
+
+
+def _noise(
+    flight: Flight, scans: Scans, settings: Settings, found: NoiseModel | None, by_tuning: str
+) -> tuple[Array, list[str]]:
+    """(m,) standard deviations of what is new at each look, and where each is from."""
+    part = settings.sensors.get(scans.sensor)
+    values, sources = np.full(len(scans.elements), np.nan), [""] * len(scans.elements)
+    rough: Array | None = None
+    for i, name in enumerate(scans.elements):
+        stated = None if part is None else getattr(part.noise, NOISE_OF[name])
+        if stated is not None:
+            values[i], sources[i] = np.radians(stated) if NOISE_OF[name].endswith("deg") else stated, STATED
+        elif found is not None:
+            values[i], sources[i] = found.noise[i], by_tuning
+        elif scans.kind == "pixel":
+            pixel = flight.manifest.uncertainty.pixel_px
+            values[i] = assumed_deviations(flight)["pixel_px"]
+            sources[i] = STATED if pixel is not None else ASSUMED
+        elif scans.R is not None and np.isfinite(scans.R).any():
+            values[i] = float(np.sqrt(np.nanmean(scans.R[..., i, i])))
+            sources[i] = "the detections' own"
+        else:
+            rough = roughness(scans) if rough is None else rough
+            values[i], sources[i] = rough[i], ROUGH
+    bad = ~(values > 0)
+    if bad.any():
+        name = scans.elements[int(np.flatnonzero(bad)[0])]
+        raise WildlabError(
+            f"how noisy {name!r} of the sensor {scans.sensor!r} is, is not stated, and its detections do not "
+            "tell",
+            f"state {NOISE_OF[name]} in [sensors.{scans.sensor}.noise] of flight.toml or of --settings",
+            file=flight.folder,
+            field=f"sensors.{scans.sensor}.noise",
+        )
+    return values, sources
+
+
+def _considered(
+    flight: Flight, scans: Scans, settings: Settings, found: NoiseModel | None, by_tuning: str
+) -> tuple[tuple[ConsideredError, ...], str]:
+    part = settings.sensors.get(scans.sensor)
+    if part is not None and part.considered:
+        stated = []
+        for name, one in part.considered.items():
+            if not _considers(scans, name):
+                known = ", ".join(slot for slot in CONSIDERED if _considers(scans, slot))
+                raise WildlabError(
+                    f"the error {name!r} cannot be considered for detections of kind {scans.kind!r}",
+                    f"use one of {known}",
+                    field=f"sensors.{scans.sensor}.considered",
+                )
+            sd = np.radians(one.sd) if CONSIDERED[name] == "deg" else one.sd
+            time = np.inf if one.correlation_time_s is None else one.correlation_time_s
+            stated += [
+                ConsideredError(each, float(sd), float(time), one.shared) for each in errors_named(name)
+            ]
+        return tuple(stated), STATED
+    if found is not None and found.considered:
+        return found.considered, by_tuning
+    if scans.poses is not None and scans.poses.covariance is not None:
+        return (), ""
+    errors = []
+    for name, key in _OF_PLATFORM.items():
+        if not _considers(scans, name):
+            continue
+        assumed = getattr(flight.manifest.uncertainty, key)
+        if assumed is not None:
+            sd = float(np.radians(assumed)) if key.endswith("deg") else float(assumed)
+            errors += [ConsideredError(each, sd, np.inf, True) for each in errors_named(name)]
+    return tuple(errors), "[uncertainty] of flight.toml"
+
+
+def errors_named(name: str) -> tuple[str, ...]:
+    """The errors of `SLOTS` that one of `CONSIDERED` stands for: a tilt is one about each level axis."""
+    return TOGETHER.get(name, (name,))
+
+
+def _considers(scans: Scans, name: str) -> bool:
+    return set(errors_named(name)) <= set(SLOTS[scans.kind])
+
+
+def _noise_words(element: str) -> str:
+    words = {"position_m": "position", "range_m": "range", "azimuth_deg": "bearing", "pixel_px": "pixel",
+             "elevation_deg": "elevation", "velocity_m_s": "velocity"}  # fmt: skip
+    return f"noise of its {words[NOISE_OF[element]]}, SD of each axis"
+
+
+def _amount(element: str, value: float) -> str:
+    unit = NOISE_OF[element].split("_", 1)[1]
+    if unit == "deg":
+        return f"{np.degrees(value):.2g}°"
+    return f"{value:.2g} {unit.replace('m_s', 'm/s')}"
+
+
+def _in_unit(error: ConsideredError) -> str:
+    unit = "deg" if error.name in TOGETHER["attitude"] else CONSIDERED[error.name]
+    return f"{np.degrees(error.sd):.2g}°" if unit == "deg" else f"{error.sd:.2g} {unit}"

@@ -1,0 +1,374 @@
+"""A flight's detections as points on the ground, each with its covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.clocks import frame_times, gimbal_angles, pose_finder, poses_at, truth_at
+from wildlab.flight.store import Flight
+from wildlab.geometry.attitude_uncertainty import pose_covariance
+from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.ray_ends import RAY_STATUS
+from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+from wildlab.geometry.terrain_uncertainty import terrain_covariance
+from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
+
+Array = NDArray[np.float64]
+
+#: Standard deviations assumed where neither the log nor the manifest states one; those of the attitude as in
+#: `wildlab.geometry.attitude_uncertainty`.
+USUAL = {
+    "pixel_px": 2.0,
+    "position_horizontal_m": 2.0,
+    "position_vertical_m": 3.0,
+    "tilt_deg": 1.0,
+    "heading_deg": 2.0,
+    "misalignment_deg": 0.0,
+    "plane_height_m": 1.0,
+}
+
+
+@dataclass(frozen=True)
+class Observations:
+    """The pixel detections of a flight with everything needed to put them on the ground. One row each.
+
+    Attributes
+    ----------
+    table
+        ``detection_id``, ``frame_id``, ``group``, ``target_id``, ``time_s`` (flight time).
+    uv
+        (N, 2) pixels.
+    poses
+        The camera's, one a detection; NaN where the log has none, a covariance where it states one. The mount
+        is calibrated or not.
+    plane_down
+        Down coordinate of the ground at each detection, (N,); NaN where it is not known. Over terrain, of the
+        point where the ray meets it.
+    terrain
+        The flight's, where it has one.
+    level
+        Over terrain, what `plane_down` would be without it, (N,).
+    """
+
+    table: pd.DataFrame
+    uv: Array
+    poses: CameraPoses
+    plane_down: Array
+    terrain: Terrain | None = None
+    level: Array | None = None
+
+    def take(self, rows: NDArray[np.bool_]) -> Observations:
+        """The observations of some rows."""
+        return Observations(
+            self.table[rows].reset_index(drop=True),
+            self.uv[rows],
+            self.poses.take(rows),
+            self.plane_down[rows],
+            self.terrain,
+            None if self.level is None else self.level[rows],
+        )
+
+
+def observe(
+    flight: Flight, source: str | None = None, stamps: str = "time_s", clock_shift: float = 0.0
+) -> Observations:
+    """Collect the pixel detections of a flight with the poses of one navigation source.
+
+    The ground of a detection is the flight's terrain; without one, the height of the target it names, else
+    the detection's own ``plane_down_m``.
+
+    Parameters
+    ----------
+    flight
+        With frames, pixel detections and poses.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+    stamps
+        Column of the frames that holds the camera's stamps.
+    clock_shift
+        Seconds added to the stamps on top of the manifest's offset.
+
+    Returns
+    -------
+    Observations
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no frames, detections or poses, no such column, or two sources to choose from.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> flight = simulate_twin("large-ship", 1)
+    >>> seen = observe(flight, "autopilot")
+    >>> seen.uv.shape == (len(flight.detections), 2)
+    True
+    """
+    detections = flight.table("detections")
+    frames = flight.table("frames")
+    if stamps not in frames:
+        known = ", ".join(name for name in map(str, frames) if name.startswith("time"))
+        raise WildlabError(
+            f"the frames have no stamps {stamps!r}",
+            f"use one of: {known}",
+            file=flight.folder,
+            field="frames",
+        )
+    pixels = detections[detections["kind"] == "pixel"].reset_index(drop=True)
+    if pixels.empty:
+        raise WildlabError(
+            "there is no detection of the kind 'pixel'",
+            "add detections with u_px and v_px",
+            file=flight.folder,
+            field="detections",
+        )
+    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
+    own_clock = frames[stamps].to_numpy(float) - frames["time_s"].to_numpy(float)
+    times = (frame_times(flight) + own_clock + clock_shift)[at]
+    p_nb, R_nb, covariance = poses_at(flight.pose_source(source)[1], times, pixels["frame_id"])
+    pan, tilt = (angle[at] for angle in gimbal_angles(flight))
+    lost = at < 0
+    p_nb[lost], R_nb[lost] = np.nan, np.nan
+    table = pd.DataFrame(
+        {
+            "detection_id": pixels["detection_id"],
+            "frame_id": pixels["frame_id"],
+            "group": frames["group"].to_numpy()[at] if "group" in frames else "",
+            "target_id": pixels["target_id"].fillna("") if "target_id" in pixels else "",
+            "time_s": np.where(lost, np.nan, times),
+        }
+    )
+    manifest = flight.manifest
+    mount = manifest.geometry_mount(flight.pose_source(source)[0])
+    level = _ground_heights(flight, table, pixels)
+    seen = Observations(
+        table,
+        pixels[["u_px", "v_px"]].to_numpy(float),
+        CameraPoses(manifest.geometry_camera(), mount, p_nb, R_nb, pan, tilt, covariance),
+        level,
+        flight.terrain,
+        None if flight.terrain is None else level,
+    )
+    return _grounded(seen)
+
+
+def _grounded(observations: Observations) -> Observations:
+    """Over terrain, the plane of each observation is level at the point where its ray meets the ground."""
+    o = observations
+    if o.terrain is None:
+        return o
+    return replace(o, plane_down=pixels_to_terrain(o.poses, o.uv, o.terrain).points[:, 2])
+
+
+def shifting_poses(flight: Flight, source: str | None, observations: Observations) -> PosesAt:
+    """From seconds to the poses of observations whose camera stamps are so much later; the last few are kept.
+
+    A moving gimbal keeps the angles it had at the unshifted stamps, and the poses their covariance.
+    """
+    times = observations.table["time_s"].to_numpy(float)
+    find = pose_finder(flight.pose_source(source)[1], observations.table["frame_id"])
+
+    @lru_cache(maxsize=4)
+    def at(shift: float) -> CameraPoses:
+        p_nb, R_nb = find(times + shift)
+        return replace(observations.poses, p_nb=p_nb, R_nb=R_nb)
+
+    return at
+
+
+def heights_left_in(flight: Flight, observations: Observations) -> Observations:
+    """The observations as they would be had the vertical correction not been taken off on import.
+
+    The ground of a labelled target comes from its survey and stays; any other came from the same source as
+    the heights of the aircraft, and rises with them. So does terrain whose heights count from what the
+    flight's do; any other stays.
+    """
+    raised = flight.manifest.vertical.correction_m
+    poses = observations.poses
+    poses = replace(poses, p_nb=poses.p_nb - np.array([0.0, 0.0, raised]))
+    terrain, record = observations.terrain, flight.manifest.terrain
+    if terrain is not None:
+        if record is not None and record.heights == "flight":
+            terrain = replace(terrain, height=terrain.height + np.float32(raised))
+        return _grounded(replace(observations, poses=poses, terrain=terrain))
+    surveyed = np.isfinite(truth_of(flight, observations.table)[:, 2])
+    return replace(
+        observations, poses=poses, plane_down=observations.plane_down - np.where(surveyed, 0.0, raised)
+    )
+
+
+def calibrated(
+    flight: Flight, source: str | None, observations: Observations, calibration: Calibration
+) -> Observations:
+    """The observations with an estimated calibration applied to mount, camera, pose and times."""
+    poses = calibrated_poses(calibration, shifting_poses(flight, source, observations))
+    times = observations.table["time_s"] + calibration.value("clock")
+    return _grounded(replace(observations, table=observations.table.assign(time_s=times), poses=poses))
+
+
+def pose_errors(
+    flight: Flight, observations: Observations, assumed: dict[str, float] | None = None
+) -> PoseErrors:
+    """Covariances of what the ground points are computed from.
+
+    The pose's covariance is the log's where it has one; all else comes from ``assumed``, then the manifest's
+    ``[uncertainty]``, then :data:`USUAL`, in that order. ``assumed`` overrides the log too. The height of
+    terrain is as good as its map is said to be.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+    observations
+        From `observe`.
+    assumed
+        Standard deviations by the names of :data:`USUAL`.
+
+    Returns
+    -------
+    PoseErrors
+        Of the N observations.
+    """
+    ground = observations.terrain
+    of_map = {} if ground is None or np.isnan(ground.sd) else {"plane_height_m": ground.sd}
+    sd = assumed_deviations(flight) | of_map | (assumed or {})
+    pose = observations.poses.covariance
+    if pose is None or assumed is not None:
+        pose = assumed_pose_covariance(observations.poses.R_nb, sd)
+    return PoseErrors(
+        pixel=np.eye(2) * sd["pixel_px"] ** 2,
+        pose=pose,
+        mount=np.eye(3) * np.radians(sd["misalignment_deg"]) ** 2,
+        plane=sd["plane_height_m"] ** 2,
+    )
+
+
+def assumed_pose_covariance(R_nb: Array, sd: dict[str, float]) -> Array:
+    """Covariance of poses whose log has none: (6, 6) or (N, 6, 6), see `pose_covariance`.
+
+    Parameters
+    ----------
+    R_nb
+        (3, 3) or (N, 3, 3): which way the body lies.
+    sd
+        By the names of :data:`USUAL`.
+    """
+    tilt, heading = np.radians([sd["tilt_deg"], sd["heading_deg"]])
+    return pose_covariance(sd["position_horizontal_m"], sd["position_vertical_m"], tilt, heading, R_nb)
+
+
+def assumed_deviations(flight: Flight) -> dict[str, float]:
+    """Standard deviations by the names of :data:`USUAL`: the manifest's, else the usual ones."""
+    stated = flight.manifest.uncertainty
+    return {
+        name: usual if getattr(stated, name) is None else float(getattr(stated, name))
+        for name, usual in USUAL.items()
+    }
+
+
+def georeference(
+    flight: Flight,
+    observations: Observations,
+    rng: np.random.Generator,
+    errors: PoseErrors | None = None,
+) -> pd.DataFrame:
+    """Ground points of a flight's pixel detections, one row each, NaN where the ray misses the ground.
+
+    Returns
+    -------
+    DataFrame
+        The table of the observations with ``north_m``, ``east_m``, ``down_m``, the covariance ``cov_nn``,
+        ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found). Over terrain also ``ray``:
+        what became of it, in the words of `wildlab.geometry.ray_ends.RAY_STATUS`.
+    """
+    o = observations
+    if errors is None:
+        errors = pose_errors(flight, o)
+    met = None
+    if o.terrain is not None:
+        met = pixels_to_terrain(o.poses, o.uv, o.terrain)
+        ground = met.points
+        covariance, method = terrain_covariance(o.poses, o.uv, o.terrain, errors, rng, met)
+    else:
+        ground = georeference_pixels(o.poses, o.uv, o.plane_down)
+        covariance, method = ground_covariance(o.poses, o.uv, o.plane_down, errors, rng)
+    more = {} if met is None else {"ray": [RAY_STATUS[int(one)] for one in met.became]}
+    return o.table.assign(
+        north_m=ground[:, 0],
+        east_m=ground[:, 1],
+        down_m=ground[:, 2],
+        cov_nn=covariance[:, 0, 0],
+        cov_ne=covariance[:, 0, 1],
+        cov_ee=covariance[:, 1, 1],
+        ellipse=method,
+        **more,
+    )
+
+
+def covariances_of(points: pd.DataFrame) -> Array:
+    """The covariances (N, 2, 2) of a table of ground points.
+
+    Parameters
+    ----------
+    points
+        From `georeference`.
+
+    Returns
+    -------
+    (N, 2, 2) m^2, north before east
+
+    Examples
+    --------
+    >>> points = pd.DataFrame({"cov_nn": [4.0], "cov_ne": [1.0], "cov_ee": [2.0]})
+    >>> covariances_of(points).tolist()
+    [[[4.0, 1.0], [1.0, 2.0]]]
+    """
+    c = points[["cov_nn", "cov_ne", "cov_ne", "cov_ee"]].to_numpy(float)
+    return c.reshape(-1, 2, 2)
+
+
+def truth_of(flight: Flight, table: pd.DataFrame) -> Array:
+    """True positions (N, 3) in n of the targets that detections name; NaN where none is named or known.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+    table
+        With ``target_id`` and ``time_s``, N rows.
+
+    Returns
+    -------
+    (N, 3) m
+    """
+    where = np.full((len(table), 3), np.nan)
+    if flight.truth is None:
+        return where
+    names = table["target_id"].to_numpy(object)
+    times = table["time_s"].to_numpy(float)
+    still = flight.truth[flight.truth["time_s"].isna()].drop_duplicates("target_id")
+    at = pd.Index(still["target_id"]).get_indexer(pd.Index(names))
+    where[at >= 0] = still[["north_m", "east_m", "down_m"]].to_numpy(float)[at[at >= 0]]
+    moving = flight.truth[flight.truth["time_s"].notna()]
+    tracks = dict(tuple(moving.groupby("target_id", sort=False)))
+    offset = flight.manifest.clocks.truth_offset_s
+    for target in set(names) & tracks.keys():
+        rows = names == target
+        where[rows] = truth_at(tracks[target], times[rows], offset_s=offset)[1][0]
+    return where
+
+
+def _ground_heights(flight: Flight, table: pd.DataFrame, pixels: pd.DataFrame) -> Array:
+    of_target = truth_of(flight, table)[:, 2]
+    if "plane_down_m" not in pixels:
+        return of_target
+    return np.asarray(np.where(np.isnan(of_target), pixels["plane_down_m"].to_numpy(float), of_target))

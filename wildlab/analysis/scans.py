@@ -1,0 +1,351 @@
+"""What one sensor of a moving or fixed platform saw, look by look, as arrays for filters; and the truth."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.position_noise import estimate_position_noise
+from wildlab.flight.checks.sensors import looks_of_others
+from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera_poses import CameraPoses
+
+Array = NDArray[np.float64]
+
+#: Elements of a measurement by kind of detection, and the columns that they are read from.
+KINDS: dict[str, dict[str, str]] = {
+    "position": {"north": "north_m", "east": "east_m"},
+    "range-bearing": {"range": "range_m", "azimuth": "azimuth_rad"},
+    "bearing": {"azimuth": "azimuth_rad"},
+    "pixel": {"u": "u_px", "v": "v_px"},
+    "velocity": {"v_north": "v_north_m_s", "v_east": "v_east_m_s"},
+}
+#: Elements whose differences are wrapped.
+ANGLES = ("azimuth", "elevation")
+_VELOCITY_COVARIANCE = ("v_cov_nn", "v_cov_ne", "v_cov_ee")
+#: Velocities of the truth and of the platform are taken over a second.
+OVER_S = 1.0
+
+
+class Scans(NamedTuple):
+    """N looks of a sensor with up to K detections each, in order of time.
+
+    Attributes
+    ----------
+    times
+        (N,) s.
+    detections
+        (N, K, m): north, east in n; range and bearing from north; bearing, with or without elevation; pixels;
+        velocities. NaN where there are fewer.
+    platform, platform_velocity
+        (N, 2), NaN outside of the log of the platform.
+    elements
+        What the m numbers are, see `KINDS`; ``elevation`` too.
+    labels, ids
+        (N, K) which target a detection names, "" none, and its own name.
+    R
+        (N, K, m, m) covariances that detections have of their own; None where none has.
+    drop
+        (N,) m, how far below the platform the target's plane is; NaN where that is not known.
+    plane_down
+        (N,) m, the plane itself.
+    poses
+        Of the camera that took the pixels, else None.
+    late, same_time
+        How many looks were logged after one with a later stamp, and how many have the stamp of the look
+        before.
+    """
+
+    sensor: str
+    kind: str
+    times: Array
+    detections: Array
+    platform: Array
+    platform_velocity: Array
+    elements: tuple[str, ...] = ()
+    labels: NDArray[np.object_] = np.empty((0, 0), object)
+    ids: NDArray[np.object_] = np.empty((0, 0), object)
+    R: Array | None = None
+    drop: Array = np.empty(0)
+    plane_down: Array = np.empty(0)
+    poses: CameraPoses | None = None
+    late: int = 0
+    same_time: int = 0
+
+    @property
+    def interval_s(self) -> float:
+        """The usual time between two looks."""
+        return float(np.median(np.diff(self.times))) if len(self.times) > 1 else 0.0
+
+    @property
+    def labelled(self) -> bool:
+        """Whether any detection names its target."""
+        return bool((self.labels != "").any())
+
+    @property
+    def angles(self) -> tuple[bool, ...]:
+        """(m,) whose differences are wrapped."""
+        return tuple(name in ANGLES for name in self.elements)
+
+
+class Truth(NamedTuple):
+    """Where one target was at N scans: ``position`` and ``velocity`` (N, 2), NaN where not known.
+
+    ``sd_m`` of each axis of the position; zero where the truth does not say.
+    """
+
+    target: str
+    position: Array
+    velocity: Array
+    sd_m: float
+
+    @property
+    def covariance(self) -> Array:
+        """(2, 2) of the position."""
+        return np.eye(2) * self.sd_m**2
+
+
+def sensors_of(flight: Flight) -> list[str]:
+    """The sensors that looked, in the order of their first look.
+
+    Where the frames name no sensor, each source of detections is one, and every frame is a look of it.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no frames, or nobody is named.
+    """
+    frames = flight.table("frames")
+    if "sensor" in frames:
+        found = [str(name) for name in frames["sensor"].drop_duplicates() if name]
+    else:
+        found = [str(name) for name in flight.table("detections")["source"].drop_duplicates()]
+    if not found:
+        raise WildlabError(
+            "there are no detections, and no frame says which sensor looked",
+            "name the sensor for every frame, also for those that saw nothing, or add detections",
+            file=flight.folder,
+            field="frames.sensor",
+        )
+    return found
+
+
+def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | None = None) -> Scans:
+    """The looks of a sensor, its detections those of the source of that name, in order of time.
+
+    Parameters
+    ----------
+    offset_s
+        What to add to the sensor's stamps. The platform's position goes with the stamp: what was seen stands
+        where the platform was then, so positions move with it.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's. One row is a
+        platform that stays where it is.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such sensor, it detects nothing or things of several kinds, its detections are in
+        looks of another one, or the flight has no poses.
+    """
+    known = sensors_of(flight)
+    if sensor not in known:
+        raise WildlabError(
+            f"there is no sensor {sensor!r}", f"use one of {', '.join(known)}", file=flight.folder
+        )
+    frames = flight.table("frames")
+    logged = frame_times(flight)
+    looked = np.isfinite(logged)
+    if "sensor" in frames:
+        looked &= (frames["sensor"] == sensor).to_numpy()
+    chosen = np.flatnonzero(looked)
+    late = int((logged[chosen] < np.maximum.accumulate(logged[chosen])).sum()) if len(chosen) else 0
+    chosen = chosen[np.argsort(logged[chosen], kind="stable")]
+    frame_ids, stamps = frames["frame_id"].iloc[chosen], logged[chosen]
+    seen = flight.table("detections")
+    others = looks_of_others(frames, seen)
+    stray = others[others["source"] == sensor]
+    if len(stray):
+        looked_by = " and ".join(repr(name) if name else "no sensor" for name in sorted(set(stray["sensor"])))
+        raise WildlabError(
+            f"{len(stray)} detections of the source {sensor!r} are in looks of {looked_by}",
+            "give the detections of each sensor a source of its name, or name in frames.sensor who looked",
+            file=flight.folder,
+            field="detections.source",
+        )
+    own_looks = seen["frame_id"].isin(frame_ids)
+    kinds = sorted(set(seen.loc[own_looks & (seen["source"] == sensor), "kind"]))
+    if not kinds and own_looks.any():
+        sources = " and ".join(repr(name) for name in sorted(set(seen.loc[own_looks, "source"])))
+        raise WildlabError(
+            f"no detection has the source {sensor!r}; those in its looks have the source {sources}",
+            f"give what {sensor!r} saw the source of its name, or name in frames.sensor who looked",
+            file=flight.folder,
+            field="detections.source",
+        )
+    seen = seen[own_looks & (seen["source"] == sensor)]
+    if len(kinds) != 1:
+        raise WildlabError(
+            f"the sensor {sensor!r} detects {' and '.join(kinds) or 'nothing'}",
+            f"a target can be followed by detections of one kind: {' or '.join(KINDS)}",
+            file=flight.folder,
+            field="detections.kind",
+        )
+    kind = kinds[0]
+    columns = dict(KINDS[kind])
+    if kind == "bearing" and "elevation_rad" in seen and np.isfinite(seen["elevation_rad"]).all():
+        columns["elevation"] = "elevation_rad"
+    row = pd.Index(frame_ids).get_indexer(pd.Index(seen["frame_id"]))
+    order = np.argsort(row, kind="stable")
+    row, seen = row[order], seen.iloc[order]
+    place = np.arange(len(row)) - np.searchsorted(row, row)
+    shape = len(stamps), int(place.max(initial=0)) + 1
+
+    def spread(values: NDArray[np.generic], empty: object) -> NDArray[np.generic]:
+        found = np.full((*shape, *values.shape[1:]), empty, dtype=object if empty == "" else float)
+        found[row, place] = values
+        return found
+
+    values = seen[list(columns.values())].to_numpy(float)
+    if kind == "range-bearing" and "elevation_rad" in seen:
+        # What is measured along the line of sight is shorter on the level.
+        values[:, 0] *= np.cos(np.nan_to_num(seen["elevation_rad"].to_numpy(float)))
+    detections = np.asarray(spread(values, np.nan), float)
+    names = seen["target_id"].fillna("") if "target_id" in seen else pd.Series("", index=seen.index)
+    labels, ids = (
+        np.asarray(spread(one.to_numpy(object), ""), object) for one in (names, seen["detection_id"])
+    )
+    own = None
+    if kind == "velocity" and set(_VELOCITY_COVARIANCE) <= set(seen):
+        a, b, c = (seen[name].to_numpy(float) for name in _VELOCITY_COVARIANCE)
+        own = np.asarray(spread(np.stack([a, b, b, c], axis=-1).reshape(-1, 2, 2), np.nan), float)
+    name, nav = flight.pose_source(source)
+    p, R_nb, covariance = platform_at(nav, stamps + offset_s, frame_ids)
+    platform = p[:, :2]
+    if kind == "position" and len(nav) > 1:
+        detections += (platform - platform_at(nav, stamps, frame_ids)[0][:, :2])[:, None]
+    ahead, behind = (
+        platform_at(nav, _inside(nav, stamps + offset_s + step))[0][:, :2]
+        for step in (OVER_S / 2, -OVER_S / 2)
+    )
+    plane = _plane_of(flight, seen, row, len(stamps))
+    poses = None
+    if kind == "pixel":
+        pan, tilt = (angle[chosen] for angle in gimbal_angles(flight))
+        manifest = flight.manifest
+        poses = CameraPoses(
+            manifest.geometry_camera(), manifest.geometry_mount(name), p, R_nb, pan, tilt, covariance
+        )
+        plane = _camera_plane(flight, name, seen, row, plane)
+    drop = plane - p[:, 2]
+    if kind == "range-bearing" and "elevation_rad" in seen and np.isfinite(seen["elevation_rad"]).any():
+        drop = np.zeros(len(stamps))
+    return Scans(
+        sensor,
+        kind,
+        stamps + offset_s,
+        detections,
+        platform,
+        (ahead - behind) / OVER_S,
+        tuple(columns),
+        labels,
+        ids,
+        own,
+        drop,
+        plane,
+        poses,
+        late,
+        int((np.diff(stamps) == 0).sum()),
+    )
+
+
+def platform_at(
+    nav: pd.DataFrame, times: ArrayLike, frame_ids: pd.Series | None = None
+) -> tuple[Array, Array, Array | None]:
+    """As `poses_at`; a log of one row is of a platform that never moves, and holds at all times."""
+    if len(nav) == 1 and "frame_id" not in nav:
+        n = len(np.atleast_1d(np.asarray(times, float)))
+        p, R, P = poses_at(nav, nav["time_s"].to_numpy(float))
+        return p.repeat(n, axis=0), R.repeat(n, axis=0), None if P is None else P.repeat(n, axis=0)
+    return poses_at(nav, times, frame_ids)
+
+
+def _plane_of(flight: Flight, seen: pd.DataFrame, row: NDArray[np.intp], n: int) -> Array:
+    """(N,) down coordinate of the plane that targets move on: stated, else the truth's; NaN if neither."""
+    stated = np.full(len(seen), np.nan)
+    if "plane_down_m" in seen:
+        stated = seen["plane_down_m"].to_numpy(float)
+    if not np.isfinite(stated).any() and flight.truth is not None and len(flight.truth):
+        truth = flight.truth.groupby("target_id")["down_m"].median()
+        named = seen["target_id"] if "target_id" in seen else pd.Series("", index=seen.index)
+        stated = named.map(truth).fillna(float(truth.median())).to_numpy(float)
+    return _filled(stated, row, n)
+
+
+def _camera_plane(
+    flight: Flight, source: str, seen: pd.DataFrame, row: NDArray[np.intp], plane: Array
+) -> Array:
+    """The same where pixels meet the ground: over terrain it is the terrain's."""
+    if flight.terrain is None:
+        return plane
+    from wildlab.analysis.georeference import observe
+
+    observed = observe(flight, source)
+    down = pd.Series(observed.plane_down, index=observed.table["detection_id"])
+    down = down[~down.index.duplicated()]
+    met = np.asarray(seen["detection_id"].map(down).to_numpy(float), np.float64)
+    return _filled(met, row, len(plane))
+
+
+def _filled(stated: Array, row: NDArray[np.intp], n: int) -> Array:
+    """(N,) the value of each look, between those that have one as time goes by; NaN where there is none."""
+    known = np.isfinite(stated)
+    if not known.any():
+        return np.full(n, np.nan)
+    first = np.unique(row[known], return_index=True)
+    return np.interp(np.arange(n), first[0], stated[known][first[1]])
+
+
+def truths_at(flight: Flight, times: ArrayLike) -> list[Truth]:
+    """Every target at given times (N,), interpolated only across gaps that the truth's own rate explains."""
+    at = np.asarray(times, float)
+    truth, offset = flight.table("truth"), flight.manifest.clocks.truth_offset_s
+    names, position = truth_at(truth, at, offset_s=offset)
+    _, ahead = truth_at(truth, at + OVER_S / 2, offset_s=offset)
+    _, behind = truth_at(truth, at - OVER_S / 2, offset_s=offset)
+    sd = {}
+    if "sd_horizontal_m" in truth:
+        sd = truth.groupby("target_id")["sd_horizontal_m"].median().to_dict()
+    return [
+        Truth(name, p[:, :2], (a - b)[:, :2] / OVER_S, float(np.nan_to_num(sd.get(name, 0.0))))
+        for name, p, a, b in zip(names, position, ahead, behind, strict=True)
+    ]
+
+
+def truth_deviations(flight: Flight) -> tuple[dict[str, float], list[str]]:
+    """Standard deviations of the true places by target, m, each axis: stated, else estimated, else zero; and
+    for which targets it is estimated."""
+    found: dict[str, float] = {}
+    estimated: list[str] = []
+    for name, own in flight.table("truth").groupby("target_id"):
+        named = own["sd_horizontal_m"] if "sd_horizontal_m" in own else pd.Series(dtype=float)
+        stated = named.dropna()
+        if len(stated):
+            sd = float(stated.median())
+        else:
+            times, places = own["time_s"].to_numpy(float), own[["north_m", "east_m"]].to_numpy(float)
+            sd = float(np.sqrt(np.mean(estimate_position_noise(times, places) ** 2)))
+            estimated += [str(name)] * bool(np.isfinite(sd))
+        found[str(name)] = sd if np.isfinite(sd) else 0.0
+    return found, estimated
+
+
+def _inside(nav: pd.DataFrame, times: Array) -> Array:
+    """Times brought into the log, for differences at its ends."""
+    stamps = nav["time_s"].to_numpy(float)
+    return np.clip(times, stamps[0], stamps[-1])

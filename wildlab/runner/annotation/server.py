@@ -1,0 +1,273 @@
+"""The server behind the page: on this machine alone, for whoever knows its address.
+
+It listens on 127.0.0.1 and answers only where the address holds the random token and the browser means this
+server by its Host; so neither another machine nor another page in the same browser gets anything. Images are
+asked for by number, never by name.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+import json
+import math
+import re
+import secrets
+import socket
+import sys
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from wildlab.errors import WildlabError
+from wildlab.runner.annotation.page import make_page
+from wildlab.runner.annotation.pictures import picture_of
+from wildlab.runner.annotation.session import Session, check_points
+
+#: Bytes that a page may send at once, and how long it may take for it, s.
+MOST_SENT, PATIENCE_S = 1_000_000, 60
+#: Connections at once, and how long one may take for its header, s.
+MOST_LINKS, HEADER_S = 16, 5.0
+#: Pictures that are decoded at once: each may be large.
+AT_ONCE = 2
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "X-Frame-Options": "DENY",
+}
+
+
+class ClickServer(ThreadingHTTPServer):
+    """Serves one session.
+
+    Parameters
+    ----------
+    session
+        What is marked.
+    port
+        On 127.0.0.1; 0 for any that is free.
+    """
+
+    daemon_threads = True
+    #: Of the system's: links that come all at once wait for their turn.
+    request_queue_size = 128
+
+    def __init__(self, session: Session, port: int = 0) -> None:
+        self.session = session
+        self.token = secrets.token_urlsafe(24)
+        self.decoding = threading.BoundedSemaphore(AT_ONCE)
+        self._links = threading.BoundedSemaphore(MOST_LINKS)
+        #: Links whose header has not come yet, the oldest first, and since when.
+        self._waiting: dict[Any, float] = {}
+        self._lock = threading.Lock()
+        super().__init__(("127.0.0.1", port), _Handler)
+        self.hosts = frozenset(f"{name}:{self.server_port}" for name in ("127.0.0.1", "localhost"))
+
+    @property
+    def address(self) -> str:
+        """What to open in a browser."""
+        return f"http://127.0.0.1:{self.server_port}/{self.token}/"
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Give a link a thread of `MOST_LINKS`; where all are taken, the one ends that has waited longest."""
+        if not self._links.acquire(blocking=False):
+            self._end_waiting(most=1)
+            if not self._links.acquire(timeout=HEADER_S):
+                self.shutdown_request(request)
+                return
+        self.await_header(request)
+        try:
+            super().process_request(request, client_address)
+        except BaseException:
+            self._links.release()
+            raise
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve a link, and give its place back."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self.got_header(request)
+            self._links.release()
+
+    def service_actions(self) -> None:
+        """End links whose header does not come."""
+        self._end_waiting(since=time.monotonic() - HEADER_S)
+
+    def await_header(self, request: Any) -> None:
+        """From now on a link's header is waited for."""
+        with self._lock:
+            self._waiting[request] = time.monotonic()
+
+    def got_header(self, request: Any) -> None:
+        """A link is being answered, or has ended."""
+        with self._lock:
+            self._waiting.pop(request, None)
+
+    def _end_waiting(self, most: int | None = None, since: float = math.inf) -> None:
+        with self._lock:
+            chosen = [one for one, began in self._waiting.items() if began < since][:most]
+            for one in chosen:
+                del self._waiting[one]
+                with contextlib.suppress(OSError):
+                    one.shutdown(socket.SHUT_RDWR)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Browsers break off as they like; whatever else happens is the terminal's."""
+        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
+            super().handle_error(request, client_address)
+
+
+def open_server(session: Session, port: int = 0) -> ClickServer:
+    """A server for a session.
+
+    Parameters
+    ----------
+    session
+        What is marked.
+    port
+        On 127.0.0.1; 0 for any that is free.
+
+    Returns
+    -------
+    ClickServer
+
+    Raises
+    ------
+    WildlabError
+        Where the port is taken.
+    """
+    try:
+        return ClickServer(session, port)
+    except OSError as error:
+        raise WildlabError(
+            f"the port {port} cannot be listened on ({error.strerror})", "choose another", field="--port"
+        ) from None
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: ClickServer
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "wildlab", ""
+    timeout = PATIENCE_S
+
+    def handle_one_request(self) -> None:
+        self.server.await_header(self.connection)
+        super().handle_one_request()
+
+    def parse_request(self) -> bool:
+        parsed = super().parse_request()
+        self.server.got_header(self.connection)
+        return parsed
+
+    def do_GET(self) -> None:
+        place = self._place()
+        if place is None:
+            return
+        number = re.fullmatch(r"image/(\d{1,9})", place)
+        if place == "":
+            nonce = secrets.token_urlsafe(18)
+            self._answer(200, "text/html; charset=utf-8", make_page(nonce).encode(), _policy(nonce))
+        elif place == "state":
+            self._json(200, self.server.session.state())
+        elif number and int(number[1]) < len(self.server.session.images):
+            with self.server.decoding:
+                found = picture_of(self.server.session.images[int(number[1])])
+            if isinstance(found, str):
+                self._text(422, found)
+            else:
+                self._answer(200, found.kind, found.data)
+        else:
+            self._text(404, "there is nothing here")
+
+    def do_POST(self) -> None:
+        place = self._place()
+        if place is None:
+            return
+        origin = self.headers.get("Origin")
+        if origin is not None and origin.removeprefix("http://") not in self.server.hosts:
+            self._text(403, "this page is not of this server")
+        elif self.headers.get_content_type() != "application/json":
+            self._text(415, "JSON is wanted")
+        elif place == "clicks":
+            self._mark(self._sent())
+        elif place == "finish":
+            self._json(200, {})
+            threading.Thread(target=self.server.shutdown, daemon=True).start()
+        else:
+            self._text(404, "there is nothing here")
+
+    def _mark(self, sent: Any) -> None:
+        if not isinstance(sent, dict):
+            self._text(400, "no object of JSON, or too much of it")
+            return
+        session = self.server.session
+        image, revision = sent.get("image"), sent.get("revision")
+        if type(image) is not int or type(revision) is not int or not 0 <= image < len(session.images):
+            self._text(400, "there is no such image")
+            return
+        points = check_points(sent.get("points"))
+        if isinstance(points, str):
+            self._text(400, points)
+            return
+        try:
+            now = session.mark(image, points, revision)
+        except WildlabError as error:
+            self._text(500, error.problem)
+            return
+        if now is None:
+            self._text(409, "another window marked this image meanwhile: load the page again")
+        else:
+            self._json(200, {"revision": now})
+
+    def _place(self) -> str | None:
+        """What is asked for below the token; None where it is refused, and that was said."""
+        host = self.headers.get("Host", "")
+        _, token, place = [*self.path.split("?", 1)[0].split("/", 2), "", ""][:3]
+        known = hmac.compare_digest(token.encode("utf-8", "replace"), self.server.token.encode())
+        if host not in self.server.hosts or not known:
+            self._text(403, "refused: open the address that the terminal shows")
+            return None
+        return place
+
+    def _sent(self) -> Any:
+        length = self.headers.get("Content-Length", "")
+        if not length.isascii() or not length.isdecimal() or int(length) > MOST_SENT:
+            self.close_connection = True
+            return None
+        try:
+            return json.loads(self.rfile.read(int(length)))
+        except (ValueError, RecursionError):
+            return None
+
+    def _json(self, status: int, content: Any) -> None:
+        self._answer(status, "application/json", json.dumps(content).encode())
+
+    def _text(self, status: int, said: str) -> None:
+        # Whatever was sent and not read would be taken for the next request.
+        self.close_connection = True
+        self._answer(status, "text/plain; charset=utf-8", said.encode("utf-8", "replace"))
+
+    def _answer(self, status: int, kind: str, body: bytes, policy: str = "default-src 'none'") -> None:
+        self.send_response(status)
+        headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Content-Security-Policy": policy}
+        for name, value in {**headers, **_HEADERS}.items():
+            self.send_header(name, value)
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: the terminal shows the address and the next command."""
+
+
+def _policy(nonce: str) -> str:
+    return (
+        f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src 'self' data:; "
+        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
