@@ -49,7 +49,7 @@ FENCE = {
 #: Files of a run that are no result: times, digests, versions.
 NO_RESULT = ("status.json", "provenance.json", "checksums.json", "digests.json")
 _CELL = re.compile(r"<t[dh][^>]*>(.*?)</t[dh]>", re.DOTALL)
-_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\d.])")
 
 
 class Step(NamedTuple):
@@ -80,7 +80,9 @@ def steps() -> Iterator[Step]:
         )
         many = ["track", "--many", _flight(name), "--into", _out("many", name) + "/report", *more]
         yield Step(f"many-{name}", many)
-        yield Step(f"shared-{name}", ["share", _flight(name), "--out", _out("shared", name) + "/copy.html"])
+        report = _out("evaluated", name) + f"/{name}"
+        copy = ["share", report, "--flight", _flight(name), "--out", _out("shared", name) + "/copy.html"]
+        yield Step(f"shared-{name}", copy)
     sight = ["--image", "640x512", "--view", "32", "--height", "60"]
     yield Step("planned", ["plan", "{work}/fence.geojson", *sight, "--into", _out("planned")])
     warm = ["detect", "{data}/imagery/bambi_gatter/thermal", "--method", "warm"]
@@ -150,14 +152,16 @@ def _numbers_below(folder: Path) -> Iterator[tuple[str, int, float]]:
 def _columns(path: Path) -> Iterator[tuple[str, np.ndarray]]:
     """The numbers of a file, by column."""
     if path.suffix in (".csv", ".parquet"):
+        if path.stat().st_size == 0:
+            return
         table = pd.read_csv(path, comment="#") if path.suffix == ".csv" else pd.read_parquet(path)
-        for name in table.select_dtypes("number"):
+        for name in table.select_dtypes(["number", "bool"]):
             yield str(name), table[name].to_numpy(float)
-    elif path.suffix == ".json":
+    elif path.suffix in (".json", ".geojson"):
         for name, value in _leaves(json.loads(path.read_text(encoding="utf-8") or "null"), ""):
             yield name, np.array([value])
     elif path.suffix == ".html":
-        cells = " ".join(_CELL.findall(path.read_text(encoding="utf-8")))
+        cells = " ".join(_CELL.findall(path.read_text(encoding="utf-8"))).replace("\u2212", "-")
         yield "cells", np.array([float(number) for number in _NUMBER.findall(re.sub(r"<[^>]*>", " ", cells))])
 
 
@@ -173,7 +177,7 @@ def _leaves(content: Any, name: str) -> Iterator[tuple[str, float]]:
             own = value if isinstance(value, dict) else {}
             label = "/".join(str(own[key]) for key in ("subject", "name", "id") if key in own)
             yield from _leaves(value, f"{name}[{label or index}]")
-    elif isinstance(content, (int, float)) and not isinstance(content, bool):
+    elif isinstance(content, (int, float)):
         yield name, float(content)
 
 
@@ -185,10 +189,13 @@ def compare(before: Path, after: Path, most: int) -> int:
     ]
     both = pd.concat(tables, axis=1, keys=["before", "after"], join="outer", sort=True)
     known = [both.index.isin(table.index) for table in tables]
-    size = np.maximum(both.abs().max(axis=1).to_numpy(), 1e-300)
-    change = (both["after"] - both["before"]).abs().to_numpy() / size
-    nan = both.isna().to_numpy()
-    moved = known[0] & known[1] & ((change > TOLERANCE) | (nan[:, 0] != nan[:, 1]))
+    both = both.astype(float)
+    old, new = both["before"].to_numpy(), both["after"].to_numpy()
+    with np.errstate(invalid="ignore"):
+        change = np.abs(new - old) / np.maximum(np.fmax(np.abs(old), np.abs(new)), 1e-300)
+    same_kind = (old == new) | (np.isnan(old) & np.isnan(new))
+    # What is infinite, or known before or after alone, has moved however far.
+    moved = known[0] & known[1] & ~same_kind & ~(change <= TOLERANCE)
     for word, rows in (("moved", moved), ("gone", known[0] & ~known[1]), ("new", known[1] & ~known[0])):
         found = both[rows].assign(change=change[rows]).reset_index()
         keys = found.groupby("key", sort=False).agg(

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import wildlab
-from wildlab.analysis.consistency import Series
+from wildlab.analysis.consistency import Series, mean_of_runs
 from wildlab.analysis.following.estimates import STATE, estimates_table
 from wildlab.analysis.following.follow import follow_targets
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
@@ -258,3 +258,25 @@ def test_a_verdict_on_few_independent_values_says_so(worth, hedged, mean, verdic
     average = Average(mean, low, high, 100, worth)
     text = repr(Consistency({"NIS": average}, {"NIS": (series,)}))
     assert verdict in text and ("few" in text) == hedged
+
+
+def test_an_error_that_lasts_is_one_value():
+    """Each run an error of its own throughout: an honest filter is inside in 95 of 100 runs, not in 6."""
+    rng = np.random.default_rng(3)
+    inside, P = [], np.tile(np.eye(2), (400, 1, 1))
+    for _ in range(200):
+        found = wildlab.consistency(errors=np.repeat(rng.normal(size=(1, 2)), 400, 0), covariances=P).means[
+            "NEES"
+        ]
+        inside.append(found.inside)
+        assert found.worth == 1.0
+    # 200 draws of 0.95: below 0.88 once in 10 000.
+    assert np.mean(inside) > 0.88
+
+
+def test_elements_of_several_sensors_are_counted_on_average():
+    runs = [Series("NIS", dof, np.arange(2.0), np.array([1.0, 2.0])) for dof in (1.0, 2.0)]
+    runs.append(Series("NIS", 2.0, np.arange(2.0), np.array([1.0, np.nan])))
+    assert mean_of_runs(runs) == mean_of_runs(runs[::-1])
+    low, high = chi_square_interval((2 * 1 + 2 * 2 + 1 * 2) / 5, runs=5)
+    assert (mean_of_runs(runs).low, mean_of_runs(runs).high) == pytest.approx((low, high))

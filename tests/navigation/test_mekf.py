@@ -340,3 +340,32 @@ def test_standing_still_holds_the_velocity():
     free = run_mekf(imu, start, NOISE, EARTH, [], [59.9])
     assert np.abs(held.velocity).max() < 0.02
     assert np.sqrt(held.covariance[0, 3, 3]) < 0.02 < np.sqrt(free.covariance[0, 3, 3])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_correction_is_the_plain_one(seed):
+    """Random covariances and measurements of one and three rows, with and without errors of the axes."""
+    rng = np.random.default_rng(seed)
+    axes, m = bool(seed % 2), (1, 3)[seed // 2 % 2]
+    n = kernels.N_ERRORS + axes * kernels.N_AXES + 3 * (seed % 3)
+    A = rng.normal(size=(n, n))
+    P, x, H, y = A @ A.T / n + 1e-3 * np.eye(n), rng.normal(size=n + 1), np.zeros((3, n)), np.zeros(3)
+    x[6:10] /= np.linalg.norm(x[6:10])
+    columns = rng.choice(n, rng.integers(1, n + 1), replace=False)
+    H[:m, columns], y[:m] = rng.normal(size=(m, len(columns))), 0.3 * rng.normal(size=m)
+    R = rng.uniform(0.1, 2.0, 3)
+    expected, covariance = reference_mekf.correct(x.copy(), P.copy(), H[:m], y[:m], np.diag(R[:m]), axes)
+    used = kernels.columns_of(H, m)
+    assert sorted(used) == sorted(columns)
+    HP, S, inverse = np.zeros((3, n)), np.zeros((3, 3)), np.full((3, 3), np.nan)
+    HP[:m] = H[:m] @ P
+    S[:m, :m] = H[:m] @ HP[:m].T + np.diag(R[:m])
+    kernels.invert(S, m, inverse)
+    K, M, work = np.full((3, n), np.nan), np.full((n, n), np.nan), np.full((3, 4), np.nan)
+    kernels.correct(x, P, H, used, m, y, R, axes, inverse, HP, K, M, work)
+    x[6:10] *= np.sign(x[6:10] @ expected[6:10])
+    assert np.allclose(x, expected, rtol=1e-10, atol=1e-12)
+    assert np.allclose(P, covariance, rtol=1e-10, atol=1e-11) and np.array_equal(P, P.T)
+    if axes:
+        dense = slice(kernels.N_ERRORS, kernels.N_ERRORS + kernels.N_AXES)
+        assert np.array_equal(K[:, dense], np.zeros((3, kernels.N_AXES))), "considered, not estimated"

@@ -20,12 +20,17 @@ Array = NDArray[np.float64]
 
 
 class Series(NamedTuple):
-    """NEES or NIS (N,) of one run over its times (N,), s, with ``dof`` degrees of freedom; NaN: none."""
+    """NEES or NIS (N,) of one run over its times (N,), s, with ``dof`` degrees of freedom; NaN: none.
+
+    ``worth``: at most so many independent values, where the errors themselves say so: one that lasts is one,
+    however much its square wavers.
+    """
 
     name: str
-    dof: int
+    dof: float
     times: Array
     values: Array
+    worth: float = np.inf
 
 
 def worth(values: ArrayLike) -> float:
@@ -59,7 +64,7 @@ def mean_of_runs(runs: Sequence[Series]) -> Average:
     Parameters
     ----------
     runs
-        One series for each run, all with the same degrees of freedom.
+        One series for each run; degrees of freedom that differ are averaged over the values.
 
     Returns
     -------
@@ -74,7 +79,9 @@ def mean_of_runs(runs: Sequence[Series]) -> Average:
     (2.0, 6, 6.0, True)
     """
     values = np.concatenate([np.asarray(run.values, float) for run in runs])
-    return average(values, runs[0].dof, sum(worth(run.values) for run in runs))
+    known = np.array([np.isfinite(run.values).sum() for run in runs])
+    dof = float(np.average([run.dof for run in runs], weights=known)) if known.any() else runs[0].dof
+    return average(values, dof, sum(min(worth(run.values), run.worth) for run in runs))
 
 
 def navigation_series(errors: NavigationErrors, begin: float = -np.inf, end: float = np.inf) -> list[Series]:

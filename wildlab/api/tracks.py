@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.analysis.consistency import Series, mean_of_runs, navigation_series
 from wildlab.analysis.following.filters import SMOOTHED
 from wildlab.analysis.following.follow import TOGETHER, WHITE, TrackingResult, follow_targets
-from wildlab.analysis.following.judged import FEW_INDEPENDENT, verdict
+from wildlab.analysis.following.judged import FEW_INDEPENDENT, seen_of, verdict, worth_of_errors
 from wildlab.analysis.following.sensor_tracks import SensorTrack
 from wildlab.analysis.georeference import (
     assumed_deviations,
@@ -165,8 +165,11 @@ class Tracked(Brief):
         (N, 4) truth minus estimate; NaN without a track or truth.
     used
         (N,) looks whose detection the filter used, the one that it starts on among them.
+    judged
+        (N,) looks that the numbers are of: at which the target was in sight; all, with a tuning, as in H.
     measured
-        (N, 2) north and east, m, of the detection that was used; NaN where there was none.
+        (N, 2) north and east, m, of the detection that was used; NaN where there was none, or it is no place
+        by itself.
     innovation
         (N, m) in the unit of the detections; NaN where none was used.
     nees, nis
@@ -186,6 +189,7 @@ class Tracked(Brief):
     covariance: Array
     error: Array
     used: NDArray[np.bool_]
+    judged: NDArray[np.bool_]
     measured: Array
     innovation: Array
     nees: Array
@@ -201,8 +205,9 @@ class Tracked(Brief):
     @property
     def numbers(self) -> dict[str, float]:
         """``mae`` and ``rmse`` (m, horizontal), mean ``nees`` and ``nis``; NaN where they are not known."""
-        summary = summarise_track(track_errors(self.truth, self.estimate))
-        means = {name: _mean(getattr(self, name)) for name in ("nees", "nis")}
+        rows = self.judged
+        summary = summarise_track(track_errors(self.truth[rows], self.estimate[rows]))
+        means = {"nees": _mean(self.nees[rows]), "nis": _mean(self.nis)}
         return {"mae": summary.mae, "rmse": summary.rmse} | means
 
     def brief(self) -> Summary:
@@ -211,9 +216,11 @@ class Tracked(Brief):
         rows = [("filter", f"{self.filter}, by {self.sensor}"), *self.told]
         rows.append(("detections used", f"{int(self.used.sum())} in {np.ptp(self.times):.0f} s"))
         if np.isfinite(n["mae"]):
-            far = f"{n['mae']:.2f} m mean, {n['rmse']:.2f} m RMS, with or without a detection"
-            rows.append(("distance from the truth", far))
-            rows.append(("mean NEES and NIS", f"{n['nees']:.2f} and {n['nis']:.2f} (see consistency)"))
+            where = "with or without a detection" if self.judged.all() else "while it was in sight"
+            rows.append(("distance from the truth", f"{n['mae']:.2f} m mean, {n['rmse']:.2f} m RMS, {where}"))
+        known = [f"{n[name]:.2f} ({name.upper()})" for name in ("nees", "nis") if np.isfinite(n[name])]
+        if known:
+            rows.append(("mean", f"{', '.join(known)}; see consistency"))
         return Summary(f"Track on {self.flight}", rows)
 
 
@@ -270,8 +277,18 @@ def track(
     ('schmidt', 4)
     """
     if tuning is not None:
+        if settings is not None or sensor is not None or smooth:
+            raise WildlabError(
+                "a tuning goes without settings, sensor and smoothing",
+                "leave these out, or the tuning",
+                field="tuning",
+            )
         return _as_tuned(flight, target, source, filter or "schmidt", tuning)
     told = settings
+    if told is not None and not isinstance(told, (str, Path, Mapping, Settings)):
+        raise WildlabError(
+            f"settings are a {type(told).__name__}", "give a file or a mapping", field="settings"
+        )
     if isinstance(told, (str, Path)):
         told = read_settings(Path(told))
     elif isinstance(told, Mapping):
@@ -303,23 +320,37 @@ def track(
 
 
 def _as_followed(flight: Flight, found: TrackingResult, one: SensorTrack, source: str | None) -> Tracked:
-    about = [each for each in found.said if each.subject in ("targets", one.sensor)]
-    told = tuple((each.what, f"{each.value} ({each.source})") for each in about)
-    measured = np.full((len(one.times), 2), np.nan)
-    kinds = {name: scans.kind for name, scans in found.scans.items()}
-    if kinds.get(one.sensor) == "position":
-        rows = np.arange(len(one.times))
-        scans = found.scans[one.sensor]
-        which = np.argmax((scans.ids == one.detection[:, None]) & (scans.ids != ""), axis=1)
-        measured = np.where((one.detection != "")[:, None], scans.detections[rows, which], np.nan)
-    elif kinds.get(one.sensor) == "pixel":
-        points = georeference(flight, observe(flight, source), np.random.default_rng(0))
-        places = points.set_index("detection_id")[["north_m", "east_m"]]
-        measured = places.reindex(one.detection).to_numpy(float)
+    of = {"targets", *(found.scans if one.sensor == TOGETHER else (one.sensor,))}
+    about = [each for each in found.said if each.subject in of]
+    several = len(of) > 2
+    told = [
+        (f"{each.subject}: {each.what}" if several else each.what, f"{each.value} ({each.source})")
+        for each in about
+    ]
+    told += [("note", note) for note in found.notes]
     return Tracked(
         flight.name, one.sensor, one.target, one.filter, one.times, one.estimate, one.covariance, one.error,
-        one.detection != "", measured, one.innovation, one.nees, one.nis, one.dof, told,
+        one.detection != "", seen_of(one), _places(flight, found, one, source), one.innovation, one.nees,
+        one.nis, one.dof, tuple(told),
     )  # fmt: skip
+
+
+def _places(flight: Flight, found: TrackingResult, one: SensorTrack, source: str | None) -> Array:
+    """(N, 2) of the detections used, where they are places by themselves."""
+    nothing = np.full((len(one.times), 2), np.nan)
+    scans = found.scans.get(one.sensor)
+    if scans is None:
+        return nothing
+    if scans.kind == "position":
+        which = np.argmax((scans.ids == one.detection[:, None]) & (scans.ids != ""), axis=1)
+        chosen = scans.detections[np.arange(len(one.times)), which]
+        return np.where((one.detection != "")[:, None], chosen, np.nan)
+    # With a clock that is corrected the poses of other times count.
+    if scans.kind == "pixel" and not found.beliefs[one.sensor].offset_s:
+        points = georeference(flight, observe(flight, source), np.random.default_rng(0))
+        places = points.set_index("detection_id")[["north_m", "east_m"]]
+        return places.reindex(one.detection).to_numpy(float)
+    return nothing
 
 
 def _as_tuned(
@@ -348,7 +379,8 @@ def _as_tuned(
     called = target or str(flight.table("detections")["target_id"].iloc[0])
     return Tracked(
         flight.name, "camera", called, filter, seen.times, found.x[:, :4], found.P[:, :4, :4], error,
-        seen.seen, seen.positions, found.innovation, nees, found.nis, 2.0, told,
+        seen.seen, np.ones(len(seen.times), bool), seen.positions, found.innovation, nees, found.nis, 2.0,
+        told,
     )  # fmt: skip
 
 
@@ -381,7 +413,7 @@ class Consistency(Brief):
             if not a.inside and a.worth < FEW_INDEPENDENT:
                 said += ", but on few independent values"
             count = f"{a.n}, worth {a.worth:.0f}"
-            dof = str(self.series[name][0].dof)
+            dof = f"{self.series[name][0].dof:.3g}"
             rows.append((name, f"{a.mean:.2f}", dof, f"{a.low:.2f} to {a.high:.2f}", count, said))
         head = ("mean of", "is", "should be", "95 % interval", "values", "so the filter is")
         return Summary("Consistency", rows, head)
@@ -392,11 +424,12 @@ def consistency(
 ) -> Consistency:
     """Mean NEES and NIS of one run, or of several independent ones, beside what they should be.
 
-    Of a track: the NEES of its position (two degrees of freedom) and the NIS of its detections (two). Of a
-    navigation: the NEES of position, velocity and attitude (three each) in that part of the flight which
-    counts. Values of one run are correlated, so each run counts as what its values are worth. That is an
-    estimate from the same values: where it is below `FEW_INDEPENDENT`, an honest filter's mean falls outside
-    of the interval not in 5 % of cases but in 10 to 30 %, and the verdict says so. More runs help.
+    Of a track: the NEES of its position (two degrees of freedom) at the looks that it is judged at, and the
+    NIS of its detections (as many as they have elements). Of a navigation: the NEES of position, velocity and
+    attitude (three each) in that part of the flight which counts. Values of one run are correlated, so each
+    run counts as what its values are worth, an error that lasts as one. That is an estimate from the same
+    values: where it is below `FEW_INDEPENDENT`, an honest filter's mean falls outside of the interval not in
+    5 % of cases but in 10 to 30 %, and the verdict says so. More runs help.
 
     Parameters
     ----------
@@ -427,17 +460,19 @@ def consistency(
     gathered: dict[str, list[Series]] = {}
     if errors is not None and covariances is not None and not results:
         e, P = np.asarray(errors, float), np.asarray(covariances, float)
-        if e.ndim not in (2, 3) or P.shape != (*e.shape, e.shape[-1]):
+        if e.ndim not in (2, 3) or 0 in e.shape or P.shape != (*e.shape, e.shape[-1]):
             raise WildlabError(
                 f"errors are {e.shape}, covariances {P.shape}",
                 "give (N, n) and (N, n, n), or (M, N, n) and (M, N, n, n) of M runs",
                 field="covariances",
             )
         runs = zip(e.reshape(-1, *e.shape[-2:]), P.reshape(-1, *P.shape[-3:]), strict=True)
-        values = [nees(*run) for run in runs]
-        known = [one for one in values if np.isfinite(one).any()]
-        gathered = {"NEES": [Series("NEES", e.shape[-1], np.arange(float(len(one))), one) for one in known]}
-        gathered = {name: found for name, found in gathered.items() if found}
+        found = [
+            Series("NEES", e.shape[-1], np.arange(float(len(one))), nees(one, its), worth_of_errors(one, its))
+            for one, its in runs
+        ]
+        known = [one for one in found if np.isfinite(one.values).any()]
+        gathered = {"NEES": known} if known else {}
     elif errors is not None or covariances is not None or len({type(one) for one in results}) != 1:
         raise WildlabError(
             "results of one kind are needed",
@@ -461,8 +496,10 @@ def _series(one: Tracked | Navigation) -> list[Series]:
     if isinstance(one, Navigation):
         scored = one.errors is not None and one.reference == REFERENCES[0]
         return navigation_series(one.errors, *one.part[1:]) if one.errors is not None and scored else []
+    rows = one.judged
+    worth = worth_of_errors(one.error[rows, :2], one.covariance[rows, :2, :2])
     both = [
-        Series("NEES position", 2, one.times, one.nees),
-        Series("NIS", round(one.dof), one.times, one.nis),
+        Series("NEES position", 2, one.times, np.where(rows, one.nees, np.nan), worth),
+        Series("NIS", one.dof, one.times, one.nis),
     ]
     return [each for each in both if np.isfinite(each.values).any()]

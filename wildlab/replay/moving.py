@@ -6,6 +6,7 @@ import numpy as np
 
 from wildlab.analysis.following.estimates import read_estimates
 from wildlab.analysis.following.judged import LEADING
+from wildlab.analysis.overviews.overview import length_of_way
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.replay.gather import scene_of
@@ -115,7 +116,7 @@ def alt(scene: ReplayScene) -> str:
     """What the picture shows, in numbers, for who cannot see it."""
     assert scene.path is not None  # noqa: S101 - for the type checker
     low, high = scene.path.places[:, :2].min(axis=0), scene.path.places[:, :2].max(axis=0)
-    way = float(np.linalg.norm(np.diff(scene.path.places[:, :2], axis=0), axis=1).sum())
+    way = length_of_way(scene.path.times, scene.path.places[:, :2])
     text = (
         f"Map of the flight: the aircraft goes {way:.0f} m in {minutes(scene.length)}, "
         f"within {high[0] - low[0]:.0f} m north-south and {high[1] - low[1]:.0f} m east-west"

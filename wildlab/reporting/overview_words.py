@@ -9,7 +9,7 @@ import pandas as pd
 
 from wildlab.analysis.overviews.alarms import Alarm
 from wildlab.analysis.overviews.image_coverage import Coverage
-from wildlab.analysis.overviews.overview import Issue, Overview, troubled_for
+from wildlab.analysis.overviews.overview import Issue, Overview, length_of_way, troubled_for
 from wildlab.analysis.overviews.recommendations import MOST, Gain
 from wildlab.analysis.overviews.verdict import WORTH, Verdict
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
@@ -73,15 +73,13 @@ def area_words(area_m2: float) -> str:
 
 
 def way_of(overview: Overview) -> float:
-    """Length of the path over the ground, m; NaN without one. Steps below half a second are joined: what
-    shakes is no way. They are counted from the first pose, so that no clock has a say in it."""
+    """Length of the path over the ground, m; NaN without one."""
     path = overview.path
     if path is None or len(path.times) < 2:
         return float("nan")
-    since = path.times - path.times[0] + 1e-6
-    keep = np.concatenate([[0], np.flatnonzero(np.diff(np.floor(since * 2)) > 0) + 1])
-    place = path.place[keep if path.timed else slice(None), :2]
-    return float(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
+    if not path.timed:
+        return float(np.linalg.norm(np.diff(path.place[:, :2], axis=0), axis=1).sum())
+    return length_of_way(path.times, path.place[:, :2])
 
 
 def gain_title(gain: Gain) -> str:

@@ -83,8 +83,8 @@ def sources_of(
             if same_flight(read_provenance(one).get("flight") or {}, mine)
         ]
         if not ours:
-            fix = f"evaluate it, then share it: {typed('wildlab evaluate', path)}"
-            raise WildlabError("there is no report on this flight as it is", fix, file=path)
+            fix = f"name the report itself, or evaluate it here: {typed('wildlab evaluate', path)}"
+            raise WildlabError(f"{reports.name}/ has no report on this flight as it is", fix, file=path)
         path = ours[0]
     folder = path.parent if path.name == "report.html" else path
     if not folder.is_dir():

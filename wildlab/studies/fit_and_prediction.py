@@ -113,7 +113,7 @@ def _listed(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def simulated_section(report: Report, *twins: str, study: str = "", about: str = "") -> None:
+def simulated_section(report: Report, *twins: str, study: str = "", about: str = "", used: str = "") -> None:
     """The section of a report on what was simulated: every parameter of its twins, folded away.
 
     Parameters
@@ -124,15 +124,18 @@ def simulated_section(report: Report, *twins: str, study: str = "", about: str =
         Left out where no published table stands beside the twin.
     about
         What to say of it.
+    used
+        Which of the parameters the study takes; left out, all.
     """
     report.section("What was simulated", about)
     for twin in twins:
-        twin_table(report, twin, study)
+        twin_table(report, twin, study, used)
 
 
-def twin_table(report: Report, twin: str, study: str = "") -> None:
+def twin_table(report: Report, twin: str, study: str = "", used: str = "") -> None:
     """The table of `simulated_section` alone, for one twin."""
     table = parameters_table(twin)
     fitted = f" {fit_words(load_published(study), twin)}" if study else ""
     told = f"The twin {twin}: {status_words(table)}"
-    report.table(table, fold=told, caption=f"Every parameter of the twin.{fitted}")
+    taken = f", of which the study takes {used}" if used else ""
+    report.table(table, fold=told, caption=f"Every parameter of the twin{taken}.{fitted}")

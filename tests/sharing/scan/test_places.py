@@ -241,3 +241,22 @@ def test_the_zone_is_found_and_others_are_not():
     for text in ("EPSG:32632", "EPSG 25832", "UTM zone 32V", "utm32"):
         assert "the zone of UTM" in kinds(text, secrets()), text
     assert "the zone of UTM" not in kinds("EPSG:32634, UTM zone 3, UTM zone 322", secrets())
+
+
+@pytest.mark.parametrize(
+    ("drawn", "found"),
+    [
+        ('<path d="M4 6 224.4L12.6 41.3h0M300.9 2"/>', False),
+        ('<animate values="6,334.6 141.3;62.4 12.7" keyTimes="0;0.4138;0.6838;1"/>', False),
+        ('<path d="M62.4138 12.6838"/>', True),
+        ('<polyline points="1,2 6224.828,1241.028"/>', True),
+        ("<text>62.4138 12.6838</text>", True),
+        ('<path data-x="62.4138 12.6838" d="M1 2"/>', True),
+    ],
+)
+def test_lines_of_a_drawing_are_no_places_and_places_among_them_are(tmp_path, drawn, found):
+    """Pixels to a tenth hold no place; what is finer or larger in a drawing may."""
+    known = replace(secrets(62.4138, 12.6838), words=("M300",))
+    said = read(tmp_path, f"<p>a</p><svg viewBox='0 0 900 600'>{drawn}</svg>", known)
+    assert any(": place: " in one for one in said) == found, said
+    assert not any(": name: " in one or "name" in one.split(": ")[1:2] for one in said), said

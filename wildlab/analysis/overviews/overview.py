@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.overviews.alarms import QUATERNION, VELOCITY, Alarm, alarms_of, jumps_of
 from wildlab.analysis.overviews.image_coverage import Coverage, cover_images, ground_height
@@ -329,3 +329,29 @@ def _vibration(flight: Flight) -> tuple[Vibration, Array] | None:
     t, force = ordered(flight.imu, flight.imu["time_s"].to_numpy(float), FORCE)
     found = vibration_of(t, force)
     return None if found is None else (found, t)
+
+
+def length_of_way(times: ArrayLike, places: ArrayLike) -> float:
+    """Length of a path over the ground, m: steps below half a second are joined, for what shakes is no way.
+
+    They are counted from the first pose, so that no clock has a say in it.
+
+    Parameters
+    ----------
+    times
+        (N,) s, in order.
+    places
+        (N, 2) m.
+
+    Examples
+    --------
+    >>> t = np.arange(0.0, 10.0, 0.01)
+    >>> shaken = np.column_stack([5 * t, 0.1 * np.tile([1.0, -1.0], len(t) // 2)])
+    >>> bool(49 < length_of_way(t, shaken) < 50)
+    True
+    """
+    t, place = np.asarray(times, float), np.asarray(places, float)
+    if not len(t):
+        return 0.0
+    keep = np.concatenate([[0], np.flatnonzero(np.diff(np.floor(2 * (t - t[0] + 1e-6))) > 0) + 1])
+    return float(np.linalg.norm(np.diff(place[keep], axis=0), axis=1).sum())

@@ -57,9 +57,9 @@ def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
     columns = (
         SpinnerColumn(),
         BarColumn(bar_width=20),
-        TextColumn("{task.completed:.0f} of {task.total:.0f} seeds and cells"),
+        TextColumn("{task.completed:.0f} of {task.total:.0f}"),
         TimeElapsedColumn(),
-        TextColumn("gone, left"),
+        TextColumn("left"),
         TimeRemainingColumn(),
         # Whatever does not fit is cut off: the line must not wrap.
         TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),

@@ -31,6 +31,11 @@ _CONTROL = np.zeros(256, bool)
 _CONTROL[[code for code in range(32) if code not in b"\t\n\r\f\x1b"]] = True
 #: Escapes may stand inside of escapes: a page in a notebook.
 DEEPEST = 3
+#: Lines of an inline SVG, and when they move, from 0 to 1; wider than `PAPER`, px, no drawing is.
+_DRAWN = re.compile(r"""(\s(?:d|points|values)=")([MmLlHhVvZzCcSsQqTtAa0-9.,;\s+-]*)(?=")""")
+_TIMED = re.compile(r"""(\s(?:keyTimes|keySplines)=")([01.][0-9.;\s]*)(?=")""")
+_DRAWN_NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
+PAPER = 2000
 
 
 def is_text(data: bytes) -> bool:
@@ -83,8 +88,27 @@ def texts_of(data: bytes) -> list[str]:
             base.append("\n".join(run.replace(b"\x00", b"").decode("ascii") for run in _WIDE.findall(data)))
     found: list[str] = []
     for text in base:
-        found += _readings(text)
+        found += _readings(_undrawn(text))
     return list(dict.fromkeys(found))
+
+
+def _undrawn(text: str) -> str:
+    """A text with blanks for the lines of its drawings, each as long as it was.
+
+    Lines of an inline SVG are thousands of numbers in pixels, a tenth of one at the finest, and among so many
+    some pair always is somebody's latitude and longitude. No place hides in them: below `PAPER` and with one
+    decimal, degrees are known to 10 km. What is finer, or larger, is looked at.
+    """
+
+    def blank(match: re.Match[str]) -> str:
+        numbers = [number.partition(".") for number in _DRAWN_NUMBER.findall(match[2])]
+        paper = all(len(part) <= 1 and int(whole or 0) < PAPER for whole, _, part in numbers)
+        return match[1] + " " * len(match[2]) if paper else match[0]
+
+    def untimed(match: re.Match[str]) -> str:
+        return match[1] + " " * len(match[2])
+
+    return _TIMED.sub(untimed, _DRAWN.sub(blank, text)) if "<svg" in text else text
 
 
 def _wide(data: bytes) -> str | None:

@@ -162,11 +162,16 @@ def clock_fit(s: Sightings, by: float) -> ClockFit | None:
 
 
 def _how_sure(s: Sightings, by: float) -> str:
-    """The interval of an offset of the clock, and what it is hard to tell from; nothing if not known."""
+    """The interval of an offset of the clock, and what it is hard to tell from; nothing if not known.
+
+    Noise of poses that is new at each of them is least half-way between two: where images come as regularly
+    as poses, the offset that fits best lies there, up to half of the time between two poses from the true.
+    """
     found = clock_fit(s, by)
     if found is None:
         return ""
-    low, high = sorted((abs(by) - 1.96 * found.sd_s, abs(by) + 1.96 * found.sd_s))
+    wide = 1.96 * found.sd_s + s.between_s / 2
+    low, high = abs(by) - wide, abs(by) + wide
     hard = ", from which it is hard to tell" if found.correlation > HARD else ""
     return (
         f" ({low:.2f} to {high:.2f} s, 95 %; correlation {found.correlation:.2f} with a tilt or turn of the "
@@ -182,8 +187,8 @@ def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]
             "clock of the camera",
             f"the images were taken {abs(by):.2f} s {'later' if by > 0 else 'earlier'} than their stamps say"
             f"{_how_sure(s, by)}",
-            f"`camera_offset_s = {offset_s + by:.2f}` in [clocks]; reports on these same points "
-            "flatter it then",
+            f"`camera_offset_s = {offset_s + by:.2f}` in [clocks], or what `wildlab clock` measures; "
+            "reports on these same points flatter it then",
             lambda x: shifted(x, by),
             fitted=True,
             corrections=(shift_clock("camera_offset_s", by), shift_poses(s.source, -by)),

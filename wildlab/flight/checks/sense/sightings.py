@@ -76,6 +76,8 @@ class Sightings:
         Whether its angles are the log's.
     named
         Whether it is said of which point each is.
+    between_s
+        Time from one logged pose to the next, s.
     """
 
     source: str
@@ -95,6 +97,7 @@ class Sightings:
     frames: NDArray[np.object_]
     own_gimbal: bool = False
     named: bool = True
+    between_s: float = 0.0
 
     def take(self, rows: NDArray[np.bool_]) -> Sightings:
         """Some of the rows; the poses at other times go with them."""
@@ -204,6 +207,7 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         frames=ids.to_numpy(object),
         own_gimbal=flight.gimbal is not None or "pan_rad" in frames,
         named=named,
+        between_s=float(np.median(np.diff(nav["time_s"]))) if len(nav) > 1 else 0.0,
     )
     known = np.isfinite(p).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
     known &= np.isfinite(points).all(axis=2).any(axis=0) & np.isfinite(found.pan + found.tilt)
