@@ -250,4 +250,4 @@ def test_one_bar_counts_seeds_and_cells():
         tell("one", "stage", ("page",))
         tell("two", "start", None)
         tell("one", "end", Outcome("one", "done", 3.0))
-    assert "7 of 7 seeds and cells" in text.getvalue() and text.getvalue().count("done") == 1
+    assert "7 of 7" in text.getvalue() and text.getvalue().count("done") == 1
