@@ -103,7 +103,7 @@ def navigation_series(errors: NavigationErrors, begin: float = -np.inf, end: flo
     --------
     >>> nothing = np.full((2, 9), np.nan)
     >>> blocks = {"position": np.array([3.0, 2.0]), "velocity": nothing[:, 0], "attitude": nothing[:, 0]}
-    >>> [s.name for s in navigation_series(Errors(np.arange(2.0), nothing, nothing, blocks))]
+    >>> [s.name for s in navigation_series(NavigationErrors(np.arange(2.0), nothing, nothing, blocks))]
     ['NEES position']
     """
     part = (errors.times >= begin) & (errors.times < end)

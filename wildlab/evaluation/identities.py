@@ -226,7 +226,7 @@ def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.
 
     >>> def scan(t, a, b):
     ...     truth, seen, ignored = [[t], [9 - t]], [True, True], [False, False]
-    ...     return Scan(t, [[a], [b]], np.ones((2, 1, 1)), [7, 8], truth, "AB", seen, ignored)
+    ...     return Moment(t, [[a], [b]], np.ones((2, 1, 1)), [7, 8], truth, "AB", seen, ignored)
     >>> found = compare_identities([scan(t, min(t, 9 - t), max(t, 9 - t)) for t in range(10)], 3)
     >>> found.swaps, found.breaks, sorted(found.followed[-1].items())
     (2, 0, [('A', 8), ('B', 7)])

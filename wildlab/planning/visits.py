@@ -73,8 +73,8 @@ def visit_order(
     Examples
     --------
     >>> import numpy as np
-    >>> from wildlab.planning.visits import Way, visit_order
-    >>> there = [[Way(np.zeros((0, 2, 2)), np.array([[x, 0.0], [x, 1.0]]))] for x in (5.0, 1.0, 3.0)]
+    >>> from wildlab.planning.visits import AreaWay, visit_order
+    >>> there = [[AreaWay(np.zeros((0, 2, 2)), np.array([[x, 0.0], [x, 1.0]]))] for x in (5.0, 1.0, 3.0)]
     >>> visit_order(there, start=[0.0, 0.0])
     [(1, 0), (2, 0), (0, 0)]
     """

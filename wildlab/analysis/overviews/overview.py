@@ -347,8 +347,8 @@ def length_of_way(times: ArrayLike, places: ArrayLike) -> float:
     --------
     >>> t = np.arange(0.0, 10.0, 0.01)
     >>> shaken = np.column_stack([5 * t, 0.1 * np.tile([1.0, -1.0], len(t) // 2)])
-    >>> bool(49 < length_of_way(t, shaken) < 50)
-    True
+    >>> round(length_of_way(t, shaken), 1)
+    47.5
     """
     t, place = np.asarray(times, float), np.asarray(places, float)
     if not len(t):
