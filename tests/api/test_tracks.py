@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,19 +10,21 @@ import pandas as pd
 import pytest
 
 import wildlab
+from tests.analysis.robots import KNOWN, joined, robot_flight
 from wildlab.analysis.consistency import Series, mean_of_runs
 from wildlab.analysis.following.estimates import STATE, estimates_table
-from wildlab.analysis.following.follow import follow_targets
+from wildlab.analysis.following.follow import TOGETHER, follow_targets
+from wildlab.analysis.following.judged import judged
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated
 from wildlab.analysis.navigation_errors import comparison_times
-from wildlab.analysis.track import FILTERS, CvTuning, evaluate_track, follow_schmidt, sighting
+from wildlab.analysis.track import FILTERS, CvTuning, evaluate_track, follow_schmidt, sighting, truth_states
 from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
 from wildlab.evaluation.consistency import Average, chi_square_interval
 from wildlab.flight.clocks import frame_times, poses_at
 from wildlab.flight.files import check_model
-from wildlab.flight.following import Settings
+from wildlab.flight.following import Settings, parse_settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_quaternion
 from wildlab.simulation.parameters import load_twin
@@ -280,3 +283,22 @@ def test_elements_of_several_sensors_are_counted_on_average():
     assert mean_of_runs(runs) == mean_of_runs(runs[::-1])
     low, high = chi_square_interval((2 * 1 + 2 * 2 + 1 * 2) / 5, runs=5)
     assert (mean_of_runs(runs).low, mean_of_runs(runs).high) == pytest.approx((low, high))
+
+
+def test_a_track_is_judged_as_the_command_judges_it():
+    """Radar and bearings together: numbers, degrees of freedom and bands."""
+    flight = joined(robot_flight(3), robot_flight(103, kind="bearing", sensor="cam"))
+    told = parse_settings(KNOWN + "[sensors.cam.noise]\nazimuth_deg = 0.3\n")
+    rows = judged(follow_targets(flight, settings=told, filters=["ekf"])).query("filter == 'ekf'")
+    row = rows[rows["kind"] == TOGETHER].iloc[0]
+    track = wildlab.track(flight, filter="ekf", settings=told)
+    nis, nees = (wildlab.consistency(track).means[name] for name in ("NIS", "NEES position"))
+    assert (nis.mean, nis.low, nis.high) == pytest.approx((row["nis"], row["nis_low"], row["nis_high"]))
+    assert (nees.mean, nees.low, nees.high) == pytest.approx((row["nees"], row["nees_low"], row["nees_high"]))
+    assert track.numbers["rmse"] == pytest.approx(row["rmse"]) and 1 < track.dof < 2
+    truth = truth_states(flight, track.target, track.times)
+    known = np.isfinite(track.truth[:, 0])
+    assert known.any() and np.allclose(track.truth[known, :2], truth[known, :2], atol=1e-6)
+    out_of_sight = replace(track, judged=track.judged & (track.times < np.median(track.times)))
+    found = wildlab.consistency(out_of_sight).means["NEES position"]
+    assert found.mean == pytest.approx(np.nanmean(track.nees[out_of_sight.judged])) != nees.mean

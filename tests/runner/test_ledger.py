@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.reporting import html, metrics
 from wildlab.reporting.cases import load_cases
-from wildlab.reporting.counts import tally
+from wildlab.reporting.counts import Tally, tally
 from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
@@ -307,3 +308,9 @@ def test_a_damaged_report_is_one_to_be_run_again(tmp_path, name, old, new):
     path.write_text(text.replace(old, new) if old else new, encoding="utf-8")
     one = study_status(a_study(), tmp_path)
     assert one.state == "broken off"
+
+
+def test_what_is_not_asked_whether_it_is_within_is_not_counted_as_outside():
+    closeness = Counter({"close": 42})
+    assert Tally(42, closeness, Counter(), 0.0, 0, 0).within == "-"
+    assert Tally(42, closeness, Counter({"within": 5, "outside": 1}), 0.0, 0, 0).within == "5 of 6"

@@ -51,8 +51,7 @@ def list_(out: Path | None, as_json: bool, rule: bool) -> None:
         printed = len(one.counted)
         found = tally(one.counted)
         close = f"{found.close['close']} of {printed}" if done else f"{printed} published"
-        asked = sum(found.compatible.values())
-        within = f"{found.compatible['within']} of {asked}" if done and asked else "-" if done else ""
+        within = found.within if done else ""
         claims = f"{holding} of {len(one.claims)}" if done else f"{len(one.claims)} published"
         first = f"; first: wildlab fetch {data}" if data and not done and not is_fetched(data) else ""
         unsealed = f" ({one.reason})" if one.ran and one.reason else ""

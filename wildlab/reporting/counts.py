@@ -44,6 +44,12 @@ class Tally(NamedTuple):
     waiting: int
 
     @property
+    def within(self) -> str:
+        """``"5 of 6"`` of those that are asked whether they are within; ``"-"`` where none is."""
+        asked = sum(self.compatible.values())
+        return f"{self.compatible[Compatibility.WITHIN]} of {asked}" if asked else "-"
+
+    @property
     def words(self) -> str:
         """``"5 close, 1 not close; 6 within, 1 outside (0.7 by chance)"``, without what there is none of."""
         parts = [

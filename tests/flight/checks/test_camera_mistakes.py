@@ -157,3 +157,15 @@ def test_the_advice_has_the_interval(late):
     first = next(clock_mistakes(flown(forward=False, late=late, off_m=4 * OFF_M), 0.0))
     low, high, alike = (float(x) for x in re.findall(r"\d\.\d+", first.said)[1:4])
     assert low < abs(late) < high and high - low < 0.1 and alike < HARD
+
+
+def test_the_interval_of_a_clock_reaches_half_way_between_two_poses():
+    """White noise of poses is least there, and draws the offset that fits best."""
+    late = flown(forward=False, late=0.5, off_m=OFF_M)
+
+    def bounds(between):
+        said = next(clock_mistakes(replace(late, between_s=between), 0.0)).said
+        return [float(x) for x in re.findall(r"\d\.\d+", said)[1:3]]
+
+    near, far = bounds(0.0), bounds(0.5)
+    assert far == pytest.approx([near[0] - 0.25, near[1] + 0.25], abs=0.011)

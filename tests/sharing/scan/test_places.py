@@ -250,6 +250,7 @@ def test_the_zone_is_found_and_others_are_not():
         ('<animate values="6,334.6 141.3;62.4 12.7" keyTimes="0;0.4138;0.6838;1"/>', False),
         ('<path d="M62.4138 12.6838"/>', True),
         ('<polyline points="1,2 6224.828,1241.028"/>', True),
+        ('<path d="M6224.8 1241.0"/>', True),
         ("<text>62.4138 12.6838</text>", True),
         ('<path data-x="62.4138 12.6838" d="M1 2"/>', True),
     ],
