@@ -376,9 +376,12 @@ def _as_tuned(
         ("poses", f"{name}, uncertainty assumed" if assumed else name),
     )
     nees = position_nees(error[:, :2], found.P[:, :2, :2])
-    called = target or str(flight.table("detections")["target_id"].iloc[0])
+    pixels = flight.table("detections").query("kind == 'pixel'")
+    if target is not None:
+        pixels = pixels[pixels["target_id"] == target]
+    sensor, called = (str(pixels[column].iloc[0]) for column in ("source", "target_id"))
     return Tracked(
-        flight.name, "camera", called, filter, seen.times, found.x[:, :4], found.P[:, :4, :4], error,
+        flight.name, sensor, called, filter, seen.times, found.x[:, :4], found.P[:, :4, :4], error,
         seen.seen, np.ones(len(seen.times), bool), seen.positions, found.innovation, nees, found.nis, 2.0,
         told,
     )  # fmt: skip
