@@ -9,7 +9,8 @@ import pytest
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.studies.schmidt.claims import apart, band, check_claims
-from wildlab.studies.schmidt.trial import FILTERS, MORE_NAMES, NAMES, NEES_NAMES, PUBLISHED, SUBJECTS
+from wildlab.studies.schmidt.pose_covariances import covariances_table, curve_table, predicted_error
+from wildlab.studies.schmidt.trial import FACTORS, FILTERS, MORE_NAMES, NAMES, NEES_NAMES, PUBLISHED, SUBJECTS
 
 STUDIES = ("schmidt-fast-vessel", "schmidt-slow-vessel-eight", "schmidt-drifting-vessel-eight")
 #: What the claims of all three studies need for their vague words; the strictest where they differ.
@@ -208,3 +209,36 @@ def test_no_share_is_asked_to_be_above_one():
     checks = check_claims(pd.DataFrame([flight_with()]))
     for one in ("ekf-overconfident-between", "high-nis-after-pauses"):
         assert checks[one].reaches(0.25) and not checks[one].reaches(1.0)
+
+
+def flights(nees: float = 2.0, size: int = 60) -> pd.DataFrame:
+    """Flights whose NEES at a drawn moment are quantiles of chi-square, scaled to the mean ``nees``."""
+    drawn = -nees * np.log((np.arange(size) + 0.5) / size)
+    rows = [flight_with() | {(who, "nees_drawn"): one for who in SUBJECTS} for one in drawn]
+    frame = pd.DataFrame(rows)
+    for who in SUBJECTS:
+        frame[who, "nees"] = nees
+    for axis in ("roll", "pitch", "yaw"):
+        frame["mekf-data-sheet", f"mean_sd_{axis}"] = frame["mekf-data-sheet", f"rms_{axis}"] = 0.005
+        frame["estimated", f"mean_sd_{axis}"] = 0.8
+    return frame
+
+
+@pytest.mark.parametrize(("nees", "inside"), [(2.0, True), (8.0, False), (0.5, False)])
+def test_a_filters_errors_beside_what_it_predicts(nees, inside):
+    found = predicted_error(flights(nees), "schmidt")
+    assert found.drawn.inside == inside
+    assert found.ratio == pytest.approx(np.sqrt(nees / 2))
+    assert predicted_error(flights(nees, size=4), "schmidt").drawn.high > found.drawn.high
+
+
+def test_the_lenient_band_counts_averages_within_the_bounds_of_single_values():
+    half = flights()
+    half["schmidt", "nees"] = np.where(np.arange(len(half)) % 2, 7.3, 7.5)
+    assert predicted_error(half, "schmidt").inside == 0.5
+
+
+def test_the_curve_is_over_the_deviations_that_each_factor_gives():
+    curve = curve_table(flights())
+    assert curve["sd"].to_numpy() == pytest.approx(1.4 * np.array(FACTORS))
+    assert covariances_table(flights())["sd_yaw"].tolist() == pytest.approx([1.4, 0.005, 0.8])

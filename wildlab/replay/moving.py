@@ -43,8 +43,9 @@ def show_moving(report: Report, flight: Flight, source: str | None = None) -> No
         shown = moving_flight(scene)
     except WildlabError:
         return
-    report.section("The flight, moving", said(scene))
-    report.animation(shown, alt=alt(scene), most_bytes=MOST_BYTES)
+    report.animation(
+        shown, alt=alt(scene), most_bytes=MOST_BYTES, fold="The flight, moving", intro=said(scene)
+    )
 
 
 def moving_flight(scene: ReplayScene) -> ShownFlight:

@@ -109,7 +109,9 @@ def with_glossary(body: str, known: Sequence[Word] | None = None) -> str:
         f'<dt id="{word.anchor}">{escape(word.name)}</dt><dd>{escape(word.text)}</dd>' for word in listed
     )
     section = BeautifulSoup(
-        f'<h2 id="glossary">Words used here</h2><dl class="words">{items}</dl>', "html.parser"
+        f'<details class="plain" id="glossary"><summary>Words used here</summary>'
+        f'<dl class="words">{items}</dl></details>',
+        "html.parser",
     )
     method = soup.find("details", class_="method")
     for part in list(section.contents):

@@ -146,6 +146,10 @@ def _is_wrapper(name: str | None) -> bool:
     return name in _WRAPPERS
 
 
+def _folded(summary: str, html: str) -> str:
+    return f'<details class="plain"><summary>{escape(summary)}</summary>{html}</details>' if html else ""
+
+
 def report_page(
     notebook: nbformat.NotebookNode,
     *,
@@ -192,7 +196,7 @@ def report_page(
         title=heading.get_text(" ", strip=True) if heading else study,
         body=body,
         kicker=" · ".join(filter(None, [f"wildlab › {escape(study)}", escape(made[:10])])),
-        footer=footer + cited,
+        footer=_folded("How to reproduce this page", footer + cited),
     )
     examine(whole, study)
     return whole

@@ -67,7 +67,6 @@ a.word { color: inherit; text-decoration: underline dotted; text-underline-offse
 .words dd { margin: 0 }
 .words dt:target, .words dt:target + dd { background: var(--soft) }
 .get { white-space: nowrap }
-.paper { display: none }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(9.5rem, 1fr)); gap: .75rem;
   margin: 1.3rem 0; padding: 0; list-style: none; max-width: none }
 .tiles li { border: 1px solid var(--line); border-radius: .4rem; padding: .65rem .85rem; margin: 0 }
@@ -159,10 +158,9 @@ footer p { margin: .25rem 0; max-width: none }
   h1, h2, h3 { break-after: avoid }
   figure:not(.table), tr, .summary, .alert, .tiles, .formula, .words > * { break-inside: avoid }
   figcaption { break-before: avoid }
-  /* Paper cannot be unfolded, nor can every browser unfold by style: what is folded is printed as a copy. */
-  details { display: none }
-  .paper { display: block }
-  .paper > p:first-of-type { margin-top: 1rem }
+  /* Paper cannot be unfolded. */
+  details::details-content { content-visibility: visible; block-size: auto }
+  details > summary { list-style: none; font-weight: 600; color: inherit; break-after: avoid }
   .row { gap: 0 5mm }
   .row figure { flex: 1 1 80mm }
   /* Lower than half a page: what has no room leaves less than that empty. */
@@ -193,43 +191,6 @@ def first_look_notice(look: str, again: str) -> str:
     )
 
 
-def paper_copies(body: str) -> str:
-    """What is folded away in ``body``, once more for paper: shown there alone, at the end.
-
-    Parameters
-    ----------
-    body
-        HTML.
-
-    Returns
-    -------
-    str
-        HTML; "" where nothing is folded.
-    """
-    if "<details" not in body:
-        return ""
-    from bs4 import BeautifulSoup  # takes a while, and most that import this module write no page
-
-    soup = BeautifulSoup(body, "html.parser")
-    copies = []
-    for folded in soup.find_all("details"):
-        if folded.find_parent("details") is not None:
-            continue
-        title = folded.summary.extract().decode_contents() if folded.summary is not None else ""
-        for inner in folded.find_all("details"):
-            inner.unwrap()
-        for inner in folded.find_all("summary"):
-            inner.name = "p"
-        for named in folded.find_all(id=True):
-            del named["id"]
-        for box in folded.find_all(tabindex=True):
-            box.attrs = {key: box[key] for key in box.attrs if key not in ("tabindex", "role", "aria-label")}
-        for link in folded.find_all("a", class_="data"):
-            link.decompose()
-        copies.append(f"<p><b>{title}</b></p>{folded.decode_contents()}")
-    return f'\n<section class="paper" aria-hidden="true">{"".join(copies)}</section>'
-
-
 def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: str = "") -> str:
     """A whole HTML document.
 
@@ -242,7 +203,6 @@ def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: st
     style
         CSS that this page has besides `STYLE`.
     """
-    body += paper_copies(body)
     above = f'<p class="kicker">{kicker}</p>\n' if kicker else ""
     below = f"<footer>{footer}</footer>\n" if footer else ""
     rules = f"{STYLE}\n{style}" if style else STYLE

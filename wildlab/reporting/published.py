@@ -132,6 +132,17 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     return pd.DataFrame(published_rows(study, folder), columns=_COLUMNS)
 
 
+def published_values(study: str, folder: Path = FOLDER) -> dict[tuple[str, str], float]:
+    """The published numbers of one study by subject and name; parameters as of `load_published`.
+
+    Examples
+    --------
+    >>> published_values("schmidt-fast-vessel")["ekf", "mae"]
+    9.4
+    """
+    return {(row["subject"], row["name"]): float(row["value"]) for row in published_rows(study, folder)}
+
+
 def quantity_kind(name: str) -> str:
     """What the quantity of that name is: a key of `wildlab.evaluation.replication.KINDS`.
 

@@ -35,9 +35,10 @@ from wildlab.reporting.flight_status import Standing, standing
 from wildlab.reporting.page import TAGS
 from wildlab.reporting.pictures import figure_html
 from wildlab.reporting.published import load_claims, published_rows
+from wildlab.reporting.published_table import LONGEST, claims_table, published_table, sources_of
 from wildlab.reporting.tables import csv_link, table_html
 from wildlab.reporting.text import escape, inline, known, maths, prose, slug
-from wildlab.reporting.verdicts import judge
+from wildlab.reporting.verdicts import compared_number, judge
 
 LEVELS = ("good", "warn", "bad", "neutral")
 #: The pill that goes with a bar's colour.
@@ -222,7 +223,9 @@ class Report:
         """Several ``(fig, name, alt, caption)`` side by side, or one below the other on a phone."""
         self._show(f'<div class="row">{"".join(self._figure(*item) for item in row)}</div>')
 
-    def animation(self, shown: ShownFlight, *, alt: str, most_bytes: int = 1_000_000) -> None:
+    def animation(
+        self, shown: ShownFlight, *, alt: str, most_bytes: int = 1_000_000, fold: str = "", intro: str = ""
+    ) -> None:
         """Show a flight that moves without a script, and stands still on paper and where motion is unwanted.
 
         Parameters
@@ -233,9 +236,14 @@ class Report:
             What a reader who cannot see it should know; never empty.
         most_bytes
             Of the picture.
+        fold, intro
+            The one-line summary behind which it is folded away, and what stands above it.
         """
         drawn = pausable(animated_flight(shown, alt=alt, most_bytes=most_bytes))
-        self._show(f"<style>{PAUSE_STYLE}</style><figure>{drawn}</figure>")
+        html = f"<style>{PAUSE_STYLE}</style><figure>{drawn}</figure>"
+        if fold:
+            html = f"<details><summary>{inline(fold)}</summary><p>{inline(known(intro))}</p>{html}</details>"
+        self._show(html)
 
     def table(
         self,
@@ -275,6 +283,52 @@ class Report:
         html = f'<figure class="table{long}">{box}'
         html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
+
+    def published(
+        self, title: str, caption: str, subjects: Mapping[str, str], quantities: Mapping[str, str]
+    ) -> None:
+        """The section of the published numbers beside those recorded so far; nothing where there are none.
+
+        Parameters
+        ----------
+        title, caption
+            Of the section, and of its table.
+        subjects, quantities
+            Words for the numbers' subjects and names.
+        """
+        recorded = self.recorded
+        rows = list(self._published.values())
+        numbers = [compared_number(row, recorded, self.seeds, self.kind) for row in rows]
+        if not numbers:
+            return
+        about = f"<figcaption>{inline(caption)} {escape(sources_of(numbers))}.</figcaption>"
+        table = published_table(numbers, subjects, quantities)
+        html = f'<figure class="table">{table}{about}</figure>'
+        self.section(title)
+        if len(numbers) > LONGEST:
+            summary = f"{len(numbers)} published numbers beside ours"
+            html = f'<details class="plain"><summary>{summary}</summary>{html}</details>'
+        self._show(html)
+
+    def claims_in_sight(self, title: str, effects: Mapping[str, tuple[str, str]]) -> None:
+        """The section of the claims recorded so far, a line each; nothing where there are none.
+
+        Parameters
+        ----------
+        title
+            Of the section.
+        effects
+            By claim on how much it is true, and by how much what it compares differs, in words.
+        """
+        if not self._claims:
+            return
+        typed = {claim["id"]: claim for claim in load_claims(self.study)}
+        rows = [
+            (one["text"], typed.get(one["id"], {}).get("source", ""), one["verdict"], *effects[one["id"]])
+            for one in self._claims
+        ]
+        self.section(title)
+        self._show(f'<figure class="table">{claims_table(rows)}</figure>')
 
     def files(self, intro: str, links: Sequence[str]) -> None:
         """Files that the page itself hands over, each from `wildlab.reporting.tables.data_link`."""

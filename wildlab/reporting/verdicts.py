@@ -21,6 +21,7 @@ from wildlab.evaluation.replication import (
 )
 from wildlab.evaluation.runs import share_interval
 from wildlab.reporting.published import CALCULATED, MEAN_OF_RUNS, SHARE_OF_IMAGES, quantity_kind
+from wildlab.reporting.status import MISSING, Number
 
 #: What a run recorded, by name and subject: entries of ``metrics.json``.
 Recorded = Mapping[tuple[str, str], Mapping[str, Any]]
@@ -125,6 +126,51 @@ def judge(row: Mapping[str, Any], ours: Recorded) -> Comparison | None:
             power=found.get("power"),
         )
     return replace(compared, difference=here - value, fitted=str(row["fitted"]))
+
+
+def compared_number(row: Mapping[str, Any], ours: Recorded, seeds: int | None, kind: str = "twin") -> Number:
+    """A published number beside ours, with both answers.
+
+    Parameters
+    ----------
+    row, ours
+        As `judge` takes them.
+    seeds
+        How many flights the run is of, where it is of more than one.
+    kind
+        Of the run: of a twin, the runs of one flight are what its bounds are over.
+
+    Returns
+    -------
+    Number
+        Its ``waiting`` is `MISSING` where the run has none.
+    """
+    found, compared = recorded_for(row, ours), judge(row, ours)
+    over = None
+    if found.get("low") is not None:
+        over = found["flights"] or seeds or (found["n"] if kind == "twin" else None)
+    return Number(
+        name=row["name"],
+        subject=row["subject"],
+        unit=row["unit"],
+        source=row["source"],
+        published=abs(float(row["value"])) if row["by_size"] else float(row["value"]),
+        digits=int(row["digits"]),
+        here=found.get("value"),
+        low=found.get("low"),
+        high=found.get("high"),
+        compared=compared,
+        waiting=MISSING if compared is None else "",
+        reason="" if compared is None else compared.reason,
+        kind=row["kind"],
+        ratio=None if compared is None else compared.ratio,
+        below=found.get("below"),
+        power=found.get("power"),
+        by_size=bool(row["by_size"]),
+        again=bool(row["again"]),
+        fitted=row["fitted"],
+        over=over,
+    )
 
 
 def _pair(found: Mapping[str, Any], low: str, high: str, unit: float = 1.0) -> tuple[float, float] | None:

@@ -14,6 +14,8 @@ from wildlab.files import write_atomic
 from wildlab.flight.checksums import confirmed_locations
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, load_flight
+from wildlab.messages.catalogue import Language, load_language
+from wildlab.messages.message import Day
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import load_studies
 from wildlab.sharing.agreement import agreement_words
@@ -22,8 +24,6 @@ from wildlab.sharing.document import Chapter, joined, read_part
 from wildlab.sharing.edition.edition import Place, edition_html
 from wildlab.sharing.edition.facts import facts_of
 from wildlab.sharing.edition.flight_map import map_of
-from wildlab.sharing.edition.language import Language, load_language
-from wildlab.sharing.edition.said import Day
 from wildlab.sharing.generalise import Generalised, generalise
 from wildlab.sharing.package import (
     OPENED_WITH,

@@ -32,7 +32,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -43,6 +43,7 @@ from wildlab.errors import WildlabError
 
 if TYPE_CHECKING:
     from wildlab.evaluation.shares import Check
+    from wildlab.studies.page import Facts
 
 #: The parameter of `run_trial` that moves the twins.
 VARIED = "varied"
@@ -78,6 +79,9 @@ class Study:
         -> what the flights give for each claim, by the claim's id: a `Check`, or (flights,) bools.
     metric_of
         Subject and name of a number of the trial -> its metric; None where it is recorded as none.
+    answer
+        What was recorded (`wildlab.studies.page.Facts`) -> keys of the sentences of
+        ``data/messages/en/<case>.toml`` that answer the page's question, the most important first.
     """
 
     case: str
@@ -85,6 +89,7 @@ class Study:
     trial: Callable[..., Numbers] | None = None
     check_claims: Callable[..., Mapping[str, Check] | Mapping[str, ArrayLike]] | None = None
     metric_of: Callable[[str, str], Metric | None] | None = None
+    answer: Callable[[Facts], Sequence[str]] | None = None
 
     @property
     def parameters(self) -> tuple[str, ...]:

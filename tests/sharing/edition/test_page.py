@@ -21,12 +21,13 @@ from tests.sharing.left import leave_report
 from wildlab.analysis.georeference import observe
 from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import georeference_pixels
+from wildlab.messages.catalogue import load_language
+from wildlab.messages.message import Day
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.page import POLICY
 from wildlab.sharing.edition.edition import Place, edition_html
 from wildlab.sharing.edition.facts import Alarm
 from wildlab.sharing.edition.flight_map import map_of
-from wildlab.sharing.edition.language import load_language
 from wildlab.sharing.edition.make import make_edition
 from wildlab.sharing.edition.picture import (
     FOOT,
@@ -37,7 +38,6 @@ from wildlab.sharing.edition.picture import (
     nice_length,
     picture_html,
 )
-from wildlab.sharing.edition.said import Day
 
 MAP = MapPicture(
     np.array([[0.0, 0.0], [0.0, 400.0], [300.0, 400.0], [300.0, 0.0]]),

@@ -12,9 +12,9 @@ from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from wildlab.analysis.overviews.alarms import ALARMS
 from wildlab.analysis.overviews.recommendations import CAUSES
 from wildlab.analysis.overviews.verdict import PARTS, Verdict
+from wildlab.messages.catalogue import languages, load_language, say
+from wildlab.messages.message import Message, length
 from wildlab.sharing.edition.facts import _TROUBLES, Alarm, Facts, Gain
-from wildlab.sharing.edition.language import languages, load_language, say
-from wildlab.sharing.edition.said import Message, length
 from wildlab.sharing.edition.sentences import STEP_M, Story, steps_of, tell
 
 LANGUAGES = [load_language(code) for code in languages()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,8 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.published import FOLDER, load_claims, published_rows
-from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus, look_words
-from wildlab.reporting.verdicts import judge, recorded_for
+from wildlab.reporting.status import FIRST_LOOK, Claim, Number, StudyStatus, look_words
+from wildlab.reporting.verdicts import compared_number
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.record.digests import BEFORE_DIGESTS, STATUS, has_digests, read_status
 
@@ -93,46 +93,16 @@ def _status(folder: Path) -> dict[str, Any]:
 
 def _numbers(study: StudyEntry, metrics: dict[str, Any] | None, state: str, published: Path) -> list[Number]:
     ours = {(entry["name"], entry["subject"]): entry for entry in metrics["metrics"]} if metrics else {}
-    rows = published_rows(study.name, published)
+    seeds, kind = (metrics["seeds"], metrics["kind"]) if metrics else (None, "twin")
     numbers = []
-    for row in rows:
-        found, compared = recorded_for(row, ours), judge(row, ours)
-        if compared is None:
-            waiting, reason = MISSING, _reason(study, row["name"], row["subject"], state)
-        else:
-            waiting, reason = FIRST_LOOK if state == FIRST_LOOK else "", compared.reason
-        numbers.append(
-            Number(
-                name=row["name"],
-                subject=row["subject"],
-                unit=row["unit"],
-                source=row["source"],
-                published=abs(float(row["value"])) if row["by_size"] else float(row["value"]),
-                digits=int(row["digits"]),
-                here=found.get("value"),
-                low=found.get("low"),
-                high=found.get("high"),
-                compared=compared,
-                waiting=waiting,
-                reason=reason,
-                kind=row["kind"],
-                ratio=None if compared is None else compared.ratio,
-                below=found.get("below"),
-                power=found.get("power"),
-                by_size=bool(row["by_size"]),
-                again=bool(row["again"]),
-                fitted=row["fitted"],
-                over=_over(metrics, dict(found)),
-            )
-        )
+    for row in published_rows(study.name, published):
+        number = compared_number(row, ours, seeds, kind)
+        if number.waiting:
+            number = replace(number, reason=_reason(study, row["name"], row["subject"], state))
+        elif state == FIRST_LOOK:
+            number = replace(number, waiting=FIRST_LOOK)
+        numbers.append(number)
     return numbers
-
-
-def _over(metrics: dict[str, Any] | None, found: dict[str, Any]) -> int | None:
-    """Over how many flights, or runs of one, the bounds of a number are; None where they are none such."""
-    if metrics is None or found.get("low") is None:
-        return None
-    return found["flights"] or metrics["seeds"] or (found["n"] if metrics["kind"] == "twin" else None)
 
 
 def _reason(study: StudyEntry, name: str, subject: str, state: str) -> str:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wildlab.analysis.overviews.verdict import Verdict
+from wildlab.messages.catalogue import Language, load_language, of_unflown, say
+from wildlab.messages.message import Day, Message, Value, length
 from wildlab.reporting.page import POLICY
 from wildlab.reporting.text import escape, inline
 from wildlab.sharing.edition.facts import Facts
-from wildlab.sharing.edition.language import Language, load_language, of_unflown, say
 from wildlab.sharing.edition.picture import IN_STEPS, ImagePicture, MapPicture, picture_html
-from wildlab.sharing.edition.said import Day, Message, Value, length
 from wildlab.sharing.edition.sentences import Story, tell
 from wildlab.sharing.edition.style import STYLE
 

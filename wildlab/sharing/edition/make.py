@@ -6,12 +6,12 @@ from pathlib import Path
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
+from wildlab.messages.catalogue import Language
+from wildlab.messages.message import Day
 from wildlab.runner.record.own_flights import own_flights
 from wildlab.sharing.edition.edition import Place, edition_html
 from wildlab.sharing.edition.facts import facts_of
 from wildlab.sharing.edition.flight_map import map_of
-from wildlab.sharing.edition.language import Language
-from wildlab.sharing.edition.said import Day
 
 
 def make_edition(

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.messages.catalogue import Language, say
+from wildlab.messages.message import Message, length, number
 from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.text import escape
 from wildlab.sharing.edition.facts import Facts
-from wildlab.sharing.edition.language import Language, say
-from wildlab.sharing.edition.said import Message, length, number
 from wildlab.sharing.edition.sentences import MEDIAN_DISTANCE, STEP_M
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ def picture_html(picture: MapPicture | ImagePicture | None, facts: Facts, langua
     facts
         Of the flight.
     language
-        From `wildlab.sharing.edition.language.load_language`.
+        From `wildlab.messages.catalogue.load_language`.
 
     Returns
     -------

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from wildlab.analysis.overviews.recommendations import MOST
 from wildlab.analysis.overviews.verdict import WORTH, Verdict
+from wildlab.messages.message import Message, Quantity, Value, duration, length, number, share
 from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.tracking import NEAR_THE_BAND
 from wildlab.sharing.edition.facts import Alarm, Facts, Gain
-from wildlab.sharing.edition.said import Message, Quantity, Value, duration, length, number, share
 
 #: A step of somebody who walks, m, and beyond how many nobody counts them.
 STEP_M, MOST_STEPS = 0.75, 200

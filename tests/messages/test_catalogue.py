@@ -13,14 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.sharing.edition.language import (
+from wildlab.messages.catalogue import (
     FOLDER,
     languages,
     load_language,
     placeholders,
     say,
 )
-from wildlab.sharing.edition.said import Day, Message, Quantity, duration, length, number, share
+from wildlab.messages.message import Day, Message, Quantity, duration, length, number, share
 
 ENGLISH = FOLDER / "en.toml"
 SPACE = "\u00a0"

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_toml
+from wildlab.messages.message import Day, Message, Quantity, Value
 from wildlab.paths import DATA
-from wildlab.sharing.edition.said import Day, Message, Quantity, Value
 
 #: Where the files are, one for each language, named by its code.
 FOLDER = DATA / "edition"

@@ -1,0 +1,73 @@
+"""Which sentences answer a study's question: rules on numbers, tried on facts that say the opposite."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from wildlab.messages.page_texts import FOLDER, load_texts
+from wildlab.studies.page import Facts
+from wildlab.studies.protocol import case_names, find_case
+
+#: Recorded numbers by "subject/name" (a number, or an entry), and claims' verdicts by their id -> the keys of
+#: the sentences.
+Case = tuple[Mapping[str, Any], tuple[str, ...]]
+
+
+def moments(schmidt: float, ekf: float, n: int = 100) -> dict[str, Any]:
+    """Mean NEES of one moment of each of ``n`` flights, with poses as calibrated."""
+    return {
+        "schmidt-estimated/mean_of_drawn_nees": {"value": schmidt, "n": n},
+        "ekf/mean_of_drawn_nees": {"value": ekf, "n": n},
+    }
+
+
+ANSWERS: dict[str, list[Case]] = {
+    "schmidt": [
+        (moments(2.0, 2.1), ("schmidt-consistent", "ekf-consistent")),
+        (moments(2.9, 2.9), ("schmidt-nearly", "ekf-nearly")),
+        (moments(20.0, 18.0), ("schmidt-overconfident", "ekf-overconfident")),
+        (moments(0.5, 0.4), ("schmidt-conservative", "ekf-conservative")),
+        (moments(2.9, 18.0, n=3), ("schmidt-consistent", "ekf-overconfident")),
+        ({}, ("schmidt-unknown", "ekf-unknown")),
+    ],
+}
+CASES = [name for name in case_names() if find_case(name).answer is not None]
+
+
+def facts_of(given: Mapping[str, Any]) -> Facts:
+    recorded = {}
+    for key, value in given.items():
+        if "/" in key:
+            subject, name = key.split("/")
+            recorded[name, subject] = value if isinstance(value, Mapping) else {"value": value}
+    return Facts(recorded, {key: value for key, value in given.items() if "/" not in key})
+
+
+@pytest.mark.parametrize(
+    ("case", "given", "keys"), [(c, *one) for c, many in ANSWERS.items() for one in many]
+)
+def test_the_facts_choose_the_sentences(case, given, keys):
+    answer = find_case(case).answer
+    assert answer is not None
+    assert tuple(answer(facts_of(given))) == keys
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_sentence_can_be_chosen_and_every_chosen_one_is_there(case):
+    chosen = {key for _, keys in ANSWERS[case] for key in keys}
+    assert chosen == set(load_texts(case).answers)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_facts_that_are_not_known_choose_a_sentence_that_needs_none(case):
+    answer = find_case(case).answer
+    assert answer is not None
+    texts = load_texts(case)
+    assert all("{" not in texts.answers[key] for key in answer(facts_of({})))
+
+
+def test_every_page_of_a_study_is_a_cases():
+    assert {path.stem for path in FOLDER.glob("*.toml")} <= set(case_names())

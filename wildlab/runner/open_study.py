@@ -1,0 +1,204 @@
+"""A study while its notebook runs: its flight, its simulated flights, its report and its page.
+
+::
+
+    study = open_study("schmidt-fast-vessel", seeds=5)
+    compared = schmidt.compare_flight(study.data, study.seed)     # one flight
+    runs = study.runs(schmidt.summarise(compared))                # the same of every seed
+    study.record(runs)
+    study.show(figures=[...], checks=schmidt.check_claims(runs))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
+from wildlab.flight.store import Flight
+from wildlab.messages.page_texts import PageTexts, load_texts
+from wildlab.replay.moving import show_moving
+from wildlab.reporting.report import Report, open_report
+from wildlab.runner import vary
+from wildlab.runner.by_hand import flights_for
+from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
+from wildlab.runner.trials import trials_table
+from wildlab.studies.monte_carlo import record_spread
+from wildlab.studies.page import Shown, show_page, show_twins
+from wildlab.studies.protocol import Study, find_case
+
+
+def open_study(
+    study: str,
+    *,
+    flight: str = "",
+    others: Sequence[str] = (),
+    seed: int = 1,
+    seeds: int | None = None,
+    out: str = "",
+) -> OpenStudy:
+    """Begin a study's notebook.
+
+    Parameters
+    ----------
+    study
+        Its name in ``studies.toml``.
+    flight, others
+        Folders of its flights, as the runner gives them; left out, its twin is simulated for ``seed``, or its
+        data set is imported.
+    seed
+        Of the flight that the figures show, or of whatever is drawn at random.
+    seeds
+        How many simulated flights the numbers are of.
+    out
+        Folder of the report; "" (a notebook opened by hand) writes nothing.
+
+    Returns
+    -------
+    OpenStudy
+
+    Raises
+    ------
+    WildlabError
+        If there is no such study.
+
+    Examples
+    --------
+    >>> open_study("consistency-bounds").case.case
+    'consistency-bounds'
+    """
+    entry = find_study(study, load_studies())
+    if entry.case is None:
+        raise WildlabError(f"the study {study!r} is of no case", "name its case", field="case")
+    return OpenStudy(entry, find_case(entry.case), flight, tuple(others), seed, seeds, out)
+
+
+class OpenStudy:
+    """A study while its notebook runs; see the module. Make one with `open_study`."""
+
+    def __init__(
+        self,
+        entry: StudyEntry,
+        case: Study,
+        flight: str,
+        others: Sequence[str],
+        seed: int,
+        seeds: int | None,
+        out: str,
+    ) -> None:
+        self.entry, self.case, self.seed, self.seeds, self.out = entry, case, seed, seeds, out
+        self._folders = flight, others
+
+    @cached_property
+    def flights(self) -> list[Flight]:
+        """Its flights, the one that the figures show first; none where it is a calculation."""
+        if self.entry.kind == "computed":
+            return []
+        return flights_for(self.entry.name, self._folders[0], self._folders[1], self.seed)
+
+    @property
+    def data(self) -> Flight:
+        """The flight that the figures show."""
+        return self.flights[0]
+
+    @cached_property
+    def report(self) -> Report:
+        """Its report."""
+        first = self.flights[0] if self.flights else None
+        return open_report(
+            study=self.entry.name,
+            flight="" if first is None else first.name,
+            kind=self.entry.kind if first is None else first.manifest.kind,
+            seed=self.seed,
+            seeds=self.seeds,
+            out=self.out,
+        )
+
+    @cached_property
+    def texts(self) -> PageTexts:
+        """What its page says."""
+        return load_texts(self.case.case)
+
+    @property
+    def twin(self) -> str:
+        """The twin that the flight is simulated by."""
+        return str(self.data.manifest.twin.name) if self.data.manifest.twin else ""
+
+    def runs(self, drawn: Mapping[tuple[str, str], float], **parameters: Any) -> pd.DataFrame:
+        """What the case's trial gives on each flight: columns (subject, name), a row for each seed.
+
+        Parameters
+        ----------
+        drawn
+            The same numbers of the flight that the figures show, which is the first row.
+        parameters
+            The trial's, besides its twin.
+        """
+        if "twin" in self.case.parameters:
+            parameters.setdefault("twin", self.twin)
+        return trials_table(
+            self.case.case,
+            self.seeds or 1,
+            study=self.entry.name,
+            seed=self.seed,
+            drawn=drawn,
+            out=self.out,
+            **parameters,
+        )
+
+    def record(self, runs: pd.DataFrame, n: Mapping[str, int] | None = None) -> None:
+        """Record what all flights give, by the case's metrics; ``n``: how many observations a subject has."""
+        record_spread(self.report, self.case, runs, dict(n or {}))
+
+    def show(
+        self,
+        figures: Sequence[Shown],
+        checks: Mapping[str, Check | ArrayLike] | None = None,
+        tables: Mapping[str, pd.DataFrame] | None = None,
+        values: Mapping[str, Any] | None = None,
+        twins: Sequence[str] = (),
+    ) -> None:
+        """Show the page (`wildlab.studies.page.show_page`), and write its numbers.
+
+        Parameters
+        ----------
+        figures, checks, tables, values
+            As of `show_page`.
+        twins
+            Whose parameters are listed besides those of the flight's own twin.
+        """
+        count = self.seeds or 1
+        words = f"{count} simulated flights" if count > 1 else "one simulated flight"
+        given = {"flights": words, "seed": self.seed, **(values or {})}
+        if self.case.answer is None:
+            raise WildlabError(f"the case {self.case.case!r} gives no answer", "give its Study one")
+        show_page(
+            self.report,
+            self.texts,
+            title=self.entry.title,
+            answer=self.case.answer,
+            figures=figures,
+            checks=checks,
+            tables=tables,
+            values=given,
+            thesis="F" if self.entry.section.startswith("F") else "H",
+        )
+        own = (self.twin,) if self.flights and self.twin else ()
+        if own or twins:
+            show_twins(self.report, [*own, *(one for one in twins if one not in own)], self.entry.name)
+        kept = vary.kept_table(self.entry.name, self.out)
+        if kept is not None:
+            self.report.table(
+                kept[0],
+                columns=vary.COLUMNS,
+                digits={"factor": 2, "turned": 0},
+                fold="Verdicts that turn where chosen parameters are moved",
+            )
+        if self.flights:
+            show_moving(self.report, self.data)
+        self.report.save()

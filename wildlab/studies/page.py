@@ -1,0 +1,220 @@
+"""The one form of a study's page: answer, main figure, numbers, published and ours, claims, figures.
+
+A study computes; its texts lie in ``data/messages/en/<case>.toml`` (`wildlab.messages.page_texts`). What is
+recorded (`wildlab.reporting.report.Report.metric`) are the facts from which the texts' numbers come, and by
+which the study's ``answer`` chooses its sentences.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import pandas as pd
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from wildlab.evaluation.shares import HOLDS, Check
+from wildlab.messages.page_texts import FORMS, PageTexts, TileText, fill
+from wildlab.reporting.report import Report
+from wildlab.studies.fit_and_prediction import simulated_section
+from wildlab.studies.monte_carlo import CLAIM_COLUMNS, CLAIMS_EXPLAINED, decide_claims
+
+PUBLISHED_CAPTION = (
+    "Close: our median is within a factor of 1.25. Within: the published flight could be one more of ours. "
+    "✓ yes, ✗ no, ? undecided. Published in"
+)
+
+
+_FIGURE = re.compile(r"fig-([0-9a-c])-([0-9]+[a-z]?)")
+
+
+class Shown(NamedTuple):
+    """A figure, the key of its texts, and its file's name where that is another. The text's title is put over
+    its first axes."""
+
+    fig: Figure
+    text: str
+    name: str = ""
+
+
+class Facts:
+    """What a study has recorded, for the rules that choose its sentences; NaN where something is not known.
+
+    Examples
+    --------
+    >>> facts = Facts({("mae", "ekf"): {"value": 9.4, "low": 5.0, "high": 14.0}}, {"nis-similar": "holds"})
+    >>> facts.value("ekf", "mae"), facts.holds("nis-similar")
+    (9.4, True)
+    """
+
+    def __init__(
+        self, recorded: Mapping[tuple[str, str], Mapping[str, Any]], verdicts: Mapping[str, str]
+    ) -> None:
+        self.recorded, self.verdicts = recorded, verdicts
+
+    def value(self, subject: str, name: str, what: str = "value") -> float:
+        """A recorded number, or another entry of it: ``low``, ``high``, ``centre_low``, ``n``."""
+        found = self.recorded.get((name, subject), {}).get(what)
+        return math.nan if found is None else float(found)
+
+    def holds(self, *claims: str) -> bool:
+        """Whether all of these claims hold."""
+        return all(self.verdicts.get(one) == HOLDS for one in claims)
+
+
+Answer = Callable[[Facts], Sequence[str]]
+
+
+def show_page(
+    report: Report,
+    texts: PageTexts,
+    *,
+    title: str,
+    answer: Answer,
+    figures: Sequence[Shown],
+    checks: Mapping[str, Check | ArrayLike] | None = None,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    values: Mapping[str, Any] | None = None,
+    thesis: str = "H",
+) -> None:
+    """Write a study's page from what its report has recorded.
+
+    Parameters
+    ----------
+    report
+        With every number recorded that the page shows.
+    texts
+        Of the page; every sentence, caption and limit is one of them.
+    title
+        The question that the page answers.
+    answer
+        What is recorded -> keys of the sentences that answer it, most important first.
+    figures
+        The first is the page's main figure; the others stand two by two.
+    checks
+        By claim what the flights give for it; None where the study tests none.
+    tables
+        Further tables by the key of their texts.
+    values
+        What placeholders without a subject stand for.
+    thesis
+        Whose figures the figures' names number: "H" or "F".
+
+    Raises
+    ------
+    KeyError
+        If a text, or a number that one names, is missing: a fault of the study.
+    """
+    known = dict(values or {})
+    decided = None if checks is None else decide_claims(report, report.study, checks)
+
+    def say(text: str) -> str:
+        return fill(text, report.recorded, known)
+
+    facts = Facts(report.recorded, {one["id"]: one["verdict"] for one in report.claims})
+    report.head(title, say(texts.subtitle))
+    sentences = {key: say(text) for key, text in texts.answers.items()}
+    report.summary([sentences[key] for key in answer(facts)])
+    report.tiles([_tile(report, one, say) for one in texts.tiles])
+    first, *others = figures
+    fig, name, alt, caption = _captioned(first, texts, say, thesis)
+    report.figure(fig, name=name, alt=alt, caption=caption, main=True)
+    report.published("Published and here", PUBLISHED_CAPTION, texts.subjects, texts.quantities)
+    if decided is not None and len(decided):
+        _claims(report, decided)
+    for key, frame in (tables or {}).items():
+        if texts.tables[key].open:
+            _table(report, key, frame, texts, say)
+    if others:
+        report.section("Figures")
+    for i in range(0, len(others), 2):
+        report.figures([_captioned(one, texts, say, thesis) for one in others[i : i + 2]])
+    report.limits([say(one) for one in texts.limits])
+    report.section("Details")
+    if decided is not None and len(decided):
+        _premises(report, decided)
+    for key, frame in (tables or {}).items():
+        if not texts.tables[key].open:
+            _table(report, key, frame, texts, say)
+    report.method(say_method(texts.method))
+
+
+def say_method(method: str) -> str:
+    """The method with the rule of claims, which all studies share."""
+    return f"{method}\n\n{CLAIMS_EXPLAINED}" if method else CLAIMS_EXPLAINED
+
+
+def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
+    """What was simulated: each twin's parameters, folded away."""
+    simulated_section(report, *twins, study=study)
+
+
+def _tile(report: Report, tile: TileText, say: Callable[[str], str]) -> tuple[str, str]:
+    entry = report.recorded[tile.name, tile.subject]
+    words = say(tile.text)
+    low, high = entry.get("low"), entry.get("high")
+    if low is not None and high is not None:
+        ends = (
+            FORMS["percent" if tile.form == "percent" else "number"]({**entry, "value": end})
+            for end in (low, high)
+        )
+        words += f" ({' to '.join(ends)})"
+    printed = report.printed(tile.name, tile.subject)
+    if printed is not None:
+        words += f"; published {printed['value']:g}"
+    return FORMS[tile.form](entry), words
+
+
+def _captioned(
+    one: Shown, texts: PageTexts, say: Callable[[str], str], thesis: str
+) -> tuple[Figure, str, str, str]:
+    text = texts.figures[one.text]
+    if text.title:
+        one.fig.axes[0].set_title(say(text.title))
+    name = one.name or one.text
+    return one.fig, name, say(text.alt), f"{say(text.caption)} {counterpart(name, thesis)}".strip()
+
+
+def counterpart(name: str, thesis: str) -> str:
+    """The figure of a thesis that a file of that name answers to, as the end of a caption.
+
+    Examples
+    --------
+    >>> counterpart("fig-7-19a", "H"), counterpart("fig-b-02", "F"), counterpart("track-map", "H")
+    ('H figure 7.19a.', 'F figure B.2.', '')
+    """
+    found = _FIGURE.fullmatch(name)
+    return f"{thesis} figure {found[1].upper()}.{found[2].lstrip('0')}." if found else ""
+
+
+def _table(
+    report: Report, key: str, frame: pd.DataFrame, texts: PageTexts, say: Callable[[str], str]
+) -> None:
+    text = texts.tables[key]
+    columns = {name: say(heading) for name, heading in text.columns.items()} or None
+    if text.open:
+        report.section(say(text.title))
+    report.table(
+        frame,
+        columns=columns,
+        digits=text.digits or None,
+        caption=say(text.caption),
+        fold="" if text.open else say(text.title),
+    )
+
+
+def _claims(report: Report, decided: pd.DataFrame) -> None:
+    effects = {
+        one["id"]: (row["share"], row["difference"])
+        for one, row in zip(report.claims, decided.to_dict("records"), strict=True)
+    }
+    report.claims_in_sight("Claims of the thesis", effects)
+
+
+def _premises(report: Report, decided: pd.DataFrame) -> None:
+    if (decided["premise"].astype(bool) | decided["threshold"].astype(bool)).any():
+        columns = {name: CLAIM_COLUMNS[name] for name in ("claim", "premise", "threshold")}
+        report.table(decided, columns=columns, fold="Premises and thresholds of the claims")
