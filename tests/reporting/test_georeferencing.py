@@ -16,16 +16,12 @@ import pytest
 from bs4 import BeautifulSoup
 
 from wildlab.analysis.georeference import georeference, observe
-from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
+from wildlab.messages.page_texts import load_texts
 from wildlab.reporting import georeferencing
-from wildlab.reporting.georeferencing import noise_table
-from wildlab.reporting.georeferencing_left import remaining_parts
-from wildlab.reporting.georeferencing_points import COLUMNS, points_section
-from wildlab.reporting.ground import level_sentence
-from wildlab.reporting.known_positions import EXACT, known_limits, known_positions, offset_sentence
+from wildlab.reporting.georeferencing import EXACT, POINT_COLUMNS, point_links, truth_kinds
 from wildlab.reporting.report import Report, open_report
 from wildlab.simulation.twins import simulate_twin
 
@@ -57,22 +53,14 @@ def test_metrics_have_the_promised_names(report):
 def test_noise_is_shown_in_degrees():
     noise = PoseNoise(dict.fromkeys(KINDS, np.radians(2.0)), dict.fromkeys(KINDS, 1.5))
     units = ("position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg", "pixel_px")
-    table = georeferencing.noise_table(noise, dict.fromkeys(units, 1)).set_index("what")
-    assert table.loc["heading", "estimated"] == pytest.approx(2.0) and len(table) == len(KINDS)
+    table = georeferencing.noise_table(noise, dict.fromkeys(units, 1))
+    heading = table[table["unit"] == "deg"]["estimated"]
+    assert heading.tolist() == pytest.approx([2.0, 2.0]) and len(table) == len(KINDS)
 
 
-def test_too_few_points_are_not_praised():
-    few, many = summarise(np.ones((3, 2))), summarise(np.ones((20, 2)))
-    assert len(georeferencing.headline(few, 3)) == 3 and len(georeferencing.headline(many, 20)) == 1
-    assert "20 of 25" in georeferencing.headline(many, 25)[0]
-    assert georeferencing.headline(summarise(np.empty((0, 2))), 25) == []
-
-
-def test_the_title_of_the_scatter_follows_the_bias():
-    wide = summarise(np.random.default_rng(0).normal(size=(200, 2)))
-    off = summarise(np.tile([3.0, 4.0], (9, 1)))
-    assert "5.0 m" in georeferencing.scatter_title(off) and " m" not in georeferencing.scatter_title(wide)
+def test_the_range_of_views():
     assert georeferencing.span([50.6, 111.2, np.nan]) == "51 to 111"
+    assert georeferencing.short_length(0.4) == "40 cm" and georeferencing.short_length(5.06) == "5.1 m"
 
 
 def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():
@@ -83,8 +71,6 @@ def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():
         "Flight-1-again",
         "north-gate",
     ]
-    assert "north gate" not in georeferencing.unlabelled_words(["north gate"], shown=False)[0]
-    assert "40" not in georeferencing.vertical_words(40.3)
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +94,7 @@ def handed_over(report: Report) -> dict[str, bytes]:
 def shown(made: tuple[Flight, Any], sensitivity: str) -> Report:
     flight, points = made
     report = open_report(study="mine", kind="twin")
-    points_section(report, with_locations(flight, sensitivity), points, "autopilot")
+    report.files("", point_links(with_locations(flight, sensitivity), points, "autopilot"))
     return report
 
 
@@ -118,7 +104,7 @@ def test_metres_alone_are_handed_over_where_places_are_not_open(made, sensitivit
     files = handed_over(shown(made, sensitivity))
     assert list(files) == ["points.csv"]
     table = pd.read_csv(io.BytesIO(files["points.csv"]))
-    assert tuple(table) == COLUMNS and len(table) == len(points)
+    assert tuple(table) == POINT_COLUMNS and len(table) == len(points)
     np.testing.assert_allclose(table["north_m"], points["north_m"], atol=6e-4)
     np.testing.assert_allclose(table["east_m"], points["east_m"], atol=6e-4)
     assert table["seconds"].min() == 0
@@ -144,9 +130,6 @@ def test_places_are_handed_over_where_they_are_open(made):
     np.testing.assert_allclose(found, np.stack([longitude, latitude], axis=1), atol=2e-8)
 
 
-SCATTER = Scatter(0.1, 0.3, 0.6, *(np.array([a, a]) for a in (0.6, 3.0, 1.2)), 4.7)
-
-
 def flown(kind="logged", **columns):
     truth = pd.DataFrame({"target_id": ["m1", "m2", "walker", "walker"],
                           "time_s": [np.nan, np.nan, 1.0, 2.0], **columns})  # fmt: skip
@@ -157,55 +140,40 @@ def scored(*names):
     return pd.DataFrame({"truth_id": names})
 
 
-WALK = known_positions(flown(), scored("walker", "walker", "m1"))
-MARKS = known_positions(flown(), scored("m1", "m1", "m2"))
+def test_points_are_counted_by_what_they_are_compared_with():
+    assert truth_kinds(flown(), scored("walker", "walker", "m1"))[:2] == (1, 2)
+    assert truth_kinds(flown(), scored("m1", "m1", "m2"))[:2] == (3, 0)
+    reported = truth_kinds(flown(sd_horizontal_m=[0.02, np.nan, 1.4, 1.6]), scored("walker", "m1"))
+    assert reported[2:] == (0.02, pytest.approx(1.5))
+    assert truth_kinds(flown("twin"), scored("walker")) == EXACT
 
 
-def test_points_are_counted_by_what_they_are_held_against():
-    assert WALK[:4] == (1, 2, 1, 1) and MARKS[:4] == (3, 0, 2, 0)
-    stated = known_positions(flown(sd_horizontal_m=[0.02, np.nan, 1.4, 1.6]), scored("walker", "m1"))
-    assert stated[4:] == (0.02, pytest.approx(1.5))
-    assert known_positions(flown("twin"), scored("walker")) == EXACT
-
-
-def test_marks_and_tracks_are_told_apart():
-    stated = known_positions(flown(sd_horizontal_m=[0.02, np.nan, 1.4, 1.6]), scored("walker"))
-    for known, numbers in ((WALK, ["2 points", "One point"]), (MARKS, ["3 points"]), (stated, ["1.5 m"])):
-        limits = known_limits(known)
-        assert [number in one for number, one in zip(numbers, limits, strict=True)] == [True] * len(numbers)
-    assert known_limits(EXACT) == []
-
-
-def test_clicks_and_lens_are_not_blamed_for_the_target_s_receiver():
-    noise = PoseNoise(dict.fromkeys(KINDS, 0.1), dict.fromkeys(KINDS, 1.5))
-    assumed = dict.fromkeys(("position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg"), 1.0)
-    for known in (WALK, MARKS, EXACT):
-        table = noise_table(noise, {**assumed, "pixel_px": 1.0}, known)
-        for text in (" ".join(table["what"]), " ".join(remaining_parts(SCATTER, known))):
-            assert ("receiver" in text) == (known is WALK)
-
-
-def corrected(offset, kind="logged"):
-    clocks = SimpleNamespace(camera_offset_s=offset)
-    return offset_sentence(SimpleNamespace(manifest=SimpleNamespace(kind=kind, clocks=clocks)))
+def limits_with(offset=0.0, kind="logged", truth=EXACT, certain=False, halves=False, lost=0):
+    manifest = SimpleNamespace(
+        kind=kind, clocks=SimpleNamespace(camera_offset_s=offset), time=SimpleNamespace(kind="utc"),
+        vertical=SimpleNamespace(correction_m=0.0),
+    )  # fmt: skip
+    flight = SimpleNamespace(manifest=manifest, pose_source=lambda _: ("nav", []))
+    found = SimpleNamespace(
+        diagnosis=SimpleNamespace(counts=certain), nearest=None, lost=lost, scored=range(100),
+        halves=SimpleNamespace(disagree=halves),
+    )  # fmt: skip
+    return {one.key: dict(one.values) for one in georeferencing.limits(flight, found, truth, [], None)}
 
 
 def test_an_offset_of_the_camera_s_clock_is_parted_from_its_zone():
-    assert "+1.58 s" in corrected(-45898.42) and "-12.75 h" in corrected(-45898.42)
-    assert "-0.40 s" in corrected(-0.4) and " h" not in corrected(-0.4).partition("s")[0]
+    assert limits_with(-45898.42)["limit-clock-fitted"] == {"offset": "+1.58"}
+    assert limits_with(-0.4)["limit-clock-fitted"] == {"offset": "-0.40"}
     # A zone is read from the hours of the flight, and no point is fitted.
-    assert corrected(0.0) == corrected(-45900.0) == corrected(0.4, "twin") == ""
+    for said in (limits_with(0.0), limits_with(-45900.0), limits_with(0.4, "twin")):
+        assert "limit-clock-fitted" not in said
 
 
-@pytest.mark.parametrize(
-    ("terrain", "level", "interval", "words"),
-    [
-        (2.0, 5.0, (1.0, 4.0), "the terrain is nearer"),
-        (5.0, 2.0, (-4.0, -1.0), "level ground is nearer"),
-        (5.0, 4.0, (-2.0, 1.0), "not decide"),
-        (5.0, 4.0, (np.nan, np.nan), "too few"),
-    ],
-)
-def test_which_is_nearer_follows_the_interval(terrain, level, interval, words):
-    said = level_sentence(terrain, level, 30, interval)
-    assert words in said and (f"{level - terrain:+.2f} m" in said) == (words != "too few")
+def test_limits_are_those_that_apply_and_five_at_most():
+    receiver = EXACT._replace(tracked=3, track_sd_m=1.5)
+    assert limits_with(truth=receiver)["limit-track"] == {"sd": "1.5 m"}
+    assert not {"limit-track", "limit-mark", "limit-wander", "limit-halves"} & set(limits_with())
+    every = limits_with(1.0, truth=receiver._replace(marked=1), certain=True, halves=True, lost=2)
+    assert len(every) == 5 and "limit-lost" in every and "limit-lost" not in limits_with(lost=21)
+    texts = load_texts("georeferencing").answers
+    assert {key for key in every | limits_with()} <= set(texts)

@@ -1,5 +1,6 @@
 """What is named as a cause follows from its measured gain, and the verdict from gain, losses and ellipses."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,9 +18,9 @@ from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.outliers import Outlier
 from wildlab.evaluation.runs import Interval
 from wildlab.geometry.calibration import Calibration
-from wildlab.reporting import georeferencing_cause as cause
-from wildlab.reporting import georeferencing_left as left
-from wildlab.reporting.georeferencing_sections import verdict_words
+from wildlab.messages.page_texts import load_texts
+from wildlab.reporting import georeferencing as page
+from wildlab.reporting.ground import terrain_message
 from wildlab.reporting.report import open_report
 
 MANY = summarise(np.tile([3.0, 4.0], (50, 1)))
@@ -34,7 +35,7 @@ def model(causes, without=10.0, with_=10.0, half=0.5, undetermined=None):
         causes=tuple(causes), name=" and ".join(causes) or "nothing",
         fit=SimpleNamespace(names=names, undetermined=undetermined or {}),
         gain=Gain(without, with_, Interval(gain, gain - half, gain + half)),
-        held=np.zeros((4, 2)), chance=0.0,
+        held=np.zeros((20, 2)), chance=0.0,
         gain_of_all=Gain(without, with_, Interval(gain, gain - 20.0, gain + 20.0)),
     )  # fmt: skip
 
@@ -71,19 +72,24 @@ FAR = Outlier("mark", "", "M7", 8, 25.0)
 
 
 @pytest.mark.parametrize(
-    ("winner", "word"),
+    ("winner", "key"),
     [
-        (MOST, "Most"),
-        (PART, "Part"),
-        (LITTLE, "small"),
-        (UNSURE, "possible"),
-        (SLIGHT, "No"),
-        (NOTHING, "No"),
+        (MOST, "cause-most"),
+        (PART, "cause-part"),
+        (LITTLE, "cause-small"),
+        (UNSURE, "cause-possible"),
+        (SLIGHT, "cause-none"),
+        (NOTHING, "cause-none"),
     ],
 )
-def test_the_cause_is_named_by_its_measured_gain_alone(winner, word):
-    said = cause.cause_sentence(diagnosis(winner, model(["height"])))
-    assert [one for one in ("Most", "Part", "small", "possible", "No") if one in said] == [word]
+def test_the_cause_is_named_by_its_measured_gain_alone(winner, key):
+    assert page.cause_message(diagnosis(winner, model(["height"]))).key == key
+
+
+def test_no_cause_is_named_where_nobody_could_look_or_too_many_are_outliers():
+    assert page.cause_message(None).key == "cause-untried"
+    many = page.cause_message(diagnosis(MOST, out=6))
+    assert many.key == "cause-outliers" and many.values == {"out": "6", "points": "20"}
 
 
 def test_a_cause_that_another_explains_as_well_does_not_count():
@@ -91,7 +97,8 @@ def test_a_cause_that_another_explains_as_well_does_not_count():
     rival, both = model(["clock"], with_=2.1), model(["clock", "height"], with_=2.0)
     found = diagnosis(MOST, rival, both, rivals=(rival, both))
     assert not found.counts and found.inseparable == ("boresight", "clock", "height")
-    assert cause.simplest_rivals(found) == [("clock",)]
+    assert page.simplest_rivals(found) == [("clock",)]
+    assert page.cause_message(found).key == "cause-inseparable"
 
 
 def test_what_is_not_told_from_zero_is_not_blamed():
@@ -102,7 +109,7 @@ def test_what_is_not_told_from_zero_is_not_blamed():
         ((1.0, 1.0, -1.0), ("height", "boresight", "clock")),
         ((0.1, 0.1, -0.1), ("height", "boresight", "clock")),
     ):
-        assert cause.causes_told(replace(found, calibration=calibration(names, values))) == blamed
+        assert page.significant_causes(replace(found, calibration=calibration(names, values))) == blamed
 
 
 @pytest.mark.parametrize("high", [0.5, -0.1])
@@ -129,19 +136,19 @@ def test_numbers_alone_name_the_same(high):
 )
 def test_the_colour_of_the_verdict(lost, word, found, level):
     size = (1.3, 1.1, 1.5) if word == "too small" else (1.0, 0.9, 1.1)
-    assert verdict_words(MANY, lost, ellipses(word, *size), diagnosis(found))[0].colour == level
-    assert verdict_words(summarise(np.empty((0, 2))), 5, ellipses(word), None)[0].colour == "bad"
+    assert page.verdict_of_accuracy(MANY, lost, ellipses(word, *size), diagnosis(found))[0].colour == level
+    assert page.verdict_of_accuracy(summarise(np.empty((0, 2))), 5, ellipses(word), None)[0].colour == "bad"
 
 
 def test_no_flight_is_good_whose_cause_nobody_could_look_for():
     """Twelve points of one image: neither cause nor ellipses are judged."""
-    assert verdict_words(MANY, 0, ellipses("too few"), None)[0].colour == "neutral"
+    assert page.verdict_of_accuracy(MANY, 0, ellipses("too few"), None)[0].colour == "neutral"
 
 
 def test_logs_that_contradict_each_other_are_a_problem_and_a_warning_is_none():
     given = (MANY, 0, ellipses("honest"), diagnosis(NOTHING))
-    assert verdict_words(*given, ["warning: a"])[0].colour == "good"
-    assert verdict_words(*given, ["problem: a"])[0].colour == "bad"
+    assert page.verdict_of_accuracy(*given, 0)[0].colour == "good"
+    assert page.verdict_of_accuracy(*given, 1)[0].colour == "bad"
 
 
 def test_a_cause_that_is_not_certain_is_in_no_figure_of_what_is_far_out():
@@ -155,7 +162,7 @@ def test_a_cause_that_is_not_certain_is_in_no_figure_of_what_is_far_out():
 def test_leaving_out_what_is_far_out_gains_what_the_mean_loses():
     found = diagnosis(model(()), outliers=(FAR,), out=5)
     found.models[0].held = np.where(np.arange(20)[:, None] < 5, [3.0, 4.0], [0.6, 0.8])
-    evidence = cause.evidence_of(MANY, 0, ellipses("honest"), found)
+    evidence = page.evidence_of(MANY, 0, ellipses("honest"), found)
     assert evidence.gain == pytest.approx(1 - 1.0 / 2.0) and evidence.troubled == 1
 
 
@@ -169,25 +176,21 @@ def test_no_cause_is_certain_where_a_third_is_far_out():
     assert diagnosis(MOST, out=5).counts and not diagnosis(MOST, out=6).counts
 
 
-def test_outliers_are_counted_with_the_figures_without_them():
-    without = summarise(np.tile([0.6, 0.8], (41, 1)))
-    said = left.outliers_sentence((FAR, FAR), MANY, without)
-    assert "9 of 50" in said and said.index("1.0 m") < said.index("5.0 m")
-    assert left.outliers_table((FAR,))["photo"].tolist() == ["several"]
-
-
-def test_what_is_left_is_sorted_and_in_one_unit():
+def test_what_is_left_is_sorted_and_its_whole_comes_last():
     image, within = np.array([0.6, 0.8]), np.array([3.0, 4.0])
-    parts = left.remaining_parts(Scatter(0.1, 0.3, 0.6, image, within, np.array([1.2, 1.6]), 5.6))
-    assert [size in one for size, one in zip(("5.0 m", "2.0 m", "1.0 m"), parts, strict=True)] == [True] * 3
+    scatter = Scatter(0.1, 0.3, 0.6, image, within, np.array([1.2, 1.6]), 5.6)
+    table = page.parts_table(SimpleNamespace(remaining=scatter))
+    assert table["rms"].tolist() == pytest.approx([5.0, 2.0, 1.0, 5.6])
     nan = np.full(2, np.nan)
-    assert left.remaining_parts(Scatter(np.nan, np.nan, np.nan, nan, nan, nan, np.nan)) == []
+    unknown = Scatter(np.nan, np.nan, np.nan, nan, nan, nan, np.nan)
+    assert not len(page.parts_table(SimpleNamespace(remaining=unknown)))
+    assert page.outliers_table((FAR,))["photo"].tolist() == ["several"]
 
 
 def test_an_axis_is_constant_by_its_interval():
     one, other = Interval(3.0, 2.0, 4.0), Interval(1.0, -1.0, 3.0)
-    table = cause.axes_table({"north": AlongAxis(one, 0.5, 9), "east": AlongAxis(other, 0.1, 9)})
-    assert [one == "lasting" for one in table["verdict"]] == [True, False]
+    table = page.axes_table({"north": AlongAxis(one, 0.5, 9), "east": AlongAxis(other, 0.1, 9)})
+    assert table["lasting"].tolist() == [True, False]
     assert table["share"].tolist() == [50.0, 10.0]
 
 
@@ -195,8 +198,8 @@ def test_parameters_are_called_different_from_zero_by_their_interval():
     report = open_report(study="made-up", kind="twin")
     covariance = np.diag([1e-4, 1.0])
     found = Calibration(("tilt", "north"), np.array([np.radians(-5.0), 1.5]), covariance, {}, 40, 20, 10)
-    table = cause.parameters_table(report, found)
-    assert [one == "differs from zero" for one in table["verdict"]] == [True, False]
+    table = page.parameters_table(report, found)
+    assert table["zero"].tolist() == [False, True]
     # Student's with nine degrees of freedom, not the 1.96 of many draws.
     assert report.recorded["north_offset", "calibration"]["low"] == pytest.approx(1.5 - 2.262, abs=1e-3)
     assert report.recorded["boresight_tilt", "calibration"]["value"] == pytest.approx(-5.0)
@@ -211,7 +214,87 @@ def test_the_parts_of_a_flight_come_to_the_same_verdict(gain, half):
                ("horizontal_error_mean", "logged-pose"): {"value": MANY.mean}}  # fmt: skip
     if found.counts:
         numbers["horizontal_error_mean", "calibrated-pose"] = {"value": 5.0 - gain}
-    ours, _ = verdict_words(MANY, 0, ellipses("honest"), found)
+    ours, _ = page.verdict_of_accuracy(MANY, 0, ellipses("honest"), found)
     worth = sum(one.share >= WORTH for one in gains_of(SimpleNamespace(lost=()), numbers))
     whole = Evidence(gain=WORTH * worth, troubled=int(possible_gain(numbers) is not None), judged=1)
     assert verdict_of(whole) == ours
+
+
+def found_with(points=50, lost=0, winner=NOTHING, **more):
+    summary = summarise(np.tile([3.0, 4.0], (points, 1)))
+    given = {"diagnosis": diagnosis(winner), "unambiguous": None, **more}
+    return SimpleNamespace(summary=summary, lost=lost, scored=range(points + lost), **given)
+
+
+@pytest.mark.parametrize(
+    ("given", "keys"),
+    [
+        ({}, ["typical", "cause-none"]),
+        ({"winner": MOST}, ["typical", "cause-most"]),
+        ({"points": 9}, ["few-points"]),
+        ({"points": 10}, ["typical", "cause-none"]),
+        ({"lost": 13}, ["many-lost"]),
+        ({"lost": 12}, ["typical", "cause-none"]),
+        ({"points": 0, "lost": 5}, ["no-position"]),
+    ],
+)
+def test_how_far_off_is_said_only_of_enough_points(given, keys):
+    assert [one.key for one in page.answer(found_with(**given))] == keys
+
+
+ALL_WINNERS = (MOST, PART, LITTLE, UNSURE, NOTHING)
+ANSWERS = ({}, {"points": 9}, {"lost": 13}, {"points": 0, "lost": 5})
+RIVAL = model(["clock"], with_=2.1)
+ADVICE = [
+    ({}, {}, []),
+    ({"winner": MOST}, {}, ["advice-calibrate"]),
+    ({"winner": MOST}, {"calibrated_elsewhere": True}, ["advice-recalibrate"]),
+    ({"winner": LITTLE}, {}, []),
+    ({"diagnosis": diagnosis(MOST, RIVAL, rivals=(RIVAL,))}, {}, ["advice-vary"]),
+    ({"diagnosis": diagnosis(MOST, outliers=(FAR,))}, {}, ["advice-outlier", "advice-calibrate"]),
+    ({"winner": MOST, "unambiguous": diagnosis(NOTHING)}, {}, ["advice-record-marks"]),
+    ({"diagnosis": None}, {}, ["advice-more-points"]),
+    ({"lost": 13}, {"problems": 1}, ["advice-contradictions", "advice-lost"]),
+]
+
+
+@pytest.mark.parametrize(("given", "options", "keys"), ADVICE)
+def test_what_to_do_follows_from_what_was_found(given, options, keys):
+    said = page.advice(found_with(**given), **{"calibrated_elsewhere": False, **options})
+    assert [one.key for one in said] == keys
+
+
+REASONS = [
+    ((MANY, 0, ellipses("honest"), diagnosis(NOTHING)), "reason-sound"),
+    ((MANY, 0, ellipses("honest"), diagnosis(MOST)), "reason-gain"),
+    ((MANY, 0, ellipses("honest"), diagnosis(UNSURE)), "reason-possible"),
+    ((MANY, 0, ellipses("honest"), diagnosis(NOTHING, outliers=(FAR,))), "reason-outliers"),
+    ((MANY, 0, ellipses("too small", 1.3, 1.1, 1.5), diagnosis(NOTHING)), "reason-ellipses"),
+    ((MANY, 13, ellipses("honest"), diagnosis(NOTHING)), "reason-lost"),
+    ((MANY, 0, ellipses("honest"), diagnosis(NOTHING), 2), "reason-contradictions"),
+    ((summarise(np.ones((3, 2))), 0, ellipses("honest"), diagnosis(NOTHING)), "reason-few"),
+    ((MANY, 0, ellipses("too few"), None), "reason-untried"),
+]
+
+
+@pytest.mark.parametrize(("given", "key"), REASONS)
+def test_the_most_pressing_reason_is_given(given, key):
+    assert page.verdict_of_accuracy(*given)[1].key == key
+
+
+def test_every_sentence_has_its_words_and_every_word_its_sentence():
+    """Keys that the rules give in the tests above are those of the catalogue, with all their values."""
+    said = [page.cause_message(d) for d in (None, diagnosis(MOST, out=6), *map(diagnosis, ALL_WINNERS))]
+    said += [page.cause_message(diagnosis(MOST, RIVAL, rivals=(RIVAL,)))]
+    said += [one for given in ANSWERS for one in page.answer(found_with(**given))]
+    for given, options, _ in ADVICE:
+        said += page.advice(found_with(**given), **{"calibrated_elsewhere": False, **options})
+    said += [page.verdict_of_accuracy(*given)[1] for given, _ in REASONS]
+    for word in ("honest", "too small", "too large", "undecided", "too few"):
+        said.append(page._ellipse_message(ellipses(word)))
+    said += [terrain_message(1.0, 2.0, ends) for ends in ((1.0, 2.0), (-2.0, -1.0), (-1.0, 1.0))]
+    texts = load_texts("georeferencing").answers
+    for one in said:
+        assert set(re.findall(r"{(\w+)}", texts[one.key])) <= set(one.values), one.key
+    rest = {key for key in set(texts) - {one.key for one in said} if not key.startswith("limit-")}
+    assert rest == {"terrain-shift"}

@@ -230,6 +230,10 @@ def test_a_filters_errors_beside_what_it_predicts(nees, inside):
     assert found.drawn.inside == inside
     assert found.ratio == pytest.approx(np.sqrt(nees / 2))
     assert predicted_error(flights(nees, size=4), "schmidt").drawn.high > found.drawn.high
+    # The test is on the drawn moments, whatever the averages are.
+    others = flights(nees)
+    others["schmidt", "nees"] = 2.5
+    assert predicted_error(others, "schmidt").drawn == found.drawn
 
 
 def test_the_lenient_band_counts_averages_within_the_bounds_of_single_values():

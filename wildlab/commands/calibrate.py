@@ -39,7 +39,7 @@ def calibrate(
     from wildlab.flight.checks.sense.sense import sense_sentences
     from wildlab.flight.learnt import write_learnt
     from wildlab.flight.store import load_flight
-    from wildlab.reporting.georeferencing_cause import causes_in_words, simplest_rivals
+    from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
 
     if into.exists() and not overwrite:
         raise WildlabError("this file is there already", "name another, or add --overwrite", file=into)
@@ -59,7 +59,7 @@ def calibrate(
     causes, possible = diagnosis.winner.causes, diagnosis.winner.gain.gain
     if gain is None and causes and np.isfinite(possible.low):
         click.echo(
-            f"Possible, not certain: {causes_in_words(causes)} taken off gains {possible.low:.2f} to "
+            f"Possible, not certain: {words_of_causes(causes)} taken off gains {possible.low:.2f} to "
             f"{possible.high:.2f} m on images that it was not estimated from. The file holds the noise of "
             "the poses alone."
         )
@@ -71,7 +71,7 @@ def calibrate(
         )
     if gain is None:
         if others := simplest_rivals(diagnosis):
-            one, other = causes_in_words(diagnosis.winner.causes), causes_in_words(others[0])
+            one, other = words_of_causes(diagnosis.winner.causes), words_of_causes(others[0])
             click.echo(f"These images do not separate {one} from {other}.")
     else:
         click.echo(

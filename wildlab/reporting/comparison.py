@@ -12,7 +12,6 @@ from wildlab.analysis.following.judged import LEADING
 from wildlab.analysis.overviews.verdict import Verdict
 from wildlab.reporting.arrange import LIMITS, arranged
 from wildlab.reporting.charts.comparison import dots_chart
-from wildlab.reporting.georeferencing_cause import listed, metres
 from wildlab.reporting.glossary import with_glossary
 from wildlab.reporting.html import examine
 from wildlab.reporting.overview_words import area_words, duration_words, length_words
@@ -20,7 +19,7 @@ from wildlab.reporting.own_flights import OwnFlight
 from wildlab.reporting.page import TAGS, page
 from wildlab.reporting.report import open_report
 from wildlab.reporting.tables import csv_link
-from wildlab.reporting.text import NOTHING, number, percent
+from wildlab.reporting.text import NOTHING, listed, metres, number, percent
 
 #: Rounding errors of what is zero.
 NO_MORE = 1e-9

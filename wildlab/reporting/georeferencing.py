@@ -1,128 +1,92 @@
-"""What the report on positions read from single images says: words, tables and metrics about accuracy."""
+"""The page on positions read from single images: how far off they are, why, and whether their ellipses tell.
+
+What is said follows by rules from what `wildlab.analysis.accuracy.judge_accuracy` found; the words lie in
+``data/messages/en/georeferencing.toml``.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from wildlab.analysis.accuracy import Accuracy
-from wildlab.analysis.evaluate import errors_of
-from wildlab.analysis.overviews.verdict import FEW_POINTS
+from wildlab.analysis.diagnosis import CAUSES, Diagnosis
+from wildlab.analysis.evaluate import errors_of, score_points
+from wildlab.analysis.georeference import georeference, heights_left_in
+from wildlab.analysis.ground_file import points_geojson, with_axes
+from wildlab.analysis.overviews.recommendations import is_possible
+from wildlab.analysis.overviews.verdict import (
+    FEW_POINTS,
+    MANY_LOST,
+    VERDICT_LEVEL,
+    WORTH,
+    Evidence,
+    Verdict,
+    verdict_of,
+)
+from wildlab.evaluation.axes import AlongAxis
+from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary, summarise
+from wildlab.evaluation.outliers import Outlier
 from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.reporting import known_positions as truths
+from wildlab.files import csv_text
+from wildlab.flight.store import Flight
+from wildlab.geometry.calibration import BORESIGHT, Calibration
+from wildlab.messages.message import Message
+from wildlab.messages.page_texts import PageTexts, load_texts, measure, percent_of, significant
+from wildlab.reporting.arrange import ADVICE
+from wildlab.reporting.charts.georeferencing import error_scatter, error_shares, errors_by_image
+from wildlab.reporting.figures import colour
+from wildlab.reporting.ground import terrain_section
+from wildlab.reporting.published import load_published
 from wildlab.reporting.report import Report
+from wildlab.reporting.tables import data_link
+from wildlab.reporting.text import listed
+from wildlab.reporting.wording import Wording
 
 #: Fewer points than this say little about a flight.
 FEW = FEW_POINTS
-#: Headings of the table of errors, by the fields of an error summary.
-ERROR_COLUMNS = {
-    "n": "points",
-    "bias_north": "mean north",
-    "bias_east": "mean east",
-    "sd_north": "SD north",
-    "sd_east": "SD east",
-    "mean": "mean",
-    "median": "median",
-    "p90": "90 %",
-    "max": "largest",
+#: From this share of the error on a constant error is most of it.
+MOST = 0.5
+#: Rows of the table of models; messages of what to do.
+SHOWN, MOST_ADVICE = 8, 3
+#: Zones are whole quarters of an hour, s.
+ZONE_S = 900.0
+#: Unit of each parameter, and how many of that are one.
+_UNITS = {
+    **dict.fromkeys(("roll", "tilt", "pan", "heading"), ("deg", 180 / np.pi)),
+    **dict.fromkeys(("down", "north", "east"), ("m", 1.0)),
+    **dict.fromkeys(("focal", "aspect"), ("%", 100.0)),
+    **dict.fromkeys(("centre_u", "centre_v"), ("px", 1.0)),
+    "clock": ("s", 1.0),
+    "radial": ("1", 1.0),
 }
-ERROR_DIGITS = dict.fromkeys(ERROR_COLUMNS, 2) | {"n": 0, "max": 1}
-
-_METHOD = r"""Pinhole camera with Brown distortion (exact inverse by Newton's method), rotation
-$\mathbf{R}_c^n = \mathbf{R}_b^n\mathbf{R}_m^b\mathbf{R}_c^m$ from the logged attitude and the mount (H 5.9 to
-5.12), ray GROUND
-
-Blocks: points of neighbouring images, in time order; a minute where the images have times and last for six,
-otherwise three images where that leaves six blocks. Errors of one block are not taken for independent.
-
-Cause: constant errors of position, height, boresight, clock and lens, and their sums, are fitted by
-generalised least squares (after H 5.15 to 5.17). The covariance of the errors has white noise of each point
-and pose errors of each image, part of which is a Gauss-Markov process; their sizes, that part and its time
-constants maximise the restricted likelihood, with a broad prior about what was stated. Models are ordered by
-Schwarz's criterion; the simplest one within odds of 19 to 1 of the best wins, and others within them that
-have no more parameters and do not hold it are not separable from it. It is certain where none of these is
-left, where its gain on blocks of images that it was not fitted to has a 90 % interval (Student's, by the
-number of blocks) above zero, and where its estimate would be chance in less than 0.1 % (Wald's test with
-Satterthwaite's degrees of freedom, times the number of parameters tried). Corrections beyond what is
-plausible are not offered. A sum of which the data cannot tell the parts (correlation beyond 0.99, or known no
-better than one would guess) is not tried. Intervals of parameters: 95 %, under that covariance.
-
-Far out: so many times the robust spread of its like that the largest of as many normal errors is as far with
-probability 0.001; marks first, then photos, then clicks. It is looked for before the cause, with every
-parameter taken off that the data determine, and kept out of what models are fitted to and ranked by; then
-once more with the cause taken off, and where other points are far out then, the search is repeated without
-these. Where more than a quarter of the points is far out no cause is certain.
-
-Ellipses: the factor is the root of the 90 % quantile of the normalised squared error over that of chi-square;
-its interval from drawing blocks with replacement. No draw holds a larger error than was seen, so its high end
-is at least that of the mean logarithm of all squared errors (Student's, by the number of blocks). Noise: most
-likely standard deviations, five images in a hundred taken to be ten times as far off.
-
-Shares of the squared error: one-way analysis of variance with images as groups. Intervals of the figures at
-the top: as many blocks with replacement as there are, a thousand times, middle 90 %. They say how far these
-images decide the figure, not what another day would bring."""
-
-_ON_PLANE = """cut with the horizontal plane at the height of the ground (H 5.13).
-
-Ellipses: covariances of pixel, pose, mount and plane height through the derivatives of the ground point.
-Where the depression's standard deviation times its cotangent exceeds one tenth the linear ellipse is known to
-be wrong, and 1000 samples decide its size."""
-
-_ON_TERRAIN = """followed from cell to cell of the flight's terrain, whose surface is bilinear between its
-nodes, to where it first meets the ground. A ray that leaves the map, comes to a hole of it, or starts below
-the ground has no point.
-
-Ellipses: covariances of pixel, pose, mount and terrain height through the derivatives of where the ray meets
-the plane that touches the ground. Rays to 16 points of each ellipse are followed, too: where one meets the
-ground a fifth of the ellipse or more from that plane, or not at all, or where the ray is flat against the
-slope (as for level ground: one tenth), 1000 samples decide its size. They are called split where they fall
-into a near and a far group. No ellipse is given where more than 5 % of them meet no ground.
-
-What follows looks for causes and noise on level ground as high as each point on the terrain."""
-
 _NOISE = {
-    "position_horizontal": ("position_horizontal_m", "position, horizontal", "m"),
-    "position_vertical": ("position_vertical_m", "position, vertical", "m"),
-    "tilt": ("tilt_deg", "tilt, each level axis", "deg"),
-    "heading": ("heading_deg", "heading", "deg"),
-    "pixel": ("pixel_px", "pixel (marking and lens)", "px"),
+    "position_horizontal": ("position_horizontal_m", "m"),
+    "position_vertical": ("position_vertical_m", "m"),
+    "tilt": ("tilt_deg", "deg"),
+    "heading": ("heading_deg", "deg"),
+    "pixel": ("pixel_px", "px"),
 }
-_ELLIPSES = {
-    "linear": "computed by linearisation",
-    "sampled": "found by sampling, the ray being flat",
-    "split": "found by sampling, a ridge parting the samples",
-    "unbounded": "not given, the ray being too near the horizon",
-    "none": "without a point on the ground",
+#: What the files of points have of a point, m and degrees; times count from the first image.
+POINT_COLUMNS = ("point", "seconds", "north_m", "east_m", "long_90_m", "short_90_m", "bearing_deg")
+_SUMMARY = {
+    "horizontal_error_mean": "mean",
+    "horizontal_error_median": "median",
+    "horizontal_error_p90": "p90",
+    "horizontal_error_max": "max",
+    "bias_north": "bias_north",
+    "bias_east": "bias_east",
+    "sd_north": "sd_north",
+    "sd_east": "sd_east",
 }
 
 
-_OVER_TERRAIN = {
-    "sampled": "found by sampling, the ray being flat or the ground bent",
-    "unbounded": "not given, too many of the samples meeting no ground",
-}
-
-
-def record_errors(
-    report: Report,
-    subject: str,
-    scored: pd.DataFrame,
-    intervals: Mapping[str, tuple[float, float]] | None = None,
-) -> ErrorSummary:
-    """Record the metrics of one scored table under ``subject``, and return its summary.
-
-    ``intervals`` gives low and high by metric name.
-    """
-    s = summarise(errors_of(scored))
-    record_summary(report, subject, s, intervals)
-    if scored["inside_90"].notna().any():
-        known = int(scored["inside_90"].notna().sum())
-        report.metric("ellipse_coverage_90", subject, scored["inside_90"].mean(), "1", n=known)
-    return s
+# -- what is recorded
 
 
 def record_summary(
@@ -131,20 +95,25 @@ def record_summary(
     summary: ErrorSummary,
     intervals: Mapping[str, tuple[float, float]] | None = None,
 ) -> None:
-    """Record the figures of a summary of errors under ``subject``."""
-    values = {
-        "horizontal_error_mean": summary.mean,
-        "horizontal_error_median": summary.median,
-        "horizontal_error_p90": summary.p90,
-        "horizontal_error_max": summary.max,
-        "bias_north": summary.bias_north,
-        "bias_east": summary.bias_east,
-        "sd_north": summary.sd_north,
-        "sd_east": summary.sd_east,
-    }
-    for name, value in values.items():
+    """Record the figures of a summary of errors under ``subject``; ``intervals`` by metric name."""
+    for name, field in _SUMMARY.items():
         low, high = (intervals or {}).get(name, (None, None))
-        report.metric(name, subject, value, "m", n=summary.n, low=low, high=high)
+        report.metric(name, subject, getattr(summary, field), "m", n=summary.n, low=low, high=high)
+
+
+def record_errors(
+    report: Report,
+    subject: str,
+    scored: pd.DataFrame,
+    intervals: Mapping[str, tuple[float, float]] | None = None,
+) -> ErrorSummary:
+    """Record the metrics of one scored table under ``subject``, and return its summary."""
+    summary = summarise(errors_of(scored))
+    record_summary(report, subject, summary, intervals)
+    if scored["inside_90"].notna().any():
+        known = int(scored["inside_90"].notna().sum())
+        report.metric("ellipse_coverage_90", subject, scored["inside_90"].mean(), "1", n=known)
+    return summary
 
 
 def record_accuracy(
@@ -154,14 +123,10 @@ def record_accuracy(
     record_errors(report, "logged-pose", found.scored, found.intervals)
     diagnosis = found.diagnosis
     if diagnosis is not None:
-        gain = diagnosis.winner.gain.gain
-        n = int(diagnosis.inliers.sum())
-        report.metric("gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
+        _record_gain(report, "winner", diagnosis.winner.gain.gain, int(diagnosis.inliers.sum()))
         if diagnosis.outliers:
-            gain, n = diagnosis.winner.gain_of_all.gain, len(diagnosis.inliers)
-            report.metric(
-                "gain", "winner/with-far-out", gain.estimate, "m", n=n, low=gain.low, high=gain.high
-            )
+            gain = diagnosis.winner.gain_of_all.gain
+            _record_gain(report, "winner/with-far-out", gain, len(diagnosis.inliers))
         if diagnosis.counts:
             record_summary(report, "calibrated-pose", diagnosis.held_summary())
     if diagnosis and diagnosis.outliers and diagnosis.inliers.any():
@@ -177,6 +142,10 @@ def record_accuracy(
         subject = "recorded-answers" if len(answers) == 1 else f"recorded-answers/{program}"
         others[program] = record_errors(report, subject, table)
     return others
+
+
+def _record_gain(report: Report, subject: str, gain: Any, n: int) -> None:
+    report.metric("gain", subject, gain.estimate, "m", n=n, low=gain.low, high=gain.high)
 
 
 def named(tables: Mapping[str, pd.DataFrame], kind: str, *, shown: bool) -> dict[str, pd.DataFrame]:
@@ -205,90 +174,256 @@ def named(tables: Mapping[str, pd.DataFrame], kind: str, *, shown: bool) -> dict
     return found
 
 
-def scatter_title(logged: ErrorSummary) -> str:
-    """Title of the figure of the errors: whether they centre on the truth."""
-    bias = float(np.hypot(logged.bias_north, logged.bias_east))
-    if bias < 0.25 * logged.mean:
-        return "Errors centre on the truth"
-    return f"The middle of the errors lies {short_length(bias)} off"
+# -- what follows from it
 
 
-def vertical_words(correction: float, left_in: ErrorSummary | None = None, labelled: bool = False) -> str:
-    """What the vertical correction that was taken off on import is worth; ``left_in``, the errors without it.
+class TruthKinds(NamedTuple):
+    """How many points are compared with a mark and with a track, and the reported SD of each (m, or NaN)."""
 
-    Without these it is only said that there is one: the height of the geoid tells of a place.
+    marked: int
+    tracked: int
+    mark_sd_m: float
+    track_sd_m: float
+
+
+#: A simulated flight's truth is exact.
+EXACT = TruthKinds(0, 0, np.nan, np.nan)
+
+
+def truth_kinds(flight: Flight, scored: pd.DataFrame) -> TruthKinds:
+    """What the points of a flight are compared with; `EXACT` for a simulated flight.
+
+    Parameters
+    ----------
+    flight
+        With truth.
+    scored
+        From `wildlab.analysis.evaluate.score_points`, of it.
     """
-    if left_in is None:
-        return "**Vertical reference.** The recorded heights were of another kind; corrected on import."
-    fault = "Aircraft and ground share the fault."
-    if labelled:
-        fault = f"Left in, the mean error would be {left_in.mean:.0f} m."
-    too_high = f"The recorded heights stand {correction:.1f} m too high; taken off on import."
-    return f"**Vertical reference.** {too_high} {fault}"
+    if flight.manifest.kind == "twin":
+        return EXACT
+    truth = flight.table("truth")
+    moving = truth["time_s"].notna().groupby(truth["target_id"]).any()
+    used = scored["truth_id"].astype(str)
+    tracked = used.isin(moving[moving].index).to_numpy(bool)
+
+    def reported(which: set[str]) -> float:
+        if "sd_horizontal_m" not in truth:
+            return np.nan
+        sd = truth.loc[truth["target_id"].isin(which), "sd_horizontal_m"].to_numpy(float)
+        return float(np.nanmedian(sd)) if np.isfinite(sd).any() else np.nan
+
+    sds = reported(set(used[~tracked])), reported(set(used[tracked]))
+    return TruthKinds(int((~tracked).sum()), int(tracked.sum()), *sds)
 
 
-def length(metres: float, unit: tuple[str, str] = ("metres", "centimetres")) -> str:
-    """A length in words: ``5.1 metres``, below a metre ``40 centimetres``."""
-    return f"{metres:.1f} {unit[0]}" if not metres < 0.95 else f"{100 * metres:.0f} {unit[1]}"
+def gained_share(gain: Any) -> float:
+    """A gain (`wildlab.evaluation.causes.Gain`) as a share of the error without it."""
+    return gain.gain.estimate / gain.without if gain.without > 0 else 0.0
 
 
-def short_length(metres: float) -> str:
-    """A length for a tile: ``5.1 m``, below a metre ``40 cm``."""
-    return length(metres, ("m", "cm"))
+def significant_parameters(calibration: Calibration) -> tuple[str, ...]:
+    """Parameters whose interval leaves zero out."""
+    ends = {name: calibration.interval(name) for name in calibration.names}
+    return tuple(name for name, (low, high) in ends.items() if low > 0 or high < 0)
 
 
-def span(values: Any) -> str:
-    """The range of values without decimals: ``51 to 111``, or one number where both ends are the same."""
-    low, high = f"{np.nanmin(values):.0f}", f"{np.nanmax(values):.0f}"
-    return low if low == high else f"{low} to {high}"
+def significant_causes(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """The winner's causes that have a parameter which differs from zero; all of them where none has.
+
+    Only these are named: what a fit takes along without being able to tell it from zero is not blamed.
+    """
+    parameters = set(significant_parameters(diagnosis.calibration))
+    causes = diagnosis.winner.causes
+    return tuple(cause for cause in causes if parameters & set(CAUSES[cause])) or causes
 
 
-def headline(logged: ErrorSummary, total: int) -> list[str]:
-    """The first sentences of the summary: how far off, of how many points."""
-    if not logged.n:
-        return []
-    of = f"{logged.n} points" if logged.n == total else f"{logged.n} of {total} points"
-    if logged.n < FEW:
-        return [
-            f"Only {of} could be compared with the truth, too few to say how accurate this flight is.",
-            f"Their median error is {length(logged.median)}, the largest {length(logged.max)}.",
-            "Mark more known points, in at least six images, and evaluate again.",
-        ]
-    return [
-        f"A position read from a single image of this flight is typically {length(logged.median)} off, and "
-        f"nine times out of ten less than {length(logged.p90)} ({of})."
-    ]
+def simplest_rivals(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """Causes of the rivals that hold no other rival, the two of the least held-out error at most."""
+    rivals = [one for one in diagnosis.rivals if one.causes and one.causes != diagnosis.winner.causes]
+    simple = [one for one in rivals if not any(set(other.causes) < set(one.causes) for other in rivals)]
+    return [one.causes for one in sorted(simple, key=lambda one: one.gain.with_)][:2]
 
 
-def errors_table(rows: Mapping[str, ErrorSummary], first: str = "pose") -> pd.DataFrame:
-    """One row of errors for each summary, with its name in the column ``first``."""
-    return pd.DataFrame([{first: name, **summary._asdict()} for name, summary in rows.items()])
+def words_of_causes(causes: Sequence[str]) -> str:
+    """Causes as they stand in a sentence."""
+    names = load_texts("georeferencing").subjects
+    return listed([names[cause] for cause in causes])
 
 
-def unlabelled_words(programs: Sequence[str], *, shown: bool = True) -> list[str]:
-    """That answers of other programs could not be judged, as a list of no or one sentence."""
-    if not programs:
-        return []
-    who = ", ".join(programs) if shown else "other programs"
-    return [
-        f"Positions recorded by {who} name no target with a known position, so they are not "
-        "judged: fill target_id of those detections."
-    ]
-
-
-def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorSummary) -> pd.DataFrame:
-    """Published figures with those of the same answers scored here (``again``) and of ours (``here``)."""
-    fields = {
-        "horizontal_error_mean": ("mean error", "mean"),
-        "horizontal_error_median": ("median error", "median"),
-        "horizontal_error_p90": ("nine of ten within", "p90"),
+def cause_message(diagnosis: Diagnosis | None) -> Message:
+    """Which constant error explains the errors, by what removing it gains on images it was not fitted to."""
+    if diagnosis is None:
+        return Message("cause-untried")
+    if diagnosis.too_many_out:
+        out = int((~diagnosis.inliers).sum())
+        return Message("cause-outliers", {"out": str(out), "points": str(len(diagnosis.inliers))})
+    winner = diagnosis.winner
+    share = gained_share(winner.gain)
+    if not winner.causes or (not diagnosis.counts and share < WORTH):
+        return Message("cause-none")
+    causes = significant_causes(diagnosis)
+    values = {
+        "causes": words_of_causes(causes),
+        "share": percent_of(share),
+        "without": short_length(winner.gain.without),
+        "with": short_length(winner.gain.with_),
     }
-    table = published[published["name"].isin(fields)]
-    return table.assign(
-        quantity=[fields[name][0] for name in table["name"]],
-        again=[getattr(theirs, fields[name][1]) for name in table["name"]],
-        here=[getattr(ours, fields[name][1]) for name in table["name"]],
+    if not diagnosis.counts:
+        others = [one for one in simplest_rivals(diagnosis) if not set(causes) <= set(one)]
+        if others:
+            rivals = listed([words_of_causes(one) for one in others], "or")
+            return Message("cause-inseparable", {**values, "others": rivals})
+        return Message("cause-possible", values)
+    return Message(
+        "cause-most" if share >= MOST else "cause-part" if share >= WORTH else "cause-small", values
     )
+
+
+def answer(found: Accuracy) -> list[Message]:
+    """How far off positions are, and why: the two sentences that answer the page's question."""
+    summary, total = found.summary, len(found.scored)
+    values = {
+        "points": str(summary.n),
+        "total": str(total),
+        "lost": str(found.lost),
+        "median": short_length(summary.median),
+        "p90": short_length(summary.p90),
+    }
+    if not summary.n:
+        return [Message("no-position", values)]
+    if found.lost > MANY_LOST * total:
+        return [Message("many-lost", values)]
+    if summary.n < FEW:
+        return [Message("few-points", values)]
+    return [Message("typical", values), cause_message(found.diagnosis)]
+
+
+def possible_share(logged: ErrorSummary, diagnosis: Diagnosis | None) -> float:
+    """What taking the cause off may gain, as a share of the mean error; 0 where certain, or too small."""
+    if diagnosis is None or not diagnosis.winner.causes:
+        return 0.0
+    gain = diagnosis.winner.gain.gain.estimate
+    return gain / logged.mean if is_possible(gain, logged.mean, certain=diagnosis.counts) else 0.0
+
+
+def evidence_of(
+    logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None, problems: int = 0
+) -> Evidence:
+    """What the verdict on the georeferencing follows from.
+
+    Parameters
+    ----------
+    logged, lost
+        Errors of the points that have a position, and how many have none.
+    ellipses, diagnosis
+        As `wildlab.analysis.accuracy.judge_accuracy` found them; None: nobody could look for a cause.
+    problems
+        How many things in the flight contradict each other.
+    """
+    total = logged.n + lost
+    gains = []
+    if diagnosis is not None and diagnosis.counts:
+        gains.append(gained_share(diagnosis.winner.gain))
+    if diagnosis is not None and diagnosis.outliers and diagnosis.inliers.any():
+        whole, kept = diagnosis.held_summary().mean, diagnosis.held_summary(diagnosis.inliers).mean
+        gains.append((whole - kept) / whole if whole > 0 else np.nan)
+    return Evidence(
+        problems=problems,
+        lost=lost / total if total else np.nan,
+        gain=max((gain for gain in gains if gain == gain), default=np.nan),
+        possible=possible_share(logged, diagnosis),
+        troubled=len(diagnosis.outliers) if diagnosis is not None else 0,
+        points=logged.n,
+        excess=(ellipses.factor,),
+        judged=int(diagnosis is not None),
+    )
+
+
+def verdict_of_accuracy(
+    logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None, problems: int = 0
+) -> tuple[Verdict, Message]:
+    """What the georeferencing comes to, and the most pressing reason; parameters of `evidence_of`."""
+    evidence = evidence_of(logged, lost, ellipses, diagnosis, problems)
+    verdict, total = verdict_of(evidence), logged.n + lost
+    gain = gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
+    reasons = (
+        ("reason-contradictions", problems > 0, {"problems": str(problems)}),
+        ("reason-lost", lost > MANY_LOST * total or not logged.n, {"lost": str(lost), "total": str(total)}),
+        ("reason-gain", gain >= WORTH, {"share": percent_of(gain)}),
+        ("reason-possible", evidence.possible > 0, {"share": percent_of(evidence.possible)}),
+        ("reason-outliers", evidence.troubled > 0, {"outliers": str(evidence.troubled)}),
+        ("reason-ellipses", ellipses.word == "too small", {}),
+        ("reason-few", logged.n < FEW, {"points": str(logged.n)}),
+        ("reason-untried", diagnosis is None, {}),
+        ("reason-sound", True, {}),
+    )
+    return next((verdict, Message(key, values)) for key, applies, values in reasons if applies)
+
+
+def advice(found: Accuracy, *, calibrated_elsewhere: bool, problems: int = 0) -> list[Message]:
+    """What to do, the most pressing first, `MOST_ADVICE` at most."""
+    diagnosis = found.diagnosis
+    said = [Message("advice-contradictions")] if problems else []
+    if found.lost > MANY_LOST * len(found.scored):
+        said.append(Message("advice-lost"))
+    if diagnosis is None:
+        return [*said, *([Message("advice-more-points")] if found.summary.n else [])][:MOST_ADVICE]
+    first = next((one for one in diagnosis.outliers if one.kind != "click"), None)
+    if first is not None:
+        name = first.mark if first.kind == "mark" else first.photo
+        values = {"kind": first.kind, "name": str(name), "error": short_length(first.off_m)}
+        said.append(Message("advice-outlier", values))
+    unambiguous = found.unambiguous
+    if unambiguous is not None and unambiguous.winner.causes != diagnosis.winner.causes:
+        said.append(Message("advice-record-marks"))
+    elif diagnosis.counts and gained_share(diagnosis.winner.gain) >= WORTH:
+        said.append(Message("advice-recalibrate" if calibrated_elsewhere else "advice-calibrate"))
+    elif diagnosis.rivals and diagnosis.winner.gain.counts and not calibrated_elsewhere:
+        said.append(Message("advice-vary"))
+    return said[:MOST_ADVICE]
+
+
+def limits(
+    flight: Flight, found: Accuracy, truth: TruthKinds, programs: Sequence[str], source: str | None
+) -> list[Message]:
+    """What the page does not tell: what always holds last, of the others those that apply; five at most."""
+    manifest, diagnosis = flight.manifest, found.diagnosis
+    offset = manifest.clocks.camera_offset_s
+    rest = offset - ZONE_S * round(offset / ZONE_S)
+    timed = manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
+    nearest = found.nearest
+    conditional = (
+        ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": str(found.lost)}),
+        ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
+        ("limit-halves", bool(found.halves.disagree), {}),
+        (
+            "limit-nearest",
+            nearest is not None,
+            {"hidden": "" if nearest is None else short_length(nearest.visible_m)},
+        ),
+        ("limit-track", truth.tracked > 0, {"sd": _sd_words(truth.track_sd_m)}),
+        ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
+        ("limit-unlabelled", bool(programs), {}),
+        ("limit-untimed", not timed, {}),
+        ("limit-vertical", bool(manifest.vertical.correction_m), {}),
+        ("limit-mark", truth.marked > 0, {"sd": _sd_words(truth.mark_sd_m)}),
+        ("limit-marking", True, {}),
+        ("limit-ground", True, {}),
+    )
+    return [Message(key, values) for key, applies, values in conditional if applies][:5]
+
+
+def _sd_words(sd_m: float) -> str:
+    return measure(sd_m, "m") if np.isfinite(sd_m) else "–"
+
+
+# -- tables
+
+
+def errors_table(rows: Mapping[str, ErrorSummary]) -> pd.DataFrame:
+    """One row of errors for each summary, with its name in the column ``pose``."""
+    return pd.DataFrame([{"pose": name, **summary._asdict()} for name, summary in rows.items()])
 
 
 def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -306,98 +441,377 @@ def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     )
 
 
-def ellipse_words(scored: pd.DataFrame, *, terrain: bool = False) -> str:
-    """How the ellipses of a scored table were found, in words; over ``terrain`` for other reasons."""
-    words = _ELLIPSES | (_OVER_TERRAIN if terrain else {})
-    counts = scored["ellipse"].value_counts()
-    return ", ".join(f"{count} were {words[str(kind)]}" for kind, count in counts.items())
-
-
-def method_words(*, terrain: bool) -> str:
-    """How it was computed, on level ground or over terrain."""
-    return _METHOD.replace("GROUND", _ON_TERRAIN if terrain else _ON_PLANE)
-
-
-def assumed_words(stated: Mapping[str, float]) -> str:
-    """The assumed standard deviations in words."""
-    return (
-        f"{stated['tilt_deg']:.3g}° in tilt (about each level axis), "
-        f"{stated['heading_deg']:.3g}° in heading, "
-        f"{stated['position_horizontal_m']:.3g} m horizontally and {stated['position_vertical_m']:.3g} m "
-        "vertically"
+def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorSummary) -> pd.DataFrame:
+    """Published figures with those of the same answers scored here (``again``) and of ours (``here``)."""
+    table = published[published["name"].isin(_SUMMARY)]
+    fields = [_SUMMARY[name] for name in table["name"]]
+    return table.assign(
+        quantity=[name.removeprefix("horizontal_error_") for name in table["name"]],
+        again=[getattr(theirs, field) for field in fields],
+        here=[getattr(ours, field) for field in fields],
     )
 
 
-def noise_table(
-    noise: PoseNoise, stated: Mapping[str, float], known: truths.KnownPositions = truths.EXACT
-) -> pd.DataFrame:
-    """Assumed and estimated standard deviations, one row each, in degrees, metres and pixels.
-
-    ``known``: what the errors were held against.
-    """
+def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """The most likely models, the winner bold, and the poses as logged."""
+    shown = list(np.argsort(diagnosis.ranked.scores, kind="stable")[:SHOWN])
+    shown += [m for m in (diagnosis.ranked.winner, 0) if m not in shown]
     rows = []
-    for kind, (key, label, unit) in _NOISE.items():
-        value = np.degrees(noise.sd[kind]) if unit == "deg" else noise.sd[kind]
+    for m in shown:
+        model = diagnosis.models[m]
+        gain = model.gain.gain
         rows.append(
             {
-                "what": truths.noise_label(label, known),
-                "assumed": stated[key],
-                "estimated": value,
-                "unit": unit,
-                "factor": noise.factor[kind],
+                "what": f"**{model.name}**" if m == diagnosis.ranked.winner else model.name,
+                "parameters": len(model.fit.names),
+                "error": model.gain.with_,
+                "gain": gain.estimate if model.causes else np.nan,
+                "low": gain.low if model.causes else np.nan,
+                "high": gain.high if model.causes else np.nan,
             }
         )
     return pd.DataFrame(rows)
 
 
-def limits_of(
-    points: pd.DataFrame,
-    depression_deg: Any,
-    height_m: Any,
-    *,
-    labelled: bool,
-    timed: bool,
-    enough: bool,
-    certain: bool = False,
-    terrain: bool = False,
-    known: truths.KnownPositions = truths.EXACT,
-) -> list[str]:
-    """What a report on these points does not tell; ``certain``: a cause gained something for certain.
+def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
+    """Estimated corrections with their 95 % intervals, one row each; recorded as metrics too."""
+    names, rows = load_texts("georeferencing").quantities, []
+    zero = set(calibration.names) - set(significant_parameters(calibration))
+    for name in calibration.names:
+        unit, scale = _UNITS[name]
+        value, (low, high) = scale * calibration.value(name), (scale * x for x in calibration.interval(name))
+        metric = f"boresight_{name}" if name in BORESIGHT else f"{name}_offset"
+        report.metric(metric, "calibration", value, unit, n=calibration.n_images, low=low, high=high)
+        rows.append(
+            {
+                "what": names[name],
+                "value": value,
+                "low": low,
+                "high": high,
+                "unit": "" if unit == "1" else unit,
+                "zero": name in zero,
+            }
+        )
+    return pd.DataFrame(rows)
 
-    ``known``: what the errors were held against.
+
+def axes_table(axes: Mapping[str, AlongAxis]) -> pd.DataFrame:
+    """Mean error along each axis, and whether it lasts."""
+    return pd.DataFrame(
+        [
+            {
+                "axis": name,
+                "mean": one.mean.estimate,
+                "low": one.mean.low,
+                "high": one.mean.high,
+                "share": 100 * one.share,
+                "lasting": one.constant,
+            }
+            for name, one in axes.items()
+        ]
+    )
+
+
+def outliers_table(outliers: Sequence[Outlier]) -> pd.DataFrame:
+    """Marks, photos and clicks that are outliers, largest first."""
+    return pd.DataFrame(
+        [
+            {
+                "kind": one.kind,
+                "photo": one.photo or "several",
+                "mark": one.mark or ("several" if one.kind == "photo" else "not known"),
+                "points": one.points,
+                "error": one.off_m,
+            }
+            for one in outliers
+        ]
+    )
+
+
+def parts_table(found: Accuracy) -> pd.DataFrame:
+    """What the errors are made of once the cause is removed, RMS (m), largest first; none if unknown."""
+    scatter = found.remaining
+    if not np.isfinite(scatter.whole_m):
+        return pd.DataFrame(columns=["part", "rms"])
+    names = load_texts("georeferencing").quantities
+    parts = zip(("constant", "image", "point"), scatter.parts_m, strict=True)
+    rows = [{"part": names[name], "rms": float(rms)} for name, rms in sorted(parts, key=lambda one: -one[1])]
+    return pd.DataFrame([*rows, {"part": names["whole"], "rms": float(scatter.whole_m)}])
+
+
+def noise_table(noise: PoseNoise, assumed: Mapping[str, float]) -> pd.DataFrame:
+    """Assumed and estimated standard deviations, one row each, in degrees, metres and pixels."""
+    names = load_texts("georeferencing").quantities
+    return pd.DataFrame(
+        [
+            {
+                "what": names[kind],
+                "assumed": assumed[key],
+                "estimated": np.degrees(noise.sd[kind]) if unit == "deg" else noise.sd[kind],
+                "unit": unit,
+                "factor": noise.factor[kind],
+            }
+            for kind, (key, unit) in _NOISE.items()
+        ]
+    )
+
+
+def points_table(points: pd.DataFrame) -> pd.DataFrame:
+    """Places in local metres with their ellipses, without names, dates or anything else that locates them.
+
+    Parameters
+    ----------
+    points
+        From `wildlab.analysis.georeference.georeference`.
+
+    Returns
+    -------
+    DataFrame
+        With `POINT_COLUMNS`; ``seconds`` is the time since the first point, NaN where that is not known.
     """
-    ground = "an elevation map" if terrain else truths.ground_words(known) if labelled else "the log"
-    missed = int(points["north_m"].isna().sum())
-    limits = [
-        "Whoever or whatever marked the points is part of these errors; another person or detector "
-        "adds its own.",
-        f"The height of the ground was taken from {ground}; where it is not known, the error grows.",
-        *truths.known_limits(known),
+    times = points["time_s"].to_numpy(float)
+    first = np.nanmin(times) if np.isfinite(times).any() else np.nan
+    table = with_axes(points).assign(point=np.arange(1, len(points) + 1), seconds=times - first)
+    return table[list(POINT_COLUMNS)].round(3)
+
+
+def point_links(flight: Flight, points: pd.DataFrame, source: str | None) -> list[str]:
+    """Links that hand over all points: metres for all, places where locations are open."""
+    links = [
+        data_link(csv_text(points_table(points)).encode(), "text/csv", "points.csv", "CSV, local metres")
     ]
-    if np.isfinite(height_m).any():
-        limits.insert(
-            0,
-            f"Nothing about flatter views than {np.nanmin(depression_deg):.0f}° below the horizon, or "
-            f"greater heights than {np.nanmax(height_m):.0f} m.",
+    if flight.manifest.locations.sensitivity == "open":
+        places = points_geojson(flight, points, source or "").encode()
+        links.append(data_link(places, "application/geo+json", "points.geojson", "GeoJSON, exact places"))
+    return [link for link in links if link]
+
+
+# -- the page
+
+
+def short_length(metres: float) -> str:
+    """A length with its unit, in centimetres below a metre: ``5.1 m``, ``40 cm``."""
+    return measure(metres, "m") if not metres < 0.95 else measure(100 * metres, "cm")
+
+
+def span(values: Any) -> str:
+    """The range of values without decimals: ``51 to 111``, or one number where both ends are the same."""
+    low, high = f"{np.nanmin(values):.0f}", f"{np.nanmax(values):.0f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def show_summary(
+    report: Report, wording: Wording, found: Accuracy, problems: int, *, calibrated_elsewhere: bool
+) -> None:
+    """The answer with its verdict, and what to do."""
+    verdict, reason = verdict_of_accuracy(
+        found.summary, found.lost, found.ellipses, found.diagnosis, problems
+    )
+    report.summary(
+        wording.messages(answer(found)),
+        level=verdict.colour,
+        verdict=(verdict.value, wording.messages([reason])[0]),
+    )
+    report.metric(VERDICT_LEVEL, "georeferencing", verdict.level, "1")
+    show_advice(
+        report, wording.messages(advice(found, calibrated_elsewhere=calibrated_elsewhere, problems=problems))
+    )
+
+
+def show_advice(report: Report, said: Sequence[str]) -> None:
+    """What to do, in order; nothing where there is nothing."""
+    if said:
+        report.section("What to do", part=ADVICE)
+        report.points(said, ordered=True)
+
+
+def show_contradictions(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
+    """What does not fit together in the flight; only how much where its locations are not open."""
+    if amiss:
+        hidden = [f"{len(amiss)} findings: `wildlab check` on the flight's folder says which."]
+        report.alert("What does not fit together", list(amiss) if shown else hidden)
+
+
+def show_accuracy(
+    report: Report,
+    flight: Flight,
+    found: Accuracy,
+    *,
+    programs: Mapping[str, pd.DataFrame],
+    unlabelled: Sequence[str],
+    amiss: Sequence[str],
+    applied: str = "",
+    source: str | None = None,
+) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    report
+        Is added to.
+    flight, found
+        The flight, and what its points are worth.
+    programs
+        Answers of other programs that the flight has, scored, by name.
+    unlabelled
+        Programs whose answers name no target.
+    amiss
+        What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
+    applied
+        What is to be said of the calibration of another flight that was applied.
+    source
+        Name of the poses' ``nav`` table; None for the flight's own.
+    """
+    texts, shown = load_texts("georeferencing"), flight.manifest.locations.sensitivity == "open"
+    programs = named(programs, "program", shown=shown)
+    others = record_accuracy(report, found, programs)
+    groups = {name: rows for name, rows in found.scored.groupby("group") if name}
+    groups = dict(sorted(groups.items(), key=lambda one: (len(one[0]), one[0])))
+    groups = named(groups, "part", shown=shown)
+    for name, rows in groups.items():
+        record_errors(report, f"logged-pose/{name}", rows)
+    wording = Wording(report, texts)
+    report.head(texts.subjects["question"], _subtitle(flight, found))
+    problems = sum(one.startswith("problem") for one in amiss)
+    show_summary(report, wording, found, problems, calibrated_elsewhere=bool(applied))
+    if applied:
+        report.text(applied)
+    show_contradictions(report, amiss, shown=shown)
+    logged, diagnosis = found.summary, found.diagnosis
+    corrections = (
+        parameters_table(report, diagnosis.calibration) if diagnosis and diagnosis.winner.causes else None
+    )
+    if logged.n:
+        report.tiles(_tiles(found, texts))
+        _figures(report, wording, found, programs)
+        rows = {texts.subjects["applied" if applied else "logged"]: logged}
+        rows |= _other_summaries(flight, found, texts, shown=shown)
+        rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}
+        wording.table("errors", errors_table(rows))
+        published = load_published(report.study)
+        if len(published) and others:
+            beside = beside_published(published, next(iter(others.values())), logged)
+            wording.table("published", beside)
+    if diagnosis is not None:
+        if corrections is not None and (diagnosis.counts or possible_share(logged, diagnosis)):
+            wording.table("parameters", corrections)
+        if diagnosis.outliers:
+            wording.table("outliers", outliers_table(diagnosis.outliers))
+    if logged.n:
+        report.section(
+            "Predicted uncertainty", " ".join(wording.messages([_ellipse_message(found.ellipses)]))
         )
-    if missed:
-        limits.append(
-            f"{missed} of {len(points)} points have no position: no pose, no ground height, or a ray "
-            + ("that meets no ground." if terrain else "above the horizon.")
+    truth = truth_kinds(flight, found.scored)
+    report.limits(wording.messages(limits(flight, found, truth, unlabelled, source)))
+    report.section("Details")
+    if groups and logged.n:
+        wording.table("groups", groups_table(groups))
+    show_models(report, wording, diagnosis)
+    if diagnosis is not None:
+        wording.table("axes", axes_table(found.axes))
+    parts = parts_table(found)
+    if len(parts):
+        wording.table("parts", parts)
+    if found.noise is not None:
+        wording.table("noise", noise_table(found.noise, found.assumed))
+    terrain_section(report, flight, found.observations, found.points)
+    if found.points["north_m"].notna().any():
+        report.files(texts.subjects["files"], point_links(flight, found.points, source))
+    report.method(texts.method)
+
+
+def show_models(report: Report, wording: Wording, diagnosis: Diagnosis | None) -> None:
+    """The constant errors that were tried, folded away, with the pairs that cannot be told apart."""
+    if diagnosis is None:
+        return
+    names = wording.texts.subjects
+    pairs = "; ".join(f"{names[one]} / {names[other]}" for one, other in diagnosis.alike)
+    blocks = str(int(diagnosis.blocks.max()) + 1)
+    wording.table("models", models_table(diagnosis), {"pairs": pairs or "–", "blocks": blocks})
+
+
+def _subtitle(flight: Flight, found: Accuracy) -> str:
+    scored = found.scored
+    views = ""
+    if found.summary.n:
+        placed = found.points["detection_id"].isin(scored["detection_id"]).to_numpy() & np.isfinite(
+            found.points["north_m"]
         )
-    if not timed:
-        limits.append(
-            "The images carry no time of their own, or each a pose of its own: an error of the camera's "
-            "clock cannot be seen."
+        poses = found.observations.poses
+        height = (found.observations.plane_down - poses.p_nb[:, 2])[placed]
+        depression = np.degrees(np.arcsin(np.clip(poses.R_nc[placed, 2, 2], -1, 1)))
+        views = f"{span(height)} m above the ground, camera {span(depression)}° below the horizon, "
+    rule = (
+        "its known position" if flight.manifest.scoring.rule == "labelled" else "the nearest known position"
+    )
+    return f"{scored['frame_id'].nunique()} images, {views}{len(scored)} points, each against {rule}"
+
+
+def _tiles(found: Accuracy, texts: PageTexts) -> list[tuple[str, str]]:
+    logged, diagnosis, names = found.summary, found.diagnosis, texts.subjects
+    interval = found.intervals.get("horizontal_error_mean")
+    again = f" ({short_length(interval[0])} to {short_length(interval[1])})" if interval else ""
+    shown = [
+        (short_length(logged.mean), names["tile-mean"] + again),
+        (short_length(logged.p90), names["tile-p90"]),
+    ]
+    if diagnosis is not None and diagnosis.counts:
+        shown.append((short_length(diagnosis.held_summary().mean), names["tile-corrected"]))
+    coverage = found.ellipses.coverage
+    if np.isfinite(coverage.estimate):
+        ends = (
+            f" ({percent_of(coverage.low)} to {percent_of(coverage.high)})"
+            if np.isfinite(coverage.low)
+            else ""
         )
-    if certain:
-        limits.append(
-            "Whether the cause stays: an error that wanders over minutes (of a satellite fix, of a heading) "
-            "looks constant too, and images that a fit had not seen share it with their neighbours."
-        )
-    if not enough:
-        limits.append(
-            "Fewer than six images have a point with a known error and an ellipse: no interval is given, and "
-            "neither cause nor noise was looked for."
-        )
-    return limits
+        shown.append((percent_of(coverage.estimate), names["tile-ellipses"] + ends))
+    return shown[:4]
+
+
+def _other_summaries(
+    flight: Flight, found: Accuracy, texts: PageTexts, *, shown: bool
+) -> dict[str, ErrorSummary]:
+    """Errors with the cause taken off, without outliers, and with heights as they were recorded."""
+    diagnosis, rows = found.diagnosis, {}
+    if diagnosis is not None and diagnosis.counts:
+        rows[texts.subjects["corrected"]] = diagnosis.held_summary()
+    if diagnosis is not None and diagnosis.outliers:
+        rows[texts.subjects["inliers"]] = diagnosis.held_summary(diagnosis.inliers)
+    manifest = flight.manifest
+    apart = manifest.scoring.rule == "labelled" or (
+        manifest.terrain is not None and manifest.terrain.heights != "flight"
+    )
+    # The height of the geoid tells of a place.
+    if manifest.vertical.correction_m and shown and apart:
+        raised = georeference(flight, heights_left_in(flight, found.observations), np.random.default_rng(0))
+        rows[texts.subjects["uncorrected-heights"]] = summarise(errors_of(score_points(flight, raised)))
+    return rows
+
+
+def _ellipse_message(verdict: EllipseVerdict) -> Message:
+    factor = verdict.factor
+    values = {
+        "inside": percent_of(verdict.coverage.estimate),
+        "n": str(verdict.n),
+        "factor": significant(factor.estimate),
+        "low": significant(factor.low),
+        "high": significant(factor.high),
+    }
+    return Message(f"ellipses-{verdict.word.replace(' ', '-')}", values)
+
+
+def _figures(report: Report, wording: Wording, found: Accuracy, programs: Mapping[str, pd.DataFrame]) -> None:
+    errors, diagnosis, names = found.errors, found.diagnosis, wording.texts.subjects
+    reach = 1.1 * np.nanmax(np.abs(errors))
+    series = {names["logged"]: (errors, colour("logged-pose"))}
+    if diagnosis is not None and diagnosis.counts:
+        series[names["corrected"]] = (diagnosis.winner.held, colour("calibrated-pose"))
+    for program, table in programs.items():
+        series[names["recorded"].format(program)] = (errors_of(table), colour("recorded"))
+    wording.figure("error-scatter", error_scatter(errors, "", colour("logged-pose"), reach), main=True)
+    report.figures(
+        [
+            wording.captioned("error-shares", error_shares(series, "")),
+            wording.captioned("errors-by-image", errors_by_image(found.scored, "")),
+        ]
+    )

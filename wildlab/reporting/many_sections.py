@@ -7,8 +7,8 @@ from wildlab.analysis.many.follow import ManyTracks
 from wildlab.evaluation.identities import Identities
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
-from wildlab.reporting.georeferencing_cause import listed
 from wildlab.reporting.report import Report
+from wildlab.reporting.text import listed
 
 
 def head_section(report: Report, followed: ManyTracks, lives: Identities | None) -> None:

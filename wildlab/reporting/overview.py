@@ -24,7 +24,7 @@ from wildlab.reporting import overview_sections as sections
 from wildlab.reporting import overview_words as words
 from wildlab.reporting.arrange import ADVICE
 from wildlab.reporting.charts import overview as charts
-from wildlab.reporting.georeferencing_sections import amiss_section
+from wildlab.reporting.georeferencing import show_contradictions
 from wildlab.reporting.report import Report
 
 #: Subject of what is recorded of the whole flight.
@@ -70,7 +70,7 @@ def show_overview(
     if overview.problems:
         count = "One problem" if overview.problems == 1 else f"{overview.problems} problems"
         report.alert(f"{count} in its tables", ["`wildlab check` on the flight's folder says which."])
-    amiss_section(report, amiss, shown=shown)
+    show_contradictions(report, amiss, shown=shown)
     begin = min((pace.begin for pace in overview.streams.values() if pace.n), default=0.0)
     clock = charts.Clock(begin, overview.length_s)
     sections.places_section(report, overview)

@@ -13,8 +13,7 @@ from wildlab.analysis.overviews.overview import Issue, Overview, length_of_way, 
 from wildlab.analysis.overviews.recommendations import MOST, Gain
 from wildlab.analysis.overviews.verdict import WORTH, Verdict
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
-from wildlab.reporting.georeferencing_cause import listed, metres
-from wildlab.reporting.text import percent
+from wildlab.reporting.text import listed, metres, percent
 
 _CAUSES = {
     "position": "the position (north and east)",

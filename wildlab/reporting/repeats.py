@@ -1,100 +1,107 @@
-"""What the report on a flight without truth says: spread and consistency, and what cannot be said."""
+"""The page on a flight without truth: how far apart sightings of the same thing lie, and what that tells."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from wildlab.analysis.overviews.verdict import MANY_LOST, Evidence, Verdict, verdict_of
+from wildlab.analysis.overviews.verdict import MANY_LOST, VERDICT_LEVEL, Evidence, Verdict, verdict_of
 from wildlab.analysis.repeats import Repeats
-from wildlab.reporting.georeferencing import short_length
-from wildlab.reporting.georeferencing_cause import amiss_sentence, cause_sentence, lost_sentence
+from wildlab.flight.store import Flight
+from wildlab.messages.message import Message
+from wildlab.messages.page_texts import load_texts, significant
+from wildlab.reporting.georeferencing import (
+    cause_message,
+    parameters_table,
+    short_length,
+    show_contradictions,
+    show_models,
+)
+from wildlab.reporting.report import Report
+from wildlab.reporting.wording import Wording
 
 #: Ellipses whose size is off by less than this factor fit the spread.
 CLOSE = 1.25
+#: Rows of the table of things.
+SHOWN = 20
 
 
-def summary_sentences(found: Repeats, amiss: Sequence[str] = ()) -> list[str]:
-    """How far apart sightings lie, whether the ellipses fit that, and what was lost.
+def answer(found: Repeats) -> Message:
+    """How far apart sightings lie, and whether the ellipses fit that."""
+    spread, total = found.spread, len(found.points)
+    values = {"lost": str(found.lost), "total": str(total)}
+    if found.lost > MANY_LOST * total:
+        return Message("many-lost", values)
+    if spread is None:
+        return Message("none-twice", values)
+    values |= {
+        "scatter": short_length(spread.sd),
+        "sightings": str(spread.sightings),
+        "things": str(spread.things),
+        "ratio": significant(spread.consistent),
+    }
+    if math.isnan(spread.consistent):
+        return Message("scatter", values)
+    if spread.consistent > CLOSE:
+        return Message("ellipses-small", values)
+    return Message("ellipses-large" if spread.consistent < 1 / CLOSE else "ellipses-fit", values)
+
+
+def verdict(found: Repeats, problems: int = 0) -> tuple[Verdict, Message]:
+    """What it comes to, and why: never sound, for the errors themselves are not known."""
+    total = len(found.points)
+    word = verdict_of(Evidence(problems=problems, lost=found.lost / total if total else math.nan))
+    if problems:
+        return word, Message("reason-contradictions", {"problems": str(problems)})
+    if word == Verdict.MEND:
+        return word, Message("reason-lost", {"lost": str(found.lost), "total": str(total)})
+    return word, Message("reason-unknown")
+
+
+def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence[str]) -> None:
+    """Write the page, but for its terrain, and record its numbers.
 
     Parameters
     ----------
-    found
-        From `judge_repeats`.
+    report
+        Is added to.
+    flight, found
+        The flight, and its sightings.
     amiss
         What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
-
-    Returns
-    -------
-    list of str
-        What does not fit together first.
     """
-    first = amiss_sentence(amiss)
-    said = _found_sentences(found)
-    return [first, *said] if first else said
-
-
-def _found_sentences(found: Repeats) -> list[str]:
-    lost = lost_sentence(found.lost, len(found.points))
-    if found.spread is None:
-        return [
-            "Nothing has a position from two images or more, so nothing can be said of how good the "
-            "positions are.",
-            *([lost] if lost else []),
-        ]
-    s = found.spread
-    said = [
-        f"Sightings of the same thing from different images scatter by {short_length(s.sd)} along either "
-        f"axis ({s.sightings} sightings of {s.things} things).",
-        "How far off they are together cannot be said without known points.",
-    ]
-    if np.isfinite(s.consistent):
-        said.append(consistency_sentence(s.consistent))
-    if found.diagnosis is not None:
-        said.append(cause_sentence(found.diagnosis))
-    return [lost, *said] if found.lost > MANY_LOST * len(found.points) else [*said, *([lost] if lost else [])]
-
-
-def consistency_sentence(ratio: float) -> str:
-    """Whether the ellipses fit the spread; ``ratio`` is the spread over what they say."""
-    if ratio > CLOSE:
-        return (
-            f"The ellipses are too small: the scatter is {ratio:.1f} times what they say, and what all "
-            "images share comes on top."
+    texts = load_texts("repeat-sightings")
+    wording = Wording(report, texts)
+    spread, diagnosis, total = found.spread, found.diagnosis, len(found.points)
+    images = found.points["frame_id"].nunique()
+    report.head(texts.subjects["question"], f"{images} images, {total} points, no truth")
+    word, reason = verdict(found, sum(one.startswith("problem") for one in amiss))
+    said = wording.messages([answer(found)])
+    cause = Wording(report, load_texts("georeferencing"))
+    if diagnosis is not None and spread is not None:
+        said += cause.messages([cause_message(diagnosis)])
+    report.summary(said, level=word.colour, verdict=(word.value, wording.messages([reason])[0]))
+    report.metric(VERDICT_LEVEL, "georeferencing", word.level, "1")
+    show_contradictions(report, amiss, shown=flight.manifest.locations.sensitivity == "open")
+    if spread is not None:
+        report.metric("sighting_spread", "logged-pose", spread.sd, "m", n=spread.sightings)
+        report.metric("sighting_consistency", "logged-pose", spread.consistent, "1", n=spread.sightings)
+        report.tiles(
+            [
+                (short_length(spread.sd), texts.subjects["tile-scatter"]),
+                (f"{spread.things} of {len(found.things)}", texts.subjects["tile-things"]),
+                (f"{found.lost} of {total}", texts.subjects["tile-lost"]),
+            ]
         )
-    if ratio < 1 / CLOSE:
-        return (
-            f"The scatter is {ratio:.1f} times what the ellipses say: they are too large, or what they hold "
-            "is mostly shared by all images."
-        )
-    return "The scatter fits the ellipses, as far as images differ."
-
-
-def verdict(found: Repeats, amiss: Sequence[str] = ()) -> tuple[Verdict, str]:
-    """What it comes to, and why: never sound, for the errors themselves are not known."""
-    contradictions, total = sum(one.startswith("problem") for one in amiss), len(found.points)
-    word = verdict_of(Evidence(problems=contradictions, lost=found.lost / total if total else np.nan))
-    if contradictions:
-        count = "1 finding" if contradictions == 1 else f"{contradictions} findings"
-        return word, f"The logs contradict each other: {count}."
-    if word == Verdict.MEND:
-        return word, f"{found.lost} of {total} points have no position."
-    return word, "Without points whose place is known, errors stay unknown."
-
-
-def limits(found: Repeats) -> list[str]:
-    """What such a report does not tell."""
-    said = [
-        "How far off the positions are: an error that all images share (height, clock, boresight seen from "
-        "one side) moves all sightings together and does not show.",
-        "How far a thing moved between its sightings: that counts as scatter, and makes the ellipses look "
-        "too small.",
-    ]
-    if (found.things["images"] < 2).any():
-        alone = int((found.things["images"] < 2).sum())
-        said.append(
-            f"Anything about {alone} of {len(found.things)} things that have a position from one image only, "
-            "or from none."
-        )
-    return said
+        wording.table("things", found.things.head(SHOWN))
+    if diagnosis is not None:
+        gain = diagnosis.winner.gain.gain
+        n = len(diagnosis.scored)
+        report.metric("sighting_gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
+        report.metric("cause_certain", "winner", float(diagnosis.counts), "1", n=n)
+        if diagnosis.winner.causes:
+            cause.table("parameters", parameters_table(report, diagnosis.calibration))
+    report.limits([wording.say(one) for one in texts.limits])
+    report.section("Details")
+    show_models(report, cause, diagnosis)
+    report.method(texts.method)

@@ -8,7 +8,6 @@ which the study's ``answer`` chooses its sentences.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -17,8 +16,9 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.shares import HOLDS, Check
-from wildlab.messages.page_texts import FORMS, PageTexts, TileText, fill
+from wildlab.messages.page_texts import FORMS, PageTexts, TileText
 from wildlab.reporting.report import Report
+from wildlab.reporting.wording import Wording
 from wildlab.studies.fit_and_prediction import simulated_section
 from wildlab.studies.monte_carlo import CLAIM_COLUMNS, CLAIMS_EXPLAINED, decide_claims
 
@@ -26,9 +26,6 @@ PUBLISHED_CAPTION = (
     "Close: our median is within a factor of 1.25. Within: the published flight could be one more of ours. "
     "✓ yes, ✗ no, ? undecided. Published in"
 )
-
-
-_FIGURE = re.compile(r"fig-([0-9a-c])-([0-9]+[a-z]?)")
 
 
 class Shown(NamedTuple):
@@ -108,37 +105,34 @@ def show_page(
     KeyError
         If a text, or a number that one names, is missing: a fault of the study.
     """
-    known = dict(values or {})
+    wording = Wording(report, texts, values, thesis)
     decided = None if checks is None else decide_claims(report, report.study, checks)
-
-    def say(text: str) -> str:
-        return fill(text, report.recorded, known)
-
     facts = Facts(report.recorded, {one["id"]: one["verdict"] for one in report.claims})
-    report.head(title, say(texts.subtitle))
-    sentences = {key: say(text) for key, text in texts.answers.items()}
+    report.head(title, wording.say(texts.subtitle))
+    # All are filled in, so that a fault of one that is not chosen shows.
+    sentences = {key: wording.say(text) for key, text in texts.answers.items()}
     report.summary([sentences[key] for key in answer(facts)])
-    report.tiles([_tile(report, one, say) for one in texts.tiles])
+    report.tiles([_tile(report, one, wording) for one in texts.tiles])
     first, *others = figures
-    fig, name, alt, caption = _captioned(first, texts, say, thesis)
-    report.figure(fig, name=name, alt=alt, caption=caption, main=True)
+    wording.figure(first.text, first.fig, first.name, main=True)
     report.published("Published and here", PUBLISHED_CAPTION, texts.subjects, texts.quantities)
     if decided is not None and len(decided):
         _claims(report, decided)
-    for key, frame in (tables or {}).items():
+    ordered = sorted((tables or {}).items(), key=lambda one: not texts.tables[one[0]].open)
+    for key, frame in ordered:
         if texts.tables[key].open:
-            _table(report, key, frame, texts, say)
+            wording.table(key, frame)
     if others:
         report.section("Figures")
     for i in range(0, len(others), 2):
-        report.figures([_captioned(one, texts, say, thesis) for one in others[i : i + 2]])
-    report.limits([say(one) for one in texts.limits])
+        report.figures([wording.captioned(one.text, one.fig, one.name) for one in others[i : i + 2]])
+    report.limits([wording.say(one) for one in texts.limits])
     report.section("Details")
     if decided is not None and len(decided):
         _premises(report, decided)
-    for key, frame in (tables or {}).items():
+    for key, frame in ordered:
         if not texts.tables[key].open:
-            _table(report, key, frame, texts, say)
+            wording.table(key, frame)
     report.method(say_method(texts.method))
 
 
@@ -152,58 +146,17 @@ def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
     simulated_section(report, *twins, study=study)
 
 
-def _tile(report: Report, tile: TileText, say: Callable[[str], str]) -> tuple[str, str]:
+def _tile(report: Report, tile: TileText, wording: Wording) -> tuple[str, str]:
     entry = report.recorded[tile.name, tile.subject]
-    words = say(tile.text)
+    words = wording.say(tile.text)
     low, high = entry.get("low"), entry.get("high")
     if low is not None and high is not None:
-        ends = (
-            FORMS["percent" if tile.form == "percent" else "number"]({**entry, "value": end})
-            for end in (low, high)
-        )
-        words += f" ({' to '.join(ends)})"
+        form = FORMS["percent" if tile.form == "percent" else "number"]
+        words += f" ({form({**entry, 'value': low})} to {form({**entry, 'value': high})})"
     printed = report.printed(tile.name, tile.subject)
     if printed is not None:
         words += f"; published {printed['value']:g}"
     return FORMS[tile.form](entry), words
-
-
-def _captioned(
-    one: Shown, texts: PageTexts, say: Callable[[str], str], thesis: str
-) -> tuple[Figure, str, str, str]:
-    text = texts.figures[one.text]
-    if text.title:
-        one.fig.axes[0].set_title(say(text.title))
-    name = one.name or one.text
-    return one.fig, name, say(text.alt), f"{say(text.caption)} {counterpart(name, thesis)}".strip()
-
-
-def counterpart(name: str, thesis: str) -> str:
-    """The figure of a thesis that a file of that name answers to, as the end of a caption.
-
-    Examples
-    --------
-    >>> counterpart("fig-7-19a", "H"), counterpart("fig-b-02", "F"), counterpart("track-map", "H")
-    ('H figure 7.19a.', 'F figure B.2.', '')
-    """
-    found = _FIGURE.fullmatch(name)
-    return f"{thesis} figure {found[1].upper()}.{found[2].lstrip('0')}." if found else ""
-
-
-def _table(
-    report: Report, key: str, frame: pd.DataFrame, texts: PageTexts, say: Callable[[str], str]
-) -> None:
-    text = texts.tables[key]
-    columns = {name: say(heading) for name, heading in text.columns.items()} or None
-    if text.open:
-        report.section(say(text.title))
-    report.table(
-        frame,
-        columns=columns,
-        digits=text.digits or None,
-        caption=say(text.caption),
-        fold="" if text.open else say(text.title),
-    )
 
 
 def _claims(report: Report, decided: pd.DataFrame) -> None:

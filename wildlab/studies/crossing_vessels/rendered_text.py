@@ -10,7 +10,7 @@ import pandas as pd
 
 from wildlab.analysis.rendered import OVERLAP
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.reporting.georeferencing_cause import listed
+from wildlab.reporting.text import listed
 from wildlab.simulation.scene.flights import VesselLook
 from wildlab.studies.crossing_vessels.rendered import SEA_EVERY, Associated, CrossingTracks, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
