@@ -33,7 +33,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.reporting.overview import counts_of, show_overview
 from wildlab.reporting.report import open_report
-from wildlab.reporting.tracking_sections import head_section
+from wildlab.reporting.tracking import show_answer
 from wildlab.simulation.twins import simulate_twin
 
 
@@ -355,7 +355,7 @@ def test_tracks_that_their_own_report_doubts_are_not_sound_here(off_deg, tmp_pat
     )
     rows = judged_tracks(followed)
     tracking = open_report(study="tracking", kind="logged", flight="f", out=str(tmp_path))
-    head_section(tracking, followed, rows, [], None)
+    show_answer(tracking, followed, rows, [])
     tracking.save()
     numbers = numbers_of([json.loads((tmp_path / "metrics.json").read_text())])
     assert verdict_of(Evidence(judged=1, parts=tuple(parts_of(numbers).values()))) == (

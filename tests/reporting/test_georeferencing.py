@@ -21,7 +21,8 @@ from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.messages.page_texts import load_texts
 from wildlab.reporting import georeferencing
-from wildlab.reporting.georeferencing import EXACT, POINT_COLUMNS, point_links, truth_kinds
+from wildlab.reporting.georeferencing import EXACT, truth_kinds
+from wildlab.reporting.georeferencing_tables import POINT_COLUMNS, noise_table, point_links
 from wildlab.reporting.report import Report, open_report
 from wildlab.simulation.twins import simulate_twin
 
@@ -53,7 +54,7 @@ def test_metrics_have_the_promised_names(report):
 def test_noise_is_shown_in_degrees():
     noise = PoseNoise(dict.fromkeys(KINDS, np.radians(2.0)), dict.fromkeys(KINDS, 1.5))
     units = ("position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg", "pixel_px")
-    table = georeferencing.noise_table(noise, dict.fromkeys(units, 1))
+    table = noise_table(noise, dict.fromkeys(units, 1))
     heading = table[table["unit"] == "deg"]["estimated"]
     assert heading.tolist() == pytest.approx([2.0, 2.0]) and len(table) == len(KINDS)
 

@@ -20,6 +20,7 @@ from wildlab.evaluation.runs import Interval
 from wildlab.geometry.calibration import Calibration
 from wildlab.messages.page_texts import load_texts
 from wildlab.reporting import georeferencing as page
+from wildlab.reporting import georeferencing_tables as tables
 from wildlab.reporting.ground import terrain_message
 from wildlab.reporting.report import open_report
 
@@ -179,17 +180,17 @@ def test_no_cause_is_certain_where_a_third_is_far_out():
 def test_what_is_left_is_sorted_and_its_whole_comes_last():
     image, within = np.array([0.6, 0.8]), np.array([3.0, 4.0])
     scatter = Scatter(0.1, 0.3, 0.6, image, within, np.array([1.2, 1.6]), 5.6)
-    table = page.parts_table(SimpleNamespace(remaining=scatter))
+    table = tables.parts_table(SimpleNamespace(remaining=scatter))
     assert table["rms"].tolist() == pytest.approx([5.0, 2.0, 1.0, 5.6])
     nan = np.full(2, np.nan)
     unknown = Scatter(np.nan, np.nan, np.nan, nan, nan, nan, np.nan)
-    assert not len(page.parts_table(SimpleNamespace(remaining=unknown)))
-    assert page.outliers_table((FAR,))["photo"].tolist() == ["several"]
+    assert not len(tables.parts_table(SimpleNamespace(remaining=unknown)))
+    assert tables.outliers_table((FAR,))["photo"].tolist() == ["several"]
 
 
 def test_an_axis_is_constant_by_its_interval():
     one, other = Interval(3.0, 2.0, 4.0), Interval(1.0, -1.0, 3.0)
-    table = page.axes_table({"north": AlongAxis(one, 0.5, 9), "east": AlongAxis(other, 0.1, 9)})
+    table = tables.axes_table({"north": AlongAxis(one, 0.5, 9), "east": AlongAxis(other, 0.1, 9)})
     assert table["lasting"].tolist() == [True, False]
     assert table["share"].tolist() == [50.0, 10.0]
 
@@ -198,7 +199,7 @@ def test_parameters_are_called_different_from_zero_by_their_interval():
     report = open_report(study="made-up", kind="twin")
     covariance = np.diag([1e-4, 1.0])
     found = Calibration(("tilt", "north"), np.array([np.radians(-5.0), 1.5]), covariance, {}, 40, 20, 10)
-    table = page.parameters_table(report, found)
+    table = tables.parameters_table(report, found)
     assert table["zero"].tolist() == [False, True]
     # Student's with nine degrees of freedom, not the 1.96 of many draws.
     assert report.recorded["north_offset", "calibration"]["low"] == pytest.approx(1.5 - 2.262, abs=1e-3)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from wildlab.analysis.following.judged import Apart, leading_filter
 from wildlab.evaluation.consistency import Average
-from wildlab.reporting import tracking as words
+from wildlab.messages.page_texts import load_texts
+from wildlab.reporting import tracking as page
+from wildlab.reporting.text import NOTHING
 
 
 def rows(**changes: object) -> pd.DataFrame:
@@ -27,7 +31,11 @@ def rows(**changes: object) -> pd.DataFrame:
 
 
 def colour(rows: pd.DataFrame, pairs: list[Apart] | None = None) -> str:
-    return words.summary(rows, pairs or [], None)[1].colour
+    return page.judge_tracks(rows, pairs or []).colour
+
+
+def keys(rows: pd.DataFrame, pairs: list[Apart] | None = None) -> list[str]:
+    return [one.key for one in page.answer(rows, pairs or [])]
 
 
 def test_the_best_consistent_filter_leads():
@@ -40,8 +48,7 @@ def test_the_best_consistent_filter_leads():
 
 def test_where_no_filter_is_consistent_the_least_error_leads():
     worse = rows(nees=50.0, verdict="overconfident", rmse=8.0)
-    said, verdict = words.summary(worse, [], None)
-    assert verdict.value == "look closer" and said[0] == words.NONE_CONSISTENT
+    assert page.judge_tracks(worse, []).value == "look closer"
     assert leading_filter(worse) == "ekf"
     assert leading_filter(rows(nees=50.0, verdict="overconfident", rmse=2.0)) == "schmidt"
     assert leading_filter(rows(rmse=np.nan, nees=np.nan, verdict="not judged")) == "ekf"
@@ -52,68 +59,99 @@ def test_a_filter_that_its_detections_surprise_is_looked_at(nis, level):
     # Of two elements: 1.5 times is 4.5.
     odd = rows(nis=nis, nis_verdict="overconfident")
     assert colour(odd) == level
-    assert ("detections" in words.reason_of(odd)) == (level == "warn")
+    assert ("surprised" in keys(odd)) == (level == "warn")
 
 
 @pytest.mark.parametrize(
-    ("changes", "level"),
+    ("changes", "level", "first"),
     [
-        ({}, "good"),
+        ({}, "good", "errors-consistent"),
         # Few detections do not surprise, and what few values say is neither green nor red.
-        ({"nis": 4.6, "nis_high": 3.9, "nis_worth": 6.0, "nis_verdict": "overconfident"}, "good"),
-        ({"nees_worth": 4.0}, "neutral"),
-        ({"nees": 5.3, "verdict": "overconfident"}, "warn"),
+        (
+            {"nis": 4.6, "nis_high": 3.9, "nis_worth": 6.0, "nis_verdict": "overconfident"},
+            "good",
+            "errors-consistent",
+        ),
+        ({"nees_worth": 4.0}, "neutral", "errors-unknown"),
+        ({"nees": 5.3, "verdict": "overconfident", "rmse": 1.0}, "warn", "errors-overconfident"),
+        ({"nees": 0.1, "verdict": "too cautious", "rmse": 1.0}, "warn", "errors-conservative"),
     ],
 )
-def test_the_colour_of_the_verdict(changes, level):
-    assert colour(rows(**changes)) == level
+def test_verdict_and_answer_follow_the_leading_filter(changes, level, first):
+    assert colour(rows(**changes)) == level and keys(rows(**changes))[0] == first
 
 
-def blind() -> pd.DataFrame:
-    return rows().assign(compared=0, rmse=np.nan, nees=np.nan, verdict="not judged")
+def test_tracks_that_differ_are_counted():
+    both = pd.concat([rows(), rows(target="other", nees=9.0, verdict="overconfident", rmse=1.0).iloc[1:]])
+    first = page.answer(both, [])[0]
+    assert first.key == "errors-mixed"
+    assert [first.values[one] for one in ("n", "consistent", "overconfident")] == ["2", "1", "1"]
+    assert page.reason(both).values["counts"] == "1 consistent, 1 overconfident"
+
+
+def blind(**changes: object) -> pd.DataFrame:
+    return rows().assign(compared=0, rmse=np.nan, nees=np.nan, verdict="not judged", **changes)
 
 
 def test_without_truth_the_filter_leads_whose_innovations_are_as_it_expects():
-    seen = blind().assign(nis=[1.99, 9.0])
+    seen = blind(nis=[1.99, 9.0])
     assert leading_filter(seen.assign(nis_verdict=["consistent", "overconfident"])) == "ekf"
     assert leading_filter(seen.assign(nis_verdict=["overconfident", "consistent"])) == "schmidt"
     assert leading_filter(seen.assign(nis_verdict="overconfident", nis=[9.0, 1.0])) == "schmidt"
-    assert "rmse" not in words.columns_of(words.tracks_table(seen))
+    assert "rmse" not in page.tracks_table(seen)
+    assert page.reason(seen).key == "reason-nis"
+
+
+@pytest.mark.parametrize(
+    ("nis", "word", "key"),
+    [
+        (2.0, "consistent", "innovations-consistent"),
+        (9.0, "overconfident", "innovations-overconfident"),
+        (0.5, "too cautious", "innovations-conservative"),
+        (np.nan, "not judged", "innovations-unknown"),
+    ],
+)
+def test_innovations_answer_where_there_is_no_truth(nis, word, key):
+    assert keys(blind(nis=nis, nis_verdict=word)) == [key, "no-truth"]
+
+
+PAIR = Apart("boat", "schmidt", "radar", "lidar", 3.0, 90, Average(8.0, 1.5, 2.5, 90, 60.0))
 
 
 def test_sensors_that_contradict_each_other_are_looked_at():
-    pair = Apart("boat", "schmidt", "radar", "lidar", 3.0, 90, Average(8.0, 1.5, 2.5, 90, 60.0))
-    agreeing = pair._replace(squares=Average(2.0, 1.5, 2.5, 90, 60.0))
-    assert colour(blind(), [pair]) == "warn" != colour(blind(), [agreeing])
-    assert "2.0 times" in words.apart_sentence(pair) and "3.0 m" in words.apart_sentence(pair)
+    agreeing = PAIR._replace(squares=Average(2.0, 1.5, 2.5, 90, 60.0))
+    assert colour(blind(), [PAIR]) == "warn" != colour(blind(), [agreeing])
+    beside = page.answer(blind(), [PAIR, agreeing])[1]
+    assert beside.key == "apart" and (beside.values["times"], beside.values["rms"]) == ("2.0", "3.0 m")
 
 
 def test_a_smoothed_track_without_innovations_is_not_a_lost_one():
     both = pd.concat([rows(), rows(filter="schmidt-smoothed", detections=0, nis=np.nan).iloc[1:]])
-    assert not any("boat by" in one for one in words.summary(both, [], None)[0])
+    assert keys(both) == ["errors-consistent", "ekf"]
     lost = rows().assign(detections=0, compared=0, sensor="ir", nees=np.nan, verdict="not judged")
-    assert "boat by ir" in words.summary(pd.concat([rows(), lost]), [], None)[0][-1]
-    assert words.tracks_table(both)["detections"].tolist() == ["100", "100", words.NOTHING]
+    never = page.answer(pd.concat([rows(), lost]), [])[1]
+    assert never.key == "never-tracked" and never.values == {"never": "1", "of": "2"}
+    assert page.tracks_table(both)["detections"].tolist() == ["100", "100", NOTHING]
 
 
 @pytest.mark.parametrize(("nees", "few"), [(5.5, True), (7.4, True), (7.6, False), (2.0, False)])
 def test_few_values_are_an_excuse_near_the_band_only(nees, few):
     row = rows(nees=nees, verdict="overconfident" if nees > 5 else "consistent").iloc[1]
-    assert words.on_few(row) == few
+    assert page.on_few(row) == few
+    assert page.tracks_table(pd.DataFrame([row]))["verdict"].iloc[0].endswith("*") == few
 
 
 def test_time_without_the_target_is_a_number_of_its_own():
-    lost = rows(rmse=9.4, compared=263, without=1084, rmse_without=205.0, wait=67.7)
-    said, _ = words.summary(lost, [], None)
-    assert "263 of 1347" in said[0] and "205 m" in said[1]
-    table = words.tracks_table(lost)
-    assert table["compared"].tolist() == [100, 263] and table["rmse_without"].iloc[1] == 205.0
+    lost = rows(rmse=9.4, compared=263, without=1084, rmse_without=205.0, wait=67.7, filter="ekf").iloc[1:]
+    assert [one.values.get("rmse") for one in page.answer(lost, [])] == ["9.4 m", "205 m"]
+    table = page.tracks_table(lost)
+    assert table["compared"].tolist() == [263] and table["rmse_without"].iloc[0] == 205.0
 
 
-@pytest.mark.parametrize("used", [0, 1])
-def test_without_a_second_detection_nothing_is_judged(used):
+@pytest.mark.parametrize(("used", "key"), [(0, "no-track"), (1, "one-detection")])
+def test_without_a_second_detection_nothing_is_judged(used, key):
     one = rows().assign(detections=0, used=used, compared=0, verdict="not judged")
-    assert colour(one) == "bad"
+    assert colour(one) == "bad" and keys(one) == [key] and page.reason(one).key == "reason-none"
 
 
 @pytest.mark.parametrize(("rmse", "level"), [(261.0, "warn"), (4.9, "warn"), (4.7, "good"), (3.0, "good")])
@@ -121,4 +159,23 @@ def test_all_sensors_together_must_not_be_worse_than_the_best_alone(rmse, level)
     together = rows(rmse=rmse, nees=900.0, verdict="overconfident")
     both = pd.concat([rows(), together.assign(sensor="together", kind="together")])
     assert colour(both) == level
-    assert f"{words.length(rmse)} from boat" in words.summary(both, [], None)[0][1]
+    assert ("worse-together" in keys(both)) == (level == "warn")
+
+
+def test_restarts_are_counted_once_for_all_filters():
+    again = rows().assign(anew=2, gone=40, spanned=100, gone_seen=3)
+    said = page.answer(again, [])[1]
+    assert said.key == "restarted" and said.values == {"times": "2", "gone": "40", "looks": "100"}
+    times, without = np.arange(6.0), np.array([False, True, True, False, True, False])
+    assert page.longest_gap(times, without) == 2.0
+    assert page.longest_gap(times, np.zeros(6, bool)) == 0.0
+
+
+def test_every_sentence_is_one_of_the_catalogue():
+    mixed = pd.concat([blind(), blind(target="b", nis_verdict="overconfident", nis=9.0)])
+    said = [*page.answer(mixed, []), page.reason(rows()), page.reason(rows(nees_worth=4.0))]
+    said += [page.reason(blind(nis_worth=4.0))]
+    texts = load_texts("tracking").answers
+    assert said[0].key == "innovations-mixed"
+    for one in said:
+        assert set(re.findall(r"{(\w+)}", texts[one.key])) <= set(one.values)

@@ -17,7 +17,6 @@ from wildlab.analysis.accuracy import Accuracy
 from wildlab.analysis.diagnosis import CAUSES, Diagnosis
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import georeference, heights_left_in
-from wildlab.analysis.ground_file import points_geojson, with_axes
 from wildlab.analysis.overviews.recommendations import is_possible
 from wildlab.analysis.overviews.verdict import (
     FEW_POINTS,
@@ -28,23 +27,31 @@ from wildlab.analysis.overviews.verdict import (
     Verdict,
     verdict_of,
 )
-from wildlab.evaluation.axes import AlongAxis
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary, summarise
-from wildlab.evaluation.outliers import Outlier
-from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.files import csv_text
 from wildlab.flight.store import Flight
-from wildlab.geometry.calibration import BORESIGHT, Calibration
 from wildlab.messages.message import Message
 from wildlab.messages.page_texts import PageTexts, load_texts, measure, percent_of, significant
 from wildlab.reporting.arrange import ADVICE
 from wildlab.reporting.charts.georeferencing import error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
+from wildlab.reporting.georeferencing_tables import (
+    SUMMARY,
+    axes_table,
+    beside_published,
+    errors_table,
+    groups_table,
+    models_table,
+    noise_table,
+    outliers_table,
+    parameters_table,
+    parts_table,
+    point_links,
+    significant_parameters,
+)
 from wildlab.reporting.ground import terrain_section
 from wildlab.reporting.published import load_published
 from wildlab.reporting.report import Report
-from wildlab.reporting.tables import data_link
 from wildlab.reporting.text import listed
 from wildlab.reporting.wording import Wording
 
@@ -52,38 +59,10 @@ from wildlab.reporting.wording import Wording
 FEW = FEW_POINTS
 #: From this share of the error on a constant error is most of it.
 MOST = 0.5
-#: Rows of the table of models; messages of what to do.
-SHOWN, MOST_ADVICE = 8, 3
+#: Messages of what to do, at most.
+MOST_ADVICE = 3
 #: Zones are whole quarters of an hour, s.
 ZONE_S = 900.0
-#: Unit of each parameter, and how many of that are one.
-_UNITS = {
-    **dict.fromkeys(("roll", "tilt", "pan", "heading"), ("deg", 180 / np.pi)),
-    **dict.fromkeys(("down", "north", "east"), ("m", 1.0)),
-    **dict.fromkeys(("focal", "aspect"), ("%", 100.0)),
-    **dict.fromkeys(("centre_u", "centre_v"), ("px", 1.0)),
-    "clock": ("s", 1.0),
-    "radial": ("1", 1.0),
-}
-_NOISE = {
-    "position_horizontal": ("position_horizontal_m", "m"),
-    "position_vertical": ("position_vertical_m", "m"),
-    "tilt": ("tilt_deg", "deg"),
-    "heading": ("heading_deg", "deg"),
-    "pixel": ("pixel_px", "px"),
-}
-#: What the files of points have of a point, m and degrees; times count from the first image.
-POINT_COLUMNS = ("point", "seconds", "north_m", "east_m", "long_90_m", "short_90_m", "bearing_deg")
-_SUMMARY = {
-    "horizontal_error_mean": "mean",
-    "horizontal_error_median": "median",
-    "horizontal_error_p90": "p90",
-    "horizontal_error_max": "max",
-    "bias_north": "bias_north",
-    "bias_east": "bias_east",
-    "sd_north": "sd_north",
-    "sd_east": "sd_east",
-}
 
 
 # -- what is recorded
@@ -96,7 +75,7 @@ def record_summary(
     intervals: Mapping[str, tuple[float, float]] | None = None,
 ) -> None:
     """Record the figures of a summary of errors under ``subject``; ``intervals`` by metric name."""
-    for name, field in _SUMMARY.items():
+    for name, field in SUMMARY.items():
         low, high = (intervals or {}).get(name, (None, None))
         report.metric(name, subject, getattr(summary, field), "m", n=summary.n, low=low, high=high)
 
@@ -220,12 +199,6 @@ def truth_kinds(flight: Flight, scored: pd.DataFrame) -> TruthKinds:
 def gained_share(gain: Any) -> float:
     """A gain (`wildlab.evaluation.causes.Gain`) as a share of the error without it."""
     return gain.gain.estimate / gain.without if gain.without > 0 else 0.0
-
-
-def significant_parameters(calibration: Calibration) -> tuple[str, ...]:
-    """Parameters whose interval leaves zero out."""
-    ends = {name: calibration.interval(name) for name in calibration.names}
-    return tuple(name for name, (low, high) in ends.items() if low > 0 or high < 0)
 
 
 def significant_causes(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -416,174 +389,6 @@ def limits(
 
 def _sd_words(sd_m: float) -> str:
     return measure(sd_m, "m") if np.isfinite(sd_m) else "–"
-
-
-# -- tables
-
-
-def errors_table(rows: Mapping[str, ErrorSummary]) -> pd.DataFrame:
-    """One row of errors for each summary, with its name in the column ``pose``."""
-    return pd.DataFrame([{"pose": name, **summary._asdict()} for name, summary in rows.items()])
-
-
-def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """One row of errors for each scored part of a flight, with images and ellipse coverage."""
-    return pd.DataFrame(
-        [
-            {
-                "part": name,
-                "images": rows["frame_id"].nunique(),
-                **summarise(errors_of(rows))._asdict(),
-                "inside": 100 * rows["inside_90"].mean(),
-            }
-            for name, rows in groups.items()
-        ]
-    )
-
-
-def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorSummary) -> pd.DataFrame:
-    """Published figures with those of the same answers scored here (``again``) and of ours (``here``)."""
-    table = published[published["name"].isin(_SUMMARY)]
-    fields = [_SUMMARY[name] for name in table["name"]]
-    return table.assign(
-        quantity=[name.removeprefix("horizontal_error_") for name in table["name"]],
-        again=[getattr(theirs, field) for field in fields],
-        here=[getattr(ours, field) for field in fields],
-    )
-
-
-def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """The most likely models, the winner bold, and the poses as logged."""
-    shown = list(np.argsort(diagnosis.ranked.scores, kind="stable")[:SHOWN])
-    shown += [m for m in (diagnosis.ranked.winner, 0) if m not in shown]
-    rows = []
-    for m in shown:
-        model = diagnosis.models[m]
-        gain = model.gain.gain
-        rows.append(
-            {
-                "what": f"**{model.name}**" if m == diagnosis.ranked.winner else model.name,
-                "parameters": len(model.fit.names),
-                "error": model.gain.with_,
-                "gain": gain.estimate if model.causes else np.nan,
-                "low": gain.low if model.causes else np.nan,
-                "high": gain.high if model.causes else np.nan,
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
-    """Estimated corrections with their 95 % intervals, one row each; recorded as metrics too."""
-    names, rows = load_texts("georeferencing").quantities, []
-    zero = set(calibration.names) - set(significant_parameters(calibration))
-    for name in calibration.names:
-        unit, scale = _UNITS[name]
-        value, (low, high) = scale * calibration.value(name), (scale * x for x in calibration.interval(name))
-        metric = f"boresight_{name}" if name in BORESIGHT else f"{name}_offset"
-        report.metric(metric, "calibration", value, unit, n=calibration.n_images, low=low, high=high)
-        rows.append(
-            {
-                "what": names[name],
-                "value": value,
-                "low": low,
-                "high": high,
-                "unit": "" if unit == "1" else unit,
-                "zero": name in zero,
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def axes_table(axes: Mapping[str, AlongAxis]) -> pd.DataFrame:
-    """Mean error along each axis, and whether it lasts."""
-    return pd.DataFrame(
-        [
-            {
-                "axis": name,
-                "mean": one.mean.estimate,
-                "low": one.mean.low,
-                "high": one.mean.high,
-                "share": 100 * one.share,
-                "lasting": one.constant,
-            }
-            for name, one in axes.items()
-        ]
-    )
-
-
-def outliers_table(outliers: Sequence[Outlier]) -> pd.DataFrame:
-    """Marks, photos and clicks that are outliers, largest first."""
-    return pd.DataFrame(
-        [
-            {
-                "kind": one.kind,
-                "photo": one.photo or "several",
-                "mark": one.mark or ("several" if one.kind == "photo" else "not known"),
-                "points": one.points,
-                "error": one.off_m,
-            }
-            for one in outliers
-        ]
-    )
-
-
-def parts_table(found: Accuracy) -> pd.DataFrame:
-    """What the errors are made of once the cause is removed, RMS (m), largest first; none if unknown."""
-    scatter = found.remaining
-    if not np.isfinite(scatter.whole_m):
-        return pd.DataFrame(columns=["part", "rms"])
-    names = load_texts("georeferencing").quantities
-    parts = zip(("constant", "image", "point"), scatter.parts_m, strict=True)
-    rows = [{"part": names[name], "rms": float(rms)} for name, rms in sorted(parts, key=lambda one: -one[1])]
-    return pd.DataFrame([*rows, {"part": names["whole"], "rms": float(scatter.whole_m)}])
-
-
-def noise_table(noise: PoseNoise, assumed: Mapping[str, float]) -> pd.DataFrame:
-    """Assumed and estimated standard deviations, one row each, in degrees, metres and pixels."""
-    names = load_texts("georeferencing").quantities
-    return pd.DataFrame(
-        [
-            {
-                "what": names[kind],
-                "assumed": assumed[key],
-                "estimated": np.degrees(noise.sd[kind]) if unit == "deg" else noise.sd[kind],
-                "unit": unit,
-                "factor": noise.factor[kind],
-            }
-            for kind, (key, unit) in _NOISE.items()
-        ]
-    )
-
-
-def points_table(points: pd.DataFrame) -> pd.DataFrame:
-    """Places in local metres with their ellipses, without names, dates or anything else that locates them.
-
-    Parameters
-    ----------
-    points
-        From `wildlab.analysis.georeference.georeference`.
-
-    Returns
-    -------
-    DataFrame
-        With `POINT_COLUMNS`; ``seconds`` is the time since the first point, NaN where that is not known.
-    """
-    times = points["time_s"].to_numpy(float)
-    first = np.nanmin(times) if np.isfinite(times).any() else np.nan
-    table = with_axes(points).assign(point=np.arange(1, len(points) + 1), seconds=times - first)
-    return table[list(POINT_COLUMNS)].round(3)
-
-
-def point_links(flight: Flight, points: pd.DataFrame, source: str | None) -> list[str]:
-    """Links that hand over all points: metres for all, places where locations are open."""
-    links = [
-        data_link(csv_text(points_table(points)).encode(), "text/csv", "points.csv", "CSV, local metres")
-    ]
-    if flight.manifest.locations.sensitivity == "open":
-        places = points_geojson(flight, points, source or "").encode()
-        links.append(data_link(places, "application/geo+json", "points.geojson", "GeoJSON, exact places"))
-    return [link for link in links if link]
 
 
 # -- the page

@@ -13,8 +13,8 @@ from wildlab.analysis.many.follow import CUTOFF_M, ManyTracks
 from wildlab.analysis.many.target_model import HERE
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
+from wildlab.reporting.filter_names import length
 from wildlab.reporting.report import Report
-from wildlab.reporting.tracking import length
 from wildlab.tracking.particles import Count, count_interval, count_probabilities
 
 #: A target is followed well where it has a track at this share of the looks at which it can be seen.

@@ -12,11 +12,11 @@ from wildlab.messages.message import Message
 from wildlab.messages.page_texts import load_texts, significant
 from wildlab.reporting.georeferencing import (
     cause_message,
-    parameters_table,
     short_length,
     show_contradictions,
     show_models,
 )
+from wildlab.reporting.georeferencing_tables import parameters_table
 from wildlab.reporting.report import Report
 from wildlab.reporting.wording import Wording
 

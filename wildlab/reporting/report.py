@@ -219,9 +219,13 @@ class Report:
         """
         self._show(self._figure(fig, name, alt, caption, main=main))
 
-    def figures(self, row: Sequence[tuple[Figure, str, str, str]]) -> None:
-        """Several ``(fig, name, alt, caption)`` side by side, or one below the other on a phone."""
-        self._show(f'<div class="row">{"".join(self._figure(*item) for item in row)}</div>')
+    def figures(self, row: Sequence[tuple[Figure, str, str, str]], *, fold: str = "") -> None:
+        """Several ``(fig, name, alt, caption)`` side by side, or one below the other on a phone.
+
+        ``fold`` is the one-line summary behind which they are folded away, where they are.
+        """
+        html = f'<div class="row">{"".join(self._figure(*item) for item in row)}</div>'
+        self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
 
     def animation(
         self, shown: ShownFlight, *, alt: str, most_bytes: int = 1_000_000, fold: str = "", intro: str = ""

@@ -139,8 +139,8 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         named = None if study.metric_of is None else study.metric_of(*key)
         if named is None:
             continue
-        name, subject, unit = named
-        values, printed = spread[key], report.printed(name, subject)
+        name, subject, unit, scale = named
+        values, printed = scale * spread[key], report.printed(name, subject)
         if len(values) > 1 and values.notna().sum() == 1 and np.isfinite(values.iloc[0]):
             report.metric(name, subject, values.iloc[0], unit, n=1, flights=1)
             continue

@@ -54,11 +54,13 @@ Values = dict[str, float]
 
 
 class Metric(NamedTuple):
-    """What a number of a trial is called in ``metrics.json``, and its unit there."""
+    """What a number of a trial is called in ``metrics.json``, and its unit there, of which ``scale`` are one
+    of the trial's: 180/pi for degrees of radians."""
 
     name: str
     subject: str
     unit: str
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)

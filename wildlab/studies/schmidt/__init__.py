@@ -10,7 +10,7 @@ from wildlab.studies.protocol import Metric, Study
 from wildlab.studies.schmidt import claims, trial
 from wildlab.studies.schmidt.trial import MORE_NAMES, NAMES, PUBLISHED
 
-_COURSES = {"rmse_course": "deg", "rmse_course_start": "deg"}
+_COURSES = ("rmse_course", "rmse_course_start")
 _SHARES = ("outside", "sd_spread", "turning", "moving", "detections", "pauses")
 #: Errors this many times as large as predicted, or less, are called nearly as predicted.
 NEARLY = 1.5
@@ -18,7 +18,9 @@ NEARLY = 1.5
 
 def _metric(subject: str, name: str) -> Metric:
     """With courses, which are radians in a trial, in degrees."""
-    known = NAMES | MORE_NAMES | _COURSES
+    if name in _COURSES:
+        return Metric(name, subject, "deg", 180 / math.pi)
+    known = NAMES | MORE_NAMES
     if name in known:
         return Metric(name, subject, known[name])
     return Metric(name, subject, _unit_of_pose(subject, name))
