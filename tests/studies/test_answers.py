@@ -24,6 +24,11 @@ def moments(schmidt: float, ekf: float, n: int = 100) -> dict[str, Any]:
     }
 
 
+def known(value: float, within: float = 0.01) -> dict[str, float]:
+    """A number with the interval of its median."""
+    return {"value": value, "centre_low": value - within, "centre_high": value + within}
+
+
 ANSWERS: dict[str, list[Case]] = {
     "schmidt": [
         (moments(2.0, 2.1), ("schmidt-consistent", "ekf-consistent")),
@@ -32,6 +37,36 @@ ANSWERS: dict[str, list[Case]] = {
         (moments(0.5, 0.4), ("schmidt-conservative", "ekf-conservative")),
         (moments(2.9, 18.0, n=3), ("schmidt-consistent", "ekf-overconfident")),
         ({}, ("schmidt-unknown", "ekf-unknown")),
+    ],
+    "line-of-sight": [
+        (
+            {
+                "ray-casting/agreement_60m": known(0.97),
+                "bresenham/agreement_60m": known(0.93),
+                "trees/hidden_0deg": known(0.2),
+                "trees/hidden_75deg": known(0.5),
+            },
+            ("rays-more", "trees-more"),
+        ),
+        (
+            {
+                "ray-casting/agreement_60m": known(0.93),
+                "bresenham/agreement_60m": known(0.97),
+                "trees/hidden_0deg": known(0.5),
+                "trees/hidden_75deg": known(0.2),
+            },
+            ("rays-less", "trees-less"),
+        ),
+        (
+            {
+                "ray-casting/agreement_60m": known(0.93, 0.05),
+                "bresenham/agreement_60m": known(0.97, 0.05),
+                "trees/hidden_0deg": known(0.2),
+                "trees/hidden_75deg": known(0.2),
+            },
+            ("rays-alike", "trees-alike"),
+        ),
+        ({}, ("rays-unknown", "trees-unknown")),
     ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]

@@ -1,6 +1,8 @@
-"""Charts of the study of the line of sight."""
+"""Charts and tables of the study of the line of sight."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -9,17 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from wildlab.evaluation.runs import mean_interval
-from wildlab.evaluation.shares import paired_difference
+from wildlab.evaluation.runs import mean_interval, mean_share_interval
 from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.visibility import lines_clear
 from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
-from wildlab.reporting.spread import bounds_of, spread_words
-from wildlab.reporting.text import percent
-from wildlab.studies.line_of_sight.claims import at_heights, disagreement, hidden
-from wildlab.studies.line_of_sight.text import NAMES, time_ratios
+from wildlab.reporting.spread import bounds_of
+from wildlab.reporting.text import number, percent, percent_between
+from wildlab.studies.line_of_sight.claims import at_heights, hidden
 from wildlab.studies.line_of_sight.timing import WAYS, seconds
 from wildlab.studies.line_of_sight.trial import (
     ANGLES,
@@ -28,125 +28,56 @@ from wildlab.studies.line_of_sight.trial import (
     INCIDENCES,
     RAYS,
     STEP,
-    TILT,
     TOLERANCE,
-    TREES,
     WHOLE_RAYS,
     TerrainView,
+    settings,
 )
 
-#: What `Report.figures` takes: figure, name, alternative text, caption.
-Shown = tuple[Figure, str, str, str]
 _COLOURS = {RAYS: BLUE, WHOLE_RAYS: GREEN, ANGLES: VERMILLION, EXACT: INK}
-_SHORT = {RAYS: "rays", WHOLE_RAYS: "rays from the camera", ANGLES: "Bresenham", EXACT: "exact"}
 
 
-def _band(ax: Axes, x: ArrayLike, values: Array, colour: str, label: str, most: float = np.inf) -> Array:
-    """Mean over lands and its 95 % interval; (n,) the means."""
-    mean = np.nanmean(values, axis=0)
-    if len(values) > 1:
-        ends = np.clip([mean_interval(column)[1:] for column in values.T], 0.0, most)
-        ax.fill_between(np.asarray(x, float), ends[:, 0], ends[:, 1], color=colour, alpha=0.18, lw=0)
-    ax.plot(x, mean, "o-", color=colour, label=label)
-    return np.asarray(mean)
+def agreement_over_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """Agreement of both algorithms with the exact line of sight."""
+    values = {way: 100 * at_heights(runs, way, "agreement") for way in (RAYS, ANGLES)}
+    fig, ax = _over_height(values, names, 100.0)
+    ax.set_ylabel("correct points (%)")
+    return fig
 
 
-def _heights(ax: Axes) -> None:
-    ax.set(xscale="log", xlabel="height above the ground (m)")
-    ax.set_xticks(HEIGHTS, [str(height) for height in HEIGHTS])
-    ax.minorticks_off()
-
-
-def nearer_words(spread: pd.DataFrame) -> str:
-    """Which way is nearer to the exact answer: by the interval of the paired difference over lands."""
-    ahead = paired_difference(disagreement(spread, ANGLES), disagreement(spread, RAYS))
-    if ahead is None or ahead.low <= 0 <= ahead.high:
-        return f"{len(spread)} lands do not tell which way is nearer"
-    better = NAMES[RAYS if ahead.low > 0 else ANGLES]
-    return f"{better[0].upper()}{better[1:]} is nearer to the exact answer"
-
-
-def agreement_shown(spread: pd.DataFrame) -> Shown:
-    """Agreement with the exact line of sight over height."""
-    fig, ax = new_figure(5.6, 3.4)
-    found = {}
-    for way in (RAYS, ANGLES):
-        values = 100 * at_heights(spread, way, "agreement")
-        found[way] = _band(ax, HEIGHTS, values, _COLOURS[way], _SHORT[way], 100.0)
-    _heights(ax)
-    ax.set_ylabel("points answered as exactly (%)")
-    ax.set_title(nearer_words(spread))
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    ends = "; ".join(f"{_SHORT[way]} {each.min():.0f} to {each.max():.0f} %" for way, each in found.items())
-    return (
-        fig, "agreement", f"Agreement with the exact line of sight at heights of {HEIGHTS[0]} to "
-                          f"{HEIGHTS[-1]} m: {ends}.",
-        f"The lens {TILT} degrees from straight down; means over lands with their 95 % interval.",
-    )  # fmt: skip
-
-
-def times_shown(times: pd.DataFrame) -> Shown:
-    """Time a grid point over height: the counterpart of F figure 7.1."""
+def times_over_height(times: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """Time per grid point: the counterpart of F figure 7.1."""
     fig, ax = new_figure(5.6, 3.6)
     for way in WAYS:
         values = 1e6 * seconds(times, way)
         low, high = np.transpose([bounds_of(pd.Series(column)) for column in values.T])
         ax.fill_between(HEIGHTS, low, high, color=_COLOURS[way], alpha=0.15, lw=0)
-        ax.plot(HEIGHTS, np.nanmedian(values, axis=0), "o-", color=_COLOURS[way], label=_SHORT[way])
+        ax.plot(HEIGHTS, np.nanmedian(values, axis=0), "o-", color=_COLOURS[way], label=names[way])
     _heights(ax)
-    ax.set(yscale="log", ylabel="time a grid point (µs)")
-    ratio, band = float(time_ratios(times, RAYS)[-1]), spread_words(len(times)).key
-    ax.set_title(f"From {HEIGHTS[-1]} m rays take {ratio:.2g} times Bresenham's time")
+    ax.set(yscale="log", ylabel="time per grid point (µs)")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    said = "; ".join(
-        f"{_SHORT[way]} {1e6 * times[way, HEIGHTS[0]].median():.2g} and "
-        f"{1e6 * times[way, HEIGHTS[-1]].median():.2g}"
-        for way in WAYS
-    )
-    return (
-        fig, "times", f"Microseconds a grid point at {HEIGHTS[0]} m and at {HEIGHTS[-1]} m: {said}.",
-        f"On this machine, compiled; median land{f', and band: {band}' if band else ''}. Counterpart of F "
-        "figure 7.1.",
-    )  # fmt: skip
+    return fig
 
 
-def steps_shown(spread: pd.DataFrame) -> Shown:
-    """Steps a grid point over height."""
-    fig, ax = new_figure(5.6, 3.4)
-    found = {}
-    for way in (RAYS, WHOLE_RAYS, ANGLES):
-        values = at_heights(spread, way, "steps")
-        found[way] = _band(ax, HEIGHTS, values, _COLOURS[way], _SHORT[way])
-    _heights(ax)
-    ax.set(yscale="log", ylabel="steps, or grid points asked")
-    most = max(found, key=lambda way: float(found[way][-1]))
-    ax.set_title(f"From {HEIGHTS[-1]} m on average {found[most][-1]:.0f} steps a point")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    said = "; ".join(f"{_SHORT[way]} {each[0]:.0f} and {each[-1]:.0f}" for way, each in found.items())
-    return (
-        fig, "steps", f"Steps a grid point at {HEIGHTS[0]} m and at {HEIGHTS[-1]} m: {said}.",
-        "Counted: the same on every machine. Means over lands with their 95 % interval.",
-    )  # fmt: skip
+def steps_over_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """Steps per grid point."""
+    values = {way: at_heights(runs, way, "steps") for way in (RAYS, WHOLE_RAYS, ANGLES)}
+    fig, ax = _over_height(values, names)
+    ax.set(yscale="log", ylabel="steps per grid point")
+    return fig
 
 
-def trees_shown(spread: pd.DataFrame) -> Shown:
-    """Share hidden by trees over incidence."""
+def hidden_over_incidence(runs: pd.DataFrame) -> Figure:
+    """Share of the ground that trees hide."""
     fig, ax = new_figure(5.6, 3.2)
-    mean = _band(ax, INCIDENCES, 100 * hidden(spread), GREEN, "hidden by trees")
-    ax.set(xlabel="incidence, from straight down (deg)", ylabel="ground hidden by trees (%)", ylim=(0, None))
+    _band(ax, INCIDENCES, 100 * hidden(runs), GREEN, "")
+    ax.set(xlabel="incidence, from straight down (°)", ylabel="ground hidden by trees (%)", ylim=(0, None))
     ax.set_xticks(INCIDENCES)
-    ax.set_title(f"Trees hide {mean[0]:.0f} % from above and {mean[-1]:.0f} % at {INCIDENCES[-1]} degrees")
-    return (
-        fig, "trees", f"Share of the ground hidden by trees: {mean[0]:.0f} % straight down, "
-                      f"{mean[-1]:.0f} % at {INCIDENCES[-1]} degrees.",
-        f"Of what is seen without trees; they are planted on {percent(spread[TREES, 'planted'].mean())} of "
-        f"the grid points, and the surface over them covers {percent(spread[TREES, 'covered'].mean())} of "
-        "the ground. Mean over lands with its 95 % interval.",
-    )  # fmt: skip
+    return fig
 
 
-def map_shown(land: Terrain, view: TerrainView) -> Shown:
-    """One view on the map: what is seen, and where both ways of F say something else."""
+def view_map(land: Terrain, view: TerrainView, names: Mapping[str, str]) -> Figure:
+    """One view on the map: what is seen, and where each algorithm says something else."""
     exact = lines_clear(land, view.points, view.p_nc)
     ways = {
         RAYS: cast_rays(land, view.nodes, view.p_nc, STEP, TOLERANCE).clear,
@@ -158,7 +89,6 @@ def map_shown(land: Terrain, view: TerrainView) -> Shown:
     low, high = about.min(axis=0) - 10, about.max(axis=0) + 10
     rows, columns = land.height.shape
     south, most, west, furthest = land.extent
-    said = []
     for ax, (way, clear) in zip(axes, ways.items(), strict=True):
         ax.contour(
             np.linspace(west, furthest, columns), np.linspace(south, most, rows), land.height,
@@ -167,19 +97,60 @@ def map_shown(land: Terrain, view: TerrainView) -> Shown:
         for which, colour in ((~exact & ~clear, INK), (clear & ~exact, ORANGE), (exact & ~clear, VERMILLION)):
             ax.plot(east[which], north[which], ".", ms=2.2, color=colour)
         ax.plot(view.p_nc[1], view.p_nc[0], "^", color=BLUE, ms=7)
-        wrong = float((clear != exact).mean())
-        ax.set_title(f"{_SHORT[way][0].upper()}{_SHORT[way][1:]}: {percent(wrong)} wrong", fontsize=10)
+        ax.set_title(f"{names[way]}: {percent(float((clear != exact).mean()))} wrong", fontsize=10)
         ax.set(xlim=(low[1], high[1]), ylim=(low[0], high[0]))
-        said.append(f"{_SHORT[way]} {percent(wrong)}")
     map_axes(axes[0])
     map_axes(axes[1], north="")
-    marks = {"hidden": INK, "seen by it alone": ORANGE, "missed by it": VERMILLION, "camera": BLUE}
+    marks = {"hidden": INK, "wrongly visible": ORANGE, "wrongly hidden": VERMILLION, "camera": BLUE}
     handles = [
         Line2D([], [], marker="o", ls="", color=colour, label=label) for label, colour in marks.items()
     ]
     fig.legend(handles=handles, loc="outside lower center", ncols=4)
-    return (
-        fig, "map", f"Map of one view. Points answered otherwise than exactly: {', '.join(said)}.",
-        f"{len(exact)} grid points in view, of which {percent(float(exact.mean()))} are seen (left "
-        f"blank). Contours every 5 m.",
-    )  # fmt: skip
+    return fig
+
+
+def tables(runs: pd.DataFrame, times: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Shares of grid points by height and tilt, with the 95 % interval of their mean over terrains, and
+    median times (µs)."""
+    shares = []
+    for name, height, tilt in settings():
+        row = {"where": f"{height:.0f} m, {tilt:.0f}°", "seen": _share(runs[EXACT, f"seen_{name}"])}
+        for way in (RAYS, ANGLES):
+            row[way] = _share(runs[way, f"agreement_{name}"])
+            wrong = [percent(float(runs[way, f"{what}_{name}"].mean())) for what in ("too_many", "too_few")]
+            row[f"{way}-wrong"] = " / ".join(wrong)
+        shares.append(row)
+    taken = [
+        {"height": f"{height} m"} | {way: number(1e6 * float(times[way, height].median()), 2) for way in WAYS}
+        for height in HEIGHTS
+    ]
+    return {"agreement": pd.DataFrame(shares), "times": pd.DataFrame(taken)}
+
+
+def _share(values: ArrayLike) -> str:
+    return percent_between(mean_share_interval(values))
+
+
+def _over_height(
+    values: Mapping[str, Array], names: Mapping[str, str], most: float = np.inf
+) -> tuple[Figure, Axes]:
+    fig, ax = new_figure(5.6, 3.4)
+    for way, each in values.items():
+        _band(ax, HEIGHTS, each, _COLOURS[way], names[way], most)
+    _heights(ax)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return fig, ax
+
+
+def _band(ax: Axes, x: Sequence[float], values: Array, colour: str, label: str, most: float = np.inf) -> None:
+    """Mean over terrains and its 95 % interval."""
+    if len(values) > 1:
+        ends = np.clip([mean_interval(column)[1:] for column in values.T], 0.0, most)
+        ax.fill_between(np.asarray(x, float), ends[:, 0], ends[:, 1], color=colour, alpha=0.18, lw=0)
+    ax.plot(x, np.nanmean(values, axis=0), "o-", color=colour, label=label)
+
+
+def _heights(ax: Axes) -> None:
+    ax.set(xscale="log", xlabel="height above the ground (m)")
+    ax.set_xticks(HEIGHTS, [str(height) for height in HEIGHTS])
+    ax.minorticks_off()
