@@ -31,7 +31,7 @@ from wildlab.reporting.charts.tracks import (
     squares_over_time,
 )
 from wildlab.reporting.figures import MOST_POINTS, png_bytes
-from wildlab.reporting.overview_words import way_of
+from wildlab.reporting.overview import way_of
 
 N = 200
 

@@ -14,9 +14,9 @@ from wildlab.reporting.arrange import LIMITS, arranged
 from wildlab.reporting.charts.comparison import dots_chart
 from wildlab.reporting.glossary import with_glossary
 from wildlab.reporting.html import examine
-from wildlab.reporting.overview_words import area_words, duration_words, length_words
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.reporting.page import TAGS, page
+from wildlab.reporting.quantities import area, duration, way_length
 from wildlab.reporting.report import open_report
 from wildlab.reporting.tables import csv_link
 from wildlab.reporting.text import NOTHING, listed, metres, number, percent
@@ -77,8 +77,8 @@ def _share(value: float, low: float, high: float) -> str:
 
 
 QUANTITIES = (
-    Quantity("duration_s", "length", "overview", "duration", "flight", "s", lambda v, *_: duration_words(v)),
-    Quantity("path_m", "path", "overview", "path_length", "flight", "m", lambda v, *_: length_words(v)),
+    Quantity("duration_s", "length", "overview", "duration", "flight", "s", lambda v, *_: duration(v)),
+    Quantity("path_m", "path", "overview", "path_length", "flight", "m", lambda v, *_: way_length(v)),
     Quantity(
         "height_m",
         "height above ground, median and middle 90 %",
@@ -108,7 +108,7 @@ QUANTITIES = (
         "area_seen",
         "flight",
         "m²",
-        lambda v, *_: area_words(v),
+        lambda v, *_: area(v),
         "images",
     ),
     Quantity("detections", "detections", "overview", "detections", "flight", "", _unit("")),

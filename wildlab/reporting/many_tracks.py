@@ -13,7 +13,7 @@ from wildlab.analysis.many.follow import CUTOFF_M, ManyTracks
 from wildlab.analysis.many.target_model import HERE
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
-from wildlab.reporting.filter_names import length
+from wildlab.reporting.quantities import length
 from wildlab.reporting.report import Report
 from wildlab.tracking.particles import Count, count_interval, count_probabilities
 

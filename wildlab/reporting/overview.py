@@ -1,14 +1,27 @@
-"""The overview of a flight: what is shown, in which order, and the numbers that are recorded of it."""
+"""The overview of a flight: what happened on it, what is worth fixing, and what was recorded.
+
+What is said follows by rules from numbers; the words lie in ``data/messages/en/overview.toml``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from wildlab.analysis.overviews.alarms import APART_M, APART_SD, APART_SHARE, JUMP, JUMP_M, LEANT_DEG
-from wildlab.analysis.overviews.image_coverage import FLATTEST
-from wildlab.analysis.overviews.overview import Overview, troubled_for
+from wildlab.analysis.overviews.alarms import (
+    APART_M,
+    APART_SD,
+    APART_SHARE,
+    JUMP,
+    JUMP_M,
+    LEANT_DEG,
+    Alarm,
+    beside_satellites,
+)
+from wildlab.analysis.overviews.overview import Issue, Overview, length_of_way, troubled_for
 from wildlab.analysis.overviews.recommendations import (
     LISTED,
     MOST,
@@ -17,71 +30,171 @@ from wildlab.analysis.overviews.recommendations import (
     error_measured,
     possible_gain,
 )
-from wildlab.analysis.overviews.verdict import WORTH, Numbers, evidence_of, verdict_of
-from wildlab.evaluation.vibration import FLOOR_HZ, HARMFUL, SMOOTH_HZ
-from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
-from wildlab.reporting import overview_sections as sections
-from wildlab.reporting import overview_words as words
-from wildlab.reporting.arrange import ADVICE
+from wildlab.analysis.overviews.verdict import WORTH, Numbers, Verdict, evidence_of, verdict_of
+from wildlab.evaluation.vibration import FINE, FLOOR_HZ, HARMFUL
+from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS, gnss_times
+from wildlab.messages.message import Message
+from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.reporting import quantities
 from wildlab.reporting.charts import overview as charts
-from wildlab.reporting.georeferencing import show_contradictions
+from wildlab.reporting.georeferencing import show_advice, show_contradictions, words_of_causes
 from wildlab.reporting.report import Report
+from wildlab.reporting.text import listed, metres, number
+from wildlab.reporting.wording import Wording
 
 #: Subject of what is recorded of the whole flight.
 FLIGHT = "flight"
+#: Positions closer than this are the same, but for rounding, m.
+SAME_M = 1e-3
+_UNITS = {"jumps": "m", "leans": "deg", "apart": "m", "shakes": "m/s^2"}
 
 
-def show_overview(
-    report: Report, overview: Overview, gains: Sequence[Gain], numbers: Numbers, amiss: Sequence[str],
-    lacking: Sequence[str], judged: int,
-) -> None:  # fmt: skip
-    """Write the whole report.
+#: Constants that the method names.
+METHOD_VALUES = {
+    "gap": f"{MAX_GAP_S:g}",
+    "steps": f"{USUAL_STEPS:g}",
+    "jump": f"{JUMP:g}",
+    "jump_m": f"{JUMP_M:g}",
+    "leant": f"{LEANT_DEG:g}",
+    "apart_m": f"{APART_M:g}",
+    "apart_sd": f"{APART_SD:g}",
+    "apart_share": f"{100 * APART_SHARE:g}",
+    "fine": f"{FINE:g}",
+    "harmful": f"{HARMFUL:g}",
+    "floor": f"{FLOOR_HZ:g}",
+    "listed": f"{100 * LISTED:g}",
+    "worth": f"{100 * WORTH:g}",
+}
 
-    Parameters
+
+class Judged(NamedTuple):
+    """What the overview's sentences follow from.
+
+    Attributes
     ----------
-    report
-        Is added to.
-    overview
-        From `wildlab.analysis.overviews.overview.look_over`.
-    gains, numbers
-        From `wildlab.analysis.overviews.recommendations`, and the numbers of the other reports behind them.
-    amiss
-        What does not fit together: `wildlab.flight.checks.sense.sense.sense_sentences`.
-    lacking
-        Which reports could not be made, and why: clauses.
-    judged
-        How many of the other reports there are.
+    overview, gains
+        The flight, and what is worth fixing, most first.
+    problems
+        Things in its tables that cannot be used or contradict each other.
+    verdict
+        Of the flight.
+    possible
+        A gain that is not certain.
+    doubts
+        Other reports that ask for a closer look.
+    judged, measured
+        How many other reports there are, and whether any measured how far off positions are.
     """
-    problems = overview.problems + sum(one.startswith("problem") for one in amiss)
-    possible = possible_gain(numbers)
-    doubts = doubted(numbers)
-    counts = counts_of(overview, gains, problems, judged, possible)
-    word = verdict_of(evidence_of(counts, numbers))
-    shown = overview.flight.manifest.locations.sensitivity == "open"
-    report.head("What happened on this flight, and what is worth fixing?", words.subtitle(overview))
-    measured = error_measured(numbers)
-    said = words.summary_sentences(overview, word, gains, problems, lacking, measured, possible, doubts)
-    reason = words.reason_words(**counts, possible=possible, doubts=doubts)
-    report.summary(said, level=word.colour, verdict=(word.value, reason))
-    report.tiles(sections.tiles(overview))
-    report.section("Most worth fixing", words.first_of(gains, possible), part=ADVICE)
-    if gains:
-        report.points([words.gain_sentence(gain) for gain in gains[:MOST]], ordered=True)
-    if overview.problems:
-        count = "One problem" if overview.problems == 1 else f"{overview.problems} problems"
-        report.alert(f"{count} in its tables", ["`wildlab check` on the flight's folder says which."])
-    show_contradictions(report, amiss, shown=shown)
+
+    overview: Overview
+    gains: Sequence[Gain]
+    problems: int
+    verdict: Verdict
+    possible: Gain | None = None
+    doubts: Sequence[str] = ()
+    judged: int = 0
+    measured: bool = True
+
+
+# -- what follows from the numbers
+
+
+def way_of(overview: Overview) -> float:
+    """Length of the path over the ground, m; NaN without one."""
+    path = overview.path
+    if path is None or len(path.times) < 2:
+        return float("nan")
+    if not path.timed:
+        return float(np.linalg.norm(np.diff(path.place[:, :2], axis=0), axis=1).sum())
+    return length_of_way(path.times, path.place[:, :2])
+
+
+def gain_message(gain: Gain) -> Message:
+    """What fixing one thing gains, and how."""
+    values = {"share": percent_of(gain.share), "why": gain.why}
+    if gain.key == "cause":
+        error, left = metres(gain.of), metres(gain.of - gain.value)
+        causes = words_of_causes(gain.causes) if gain.causes else "–"
+        return Message("gain-cause", {**values, "causes": causes, "error": error, "left": left})
+    if gain.key == "far_out":
+        return Message(
+            "gain-outliers", {**values, "left": metres(gain.of - gain.value), "error": metres(gain.of)}
+        )
+    counts = {"lost": f"{gain.value:.0f}", "of": f"{gain.of:.0f}", "what": gain.what}
+    return Message(f"gain-{gain.key.replace('_', '-')}", values | counts)
+
+
+def alarm_message(alarm: Alarm, overview: Overview) -> Message:
+    """One alarm: how much, and when since the first stamp."""
     begin = min((pace.begin for pace in overview.streams.values() if pace.n), default=0.0)
-    clock = charts.Clock(begin, overview.length_s)
-    sections.places_section(report, overview)
-    sections.streams_section(report, overview, clock)
-    sections.motion_section(report, overview, clock)
-    sections.satellites_section(report, overview, clock)
-    sections.shaking_section(report, overview, clock)
-    sections.clocks_section(report, overview, numbers)
-    record(report, overview, gains, counts)
-    report.limits(limits(overview, lacking))
-    report.method(METHOD)
+    size = quantities.fine_length(alarm.size) if _UNITS[alarm.what] == "m" else f"{alarm.size:.1f}"
+    values = {
+        "size": size,
+        "at": f"{alarm.worst - begin:.0f}",
+        "share": percent_of(alarm.share),
+        "times": str(alarm.often),
+    }
+    once = "-once" if alarm.what == "jumps" and alarm.often == 1 else ""
+    return Message(f"alarm-{alarm.what}{once}", values)
+
+
+def issue_message(issue: Issue, overview: Overview) -> Message:
+    """One thing that is wrong along the path, and for how long."""
+    instant = issue.seconds < 1 or not overview.length_s > 0
+    share = "" if instant else percent_of(min(1.0, issue.seconds / overview.length_s))
+    return Message("issue-instant" if instant else "issue", {"what": issue.what, "share": share})
+
+
+def answer(found: Judged) -> list[Message]:
+    """What happened and what is worth fixing: two sentences at most, the most pressing first."""
+    overview, worth = found.overview, [gain for gain in found.gains if gain.share >= WORTH]
+    lasting = [one for one in overview.troubles if one.seconds >= 1]
+    said: list[Message] = [alarm_message(one, overview) for one in overview.alarms]
+    if found.problems:
+        said.append(Message("problems", {"problems": str(found.problems)}))
+    said += [gain_message(gain) for gain in (worth or found.gains)[:1]]
+    if lasting:
+        said.append(issue_message(max(lasting, key=lambda one: one.seconds), overview))
+    if found.possible is not None:
+        said.append(Message("possible", {"share": percent_of(found.possible.share)}))
+    if found.doubts:
+        said.append(Message("doubts", {"reports": listed(list(found.doubts))}))
+    if found.verdict == Verdict.UNJUDGED:
+        return [Message("not-judged"), *said[:1]]
+    if found.verdict == Verdict.SOUND:
+        return [Message("sound" if found.measured else "sound-unmeasured"), *said[:1]]
+    return said[:2] or [Message("look")]
+
+
+def reason(found: Judged, counts: Mapping[str, int]) -> Message:
+    """Why the verdict is what it is: the most pressing of what was counted."""
+    overview = found.overview
+    if overview.alarms:
+        return Message("reason-alarms", {"count": str(len(overview.alarms))})
+    if found.problems:
+        return Message("reason-problems", {"count": str(found.problems)})
+    if counts["worth"]:
+        return Message("reason-worth", {"count": str(counts["worth"]), "share": percent_of(WORTH)})
+    if found.doubts:
+        return Message("reason-doubts", {"reports": listed(list(found.doubts))})
+    if counts["troubled"]:
+        return Message("reason-troubled", {"count": str(counts["troubled"])})
+    if not found.judged:
+        return Message("reason-unjudged")
+    return Message("reason-sound", {"count": str(found.judged)})
+
+
+def limits(overview: Overview, lacking: Sequence[str]) -> list[Message]:
+    """What the report does not tell; five at most."""
+    said = [Message("limit-lacking", {"what": one}) for one in lacking[:2]]
+    if overview.path is not None and overview.path.who == "truth":
+        said.append(Message("limit-target"))
+    if overview.above is not None and not overview.flight.terrain:
+        said.append(Message("limit-level"))
+    return [*said, Message("limit-measured")]
+
+
+# -- what is recorded
 
 
 def counts_of(
@@ -115,7 +228,7 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
     for name, count in counts.items():
         note(named.get(name, name), count, "1")
     note("duration", overview.length_s, "s")
-    note("path_length", words.way_of(overview), "m")
+    note("path_length", way_of(overview), "m")
     if overview.above is not None and np.isfinite(overview.above[0]).any():
         above = overview.above[0]
         low, high = np.nanquantile(above, [0.05, 0.95])
@@ -151,9 +264,8 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
         note("shaking_max", float(found.worst.max()), "m/s^2", len(found.worst))
     for trouble in overview.troubles:
         report.metric("trouble", trouble.what.replace(" ", "-"), trouble.seconds, "s", n=len(trouble.spells))
-    units = {"jumps": "m", "leans": "deg", "apart": "m", "shakes": "m/s^2"}
     for alarm in overview.alarms:
-        report.metric("alarm", alarm.what, alarm.size, units[alarm.what], n=alarm.often)
+        report.metric("alarm", alarm.what, alarm.size, _UNITS[alarm.what], n=alarm.often)
     for gain in gains:
         report.metric("gain_share", gain.key, gain.share, "1")
     for lost in overview.lost:
@@ -169,35 +281,249 @@ def things_named(overview: Overview) -> int:
     return 0 if (names == "").any() else int(names.nunique())
 
 
-def limits(overview: Overview, lacking: Sequence[str]) -> list[str]:
-    """What the report does not tell."""
-    said = [f"What is not judged here: {one}." for one in lacking]
-    said.append("What was not measured is in no list above, however much it may matter.")
-    if any(gain.who == "truth" for gain in filter(None, [overview.path])):
-        said.append("Where the aircraft was: the map shows the first target.")
-    if overview.above is not None and not overview.flight.terrain:
-        said.append("Heights above the real ground: it is taken to be level.")
-    return said
+# -- tables
 
 
-METHOD = f"""
-Stamps are those of the tables, with the offsets of the manifest. A pause is a step longer than
-{MAX_GAP_S:g} s and than {USUAL_STEPS:g} usual steps. Poses jump where a step is off by more than {JUMP:g}
-times the usual difference, and {JUMP_M:g} m, from what the stated speeds before and after it make of it;
-without speeds, from both the step before and the step after.
+def streams_table(overview: Overview) -> pd.DataFrame:
+    """A row for each stream: samples, rate, half the width of the middle 90 % of the steps, pauses."""
+    rows = []
+    for name, pace in overview.streams.items():
+        even = pace.even and np.isfinite(pace.rate_hz)
+        rows.append(
+            {
+                "stream": name,
+                "n": pace.n,
+                "rate": pace.rate_hz if even else np.nan,
+                "wavering": 1e3 * pace.wavering_s if even else np.nan,
+                "missing": 100 * pace.missing_share if even else np.nan,
+                "pauses": len(pace.gaps),
+                "paused": pace.paused_s,
+                "longest": float(np.diff(pace.gaps, axis=1).max()) if len(pace.gaps) else np.nan,
+                "unordered": pace.unordered,
+            }
+        )
+    return pd.DataFrame(rows)
 
-What comes before all gains: jumps; an airframe that leans by more than {LEANT_DEG:g}°; shaking beyond
-{HARMFUL:g} m/s²; poses more than {APART_M:g} m, and {APART_SD:g} stated standard deviations, beside more than
-{100 * APART_SHARE:g} % of the satellite positions.
 
-Shaking is measured as ArduPilot does for its VIBE message: the specific force less its own low pass of
-{FLOOR_HZ:g} Hz, squared, smoothed below {SMOOTH_HZ:g} Hz, and the root of that. By band it is Welch's
-spectrum of the whole flight.
+def satellites_table(overview: Overview) -> pd.DataFrame:
+    """What the receiver reports of its positions, and how far the poses are from them; maybe no rows."""
+    gnss, rows = overview.flight.gnss, []
+    names = load_texts("overview").quantities
+    columns = {"satellites": "satellites", "sd_horizontal_m": "sd-horizontal", "sd_vertical_m": "sd-vertical"}
+    for column, key in columns.items():
+        if gnss is not None and column in gnss and gnss[column].notna().any():
+            values = gnss[column].to_numpy(float)
+            worst = np.nanmin(values) if column == "satellites" else np.nanmax(values)
+            rows.append({"what": names[key], "median": float(np.nanmedian(values)), "worst": float(worst)})
+    path = overview.path
+    if gnss is not None and path is not None and path.who.startswith("nav/") and path.timed:
+        gaps = overview.streams[path.who].gaps
+        _, off, _ = beside_satellites(overview.flight, path.times, path.place, gaps)
+        if len(off) and np.median(np.abs(off)) >= SAME_M:
+            level = np.hypot(off[:, 0], off[:, 1])
+            quantile = float(np.quantile(level, 0.95))
+            rows.append({"what": names["apart-level"], "median": float(np.median(level)), "worst": quantile})
+            above = float(np.median(-off[:, 2]))
+            rows.append({"what": names["apart-above"], "median": above, "worst": np.nan})
+    return pd.DataFrame(rows, columns=["what", "median", "worst"])
 
-A footprint is the border of an image on the ground. The area of all together is counted in cells whose centre
-lies in at least one. An image whose border comes within {np.degrees(FLATTEST):g}° of the horizon has none.
 
-The list of what is most worth fixing has gains in metres from the report on the georeferencing, measured on
-images that the correction was not estimated from, and data that are lost; from a share of
-{100 * LISTED:g} % on, and as worth fixing from {100 * WORTH:g} % on.
-"""
+def coverage_table(overview: Overview) -> pd.DataFrame:
+    """Images by whether they have a footprint on the ground, and why not; no rows without images."""
+    coverage, names = overview.coverage, load_texts("overview").quantities
+    if coverage is None:
+        return pd.DataFrame(columns=["what", "images"])
+    placed, posed, flat = (int(one.sum()) for one in (coverage.placed, coverage.posed, coverage.flat))
+    counts = {
+        "images": coverage.images,
+        "footprint": placed,
+        "no-pose": coverage.images - posed,
+        "flat": flat,
+        "away": posed - placed - flat,
+        "with-detections": overview.detections[1],
+    }
+    return pd.DataFrame([{"what": names[key], "images": count} for key, count in counts.items()])
+
+
+def clocks_table(overview: Overview, numbers: Numbers) -> pd.DataFrame:
+    """Offsets of the clocks: the given ones, and what is left of the camera's; no rows where none applies."""
+    manifest, tables = overview.flight.manifest, overview.flight.tables
+    if manifest.time.kind != "utc":
+        return pd.DataFrame(columns=["clock", "offset", "left", "low", "high"])
+    given = [
+        ("camera", manifest.clocks.camera_offset_s, "frames" in tables),
+        ("truth", manifest.clocks.truth_offset_s, "truth" in tables),
+        ("satellite receiver", manifest.clocks.gnss_offset_s - manifest.gnss.latency_s, "gnss" in tables),
+    ]
+    entry = numbers.get(("clock_offset", "calibration"), {})
+    rows = []
+    for name, offset, there in given:
+        left = {
+            key: np.nan if name != "camera" or entry.get(end) is None else entry[end]
+            for key, end in (("left", "value"), ("low", "low"), ("high", "high"))
+        }
+        if there:
+            rows.append({"clock": name, "offset": offset, **left})
+    return pd.DataFrame(rows, columns=["clock", "offset", "left", "low", "high"])
+
+
+# -- the page
+
+
+def subtitle(overview: Overview) -> str:
+    """What the flight is, in a line."""
+    parts, way = [quantities.duration(overview.length_s)], way_of(overview)
+    if np.isfinite(way):
+        parts.append(quantities.way_length(way))
+    if overview.above is not None and np.isfinite(overview.above[0]).any():
+        low, high = np.nanquantile(overview.above[0], [0.05, 0.95])
+        if height := height_words(low, high):
+            parts.append(f"mostly {height} above {overview.above[1]}")
+    parts.append(f"poses: {overview.source}" if overview.source else "no poses")
+    return ", ".join(parts)
+
+
+def height_words(low: float, high: float) -> str:
+    """Between which heights (m): ``"59 to 61 m"``, ``"60 m"``; nothing where it never left the ground."""
+    below, above = round(low), round(high)
+    return f"{below} to {above} m" if below != above else f"{above} m" if above else ""
+
+
+def tiles(overview: Overview) -> list[tuple[str, str]]:
+    """The few numbers to remember."""
+    names, found = load_texts("overview").subjects, []
+    way = way_of(overview)
+    if np.isfinite(overview.length_s):
+        found.append((quantities.duration(overview.length_s), names["tile-duration"]))
+    elif np.isfinite(way):
+        found.append((quantities.way_length(way), names["tile-way"]))
+    frames = overview.flight.frames
+    if frames is not None and len(frames):
+        without = next((one.lost for one in overview.lost if one.key == "images_without_pose"), 0)
+        posed = len(frames) - without if overview.source else 0
+        found.append((f"{posed} / {len(frames)}", names["tile-posed"]))
+    if overview.coverage is not None and overview.coverage.placed.any():
+        found.append((quantities.area(overview.coverage.area_m2), names["tile-area"]))
+    seen, _, placed = overview.detections
+    if seen:
+        pixels = overview.detections_in_images
+        # A radar's are put nowhere by a camera's ray: that none is on the ground would say nothing.
+        on_ground = (f"{placed} / {pixels}", names["tile-placed"])
+        found.append(on_ground if pixels else (str(seen), names["tile-detections"]))
+    elif overview.vibration is not None:
+        found.append((f"{number(overview.vibration[0].worst.max())} m/s²", names["tile-shaking"]))
+    return found or [("0", names["tile-nothing"])]
+
+
+def show_overview(
+    report: Report, overview: Overview, gains: Sequence[Gain], numbers: Numbers, amiss: Sequence[str],
+    lacking: Sequence[str], judged: int,
+) -> None:  # fmt: skip
+    """Write the whole report.
+
+    Parameters
+    ----------
+    report
+        Is added to.
+    overview
+        From `wildlab.analysis.overviews.overview.look_over`.
+    gains, numbers
+        From `wildlab.analysis.overviews.recommendations`, and the numbers of the other reports behind them.
+    amiss
+        What does not fit together: `wildlab.flight.checks.sense.sense.sense_sentences`.
+    lacking
+        Which reports could not be made, and why: clauses.
+    judged
+        How many of the other reports there are.
+    """
+    wording = Wording(report, load_texts("overview"))
+    problems = overview.problems + sum(one.startswith("problem") for one in amiss)
+    possible = possible_gain(numbers)
+    counts = counts_of(overview, gains, problems, judged, possible)
+    word = verdict_of(evidence_of(counts, numbers))
+    found = Judged(
+        overview, gains, problems, word, possible, doubted(numbers), judged, error_measured(numbers)
+    )
+    shown = overview.flight.manifest.locations.sensitivity == "open"
+    report.head(wording.texts.subjects["question"], subtitle(overview))
+    said, why = wording.messages(answer(found)), wording.messages([reason(found, counts)])[0]
+    report.summary(said, level=word.colour, verdict=(word.value, why))
+    report.tiles(tiles(overview))
+    show_advice(report, wording.messages(_with_remedies(gains[:MOST])))
+    if overview.problems:
+        report.alert(*wording.messages([Message("tables", {"problems": str(overview.problems)})]), [])
+    show_contradictions(report, amiss, shown=shown)
+    _show_figures(wording, overview)
+    record(report, overview, gains, counts)
+    report.limits(wording.messages(limits(overview, lacking)))
+    report.section("Details")
+    frames = {
+        "coverage": coverage_table(overview),
+        "streams": streams_table(overview) if overview.flight.manifest.time.kind == "utc" else pd.DataFrame(),
+        "satellites": satellites_table(overview),
+        "clocks": clocks_table(overview, numbers),
+    }
+    for key, frame in frames.items():
+        if len(frame):
+            wording.table(key, frame)
+    report.method(wording.say(wording.texts.method, METHOD_VALUES))
+
+
+def _with_remedies(gains: Sequence[Gain]) -> Iterator[Message]:
+    for gain in gains:
+        message = gain_message(gain)
+        yield Message(f"{message.key}-remedy", message.values)
+
+
+def _show_figures(wording: Wording, overview: Overview) -> None:
+    """Map and coverage; streams, motion, satellites and shaking folded away."""
+    begin = min((pace.begin for pace in overview.streams.values() if pace.n), default=0.0)
+    clock = charts.Clock(begin, overview.length_s)
+    report, path, coverage = wording.report, overview.path, overview.coverage
+    if path is not None:
+        wording.figure("path", charts.path_chart(path, overview.troubles, ""), main=True)
+    if coverage is not None and coverage.placed.any():
+        report.section("Where it flew, and what it saw")
+        wording.figure("coverage", charts.coverage_chart(coverage, path, ""))
+    row = [wording.captioned(key, fig) for key, fig in _figures_over_time(overview, clock)]
+    for i in range(0, len(row), 2):
+        report.figures(
+            row[i : i + 2], fold=listed([wording.texts.figures[one[1]].title for one in row[i : i + 2]])
+        )
+
+
+def _figures_over_time(overview: Overview, clock: charts.Clock) -> Iterator[tuple[str, charts.Figure]]:
+    named = {name: pace for name, pace in overview.streams.items() if pace.n}
+    if named and overview.flight.manifest.time.kind == "utc":
+        yield "streams", charts.streams_chart(named, clock, "")
+    if not any(overview.series.values()):
+        return
+    if height := overview.series["height"]:
+        ground = None
+        if overview.above is not None and overview.path is not None:
+            ground = overview.path.times, -overview.path.place[:, 2] - overview.above[0]
+        yield "height", charts.lines_chart(height, clock, "height (m)", "", ground=ground)
+    if speed := overview.series["speed"]:
+        yield "speed", charts.lines_chart(speed, clock, "speed (m/s)", "", floor=True)
+    if attitude := overview.series["attitude"]:
+        yield "attitude", charts.attitude_chart(attitude, clock, "")
+    for times, rates in overview.series["turning"].values():
+        yield "turning", charts.turning_chart(times, rates, clock, "")
+    gnss = overview.flight.gnss
+    if gnss is not None and len(gnss):
+        times = gnss_times(overview.flight)
+        known = np.isfinite(times)
+
+        def column(name: str) -> tuple[np.ndarray, np.ndarray] | None:
+            there = name in gnss and gnss[name].notna().any()
+            return (times[known], gnss[name].to_numpy(float)[known]) if there else None
+
+        satellites = column("satellites")
+        sd = {"each horizontal axis": column("sd_horizontal_m"), "height": column("sd_vertical_m")}
+        reported = {name: series for name, series in sd.items() if series is not None}
+        if satellites is not None or reported:
+            yield "satellites", charts.satellites_chart(satellites, reported, clock, "")
+    if overview.vibration is not None:
+        vibration, times = overview.vibration
+        yield "shaking", charts.shaking_chart(vibration, times, clock, "")
+        yield "bands", charts.bands_chart(vibration, "")

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from wildlab.analysis.overviews.verdict import Verdict, evidence_of, verdict_of
-from wildlab.reporting.overview_words import duration_words
 from wildlab.reporting.page import TAGS, page
+from wildlab.reporting.quantities import duration
 from wildlab.reporting.text import NOTHING, escape
 
 #: The page, beside the ledger.
@@ -196,7 +196,7 @@ def _row(flight: OwnFlight) -> str:
     )
     old = ", ".join(f'<a href="{address(one.folder)}">{escape(one.about)}</a>' for one in flight.earlier)
     links += f'<br><span class="dim">of an earlier evaluation: {old}</span>' if old else ""
-    length = duration_words(flight.length_s) if flight.length_s == flight.length_s else NOTHING
+    length = duration(flight.length_s) if flight.length_s == flight.length_s else NOTHING
     cells = (
         verdict_pill(flight),
         escape(TAGS.get(flight.kind, flight.kind)),

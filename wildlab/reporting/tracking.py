@@ -32,7 +32,8 @@ from wildlab.messages.message import Message
 from wildlab.messages.page_texts import load_texts, significant
 from wildlab.reporting.charts import following as charts
 from wildlab.reporting.charts.beside import beside_plain_shown
-from wildlab.reporting.filter_names import filter_words, length, short_words
+from wildlab.reporting.filter_names import filter_words, short_words
+from wildlab.reporting.quantities import length
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import NOTHING
 from wildlab.reporting.wording import Wording

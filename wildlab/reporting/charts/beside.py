@@ -15,7 +15,8 @@ from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.following import UNEVEN, Shown, few, slug
 from wildlab.reporting.figure_text import Powers
 from wildlab.reporting.figures import INK, colour, new_figure, thinned
-from wildlab.reporting.filter_names import filter_words, length, short_words
+from wildlab.reporting.filter_names import filter_words, short_words
+from wildlab.reporting.quantities import length
 
 #: The filters that know of white noise alone: the others are held against the first that is there.
 PLAIN = ("ekf", "kf")

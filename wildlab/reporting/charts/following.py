@@ -35,7 +35,8 @@ from wildlab.reporting.figures import (
     new_figure,
     thinned,
 )
-from wildlab.reporting.filter_names import WORDS, filter_words, length, short_words
+from wildlab.reporting.filter_names import WORDS, filter_words, short_words
+from wildlab.reporting.quantities import length
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]

@@ -1,0 +1,128 @@
+"""What the overview of a flight says turns with its numbers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wildlab.analysis.overviews.alarms import Alarm
+from wildlab.analysis.overviews.overview import Issue
+from wildlab.analysis.overviews.recommendations import Gain
+from wildlab.analysis.overviews.verdict import Verdict
+from wildlab.messages.page_texts import load_texts
+from wildlab.reporting import overview as page
+from wildlab.reporting.overview import Judged
+
+TEXTS = load_texts("overview").answers
+#: What may be lost: the keys of `wildlab.analysis.overviews.lost.lost_data`.
+LOST = (
+    "images_without_pose",
+    "images_without_gimbal",
+    "detections_off_ground",
+    "detections_without_truth",
+    "time_without_poses",
+    "time_without_satellites",
+    "time_without_inertial",
+    "inertial_samples",
+)
+
+
+@dataclass
+class Flight:
+    """What the rules ask of an overview."""
+
+    alarms: tuple[Any, ...] = ()
+    troubles: tuple[Issue, ...] = ()
+    length_s: float = 600.0
+    streams: dict[str, Any] = field(default_factory=lambda: {"nav": SimpleNamespace(n=9, begin=100.0)})
+    path: Any = None
+    above: Any = None
+    flight: Any = field(default_factory=lambda: SimpleNamespace(terrain=None))
+
+
+def gain(key: str = "cause", share: float = 0.4, causes: tuple[str, ...] = ("boresight",)) -> Gain:
+    return Gain(key, causes, 2.0, 1.5, 2.5, "m", 5.0, "images", share, "")
+
+
+def alarm(what: str, often: int = 3) -> Alarm:
+    return Alarm(what, often, 110.0, 130.0, 6.72, 80.0, 0.2)
+
+
+def judged(verdict: Verdict, **more: Any) -> Judged:
+    return Judged(
+        more.pop("overview", Flight()), more.pop("gains", ()), more.pop("problems", 0), verdict, **more
+    )
+
+
+LASTING = Flight(troubles=(Issue("no poses", np.array([[0.0, 60.0]])),))
+CASES = [
+    (judged(Verdict.SOUND), ["sound"]),
+    (judged(Verdict.SOUND, measured=False), ["sound-unmeasured"]),
+    (judged(Verdict.SOUND, gains=[gain(share=0.05)]), ["sound", "gain-cause"]),
+    (judged(Verdict.UNJUDGED), ["not-judged"]),
+    (judged(Verdict.FIX, gains=[gain(share=0.05), gain("far_out")]), ["gain-outliers"]),
+    (
+        judged(Verdict.ALARM, overview=Flight((alarm("leans"), alarm("jumps")))),
+        ["alarm-leans", "alarm-jumps"],
+    ),
+    (judged(Verdict.MEND, problems=2), ["problems"]),
+    (judged(Verdict.LOOK, overview=LASTING), ["issue"]),
+    (judged(Verdict.LOOK, possible=gain(share=0.2), doubts=("tracking",)), ["possible", "doubts"]),
+    (judged(Verdict.LOOK), ["look"]),
+]
+
+
+@pytest.mark.parametrize(("found", "keys"), CASES)
+def test_the_most_pressing_is_said_first(found, keys):
+    assert [one.key for one in page.answer(found)] == keys
+
+
+def test_an_alarm_is_told_by_its_time_since_the_first_stamp():
+    message = page.alarm_message(alarm("jumps", 1), Flight())
+    assert (
+        message.key == "alarm-jumps-once"
+        and message.values["at"] == "30"
+        and message.values["size"] == "6.7 m"
+    )
+    assert page.issue_message(LASTING.troubles[0], LASTING).values["share"] == "10 %"
+    instant = Issue("position jumps", np.array([[5.0, 5.0]]))
+    assert page.issue_message(instant, LASTING).key == "issue-instant"
+
+
+COUNTS = {"worth": 0, "troubled": 0}
+
+
+@pytest.mark.parametrize(
+    ("found", "counts", "key"),
+    [
+        (CASES[5][0], {}, "reason-alarms"),
+        (CASES[6][0], {"worth": 1}, "reason-problems"),
+        (judged(Verdict.FIX), {"worth": 1, "troubled": 1}, "reason-worth"),
+        (judged(Verdict.LOOK, doubts=("tracking",)), {"troubled": 1}, "reason-doubts"),
+        (judged(Verdict.LOOK), {"troubled": 1}, "reason-troubled"),
+        (judged(Verdict.UNJUDGED), {}, "reason-unjudged"),
+        (judged(Verdict.SOUND, judged=2), {}, "reason-sound"),
+    ],
+)
+def test_the_reason_is_the_most_pressing_count(found, counts, key):
+    assert page.reason(found, COUNTS | counts).key == key
+
+
+def test_every_sentence_has_its_words_and_every_word_its_sentence():
+    said = [one for found, _ in CASES for one in page.answer(found)]
+    said += [
+        page.alarm_message(alarm(what, n), Flight()) for what in ("jumps", "apart", "shakes") for n in (1, 2)
+    ]
+    said += [page.issue_message(Issue("position jumps", np.array([[5.0, 5.0]])), LASTING)]
+    gains = [gain(), gain("far_out", causes=()), *(gain(key, causes=()) for key in LOST)]
+    said += [page.gain_message(one) for one in gains]
+    said += list(page._with_remedies(gains))
+    for one in said:
+        assert set(re.findall(r"{(\w+)}", TEXTS[one.key])) <= set(one.values), one.key
+    rest = set(TEXTS) - {one.key for one in said}
+    assert all(key.startswith(("reason-", "limit-", "tables")) for key in rest), rest
