@@ -251,3 +251,15 @@ def test_one_bar_counts_seeds_and_cells():
         tell("two", "start", None)
         tell("one", "end", Outcome("one", "done", 3.0))
     assert "7 of 7" in text.getvalue() and text.getvalue().count("done") == 1
+
+
+@pytest.mark.parametrize("changed", ["glossary.toml", "published/a.toml", "messages/en/a.toml"])
+def test_a_page_is_made_again_where_what_it_says_has_changed(changed, tmp_path, monkeypatch):
+    files = [tmp_path / one for one in ("glossary.toml", "published/a.toml", "messages/en/a.toml")]
+    for one in files:
+        one.parent.mkdir(parents=True, exist_ok=True)
+        one.write_text("")
+    monkeypatch.setattr(fingerprint, "DATA", tmp_path)
+    before = fingerprint.page_key(NOTEBOOKS / "schmidt.ipynb", {}, "")
+    (tmp_path / changed).write_text("a = 1")
+    assert fingerprint.page_key(NOTEBOOKS / "schmidt.ipynb", {}, "") != before

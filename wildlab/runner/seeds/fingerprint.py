@@ -50,9 +50,11 @@ def trial_key(case: str, parameters: Mapping[str, Any], code: str) -> str:
 def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
     """What a study's page depends on, as 64 hexadecimal digits: `code_key`, how it is shown and said, what is
     published, the notebook, and ``given``, whatever the notebook is given."""
-    shown = [path for room in ("studies", "reporting") for path in (PACKAGE / room).rglob("*.py")]
+    rooms = ("studies", "reporting", "messages")
+    shown = [path for room in rooms for path in (PACKAGE / room).rglob("*.py")]
+    texts = [*(DATA / "published").glob("*.toml"), *(DATA / "messages").rglob("*.toml")]
     digest = hashlib.sha256(json.dumps([code, dict(given)], sort_keys=True, allow_nan=False).encode())
-    for path in [*sorted([*shown, DATA / "glossary.toml", *(DATA / "published").glob("*.toml")]), notebook]:
+    for path in [*sorted([*shown, DATA / "glossary.toml", *texts]), notebook]:
         digest.update(path.name.encode())
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
