@@ -38,6 +38,13 @@ def test_what_is_not_known_is_nan_in_every_form():
     assert measure(math.nan, "m").startswith("nan")
 
 
+def test_a_subject_may_have_parts():
+    assert (
+        fill("{level/roll/400m/error}", {("error", "level/roll/400m"): {"value": 21, "unit": "m"}}, {})
+        == "21 m"
+    )
+
+
 def test_numbers_and_values_are_put_in_once():
     values = {"flights": "{ekf/mae}", "factor": 2.96, "share": 0.937, "n": 1234}
     assert fill("{ekf/mae:range}; {ekf/mae:count}", MAE, {}) == "9.8 m (5.1 to 16); 40"

@@ -29,6 +29,52 @@ def known(value: float, within: float = 0.01) -> dict[str, float]:
     return {"value": value, "centre_low": value - within, "centre_high": value + within}
 
 
+def two_tracks(kf: float, ekf: float, nees: float) -> dict[str, Any]:
+    """Mean errors of both filters, and the median NEES of both within 1."""
+    return {"kf/mae": kf, "ekf/mae": ekf} | dict.fromkeys(("kf/nees", "ekf/nees"), known(nees, 1.0))
+
+
+def differenced(plain: float, coloured: float) -> dict[str, Any]:
+    """Mean NEES without and with differenced measurements."""
+    return {"cv/nees": plain, "coloured/nees": coloured}
+
+
+COLUMNS_AT_REST = [f"{column}/mae" for column in find_case("static-point").subjects]
+BOTH_KINDS = {"drawn-kf/mae": 8.0, "rendered-kf/mae": 8.1}
+
+
+def image_and_track(track: float) -> dict[str, Any]:
+    """Median errors of single images, 9 within 1, and of the track."""
+    return {
+        "reference/mae": 3.0,
+        "observer/mae": known(9.0, 1.0),
+        "filter/filter_error_mean": known(track, 1.0),
+    }
+
+
+def centres_moved(moved: float, found: float) -> dict[str, Any]:
+    """Errors of the track, and of the centre in the image with the range of flights."""
+    errors = {"with-adjustment": moved, "without-adjustment": found}
+    return {f"{who}/mae_after_start": one for who, one in errors.items()} | {
+        f"{who}/pixel_error": {"value": one, "low": one - 1, "high": one + 1} for who, one in errors.items()
+    }
+
+
+def shares_inside(honest: float, overconfident: float) -> dict[str, Any]:
+    """Of all steps of both filters."""
+    shares = {"honest": honest, "overconfident": overconfident}
+    return {f"{who}/nees-1-run/share_inside": share for who, share in shares.items()}
+
+
+def grown(**growth: float) -> dict[str, Any]:
+    """Errors at both heights."""
+    return {
+        f"level/{name}/{height}/horizontal_error": error
+        for name, times in growth.items()
+        for height, error in (("100m", 10.0), ("400m", 10.0 * times))
+    }
+
+
 ANSWERS: dict[str, list[Case]] = {
     "schmidt": [
         (moments(2.0, 2.1), ("schmidt-consistent", "ekf-consistent")),
@@ -76,7 +122,7 @@ def facts_of(given: Mapping[str, Any]) -> Facts:
     recorded = {}
     for key, value in given.items():
         if "/" in key:
-            subject, name = key.split("/")
+            subject, name = key.rsplit("/", 1)
             recorded[name, subject] = value if isinstance(value, Mapping) else {"value": value}
     return Facts(recorded, {key: value for key, value in given.items() if "/" not in key})
 

@@ -50,7 +50,7 @@ from wildlab.paths import DATA
 FOLDER = DATA / "messages" / "en"
 #: A recorded number: an entry of ``metrics.json``.
 Entry = Mapping[str, Any]
-_PLACEHOLDER = re.compile(r"\{(?:([^{}/:\s]+)/)?([a-z][a-z0-9_]*)(?::([a-z]+))?\}")
+_PLACEHOLDER = re.compile(r"\{(?:([^{}:\s]+)/)?([a-z][a-z0-9_]*)(?::([a-z]+))?\}")
 _UNITS = {"1": "", "": "", "deg": "°", "%": " %"}
 
 

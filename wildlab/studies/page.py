@@ -15,7 +15,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from wildlab.evaluation.shares import HOLDS, Check
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, Check
 from wildlab.messages.page_texts import FORMS, PageTexts, TileText
 from wildlab.reporting.report import Report
 from wildlab.reporting.wording import Wording
@@ -60,6 +60,11 @@ class Facts:
     def holds(self, *claims: str) -> bool:
         """Whether all of these claims hold."""
         return all(self.verdicts.get(one) == HOLDS for one in claims)
+
+    def choose(self, claim: str, yes: str, no: str, unclear: str = "unclear") -> str:
+        """``yes`` where the claim holds on most flights or on all, ``no`` where it fails on as many."""
+        verdict = self.verdicts.get(claim)
+        return yes if verdict in (HOLDS, MOSTLY) else no if verdict in (FAILS, MOSTLY_NOT) else unclear
 
 
 Answer = Callable[[Facts], Sequence[str]]
@@ -133,12 +138,8 @@ def show_page(
     for key, frame in ordered:
         if not texts.tables[key].open:
             wording.table(key, frame)
-    report.method(say_method(texts.method))
-
-
-def say_method(method: str) -> str:
-    """The method with the rule of claims, which all studies share."""
-    return f"{method}\n\n{CLAIMS_EXPLAINED}" if method else CLAIMS_EXPLAINED
+    rule = [] if decided is None or decided.empty else [CLAIMS_EXPLAINED]
+    report.method("\n\n".join([texts.method, *rule]).strip())
 
 
 def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
@@ -152,7 +153,8 @@ def _tile(report: Report, tile: TileText, wording: Wording) -> tuple[str, str]:
     low, high = entry.get("low"), entry.get("high")
     if low is not None and high is not None:
         form = FORMS["percent" if tile.form == "percent" else "number"]
-        words += f" ({form({**entry, 'value': low})} to {form({**entry, 'value': high})})"
+        ends = [form({**entry, "value": end}) for end in (low, high)]
+        words += f" ({' to '.join(ends)})" if ends[0] != ends[1] else ""
     printed = report.printed(tile.name, tile.subject)
     if printed is not None:
         words += f"; published {printed['value']:g}"
