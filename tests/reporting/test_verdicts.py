@@ -24,7 +24,7 @@ from wildlab.reporting.flight_status import (
 from wildlab.reporting.report import open_report
 from wildlab.reporting.spread import bounds_of, range_clause, range_words, share_below, spread_words
 from wildlab.reporting.verdicts import comparison_words
-from wildlab.studies import monte_carlo, single_target
+from wildlab.studies import monte_carlo
 from wildlab.studies.protocol import Metric, Study
 
 
@@ -122,9 +122,9 @@ def test_metrics_and_tables_follow_the_number_of_flights(n):
     assert (entry["low"], entry["high"]) == (bounds_of(values) if n > 1 else (None, None))
     assert entry["value"] == values.median()
     table = monte_carlo.beside_published(report, spread, {"kf": "A"}, ["mae"])
-    for columns in (monte_carlo.published_columns(n), single_target.published_columns(n)):
-        assert set(columns) <= set(table)
-        assert columns.get("range", "") == spread_words(n).heading and ("below" in columns) == (n > 1)
+    columns = monte_carlo.published_columns(n)
+    assert set(columns) <= set(table)
+    assert columns.get("range", "") == spread_words(n).heading and ("below" in columns) == (n > 1)
     assert table.loc[0, "range"] == range_words(values)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY
 from wildlab.messages.page_texts import FOLDER, load_texts
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import case_names, find_case
@@ -113,6 +114,31 @@ ANSWERS: dict[str, list[Case]] = {
             ("rays-alike", "trees-alike"),
         ),
         ({}, ("rays-unknown", "trees-unknown")),
+    ],
+    "linear-vs-nonlinear": [
+        (
+            two_tracks(7.0, 8.0, 5.0) | {"kf-ekf-similar": MOSTLY},
+            ("accuracy-alike", "consistency-overconfident"),
+        ),
+        (
+            two_tracks(7.0, 9.0, 0.5) | {"kf-more-accurate": HOLDS},
+            ("accuracy-ground", "consistency-conservative"),
+        ),
+        (
+            two_tracks(9.0, 7.0, 2.0) | {"kf-more-accurate": FAILS},
+            ("accuracy-image", "consistency-unclear"),
+        ),
+        (two_tracks(9.0, 7.0, 2.0), ("accuracy-unclear", "consistency-unclear")),
+        ({}, ("accuracy-unknown", "consistency-unknown")),
+    ],
+    "coloured-noise": [
+        (
+            differenced(9.0, 1.5) | {"differencing-consistent": HOLDS, "differencing-costs": MOSTLY},
+            ("consistency-gained", "accuracy-lost"),
+        ),
+        (differenced(9.0, 4.0) | {"differencing-costs": FAILS}, ("consistency-nearer", "accuracy-gained")),
+        (differenced(3.0, 0.2), ("consistency-not-gained", "accuracy-unclear")),
+        ({}, ("consistency-unknown",)),
     ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]

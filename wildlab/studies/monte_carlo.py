@@ -10,7 +10,6 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import average
 from wildlab.evaluation.order_statistics import LEVEL, median_interval
 from wildlab.evaluation.replication import power_of
 from wildlab.evaluation.runs import share_interval
@@ -48,49 +47,6 @@ CLAIMS_EXPLAINED = (
     "half and at twice of it stand beside, where what is measured can be on either side of them. "
     "Differences are means over flights, with their 95 % interval."
 )
-#: Headings of the table that `n_run_tests` gives, and what it is.
-N_RUN_COLUMNS = {
-    "filter": "filter",
-    "mean": "mean NEES at the last frame",
-    "band": "95 % band",
-    "flights": "flights",
-    "verdict": "the filter is",
-}
-N_RUN_EXPLAINED = (
-    "The test over runs of H example 3.1: one value of each flight, that of its last frame, so that values "
-    "are independent; position alone, two degrees of freedom."
-)
-
-
-def n_run_tests(spread: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
-    """Whether each filter is consistent over all flights: H example 3.1, on ``nees_at_end``.
-
-    Parameters
-    ----------
-    spread
-        One row for each flight; columns are (subject, name).
-    names
-        Words for each subject.
-
-    Returns
-    -------
-    DataFrame
-        One row for each subject, with the columns of `N_RUN_COLUMNS`.
-    """
-    rows = []
-    for subject, words in names.items():
-        found = average(spread[subject, "nees_at_end"], 2)
-        verdict = "consistent" if found.low <= found.mean <= found.high else "too sure of itself"
-        rows.append(
-            {
-                "filter": words,
-                "mean": found.mean,
-                "band": f"{found.low:.2f} to {found.high:.2f}",
-                "flights": found.n,
-                "verdict": "too cautious" if found.mean < found.low else verdict,
-            }
-        )
-    return pd.DataFrame(rows)
 
 
 def published_columns(n: int) -> dict[str, str]:

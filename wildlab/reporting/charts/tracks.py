@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval
@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 
 #: A pause in the detections longer than this (seconds) is shaded.
 GAP_S = 2.0
+#: Dots of so many flights are large enough to be seen alone.
+FEW = 20
 #: Courses that stay this near to one, degrees, are drawn about it.
 STEADY = 60.0
 #: Later lines are thinner, so that one which lies on another does not hide it.
@@ -216,37 +218,48 @@ def squares_over_time(
     return _finished(fig, strips[:, 0], title)
 
 
-def nees_over_flights(
-    spread: pd.DataFrame, published: Mapping[str, float], names: Mapping[str, str], title: str
+def values_over_flights(
+    values: pd.DataFrame,
+    published: Mapping[str, float],
+    names: Mapping[str, str],
+    label: str,
+    band: int | None = None,
 ) -> Figure:
-    """Time-averaged NEES of every flight by filter, on a log axis with the 95 % band of one run.
+    """A positive number of every flight by filter, on a log axis.
 
     Parameters
     ----------
-    spread
-        One row for each flight, the one drawn first; columns are the filters' names.
+    values
+        One row for each flight; columns are the filters' names.
     published
         What was printed, for those that have it: a hollow diamond.
+    names
+        Of the filters, from top to bottom.
+    label
+        Of the axis.
+    band
+        Degrees of freedom of NEES or NIS, whose 95 % band of one run is shaded; left out, nothing is.
     """
-    low, high = chi_square_interval(2)
     fig, ax = new_figure(5.9, 0.62 * len(names) + 1.5)
-    ax.axvspan(low, high, color=GREEN, alpha=0.13, lw=0, zorder=0)
+    if band is not None:
+        ax.axvspan(*chi_square_interval(band), color=GREEN, alpha=0.13, lw=0, zorder=0)
+    size = 4.5 if len(values) > FEW else 9.0
     for place, name in enumerate(names):
-        values = np.sort(spread[name].to_numpy(float))
+        row = np.sort(values[name].to_numpy(float))
         color = colour(name.split("-")[0] if name != "inflation" else "kf")
         # Spread out by rank, in a pattern that repeats, so that equal values do not hide one another.
-        offset = 0.28 * (2 * ((np.arange(len(values)) * 0.618034) % 1) - 1)
-        ax.plot(values, place + offset, ".", color=color, alpha=0.4, ms=4.5, mec="none")
-        ax.plot([np.median(values)] * 2, [place - 0.36, place + 0.36], color=INK, lw=1.6)
+        offset = 0.28 * (2 * ((np.arange(len(row)) * 0.618034) % 1) - 1)
+        ax.plot(row, place + offset, ".", color=color, alpha=0.4, ms=size, mec="none")
+        ax.plot([np.median(row)] * 2, [place - 0.36, place + 0.36], color=INK, lw=1.6)
         if name in published:
             ax.plot(published[name], place, "D", mfc="white", mec=INK, ms=8, mew=1.6, zorder=5)
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False))
     ax.set_yticks(range(len(names)), [figure_name(name) for name in names.values()])
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
-    ax.set_xlabel("NEES of the position, mean over a flight")
-    ax.set_title(title)
+    ax.set_xlabel(label)
     return fig
 
 

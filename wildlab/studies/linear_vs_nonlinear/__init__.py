@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 from wildlab.studies.linear_vs_nonlinear import trial
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.single_target import consistency_of
 
 #: What is recorded of the georeferenced detections themselves.
 MEASURED = ("mae_georeferenced", "mean_north", "mean_east")
+#: The numbers of the thesis's figures, by twin.
+FIGURES = {
+    twin: {
+        part: f"6-{number:02d}"
+        for number, part in enumerate(("paths", "errors", "map", "speed", "squares", "correlation"), first)
+    }
+    for twin, first in (("fast-vessel", 5), ("slow-vessel-eight", 11))
+}
 
 
 def track_metric(subject: str, name: str) -> Metric | None:
@@ -16,6 +28,21 @@ def track_metric(subject: str, name: str) -> Metric | None:
     return Metric(name, subject, trial.UNITS.get(name, "1"))
 
 
+def answer(facts: Facts) -> list[str]:
+    """Which filter is the more accurate one, then whether both know their errors."""
+    if math.isnan(facts.value("kf", "mae") + facts.value("ekf", "mae")):
+        accuracy = "unknown"
+    else:
+        better = facts.choose("kf-more-accurate", "ground", "image")
+        accuracy = facts.choose("kf-ekf-similar", "alike", better, better)
+    return [f"accuracy-{accuracy}", f"consistency-{consistency_of(facts, 'kf', 'ekf')}"]
+
+
 STUDY = Study(
-    "linear-vs-nonlinear", (*trial.PUBLISHED, "measurements"), trial.trial, trial.check_claims, track_metric
+    "linear-vs-nonlinear",
+    (*trial.PUBLISHED, "measurements"),
+    trial.trial,
+    trial.check_claims,
+    track_metric,
+    answer,
 )

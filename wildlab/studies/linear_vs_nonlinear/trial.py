@@ -86,7 +86,6 @@ UNITS = {
     "nees_at_end": "1",
     "p95_measured": "m",
 }
-TABLE_NAMES = ("mean_north", "mean_east", "mae", "nees", "nis")
 
 
 class ScoredTrack(NamedTuple):

@@ -12,10 +12,10 @@ from matplotlib.ticker import FuncFormatter
 from wildlab.evaluation.runs import share_interval
 from wildlab.reporting.charts.tracks import (
     error_over_time,
-    nees_over_flights,
     speed_and_course,
     squares_over_time,
     track_map,
+    values_over_flights,
 )
 from wildlab.reporting.figures import GREEN, GREY, INK, colour, new_figure
 from wildlab.studies.page import Shown
@@ -63,11 +63,12 @@ def nees_of_flights(
     runs: pd.DataFrame, published: Mapping[tuple[str, str], float], names: Mapping[str, str]
 ) -> Figure:
     """NEES of every flight, a row for each filter; ``published`` by subject and name."""
-    return nees_over_flights(
+    return values_over_flights(
         pd.DataFrame({who: runs[who, "nees"] for who in FILTERS}),
         {who: published[who, "nees"] for who in PUBLISHED},
         names,
-        "",
+        "NEES of the position, mean over a flight",
+        band=2,
     )
 
 
