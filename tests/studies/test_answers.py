@@ -140,6 +140,20 @@ ANSWERS: dict[str, list[Case]] = {
         (differenced(3.0, 0.2), ("consistency-not-gained", "accuracy-unclear")),
         ({}, ("consistency-unknown",)),
     ],
+    "static-point": [
+        (
+            dict.fromkeys(COLUMNS_AT_REST, 6.0) | {"misalignment-matters-most": HOLDS},
+            ("located", "calibration-first"),
+        ),
+        (dict.fromkeys(COLUMNS_AT_REST, 6.0), ("located", "calibration-unclear")),
+        ({}, ("unknown",)),
+    ],
+    "slow-vessel": [
+        (image_and_track(6.0), ("located", "track-nearer")),
+        (image_and_track(12.0), ("located", "track-farther")),
+        (image_and_track(10.0), ("located", "track-unclear")),
+        ({}, ("unknown",)),
+    ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]
 
