@@ -154,6 +154,18 @@ ANSWERS: dict[str, list[Case]] = {
         (image_and_track(10.0), ("located", "track-unclear")),
         ({}, ("unknown",)),
     ],
+    "large-ship": [
+        (centres_moved(4.0, 9.0) | {"more-accurate-after-start": HOLDS}, ("track-helps", "image-nearer")),
+        (centres_moved(9.0, 4.0) | {"more-accurate-after-start": FAILS}, ("track-harms", "image-unclear")),
+        (centres_moved(9.0, 4.0), ("track-unclear", "image-unclear")),
+        ({}, ("unknown",)),
+    ],
+    "end-to-end": [
+        (BOTH_KINDS | {"tracks-alike": HOLDS}, ("tracks-alike", "claims")),
+        (BOTH_KINDS | {"tracks-alike": FAILS}, ("tracks-differ", "claims")),
+        (BOTH_KINDS, ("tracks-unclear", "claims")),
+        ({}, ("unknown",)),
+    ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]
 

@@ -8,11 +8,12 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.reporting.published import load_claims
 from wildlab.studies.coloured_noise import trial as coloured
-from wildlab.studies.end_to_end import text
+from wildlab.studies.end_to_end import tables
 from wildlab.studies.end_to_end.trial import (
     COLOURED,
     DRAWN,
     KINDS,
+    PIXEL_UNITS,
     RENDERED,
     STUDY_OF,
     TWO_FILTERS,
@@ -112,10 +113,11 @@ def test_verdicts_stand_side_by_side():
         DRAWN: {"one": {"a": Check(true=many), "b": Check(true=many)}},
         RENDERED: {"one": {"a": Check(true=many), "b": Check(true=~many)}},
     }
-    table = text.verdicts_table(checks, claims)
+    table = tables.verdicts_table(checks, claims)
     assert table["flights"].tolist() == [0, 40]
     assert table["verdict_drawn"].tolist() == ["holds", "holds"]
     assert table["verdict_rendered"].tolist() == ["holds", "does not hold"]
+    assert tables.count_turned(table) == 1
     assert table[RENDERED].tolist() == ["holds: 40 of 40", "does not hold: 0 of 40"]
 
 
@@ -138,14 +140,12 @@ def test_own_claims_follow_the_numbers(numbers):
 
     assert all(held(better | alike | biased).values())
     assert not any(held(worse | apart | noisy).values())
-    assert text.ellipse_word(pd.Series([0.2, 0.9, 1.0])) == "undecided"
-    assert text.ellipse_word(pd.Series([0.9])) == "undecided"
 
 
 def test_intervals_of_shares_stay_within_all_and_none():
     values = pd.Series([0.9, 1.0, 1.0])
-    assert text.with_interval(values, 100, 0, share=True) == "97 (82 to 100)"
-    assert text.with_interval(values, 100, 0) == "97 (82 to 111)"
+    assert tables.interval_text(values, 100, 0, share=True) == "97 (82 to 100)"
+    assert tables.interval_text(values, 100, 0) == "97 (82 to 111)"
 
 
 def test_a_count_has_no_end_at_one(numbers):
@@ -153,5 +153,7 @@ def test_a_count_has_no_end_at_one(numbers):
         spread_of(numbers, {(RENDERED, "false_alarms_per_image"): alarms}, flights=1)
         for alarms in (1.0, 1.2, 1.4)
     ]
-    table = text.detections_table(pd.concat(rows)).set_index("quantity")
-    assert table.loc["false alarms an image", RENDERED] == "1.200 (0.703 to 1.697)"
+    table = tables.detections_table(pd.concat(rows), {name: name for name in PIXEL_UNITS}).set_index(
+        "quantity"
+    )
+    assert table.loc["false_alarms_per_image", RENDERED] == "1.200 (0.703 to 1.697)"

@@ -6,9 +6,8 @@ import pytest
 
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.large_ship import STUDY, text
+from wildlab.studies.large_ship import STUDY
 from wildlab.studies.large_ship.claims import check_claims, scatter_left
-from wildlab.studies.large_ship.readings import BOX, readings_of, readings_table, shots_as_boxes
 from wildlab.studies.large_ship.trial import (
     DETECTOR,
     NEAR_M,
@@ -25,6 +24,9 @@ from wildlab.studies.large_ship.trial import (
     photograph,
     time_to_rest,
 )
+
+#: Means of H table 6.1, m, north and east, about an origin that is not printed: of receiver and detections.
+REFERENCE, POSITIONS = (6.6, 16.4), {WITH: (4.8, 12.2), WITHOUT: (3.6, 9.7)}
 
 
 @pytest.fixture(scope="module")
@@ -159,8 +161,7 @@ def test_every_recorded_number_is_computed_and_every_published_one_has_a_subject
 def test_published_differences_are_those_of_the_table():
     printed = load_published("large-ship").set_index(["name", "subject"])["value"].to_dict()
     for subject in (WITH, WITHOUT):
-        pairs = zip(text.POSITIONS["reference"], text.POSITIONS[subject], strict=True)
-        apart = [reference - value for reference, value in pairs]
+        apart = [theirs - ours for theirs, ours in zip(REFERENCE, POSITIONS[subject], strict=True)]
         assert [printed[f"mean_{axis}", subject] for axis in ("north", "east")] == pytest.approx(apart)
         assert printed["error_of_mean", subject] == pytest.approx(np.hypot(*apart), abs=0.06)
         sds = [printed[f"sd_{axis}", subject] for axis in ("north", "east")]
@@ -209,8 +210,6 @@ def test_claims_follow_the_numbers(numbers):
 
     assert all(held(good).values())
     assert not any(held(bad).values())
-    assert float(thresholds["mainly-navigation"]) == pytest.approx(text.HALF_OF_VARIANCE)
-    assert float(thresholds["high-success-rate"]) == pytest.approx(text.MISSED)
     near = check_claims(
         spread_of(numbers, good | {(WITH, "share_near_5"): 0.1, (WITHOUT, "share_near_5"): 0.2})
     )
@@ -223,19 +222,6 @@ def test_claims_follow_the_numbers(numbers):
     )
     assert not never["rest-sooner"].premise.any(), "of a ship that never rests nothing is sooner"
     assert not never["mainly-navigation"].reaches(1.4), "what is left above all is no reduction"
-
-
-def test_readings_change_one_thing_each(taken, tracked, numbers):
-    table = readings_table(taken, readings_of(taken))
-    assert table["reading"].is_unique
-    subjects = table.set_index("reading")["subject"]
-    assert (subjects[table["beside"]] == WITHOUT).all(), "each stands beside a track without the adjustment"
-    for row, subject in ((0, WITH), (1, WITHOUT)):
-        assert table["mae"].iloc[row] == pytest.approx(numbers[subject, "mae"])
-    told = table.set_index("reading")["pixel_error"]
-    assert len(set(told.round(9))) > 5
-    boxes = shots_as_boxes(taken.shots)
-    assert np.allclose(boxes[0].detections.axes, BOX * taken.shots[0].detections.axes)
 
 
 def test_what_scatters_is_that_of_the_worse_of_both(numbers):

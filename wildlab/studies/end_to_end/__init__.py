@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from wildlab.studies.end_to_end import trial
 from wildlab.studies.linear_vs_nonlinear.trial import UNITS
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
 
 
@@ -13,4 +16,11 @@ def _metric(subject: str, name: str) -> Metric | None:
     return Metric(name, subject, UNITS[name]) if name in UNITS else None
 
 
-STUDY = Study("end-to-end", trial.KINDS, trial.trial, trial.check_claims, _metric)
+def answer(facts: Facts) -> list[str]:
+    """Whether tracks change, then how many claims do."""
+    if math.isnan(sum(facts.value(f"{kind}-kf", "mae") for kind in trial.KINDS)):
+        return ["unknown"]
+    return [f"tracks-{facts.choose('tracks-alike', 'alike', 'differ')}", "claims"]
+
+
+STUDY = Study("end-to-end", trial.KINDS, trial.trial, trial.check_claims, _metric, answer)
