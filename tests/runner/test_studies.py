@@ -168,7 +168,7 @@ PAGES = {
     "gondola-coverage": Page(2, ("fig-7-15", "fig-7-16", "fig-7-17", "fig-7-18"), covered),
     "precision-drop": Page(2, ("found", "horizon", "mean", "scatter"), drop),
     "information-planning": Page(
-        2, ("share-found", "times", "way-information", "way-rows", "way-chance", "greedy"), planning
+        2, ("share-found", "times", "way-information", "way-rows", "greedy"), planning
     ),
     "wildlife-detection": Page(
         2, ("methods-noon", "sequence", "blocks-offset-65", "weather-recall", "heights")

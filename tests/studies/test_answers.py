@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
 from wildlab.messages.page_texts import FOLDER, load_texts
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import case_names, find_case
@@ -74,6 +74,24 @@ def grown(**growth: float) -> dict[str, Any]:
         for name, times in growth.items()
         for height, error in (("100m", 10.0), ("400m", 10.0 * times))
     }
+
+
+def searched(information: float, rows: float, swing: str, fixed: str) -> dict[str, Any]:
+    """Times until all animals are found, and verdicts on the comparison with each kind of rows."""
+    verdicts = {"lower-search-time-swing": swing, "lower-search-time-fixed": fixed}
+    return {"information/all_found": information, "rows-swing/all_found": rows, **verdicts}
+
+
+def frames(empty: float, unset: float, after: float) -> dict[str, Any]:
+    """Share of frames without an animal, and errors before and after the clock is set."""
+    return {"none-in-view/share_of_frames": empty, "clock/error_unset": unset, "clock/error_set": after}
+
+
+def by_weather(night: float, noon: float, other: float) -> dict[str, Any]:
+    """F1 of background subtraction, and at noon of another method."""
+    ends = {"f1_night": night, "f1_noon": noon}
+    found = {f"subtracted/{k}": {"value": v, "low": v - 0.05, "high": v + 0.05} for k, v in ends.items()}
+    return found | {"enhanced/f1_noon": other}
 
 
 ANSWERS: dict[str, list[Case]] = {
@@ -164,6 +182,29 @@ ANSWERS: dict[str, list[Case]] = {
         (BOTH_KINDS | {"tracks-alike": HOLDS}, ("tracks-alike", "claims")),
         (BOTH_KINDS | {"tracks-alike": FAILS}, ("tracks-differ", "claims")),
         (BOTH_KINDS, ("tracks-unclear", "claims")),
+        ({}, ("unknown",)),
+    ],
+    "replay": [
+        (frames(0.7, 2.0, 1.0) | {"manual-sync-increases-precision": HOLDS}, ("view-empty", "clock-better")),
+        (
+            frames(0.2, 2.0, 1.0) | {"manual-sync-increases-precision": FAILS},
+            ("view-busy", "clock-no-better"),
+        ),
+        (frames(0.7, 2.0, 1.0), ("view-empty", "clock-open")),
+        ({}, ("view-unknown", "clock-unknown")),
+    ],
+    "information-planning": [
+        (
+            searched(200.0, 300.0, swing=HOLDS, fixed=MOSTLY),
+            ("free-sooner", "fixed-sooner"),
+        ),
+        (searched(300.0, 200.0, swing=FAILS, fixed=MOSTLY_NOT), ("free-later", "fixed-later")),
+        (searched(300.0, 290.0, swing=UNDECIDED, fixed=UNDECIDED), ("free-open", "fixed-open")),
+        ({}, ("unknown",)),
+    ],
+    "wildlife-detection": [
+        (by_weather(night=0.98, noon=0.2, other=0.3), ("sun-breaks", "noon-unusable")),
+        (by_weather(night=0.9, noon=0.88, other=0.9), ("sun-harmless", "noon-usable")),
         ({}, ("unknown",)),
     ],
 }

@@ -10,7 +10,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation import share_interval
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import UNDECIDABLE, Check
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies import image_shares, monte_carlo
 from wildlab.studies.protocol import Metric, Study
@@ -165,3 +165,10 @@ def test_shares_of_flights_are_pooled_by_their_images():
 def test_only_published_shares_of_images_have_a_table_of_them(report):
     with pytest.raises(WildlabError, match="not published"):
         image_shares.shares_beside_published(report, {("rate", "nothing"): "x"})
+
+
+def test_a_claim_that_needs_what_no_flight_has_cannot_be_decided(report, monkeypatch):
+    claims_of(monkeypatch, "a", needs="recorded paths")
+    (row,) = monte_carlo.decide_claims(report, "x", {}).to_dict("records")
+    assert (row["verdict"], row["share"]) == (UNDECIDABLE, "needs recorded paths")
+    assert report.claims[0]["verdict"] == UNDECIDABLE

@@ -12,7 +12,6 @@ from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.replay.scene import Points
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.replay import text
 from wildlab.studies.replay.tracks import EVERY_S, WALK, track_targets
 from wildlab.studies.replay.trial import (
     CLOCK,
@@ -110,11 +109,3 @@ def test_claims_follow_the_numbers():
         "manual-sync-increases-precision": True,
     }
     assert not np.any(check_claims(spread_of(-0.5, all_there))["manual-sync-increases-precision"].true)
-
-
-def test_the_moment_shown_has_what_its_screenshot_shows():
-    ones = np.ones(3, int)
-    moments = Moments(np.arange(3.0), np.array([0, 1, 2]), np.array([0, 1, 1]), 4 * ones, ones.astype(bool))
-    assert text.moment_for(moments, NONE) == 0 and text.moment_for(moments, ONE) == 1
-    none = moments._replace(in_view=5 * ones, detected=3 * ones)
-    assert text.moment_for(none, SINGLE) is None

@@ -119,27 +119,3 @@ def test_a_layout_is_the_same_place_in_any_weather():
     uv = [one.uv for one in view.seen if one.kind in trial.ANIMALS]
     assert len(uv) == 4
     assert (np.array(uv) > 25).all() and (np.array(uv) < [155, 95]).all()
-
-
-def test_masks_are_compared_pixel_by_pixel():
-    picture = picture_of(rhino())
-    constant, floor = METHODS[CONSTANT], METHODS[ADAPTIVE]
-    assert trial.overlap(picture, constant, floor) == 1.0
-    assert trial.overlap(picture, constant, replace(constant, level=255.0)) == 0.0
-    assert trial.overlap(picture, replace(constant, level=255.0), replace(floor, level=255.0)) == 1.0
-    both = trial.above(picture, constant), trial.above(picture, replace(constant, level=180.0))
-    part = trial.overlap(picture, constant, replace(constant, level=180.0))
-    assert part == both[1].sum() / both[0].sum() < 1
-    # Where blocks are as bright as the level the two differ.
-    bright = picture_of(rhino(), window=(-30.0, 10.0))
-    assert trial.overlap(bright, constant, floor) < 1
-
-
-def test_a_window_of_another_width_has_the_same_middle():
-    picture = picture_of(rhino())
-    wide = trial.with_window(picture, 2 * trial.WINDOW)
-    assert np.isclose(sum(wide.window), sum(picture.window))
-    assert np.isclose(np.ptp(wide.window), 2 * np.ptp(picture.window))
-    assert wide.grey.max() < picture.grey.max()
-    faint = trial.with_window(picture, 20.0)
-    assert judge(faint, find(faint, METHODS[CONSTANT])).counts.tolist() == [0, 0, 1]

@@ -74,7 +74,14 @@ _OPTIONAL: dict[str, dict[str, Any]] = {
         "fitted": str,
         "unjudged": str,
     },
-    "claim": {"premise": str, "threshold": (Decimal, int), "reason": str, "own": bool, "fitted": str},
+    "claim": {
+        "premise": str,
+        "threshold": (Decimal, int),
+        "reason": str,
+        "own": bool,
+        "fitted": str,
+        "needs": str,
+    },
 }
 CALCULATED, MEAN_OF_RUNS, ONE_FLIGHT = "calculated", "mean of runs", "one flight"
 #: Of a rate: all images of all flights together are compared, not one flight's.
@@ -195,7 +202,7 @@ def published_rows(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
 
 def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
     """The claims of one study, in the order of the files, each with ``study``, ``id``, ``text`` and
-    ``source``, and ``premise``, ``threshold``, ``reason`` and ``own`` where it has them.
+    ``source``, and ``premise``, ``threshold``, ``reason``, ``own`` and ``needs`` where it has them.
 
     Parameters
     ----------

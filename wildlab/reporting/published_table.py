@@ -78,7 +78,7 @@ def claims_table(rows: Sequence[tuple[str, str, str, str, str]]) -> str:
     )
     body = []
     for text, source, verdict, *effects in rows:
-        where = f' <span class="dim source">{escape(source)}</span>' if source else ""
+        where = f' <span class="dim">{escape(source)}</span>' if source else ""
         pill = f'<span class="pill {PILLS.get(verdict, "")}">{escape(verdict)}</span>'
         cells = "".join(
             f'<td role="cell" class="text" data-label="{label}">{escape(one)}</td>'

@@ -13,7 +13,15 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.order_statistics import LEVEL, median_interval
 from wildlab.evaluation.replication import power_of
 from wildlab.evaluation.runs import share_interval
-from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide_check, paired_difference
+from wildlab.evaluation.shares import (
+    FITTED,
+    HOLDS,
+    NO_PREMISE,
+    UNDECIDABLE,
+    Check,
+    decide_check,
+    paired_difference,
+)
 from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
@@ -202,6 +210,8 @@ def _decimals(largest: float) -> int:
 def decide_claims(report: Report, study: str, checks: Mapping[str, Check | ArrayLike]) -> pd.DataFrame:
     """Record the verdict on each claim of a study, and return them as a table of `CLAIM_COLUMNS`.
 
+    A claim that ``needs`` what no simulated flight has cannot be decided; it asks for no check.
+
     Parameters
     ----------
     checks
@@ -215,6 +225,17 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
     """
     rows = []
     for claim in load_claims(study):
+        text = claim["text"] + (" (Ours, not the thesis's.)" if claim.get("own") else "")
+        if "needs" in claim:
+            report.claim(claim["id"], claim["text"], UNDECIDABLE)
+            undecidable = {
+                "share": f"needs {claim['needs']}",
+                "difference": "",
+                "premise": "",
+                "threshold": "",
+            }
+            rows.append({"claim": text, "source": claim["source"], "verdict": UNDECIDABLE} | undecidable)
+            continue
         if claim["id"] not in checks:
             raise WildlabError(
                 f"nothing was computed for the claim {claim['id']!r}",
@@ -253,7 +274,7 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
         )
         rows.append(
             {
-                "claim": claim["text"] + (" (Ours, not the thesis's.)" if claim.get("own") else ""),
+                "claim": text,
                 "source": claim["source"],
                 "verdict": f"{FITTED} ({claim['fitted']})" if claim.get("fitted") else found.verdict,
                 "share": _share_words(found, check),

@@ -361,19 +361,19 @@ def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
     return numbers
 
 
-def check_claims(spread: pd.DataFrame, *, loads: Array) -> dict[str, Check]:
+def check_claims(runs: pd.DataFrame, *, loads: Array) -> dict[str, Check]:
     """What the worlds give for each claim of F, by the claim's id.
 
     Parameters
     ----------
-    spread
+    runs
         What `trial` gives, one row for each world.
     loads
         (N,) share of one core, as the notebook has measured it on some worlds (`timing.planning_cost`).
     """
 
     def of(subject: str, name: str) -> Array:
-        return spread[subject, name].to_numpy(float)
+        return runs[subject, name].to_numpy(float)
 
     def sooner(name: str, other: str, one: str = INFORMATION) -> Check:
         first, second = of(one, name), of(other, name)

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
 from wildlab.studies.replay import trial
+from wildlab.studies.replay.trial import CLOCK, NONE
+
+_CLOCK = {HOLDS: "better", MOSTLY: "better", MOSTLY_NOT: "no-better", FAILS: "no-better"}
 
 
 def _metric(subject: str, name: str) -> Metric | None:
@@ -11,4 +18,14 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
-STUDY = Study("replay", trial.SUBJECTS, trial.trial, trial.check_claims, _metric)
+def answer(facts: Facts) -> list[str]:
+    """How often there is no animal in view, then what setting the clock by hand changes."""
+    empty = facts.value(NONE, "share_of_frames")
+    gain = facts.value(CLOCK, "error_unset") - facts.value(CLOCK, "error_set")
+    view = "unknown" if math.isnan(empty) else "empty" if empty > 0.5 else "busy"
+    verdict = facts.verdicts.get("manual-sync-increases-precision", "")
+    clock = "unknown" if math.isnan(gain) else _CLOCK.get(verdict, "open")
+    return [f"view-{view}", f"clock-{clock}"]
+
+
+STUDY = Study("replay", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)

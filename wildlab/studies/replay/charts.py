@@ -18,13 +18,29 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
+from wildlab.studies.page import Shown
+from wildlab.studies.replay.trial import NONE, ONE, SINGLE, Moments
 
 #: Half of the side of the map, m.
 AROUND = 170.0
+#: The screenshots of F: kind of moment, and the figure.
+SCREENSHOTS = {ONE: "fig-7-20", SINGLE: "fig-b-1", NONE: "fig-b-2"}
 
 
-def operator_view(scene: ReplayScene, t: float, title: str) -> Figure:
-    """The map about the aircraft, and beside it the image.
+def screenshots(scene: ReplayScene, moments: Moments, begin: float) -> list[Shown]:
+    """A view of the middle moment of each kind that the flight has; the scene begins at ``begin``, s."""
+    found = {kind: np.flatnonzero(moments.of(kind)) for kind in SCREENSHOTS}
+    return [
+        Shown(
+            operator_view(scene, float(moments.times[rows[len(rows) // 2]]) - begin), kind, SCREENSHOTS[kind]
+        )
+        for kind, rows in found.items()
+        if len(rows)
+    ]
+
+
+def operator_view(scene: ReplayScene, t: float) -> Figure:
+    """The map about the aircraft, and below it the image.
 
     Parameters
     ----------
@@ -32,11 +48,9 @@ def operator_view(scene: ReplayScene, t: float, title: str) -> Figure:
         With a path, views, a camera and tracks.
     t
         When, s.
-    title
-        The message.
     """
     assert scene.path is not None and scene.views is not None and scene.camera is not None  # noqa: S101
-    fig, (ax, image) = new_figure(7.6, 4.4, columns=2, width_ratios=[3, 2])
+    fig, (ax, image) = new_figure(5.6, 7.4, rows=2, height_ratios=[3, 2])
     path, views = scene.path, scene.views
     row = int(np.abs(views.times - t).argmin())
     here = np.array([np.interp(t, path.times, path.places[:, k]) for k in range(2)])
@@ -62,7 +76,6 @@ def operator_view(scene: ReplayScene, t: float, title: str) -> Figure:
     ax.set_xlim(here[1] - AROUND, here[1] + AROUND)
     ax.set_ylim(here[0] - AROUND, here[0] + AROUND)
     map_axes(ax)
-    ax.set_title(title)
     w, h = scene.camera.width, scene.camera.height
     image.add_patch(Rectangle((-0.5, -0.5), w, h, fc="#eef2f4", ec=GREY))
     count = 0
@@ -73,7 +86,7 @@ def operator_view(scene: ReplayScene, t: float, title: str) -> Figure:
     image.set(xlim=(-0.5, w - 0.5), ylim=(h - 0.5, -0.5), aspect="equal", xticks=[], yticks=[])
     image.grid(visible=False)
     image.set_title(f"image: {count} detected")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return fig
 
 

@@ -164,17 +164,17 @@ def numbers_of(flight: Flight, seed: int) -> dict[tuple[str, str], float]:
     }
 
 
-def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
     """What the flights give for each claim, by the claim's id.
 
     Parameters
     ----------
-    spread
+    runs
         What `trial` gives, one row for each flight.
     """
-    unset, after = (spread[CLOCK, name].to_numpy(float) for name in ("error_unset", "error_set"))
+    unset, after = (runs[CLOCK, name].to_numpy(float) for name in ("error_unset", "error_set"))
     ids = {"one-of-several-in-view": ONE, "one-detected": SINGLE, "none-in-view-several-tracks": NONE}
     return {
-        **{id: Check(true=spread[kind, "share_of_frames"].to_numpy(float) > 0) for id, kind in ids.items()},
+        **{id: Check(true=runs[kind, "share_of_frames"].to_numpy(float) > 0) for id, kind in ids.items()},
         "manual-sync-increases-precision": Check(true=after < unset, first=unset, second=after, unit="m"),
     }

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.claims import check_claims
+from wildlab.studies.wildlife_detection.trial import METHODS, PROPOSED, SUBTRACTED
+
+#: An F1 from which on a method is called usable: half of what it reports, or of what is there, is right.
+USABLE = 0.5
 
 
 def _metric(subject: str, name: str) -> Metric | None:
@@ -12,6 +19,19 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
+def answer(facts: Facts) -> list[str]:
+    """Background subtraction by night and in full sun, then whether another method is usable there."""
+    by_night, in_sun = (facts.value(SUBTRACTED, f"f1_{weather}") for weather in ("night", "noon"))
+    if math.isnan(by_night + in_sun):
+        return ["unknown"]
+    low, high = facts.value(SUBTRACTED, "f1_night", "low"), facts.value(SUBTRACTED, "f1_noon", "high")
+    best = max(
+        facts.value(one, "f1_noon") for one in (*METHODS, *PROPOSED) if facts.value(one, "f1_noon") >= 0
+    )
+    sun = "breaks" if high < low else "harmless"
+    return [f"sun-{sun}", f"noon-{'usable' if best >= USABLE else 'unusable'}"]
+
+
 STUDY = Study(
-    "wildlife-detection", (*trial.SUBJECTS, "ground", "herd", "masks"), trial.trial, check_claims, _metric
+    "wildlife-detection", (*trial.SUBJECTS, "ground", "herd"), trial.trial, check_claims, _metric, answer
 )

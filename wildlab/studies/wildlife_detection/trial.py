@@ -105,8 +105,6 @@ AREA = (0.2, 8.0)
 HOTTEST = 310.15
 #: How wide the operator's window is, as a multiple of what animals have over the ground, and at least, K.
 WINDOW, LEAST_WINDOW = 2.0, 8.0
-#: Other widths, and the readings that are tried with them: F 3.1 leaves them to whoever stands in the field.
-WIDTHS, TRIED = (1.0, 1.5, 2.0, 3.0), ("floor", "offset")
 #: Of an animal that is to be found this share must show.
 SHOWN = 0.25
 #: The animal is larger than the block by its major axis, px: F's small block has 51.
@@ -214,23 +212,9 @@ def above(picture: Picture, thresholds: Warm) -> NDArray[np.bool_]:
     return np.asarray(grey_above(grey, thresholds), bool)
 
 
-def overlap(picture: Picture, first: Warm, second: Warm) -> float:
-    """What is in both masks, of what is in either: 1 where they are equal."""
-    one, other = above(picture, first), above(picture, second)
-    either = int((one | other).sum())
-    return float((one & other).sum() / either) if either else 1.0
-
-
-def with_window(picture: Picture, width: float) -> Picture:
-    """The same picture; its window has the same middle, and is ``width`` times animals' excess wide."""
-    low, high = picture.window
-    middle, half = (low + high) / 2, (high - low) / 2 * width / WINDOW
-    return replace(picture, window=(middle - half, middle + half))
-
-
-def read_subject(method: str, reading: str, width: float = WINDOW) -> str:
-    """What a setting in a reading, with a window of that width, is called in the numbers."""
-    return f"{method}-{reading}" if width == WINDOW else f"{method}-{reading}-{width:g}"
+def read_subject(method: str, reading: str) -> str:
+    """What a setting in a reading is called in the numbers."""
+    return f"{method}-{reading}"
 
 
 def proposed(name: str, picture: Picture, camera: Camera, response: CameraResponse) -> Warm:
@@ -359,28 +343,20 @@ def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], 
             tally(method, at, picture, thresholds)
         for method in PROPOSED:
             tally(method, at, picture, proposed(method, picture, operator.camera, operator.response))
-        numbers["masks", f"overlap_{at}"] = overlap(picture, METHODS[CONSTANT], METHODS[ADAPTIVE])
         numbers["ground", f"as_warm_{at}"] = as_warm(picture)
         left = background_left(picture)
         numbers[SUBTRACTED, f"background_{at}"], numbers[ENHANCED, f"background_{at}"] = left
     for name, picture in zip(("before", "after"), pictures.sequence, strict=True):
         for method in (CONSTANT, *PRINTED, BY_MEAN, BY_MEDIAN):
             tally(method, name, picture, METHODS[method])
-        numbers["masks", f"overlap_{name}"] = overlap(picture, METHODS[CONSTANT], METHODS[ADAPTIVE])
         numbers["ground", f"level_{name}"] = float(np.median(picture.grey[picture.view.labels == 0]))
     read = {str(height): pictures.plain[CLOUDY, height] for height in READ_AT}
     sequence = dict(zip(("before", "after"), pictures.sequence, strict=True))
-    for width in WIDTHS:
-        shown, changed = (
-            {at: with_window(one, width) for at, one in own.items()} for own in (read, sequence)
-        )
-        for reading in READINGS if width == WINDOW else TRIED:
-            for method in PRINTED:
-                of = shown | changed if method == ADAPTIVE else shown
-                for at, picture in of.items():
-                    tally(
-                        read_subject(method, reading, width), at, picture, read_as(METHODS[method], reading)
-                    )
+    for reading in READINGS:
+        for method in PRINTED:
+            of = read | sequence if method == ADAPTIVE else read
+            for at, picture in of.items():
+                tally(read_subject(method, reading), at, picture, read_as(METHODS[method], reading))
     near = pictures.plain[CLOUDY, min(VIEWS)]
     for method in (SMALL, LARGE):
         for kind, level in PIECES:
