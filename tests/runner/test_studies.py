@@ -23,7 +23,7 @@ from wildlab.runner.run import run_studies
 from wildlab.runner.trials import split_keys
 from wildlab.studies.line_of_sight.timing import WAYS
 from wildlab.studies.line_of_sight.trial import HEIGHTS, VIEW
-from wildlab.studies.printed_numbers.items import all_items
+from wildlab.studies.printed_numbers.pairs import all_pairs
 from wildlab.studies.protocol import run_trial
 
 pytestmark = pytest.mark.slow
@@ -96,7 +96,7 @@ def camera(found: Values) -> None:
 
 def printed_numbers(found: Values) -> None:
     assert {subject: m["value"] for (name, subject), m in found.items() if name == "ratio"} == pytest.approx(
-        {item.key: item.ratio for item in all_items()}
+        {pair.key: pair.ratio for pair in all_pairs()}
     )
 
 

@@ -17,6 +17,17 @@ from wildlab.studies.protocol import case_names, find_case
 Case = tuple[Mapping[str, Any], tuple[str, ...]]
 
 
+def found(ship: float, whole: float, alarms: float, near_perfect: str) -> dict[str, Any]:
+    """Detection rates, false alarms an image on both flights, and the verdict on a near perfect rate."""
+    return {
+        "ship/detection_rate": ship,
+        "boats-whole/detection_rate": whole,
+        "ship/false_alarms_per_image": 0.0,
+        "boats/false_alarms_per_image": alarms,
+        "near-perfect": near_perfect,
+    }
+
+
 def moments(schmidt: float, ekf: float, n: int = 100) -> dict[str, Any]:
     """Mean NEES of one moment of each of ``n`` flights, with poses as calibrated."""
     return {
@@ -205,6 +216,34 @@ ANSWERS: dict[str, list[Case]] = {
     "wildlife-detection": [
         (by_weather(night=0.98, noon=0.2, other=0.3), ("sun-breaks", "noon-unusable")),
         (by_weather(night=0.9, noon=0.88, other=0.9), ("sun-harmless", "noon-usable")),
+        ({}, ("unknown",)),
+    ],
+    "vessel-detection": [
+        (found(0.99, 1.0, 0.0, HOLDS), ("found-holds", "alarms-none")),
+        (found(0.99, 0.8, 0.1, FAILS), ("found-fails", "alarms-some")),
+        (found(0.99, 0.97, 0.0, UNDECIDED), ("found-open", "alarms-none")),
+        ({}, ("found-unknown", "alarms-unknown")),
+    ],
+    "precision-drop": [
+        ({"within-a-few-metres": HOLDS, "single-is-inaccurate": MOSTLY}, ("mean-holds", "single-holds")),
+        ({"within-a-few-metres": FAILS, "single-is-inaccurate": FAILS}, ("mean-fails", "single-fails")),
+        ({"within-a-few-metres": UNDECIDED, "single-is-inaccurate": UNDECIDED}, ("mean-open", "single-open")),
+        ({}, ("mean-unknown", "single-unknown")),
+    ],
+    "wildlife-camera": [
+        (
+            {"tau2-data-sheet/best_video_off": 0.6, "inverse/largest_error": 0.1},
+            ("video-fits", "inverse-unnoticed"),
+        ),
+        (
+            {"tau2-data-sheet/best_video_off": 6.0, "inverse/largest_error": 3.0},
+            ("video-open", "inverse-rim"),
+        ),
+        ({}, ("video-unknown", "inverse-unknown")),
+    ],
+    "printed-numbers": [
+        ({"one/ratio": 1.0, "other/ratio": 1.2}, ("some-differ", "reasons")),
+        ({"one/ratio": 1.0, "other/ratio": 0.96}, ("all-agree",)),
         ({}, ("unknown",)),
     ],
 }

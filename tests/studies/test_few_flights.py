@@ -64,7 +64,7 @@ UNKNOWN = re.compile(
 def text_functions() -> Iterator[tuple[str, Callable[..., Any]]]:
     """All that are public and take a ``spread``, but those that others call for a part of it."""
     for module in pkgutil.walk_packages(studies.__path__, "wildlab.studies."):
-        if module.name.endswith(("_file", "monte_carlo", "image_shares")):
+        if module.name.endswith(("_file", "monte_carlo")):
             continue
         for name, function in vars(importlib.import_module(module.name)).items():
             if inspect.isfunction(function) and function.__module__ == module.name and name[0] != "_":
@@ -76,9 +76,8 @@ def text_functions() -> Iterator[tuple[str, Callable[..., Any]]]:
 
 
 FUNCTIONS = dict(text_functions())
-#: Of these all but one that says counts alone.
+#: Those that make sentences.
 TEXTS = [name for name in FUNCTIONS if "text" in name or "headline" in name]
-TEXTS.remove("vessel_detection.text.alarmed_words")
 
 
 def value_of(key: Any, variant: int) -> float:

@@ -12,7 +12,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation import share_interval
 from wildlab.evaluation.shares import UNDECIDABLE, Check
 from wildlab.reporting.report import Report, open_report
-from wildlab.studies import image_shares, monte_carlo
+from wildlab.studies import monte_carlo
 from wildlab.studies.protocol import Metric, Study
 
 STUDY = Study("x", ("ekf",), metric_of=lambda subject, name: Metric(name, subject, "m"))
@@ -155,16 +155,11 @@ def test_a_claim_without_a_check_is_named(report, monkeypatch):
 
 def test_shares_of_flights_are_pooled_by_their_images():
     spread = pd.DataFrame({("x", "images"): [10.0, 30.0, 5.0], ("x", "rate"): [1.0, 0.5, np.nan]})
-    share, images = image_shares.pooled_share(spread, "x", "rate")
+    share, images = monte_carlo.pooled_share(spread, "x", "rate")
     assert images == 40 and share == share_interval(25, 40)
-    alarms = image_shares.pooled_share(spread * [1, 3], "x", "rate")[0]
+    alarms = monte_carlo.pooled_share(spread * [1, 3], "x", "rate")[0]
     assert alarms.estimate == pytest.approx(75 / 40) and alarms.high == 1.0
-    assert image_shares.pooled_share(spread * [0, 1], "x", "rate")[1] == 0
-
-
-def test_only_published_shares_of_images_have_a_table_of_them(report):
-    with pytest.raises(WildlabError, match="not published"):
-        image_shares.shares_beside_published(report, {("rate", "nothing"): "x"})
+    assert monte_carlo.pooled_share(spread * [0, 1], "x", "rate")[1] == 0
 
 
 def test_a_claim_that_needs_what_no_flight_has_cannot_be_decided(report, monkeypatch):

@@ -16,7 +16,7 @@ from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.coloured import Ground
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.studies import monte_carlo
-from wildlab.studies.precision_drop import STUDY, text
+from wildlab.studies.precision_drop import STUDY
 from wildlab.studies.precision_drop.trial import (
     COUNTS,
     FOUND,
@@ -121,16 +121,6 @@ def table(**changed):
     return pd.DataFrame([base, base], dtype=float)
 
 
-def test_what_a_mean_is_worth_has_an_interval_over_flights():
-    assert text.worth_interval(table()) is None
-    twelve = pd.concat([table(), table(mean_error=2.5)] * 3, ignore_index=True)
-    low, high = text.worth_interval(twelve)
-    assert low < text.worth(twelve) < high
-    assert 16 / 6.25 <= low < high <= 4
-    alike = pd.concat([table()] * 3, ignore_index=True)
-    assert text.worth_interval(alike) == pytest.approx((4, 4)) and text.worth(alike) == pytest.approx(4)
-
-
 def test_a_few_pixels_on_the_ground_are_a_calculation():
     check = check_claims(table())["few-pixels-are-little"]
     assert (decide_check(check, 1.0).verdict, decide_check(check, 0.5).verdict) == (HOLDS, FAILS)
@@ -154,8 +144,3 @@ def test_claims_turn_with_the_numbers():
         assert not bad[name].holds(claim.get("threshold")).any(), name
     none = check_claims(table(horizon_alarms_without_borders=0))["horizon-near-the-border"]
     assert decide(none.holds(0.1), none.premise).met == 0
-
-
-@pytest.mark.parametrize(("share", "said"), [(0.5, "narrow"), (1.0, "wider")])
-def test_ellipses_are_judged_by_the_share_that_they_hold(share, said):
-    assert said in text.pixel_words(table(tarpaulin_ellipse_coverage_90=share))

@@ -13,11 +13,12 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.reporting.report import open_report
+from wildlab.reporting.verdicts import judge as judge_number
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene import EVEN, IDEAL, Scene, expose, rectangle, render, sensor_of
 from wildlab.simulation.scene.flights import SceneFlight
-from wildlab.studies import image_shares, monte_carlo
-from wildlab.studies.vessel_detection import STUDY, sweeps, text
+from wildlab.studies import monte_carlo
+from wildlab.studies.vessel_detection import STUDY, sweeps
 from wildlab.studies.vessel_detection.trial import (
     BOATS,
     CUT,
@@ -108,23 +109,6 @@ def spread_of(**changes):
     return pd.DataFrame([numbers] * 40)
 
 
-def heights_of(**reach):
-    rows = []
-    for kind in ("person", "boat"):
-        for height in (50.0, 100.0, 200.0):
-            found = float(height <= reach.get(kind, 0.0))
-            scaled = float(height <= reach.get(f"{kind}_scaled", reach.get(kind, 0.0)))
-            rows.append({"kind": kind, "height_m": height, "found": found, "scaled": scaled, "draws": 20})
-    return pd.DataFrame(rows)
-
-
-def test_a_height_beyond_a_gap_does_not_count():
-    heights = heights_of(boat=200.0)
-    heights.loc[(heights["kind"] == "boat") & (heights["height_m"] == 100.0), "found"] = 0.5
-    assert text.reach(heights, "boat") == 50.0
-    assert text.reach(heights, "person") == 0.0
-
-
 CLAIMS = {claim["id"]: claim for claim in load_claims("vessel-detection")}
 
 
@@ -149,11 +133,6 @@ def test_claims_are_judged_by_all_images_together():
     bad = {f"{one}__images_with_{what}": 2.0 for one, what in (("ship", "false"), ("sea", "false"))}
     assert set(decided(**bad, whole__images_with_missed=2.0).values()) == {FAILS}
     assert decided(ship__images_with_missed=2.0)["near-perfect"] == FAILS
-
-
-@pytest.mark.parametrize(("share", "said"), [(0.6, "small"), (0.9, "within"), (0.99, "large")])
-def test_ellipses_are_judged_by_the_share_that_they_hold(share, said):
-    assert said in text.ellipse_words(spread_of(ship__ellipse_coverage_90=share)).split(" for ship")[0]
 
 
 def test_what_is_missed_is_a_small_part_or_not():
@@ -182,21 +161,17 @@ def test_thresholds_of_none_are_what_the_printed_images_leave_open():
         )
 
 
-def test_printed_rates_are_held_against_all_images_together():
-    def verdict(**changes):
+def test_published_rates_are_compared_with_all_images_together():
+    def compared(**changes):
         report = open_report(study="vessel-detection", kind="twin")
         monte_carlo.record_spread(report, STUDY, spread_of(**changes)[:6], {})
-        table = image_shares.shares_beside_published(report, text.SHARES)
-        return table.set_index("of").loc["images with boats wholly in view, all found"]
+        row = report.printed("detection_rate", WHOLE)
+        return judge_number(row, report.recorded).words, report.recorded["detection_rate", WHOLE]["n"]
 
     # Each flight's rate is 0.96 or 1.00: what 48 images say is too little, and 12000 are enough.
-    assert verdict(whole__images=8.0)["verdict"] == "cannot tell, too few flights"
-    assert verdict(whole__images=8.0)["here"] == "100 % (92.6 % to 100 %)"
-    assert verdict(whole__images=2000.0)["verdict"] == "close, too few flights"
-    assert (
-        verdict(whole__images=2000.0, whole__detection_rate=0.96)["verdict"] == "not close, too few flights"
-    )
-    assert verdict(whole__images=2000.0)["images"] == 12000
+    assert compared(whole__images=8.0) == ("cannot tell, too few flights", 48)
+    assert compared(whole__images=2000.0) == ("close, too few flights", 12000)
+    assert compared(whole__images=2000.0, whole__detection_rate=0.96)[0] == "not close, too few flights"
 
 
 def test_an_image_with_one_boat_whole_and_one_cut_counts_by_the_whole_one():

@@ -19,10 +19,6 @@ def test_the_inverse_is_exact_in_the_middle_and_misses_by_the_third_order_outsid
     assert found.error[-1, -1] == pytest.approx(about, rel=0.4)
 
 
-def test_rounds_of_a_fixed_point_grow_with_what_is_asked():
-    assert lens.rounds_needed(CAMERA, 1.0) < lens.rounds_needed(CAMERA, 1e-4)
-
-
 def test_the_video_is_told_by_the_ratio_of_focal_lengths():
     best = lens.read_videos()[0]
     assert (best.width, best.height) == (720, 480) and best.off < 1

@@ -68,10 +68,10 @@ def claims_table(rows: Sequence[tuple[str, str, str, str, str]]) -> str:
     Returns
     -------
     str
-        HTML; the last column is left out where no claim compares anything.
+        HTML; the last columns are left out where no claim has anything in them.
     """
-    compared = any(one[4] for one in rows)
-    headings = ("claim", "verdict", "true on", "difference")[: 4 if compared else 3]
+    filled = max((2 + (2 if one[4] else 1 if one[3] else 0) for one in rows), default=2)
+    headings = ("claim", "verdict", "true on", "difference")[:filled]
     heads = "".join(
         f'<th role="columnheader" scope="col" class="text{" wide" if i == 0 else ""}">{one}</th>'
         for i, one in enumerate(headings)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from wildlab.errors import WildlabError
 from wildlab.evaluation.order_statistics import LEVEL, median_interval
 from wildlab.evaluation.replication import power_of
-from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.shares import (
     FITTED,
     HOLDS,
@@ -27,7 +27,6 @@ from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
 from wildlab.reporting.text import percent
 from wildlab.reporting.verdicts import comparison_words, judge, recorded_for, size_name
-from wildlab.studies.image_shares import pooled_share
 from wildlab.studies.protocol import Study
 
 #: Decimals of the table that `beside_published` gives, headings of that of `decide_claims`.
@@ -121,6 +120,30 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         _record(report, name, subject, values, unit, n.get(subject), value)
         if value is not None and quantity_kind(name) == "signed mean" and len(values) > 1:
             _record(report, size_name(name), subject, values.abs(), unit, n.get(subject), abs(value))
+
+
+def pooled_share(spread: pd.DataFrame, subject: str, name: str) -> tuple[Interval, int]:
+    """A share of all images of all flights, with its 95 % interval, and how many images there are.
+
+    Parameters
+    ----------
+    spread
+        One row for each flight; besides the share of each flight it has how many ``images`` there were.
+    subject, name
+        Of the share. Of a mean count the interval is that of a share, and ends at one.
+
+    Returns
+    -------
+    (share, images)
+        The share is NaN where there is no image.
+    """
+    images, rate = (spread[subject, one].to_numpy(float) for one in ("images", name))
+    known = np.isfinite(rate) & (images > 0)
+    count, of = round(float((images * rate)[known].sum())), round(float(images[known].sum()))
+    if not of:
+        return Interval(np.nan, np.nan, np.nan), 0
+    share = share_interval(min(count, of), of)
+    return share._replace(estimate=count / of), of
 
 
 def _record(

@@ -15,7 +15,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, Check
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, Check
 from wildlab.messages.page_texts import FORMS, PageTexts, TileText
 from wildlab.reporting.report import Report
 from wildlab.reporting.wording import Wording
@@ -66,6 +66,13 @@ class Facts:
         verdict = self.verdicts.get(claim)
         return yes if verdict in (HOLDS, MOSTLY) else no if verdict in (FAILS, MOSTLY_NOT) else unclear
 
+    def outcome(self, claim: str) -> str:
+        """How a claim came out, as the end of a text's key: ``holds``, ``fails``, ``open``, or ``unknown``
+        where it was not tested."""
+        if self.verdicts.get(claim, NO_PREMISE) == NO_PREMISE:
+            return "unknown"
+        return self.choose(claim, "holds", "fails", "open")
+
 
 Answer = Callable[[Facts], Sequence[str]]
 
@@ -97,7 +104,7 @@ def show_page(
     figures
         The first is the page's main figure; the others stand two by two.
     checks
-        By claim what the flights give for it; None where the study tests none.
+        By claim what the flights give for it; None where the study tests none, or has recorded its verdicts.
     tables
         Further tables by the key of their texts.
     values
@@ -117,12 +124,11 @@ def show_page(
     # All are filled in, so that a fault of one that is not chosen shows.
     sentences = {key: wording.say(text) for key, text in texts.answers.items()}
     report.summary([sentences[key] for key in answer(facts)])
-    report.tiles([_tile(report, one, wording) for one in texts.tiles])
+    report.tiles([tile_of(report, one, wording) for one in texts.tiles])
     first, *others = figures
     wording.figure(first.text, first.fig, first.name, main=True)
     report.published("Published and here", PUBLISHED_CAPTION, texts.subjects, texts.quantities)
-    if decided is not None and len(decided):
-        _claims(report, decided)
+    _claims(report, decided)
     ordered = sorted((tables or {}).items(), key=lambda one: not texts.tables[one[0]].open)
     for key, frame in ordered:
         if texts.tables[key].open:
@@ -147,7 +153,8 @@ def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
     simulated_section(report, *twins, study=study)
 
 
-def _tile(report: Report, tile: TileText, wording: Wording) -> tuple[str, str]:
+def tile_of(report: Report, tile: TileText, wording: Wording) -> tuple[str, str]:
+    """A recorded number, and its words with its interval and the published number."""
     entry = report.recorded[tile.name, tile.subject]
     words = wording.say(tile.text)
     low, high = entry.get("low"), entry.get("high")
@@ -161,11 +168,14 @@ def _tile(report: Report, tile: TileText, wording: Wording) -> tuple[str, str]:
     return FORMS[tile.form](entry), words
 
 
-def _claims(report: Report, decided: pd.DataFrame) -> None:
-    effects = {
-        one["id"]: (row["share"], row["difference"])
-        for one, row in zip(report.claims, decided.to_dict("records"), strict=True)
-    }
+def _claims(report: Report, decided: pd.DataFrame | None) -> None:
+    """With shares and differences where they are of flights; a study may have decided others by itself."""
+    effects = {one["id"]: ("", "") for one in report.claims}
+    if decided is not None:
+        effects |= {
+            one["id"]: (row["share"], row["difference"])
+            for one, row in zip(report.claims, decided.to_dict("records"), strict=True)
+        }
     report.claims_in_sight("Claims of the thesis", effects)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from wildlab.studies.page import Facts
 from wildlab.studies.precision_drop import trial
 from wildlab.studies.protocol import Metric, Study
 
@@ -11,4 +12,9 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
-STUDY = Study("precision-drop", trial.SUBJECTS, trial.trial, trial.check_claims, _metric)
+def answer(facts: Facts) -> list[str]:
+    """Whether the mean of many positions is near enough, and whether it is nearer than a single one."""
+    return [f"mean-{facts.outcome('within-a-few-metres')}", f"single-{facts.outcome('single-is-inaccurate')}"]
+
+
+STUDY = Study("precision-drop", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)

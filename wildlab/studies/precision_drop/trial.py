@@ -333,17 +333,17 @@ def flown(
     return drop, errors, numbers
 
 
-def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
     """What the flights give for each claim of H 4.4.2, by the claim's id.
 
     Parameters
     ----------
-    spread
+    runs
         What `trial` gives, one row for each flight.
     """
 
     def of(subject: str, name: str) -> NDArray[np.float64]:
-        return spread[subject, name].to_numpy(float)
+        return runs[subject, name].to_numpy(float)
 
     mean, single = of(MEAN, "error"), of(SINGLE, "median_error")
     every = of(HORIZON, "alarms_without_borders")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
 from wildlab.studies.vessel_detection import trial
 
@@ -11,4 +14,13 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
-STUDY = Study("vessel-detection", trial.SUBJECTS, trial.trial, trial.check_claims, _metric)
+def answer(facts: Facts) -> list[str]:
+    """Whether vessels are missed, by the worse of both data sets, and whether anything else is found."""
+    alarms = [facts.value(who, "false_alarms_per_image") for who in (trial.SHIP, trial.BOATS)]
+    return [
+        f"found-{facts.outcome('near-perfect')}",
+        "alarms-unknown" if any(map(math.isnan, alarms)) else "alarms-some" if any(alarms) else "alarms-none",
+    ]
+
+
+STUDY = Study("vessel-detection", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)

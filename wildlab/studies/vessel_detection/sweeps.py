@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pandas as pd
 
 from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import find_objects
-from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.detection.thresholds import CHOSEN, PUBLISHED, FloatingThresholds
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -118,8 +118,8 @@ def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``wind`` m/s, ``glint`` K of the sun mirrored in view (0: no sun), ``false`` alarms per
-        image, of ``draws`` images, of which so many are ``alarmed``.
+        ``wind`` m/s, ``glint`` K of the sun mirrored in view (0: no sun), and in which share of ``draws``
+        images something is ``found``.
     """
     response = CameraResponse()
     sensor = sensor_of(response, (camera.height, camera.width), np.random.default_rng([seed, 5]))
@@ -130,16 +130,14 @@ def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
             # Ahead, as far above the horizon as the camera looks below it: mirrored in the image's middle.
             elevation = float(np.pi / 2 - TILT) if glint else None
             sea = Sea(wind_speed=wind, sun_azimuth=0.0, sun_elevation=elevation, glint=glint, seed=seed)
-            alarms = alarmed = 0
+            alarmed = 0
             for number in range(draws):
                 rng = np.random.default_rng([seed, int(10 * wind), int(10 * glint), number])
                 at = np.array([*rng.uniform(-1000.0, 1000.0, 2), -REFERENCE])
                 poses = CameraPoses(camera, Mount("down"), at, R_nb)
                 view = render(Scene(sea), camera, poses.p_nc, poses.R_nc)
-                found = len(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
-                alarms, alarmed = alarms + found, alarmed + bool(found)
-            row = {"wind": wind, "glint": glint, "false": alarms / draws, "draws": draws}
-            rows.append(row | {"alarmed": alarmed})
+                alarmed += bool(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
+            rows.append({"wind": wind, "glint": glint, "found": alarmed / draws, "draws": draws})
     return pd.DataFrame(rows)
 
 
@@ -166,7 +164,8 @@ def over_readings(images: list[Image]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``reading``; ``ship`` and ``boats`` found, ``false`` alarms per image, ``pieces`` per ship.
+        ``reading``; ``ship`` and ``boats`` found, % of images, ``false`` alarms per image, ``pieces`` per
+        ship.
     """
     rows = []
     for reading, thresholds in READINGS.items():
@@ -175,10 +174,25 @@ def over_readings(images: list[Image]) -> pd.DataFrame:
         rows.append(
             {
                 "reading": reading,
-                "ship": numbers[SHIP, "detection_rate"],
-                "boats": numbers[WHOLE, "detection_rate"],
+                "ship": 100 * numbers[SHIP, "detection_rate"],
+                "boats": 100 * numbers[WHOLE, "detection_rate"],
                 "false": float(frames["false"].mean()),
                 "pieces": numbers[SHIP, "pieces"],
             }
         )
     return pd.DataFrame(rows)
+
+
+def thresholds_table(thresholds: FloatingThresholds) -> pd.DataFrame:
+    """Every threshold with its value, published or chosen, and where it is published or why it is so."""
+    return pd.DataFrame(
+        [
+            {
+                "name": field.name.replace("_", " "),
+                "value": str(getattr(thresholds, field.name)),
+                "status": "chosen" if field.name in CHOSEN else "published",
+                "reason": CHOSEN[field.name] if field.name in CHOSEN else PUBLISHED[field.name],
+            }
+            for field in fields(thresholds)
+        ]
+    )

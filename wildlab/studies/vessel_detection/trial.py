@@ -210,17 +210,17 @@ def trial(seed: int, *, twin: str, second: str, images: int) -> dict[tuple[str, 
     return numbers_of(*tally(rendered, FloatingThresholds()))
 
 
-def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
     """What the flights give for each claim of H 4.3 and 4.4.1, by the claim's id.
 
     Parameters
     ----------
-    spread
+    runs
         What `trial` gives, one row for each flight.
     """
 
     def of(subject: str, name: str) -> NDArray[np.float64]:
-        return spread[subject, name].to_numpy(float)
+        return runs[subject, name].to_numpy(float)
 
     def together(count: str, *subjects: str) -> Check:
         """Each flight's share of images with something missed or false, and that of all flights' images."""

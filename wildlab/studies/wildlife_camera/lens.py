@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from wildlab.detection.boards import Board
 from wildlab.geometry.board_views import INTRINSICS, parameters_of, project_board
@@ -14,6 +16,8 @@ from wildlab.geometry.camera import Camera, normalise, undistort, undistort_appr
 from wildlab.geometry.directions import direction_differences
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
+from wildlab.reporting.figures import new_figure
+from wildlab.reporting.verdicts import error_name
 from wildlab.simulation.boards import board_views
 
 #: F 7.1, as printed. The skew and k2 to k5 "are assumed to be zero, and therefore not estimated".
@@ -119,21 +123,6 @@ def inverse_error(camera: Camera) -> Inverse:
     return Inverse(u, v, error.reshape(u.shape))
 
 
-def rounds_needed(camera: Camera, within: float = 0.01, most: int = 50) -> int:
-    """How many rounds of a fixed point bring each corner that near its exact inverse, px."""
-    u, v = np.meshgrid([0.0, camera.width - 1], [0.0, camera.height - 1])
-    uv = np.column_stack([u.ravel(), v.ravel()])
-    distorted = normalise(replace(camera, distortion=(0.0,) * 5), uv)
-    k1 = camera.distortion[0]
-    exact = undistort(distorted, (k1, 0.0, 0.0, 0.0, 0.0))
-    guess = distorted
-    for count in range(1, most + 1):
-        guess = distorted / (1 + k1 * (guess**2).sum(axis=1, keepdims=True))
-        if np.abs((guess - exact) * [camera.fx, camera.fy]).max() < within:
-            return count
-    return most
-
-
 def direction_error(one: Camera, other: Camera) -> float:
     """Root mean squared difference of the directions in which two cameras see their pixels, px."""
     return float(np.sqrt(np.nanmean((direction_differences(one, other) ** 2).sum(axis=1))))
@@ -222,3 +211,78 @@ def bent_camera(camera: Camera) -> Camera:
     k1 = camera.distortion[0]
     bends = (k1, NOT_ZERO["k2"], NOT_ZERO["p1"], NOT_ZERO["p2"], 0.0)
     return replace(camera, skew=NOT_ZERO["skew"], distortion=bends)
+
+
+def videos_table(videos: Sequence[Video], height: float) -> pd.DataFrame:
+    """A row for each video, with the largest error of F (2.19) over its image, px, and on the ground from
+    ``height``, m."""
+    rows = []
+    for one in videos:
+        largest = float(inverse_error(printed_camera(one.width, one.height)).error.max())
+        rows.append({**one._asdict(), "largest": largest, "ground": height * largest / FY})
+    return pd.DataFrame(rows)
+
+
+def models_table(straight: pd.DataFrame, bent: pd.DataFrame) -> pd.DataFrame:
+    """Median error of directions (px) with F's model and with the whole one, if F is right and if not."""
+    parts = ", ".join(f"{name} {value:g}" for name, value in NOT_ZERO.items())
+    truths = {"as F assumes": straight, parts: bent}
+    return pd.DataFrame(
+        [
+            {"truth": truth, "few": one["few"].median(), "all": one["all"].median()}
+            for truth, one in truths.items()
+        ]
+    )
+
+
+def zeros_table(straight: pd.DataFrame) -> pd.DataFrame:
+    """For what F assumes zero: its standard deviation, if estimated, and how often zero is inside (%)."""
+    return pd.DataFrame(
+        [
+            {
+                "name": name,
+                "sd": straight[f"sd_{name}"].median(),
+                "inside": 100 * straight[f"inside_{name}"].mean(),
+            }
+            for name in ASSUMED_ZERO
+        ]
+    )
+
+
+def metrics_of(
+    back: pd.DataFrame, videos: Sequence[Video], inverse: Inverse, straight: pd.DataFrame
+) -> list[dict[str, Any]]:
+    """What the study records; ``back`` from `come_back`, ``straight`` from `compare_models`."""
+    found: list[dict[str, Any]] = []
+    for name, values in back.items():
+        about = {"subject": "tau2", "unit": "" if name == "k1" else "px", "n": len(back)}
+        found.append({"name": name, "value": values.mean(), **about})
+        found.append({"name": error_name(str(name)), "value": values.sem(), **about})
+    rms = float(np.sqrt((inverse.error**2).mean()))
+    about = {"subject": "tau2", "unit": "px", "n": len(straight)}
+    return [
+        *found,
+        {"name": "ratio", "subject": "tau2", "value": FX / FY, "unit": ""},
+        {"name": "best_video_off", "subject": "tau2-data-sheet", "value": videos[0].off, "unit": "%"},
+        {"name": "largest_error", "subject": "inverse", "value": inverse.error.max(), "unit": "px"},
+        {"name": "rms_error", "subject": "inverse", "value": rms, "unit": "px"},
+        {"name": "direction_error_few", "value": straight["few"].median(), **about},
+        {"name": "direction_error_all", "value": straight["all"].median(), **about},
+    ]
+
+
+def plot_inverse(inverse: Inverse, camera: Camera) -> Figure:
+    """Contours of the error of the approximate inverse over the image; a cross at the principal point."""
+    fig, ax = new_figure(5.6, 4.0)
+    levels = np.linspace(0, float(inverse.error.max()), 11)
+    ax.contourf(inverse.u, inverse.v, inverse.error, levels=levels, cmap="cividis")
+    lines = ax.contour(
+        inverse.u, inverse.v, inverse.error, levels=levels[[1, 3, 6, 9]], colors="white", linewidths=0.8
+    )
+    ax.clabel(lines, fmt="%.2g px", fontsize=10)
+    ax.plot(camera.cx, camera.cy, "+", color="white", ms=9)
+    ax.set(xlabel="u (px)", ylabel="v (px)")
+    ax.set_aspect("equal")
+    ax.invert_yaxis()
+    ax.grid(visible=False)
+    return fig
