@@ -246,6 +246,21 @@ ANSWERS: dict[str, list[Case]] = {
         ({"one/ratio": 1.0, "other/ratio": 0.96}, ("all-agree",)),
         ({}, ("unknown",)),
     ],
+    "consistency-bounds": [
+        (shares_inside(0.95, 0.5) | {"nees-1-run": HOLDS}, ("honest-inside", "overconfident-outside")),
+        (shares_inside(0.95, 0.9), ("honest-otherwise", "overconfident-inside")),
+        ({}, ("unknown",)),
+    ],
+    "sensitivity": [
+        (grown(roll=4.0, north=1.0), ("tilt-grows", "position-alike")),
+        (grown(roll=1.0, north=4.0), ("tilt-alike", "position-grows")),
+        ({}, ("unknown",)),
+    ],
+    "camera-calibration": [
+        ({"tau2/sd_fx": 0.3, "mounting/error_at_350_m": 6.7}, ("camera-well", "mounting-large")),
+        ({"tau2/sd_fx": 3.0, "mounting/error_at_350_m": 0.7}, ("camera-poorly", "mounting-small")),
+        ({}, ("unknown",)),
+    ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]
 

@@ -1,11 +1,10 @@
 """The study of camera and mount: what it computes."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from wildlab.geometry.camera import Camera
-from wildlab.studies.camera_calibration import mounting, text
+from wildlab.studies.camera_calibration import mounting
 from wildlab.studies.camera_calibration.intrinsics import (
     TAU2,
     calibrations,
@@ -14,14 +13,6 @@ from wildlab.studies.camera_calibration.intrinsics import (
     neglected_distortion,
     theoretical,
 )
-
-
-def found():
-    rng = np.random.default_rng(1)
-    return pd.DataFrame({
-        "fx": 1159.2 + rng.normal(0, 0.3, 50), "fy": 1167.8 + rng.normal(0, 0.3, 50),
-        "cx": 313 + rng.normal(0, 0.3, 50), "cy": 265 + rng.normal(0, 0.3, 50),
-    })  # fmt: skip
 
 
 def test_the_data_sheet_is_that_of_the_print_but_for_its_last_digit():
@@ -70,8 +61,3 @@ def test_the_printed_error_at_the_height_of_the_flight():
     # The corners of what 0.0229 m and 1.2 m are rounded from, to first order.
     assert found.low == pytest.approx(0.02285 * 350 / 1.25, abs=0.02)
     assert found.high == pytest.approx(0.02295 * 350 / 1.15, abs=0.02)
-
-
-def test_the_aspect_has_its_spread():
-    apart, sd = text.aspect(found(), TAU2)
-    assert apart == pytest.approx(8.6) and 0.2 < sd < 0.7

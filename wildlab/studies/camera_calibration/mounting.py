@@ -101,20 +101,22 @@ def calibrate_once(rng: np.random.Generator, cause: str, size: float) -> tuple[M
     mount = true_mount()
     true = CameraPoses(TAU2, mount, p[image], R[image])
     uv = ground_to_pixel(TAU2, points, true.p_nc, true.R_nc)
-    told_p, told_R, camera, told = p, R, TAU2, Mount("down")
+    given_p, given_R, camera, given = p, R, TAU2, Mount("down")
     if cause == "clicks":
         uv = uv + rng.normal(0, size, uv.shape)
     elif cause == "attitude":
-        told_R = R @ euler_to_matrix(*np.radians(rng.normal(0, size, (3, POSES))))
+        given_R = R @ euler_to_matrix(*np.radians(rng.normal(0, size, (3, POSES))))
     elif cause == "position":
-        told_p = p + rng.normal(0, size, p.shape)
+        given_p = p + rng.normal(0, size, p.shape)
     elif cause == "lens offset":
         arm = _direction(rng) * size
-        told = Mount("down", lever_arm=(float(arm[0]), float(arm[1]), float(arm[2])))
+        given = Mount("down", lever_arm=(float(arm[0]), float(arm[1]), float(arm[2])))
     else:
         share = 1 + rng.choice([-1, 1]) * size / 100
         camera = type(TAU2)(640, 512, TAU2.fx * share, TAU2.fy * share, TAU2.cx, TAU2.cy)
-    found = mounting_from_points(CameraPoses(camera, told, told_p[image], told_R[image]), uv, points, image)
+    found = mounting_from_points(
+        CameraPoses(camera, given, given_p[image], given_R[image]), uv, points, image
+    )
     axes = camera_rotation(found.mount)[:, 2], camera_rotation(mount)[:, 2]
     return found, float(np.linalg.norm(np.cross(*axes)))
 
@@ -122,6 +124,15 @@ def calibrate_once(rng: np.random.Generator, cause: str, size: float) -> tuple[M
 def _direction(rng: np.random.Generator) -> Array:
     one = rng.normal(size=3)
     return np.asarray(one / np.linalg.norm(one))
+
+
+def try_cause(rng: np.random.Generator, cause: str, size: float, runs: int) -> Cause:
+    """What one cause of that size leaves in so many calibrations, and what it then does."""
+    found = [calibrate_once(rng, cause, size) for _ in range(runs)]
+    errors = np.array([one.error for one, _ in found])
+    angle = float(np.sqrt(np.mean([angle**2 for _, angle in found])))
+    ground = HEIGHT * float(np.tan(angle))
+    return Cause(cause, CAUSES[cause][0], size, float(errors.mean()), _standard_error(errors), angle, ground)
 
 
 def explain(rng: np.random.Generator, cause: str, runs: int) -> Cause:
@@ -140,27 +151,18 @@ def explain(rng: np.random.Generator, cause: str, runs: int) -> Cause:
     -------
     Cause
     """
-    unit, size = CAUSES[cause]
+    _, size = CAUSES[cause]
     for _ in range(2):  # what is left grows with the size, nearly in proportion
         tried = np.array([calibrate_once(rng, cause, size)[0].error for _ in range(max(runs // 2, 2))])
         size *= PRINTED_ERROR / float(tried.mean())
-    found = [calibrate_once(rng, cause, size) for _ in range(runs)]
-    errors = np.array([one.error for one, _ in found])
+    found = try_cause(rng, cause, size, runs)
     # What chance does to the size that was found counts as well: it is proportional.
-    scaled = tried * PRINTED_ERROR / tried.mean()
-    both = [
-        float(one.std(ddof=1) / np.sqrt(len(one))) if len(one) > 1 else np.nan for one in (errors, scaled)
-    ]
-    angle = float(np.sqrt(np.mean([angle**2 for _, angle in found])))
-    return Cause(
-        cause,
-        unit,
-        size,
-        float(errors.mean()),
-        float(np.linalg.norm(both)),
-        angle,
-        HEIGHT * float(np.tan(angle)),
-    )
+    scaled = _standard_error(tried * PRINTED_ERROR / tried.mean())
+    return found._replace(left_error=float(np.linalg.norm([found.left_error, scaled])))
+
+
+def _standard_error(values: Array) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else np.nan
 
 
 def printed_angles(found: Mounting) -> tuple[float, float, float]:

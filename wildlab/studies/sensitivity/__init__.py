@@ -2,6 +2,28 @@
 
 from __future__ import annotations
 
+import math
+
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
 
-STUDY = Study("sensitivity", ("level", "turn", "ascent"))
+#: A ratio of errors nearer to one than this is no growth.
+ALIKE = 1.1
+
+
+def answer(facts: Facts) -> list[str]:
+    """What an angle moves, then whether flying lower helps against errors of position."""
+
+    def error(offset: str, height: str) -> float:
+        return facts.value(f"level/{offset}/{height}", "horizontal_error")
+
+    growth = {name: error(name, "400m") / error(name, "100m") for name in ("roll", "north")}
+    if any(math.isnan(one) for one in growth.values()):
+        return ["unknown"]
+    return [
+        "tilt-grows" if growth["roll"] > ALIKE else "tilt-alike",
+        "position-grows" if growth["north"] > ALIKE else "position-alike",
+    ]
+
+
+STUDY = Study("sensitivity", ("level", "turn", "ascent"), answer=answer)

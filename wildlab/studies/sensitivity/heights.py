@@ -21,18 +21,9 @@ ABOVE_M, COARSE_M = 60.0, 30.0
 LANDS, RAYS = 12, 300
 #: Rays start this far from the border of the map, metres, so that few leave it.
 MARGIN_M = 120.0
-#: What may be wrong, by its column.
-WRONG = {
-    "level": "the ground 1 m too high",
-    "plane": "a plane at the height below the camera",
-    "coarse": f"a map with a node every {COARSE_M:.0f} m",
-}
-
-CAPTION = (
-    f"Distance from the true point, {ABOVE_M:.0f} m above land drawn {LANDS} times with {RAYS} rays each: "
-    "medians over rays, mean over landscapes with its interval. A ray that meets the true ground and not the "
-    "coarse map is in no median."
-)
+#: What may be wrong: the ground is a metre too high, it is taken for a plane at the height below the camera,
+#: or its map is coarse.
+WRONG = ("level", "plane", "coarse")
 
 
 class Shift(NamedTuple):
@@ -156,44 +147,3 @@ def shifts_table(found: list[Shift]) -> pd.DataFrame:
         row["rays"] = one.used
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def heights_words(found: list[Shift]) -> tuple[str, str]:
-    """A heading and a paragraph on what wrong heights cost at the steepest and the flattest pitch.
-
-    Parameters
-    ----------
-    found
-        Of `shifts`.
-
-    Returns
-    -------
-    tuple of str
-    """
-    flat, steep = min(found, key=lambda one: one.pitch), max(found, key=lambda one: one.pitch)
-    per_metre, straight = (float(np.nanmean(one.off["level"])) for one in (flat, steep))
-    plane = {one.pitch: mean_interval(one.off["plane"]) for one in found}
-    coarse = {one.pitch: mean_interval(one.off["coarse"]) for one in found}
-    growing = per_metre > 2 * max(straight, 0.05)
-    heading = (
-        f"A metre of height costs {per_metre:.1f} m at {flat.pitch:.0f} degrees"
-        if growing
-        else f"A metre of height costs at most {max(per_metre, straight):.1f} m"
-    )
-    unlike = coarse[flat.pitch].high < plane[flat.pitch].low
-    beside = (
-        f"a map with a node every {COARSE_M:.0f} m takes most of that away"
-        if coarse[flat.pitch].estimate < 0.5 * plane[flat.pitch].estimate and unlike
-        else f"a map with a node every {COARSE_M:.0f} m helps"
-        if unlike
-        else f"a map with a node every {COARSE_M:.0f} m is not told from a plane"
-    )
-    return heading, (
-        f"From {ABOVE_M:.0f} m above rolling land a ray {flat.pitch:.0f} degrees below the horizon "
-        f"lands {plane[flat.pitch].estimate:.0f} m off ({plane[flat.pitch].low:.0f} to "
-        f"{plane[flat.pitch].high:.0f}) on a plane at the height below the camera, and one straight down "
-        f"{plane[steep.pitch].estimate:.1f} m; {beside}: {coarse[flat.pitch].estimate:.1f} m "
-        f"({coarse[flat.pitch].low:.1f} to {coarse[flat.pitch].high:.1f}). {flat.drawn - flat.used} "
-        f"of the {flat.drawn} rays at {flat.pitch:.0f} degrees leave the land without meeting it and count "
-        f"nowhere; straight down {steep.drawn - steep.used} do."
-    )

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import permutations, product
-from typing import NamedTuple
+from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.replication import propagate_rounding
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
+from wildlab.geometry.flodell import linear_enu_error
+from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
 
@@ -18,6 +19,10 @@ from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
 TAU2 = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 #: Mounting misalignment of H 5.6.1: roll, tilt, pan as printed, degrees.
 PRINTED_MISALIGNMENT_DEG = (-1.7, 3.9, 1.9)
+#: Latitude and longitude of F's site, radians, and the radius by which distances become angles, metres.
+KOLMARDEN, EARTH_M = (float(np.radians(58.662064)), float(np.radians(16.433337))), 6.371e6
+#: How far from the origin F's linear conversion of coordinates is tried, metres.
+DISTANCES_M = np.geomspace(100, 20_000, 40)
 #: Where the object stands in the image: its middle (H 5.3.1), not the principal point.
 IMAGE_CENTRE = (320.0, 256.0)
 
@@ -111,29 +116,35 @@ def rounded_tables() -> dict[str, tuple[float, float]]:
     return dict(zip(names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
 
 
-class Convention(NamedTuple):
-    """One way to combine the printed misalignment angles: ``R_bm`` is their product in this order."""
+def errors_over_image() -> tuple[Array, Array, dict[str, Array]]:
+    """Columns and rows (33, 41) of pixels, and by attitude the error there (metres) for 3 degrees of roll and
+    pitch from the higher altitude."""
+    u, v = np.meshgrid(np.linspace(0, TAU2.width, 41), np.linspace(0, TAU2.height, 33))
+    uv = np.column_stack([u.ravel(), v.ravel()])
+    offset, above = OFFSETS["roll+pitch"], (0.0, 0.0, -ALTITUDES_M[-1])
+    errors = {}
+    for attitude, euler_deg in ATTITUDES_DEG.items():
+        shift = displacement(
+            TAU2, helgesen_mount(), uv, np.radians(euler_deg), above, np.radians(offset[:3]), offset[3:]
+        )
+        errors[attitude] = np.hypot(*shift.T).reshape(u.shape)
+    return u, v, errors
 
-    order: str  # of "roll", "tilt" and "pan", by first letters, left to right
-    signs: tuple[int, ...]  # of roll, tilt, pan against the print
-    errors: dict[str, float]  # as from helgesen_tables
+
+def flat_map_errors(latitude: float) -> Array:
+    """The largest error over all directions, metres, of F's linear conversion of coordinates (F 2.2, 2.3) at
+    `DISTANCES_M` from an origin of that latitude, radians."""
+    origin = (latitude, KOLMARDEN[1])
+    bearings = np.radians(np.arange(0, 360, 15))[:, None]
+    north, east = DISTANCES_M * np.cos(bearings), DISTANCES_M * np.sin(bearings)
+    found = linear_enu_error(
+        origin[0] + north / EARTH_M, origin[1] + east / (EARTH_M * np.cos(origin[0])), origin
+    )
+    return np.asarray(found.max(axis=0))
 
 
-def misalignment_conventions() -> list[Convention]:
-    """The 42 numbers under all 48 orders and signs of the printed mounting angles.
-
-    H prints the angles and not how they combine; this is how the convention of
-    :func:`~wildlab.geometry.mount.helgesen_misalignment` was found.
-    """
-    axes = {"r": (1, 0, 0), "t": (0, 1, 0), "p": (0, 0, 1)}
-    conventions = []
-    for order in permutations("rtp"):
-        for signs in product((1, -1), repeat=3):
-            angles = dict(zip("rtp", np.radians(PRINTED_MISALIGNMENT_DEG) * signs, strict=True))
-            R_bm = np.eye(3)
-            for letter in order:
-                R_bm = R_bm @ euler_to_matrix(*(angles[letter] * np.array(axes[letter])))
-            roll, tilt, pan = (float(angle) for angle in matrix_to_euler(R_bm))
-            table = helgesen_tables(mount=Mount("down", misalignment=(roll, tilt, pan)))
-            conventions.append(Convention("".join(order), signs, table))
-    return conventions
+def differing_digits(errors: Mapping[str, float], published: pd.DataFrame) -> pd.DataFrame:
+    """The rows of ``published`` that differ in the last printed digit, with ``here`` and ``difference``."""
+    here = published["subject"].map(errors)
+    table = published.assign(here=here, difference=here - published["value"])
+    return table[table["difference"].abs() >= 0.5001 * 10.0 ** -table["digits"]]
