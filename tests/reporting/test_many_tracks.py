@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any
@@ -13,8 +14,9 @@ from tests.figure_text import overlapping
 from wildlab.analysis.following.noise_model import ToldValue
 from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackLife, compare_identities
 from wildlab.evaluation.sets import gospa
+from wildlab.messages.page_texts import load_texts
 from wildlab.reporting import figures
-from wildlab.reporting import many_tracks as words
+from wildlab.reporting import many_tracks as page
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.figure_text import least_size
 from wildlab.reporting.pictures import PHONE_WIDTH
@@ -112,10 +114,12 @@ def lives(**changes: Any) -> Identities:
     return Identities(**(base | changes))
 
 
+TEXTS = load_texts("tracking-many")
+
+
 def level_of(one: Any, two: Any) -> tuple[str, str]:
     """The colour of the summary, and the word of its verdict."""
-    _, level = words.summary(one, two)
-    return level, words.verdict_of(one, two, level)[0]
+    return page.level_of(one, two), TEXTS.subjects[f"verdict-{page.verdict_key(one, two)}"]
 
 
 FALSE = {0: TrackLife(9, 9, 2.0, False, 9), 1: TrackLife(9, 0, np.nan, True)}
@@ -148,17 +152,17 @@ def test_without_truth_or_tracks_nothing_is_judged():
 
 
 def test_numbers_of_the_summary():
-    assert words.rms_error(lives()) == pytest.approx(3.0)
-    assert words.on_target(lives()) == 2 * 61
-    assert words.counts_of(followed()) == (2, 2.0)
+    assert page.rms_error(lives()) == pytest.approx(3.0)
+    assert page.on_target(lives()) == 2 * 61
+    assert page.counts_of(followed()) == (2, 2.0)
     none = gospa([[0.0, 0.0]], np.empty((0, 2)), 20.0)
     never = lives(gospa=[none] * 61, targets={"a": TargetLife(61, 0.0, np.nan, 0, 0)})
-    assert words.on_target(never) == 0 and np.isnan(words.rms_error(never))
+    assert page.on_target(never) == 0 and np.isnan(page.rms_error(never))
 
 
 def test_parts_of_gospa_add_up():
     far = gospa([[0.0, 0.0], [50.0, 0.0]], [[3.0, 0.0], [99.0, 3.0]], 20.0)
-    table = words.parts_table([far])
+    table = page.parts_table([far])
     assert table["metres"].iloc[1:].pow(2).sum() == pytest.approx(table["metres"].iloc[0] ** 2)
     assert table["share"].iloc[1:].sum() == pytest.approx(100)
 
@@ -172,21 +176,59 @@ def test_a_track_that_goes_on_without_its_target_is_seen():
         targets={"a": TargetLife(60, 1.0, 0.0, 0, 0)},
         tracks={0: TrackLife(100, 60, 2.0, False, 60)},
     )
-    assert words.false_share(gone) == pytest.approx(0.4)
+    assert page.false_share(gone) == pytest.approx(0.4)
     assert level_of(followed(looks=100), gone) == ("warn", "look closer")
 
 
-def test_names_are_only_text_and_what_is_not_known_is_not_said():
+def test_names_are_only_text():
     values = [
         ToldValue("targets", "kinds", "**bold** `code`", "stated"),
         ToldValue("radar", "x", "1", "stated"),
     ]
-    table = words.told_table([values[1], values[0], values[1]])
+    table = page.parameters_table([values[1], values[0], values[1]])
     assert table["of"].tolist() == ["radar", "radar", "targets"]
     assert not set("*`") & set(table["value"].iloc[2])
-    changes = {"targets": {"**x**": TargetLife(61, 0.0, np.nan, 0, 0)}}
-    text = " ".join(words.summary(followed(), lives(**changes, false_tracks_per_minute=float("nan")))[0])
-    assert "**" not in text and "nan" not in text
+    changes = {"targets": {"**x**": TargetLife(61, 0.5, 0.0, 0, 0), "b": TargetLife(61, 0.6, 0.0, 0, 0)}}
+    assert "*" not in page.answer(followed(), lives(**changes))[0].values["target"]
+
+
+NEVER = {"a": TargetLife(61, 0.0, np.nan, 0, 0), "b": TargetLife(61, 1.0, 0.0, 0, 0)}
+SHORT = {"a": TargetLife(61, 0.7, 0.0, 0, 0)}
+OUT = {"a": TargetLife(0, np.nan, np.nan, 0, 0)}
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "keys", "reason"),
+    [
+        (followed(), lives(), ["several", "identities"], "sound"),
+        (followed(), lives(targets=SHORT), ["one", "identities"], "short"),
+        (followed(), lives(targets=NEVER), ["never", "identities"], "never"),
+        (followed(), lives(targets=OUT), ["none-in-reach"], "unjudged"),
+        (followed(), None, ["no-truth"], "unjudged"),
+        (followed(0), lives(), ["no-track"], "none"),
+        (followed(), lives(swaps=1, breaks=1), ["several", "identities"], "swaps"),
+        (followed(), lives(breaks=1), ["several", "identities"], "breaks"),
+        (followed(), lives(tracks=FALSE), ["several", "identities"], "false"),
+        (followed(), lives(tracks=FEW), ["several", "identities"], "few"),
+        (
+            followed(),
+            lives(tracks={0: TrackLife(9, 9, 9.0, False, 9)}),
+            ["several", "identities"],
+            "overconfident",
+        ),
+        (
+            followed(),
+            lives(tracks={0: TrackLife(9, 9, 0.5, False, 9)}),
+            ["several", "identities"],
+            "conservative",
+        ),
+    ],
+)
+def test_answer_and_reason_turn_with_the_numbers(one, two, keys, reason):
+    said = [*page.answer(one, two), page.reason(one, two)]
+    assert [message.key for message in said] == [*keys, f"reason-{reason}"]
+    for message in said:
+        assert set(re.findall(r"{(\w+)}", TEXTS.answers[message.key])) <= set(message.values)
 
 
 def test_what_counts_as_on_a_target_must_hold_honest_errors_and_whole_hulls():
@@ -198,5 +240,6 @@ def test_what_counts_as_on_a_target_must_hold_honest_errors_and_whole_hulls():
             look.P[:, 0, 0] = sd**2
         for cutoff, advised in ((20.0, bool(reach)), (max(reach, 20.0) + 1.0, False)):
             one.cutoff_m = cutoff
-            told = [told for told in words.summary(one, lives())[0] if "reach_m" in told]
-            assert [f"reach_m = {reach}" in one for one in told] == [True] * advised
+            second = page.answer(one, lives())[1]
+            assert (second.key == "reach") == advised
+            assert not advised or second.values["reach"] == str(reach)

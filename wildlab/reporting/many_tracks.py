@@ -1,4 +1,8 @@
-"""What the report on many targets says, from its numbers."""
+"""The page on many targets at once: who has a track, whether it stays on its target, and what is on nothing.
+
+What is said follows by rules from what was tracked and how it compares with the truth; the words lie in
+``data/messages/en/tracking-many.toml``.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +13,31 @@ import pandas as pd
 
 from wildlab.analysis.following.judged import FEWEST
 from wildlab.analysis.following.noise_model import ToldValue
+from wildlab.analysis.many.errors import counted_twice, of_platform
 from wildlab.analysis.many.follow import CUTOFF_M, ManyTracks
 from wildlab.analysis.many.target_model import HERE
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
+from wildlab.messages.message import Message
+from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.reporting.charts import many as charts
 from wildlab.reporting.quantities import length
 from wildlab.reporting.report import Report
+from wildlab.reporting.text import listed
+from wildlab.reporting.wording import Wording
 from wildlab.tracking.particles import Count, count_interval, count_probabilities
 
-#: A target is followed well where it has a track at this share of the looks at which it can be seen.
-FOLLOWED = 0.9
+#: A target is tracked well where it has a track at this share of the scans at which it can be seen; below
+#: half it is lost.
+FOLLOWED, HALF = 0.9, 0.5
 #: Of so many standard deviations hardly any honest error is larger.
 WITHIN_SDS = 3.0
-#: Mean NEES of a position, divided by two: between these a track is as far off as it says, to a factor of
+#: Mean NEES of a position, divided by two: between these a track is as far off as it predicts, to a factor of
 #: about 1.4 in size.
 SMALLEST, LARGEST = 0.5, 2.0
-NOTHING = "–"
+
+
+# -- numbers
 
 
 def counts_of(shown: ManyTracks) -> tuple[int, float]:
@@ -41,17 +54,6 @@ def most_at_once(followed: ManyTracks) -> Count:
     return count_interval(count_probabilities(followed.shown[int(np.argmax(expected))].existence))
 
 
-def count_words(count: Count) -> str:
-    """An interval of a number of targets.
-
-    Examples
-    --------
-    >>> count_words(count_interval(count_probabilities([0.99, 0.5])))
-    '1 to 2'
-    """
-    return f"{count.low}" if count.low == count.high else f"{count.low} to {count.high}"
-
-
 def rms_error(lives: Identities) -> float:
     """Root mean square distance of tracks from the targets they are on, m; NaN where there are none."""
     squares = sum(one.localisation**2 for one in lives.gospa)
@@ -64,91 +66,9 @@ def on_target(lives: Identities) -> int:
     return could - sum(one.n_missed for one in lives.gospa)
 
 
-def summary(followed: ManyTracks, lives: Identities | None) -> tuple[list[str], str]:
-    """The first sentences of the page, and its level."""
-    tracks, at_once = counts_of(followed)
-    looks, minutes = len(followed.scans), followed.minutes
-    many = f"{tracks} {'track' if tracks == 1 else 'tracks'} in {looks} looks over {minutes:.1f} min"
-    if not tracks:
-        return [f"No track was confirmed in {looks} looks over {minutes:.1f} min."], "bad"
-    if lives is None:
-        return [
-            f"{many}, {at_once:.1f} at a time in the mean; when there are most, "
-            f"{count_words(most_at_once(followed))} at once (90 % interval).",
-            "Whose they are, and how many are false, cannot be said without the targets' true places.",
-        ], "neutral"
-    seen = {name: life for name, life in lives.targets.items() if life.visible}
-    if not seen:
-        return [f"{many}; no target with a known place was ever in reach."], "neutral"
-    shares = {name: life.tracked for name, life in seen.items()}
-    least = min(shares, key=lambda name: shares[name])
-    if len(seen) > 1:
-        first = f"Of {len(seen)} targets in reach, {plain(str(least))} has a track at the fewest looks, at "
-    else:
-        first = "The target in reach has a track at "
-    off = f"; tracks are off by {length(rms_error(lives))} (RMS of those within {followed.cutoff_m:g} m)"
-    said = [
-        f"{first}{_share(shares[least])} of those at which it can be seen{off if on_target(lives) else ''}.",
-        f"{_how_often(lives.swaps, 'track went over to another target', 'tracks went over to others')}, "
-        f"{_how_often(lives.breaks, 'target got a new track', 'times a target got a new track').lower()}"
-        # Where tracks on others are not judged, none is on nothing.
-        + ("." if followed.others else f", and {_false_words(lives)}."),
-    ]
-    if len(lives.gospa) < looks:
-        said.append(f"Judged are {len(lives.gospa)} of {looks} looks: a true place is known there.")
-    if lives.incomplete:
-        said.append(
-            "As is stated, others are about whose true places nobody knows: tracks on none of the known ones "
-            "are not judged."
-            if followed.others
-            else f"At {lives.incomplete} of the judged looks not every target's true place is known: tracks "
-            "on none of the known ones are left out there."
-        )
-    said += [one for one in (_wide_words(followed), _long_words(followed)) if one]
-    lost = [name for name, share in shares.items() if share == 0]
-    if lost:
-        said.append(f"Never followed: {', '.join(plain(str(name)) for name in lost)}.")
-    return said, _level(lives, shares)
-
-
-def _wide_words(followed: ManyTracks) -> str:
-    """Where tracks may well be farther off than what counts as on a target; "" else."""
-    covariances = [look.P[:, :2, :2] for look in followed.shown if len(look.P)]
-    if not covariances:
-        return ""
-    widest = float(np.median(np.sqrt(np.linalg.eigvalsh(np.concatenate(covariances))[:, -1])))
-    if WITHIN_SDS * widest <= followed.cutoff_m:
-        return ""
-    return (
-        f"Tracks say that they may be {length(widest)} off (standard deviation of the worse axis, median), "
-        f"and what is farther than {followed.cutoff_m:g} m counts as on nothing: honest tracks may be among "
-        f"it. State `reach_m = {np.ceil(WITHIN_SDS * widest):.0f}` in [targets]."
-    )
-
-
-def _long_words(followed: ManyTracks) -> str:
-    """Where a target is longer than what counts as on it; "" else."""
-    longest = max((hull.length_m for hull in followed.targets.hulls), default=0.0)
-    if longest <= followed.cutoff_m:
-        return ""
-    return (
-        f"The longest kind of target has {length(longest)}, and a track farther than {followed.cutoff_m:g} m "
-        "from where a target is said to be counts as on nothing, also where it is on its other end. State "
-        f"`reach_m = {np.ceil(longest):.0f}` in [targets]."
-    )
-
-
 def false_share(lives: Identities) -> float:
     """Of how many looks a track is on nothing."""
     return float(np.mean([one.n_false > 0 for one in lives.gospa]))
-
-
-def _false_words(lives: Identities) -> str:
-    false = sum(track.false for track in lives.tracks.values())
-    rate = lives.false_tracks_per_minute
-    each = f" ({rate:.2f} a minute)" if np.isfinite(rate) else ""
-    of = f"{false} of {len(lives.tracks)} tracks{each} {'is' if false == 1 else 'are'} mostly on nothing"
-    return f"{of}; a track is on nothing at {_share(false_share(lives))} of the looks"
 
 
 def judged_nees(lives: Identities) -> list[float]:
@@ -156,63 +76,148 @@ def judged_nees(lives: Identities) -> list[float]:
     return [one.anees / 2 for one in lives.tracks.values() if one.compared >= FEWEST]
 
 
-def _level(lives: Identities, shares: dict[object, float]) -> str:
-    if lives.swaps or min(shares.values()) < 0.5:
+def counted(count: Count) -> str:
+    """An interval of a number of targets.
+
+    Examples
+    --------
+    >>> counted(count_interval(count_probabilities([0.99, 0.5])))
+    '1 to 2'
+    """
+    return f"{count.low}" if count.low == count.high else f"{count.low} to {count.high}"
+
+
+def needed_reach(followed: ManyTracks) -> float:
+    """How far from its target a track must count as on it, m, so that honest errors and the longest hull do.
+
+    0 where what is taken suffices.
+    """
+    covariances = [look.P[:, :2, :2] for look in followed.shown if len(look.P)]
+    widest = 0.0
+    if covariances:
+        widest = float(np.median(np.sqrt(np.linalg.eigvalsh(np.concatenate(covariances))[:, -1])))
+    longest = max((hull.length_m for hull in followed.targets.hulls), default=0.0)
+    reach = max(WITHIN_SDS * widest, longest)
+    return float(np.ceil(reach)) if reach > followed.cutoff_m else 0.0
+
+
+# -- what follows from them
+
+
+def level_of(followed: ManyTracks, lives: Identities | None) -> str:
+    """The colour of the page: ``good``, ``warn``, ``bad`` or ``neutral``."""
+    tracks, _ = counts_of(followed)
+    if not tracks:
+        return "bad"
+    shares = [] if lives is None else [life.tracked for life in lives.targets.values() if life.visible]
+    if lives is None or not shares:
+        return "neutral"
+    if lives.swaps or min(shares) < HALF:
         return "bad"
     nees = judged_nees(lives)
     doubtful = not nees or any(not SMALLEST <= one <= LARGEST for one in nees)
     false = any(track.false for track in lives.tracks.values()) or false_share(lives) > 1 - FOLLOWED
-    if lives.breaks or false or min(shares.values()) < FOLLOWED or doubtful:
-        return "warn"
-    return "good"
+    return "warn" if lives.breaks or false or min(shares) < FOLLOWED or doubtful else "good"
 
 
-def verdict_of(followed: ManyTracks, lives: Identities | None, level: str) -> tuple[str, str]:
-    """The word that goes with the level, and its reason."""
+def verdict_key(followed: ManyTracks, lives: Identities | None) -> str:
+    """The key of the verdict's word."""
+    level = level_of(followed, lives)
+    if level == "bad":
+        return "none" if not counts_of(followed)[0] else "swapped" if lives and lives.swaps else "lost"
+    return {"good": "sound", "warn": "look", "neutral": "unjudged"}[level]
+
+
+def answer(followed: ManyTracks, lives: Identities | None) -> list[Message]:
+    """How well the targets are tracked, and what goes wrong: two sentences at most."""
+    tracks, _ = counts_of(followed)
+    values = {"tracks": str(tracks), "scans": str(len(followed.scans)), "minutes": f"{followed.minutes:.1f}"}
+    if not tracks:
+        return [Message("no-track", values)]
+    if lives is None:
+        return [Message("no-truth", {**values, "most": counted(most_at_once(followed))})]
+    seen = {name: life.tracked for name, life in lives.targets.items() if life.visible}
+    if not seen:
+        return [Message("none-in-reach", values)]
+    never = sum(share == 0 for share in seen.values())
+    least = min(seen, key=lambda name: seen[name])
+    values = {
+        "targets": str(len(seen)),
+        "share": percent_of(seen[least]),
+        "target": plain(str(least)),
+        "rmse": length(rms_error(lives)) if on_target(lives) else "–",
+        "never": str(never),
+    }
+    first = Message("never" if never else "one" if len(seen) == 1 else "several", values)
+    false = sum(track.false for track in lives.tracks.values())
+    counts = {
+        "swaps": str(lives.swaps),
+        "breaks": str(lives.breaks),
+        "false": str(false),
+        "tracks": str(tracks),
+    }
+    if reach := needed_reach(followed):
+        return [first, Message("reach", {"cutoff": f"{followed.cutoff_m:g}", "reach": f"{reach:.0f}"})]
+    if followed.others:
+        return [first, Message("identities-others", counts)]
+    return [first, Message("identities", counts)]
+
+
+def reason(followed: ManyTracks, lives: Identities | None) -> Message:
+    """The most pressing of what keeps the tracks from being sound."""
     tracks, _ = counts_of(followed)
     if not tracks:
-        return "no track", "Nothing met all that the tracker was told a target is."
-    if lives is None:
-        return "not judged", "No target's true place is known at any look."
-    seen = [life for life in lives.targets.values() if life.visible]
-    if not seen:
-        return "not judged", "No target whose true place is known is in reach."
-    reasons = []
-    if lives.swaps:
-        reasons.append(f"tracks went over to other targets: {lives.swaps}")
-    if lives.breaks:
-        reasons.append(f"targets got new tracks: {lives.breaks}")
-    if false := sum(track.false for track in lives.tracks.values()):
-        reasons.append(f"tracks mostly on nothing: {false} of {len(lives.tracks)}")
-    elif false_share(lives) > 1 - FOLLOWED:
-        reasons.append(f"a track is on nothing at {_share(false_share(lives))} of the looks")
-    if never := sum(life.tracked == 0 for life in seen):
-        reasons.append(f"targets never followed: {never} of {len(seen)}")
-    if short := sum(0 < life.tracked < FOLLOWED for life in seen):
-        reasons.append(
-            "targets without a track at more than a tenth of the looks, those before it is confirmed "
-            f"counted too: {short} of {len(seen)}"
-        )
+        return Message("reason-none")
+    seen = [] if lives is None else [life for life in lives.targets.values() if life.visible]
+    if lives is None or not seen:
+        return Message("reason-unjudged")
     nees = judged_nees(lives)
-    if not nees:
-        reasons.append(f"no track was on a target at {FEWEST} looks: its covariance is not judged")
-    if over := sum(value > LARGEST for value in nees):
-        reasons.append(f"tracks farther off than they say: {over} of {len(nees)}")
-    if under := sum(value < SMALLEST for value in nees):
-        reasons.append(f"tracks nearer than they say: {under} of {len(nees)}")
-    words = {"good": "sound", "warn": "look closer", "bad": "mixed up" if lives.swaps else "targets lost"}
-    if not reasons:
-        reasons = ["every target was followed by one track, and hardly ever was a track on nothing"]
-    text = "; ".join(reasons)
-    return words[level], f"{text[0].upper()}{text[1:]}."
+    false = sum(track.false for track in lives.tracks.values())
+    counts = (
+        ("swaps", lives.swaps, len(lives.tracks)),
+        ("never", sum(life.tracked == 0 for life in seen), len(seen)),
+        ("breaks", lives.breaks, len(seen)),
+        ("false", false, len(lives.tracks)),
+        ("nothing", int(false_share(lives) > 1 - FOLLOWED), 1),
+        ("short", sum(life.tracked < FOLLOWED for life in seen), len(seen)),
+        ("few", int(not nees), 1),
+        ("overconfident", sum(value > LARGEST for value in nees), len(nees)),
+        ("conservative", sum(value < SMALLEST for value in nees), len(nees)),
+    )
+    key, count, of = next((one for one in counts if one[1]), ("sound", 0, 0))
+    return Message(
+        f"reason-{key}", {"count": str(count), "of": str(of), "share": percent_of(false_share(lives))}
+    )
 
 
-def _share(value: float) -> str:
-    return f"{100 * value:.0f} %"
+def limits(followed: ManyTracks) -> list[Message]:
+    """What the page does not tell; five at most."""
+    kinds = {one.kind for one in followed.places.values()}
+    every = {name: one.errors for name, one in followed.places.items()}
+    platform = {"heading", "platform_north", "platform_east"}
+    bare = [name for name, errors in every.items() if not platform & of_platform(errors)]
+    shared = [
+        name for name, own in every.items() if any(counted_twice(own, errors) for errors in every.values())
+    ]
+    estimated = [followed.truth_sd[name] for name in followed.truth_estimated if name in followed.truth_sd]
+    exact = len(followed.truth) - sum(sd > 0 for sd in followed.truth_sd.values())
+    truth = bool(followed.truth)
+    conditional = (
+        ("others", truth and not followed.others, {}),
+        ("beside", truth and followed.others, {}),
+        ("truth-estimated", bool(estimated), {"sd": f"{max(estimated, default=0.0):.2g}"}),
+        ("truth-exact", truth and exact > 0, {"count": str(exact)}),
+        ("shared", bool(shared), {"sensors": listed(shared)}),
+        ("bare", bool(bare), {"sensors": listed(bare)}),
+        ("smoothed", bool(followed.unknown_lasting), {"sensors": listed(list(followed.unknown_lasting))}),
+        ("bearing", "bearing" in kinds, {}),
+        ("pixel", "pixel" in kinds, {}),
+        ("returned", True, {}),
+    )
+    return [Message(f"limit-{key}", values) for key, applies, values in conditional if applies][:5]
 
 
-def _how_often(count: int, once: str, more: str) -> str:
-    return f"No {once}" if not count else f"1 {once}" if count == 1 else f"{count} {more}"
+# -- tables
 
 
 def targets_table(lives: Identities) -> pd.DataFrame:
@@ -230,12 +235,6 @@ def targets_table(lives: Identities) -> pd.DataFrame:
             for name, life in lives.targets.items()
         ]
     )
-
-
-TARGETS = {
-    "target": "target", "looks": "looks in reach", "tracked": "with a track (%)",
-    "confirm": "first after (s)", "swaps": "tracks from others", "breaks": "new tracks",
-}  # fmt: skip
 
 
 def tracks_table(followed: ManyTracks, lives: Identities | None) -> pd.DataFrame:
@@ -268,35 +267,26 @@ def tracks_table(followed: ManyTracks, lives: Identities | None) -> pd.DataFrame
     return pd.DataFrame(rows)
 
 
-TRACKS = {
-    "track": "track", "from": "from (s)", "to": "to (s)", "looks": "looks", "kind": "mostly a",
-    "on": "on a target (%)", "nees": "mean NEES / 2", "alone": "truth exact",
-}  # fmt: skip
-
-
 def parts_table(found: Sequence[Gospa]) -> pd.DataFrame:
-    """What GOSPA is made of, means over the looks."""
-    total = np.mean([one.distance for one in found])
+    """What GOSPA is made of: roots of mean squares over the scans, and shares of the square."""
+    names = load_texts("tracking-many").quantities
     squares = {
-        "distance of tracks from their targets": np.mean([one.localisation**2 for one in found]),
-        "targets without a track": np.mean([one.missed**2 for one in found]),
-        "tracks on nothing": np.mean([one.false**2 for one in found]),
+        "distance": float(np.mean([one.localisation**2 for one in found])),
+        "missed": float(np.mean([one.missed**2 for one in found])),
+        "false": float(np.mean([one.false**2 for one in found])),
     }
     every = sum(squares.values())
-    rows = [{"part": "GOSPA, mean over looks", "metres": total, "share": np.nan}]
-    for name, square in squares.items():
-        rows.append(
-            {
-                "part": f"from {name}, root of the mean square",
-                "metres": np.sqrt(square),
-                "share": 100 * square / every if every else np.nan,
-            }
-        )
+    rows = [
+        {"part": names["gospa"], "metres": float(np.mean([one.distance for one in found])), "share": np.nan}
+    ]
+    for key, square in squares.items():
+        share = 100 * square / every if every else np.nan
+        rows.append({"part": names[key], "metres": float(np.sqrt(square)), "share": share})
     return pd.DataFrame(rows)
 
 
-def told_table(said: Sequence[ToldValue]) -> pd.DataFrame:
-    """Every value, subject by subject; a name in it is only text."""
+def parameters_table(said: Sequence[ToldValue]) -> pd.DataFrame:
+    """Every value that the tracker was given, subject by subject; a name in it is only text."""
     subjects = list(dict.fromkeys(one.subject for one in said))
     return pd.DataFrame(
         [
@@ -306,22 +296,19 @@ def told_table(said: Sequence[ToldValue]) -> pd.DataFrame:
     )
 
 
+def count_assumed(said: Sequence[ToldValue]) -> dict[str, str]:
+    """How many of the given values are assumed, and estimated on this flight, for captions."""
+    assumed = sum(one.source.startswith("assumed") for one in said)
+    here = sum(one.source.startswith(HERE) for one in said)
+    return {"values": str(len(said)), "assumed": str(assumed), "here": str(here)}
+
+
 def plain(text: str) -> str:
     """A name without the signs by which a page sets words bold or as code."""
     return text.replace("*", "∗").replace("`", "ˋ")
 
 
-def assumed_sentence(said: Sequence[ToldValue]) -> str:
-    """How much of what the tracker was told is assumed or estimated from what it then followed."""
-    assumed = sum(one.source.startswith("assumed") for one in said)
-    here = sum(one.source.startswith(HERE) for one in said)
-    if not assumed and not here:
-        return "All that the tracker was told is stated."
-    return (
-        f"Of {len(said)} values that the tracker was told, {assumed} {'is' if assumed == 1 else 'are'} "
-        f"assumed and {here} {'is' if here == 1 else 'are'} estimated from the detections themselves. State "
-        "them in `flight.toml` or with `--settings`."
-    )
+# -- what is recorded, and the page
 
 
 def record(report: Report, followed: ManyTracks, lives: Identities | None) -> None:
@@ -352,3 +339,43 @@ def caption_of_gospa(cutoff: float = CUTOFF_M) -> str:
         f"target without a track and every track on nothing, as squares; beyond {cutoff:g} m a track is on "
         "no target."
     )
+
+
+def show_many(report: Report, followed: ManyTracks, lives: Identities | None) -> None:
+    """Write the page, and record its numbers.
+
+    Parameters
+    ----------
+    report
+        Is added to.
+    followed, lives
+        From `wildlab.analysis.many.follow`: the tracks, and their lives beside the true targets'.
+    """
+    wording = Wording(report, load_texts("tracking-many"))
+    names, level = wording.texts.subjects, level_of(followed, lives)
+    record(report, followed, lives)
+    report.head(names["question"], ", ".join(followed.places))
+    said = wording.messages([reason(followed, lives)])[0]
+    verdict = names[f"verdict-{verdict_key(followed, lives)}"]
+    report.summary(wording.messages(answer(followed, lives)), level=level, verdict=(verdict, said))
+    if followed.notes:
+        report.points(followed.notes)
+    figure, name, alt, caption = charts.map_shown(followed)
+    report.figure(figure, name=name, alt=alt, caption=caption, main=True)
+    if lives is not None and any(life.visible for life in lives.targets.values()):
+        report.section(names["over-time"])
+        shown = [charts.identities_shown(followed, lives)] if any(lives.followed) else []
+        report.figures([*shown, charts.wrong_shown(followed, lives)])
+    if lives is not None and lives.targets:
+        wording.table("targets", targets_table(lives))
+        apart = {"each": f"{followed.cutoff_m / np.sqrt(2):.1f}", "cutoff": f"{followed.cutoff_m:g}"}
+        wording.table("parts", parts_table(lives.gospa), apart)
+    report.limits(wording.messages(limits(followed)))
+    report.section("Details")
+    table = tracks_table(followed, lives)
+    if len(table):
+        text = wording.texts.tables["tracks"]
+        columns = {name: heading for name, heading in text.columns.items() if name in table}
+        report.table(table, columns=columns, digits=text.digits, caption=text.caption, fold=text.title)
+    wording.table("parameters", parameters_table(followed.said), count_assumed(followed.said))
+    report.method(wording.texts.method)
