@@ -164,8 +164,8 @@ PAGES = {
     "vessel-detection": Page(
         2, ("rates", "steps-ship", "steps-boats-whole", "shares", "heights", "contrast", "weather")
     ),
-    "uav-coverage": Page(2, ("fig-7-12a", "fig-7-12d", "age", "gap", "detected", "land"), covered),
-    "gondola-coverage": Page(2, ("fig-7-15", "fig-7-16", "fig-7-17", "fig-7-18"), covered),
+    "uav-coverage": Page(2, ("shares", "fig-7-12a", "fig-7-12d", "age", "detected"), covered),
+    "gondola-coverage": Page(2, ("shares", "fig-7-15", "fig-7-16", "fig-7-17", "fig-7-18"), covered),
     "precision-drop": Page(2, ("found", "horizon", "mean", "scatter"), drop),
     "information-planning": Page(
         2, ("share-found", "times", "way-information", "way-rows", "greedy"), planning

@@ -105,6 +105,17 @@ def by_weather(night: float, noon: float, other: float) -> dict[str, Any]:
     return found | {"enhanced/f1_noon": other}
 
 
+def seen(**shares: float) -> dict[str, float]:
+    """Shares of the enclosures seen from a multicopter."""
+    plans = {"DOWN": "down-60m-25m", "YAW": "yaw-60m-25m", "LOW": "yaw-30m-25m", "CLOSE": "yaw-30m-10m"}
+    return {f"{plans[plan]}/seen": share for plan, share in shares.items()}
+
+
+def seen_along_cable(down: float, roll: float, adaptive: float) -> dict[str, Any]:
+    """Shares of the enclosures seen from a gondola."""
+    return {"down/seen": down, "roll-60/seen": roll, "adaptive-60/seen": adaptive}
+
+
 ANSWERS: dict[str, list[Case]] = {
     "schmidt": [
         (moments(2.0, 2.1), ("schmidt-consistent", "ekf-consistent")),
@@ -259,6 +270,28 @@ ANSWERS: dict[str, list[Case]] = {
     "camera-calibration": [
         ({"tau2/sd_fx": 0.3, "mounting/error_at_350_m": 6.7}, ("camera-well", "mounting-large")),
         ({"tau2/sd_fx": 3.0, "mounting/error_at_350_m": 0.7}, ("camera-poorly", "mounting-small")),
+        ({}, ("unknown",)),
+    ],
+    "uav-coverage": [
+        (seen(DOWN=0.8, YAW=0.9, LOW=0.7, CLOSE=0.9), ("camera-yaw", "half-height-closer-rows")),
+        (seen(DOWN=0.9, YAW=0.8, LOW=0.7, CLOSE=0.7), ("camera-down", "half-height-lost")),
+        (
+            seen(DOWN=0.98, YAW=0.99, LOW=0.98, CLOSE=0.99),
+            ("camera-both-see-nearly-all", "half-height-alike"),
+        ),
+        (seen(DOWN=0.8, YAW=0.81, LOW=0.9, CLOSE=0.9), ("camera-alike", "half-height-alike")),
+        ({}, ("camera-unknown", "half-height-unknown")),
+    ],
+    "gondola-coverage": [
+        (
+            seen_along_cable(0.2, 0.5, 0.6) | {"adaptive-least-outside": HOLDS, "adaptive-sees-more": HOLDS},
+            ("roll-more", "adaptive-more-inside"),
+        ),
+        (
+            seen_along_cable(0.2, 0.5, 0.4) | {"adaptive-least-outside": HOLDS, "adaptive-sees-more": FAILS},
+            ("roll-more", "adaptive-less-outside"),
+        ),
+        (seen_along_cable(0.6, 0.5, 0.4), ("roll-no-more", "adaptive-not-better")),
         ({}, ("unknown",)),
     ],
 }

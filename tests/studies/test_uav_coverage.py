@@ -11,7 +11,7 @@ from wildlab.evaluation.shares import FAILS, HOLDS, NO_PREMISE, decide_check
 from wildlab.planning.coverage import nodes_in
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.uav_coverage import STUDY, text
+from wildlab.studies.uav_coverage import STUDY
 from wildlab.studies.uav_coverage.trial import (
     CASES,
     DOWN,
@@ -26,11 +26,8 @@ from wildlab.studies.uav_coverage.trial import (
     fences_of,
     land_of,
     plan,
-    planned_coverage,
     required,
-    run_case,
     trial,
-    with_larger_errors,
 )
 
 
@@ -52,7 +49,7 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
         "time": 1000.0, "held": 0.99, "sure": 0.8, "flown": 0.9, "margin": 80.0, "kept": 0.9, "sharp": 1.0,
     }  # fmt: skip
     row = {(name, key): value for name in CASES | MORE for key, value in usual.items()}
-    row |= {(YAW, "seen"): 0.98, (YAW, "ground"): 1.5e5, (YAW, "in_sight"): 4.0, (LOW, "seen"): 0.8}
+    row |= {(YAW, "seen"): 0.94, (YAW, "ground"): 1.5e5, (YAW, "in_sight"): 4.0, (LOW, "seen"): 0.8}
     row |= {(LOW_CLOSE, "seen"): 0.97, (DOWN, "in_view"): 1.0}
     for k, spacing in enumerate(SPACINGS):
         row |= {
@@ -106,6 +103,7 @@ def test_claims_are_those_published_and_turn_with_the_numbers():
     opposed = {
         "yaw-covers-more": {f"{YAW}/ground": 1.05e5},
         "yaw-covers-more-inside": {f"{YAW}/seen": 0.905},
+        "no-large-rotations": {f"{YAW}/seen": 0.98},
         "moving-more-less-redundant": {f"{YAW}/in_sight": 6.0},
         "lower-needs-closer": {f"{LOW}/seen": 0.97},
         "lower-needs-closer-or-faster": {f"{LOW_FASTER}/seen": 0.97},
@@ -137,19 +135,6 @@ def test_animals_that_stand_are_missed_where_no_image_shows_the_ground(draws):
     assert (draws[last, "missed"] != draws[last, "missed_still"]).any()
 
 
-def test_larger_errors_show_less_of_what_is_surely_planned():
-    twin, land = load_twin("uav-search"), land_of(1)
-    run = run_case(twin, land, LOW, 1, 1, 1.0)
-    held = [with_larger_errors(twin, land, LOW, 1, run, factor) for factor in (0.0, 1.0, 4.0)]
-    assert held[0] == 1.0 and held[1] == pytest.approx(run[1].held) and held[2] < held[1]
-    assert planned_coverage(twin, land, LOW, 1, 1.0).seen.sum() == run[1].planned.seen.sum()
-
-
 def test_a_twin_without_a_survey_is_refused():
     with pytest.raises(WildlabError, match="twin"):
         required(None, "survey")
-
-
-def test_a_case_that_did_not_hold_is_named():
-    assert text.NAMES[LOW] not in text.held_words(made_up())
-    assert text.NAMES[LOW] in text.held_words(made_up(**{f"{LOW}/held": 0.9}))

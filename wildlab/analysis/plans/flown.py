@@ -65,11 +65,6 @@ class ExecutionErrors(NamedTuple):
     yaw: float
     attitude_time: float
 
-    def larger(self, factor: float) -> ExecutionErrors:
-        """Errors ``factor`` times as large, that last as long."""
-        sizes = ("horizontal", "vertical", "roll", "pitch", "yaw")
-        return self._replace(**{name: factor * getattr(self, name) for name in sizes})
-
 
 class Planned(NamedTuple):
     """A plan alone.
@@ -272,40 +267,3 @@ def as_planned(terrain: Terrain, poses: CameraPoses, times: ArrayLike, looks: Lo
     sharp = blur(camera, poses, t, looks.exposure, distance) <= allowed
     found = see(terrain, poses, looks.furthest)
     return Planned(from_sightings(found, terrain, t, sharp, looks.range_scale), found, sharp, distance)
-
-
-def held_with(
-    done: Executed,
-    terrain: Terrain,
-    poses: CameraPoses,
-    headings: ArrayLike,
-    times: ArrayLike,
-    furthest: float,
-    errors: ExecutionErrors,
-    rng: np.random.Generator,
-) -> float:
-    """Share of what a plan says is surely seen that a flight shows with other errors than those planned for.
-
-    Parameters
-    ----------
-    done
-        The plan, from `execute`.
-    terrain, poses, headings, times
-        As for `execute`.
-    furthest
-        Distance up to which anything is looked for, metres.
-    errors
-        Of this flight.
-    rng
-        Random numbers.
-
-    Returns
-    -------
-    float
-        NaN where nothing is surely seen. Images that are sharp in the plan are taken for sharp.
-    """
-    t = np.asarray(times, float)
-    really = with_errors(poses, headings, errors, float(np.median(np.diff(t))), rng)
-    seen = see(terrain, really, furthest)
-    shown = np.bincount(seen.node[done.sharp[seen.image]], minlength=terrain.height.size) > 0
-    return float(shown.reshape(done.sure.shape)[done.sure].mean()) if done.sure.any() else np.nan

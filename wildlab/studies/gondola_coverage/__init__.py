@@ -2,8 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
+import pandas as pd
+
+from wildlab.evaluation.shares import HOLDS, MOSTLY
 from wildlab.studies.gondola_coverage import trial
+from wildlab.studies.gondola_coverage.trial import ADAPT, DOWN, ROLL, STRATEGIES
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
+
+#: Quantities of the page's tables, by its key.
+TABLES = {
+    "strategies": ("seen", "near", "ground", "share_outside", "in_sight", "only_blurred"),
+    "held": ("sure", "held"),
+}
+#: The settings that are compared in words: of the thesis's limits the middle one.
+PLAIN, ADAPTIVE = list(ROLL)[1], list(ADAPT)[1]
 
 
 def _metric(subject: str, name: str) -> Metric | None:
@@ -11,4 +26,26 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
-STUDY = Study("gondola-coverage", trial.SUBJECTS, trial.trial, trial.check_claims, _metric)
+def with_share_outside(runs: pd.DataFrame) -> pd.DataFrame:
+    """``runs`` with the share of the ground seen that lies outside the enclosures, as ``share_outside``."""
+    more = runs.copy()
+    for one in STRATEGIES:
+        more[one, "share_outside"] = runs[one, "outside"] / runs[one, "ground"]
+    return more
+
+
+def answer(facts: Facts) -> list[str]:
+    """What a swing adds to a camera that looks straight down, then what the adaptive swing adds to that."""
+    down, plain, adaptive = (facts.value(one, "seen") for one in (DOWN, PLAIN, ADAPTIVE))
+    if math.isnan(down + plain + adaptive):
+        return ["unknown"]
+    swing = "roll-more" if plain > down else "roll-no-more"
+    inside, more = (
+        facts.verdicts.get(claim) in (HOLDS, MOSTLY)
+        for claim in ("adaptive-least-outside", "adaptive-sees-more")
+    )
+    kind = "not-better" if not inside else "more-inside" if more else "less-outside"
+    return [swing, f"adaptive-{kind}"]
+
+
+STUDY = Study("gondola-coverage", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)

@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.plans.flown import Executed, ExecutionErrors, as_planned, execute, held_with
+from wildlab.analysis.plans.flown import Executed, ExecutionErrors, execute
 from wildlab.evaluation.shares import Check
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.courses import fly
-from wildlab.planning.coverage import Coverage, nodes_in, share_seen
+from wildlab.planning.coverage import nodes_in, share_seen
 from wildlab.planning.gimbal import (
     NADIR,
     GimbalAngles,
@@ -71,8 +71,6 @@ CABIN = 0.5
 #: Decisions of the adaptive strategy for each second, whatever the camera's rate: it turns by less than two
 #: degrees between two. Chosen.
 DECISIONS = 25.0
-#: How many times as large errors are tried as the plan allows for.
-LARGER = 2.0
 #: How far apart the places (s) and angles (degrees) are at which the strategy knows what it would see.
 #: Chosen: the cabin moves by less than a cell of the land meanwhile.
 KNOWN, APART = 0.5, 2.5
@@ -162,31 +160,6 @@ def poses_of(
     start = float(stream(seed, "swing").uniform())
     angles = angles_of(name, twin, land, fences, there, start)
     return camera_on_course(camera_of(twin), there.places, there.headings, angles)
-
-
-def planned_coverage(
-    name: str, twin: TwinParameters, land: Terrain, fences: list[Array], there: Ride, seed: int
-) -> Coverage:
-    """What one of `STRATEGIES` is planned to see along a ride."""
-    poses = poses_of(name, twin, land, fences, there, seed)
-    return as_planned(land, poses, there.times, LOOKS).coverage
-
-
-def with_larger_errors(
-    done: Executed,
-    name: str,
-    twin: TwinParameters,
-    land: Terrain,
-    fences: list[Array],
-    there: Ride,
-    seed: int,
-    factor: float,
-) -> float:
-    """Share of what is surely planned that a ride shows with errors ``factor`` times as large."""
-    poses = poses_of(name, twin, land, fences, there, seed)
-    errors = errors_of_execution(twin).larger(factor)
-    rng = stream(seed, f"execution of {name}")
-    return held_with(done, land, poses, there.headings, there.times, LOOKS.furthest, errors, rng)
 
 
 def run_strategy(
@@ -282,17 +255,17 @@ def _all_larger(pairs: list[tuple[Array, Array]]) -> Check:
     )
 
 
-def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
     """What the draws give for each claim of F on the camera of a gondola, by the claim's id.
 
     Parameters
     ----------
-    spread
+    runs
         What `trial` gives, one row for each draw.
     """
 
     def of(subject: str, name: str) -> NDArray[np.float64]:
-        return spread[subject, name].to_numpy(float)
+        return runs[subject, name].to_numpy(float)
 
     adaptive, roll = "adaptive-60", "roll-60"
     outside = {name: of(name, "outside") / of(name, "ground") for name in STRATEGIES}

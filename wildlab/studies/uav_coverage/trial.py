@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.plans.flown import Executed, ExecutionErrors, Looks, as_planned, execute, held_with
+from wildlab.analysis.plans.flown import Executed, ExecutionErrors, Looks, execute
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.geometry.camera import Camera
@@ -20,7 +20,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.courses import Course, fly
-from wildlab.planning.coverage import Coverage, nodes_in, share_seen
+from wildlab.planning.coverage import nodes_in, share_seen
 from wildlab.planning.gimbal import camera_on_course, look_down, swing_yaw
 from wildlab.planning.heights import follow_terrain
 from wildlab.planning.moving import first_seen, walks
@@ -70,8 +70,6 @@ RECORDED = {
     "missed_still": "1",
     "unseen": "1",
 }
-#: How many times as large errors are tried as the plan allows for.
-LARGER = 2.0
 #: Chosen: an animal of 1.5 m; 10 ms is a usual time constant of a microbolometer; a quarter of an animal's
 #: length; animals down to a dozen pixels; r of (5.9) where these are few.
 LOOKS = Looks(size=1.5, exposure=0.01, blur_share=0.25, furthest=150.0, range_scale=150.0)
@@ -159,21 +157,6 @@ def run_case(
     rng = stream(seed, f"execution of {name}")
     errors = errors_of_execution(twin)
     return flown, execute(land, flown.poses, flown.headings, flown.times, LOOKS, errors, SIGMAS, rng)
-
-
-def planned_coverage(twin: TwinParameters, land: Terrain, name: str, fields: int, rate: float) -> Coverage:
-    """What one of `CASES` or `MORE` is planned to see."""
-    flown = plan(twin, land, (CASES | MORE)[name], fields, rate)
-    return as_planned(land, flown.poses, flown.times, LOOKS).coverage
-
-
-def with_larger_errors(
-    twin: TwinParameters, land: Terrain, name: str, seed: int, run: tuple[Flown, Executed], factor: float
-) -> float:
-    """Share of what is surely planned that a flight shows with errors ``factor`` times as large."""
-    flown, done = run
-    errors, rng = errors_of_execution(twin).larger(factor), stream(seed, f"execution of {name}")
-    return held_with(done, land, flown.poses, flown.headings, flown.times, LOOKS.furthest, errors, rng)
 
 
 def trial(seed: int, *, twin: str, fields: int, rate: float) -> dict[tuple[str, str], float]:
@@ -266,17 +249,17 @@ def _moving(
     return numbers
 
 
-def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
     """What the draws give for each claim of F on rows and yaw, by the claim's id.
 
     Parameters
     ----------
-    spread
+    runs
         What `trial` gives, one row for each draw.
     """
 
     def of(subject: str, name: str) -> NDArray[np.float64]:
-        return spread[subject, name].to_numpy(float)
+        return runs[subject, name].to_numpy(float)
 
     down, yaw, low, close, faster = (of(name, "seen") for name in (*CASES, LOW_FASTER))
     times = np.stack([of(f"rows-{one:.0f}m", "time") for one in SPACINGS])
@@ -291,6 +274,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         "yaw-covers-more-inside": Check(
             measured=(yaw - down) / np.maximum(1 - down, 1e-9), above=True, premise=down < 0.95
         ),
+        "no-large-rotations": Check(measured=yaw - down, reach=(-1, 1)),
         "moving-more-less-redundant": Check(
             true=(wider > 0) & (of(YAW, "in_sight") < of(DOWN, "in_sight")),
             first=of(DOWN, "in_sight"),
