@@ -23,7 +23,7 @@ import pytest
 from tests.analysis.survey_twin import Survey, simulate
 from tests.annotation import HOSTILE, ask, serving, write_images
 from tests.commands import call, refuse
-from wildlab.flight.readers.clicks import clicks as click_files
+from wildlab.flight.readers.formats import read_log
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.runner.annotation.pictures import Picture, picture_of
@@ -110,7 +110,7 @@ def test_clicks_keys_and_a_second_opening(browser, images, serve):
     other = open_page(browser, serve(again).address, faults)
     other.wait_for_selector("#points li")
     assert other.locator("#points li").count() == 2
-    part = click_files.read(session.table, session.table.read_bytes()).parts["clicks"]
+    part = read_log(session.table, session.table.read_bytes(), "clicks").parts["clicks"]
     assert part.columns["name"].tolist().count("=A1") == 3
     assert faults == []
 

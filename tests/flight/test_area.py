@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.area import parse_areas, read_areas
-from wildlab.flight.readers.rings import crossing, ring_area
+from wildlab.flight.readers.area import crossing, parse_areas, read_areas, ring_area
 from wildlab.geometry.frames import ned_to_geodetic
 
 LAT, LON = 58.66, 16.46

@@ -10,7 +10,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.flight import heights
 from wildlab.flight.heights import choose_reference, undulation
-from wildlab.flight.readers.logs.log import Stream, make_stream
+from wildlab.flight.readers.log import Stream, make_stream
 
 GEOID = 40.0
 

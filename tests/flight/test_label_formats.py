@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers import label_yolo
+from wildlab.flight.readers import box_files
 from wildlab.flight.readers.labels import Labels, read_labels
 
 #: Two animals and a car in an image of 200 x 100 pixels, and an image in which nothing is.
@@ -173,7 +173,7 @@ def test_an_image_with_a_class_and_no_box_is_not_judged(tmp_path):
         (BATCH, '"category": "1"', '"category": "9"', "_categories has 1, 2"),
         (BATCH, '"detection_categories"', '"kinds"', "categories are called"),
         (r'{"a": 1, "b\u001b": 2}', "", "", r"'b\\x1b'"),
-        ('{"images": [', "", "", "like JSON"),
+        ('{"images": [', "", "", "begins like"),
     ],
 )
 def test_what_is_wrong_in_json_is_named(tmp_path, source, old, new, word):
@@ -210,7 +210,7 @@ def test_folders_that_are_none_of_yolo_are_refused(tmp_path, monkeypatch):
         read_labels(tmp_path / "labels")
     write(tmp_path / "data.yaml", "nc: 3\n")
     assert len(read_labels(tmp_path / "labels").boxes) == 2
-    monkeypatch.setattr(label_yolo, "MOST_FILES", 1)
+    monkeypatch.setattr(box_files, "MOST_FILES", 1)
     with pytest.raises(WildlabError, match="more than 1"):
         read_labels(tmp_path / "labels")
 
@@ -292,7 +292,7 @@ def test_numbers_of_a_clip_and_names_without_ending(tmp_path):
         ("image,x,y,w,h\na.png,1,2,3,4\na.png,1,2,-3,4\n", "line 3 has no box"),
         ("image,x,y,w,h\na.png,1,?,3,4\n", "line 2 has no box"),
         ("frame0,x,y,w,h\na,1,2,3,4\n", "line 2 has no number"),
-        ("", "has no row"),
+        ("", "has no header"),
         ("image,x,y,w,h\na.png,1,2,3,4,5,6\n", "7 values"),
         ("image,x,y,w,h\na.png,.1,.2,.3,.4\n", "shares"),
         ("image,x_min,y_min,x_max,y_max\na.png,5,2,3,4\n", "x_min 5"),

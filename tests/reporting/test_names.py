@@ -236,8 +236,8 @@ def test_tables_give_names_back_and_hold_no_formula(names):
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.lists(NAMES, min_size=1, max_size=4))
 def test_detections_and_clicks_are_read_back_by_name(names):
-    from wildlab.flight.readers.clicks import clicks
-    from wildlab.flight.readers.label_table import read_table_boxes
+    from wildlab.flight.readers.box_files import read_table_boxes
+    from wildlab.flight.readers.formats import read_log
 
     names = [shown for name in names if (shown := "".join(filter(str.isprintable, name)).strip())] or ["a"]
     found = pd.DataFrame({name: 5.0 for name in TABLE_COLUMNS}, index=range(len(names)))
@@ -246,5 +246,5 @@ def test_detections_and_clicks_are_read_back_by_name(names):
     assert set(marked.names) == set(names)
     points = {f"{name}.jpg": [Point(name, 1.0, 2.0)] for name in names}
     session: Any = SimpleNamespace(points=points)
-    part = clicks.read(Path("clicks.csv"), Session._text(session).encode()).parts["clicks"]
+    part = read_log(Path("clicks.csv"), Session._text(session).encode(), "clicks").parts["clicks"]
     assert set(part.columns["image"]) == set(points) and set(part.columns["name"]) == set(names)

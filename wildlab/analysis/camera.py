@@ -15,8 +15,7 @@ from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_boar
 from wildlab.errors import WildlabError
 from wildlab.flight.camera_file import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
 from wildlab.flight.manifest_parts import CameraPart
-from wildlab.flight.readers.frames.frame import file_name
-from wildlab.flight.readers.frames.image import read_image
+from wildlab.flight.readers.frames.image import file_name, read_image
 from wildlab.geometry.board_views import parameters_of
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import FEWEST, LENSES, PINHOLE, Intrinsics, calibrate_camera, view_errors

@@ -103,7 +103,7 @@ def camera(
     from wildlab.analysis.camera_text import sentences
     from wildlab.detection.boards import Board
     from wildlab.flight.camera_file import write_camera
-    from wildlab.flight.readers.stills import still_files
+    from wildlab.flight.readers.frames.image import still_files
 
     columns, rows = board or circles or (0, 0)
     pattern = "chessboard" if board else "staggered circles" if staggered else "circles"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.log import Stream
 
 Array = NDArray[np.float64]
 

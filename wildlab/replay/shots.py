@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import Frame, open_frames
-from wildlab.flight.readers.frames.frame import file_name, frame_name
+from wildlab.flight.readers.frames.image import file_name, frame_name
 
 #: Bytes of all images, and images, at most; the longest side, px.
 MOST_BYTES, MOST_IMAGES, LONGEST = 24_000_000, 1000, 960

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.card.found import Found
 from wildlab.flight.card.images import clock_of_images
-from wildlab.flight.readers.logs.log import RawLog, Stream, make_stream
-from wildlab.flight.readers.logs.parts import stamped_by
+from wildlab.flight.readers.log import RawLog, Stream, make_stream
+from wildlab.flight.readers.parts import stamped_by
 
 START = 1.7e9
 #: When images were truly taken: not evenly, as on the way from row to row.

@@ -15,8 +15,8 @@ from wildlab.flight.card.importing import import_card, read_card
 from wildlab.flight.card.proposal import Wishes
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.card.said import paced, sentences_of
-from wildlab.flight.readers.logs.log import Clock, RawLog, make_stream
-from wildlab.flight.readers.logs.parts import stream_of
+from wildlab.flight.readers.log import Clock, RawLog, make_stream
+from wildlab.flight.readers.parts import stream_of
 from wildlab.flight.recipe.series import LogTable
 from wildlab.flight.store import Flight
 

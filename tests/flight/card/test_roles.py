@@ -9,7 +9,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.flight.card.found import Found
 from wildlab.flight.card.roles import choose_roles
-from wildlab.flight.readers.logs.log import RawLog, make_stream
+from wildlab.flight.readers.log import RawLog, make_stream
 
 START = 1.7e9
 

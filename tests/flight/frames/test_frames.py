@@ -12,10 +12,9 @@ import pytest
 from tests.annotation import write_images
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
-from wildlab.flight.readers.frames.below import images_below
-from wildlab.flight.readers.frames.flir import Planck, gather_pieces, read_records, to_kelvin
-from wildlab.flight.readers.frames.valid import find_clipped, find_no_data, find_overlay
-from wildlab.flight.readers.stills import still_files
+from wildlab.flight.readers.frames.image import images_below, still_files
+from wildlab.flight.readers.frames.scene import find_clipped, find_no_data, find_overlay
+from wildlab.flight.readers.frames.thermal import Planck, gather_pieces, read_records, to_kelvin
 from wildlab.replay.shots import read_shots
 
 

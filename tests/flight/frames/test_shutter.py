@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 
 from wildlab.flight.readers.frames import Frame, open_frames
-from wildlab.flight.readers.frames.pixels import MOST_DEAD, find_dead, measure_vignetting, without_vignetting
-from wildlab.flight.readers.frames.shutter import is_shutter, mark_shutter
+from wildlab.flight.readers.frames.opening import mark_shutter
+from wildlab.flight.readers.frames.scene import (
+    MOST_DEAD,
+    find_dead,
+    is_shutter,
+    measure_vignetting,
+    without_vignetting,
+)
 from wildlab.simulation.scene.response import (
     CameraResponse,
     expose,

@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.flight.readers.tracks import check, columns_of, near
-from wildlab.flight.readers.dji import airdata
+from tests.flight.readers.tracks import Reader, check, columns_of, near
+
+airdata = Reader("airdata")
 
 START = datetime(2026, 6, 1, 10, tzinfo=UTC)
 METRIC = (
@@ -41,7 +42,7 @@ def table(made: list[dict[str, object]], names: tuple[str, ...] = METRIC) -> str
 def test_equals_pandas(shared_data):
     path = shared_data("logs", "dji_airdata_p4rtk", "Jul-7th-2022-11-10AM-Flight-Airdata.csv")
     data = path.read_bytes()
-    assert airdata.recognise(data[:8192], path.name)
+    assert airdata.sniff(data[:8192], path.name)
     log = airdata.read(path, data)
     check(log)
     table = pd.read_csv(path, skipinitialspace=True)

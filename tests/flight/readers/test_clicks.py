@@ -11,14 +11,23 @@ from hypothesis import strategies as st
 from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.tracks import near, spoilt
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.clicks import clicks
-from wildlab.flight.readers.logs.log import RawLog
+from wildlab.flight.readers import clicks
+from wildlab.flight.readers.judging import judge_log
+from wildlab.flight.readers.log import RawLog
 from wildlab.names import csv_cell, from_csv_cell
 
 HERE = Path("clicks")
 #: Image, name, left, top, width, height.
 BOXES = [("a.jpg", "A1", 10.0, 20.0, 4.0, 6.0), ("b.jpg", "B <b>", 0.0, 0.5, 100.0, 50.5)]
 SIZES = {"a.jpg": (200.0, 100.0), "b.jpg": (200.0, 100.0)}
+
+
+def read(path: Path, data: bytes, sizes: clicks.Sizes | None = None) -> RawLog:
+    return judge_log("clicks", clicks.decode(path, data, sizes=sizes), False)
+
+
+def read_folder(folder: Path, sizes: clicks.Sizes | None = None) -> RawLog:
+    return judge_log("clicks", clicks.folder_decode(folder, sizes=sizes), False)
 
 
 def column(log: RawLog, name: str) -> list[Any]:
@@ -68,16 +77,16 @@ OTHER_NAMES = (
 
 @pytest.mark.parametrize("data", [COCO, CVAT, CORNERS, SIZES_CSV, OTHER_NAMES])
 def test_boxes_out_of_every_format(data):
-    assert clicks.recognise(data[:8192], "x")
-    check_boxes(clicks.read(HERE, data))
+    assert clicks.sniff(data[:8192], "x")
+    check_boxes(read(HERE, data))
 
 
 def test_shares_of_an_image_want_its_size():
-    assert clicks.recognise(MEGADETECTOR, "x")
-    log = clicks.read(HERE, MEGADETECTOR, sizes=SIZES)
+    assert clicks.sniff(MEGADETECTOR, "x")
+    log = read(HERE, MEGADETECTOR, sizes=SIZES)
     check_boxes(log)
     assert column(log, "score") == [0.5, 0.5]
-    without = clicks.read(HERE, MEGADETECTOR)
+    without = read(HERE, MEGADETECTOR)
     assert column(without, "why") == ["no place in the image"] * 2
     assert any("2 of 2" in one for one in without.notes)
 
@@ -91,11 +100,11 @@ def write_yolo(folder: Path, classes: Path) -> None:
 
 def test_yolo_folder(tmp_path):
     write_yolo(tmp_path, tmp_path)
-    check_boxes(clicks.clicks_of_folder(tmp_path, SIZES), stems=True)
-    assert not clicks.clicks_of_folder(tmp_path).parts["clicks"].used.any()
+    check_boxes(read_folder(tmp_path, SIZES), stems=True)
+    assert not read_folder(tmp_path).parts["clicks"].used.any()
     (tmp_path / "none").mkdir()
     with pytest.raises(WildlabError, match="no text file"):
-        clicks.clicks_of_folder(tmp_path / "none")
+        read_folder(tmp_path / "none")
 
 
 @pytest.mark.parametrize("layout", [("", ""), ("images", "labels"), ("images/train", "labels/train")])
@@ -106,27 +115,25 @@ def test_sizes_of_images_beside_labels(tmp_path, layout):
     for name in SIZES:
         made.write(images, name, size=(200, 100))
     write_yolo(labels, tmp_path)
-    check_boxes(clicks.read_clicks_folder(labels), stems=True)
+    check_boxes(read_folder(labels), stems=True)
     # MegaDetector names images with their folders, and a file may name what lies elsewhere.
-    check_boxes(clicks.read(images / "md.json", MEGADETECTOR))
+    check_boxes(read(images / "md.json", MEGADETECTOR))
     above = MEGADETECTOR.replace(b"a.jpg", b"../../../a.jpg").replace(b"b.jpg", b"/etc/b.jpg")
-    log = clicks.read(images / "md.json", above)
+    log = read(images / "md.json", above)
     assert column(log, "u_px") == pytest.approx([12.0, 50.0])
     deep = MEGADETECTOR.replace(b'"a.jpg', b'"images/a.jpg').replace(b'"b.jpg', b'"images\\\\b.jpg')
-    assert clicks.read(tmp_path / "md.json", deep).parts["clicks"].used.all() == (layout[0] != "images/train")
+    assert read(tmp_path / "md.json", deep).parts["clicks"].used.all() == (layout[0] != "images/train")
 
 
 def test_points():
-    log = clicks.read(
-        HERE, b'image,name,u_px,v_px\na.jpg,007,1.5,-0.5\n"b,c.jpg",,3,4\nd.jpg,X,,\ne.jpg,Y,1,z\n'
-    )
+    log = read(HERE, b'image,name,u_px,v_px\na.jpg,007,1.5,-0.5\n"b,c.jpg",,3,4\nd.jpg,X,,\ne.jpg,Y,1,z\n')
     assert column(log, "image") == ["a.jpg", "b,c.jpg", "e.jpg"]
     assert column(log, "name") == ["007", "", "Y"]
     assert column(log, "u_px")[:2] == [1.5, 3.0]
     assert np.isnan(column(log, "box_u_px")).all()
     assert column(log, "why") == ["", "", "no place in the image"]
     assert log.parts["clicks"].rows.tolist() == [2, 3, 5]
-    comma = clicks.read(HERE, b"image;marker;u;v\na.jpg;A;1,5;2,25\n")
+    comma = read(HERE, b"image;marker;u;v\na.jpg;A;1,5;2,25\n")
     assert (column(comma, "u_px"), column(comma, "v_px")) == ([1.5], [2.25])
 
 
@@ -135,26 +142,26 @@ def test_points_attributes_and_other_shapes_of_cvat():
         b'<image id="9" name="c.jpg"><points label="marker" points="1.5,2.5;3,4"><attribute name="name">A7'
         b'</attribute></points><polygon label="x" points="1,2;3,4;5,6"/><tag label="sunny"/></image>'
     )
-    log = clicks.read(HERE, CVAT.replace(b"</annotations>", more + b"</annotations>"))
+    log = read(HERE, CVAT.replace(b"</annotations>", more + b"</annotations>"))
     assert column(log, "name")[2:] == ["A7", "A7"]
     assert (column(log, "u_px")[2:], column(log, "v_px")[2:]) == ([1.5, 3.0], [2.5, 4.0])
     assert log.lost[0].startswith("1 ")
 
 
 def test_cvat_that_breaks_off_is_kept_as_far_as_it_goes():
-    log = clicks.read(HERE, CVAT[: CVAT.find(b'name="b.jpg"')])
+    log = read(HERE, CVAT[: CVAT.find(b'name="b.jpg"')])
     assert column(log, "image") == ["a.jpg"]
 
 
 @pytest.mark.parametrize(
     ("data", "problem"),
     [
-        (b"image,name\na.jpg,A\n", "says where"),
+        (b"image,name\na.jpg,A\n", "say where"),
         (b"name,u,v\nA,1,2\n", "names the image"),
         (b"image,u,v\na.jpg,,\n", "marks nothing"),
         (b"image,x,y,w,h\na.jpg,0.1,0.2,0.1,0.1\n", "shares"),
         (b"{}", "no format"),
-        (b"[[[", "is none"),
+        (b"[[[", "begins like"),
         (b"<annotations><image name='a'></image></annotations>", "no box"),
         (b"<annotations>", "is not readable XML"),
         (b'<!DOCTYPE a [<!ENTITY b "c">]><annotations>&b;</annotations>', "document type"),
@@ -163,22 +170,22 @@ def test_cvat_that_breaks_off_is_kept_as_far_as_it_goes():
 )
 def test_what_is_refused(data, problem):
     with pytest.raises(WildlabError, match=problem):
-        clicks.read(HERE, data)
+        read(HERE, data)
 
 
 @pytest.mark.parametrize(
     "head", [b"", b"\x00\xff", b"{}", b'{"type": "Point"}', b"<kml>", b"time,u,v\n", b"image,note\n"]
 )
 def test_what_is_not_recognised(head):
-    assert not clicks.recognise(head, "x.csv")
+    assert not clicks.sniff(head, "x.csv")
 
 
 @pytest.mark.parametrize("data", [COCO, CVAT, MEGADETECTOR, b"image,u,v\n" + b"a,1,2\n" * 9])
 def test_damaged_files_end_in_a_sentence(data):
     for one in spoilt(data):
-        clicks.recognise(one, "x")
+        clicks.sniff(one, "x")
         try:
-            part = clicks.read(HERE, one, sizes=SIZES).parts["clicks"]
+            part = read(HERE, one, sizes=SIZES).parts["clicks"]
         except WildlabError:
             continue
         assert np.isfinite(part.columns["u_px"][part.used]).all()

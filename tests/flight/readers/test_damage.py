@@ -11,10 +11,11 @@ from tests.flight.readers import test_rtklib_pos as of_pos
 from tests.flight.readers.test_dji_mrk import row
 from tests.flight.readers.test_dji_srt import new, subtitles
 from tests.flight.readers.test_ubx import message, old, pvt
-from tests.flight.readers.tracks import survives
+from tests.flight.readers.tracks import Reader, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.dji import airdata, mrk, srt
-from wildlab.flight.readers.tracks import gpx, nmea, rtklib_pos, ubx
+
+gpx, nmea, ubx, airdata = (Reader(one) for one in ("gpx", "nmea", "ubx", "airdata"))
+mrk, srt, rtklib_pos = (Reader(one) for one in ("dji-mrk", "dji-srt", "rtklib-pos"))
 
 AIRDATA = of_airdata.table(of_airdata.rows(120))
 
@@ -60,7 +61,7 @@ def test_what_holds_nothing_is_refused(reader, data, words):
     ],
 )
 def test_others_are_not_taken_for_them(reader, head, name):
-    assert not reader.recognise(head, name)
+    assert not reader.sniff(head, name)
 
 
 @pytest.mark.parametrize(

@@ -20,11 +20,11 @@ from tests.flight.readers.dataflash_logs import (
     second_generation,
     third_generation,
 )
-from tests.flight.readers.tracks import check
+from tests.flight.readers.tracks import Reader, check
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.ardupilot import binary as dataflash
-from wildlab.flight.readers.ardupilot import text as dataflash_text
-from wildlab.flight.readers.ardupilot.records import read_records
+from wildlab.flight.readers.dataflash import read_records
+
+dataflash, dataflash_text = Reader("dataflash"), Reader("dataflash-text")
 
 REAL = (
     "copter_2014_joey/2014-10-18 20-04-24.bin",
@@ -60,7 +60,9 @@ def compare(path: Path) -> int:
     for name, messages in theirs.items():
         # The first generation's definition of FMT leaves out its last column.
         for field in messages[0].fmt.columns:
-            values = ours[name].column(ours[name].fields.index(field)).tolist()
+            table = ours[name]
+            is_text = table.characters[field] in "nNZ"
+            values = table.texts(field) if is_text else table.fields[field].tolist()
             theirs_too = [getattr(message, field) for message in messages]
             differ = [pair for pair in zip(values, theirs_too, strict=True) if not same(*pair)]
             assert not differ, (name, field, differ[:3])
@@ -113,8 +115,8 @@ def test_nothing_between_messages_hides_them(garbage):
     behind = [one for one in pieces if one[2] != 128]
     data = b"".join(ahead) + b"".join(g + one for g, one in zip(garbage, behind, strict=True))
     found = read_records(data)
-    assert found.tables["A"].numbers("V").tolist() == [0, 0.5, 1, 1.5]
-    assert found.tables["B"].numbers("W").tolist() == [0, 1, 2, 3]
+    assert found.tables["A"].get("V").tolist() == [0, 0.5, 1, 1.5]
+    assert found.tables["B"].get("W").tolist() == [0, 1, 2, 3]
     assert found.lost_bytes == sum(map(len, garbage))
     assert found.places == sum(map(bool, garbage))
 
@@ -124,7 +126,7 @@ def test_heads_within_messages_are_not_believed():
     # In each text stands what looks like the head of a B.
     found = read_records(log.binary().replace(b"a text", b"at\xa3\x95" + bytes([log.kinds["B"][0]]) + b"t"))
     assert found.lost_bytes == 0
-    assert found.tables["B"].numbers("W").tolist() == list(range(50))
+    assert found.tables["B"].get("W").tolist() == list(range(50))
 
 
 def test_a_message_whose_kind_was_damaged_costs_itself():
@@ -135,7 +137,7 @@ def test_a_message_whose_kind_was_damaged_costs_itself():
     at = next(i for i, one in enumerate(pieces) if one[2] == shorter) + 5
     pieces[at] = pieces[at][:2] + bytes([longer]) + pieces[at][3:]
     found = read_records(b"".join(pieces))
-    assert found.tables["B"].numbers("W").tolist() == [i for i in range(20) if i != 5]
+    assert found.tables["B"].get("W").tolist() == [i for i in range(20) if i != 5]
     assert (found.lost_bytes, found.places) == (len(pieces[at]), 1)
 
 
@@ -146,8 +148,8 @@ def test_definitions_that_change_hold_from_there_on():
     found = read_records(log.binary() + other.binary())
     assert found.lost_bytes == 0
     table = found.tables["A"]
-    assert table.numbers("W").tolist() == [7, 8]
-    np.testing.assert_array_equal(table.numbers("V"), [np.nan, 0.25])
+    assert table.get("W").tolist() == [7, 8]
+    np.testing.assert_array_equal(table.get("V"), [np.nan, 0.25])
 
 
 def lengths(data: bytes) -> dict[str, int]:
@@ -185,7 +187,7 @@ def test_filling_at_the_end_is_no_loss_and_a_cut_message_is():
     for filling in (b"\0" * 5000, b"\xff" * 5000):
         assert dataflash.read(Path("x.bin"), data + filling).lost == ()
     (said,) = dataflash.read(Path("x.bin"), data[:-1]).lost
-    assert f"of {len(data) - 1} bytes" in said
+    assert f"bytes of {len(data) - 1}" in said
 
 
 @pytest.mark.parametrize(
@@ -213,11 +215,11 @@ def test_other_logs_with_the_same_heads_are_refused():
 
 def test_a_file_is_known_by_its_content():
     log = second_generation(Truth(2025), 3.0)
-    assert dataflash.recognise(b"\0\0lost" + log.binary()[:8192], "x")
-    assert dataflash_text.recognise(log.text()[:8192], "x")
+    assert dataflash.sniff(b"\0\0lost" + log.binary()[:8192], "x")
+    assert dataflash_text.sniff(log.text()[:8192], "x")
     others = (b"", b"$GPGGA,1,2,3", b"\xa3\x95\x80 nothing", b"ULog\x01\x12\x35", b"<gpx>")
-    assert not any(dataflash.recognise(one, "x.bin") for one in (*others, log.text()[:8192]))
-    assert not any(dataflash_text.recognise(one, "x.log") for one in (*others, log.binary()[:8192]))
+    assert not any(dataflash.sniff(one, "x.bin") for one in (*others, log.text()[:8192]))
+    assert not any(dataflash_text.sniff(one, "x.log") for one in (*others, log.binary()[:8192]))
 
 
 def read_damaged(data: bytes, text: bool) -> None:

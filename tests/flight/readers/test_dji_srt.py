@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.flight.readers.tracks import check, columns_of, near
+from tests.flight.readers.tracks import Reader, check, columns_of, near
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.dji import srt as dji_srt
+
+dji_srt = Reader("dji-srt")
 
 #: Sample -> subtitles, rows with a place, first latitude, longitude, height, first stamp (local), satellites.
 SAMPLES = {
@@ -52,7 +53,7 @@ def test_samples(name, shared_data):
     path = shared_data("logs", "dji_srt", name)
     data = path.read_bytes()
     blocks, places, latitude, longitude, height, stamp, satellites = SAMPLES[name]
-    assert dji_srt.recognise(data[:8192], name)
+    assert dji_srt.sniff(data[:8192], name)
     for zone, ahead in ((None, 0), ("+02:00", 7200), ("Europe/Madrid", 7200)):
         columns = columns_of(dji_srt, data, zone=zone)
         assert len(columns["use"]) == blocks

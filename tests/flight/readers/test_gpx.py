@@ -8,9 +8,10 @@ import gpxpy
 import numpy as np
 import pytest
 
-from tests.flight.readers.tracks import check, columns_of, near
+from tests.flight.readers.tracks import Reader, check, columns_of, near
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.tracks import gpx
+
+gpx = Reader("gpx")
 
 START = datetime(2026, 6, 1, 10, tzinfo=UTC)
 SAMPLES = ("around-visnjan-with-car", "cerknicko-jezero", "Mojstrovka", "korita-zbevnica")
@@ -35,7 +36,7 @@ def track(count: int = 10) -> str:
 def test_equals_gpxpy(name, shared_data):
     path = shared_data("logs", "target_gpx", f"{name}.gpx")
     data = path.read_bytes()
-    assert gpx.recognise(data[:8192], path.name)
+    assert gpx.sniff(data[:8192], path.name)
     log = gpx.read(path, data)
     check(log)
     assert not log.lost
@@ -110,7 +111,7 @@ def test_encodings_and_line_ends(codec):
     text = document(track()).decode().replace("<name>n</name>", "<name>Sæl =1+1</name>\r\n")
     head = '<?xml version="1.0" encoding="ISO-8859-1"?>\r\n' if codec == "latin-1" else ""
     data = (head + text).encode(codec)
-    assert gpx.recognise(data[:8192], "x")
+    assert gpx.sniff(data[:8192], "x")
     log = gpx.read(Path("x.gpx"), data)
     assert len(log.parts["gnss"]) == 10
     assert not log.lost

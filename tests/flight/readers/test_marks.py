@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.flight.readers.tracks import spoilt
+from tests.flight.readers.tracks import Reader, spoilt
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs.log import RawLog
-from wildlab.flight.readers.marks import geojson as marks_geojson
-from wildlab.flight.readers.marks import kml as marks_kml
-from wildlab.flight.readers.marks import table as marks_csv
+from wildlab.flight.readers.log import RawLog
+
+marks_kml, marks_geojson, marks_csv = (Reader(f"marks-{one}") for one in ("kml", "geojson", "csv"))
 
 HERE = Path("marks")
 #: Name, latitude, longitude, height.
@@ -64,9 +63,9 @@ def test_order_comments_and_spreads_of_a_table():
 
 def test_a_table_of_metres_is_known_to_be_refused_and_others_are_not_taken():
     for header in ("Punkt;Rechtswert;Hochwert;H", "name;Easting (m);Northing (m);h"):
-        assert marks_csv.recognise(table(POINTS, header, ";"), "x")
+        assert marks_csv.sniff(table(POINTS, header, ";"), "x")
     for header in ("Name;X;Y;Z", "a;b;c;d", "time;easting;northing;name"):
-        assert not marks_csv.recognise(table(POINTS, header, ";"), "x")
+        assert not marks_csv.sniff(table(POINTS, header, ";"), "x")
 
 
 def test_rows_that_cannot_be_used_stay_and_say_why():
@@ -121,7 +120,7 @@ def test_other_geometries_are_counted():
 )
 def test_damaged_files_end_in_a_sentence(reader, data):
     for one in spoilt(data):
-        reader.recognise(one[:8192], "x")
+        reader.sniff(one[:8192], "x")
         try:
             part = reader.read(HERE, one).parts["marks"]
         except WildlabError:
@@ -178,7 +177,7 @@ OLDER = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}
     ],
 )
 def test_points_out_of_every_format(reader, data, height):
-    assert reader.recognise(data[:8192], "x")
+    assert reader.sniff(data[:8192], "x")
     log = reader.read(HERE, data)
     for name, at in (("name", 0), ("latitude_deg", 1), ("longitude_deg", 2), (f"height_{height}_m", 3)):
         assert values(log, name) == [one[at] for one in POINTS]

@@ -9,8 +9,9 @@ import numpy as np
 import pynmea2
 import pytest
 
-from tests.flight.readers.tracks import Columns, columns_of, near
-from wildlab.flight.readers.tracks import nmea
+from tests.flight.readers.tracks import Columns, Reader, columns_of, near
+
+nmea = Reader("nmea")
 
 KNOT = 1852 / 3600
 
@@ -61,7 +62,7 @@ def track(start: datetime, count: int, **other: object) -> bytes:
 def test_equals_pynmea2(shared_data):
     path = shared_data("logs", "target_boat_nmea", "bundg_zeus_9.log")
     data = path.read_bytes()
-    assert nmea.recognise(data[:8192], path.name)
+    assert nmea.sniff(data[:8192], path.name)
     columns = columns_of(nmea, data)
     by_time: dict[float, dict[str, Any]] = {}
     for line in data.decode("utf-8", "replace").splitlines():

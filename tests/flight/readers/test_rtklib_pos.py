@@ -9,8 +9,9 @@ import pandas as pd
 import pymap3d
 import pytest
 
-from tests.flight.readers.tracks import check, columns_of, near
-from wildlab.flight.readers.tracks import rtklib_pos
+from tests.flight.readers.tracks import Reader, check, columns_of, near
+
+rtklib_pos = Reader("rtklib-pos")
 
 START = datetime(2025, 3, 1, 23, 59, 50, tzinfo=UTC)
 COUNT = 40
@@ -85,7 +86,7 @@ WAYS = {
 @pytest.mark.parametrize("way", WAYS)
 def test_every_way_gives_the_same_track(way):
     data = WAYS[way].encode()
-    assert rtklib_pos.recognise(data[:8192], "x")
+    assert rtklib_pos.sniff(data[:8192], "x")
     log = rtklib_pos.read(Path("x.pos"), data)
     check(log)
     stream = log.parts["gnss"]

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from pyubx2 import GET, UBXMessage, UBXReader
 
-from tests.flight.readers.tracks import check, columns_of, near
-from wildlab.flight.readers.tracks import ubx
-from wildlab.flight.readers.tracks.ubx_frames import LAYOUTS, frames, rows
+from tests.flight.readers.tracks import Reader, check, columns_of, near
+from wildlab.flight.readers.ubx import LAYOUTS, frames
+
+ubx = Reader("ubx")
 
 #: 2025-03-01 12:00:00 UTC is so many s into GPS week 2355.
 WEEK, TOW = 2355, 6 * 86400 + 43200 + 18
@@ -50,7 +51,7 @@ def old(k: int, *left_out: str, **other: object) -> bytes:
 def test_equals_pyubx2(shared_data):
     path = shared_data("logs", "target_ubx_m8l", "ublox-neo-m8l.log")
     data = path.read_bytes()
-    assert ubx.recognise(data[:8192], path.name)
+    assert ubx.sniff(data[:8192], path.name)
     log = ubx.read(path, data)
     check(log)
     seen: dict[str, list[object]] = {}
@@ -192,4 +193,4 @@ def test_frames_agree_with_pyubx2_on_any_length():
         data += b"\xb5\x62" + body + bytes([first, second]) + b"x"
     found = frames(data)
     assert (found.stop - found.start - 8).tolist() == lengths
-    assert len(rows(data, found, (0x01, 0x07))[0]) == 0
+    assert len(found.rows((0x01, 0x07))) == 0

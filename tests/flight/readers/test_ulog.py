@@ -10,13 +10,13 @@ import pytest
 from pyulog import ULog
 
 from tests.flight.readers.mavlink_logs import START_S, message, ulog
-from tests.flight.readers.tracks import check, near, survives
+from tests.flight.readers.tracks import Reader, check, near, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs.formats import recognise
-from wildlab.flight.readers.px4 import ulog as reader
-from wildlab.flight.readers.px4.frames import sound_part
-from wildlab.flight.readers.px4.streams import TOPICS
-from wildlab.flight.readers.px4.topics import from_local
+from wildlab.flight.readers.formats import recognise
+from wildlab.flight.readers.px4 import TOPICS, from_local
+from wildlab.flight.readers.ulog import sound_part
+
+reader = Reader("ulog")
 
 PATH = Path("flight.ulg")
 SAMPLES = [("px4_quad_clean_short", "test.ulg"), ("px4_quad_ekf_failure", "ekf_failure.ulg")]
@@ -207,13 +207,13 @@ def test_old_names_and_integers():
     [
         ({"fix": 1}, "no fix"),
         ({"fix": 2}, "a fix without height"),
-        ({"lat": -1.2e-6, "lon": 0.0}, "no position"),
+        ({"lat": -1.2e-6, "lon": 0.0}, "position is a placeholder"),
         ({"lat": np.nan}, "no position"),
-        ({"lat": 91.0}, "no position"),
-        ({"up": 1e9}, "an impossible height"),
+        ({"lat": 91.0}, "impossible position"),
+        ({"up": 1e9}, "impossible height"),
         ({"up": np.nan, "ellipsoid": np.nan}, "no height"),
-        ({"vn": 900.0}, "an impossible speed"),
-        ({"lat": LAT + 1.0}, "a place out of reach"),
+        ({"vn": 900.0}, "impossible speed"),
+        ({"lat": LAT + 1.0}, "impossible jump"),
     ],
 )
 def test_fixes_that_cannot_be_true(other, reason):
@@ -271,7 +271,7 @@ def test_inertial_sensor_and_magnetometers():
     field = ("uint64_t timestamp;float x;float y;float z;", [(us(k), 0.1, 0.2, 0.4) for k in range(40)])
     log = read(ulog(flight(sensor_combined=(COMBINED, rows), sensor_mag=field)))
     imu = log.parts["imu"]
-    assert imu.columns["why"][9] == "not a number"
+    assert imu.columns["why"][9] == "no measurement"
     assert imu.used.sum() == 399
     near(imu.columns, 1e-7, w_z_rad_s=0.3)
     near(log.parts["magnetometer"].columns, 1e-5, field_z_ut=40)
@@ -421,7 +421,7 @@ def test_one_wrong_length_costs_one_message():
     data[at] ^= 0x10
     log = read(bytes(data))
     assert len(log.parts["poses"]) == 49
-    assert any(one.startswith(f"37 of {len(data)}") for one in log.lost)
+    assert any(one.startswith(f"37 bytes of {len(data)}") for one in log.lost)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,21 @@ from typing import Any
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs.log import PARTS, TIMES, RawLog
+from wildlab.flight.readers.formats import FORMATS, read_log
+from wildlab.flight.readers.log import PARTS, TIMES, RawLog
 
-Reader = Callable[[Path, bytes, str | None], RawLog]
+Read = Callable[[Path, bytes, str | None], RawLog]
 Columns = dict[str, Any]
+
+
+class Reader:
+    """A format as a flight's import knows it."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.sniff = name, FORMATS[name].function("sniff")
+
+    def read(self, path: Path, data: bytes, zone: str | None = None) -> RawLog:
+        return read_log(path, data, self.name, zone)
 
 
 def damaged(data: bytes, cuts: int = 20, flips: int = 40) -> Iterator[bytes]:
@@ -72,7 +83,7 @@ def near(columns: Columns, atol: float = 1e-9, **expected: Any) -> None:
         np.testing.assert_allclose(columns[name], values, rtol=0, atol=atol, err_msg=name)
 
 
-def survives(read: Reader, data: bytes, cuts: int = 20, flips: int = 40) -> float:
+def survives(read: Read, data: bytes, cuts: int = 20, flips: int = 40) -> float:
     """Read all damaged copies; the share that could be read."""
     survived = []
     for one in damaged(data, cuts, flips):

@@ -6,7 +6,7 @@ from wildlab.analysis.detecting.detect import Detected
 from wildlab.analysis.detecting.judged import DetectorScore
 from wildlab.flight.files import printable
 from wildlab.flight.readers.frames import Frames, Polarity
-from wildlab.flight.readers.frames.shutter import CORRECTIONS
+from wildlab.flight.readers.frames.opening import CORRECTIONS
 
 #: Detections an image from which on defaults are said to fit badly: more than anyone looks through.
 MANY = 10

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.flight.readers.area import Area
-from wildlab.flight.readers.rings import crossing, ring_area
+from wildlab.flight.readers.area import Area, crossing, ring_area
 from wildlab.geometry.frames import Array
 from wildlab.planning.areas import contains
 

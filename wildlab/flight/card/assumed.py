@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wildlab.flight.files import read_toml
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.log import Stream
 from wildlab.paths import DATA
 
 FILE = DATA / "recipes" / "assumed.toml"

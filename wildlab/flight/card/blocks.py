@@ -8,7 +8,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.card.roles import PARTS_SHOWN, Choice
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.log import Stream
 
 
 def stream_of(choice: Choice, part: str) -> Stream:

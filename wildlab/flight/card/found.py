@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular
-from wildlab.flight.readers.frames.image import SUFFIXES
-from wildlab.flight.readers.logs.formats import (
+from wildlab.flight.readers.formats import (
     FOLDERS,
     FORMATS,
     HEAD,
@@ -21,7 +20,8 @@ from wildlab.flight.readers.logs.formats import (
     read_log,
     recognise,
 )
-from wildlab.flight.readers.logs.log import RawLog, Stream
+from wildlab.flight.readers.frames.image import SUFFIXES
+from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.recipe.raw import RAW_LIMIT
 
 Array = NDArray[np.float64]
@@ -69,8 +69,8 @@ class Found:
     def called(self) -> str:
         """The format in words."""
         if self.format in FOLDERS:
-            return FOLDERS[self.format][2]
-        return FORMATS[self.format][1] if self.format else "not known"
+            return FOLDERS[self.format].called
+        return FORMATS[self.format].called if self.format else "not known"
 
     def part(self, name: str) -> Stream | None:
         """One part of the log, where it has one with a row that can be used; images count without a place."""

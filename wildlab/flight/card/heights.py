@@ -10,7 +10,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.heights import NO_GRID, choose_reference
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.log import Stream
 
 Kind = Literal["ellipsoid", "sea", "home"]
 #: A part of a file: (name of the file, part).

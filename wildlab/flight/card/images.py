@@ -15,8 +15,8 @@ from wildlab.flight.card.found import Found
 from wildlab.flight.card.roles import span_of
 from wildlab.flight.files import printable
 from wildlab.flight.manifest_parts import CameraPart
-from wildlab.flight.readers.logs.log import Stream
-from wildlab.flight.readers.photos.folder import camera_of, of_camera
+from wildlab.flight.readers.log import Stream
+from wildlab.flight.readers.photos import camera_of, of_camera
 from wildlab.flight.time.matching import match_triggers
 from wildlab.flight.time.whole_hours import hours_words, whole_hours
 

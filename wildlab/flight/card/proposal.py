@@ -14,7 +14,7 @@ from wildlab.flight.card.found import OTHER
 from wildlab.flight.card.heights import Heights, Key, heights_of
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.manifest_parts import CameraPart
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.log import Stream
 from wildlab.flight.toml import dump_toml
 
 #: Rows that can be used.

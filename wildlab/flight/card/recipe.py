@@ -16,7 +16,7 @@ from wildlab.flight.card.roles import Choice
 from wildlab.flight.card.seen import add_frames, add_seen, add_targets
 from wildlab.flight.card.vehicle import add_poses, add_satellites, add_vehicle
 from wildlab.flight.files import is_safe_name
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.log import Stream
 
 
 def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.flight.card.found import OTHER
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.files import printable
-from wildlab.flight.readers.logs.log import Clock, Stream
+from wildlab.flight.readers.log import Clock, Stream
 
 #: Headings of `rows_of`.
 HEADINGS = ("file", "format", "begins (UTC)", "lasts", "holds", "time from", "heights from", "role")

@@ -14,7 +14,7 @@ from wildlab.flight.card.images import camera_of_images, clock_of_images
 from wildlab.flight.card.proposal import NO_ANGLE, TIMED, USED, UTC, Proposal, Sources
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.files import printable
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.log import Stream
 
 
 def add_frames(

@@ -8,7 +8,7 @@ from wildlab.flight.card.assumed import assumed
 from wildlab.flight.card.blocks import angles, attitude, position, quantity, spreads, stream_of, velocity
 from wildlab.flight.card.proposal import USED, UTC, Proposal, Sources
 from wildlab.flight.card.roles import Choice
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.log import Stream
 
 
 def add_vehicle(proposal: Proposal, sources: Sources, own: Choice, name: str, receiver: bool) -> None:

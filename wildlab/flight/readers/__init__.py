@@ -1,9 +1,11 @@
-"""Whatever is neither a plain table nor MATLAB's: a room for each family of formats, bytes in, columns out.
+"""Whatever is neither a plain table nor MATLAB's: bytes in, columns out.
 
-Raw logs, images, marks and clicks give a `RawLog` (`logs.log`): ``ardupilot``, ``mavlink``, ``px4``, ``dji``,
-``tracks``, ``photos``, ``marks``, ``clicks``. The others take the path (for messages only), the file's bytes
-and the part that is wanted, and give columns by name, (N,) each, in the log's own units and frames, with the
-line or entry (N,) each row came from; the recipe says what the units are. All raise
-`wildlab.errors.WildlabError` with the place where a file is not what it should be, and believe nothing that
-it says of itself.
+A reader of a raw log has two functions, ``sniff`` and ``decode``; `formats.FORMATS` knows them all. What is
+decoded is judged in one place (`judging`) and becomes a `log.RawLog`, whatever the format: named parts with
+the same columns and units. A reader believes nothing that the log says of itself: what cannot be read is
+left out and said in `RawLog.lost`, rows that cannot be true stay where they are and are marked (``use``,
+``why``).
+
+Areas, labels, frames, terrain and the Autoferry data have readers of their own. All raise
+`wildlab.errors.WildlabError` with the place where a file is not what it should be.
 """

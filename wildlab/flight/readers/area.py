@@ -6,20 +6,19 @@ says the same. Of KML, polygons of placemarks are read, and nothing that a file 
 
 from __future__ import annotations
 
-import json
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular
+from wildlab.flight.readers.documents import Field, parse_json
 from wildlab.flight.readers.kml import read_kml
-from wildlab.flight.readers.rings import check_shape, checked_ring, ring_area
 from wildlab.geometry.frames import (
     Array,
     Origin,
@@ -127,11 +126,14 @@ def parse_areas(data: bytes, path: Path) -> Areas:
     """
     start = data[:200].lstrip(b"\xef\xbb\xbf \t\r\n")
     if start[:1] == b"<":
-        found = [Outline(one.name, one.rings) for one in read_kml(data, path)]
+        found = [
+            Outline(one.name, [[place[:2] for place in ring] for ring in one.rings])
+            for one in read_kml(data, path).polygons
+        ]
     elif start[:4] == b"PK\x03\x04":
         raise WildlabError("is a zip, as KMZ is", "unpack it, and give the KML inside", file=path)
     else:
-        found = list(_outlines(_load(data, path), path, ""))
+        found = list(_outlines(parse_json(data, path, "GeoJSON"), ""))
     if not found:
         raise WildlabError("has no polygon", "draw the outline of each area as a polygon", file=path)
     if len(found) > MOST_AREAS:
@@ -210,130 +212,261 @@ def _names(given: list[str]) -> list[str]:
 
 
 # -- GeoJSON
-# ------------------------------------------------------------------------------------------------
-
-
-def _load(data: bytes, path: Path) -> Any:
-    def refuse(word: str) -> NoReturn:
-        raise ValueError(f"it has {word}, which is no number")
-
-    try:
-        return json.loads(data.decode("utf-8-sig"), parse_constant=refuse)
-    except (ValueError, RecursionError) as error:
-        said = printable(str(error) or "its brackets are too deep")[:100]
-        raise WildlabError(f"is not GeoJSON ({said})", "write it anew, in UTF-8", file=path) from None
-
-
-def _outlines(found: Any, path: Path, name: str, depth: int = 0) -> Iterator[Outline]:
-    if not isinstance(found, dict):
-        raise WildlabError(f"has a {type(found).__name__} where an object is wanted", _KIND, file=path)
-    _check_crs(found, path)
-    kind = found.get("type")
-    if kind == "FeatureCollection" and depth == 0:
-        for one in _list(found.get("features"), "features", path):
-            yield from _outlines(one, path, "", depth + 1)
-    elif kind == "Feature" and depth <= 1:
-        yield from _feature(found, path, depth)
-    elif kind == "GeometryCollection" and depth <= 2:
-        for one in _list(found.get("geometries"), "geometries", path):
-            yield from _outlines(one, path, name, depth + 3)
-    elif kind == "Polygon":
-        yield Outline(name, _rings(found.get("coordinates"), path, name))
-    elif kind == "MultiPolygon":
-        for one in _list(found.get("coordinates"), "coordinates", path):
-            yield Outline(name, _rings(one, path, name))
-    else:
-        shown = printable(str(kind))[:40]
-        raise WildlabError(f"has a {shown}, and polygons are wanted", _KIND, file=path, field="type")
-
 
 _KIND = "give a Polygon, a MultiPolygon, a Feature or a FeatureCollection of them"
 
 
-def _feature(found: Mapping[str, Any], path: Path, depth: int) -> Iterator[Outline]:
-    about = found.get("properties")
-    about = about if isinstance(about, dict) else {}
-    given = next((about[key] for key in NAMES if about.get(key) not in (None, "")), found.get("id", ""))
-    name = str(given) if isinstance(given, str | int | float) else ""
-    animals = about.get("animals")
-    if animals is None:
-        number = math.nan
-    elif isinstance(animals, int | float) and not isinstance(animals, bool) and 0 <= animals < 1e9:
-        number = float(animals)
+def _outlines(found: Field, name: str, depth: int = 0) -> Iterator[Outline]:
+    """Outlines of an object that is so deep in others: a feature in a collection, geometries in a feature."""
+    kind = found.member("type").value
+    _check_crs(found.member("crs"))
+    if kind == "FeatureCollection" and depth == 0:
+        for one in found.member("features").items():
+            yield from _outlines(one, "", 1)
+    elif kind == "Feature" and depth <= 1:
+        yield from _feature(found)
+    elif kind == "GeometryCollection" and depth <= 2:
+        for one in found.member("geometries").items():
+            yield from _outlines(one, name, 3)
+    elif kind == "Polygon":
+        yield Outline(name, _rings(found.member("coordinates"), name))
+    elif kind == "MultiPolygon":
+        for one in found.member("coordinates").items():
+            yield Outline(name, _rings(one, name))
     else:
+        raise found.member("type").fail("polygons are wanted", _KIND)
+
+
+def _feature(found: Field) -> Iterator[Outline]:
+    about = found.member("properties").value
+    about = about if isinstance(about, dict) else {}
+    given = next((about[key] for key in NAMES if about.get(key) not in (None, "")), found.value.get("id", ""))
+    name = str(given) if isinstance(given, str | int | float) else ""
+    count = about.get("animals")
+    if count is not None and (
+        isinstance(count, bool) or not isinstance(count, int | float) or not 0 <= count < 1e9
+    ):
         raise WildlabError(
-            f"an area has {printable(str(animals))[:40]!r} animals",
+            f"an area has {printable(str(count))[:40]!r} animals",
             "give a number from 0 on, or take the property out",
-            file=path,
+            file=found.path,
             field="animals",
         )
-    if found.get("geometry") is None:
-        raise WildlabError("a Feature has no geometry", _KIND, file=path, field="geometry")
-    parts = list(_outlines(found["geometry"], path, name, max(depth, 1) + 1))
+    parts = list(_outlines(found.member("geometry"), name, 2))
     # The parts of a feature share its animals by their sizes, which are not known yet: one part has them.
-    if len(parts) > 1 and not math.isnan(number):
+    if len(parts) > 1 and count is not None:
         raise WildlabError(
-            f"{name or 'an area'} has {number:g} animals in {len(parts)} polygons together",
+            f"{name or 'an area'} has {count:g} animals in {len(parts)} polygons together",
             "say for each polygon how many, as a Feature of its own",
-            file=path,
+            file=found.path,
             field="animals",
         )
-    yield from (one._replace(animals=number) for one in parts)
+    yield from (one._replace(animals=math.nan if count is None else float(count)) for one in parts)
 
 
-def _check_crs(found: Mapping[str, Any], path: Path) -> None:
-    crs = found.get("crs")
-    if crs is None:
+def _check_crs(crs: Field) -> None:
+    if crs.value is None:
         return
-    about = crs.get("properties") if isinstance(crs, dict) else None
+    about = crs.value.get("properties") if isinstance(crs.value, dict) else None
     name = about.get("name") if isinstance(about, dict) else None
     if not isinstance(name, str) or not WGS84.fullmatch(name.strip().replace("::", ":")):
-        said = printable(str(name if name is not None else crs))[:60]
-        raise WildlabError(
-            f"its coordinates are of {said}",
+        raise crs._replace(value=crs.value if name is None else name).fail(
+            "WGS84 is wanted",
             "write it in WGS84, longitude and latitude in degrees (EPSG:4326), as GeoJSON wants it",
-            file=path,
-            field="crs",
         )
 
 
-def _list(found: Any, field: str, path: Path) -> list[Any]:
-    if not isinstance(found, list):
-        raise WildlabError("is no list", _KIND, file=path, field=field)
-    return found
-
-
-def _rings(found: Any, path: Path, name: str) -> list[list[tuple[float, float]]]:
+def _rings(found: Field, name: str) -> list[list[tuple[float, float]]]:
     rings = []
-    for number, ring in enumerate(_list(found, "coordinates", path)):
-        what = printable(_what(name[:MOST_LETTERS] or "an area", number))
+    for ring, given in enumerate(found.items()):
+        what = printable(_what(name[:MOST_LETTERS] or "an area", ring))
         points = []
-        for at, point in enumerate(_list(ring, "coordinates", path)):
-            good = isinstance(point, list) and 2 <= len(point) <= 4
-            if not good or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in point):
-                raise WildlabError(
-                    f"point {at + 1} of {what} is {printable(str(point))[:40]}",
-                    "give longitude and latitude, two numbers",
-                    file=path,
-                    field="coordinates",
+        for point in given.items():
+            pair: Any = (
+                point.value if isinstance(point.value, list) and 2 <= len(point.value) <= 4 else [None]
+            )
+            if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in pair):
+                raise point.fail(
+                    f"longitude and latitude of a point of {what} are wanted", "give two numbers"
                 )
-            points.append((_float(point[0]), _float(point[1])))
+            # Also of whole numbers that are too large for one.
+            lon, lat = (float(x) if abs(x) < 1e300 else math.inf for x in pair[:2])
+            points.append((lon, lat))
         if points and points[0] != points[-1]:
             raise WildlabError(
                 f"{what} is not closed: its last point is not its first",
                 "repeat the first point at the end",
-                file=path,
-                field="coordinates",
+                file=found.path,
+                field=given.where,
             )
         rings.append(points)
     if not rings:
-        raise WildlabError("a polygon has no ring", _KIND, file=path, field="coordinates")
+        raise found.fail("a polygon has no ring", _KIND)
     return rings
 
 
-def _float(value: float) -> float:
-    """Also of whole numbers that are too large for one."""
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
+# -- rings
+
+#: The most points of a ring; a surveyor's fence has hundreds.
+MOST_POINTS = 5_000
+#: Square metres below which a ring is a slip of the pen.
+LEAST_AREA = 1.0
+#: Sine of the angle below which a side that turns back lies on the one before it.
+STRAIGHT = 1e-9
+
+
+def checked_ring(points: list[tuple[float, float]], what: str, file: str) -> Array:
+    """Longitude and latitude of a ring, looked at as numbers on the Earth.
+
+    Parameters
+    ----------
+    points
+        Longitude and latitude, degrees; the last may repeat the first.
+    what
+        Whose ring it is, for messages.
+    file
+        Where it was found.
+
+    Returns
+    -------
+    (K, 2) longitude, latitude, degrees; not closed, no point twice in a row.
+
+    Raises
+    ------
+    WildlabError
+        Where there are too few or too many points, or they are not degrees of one place.
+    """
+    if len(points) > MOST_POINTS + 1:
+        raise WildlabError(
+            f"{what} has {len(points):,} points, and {MOST_POINTS:,} are the most that is planned with",
+            "simplify the outline",
+            file=file,
+        )
+    ring = np.array(points, float).reshape(-1, 2)
+    if not np.isfinite(ring).all():
+        at = int(np.flatnonzero(~np.isfinite(ring).all(axis=1))[0])
+        raise WildlabError(f"point {at + 1} of {what} is no finite number", "give degrees", file=file)
+    _on_the_earth(ring, what, file)
+    if len(ring) > 1 and (ring[0] == ring[-1]).all():
+        ring = ring[:-1]
+    if len(ring) > 1:
+        ring = ring[~(ring == np.roll(ring, 1, axis=0)).all(axis=1)]
+    if len(ring) < 3:
+        raise WildlabError(
+            f"{what} has {len(ring)} different point{'' if len(ring) == 1 else 's'}",
+            "an outline needs three corners at least",
+            file=file,
+        )
+    if np.ptp(ring[:, 0]) > 180:
+        raise WildlabError(
+            f"the longitudes of {what} span {np.ptp(ring[:, 0]):.0f} degrees",
+            "split an area that crosses the antimeridian at 180 degrees, each part as a polygon of its own",
+            file=file,
+        )
+    return ring
+
+
+def _on_the_earth(ring: Array, what: str, file: str) -> None:
+    most = np.abs(ring).max(axis=0) if len(ring) else np.zeros(2)
+    if (most > 180).any():
+        raise WildlabError(
+            f"{what} has a coordinate of {most.max():g}, which is no degree",
+            "give longitude and latitude in degrees of WGS84 (EPSG:4326), not metres of a map projection",
+            file=file,
+        )
+    if most[1] > 90:
+        if most[0] <= 90:
+            raise WildlabError(
+                f"{what} has a latitude of {most[1]:g} degrees: its coordinates are swapped",
+                "give longitude first, then latitude",
+                file=file,
+            )
+        raise WildlabError(
+            f"{what} has a latitude of {most[1]:g} degrees", "give one of at most 90", file=file
+        )
+
+
+def check_shape(ring: Array, what: str, file: str) -> None:
+    """Refuse a ring that bounds nothing, or that is not sure what it bounds.
+
+    Parameters
+    ----------
+    ring
+        (K, 2) metres, not closed.
+    what, file
+        As for `checked_ring`.
+
+    Raises
+    ------
+    WildlabError
+        Where its area is next to nothing, or it crosses or touches itself.
+    """
+    met = crossing(ring)
+    if met is not None:
+        one, other = met
+        raise WildlabError(
+            f"{what} crosses itself: the side after point {one + 1} meets the side after point {other + 1}",
+            "put its points in the order in which they follow each other along the fence",
+            file=file,
+        )
+    if ring_area(ring) < LEAST_AREA:
+        raise WildlabError(
+            f"{what} bounds {ring_area(ring):.2g} square metres", "check its coordinates", file=file
+        )
+
+
+def ring_area(ring: Array) -> float:
+    """Area within a ring (K, 2) that does not cross itself, square metres.
+
+    Examples
+    --------
+    >>> ring_area(np.array([[0.0, 0.0], [0.0, 20.0], [10.0, 20.0], [10.0, 0.0]]))
+    200.0
+    """
+    p, q = ring, np.roll(ring, -1, axis=0)
+    return float(abs(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])) / 2)
+
+
+def crossing(ring: Array) -> tuple[int, int] | None:
+    """Two sides of a ring (K, 2) that meet, but for the corner that neighbours share; None where none do.
+
+    Returns
+    -------
+    Numbers of the sides, by the points that they begin at; or None.
+
+    Examples
+    --------
+    >>> crossing(np.array([[0.0, 0.0], [10.0, 10.0], [10.0, 0.0], [0.0, 10.0]]))
+    (0, 2)
+    >>> crossing(np.array([[0.0, 0.0], [0.0, 10.0], [10.0, 10.0]]))
+    """
+    n = len(ring)
+    begins, ends = ring, np.roll(ring, -1, axis=0)
+    for one in range(n):
+        others = np.arange(one + 1, n)
+        # Neighbours share a corner; they meet beyond it only where the second one turns straight back.
+        apart = others[(others != one + 1) & ~((one == 0) & (others == n - 1))]
+        met = _segments_meet(begins[one], ends[one], begins[apart], ends[apart])
+        if met.any():
+            return one, int(apart[np.argmax(met)])
+        follows = (one + 1) % n
+        ahead, back = ends[one] - begins[one], ends[follows] - begins[follows]
+        lengths = float(np.hypot(*ahead) * np.hypot(*back))
+        if abs(float(_cross(ahead, back))) <= STRAIGHT * lengths and float(ahead @ back) < 0:
+            return min(one, follows), max(one, follows)
+    return None
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _segments_meet(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """Whether the segment a-b meets each of the segments c-d, touching included."""
+    side_c, side_d = _cross(b - a, c - a), _cross(b - a, d - a)
+    side_a, side_b = _cross(d - c, a - c), _cross(d - c, b - c)
+    straddle = (side_c * side_d <= 0) & (side_a * side_b <= 0)
+    # On one line, the products are all zero, and the boxes about the segments decide.
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    boxes = ((np.minimum(c, d) <= high) & (np.maximum(c, d) >= low)).all(axis=-1)
+    return np.asarray(straddle & boxes)

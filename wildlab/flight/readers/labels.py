@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular, unreadable
-from wildlab.flight.readers.label_json import read_json_boxes
-from wildlab.flight.readers.label_table import read_table_boxes
-from wildlab.flight.readers.label_yolo import read_yolo_folder
-from wildlab.flight.readers.marked import MOST_BYTES, MOST_IN_FRAME, Marked
+from wildlab.flight.readers.box_files import read_table_boxes, read_yolo_folder
+from wildlab.flight.readers.boxes import MOST_BYTES, MOST_IN_FRAME, Marked, read_json_boxes
 
 Array = NDArray[np.float64]
 
@@ -218,7 +216,6 @@ def _read(path: Path, group: str | None, truth: Marked | None) -> Marked:
         data = read_regular(path, MOST_BYTES)
     except FileNotFoundError:
         raise WildlabError("there is no such file", "check the path", file=path) from None
-    start = data[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()
-    if start[:1] in (b"{", b"["):
-        return read_json_boxes(data.removeprefix(b"\xef\xbb\xbf"), path, group=group, truth=truth)
+    if data[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"["):
+        return read_json_boxes(data, path, group=group, truth=truth)
     return read_table_boxes(data, path, group=group)

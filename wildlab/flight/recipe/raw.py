@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.files import did_you_mean, inside, printable, read_regular
 from wildlab.flight.readers.autoferry import Part, read_part
-from wildlab.flight.readers.logs.formats import FOLDERS, read_folder, read_log
-from wildlab.flight.readers.logs.log import RawLog, Stream
-from wildlab.flight.readers.logs.parts import of_images, stamped_by, stream_of
+from wildlab.flight.readers.formats import FOLDERS, read_folder, read_log
+from wildlab.flight.readers.log import RawLog, Stream
+from wildlab.flight.readers.parts import of_images, stamped_by, stream_of
 from wildlab.flight.recipe.delimited import is_packed, packed, read_delimited
 from wildlab.flight.recipe.matlab import read_matlab, table_of
 from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone

@@ -10,8 +10,8 @@ from pydantic import Field, field_validator, model_validator
 from wildlab.flight.files import Strict, did_you_mean, is_safe_name, leaves_folder
 from wildlab.flight.manifest_parts import GnssPart, ImuPart, MagnetometerPart
 from wildlab.flight.readers.autoferry import Part
-from wildlab.flight.readers.logs.formats import FOLDERS, FORMATS
-from wildlab.flight.readers.logs.log import PARTS
+from wildlab.flight.readers.formats import FOLDERS, FORMATS
+from wildlab.flight.readers.log import PARTS
 from wildlab.flight.recipe.parts import (
     Acceleration,
     Angle,

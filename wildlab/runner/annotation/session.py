@@ -15,11 +15,9 @@ from wildlab.errors import WildlabError
 from wildlab.files import csv_text, write_atomic
 from wildlab.flight.files import printable, read_regular, unreadable
 from wildlab.flight.manifest import FILE_NAME
-from wildlab.flight.readers.clicks import clicks as click_files
-from wildlab.flight.readers.frames.below import images_below
-from wildlab.flight.readers.frames.frame import file_name
-from wildlab.flight.readers.frames.image import SUFFIXES
-from wildlab.flight.readers.photos.folder import is_photos, natural_key
+from wildlab.flight.readers.formats import read_log
+from wildlab.flight.readers.frames.image import SUFFIXES, file_name, images_below
+from wildlab.flight.readers.photos import is_photos, natural_key
 from wildlab.flight.store import load_flight
 
 #: Images of a folder, points in one image, letters of a name, and bytes of a table, at most.
@@ -207,7 +205,7 @@ def read_points(table: Path) -> dict[str, list[Point]]:
         return {}
     if data.strip() == ",".join(COLUMNS).encode():
         return {}
-    log = click_files.read(table, data)
+    log = read_log(table, data, "clicks")
     part = log.parts["clicks"]
     if log.lost or not part.used.all():
         bad = [f"line {row}" for row in part.rows[~part.used][:1]] or list(log.lost[:1])

@@ -4,8 +4,7 @@ A file is opened only where it is a regular one, its claims are held against lim
 what cannot be used is a frame with a sentence in ``problem``: the rest goes on.
 """
 
-from wildlab.flight.readers.frames.frame import Frame, Polarity, Unit
-from wildlab.flight.readers.frames.image import read_image
+from wildlab.flight.readers.frames.image import Frame, Polarity, Unit, read_image
 from wildlab.flight.readers.frames.opening import Frames, open_frames
 
 __all__ = ["Frame", "Frames", "Polarity", "Unit", "open_frames", "read_image"]

@@ -6,20 +6,87 @@ header, and held against `MOST_PIXELS`.
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
-from typing import Literal, NamedTuple
+from typing import BinaryIO, Literal, NamedTuple
 
 Kind = Literal["png", "jpeg", "tiff"]
 
 #: The most pixels that are decoded: four times the largest camera sensors that fly on small aircraft.
 MOST_PIXELS = 100_000_000
-#: The most entries of a TIFF directory that are looked at.
-MOST_TAGS = 4096
-_PNG = b"\x89PNG\r\n\x1a\n"
+#: The most entries of a TIFF directory, and pieces of another file, that are looked at.
+MOST_TAGS, MOST_PIECES = 4096, 100_000
+PNG, JPEG, TIFF = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", (b"II*\0", b"MM\0*")
 #: JPEG markers that begin a frame and so have its size; the others of that range are tables.
 _FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _START_OF_SCAN, _END_OF_IMAGE = 0xDA, b"\xff\xd9"
+
+
+class HeaderPiece(NamedTuple):
+    """A segment of a JPEG (its marker) or a chunk of a PNG (its name), and where its content stands."""
+
+    kind: int | bytes
+    at: int
+    length: int
+
+
+class HeaderPieces(NamedTuple):
+    """Pieces of a file, of a JPEG those before its scan; its size (px, 0 where it says none); "" or a
+    problem."""
+
+    found: list[HeaderPiece]
+    width: int = 0
+    height: int = 0
+    problem: str = ""
+
+
+def jpeg_pieces(stream: BinaryIO, size: int) -> HeaderPieces:
+    """Segments of a JPEG of so many bytes; the last one begins the scan, where the header is whole."""
+    found: list[HeaderPiece] = []
+    width = height = 0
+    at = 2
+    for _ in range(MOST_PIECES):
+        stream.seek(at)
+        head = stream.read(4)
+        if len(head) < 4:
+            return HeaderPieces(found, width, height, "the file is cut off inside its header")
+        marker = head[1]
+        if head[0] != 0xFF:
+            return HeaderPieces(found, width, height, "its header is damaged")
+        if marker in (0xFF, 0x01) or 0xD0 <= marker <= 0xD7:
+            at += 1 if marker == 0xFF else 2  # fill bytes, and markers that stand alone
+            continue
+        length = max(struct.unpack(">H", head[2:])[0] - 2, 0)
+        found.append(HeaderPiece(marker, at + 4, length))
+        if marker in (_START_OF_SCAN, _END_OF_IMAGE[1]):
+            break
+        if at + 4 + length > size:
+            return HeaderPieces(found[:-1], width, height, "the file is cut off inside its header")
+        if marker in _FRAME_MARKERS and length >= 5:
+            height, width = struct.unpack(">HH", stream.read(5)[1:])
+        at += 4 + length
+    return HeaderPieces(found, width, height)
+
+
+def png_pieces(stream: BinaryIO, size: int) -> HeaderPieces:
+    """Chunks of a PNG of so many bytes up to its end."""
+    found: list[HeaderPiece] = []
+    width = height = 0
+    at = len(PNG)
+    for _ in range(MOST_PIECES):
+        stream.seek(at)
+        head = stream.read(8)
+        length, kind = int.from_bytes(head[:4], "big"), head[4:]
+        if len(head) < 8 or at + 12 + length > size:
+            return HeaderPieces(found, width, height, "the file is cut off before its end")
+        found.append(HeaderPiece(kind, at + 8, length))
+        if kind == b"IHDR" and length >= 8:
+            width, height = struct.unpack(">II", stream.read(8))
+        elif kind == b"IEND":
+            break
+        at += 12 + length
+    return HeaderPieces(found, width, height)
 
 
 class Header(NamedTuple):
@@ -60,11 +127,11 @@ def read_header(data: bytes) -> Header | str:
     'it is no PNG, JPEG or TIFF file'
     """
     try:
-        if data.startswith(_PNG):
+        if data.startswith(PNG):
             found: Header | str = _png(data)
-        elif data.startswith(b"\xff\xd8\xff"):
+        elif data.startswith(JPEG):
             found = _jpeg(data)
-        elif data[:4] in (b"II*\0", b"MM\0*"):
+        elif data[:4] in TIFF:
             found = _tiff(data)
         else:
             return "the file is empty" if not data else "it is no PNG, JPEG or TIFF file"
@@ -81,49 +148,28 @@ def read_header(data: bytes) -> Header | str:
 
 
 def _png(data: bytes) -> Header:
-    width, height = struct.unpack_from(">II", data, 16)
-    problem, at = "", len(_PNG)
-    while True:
-        if at + 12 > len(data):
-            problem = "the file is cut off before its end"
-            break
-        (length,) = struct.unpack_from(">I", data, at)
-        body = data[at + 4 : at + 8 + length]
-        if len(body) < 4 + length or at + 12 + length > len(data):
-            problem = "the file is cut off before its end"
-            break
+    struct.unpack_from(">II", data, 16)
+    pieces = png_pieces(io.BytesIO(data), len(data))
+    problem = pieces.problem
+    for one in pieces.found:
         # Damage is found here, where it can be said; the decoder would write to the terminal.
-        if zlib.crc32(body) != struct.unpack_from(">I", data, at + 8 + length)[0]:
-            problem = f"its part at byte {at:,} is damaged"
+        if (
+            zlib.crc32(data[one.at - 4 : one.at + one.length])
+            != struct.unpack_from(">I", data, one.at + one.length)[0]
+        ):
+            problem = f"its part at byte {one.at - 8:,} is damaged"
             break
-        if body[:4] == b"IEND":
-            break
-        at += 12 + length
-    return Header("png", width, height, problem)
+    return Header("png", pieces.width, pieces.height, problem)
 
 
 def _jpeg(data: bytes) -> Header | str:
-    at, size = 2, (0, 0)
-    while True:
-        if at + 4 > len(data):
-            return "the file is cut off inside its header"
-        if data[at] != 0xFF:
-            return "its header is damaged"
-        marker = data[at + 1]
-        if marker == 0xFF or marker == 0x01 or 0xD0 <= marker <= 0xD7:
-            at += 1 if marker == 0xFF else 2  # fill bytes, and markers that stand alone
-            continue
-        (length,) = struct.unpack_from(">H", data, at + 2)
-        if marker in _FRAME_MARKERS:
-            height, width = struct.unpack_from(">HH", data, at + 5)
-            size = (width, height)
-        if marker == _START_OF_SCAN:
-            break
-        at += 2 + max(length, 2)
+    pieces = jpeg_pieces(io.BytesIO(data), len(data))
+    if pieces.problem:
+        return pieces.problem
     # Inside a scan 0xFF is followed by 0 or a restart, so the end is found for certain. A thumbnail in the
     # header has an end of its own, which is why the search begins here.
-    whole = data.find(_END_OF_IMAGE, at) >= 0
-    return Header("jpeg", *size, "" if whole else "the file is cut off before its end")
+    whole = bool(pieces.found) and data.find(_END_OF_IMAGE, pieces.found[-1].at - 4) >= 0
+    return Header("jpeg", pieces.width, pieces.height, "" if whole else "the file is cut off before its end")
 
 
 def _tiff(data: bytes) -> Header | str:
@@ -137,9 +183,7 @@ def _tiff(data: bytes) -> Header | str:
         tags[tag] = (kind, values, at + 8)
 
     def numbers(tag: int) -> list[int]:
-        if tag not in tags:
-            return []
-        kind, values, at = tags[tag]
+        kind, values, at = tags.get(tag, (0, 0, 0))
         letter, size = {3: ("H", 2), 4: ("I", 4)}.get(kind, ("", 0))
         if not letter or values * size > len(data):
             return []
@@ -151,6 +195,5 @@ def _tiff(data: bytes) -> Header | str:
     if not width or not height:
         return "its header says no size"
     starts, lengths = numbers(273) or numbers(324), numbers(279) or numbers(325)
-    ends = [a + b for a, b in zip(starts, lengths, strict=False)]
-    whole = all(end <= len(data) for end in ends)
+    whole = all(a + b <= len(data) for a, b in zip(starts, lengths, strict=False))
     return Header("tiff", width[0], height[0], "" if whole else "the file is cut off before its end")

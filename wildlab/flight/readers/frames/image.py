@@ -1,26 +1,36 @@
-"""One image file as a frame: read as a regular file, its header believed before its content is decoded."""
+"""Image files as frames: read as regular files, their headers believed before their content is decoded."""
 
 from __future__ import annotations
 
 import io
+import os
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import read_regular
-from wildlab.flight.readers.frames.decoding import decode_image
-from wildlab.flight.readers.frames.dji import AS_COUNTS, read_dji
-from wildlab.flight.readers.frames.flir import gather_pieces, read_records, to_kelvin
-from wildlab.flight.readers.frames.frame import Frame, Polarity, Unit, file_name, spoilt
+from wildlab.flight.files import printable, read_regular, unreadable
 from wildlab.flight.readers.frames.headers import Header, read_header
-from wildlab.flight.readers.frames.valid import find_clipped, find_no_data, problem_of
+from wildlab.flight.readers.frames.scene import find_clipped, find_no_data, problem_of
+from wildlab.flight.readers.frames.thermal import (
+    AS_COUNTS,
+    RECORDS,
+    decode_image,
+    gather_pieces,
+    read_dji,
+    read_records,
+    to_kelvin,
+)
 
 #: What is taken for an image in a folder.
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".fff"})
+#: A mask of no pixel.
+NOTHING = np.zeros((0, 0), bool)
 #: The most bytes of an image file that are read.
 MOST_BYTES = 300_000_000
 #: The tag of EXIF that says how an image is to be turned.
@@ -29,6 +39,115 @@ ORIENTATION = 0x0112
 GREY = 6
 #: The most that a pixel may be read as, K: hotter than what a thermal camera measures is a broken constant.
 HOTTEST = 3000.0
+
+Unit = Literal["grey", "counts", "kelvin", "colour"]
+Polarity = Literal["white-hot", "black-hot", "unknown"]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One image.
+
+    Attributes
+    ----------
+    name
+        File name, or name of the clip and number of the frame in it, from 0.
+    time
+        s, from the first frame of a clip; None where it is not known.
+    image
+        (H, W) uint8 for ``grey``, (H, W, 3) uint8 red-green-blue for ``colour``, (H, W) uint16 for
+        ``counts``, (H, W) float32 K for ``kelvin``.
+    unit
+        What the numbers are.
+    polarity
+        Whether warm is bright.
+    valid
+        (H, W) bool: False where there is no scene, or nothing can be told of it.
+    problem
+        "" where the frame can be used, else a sentence; the image is then of size (0, 0).
+    note
+        What is to be known of how it was read, as a clause; "" where there is nothing.
+
+    Examples
+    --------
+    >>> Frame("a.png", None, np.zeros((2, 3), np.uint8), "grey", "unknown", np.ones((2, 3), bool)).usable
+    True
+    """
+
+    name: str
+    time: float | None
+    image: NDArray[Any]
+    unit: Unit
+    polarity: Polarity
+    valid: NDArray[np.bool_]
+    problem: str = ""
+    note: str = ""
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is no problem."""
+        return not self.problem
+
+
+def spoilt(name: str, problem: str, time: float | None = None) -> Frame:
+    """A frame that cannot be used, with the sentence that says why.
+
+    Parameters
+    ----------
+    name, time
+        As those of `Frame`.
+    problem
+        A clause or a sentence; it gets a capital and a full stop.
+
+    Returns
+    -------
+    Frame
+        Its image has no pixels.
+    """
+    said = problem[:1].upper() + problem[1:].rstrip(".") + "."
+    return Frame(name, time, np.zeros((0, 0), np.uint8), "grey", "unknown", NOTHING, said)
+
+
+def file_name(path: Path) -> str:
+    """A file's name as text that can be written: what is no UTF-8 in it stands as ``\\udcff``.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> file_name(Path("flight/a\\udcff.png"))
+    'a\\\\udcff.png'
+    """
+    return path.name.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def frame_name(path: Path, number: int) -> str:
+    """What a frame of a clip is called.
+
+    Parameters
+    ----------
+    path
+        Of the clip.
+    number
+        Of the frame, from 0.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> frame_name(Path("flights/a.mp4"), 12)
+    'a#000012'
+    """
+    return f"{Path(file_name(path)).stem}#{number:06d}"
 
 
 def read_image(path: Path, *, polarity: Polarity = "unknown") -> Frame:
@@ -63,13 +182,16 @@ def read_image(path: Path, *, polarity: Polarity = "unknown") -> Frame:
     if isinstance(found, str):
         return spoilt(name, found)
     image, unit, note = found
-    valid = ~find_no_data(image) & ~find_clipped(image)
-    problem = problem_of(image, valid)
-    if problem:
-        return spoilt(name, problem)
     warm = unit == "kelvin" or note == AS_COUNTS
     note = "; ".join(one for one in (note, _turn(data)) if one)
-    return Frame(name, None, image, unit, "white-hot" if warm else polarity, valid, note=note)
+    return masked(Frame(name, None, image, unit, "white-hot" if warm else polarity, NOTHING, note=note))
+
+
+def masked(frame: Frame) -> Frame:
+    """A frame with the mask of what shows the scene, or with the problem that nothing does."""
+    valid = ~find_no_data(frame.image) & ~find_clipped(frame.image)
+    problem = problem_of(frame.image, valid)
+    return spoilt(frame.name, problem, frame.time) if problem else replace(frame, valid=valid)
 
 
 def _turn(data: bytes) -> str:
@@ -107,7 +229,7 @@ def decode(data: bytes) -> tuple[NDArray[Any], Unit, str] | str:
     >>> decode(b"")
     'the file is empty'
     """
-    if data[:4] in (b"FFF\0", b"AFF\0"):
+    if data[:4] in RECORDS:
         records = _radiometric(data)
         return records if isinstance(records, str) else (*records, "")
     header = read_header(data)
@@ -185,3 +307,83 @@ def _radiometric(records: bytes) -> tuple[NDArray[Any], Unit] | str:
     kelvin = to_kelvin(found.counts, found.planck)
     kelvin[kelvin > HOTTEST] = np.nan
     return (kelvin, "kelvin") if np.isfinite(kelvin).mean() > 0.5 else (found.counts, "counts")
+
+
+def images_in(folder: Path) -> list[Path]:
+    """Images of a folder by their endings, in the order of their names.
+
+    Raises
+    ------
+    WildlabError
+        Where it cannot be read.
+    """
+    try:
+        return sorted(one for one in folder.iterdir() if one.suffix.lower() in SUFFIXES)
+    except OSError as error:
+        raise unreadable(error, folder) from None
+
+
+def still_files(paths: list[Path]) -> list[Path]:
+    """Image files named one by one, and those in folders, each once.
+
+    Raises
+    ------
+    WildlabError
+        Where a path is not there, or a folder holds none.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if not path.exists():
+            raise WildlabError("there is no such file or folder", "check the path", file=path)
+        inside = [one for one in images_in(path) if one.is_file()] if path.is_dir() else [path]
+        if not inside:
+            raise no_images(path)
+        found += inside
+    return list(dict.fromkeys(found))
+
+
+def no_images(folder: Path) -> WildlabError:
+    """An error about a folder without images, to be raised."""
+    endings = ", ".join(sorted(SUFFIXES))
+    return WildlabError("there are no images in this folder", f"name one with {endings} files", file=folder)
+
+
+def images_below(folder: Path, ids: Collection[str]) -> list[Path]:
+    """Images in the folders below a folder that are frames of a flight, in the order of their paths.
+
+    Parameters
+    ----------
+    folder
+        As ``DCIM``; links and hidden folders in it are not followed.
+    ids
+        What the flight calls its frames: names of files, with or without their endings.
+
+    Returns
+    -------
+    list of Path
+        Empty where no image there is one of these.
+
+    Raises
+    ------
+    WildlabError
+        Where two files in different folders have one name: which of them is meant nobody says.
+    """
+    wanted = {str(one) for one in ids}
+    stems = {Path(one).stem for one in wanted}
+    found: dict[str, Path] = {}
+    for here, folders, files in os.walk(folder):
+        folders[:] = sorted(one for one in folders if not one.startswith("."))
+        for name in sorted(files):
+            path = Path(here) / name
+            if path.suffix.lower() not in SUFFIXES or (name not in wanted and path.stem not in stems):
+                continue
+            if name in found:
+                both = [printable(one.parent.relative_to(folder).as_posix()) for one in (found[name], path)]
+                raise WildlabError(
+                    f"{printable(name)}, a frame of the flight, is in {both[0]} and in {both[1]}",
+                    f"name the folder that the flight has its images from: {both[0]} or {both[1]} in it",
+                    file=folder,
+                    field="--images",
+                )
+            found[name] = path
+    return sorted(found.values())

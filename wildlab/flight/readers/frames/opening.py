@@ -1,9 +1,13 @@
-"""Frames of a folder of images, of one image or of a video, one after another."""
+"""Frames of a folder of images, of one image or of a video, one after another.
+
+The container of a video is looked at before a decoder is: playlists lead to other files.
+"""
 
 from __future__ import annotations
 
+import os
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import compress, islice
 from pathlib import Path
@@ -14,22 +18,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import printable
-from wildlab.flight.readers.frames import image as images
-from wildlab.flight.readers.frames import video as videos
-from wildlab.flight.readers.frames.below import images_below
-from wildlab.flight.readers.frames.frame import Frame, Polarity, frame_name, spoilt
-from wildlab.flight.readers.frames.image import read_image
-from wildlab.flight.readers.frames.pixels import (
+from wildlab.flight.files import printable, regular_size
+from wildlab.flight.readers.frames.headers import MOST_PIXELS
+from wildlab.flight.readers.frames.image import (
+    NOTHING,
+    SUFFIXES,
+    Frame,
+    Polarity,
+    as_grey_or_colour,
+    frame_name,
+    images_below,
+    images_in,
+    masked,
+    read_image,
+    spoilt,
+)
+from wildlab.flight.readers.frames.scene import (
+    HELD,
+    MOST_ALIKE,
     Vignetting,
+    are_alike,
     find_dead,
+    find_overlay,
+    is_shutter,
     measure_vignetting,
     without_vignetting,
 )
-from wildlab.flight.readers.frames.shutter import HELD, MOST_ALIKE, are_alike, is_shutter, mark_shutter
-from wildlab.flight.readers.frames.valid import find_overlay
-from wildlab.flight.readers.frames.video import open_video, read_video
+from wildlab.flight.readers.frames.thermal import quiet
 
+#: What the problems of such frames have in them.
+CORRECTIONS = ("flat-field correction", "picture is held")
 #: Images of a folder that are looked at, and those that are read, each with the next one, to find what stays:
 #: burnt-in text, dead pixels, dark corners.
 MOST_FILES, SAMPLE = 1_000_000, 12
@@ -228,7 +246,7 @@ class Frames:
             for number in numbers:
                 capture.set(cv2.CAP_PROP_POS_FRAMES, float(number))
                 two = [
-                    videos.as_frame(frame_name(self.path, int(number)), None, picture, self.polarity)
+                    as_frame(frame_name(self.path, int(number)), None, picture, self.polarity)
                     for done, picture in (capture.read(), capture.read())
                     if done
                 ]
@@ -265,13 +283,13 @@ def open_frames(
     WildlabError
         Where there is nothing, or nothing that is an image or a video; as `images_below`.
     """
-    kinds = ", ".join(sorted(images.SUFFIXES | videos.SUFFIXES))
+    kinds = ", ".join(sorted(SUFFIXES | VIDEOS))
     if path.is_dir():
-        found = sorted(one for one in path.iterdir() if one.suffix.lower() in images.SUFFIXES)[:MOST_FILES]
+        found = images_in(path)[:MOST_FILES]
         if not found and ids:
             found = images_below(path, ids)
         if not found:
-            clips = sorted(one.name for one in path.iterdir() if one.suffix.lower() in videos.SUFFIXES)
+            clips = sorted(one.name for one in path.iterdir() if one.suffix.lower() in VIDEOS)
             fix = (
                 f"name one of its videos, {clips[0]} for instance"
                 if clips
@@ -284,13 +302,13 @@ def open_frames(
         return Frames(path, tuple(found), len(found), polarity, even=even)
     if not path.exists():
         raise WildlabError("there is no such file or folder", "check the path", file=path)
-    if path.suffix.lower() in images.SUFFIXES:
+    if path.suffix.lower() in SUFFIXES:
         return Frames(path, (path,), 1, polarity, even=even)
-    if path.suffix.lower() in videos.SUFFIXES:
+    if path.suffix.lower() in VIDEOS:
         capture = open_video(path)
         claimed = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         capture.release()
-        known = np.isfinite(claimed) and 0 < claimed <= videos.MOST_FRAMES
+        known = np.isfinite(claimed) and 0 < claimed <= MOST_FRAMES
         return Frames(path, (), int(claimed) if known else None, polarity, even=even)
     raise WildlabError(
         f"the name ends in {path.suffix!r}", f"give a folder, or a file in one of {kinds}", file=path
@@ -312,12 +330,155 @@ def filled(image: NDArray[Any], dead: NDArray[np.bool_]) -> NDArray[Any]:
 
 def _folders_with_images(path: Path) -> list[str]:
     """Names of the first folders in a folder that have images."""
-
-    def has_images(folder: Path) -> bool:
-        try:
-            return any(one.suffix.lower() in images.SUFFIXES for one in islice(folder.iterdir(), 1000))
-        except OSError:  # a closed one
-            return False
-
     folders = sorted(one for one in path.iterdir() if one.is_dir())[:50]
-    return [printable(one.name) for one in folders if has_images(one)][:3]
+    found = []
+    for one in folders:
+        # Not into a closed one.
+        if os.access(one, os.R_OK | os.X_OK) and images_in(one):
+            found.append(printable(one.name))
+    return found[:3]
+
+
+# -- flat-field corrections
+
+
+def mark_shutter(frames: Iterable[Frame], held_can_be_told: bool) -> Iterator[Frame]:
+    """Frames in their order; those of a shutter with a problem in place of their image.
+
+    Parameters
+    ----------
+    frames
+        Of one camera, one after another.
+    held_can_be_told
+        Whether neighbouring frames of this camera differ as a rule.
+
+    Yields
+    ------
+    Frame
+        From the third one alike on, a picture is held; the first two of them stay.
+    """
+    before: NDArray[Any] | None = None
+    run = 1
+    for frame in frames:
+        if not frame.usable:
+            yield frame
+            continue
+        run = run + 1 if before is not None and are_alike(before, frame.image) else 1
+        before = frame.image
+        if is_shutter(frame.image, frame.valid):
+            said = "the shutter is closed: it shows noise and nothing else (flat-field correction)"
+            yield spoilt(frame.name, said, frame.time)
+        elif held_can_be_told and run >= HELD:
+            said = f"its picture is held: it repeats the {HELD - 1} frames before it to the last bit"
+            yield spoilt(frame.name, said, frame.time)
+        else:
+            yield frame
+
+
+# -- videos
+
+#: What is taken for a video.
+VIDEOS = frozenset({".mp4", ".mov", ".m4v", ".avi", ".mkv"})
+#: The most bytes of a video: a day of a thermal camera.
+MOST_BYTES = 200_000_000_000
+#: Frames after which a video that claims more is taken for broken.
+MOST_FRAMES = 10_000_000
+#: By how many frames a sound video may have fewer than it claims.
+UNSURE = 2
+
+
+def open_video(path: Path) -> Any:
+    """A decoder for a video file.
+
+    Parameters
+    ----------
+    path
+        MP4, MOV, AVI or MKV.
+
+    Returns
+    -------
+    cv2.VideoCapture
+        Opened.
+
+    Raises
+    ------
+    WildlabError
+        Where it is no such file, claims too large a picture or cannot be decoded.
+    """
+    fix = "give a video as MP4, MOV, AVI or MKV, or a folder of its frames as images"
+    try:
+        regular_size(path, MOST_BYTES)
+        with path.open("rb") as stream:
+            start = stream.read(12)
+    except FileNotFoundError:
+        raise WildlabError("there is no such file", "check the path", file=path) from None
+    known = start[4:8] in (b"ftyp", b"moov", b"mdat", b"wide", b"free") or start[:4] == b"\x1aE\xdf\xa3"
+    if not known and not (start[:4] == b"RIFF" and start[8:12] == b"AVI "):
+        raise WildlabError("does not begin as a video does", fix, file=path)
+    # FFmpeg would write to the terminal what is said below; OpenCV looks for this once, at the first video.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    # OpenCV's other readers would take a name with a per cent sign for a series of images.
+    with quiet():
+        capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    if not capture.isOpened():
+        raise WildlabError("cannot be decoded as a video", fix, file=path)
+    width, height = capture.get(cv2.CAP_PROP_FRAME_WIDTH), capture.get(cv2.CAP_PROP_FRAME_HEIGHT)
+    if not 0 < width * height <= MOST_PIXELS:
+        capture.release()
+        raise WildlabError(f"claims pictures of {width:.0f} x {height:.0f} pixels", fix, file=path)
+    return capture
+
+
+def read_video(
+    path: Path, wanted: Callable[[int], bool] = lambda number: True, *, polarity: Polarity = "unknown"
+) -> Iterator[Frame]:
+    """Frames of a video, one after another.
+
+    Parameters
+    ----------
+    path
+        Of the video.
+    wanted
+        Of the number of a frame, from 0: whether it is wanted. Others are gone over: seeking is not exact in
+        compressed video.
+    polarity
+        Of the camera.
+
+    Yields
+    ------
+    Frame
+        Named ``clip#000012``; its time is by the frame rate. Where the video breaks off, a last one has the
+        problem.
+
+    Raises
+    ------
+    WildlabError
+        As `open_video`.
+    """
+    capture = open_video(path)
+    try:
+        rate = capture.get(cv2.CAP_PROP_FPS)
+        claimed = capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        for number in range(MOST_FRAMES):
+            done, picture = capture.read() if wanted(number) else (capture.grab(), None)
+            if not done and number < claimed - UNSURE and wanted(number):
+                yield spoilt(
+                    frame_name(path, number), f"the video breaks off: it claims {claimed:.0f} frames"
+                )
+            if not done:
+                return
+            if picture is None:
+                continue
+            name = frame_name(path, number)
+            time = number / rate if np.isfinite(rate) and rate > 0 else None
+            yield as_frame(name, time, picture, polarity)
+    finally:
+        capture.release()
+
+
+def as_frame(name: str, time: float | None, picture: Any, polarity: Polarity) -> Frame:
+    """A decoded picture (H, W, 3), blue first, as a frame with its mask."""
+    found = as_grey_or_colour(picture)
+    if isinstance(found, str):
+        return spoilt(name, found, time)
+    return masked(Frame(name, time, *found, polarity, NOTHING))

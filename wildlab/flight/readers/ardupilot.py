@@ -1,0 +1,527 @@
+"""What messages of ArduPilot say, in all generations of their names: times, motion, sensors, images."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.autopilot import (
+    AXES,
+    FIELD,
+    FIX_PLANE,
+    FIX_SPACE,
+    IMU,
+    at_times,
+    usable,
+)
+from wildlab.flight.readers.dataflash import MessageTable, Unit, read_lines, read_records, sniff, text_sniff
+from wildlab.flight.readers.judging import in_order, placed
+from wildlab.flight.readers.log import ANGLES, Array, Clock, Decoded, Mask, Readings, any_of
+from wildlab.flight.readers.text import percent
+from wildlab.flight.schema import SPEED
+from wildlab.flight.time.leap_seconds import week_to_utc
+from wildlab.flight.time.steady import fit_steady
+
+#: Fixes are written down by a loop that runs so often, s, at its slowest.
+LOOP_S = 0.02
+#: No fix is written down later than this, s.
+LATEST_S = 5.0
+#: So many messages on both sides of a step back make it one of the board, not of a damaged stamp.
+_SURE_ROWS = 5
+#: Messages that say something of the whole log.
+_LASTING = frozenset({"FMT", "FMTU", "UNIT", "MULT", "PARM", "VER", "MSG"})
+#: Spreads of this and more are what 16 bits hold, not what a receiver found; no undulation is so large.
+WORST_SPREAD_M, WORST_UNDULATION_M = 655.0, 200.0
+#: Metres of a step of 1e-7 deg of latitude, as ArduPilot takes it between degrees and metres.
+_STEP_M = 0.011131884502145034
+#: What an autopilot of this family calls itself, with its version.
+_VEHICLE = re.compile(
+    r"\b(?:Ardu\w+|APM:?\w+|AntennaTracker|Blimp|Rover|Sub)\s+V?\d[\w.()-]*(?: \([0-9a-f]+\))?"
+)
+#: Columns of a place -> their names with units.
+_PLACE = ("latitude_deg", "longitude_deg", "height_sea_m", "height_home_m")
+
+
+class ArdupilotLog(NamedTuple):
+    """Messages of a log by name, and how its stamps become UTC.
+
+    Attributes
+    ----------
+    tables
+        By name.
+    counted_in
+        What their rows count.
+    receiver
+        Messages of the satellite receiver that is used; None where there are none.
+    rows, stamps
+        (N,) where stamped messages stand in the file, and their stamps in s: for those that carry none.
+    clock
+        None where nothing in the log is stamped; without a base where UTC is not known.
+    """
+
+    tables: dict[str, MessageTable]
+    counted_in: str
+    receiver: MessageTable | None
+    rows: NDArray[np.int64]
+    stamps: Array
+    clock: Clock | None
+
+    def sensors(self, *names: str) -> list[MessageTable]:
+        """One table per sensor, of messages by these names, in their order."""
+        return [one for name in names if name in self.tables for one in self.tables[name].instances()]
+
+    def first(self, names: Sequence[str], *fields: str) -> MessageTable | None:
+        """Messages of the first sensor that has these fields."""
+        return next((one for one in self.sensors(*names) if one.has(*fields)), None)
+
+    def of(self, table: MessageTable) -> Array:
+        """(N,) s since the board was switched on; by their place in the file for messages without stamps."""
+        own = own_stamps(table)
+        if own is not None:
+            return own
+        if not len(self.rows):
+            return np.full(len(table), np.nan)
+        return np.interp(table.rows, self.rows, self.stamps, left=np.nan, right=np.nan)
+
+    def utc(self, stamps: Array) -> Array:
+        """(N,) s since 1970 of stamps; NaN where UTC is not known."""
+        if self.clock is None or not self.clock.base:
+            return np.full(len(stamps), np.nan)
+        return np.asarray(self.clock.offset_s + self.clock.rate * stamps)
+
+    def readings(
+        self, table: MessageTable, columns: dict[str, Array], unusable: dict[str, Mask] | None = None
+    ) -> Readings:
+        """Columns of messages with their times; all rows count, with a place or without."""
+        stamps = self.of(table)
+        times = {"time_s": self.utc(stamps), "time_log_s": stamps}
+        return Readings(times | columns, table.rows, self.counted_in, unusable or {}, anywhere=True)
+
+
+def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+    """A DataFlash log, its rows counted in messages.
+
+    Raises
+    ------
+    WildlabError
+        Where no message of it can be read or tells of motion or images, or PX4 wrote it.
+    """
+    found = read_records(data)
+    where = "one place" if found.places == 1 else f"{found.places} places"
+    share = percent(found.lost_bytes, len(data))
+    lost = [(found.lost_bytes, "byte", f"of {len(data)} ({share}) in {where} belong to no message")]
+    return _decoded(path, found.tables, "message", lost, "")
+
+
+def text_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+    """A DataFlash log as text, its rows counted in lines; errors as of `decode`."""
+    tables, lost, title = read_lines(data)
+    return _decoded(path, tables, "line", lost, title)
+
+
+# Damaged values may be anything: they are marked, not warned of.
+@np.errstate(all="ignore")
+def _decoded(
+    path: Path,
+    tables: dict[str, MessageTable],
+    counted_in: str,
+    lost: Sequence[tuple[int, str, str]],
+    title: str,
+) -> Decoded:
+    """A log of messages; `title` is what the file says of the vehicle outside of them."""
+    if not set(tables) - {"FMT"}:
+        problem = "holds no message of an ArduPilot log that can be read"
+        raise WildlabError(problem, "copy it from the card again", file=path)
+    if any(name in tables and tables[name].has(one) for name, one in (("ATT", "qw"), ("TIME", "StartTime"))):
+        problem = "is a log of PX4's old format sdlog2, whose messages have other units under the same names"
+        raise WildlabError(problem, "log with a newer PX4, as .ulg", file=path)
+    tables, left_out = longest_run(tables)
+    log, receivers = _clocked(tables, counted_in)
+    gnss = None if log.receiver is None else _gnss(log, log.receiver)
+    place = next((one for name in ("POS", "AHR2", "XKF1", "NKF1") if (one := _place_of(name, log))), None)
+    if place is None and gnss is not None and log.receiver is not None:
+        place = _place_of_gnss(gnss, log.receiver, log)
+    found = {
+        "gnss": gnss,
+        "poses": _poses(log, place),
+        "imu": _imu(log),
+        "magnetometer": _magnetometer(log),
+        "gimbal": _gimbal(log),
+        "triggers": _triggers(log),
+    }
+    parts = {name: part for name, part in found.items() if part is not None and len(part.columns["time_s"])}
+    if not parts:
+        problem = "has no message of attitude, position, sensors or images"
+        raise WildlabError(problem, "log these messages (LOG_BITMASK of the autopilot)", file=path)
+    said = [text for name, field in (("VER", "FWS"), ("MSG", "Message")) if name in tables
+            for text in tables[name].texts(field)]  # fmt: skip
+    vehicle = next((match.group() for text in (*said, title) if (match := _VEHICLE.search(text))), "")
+    return Decoded(parts, vehicle, log.clock, [*lost, *left_out], _notes(log, parts, receivers, place))
+
+
+# -- times
+
+
+def own_stamps(table: MessageTable) -> Array | None:
+    """(N,) s since the board was switched on, of messages that carry them; NaN: 0, which is none."""
+    if table.has("SampleUS"):
+        # When the sensor was read, not when that was written down.
+        stamps = table.get("SampleUS") / 1e6
+        if (stamps > 0).any():
+            return np.where(stamps > 0, stamps, np.nan)
+    if table.has("TimeUS"):
+        return table.get("TimeUS") / 1e6
+    # The first generation calls milliseconds of the week TimeMS, and its stamp T.
+    name = "T" if _week_in_ms(table) else "TimeMS"
+    return table.get(name) / 1e3 if table.has(name) else None
+
+
+def gps_utc(table: MessageTable) -> Array:
+    """(N,) s since 1970 by week and ms of the week of GPS or CAM messages; NaN where the week is 0."""
+    week = table.get("GWk", "Week", "GPSWeek")
+    ms = table.get("GMS", "TimeMS" if _week_in_ms(table) else "GMS", "GPSTime")
+    known = (week > 0) & (ms >= 0) & (ms < 7 * 86400e3)
+    return week_to_utc(np.where(known, week, np.nan), np.where(known, ms / 1e3, np.nan))
+
+
+def _week_in_ms(table: MessageTable) -> bool:
+    return table.has("TimeMS", "Week") and not table.has("GMS")
+
+
+def _true_fix(table: MessageTable) -> Mask:
+    """(N,) GPS messages with a fix in space, at a place, in a week."""
+    fixed = table.get("Status") >= FIX_SPACE
+    return np.asarray(fixed & placed(table.get("Lat"), table.get("Lng")) & np.isfinite(gps_utc(table)))
+
+
+def _clocked(tables: dict[str, MessageTable], counted_in: str) -> tuple[ArdupilotLog, list[MessageTable]]:
+    """A log with its clock by the true fixes of a receiver, and all receivers."""
+    log = ArdupilotLog(tables, counted_in, None, np.empty(0, np.int64), np.empty(0), None)
+    receivers = [one for one in log.sensors("GPS", "GPS2", "GPS3") if one.has("Lat", "Lng")]
+    receiver = next((one for one in receivers if _true_fix(one).any()), receivers[0] if receivers else None)
+    log = log._replace(receiver=receiver)
+    anchor = _stamped(tables)
+    if anchor is None:
+        return log, receivers
+    kept = in_order(anchor[1])
+    log = log._replace(rows=anchor[0].rows[kept], stamps=anchor[1][kept], clock=Clock(""))
+    if receiver is not None:
+        own, utc, fixed = log.of(receiver), gps_utc(receiver), _true_fix(receiver)
+        pairs = in_order(own, fixed) & in_order(utc, fixed)
+        if pairs.any():
+            fit = fit_steady(own[pairs], utc[pairs], resolution_s=LOOP_S)
+            log = log._replace(clock=Clock.fitted("GPS weeks", fit))
+    return log, receivers
+
+
+def longest_run(
+    tables: dict[str, MessageTable],
+) -> tuple[dict[str, MessageTable], list[tuple[int, str, str]]]:
+    """The messages of one time that the board was on, and those that are left out, as `Decoded.lost` has
+    them.
+
+    Stamps begin again where it was switched on again within a log: the longest time is kept, by its messages.
+    A few wrong stamps make no new time.
+    """
+    anchor = _stamped(tables)
+    if anchor is None or len(anchor[1]) < 2 * _SURE_ROWS:
+        return tables, []
+    rows, stamps = anchor[0].rows, anchor[1]
+    if not (np.diff(stamps) < -1.0).any():
+        return tables, []
+    middle = np.median(sliding_window_view(stamps, _SURE_ROWS), axis=1)
+    back = np.flatnonzero(middle[_SURE_ROWS:] < middle[:-_SURE_ROWS] - 1.0) + _SURE_ROWS
+    # Some places in a row see the same step: it is the one with the largest step between neighbours.
+    groups = np.split(back, np.flatnonzero(np.diff(back) > 1) + 1) if len(back) else []
+    begins = [int(group[np.argmin(stamps[group] - stamps[group - 1])]) for group in groups]
+    if not begins:
+        return tables, []
+    # What stands before the first stamp of a time, as an origin or a version, belongs to it.
+    edges = np.array([0, *(rows[np.array(begins) - 1] + 1), np.iinfo(np.int64).max])
+    every = np.concatenate([table.rows for table in tables.values()])
+    counts = np.histogram(every, edges.astype(float))[0]
+    best = int(np.argmax(counts))
+    kept = {
+        name: table
+        if name in _LASTING
+        else table.take((table.rows >= edges[best]) & (table.rows < edges[best + 1]))
+        for name, table in tables.items()
+    }
+    left_out = int(counts.sum() - counts[best])
+    said = (
+        f"of {counts.sum()} ({percent(left_out, int(counts.sum()))}): the board was switched on again within "
+        f"it, and of {len(counts)} stretches the longest is used"
+    )
+    return {name: table for name, table in kept.items() if len(table)}, [(left_out, "message", said)]
+
+
+def _stamped(tables: dict[str, MessageTable]) -> tuple[MessageTable, Array] | None:
+    """The most frequent messages with stamps, and these."""
+    for table in sorted(tables.values(), key=len, reverse=True):
+        if (own := own_stamps(table)) is not None:
+            return table, own
+    return None
+
+
+# -- places
+
+
+class PlaceTrack(NamedTuple):
+    """Positions by one kind of message: stamps (N,) s, columns (N,), and rows that are true but for order."""
+
+    name: str
+    stamps: Array
+    columns: dict[str, Array]
+
+    def at(self, stamps: Array) -> dict[str, Array]:
+        """Columns at other stamps (T,), s."""
+        high = any_of([np.isfinite(self.columns[one]) for one in _PLACE[2:]], len(self.stamps))
+        return at_times(self.stamps, self.columns, stamps, f"messages {self.name}", ~high)
+
+    def is_known(self) -> bool:
+        """Whether any of its rows can be used."""
+        return bool(np.isfinite(self.at(self.stamps)["latitude_deg"]).any())
+
+
+def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Readings:
+    """Satellite positions of one receiver, with what messages GPA say of how sure it was."""
+    get, stamps = receiver.get, log.of(receiver)
+    speed, course = get("Spd", unit="m/s"), np.radians(get("GCrs", unit="deg"))
+    fix, down = get("Status"), get("VZ", unit="m/s")
+    # A fix may be written down late; its own time then says so. One far from the clock's is damaged.
+    clock, own = log.utc(stamps), gps_utc(receiver)
+    columns = {
+        "time_s": np.where(_true_fix(receiver) & (np.abs(own - clock) < LATEST_S), own, clock),
+        "time_log_s": stamps,
+        **{"latitude_deg": get("Lat", unit="deg"), "longitude_deg": get("Lng", unit="deg")},
+        **{"height_sea_m": get("Alt", unit="m"), "v_down_m_s": down},
+        **{"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)},
+        **{"satellites": get("NSats"), "fix": fix, "hdop": get("HDop")},
+        **_accuracies(receiver, log, stamps, down),
+    }
+    unusable = {
+        "no fix": ~(fix >= FIX_PLANE),
+        "a fix without height": ~(fix >= FIX_SPACE),
+        "no GPS week": np.isfinite(get("GWk", "Week")) & np.isnan(own),
+        # Its parts to the north and east may each be possible.
+        "impossible speed": speed > SPEED[1],
+    }
+    return Readings(columns, receiver.rows, log.counted_in, unusable)
+
+
+def _accuracies(receiver: MessageTable, log: ArdupilotLog, stamps: Array, down: Array) -> dict[str, Array]:
+    """Columns from the messages GPA of the same receiver, which have the stamps of its GPS messages."""
+    instance = receiver.get("I")[:1]
+    for table in log.sensors(*(("GPA",) if receiver.name == "GPS" else ("GPA" + receiver.name[3:], "GPA2"))):
+        if np.isfinite(instance).any() and table.get("I")[0] != instance[0]:
+            continue
+        us = table.get("TimeUS") if table.has("TimeUS") else 1e3 * table.get("TimeMS")
+        theirs = np.where(np.isfinite(us), np.round(us), -2.0)
+        order = np.argsort(theirs, kind="stable")
+        wanted = np.nan_to_num(np.round(stamps * 1e6), nan=-1.0)
+        at = order[np.clip(np.searchsorted(theirs[order], wanted), 0, len(order) - 1)]
+        met = theirs[at] == wanted
+        made = {}
+        for column, name, most in (
+            ("sd_horizontal_m", "HAcc", WORST_SPREAD_M),
+            ("sd_vertical_m", "VAcc", WORST_SPREAD_M),
+            ("sd_velocity_m_s", "SAcc", WORST_SPREAD_M),
+            ("undulation_m", "Und", WORST_UNDULATION_M),
+        ):
+            values = table.get(name)[at]
+            made[column] = np.where(met & (values != 0) & (np.abs(values) < most), values, np.nan)
+        # ArduPilot has it the other way round: sea level minus ellipsoid.
+        made["undulation_m"] = -made["undulation_m"]
+        # A receiver that has no vertical velocity is logged with one of 0.
+        return made | {"v_down_m_s": np.where(met & (table.get("VV")[at] == 0), np.nan, down)}
+    return {}
+
+
+def _place_of(name: str, log: ArdupilotLog) -> PlaceTrack | None:
+    """True positions by messages POS, AHR2, or XKF1 and NKF1 with the origin of ORGN; None where none is."""
+    table = next(iter(log.sensors(name)), None)
+    if table is None:
+        return None
+    if name in ("XKF1", "NKF1"):
+        columns = _from_origin(table, log)
+    else:
+        columns = {
+            **{"latitude_deg": table.get("Lat", unit="deg"), "longitude_deg": table.get("Lng", unit="deg")},
+            "height_sea_m": table.get("Alt", unit="m"),
+            "height_home_m": table.get("RelHomeAlt", "RelAlt", unit="m"),
+        }
+        if table.has("RelOriginAlt"):
+            # Before the filter has its origin, heights count from nothing.
+            nowhere = np.isnan(table.get("RelOriginAlt"))
+            columns |= {one: np.where(nowhere, np.nan, columns[one]) for one in _PLACE[2:]}
+    place = PlaceTrack(name, log.of(table), columns)
+    return place if columns and place.is_known() else None
+
+
+def _place_of_gnss(gnss: Readings, receiver: MessageTable, log: ArdupilotLog) -> PlaceTrack | None:
+    """Positions of the satellite receiver; heights above home where its messages have the autopilot's."""
+    stamps, clock = gnss.columns["time_log_s"], log.clock
+    if clock is not None and clock.base:
+        stamps = (gnss.columns["time_s"] - clock.offset_s) / clock.rate
+    used = usable("gnss", gnss) & np.isfinite(stamps)
+    columns = {one: gnss.columns[one][used] for one in _PLACE[:3]}
+    columns["height_home_m"] = receiver.get("RelAlt", "RAlt", unit="m")[used]
+    return PlaceTrack(receiver.name, stamps[used], columns) if used.any() else None
+
+
+def _from_origin(table: MessageTable, log: ArdupilotLog) -> dict[str, Array]:
+    if "ORGN" not in log.tables:
+        return {}
+    origins = log.tables["ORGN"]
+    # Type 0 is where the filter counts from; 1 is home.
+    origins = origins.take(origins.get("Type") == 0) if origins.has("Type") else origins
+    latitude, longitude = origins.get("Lat", unit="deg"), origins.get("Lng", unit="deg")
+    since = log.of(origins)
+    kept = in_order(since, placed(latitude, longitude))
+    if not kept.any():
+        return {}
+    at = np.maximum(np.searchsorted(since[kept], log.of(table), side="right") - 1, 0)
+    latitude_0, longitude_0 = latitude[kept][at], longitude[kept][at]
+    north, east, down = (table.get(one, unit="m") for one in ("PN", "PE", "PD"))
+    step = north / _STEP_M * 1e-7
+    # The width of a degree halfway, as the autopilot has it: so its own degrees come back.
+    width = np.maximum(np.cos(np.radians(latitude_0 + step / 2)), 0.01)
+    return {
+        **{"latitude_deg": latitude_0 + step, "longitude_deg": longitude_0 + east / _STEP_M * 1e-7 / width},
+        "height_sea_m": origins.get("Alt")[kept][at] - down,
+        "height_home_m": np.full(len(table), np.nan),
+    }
+
+
+# -- motion
+
+
+def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
+    """Attitudes with the positions at their times; None where the log has no attitude.
+
+    Attitudes are those of messages ATT, else quaternions of XKQ or NKQ, else of AHR2.
+    """
+    euler, q = ("Roll", "Pitch", "Yaw"), ("Q1", "Q2", "Q3", "Q4")
+    filters = ("XKQ", "XKQ1", "NKQ", "NKQ1", "XKQ2", "NKQ2")
+    ways = ((("ATT",), euler), (filters, q), (("AHR2", "AHRS"), euler))
+    found = ((table, fields) for names, fields in ways if (table := log.first(names, *fields)) is not None)
+    table, fields = next(found, (None, ()))
+    if table is None:
+        return None
+    names = ANGLES if fields == euler else ("q_w", "q_x", "q_y", "q_z")
+    unit: Unit | None = "deg" if fields == euler else None
+    columns = {name: table.get(one, unit=unit) for name, one in zip(names, fields, strict=True)}
+    stamps = log.of(table)
+    where = {one: np.full(len(table), np.nan) for one in _PLACE} if place is None else place.at(stamps)
+    moving = log.first(("XKF1", "NKF1", "EKF1"), "VN", "VE", "VD")
+    if moving is not None:
+        v = {f"v_{one}_m_s": moving.get(f"V{one[0].upper()}", unit="m/s") for one in AXES}
+        columns |= at_times(log.of(moving), v, stamps, f"messages {moving.name}")
+    high = any_of([np.isfinite(where[one]) for one in _PLACE[2:]], len(table))
+    low = np.isfinite(where["latitude_deg"]) & ~high
+    return log.readings(table, columns | where, {"no height": low})._replace(anywhere=False)
+
+
+def _imu(log: ArdupilotLog) -> Readings | None:
+    """Specific force and rates of turn of the first IMU; None where the log has none."""
+    gyros, forces = ([f"{start}{axis}" for axis in "XYZ"] for start in ("Gyr", "Acc"))
+    table = log.first(("IMU", "IMU2", "IMU3"), "GyrX", "AccX")
+    force = table or next(iter(log.sensors("ACC", "ACC1", "ACC2", "ACC3")), None)
+    table = table or next(iter(log.sensors("GYR", "GYR1", "GYR2", "GYR3")), None)
+    if table is None or force is None:
+        return None
+    f = {name: force.get(one, unit="m/s2") for name, one in zip(IMU[:3], forces, strict=True)}
+    if force is not table:
+        f = at_times(log.of(force), f, log.of(table), f"messages {force.name}")
+    w = {name: table.get(one, unit="rad/s") for name, one in zip(IMU[3:], gyros, strict=True)}
+    return log.readings(table, f | w)
+
+
+def _magnetometer(log: ArdupilotLog) -> Readings | None:
+    """The field that the first compass found; None where the log has none."""
+    fields = ("MagX", "MagY", "MagZ")
+    table = log.first(("MAG", "MAG2", "MAG3"), *fields)
+    if table is None:
+        return None
+    return log.readings(
+        table, {name: table.get(one, unit="uT") for name, one in zip(FIELD, fields, strict=True)}
+    )
+
+
+def _gimbal(log: ArdupilotLog) -> Readings | None:
+    """Where the first gimbal looks: against north and the horizon, and its yaw against the airframe."""
+    table = log.first(("MNT", "MNT1", "MOUNT"), "Roll", "Pitch")
+    if table is None:
+        return None
+    fields = {
+        "roll_world_deg": "Roll",
+        "pitch_world_deg": "Pitch",
+        "yaw_world_deg": "YawE",
+        "pan_deg": "YawB",
+    }
+    columns = {name: table.get(one, unit="deg") for name, one in fields.items() if table.has(one)}
+    return log.readings(table, columns)
+
+
+def _triggers(log: ArdupilotLog) -> Readings | None:
+    """When the camera took an image: messages CAM, else TRIG, of the first camera.
+
+    The first generation has only GPS time, of the fix before: the messages around tell more closely.
+    """
+    table = log.first(("CAM", "TRIG"), "Lat", "Lng")
+    if table is None:
+        return None
+    get = table.get
+    latitude, longitude = get("Lat", unit="deg"), get("Lng", unit="deg")
+    # Before the first fix images have no place, but they were taken.
+    known = placed(latitude, longitude)
+    columns = {
+        "latitude_deg": np.where(known, latitude, np.nan),
+        "longitude_deg": np.where(known, longitude, np.nan),
+        **{name: get(name[:-4].title(), name[0].upper(), unit="deg") for name in ANGLES},
+    }
+    if table.has("RelAlt"):
+        # Without it, copters and planes meant different things by `Alt`.
+        columns |= {"height_sea_m": get("Alt", unit="m"), "height_home_m": get("RelAlt", unit="m")}
+    if table.has("Img"):
+        columns["number"] = get("Img")
+    return log.readings(table, columns)
+
+
+def _notes(
+    log: ArdupilotLog, parts: dict[str, Readings], receivers: list[MessageTable], place: PlaceTrack | None
+) -> list[str]:
+    notes, clock = [], log.clock
+    kinds = ("GPS", "ATT", "IMU", "CAM", "TRIG")
+    unstamped = [one for one in kinds if one in log.tables and own_stamps(log.tables[one]) is None]
+    if unstamped and clock is not None:
+        names = " and ".join(unstamped)
+        notes.append(f"messages {names} carry no stamps: their times are those of the messages around them")
+    if "imu" not in parts:
+        notes.append("it has no messages of an IMU: no rates of turn and no accelerations")
+    if clock is None:
+        notes.append("its messages carry no stamps")
+    elif not clock.base:
+        notes.append("no fix of a satellite receiver tells the time: its stamps are not known in UTC")
+    if "poses" in parts and place is not None:
+        known = {"sea level": "height_sea_m", "home": "height_home_m"}
+        above = " and ".join(what for what, one in known.items() if np.isfinite(place.columns[one]).any())
+        notes.append(
+            f"positions of poses are those of messages {place.name}; their heights count from {above}"
+        )
+    if len(receivers) > 1:
+        used = 1 + next(i for i, one in enumerate(receivers) if one is log.receiver)
+        notes.append(f"it has {len(receivers)} satellite receivers; receiver {used} is used")
+    if "triggers" in parts and "height_sea_m" not in parts["triggers"].columns:
+        notes.append("heights of its messages CAM are left out: it does not say what they count from")
+    return notes
+
+
+__all__ = ["decode", "sniff", "text_decode", "text_sniff"]

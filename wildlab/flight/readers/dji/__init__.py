@@ -1,1 +1,0 @@
-"""What DJI aircraft leave: subtitles, records of images, tables of AirData."""

@@ -1,1 +1,0 @@
-"""Surveyed points: KML, GeoJSON and tables."""

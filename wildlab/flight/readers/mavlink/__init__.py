@@ -1,1 +1,0 @@
-"""Telemetry of MAVLink as ground stations keep it."""

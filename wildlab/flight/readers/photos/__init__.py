@@ -1,1 +1,0 @@
-"""Folders of images: what stands in their headers."""

@@ -1,1 +1,0 @@
-"""ULog of PX4, with names of fields old and new."""

@@ -1,0 +1,563 @@
+"""MAVLink telemetry log (``.tlog``): what a ground station received, each frame behind its time of receipt.
+
+A time of receipt is eight bytes, big end first, us since 1970. Which messages there are, their fields and
+what goes into their checksums is pymavlink's knowledge (dialect ardupilotmega 2.0, which holds the common
+messages); walking and decoding is done here, because decoding each message into an object takes several
+times longer.
+
+The ground station stamps what it receives, late by up to seconds; the vehicle stamps what it measures,
+since it was switched on. What goes with what is fitted along the lower edge of the receipts
+(`wildlab.flight.time.fitting`), or, where the vehicle knows UTC, on what it says itself (``SYSTEM_TIME``).
+One vehicle is read, that which sent most attitudes; ground stations and other vehicles are named in the
+notes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.files import printable
+from wildlab.flight.readers.autopilot import (
+    AXES,
+    FIELD,
+    IMU,
+    Messages,
+    at_times,
+    device_angles,
+    fix_reasons,
+    heading_at,
+    wrapped,
+)
+from wildlab.flight.readers.judging import placed
+from wildlab.flight.readers.log import ANGLES, WORLD, Array, Clock, Decoded, Mask, Readings, any_of
+from wildlab.flight.time.fitting import ClockFit
+from wildlab.flight.time.steady import fit_steady
+
+#: So many sound frames say what a file is, where its name does not.
+ENOUGH = 3
+#: MAV_AUTOPILOT_INVALID and MAV_TYPE_GCS: what is no autopilot says so in its heartbeat.
+_NO_AUTOPILOT, _GROUND_STATION = 8, 6
+#: What vehicles are known by, best first.
+_FLIES = ("ATTITUDE", "GLOBAL_POSITION_INT", "GPS_RAW_INT")
+_FIRMWARE = re.compile(r"^(Ardu\w+|APM:?\w*|PX4|AntennaTracker|Blimp)\b.*\d")
+STANDARD_GRAVITY = 9.80665
+#: In units of g: what a device at rest and in flight feels in the middle, whatever it is called raw.
+_FELT = (0.5, 2.0)
+#: Values that mean "not known" in 8 and 16 bits.
+_NO_8, _NO_16 = 255, 65535
+#: 1990 and 2100, in us since 1970: no telemetry log is of another time.
+EARLIEST_US, LATEST_US = 631_152_000_000_000, 4_102_444_800_000_000
+VERSIONS = (0xFE, 0xFD)
+_SIGNED, _SIGNATURE = 0x01, 13
+#: A stamp begins with 0 for two thousand years yet, and the ninth byte begins a frame.
+_BEGINNING = re.compile(rb"\x00(?=[\x00-\xff]{7}[\xfd\xfe])", re.DOTALL)
+
+_TYPES = {
+    **{f"{kind}{bits}_t": f"<{kind[0]}{bits // 8}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)},
+    **{"float": "<f4", "double": "<f8"},
+}
+
+
+_COLUMNS = ("number", "message", "system", "component", "at", "size")
+
+
+class MavlinkFrames(NamedTuple):
+    """Sound frames of known messages in the order of the file; `data` is the whole file.
+
+    `table`: (N,) of `received_s` (s since 1970), `number` (which frame of the file it is, from 1), `message`,
+    `system`, `component`, `at` and `size` of the payload. `damaged`: frames with a wrong checksum. `unknown`:
+    message -> frames of it. `skipped`: bytes between frames, in so many `places`. `rest`: bytes of a last
+    frame that is cut.
+    """
+
+    data: bytes
+    table: NDArray[Any]
+    damaged: int
+    unknown: dict[int, int]
+    skipped: int
+    places: int
+    rest: int
+
+
+def _dialect() -> Any:
+    # Takes a tenth of a second, and only these logs need it.
+    from pymavlink.dialects.v20 import ardupilotmega
+
+    return ardupilotmega
+
+
+def _plausible(data: bytes, at: int) -> bool:
+    return EARLIEST_US < int.from_bytes(data[at : at + 8], "big") < LATEST_US
+
+
+def names(enumeration: str, value: int) -> str:
+    """What MAVLink calls a value, in small letters: ``names("MAV_TYPE", 1)`` is ``"fixed wing"``."""
+    entry = _dialect().enums.get(enumeration, {}).get(value)
+    return "" if entry is None else entry.name.removeprefix(enumeration + "_").replace("_", " ").lower()
+
+
+def walk(data: bytes) -> MavlinkFrames:
+    """All frames of a telemetry log, or of its beginning; none where it is no such log."""
+    dialect = _dialect()
+    checksum = dialect.x25crc
+    extra = {key: bytes([one.crc_extra]) for key, one in dialect.mavlink_map.items()}
+    rows: list[tuple[float, int, int, int, int, int, int]] = []
+    unknown: Counter[int] = Counter()
+    damaged = skipped = places = number = pos = covered = 0
+    length = len(data)
+    while pos + 16 <= length:
+        end, message, system, component, payload = _header(data, pos)
+        whole = 0 < end <= length and _plausible(data, pos)
+        known = message in extra
+        sound = False
+        if whole and known:
+            tail = data[pos + 9] + payload
+            found = checksum(data[pos + 9 : tail] + extra[message]).crc
+            sound = found == data[tail] | data[tail + 1] << 8
+        if not sound and not (whole and _begins(data, end)):
+            next_ = _BEGINNING.search(data, pos + 1)
+            if next_ is None:
+                break
+            pos = next_.start()
+            continue
+        number += 1
+        if sound:
+            stamp = int.from_bytes(data[pos : pos + 8], "big")
+            rows.append((stamp / 1e6, number, message, system, component, payload, data[pos + 9]))
+        elif known:
+            damaged += 1
+        else:
+            unknown[message] += 1
+        if pos > covered:
+            skipped, places = skipped + pos - covered, places + 1
+        pos = covered = end
+    table = np.array(rows, [("received_s", "f8"), *((name, "i8") for name in _COLUMNS)])
+    return MavlinkFrames(data, table, damaged, dict(unknown), skipped, places, length - covered)
+
+
+def _begins(data: bytes, at: int) -> bool:
+    """Whether a frame seems to begin, or the file ends before that can be seen."""
+    return len(data) - at <= 8 or (data[at] == 0 and data[at + 8] in VERSIONS)
+
+
+def _header(data: bytes, pos: int) -> tuple[int, int, int, int, int]:
+    """End of the frame (0: none is here), message, system, component, start of the payload."""
+    size = data[pos + 9]
+    if data[pos + 8] == VERSIONS[0]:
+        return pos + 16 + size, data[pos + 13], data[pos + 11], data[pos + 12], pos + 14
+    if data[pos + 8] == VERSIONS[1] and pos + 18 <= len(data) and not data[pos + 10] & ~_SIGNED:
+        signature = _SIGNATURE if data[pos + 10] & _SIGNED else 0
+        message = data[pos + 15] | data[pos + 16] << 8 | data[pos + 17] << 16
+        return pos + 20 + size + signature, message, data[pos + 13], data[pos + 14], pos + 18
+    return 0, -1, 0, 0, pos
+
+
+def messages(
+    frames: MavlinkFrames, name: str, system: int | None = None, component: int | None = None
+) -> Messages:
+    """Messages of one kind, with `received_s`, `system` and `component` beside their own fields.
+
+    Parameters
+    ----------
+    frames
+        Of `walk`.
+    name
+        As MAVLink calls it: ``"ATTITUDE"``.
+    system, component
+        From whom; None: from all.
+
+    Returns
+    -------
+    Messages
+        Fields that the sender left away (zeros at the end, extensions) are zero, as the format wants it.
+    """
+    table = frames.table
+    kind = next((one for one in _dialect().mavlink_map.values() if one.msgname == name), None)
+    chosen = table["message"] == (-1 if kind is None else kind.id)
+    for field, value in (("system", system), ("component", component)):
+        chosen &= table[field] == (table[field] if value is None else value)
+    table = table[chosen]
+    fields: dict[str, Any] = {one: table[one] for one in ("received_s", "system", "component")}
+    if kind is not None:
+        types = dict(zip(kind.fieldnames, kind.fieldtypes, strict=True))
+        counts = zip(kind.ordered_fieldnames, kind.array_lengths, strict=True)
+        dtype = np.dtype([_field(one, types[one], many) for one, many in counts])
+        width, data = dtype.itemsize, frames.data
+        spans = zip(table["at"].tolist(), table["size"].tolist(), strict=True)
+        joined = b"".join([data[a : a + min(n, width)].ljust(width, b"\0") for a, n in spans])
+        found = np.frombuffer(joined, dtype)
+        for one in dtype.names or ():
+            several = found[one].ndim > 1
+            fields |= (
+                {f"{one}[{i}]": found[one][:, i] for i in range(found[one].shape[1])}
+                if several
+                else {one: found[one]}
+            )
+    return Messages(name, fields, table["number"])
+
+
+def _field(name: str, kind: str, many: int) -> tuple[Any, ...]:
+    if kind == "char":
+        return name, f"S{max(many, 1)}"
+    return (name, _TYPES[kind], (many,)) if many else (name, _TYPES[kind])
+
+
+DAY_S = 86400.0
+#: Stamps that fall back by more than this mean that the vehicle was switched on again.
+RESTART_S = 10.0
+MOST_RUNS = 50
+#: A stamp goes with its receipt if it lies within this of it, the clocks' difference taken off.
+BESIDE_S = 60.0
+#: Messages with time since start that each autopilot sends all the time.
+_STAMPED = ("ATTITUDE", "GLOBAL_POSITION_INT", "SYSTEM_TIME", "LOCAL_POSITION_NED", "SCALED_IMU2")
+
+
+class Boot(NamedTuple):
+    """Runs of a vehicle from one start to the next, each with its clock.
+
+    `first` (S,): number of the frame that each begins with. `rate`, `offset_s` (S,): to UTC. `behind_s` (S,):
+    middle of what receipts are behind UTC. `clock`: of the longest run. `notes`: sentences.
+    """
+
+    first: NDArray[np.int64]
+    rate: Array
+    offset_s: Array
+    behind_s: Array
+    clock: Clock
+    notes: tuple[str, ...]
+
+    def utc(self, boot_s: Array, found: Messages) -> tuple[Array, Mask]:
+        """UTC (N,) of stamps (N,) in messages, s since 1970, and whether it goes with their receipts."""
+        run = np.maximum(np.searchsorted(self.first, found.rows, side="right") - 1, 0)
+        utc = self.offset_s[run] + self.rate[run] * boot_s
+        with np.errstate(invalid="ignore"):
+            return utc, np.abs(found.get("received_s") - self.behind_s[run] - utc) < BESIDE_S
+
+
+def find_boot(frames: MavlinkFrames, system: int, component: int) -> Boot | None:
+    """The clock of an autopilot; None where nothing that it sent has a stamp."""
+    kinds = {name: messages(frames, name, system, component) for name in _STAMPED}
+    number = np.concatenate([one.rows for one in kinds.values()])
+    order = np.argsort(number, kind="stable")
+    own = np.concatenate([one.get("time_boot_ms") for one in kinds.values()])[order] / 1e3
+    received = np.concatenate([one.get("received_s") for one in kinds.values()])[order]
+    known = own > 0
+    number, own, received = number[order][known], own[known], received[known]
+    if not len(own):
+        return None
+    starts = np.r_[0, 1 + np.flatnonzero(np.diff(own) < -RESTART_S)]
+    falls = len(starts) - 1
+    if falls >= MOST_RUNS:
+        # No vehicle is switched on so often: the stamps are of no use, and one line goes under most of them.
+        starts = starts[:1]
+    ends = np.r_[starts[1:], len(own)]
+    told = kinds["SYSTEM_TIME"]
+    unix = told.get("time_unix_usec") / 1e6
+    said = unix > 0
+    near = said & (np.abs(unix - told.get("received_s")) < DAY_S)
+    believed = bool(near.sum() > said.sum() / 2)
+    fits: list[ClockFit] = []
+    behind: list[float] = []
+    from_vehicle: list[bool] = []
+    late = np.empty(len(own))
+    for a, b in zip(starts, ends, strict=True):
+        fit = fit_steady(own[a:b], received[a:b], late=True)
+        inside = near & (told.rows >= number[a]) & (told.rows <= number[b - 1])
+        from_vehicle.append(believed and int(inside.sum()) > 2)
+        if from_vehicle[-1]:
+            fit = fit_steady(told.get("time_boot_ms")[inside] / 1e3, unix[inside])
+        fits.append(fit)
+        behind.append(float(np.median(received[a:b] - fit.to_reference(own[a:b]))))
+        late[a:b] = received[a:b] - fit.offset_s - fit.rate * own[a:b]
+    main = int(np.argmax(ends - starts))
+    base = "UTC of the messages SYSTEM_TIME" if from_vehicle[main] else "times of receipt"
+    notes = []
+    if said.any() and not believed:
+        far = int((np.abs(unix - told.get("received_s"))[said] >= DAY_S).sum())
+        year = int(1970 + np.median(unix[said]) // 31556952)
+        notes.append(
+            f"UTC of its messages SYSTEM_TIME is not believed: {far} of {said.sum()} are more than a day "
+            f"from their receipt (the middle one in the year {year})"
+        )
+    middle, worst = (float(np.percentile(late, share)) for share in (50, 99))
+    notes.append(
+        f"the ground station received {middle:.3f} s after the vehicle's UTC, in the middle"
+        if from_vehicle[main]
+        else "UTC is the ground station's: the vehicle's clock is fitted along the earliest receipts, the "
+        f"others are {middle:.3f} s later in the middle, 1 of 100 is more than {worst:.3f} s; what the "
+        "quickest took is not known"
+    )
+    if len(starts) > 1:
+        runs = len(starts)
+        notes.append(f"the vehicle was switched on {runs} times within it; each run has a clock of its own")
+    if falls >= MOST_RUNS:
+        notes.append(f"the vehicle's stamps fall back {falls} times: they are of several clocks")
+    rate, offset_s = np.array([(one.rate, one.offset_s) for one in fits]).T
+    clock = Clock.fitted(base, fits[main])
+    return Boot(number[starts], rate, offset_s, np.array(behind), clock, tuple(notes))
+
+
+class Vehicle(NamedTuple):
+    """Messages of one vehicle: its frames, its numbers, and its clock, None where nothing has a stamp."""
+
+    frames: MavlinkFrames
+    system: int
+    component: int
+    boot: Boot | None
+
+    def own(self, name: str) -> Messages:
+        """Messages of its autopilot."""
+        return messages(self.frames, name, self.system, self.component)
+
+    def any(self, name: str) -> Messages:
+        """Messages of all its components: cameras and gimbals may be such."""
+        return messages(self.frames, name, self.system)
+
+    def readings(
+        self, found: Messages, field: str, columns: dict[str, Array], unusable: dict[str, Mask] | None = None
+    ) -> Readings:
+        """Columns of messages with ``time_s`` and ``time_log_s``.
+
+        `field` is ``"time_boot_ms"``, ``"time_usec"``, or ``""`` where messages have no stamp. Without one
+        that goes by a known clock, ``time_s`` is that of receipt. Stamps of others than the autopilot are
+        used only if they go by its clock.
+        """
+        received, none = found.get("received_s"), np.full(len(found), np.nan)
+        times, wrong = {"time_s": received, "time_log_s": none}, dict(unusable or {})
+        if found.has(field):
+            stamp = found.get(field) / (1e3 if field == "time_boot_ms" else 1e6)
+            if field == "time_usec" and _most(np.abs(stamp - received) < DAY_S):
+                times = {"time_s": stamp, "time_log_s": stamp}
+            elif self.boot is not None:
+                utc, beside = self.boot.utc(stamp, found)
+                own = field == "time_boot_ms" and bool((found.get("component") == self.component).all())
+                if _most(beside) or own:
+                    times = {"time_s": utc, "time_log_s": stamp}
+                    wrong["a stamp that its receipt contradicts"] = ~beside
+        return Readings(times | columns, found.rows, "frame", wrong)
+
+
+def _most(rows: Mask) -> bool:
+    return bool(len(rows) and rows.mean() > 0.5)
+
+
+def sniff(head: bytes, name: str) -> bool:
+    """Whether a file that begins with `head` is such a log; its name only makes up for a short beginning."""
+    if not any(_plausible(head, one.start()) for one in _BEGINNING.finditer(head)):
+        return False
+    found = len(walk(head).table)
+    return found >= ENOUGH or (found > 0 and name.lower().endswith(".tlog"))
+
+
+def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+    """A telemetry log, its rows counted in frames.
+
+    Raises
+    ------
+    WildlabError
+        Where it holds no sound frame, or no vehicle.
+    """
+    frames = walk(data)
+    sound = len(frames.table)
+    if not sound:
+        raise WildlabError(
+            "holds no sound MAVLink frame behind a time of receipt",
+            "give the .tlog that the ground station wrote",
+            file=path,
+        )
+    vehicles, stations = _systems(frames)
+    if not vehicles:
+        raise WildlabError(
+            f"holds {sound} messages, and none of attitude or position",
+            "give the log of the flight itself",
+            file=path,
+        )
+    (system, component), *others = vehicles
+    vehicle = Vehicle(frames, system, component, find_boot(frames, system, component))
+    parts, notes = _parts(vehicle)
+    if others:
+        said = ", ".join(f"{one}" for one, _ in others)
+        notes = [f"it holds several vehicles: system {system} is read, not {said}", *notes]
+    if stations:
+        said = ", ".join(map(str, sorted(stations)))
+        notes = [*notes, f"left out as no vehicles: system {said}"]
+    kinds = ", ".join(str(one) for one in sorted(frames.unknown)[:8])
+    more = f" and {len(frames.unknown) - 8} more" if len(frames.unknown) > 8 else ""
+    lost = [
+        (frames.damaged, "frame", f"with a wrong checksum, {sound} are read"),
+        (frames.skipped, "byte", f"of {len(data)} in {frames.places} places are no frames"),
+        (frames.rest, "byte", f"of {len(data)} at the end: it ends within a frame"),
+        (sum(frames.unknown.values()), "message", f"of kinds that are not known (numbers {kinds}{more})"),
+    ]
+    clock, before = (vehicle.boot.clock, vehicle.boot.notes) if vehicle.boot else (None, ())
+    return Decoded(parts, _called(vehicle), clock, lost, [*before, *notes])
+
+
+def _systems(frames: MavlinkFrames) -> tuple[list[tuple[int, int]], set[int]]:
+    """(system, component) of the autopilots, the busiest first, and systems that are none."""
+    beats = messages(frames, "HEARTBEAT")
+    no = (beats.get("autopilot") == _NO_AUTOPILOT) | (beats.get("type") == _GROUND_STATION)
+    known, autopilots = set(_senders(beats)), set(_senders(beats.take(~no)))
+    counts: dict[tuple[int, int], tuple[int, ...]] = {}
+    for place, name in enumerate(_FLIES):
+        for one, count in Counter(_senders(messages(frames, name))).items():
+            if one in autopilots or one not in known:
+                had = counts.get(one, (0,) * len(_FLIES))
+                counts[one] = (*had[:place], count, *had[place + 1 :])
+    # A heartbeat says more than none: without it a component may forward what others sent.
+    order = sorted(counts, key=lambda one: (one in autopilots, counts[one]), reverse=True)
+    first: dict[int, tuple[int, int]] = {}
+    for one in order:
+        first.setdefault(one[0], one)
+    everyone = set(np.unique(frames.table["system"]).tolist())
+    return list(first.values()), everyone - set(first)
+
+
+def _senders(found: Messages) -> list[tuple[int, int]]:
+    return list(zip(found.fields["system"].tolist(), found.fields["component"].tolist(), strict=True))
+
+
+def _called(vehicle: Vehicle) -> str:
+    for text in vehicle.own("STATUSTEXT").texts("text"):
+        if _FIRMWARE.match(text.strip()):
+            return printable(text.strip())
+    beats = vehicle.own("HEARTBEAT")
+    if not len(beats):
+        return ""
+    kind = names("MAV_TYPE", int(beats.get("type")[0]))
+    said = [names("MAV_AUTOPILOT", int(beats.get("autopilot")[0]))]
+    version = vehicle.own("AUTOPILOT_VERSION")
+    if len(version) and (number := int(version.get("flight_sw_version")[0])):
+        said.append(".".join(str(number >> shift & 255) for shift in (24, 16, 8)))
+    return " ".join(one for one in (*said, kind and f"({kind})") if one)
+
+
+# -- parts
+
+
+def _parts(vehicle: Vehicle) -> tuple[dict[str, Readings], list[str]]:
+    """All parts that there are rows of, and sentences on what a user should know of them."""
+    notes: list[str] = []
+    parts = {"poses": _poses(vehicle, notes), "gnss": _gnss(vehicle), **_inertial(vehicle, notes)}
+    parts |= {"triggers": _triggers(vehicle, notes), "gimbal": _gimbal(vehicle, parts["poses"], notes)}
+    return {name: one for name, one in parts.items() if one is not None}, notes
+
+
+def _poses(vehicle: Vehicle, notes: list[str]) -> Readings | None:
+    attitude, position = vehicle.own("ATTITUDE"), vehicle.own("GLOBAL_POSITION_INT")
+    if not len(attitude):
+        if len(position):
+            notes.append(f"{len(position)} positions stand without any attitude: there are no poses")
+        return None
+    columns = {name: np.degrees(attitude.get(name[:-4])) for name in ANGLES}
+    place = {
+        **{"latitude_deg": position.get("lat") / 1e7, "longitude_deg": position.get("lon") / 1e7},
+        **{"height_sea_m": position.get("alt") / 1e3, "height_home_m": position.get("relative_alt") / 1e3},
+        **{f"v_{axis}_m_s": position.get(f"v{one}") / 1e2 for axis, one in zip(AXES, "xyz", strict=True)},
+    }
+    made = vehicle.readings(attitude, "time_boot_ms", columns)
+    where = vehicle.readings(position, "time_boot_ms", {})
+    doubtful = any_of(where.unusable.values(), len(position))
+    stamps, at = where.columns["time_s"], made.columns["time_s"]
+    found = at_times(stamps, place, at, "GLOBAL_POSITION_INT", doubtful)
+    return made._replace(columns=made.columns | found)
+
+
+def _gnss(vehicle: Vehicle) -> Readings:
+    found = vehicle.own("GPS_RAW_INT")
+
+    def known(name: str, none: int) -> Array:
+        values = found.get(name)
+        return np.where(values == none, np.nan, values)
+
+    speed, course = known("vel", _NO_16) / 1e2, np.radians(known("cog", _NO_16) / 1e2)
+    columns = {
+        **{"latitude_deg": found.get("lat") / 1e7, "longitude_deg": found.get("lon") / 1e7},
+        "height_sea_m": found.get("alt") / 1e3,
+        # Zeros at the end of a message are not sent: zero and not known look alike.
+        "height_ellipsoid_m": known("alt_ellipsoid", 0) / 1e3,
+        **{"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)},
+        **{"sd_horizontal_m": known("h_acc", 0) / 1e3, "sd_vertical_m": known("v_acc", 0) / 1e3},
+        "sd_velocity_m_s": known("vel_acc", 0) / 1e3,
+        "satellites": known("satellites_visible", _NO_8),
+        **{"fix": found.get("fix_type"), "hdop": known("eph", _NO_16) / 1e2},
+    }
+    return vehicle.readings(found, "time_usec", columns, fix_reasons(columns["fix"]))
+
+
+def _inertial(vehicle: Vehicle, notes: list[str]) -> dict[str, Readings | None]:
+    """Of the first device, from the message in the best known units."""
+    for name in ("HIGHRES_IMU", "SCALED_IMU", "RAW_IMU"):
+        found = vehicle.own(name)
+        found = found.take(found.get("id") == 0) if found.has("id") else found
+        if not len(found):
+            continue
+        # Gauss and milligauss to microtesla, among others.
+        f, w, ut = (1.0, 1.0, 100.0) if name == "HIGHRES_IMU" else (STANDARD_GRAVITY / 1e3, 1e-3, 0.1)
+        force, rate, field = (
+            np.stack([found.get(f"{axis}{kind}") for axis in "xyz"]) * by
+            for kind, by in (("acc", f), ("gyro", w), ("mag", ut))
+        )
+        stamp = "time_usec" if found.has("time_usec") else "time_boot_ms"
+        felt = float(np.median(np.linalg.norm(force, axis=0))) / STANDARD_GRAVITY
+        parts: dict[str, Readings | None] = {}
+        if _FELT[0] < felt < _FELT[1]:
+            parts["imu"] = vehicle.readings(found, stamp, dict(zip(IMU, (*force, *rate), strict=True)))
+        else:
+            notes.append(
+                f"{name} is left out: it feels {felt:.3g} g in the middle, so that its units are not known"
+            )
+        if (field != 0).any():
+            parts["magnetometer"] = vehicle.readings(found, stamp, dict(zip(FIELD, field, strict=True)))
+        return parts
+    return {}
+
+
+def _triggers(vehicle: Vehicle, notes: list[str]) -> Readings | None:
+    found, trigger = vehicle.any("CAMERA_FEEDBACK"), vehicle.any("CAMERA_TRIGGER")
+    if not len(found):
+        made = vehicle.readings(trigger, "time_usec", {"number": trigger.get("seq")})
+        return made if len(trigger) else None
+    place = {"latitude_deg": found.get("lat") / 1e7, "longitude_deg": found.get("lng") / 1e7}
+    there = placed(*place.values())
+    place |= {"height_sea_m": found.get("alt_msl"), "height_home_m": found.get("alt_rel")}
+    columns = {"number": found.get("img_idx"), **{name: found.get(name[:-4]) for name in ANGLES}}
+    columns |= {name: np.where(there, values, np.nan) for name, values in place.items()}
+    made = vehicle.readings(found, "time_usec", columns)._replace(anywhere=True)
+    if np.isnan(made.columns["time_log_s"]).all():
+        notes.append("times of the triggers are those of receipt: their own stamps go by no known clock")
+    return made
+
+
+def _gimbal(vehicle: Vehicle, poses: Readings | None, notes: list[str]) -> Readings | None:
+    kinds = ("GIMBAL_DEVICE_ATTITUDE_STATUS", "MOUNT_ORIENTATION", "MOUNT_STATUS")
+    found = next((one for name in kinds if len(one := vehicle.any(name))), None)
+    if found is None:
+        return None
+    made = vehicle.readings(found, "time_boot_ms", {})
+    heading = heading_at(poses, made.columns["time_s"])
+    if found.name == "MOUNT_STATUS":
+        notes.append(
+            "the gimbal is known from MOUNT_STATUS, which has no stamps (times are those of receipt) and "
+            "does not say against what it counts: taken as pitch and roll against the horizon, yaw against "
+            "the vehicle"
+        )
+        roll, pitch, yaw = (found.get(f"pointing_{one}") / 1e2 for one in "bac")
+        angles = dict(zip(WORLD, (roll, pitch, wrapped(yaw + heading)), strict=True))
+    elif np.isnan(made.columns["time_log_s"]).all():
+        notes.append("times of the gimbal are those of receipt: its own stamps go by no known clock")
+    if found.name == "GIMBAL_DEVICE_ATTITUDE_STATUS":
+        angles = device_angles(found.quaternion(), found.get("flags"), heading)
+    elif found.name == "MOUNT_ORIENTATION":
+        yaw = found.get("yaw_absolute")
+        # Where the extension is not sent, its yaw is against the vehicle.
+        yaw = yaw if (yaw != 0).any() else wrapped(found.get("yaw") + heading)
+        angles = dict(zip(WORLD, (found.get("roll"), found.get("pitch"), yaw), strict=True))
+    return made._replace(columns=made.columns | angles)
