@@ -6,13 +6,13 @@ import pytest
 from wildlab.geometry.camera import Camera
 from wildlab.studies.camera_calibration import mounting
 from wildlab.studies.camera_calibration.intrinsics import (
-    TAU2,
     calibrations,
     ground_shift,
     measure_centres,
     neglected_distortion,
     theoretical,
 )
+from wildlab.studies.sensitivity.tables import PRINTED_MISALIGNMENT_DEG, TAU2
 
 
 def test_the_data_sheet_is_that_of_the_print_but_for_its_last_digit():
@@ -45,7 +45,7 @@ def test_the_more_a_lens_bends_the_more_neglecting_it_costs():
 def test_the_room_without_errors_gives_the_printed_angles():
     one, angle = mounting.calibrate_once(np.random.default_rng(4), "clicks", 0.0)
     assert angle < 1e-8
-    np.testing.assert_allclose(np.degrees(mounting.printed_angles(one)), mounting.PRINTED_DEG, atol=1e-6)
+    np.testing.assert_allclose(np.degrees(mounting.printed_angles(one)), PRINTED_MISALIGNMENT_DEG, atol=1e-6)
 
 
 @pytest.mark.parametrize("cause", mounting.CAUSES)

@@ -17,9 +17,8 @@ from wildlab.geometry.directions import direction_differences
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
 from wildlab.simulation.boards import board_image, board_views
+from wildlab.studies.sensitivity.tables import TAU2
 
-#: The calibrated camera of H (2.3).
-TAU2 = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 #: Its data sheet: lens (m), pitch of the pixels (m), H table A.1.
 LENS, PITCH = 0.019, 17e-6
 #: How many images H took.

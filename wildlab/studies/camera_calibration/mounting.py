@@ -18,11 +18,10 @@ from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_rotation, helgesen_misalignment
 from wildlab.geometry.mounting import Mounting, mounting_from_points
-from wildlab.studies.camera_calibration.intrinsics import HEIGHT, TAU2
+from wildlab.studies.camera_calibration.intrinsics import HEIGHT
+from wildlab.studies.sensitivity.tables import TAU2, helgesen_mount
 
-#: As printed: roll, tilt, pan of H 5.6.1 (deg), the mean error left (m), at which range (m), and what that
-#: makes from the height of the flight (m).
-PRINTED_DEG = (-1.7, 3.9, 1.9)
+#: As printed: the mean error left, at which range, and what that makes from the height of the flight, metres.
 PRINTED_ERROR, PRINTED_RANGE, PRINTED_AT_HEIGHT = 0.0229, 1.2, 6.6
 #: Chosen: images, known points in each (a square of this half side, m), attitudes within so many degrees.
 POSES, HALF_SIDE, TILTED_DEG = 12, 0.2, 8.0
@@ -64,11 +63,6 @@ class Cause(NamedTuple):
     ground: float
 
 
-def true_mount() -> Mount:
-    """The mount of H 5.6.1."""
-    return Mount("down", misalignment=helgesen_misalignment(*np.radians(PRINTED_DEG)))
-
-
 def calibrate_once(rng: np.random.Generator, cause: str, size: float) -> tuple[Mounting, float]:
     """One calibration in the room, with one thing wrong.
 
@@ -98,7 +92,7 @@ def calibrate_once(rng: np.random.Generator, cause: str, size: float) -> tuple[M
     p = np.column_stack([rng.uniform(-0.1, 0.1, (POSES, 2)), -rng.uniform(0.95, 1.05, POSES) * PRINTED_RANGE])
     points = np.column_stack([np.tile(board, (POSES, 1)), np.zeros(POSES * m)])
 
-    mount = true_mount()
+    mount = helgesen_mount()
     true = CameraPoses(TAU2, mount, p[image], R[image])
     uv = ground_to_pixel(TAU2, points, true.p_nc, true.R_nc)
     given_p, given_R, camera, given = p, R, TAU2, Mount("down")

@@ -14,12 +14,7 @@ from wildlab.geometry.intrinsics import PINHOLE
 from wildlab.geometry.mounting import Mounting
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, new_figure
 from wildlab.reporting.verdicts import error_name
-from wildlab.studies.camera_calibration.intrinsics import (
-    TAU2,
-    Centres,
-    theoretical,
-    theoretical_focal_length,
-)
+from wildlab.studies.camera_calibration.intrinsics import Centres, theoretical, theoretical_focal_length
 from wildlab.studies.camera_calibration.mounting import (
     CONSTANT,
     PRINTED_AT_HEIGHT,
@@ -27,6 +22,7 @@ from wildlab.studies.camera_calibration.mounting import (
     error_from_height,
     printed_angles,
 )
+from wildlab.studies.sensitivity.tables import TAU2
 
 
 class Recorded(NamedTuple):

@@ -20,7 +20,7 @@ from wildlab.flight.store import Flight
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.static_point.trial import TABLE_NAMES, differ
+from wildlab.studies.static_point.trial import TABLE_NAMES, differ, table_numbers
 from wildlab.tracking.measurement import positions
 from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.run import run_filter, start_from_first
@@ -167,10 +167,7 @@ def summarise_vessel(flight: Flight, scored: dict[str, pd.DataFrame]) -> dict[tu
     """
     result: dict[tuple[str, str], float] = {}
     for column, table in scored.items():
-        for subject, part in ((column, table), (f"{column}-{SUBSET}", subset_of(table))):
-            s = summarise(errors_of(part))
-            values = (s.bias_north, s.bias_east, s.sd_north, s.sd_east, s.mean)
-            result |= {(subject, name): value for name, value in zip(TABLE_NAMES, values, strict=True)}
+        result |= table_numbers(column, table) | table_numbers(f"{column}-{SUBSET}", subset_of(table))
     table = scored["observer"]
     distance = table["error_m"].to_numpy(float)
     result |= {

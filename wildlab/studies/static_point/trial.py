@@ -116,6 +116,13 @@ def filter_errors(scored: pd.DataFrame) -> Filtered:
     return filter_at_rest(errors_of(ordered), covariances_of(ordered))
 
 
+def table_numbers(subject: str, scored: pd.DataFrame) -> dict[tuple[str, str], float]:
+    """A column of the tables, of scored points: `TABLE_NAMES` of that subject."""
+    s = summarise(errors_of(scored))
+    values = (s.bias_north, s.bias_east, s.sd_north, s.sd_east, s.mean)
+    return {(subject, name): value for name, value in zip(TABLE_NAMES, values, strict=True)}
+
+
 def summarise_at_rest(scored: dict[str, pd.DataFrame]) -> dict[tuple[str, str], float]:
     """Everything that is compared over many flights, by (subject, name).
 
@@ -127,9 +134,7 @@ def summarise_at_rest(scored: dict[str, pd.DataFrame]) -> dict[tuple[str, str], 
     """
     result: dict[tuple[str, str], float] = {}
     for column, table in scored.items():
-        s = summarise(errors_of(table))
-        values = (s.bias_north, s.bias_east, s.sd_north, s.sd_east, s.mean)
-        result |= {(column, name): value for name, value in zip(TABLE_NAMES, values, strict=True)}
+        result |= table_numbers(column, table)
     table = scored["observer"].sort_values("time_s", kind="stable")
     single = table["error_m"].to_numpy(float)
     followed = filter_errors(table)
