@@ -133,7 +133,7 @@ def test_distances_from_the_middle_leave_the_receiver_out(taken, tracked, number
 
 
 def test_slivers_are_counted_apart(taken, tracked, numbers):
-    marks = taken.marks(np.nan)
+    marks = taken.marks(moved=False)
     clear = marks.share >= SLIVER
     assert numbers[DETECTOR, "rate_beyond_sliver"] == pytest.approx(marks.found[clear].mean())
     best = int(np.argmax(np.where(marks.found, marks.share, -1.0)))

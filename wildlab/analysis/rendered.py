@@ -257,7 +257,6 @@ def marks_of(
     shape: tuple[int, int],
     number: int = 1,
     length: float = np.nan,
-    **adjustment: float | bool,
 ) -> Marks:
     """What images give of one target.
 
@@ -271,8 +270,6 @@ def marks_of(
         Of the target's body, from 1.
     length
         Of the target, px: then centres are moved where the border cuts it, H (4.7); NaN moves none.
-    adjustment
-        ``axis_ratio``, ``full_axis``, ``length_sd`` of `wildlab.detection.border.adjust_at_border`.
 
     Returns
     -------
@@ -293,7 +290,7 @@ def marks_of(
         if not rows:
             continue
         one = shot.detections.select(rows[:1])
-        found = adjust_at_border(one, shape, length, **adjustment) if np.isfinite(length) else one  # type: ignore[arg-type]
+        found = adjust_at_border(one, shape, length) if np.isfinite(length) else one
         uv[k], covariance[k] = found.uv[0], found.covariance[0]
         moved[k] = bool((found.uv[0] != one.uv[0]).any())
     exposure = np.array([shot.exposure for shot in taken], np.intp)

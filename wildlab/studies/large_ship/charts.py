@@ -16,7 +16,7 @@ _COLOURS = {WITH: BLUE, WITHOUT: VERMILLION}
 
 def images(taken: Photographs) -> Figure:
     """An image that shows much of the ship, and one that shows about half of it (H figures 6.2, 4.8)."""
-    plain, moved = taken.marks(np.nan), taken.marks()
+    plain, moved = taken.marks(moved=False), taken.marks()
     whole = int(np.argmax(np.where(plain.found, plain.share, -1.0)))
     cut = moved.moved if moved.moved.any() else plain.found
     part = int(np.argmin(np.where(cut, np.abs(plain.share - 0.5), 2.0)))

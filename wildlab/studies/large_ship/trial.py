@@ -36,6 +36,8 @@ Numbers = dict[tuple[str, str], float]
 #: With the centre moved at the border, H (4.7), and without.
 WITH, WITHOUT = "with-adjustment", "without-adjustment"
 SUBJECTS = (WITH, WITHOUT)
+#: Whose poses H 6.4.1 uses.
+SOURCE = "autopilot"
 #: The detector alone, without and before any adjustment.
 DETECTOR = "detector"
 
@@ -82,15 +84,12 @@ class Photographs(NamedTuple):
         The images and what was found in them, in order.
     length
         Of the ship, px: its printed length from the printed height, which the detector is told (H 6.4.1).
-    per_metre
-        Pixels a metre of the sea is long from that height.
     """
 
     flight: Flight
     camera: Photographer
     shots: list[Shot]
     length: float
-    per_metre: float
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -98,9 +97,9 @@ class Photographs(NamedTuple):
         one = self.camera.flight.poses.camera
         return one.height, one.width
 
-    def marks(self, length: float | None = None, **adjustment: float | bool) -> Marks:
-        """Detections of the ship, moved for a ``length`` in px; NaN moves none, None is the stated one."""
-        return marks_of(self.shots, self.shape, 1, self.length if length is None else length, **adjustment)
+    def marks(self, *, moved: bool = True) -> Marks:
+        """Detections of the ship, with their centres moved for its length, or as they are."""
+        return marks_of(self.shots, self.shape, 1, self.length if moved else np.nan)
 
 
 class Tracked(NamedTuple):
@@ -146,7 +145,7 @@ def photograph(twin: str, seed: int, every: int) -> Photographs:
     shots = list(camera.shoot(exposures_of(flight.table("frames"))[::every]))
     stated = flight.manifest.geometry_camera()
     per_metre = float(np.sqrt(stated.fx * stated.fy)) / parameters.flight.altitude.si
-    return Photographs(flight, camera, shots, outline.length.si * per_metre, per_metre)
+    return Photographs(flight, camera, shots, outline.length.si * per_metre)
 
 
 def merged_times(times: Array, groups: NDArray[np.object_]) -> Array:
@@ -165,18 +164,18 @@ def merged_times(times: Array, groups: NDArray[np.object_]) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.where(same, steps, usual))])
 
 
-def follow(taken: Photographs, marks: Marks, tuning: CvTuning = TUNING, source: str = "autopilot") -> Tracked:
-    """Put detections on the sea with the poses of a source, and track them in the image, H 6.3."""
+def follow(taken: Photographs, marks: Marks) -> Tracked:
+    """Put detections on the sea with the autopilot's poses, and track them in the image, H 6.3."""
     target = str(taken.flight.table("detections")["target_id"].iloc[0])
     flight = with_detections(taken.flight, marks, target)
-    seen = sighting(flight, source)
+    seen = sighting(flight, SOURCE)
     # A sighting begins and ends with a detection.
     rows = np.flatnonzero(marks.found)
     inside = slice(int(rows[0]), int(rows[-1]) + 1)
     groups = flight.table("frames")["group"].to_numpy(object)[inside]
     seen = seen._replace(times=merged_times(seen.times, groups))
     within = marks.take(inside)
-    return Tracked(seen, within, follow_pixels(seen, tuning))
+    return Tracked(seen, within, follow_pixels(seen, TUNING))
 
 
 def errors_of(one: Tracked) -> tuple[Array, Array]:
@@ -246,13 +245,13 @@ def numbers_of_track(taken: Photographs, one: Tracked) -> dict[str, float]:
     }
 
 
-def ground_inside(taken: Photographs, one: Tracked, source: str = "autopilot") -> NDArray[np.bool_]:
+def ground_inside(taken: Photographs, one: Tracked) -> NDArray[np.bool_]:
     """Whether the 90 % ellipses of the detections on the sea, pixel and pose together, hold the ship: (K,).
 
     The pixel's covariance is the detector's; the rest is what the flight states of its poses.
     """
     target = str(taken.flight.table("detections")["target_id"].iloc[0])
-    seen = observe(with_detections(taken.flight, one.marks, target), source)
+    seen = observe(with_detections(taken.flight, one.marks, target), SOURCE)
     errors = pose_errors(taken.flight, seen)._replace(pixel=one.marks.covariance[one.marks.found])
     found = ground_covariance(seen.poses, seen.uv, seen.plane_down, errors, np.random.default_rng(0))
     off = errors_of(one)[0][one.marks.found]
@@ -266,7 +265,7 @@ def numbers_of(taken: Photographs, tracked: dict[str, Tracked]) -> Numbers:
         for subject, one in tracked.items()
         for name, value in numbers_of_track(taken, one).items()
     }
-    marks = taken.marks(np.nan)
+    marks = taken.marks(moved=False)
     visible = marks.share > 0
     missed, clear = marks.share[visible & ~marks.found], marks.share >= SLIVER
     receiver = tracked[WITH].seen.truth[:, :2] - centres_of(taken, tracked[WITH])
@@ -294,7 +293,7 @@ def share_within(tracked: dict[str, Tracked]) -> float:
 
 def follow_both(taken: Photographs) -> dict[str, Tracked]:
     """With the adjustment and without it, by subject."""
-    return {WITH: follow(taken, taken.marks()), WITHOUT: follow(taken, taken.marks(np.nan))}
+    return {WITH: follow(taken, taken.marks()), WITHOUT: follow(taken, taken.marks(moved=False))}
 
 
 def trial(seed: int, *, twin: str, every: int) -> Numbers:
