@@ -233,8 +233,9 @@ def test_lock_names_no_index_and_hashes_everything():
 
 
 def commands_in_readme() -> str:
-    """What the README shows as something to type: between backticks, or indented."""
-    text = (paths.ROOT / "README.md").read_text(encoding="utf-8")
+    """What README and docs show as something to type: between backticks, or indented."""
+    files = [paths.ROOT / "README.md", *(paths.ROOT / "docs").glob("*.md")]
+    text = "\n".join(file.read_text(encoding="utf-8") for file in files)
     return "\n".join(re.findall(r"`[^`\n]+`|^    .*$", text, re.MULTILINE))
 
 
@@ -246,8 +247,8 @@ def test_readme_names_only_targets_that_exist():
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
 
 
-def test_readme_table_lists_every_command():
+def test_the_table_of_commands_lists_every_one():
     from wildlab.cli import wildlab
 
-    text = (paths.ROOT / "README.md").read_text(encoding="utf-8")
+    text = (paths.ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| `wildlab ([a-z]+)", text, re.MULTILINE)) == set(wildlab.commands)
