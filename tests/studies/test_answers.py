@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDABLE, UNDECIDED
 from wildlab.messages.page_texts import FOLDER, load_texts
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import case_names, find_case
@@ -25,6 +25,16 @@ def found(ship: float, whole: float, alarms: float, near_perfect: str) -> dict[s
         "ship/false_alarms_per_image": 0.0,
         "boats/false_alarms_per_image": alarms,
         "near-perfect": near_perfect,
+    }
+
+
+def rates(own: float, stress: float) -> dict[str, Any]:
+    """Right associations (%) by angles, with the track's own measurement and with the assigned one."""
+    subjects = {"angles": own, "angles/updated-with-assigned": stress}
+    return {
+        f"{who}/{name}": value
+        for who, rate in subjects.items()
+        for name, value in (("success_rate", rate), ("success_rate_se", 0.1))
     }
 
 
@@ -293,6 +303,27 @@ ANSWERS: dict[str, list[Case]] = {
         ),
         (seen_along_cable(0.6, 0.5, 0.4), ("roll-no-more", "adaptive-not-better")),
         ({}, ("unknown",)),
+    ],
+    "optical-flow-velocity": [
+        (
+            {"very-large-variance": HOLDS, "own-motion-dominates": HOLDS},
+            ("scatter-holds", "own-motion-holds"),
+        ),
+        (
+            {"very-large-variance": FAILS, "own-motion-dominates": FAILS},
+            ("scatter-fails", "own-motion-fails"),
+        ),
+        (
+            {"very-large-variance": UNDECIDED, "own-motion-dominates": UNDECIDED},
+            ("scatter-open", "own-motion-open"),
+        ),
+        ({}, ("scatter-unknown", "own-motion-unknown")),
+    ],
+    "gating": [
+        (rates(96.0, 71.0) | {"forms-agree": HOLDS}, ("rate-forms-agree", "stress-lower")),
+        (rates(71.0, 96.0) | {"forms-agree": FAILS}, ("rate-by-form", "stress-same")),
+        (rates(96.0, 95.9) | {"forms-agree": UNDECIDABLE}, ("rate-by-form", "stress-same")),
+        ({}, ("rate-unknown", "stress-unknown")),
     ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]

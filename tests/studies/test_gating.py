@@ -14,6 +14,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.reporting.report import open_report
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.gating import kernels
 from wildlab.studies.gating import monte_carlo as gating
@@ -29,15 +30,16 @@ from wildlab.studies.gating.monte_carlo import (
     overflight,
     streams,
 )
-from wildlab.studies.gating.readings import READINGS
-from wildlab.studies.gating.variations import (
+from wildlab.studies.gating.readings import (
+    DEFAULT,
+    READINGS,
     claim_margins,
-    seconds_in_view,
+    metrics_of,
     standard_error,
-    variations,
-    vary,
+    subject,
     verdict,
 )
+from wildlab.studies.gating.variations import variations, vary
 from wildlab.tracking.measurement import predict_azimuth_elevation, predict_pixel
 
 FEEDS = ("own", "assigned", "nothing")
@@ -226,9 +228,9 @@ def test_a_run_does_not_depend_on_the_others(over):
 
 
 def test_readings_are_judged_on_the_same_draws(over):
-    found = outcomes(over, {name: one.choices for name, one in READINGS.items()}, 6, 3, chunk=4)
+    found = outcomes(over, READINGS, 6, 3, chunk=4)
     for name, one in READINGS.items():
-        np.testing.assert_array_equal(found[name].rate, gating.success_rates(over, one.choices, 6, 3))
+        np.testing.assert_array_equal(found[name].rate, gating.success_rates(over, one, 6, 3))
     # Angles in the update change the track that angles gate, and no other.
     same = np.isclose(found["own"].rate, found["angles"].rate).all(axis=1)
     assert same.tolist() == [True, True, False, True]
@@ -401,6 +403,24 @@ def test_a_run_without_mistakes_says_nothing_of_where_they_fall():
     assert np.isnan(margin["mistakes-on-different-images"]).all()
 
 
-def test_a_gimbal_keeps_the_targets_in_view_longer(over, flight):
-    at_rest = seconds_in_view(overflight(flight, gimbal="down"))
-    assert 0 < at_rest < seconds_in_view(over) == IMAGES / 10
+def test_every_mean_is_recorded_with_its_standard_error():
+    rng = np.random.default_rng(1)
+    own, stress = (
+        outcome(np.array(means)[:, None] + rng.standard_normal((4, 400)))
+        for means in ((96.6, 96.8, 96.0, 97.5), (88.0, 82.0, 71.0, 79.0))
+    )
+    stress.rate[:, :80] = 30.0
+    report = open_report(study="gating", kind="twin", flight="large-ship")
+    for one in metrics_of({DEFAULT: own, "assigned": stress}):
+        report.metric(**one)
+    for reading, found in ((DEFAULT, own), ("assigned", stress)):
+        for form, rates in zip(GATES, found.rate, strict=True):
+            of = subject(form, reading)
+            mean, se = (report.recorded[name, of] for name in ("success_rate", "success_rate_se"))
+            assert mean["value"] == pytest.approx(rates.mean())
+            assert se["value"] == pytest.approx(standard_error(rates))
+            # The spread of single runs is not that of the mean, and is not recorded as if it were.
+            assert mean["low"] is None and mean["n"] == 400
+    assert report.recorded["success_rate", "angles"]["published"] == 95.99
+    assert report.recorded["success_rate", "angles/updated-with-assigned"]["published"] is None
+    assert report.recorded["runs_mostly_wrong", "angles/updated-with-assigned"]["value"] == 20.0

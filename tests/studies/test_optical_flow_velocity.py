@@ -6,7 +6,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.optical_flow_velocity import STUDY, text
+from wildlab.studies.optical_flow_velocity import STUDY
 from wildlab.studies.optical_flow_velocity import trial as study
 from wildlab.studies.optical_flow_velocity.trial import (
     CALIBRATED,
@@ -23,7 +23,6 @@ from wildlab.studies.optical_flow_velocity.trial import (
     check_claims,
     half_of_mean,
     look,
-    mean_decided,
     numbers_of,
     readings,
     stretches,
@@ -168,18 +167,11 @@ def test_the_interval_of_a_mean_counts_neighbours_correlation():
     assert np.isnan(half_of_mean([1.0])) and np.isnan(half_of_mean([3.0, 3.0, 3.0]))
 
 
-def test_a_mean_whose_interval_has_both_sides_in_it_decides_nothing():
-    for mean, half, known in (
-        (-1.4, 1.0, False), (-1.4, 0.3, True), (0.8, 0.3, False), (0.8, 0.1, True), (0.2, np.nan, False),
-    ):  # fmt: skip
+def test_how_well_a_mean_is_known_is_no_premise_of_what_it_is():
+    for mean, half in ((-1.4, 1.0), (-1.4, 0.3), (0.8, 0.3), (0.2, np.nan)):
         changes = {"logged__mean_north": mean, "logged__half_mean_north": half}
         check = check_claims(spread_of(**changes))["mean-within-one"]
-        # How well the mean is known is no premise: it is what the claim measures.
         assert check.premise is None and check.true.tolist() == [abs(mean) <= 1] * 40
-        assert mean_decided(spread_of(**changes)).tolist() == [known] * 40, (mean, half)
-    wide_elsewhere = {"logged__mean_north": -1.4, "logged__half_mean_east": 3.0}
-    assert mean_decided(spread_of(**wide_elsewhere)).all(), "one axis clearly outside is enough"
-    assert not mean_decided(spread_of(logged__half_mean_east=3.0)).any()
 
 
 def test_every_published_number_is_recorded():
@@ -190,8 +182,3 @@ def test_every_published_number_is_recorded():
 def test_no_correlation_is_asked_to_be_above_one():
     check, threshold = check_claims(spread_of())["flows-correlate"], 0.5
     assert check.reaches(threshold / 2) and check.reaches(threshold) and not check.reaches(2 * threshold)
-
-
-@pytest.mark.parametrize(("share", "said"), [(0.7, "sure"), (0.95, "right"), (1.0, "cautious")])
-def test_intervals_are_judged_by_the_share_that_they_hold(share, said):
-    assert said in text.interval_words(spread_of(logged__interval_share_95=share))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from wildlab.studies.optical_flow_velocity import trial
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
 
 
@@ -11,4 +12,12 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
-STUDY = Study("optical-flow-velocity", trial.SUBJECTS, trial.trial, trial.check_claims, _metric)
+def answer(facts: Facts) -> list[str]:
+    """How much the velocities of single pairs scatter, and whether poses or images cause it."""
+    return [
+        f"scatter-{facts.outcome('very-large-variance')}",
+        f"own-motion-{facts.outcome('own-motion-dominates')}",
+    ]
+
+
+STUDY = Study("optical-flow-velocity", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)

@@ -215,27 +215,6 @@ def half_of_mean(values: ArrayLike) -> float:
     return float(student_quantile(0.975, worth - 1) * v.std(ddof=1) / np.sqrt(worth))
 
 
-def mean_decided(spread: pd.DataFrame) -> NDArray[np.bool_]:
-    """Of which flights the pairs can tell whether both means are within 1 m/s.
-
-    Parameters
-    ----------
-    spread
-        What `trial` gives, one row for each flight.
-
-    Returns
-    -------
-    (flights,) bool: both intervals lie inside, or one of them lies wholly outside.
-    """
-    mean, half = (
-        np.stack([spread[LOGGED, f"{name}_{axis}"].to_numpy(float) for axis in ("north", "east")])
-        for name in ("mean", "half_mean")
-    )
-    inside = (np.abs(mean) + half <= WITHIN_M_S).all(axis=0)
-    outside = (np.abs(mean) - half > WITHIN_M_S).any(axis=0)
-    return np.asarray(inside | outside)
-
-
 def velocity_numbers(table: pd.DataFrame) -> dict[str, float]:
     """Means and standard deviations of the velocities of a ship at rest, and whether intervals hold zero."""
     known = table.dropna(subset=["v_north_m_s", "v_east_m_s"])
@@ -284,34 +263,34 @@ def trial(seed: int, *, twin: str, pairs: int) -> dict[tuple[str, str], float]:
     return numbers_of(looked, readings(looked))
 
 
-def sizes(spread: pd.DataFrame, subject: str) -> NDArray[np.float64]:
+def sizes(runs: pd.DataFrame, subject: str) -> NDArray[np.float64]:
     """Of each flight the standard deviation of a velocity along any axis, (flights,) m/s."""
-    north, east = (spread[subject, f"sd_{axis}"].to_numpy(float) for axis in ("north", "east"))
+    north, east = (runs[subject, f"sd_{axis}"].to_numpy(float) for axis in ("north", "east"))
     return np.asarray(np.sqrt((north**2 + east**2) / 2))
 
 
-def largest_means(spread: pd.DataFrame) -> NDArray[np.float64]:
+def largest_means(runs: pd.DataFrame) -> NDArray[np.float64]:
     """Of each flight the larger of its two means by size, (flights,) m/s."""
-    north, east = (spread[LOGGED, f"mean_{axis}"].to_numpy(float) for axis in ("north", "east"))
+    north, east = (runs[LOGGED, f"mean_{axis}"].to_numpy(float) for axis in ("north", "east"))
     return np.asarray(np.maximum(np.abs(north), np.abs(east)))
 
 
-def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
     """What the flights give for each claim of H 5.4 and 5.6.3, by the claim's id.
 
     Parameters
     ----------
-    spread
+    runs
         What `trial` gives, one row for each flight.
     """
 
     def of(subject: str, name: str) -> NDArray[np.float64]:
-        return spread[subject, name].to_numpy(float)
+        return runs[subject, name].to_numpy(float)
 
-    whole, synchronised, still = (sizes(spread, one) for one in (LOGGED, SYNCHRONISED, STILL))
+    whole, synchronised, still = (sizes(runs, one) for one in (LOGGED, SYNCHRONISED, STILL))
     correlation = np.minimum(of(LOGGED, "correlation_u"), of(LOGGED, "correlation_v"))
     return {
-        "mean-within-one": Check(true=largest_means(spread) <= WITHIN_M_S),
+        "mean-within-one": Check(true=largest_means(runs) <= WITHIN_M_S),
         "very-large-variance": Check(
             measured=np.minimum(of(LOGGED, "sd_north"), of(LOGGED, "sd_east")), above=True
         ),
@@ -320,5 +299,5 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
             measured=synchronised / whole, first=synchronised, second=whole, unit="m/s"
         ),
         "better-with-a-still-gimbal": Check(true=still < whole, first=still, second=whole, unit="m/s"),
-        "own-motion-dominates": Check(measured=sizes(spread, TRUE) / whole),
+        "own-motion-dominates": Check(measured=sizes(runs, TRUE) / whole),
     }
