@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.page_words import MOST_IN_ANSWER, MOST_WORDS, words_in_sight
 from wildlab.analysis.navigation_errors import TUNINGS
 from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import white_bound
@@ -215,6 +216,8 @@ def test_a_study_and_its_page(name, reports, faults):
     has_intervals(found)
     if page.judge is not None:
         page.judge(found)
+    words, answer = words_in_sight(folder / "report.html")
+    assert words <= MOST_WORDS and answer <= MOST_IN_ANSWER
     assert {f"{one}.png" for one in page.figures} <= {one.name for one in (folder / "figures").glob("*.png")}
     if name == next(one for one in PAGES if STUDIES[one].notebook == entry.notebook):
         assert faults(folder / "report.html") == []
