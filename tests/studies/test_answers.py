@@ -325,6 +325,18 @@ ANSWERS: dict[str, list[Case]] = {
         (rates(96.0, 95.9) | {"forms-agree": UNDECIDABLE}, ("rate-by-form", "stress-same")),
         ({}, ("rate-unknown", "stress-unknown")),
     ],
+    "crossing-vessels": [
+        (
+            {"no-swap-with-features": HOLDS, "size-best": HOLDS, "looks/separation_size": 9.0},
+            ("swap-holds", "feature-size"),
+        ),
+        (
+            {"no-swap-with-features": FAILS, "size-best": FAILS, "looks/separation_size": 1.0},
+            ("swap-fails", "feature-open"),
+        ),
+        ({"no-swap-with-features": UNDECIDED}, ("swap-open", "feature-unknown")),
+        ({}, ("swap-unknown", "feature-unknown")),
+    ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]
 

@@ -13,8 +13,9 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.scene.render import SeenBody
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.crossing_vessels import charts
 from wildlab.studies.crossing_vessels import rendered as study
-from wildlab.studies.crossing_vessels import rendered_charts as charts
+from wildlab.studies.crossing_vessels.outcomes import detected_table, rendered_table
 from wildlab.studies.crossing_vessels.rendered import (
     Placed,
     Rendering,
@@ -110,11 +111,8 @@ def test_each_detection_has_the_vessel_that_it_was_judged_to_be():
 
 def test_counts_are_those_by_hand():
     counted = count(spot(SHOTS, SHAPE))
-    assert (counted.frames, counted.false, counted.with_false) == (5, 1, 1)
+    assert (counted.frames, counted.false) == (5, 1)
     assert (counted.whole, counted.found, counted.joined, counted.missed) == (5, 3, 1, 1)
-    assert (counted.cut, counted.cut_found, counted.cut_joined) == (1, 1, 0)
-    assert counted.pieces == 1
-    assert counted.plus(counted).whole == 10 and counted.plus(counted).missed == 2
 
 
 def test_no_image_is_no_detection():
@@ -225,7 +223,7 @@ def test_looks_are_the_detections_own(rendering, flight):
     placed = on_the_sea(flight, spotted)
     row_of = {int(frame): k for k, frame in enumerate(spotted.frames)}
     at = [row_of[int(image)] for image in placed.crossing.looks.image]
-    whole = (spotted.share[at, placed.crossing.boat] >= WHOLE) & ~placed.both & ~placed.cut
+    whole = (spotted.share[at, placed.crossing.boat] >= WHOLE) & ~placed.both
     for boat, length in enumerate((11.0, 7.0)):
         size = np.exp(placed.appearance.features[whole & (placed.crossing.boat == boat), 0])
         assert len(size) > 10
@@ -265,7 +263,7 @@ def passing(images: int = 40) -> Crossing:
 def placed_of(crossing: Crossing, **marks: np.ndarray) -> Placed:
     none = np.zeros(len(crossing.boat), bool)
     looks = Appearance(crossing.boat[:, None].astype(float), np.ones(1), np.ones(1))
-    return Placed(crossing, looks, none, none)._replace(**marks)
+    return Placed(crossing, looks, none)._replace(**marks)
 
 
 def bank_of(crossing: Crossing, track: np.ndarray, started: list[int]) -> Bank:
@@ -279,7 +277,7 @@ def bank_of(crossing: Crossing, track: np.ndarray, started: list[int]) -> Bank:
 def test_two_far_apart_are_two_tracks_and_nothing_is_wrong():
     done = follow(placed_of(passing()))
     one = done.by_rule[FEATURES]
-    assert (one.own, one.wrong, one.mixed, one.tracks, one.by_false, one.by_cut) == (80, 0, 0, 2, 0, 0)
+    assert (one.own, one.wrong, one.tracks) == (80, 0, 2)
     assert not one.swapped and one.swaps == 0
     np.testing.assert_allclose(done.off, 0)
     joint = done.by_rule[JOINT]
@@ -293,20 +291,13 @@ def test_what_a_rule_did_is_counted_by_hand():
     crossing = crossing._replace(boat=boat)
     #  boat:          0  1  0  1 NONE 1  0  1  0 NONE
     track = np.array([0, 1, 1, 1, 2, 2, 0, -1, 1, 0])
-    cut = np.zeros(10, bool)
-    cut[6] = True  # the second of the first track
     bank = bank_of(crossing, track, [0, 1, 4])
-    one = associate(placed_of(crossing, cut=cut), bank)
-    assert (one.own, one.wrong, one.unassigned) == (8, 2, 1)
-    assert (one.own_inside, one.wrong_inside) == (7, 2)
-    wrong_cut = associate(placed_of(crossing, cut=np.arange(10) == 2), bank)
-    assert (wrong_cut.wrong, wrong_cut.wrong_inside) == (2, 1)
-    assert one.mixed == 2, "a vessel's on the track of nothing, and nothing on a vessel's"
-    assert (one.tracks, one.by_false, one.by_cut) == (3, 1, 1)
+    one = associate(placed_of(crossing), bank)
+    assert (one.own, one.wrong, one.unassigned, one.tracks) == (8, 2, 1, 3)
     both = np.zeros(10, bool)
     both[2] = True
     right = associate(placed_of(crossing, both=both), bank)
-    assert (right.own, right.wrong, right.by_cut) == (7, 1, 0), "of both is right on either's"
+    assert (right.own, right.wrong) == (7, 1), "of both is right on either's"
 
 
 def test_without_any_track_nothing_is_wrong():
@@ -362,3 +353,17 @@ def test_a_frame_is_the_same_when_it_is_seen_again(rendering):
 def frame_time(rendering: Rendering, exposure: int) -> float:
     crossing = rendering.frames.crossing
     return float(crossing.times[list(np.unique(crossing.looks.image)).index(exposure)])
+
+
+@pytest.mark.slow
+def test_tables_and_figure_are_of_what_was_rendered(rendering):
+    (detected,) = detected_table([rendering]).to_dict("records")
+    assert (detected["flight"], detected["whole"]) == (str(SEED), rendering.near.whole)
+    assert detected["missed"] == rendering.near.whole - detected["found"] - detected["joined"]
+    names = {rule: rule for rule in (*study.SUBJECTS, JOINT)}
+    table = rendered_table([rendering, rendering], names).set_index("rule")
+    one = rendering.frames.by_rule[DISTANCE]
+    assert table.loc[DISTANCE, "frames_wrong"] == pytest.approx(100 * one.wrong / one.own)
+    assert table.loc[DISTANCE, "frames_swapped"] == 2 * one.swapped
+    assert np.isnan(table.loc[JOINT, "drawn_wrong"]), "no detection is one track's"
+    assert charts.plot_frames(TWIN, [rendering]) is not None

@@ -3,15 +3,14 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import binomtest
 
 from wildlab.analysis.georeference import observe
 from wildlab.geometry.validation import gate_threshold
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.crossing_vessels import STUDY, text
+from wildlab.studies.crossing_vessels import STUDY
 from wildlab.studies.crossing_vessels import trial as study
-from wildlab.studies.crossing_vessels.claims import check_claims
+from wildlab.studies.crossing_vessels.outcomes import check_claims
 from wildlab.studies.crossing_vessels.rendered import part_of
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
@@ -283,8 +282,3 @@ def test_two_are_apart_up_to_just_before_they_meet_and_from_just_after():
     assert until == (300 - 18) * INTERVAL and since == (300 + 18) * INTERVAL
     together = crossing._replace(truth=np.zeros_like(crossing.truth))
     assert apart_times(together) == (0.0, 599 * INTERVAL)
-
-
-def test_a_difference_beyond_chance_is_that_of_a_sign_test():
-    for one, other in ((one, other) for one in range(13) for other in range(13) if one + other):
-        assert text.beyond_chance(one, other) == (binomtest(one, one + other).pvalue < 0.05), (one, other)

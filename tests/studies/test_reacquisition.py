@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.evaluation.runs import mean_share_interval, share_interval
-from wildlab.studies.crossing_vessels import reacquisition_text as text
+from wildlab.studies.crossing_vessels.outcomes import reacquired_shares, reacquisition_table
 from wildlab.studies.crossing_vessels.trial.crossing import TUNING
 from wildlab.studies.crossing_vessels.trial.reacquisition import (
     UNITS,
@@ -124,34 +123,16 @@ BAD = {WITHOUT: (9, 0, 1, 0), WITH: (1, 2, 7, 0), GUESSED_WITHOUT: (9, 0, 1, 0),
 
 
 def test_shares_are_of_tracks_that_had_something_to_find():
-    spread = spread_of(GOOD, {way: (0, 0, 0, 5) for way in WAYS}, BAD)
-    assert np.array_equal(text.shares(spread, WITH, "found_right"), [1.0, np.nan, 0.1], equal_nan=True)
-    assert np.array_equal(
-        text.shares(spread, GUESSED_WITHOUT, "found_wrong"), [0.3, np.nan, 0.0], equal_nan=True
-    )
-
-
-def test_intervals_are_those_of_flights():
-    spread = spread_of(*[GOOD] * 3, *[BAD] * 3)
-    found = mean_share_interval([1.0] * 3 + [0.1] * 3)
-    row = text.again_table(spread).set_index("way").loc[text.NAMES[WITH]]
-    assert row["found_right"] == f"55.0 % ({100 * found.low:.1f} to {100 * found.high:.1f} %)"
-    wilson = share_interval(3, 6)
-    assert row["none wrong"] == f"3 of 6 ({100 * wilson.low:.0f} to {100 * wilson.high:.0f} %)"
-    assert row["all right"] == row["none wrong"]
+    runs = spread_of(GOOD, {way: (0, 0, 0, 5) for way in WAYS}, BAD)
+    right, guessed = reacquired_shares(runs, WITH, "found_right"), (GUESSED_WITHOUT, "found_wrong")
+    assert np.array_equal(right, [1.0, np.nan, 0.1], equal_nan=True)
+    assert np.array_equal(reacquired_shares(runs, *guessed), [0.3, np.nan, 0.0], equal_nan=True)
 
 
 def test_flights_with_nothing_to_find_count_nowhere():
-    """Half of eight flights have a track to find: of four, in each column."""
-    parts = {text.RIGHT: [1.0] * 4 + [0.0] * 4, text.WRONG: 0.0, text.MISSED: 0.0, text.NEW: 0.0}
-    table = pd.DataFrame({(way, name): np.broadcast_to(values, 8)
-                          for way in text.NAMES for name, values in parts.items()})  # fmt: skip
-    for _, row in text.again_table(table).iterrows():
-        assert row["none wrong"].startswith("4 of 4") and row["all right"].startswith("4 of 4")
-
-
-@pytest.mark.parametrize(
-    ("flights", "said"), [([GOOD] * 8, "help"), ([BAD] * 8, "harm"), ([GOOD] * 3, "chance")]
-)
-def test_looks_help_or_harm_only_beyond_chance(flights, said):
-    assert said in text.again_words(spread_of(*flights))
+    """Half of eight flights have a track to find."""
+    nothing = {way: (0, 0, 0, 5) for way in WAYS}
+    table = reacquisition_table(spread_of(GOOD, BAD, GOOD, BAD, *[nothing] * 4), {way: way for way in WAYS})
+    row = table.set_index("way").loc[WITH]
+    assert (row["found_right"], row["found_wrong"]) == (pytest.approx(55.0), pytest.approx(10.0))
+    assert row["none_wrong"] == 50.0

@@ -1,15 +1,21 @@
-"""Figures of the study of crossing vessels: counterparts of H figures 6.21, 6.23, 6.24, and one of ours."""
+"""Figures of two vessels that cross: counterparts of H figures 6.21 to 6.24, and one of ours."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
-from wildlab.reporting.spread import bounds_of, spread_words
+from wildlab.analysis.rendered import Photographer
+from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
+from wildlab.reporting.spread import bounds_of
+from wildlab.studies.crossing_vessels.rendered import Rendering
+from wildlab.studies.crossing_vessels.spotted import WHOLE, Spotted, spot
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
     FEATURES,
@@ -18,26 +24,23 @@ from wildlab.studies.crossing_vessels.trial import (
     Flown,
     curve_subject,
     looks_of,
-    swapped,
-    wrong_of,
 )
-from wildlab.studies.crossing_vessels.trial.crossing import BOATS, Crossing
+from wildlab.studies.crossing_vessels.trial.crossing import BOATS, NONE
 
 Array = NDArray[np.float64]
-#: What `Report.figures` takes: figure, name, alternative text, caption.
-Shown = tuple[Figure, str, str, str]
 #: Tracks by the vessel whose detections started them, as in H figure 6.21.
 _COLOURS = (BLUE, ORANGE)
 #: Of the height of a map, left free below everything on it for the scale bar.
 FREE = 0.3
+#: Around the boxes of a frame, px, and how wide what is shown is at least.
+AROUND, LEAST = 30, 200
 _AXES = {"size": "ln of the size in m²", "intensity": "intensity (counts)", "hu": "ln of Hu's first moment"}
 
 
-def tracks_shown(flown: Flown) -> Shown:
-    """Tracks without features and with them, beside the truth (H figures 6.23 and 6.24)."""
+def plot_tracks(flown: Flown, names: Mapping[str, str]) -> Figure:
+    """True paths and tracks without features and with them (H figures 6.23 and 6.24)."""
     fig, axes = new_figure(5.9, 6.6, rows=2)
-    said = []
-    for ax, rule, name in zip(axes, (DISTANCE, FEATURES), ("Distance alone", "And features"), strict=True):
+    for ax, rule in zip(axes, (DISTANCE, FEATURES), strict=True):
         bank, crossing = flown.banks[rule], flown.crossing
         for number, boat in enumerate(BOATS):
             north, east = crossing.truth[number].T
@@ -48,39 +51,20 @@ def tracks_shown(flown: Flown) -> Shown:
             label = f"track that {BOATS[owner]} started" if new else None
             x = bank.x[:, track]
             ax.plot(x[:, 1], x[:, 0], color=_COLOURS[owner], lw=1.4, alpha=0.85, label=label)
-        words = outcome_words(crossing, rule, flown)
-        ax.set_title(f"{name}: {words}")
-        said.append(f"{'with' if rule == FEATURES else 'without'} features {words}")
+        ax.set_title(names[rule])
         low, high = ax.get_ylim()
         ax.set_ylim(low - FREE * (high - low), high)
         map_axes(ax, scale_bar=ax is axes[-1])
     axes[0].set_xlabel("")
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return (
-        fig, "fig-6-23", f"Map of both vessels and their tracks: {'; '.join(said)}.",
-        f"{'; '.join(said).capitalize()}. A track has the colour of the vessel whose detections started it. "
-        "Counterpart of H figures 6.23 and 6.24.",
-    )  # fmt: skip
+    return fig
 
 
-def outcome_words(crossing: Crossing, rule: str, flown: Flown) -> str:
-    """Whether the tracks of one flight were swapped, and how many detections went wrong."""
-    after, end = swapped(crossing, flown.banks[rule])
-    wrong = int(wrong_of(crossing, flown.banks[rule]).sum())
-    if after and end:
-        how = "swapped for good"
-    elif after:
-        how = "swapped, and not at the end"
-    else:
-        how = "swapped at the end" if end else "no swap"
-    return f"{how}, {wrong} wrong"
-
-
-def looks_shown(looks: list[Array]) -> Shown:
-    """What the two look like in rendered images (H figure 6.21)."""
+def plot_features(looks: list[Array]) -> Figure:
+    """Features of both vessels in rendered images (H figure 6.21)."""
     fig, axes = new_figure(5.9, 3.2, columns=3)
-    apart, said = looks_of(looks), []
-    rng = np.random.default_rng(0)  # to tell points apart, across
+    apart = looks_of(looks)
+    rng = np.random.default_rng(0)  # to keep points apart, across
     for ax, (k, name) in zip(axes, enumerate(NAMES), strict=True):
         for number, pool in enumerate(looks):
             across = number + rng.uniform(-0.18, 0.18, len(pool))
@@ -89,54 +73,106 @@ def looks_shown(looks: list[Array]) -> Shown:
         ax.grid(False, axis="x")
         value = apart["looks", f"separation_{name}"]
         ax.set_title(f"{value:.0f} apart" if value >= 10 else f"{value:.1f} apart")
-        said.append(f"{'Hu moment' if name == 'hu' else name} {value:.1f}")
-    return (
-        fig, "fig-6-21",
-        f"Size, intensity and Hu's first moment of both vessels in rendered images, apart by so many "
-        f"spreads within a vessel: {', '.join(said)}.",
-        f"Rendered images of the flight of the figures. Means apart, in spreads within a vessel: "
-        f"{', '.join(said)}. Counterpart of H figure 6.21.",
-    )  # fmt: skip
+    return fig
 
 
-def curve_shown(spread: pd.DataFrame) -> Shown:
+def plot_separation(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """Wrong associations and swaps over the separation of a made-up feature."""
-    fig, axes = new_figure(5.9, 4.6, rows=2, sharex=True)
+    fig, (top, low) = new_figure(5.9, 4.6, rows=2, sharex=True)
     subjects = [curve_subject(separation) for separation in SEPARATIONS]
-    middle = np.array([spread[one, "wrong"].median() for one in subjects])
-    bounds = np.array([bounds_of(spread[one, "wrong"]) for one in subjects])
-    share = 100 * np.array([spread[one, "swapped"].mean() for one in subjects])
-    top, low = axes
+    middle = np.array([runs[one, "wrong"].median() for one in subjects])
+    bounds = np.array([bounds_of(runs[one, "wrong"]) for one in subjects])
     if np.isfinite(bounds).all():
         top.fill_between(SEPARATIONS, *bounds.T, color=BLUE, alpha=0.18, lw=0)
     top.plot(SEPARATIONS, middle, "o-", color=BLUE)
+    share = [100 * runs[one, "swapped"].mean() for one in subjects]
     low.plot(SEPARATIONS, share, "o-", color=BLUE, label="one made-up feature")
-    _level(top, spread[DISTANCE, "wrong"].median(), GREY)
-    _level(low, 100 * spread[DISTANCE, "swapped"].mean(), GREY, "distance alone")
-    _level(top, spread[FEATURES, "wrong"].median(), VERMILLION)
-    _level(low, 100 * spread[FEATURES, "swapped"].mean(), VERMILLION, "as rendered")
+    for rule, color in ((DISTANCE, GREY), (FEATURES, VERMILLION)):
+        top.axhline(runs[rule, "wrong"].median(), color=color, lw=1.3, ls="--")
+        low.axhline(100 * runs[rule, "swapped"].mean(), color=color, lw=1.3, ls="--", label=names[rule])
     top.set_yscale("symlog", linthresh=1)
     # None wrong lies a little above the axis, where its line is seen.
     top.set(ylabel="wrong", ylim=(-0.4, None))
     low.set(ylabel="swapped (%)", ylim=(-3, 103), xticks=SEPARATIONS)
     low.set_xlabel("difference of the two (spreads of the feature)")
-    at = {separation: value for separation, value in zip(SEPARATIONS, middle, strict=True)}
-    most = max(SEPARATIONS)
-    top.set_title(f"Wrong: {at[0]:.0f} at no difference, {at[most]:.0f} at {most} spreads")
     fig.legend(*low.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    said = "; ".join(
-        f"{separation}: {value:.0f} wrong, {part:.0f} % swapped"
-        for separation, value, part in zip(SEPARATIONS, middle, share, strict=True)
-    )
-    band = spread_words(len(spread)).key
-    return (
-        fig, "separation",
-        f"Detections wrong and flights swapped over how different the two are, in spreads: {said}.",
-        "Above the detections that went to the wrong track, median of the flights"
-        f"{f', and band: {band}' if band else ''}; below the flights swapped. By difference in spreads: "
-        f"{said}.",
-    )  # fmt: skip
+    return fig
 
 
-def _level(ax: Axes, value: float, color: str, label: str | None = None) -> None:
-    ax.axhline(value, color=color, lw=1.3, ls="--", label=label)
+class Picture(NamedTuple):
+    """A frame of the crossing: its counts (H, W), its detections and their boxes, (D, 4) px; m apart."""
+
+    exposure: int
+    counts: NDArray[np.uint16]
+    spotted: Spotted
+    box: NDArray[np.float64]
+    apart: float
+
+
+def telling_exposures(one: Rendering) -> list[int]:
+    """Of the frames with both whole in view: where they are nearest and detected each alone, and as one.
+
+    None, one or two of these; a frame without any detection has no place among them.
+    """
+    spotted, crossing = one.spotted, one.frames.crossing
+    images = np.unique(crossing.looks.image)
+    both = (spotted.share >= WHOLE).all(axis=1)
+    chosen = []
+    for kind in (spotted.found.all(axis=1), spotted.joined.any(axis=1)):
+        rows = np.flatnonzero(np.isin(images, spotted.frames[both & kind]))
+        if len(rows) and np.isfinite(crossing.apart[rows]).any():
+            chosen.append(int(images[rows[np.nanargmin(crossing.apart[rows])]]))
+    return chosen
+
+
+def picture_of(twin: str, one: Rendering, exposure: int) -> Picture:
+    """A frame rendered and searched again."""
+    camera = Photographer(twin, one.seed)
+    _, counts = camera.image(exposure)
+    shot = next(iter(camera.shoot([exposure])))
+    crossing = one.frames.crossing
+    apart = float(crossing.apart[np.searchsorted(np.unique(crossing.looks.image), exposure)])
+    rows, columns = counts.shape
+    return Picture(exposure, counts, spot([shot], (rows, columns)), shot.detections.box, apart)
+
+
+def plot_frames(twin: str, flights: Sequence[Rendering]) -> Figure | None:
+    """The two at the crossing, each detected alone, and as one: of the first flight that has most of these.
+
+    None where both are whole in no frame with a detection.
+    """
+    chosen = [telling_exposures(one) for one in flights]
+    most = max((len(found) for found in chosen), default=0)
+    if not most:
+        return None
+    at = next(k for k, found in enumerate(chosen) if len(found) == most)
+    pictures = [picture_of(twin, flights[at], exposure) for exposure in chosen[at]]
+    fig, axes = new_figure(5.9, 3.1 if most > 1 else 4.6, columns=most, squeeze=False)
+    for ax, picture in zip(axes.flat, pictures, strict=True):
+        (left, top), (right, bottom) = _part(picture)
+        shown = picture.counts[top:bottom, left:right]
+        low, high = np.percentile(shown, (0.5, 99.8))
+        ax.imshow(picture.counts, cmap="gray", vmin=low, vmax=high, interpolation="nearest")
+        for (x, y, width, height), boat, both in zip(
+            picture.box, picture.spotted.boat, picture.spotted.both, strict=True
+        ):
+            colour = VERMILLION if boat == NONE else GREEN if both else _COLOURS[boat]
+            box = Rectangle((x - 4, y - 4), width + 8, height + 8, fill=False, ec=colour, lw=1.8)
+            ax.add_patch(box)
+        ax.set(xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5), xticks=[], yticks=[])
+        ax.grid(False)
+        ax.set_title(f"{picture.apart:.0f} m apart")
+    return fig
+
+
+def _part(picture: Picture) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Corners of the part that is shown, px: all boxes, and some sea about them."""
+    rows, columns = picture.counts.shape
+    low = picture.box[:, :2].min(axis=0) - AROUND
+    high = (picture.box[:, :2] + picture.box[:, 2:]).max(axis=0) + AROUND
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST / 2).max()
+    size = np.array([columns, rows])
+    half = min(half, size.min() / 2)
+    middle = np.clip(middle, half, size - half)
+    first, last = np.floor(middle - half).astype(int), np.ceil(middle + half).astype(int)
+    return (int(first[0]), int(first[1])), (min(int(last[0]), columns), min(int(last[1]), rows))

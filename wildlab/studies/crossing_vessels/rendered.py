@@ -58,12 +58,11 @@ Tell = Callable[[int, int], None]
 
 
 class Placed(NamedTuple):
-    """D detections on the sea, what they look like, and `Spotted.both` and `Spotted.cut` of them."""
+    """D detections on the sea, what they look like, and `Spotted.both` of them."""
 
     crossing: Crossing
     appearance: Appearance
     both: Bools
-    cut: Bools
 
 
 class Associated(NamedTuple):
@@ -78,13 +77,8 @@ class Associated(NamedTuple):
     own, wrong, unassigned
         Detections of one vessel alone; of these those that went to a track that the other started; and those
         that went to none.
-    own_inside, wrong_inside
-        Of ``own`` and ``wrong`` those that do not touch the border of the image.
-    mixed
-        Detections of nothing that a vessel's track took, and vessels' that one started by nothing took.
-    tracks, by_false, by_cut
-        That were started; of these by a detection of nothing; and of these with one of their first two
-        detections at the border of the image.
+    tracks
+        That were started.
     """
 
     swapped: bool
@@ -92,12 +86,7 @@ class Associated(NamedTuple):
     own: int | None = None
     wrong: int | None = None
     unassigned: int | None = None
-    own_inside: int | None = None
-    wrong_inside: int | None = None
-    mixed: int | None = None
     tracks: int | None = None
-    by_false: int | None = None
-    by_cut: int | None = None
 
 
 class CrossingTracks(NamedTuple):
@@ -197,7 +186,7 @@ def on_the_sea(flight: Flight, spotted: Spotted, source: str = "autopilot") -> P
     features = image_features(spotted.area, spotted.intensity, spotted.hu, per_px)
     crossing, order = arrange(flight, seen, spotted.boat)
     appearance = Appearance(features[order], TOLD_SD, WEIGHTS)
-    return Placed(crossing, appearance, spotted.both[order], spotted.cut[order])
+    return Placed(crossing, appearance, spotted.both[order])
 
 
 def drawn_at_sea(flight: Flight, source: str = "autopilot") -> Crossing:
@@ -225,21 +214,14 @@ def part_of(crossing: Crossing, span: tuple[float, float]) -> Crossing:
 def associate(placed: Placed, bank: Bank) -> Associated:
     """What is counted of one rule's tracks; a detection of both vessels is right on either's."""
     crossing = placed.crossing
-    owner = np.append(crossing.boat[bank.started], NONE)[bank.track]
     vessel, given = crossing.boat != NONE, bank.track >= 0
-    firsts = [np.flatnonzero(bank.track == track)[:2] for track in range(len(bank.started))]
     own, wrong = vessel & ~placed.both, wrong_of(crossing, bank) & ~placed.both
     after, _ = swapped(crossing, bank)
     return Associated(
         own=int(own.sum()),
         wrong=int(wrong.sum()),
         unassigned=int((vessel & ~given).sum()),
-        own_inside=int((own & ~placed.cut).sum()),
-        wrong_inside=int((wrong & ~placed.cut).sum()),
-        mixed=int((given & (vessel != (owner != NONE))).sum()),
         tracks=len(bank.started),
-        by_false=int((crossing.boat[bank.started] == NONE).sum()),
-        by_cut=sum(bool(placed.cut[rows].any()) for rows in firsts),
         swapped=after,
         swaps=identities_of(crossing, bank).swaps,
     )
@@ -326,7 +308,7 @@ def render_crossing(
         sea=count(of_sea),
         frames=follow(on_the_sea(flight, spotted)),
         inside=follow(on_the_sea(flight, spotted.of(~spotted.cut))),
-        drawn=follow(Placed(drawn, dressed(drawn, photograph(twin, seed, flight, images), seed), none, none)),
+        drawn=follow(Placed(drawn, dressed(drawn, photograph(twin, seed, flight, images), seed), none)),
     )
 
 

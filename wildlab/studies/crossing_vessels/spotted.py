@@ -67,35 +67,22 @@ class Counted(NamedTuple):
 
     Attributes
     ----------
-    frames, with_false, false
-        How many; of these with a detection of nothing; and how many such detections.
+    frames, false
+        How many, and detections of nothing in them.
     whole, found, joined
         Times that a vessel was whole in view; of these detected on its own; and in one with the other.
-    cut, cut_found, cut_joined
-        The same where the border cuts it.
-    pieces
-        Detections of a vessel beyond its first in a frame.
     """
 
     frames: int
-    with_false: int
     false: int
     whole: int
     found: int
     joined: int
-    cut: int
-    cut_found: int
-    cut_joined: int
-    pieces: int
 
     @property
     def missed(self) -> int:
         """Times that a vessel was whole in view and in no detection."""
         return self.whole - self.found - self.joined
-
-    def plus(self, other: Counted) -> Counted:
-        """Both together."""
-        return Counted(*(a + b for a, b in zip(self, other, strict=True)))
 
 
 def spot(shots: Iterable[Shot], shape: tuple[int, int]) -> Spotted:
@@ -147,17 +134,11 @@ def spot(shots: Iterable[Shot], shape: tuple[int, int]) -> Spotted:
 
 def count(spotted: Spotted) -> Counted:
     """How often what is in view was detected, and how often nothing was."""
-    whole, cut = spotted.share >= WHOLE, (spotted.share > 0) & (spotted.share < WHOLE)
-    false = spotted.exposure[spotted.boat == NONE]
+    whole = spotted.share >= WHOLE
     return Counted(
         frames=len(spotted.frames),
-        with_false=len(np.unique(false)),
-        false=len(false),
+        false=int((spotted.boat == NONE).sum()),
         whole=int(whole.sum()),
         found=int((whole & spotted.found).sum()),
         joined=int((whole & spotted.joined).sum()),
-        cut=int(cut.sum()),
-        cut_found=int((cut & spotted.found).sum()),
-        cut_joined=int((cut & spotted.joined).sum()),
-        pieces=int((spotted.boat != NONE).sum() - spotted.found.sum()),
     )
