@@ -6,8 +6,10 @@ from html import unescape
 import cv2
 import numpy as np
 import pandas as pd
+import pytest
 
-from wildlab.reporting.detections import LISTED, ROOM, _rates_shown, advice_of, detections_page
+from wildlab.messages.page_texts import load_texts
+from wildlab.reporting.detections import LISTED, ROOM, advice, answer, detections_page, rates_shown, reason
 
 JPEG = bytes(cv2.imencode(".jpg", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
 
@@ -64,17 +66,18 @@ def test_other_detectors_stand_beside_ours_with_their_curves():
 def test_what_was_chosen_here_does_not_come_first():
     fit = {"held_out": rates(5, 5, 4), "where_chosen": rates(8, 1, 1), "defaults": rates(2, 9, 7)}
     result = run(judged=rates(8, 1, 1), fit=fit, chosen_here=True, detections=9)
-    assert list(_rates_shown(result).values()) == [fit["held_out"], fit["where_chosen"], fit["defaults"]]
+    assert list(rates_shown(result).values()) == [fit["held_out"], fit["where_chosen"], fit["defaults"]]
     assert "5 of 9" in shown(result)[1]
     elsewhere = run(judged=rates(7, 1, 2), fit=fit, chosen_here=False, detections=8)
-    assert len(_rates_shown(elsewhere)) == 4
+    assert len(rates_shown(elsewhere)) == 4
 
 
 def test_images_that_could_not_be_used_are_listed_and_never_silent():
     problems = [[f"bad{n}.png", "it is empty"] for n in range(LISTED + 2)]
     page, words = shown(run(problems=problems))
     assert page.count("it is empty") == LISTED and "2 more" in words
-    assert len(advice_of(run(usable=0, detections=0, problems=problems))) == 1
+    nothing = run(usable=0, detections=0, problems=problems)
+    assert [one.key for one in (*answer(nothing), *advice(nothing))] == ["no-image", "advice-images"]
 
 
 def test_names_are_names_and_nothing_more():
@@ -89,3 +92,29 @@ def test_pictures_have_an_end():
     page, words = shown(run(), {}, [("a", large), ("b", JPEG), ("c", large), ("d", JPEG)])
     assert page.count("data:image/jpeg") == 2 and "2 more pictures" in words
     assert "data:image/jpeg" not in shown(run(), {}, [("a", large + large)])[0]
+
+
+ELLIPSES = {"estimate": 0.6, "low": 0.5, "high": 0.7}
+RUNS = [
+    (run(judged=rates(6, 2, 3)), ["labels", "reason-judged", "advice-fit"]),
+    (run(judged=rates(6, 0, 0, interval=False)), ["labels", "reason-judged", "advice-few"]),
+    (run(), ["not-judged", "reason-not-judged", "advice-label"]),
+    (run(problems=[["a", "b"]]), ["not-judged", "reason-lost", "advice-label"]),
+    (run(judged=rates(6, 0, 0), fit={"held_out": rates(5, 1, 1), "where_chosen": rates(6, 1, 1),
+                                     "defaults": rates(2, 9, 7)}), ["held-out", "reason-judged"]),
+    (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES}),
+     ["labels", "ellipses-small", "reason-judged"]),
+    (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES | {"high": 0.95}}),
+     ["labels", "ellipses-right", "reason-judged"]),
+    (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES | {"low": 0.95, "high": 0.99}}),
+     ["labels", "ellipses-large", "reason-judged"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("result", "keys"), RUNS)
+def test_what_is_said_follows_from_the_run(result, keys):
+    said = [*answer(result), reason(result)[2], *advice(result)]
+    assert [one.key for one in said] == keys
+    texts = load_texts("detections").answers
+    for one in said:
+        assert set(re.findall(r"{(\w+)}", texts[one.key])) <= set(one.values)

@@ -24,7 +24,7 @@ from wildlab.files import csv_text, read_csv
 from wildlab.names import FORMULA
 from wildlab.reporting.charts import comparison, following, georeferencing, many, navigation, overview, tracks
 from wildlab.reporting.charts.beside import beside_plain_shown
-from wildlab.reporting.detectors_compared import curves_shown
+from wildlab.reporting.detections import precision_over_recall
 from wildlab.reporting.figure_text import _harmless as _harmless_texts
 from wildlab.reporting.figure_text import fit_text
 from wildlab.reporting.tables import csv_link
@@ -167,7 +167,7 @@ def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
     yield tracks.track_map(WAY, {"a": WAY}, {"a": one}, other), {one}
     yield comparison.dots_chart([one, other], [1.0, 2.0], [0.5, 1.5], [1.5, 2.5], one, other), set()
     curves = pd.DataFrame({"detector": [one, one], "recall": [0.1, 0.2], "precision": [1.0, 0.9]})
-    yield curves_shown([{"name": one, "average_precision": {"estimate": 0.5}}], curves)[0], {one}
+    yield precision_over_recall([one], curves), {one}
     yield georeferencing.error_shares({one: (TIMES, "#000000")}, other), set()
 
 

@@ -1,41 +1,167 @@
-"""The page of a run of a detector: what was found, what was missed and invented, and pictures of it."""
+"""The page of a run of a detector: what was found, missed and invented, pictures, and other detectors beside.
+
+What is said follows by rules from the run's numbers; the words lie in ``data/messages/en/detections.toml``.
+"""
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
-from wildlab.analysis.detecting.judged import ellipse_sentence, rate_words
-from wildlab.detection.detections import PART
-from wildlab.reporting.detectors_compared import compared_section
-from wildlab.reporting.figures import BLUE, new_figure, png_bytes
+from wildlab.analysis.detecting.judged import ELLIPSE, rate_words
+from wildlab.messages.message import Message
+from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.names import figure_name
+from wildlab.reporting.arrange import ADVICE, arranged
+from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
 from wildlab.reporting.glossary import with_glossary
 from wildlab.reporting.html import examine
 from wildlab.reporting.page import page
-from wildlab.reporting.text import NOTHING, escape, inline
+from wildlab.reporting.report import open_report
+from wildlab.reporting.text import NOTHING
+from wildlab.reporting.wording import Wording
 
 #: Bytes of pictures on a page at most: it is sent by mail. What has no room is left out, and that is said.
 ROOM = 2_500_000
 #: Problems of images that are listed one by one.
 LISTED = 20
-#: What each sheet shows, and how its picture is described.
-SHEETS = {
-    "missed": "Labelled, and not found",
-    "invented": "Found, and not labelled",
-    "found": "Found, and labelled",
-    "detected": "Detected",
-}
-_COLOURS = {
-    "found": "green",
-    "invented": "red",
-    "missed": "yellow",
-    "not judged": "grey",
-    "detected": "orange",
-}
+#: What each sheet shows: keys of its texts.
+SHEETS = ("missed", "invented", "found", "detected")
+_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, INK)
+_RATES = ("f1", "precision", "recall")
+
+
+# -- what follows from the numbers
+
+
+def rates_shown(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Rates by where they come from (keys of their words), the one that counts first."""
+    rows: dict[str, Mapping[str, Any]] = {}
+    fit, judged = result.get("fit"), result.get("judged")
+    if fit:
+        rows["held-out"] = fit["held_out"]
+    if judged and not result.get("chosen_here"):
+        rows["labels"] = judged
+    if fit:
+        rows["where-chosen"] = fit["where_chosen"]
+        rows["no-classifier" if result["method"] == "shape" else "defaults"] = fit["defaults"]
+    return rows
+
+
+def answer(result: Mapping[str, Any]) -> list[Message]:
+    """What was found, and whether the ellipses hold; two sentences at most."""
+    if not result["frames"]["usable"]:
+        return [Message("no-image")]
+    rows = rates_shown(result)
+    if not rows:
+        return [Message("not-judged", {"detections": str(result["detections"])})]
+    where, best = next(iter(rows.items()))
+    values = {
+        "found": str(best["found"]),
+        "labelled": str(best["found"] + best["missed"]),
+        "invented": str(best["invented"]),
+        "detections": str(best["found"] + best["invented"]),
+    }
+    said = [Message("held-out" if where == "held-out" else "labels", values)]
+    share = (result.get("judged") or {}).get("ellipse_coverage_90")
+    if share:
+        kind = "small" if share["high"] < ELLIPSE else "large" if share["low"] > ELLIPSE else "right"
+        said.append(Message(f"ellipses-{kind}", {"share": percent_of(share["estimate"])}))
+    return said
+
+
+def reason(result: Mapping[str, Any]) -> tuple[str, str, Message]:
+    """Level, key of the verdict's word, and why."""
+    of, judged = result["frames"], result.get("judged")
+    if lost := of["all"] - of["usable"]:
+        return "warn", "lost", Message("reason-lost", {"lost": str(lost), "all": str(of["all"])})
+    key = "judged" if judged else "not-judged"
+    return "neutral", key, Message(f"reason-{key}")
+
+
+def advice(result: Mapping[str, Any]) -> list[Message]:
+    """What to do next; nothing where there is nothing to advise.
+
+    Parameters
+    ----------
+    result
+        As for `detections_page`.
+    """
+    judged = result.get("judged")
+    if result["frames"]["usable"] == 0:
+        return [Message("advice-images")]
+    if judged is None:
+        return [Message("advice-label")]
+    said = []
+    missed, invented = int(judged["missed"]), int(judged["invented"])
+    if missed + invented and result.get("fit") is None:
+        said.append(Message("advice-fit", {"missed": str(missed), "invented": str(invented)}))
+    if judged["f1"]["estimate"] is not None and judged["f1"]["low"] is None:
+        said.append(Message("advice-few", {"groups": str(judged["groups"])}))
+    return said
+
+
+# -- tables and figures
+
+
+def rates_table(result: Mapping[str, Any]) -> pd.DataFrame:
+    """A row for each set of images that rates are of; empty without labels."""
+    names = load_texts("detections").subjects
+    return pd.DataFrame(
+        [
+            {
+                "where": names[f"rates-{where}"],
+                **{key: rate_words(of[key]) or NOTHING for key in _RATES},
+                **{key: of[key] for key in ("found", "invented", "missed")},
+            }
+            for where, of in rates_shown(result).items()
+        ]
+    )
+
+
+def compared_table(compared: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """A row for each detector, ours first: rates with intervals, and F1 minus ours."""
+    return pd.DataFrame(
+        [
+            {
+                "detector": one["name"],
+                **{key: rate_words(one[key]) or NOTHING for key in (*_RATES, "average_precision")},
+                "beyond": "" if k == 0 else (rate_words(one["f1_beyond_ours"], "+") or NOTHING),
+            }
+            for k, one in enumerate(compared)
+        ]
+    )
+
+
+def precision_over_recall(names: Sequence[str], curves: pd.DataFrame) -> Figure:
+    """Precision beside recall along the score, a line for each detector with a score; dots: all its boxes."""
+    fig, ax = new_figure(5.6, 3.8)
+    for number, name in enumerate(names):
+        own = curves[curves["detector"] == name]
+        if own.empty:
+            continue
+        colour = _COLOURS[number % len(_COLOURS)]
+        ax.plot(own["recall"], own["precision"], "-", color=colour, label=figure_name(name))
+        ax.plot(own["recall"].iloc[-1], own["precision"].iloc[-1], "o", color=colour, ms=7)
+    ax.set(xlabel="recall", ylabel="precision", xlim=(0, 1.02), ylim=(0, 1.03))
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return fig
+
+
+def detections_by_image(counts: np.ndarray) -> Figure:
+    """How many detections each image (N,) has, in order."""
+    fig, ax = new_figure(6.4, 2.4)
+    ax.stairs(counts, np.arange(len(counts) + 1) + 0.5, fill=True, color=BLUE)
+    ax.set(xlabel="image, in order", ylabel="detections", xlim=(0.5, len(counts) + 0.5))
+    ax.set_ylim(bottom=0)
+    return fig
+
+
+# -- the page
 
 
 def detections_page(
@@ -77,259 +203,115 @@ def detections_page(
     WildlabError
         If the page would break a promise of `wildlab.reporting.html.examine`.
     """
+    report = open_report(study="detections", kind="images")
+    wording = Wording(report, load_texts("detections"))
+    names, of = wording.texts.subjects, result["frames"]
+    title = wording.say(
+        names["title"], {"detections": str(result["detections"]), "images": str(of["usable"])}
+    )
+    report.head(title, f"{name}, method {result['method']}")
+    level, key, why = reason(result)
+    verdict = (names[f"verdict-{key}"], wording.messages([why])[0])
+    report.summary(wording.messages(answer(result)), level=level, verdict=verdict)
+    report.tiles(_tiles(result, names))
+    if said := wording.messages(advice(result)):
+        report.section(names["advice"], part=ADVICE)
+        report.points(said)
+    if len(rates := rates_table(result)):
+        wording.table("rates", rates)
+    compared = result.get("compared", ())
+    if curves is not None and len(compared) > 1:
+        _show_compared(wording, compared, curves)
+    left = _show_sheets(wording, result, sheets)
+    _show_overlays(wording, overlays, left, judged=result.get("judged") is not None)
+    counts = frames[frames["problem"].fillna("") == ""]["detections"].to_numpy(float)
+    if len(counts) > 2:
+        report.section(names["by-image"])
+        wording.figure("by-image", detections_by_image(counts))
+    _show_details(wording, result, thresholds)
+    whole = page(
+        title=title, body=with_glossary(arranged("\n".join(report.parts))), kicker="wildlab › detections"
+    )
+    examine(whole, name)
+    return whole
+
+
+def _tiles(result: Mapping[str, Any], names: Mapping[str, str]) -> list[tuple[str, str]]:
     of = result["frames"]
-    judged = result.get("judged")
-    what = _plural(result["detections"], "detection")
-    title = f"{what} in {_plural(of['usable'], 'image')}"
-    parts = [
-        f'<header><h1>{escape(title)}</h1><p class="sub">{escape(name)}, method '
-        f"{escape(result['method'])}</p></header>",
-        _summary(result),
-        _tiles(result),
-    ]
-    parts.append(_rates_table(result))
-    if curves is not None:
-        parts.append(compared_section(result["compared"], curves))
-    advice = advice_of(result)
-    if advice:
-        points = "".join(f"<li>{inline(one)}</li>" for one in advice)
-        parts.append(f"<h2>What to do</h2><ul>{points}</ul>")
-    left = ROOM
-    for key, heading in SHEETS.items():
+    tiles = [(f"{of['usable']} of {of['all']}", names["tile-images"])]
+    rates: Mapping[str, Any] = next(iter(rates_shown(result).values()), {})
+    for key in ("recall", "precision") if rates else ():
+        one = rates[key]
+        span = "" if one["low"] is None else f" ({one['low']:.2f} to {one['high']:.2f})"
+        value = NOTHING if one["estimate"] is None else f"{one['estimate']:.2f}"
+        tiles.append((value, names[f"tile-{key}"] + span))
+    return tiles if rates else [*tiles, (str(result["detections"]), names["tile-detections"])]
+
+
+def _show_compared(wording: Wording, compared: Sequence[Mapping[str, Any]], curves: pd.DataFrame) -> None:
+    wording.table("compared", compared_table(compared))
+    if len(curves):
+        wording.figure("curves", precision_over_recall([one["name"] for one in compared], curves))
+    if notes := [f"{one['name']}: {line}" for one in compared for line in one["told"]]:
+        wording.report.points(notes)
+
+
+def _show_sheets(wording: Wording, result: Mapping[str, Any], sheets: Mapping[str, bytes]) -> int:
+    """Show the sheets; returns the room that is left."""
+    names, judged, left = wording.texts.subjects, result.get("judged"), ROOM
+    for key in SHEETS:
         if key not in sheets:
             continue
         number = int(result["pictures"].get(key, 0))
         total = int(judged[key]) if judged else int(result["detections"])
         left -= len(sheets[key])
-        which = "the first" if key == "missed" else "the surest"
-        which = "some of all scores" if key in ("found", "detected") else which
-        more = f" {number} of {total}, {which}." if number < total else ""
-        parts.append(f"<h2>{heading}: {total}</h2>")
-        alt = f"{_plural(number, 'cutting')} of what was {key}, each with the name of its image."
-        parts.append(_picture(sheets[key], alt, f"Each with the name of its image.{more}", wide=True))
-    parts += _overlays(overlays, left, judged is not None)
-    parts += _per_frame(frames, of)
-    parts += _problems(result)
-    if isinstance(thresholds.get("part"), float) and thresholds["part"] > 0:
-        whose = "chosen on labelled people and deer" if thresholds["part"] == PART else "as it was given"
-        parts.append(
-            "<h2>What the covariances are of</h2><p>The middle of a whole animal. The warm part that is seen "
-            f"shows where it lies to {100 * thresholds['part']:.0f} % of its length (the threshold part, "
-            f"{whose}). What is evenly warm all over is better known than that: part 0 leaves what the shape "
-            "and the noise of the image explain.</p>"
-        )
-    rows = "".join(
-        f'<tr><th scope="row" class="text">{escape(key)}</th><td class="text">{escape(value)}</td></tr>'
-        for key, value in thresholds.items()
-        if not isinstance(value, dict | list) or len(str(value)) < 200
-    )
-    parts.append(
-        "<details><summary>Thresholds of this run</summary>"
-        f'<div class="scroll"><table><thead><tr><th scope="col" class="text">threshold</th>'
-        f'<th scope="col" class="text">value</th></tr></thead><tbody>{rows}</tbody></table></div></details>'
-    )
-    whole = page(title=title, body=with_glossary("\n".join(parts)), kicker="wildlab › detections")
-    examine(whole, name)
-    return whole
+        wording.report.section(f"{names[f'sheet-{key}']}: {total}")
+        caption = wording.say(names[f"sheet-caption-{key}"], {"number": str(number), "total": str(total)})
+        wording.report.picture(sheets[key], alt=names[f"sheet-{key}"], caption=caption, wide=True)
+    return left
 
 
-def advice_of(result: Mapping[str, Any]) -> list[str]:
-    """What to do next, from the numbers of the run.
-
-    Parameters
-    ----------
-    result
-        As for `detections_page`.
-
-    Returns
-    -------
-    list of str
-        Sentences; none where there is nothing to advise.
-    """
-    judged = result.get("judged")
-    if result["frames"]["usable"] == 0:
-        return ["No image could be used. The reasons are below."]
-    if judged is None:
-        return [
-            "Nothing here says yet which of these detections are what you look for. Mark what is to be seen "
-            "in some images, spread over the flight, and run the same command with `--labels FILE`."
-        ]
-    advice = []
-    missed, invented = int(judged["missed"]), int(judged["invented"])
-    if missed + invented and result.get("fit") is None:
-        more = "More is missed: " if missed > invented else "More is invented: " if invented > missed else ""
-        advice.append(
-            f"{more}{missed} missed, {invented} invented. `--fit FILE` chooses thresholds from labelled "
-            "images, and judges them on others."
-        )
-    if judged["f1"]["estimate"] is not None and judged["f1"]["low"] is None:
-        advice.append(
-            f"Labels of {_plural(judged['groups'], 'group')} of images are too few for an interval: these "
-            "rates may be far off. Label more of the flight."
-        )
-    return advice
-
-
-def _rates_shown(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Rates by where they come from, the one that counts first."""
-    rows: dict[str, Mapping[str, Any]] = {}
-    fit, judged = result.get("fit"), result.get("judged")
-    if fit:
-        rows["images that thresholds were not chosen from"] = fit["held_out"]
-    if judged and not result.get("chosen_here"):
-        rows["beside the labels"] = judged
-    if fit:
-        rows["where they were chosen (too good)"] = fit["where_chosen"]
-        what = "without a classifier" if result["method"] == "shape" else "with the defaults"
-        rows[what] = fit["defaults"]
-    return rows
-
-
-def _summary(result: Mapping[str, Any]) -> str:
-    of = result["frames"]
-    lost = of["all"] - of["usable"]
-    rows = _rates_shown(result)
-    if rows:
-        where, best = next(iter(rows.items()))
-        where = "" if where == "beside the labels" else "On images that thresholds were not chosen from: "
-        labelled, all_found = best["found"] + best["missed"], best["found"] + best["invented"]
-        first = (
-            f"{where}{best['found']} of {labelled} labelled {'is' if labelled == 1 else 'are'} found; "
-            f"{best['invented']} of {_plural(all_found, 'detection')} "
-            f"{'is' if best['invented'] == 1 else 'are'} not labelled."
-        )
-    else:
-        first = f"{_plural(result['detections'], 'detection')}; without labels, none is judged."
-    then = [str(one) for one in result.get("notes", ())]
-    judged = result.get("judged")
-    if judged and "ellipse_coverage_90" in judged:
-        then.append(ellipse_sentence(judged["ellipse_coverage_90"]))
-    if judged:
-        aside = result["detections"] - judged["found"] - judged["invented"]
-        if aside > 0:
-            then.append(
-                f"{_plural(aside, 'detection')} of {result['detections']} "
-                f"{'is' if aside == 1 else 'are'} not judged: in images without labels, or in a place "
-                "that is marked as not to be judged."
-            )
-    if lost:
-        then.append(f"{_plural(lost, 'image')} of {of['all']} could not be used, for the reasons below.")
-    level, pill = ("warn", "part") if lost else ("neutral", "")
-    word = "images lost" if lost else "judged" if judged else "not judged"
-    reason = "By the labels of the images." if judged else "There are no labels to judge the detections by."
-    if lost:
-        reason = f"{lost} of {of['all']} images could not be used."
-    return (
-        f'<section class="summary {level}" aria-label="Summary"><p><b>{escape(first[0].upper() + first[1:])}'
-        f'</b> {escape(" ".join(then))}</p><p class="verdict"><span class="pill {pill}">{word}</span> '
-        f"{reason}</p></section>"
-    )
-
-
-def _tiles(result: Mapping[str, Any]) -> str:
-    tiles = [(f"{result['frames']['usable']} of {result['frames']['all']}", "images used")]
-    rates: Mapping[str, Any] = next(iter(_rates_shown(result).values()), {})
-    for key in ("recall", "precision") if rates else ():
-        one = rates[key]
-        if one["estimate"] is None:
-            tiles.append((NOTHING, f"{key}, not defined here"))
-            continue
-        span = "no interval" if one["low"] is None else f"95 %: {one['low']:.2f} to {one['high']:.2f}"
-        meaning = "of what is labelled is found" if key == "recall" else "of detections are labelled"
-        tiles.append((f"{one['estimate']:.2f}", f"{meaning} ({key}); {span}"))
-    if not rates:
-        tiles.append((str(result["detections"]), "detections, not judged"))
-    return (
-        '<ul class="tiles">'
-        + "".join(f"<li><b>{escape(big)}</b><span>{escape(small)}</span></li>" for big, small in tiles)
-        + "</ul>"
-    )
-
-
-def _rates_table(result: Mapping[str, Any]) -> str:
-    rows = _rates_shown(result)
-    if not rows:
-        return ""
-
-    heads = ("where", "F1", "precision", "recall", "found", "invented", "missed")
-    head = "".join(
-        f'<th scope="col"{" class=" + chr(34) + "text" + chr(34) if one == "where" else ""}>{one}</th>'
-        for one in heads
-    )
-    body = "".join(
-        f'<tr><th scope="row" class="text">{escape(where)}</th>'
-        + "".join(f"<td>{rate_words(of[key]) or NOTHING}</td>" for key in ("f1", "precision", "recall"))
-        + "".join(f"<td>{of[key]}</td>" for key in ("found", "invented", "missed"))
-        + "</tr>"
-        for where, of in rows.items()
-    )
-    return (
-        f'<h2>Rates</h2><div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody>'
-        '</table></div><p class="note">In brackets 95 % intervals; they draw groups of images that belong '
-        "together.</p>"
-    )
-
-
-def _overlays(overlays: Sequence[tuple[str, bytes]], room: int, judged: bool) -> list[str]:
-    if not overlays:
-        return []
+def _show_overlays(
+    wording: Wording, overlays: Sequence[tuple[str, bytes]], room: int, *, judged: bool
+) -> None:
+    names, report = wording.texts.subjects, wording.report
     shown: list[tuple[str, bytes]] = []
     for one in overlays:
         if len(one[1]) > room:
             break
         room -= len(one[1])
         shown.append(one)
-    if not shown:
-        return ["<h2>Images</h2><p>The pictures in the folder overlays are too large for this page.</p>"]
-    words = ("found", "invented", "missed") if judged else ("detected",)
-    key = ", ".join(f"{_COLOURS[word]} {word}" for word in words)
+    if not overlays:
+        return
+    key = names["colours-judged" if judged else "colours"]
     left_out = len(overlays) - len(shown)
-    more = f" {_plural(left_out, 'more picture')} in the folder overlays." if left_out else ""
-    pictures = "".join(_picture(data, f"The image {name} with boxes: {key}.", name) for name, data in shown)
-    return [f"<h2>Images</h2><p>Boxes: {key}.{more}</p>", f'<div class="row">{pictures}</div>']
-
-
-def _per_frame(frames: pd.DataFrame, of: Mapping[str, Any]) -> list[str]:
-    good = frames[frames["problem"].fillna("") == ""]
-    if len(good) < 3:
-        return []
-    counts = good["detections"].to_numpy(float)
-    fig, ax = new_figure(6.4, 2.4)
-    ax.stairs(counts, np.arange(len(counts) + 1) + 0.5, fill=True, color=BLUE)
-    ax.set(xlabel="image, in order", ylabel="detections", xlim=(0.5, len(counts) + 0.5))
-    ax.set_ylim(bottom=0)
-    most = good.iloc[int(counts.argmax())]
-    none = int((counts == 0).sum())
-    said = (
-        f"{none} of {len(counts)} images have none; the most has {most['frame_id']!s}, "
-        f"with {int(most['detections'])}."
-        if counts.max()
-        else f"None of {len(counts)} images has any."
+    report.section(
+        names["images"], key + (wording.say(names["more"], {"more": str(left_out)}) if left_out else "")
     )
-    ax.set_title(f"{_plural(int(counts.max()), 'detection')} an image at most")
-    data = png_bytes(fig)
-    return ["<h2>Image by image</h2>", _picture(data, f"Detections in each image. {said}", said, "png")]
+    for frame, data in shown:
+        report.picture(data, alt=f"{frame}: {key}", caption=frame)
 
 
-def _problems(result: Mapping[str, Any]) -> list[str]:
-    problems = result["problems"]
-    if not problems:
-        return []
-    points = "".join(f"<li>{escape(name)}: {escape(why)}</li>" for name, why in problems[:LISTED])
-    more = len(problems) - LISTED
-    rest = f"<p>{more} more are in frames.csv.</p>" if more > 0 else ""
-    return [f"<h2>Images that could not be used: {len(problems)}</h2><ul>{points}</ul>{rest}"]
-
-
-def _picture(data: bytes, alt: str, caption: str, kind: str = "jpeg", *, wide: bool = False) -> str:
-    encoded = base64.b64encode(data).decode("ascii")
-    # Many small things side by side cannot be seen on a phone unless they may be moved past.
-    style = ' style="min-width:44rem"' if wide else ""
-    image = f'<img alt="{escape(alt)}"{style} src="data:image/{kind};base64,{encoded}">'
-    if wide:
-        image = f'<div class="scroll" role="region" tabindex="0" aria-label="{escape(alt)}">{image}</div>'
-    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
-
-
-def _plural(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
+def _show_details(wording: Wording, result: Mapping[str, Any], thresholds: Mapping[str, Any]) -> None:
+    names, report, judged = wording.texts.subjects, wording.report, result.get("judged")
+    said = [str(one) for one in result.get("notes", ())]
+    if judged and (aside := result["detections"] - judged["found"] - judged["invented"]) > 0:
+        said += wording.messages([Message("aside", {"aside": str(aside), "of": str(result["detections"])})])
+    part = thresholds.get("part")
+    if isinstance(part, float) and part > 0:
+        said += wording.messages([Message("part", {"part": f"{100 * part:.0f}"})])
+    report.section(names["details"])
+    report.points(said)
+    if problems := result["problems"]:
+        report.section(f"{names['problems']}: {len(problems)}")
+        more = len(problems) - LISTED
+        listed = [f"{image}: {why}" for image, why in problems[:LISTED]]
+        report.points(
+            [*listed, *([wording.say(names["more-problems"], {"more": str(more)})] if more > 0 else [])]
+        )
+    rows = [
+        {"threshold": key, "value": str(value)}
+        for key, value in thresholds.items()
+        if not isinstance(value, dict | list) or len(str(value)) < 200
+    ]
+    wording.table("thresholds", pd.DataFrame(rows, columns=["threshold", "value"]))

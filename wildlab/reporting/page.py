@@ -11,7 +11,12 @@ from wildlab.reporting.text import escape
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 
 #: What each kind of report is called.
-TAGS = {"logged": "logged flight", "twin": "simulated flight (twin)", "computed": "computed, no flight"}
+TAGS = {
+    "logged": "logged flight",
+    "twin": "simulated flight (twin)",
+    "computed": "computed, no flight",
+    "images": "images",
+}
 
 # System fonts only: a font file would be a request, or a megabyte. Words hold 4.5:1 against what lies behind
 # them, by day and by night (a test computes it); `--on` is written on the status colours, `--plate` lies

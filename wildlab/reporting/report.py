@@ -16,6 +16,7 @@ code span in backquotes are the only marks::
 
 from __future__ import annotations
 
+import base64
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -226,6 +227,15 @@ class Report:
         """
         html = f'<div class="row">{"".join(self._figure(*item) for item in row)}</div>'
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
+
+    def picture(self, data: bytes, *, alt: str, caption: str, wide: bool = False) -> None:
+        """Show a JPEG; ``wide`` where many small things stand side by side, which a phone can move past."""
+        encoded = base64.b64encode(data).decode("ascii")
+        style = ' style="min-width:44rem"' if wide else ""
+        html = f'<img alt="{escape(alt)}"{style} src="data:image/jpeg;base64,{encoded}">'
+        if wide:
+            html = f'<div class="scroll" role="region" tabindex="0" aria-label="{escape(alt)}">{html}</div>'
+        self._show(f"<figure>{html}<figcaption>{escape(caption)}</figcaption></figure>")
 
     def animation(
         self, shown: ShownFlight, *, alt: str, most_bytes: int = 1_000_000, fold: str = "", intro: str = ""
