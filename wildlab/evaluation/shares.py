@@ -91,6 +91,20 @@ class Check:
         """A check of what may be one already, or (N,) bools."""
         return given if isinstance(given, cls) else cls(true=np.asarray(given, bool))
 
+    @classmethod
+    def smaller(
+        cls, first: Array, second: Array, unit: str = "", premise: NDArray[np.bool_] | None = None
+    ) -> Check:
+        """A check that is true where ``first`` is the smaller one."""
+        return cls(true=first < second, premise=premise, first=first, second=second, unit=unit)
+
+    @classmethod
+    def larger(
+        cls, first: Array, second: Array, unit: str = "", premise: NDArray[np.bool_] | None = None
+    ) -> Check:
+        """A check that is true where ``first`` is the larger one."""
+        return cls(true=first > second, premise=premise, first=first, second=second, unit=unit)
+
     def holds(self, threshold: float | None = None) -> NDArray[np.bool_]:
         """(N,) bool: of which flights the sentence is true, with that threshold.
 

@@ -198,8 +198,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     nis, low, high = every("nis"), of("coloured", "nees_band_low"), of("coloured", "nees_band_high")
 
     def worse(name: str, one: str, other: str, unit: str = "m") -> Check:
-        first, second = of(one, name), of(other, name)
-        return Check(true=first > second, first=first, second=second, unit=unit)
+        return Check.larger(of(one, name), of(other, name), unit)
 
     return {
         "neglected-too-optimistic": Check(
@@ -228,9 +227,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         ),
         "nis-below-mean": Check(true=of("cv", "nis") < 2.0),
         "nis-similar": Check(measured=nis.max(axis=1) / nis.min(axis=1)),
-        "nis-smaller-with-differencing": Check(
-            true=nis[:, 2] < nis[:, :2].min(axis=1), first=nis[:, 2], second=nis[:, :2].min(axis=1)
-        ),
+        "nis-smaller-with-differencing": Check.smaller(nis[:, 2], nis[:, :2].min(axis=1)),
         "five-metres-at-end": Check(measured=every("error_at_end").max(axis=1)),
         "differencing-converges-slower": worse("rmse_speed_beginning", "coloured", "cv", "m/s"),
         "less-noise-helps-differencing": worse("mae", "coloured", "coloured-less-noise"),

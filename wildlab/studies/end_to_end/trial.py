@@ -300,9 +300,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     drawn, rendered = of(DRAWN, "pixel_rms"), of(RENDERED, "pixel_rms")
     return {
         "all-found": Check(measured=1 - of(RENDERED, "detection_rate")),
-        "nearer-than-drawn": Check(true=rendered < drawn, first=rendered, second=drawn, unit="px"),
-        "mostly-bias": Check(
-            true=bias > of(RENDERED, "pixel_sd"), first=bias, second=of(RENDERED, "pixel_sd")
-        ),
+        "nearer-than-drawn": Check.smaller(rendered, drawn, "px"),
+        "mostly-bias": Check.larger(bias, of(RENDERED, "pixel_sd")),
         "tracks-alike": Check(measured=apart),
     }

@@ -43,10 +43,6 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     def of(name: str) -> Array:
         return spread[DETECTOR, name].to_numpy(float)
 
-    def smaller(name: str, unit: str) -> Check:
-        one, other = both(name)
-        return Check(true=one < other, first=one, second=other, unit=unit)
-
     north, east = both("sd_north"), both("sd_east")
     shares = {float(limit): both(f"share_near_{limit}") for limit in NEAR_M}
     near, far = shares[NEAR_M[1]]
@@ -54,7 +50,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     known = np.isfinite(rest) | np.isfinite(rest_without)
     logged = [np.hypot(*pair) for pair in zip(north, east, strict=True)]
     return {
-        "mean-nearer": smaller("error_of_mean", "m"),
+        "mean-nearer": Check.smaller(*both("error_of_mean"), "m"),
         "variance-increases": Check(
             true=(north[0] > north[1]) & (east[0] > east[1]), first=logged[0], second=logged[1], unit="m"
         ),
@@ -65,7 +61,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         ),
         "mostly-a-part": Check(true=of("share_cut") > 0.5),
         "not-every-image-adjusted": Check(true=of("share_moved") < 1.0),
-        "more-accurate-after-start": smaller("mae_after_start", "m"),
+        "more-accurate-after-start": Check.smaller(*both("mae_after_start"), "m"),
         "within-five-metres": Check(true=of("share_within_5_m") > 0.5),
         "rest-sooner": Check(true=rest < rest_without, premise=known),
         "speed-near-zero": Check(measured=np.max(both("speed_after_start"), axis=0)),

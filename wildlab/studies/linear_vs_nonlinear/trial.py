@@ -288,7 +288,6 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         return spread[[(who, name) for who in PUBLISHED]].to_numpy(float)
 
     kf, ekf = both("mae").T
-    pair = {"first": kf, "second": ekf, "unit": "m"}
     nees, nis, persist = both("nees"), both("nis"), errors_last(spread)
     ground, image = (np.abs(lag1(spread, who, AXES[who])) for who in PUBLISHED)
     bound = bounds_of(spread)
@@ -297,23 +296,19 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     )
     correlation = np.hstack([ground, image])
     return {
-        "kf-ekf-similar": Check(measured=np.abs(kf - ekf) / np.minimum(kf, ekf), **pair),
-        "kf-more-accurate": Check(true=kf < ekf, **pair),
+        "kf-ekf-similar": Check(
+            measured=np.abs(kf - ekf) / np.minimum(kf, ekf), first=kf, second=ekf, unit="m"
+        ),
+        "kf-more-accurate": Check.smaller(kf, ekf, "m"),
         "too-optimistic": Check(true=every_of(nees > both("nees_band_high")), premise=persist),
         "nis-below-mean": Check(true=nis.max(axis=1) < 2.0),
-        "ekf-nis-larger": Check(true=nis[:, 1] > nis[:, 0], first=nis[:, 1], second=nis[:, 0]),
+        "ekf-nis-larger": Check.larger(nis[:, 1], nis[:, 0]),
         "innovations-coloured": Check(true=every_of(correlation > bound[:, None]), premise=persist),
         "ten-metres-while-measured": Check(measured=both("p95_measured").max(axis=1)),
-        "vertical-pixel-more-correlated": Check(
-            true=image[:, 1] > np.hstack([ground, image[:, :1]]).max(axis=1),
-            premise=persist,
-            first=image[:, 1],
-            second=np.hstack([ground, image[:, :1]]).max(axis=1),
+        "vertical-pixel-more-correlated": Check.larger(
+            image[:, 1], np.hstack([ground, image[:, :1]]).max(axis=1), premise=persist
         ),
-        "slow-flight-more-correlated": Check(
-            true=correlation.mean(axis=1) > beside,
-            premise=persist & np.isfinite(beside),
-            first=correlation.mean(axis=1),
-            second=beside,
+        "slow-flight-more-correlated": Check.larger(
+            correlation.mean(axis=1), beside, premise=persist & np.isfinite(beside)
         ),
     }

@@ -79,8 +79,8 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
 
     def smaller(second: str, first: str, name: str, unit: str, premise: Flags | None) -> Check:
         """True where ``second`` has less of it than ``first``."""
-        a, b = of(first, name), of(second, name)
-        return Check(true=b < a, premise=premise, first=a, second=b, unit=unit)
+        scale = 180 / np.pi if unit == "deg" else 1.0
+        return Check.larger(scale * of(first, name), scale * of(second, name), unit, premise)
 
     def pose(name: str) -> Array:
         return of(SOURCE, name)
@@ -130,30 +130,16 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         # Errors
         "schmidt-more-accurate": smaller("schmidt", "ekf", "mae", "m", off),
         "accuracy-comparable": Check(measured=apart(of("schmidt", "mae"), of("ekf", "mae")), premise=off),
-        "schmidt-mean-error-smaller": Check(
-            true=size["schmidt"] < size["ekf"],
-            premise=off,
-            first=size["ekf"],
-            second=size["schmidt"],
-            unit="m",
-        ),
-        "ekf-mean-error-smaller": Check(
-            true=size["ekf"] < size["schmidt"],
-            premise=off,
-            first=size["schmidt"],
-            second=size["ekf"],
-            unit="m",
-        ),
+        "schmidt-mean-error-smaller": Check.larger(size["ekf"], size["schmidt"], "m", off),
+        "ekf-mean-error-smaller": Check.larger(size["schmidt"], size["ekf"], "m", off),
         "ekf-drifts-more": smaller("schmidt", "ekf", "mae_predicted", "m", drifts),
         "ekf-drifts-more-at-first": smaller("schmidt", "ekf", "mae_first_pause", "m", drifts),
         "schmidt-oscillates-less": smaller("schmidt", "ekf", "oscillation", "m", off & turns),
         "speed-better": smaller("schmidt", "ekf", "rmse_speed", "m/s", off),
         "speed-better-at-first": smaller("schmidt", "ekf", "rmse_speed_start", "m/s", drifts),
         "schmidt-speed-lower": smaller("schmidt", "ekf", "mean_speed", "m/s", off),
-        "course-better": _in_degrees(smaller("schmidt", "ekf", "rmse_course", "deg", off & moves)),
-        "course-better-at-first": _in_degrees(
-            smaller("schmidt", "ekf", "rmse_course_start", "deg", drifts & moves)
-        ),
+        "course-better": smaller("schmidt", "ekf", "rmse_course", "deg", off & moves),
+        "course-better-at-first": smaller("schmidt", "ekf", "rmse_course_start", "deg", drifts & moves),
         # NIS
         "nis-similar": Check(measured=apart(nis["ekf"].mean, nis["schmidt"].mean)),
         "nis-differs": Check(measured=apart(nis["ekf"].mean, nis["schmidt"].mean), above=True, premise=off),
@@ -173,9 +159,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         ),
         # The poses
         "covariance-constant": Check(measured=pose("sd_spread"), premise=settled),
-        "yaw-errors-largest": Check(
-            true=off_yaw > off_others, first=off_yaw, second=off_others, unit="deg"
-        ),
+        "yaw-errors-largest": Check.larger(off_yaw, off_others, "deg"),
         "yaw-errors-outside": Check(
             true=out_yaw > out_others,
             premise=of("flight", "crab") > CRAB_DEG,
@@ -183,21 +167,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
             second=100 * out_others,
             unit="%",
         ),
-        "largest-errors-in-turns": Check(
-            true=pose("difference_turning") > pose("difference_straight"),
-            premise=turns,
-            first=pose("difference_turning"),
-            second=pose("difference_straight"),
-            unit="deg",
+        "largest-errors-in-turns": Check.larger(
+            pose("difference_turning"), pose("difference_straight"), "deg", turns
         ),
     }  # fmt: skip
-
-
-def _in_degrees(check: Check) -> Check:
-    return Check(
-        true=check.true,
-        premise=check.premise,
-        first=None if check.first is None else np.degrees(check.first),
-        second=None if check.second is None else np.degrees(check.second),
-        unit=check.unit,
-    )

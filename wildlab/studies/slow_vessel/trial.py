@@ -263,28 +263,20 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         "subset-comparable": Check(
             measured=differ(subset, other_subset), first=subset, second=other_subset, unit="m"
         ),
-        "observer-best-on-subset": Check(
-            true=subset < other_subset, first=subset, second=other_subset, unit="m"
-        ),
+        "observer-best-on-subset": Check.smaller(subset, other_subset, "m"),
         "mean-about-two-metres": Check(
             measured=np.hypot(of("observer", "mean_north"), of("observer", "mean_east"))
         ),
-        "larger-than-first-case": Check(true=mae > first, first=mae, second=first, unit="m"),
+        "larger-than-first-case": Check.larger(mae, first, "m"),
         "reference-explains": Check(
             true=exact <= first, premise=mae > first, first=exact, second=first, unit="m"
         ),
         "largest-almost-forty": Check(measured=np.abs(largest - 37.5)),
         "majority-below-twenty": Check(measured=1 - of("observer", "below_20")),
         "better-part-five-to-ten": Check(measured=of("observer", "5_to_10"), above=True, reach=(0, 1)),
-        "grows-at-end": Check(
-            true=of("observer", "last_tenth") > mae, first=of("observer", "last_tenth"), second=mae, unit="m"
-        ),
-        "beginning-larger-on-whole-flight": Check(
-            true=beginning > beginning_subset,
-            premise=quick > of("vessel", "speed_beginning_subset"),
-            first=beginning,
-            second=beginning_subset,
-            unit="m",
+        "grows-at-end": Check.larger(of("observer", "last_tenth"), mae, "m"),
+        "beginning-larger-on-whole-flight": Check.larger(
+            beginning, beginning_subset, "m", premise=quick > of("vessel", "speed_beginning_subset")
         ),
         "few-metres-at-end": Check(measured=of("filter", "at_end")),
     }

@@ -201,11 +201,11 @@ def check_claims(spread: pd.DataFrame, bound: float) -> dict[str, Check]:
         "observer-autopilot-comparable": Check(
             measured=differ(mae, autopilot), first=mae, second=autopilot, unit="m"
         ),
-        "synchronisation-matters": Check(true=late > mae, first=late, second=mae, unit="m"),
+        "synchronisation-matters": Check.larger(late, mae, "m"),
         "misalignment-matters-most": Check(
             true=turned_ > np.maximum(mae, late), first=turned_, second=late, unit="m"
         ),
-        "calibration-before-sensors": Check(true=sensors < care, first=care, second=sensors, unit="m"),
+        "calibration-before-sensors": Check.larger(care, sensors, "m"),
         "innovations-coloured": Check(true=coloured),
         "metre-after-first-batch": Check(measured=of("filter", "after_first_batch")),
         "half-metre-at-end": Check(measured=of("filter", "at_end")),
