@@ -12,6 +12,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation import share_interval
 from wildlab.evaluation.shares import UNDECIDABLE, Check
 from wildlab.reporting.report import Report, open_report
+from wildlab.reporting.verdicts import judge
 from wildlab.studies import monte_carlo
 from wildlab.studies.protocol import Metric, Study
 
@@ -31,43 +32,16 @@ def recorded(report: Report, **columns: Any) -> pd.DataFrame:
     return spread
 
 
-def test_published_beside_flights(report):
-    north = np.r_[1.0, np.linspace(-5, 5, 100)]
-    spread = recorded(report, mae=np.r_[20.0, np.linspace(8, 12, 100)], mean_north=north)
-    table = monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae", "mean_north"])
-    error, mean = (table.iloc[i] for i in (0, 1))
-    assert (error["published"], error["drawn"], error["verdict"]) == (9.4, 20.0, "close, within")
-    assert error["here"] == spread["ekf", "mae"].median() and error["ratio"] == "1.07"
-    assert error["below"] == "35 %"
-    # By size: 4.1 beside the median of sizes, which is not the size of the median.
-    assert (mean["published"], mean["here"], mean["drawn"]) == (4.1, np.median(np.abs(north)), 1.0)
-    assert mean["quantity"] == "mean north, by size" and mean["verdict"] == "no power"
-    # A ratio to a mean near zero says nothing: the difference stands in its place.
-    assert mean["ratio"] == f"\N{MINUS SIGN}{4.1 - np.median(np.abs(north)):.2f}"
-    with pytest.raises(WildlabError, match="not published"):
-        monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["speed"])
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_digits_of_a_range_are_those_of_its_size(sign):
-    report = open_report(study="static-point", kind="twin")
-    spread = pd.DataFrame({("observer", "mean_east"): sign * np.array([1.2098, 2.6001])})
-    (row,) = monte_carlo.beside_published(report, spread, {"observer": "x"}, ["mean_east"])["range"]
-    assert sorted(one.strip("\N{MINUS SIGN}") for one in row.split(" to ")) == ["1.2", "2.6"]
-
-
 def test_a_number_that_needs_what_is_not_printed_is_not_judged(report):
     """Even where ours is the printed one: as printed and turned by a right angle it would say two things."""
     row = report.printed("mae", "ekf")
     assert row is not None
-    spread = recorded(report, mae=np.full(101, row["value"]))
-    assert monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae"])["verdict"].tolist() == [
-        "close, within"
-    ]
+    recorded(report, mae=np.full(101, row["value"]))
+    compared = judge(row, report.recorded)
+    assert compared is not None and compared.words == "close, within"
     row["unjudged"] = "nobody says which way"
-    table = monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae"])
-    assert table["verdict"].tolist() == ["not judged: nobody says which way"]
-    assert table["quantity"].tolist() == ["mean distance"] and table["ratio"].tolist() == ["0.00"]
+    compared = judge(row, report.recorded)
+    assert compared is not None and compared.words == "not judged"
 
 
 def test_what_is_recorded_is_what_is_judged(report):
@@ -93,7 +67,6 @@ def test_claims_are_decided_by_the_interval_of_their_share(report, monkeypatch):
     assert table["share"].tolist()[2] == "30 of 50 (46 to 72 %)"
     assert [c["fraction"] for c in report.claims] == [1.0, 0.0, 0.6]
     assert (report.claims[2]["low"], report.claims[2]["high"]) == share_interval(30, 50)[1:]
-    assert monte_carlo.holding(report, "always") and not monte_carlo.holding(report, "always", "half")
 
 
 def test_three_flights_decide_nothing(report, monkeypatch):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ from wildlab.evaluation.replication import power_of
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.shares import (
     FITTED,
-    HOLDS,
     NO_PREMISE,
     UNDECIDABLE,
     Check,
@@ -24,13 +23,12 @@ from wildlab.evaluation.shares import (
 )
 from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
 from wildlab.reporting.report import Report
-from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
+from wildlab.reporting.spread import bounds_of, share_below
 from wildlab.reporting.text import percent
-from wildlab.reporting.verdicts import comparison_words, judge, recorded_for, size_name
+from wildlab.reporting.verdicts import size_name
 from wildlab.studies.protocol import Study
 
-#: Decimals of the table that `beside_published` gives, headings of that of `decide_claims`.
-PUBLISHED_DIGITS = dict.fromkeys(("published", "here", "drawn"), 2)
+#: Headings of the table that `decide_claims` gives.
 CLAIM_COLUMNS = {
     "claim": "claim",
     "source": "where",
@@ -40,10 +38,6 @@ CLAIM_COLUMNS = {
     "premise": "premise",
     "threshold": "at half and twice the threshold",
 }
-#: What a quantity is called where its name says it badly: the mean of distances is no mean of errors.
-QUANTITIES = {"mae": "mean distance", "mae_after_start": "mean distance after the start"}
-
-
 #: By how much a threshold is varied.
 TIMES = {"half": 0.5, "twice": 2.0}
 #: What stands over the claims.
@@ -54,30 +48,6 @@ CLAIMS_EXPLAINED = (
     "half and at twice of it stand beside, where what is measured can be on either side of them. "
     "Differences are means over flights, with their 95 % interval."
 )
-
-
-def published_columns(n: int) -> dict[str, str]:
-    """Headings of the table that `beside_published` gives for ``n`` flights."""
-    if n < 2:
-        return {
-            "subject": "pose",
-            "quantity": "quantity (m)",
-            "published": "published",
-            "here": "here, one flight",
-            "ratio": "ratio, or difference",
-            "verdict": "verdict",
-        }
-    return {
-        "subject": "pose",
-        "quantity": "quantity (m)",
-        "published": "published",
-        "here": "here, median",
-        "ratio": "ratio, or difference",
-        "range": spread_words(n).heading,
-        "below": "flights below the print",
-        "verdict": "verdict",
-        "drawn": "flight drawn",
-    }
 
 
 def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping[str, int]) -> None:
@@ -175,61 +145,6 @@ def _record(
     )
 
 
-def beside_published(
-    report: Report, spread: pd.DataFrame, subjects: Mapping[str, str], names: Sequence[str]
-) -> pd.DataFrame:
-    """Published numbers beside what was recorded for them, with the verdict, and the first flight's.
-
-    Parameters
-    ----------
-    report
-        What `record_spread` has recorded in.
-    spread
-        One row for each flight, the drawn one first; columns are (subject, name).
-    subjects
-        Words for each subject.
-    names
-        Which quantities, in order.
-
-    Raises
-    ------
-    WildlabError
-        If one of them is not published.
-    """
-    rows = []
-    for subject, words in subjects.items():
-        for name in names:
-            row = report.printed(name, subject)
-            if row is None:
-                raise WildlabError(f"{name} of {subject} is not published", "leave it out of the table")
-            compared = judge(row, report.recorded)
-            found, by_size = recorded_for(row, report.recorded), bool(row["by_size"])
-            values = spread[subject, name].abs() if by_size else spread[subject, name]
-            below = found.get("below")
-            rows.append(
-                {
-                    "subject": words,
-                    "quantity": QUANTITIES.get(name, name.replace("_", " ").replace("sd", "SD"))
-                    + (", by size" if by_size else ""),
-                    "published": abs(row["value"]) if by_size else row["value"],
-                    "here": found.get("value", np.nan),
-                    "ratio": "" if compared is None else comparison_words(compared),
-                    "range": range_words(values, _decimals(float(np.nanmax(np.abs(values), initial=0.0)))),
-                    "below": "" if below is None else f"{100 * below:.0f} %",
-                    "verdict": ""
-                    if compared is None
-                    else compared.words + (f": {row['unjudged']}" if row["unjudged"] else ""),
-                    "drawn": values.iloc[0],
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def _decimals(largest: float) -> int:
-    """How many decimals a range is shown with: one of metres, four of shares of a few thousandths."""
-    return 1 if largest >= 2 else 2 if largest >= 0.02 else 4
-
-
 def decide_claims(report: Report, study: str, checks: Mapping[str, Check | ArrayLike]) -> pd.DataFrame:
     """Record the verdict on each claim of a study, and return them as a table of `CLAIM_COLUMNS`.
 
@@ -307,20 +222,6 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
             }
         )
     return pd.DataFrame(rows)
-
-
-def claims_section(
-    report: Report, study: str, checks: Mapping[str, Check | ArrayLike], about: str = ""
-) -> None:
-    """The section of a report on the claims of a study, by `decide_claims`; ``about`` precedes the rule."""
-    report.section("Claims of the thesis", f"{about} {CLAIMS_EXPLAINED}".strip())
-    report.table(decide_claims(report, study, checks), columns=CLAIM_COLUMNS, digits=0)
-
-
-def holding(report: Report, *ids: str) -> bool:
-    """Whether every one of these claims has come out as one that holds; `decide_claims` has to have run."""
-    verdicts = {claim["id"]: claim["verdict"] for claim in report.claims}
-    return all(verdicts.get(one) == HOLDS for one in ids)
 
 
 def _share_words(found: Any, check: Check) -> str:
