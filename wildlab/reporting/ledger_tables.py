@@ -8,7 +8,7 @@ from wildlab.evaluation.replication import Closeness, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
 from wildlab.reporting.counts import tally
 from wildlab.reporting.published import SHARE_OF_IMAGES
-from wildlab.reporting.spread import MANY, spread_words
+from wildlab.reporting.spread import MANY, spread_key
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus
 from wildlab.reporting.text import NOTHING, escape, number
 
@@ -74,7 +74,7 @@ def summed_up(one: StudyStatus) -> str:
 def _strip_heading(one: StudyStatus) -> str:
     over = f"{one.seeds} {flights_of(one)}" if one.seeds and one.seeds > 1 else "here"
     fewest = min((n.over for n in one.numbers if n.over is not None), default=MANY)
-    band = f'<i class="band"></i>{spread_words(fewest).key}' if any(_has_band(n) for n in one.numbers) else ""
+    band = f'<i class="band"></i>{spread_key(fewest)}' if any(_has_band(n) for n in one.numbers) else ""
     return (
         f'{over}, as ratio to the print <span class="key"><i class="full"></i>here{band}'
         '<i class="hollow"></i>print</span>'
@@ -172,7 +172,7 @@ def strip(n: Number) -> str:
             f'<rect x="{left:.1f}" y="6" width="{max(2.0, right - left):.1f}" height="6" rx="3" '
             'fill="#9cc7e0"/>'
         )
-        bounds = spread_words(n.over or MANY).key.replace("%", "percent")
+        bounds = spread_key(n.over or MANY).replace("%", "percent")
         words.append(f"{bounds} {number(n.low, n.digits + 1)} to {number(n.high, n.digits + 1)}")
     parts.append(
         f'<circle cx="{middle:.1f}" cy="9" r="4.6" fill="none" stroke="#18222d" stroke-width="1.6"/>'

@@ -177,22 +177,3 @@ def _pair(found: Mapping[str, Any], low: str, high: str, unit: float = 1.0) -> t
     """Two bounds that were recorded; None where one is not known."""
     ends = found.get(low), found.get(high)
     return None if ends[0] is None or ends[1] is None else (ends[0] / unit, ends[1] / unit)
-
-
-def comparison_words(compared: Comparison) -> str:
-    """Our number beside the printed one: ``"1.21"`` times it, or where no ratio says anything ``"+3.25"``.
-
-    Parameters
-    ----------
-    compared
-        From `judge`.
-
-    Returns
-    -------
-    str
-    """
-    if compared.ratio is not None:
-        return f"{compared.ratio:.2f}"
-    off = compared.difference
-    size = f"{abs(off):.2f}" if abs(off) >= 0.005 or not off else f"{abs(off):.1g}"
-    return f"{'+' if off > 0 else MINUS if off < 0 else ''}{size}"

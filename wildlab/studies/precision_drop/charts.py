@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 
 from wildlab.detection.colour import Colour, coloured, find_coloured
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, new_figure
-from wildlab.reporting.spread import bounds_of, spread_words
+from wildlab.reporting.spread import bounds_of, spread_key
 from wildlab.simulation.scene.coloured import ColourView
 from wildlab.studies.precision_drop.trial import COUNTS, MEAN, SINGLE
 
@@ -42,7 +42,7 @@ def plot_mean(runs: pd.DataFrame) -> Figure:
     fig, ax = new_figure(5.6, 4.2)
     if len(runs) > 1:
         low, high = np.transpose([bounds_of(column) for column in columns])
-        label = f"flights, {spread_words(len(runs)).key}"
+        label = f"flights, {spread_key(len(runs))}"
         ax.fill_between(known, low, high, color=BLUE, alpha=0.18, lw=0, label=label)
     ax.plot(known, middle, "o-", color=BLUE, label="median flight")
     ax.plot(known, middle[0] / np.sqrt(known / known[0]), ":", color=INK, label="if errors were independent")
