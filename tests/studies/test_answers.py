@@ -126,6 +126,15 @@ def seen_along_cable(down: float, roll: float, adaptive: float) -> dict[str, Any
     return {"down/seen": down, "roll-60/seen": roll, "adaptive-60/seen": adaptive}
 
 
+def tracked(anees: float, right: float) -> dict[str, Any]:
+    """Numbers of the particle filter, the same from both platforms."""
+    numbers = {"rmse": known(20.0), "anees": known(anees, 0.5), "right_share": known(right)}
+    return {f"{one}-negative/{name}": value for one in ("gondola", "uav") for name, value in numbers.items()}
+
+
+HARD = dict.fromkeys(("hard-to-associate", "same-problem-uav"), HOLDS)
+
+
 ANSWERS: dict[str, list[Case]] = {
     "schmidt": [
         (moments(2.0, 2.1), ("schmidt-consistent", "ekf-consistent")),
@@ -336,6 +345,12 @@ ANSWERS: dict[str, list[Case]] = {
         ),
         ({"no-swap-with-features": UNDECIDED}, ("swap-open", "feature-unknown")),
         ({}, ("swap-unknown", "feature-unknown")),
+    ],
+    "wildlife-tracking": [
+        (tracked(4.0, 0.4) | HARD, ("known-overconfident", "lap-hard")),
+        (tracked(1.0, 0.95) | dict.fromkeys(HARD, FAILS), ("known-conservative", "lap-easy")),
+        (tracked(2.0, 0.9) | dict.fromkeys(HARD, UNDECIDED), ("known-open", "lap-open")),
+        ({}, ("known-unknown", "lap-unknown")),
     ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]

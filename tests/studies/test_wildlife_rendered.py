@@ -12,12 +12,13 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.wildlife_tracking import rendered_text as text
 from wildlab.studies.wildlife_tracking.rendered import (
     CLOUDS,
     DAWN,
+    SIMULATED,
     Rendered,
     Renderings,
+    count_all,
     counted,
     run_rendered,
     seen_again,
@@ -113,10 +114,10 @@ def beginning() -> Renderings:
 
 @pytest.mark.slow
 def test_frames_of_a_world_show_its_animals_where_it_has_them(beginning):
-    drawn, by_weather = text.counts_of(beginning)
-    assert set(by_weather) == {DAWN, CLOUDS}
-    one = by_weather[DAWN]
-    assert one.shown == drawn.shown > 0 and one.found > 0
+    counts = count_all(beginning)
+    assert set(counts) == {SIMULATED, DAWN, CLOUDS}
+    one = counts[DAWN]
+    assert one.shown == counts[SIMULATED].shown > 0 and one.found > 0
     # The frames are rendered from the true pose; a told one would be tens of pixels off.
     assert one.off_px < 4
     assert one.detections == len(beginning.by_weather[DAWN].framed.uv)

@@ -1,10 +1,18 @@
-"""Animals that walk, followed by a particle filter from a gondola and a multicopter: F 4, 5.3, 7.5, 8.3."""
+"""Animals that walk, tracked by a particle filter from a gondola and a multicopter: F 4, 5.3, 7.5, 8.3."""
 
 from __future__ import annotations
 
+import math
+
+from wildlab.evaluation.shares import FAILS, HOLDS
+from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
 from wildlab.studies.wildlife_tracking import trial
 from wildlab.studies.wildlife_tracking.claims import check_claims
+from wildlab.studies.wildlife_tracking.trial import GONDOLA, NEGATIVE, UAV
+
+#: The particle filter of each platform.
+_FILTERS = (f"{GONDOLA}-{NEGATIVE}", f"{UAV}-{NEGATIVE}")
 
 
 def _metric(subject: str, name: str) -> Metric | None:
@@ -12,4 +20,26 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
-STUDY = Study("wildlife-tracking", trial.SUBJECTS, trial.trial, check_claims, _metric)
+def answer(facts: Facts) -> list[str]:
+    """Errors out of sight and whether they are as predicted, then how many tracks are found a lap later."""
+    return [f"known-{_consistency(facts)}", f"lap-{_reacquired(facts)}"]
+
+
+def _consistency(facts: Facts) -> str:
+    if any(math.isnan(facts.value(one, name)) for one in _FILTERS for name in ("rmse", "anees")):
+        return "unknown"
+    if all(facts.value(one, "anees", "centre_low") > 2 for one in _FILTERS):
+        return "overconfident"
+    if all(facts.value(one, "anees", "centre_high") < 2 for one in _FILTERS):
+        return "conservative"
+    return "open"
+
+
+def _reacquired(facts: Facts) -> str:
+    if any(math.isnan(facts.value(one, "right_share")) for one in _FILTERS):
+        return "unknown"
+    verdicts = {facts.verdicts.get(claim) for claim in ("hard-to-associate", "same-problem-uav")}
+    return "hard" if verdicts == {HOLDS} else "easy" if verdicts == {FAILS} else "open"
+
+
+STUDY = Study("wildlife-tracking", trial.SUBJECTS, trial.trial, check_claims, _metric, answer)

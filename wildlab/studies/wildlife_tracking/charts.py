@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from matplotlib.patches import Rectangle
 
 from wildlab.analysis.animals.follow import FollowedAnimals, Known
 from wildlab.analysis.animals.frames import NONE
-from wildlab.analysis.animals.images import FURTHEST
 from wildlab.analysis.animals.revisit import Patrolled
 from wildlab.evaluation.runs import mean_interval
 from wildlab.geometry.frames import Array
@@ -28,46 +28,52 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
-from wildlab.reporting.text import number
+from wildlab.studies.page import Shown
 from wildlab.studies.wildlife_tracking.rendered import Renderings, seen_again, telling_image
-from wildlab.studies.wildlife_tracking.rendered_text import WHEN
-from wildlab.studies.wildlife_tracking.text import PLATFORMS
-from wildlab.studies.wildlife_tracking.trial import NEGATIVE, POSITIVE, UAV, Runs, World
+from wildlab.studies.wildlife_tracking.trial import (
+    GONDOLA,
+    NEGATIVE,
+    POSITIVE,
+    REVISITS,
+    UAV,
+    Runs,
+    World,
+)
 
-#: What `Report.figures` takes: figure, name, alternative text, caption.
-Shown = tuple[Figure, str, str, str]
 #: Probability that the drawn ellipses hold, as in F figure 4.1.
 HELD = 0.95
 #: So many images after a visit has found its animal is the last of the maps of it.
 AFTER = 60
-KEY = (
-    "Dots: where animals truly are, hollow for those not detected yet. Ellipses: where their tracks have "
-    f"them, {100 * HELD:.0f} % of each covariance."
-)
 
 
-def map_shown(
-    world: World, followed: FollowedAnimals, share: float, name: str, what: str, counterpart: str, seed: int
-) -> Shown:
-    """Animals, tracks and the way up to a share of the first lap.
+def figures(runs: Runs, table: pd.DataFrame, renderings: Renderings, names: Mapping[str, str]) -> list[Shown]:
+    """All figures of the page; those of a visit and of one animal only where the world has them.
 
     Parameters
     ----------
-    world
-        What was flown over.
-    followed
-        Its tracks.
-    share
-        Of the first lap.
-    name
-        Of the figure.
-    what
-        When that is, in words, for the title.
-    counterpart
-        Of which figure.
-    seed
-        Of the world.
+    runs, renderings
+        Of the world shown.
+    table
+        Of all worlds.
+    names
+        Words for platforms and weathers.
     """
+    gondola = runs.worlds[GONDOLA], runs.followed[GONDOLA, NEGATIVE]
+    multicopter = runs.worlds[UAV], runs.followed[UAV, NEGATIVE]
+    found = {
+        "fig-7-19b": tracks_map(*gondola, 1.0),
+        "fig-7-19a": tracks_map(*gondola, 0.5),
+        "fig-7-13": tracks_map(*multicopter, 1.0),
+        "covariance": deviation_over_time(runs),
+        "negative": negative_differences(table, names),
+        "fig-7-14": visit_maps(runs.worlds[UAV], runs.patrolled[REVISITS]),
+        "frames": frame_in_weathers(renderings, names),
+    }
+    return [Shown(fig, name) for name, fig in found.items() if fig is not None]
+
+
+def tracks_map(world: World, followed: FollowedAnimals, share: float) -> Figure:
+    """Animals, tracks and the path up to a share of the first lap."""
     fig, ax = new_figure(5.9, 5.2)
     times = world.images.times
     known = _at(followed.known, times, share * world.lap)
@@ -78,12 +84,7 @@ def map_shown(
     _tracks(ax, known)
     _fit(ax, world, way)
     _explain(fig)
-    said = f"{len(seen)} of {world.images.truth.shape[1]} animals found, {len(known.identity)} tracks"
-    ax.set_title(f"{what}: {said}")
-    return (
-        fig, name, f"Map of five enclosures {what.lower()}: {said}.",
-        f"World {seed}. {KEY} Counterpart of F figure {counterpart}.",
-    )  # fmt: skip
+    return fig
 
 
 def _at(known: list[Known], times: Array, time: float) -> Known:
@@ -103,7 +104,7 @@ def _explain(fig: Figure, *, animals: bool = True) -> None:
     """What lines and signs of a map are, below it."""
     ground = [
         Line2D([], [], color=INK, lw=1.2, label="fence of an enclosure"),
-        Line2D([], [], color=GREY, lw=1.0, label="way flown so far"),
+        Line2D([], [], color=GREY, lw=1.0, label="path so far"),
         Line2D([], [], color=INK, marker="^", ms=7, lw=0, label="the camera now"),
     ]
     if animals:
@@ -156,7 +157,7 @@ def visit_rows(flown: Patrolled) -> tuple[int, int] | None:
     return None if best is None else best[1:]
 
 
-def visit_shown(world: World, flown: Patrolled) -> Shown | None:
+def visit_maps(world: World, flown: Patrolled) -> Figure | None:
     """Before a visit, as it finds its animal, and when the search goes on (F figures 5.4 and 7.14)."""
     rows = visit_rows(flown)
     if rows is None:
@@ -166,7 +167,6 @@ def visit_shown(world: World, flown: Patrolled) -> Shown | None:
     later = min(found + AFTER, len(flown.times) - 1)
     waited = f"{flown.times[later] - flown.times[found]:.0f} s later"
     fig, axes = new_figure(5.9, 9.0, rows=3)
-    said, sizes = [], []
     middle = flown.known[found].mean[flown.known[found].identity == track][0]
     for ax, row, what in zip(
         axes, (max(first - 1, 0), found, later), ("Before the visit", "Seen again", waited), strict=True
@@ -180,19 +180,12 @@ def visit_shown(world: World, flown: Patrolled) -> Shown | None:
         for mean, covariance in zip(known.mean[mine], known.covariance[mine], strict=True):
             ellipse(ax, mean[::-1], covariance[::-1, ::-1], HELD, color=VERMILLION, lw=2.0)
             sd = float(np.sqrt(np.trace(covariance) / 2))
-        sizes.append(sd)
         ax.set(xlim=(middle[1] - 160, middle[1] + 160), ylim=(middle[0] - 95, middle[0] + 95))
         map_axes(ax, scale_bar=ax is axes[-1])
         ax.set_xlabel("east (m)" if ax is axes[-1] else "")
-        ax.set_title(f"{what}: known to {sd:.1f} m each way")
-        said.append(f"{what.lower()} {sd:.1f} m")
+        ax.set_title(f"{what}: SD {sd:.1f} m")
     _explain(fig, animals=False)
-    return (
-        fig, "fig-7-14", f"Three maps of a visit; the animal is known each way to: {', '.join(said)}.",
-        f"Of all visits the one after which the covariance fell furthest. The animal visited is known each "
-        f"way to: {', '.join(said)}. Ellipses: {100 * HELD:.0f} % of each covariance. Counterpart of F "
-        "figures 5.4 and 7.14.",
-    )  # fmt: skip
+    return fig
 
 
 def most_seen(followed: FollowedAnimals, out: float) -> int | None:
@@ -201,33 +194,24 @@ def most_seen(followed: FollowedAnimals, out: float) -> int | None:
     return int(np.bincount(back).argmax()) if back else None
 
 
-def covariance_shown(runs: Runs) -> Shown | None:
-    """What one animal's track says of itself over time, with and without images that show nothing."""
+def deviation_over_time(runs: Runs) -> Figure | None:
+    """Predicted deviation of one animal's track over time, with and without the negative update."""
     world = runs.worlds[UAV]
     animal = most_seen(runs.followed[UAV, NEGATIVE], 60.0)
     if animal is None:
         return None
     fig, ax = new_figure(5.9, 3.6)
-    tops = {}
     for name, color, label, style in (
-        (POSITIVE, ORANGE, "detections alone", "--"), (NEGATIVE, BLUE, "and images without", "-")
+        (POSITIVE, ORANGE, "detections alone", "--"), (NEGATIVE, BLUE, "with negative update", "-")
     ):  # fmt: skip
         times, sd = sd_of(world, runs.followed[UAV, name], animal)
         ax.plot(times / 60, sd, style, color=color, label=label)
-        tops[name] = float(np.nanmax(sd))
     seen = [one.image for one in runs.followed[UAV, NEGATIVE].found if one.animal == animal]
     ax.plot(world.images.times[seen] / 60, np.zeros(len(seen)), "|", color=INK, ms=12, label="detected")
     ax.axvline(world.lap / 60, color=GREY, lw=1.0, ls=":", label="a lap")
-    ax.set(xlabel="time (min)", ylabel="known to, each way (m)", ylim=(0, None))
-    ax.set_title(f"At most {tops[NEGATIVE]:.0f} m, and {tops[POSITIVE]:.0f} m by detections alone")
+    ax.set(xlabel="time (min)", ylabel="predicted SD (m)", ylim=(0, None))
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return (
-        fig, "covariance",
-        f"Stated standard deviation of one animal's track over two laps: at most {tops[NEGATIVE]:.0f} m, by "
-        f"detections alone {tops[POSITIVE]:.0f} m.",
-        "Of the multicopter's world, the animal that came back into sight most often; ticks: images that "
-        "detect it. The track is that which its latest detection was given to.",
-    )  # fmt: skip
+    return fig
 
 
 def sd_of(world: World, followed: FollowedAnimals, animal: int) -> tuple[Array, Array]:
@@ -244,43 +228,32 @@ def sd_of(world: World, followed: FollowedAnimals, animal: int) -> tuple[Array, 
     return np.array(times), np.array(sd)
 
 
-def differences_shown(spread: pd.DataFrame) -> Shown:
-    """What images without a detection change, world by world."""
+def negative_differences(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """What the negative update changes, world by world."""
     fig, axes = new_figure(5.9, 3.8, columns=2, sharey=True)
     rng = np.random.default_rng(0)  # to tell points apart, across
-    said = []
-    for ax, name, label in zip(axes, ("sd", "rmse"), ("stated", "off"), strict=True):
-        ends = []
-        for place, (platform, words) in enumerate(PLATFORMS.items()):
+    platforms = (GONDOLA, UAV)
+    for ax, name, label in zip(axes, ("sd", "rmse"), ("Predicted SD", "RMS error"), strict=True):
+        for place, platform in enumerate(platforms):
             one, other = f"{platform}-{NEGATIVE}", f"{platform}-{POSITIVE}"
-            values = (spread[one, name] - spread[other, name]).dropna().to_numpy(float)
+            values = (runs[one, name] - runs[other, name]).dropna().to_numpy(float)
             across = place + rng.uniform(-0.16, 0.16, len(values))
             ax.plot(across, values, "o", ms=4, color=(BLUE, ORANGE)[place], alpha=0.55, mew=0)
             if len(values) > 1:
                 found = mean_interval(values)
                 bar = [[found.estimate - found.low], [found.high - found.estimate]]
                 ax.errorbar(place + 0.3, found.estimate, bar, fmt="D", color=INK, ms=5, capsize=4)
-            if len(values):
-                ends.append(f"{words} {number(values.mean(), 2)} m")
         ax.axhline(0, color=GREY, lw=1.0)
-        ax.set(xlim=(-0.5, 1.6), xticks=[0, 1], xticklabels=list(PLATFORMS.values()))
-        ax.set_title(label.capitalize())
-        said.append(f"{label}: {', '.join(ends)}")
+        ax.set(xlim=(-0.5, 1.6), xticks=[0, 1], xticklabels=[names[one] for one in platforms])
+        ax.set_title(label)
     axes[0].set_ylabel("with less without (m)")
-    return (
-        fig, "negative",
-        f"Difference that images without a detection make, mean over worlds: {'; '.join(said)}.",
-        f"Each dot is a world; black: the mean with its 95 % interval. Means: {'; '.join(said)}. Stated: the "
-        "standard deviation that tracks state each way; off: their RMS distance from animals out of sight. "
-        "Below zero the images help.",
-    )  # fmt: skip
+    return fig
 
 
-def frames_shown(runs: Renderings) -> Shown:
+def frame_in_weathers(runs: Renderings, names: Mapping[str, str]) -> Figure:
     """One frame in each weather, with what is detected in it."""
     k = telling_image(runs)
     fig, axes = new_figure(5.9, 4.1 * len(runs.by_weather), rows=len(runs.by_weather), squeeze=False)
-    said, further = [], set[int]()
     in_view = set(np.flatnonzero(runs.world.images.in_view[k]).tolist())
     for ax, (name, one) in zip(axes.flat, runs.by_weather.items(), strict=True):
         grey, found, judged = seen_again(runs.world, one, k)
@@ -293,16 +266,6 @@ def frames_shown(runs: Renderings) -> Shown:
         ax.set(xlim=(-0.5, grey.shape[1] - 0.5), ylim=(grey.shape[0] - 0.5, -0.5), xticks=[], yticks=[])
         ax.grid(False)
         false = int((judged.animal == NONE).sum())
-        further |= set(judged.animal.tolist()) - in_view - {NONE}
-        one_said = f"{len(in_view & set(judged.animal.tolist()))} of {len(in_view)} found, {false} false"
-        ax.set_title(f"{WHEN[name]}: {one_said}")
-        said.append(f"{WHEN[name].lower()} {one_said}")
-    boxed = "1 animal that does" if len(further) == 1 else f"{len(further)} animals that do"
-    more = f" Boxed too: {boxed} not count as in view, cut by the border or more than {FURTHEST:.0f} m off."
-    more = more if further else ""
-    return (
-        fig, "frames", f"One rendered frame in {len(said)} weathers: {'; '.join(said)}.",
-        f"The frame {runs.world.images.times[k]:.0f} s after take-off, as the operator's window shows it: of "
-        "those with a false detection in any weather, if there are, the one with most animals in view. "
-        f"Boxes: detections, blue of animals, red of something else. {'; '.join(said).capitalize()}.{more}",
-    )  # fmt: skip
+        hits = len(in_view & set(judged.animal.tolist()))
+        ax.set_title(f"{names[name]}: {hits} of {len(in_view)} found, {false} false")
+    return fig

@@ -43,6 +43,8 @@ from wildlab.studies.wildlife_tracking.trial import NEGATIVE, World, follower_of
 
 #: When frames are taken: at the twin's epoch, and under clouds, as most of F's images (F 7.4).
 DAWN, CLOUDS = "dawn", "clouds"
+#: The detections without frames.
+SIMULATED = "simulated"
 
 
 class Rendered(NamedTuple):
@@ -220,6 +222,14 @@ def counted(world: World, images: Images, followed: FollowedAnimals, framed: Fra
         by_false=sum(one.started and one.animal == NONE for one in followed.found),
         sight=sight_numbers(out_of_sight(followed.known, followed.found, images.times, images.truth)),
     )
+
+
+def count_all(runs: Renderings) -> dict[str, Counted]:
+    """What came of the simulated detections (`SIMULATED`), and of the frames in each weather."""
+    return {SIMULATED: counted(runs.world, runs.world.images, runs.drawn)} | {
+        name: counted(runs.world, one.framed.images, one.followed, one.framed)
+        for name, one in runs.by_weather.items()
+    }
 
 
 def off_px(world: World, framed: Framed) -> float:

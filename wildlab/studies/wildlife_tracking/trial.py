@@ -289,6 +289,7 @@ def platform_numbers(world: World) -> dict[str, float]:
     seen = seconds > 0
     return {
         "seen_share": float(seen.mean()),
+        "at_once": float(first.mean()),
         "in_view": float(np.median(seconds[seen])) if seen.any() else np.nan,
         "minutes": world.lap / 60,
         "by_fence_alone": float(np.sqrt(np.mean([_uniform_trace(one) / 2 for one in world.fences]))),
