@@ -14,7 +14,7 @@ from wildlab.analysis.following.noise_model import from_tuning
 from wildlab.analysis.following.sensor_tracks import SensorTrack, follow_flight, table
 from wildlab.analysis.following.sensor_tuning import SensorTuning
 from wildlab.analysis.scans import scans_of, sensors_of, truths_at
-from wildlab.studies.autoferry.boats import BOATS, tune_sensor
+from wildlab.studies.autoferry.tracks import BOATS, tune_sensor
 
 EXACT = {"kind": "position", "range_sd": 0.0, "bearing_sd_deg": 0.0, "position_sd": 0.0}
 

@@ -135,6 +135,17 @@ def tracked(anees: float, right: float) -> dict[str, Any]:
 HARD = dict.fromkeys(("hard-to-associate", "same-problem-uav"), HOLDS)
 
 
+def outcomes(gained: int, spoilt: int, **kept: int) -> dict[str, Any]:
+    """Tracks that gained or were spoilt with a filter, and how many of eight each sensor kept."""
+    found: dict[str, Any] = {
+        "schmidt/all-sensors/tracks_gained": gained,
+        "schmidt/all-sensors/tracks_spoilt": spoilt,
+    }
+    return found | {
+        f"schmidt/{sensor}/tracks_kept_at_best": {"value": n, "n": 8} for sensor, n in kept.items()
+    }
+
+
 ANSWERS: dict[str, list[Case]] = {
     "schmidt": [
         (moments(2.0, 2.1), ("schmidt-consistent", "ekf-consistent")),
@@ -351,6 +362,12 @@ ANSWERS: dict[str, list[Case]] = {
         (tracked(1.0, 0.95) | dict.fromkeys(HARD, FAILS), ("known-conservative", "lap-easy")),
         (tracked(2.0, 0.9) | dict.fromkeys(HARD, UNDECIDED), ("known-open", "lap-open")),
         ({}, ("known-unknown", "lap-unknown")),
+    ],
+    "autoferry": [
+        (outcomes(9, 1, lidar=8, radar=7, ir=7, eo=8), ("filter-helps", "sensors-all")),
+        (outcomes(1, 9, lidar=8, radar=7, ir=1, eo=0), ("filter-harms", "sensors-ranging")),
+        (outcomes(4, 3, lidar=8, radar=2, ir=1, eo=0), ("filter-neither", "sensors-some")),
+        ({}, ("filter-unknown", "sensors-unknown")),
     ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]

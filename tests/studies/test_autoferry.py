@@ -10,8 +10,8 @@ import pytest
 from wildlab.analysis.following.sensor_tracks import FILTERS, follow_flight, table
 from wildlab.analysis.following.sensor_tuning import SensorTuning
 from wildlab.flight.store import Flight
-from wildlab.studies.autoferry.boats import BOATS
 from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes
+from wildlab.studies.autoferry.tracks import BOATS
 
 pytestmark = pytest.mark.slow
 SCENARIOS = (2, 3, 13)

@@ -9,11 +9,13 @@ import pytest
 from wildlab.analysis.following.sensor_tracks import COLUMNS, SensorTrack, table
 from wildlab.analysis.following.sensor_tuning import SensorTuning
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.reporting.published import load_claims
+from wildlab.messages.page_texts import load_texts
 from wildlab.reporting.report import Report, open_report
-from wildlab.studies.autoferry import charts, tables
-from wildlab.studies.autoferry import text as words
-from wildlab.studies.autoferry.comparison import check_claims, of_use, outcomes, with_hindsight
+from wildlab.studies.autoferry import charts
+from wildlab.studies.autoferry import tracks as recorded_tracks
+from wildlab.studies.autoferry.comparison import KEYS, Held, of_use, outcomes, with_hindsight
+
+NAMES = load_texts("autoferry").subjects
 
 LIDAR = SensorTuning("lidar", "position", -0.9, -1.1, -0.8, 3.0, 0.9, 20.0, 1.2, 1.5, 0.0, 100, 50, 0.5, 300)
 CAMERA = SensorTuning(
@@ -64,7 +66,7 @@ def recorded(report: Report) -> dict[tuple[str, str], float]:
 
 
 def test_every_track_has_the_numbers_of_its_kind(report, tracks):
-    tables.record_tracks(report, tracks)
+    recorded_tracks.record_tracks(report, tracks)
     found = recorded(report)
     lidar = {name for name, subject in found if subject == "lidar/a/scenario-3/kf"}
     camera = {name for name, subject in found if subject == "eo/a/scenario-3/ekf"}
@@ -78,10 +80,11 @@ def test_every_track_has_the_numbers_of_its_kind(report, tracks):
 
 
 def test_what_was_fitted_is_recorded_with_its_interval(report):
-    rows = tables.record_tunings(report, {"lidar": LIDAR, "eo": CAMERA})
+    tunings = {"lidar": LIDAR, "eo": CAMERA}
+    recorded_tracks.record_tunings(report, tunings)
+    rows = recorded_tracks.tunings_table(tunings, NAMES)
     assert rows["offset"].tolist() == ["−0.90 (−1.1 to −0.8)", "−1.00 (−2.0 to 0.5)"]
     assert rows["sd"].tolist() == ["3.0 m", "2.0°"]
-    assert rows["causes"].tolist() == ["position 1.2 m, clock 1.5 s", "heading 1.0°"]
     metric = next(m for m in report._metrics if m["subject"] == "lidar" and m["name"] == "clock_offset")
     assert (metric["low"], metric["value"], metric["high"], metric["n"]) == (-1.1, -0.9, -0.8, 300)
     assert recorded(report)["error_sd", "eo"] == pytest.approx(2.0)
@@ -111,7 +114,7 @@ def made(sensor: str, outcome: list[str], *, fixed: str = "schmidt", rmse: float
 
 
 def judged(rows: pd.DataFrame) -> pd.DataFrame:
-    return outcomes(rows, words.KEYS, "schmidt")
+    return outcomes(rows, KEYS, "schmidt")
 
 
 FEW = judged(
@@ -123,31 +126,23 @@ def test_nothing_of_use_is_a_page_all_the_same(report):
     rows = made("ir", ["lost"] * 2)
     use = of_use(rows)
     useful = rows[rows["sensor"].isin(use.loc[use["of_use"], "sensor"])]
-    found, hind = judged(useful), with_hindsight(useful, words.KEYS)
-    words.strays(found)
-    words.hindsight_words(hind, found)
-    report.table(tables.outcomes_table(found))
-    report.table(tables.filters_table(useful, "schmidt"))
-    tables.record_outcomes(report, found, use, "schmidt")
-    charts.mean_nees_shown(rows, found, "schmidt")
+    held = Held("schmidt", rows, use, judged(useful), with_hindsight(useful, KEYS))
+    for one in recorded_tracks.tables(held, {}, NAMES).values():
+        report.table(one)
+    recorded_tracks.record(report, rows.iloc[:0], {}, held)
+    charts.mean_nees(rows, NAMES)
 
 
 def test_tables_count_every_track():
-    rows = tables.outcomes_table(FEW).set_index("sensor")
-    assert rows["tracks"].to_dict() == {"lidar": 3, "radar": 1, "all": 4}
+    rows = recorded_tracks.outcomes_table(FEW, NAMES).set_index("sensor")
+    assert rows["tracks"].to_dict() == {"Lidar": 3, "Radar": 1, "all": 4}
     assert rows.loc["all"].tolist() == [4, 1, 0, 0, 0, 2, 1]
     assert (rows.drop(columns="tracks").sum(axis=1) == rows["tracks"]).all()
-    held = tables.filters_table(made("lidar", ["gained", "lost"]), "schmidt")
-    assert held["filter"].tolist() == ["Schmidt (held fixed)", "differenced", "thinned"]
-    assert held["gained"].tolist() == [1, 0, 0] and held["tracks"].tolist() == [2, 0, 0]
-    every = tables.cases_table(FEW)
-    assert every["words"].tolist() == ["gained", "spoilt", "spoilt", "lost"]
-    assert every["near"].tolist()[-1] == "25 % of 40" and every["bound"].tolist()[0] == "1.0 to 3.0"
 
 
 def test_outcomes_are_recorded_with_their_denominator(report):
     use = of_use(made("ir", ["lost"] * 5))
-    tables.record_outcomes(report, FEW, use, "schmidt")
+    recorded_tracks.record_outcomes(report, FEW, use, "schmidt")
     found = {(m["name"], m["subject"]): (m["value"], m["n"]) for m in report._metrics}
     assert found["tracks_gained", "schmidt/lidar"] == (1, 3)
     assert found["tracks_spoilt", "schmidt/all-sensors"] == (2, 4)
@@ -157,38 +152,17 @@ def test_outcomes_are_recorded_with_their_denominator(report):
 
 
 def test_overview_is_of_the_tracks_that_stay(tracks):
-    rows = tables.overview(tracks).set_index(["sensor", "filter"])
-    assert rows.loc[("lidar", "white noise"), "kept"] == "1 of 2"
-    assert rows.loc[("lidar", "white noise"), "rmse"] == pytest.approx(4.0)
-    assert rows.loc[("lidar", "white noise"), "rmse_all"] == pytest.approx(22.0)
-    assert rows.loc[("lidar", "white noise"), "inside"] == "0 of 1"
-    assert rows.loc[("lidar", "Schmidt"), "inside"] == "1 of 1"
-    assert rows.loc[("colour camera", "Schmidt"), ["kept", "inside"]].tolist() == ["0 of 1", "—"]
+    rows = recorded_tracks.overview_table(tracks, NAMES).set_index(["sensor", "filter"])
+    assert rows.loc[("Lidar", "white noise"), "kept"] == "1 of 2"
+    assert rows.loc[("Lidar", "white noise"), "rmse"] == pytest.approx(4.0)
+    assert rows.loc[("Lidar", "white noise"), "inside"] == "0 of 1"
+    assert rows.loc[("Lidar", "Schmidt"), "inside"] == "1 of 1"
+    assert rows.loc[("Colour camera", "Schmidt"), ["kept", "inside"]].tolist() == ["0 of 1", "—"]
 
 
-def test_tracks_have_their_counts_beside_every_share(tracks):
-    rows = tables.tracks_table(tracks, "lidar").set_index(["target", "filter"])
-    assert rows.loc[("a", "kf"), ["near", "kept"]].tolist() == ["100 % of 60", "yes"]
-    assert rows.loc[("b", "kf"), ["near", "kept"]].tolist() == ["0 % of 60", "no"]
-    assert rows.loc[("a", "kf"), "inside"] == "0 % of 60"
-
-
-def test_claims_sensor_by_sensor_on_the_tracks_that_stay(tracks):
-    claims = load_claims("autoferry")
-    texts = {claim["id"]: claim["text"] for claim in claims}
-    rows = tables.claims_by_sensor(tracks, texts).set_index("claim")
-    assert len(rows) == len(texts)
-    over = rows.loc[texts["white-noise-overconfident"]]
-    assert (over["lidar"], over["colour camera"], over["radar"]) == ("1 of 1", "—", "—")
-    true = check_claims(tracks, words.KEYS)
-    decided = tables.claims_table(pd.DataFrame({"claim": list(texts.values())}), claims, true)
-    assert decided["count"].tolist()[0] == "2 of 3"
-
-
-def test_nees_over_time_shows_each_filter_and_the_band(followed, tracks):
+def test_nees_over_time_shows_each_filter_and_the_band(followed):
     mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
-    rows = tracks[(tracks["sensor"] == "lidar") & (tracks["target"] == "a")]
-    figure, *_ = charts.nees_shown("lidar", mine, rows)
+    figure = charts.nees_chart(mine, NAMES)
     (ax,) = figure.axes
     assert ax.get_yscale() == "log"
     low, high = chi_square_interval(2)
@@ -197,22 +171,9 @@ def test_nees_over_time_shows_each_filter_and_the_band(followed, tracks):
     np.testing.assert_array_equal(labelled[0].get_ydata(), mine[0].nees)
 
 
-def test_innovations_beside_the_band_of_white_noise(followed, tracks):
+def test_innovations_beside_the_band_of_white_noise(followed):
     mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
-    rows = tracks[(tracks["sensor"] == "lidar") & (tracks["target"] == "a")]
-    figure, *_ = charts.innovations_shown("lidar", mine, rows)
+    figure = charts.innovations_chart([one for one in mine if one.filter != "schmidt"], NAMES)
     (ax,) = figure.axes
     assert len(ax.get_lines()) == 4
     assert all(line.get_ydata()[0] == pytest.approx(1.0) for line in ax.get_lines())
-
-
-@pytest.mark.parametrize(
-    ("outcome", "said"),
-    [
-        (["gained"] * 8 + ["spoilt"], "helps more"),
-        (["spoilt"] * 8 + ["gained"] + ["lost"] * 3, "harms more"),
-        (["gained"] * 6 + ["spoilt"] * 3, "neither"),
-    ],
-)
-def test_what_is_gained_and_spoilt_decides_the_headline(outcome, said):
-    assert said in words.headline(judged(made("lidar", outcome)), "schmidt", "x")

@@ -110,9 +110,10 @@ class OpenStudy:
     def report(self) -> Report:
         """Its report."""
         first = self.flights[0] if self.flights else None
+        name = "" if first is None else first.name
         return open_report(
             study=self.entry.name,
-            flight="" if first is None else first.name,
+            flight=name if len(self.flights) < 2 else self.entry.name,
             kind=self.entry.kind if first is None else first.manifest.kind,
             seed=self.seed,
             seeds=self.seeds,

@@ -8,6 +8,7 @@ mean NEES in the band of a consistent filter that the white one's is outside of.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -29,6 +30,9 @@ WHITES = tuple(WHITE.values())
 #: What became of a track with a filter, beside the white one's: it enters its band at the price allowed, or
 #: at a higher one; both are in; neither is; it leaves it; or the track is lost.
 OUTCOMES = ("gained", "too dear", "both inside", "neither inside", "spoilt", "lost")
+_COUNTED = ("gained", "spoilt", "lost")
+#: What names one track.
+KEYS = ["sensor", "target", "case"]
 _LAG1 = ["lag1_autocorrelation_north", "lag1_autocorrelation_east", "lag1_autocorrelation"]
 
 
@@ -118,6 +122,42 @@ def outcomes(table: pd.DataFrame, keys: Sequence[str], fixed: str) -> pd.DataFra
         rmse_ratio=ratio,
     )
     return found
+
+
+class Held(NamedTuple):
+    """One filter held fixed, and what became of the tracks.
+
+    Attributes
+    ----------
+    fixed
+        The filter, from `choose_filter`.
+    judged
+        Tracks of the flights that nothing was tuned on; of the only one where there is one.
+    use, found, hindsight
+        From `of_use`, and of the sensors that are of use from `outcomes` and `with_hindsight`.
+    """
+
+    fixed: str
+    judged: pd.DataFrame
+    use: pd.DataFrame
+    found: pd.DataFrame
+    hindsight: pd.DataFrame
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many tracks there are, and how many gained, were spoilt or lost."""
+        outcome = self.found["outcome"]
+        return {"tracks": len(outcome)} | {name: int((outcome == name).sum()) for name in _COUNTED}
+
+
+def hold_fixed(tracks: pd.DataFrame, first: str) -> Held:
+    """Choose a filter on the flight ``first``, and judge it on the others."""
+    own = tracks["case"] == first
+    fixed = choose_filter(tracks[own], KEYS)
+    judged = tracks if own.all() else tracks[~own]
+    use = of_use(judged)
+    useful = judged[judged["sensor"].isin(use.loc[use["of_use"], "sensor"])]
+    return Held(fixed, judged, use, outcomes(useful, KEYS, fixed), with_hindsight(useful, KEYS))
 
 
 def choose_filter(table: pd.DataFrame, keys: Sequence[str]) -> str:

@@ -20,7 +20,7 @@ from wildlab.flight.following import (
 )
 from wildlab.flight.store import Flight
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST
-from wildlab.studies.autoferry.boats import tune_sensor
+from wildlab.studies.autoferry.tracks import tune_sensor
 from wildlab.studies.autoferry_many.drawing import even, scale
 
 #: The ways to look: by one sensor, by both, and with the cameras too.
