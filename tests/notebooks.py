@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
-import papermill
 
 from wildlab.paths import NOTEBOOKS
+from wildlab.reporting.notebooks import give_parameters
 from wildlab.reporting.report import Report
-from wildlab.runner.processes.shell import IN_PROCESS
+from wildlab.runner.processes.shell import execute_notebook
 
 PARAMETERS = 'study = ""\nflight = ""\nseed = 0\nout = ""'
 OPEN = (
@@ -52,15 +52,8 @@ def write(folder: Path, name: str, node: nbformat.NotebookNode) -> Path:
 def run_here(name: str, **parameters: Any) -> list[dict[str, Any]]:
     """The notebook of that name, run in this process with some of its parameters: what its cells show, by
     kind (``text/html``, ``image/png``)."""
-    executed = papermill.execute_notebook(
-        nbformat.read(NOTEBOOKS / name, as_version=4),
-        None,
-        parameters,
-        kernel_name="python3",
-        language="python",
-        engine_name=IN_PROCESS,
-        progress_bar=False,
-        cwd=NOTEBOOKS,
-    )
+    executed = nbformat.read(NOTEBOOKS / name, as_version=4)
+    give_parameters(executed, parameters)
+    execute_notebook(executed, NOTEBOOKS)
     outputs = [output for cell in executed.cells for output in cell.get("outputs", [])]
     return [dict(output["data"]) for output in outputs if "data" in output]

@@ -26,8 +26,14 @@ from tests.commands import call, refuse
 from wildlab.flight.readers.formats import read_log
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.runner.annotation.pictures import Picture, picture_of
-from wildlab.runner.annotation.server import HEADER_S, MOST_LINKS, ClickServer, open_server
+from wildlab.runner.annotation.server import (
+    HEADER_S,
+    MOST_LINKS,
+    ClickServer,
+    Picture,
+    open_server,
+    picture_of,
+)
 from wildlab.runner.annotation.session import Session, check_points, open_session, read_points, table_of
 
 

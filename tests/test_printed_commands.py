@@ -16,8 +16,7 @@ from wildlab.flight.store import load_flight, save_flight
 from wildlab.paths import ROOT
 from wildlab.runner import evaluate, track
 from wildlab.runner.catalogue import load_studies
-from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.outputs import FILES
+from wildlab.runner.processes.job import FILES, Job
 from wildlab.runner.record.digests import seal
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.sharing.reports import sources_of

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import pytest
 
 from wildlab import paths
-from wildlab.runner.seeds.fingerprint import code_key
+from wildlab.runner.seeds import code_key
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import rerun.notebook as widgets
 
-from wildlab.replay.notebook import show_replay
+from wildlab.replay.recording import show_replay
 from wildlab.simulation.twins import simulate_twin
 
 

@@ -21,7 +21,7 @@ from wildlab.geometry import CameraPoses, Terrain, inside_ellipse, project
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.replay.gather import MOST_FRAMES, footprints, scene_of
 from wildlab.replay.recording import save_recording
-from wildlab.replay.shapes import ellipse_rings, mesh
+from wildlab.replay.scene import ellipse_rings, mesh
 from wildlab.replay.shots import Shot
 from wildlab.simulation.twins import simulate_twin
 

@@ -16,8 +16,7 @@ from tests.figure_text import overlapping
 from wildlab.analysis.following.sensor_tracks import Array, SensorTrack
 from wildlab.analysis.overviews.overview import Path
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.reporting.charts.beside import beside_plain, beside_plain_shown
-from wildlab.reporting.charts.following import errors_shown
+from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, errors_shown
 from wildlab.reporting.charts.navigation import (
     bias_chart,
     error_bands,

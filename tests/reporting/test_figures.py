@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from tests.figure_text import overlapping
 from tests.reporting.test_html import contrast
 from wildlab.reporting import figures
-from wildlab.reporting.charts import comparison, georeferencing, navigation, tracks
+from wildlab.reporting.charts import drawing, georeferencing, navigation, tracks
 from wildlab.reporting.figure_text import least_size
-from wildlab.reporting.pictures import PHONE_WIDTH
+from wildlab.reporting.figures import PHONE_WIDTH
 
 
 def test_ellipse_holds_its_share_of_samples():
@@ -130,7 +130,7 @@ CHARTS: dict[str, Draw] = {
     "white": lambda rng: navigation.correlation_strips(
         {"velocity": rng.uniform(-0.2, 0.2, (3, 11))}, {"velocity": 0.1}, LONG
     ),
-    "flights": lambda rng: comparison.dots_chart(
+    "flights": lambda rng: drawing.dots_chart(
         ["a", "a flight with quite a long name", "c"], rng.gamma(2, 1, 3), *np.full((2, 3), np.nan), "m",
         LONG, 1.0,
     ),
@@ -182,6 +182,6 @@ def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit):
 
 
 def test_every_line_stands_out_from_white():
-    cycle = [str(one["color"]) for one in figures._STYLE["axes.prop_cycle"]]
+    cycle = [str(one["color"]) for one in figures.house_rc()["axes.prop_cycle"]]
     for colour in {*figures.COLOURS.values(), *cycle}:
         assert contrast(colour, "#ffffff") >= 3.0, colour

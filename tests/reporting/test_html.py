@@ -16,11 +16,10 @@ from tests.notebooks import notebook, shown
 from wildlab.errors import WildlabError
 from wildlab.reporting import html
 from wildlab.reporting.arrange import ADVICE, LIMITS, METHOD, arranged
-from wildlab.reporting.failure import failure_page
 from wildlab.reporting.figures import new_figure
 from wildlab.reporting.glossary import MOST, Word, with_glossary, words
-from wildlab.reporting.notebook_file import read_notebook
-from wildlab.reporting.page import STYLE, page
+from wildlab.reporting.notebooks import read_notebook
+from wildlab.reporting.page import STYLE, failure_page, page
 from wildlab.reporting.report import Report, open_report
 
 HOSTILE = "<script>alert(1)</script>\"'\n<img src=x onerror=alert(2)>"
@@ -265,7 +264,9 @@ def test_the_last_verdict_colours_the_bar(level, given):
     verdicts = [
         f'<p class="verdict" data-part="verdict" data-level="{one}">{one} word</p>' for one in ("warn", level)
     ]
-    box = BeautifulSoup(in_order(PARTS["head"], PARTS["summary"], *verdicts), "html.parser").section
+    whole = in_order(PARTS["head"], PARTS["summary"], PARTS["numbers"], *verdicts)
+    assert order(whole, "word", "picture", "before") == ["word", "picture", "before"]
+    box = BeautifulSoup(whole, "html.parser").section
     assert box is not None and box["class"] == ["summary", given]
     assert box.get_text() == f"summary{given} word" and "data-level" not in str(box)
 

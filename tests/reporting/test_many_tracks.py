@@ -19,7 +19,7 @@ from wildlab.reporting import figures
 from wildlab.reporting import many_tracks as page
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.figure_text import least_size
-from wildlab.reporting.pictures import PHONE_WIDTH
+from wildlab.reporting.figures import PHONE_WIDTH
 from wildlab.tracking.many import POINT, Hull, Shown
 
 

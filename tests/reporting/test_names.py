@@ -22,8 +22,8 @@ from tests.reporting.test_many_tracks import made
 from wildlab.analysis.detecting.detect import TABLE_COLUMNS
 from wildlab.files import csv_text, read_csv
 from wildlab.names import FORMULA
-from wildlab.reporting.charts import comparison, following, georeferencing, many, navigation, overview, tracks
-from wildlab.reporting.charts.beside import beside_plain_shown
+from wildlab.reporting.charts import drawing, following, georeferencing, many, navigation, overview, tracks
+from wildlab.reporting.charts.following import beside_plain_shown
 from wildlab.reporting.detections import precision_over_recall
 from wildlab.reporting.figure_text import _harmless as _harmless_texts
 from wildlab.reporting.figure_text import fit_text
@@ -94,13 +94,13 @@ def _harmless(value: ast.expr) -> bool:
     return False
 
 
-def drawing() -> Iterator[Path]:
+def drawing_files() -> Iterator[Path]:
     yield from sorted((PACKAGE / "reporting").rglob("*.py"))
     yield PACKAGE / "api/plot.py"
 
 
 def test_labels_of_figures_come_through_the_door():
-    lines = [f"{path}:{line}" for path in drawing() if "new_figure" in (text := path.read_text())
+    lines = [f"{path}:{line}" for path in drawing_files() if "new_figure" in (text := path.read_text())
              for line in passed_by(text)]  # fmt: skip
     assert lines == []
     # One place makes figures, and it takes nothing for maths.
@@ -165,7 +165,7 @@ def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
     clock = overview.Clock(0.0, TIMES[-1])
     yield overview.lines_chart({one: (TIMES, TIMES), f"{other}'": (TIMES, TIMES)}, clock, one, other), {one}
     yield tracks.track_map(WAY, {"a": WAY}, {"a": one}, other), {one}
-    yield comparison.dots_chart([one, other], [1.0, 2.0], [0.5, 1.5], [1.5, 2.5], one, other), set()
+    yield drawing.dots_chart([one, other], [1.0, 2.0], [0.5, 1.5], [1.5, 2.5], one, other), set()
     curves = pd.DataFrame({"detector": [one, one], "recall": [0.1, 0.2], "precision": [1.0, 0.9]})
     yield precision_over_recall([one], curves), {one}
     yield georeferencing.error_shares({one: (TIMES, "#000000")}, other), set()

@@ -8,7 +8,6 @@ from typing import Any
 import nbformat
 import papermill
 import pytest
-from papermill.exceptions import PapermillExecutionError
 
 from tests.figure_text import seen_figures
 from tests.notebooks import run_here
@@ -17,6 +16,7 @@ from wildlab.flight.catalog import is_fetched
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import by_hand
 from wildlab.runner.catalogue import StudyEntry, load_studies
+from wildlab.runner.processes.shell import CellError
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
 
@@ -110,7 +110,7 @@ def test_a_notebook_runs_by_hand(name, tmp_path, monkeypatch):
     monkeypatch.setattr("wildlab.runner.trials.REPORTS", kept)
 
     if study.dataset is not None and not is_fetched(study.dataset):
-        with pytest.raises(PapermillExecutionError, match=f"wildlab fetch {study.dataset}"):
+        with pytest.raises(CellError, match=f"wildlab fetch {study.dataset}"):
             run_here(name)
         return
     drawn: dict[str, list[str]] = {}

@@ -20,12 +20,12 @@ from wildlab.reporting import html
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.report import open_report
 from wildlab.runner.compare import compare_flights
-from wildlab.runner.processes.outputs import FILES
+from wildlab.runner.processes.job import FILES
 from wildlab.runner.record.digests import misfits, read_status, seal
 from wildlab.runner.record.own_flights import own_flights
 from wildlab.runner.record.provenance import changed_notice, footer, provenance_of_flight
 from wildlab.runner.record.status import as_plain, study_status
-from wildlab.runner.seeds.kept import SeedWork, read_seed, write_seed
+from wildlab.runner.seeds import SeedWork, read_seed, write_seed
 from wildlab.runner.verification import verify_report
 from wildlab.sharing.reports import sources_of
 

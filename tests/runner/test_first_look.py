@@ -21,7 +21,7 @@ from wildlab.runner.first_look import THERE, has_whole_report, plan_passes, quic
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.run import make_job, run_studies
-from wildlab.runner.seeds.kept import write_seed
+from wildlab.runner.seeds import write_seed
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
 

@@ -17,11 +17,12 @@ import pytest
 from bs4 import BeautifulSoup
 
 from tests.runner.test_ledger import a_study, ran
+from tools.front_flight import simulated
 from wildlab.reporting import html, metrics
 from wildlab.reporting.counts import CALCULATIONS, counted
 from wildlab.reporting.flight_status import standing
 from wildlab.reporting.front.cards import card_html, study_card
-from wildlab.reporting.front.flight import FILE, load_front_flight, simulated
+from wildlab.reporting.front.flight import FILE, load_front_flight
 from wildlab.reporting.front.glimpse import Glimpse
 from wildlab.reporting.front.index import flight_words, front_page
 from wildlab.reporting.published import published_rows

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import _Scheduler, _waiting
 from wildlab.runner.processes.worker_pool import SeedResult, WorkerPool
-from wildlab.runner.seeds.kept import (
+from wildlab.runner.seeds import (
     SeedWork,
     again_words,
     faults,
@@ -202,7 +202,7 @@ def settled(
         if event == "again":
             told.append(what)
 
-    job = Job(one.study, "", "", "", "", "", seeds=one)
+    job = Job(one.study, "", "", "", "", seeds=one)
     pool = Pool(trial)
     waiting = _waiting(job)
     scheduler = _Scheduler([waiting], pool, 0, tell)

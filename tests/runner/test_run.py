@@ -17,7 +17,6 @@ from rich.console import Console
 from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
-from wildlab.runner.processes.ending import socket_folder
 from wildlab.runner.run import Outcome, run_studies
 
 pytestmark = pytest.mark.slow
@@ -221,7 +220,7 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path, number):
     assert {path.name: path.read_text() for path in (reports / "slow").iterdir()} == former
 
     def left() -> list[Path]:
-        return [*reports.glob(".*.part"), *socket_folder().glob(f"wl{runner.pid}-*")]
+        return list(reports.glob(".*.part"))
 
     # A notebook whose runner was killed tidies up after itself, which on a busy machine takes a while.
     deadline = time.monotonic() + 30
@@ -230,7 +229,7 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path, number):
     assert left() == [], "nothing is left of the work, whoever ended it"
 
 
-#: A notebook that ends as soon as what it waits for does, in a process whose folders take a while to remove.
+#: A notebook that ends as soon as what it waits for does, in a process whose folder takes a while to remove.
 KILLED = """
 import multiprocessing, shutil, subprocess, sys, time
 from pathlib import Path
@@ -252,17 +251,16 @@ def body(pipe, job, begun):
 if __name__ == "__main__":
     base = Path(sys.argv[1])
     theirs, ours = multiprocessing.Pipe()
-    job = Job("a", "A", "a.ipynb", work=str(base / "work"), runtime=str(base / "runtime"), reports=str(base))
+    job = Job("a", "A", "a.ipynb", work=str(base / "work"), reports=str(base))
     start_process("a", body, ours, job, str(base / "begun"))
     time.sleep(300)
 """
 
 
-def test_a_notebook_whose_runner_is_killed_does_not_end_before_its_folders_are_gone(tmp_path):
-    program, folders = tmp_path / "program.py", [tmp_path / "work", tmp_path / "runtime"]
+def test_a_notebook_whose_runner_is_killed_does_not_end_before_its_folder_is_gone(tmp_path):
+    program, folder = tmp_path / "program.py", tmp_path / "work"
     program.write_text(KILLED)
-    for folder in folders:
-        folder.mkdir()
+    folder.mkdir()
     runner = subprocess.Popen([sys.executable, str(program), str(tmp_path)], start_new_session=True)
     deadline = time.monotonic() + 60
     while not (tmp_path / "begun").exists() and time.monotonic() < deadline:
@@ -270,9 +268,9 @@ def test_a_notebook_whose_runner_is_killed_does_not_end_before_its_folders_are_g
     os.killpg(runner.pid, signal.SIGKILL)
     runner.wait(20)
     deadline = time.monotonic() + 30
-    while any(folder.exists() for folder in folders) and time.monotonic() < deadline:
+    while folder.exists() and time.monotonic() < deadline:
         time.sleep(0.1)
-    assert not any(folder.exists() for folder in folders)
+    assert not folder.exists()
 
 
 def test_wrong_use_is_an_error_before_anything_runs(tmp_path):

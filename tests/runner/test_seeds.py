@@ -23,10 +23,10 @@ from wildlab.runner.processes.progress import shown
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.processes.worker_pool import WorkerPool, answer
 from wildlab.runner.run import _notes
-from wildlab.runner.seeds import fingerprint
-from wildlab.runner.seeds.kept import (
+from wildlab.runner.seeds import (
     SeedWork,
     failed_seeds,
+    fingerprint,
     make_work,
     other_seeds,
     read_seed,

@@ -14,10 +14,10 @@ import nbformat
 import papermill
 import pytest
 from IPython.core.getipython import get_ipython
-from papermill.exceptions import PapermillExecutionError
 
+from wildlab.reporting.notebooks import give_parameters
 from wildlab.runner.processes.ending import ONE_THREAD, start_process
-from wildlab.runner.processes.shell import IN_PROCESS
+from wildlab.runner.processes.shell import CellError, execute_notebook
 
 CELLS = [
     "print('one')\nprint('two')",
@@ -38,18 +38,23 @@ CELLS = [
 ]
 
 
-def execute(cells: list[str], where: Path, engine: str | None, **parameters: Any) -> Any:
+def execute(cells: list[str], where: Path, **parameters: Any) -> Any:
+    notebook = written(cells)
+    if parameters:
+        give_parameters(notebook, parameters)
+    execute_notebook(notebook, where, where / "ours.ipynb")
+    return notebook
+
+
+def written(cells: list[str]) -> Any:
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
     notebook.cells.insert(1, nbformat.v4.new_markdown_cell("# Words"))
+    return notebook
+
+
+def execute_by_kernel(cells: list[str], where: Path) -> Any:
     return papermill.execute_notebook(
-        notebook,
-        str(where / f"{engine}.ipynb"),
-        parameters=parameters,
-        kernel_name="python3",
-        language="python",
-        engine_name=engine,
-        progress_bar=False,
-        cwd=where,
+        written(cells), None, kernel_name="python3", language="python", progress_bar=False, cwd=where
     )
 
 
@@ -62,25 +67,23 @@ def test_outputs_are_those_of_a_kernel(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     # In a thread of their own: a browser's tests may have left a loop running in this one.
     with ThreadPoolExecutor(1) as thread:
-        ours, theirs = (thread.submit(execute, CELLS, tmp_path, one).result() for one in (IN_PROCESS, None))
+        ours, theirs = (thread.submit(run, CELLS, tmp_path).result() for run in (execute, execute_by_kernel))
     assert outputs(ours) == outputs(theirs)
 
 
 def test_a_cell_that_raises_is_the_last(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
-    with pytest.raises(PapermillExecutionError) as raised:
-        execute(["y = 1", "y / 0", "print('not reached')"], tmp_path, IN_PROCESS)
-    assert raised.value.ename == "ZeroDivisionError" and "y / 0" in "".join(raised.value.traceback)
-    kept = nbformat.read(tmp_path / f"{IN_PROCESS}.ipynb", as_version=4)
+    with pytest.raises(CellError) as raised:
+        execute(["y = 1", "y / 0", "print('not reached')"], tmp_path)
+    assert raised.value.name == "ZeroDivisionError" and "y / 0" in "".join(raised.value.lines)
+    kept = nbformat.read(tmp_path / "ours.ipynb", as_version=4)
     assert "not reached" not in str([cell.get("outputs") for cell in kept.cells])
 
 
 def test_what_fails_to_show_itself_is_the_last(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
-    with pytest.raises(PapermillExecutionError, match="ZeroDivisionError"):
-        execute(
-            ["class A:\n    _repr_html_ = lambda self: 1 / 0\nA()", "open('late', 'w')"], tmp_path, IN_PROCESS
-        )
+    with pytest.raises(CellError, match="ZeroDivisionError"):
+        execute(["class A:\n    _repr_html_ = lambda self: 1 / 0\nA()", "open('late', 'w')"], tmp_path)
     assert not (tmp_path / "late").exists()
 
 
@@ -88,12 +91,12 @@ def test_parameters_and_the_folder_are_the_notebooks_own(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     cells = ["import os\nprint(speed, os.getcwd())"]
     main = sys.modules["__main__"]
-    notebook = execute(cells, tmp_path, IN_PROCESS, speed=7)
+    notebook = execute(cells, tmp_path, speed=7)
     assert sys.modules["__main__"] is main and get_ipython() is None
     assert f"7 {tmp_path}" in str(outputs(notebook))
     # Another notebook in the same process knows nothing of the first.
-    with pytest.raises(PapermillExecutionError, match="NameError"):
-        execute(["print(speed)"], tmp_path, IN_PROCESS)
+    with pytest.raises(CellError, match="NameError"):
+        execute(["print(speed)"], tmp_path)
 
 
 def tell(pipe: connection.Connection, names: list[str]) -> None:

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from tests.analysis.robots import robot_flight
 from wildlab.flight.store import save_flight
 from wildlab.paths import REPORTS
-from wildlab.runner import evaluate, track, track_many
-from wildlab.runner.processes.job import Job
-from wildlab.runner.typed import other_reports, typed, typed_in_report
+from wildlab.runner import evaluate, track
+from wildlab.runner.processes.job import Job, other_reports, typed, typed_in_report
 
 
 @given(st.lists(st.text(min_size=1).filter(lambda one: "\0" not in one)))
@@ -52,11 +51,10 @@ def test_a_report_that_failed_is_asked_for_again_as_it_was(tmp_path, monkeypatch
         return []
 
     monkeypatch.setattr(track, "run_alone", keep)
-    monkeypatch.setattr(track_many, "run_alone", keep)
     monkeypatch.setattr(evaluate, "run_all", keep_all)
     told: dict[str, Any] = {"settings": Path("s.toml"), "sensors": ("radar",), "into": tmp_path / "out"}
     track.track_flight(folder, filters=("ekf", "ukf"), smooth=True, **told)
-    track_many.track_many(folder, **told)
+    track.track_many(folder, **told)
     evaluate.evaluate_flight(folder, reports=tmp_path / "reports")
     start = "wildlab track 'flights/my boat'"
     assert jobs[0].again == (

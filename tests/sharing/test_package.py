@@ -19,7 +19,7 @@ from wildlab.errors import WildlabError
 from wildlab.files import write_json
 from wildlab.reporting.page import page
 from wildlab.runner.record.digests import seal
-from wildlab.runner.track_many import NOTEBOOK
+from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
 from wildlab.sharing.document import Chapter, joined, read_part
 from wildlab.sharing.package import (
     check_password,

@@ -25,7 +25,8 @@ from wildlab.flight.following import read_settings
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.reporting.metrics import metric
 from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.track_many import NOTEBOOK, track_many
+from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
+from wildlab.runner.track import track_many
 from wildlab.sharing import generalise, redrawn
 from wildlab.sharing import settings as neutral
 from wildlab.sharing.share import share

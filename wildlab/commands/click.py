@@ -65,7 +65,7 @@ def click_(flight: Path, images: Path | None, port: int, take: bool) -> None:
 
 def _take(flight: Path) -> None:
     from wildlab.flight.files import printable
-    from wildlab.runner.annotation.taking import take_clicks
+    from wildlab.runner.annotation.session import take_clicks
 
     taken = take_clicks(flight)
     said = f"{count(taken.points, 'point')} in {count(taken.frames, 'frame')} taken as detections"

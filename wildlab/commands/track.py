@@ -66,8 +66,7 @@ def track(
       wildlab track flights/harbour --settings settings.toml --target boat --sensor radar
       wildlab track flights/harbour --many --settings settings.toml
     """
-    from wildlab.runner.track import track_flight
-    from wildlab.runner.track_many import refuse_unfit, track_many
+    from wildlab.runner.track import refuse_unfit, track_flight, track_many
 
     if many:
         refuse_unfit({"--tune": tune, "--against": against, "--filter": filters, "--target": targets,

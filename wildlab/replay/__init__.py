@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wildlab.lazy import offer
 
 if TYPE_CHECKING:
-    from wildlab.replay.notebook import show_replay
+    from wildlab.replay.recording import show_replay
 else:
     __getattr__, __dir__ = offer(__name__)
 

@@ -15,15 +15,44 @@ from typing import Any
 
 import numpy as np
 
+from wildlab.flight.store import Flight
 from wildlab.geometry.frames import ned_to_enu
-from wildlab.replay.colours import FLOWN, GROUND, SIGHTING, TRUTH, VIEW, of_filter, rgba
-from wildlab.replay.scene import Array, Estimates, Points, ReplayScene, heights
-from wildlab.replay.shapes import ellipse_rings, mesh
+from wildlab.replay.blueprint import blueprint_of
+from wildlab.replay.gather import scene_of
+from wildlab.replay.scene import (
+    Array,
+    Estimates,
+    Path,
+    Points,
+    ReplayScene,
+    Target,
+    ellipse_rings,
+    heights,
+    mesh,
+)
 from wildlab.replay.shots import Shot
-from wildlab.replay.words import about, path_part, plain
+from wildlab.replay.words import (
+    FLOWN,
+    GROUND,
+    SIGHTING,
+    TRUTH,
+    VIEW,
+    about,
+    of_filter,
+    path_part,
+    plain,
+    rgba,
+)
 
 #: Whose layouts and recordings belong together.
 APPLICATION = "wildlab replay"
+Colour = tuple[int, int, int, int]
+#: What to say where the widget is missing.
+INSTALL = (
+    "To play the flight back here, install rerun's widget, pip install 'rerun-sdk[notebook]==0.41.*', and "
+    'start the kernel anew. Without it: save_flight(flight, "flights/mine"), and then in a terminal '
+    "wildlab replay flights/mine --html."
+)
 #: Time lines.
 SECONDS, IMAGES = "flight_time", "image"
 #: The 95 % band of a NEES with two degrees of freedom is drawn in the plot.
@@ -52,8 +81,6 @@ def save_recording(
     # Before rerun is imported: nothing of this is counted by anybody.
     import rerun as rr
 
-    from wildlab.replay.blueprint import blueprint_of
-
     handle, name = tempfile.mkstemp(prefix=f".{into.name}.", dir=into.parent)
     os.close(handle)
     part = FilePath(name)
@@ -72,8 +99,6 @@ def save_recording(
 
 def narrow_layout(scene: ReplayScene) -> bytes:
     """The layout for a narrow screen, which a viewer may be given after the recording."""
-    from wildlab.replay.blueprint import blueprint_of
-
     with tempfile.TemporaryDirectory(prefix="wildlab-layout.") as folder:
         file = FilePath(folder) / "narrow.rbl"
         blueprint_of(scene, narrow=True).save(APPLICATION, file)
@@ -123,276 +148,242 @@ class _Writer:
         tell("the aircraft")
         self.path()
         tell("what the camera saw")
-        self.views(shots)
-        self.sightings(shots)
+        scale = next(iter(shots.values())).scale if shots else 1.0
+        self.camera(scale)
+        self.images(shots)
+        self.sightings(scale)
         tell("points and tracks")
         self.points()
         for one in self.scene.tracks:
             self.track(one)
         self.truth()
 
+    # -- how things are logged
+    # ------------------------------------------------------------------------------------
+
     def static(self, entity: str, *what: Any) -> None:
         self.stream.log(entity, *what, static=True, strict=True)
 
-    def at(self, times: Array) -> list[Any]:
-        if self.scene.timed:
-            return [self.rr.TimeColumn(SECONDS, duration=np.asarray(times, float))]
-        return [self.rr.TimeColumn(IMAGES, sequence=np.asarray(times).round().astype(np.int64))]
+    def style(self, entity: str, kind: Any, colour: Colour, points: float, **more: Any) -> None:
+        """Give an entity of a kind its colour and its size on the screen."""
+        radii = self.rr.Radius.ui_points(points)
+        self.static(entity, kind.from_fields(colors=[colour], radii=radii, **more))
 
-    def columns(self, entity: str, times: Array, *columns: Any) -> None:
-        if len(times):
-            self.stream.send_columns(entity, self.at(times), columns, strict=True)
+    def columns(self, entity: str, times: Array, columns: Any, counts: Any = None) -> None:
+        """What an entity has at each time: one row, or as many as ``counts`` says."""
+        if not len(times):
+            return
+        if self.scene.timed:
+            at = self.rr.TimeColumn(SECONDS, duration=np.asarray(times, float))
+        else:
+            at = self.rr.TimeColumn(IMAGES, sequence=np.asarray(times).round().astype(np.int64))
+        parted = columns if counts is None else [column.partition(counts) for column in columns]
+        self.stream.send_columns(entity, [at], list(parted), strict=True)
+
+    def places(self, entity: str, times: Array, places: Array) -> None:
+        """Where an entity is, of which several may be at one time."""
+        at, counts = np.unique(times, return_counts=True)
+        self.columns(entity, at, self.rr.Points3D.columns(positions=ned_to_enu(places)), counts)
+
+    def dot(
+        self, entity: str, colour: Colour, points: float, of: Path | Target | Estimates, **label: Any
+    ) -> None:
+        """A dot that moves; its label is shown where that is asked for."""
+        self.style(entity, self.rr.Points3D, colour, points, **{"show_labels": False} | label)
+        self.columns(entity, of.times, self.rr.Points3D.columns(positions=ned_to_enu(of.places)))
+
+    def way(self, entity: str, places: Array, colour: Colour, points: float) -> None:
+        radii = self.rr.Radius.ui_points(points)
+        self.static(entity, self.rr.LineStrips3D([ned_to_enu(places)], colors=[colour], radii=radii))
+
+    def series(self, entity: str, times: Array, values: Array, look: Any) -> None:
+        """A plot over time; its line is cut where nothing is known."""
+        self.static(entity, look)
+        known = np.isfinite(values) & np.isfinite(times)
+        self.columns(entity, times[known], self.rr.Scalars.columns(scalars=values[known]))
+
+    # -- what there is
+    # ------------------------------------------------------------------------------------
 
     def ground(self) -> None:
-        rr, scene = self.rr, self.scene
+        scene = self.scene
         if scene.terrain is not None:
-            vertices, triangles, colours, normals = mesh(
-                scene.terrain.height, *_corner(scene), scene.terrain.step
+            place = scene.terrain.north, scene.terrain.east, scene.terrain.step
+            vertices, triangles, colours, normals = mesh(scene.terrain.height, *place)
+            surface = self.rr.Mesh3D(
+                vertex_positions=vertices,
+                triangle_indices=triangles,
+                vertex_colors=colours,
+                vertex_normals=normals,
             )
-            self.static(
-                "world/terrain",
-                rr.Mesh3D(
-                    vertex_positions=vertices,
-                    triangle_indices=triangles,
-                    vertex_colors=colours,
-                    vertex_normals=normals,
-                ),
-            )
+            self.static("world/terrain", surface)
         elif np.isfinite(scene.ground):
             low, high = scene.extent
-            margin = 0.1 * self.size
-            n, e = (low[0] - margin, high[0] + margin), (low[1] - margin, high[1] + margin)
-            corners = np.array([[n[i], e[j], scene.ground] for i, j in ((0, 0), (0, 1), (1, 1), (1, 0))])
+            (n, e), (N, E) = low[:2] - 0.1 * self.size, high[:2] + 0.1 * self.size
+            corners = np.column_stack([[n, n, N, N], [e, E, E, e], np.full(4, scene.ground)])
             # A little below what lies on it, which would flicker in it.
             corners = ned_to_enu(corners) - np.array([0.0, 0.0, 0.003 * self.size])
-            self.static(
-                "world/ground",
-                rr.Mesh3D(
-                    vertex_positions=corners,
-                    triangle_indices=[[0, 1, 2], [0, 2, 3]],
-                    vertex_colors=[rgba(GROUND)] * 4,
-                ),
+            surface = self.rr.Mesh3D(
+                vertex_positions=corners,
+                triangle_indices=[[0, 1, 2], [0, 2, 3]],
+                vertex_colors=[rgba(GROUND)] * 4,
             )
+            self.static("world/ground", surface)
 
     def path(self) -> None:
-        rr, path = self.rr, self.scene.path
+        path = self.scene.path
         if path is None:
             return
-        enu = ned_to_enu(path.places)
+        self.way("world/flown/path", path.places, rgba(FLOWN, 0.45), 1.0)
+        self.dot("world/flown/aircraft", rgba(FLOWN), 6.0, path, labels=["aircraft"])
+        look = self.rr.SeriesLines(colors=[rgba(FLOWN)], names=["height (m)"], widths=[1.5])
+        self.series("plots/height/aircraft", path.times, heights(self.scene), look)
+
+    def camera(self, s: float) -> None:
+        """The camera, its image's border and its footprints; ``s`` is by what images are made smaller."""
+        rr, views, camera = self.rr, self.scene.views, self.scene.camera
+        if views is None or camera is None:
+            return
+        w, h = camera.width * s, camera.height * s
         self.static(
-            "world/flown/path",
-            rr.LineStrips3D([enu], colors=[rgba(FLOWN, 0.45)], radii=rr.Radius.ui_points(1.0)),
-        )
-        self.static(
-            "world/flown/aircraft",
-            rr.Points3D.from_fields(
-                colors=[rgba(FLOWN)], radii=rr.Radius.ui_points(6.0), labels=["aircraft"], show_labels=False
+            "world/camera/image",
+            rr.Pinhole(
+                focal_length=(camera.fx * s, camera.fy * s),
+                principal_point=((camera.cx + 0.5) * s, (camera.cy + 0.5) * s),
+                resolution=(w, h),
+                camera_xyz=rr.ViewCoordinates.RDF,
+                image_plane_distance=0.06 * self.size,
+                color=rgba(VIEW),
+                line_width=rr.Radius.ui_points(1.5),
             ),
         )
-        self.columns("world/flown/aircraft", path.times, *rr.Points3D.columns(positions=enu))
-        height = heights(self.scene)
-        self.static(
-            "plots/height/aircraft", rr.SeriesLines(colors=[rgba(FLOWN)], names=["height (m)"], widths=[1.5])
+        frame = rr.Boxes2D(
+            mins=[[0, 0]], sizes=[[w, h]], colors=[rgba(VIEW, 0.6)], radii=rr.Radius.ui_points(1.0)
         )
-        self._scalars("plots/height/aircraft", path.times, height)
+        self.static("world/camera/image/border", frame)
+        posed = np.isfinite(views.p_nc).all(axis=1) & np.isfinite(views.R_nc).all(axis=(1, 2))
+        R = views.R_nc[posed]
+        # Into x east, y north, z up.
+        turned = np.stack([R[:, 1], R[:, 0], -R[:, 2]], axis=1)
+        moved = rr.Transform3D.columns(translation=ned_to_enu(views.p_nc[posed]), mat3x3=turned)
+        self.columns("world/camera", views.times[posed], moved)
+        self.style("world/footprint", rr.LineStrips3D, rgba(VIEW), 2.0)
+        placed = np.isfinite(views.outlines).all(axis=(1, 2))
+        if placed.any():
+            # Closed; none where part of the image looks past the ground.
+            rings = np.concatenate([views.outlines, views.outlines[:, :1]], axis=1)[placed]
+            strips = rr.LineStrips3D.columns(strips=[ned_to_enu(ring) for ring in rings])
+            self.columns("world/footprint", views.times, strips, placed.astype(int))
 
-    def _scalars(self, entity: str, times: Array, values: Array) -> None:
-        known = np.isfinite(values) & np.isfinite(times)
-        self.columns(entity, times[known], *self.rr.Scalars.columns(scalars=values[known]))
-
-    def views(self, shots: Mapping[int, Shot]) -> None:
-        rr, views, camera = self.rr, self.scene.views, self.scene.camera
-        if views is None:
+    def images(self, shots: Mapping[int, Shot]) -> None:
+        views = self.scene.views
+        if views is None or not shots:
             return
-        if camera is not None:
-            s = next(iter(shots.values())).scale if shots else 1.0
-            self.static(
-                "world/camera/image",
-                rr.Pinhole(
-                    focal_length=(camera.fx * s, camera.fy * s),
-                    principal_point=((camera.cx + 0.5) * s, (camera.cy + 0.5) * s),
-                    resolution=(camera.width * s, camera.height * s),
-                    camera_xyz=rr.ViewCoordinates.RDF,
-                    image_plane_distance=0.06 * self.size,
-                    color=rgba(VIEW),
-                    line_width=rr.Radius.ui_points(1.5),
-                ),
-            )
-            w, h = camera.width * s, camera.height * s
-            frame = rr.Boxes2D(
-                mins=[[0, 0]], sizes=[[w, h]], colors=[rgba(VIEW, 0.6)], radii=rr.Radius.ui_points(1.0)
-            )
-            self.static("world/camera/image/border", frame)
-            posed = np.isfinite(views.p_nc).all(axis=1) & np.isfinite(views.R_nc).all(axis=(1, 2))
-            self.columns(
-                "world/camera",
-                views.times[posed],
-                *rr.Transform3D.columns(
-                    translation=ned_to_enu(views.p_nc[posed]),
-                    mat3x3=_turned(views.R_nc[posed]),
-                ),
-            )
-            placed = np.atleast_1d(np.isfinite(views.outlines).all(axis=(1, 2)))
-            strips = [
-                ned_to_enu(np.vstack([one, one[:1]])) if ok else np.empty((0, 3))
-                for one, ok in zip(views.outlines, placed, strict=True)
-            ]
-            self.static(
-                "world/footprint",
-                rr.LineStrips3D.from_fields(colors=[rgba(VIEW)], radii=rr.Radius.ui_points(2.0)),
-            )
-            self._strips("world/footprint", views.times, strips)
-        if shots:
-            rows = np.array(sorted(shots))
-            self.static("world/camera/image", rr.EncodedImage.from_fields(media_type="image/jpeg"))
-            self.columns(
-                "world/camera/image",
-                views.times[rows],
-                *rr.EncodedImage.columns(blob=[shots[int(row)].jpeg for row in rows]),
-            )
+        rows = sorted(shots)
+        self.static("world/camera/image", self.rr.EncodedImage.from_fields(media_type="image/jpeg"))
+        blobs = self.rr.EncodedImage.columns(blob=[shots[row].jpeg for row in rows])
+        self.columns("world/camera/image", views.times[rows], blobs)
 
-    def _strips(self, entity: str, times: Array, strips: list[Array]) -> None:
-        """One closed line, or none, at each time."""
-        rr = self.rr
-        there = [one for one in strips if len(one)]
-        if not there:
-            return
-        columns = rr.LineStrips3D.columns(strips=there)
-        parted = [column.partition([int(len(one) > 0) for one in strips]) for column in columns]
-        self.columns(entity, times, *parted)
-
-    def sightings(self, shots: Mapping[int, Shot]) -> None:
-        rr, seen, views = self.rr, self.scene.sightings, self.scene.views
+    def sightings(self, s: float) -> None:
+        seen, views = self.scene.sightings, self.scene.views
         if seen is None or views is None:
             return
-        s = next(iter(shots.values())).scale if shots else 1.0
         order = np.argsort(seen.frame, kind="stable")
-        counts = np.bincount(seen.frame, minlength=len(views.times))
         entity = "world/camera/image/detections"
-        self.static(
-            entity,
-            rr.Points2D.from_fields(
-                colors=[rgba(SIGHTING)], radii=rr.Radius.ui_points(6.0), show_labels=True
-            ),
-        )
-        columns = rr.Points2D.columns(
-            positions=(seen.uv[order] + 0.5) * s, labels=[plain(name) for name in seen.names[order]]
-        )
-        self.columns(entity, views.times, *(column.partition(counts) for column in columns))
+        self.style(entity, self.rr.Points2D, rgba(SIGHTING), 6.0, show_labels=True)
+        names = [plain(name) for name in seen.names[order]]
+        columns = self.rr.Points2D.columns(positions=(seen.uv[order] + 0.5) * s, labels=names)
+        self.columns(entity, views.times, columns, np.bincount(seen.frame, minlength=len(views.times)))
 
     def points(self) -> None:
-        rr, points = self.rr, self.scene.points
+        points = self.scene.points
         if points is None:
             return
-        times, counts = np.unique(points.times, return_counts=True)
-        enu = ned_to_enu(points.places)
-        self.static(
-            "world/points/places",
-            rr.Points3D.from_fields(colors=[rgba(SIGHTING)], radii=rr.Radius.ui_points(2.5)),
-        )
-        self.columns(
-            "world/points/places",
-            times,
-            *(column.partition(counts) for column in rr.Points3D.columns(positions=enu)),
-        )
-        self._ellipses("world/points/ellipses", points, SIGHTING)
+        self.style("world/points/places", self.rr.Points3D, rgba(SIGHTING), 2.5)
+        self.places("world/points/places", points.times, points.places)
+        self.ellipses("world/points/ellipses", points, SIGHTING)
         if not self.scene.tracks:
-            self._judged("detections", "detections", points, SIGHTING)
-
-    def _ellipses(self, entity: str, of: Points | Estimates, colour: str) -> None:
-        rr = self.rr
-        known = np.isfinite(of.covariance).all(axis=(1, 2)) & np.isfinite(of.places).all(axis=1)
-        self.static(
-            entity, rr.LineStrips3D.from_fields(colors=[rgba(colour, 0.8)], radii=rr.Radius.ui_points(1.2))
-        )
-        if not known.any():
-            return
-        rings = ned_to_enu(ellipse_rings(of.places[known], of.covariance[known]))
-        times, counts = np.unique(of.times[known], return_counts=True)
-        columns = rr.LineStrips3D.columns(strips=list(rings))
-        self.columns(entity, times, *(column.partition(counts) for column in columns))
-
-    def _judged(self, part: str, name: str, of: Points | Estimates, colour: str) -> None:
-        rr = self.rr
-        for plot, values in (("error", of.error), ("nees", of.nees)):
-            if not np.isfinite(values).any():
-                continue
-            entity = f"plots/{plot}/{part}"
-            # The line is cut where nothing is known; single detections are dots.
-            if isinstance(of, Points):
-                self.static(
-                    entity, rr.SeriesPoints(colors=[rgba(colour)], names=[plain(name)], marker_sizes=[2.5])
-                )
-            else:
-                self.static(entity, rr.SeriesLines(colors=[rgba(colour)], names=[plain(name)], widths=[1.5]))
-            self._scalars(entity, of.times, values)
-            if plot == "nees":
-                for label, bound in zip(("low", "high"), NEES_BAND, strict=True):
-                    band = f"plots/nees/band_{label}"
-                    self.static(
-                        band, rr.SeriesLines(colors=[rgba(TRUTH, 0.5)], names=[f"95 % {label}"], widths=[1.0])
-                    )
-                    self._scalars(band, np.array([0.0, self.scene.length]), np.array([bound, bound]))
+            self.judged("detections", "detections", points, SIGHTING)
 
     def track(self, one: Estimates) -> None:
-        rr = self.rr
         colour = of_filter(one.filter)
-        base = f"world/tracks/{path_part(one.filter)}/{path_part(one.target)}/{path_part(one.sensor)}"
-        enu = ned_to_enu(one.places)
-        self.static(
-            f"{base}/place",
-            rr.Points3D.from_fields(
-                colors=[rgba(colour)],
-                radii=rr.Radius.ui_points(4.0),
-                labels=[plain(one.filter)],
-                show_labels=False,
-            ),
-        )
-        self.columns(f"{base}/place", one.times, *rr.Points3D.columns(positions=enu))
-        self._ellipses(f"{base}/ellipse", one, colour)
-        self._judged(
-            f"{path_part(one.filter)}/{path_part(one.target)}", f"{one.filter} {one.target}", one, colour
-        )
+        path = "/".join(path_part(part) for part in (one.filter, one.target))
+        base = f"world/tracks/{path}/{path_part(one.sensor)}"
+        self.dot(f"{base}/place", rgba(colour), 4.0, one, labels=[plain(one.filter)])
+        self.ellipses(f"{base}/ellipse", one, colour)
+        self.judged(path, plain(f"{one.filter} {one.target}"), one, colour)
+
+    def ellipses(self, entity: str, of: Points | Estimates, colour: str) -> None:
+        known = np.isfinite(of.covariance).all(axis=(1, 2)) & np.isfinite(of.places).all(axis=1)
+        self.style(entity, self.rr.LineStrips3D, rgba(colour, 0.8), 1.2)
+        if known.any():
+            rings = ned_to_enu(ellipse_rings(of.places[known], of.covariance[known]))
+            times, counts = np.unique(of.times[known], return_counts=True)
+            self.columns(entity, times, self.rr.LineStrips3D.columns(strips=list(rings)), counts)
+
+    def judged(self, part: str, name: str, of: Points | Estimates, colour: str) -> None:
+        """Errors and NEES over time, with the band of single values; single detections are dots."""
+        rr, shown = self.rr, {"colors": [rgba(colour)], "names": [name]}
+        for plot, values in (("error", of.error), ("nees", of.nees)):
+            if np.isfinite(values).any():
+                dots = isinstance(of, Points)
+                look = (
+                    rr.SeriesPoints(**shown, marker_sizes=[2.5])
+                    if dots
+                    else rr.SeriesLines(**shown, widths=[1.5])
+                )
+                self.series(f"plots/{plot}/{part}", of.times, values, look)
+        for label, bound in (
+            zip(("low", "high"), NEES_BAND, strict=True) if np.isfinite(of.nees).any() else ()
+        ):
+            look = rr.SeriesLines(colors=[rgba(TRUTH, 0.5)], names=[f"95 % {label}"], widths=[1.0])
+            self.series(
+                f"plots/nees/band_{label}", np.array([0.0, self.scene.length]), np.full(2, bound), look
+            )
 
     def truth(self) -> None:
-        rr = self.rr
         still = [one for one in self.scene.truth if one.still]
+        moving = [one for one in self.scene.truth if not one.still]
         if still:
             self.static(
                 "world/truth/fixed_points",
-                rr.Points3D(
+                self.rr.Points3D(
                     ned_to_enu(np.concatenate([one.places for one in still])),
                     colors=[rgba(TRUTH)],
-                    radii=rr.Radius.ui_points(3.5),
+                    radii=self.rr.Radius.ui_points(3.5),
                     labels=[plain(one.name) for one in still],
                     show_labels=len(still) <= 12,
                 ),
             )
-        moving = [one for one in self.scene.truth if not one.still]
         for one in moving:
             entity = f"world/truth/{path_part(one.name)}"
-            enu = ned_to_enu(one.places)
-            self.static(
-                f"{entity}/path",
-                rr.LineStrips3D([enu], colors=[rgba(TRUTH, 0.35)], radii=rr.Radius.ui_points(0.8)),
-            )
-            self.static(
-                f"{entity}/now",
-                rr.Points3D.from_fields(
-                    colors=[rgba(TRUTH)],
-                    radii=rr.Radius.ui_points(4.0),
-                    labels=[plain(one.name)],
-                    show_labels=len(moving) <= 12,
-                ),
-            )
-            self.columns(f"{entity}/now", one.times, *rr.Points3D.columns(positions=enu))
+            self.way(f"{entity}/path", one.places, rgba(TRUTH, 0.35), 0.8)
+            label = {"labels": [plain(one.name)], "show_labels": len(moving) <= 12}
+            self.dot(f"{entity}/now", rgba(TRUTH), 4.0, one, **label)
 
 
-def _corner(scene: ReplayScene) -> tuple[float, float]:
-    assert scene.terrain is not None  # noqa: S101 - for the type checker
-    return scene.terrain.north, scene.terrain.east
+def show_replay(flight: Flight, source: str | None = None) -> None:
+    """Show a flight in rerun's viewer below the cell, or say what to install.
 
+    Parameters
+    ----------
+    flight
+        With anything missing; what lacks is said in the viewer.
+    source
+        Name of the ``nav`` table; left out, the best known one.
 
-def _turned(R_nc: Array) -> Array:
-    """Rotations into n as rotations into x east, y north, z up."""
-    return np.stack([R_nc[:, 1], R_nc[:, 0], -R_nc[:, 2]], axis=1)
+    Raises
+    ------
+    WildlabError
+        Where a source is named that the flight has not, or there is nothing that could be shown.
+    """
+    scene = scene_of(flight, source)
+    # The widget else gets its viewer from the network.
+    os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "inline")
+    import rerun.notebook as widgets
+
+    if not widgets.HAS_NOTEBOOK:
+        print(INSTALL)
+        return
+    stream = log_scene(scene)
+    widgets.Viewer(width=960, height=640, recording=stream, blueprint=blueprint_of(scene)).display()

@@ -137,7 +137,7 @@ def _why_not(frame: Frame, size: tuple[int, int] | None) -> str:
 
 def jpeg_of(frame: Frame, size: tuple[int, int], most: int) -> bytes:
     """A frame as JPEG of a width and height, of as good a quality as `most` bytes allow."""
-    image = frame.image if frame.unit in ("grey", "colour") else _grey(frame.image)
+    image = frame.image if frame.unit in ("grey", "colour") else stretched(frame.image)
     if image.ndim == 3:
         image = image[..., ::-1]
     if (image.shape[1], image.shape[0]) != size:
@@ -151,7 +151,24 @@ def jpeg_of(frame: Frame, size: tuple[int, int], most: int) -> bytes:
     return packed
 
 
-def _grey(image: NDArray[Any]) -> NDArray[np.uint8]:
+def stretched(image: NDArray[Any]) -> NDArray[np.uint8]:
+    """Counts or temperatures as grey levels.
+
+    Parameters
+    ----------
+    image
+        (H, W), NaN where nothing is known.
+
+    Returns
+    -------
+    (H, W) uint8
+        Black to white from the 0.5th to the 99.8th percentile.
+
+    Examples
+    --------
+    >>> stretched(np.arange(1000, 1500, dtype=np.uint16).reshape(20, 25))[[0, -1], [0, -1]].tolist()
+    [0, 255]
+    """
     numbers = image.astype(np.float32)
     known = numbers[np.isfinite(numbers)]
     if not known.size:

@@ -14,7 +14,7 @@ from bs4 import BeautifulSoup, Tag
 from bs4.element import NavigableString, PageElement
 
 #: What a heading or a block may say it is, in the order of the page; "" is a section like any other.
-HEAD, SUMMARY, ALERT, MAIN, TILES, OPENING, ADVICE, LIMITS, SECTION, METHOD = (
+ORDER = HEAD, SUMMARY, ALERT, MAIN, TILES, OPENING, ADVICE, LIMITS, SECTION, METHOD = (
     "head",
     "summary",
     "alert",
@@ -26,10 +26,11 @@ HEAD, SUMMARY, ALERT, MAIN, TILES, OPENING, ADVICE, LIMITS, SECTION, METHOD = (
     "",
     "method",
 )
-ORDER = (HEAD, SUMMARY, ALERT, MAIN, TILES, OPENING, ADVICE, LIMITS, SECTION, METHOD)
 #: The verdict is shown when all numbers are there, and read in the summary.
 VERDICT = "verdict"
 _LEVELS = {"good", "warn", "bad", "neutral"}
+#: What a block is by its class, where it does not say it.
+_BY_CLASS = {"summary": SUMMARY, "look": ALERT, "tiles": TILES}
 
 
 def arranged(body: str) -> str:
@@ -48,36 +49,31 @@ def arranged(body: str) -> str:
     soup = BeautifulSoup(body, "html.parser")
     if soup.header is None:
         return body
-    groups: dict[str, list[PageElement]] = {part: [] for part in ORDER}
-    verdicts: list[Tag] = []
-    at = HEAD
+    arrange_parts(soup)
+    return re.sub(r"\n\s*\n+", "\n", str(soup)).strip()
+
+
+def arrange_parts(soup: BeautifulSoup) -> None:
+    """Put the parts of a report in the order of a page; see `arranged`."""
+    if soup.header is None:
+        return
+    groups: dict[str, list[PageElement]] = {part: [] for part in (*ORDER, VERDICT)}
+    at = OPENING
     for node in list(soup.contents):
         node.extract()
-        if not isinstance(node, Tag):
-            if not isinstance(node, NavigableString) or node.strip():
-                groups[OPENING if at == HEAD else at].append(node)
+        if isinstance(node, NavigableString) and not node.strip():
             continue
-        part = _part_of(node)
-        if part == VERDICT:
-            verdicts.append(node)
-        elif part is None:
-            groups[OPENING if at == HEAD else at].append(node)
-        elif part in (HEAD, SUMMARY, TILES, METHOD) or node.name != "h2":
-            groups[part].append(node)
-        else:
+        part = _part_of(node) if isinstance(node, Tag) else None
+        if part is not None and isinstance(node, Tag) and node.name == "h2":
             at = part
-            groups[part].append(node)
-    _judge(groups[SUMMARY], verdicts)
-    groups[MAIN] = [*groups[MAIN], *_main_picture(groups)]
-    whole = BeautifulSoup("", "html.parser")
-    for part in ORDER:
-        for node in groups[part]:
-            whole.append(node)
-    for marked in whole.select("[data-part]"):
-        del marked["data-part"]
-    _drop_bare_headings(whole)
-    _number_figures(whole)
-    return re.sub(r"\n\s*\n+", "\n", str(whole)).strip()
+        groups[at if part is None else part].append(node)
+    soup.extend(node for part in ORDER for node in groups[part])
+    _put_first(soup, _main_picture([one for part in (OPENING, ADVICE, SECTION) for one in groups[part]]))
+    _judge(groups[SUMMARY], groups[VERDICT])
+    for marked in soup.select("[data-part], [data-main]"):
+        del marked["data-part"], marked["data-main"]
+    _drop_bare_headings(soup)
+    _number_figures(soup)
 
 
 def _part_of(node: Tag) -> str | None:
@@ -85,77 +81,63 @@ def _part_of(node: Tag) -> str | None:
     said = node.get("data-part")
     if said is not None:
         return str(said)
-    if node.name == "header":
-        return HEAD
-    classes = _classes(node)
-    if "summary" in classes:
-        return SUMMARY
-    if "look" in classes:
-        return ALERT
-    if "tiles" in classes:
-        return TILES
-    return SECTION if node.name == "h2" else None
+    by_class = [_BY_CLASS[name] for name in node.get_attribute_list("class") if name in _BY_CLASS]
+    return HEAD if node.name == "header" else SECTION if node.name == "h2" else next(iter(by_class), None)
 
 
-def _classes(node: Tag) -> list[str]:
-    found = node.get("class") or ""
-    return found.split() if isinstance(found, str) else list(found)
-
-
-def _judge(summaries: list[PageElement], verdicts: list[Tag]) -> None:
+def _judge(summaries: list[PageElement], verdicts: list[PageElement]) -> None:
     """Put the last verdict into the summary, and give its bar the colour that goes with the word."""
-    boxes = [one for one in summaries if isinstance(one, Tag)]
-    if not boxes or not verdicts:
+    box = next((one for one in summaries if isinstance(one, Tag)), None)
+    last = verdicts[-1] if verdicts else None
+    if box is None or not isinstance(last, Tag):
         return
-    box, last = boxes[0], verdicts[-1]
-    level = str(last.get("data-level") or "neutral")
-    del last["data-level"]
-    box["class"] = " ".join([*(name for name in _classes(box) if name not in _LEVELS), level])
+    level = str(last.attrs.pop("data-level", "neutral"))
+    classes = [str(name) for name in box.get_attribute_list("class") if name not in _LEVELS]
+    box["class"] = " ".join([*classes, level])
     box.append(last)
 
 
-def _main_picture(groups: dict[str, list[PageElement]]) -> list[Tag]:
+def _main_picture(blocks: list[PageElement]) -> Tag | None:
     """The figure that stands first: the one marked so, else the first that is not folded away."""
-    blocks = [one for part in (OPENING, ADVICE, SECTION) for one in groups[part] if isinstance(one, Tag)]
-    figures = [figure for block in blocks for figure in _pictures(block)]
-    chosen = next((one for one in figures if one.get("data-main") is not None), None)
+    figures = [
+        one
+        for block in blocks
+        if isinstance(block, Tag)
+        for one in ([block] if block.name == "figure" else block.find_all("figure"))
+        if one.find("img") and not one.find_parent("details")
+    ]
+    marked = [one for one in figures if one.get("data-main") is not None]
+    return next(iter(marked or figures), None)
+
+
+def _put_first(soup: BeautifulSoup, chosen: Tag | None) -> None:
+    """Put the main picture below summary and alerts, and take away the row that it alone stood in."""
     if chosen is None:
-        chosen = figures[0] if figures else None
-    for figure in figures:
-        if figure.get("data-main") is not None:
-            del figure["data-main"]
-    if chosen is None:
-        return []
+        return
     row = chosen.parent
-    for part in (OPENING, ADVICE, SECTION):
-        # A figure alone in its block is the block.
-        if any(one is chosen for one in groups[part]):
-            groups[part] = [one for one in groups[part] if one is not chosen]
     chosen.extract()
-    if isinstance(row, Tag) and row.name == "div" and not row.find("figure"):
-        for part in (OPENING, ADVICE, SECTION):
-            groups[part] = [one for one in groups[part] if one is not row]
-    return [chosen]
+    if row is not None and row.name == "div" and not row.find("figure"):
+        row.extract()
+    above = [one for one in soup.find_all(recursive=False) if _part_of(one) in (HEAD, SUMMARY, ALERT)]
+    above[-1].insert_after(chosen)
 
 
-def _pictures(block: Tag) -> list[Tag]:
-    if block.name == "figure":
-        return [block] if block.find("img") else []
-    return [one for one in block.find_all("figure") if one.find("img") and not one.find_parent("details")]
-
-
-def _drop_bare_headings(whole: BeautifulSoup) -> None:
+def _drop_bare_headings(soup: BeautifulSoup) -> None:
     """Headings of sections whose only figure stands above now, and which say nothing besides."""
-    for heading in whole.find_all(["h2", "h3"]):
+    for heading in soup.find_all(["h2", "h3"]):
         after = heading.find_next_sibling()
-        closes = after is None or after.name == "h2" or (after.name == "h3" and heading.name == "h3")
-        if closes or (after is not None and after.name == "details" and "method" in _classes(after)):
+        if (
+            after is None
+            or after.name == "h2"
+            or (after.name == "h3" and heading.name == "h3")
+            or (after.name == "details" and "method" in after.get_attribute_list("class"))
+        ):
             heading.decompose()
 
 
-def _number_figures(whole: BeautifulSoup) -> None:
+def _number_figures(soup: BeautifulSoup) -> None:
     """Count figures as they now stand; tables keep their numbers, for they keep their order."""
-    figures = [one for one in whole.find_all("figure") if one.find("img")]
+    figures = [one for one in soup.find_all("figure") if one.find("img")]
     for ordinal, figure in enumerate(figures, start=1):
         box = figure.find("div", class_="scroll")
         if isinstance(box, Tag) and str(box.get("aria-label", "")).startswith("Figure "):

@@ -11,7 +11,7 @@ import pandas as pd
 from wildlab.analysis.following.judged import LEADING
 from wildlab.analysis.overviews.verdict import Verdict
 from wildlab.reporting.arrange import LIMITS, arranged
-from wildlab.reporting.charts.comparison import dots_chart
+from wildlab.reporting.charts.drawing import dots_chart
 from wildlab.reporting.glossary import with_glossary
 from wildlab.reporting.html import examine
 from wildlab.reporting.own_flights import OwnFlight

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import textwrap
-from itertools import pairwise
 from typing import Any
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -81,9 +81,14 @@ def fit_text(figure: Figure) -> None:
 def _harmless(figure: Figure) -> None:
     """Names of strangers turn no text around, what matplotlib itself writes is no maths either, and what is
     not known is not written."""
-    for text in figure.findobj(Text):
-        if isinstance(text, Text):
-            text.set_text(visible(text.get_text()) if known(text.get_text()) else "")
+    over_all = (figure._suptitle, figure._supxlabel, figure._supylabel)  # type: ignore[attr-defined]
+    texts = [*figure.texts, *filter(None, over_all)]
+    legends = list(figure.legends)
+    for axes in figure.get_axes():
+        texts += [*_names_of(axes), *axes.texts]
+        legends += filter(None, [axes.get_legend()])
+    for text in (*texts, *(text for legend in legends for text in legend.get_texts())):
+        text.set_text(visible(text.get_text()) if known(text.get_text()) else "")
     for axes in figure.get_axes():
         for axis in (axes.xaxis, axes.yaxis):
             if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
@@ -117,26 +122,22 @@ class Powers(LogFormatter):
 
 def _apart(names: list[Annotation], points: float) -> None:
     """Move names up and down until none lies on another, in the order in which their lines end."""
-    boxes = {id(name): Text.get_window_extent(name) for name in names}
-    places = {id(name): (boxes[id(name)].y0 + boxes[id(name)].y1) / 2 for name in names}
-    names = sorted(names, key=lambda name: places[id(name)])
-    wanted = [places[id(name)] for name in names]
+    boxes = {id(name): name.get_window_extent() for name in names}
+    names = sorted(names, key=lambda name: boxes[id(name)].y0 + boxes[id(name)].y1)
+    wanted = np.array([(boxes[id(name)].y0 + boxes[id(name)].y1) / 2 for name in names])
+    heights = np.array([boxes[id(name)].height for name in names])
+    places, least = wanted.copy(), (heights[:-1] + heights[1:]) / 2
     for _ in range(100):
         off = False
-        for low, high in pairwise(names):
-            least = (boxes[id(low)].height + boxes[id(high)].height) / 2
-            lack = least - (places[id(high)] - places[id(low)])
+        for i, room in enumerate(least):
+            lack = room - (places[i + 1] - places[i])
             if lack > 0.5:
-                places[id(low)], places[id(high)], off = (
-                    places[id(low)] - lack / 2,
-                    places[id(high)] + lack / 2,
-                    True,
-                )
+                places[i : i + 2] += -lack / 2, lack / 2
+                off = True
         if not off:
             break
-    for name, before in zip(names, wanted, strict=True):
-        right, up = name.xyann
-        name.xyann = (right, up + (places[id(name)] - before) * points)
+    for name, moved in zip(names, (places - wanted) * points, strict=True):
+        name.xyann = (name.xyann[0], name.xyann[1] + float(moved))
 
 
 def fit_legends(figure: Figure) -> None:
@@ -178,73 +179,77 @@ def fit_titles(figure: Figure) -> None:
         With everything on it; it is laid out. A title may go on to the figure's edge, or, where another
         panel stands to the right, to the end of its own.
     """
-    wide = 72 * figure.get_size_inches()[0]
-    long: list[tuple[Axes, Text]] = []
-    for axes in figure.get_axes():
-        for text in (axes.title, axes._left_title, axes._right_title, axes.xaxis.label):  # type: ignore[attr-defined]
-            longest = max(map(len, text.get_text().split("\n")))
-            if longest * _NARROW * float(text.get_fontsize()) > wide / _columns(axes) - _BESIDE:
-                long.append((axes, text))
-        label, high = axes.yaxis.label, 72 * figure.get_size_inches()[1]
-        if (
-            max(map(len, label.get_text().split("\n"))) * _NARROW * float(label.get_fontsize())
-            > high - _BESIDE
-        ):
-            long.append((axes, label))
-    over_all = [figure._suptitle, figure._supxlabel]  # type: ignore[attr-defined]
-    for text in filter(None, over_all):
-        _break(text, figure.bbox.width - 2 * _EDGE)
-    if not long:
-        figure.draw_without_rendering()
-        return
-    for _, text in long:
-        text.set_visible(False)  # else the axes shrink to make room for their middle
-    figure.draw_without_rendering()
-    for axes, text in long:
-        text.set_visible(True)
-        panel, edge = axes.get_window_extent(), figure.bbox.x1 - 4
-        if text is axes.yaxis.label:
-            middle = (panel.y0 + panel.y1) / 2
-            _break(text, 2 * min(middle, figure.bbox.y1 - 4 - middle), upwards=True)
+    beside = _BESIDE * figure.dpi / 72
+    every = [(axes, text, text is axes.yaxis.label) for axes in figure.get_axes() for text in _names_of(axes)]
+    for axes, text, upwards in every:
+        room = (figure.bbox.height if upwards else figure.bbox.width / _columns(axes)) - beside
+        (x0, y0), (x1, y1) = text.get_window_extent().get_points()
+        if (y1 - y0 if upwards else x1 - x0) <= room:
             continue
-        if text.get_horizontalalignment() == "left":
-            room = (panel.x1 if _columns(axes) > 1 else edge) - panel.x0
-            if _columns(axes) == 1 and room < _NARROWEST * figure.bbox.width:
-                # Beside long names on the axis: the title goes over them.
-                text.set_x((_EDGE - panel.x0) / panel.width)
-                room = edge - _EDGE
-        else:
-            middle = (panel.x0 + panel.x1) / 2
-            room = panel.width if _columns(axes) > 1 else 2 * min(middle, edge - middle)
-        _break(text, room)
-    _inside(figure)
-
-
-def _inside(figure: Figure) -> None:
-    """Break once more what leaves the figure: where a title's lines change, the panels move below it."""
+        if not upwards and _columns(axes) == 1 and text.get_horizontalalignment() == "left":
+            # It begins where the axes do, beside their numbers.
+            numbers = axes.yaxis.get_tightbbox()
+            room = figure.bbox.width - 2 * _EDGE - (0.0 if numbers is None else numbers.width)
+            if room < _NARROWEST * figure.bbox.width:
+                room = figure.bbox.width - 2 * _EDGE
+        _break(text, room, upwards)
+    for text in (figure._suptitle, figure._supxlabel):  # type: ignore[attr-defined]
+        if text is not None:
+            _break(text, figure.bbox.width - 2 * _EDGE)
+    # Once is enough but for what stands beside or above much: where its lines change, the panels move.
     for _ in range(_ROUNDS):
-        figure.draw_without_rendering()
-        off = False
-        for axes in figure.get_axes():
-            for text in (axes.title, axes._left_title, axes._right_title, axes.xaxis.label):  # type: ignore[attr-defined]
-                box = text.get_window_extent()
-                over = max(box.x1 - figure.bbox.x1, figure.bbox.x0 - box.x0)
-                if text.get_text() and over > 0:
-                    off = True
-                    # What stands in the middle gives way on both sides.
-                    sides = 1 if text.get_horizontalalignment() == "left" else 2
-                    _break(text, box.width - sides * (over + _EDGE / 2))
-            label, box = axes.yaxis.label, axes.yaxis.label.get_window_extent()
-            over = max(box.y1 - figure.bbox.y1, figure.bbox.y0 - box.y0)
-            if label.get_text() and over > 0:
-                off = True
-                _break(label, box.height - 2 * (over + _EDGE / 2), upwards=True)
+        lay_out(figure)
+        off = [one for one in every if _leaves(*one)]
         if not off:
             return
-    figure.draw_without_rendering()
+        for axes, text, upwards in off:
+            _break(text, _room_of(axes, text, upwards), upwards)
+    lay_out(figure)
 
 
-def _break(text: Text, room: float, *, upwards: bool = False) -> None:
+def _names_of(axes: Axes) -> list[Text]:
+    """The titles of axes and the names of their sides, where there are any."""
+    titles = (axes.title, axes._left_title, axes._right_title)  # type: ignore[attr-defined]
+    return [text for text in (*titles, axes.xaxis.label, axes.yaxis.label) if text.get_text()]
+
+
+def _leaves(axes: Axes, text: Text, upwards: bool) -> bool:
+    """Whether a text leaves the figure, or, where panels stand side by side, goes on into the next."""
+    (x0, y0), (x1, y1) = text.get_window_extent().get_points()
+    figure, panel = axes.figure.bbox, axes.get_window_extent()
+    if upwards:
+        return bool(y0 < 0 or y1 > figure.y1)
+    return bool(x0 < 0 or x1 > (figure.x1 if _columns(axes) == 1 else panel.x1 + _EDGE))
+
+
+def lay_out(figure: Figure) -> None:
+    """Put axes and legends where they belong; nothing is drawn for it."""
+    engine = figure.get_layout_engine()
+    if engine is None:
+        figure.draw_without_rendering()
+    else:
+        engine.execute(figure)
+
+
+def _room_of(axes: Axes, text: Text, upwards: bool) -> float:
+    """Pixels that a text may take along its lines; a title beside long names on the axis goes over them."""
+    figure, panel = axes.get_figure(root=True), axes.get_window_extent()
+    assert figure is not None  # noqa: S101 - for the type checker
+    edge, alone = figure.bbox.x1 - 4, _columns(axes) == 1
+    if upwards:
+        middle = (panel.y0 + panel.y1) / 2
+        return float(2 * min(middle, figure.bbox.y1 - 4 - middle))
+    if text.get_horizontalalignment() == "left":
+        room = float((edge if alone else panel.x1) - panel.x0)
+        if alone and room < _NARROWEST * figure.bbox.width:
+            text.set_x((_EDGE - panel.x0) / panel.width)
+            room = edge - _EDGE
+        return room
+    middle = (panel.x0 + panel.x1) / 2
+    return float(2 * min(middle, edge - middle) if alone else panel.width)
+
+
+def _break(text: Text, room: float, upwards: bool = False) -> None:
     """Set a text on as many lines as it needs to be no longer than ``room``, pixels, along its lines; a
     number stays with its unit."""
     words = _UNITS.sub("\u00a0", text.get_text())

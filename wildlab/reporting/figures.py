@@ -8,18 +8,18 @@ which stack.
 
 from __future__ import annotations
 
+import base64
 import io
 import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -29,8 +29,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.quantiles import chi2_quantile
-from wildlab.reporting.figure_text import END_LABEL, FULL_SIZE, fit_text
-from wildlab.reporting.letters import shapes_alone
+from wildlab.paths import DATA
+from wildlab.reporting.figure_text import END_LABEL, FULL_SIZE, fit_text, least_size
+from wildlab.reporting.text import escape, inline
 
 DPI = 190
 #: What a figure has of the inches that a chart asks for: letters of 10 points then have 11 pixels on a phone,
@@ -68,46 +69,8 @@ COLOURS = {
     "logged-pose": BLUE,
     "calibrated-pose": VERMILLION,
 }
-
-_STYLE: dict[str, Any] = {
-    "figure.facecolor": "white",
-    "figure.dpi": DPI,
-    "savefig.dpi": DPI,
-    "font.family": "sans-serif",
-    # matplotlib brings this font along, so a figure looks the same on every machine.
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 10.0,
-    "axes.titlesize": 11.0,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.titlepad": 9.0,
-    "axes.labelsize": 10.0,
-    "axes.edgecolor": GREY,
-    "axes.labelcolor": INK,
-    "axes.titlecolor": INK,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.prop_cycle": cycler(color=[BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, GREY]),
-    "grid.color": "#E3E7EB",
-    "grid.linewidth": 0.8,
-    "xtick.labelsize": 10.0,
-    "ytick.labelsize": 10.0,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "lines.linewidth": 1.7,
-    "lines.markersize": 4.5,
-    "text.color": INK,
-    "legend.frameon": False,
-    "legend.fontsize": 10.0,
-    "pdf.compression": 9,
-    # What things are called comes from files of strangers: a dollar sign is no maths.
-    "text.parse_math": False,
-}
+#: The house style, as matplotlib reads it.
+STYLE_FILE = DATA / "pages" / "figures.mplstyle"
 
 
 def colour(subject: str) -> str:
@@ -130,10 +93,16 @@ def colour(subject: str) -> str:
     return COLOURS.get(subject, GREY)
 
 
+@cache
+def house_rc() -> mpl.RcParams:
+    """What the house style sets."""
+    return mpl.rc_params_from_file(STYLE_FILE, use_default_template=False)
+
+
 def house_style() -> None:
     """Set matplotlib's defaults to ours, whatever the reader's own settings file says."""
     mpl.rcdefaults()
-    mpl.rcParams.update(_STYLE)  # type: ignore[arg-type]
+    mpl.rcParams.update(house_rc())
 
 
 def new_figure(
@@ -435,3 +404,68 @@ def save_figure(figure: Figure, folder: Path, name: str) -> bytes:
                 metadata={"CreationDate": None, "Producer": None, "Creator": "wildlab"},
             )
     return png
+
+
+#: Tables of a font by which letters are chosen and set beside each other: kerning, ligatures and the like.
+LAYOUT_TABLES = ("GSUB", "GPOS", "GDEF", "kern", "BASE", "JSTF", "MATH")
+
+
+@contextmanager
+def shapes_alone() -> Iterator[None]:
+    """While this holds, fonts are embedded without `LAYOUT_TABLES`.
+
+    In a PDF every letter has its place, so nobody reads them there, and taking them apart is two thirds of
+    the time that a font takes.
+    """
+    from fontTools.subset import Options  # takes a while, and a first look needs none
+
+    usual = Options._drop_tables_default
+    Options._drop_tables_default = [*usual, *LAYOUT_TABLES]
+    try:
+        yield
+    finally:
+        Options._drop_tables_default = usual
+
+
+#: CSS pixels that a phone of 390 has for a figure.
+PHONE_WIDTH = 361
+
+
+def figure_html(
+    figure: Figure, png: bytes, *, ordinal: int, alt: str, caption: str = "", main: bool = False
+) -> str:
+    """``<figure>`` with the picture in it.
+
+    Parameters
+    ----------
+    figure
+        As it was drawn.
+    png
+        The same as a picture.
+    ordinal
+        Which of the page's figures it is.
+    alt
+        What it shows.
+    caption
+        Below it; "" for none.
+    main
+        Whether it is the page's main picture.
+
+    Returns
+    -------
+    str
+        HTML. Where the letters would be too small on a phone the figure is wider than it, and marked so.
+    """
+    wide, high = figure.get_size_inches()
+    # The size in pixels lets a browser keep the place before it has decoded the picture.
+    width, height = round(wide * FULL_SIZE), round(high * FULL_SIZE)
+    least = min(width, round(wide * least_size(figure)))
+    data = base64.b64encode(png).decode("ascii")
+    image = (
+        f'<img alt="{escape(alt)}" width="{width}" height="{height}" '
+        f'style="max-width:{width}px;min-width:{least}px" src="data:image/png;base64,{data}">'
+    )
+    slides = " slides" if least > PHONE_WIDTH else ""
+    box = f'class="scroll{slides}" role="group" tabindex="0" aria-label="Figure {ordinal}"'
+    label = f"<figcaption><b>Figure {ordinal}.</b> {inline(caption)}</figcaption>" if caption else ""
+    return f"<figure{' data-main' if main else ''}><div {box}>{image}</div>{label}</figure>"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -23,9 +24,7 @@ FILE = DATA / "glossary.toml"
 #: Words of one page at most; those it uses most.
 MOST = 10
 #: Where a word is no running text, or has a meaning of its own.
-_NOT_IN = {*("a", "h1", "h2", "h3", "h4", "h5", "h6", "code", "pre", "summary", "math", "svg", "style")} | {
-    *("script", "title", "thead", "footer", "dl", "button")
-}
+_NOT_IN = re.compile("a|h[1-6]|code|pre|summary|math|svg|style|script|title|thead|footer|dl|button")
 
 
 class Word(NamedTuple):
@@ -50,17 +49,11 @@ def words(file: Path = FILE) -> tuple[Word, ...]:
     WildlabError
         If a word lacks a part, or two share a name or a way of writing.
     """
-    rows = tomllib.loads(file.read_text(encoding="utf-8")).get("word", [])
     found = []
-    for row in rows:
-        for field in ("name", "match", "text"):
-            if not row.get(field):
-                raise WildlabError(
-                    f"the word {row.get('name', '?')!r} has no {field}",
-                    "write it",
-                    file=file.name,
-                    field=field,
-                )
+    for row in tomllib.loads(file.read_text(encoding="utf-8")).get("word", []):
+        if lacking := [field for field in Word._fields if not row.get(field)]:
+            problem = f"the word {row.get('name', '?')!r} has no {lacking[0]}"
+            raise WildlabError(problem, "write it", file=file.name, field=lacking[0])
         found.append(Word(row["name"], tuple(row["match"]), row["text"]))
     spellings = [spelling.lower() for word in found for spelling in word.match]
     for many in ([word.anchor for word in found], spellings):
@@ -85,89 +78,62 @@ def with_glossary(body: str, known: Sequence[Word] | None = None) -> str:
     str
         HTML; as it was, where it uses none of them.
     """
-    known = words() if known is None else known
     soup = BeautifulSoup(body, "html.parser")
-    pattern, by_spelling = _pattern(known)
-    uses: dict[str, int] = {}
-    first: set[str] = set()
+    return str(soup) if explain_words(soup, known) else body
+
+
+def explain_words(soup: BeautifulSoup, known: Sequence[Word] | None = None) -> bool:
+    """Explain the words of a page's body, see `with_glossary`; whether it uses any."""
+    known = words() if known is None else known
+    # The longest spelling first; one of small letters also begins a sentence.
+    written = {spelling: word for word in known for spelling in word.match}
+    begun = {one[0].upper() + one[1:]: word for one, word in written.items() if one[0].islower()}
+    by_spelling = begun | written
+    longest = sorted(map(re.escape, by_spelling), key=len, reverse=True)
+    pattern = re.compile(rf"(?<![\w-])(?:{'|'.join(longest)})(?![\w-])")
+    found = [
+        (node, matches)
+        for node in soup.find_all(string=True)
+        if type(node) is NavigableString
+        and (matches := list(pattern.finditer(node)))
+        and not any(_NOT_IN.fullmatch(one.name) for one in node.parents)
+    ]
     top = soup.find("h2")
     before = set() if top is None else {id(text) for text in top.find_all_previous(string=True)}
-    for node in _texts(soup):
-        for match in pattern.finditer(str(node)):
-            name = by_spelling[_key(match[0], by_spelling)].name
-            uses[name] = uses.get(name, 0) + 1
-            if id(node) in before:
-                first.add(name)
+    uses = Counter(by_spelling[match[0]].name for _, matches in found for match in matches)
+    first = {by_spelling[match[0]].name for node, matches in found if id(node) in before for match in matches}
     order = {word.name: i for i, word in enumerate(known)}
     # Those of the first screens come before all others: not everybody reads on.
     kept = sorted(uses, key=lambda name: (name not in first, -uses[name], order[name]))[:MOST]
     if not kept:
-        return body
-    _link_first(soup, pattern, by_spelling, set(kept))
-    listed = sorted((word for word in known if word.name in kept), key=lambda word: word.name.lower())
+        return False
+    waiting = set(kept)
+    # What is folded away is linked only where there is no other use.
+    for node, matches in sorted(found, key=lambda one: one[0].find_parent("details") is not None):
+        pieces: list[PageElement] = []
+        at = 0
+        for match in matches:
+            word = by_spelling[match[0]]
+            if word.name in waiting:
+                waiting.discard(word.name)
+                link = soup.new_tag("a", attrs={"class": "word", "href": f"#{word.anchor}"}, string=match[0])
+                pieces += [NavigableString(node[at : match.start()]), link]
+                at = match.end()
+        if pieces:
+            node.replace_with(*pieces, NavigableString(node[at:]))
     items = "".join(
-        f'<dt id="{word.anchor}">{escape(word.name)}</dt><dd>{escape(word.text)}</dd>' for word in listed
+        f'<dt id="{word.anchor}">{escape(word.name)}</dt><dd>{escape(word.text)}</dd>'
+        for word in sorted((word for word in known if word.name in kept), key=lambda word: word.name.lower())
     )
-    section = BeautifulSoup(
-        f'<details class="plain" id="glossary"><summary>Words used here</summary>'
+    listed = BeautifulSoup(
+        '<details class="plain" id="glossary"><summary>Words used here</summary>'
         f'<dl class="words">{items}</dl></details>',
         "html.parser",
     )
     method = soup.find("details", class_="method")
-    for part in list(section.contents):
+    for part in list(listed.contents):
         if isinstance(method, Tag):
             method.insert_before(part)
         else:
             soup.append(part)
-    return str(soup)
-
-
-def _pattern(known: Sequence[Word]) -> tuple[re.Pattern[str], dict[str, Word]]:
-    """What finds any of the words, the longest first; and whose each spelling is."""
-    by_spelling = {spelling: word for word in known for spelling in word.match}
-    parts = []
-    for spelling in sorted(by_spelling, key=len, reverse=True):
-        first = re.escape(spelling[0])
-        if spelling[0].islower():
-            first = f"[{spelling[0]}{spelling[0].upper()}]"
-        parts.append(first + re.escape(spelling[1:]))
-    return re.compile(rf"(?<![\w-])(?:{'|'.join(parts)})(?![\w-])"), by_spelling
-
-
-def _key(found: str, by_spelling: dict[str, Word]) -> str:
-    return found if found in by_spelling else found[0].lower() + found[1:]
-
-
-def _texts(soup: BeautifulSoup) -> list[NavigableString]:
-    """Running text: nothing within links, headings, code, formulas or what is folded away."""
-    return [
-        node
-        for node in soup.find_all(string=True)
-        if type(node) is NavigableString and not any(one.name in _NOT_IN for one in node.parents)
-    ]
-
-
-def _link_first(
-    soup: BeautifulSoup, pattern: re.Pattern[str], by_spelling: dict[str, Word], wanted: set[str]
-) -> None:
-    """Link the first use of each word; one that is folded away only where there is no other."""
-    texts = _texts(soup)
-    folded = [node for node in texts if node.find_parent("details") is not None]
-    inside = {id(node) for node in folded}
-    for node in [*(one for one in texts if id(one) not in inside), *folded]:
-        if not wanted:
-            return
-        pieces: list[PageElement] = []
-        text, at = str(node), 0
-        for match in pattern.finditer(text):
-            word = by_spelling[_key(match[0], by_spelling)]
-            if word.name not in wanted:
-                continue
-            wanted.discard(word.name)
-            link = soup.new_tag("a", attrs={"class": "word", "href": f"#{word.anchor}"})
-            link.string = match[0]
-            pieces += [NavigableString(text[at : match.start()]), link]
-            at = match.end()
-        if pieces:
-            pieces.append(NavigableString(text[at:]))
-            node.replace_with(*pieces)
+    return True

@@ -1,6 +1,6 @@
 """An executed notebook as one HTML file that opens anywhere: no script, no network, maths as MathML.
 
-nbconvert's template ``basic`` turns the outputs into HTML; everything around them is ours (`page`), and the
+What the cells have shown is put in the order of a page (`arrange`) and into its frame (`page`), and the
 result is examined before it is written: what could ask the network for something, run something, or shut
 out a reader who does not see the figures, stops the build with a sentence.
 """
@@ -8,47 +8,26 @@ out a reader who does not see the figures, stops the build with a sentence.
 from __future__ import annotations
 
 import re
+from html.parser import HTMLParser
 from itertools import pairwise
-from typing import Any
 
-from bs4 import BeautifulSoup, Tag
-from nbconvert import HTMLExporter
-from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
-from traitlets.config import Config
+from bs4 import BeautifulSoup
+from nbformat import NotebookNode
 
 from wildlab.errors import WildlabError
-from wildlab.reporting.arrange import VERDICT, arranged
-from wildlab.reporting.glossary import with_glossary
-from wildlab.reporting.notebook_file import nbformat
+from wildlab.reporting.arrange import VERDICT, arrange_parts
+from wildlab.reporting.glossary import explain_words
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape, maths
 
 MAX_BYTES = 5_000_000
 #: Cells that belong to the machinery, not to the report.
-REMOVED_TAGS = ("parameters", "injected-parameters", "remove_cell")
+REMOVED_TAGS = frozenset({"parameters", "injected-parameters", "remove_cell"})
 #: Elements that could run something, ask for something, or send something.
-FORBIDDEN = (
-    *(
-        "script",
-        "iframe",
-        "frame",
-        "object",
-        "embed",
-        "applet",
-        "link",
-        "base",
-        "meta",
-        "form",
-        "input",
-        "button",
-    ),
-    *("select", "textarea", "audio", "video", "source", "track", "portal", "template", "noscript"),
+FORBIDDEN = re.compile(
+    "script|i?frame|object|embed|applet|link|base|meta|form|input|button|select|textarea|audio|video|source|"
+    "track|portal|template|noscript"
 )
-#: The classes of nbconvert's own wrappers.
-_WRAPPERS = {
-    *("cell", "inner_cell", "output_wrapper", "output", "output_area", "output_subarea", "text_cell_render"),
-    *("prompt", "input"),
-}
 #: The theses, as reports cite them: "H 5.6.1", "H (7.35)", "F table 3.1" (in full: ``docs/references.md``).
 THESES = {
     "H": "H. H. Helgesen, Detection and Tracking of Floating Objects using UAVs with Optical Sensors, "
@@ -65,85 +44,42 @@ _BESIDE = re.compile(r"[\w.%~-]+(/[\w.%~-]+)*(#[\w.%~-]*)?")
 _CSS_REQUEST = re.compile(r"@import|url\s*\(\s*['\"]?(?!data:)", re.I)
 
 
-class _Renderer(IPythonRenderer):
-    """Markdown cells with their maths translated here, since no script will do it in the browser."""
-
-    def block_math(self, body: str) -> str:
-        return maths(body, block=True)
-
-    def inline_math(self, body: str) -> str:
-        return maths(body)
-
-    def multiline_math(self, text: str) -> str:
-        return maths(text.strip("$"), block=True)
-
-    def latex_environment(self, name: str, body: str) -> str:
-        return maths(f"\\begin{{{name}}}{body}\\end{{{name}}}", block=True)
-
-
-def _markdown(source: str) -> str:
-    return str(MarkdownWithMath(renderer=_Renderer(escape=True, exclude_anchor_links=True)).render(source))
+def notebook_body(notebook: NotebookNode) -> str:
+    """What the cells of a report have shown, as HTML: no code, no prints, no warnings, no bare values."""
+    parts = []
+    for cell in notebook.cells:
+        if REMOVED_TAGS.intersection(cell.metadata.get("tags", ())):
+            continue
+        if cell.cell_type == "markdown":
+            parts.append(markdown_html(cell.source))
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {})
+            if "text/html" in data:
+                parts.append(data["text/html"])
+            elif "image/png" in data:
+                alt = escape(output.metadata.get("image/png", {}).get("alt", ""))
+                parts.append(f'<img alt="{alt}" src="data:image/png;base64,{data["image/png"].strip()}">')
+    return re.sub(r"\n\s*\n+", "\n", "\n".join(parts)).strip()
 
 
-def notebook_body(notebook: nbformat.NotebookNode, *, code: bool = False) -> str:
-    """What an executed notebook shows, as HTML without nbconvert's wrappers, and never its warnings.
+def markdown_html(source: str) -> str:
+    """A cell of words as HTML, with its maths translated here, since no script will do it in the browser."""
+    from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath  # few notebooks have one
 
-    Parameters
-    ----------
-    code
-        Whether to show code, prints and the bare values of last lines as well: a tutorial's, not a report's.
-    """
-    exporter = HTMLExporter(
-        config=Config(
-            {
-                "TagRemovePreprocessor": {"enabled": True, "remove_cell_tags": list(REMOVED_TAGS)},
-                "HTMLExporter": {
-                    "template_name": "basic",
-                    "exclude_input": not code,
-                    "exclude_input_prompt": True,
-                    "exclude_output_prompt": True,
-                    "exclude_output_stdin": True,
-                    "exclude_anchor_links": True,
-                    "embed_images": True,
-                    "require_js_url": "",
-                    "mathjax_url": "",
-                    "jquery_url": "",
-                    "mermaid_js_url": "",
-                    "widget_renderer_url": "",
-                    "preprocessors": ["nbconvert.preprocessors.TagRemovePreprocessor"],
-                },
-            }
-        )
-    )
-    exporter.register_filter("markdown2html", _no_context(_markdown))
-    shown = nbformat.from_dict(notebook)
-    for cell in shown.cells:
-        if cell.cell_type == "code":
-            cell.outputs = [output for output in cell.outputs if _is_shown(output, code)]
-    body, _ = exporter.from_notebook_node(shown)
-    soup = BeautifulSoup(body, "html.parser")
-    for block in soup.find_all("div", class_=_is_wrapper):
-        block.unwrap()
-    # Blank lines between the parts say nothing; those within code do.
-    return str(soup).strip() if code else re.sub(r"\n\s*\n+", "\n", str(soup)).strip()
+    class Renderer(IPythonRenderer):
+        def block_math(self, body: str) -> str:
+            return maths(body, block=True)
 
+        def inline_math(self, body: str) -> str:
+            return maths(body)
 
-def _is_shown(output: nbformat.NotebookNode, code: bool) -> bool:
-    if code:
-        return bool(output.get("name") != "stderr")
-    # Prints, warnings and the bare value of a last line are for whoever writes the notebook.
-    return bool(set(output.get("data", {})) - {"text/plain"})
+        def multiline_math(self, text: str) -> str:
+            return maths(text.strip("$"), block=True)
 
+        def latex_environment(self, name: str, body: str) -> str:
+            return maths(f"\\begin{{{name}}}{body}\\end{{{name}}}", block=True)
 
-def _no_context(function: Any) -> Any:
-    def render(source: str, *_: Any, **__: Any) -> str:
-        return str(function(source))
-
-    return render
-
-
-def _is_wrapper(name: str | None) -> bool:
-    return name in _WRAPPERS
+    return str(MarkdownWithMath(renderer=Renderer(escape=True, exclude_anchor_links=True)).render(source))
 
 
 def _folded(summary: str, html: str) -> str:
@@ -151,7 +87,7 @@ def _folded(summary: str, html: str) -> str:
 
 
 def report_page(
-    notebook: nbformat.NotebookNode,
+    notebook: NotebookNode,
     *,
     study: str,
     footer: str = "",
@@ -189,12 +125,12 @@ def report_page(
     if alert and soup.header is not None:
         soup.header.insert_after(BeautifulSoup(alert, "html.parser"))
     cited = cited_theses(soup.get_text(" "))
-    body = with_glossary(arranged(str(soup)))
-    heading = soup.h1
+    arrange_parts(soup)
+    explain_words(soup)
     # A page that is mailed alone has nothing beside it: the way to the ledger is words, not a link.
     whole = page(
-        title=heading.get_text(" ", strip=True) if heading else study,
-        body=body,
+        title=soup.h1.get_text(" ", strip=True) if soup.h1 else study,
+        body=str(soup),
         kicker=" · ".join(filter(None, [f"wildlab › {escape(study)}", escape(made[:10])])),
         footer=_folded("How to reproduce this page", footer + cited),
     )
@@ -250,79 +186,88 @@ def examine(whole: str, name: str, *, alone: bool = True) -> None:
             "show fewer points, or fewer and smaller figures",
             file=file,
         )
-    soup = BeautifulSoup(whole, "html.parser")
-    for tag in soup.find_all(list(FORBIDDEN)):
-        if tag.name == "meta" and tag.parent is not None and tag.parent.name == "head":
-            continue
-        raise WildlabError(
-            f"the report has a <{tag.name}>", "show text, tables and pictures only, through Report", file=file
-        )
-    for tag in soup.find_all(True):
-        _examine_attributes(tag, file, alone)
-    for style in soup.find_all("style"):
-        if _CSS_REQUEST.search(style.get_text()):
-            raise WildlabError("a style asks the network for something", "take the url() out", file=file)
-    for image in soup.find_all("img"):
-        if not str(image.get("alt") or "").strip():
-            raise WildlabError(
-                "a picture has no alt text",
-                "show it with Report.figure(alt=...), saying what it shows",
-                file=file,
+    examiner = _Examiner(file, alone)
+    examiner.feed(whole)
+    examiner.close()
+    examiner.conclude()
+
+
+class _Examiner(HTMLParser):
+    """Goes through a page once, and stops at what it must not have."""
+
+    def __init__(self, file: str, alone: bool) -> None:
+        super().__init__()
+        self.file, self.alone = file, alone
+        self.in_head, self.in_style = True, False
+        self.levels: list[int] = []
+        self.ids: set[str] = set()
+        self.within: list[str] = []
+
+    def refuse(self, problem: str, fix: str) -> None:
+        raise WildlabError(problem, fix, file=self.file)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if FORBIDDEN.fullmatch(tag) and not (tag == "meta" and self.in_head):
+            self.refuse(f"the report has a <{tag}>", "show text, tables and pictures only, through Report")
+        given = dict(attrs)
+        for name, value in attrs:
+            self.examine_attribute(tag, name, value or "")
+            if name == "href":
+                self.examine_link(value or "", "download" in given)
+        if tag == "img" and not (given.get("alt") or "").strip():
+            self.refuse(
+                "a picture has no alt text", "show it with Report.figure(alt=...), saying what it shows"
             )
-    _examine_headings([int(tag.name[1]) for tag in soup.find_all(re.compile("^h[1-6]$"))], file)
+        if re.fullmatch("h[1-6]", tag):
+            self.levels.append(int(tag[1]))
+        self.ids.add(given.get("id") or "")
+        self.in_style = tag == "style"
 
+    def handle_endtag(self, tag: str) -> None:
+        self.in_head = self.in_head and tag != "head"
+        self.in_style = False
 
-def _examine_attributes(tag: Tag, file: str, alone: bool) -> None:
-    for name, value in tag.attrs.items():
-        text = " ".join(value) if isinstance(value, list) else str(value)
-        if name.lower().startswith("on"):
-            raise WildlabError(f"a <{tag.name}> has the script attribute {name!r}", "take it out", file=file)
-        if name.lower() in _FETCHING and not text.startswith("data:image/"):
-            raise WildlabError(
-                f"a <{tag.name}> asks for {text[:60]!r}", "put the picture into the page itself", file=file
-            )
-        if name.lower() == "href":
-            _examine_link(tag, text, file, alone)
-        if name.lower() == "style" and _CSS_REQUEST.search(text):
-            raise WildlabError("a style asks the network for something", "take the url() out", file=file)
+    def handle_data(self, data: str) -> None:
+        if self.in_style:
+            self.examine_style(data)
 
+    def examine_style(self, text: str) -> None:
+        if _CSS_REQUEST.search(text):
+            self.refuse("a style asks the network for something", "take the url() out")
 
-def _examine_link(tag: Tag, to: str, file: str, alone: bool) -> None:
-    """A page is mailed alone: a link leads to a place in it, hands over a file within, or to the web. One
-    that is not may lead to what lies beside it or below."""
-    if re.match(r"\s*(javascript|vbscript):", to, re.I):
-        raise WildlabError(f"a link runs {to[:60]!r}", "link to a page", file=file)
-    if re.match(r"\s*data:", to, re.I):
-        if tag.get("download") is None or not to.startswith(HANDED_OVER):
-            raise WildlabError(
-                f"a link runs {to[:60]!r}", "hand over tables only, by wildlab.reporting.tables", file=file
-            )
-        return
-    if to.startswith("#"):
-        root = tag.find_parent("html") or tag
-        if len(to) < 2 or root.find(id=to[1:]) is None:
-            raise WildlabError(f"a link leads to {to!r}, which is not on the page", "mend it", file=file)
-    elif not to.startswith("https://") and (alone or not _BESIDE.fullmatch(to)):
-        raise WildlabError(
-            f"a link leads to {to[:60]!r}, which is missing where the page is mailed alone",
-            "say it in words",
-            file=file,
-        )
+    def examine_attribute(self, tag: str, name: str, value: str) -> None:
+        if name.startswith("on"):
+            self.refuse(f"a <{tag}> has the script attribute {name!r}", "take it out")
+        if name in _FETCHING and not value.startswith("data:image/"):
+            self.refuse(f"a <{tag}> asks for {value[:60]!r}", "put the picture into the page itself")
+        if name == "style":
+            self.examine_style(value)
 
+    def examine_link(self, to: str, download: bool) -> None:
+        """A page is mailed alone: a link leads to a place in it, hands over a file within, or to the web. One
+        that is not may lead to what lies beside it or below."""
+        scheme = to.strip().lower()
+        if scheme.startswith(("javascript:", "vbscript:")):
+            self.refuse(f"a link runs {to[:60]!r}", "link to a page")
+        elif scheme.startswith("data:"):
+            if not download or not to.startswith(HANDED_OVER):
+                self.refuse(f"a link runs {to[:60]!r}", "hand over tables only, by wildlab.reporting.tables")
+        elif to.startswith("#"):
+            self.within.append(to)
+        elif not to.startswith("https://") and (self.alone or not _BESIDE.fullmatch(to)):
+            problem = f"a link leads to {to[:60]!r}, which is missing where the page is mailed alone"
+            self.refuse(problem, "say it in words")
 
-def _examine_headings(levels: list[int], file: str) -> None:
-    if levels[:1] != [1] or levels.count(1) != 1:
-        raise WildlabError(
-            f"the report has {levels.count(1)} main headings"
-            if levels.count(1) != 1
-            else "a heading precedes <h1>",
-            "begin the notebook with one report.head(...)",
-            file=file,
-        )
-    for before, after in pairwise(levels):
-        if after > before + 1:
-            raise WildlabError(
-                f"a heading of level {after} follows one of level {before}",
-                "use the level between",
-                file=file,
-            )
+    def conclude(self) -> None:
+        """What only the whole page can tell."""
+        for to in self.within:
+            if to == "#" or to[1:] not in self.ids:
+                self.refuse(f"a link leads to {to!r}, which is not on the page", "mend it")
+        mains = self.levels.count(1)
+        if mains != 1 or self.levels[0] != 1:
+            problem = f"the report has {mains} main headings" if mains != 1 else "a heading precedes <h1>"
+            self.refuse(problem, "begin the notebook with one report.head(...)")
+        for before, after in pairwise(self.levels):
+            if after > before + 1:
+                problem = f"a heading of level {after} follows one of level {before}"
+                self.refuse(problem, "use the level between")

@@ -69,23 +69,40 @@ def plain_number(value: Any, what: str) -> float | int | None:
     return int(number) if isinstance(value, int) else number
 
 
-def metric(
-    name: str,
-    subject: str,
-    value: Any,
-    unit: str,
-    *,
-    n: Any = None,
-    published: Any = None,
-    source: str | None = None,
-    low: Any = None,
-    high: Any = None,
-    below: Any = None,
-    flights: Any = None,
-    centre_low: Any = None,
-    centre_high: Any = None,
-    power: Any = None,
-) -> dict[str, Any]:
+#: What an entry of ``metrics`` has besides name, subject, value and unit, and one of ``claims`` besides id,
+#: text and verdict; None where it is not given.
+_METRIC: dict[str, type] = {
+    "n": int,
+    "published": float,
+    "source": str,
+    **dict.fromkeys(("low", "high", "below"), float),
+    "flights": int,
+    **dict.fromkeys(("centre_low", "centre_high", "power"), float),
+}
+_CLAIM: dict[str, type] = {
+    "fraction": float,
+    "seeds": int,
+    **dict.fromkeys(("low", "high"), float),
+    "met": int,
+    **dict.fromkeys(("half", "twice"), str),
+    **dict.fromkeys(("difference", "difference_low", "difference_high"), float),
+}
+
+
+def _entry(kinds: dict[str, type], given: dict[str, Any], what: str) -> dict[str, Any]:
+    if unknown := set(given) - set(kinds):
+        raise TypeError(f"{what} has no {min(unknown)!r}")
+    return {
+        name: None
+        if given.get(name) is None
+        else plain_number(given[name], f"{name} of {what}")
+        if kind is float
+        else kind(given[name])
+        for name, kind in kinds.items()
+    }
+
+
+def metric(name: str, subject: str, value: Any, unit: str, **more: Any) -> dict[str, Any]:
     """One entry of ``metrics``, checked.
 
     Parameters
@@ -98,20 +115,12 @@ def metric(
         The number; NaN becomes null.
     unit
         ``"m"``, ``"deg"``; ``"1"`` for a number without.
-    n
-        How many values it is from.
-    published, source
-        The printed number, and where it is printed.
-    low, high
-        Bounds of the value.
-    below
-        Share of the flights that lie below the printed number.
-    flights
-        How many of them have a value.
-    centre_low, centre_high
-        90 % confidence interval of the value, as the centre of what all such flights give.
-    power
-        Of "outside", for a published flight with errors half as large.
+    **more
+        ``n``: how many values it is from. ``published`` and ``source``: the printed number, and where it is
+        printed. ``low`` and ``high``: bounds of the value. ``below``: share of the flights that lie below the
+        printed number. ``flights``: how many of them have a value. ``centre_low`` and ``centre_high``: 90 %
+        confidence interval of the value, as the centre of what all such flights give. ``power``: of
+        "outside", for a published flight with errors half as large.
 
     Returns
     -------
@@ -124,55 +133,22 @@ def metric(
     1.25
     """
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise WildlabError(
-            f"the metric name {name!r} is not made of a-z, 0-9 and _",
-            "rename it: tools read it",
-            field="metrics",
-        )
+        problem = f"the metric name {name!r} is not made of a-z, 0-9 and _"
+        raise WildlabError(problem, "rename it: tools read it", field="metrics")
     if not isinstance(subject, str) or not _SUBJECT.fullmatch(subject):
-        raise WildlabError(
-            f"the subject {subject!r} of metric {name!r} is empty or has a blank",
-            "join its parts with / or -",
-            field="metrics",
-        )
+        problem = f"the subject {subject!r} of metric {name!r} is empty or has a blank"
+        raise WildlabError(problem, "join its parts with / or -", field="metrics")
     what = f"{name} of {subject}"
-    entry: dict[str, Any] = {
-        "name": name,
-        "subject": subject,
-        "value": plain_number(value, f"the value of {what}"),
-        "unit": str(unit),
-        "n": None if n is None else int(n),
-        "published": plain_number(published, f"the published value of {what}"),
-        "source": None if source is None else str(source),
-        "low": plain_number(low, f"the low bound of {what}"),
-        "high": plain_number(high, f"the high bound of {what}"),
-        "below": plain_number(below, f"the share below the published value of {what}"),
-        "flights": None if flights is None else int(flights),
-        "centre_low": plain_number(centre_low, f"the low bound of the centre of {what}"),
-        "centre_high": plain_number(centre_high, f"the high bound of the centre of {what}"),
-        "power": plain_number(power, f"the power of {what}"),
-    }
+    value = plain_number(value, f"the value of {what}")
+    entry = {"name": name, "subject": subject, "value": value, "unit": str(unit)} | _entry(
+        _METRIC, more, what
+    )
     if entry["low"] is not None and entry["high"] is not None and entry["low"] > entry["high"]:
         raise WildlabError(f"the low bound of {what} is above the high one", "swap them", field="metrics")
     return entry
 
 
-def claim(
-    id: str,
-    text: str,
-    verdict: str,
-    *,
-    fraction: Any = None,
-    seeds: Any = None,
-    low: Any = None,
-    high: Any = None,
-    met: Any = None,
-    half: str | None = None,
-    twice: str | None = None,
-    difference: Any = None,
-    difference_low: Any = None,
-    difference_high: Any = None,
-) -> dict[str, Any]:
+def claim(id: str, text: str, verdict: str, **more: Any) -> dict[str, Any]:
     """One entry of ``claims``, checked.
 
     Parameters
@@ -181,14 +157,14 @@ def claim(
         Of the claim, as the published file has it.
     text
         The claim itself.
-    verdict, half, twice
-        ``"holds"`` or another of the known verdicts; at half and at twice the threshold, where it has one.
-    fraction, low, high
-        Share of the flights that meet the premise on which it is true, and its interval; between 0 and 1.
-    seeds, met
-        How many flights, and how many of them meet the premise.
-    difference, difference_low, difference_high
-        Of what is compared, with its interval.
+    verdict
+        ``"holds"`` or another of the known verdicts.
+    **more
+        ``half`` and ``twice``: the verdicts at half and at twice the threshold.
+        ``fraction``, ``low`` and ``high``: share of the flights that meet the premise on which it is true,
+        and its interval, between 0 and 1. ``seeds`` and ``met``: how many flights, and how many meet the
+        premise. ``difference``, ``difference_low`` and ``difference_high``: of what is compared, with its
+        interval.
 
     Returns
     -------
@@ -202,33 +178,17 @@ def claim(
     """
     if not isinstance(id, str) or not _SUBJECT.fullmatch(id):
         raise WildlabError(f"the claim id {id!r} is empty or has a blank", "use letters, digits, - and _")
-    for one in (verdict, half, twice):
-        if one not in VERDICTS and (one is not None or one is verdict):
+    entry = _entry(_CLAIM, more, f"claim {id}")
+    for one in (verdict, *(entry[name] for name in ("half", "twice") if entry[name] is not None)):
+        if one not in VERDICTS:
             raise WildlabError(
                 f"the verdict {one!r} of claim {id!r} is unknown", f"use one of: {', '.join(VERDICTS)}"
             )
-    shares = {
-        key: plain_number(value, f"the fraction of claim {id}")
-        for key, value in (("fraction", fraction), ("low", low), ("high", high))
-    }
-    for share in shares.values():
-        if share is not None and not 0 <= share <= 1:
-            raise WildlabError(f"the fraction of claim {id!r} is {share}", "give a share from 0 to 1")
-    return {
-        "id": id,
-        "text": str(text),
-        "verdict": verdict,
-        "fraction": shares["fraction"],
-        "seeds": None if seeds is None else int(seeds),
-        "low": shares["low"],
-        "high": shares["high"],
-        "met": None if met is None else int(met),
-        "half": half,
-        "twice": twice,
-        "difference": plain_number(difference, f"the difference of claim {id}"),
-        "difference_low": plain_number(difference_low, f"the difference of claim {id}"),
-        "difference_high": plain_number(difference_high, f"the difference of claim {id}"),
-    }
+    for name in ("fraction", "low", "high"):
+        if entry[name] is not None and not 0 <= entry[name] <= 1:
+            problem = f"the {name} of claim {id!r} is {entry[name]}"
+            raise WildlabError(problem, "give a share from 0 to 1")
+    return {"id": id, "text": str(text), "verdict": verdict} | entry
 
 
 def document(

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from wildlab.analysis.overviews.verdict import Verdict, evidence_of, verdict_of
-from wildlab.reporting.page import TAGS, page
+from wildlab.reporting.page import PILLS, TAGS, page
 from wildlab.reporting.quantities import duration
 from wildlab.reporting.text import NOTHING, escape
 
@@ -22,7 +22,6 @@ BEGIN = (
 )
 #: What the verdict follows from, of the overview.
 COUNTS = {"problems": "problems", "worth": "worth_fixing", "troubled": "troubled", "judged": "reports_beside"}
-_PILLS = {"bad": "no", "warn": "part", "good": "yes", "neutral": ""}
 
 
 class OwnReport(NamedTuple):
@@ -120,7 +119,7 @@ def verdict_pill(flight: OwnFlight) -> str:
     word = flight.verdict
     if word is None:
         return '<span class="pill">no overview</span>'
-    return f'<span class="pill {_PILLS[word.colour]}">{escape(word)}</span>'
+    return f'<span class="pill {PILLS[word.colour]}">{escape(word)}</span>'
 
 
 def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:

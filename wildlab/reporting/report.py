@@ -31,10 +31,9 @@ from wildlab.reporting import metrics as schema
 from wildlab.reporting.animation import ShownFlight, animated_flight, pausable
 from wildlab.reporting.animation.drawing import PAUSE_STYLE
 from wildlab.reporting.arrange import ALERT, LIMITS, METHOD, VERDICT
-from wildlab.reporting.figures import png_bytes, save_figure
+from wildlab.reporting.figures import figure_html, png_bytes, save_figure
 from wildlab.reporting.flight_status import Standing, standing
-from wildlab.reporting.page import TAGS
-from wildlab.reporting.pictures import figure_html
+from wildlab.reporting.page import PILLS, TAGS
 from wildlab.reporting.published import load_claims, published_rows
 from wildlab.reporting.published_table import LONGEST, claims_table, published_table, sources_of
 from wildlab.reporting.tables import csv_link, table_html
@@ -42,8 +41,6 @@ from wildlab.reporting.text import escape, inline, known, maths, prose, slug
 from wildlab.reporting.verdicts import compared_number, judge
 
 LEVELS = ("good", "warn", "bad", "neutral")
-#: The pill that goes with a bar's colour.
-PILLS = {"good": "yes", "warn": "part", "bad": "no", "neutral": ""}
 #: What is said where no number is known that anything could be said by.
 NOTHING_KNOWN = "Not known: there are too few observations."
 #: Points of an alert that are shown at once: what comes below must not leave the screen.
@@ -107,14 +104,8 @@ class Report:
     def __init__(
         self, *, study: str, flight: str, kind: str, seed: int | None, seeds: int | None, out: Path | None
     ) -> None:
-        self.study, self.flight, self.kind, self.seed, self.seeds, self.out = (
-            study,
-            flight,
-            kind,
-            seed,
-            seeds,
-            out,
-        )
+        self.study, self.flight, self.kind = study, flight, kind
+        self.seed, self.seeds, self.out = seed, seeds, out
         #: The HTML of every part shown so far, in order.
         self.parts: list[str] = []
         self._metrics: list[dict[str, Any]] = []
@@ -367,23 +358,9 @@ class Report:
     # -- the numbers
     # --------------------------------------------------------------------------------------------
 
-    def metric(
-        self,
-        name: str,
-        subject: str,
-        value: Any,
-        unit: str,
-        *,
-        n: int | None = None,
-        published: float | None = None,
-        source: str | None = None,
-        low: float | None = None,
-        high: float | None = None,
-        below: float | None = None,
-        **flights: float | None,
-    ) -> None:
-        """Record a number. ``published`` and ``source`` are looked up in ``data/published`` where not given;
-        ``flights`` is what `metrics.metric` has besides.
+    def metric(self, name: str, subject: str, value: Any, unit: str, **more: Any) -> None:
+        """Record a number; ``more`` as of `metrics.metric`, where ``published`` and ``source`` are looked
+        up in ``data/published``.
 
         Raises
         ------
@@ -397,23 +374,9 @@ class Report:
                     f"{name} of {subject} is in {unit!r} here and published in {known['unit']!r}",
                     "convert it",
                 )
-            published = known["value"] if published is None else published
-            source = known["source"] if source is None else source
-        self._metrics.append(
-            schema.metric(
-                name,
-                subject,
-                value,
-                unit,
-                n=n,
-                published=published,
-                source=source,
-                low=low,
-                high=high,
-                below=below,
-                **flights,
-            )
-        )
+            given = {key: value for key, value in more.items() if value is not None}
+            more = {"published": known["value"], "source": known["source"]} | given
+        self._metrics.append(schema.metric(name, subject, value, unit, **more))
 
     def claim(self, id: str, text: str, verdict: str, **found: Any) -> None:
         """Record a claim and the verdict on it; what else there is to record as `metrics.claim` has it."""

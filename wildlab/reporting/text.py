@@ -12,8 +12,6 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from latex2mathml.converter import convert as latex_to_mathml
-
 from wildlab.errors import WildlabError
 from wildlab.names import visible
 
@@ -52,8 +50,10 @@ def maths(latex: str, *, block: bool = False) -> str:
     WildlabError
         If the formula is not understood: a page must not show half-translated LaTeX.
     """
+    from latex2mathml.converter import convert  # few pages have formulas
+
     try:
-        mathml = latex_to_mathml(latex.strip(), display="block" if block else "inline")
+        mathml = convert(latex.strip(), display="block" if block else "inline")
     except Exception as error:  # latex2mathml has a dozen exceptions of its own and raises IndexError too
         raise WildlabError(
             f"the formula {latex.strip()!r} cannot be translated ({type(error).__name__})",

@@ -31,7 +31,7 @@ from wildlab.flight.store import Flight
 from wildlab.messages.message import Message
 from wildlab.messages.page_texts import load_texts, significant
 from wildlab.reporting.charts import following as charts
-from wildlab.reporting.charts.beside import beside_plain_shown
+from wildlab.reporting.charts.following import beside_plain_shown
 from wildlab.reporting.filter_names import filter_words, short_words
 from wildlab.reporting.quantities import length
 from wildlab.reporting.report import Report

@@ -5,15 +5,19 @@ The frame, the security policy and the examination are those of a report (`wildl
 
 from __future__ import annotations
 
+import re
+
 import nbformat
 from bs4 import BeautifulSoup, Tag
 
 from wildlab.errors import WildlabError
 from wildlab.reporting.figure_text import FULL_SIZE, LEAST_SIZE
-from wildlab.reporting.html import examine, notebook_body
+from wildlab.reporting.html import REMOVED_TAGS, examine, markdown_html
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
 
+#: The classes of nbconvert's own wrappers.
+_WRAPPERS = re.compile("^(cell|inner_cell|output(_wrapper|_area|_subarea)?|text_cell_render|prompt|input)$")
 # Code at a line in blue, what it printed on grey. The colours hold 4.5:1 on white.
 STYLE = """
 .highlight pre { background: none; border-left: 3px solid var(--blue); padding: .1rem 0 .1rem .9rem;
@@ -56,7 +60,9 @@ def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "
     for number, cell in enumerate(notebook.cells, start=1):
         if any(output.output_type == "error" for output in cell.get("outputs", [])):
             raise WildlabError(f"cell {number} ended in an error", "mend it", file=f"{name}.ipynb")
-    soup = BeautifulSoup(notebook_body(_joined(notebook), code=True), "html.parser")
+    soup = BeautifulSoup(_body(_joined(notebook)), "html.parser")
+    for block in soup.find_all("div", class_=_WRAPPERS):
+        block.unwrap()
     for style in soup.find_all("style"):
         style.decompose()  # pandas has its own for each table
     for i, image in enumerate(soup.find_all("img"), start=1):
@@ -77,12 +83,40 @@ def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "
     return whole
 
 
+def _body(notebook: nbformat.NotebookNode) -> str:
+    """Code and what it left, as HTML of nbconvert's template ``basic``."""
+    from nbconvert import HTMLExporter
+    from traitlets.config import Config
+
+    off = ("exclude_input_prompt", "exclude_output_prompt", "exclude_output_stdin", "exclude_anchor_links")
+    exporter = HTMLExporter(
+        config=Config(
+            {
+                "TagRemovePreprocessor": {"enabled": True, "remove_cell_tags": sorted(REMOVED_TAGS)},
+                "HTMLExporter": {
+                    "template_name": "basic",
+                    **dict.fromkeys(off, True),
+                    "embed_images": True,
+                    **dict.fromkeys(("require_js_url", "mathjax_url", "jquery_url", "mermaid_js_url"), ""),
+                    "widget_renderer_url": "",
+                    "preprocessors": ["nbconvert.preprocessors.TagRemovePreprocessor"],
+                },
+            }
+        )
+    )
+    exporter.register_filter("markdown2html", lambda source, *_, **__: markdown_html(source))
+    return str(exporter.from_notebook_node(notebook)[0])
+
+
 def _joined(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
-    """A copy in which what a cell printed in one go is one output: a kernel sends it in pieces."""
+    """A copy without warnings, in which what a cell printed in one go is one output: a kernel sends it in
+    pieces."""
     copy: nbformat.NotebookNode = nbformat.from_dict(notebook)
     for cell in copy.cells:
         joined: list[nbformat.NotebookNode] = []
         for output in cell.get("outputs", []):
+            if output.get("name") == "stderr":
+                continue
             if joined and output.get("name", "") == joined[-1].get("name") and "text" in output:
                 joined[-1].text += output.text
             else:

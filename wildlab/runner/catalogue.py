@@ -26,16 +26,21 @@
 
 from __future__ import annotations
 
+import ast
 import difflib
+import os
 import re
 import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS
+from wildlab.reporting.notebooks import read_notebook
 from wildlab.studies.protocol import Study, case_names, find_case
 
 #: What the runner gives to every notebook; a study's own parameters may not use these names.
@@ -183,3 +188,63 @@ def find_study(name: str, studies: dict[str, StudyEntry]) -> StudyEntry:
     raise WildlabError(
         f"there is no study {name!r}", f"did you mean {words}?" if near else "see: wildlab list"
     )
+
+
+def plain_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters as a cell of a notebook can say them: str, int, float, bool, None, and lists of these.
+
+    Raises
+    ------
+    WildlabError
+        If one is something else.
+    """
+    return {name: _plain(value, name) for name, value in parameters.items()}
+
+
+def _plain(value: Any, name: str) -> Any:
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(entry, name) for entry in value]
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    raise WildlabError(
+        f"the parameter {name!r} is of type {type(value).__name__}",
+        "give text, numbers, true/false or a list of these",
+    )
+
+
+def check_notebook(notebook: Path, parameters: Sequence[str]) -> int:
+    """Refuse a notebook that would not do as it is told; the number of cells of one that will.
+
+    Raises
+    ------
+    WildlabError
+        If the notebook is absent or not one, has no or several cells tagged ``parameters``, or does not
+        know one of the parameters.
+    """
+    if not notebook.is_file():
+        raise WildlabError(
+            "there is no such notebook", "restore it, or name another in studies.toml", file=notebook.name
+        )
+    node = read_notebook(notebook)
+    tagged = [cell.source for cell in node.cells if "parameters" in cell.metadata.get("tags", [])]
+    if len(tagged) != 1:
+        raise WildlabError(
+            f"the notebook has {len(tagged)} cells tagged `parameters`", "tag exactly one", file=notebook.name
+        )
+    try:
+        nodes = list(ast.walk(ast.parse(tagged[0])))
+    except SyntaxError:
+        nodes = []
+    known = [one.id for one in nodes if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)]
+    for name in parameters:
+        if name not in known:
+            raise WildlabError(
+                f"the notebook has no parameter {name!r}",
+                f"it has: {', '.join(known)}; add it to its parameters cell, or take it out of studies.toml",
+                file=notebook.name,
+            )
+    return len(node.cells)

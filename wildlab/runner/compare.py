@@ -16,10 +16,9 @@ from wildlab.reporting.comparison import comparison_page, flights_table
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.evaluate import evaluate_flight
-from wildlab.runner.record.beside import finished_metrics
 from wildlab.runner.record.digests import read_status
 from wildlab.runner.record.front_page import COMPARISON, build_ledger
-from wildlab.runner.record.own_flights import own_flights
+from wildlab.runner.record.own_flights import finished_metrics, own_flights
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,11 @@ from wildlab.flight.learnt import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.runner.processes.job import Job
+from wildlab.runner.processes.job import Job, other_reports, typed_in_report
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.own_flights import own_flights
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
-from wildlab.runner.typed import other_reports, typed_in_report
 
 #: Files of a flight that two flights may have in common.
 _SHARED = ("flight", "truth", "terrain", "calibration")
@@ -75,54 +74,29 @@ def evaluate_flight(
     studies = load_studies(notebooks / "studies.toml")
     uses = {use.purpose: use for use in usable_for(flight)}
     jobs: list[Job] = []
-    skipped: list[Outcome] = []
-
-    def prepare(name: str, notebook: str, parameters: dict[str, Any], again: str) -> None:
-        if name in studies:
-            raise WildlabError(
-                f"the flight is named {flight.name!r} like a study, whose report it would replace",
-                "rename the flight's folder, or give the report another folder with --out",
-            )
-        refuse_other_flight(folder, reports / name)
-        study = StudyEntry(name="evaluate", title=f"Flight {name}", notebook=notebook, parameters=parameters)
-        jobs.append(
-            make_job(
-                study,
-                flight=folder,
-                reports=reports,
-                notebooks=notebooks,
-                timeout_s=timeout_s,
-                name=name,
-                again=again,
-            )
-        )
-
-    places = uses["georeferencing accuracy"]
-    out = other_reports(reports)
-    again = typed_in_report("wildlab evaluate", folder, out=out)
-    again_source = typed_in_report("wildlab evaluate", folder, source=source, out=out)
     # One choice for all reports; a flight without poses, such as a radar's, has none.
     found = flight.pose_source(source)[0] if source or flight.estimated_sources else ""
     tell_source(flight, source, console)
+
+    def prepare(end: str, notebook: str, parameters: dict[str, Any], **options: Any) -> None:
+        name = f"{flight.name}{end}"
+        refuse_study_name(flight, name, studies)
+        refuse_other_flight(folder, reports / name)
+        study = StudyEntry(name="evaluate", title=f"Flight {name}", notebook=notebook, parameters=parameters)
+        again = typed_in_report("wildlab evaluate", folder, **options, out=other_reports(reports))
+        places: dict[str, Any] = {"reports": reports, "notebooks": notebooks, "timeout_s": timeout_s}
+        jobs.append(make_job(study, flight=folder, name=name, again=again, **places))
+
+    places = uses["georeferencing accuracy"]
     if places.usable:
         parameters = {"source": found}
-        again_with = typed_in_report(
-            "wildlab evaluate", folder, source=found, calibration=calibration, out=out
-        )
         applied = calibration or flight.calibration
         if applied is not None:
             learnt = read_learnt(applied)
             refuse_other_camera(flight.manifest, learnt)
             # Its text, not its path: the report can be made again without the file, and names no folder.
             parameters["calibration"] = learnt_toml(learnt)
-        prepare(flight.name, "georeferencing.ipynb", parameters, again_with)
-    elif lacks_only_truth(flight) and calibration is None:
-        prepare(
-            flight.name,
-            "repeat-sightings.ipynb",
-            {"source": found},
-            typed_in_report("wildlab evaluate", folder, source=found, out=out),
-        )
+        prepare("", "georeferencing.ipynb", parameters, source=found, calibration=calibration)
     elif calibration is not None:
         raise WildlabError(
             f"a calibration is named, and the georeferencing cannot be judged: {places.why}",
@@ -130,25 +104,43 @@ def evaluate_flight(
             file=folder,
             field="--calibration",
         )
-    lacking = lacking_for_navigation(flight, uses["navigation"])
-    if not lacking:
-        prepare(f"{flight.name}-navigation", "navigation.ipynb", {}, again)
+    elif lacks_only_truth(flight):
+        prepare("", "repeat-sightings.ipynb", {"source": found}, source=found)
+    skipped: list[Outcome] = []
+    unjudged = lacking_for_navigation(flight, uses["navigation"])
+    if not unjudged:
+        prepare("-navigation", "navigation.ipynb", {})
     elif flight.imu is not None and flight.manifest.twin is None:
-        skipped.append(Outcome(f"{flight.name}-navigation", "skipped", 0.0, lacking))
+        skipped.append(Outcome(f"{flight.name}-navigation", "skipped", 0.0, unjudged))
     untracked = lacking_for_tracking(flight, uses["tracking"], source)
     if not untracked:
-        prepare(f"{flight.name}-tracking", "tracking.ipynb", {"source": found}, again_source)
+        prepare("-tracking", "tracking.ipynb", {"source": found}, source=source)
     # The last to be run, since it lists what the others measured, and the first to be read.
     beside = [job.name for job in jobs]
     reasons = [] if beside[:1] == [flight.name] else [f"georeferencing ({places.why})"]
-    reasons += [f"navigation ({lacking})"] if lacking else []
+    reasons += [f"navigation ({unjudged})"] if unjudged else []
     reasons += [f"tracking ({untracked})"] if untracked else []
     about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": found}
-    prepare(f"{flight.name}-overview", "overview.ipynb", about, again_source)
+    prepare("-overview", "overview.ipynb", about, source=source)
     passes = [longest_first(jobs[:-1]), jobs[-1:]]
     outcomes = run_all(passes, skipped, studies, reports, console, parallel=cores())
     order = [jobs[-1].name, *beside]
     return sorted(outcomes, key=lambda one: order.index(one.name) if one.name in order else len(order))
+
+
+def refuse_study_name(flight: Flight, name: str, studies: Collection[str]) -> None:
+    """Refuse a report that would take the place of a study's.
+
+    Raises
+    ------
+    WildlabError
+        Where ``name``, of the report's folder, is that of a study.
+    """
+    if name in studies:
+        raise WildlabError(
+            f"the flight is named {flight.name!r} like a study, whose report it would replace",
+            "rename the flight's folder, or name another folder for the report (--out, --into)",
+        )
 
 
 def tell_source(flight: Flight, source: str | None, console: Console | None) -> None:

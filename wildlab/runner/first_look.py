@@ -15,7 +15,7 @@ from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.digests import read_status
-from wildlab.runner.seeds.kept import missing_seeds
+from wildlab.runner.seeds import missing_seeds
 
 #: Guessed seconds of a study that has not been run here yet. Only their order matters.
 GUESSED_S = {"computed": 5.0, "logged": 30.0, "twin": 60.0}

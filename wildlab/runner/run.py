@@ -20,17 +20,21 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import flight_name
 from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.runner.catalogue import OTHERS, STANDARD_PARAMETERS, StudyEntry, find_studies, load_studies
+from wildlab.runner.catalogue import (
+    OTHERS,
+    STANDARD_PARAMETERS,
+    StudyEntry,
+    check_notebook,
+    find_studies,
+    load_studies,
+    plain_parameters,
+)
 from wildlab.runner.first_look import plan_passes, quick_first
-from wildlab.runner.notebooks import check_notebook, plain_parameters
-from wildlab.runner.processes.ending import socket_folder
-from wildlab.runner.processes.job import Job
+from wildlab.runner.processes.job import Job, other_reports, typed_in_report
 from wildlab.runner.processes.progress import outcome_line, pass_line, shown
 from wildlab.runner.processes.scheduling import Listener, Outcome, run_jobs
 from wildlab.runner.record.front_page import build_ledger
-from wildlab.runner.seeds.fingerprint import code_key, page_key
-from wildlab.runner.seeds.kept import SeedWork, make_work
-from wildlab.runner.typed import other_reports, typed_in_report
+from wildlab.runner.seeds import SeedWork, code_key, make_work, page_key
 
 
 def make_job(
@@ -65,7 +69,7 @@ def make_job(
     Raises
     ------
     WildlabError
-        As `check_notebook`, `plain_parameters` and `wildlab.runner.seeds.kept.make_work`.
+        As `check_notebook`, `plain_parameters` and `wildlab.runner.seeds.make_work`.
     """
     notebook = notebooks / study.notebook
     parameters = plain_parameters(study.parameters)
@@ -104,7 +108,6 @@ def make_job(
         heading=heading,
         notebook=str(notebook.resolve()),
         work=str(reports / f".{name}.{os.getpid()}.part"),
-        runtime=str(socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),
         reports=str(reports),
         seed=seed,
         flight="" if flight is None else str(flight.resolve()),
@@ -116,7 +119,7 @@ def make_job(
         parameters=parameters,
         again=again,
         timeout_s=study.timeout_minutes * 60 if timeout_s is None else timeout_s,
-        cells=cells + 1,  # papermill adds one with the parameters
+        cells=cells + 1,  # and the one with the parameters
         seeds=work,
         first_look=reductions,
         fingerprint=page_key(notebook, given, work.code if work is not None else code_key()),

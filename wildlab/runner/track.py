@@ -1,8 +1,12 @@
-"""The report on a flight's tracks: checked, tuned elsewhere, and run as a notebook."""
+"""The reports on a flight's tracks, by sensor and target or of all targets at once: checked, tuned elsewhere,
+and run as notebooks.
+
+Parameters of the notebooks are texts, not paths, and name no folder.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, cast
@@ -10,21 +14,42 @@ from typing import Any, cast
 from rich.console import Console
 
 from wildlab.analysis.following.follow import refuse_unusable, sensors_with_detections
-from wildlab.analysis.following.tuned import Against, Tuned, refuse_same, tune_flight, tuned_text
+from wildlab.analysis.following.noise_model import of_flight
+from wildlab.analysis.following.tuned import Against, refuse_same, tune_flight, tuned_text
+from wildlab.analysis.many.target_model import refuse_unfit as refuse_unfit_settings
+from wildlab.analysis.scans import sensors_of
 from wildlab.errors import WildlabError
 from wildlab.flight.following import Settings, read_settings
 from wildlab.flight.store import Flight, load_flight
 from wildlab.flight.toml import dump_toml
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.runner.evaluate import refuse_other_flight, tell_source
-from wildlab.runner.processes.job import Job
+from wildlab.runner.evaluate import refuse_other_flight, refuse_study_name, tell_source
+from wildlab.runner.processes.job import Job, other_reports, typed_in_report
 from wildlab.runner.processes.progress import shown
 from wildlab.runner.processes.scheduling import Outcome, run_jobs
 from wildlab.runner.run import make_job, run_all
-from wildlab.runner.typed import other_reports, typed_in_report
 
-NOTEBOOK = "tracking.ipynb"
+#: The notebook on all targets at once.
+MANY_NOTEBOOK = "tracking-many.ipynb"
+
+
+def refuse_unfit(options: Mapping[str, object]) -> None:
+    """Refuse options that have no meaning where all targets are followed at once.
+
+    Raises
+    ------
+    WildlabError
+        For the first that was given.
+    """
+    for name, value in options.items():
+        if value:
+            raise WildlabError(
+                f"{name} and --many do not go together",
+                f"leave {name} out, or --many: with it all targets are followed by one filter, as told by "
+                "--settings",
+                field=name,
+            )
 
 
 def track_flight(
@@ -38,10 +63,7 @@ def track_flight(
     settings: Path | None = None,
     smooth: bool = False,
     source: str | None = None,
-    into: Path | None = None,
-    reports: Path = REPORTS,
-    notebooks: Path = NOTEBOOKS,
-    console: Console | None = None,
+    **places: Any,
 ) -> Outcome:
     """Follow a flight's targets, and leave a report with tables of estimates.
 
@@ -55,8 +77,8 @@ def track_flight(
         As `wildlab.analysis.following.follow.follow_targets`.
     settings
         A settings file.
-    into
-        The folder of the report; ``<reports>/<name of the flight>-tracking`` if left out.
+    **places
+        As of `_run_report`.
 
     Returns
     -------
@@ -75,8 +97,8 @@ def track_flight(
             "name another flight with --tune, or leave --against out",
             field="--against",
         )
-    tuned: Tuned | None = None
     refuse_unusable(flight, stated, filters, targets, sensors, source)
+    tuned = ""
     if tune is not None:
         other = load_flight(tune)
         refuse_same(flight, other)
@@ -90,63 +112,120 @@ def track_flight(
                 field="--tune",
             )
         its_source = source if source in other.nav else None
-        tuned = tune_flight(other, wanted, stated, cast(Against | None, against), its_source)
-    tell_source(flight, source, console)
-    studies = load_studies(notebooks / "studies.toml")
-    place = place_of(flight, folder, "tracking", into, reports, studies)
-    job = tracking_job(
-        flight,
-        place.parent,
-        notebooks,
-        place.name,
-        settings=stated,
-        tuned=tuned,
-        filters=filters,
-        targets=targets,
-        sensors=sensors,
-        source=source,
-        smooth=smooth,
-        again=typed_in_report(
-            "wildlab track",
-            folder,
-            tune=tune,
-            against=against,
-            filter=filters,
-            target=targets,
-            sensor=sensors,
-            settings=settings,
-            smooth=smooth,
-            source=source,
-            into=into or (other_reports(reports) and place),
-        ),
-    )
-    return run_alone(job, studies, place.parent, console, listed=into is None)
+        tuned = tuned_text(tune_flight(other, wanted, stated, cast(Against | None, against), its_source))
+    parameters: dict[str, Any] = {
+        "settings": _text_of(stated),
+        "tuned": tuned,
+        "filters": list(filters),
+        "targets": list(targets),
+        "sensors": list(sensors),
+        "source": source or "",
+        "smooth": smooth,
+    }
+    title = f"Tracks of {flight.name}"
+    study = StudyEntry(name="evaluate", title=title, notebook="tracking.ipynb", parameters=parameters)
+    options: dict[str, Any] = {
+        "tune": tune,
+        "against": against,
+        "filter": filters,
+        "target": targets,
+        "sensor": sensors,
+        "settings": settings,
+        "smooth": smooth,
+        "source": source,
+    }
+    return _run_report(flight, study, "tracking", options, **places)
 
 
-def place_of(
-    flight: Flight,
+def track_many(
     folder: Path,
+    *,
+    sensors: Sequence[str] = (),
+    settings: Path | None = None,
+    source: str | None = None,
+    console: Console | None = None,
+    **places: Any,
+) -> Outcome:
+    """Follow all targets of a flight at once, and leave a report with a table of tracks.
+
+    Parameters
+    ----------
+    sensors, source
+        As `wildlab.analysis.many.follow.track_targets`.
+    settings
+        A settings file.
+    console, **places
+        As of `_run_report`.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight cannot be followed as it is asked for, before anything runs.
+    """
+    flight = load_flight(folder)
+    stated = None if settings is None else read_settings(settings)
+    refuse_unusable(flight, stated, (), (), sensors, source)
+    told = of_flight(flight, stated)
+    refuse_unfit_settings(told)
+    unknown = ", ".join(map(repr, sorted(set(told.sensors) - set(sensors_of(flight)))))
+    if unknown and console is not None:
+        text = f"note: the settings speak of {unknown}, which this flight does not have."
+        console.print(text, markup=False, highlight=False)
+    parameters = {"settings": _text_of(stated), "sensors": list(sensors), "source": source or ""}
+    title = f"All targets of {flight.name}"
+    study = StudyEntry(name="evaluate", title=title, notebook=MANY_NOTEBOOK, parameters=parameters)
+    options = {"many": True, "sensor": sensors, "settings": settings, "source": source}
+    return _run_report(flight, study, "many", options, console=console, **places)
+
+
+def _text_of(settings: Settings | None) -> str:
+    return "" if settings is None else dump_toml(settings.model_dump(exclude_none=True))
+
+
+def _run_report(
+    flight: Flight,
+    study: StudyEntry,
     kind: str,
-    into: Path | None,
-    reports: Path,
-    studies: dict[str, StudyEntry],
-) -> Path:
-    """The folder of a report on a flight: ``into``, else ``<reports>/<name>-<kind>``; its parent is made.
+    options: dict[str, Any],
+    *,
+    into: Path | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    console: Console | None = None,
+) -> Outcome:
+    """Run a notebook on a flight.
+
+    Parameters
+    ----------
+    options
+        Of the command, by name: they are written into the report, to be typed again.
+    into
+        The folder of the report, which then is in no list of others; left out, it is ``<kind>`` after the
+        flight's name, in ``reports``.
+    console
+        Where progress is shown.
 
     Raises
     ------
     WildlabError
         Where a study or another flight has its report there.
     """
-    place = reports / f"{flight.name}-{kind}" if into is None else into
-    if place.name in studies and into is None:
-        raise WildlabError(
-            f"the flight is named {flight.name!r} like a study, whose report it would replace",
-            "rename the flight's folder, or give the report another folder with --into",
-        )
+    source = options["source"]
+    tell_source(flight, source, console)
+    studies = load_studies(notebooks / "studies.toml")
+    place = into or reports / f"{flight.name}-{kind}"
+    if into is None:
+        refuse_study_name(flight, place.name, studies)
+    folder = cast(Path, flight.folder)
     refuse_other_flight(folder, place)
     place.parent.mkdir(parents=True, exist_ok=True)
-    return place
+    again = typed_in_report(
+        "wildlab track", folder, **options, into=into or (other_reports(reports) and place)
+    )
+    job = make_job(
+        study, flight=folder, reports=place.parent, notebooks=notebooks, name=place.name, again=again
+    )
+    return run_alone(job, studies, place.parent, console, listed=into is None)
 
 
 def run_alone(
@@ -157,42 +236,3 @@ def run_alone(
         return run_all([[job]], [], studies, reports, console)[0]
     with shown(console) if console is not None else nullcontext() as listen:
         return run_jobs([job], listen=listen)[0]
-
-
-def tracking_job(
-    flight: Flight,
-    reports: Path,
-    notebooks: Path,
-    name: str,
-    *,
-    settings: Settings | None = None,
-    tuned: Tuned | None = None,
-    filters: Sequence[str] = (),
-    targets: Sequence[str] = (),
-    sensors: Sequence[str] = (),
-    source: str | None = None,
-    smooth: bool = False,
-    timeout_s: float | None = None,
-    again: str | None = None,
-) -> Job:
-    """The notebook on a flight's tracks; its parameters are texts, not paths, and name no folder."""
-    parameters: dict[str, Any] = {
-        "settings": "" if settings is None else dump_toml(settings.model_dump(exclude_none=True)),
-        "tuned": "" if tuned is None else tuned_text(tuned),
-        "filters": list(filters),
-        "targets": list(targets),
-        "sensors": list(sensors),
-        "source": source or "",
-        "smooth": smooth,
-    }
-    study = StudyEntry(name="evaluate", title=f"Tracks of {flight.name}", notebook=NOTEBOOK,
-                       parameters=parameters)  # fmt: skip
-    return make_job(
-        study,
-        flight=flight.folder,
-        reports=reports,
-        notebooks=notebooks,
-        timeout_s=timeout_s,
-        name=name,
-        again=again,
-    )

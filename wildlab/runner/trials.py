@@ -11,7 +11,7 @@ import pandas as pd
 from wildlab.errors import RunFailed
 from wildlab.paths import REPORTS
 from wildlab.runner.processes.worker_pool import WorkerPool
-from wildlab.runner.seeds.kept import (
+from wildlab.runner.seeds import (
     SeedWork,
     again_words,
     failed_seeds,

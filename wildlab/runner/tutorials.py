@@ -21,17 +21,16 @@ from rich.console import Console
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.paths import NOTEBOOKS, PACKAGE, REPORTS
-from wildlab.reporting.notebook_file import read_notebook
+from wildlab.paths import DATA, NOTEBOOKS, PACKAGE, REPORTS
+from wildlab.reporting.notebooks import read_notebook
 from wildlab.runner.catalogue import load_studies
-from wildlab.runner.processes.ending import socket_folder
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.progress import shown
 from wildlab.runner.processes.scheduling import Outcome, run_jobs
 from wildlab.runner.record.front_page import build_ledger, title_of, tutorial_links, tutorial_notebooks
-from wildlab.runner.seeds.fingerprint import code_key
+from wildlab.runner.seeds import code_key
 
-#: What a tutorial shows comes out of these besides the rooms below them (`wildlab.runner.seeds.fingerprint`).
+#: What a tutorial shows comes out of these besides the rooms below them (`wildlab.runner.seeds`).
 _SHOWING = (
     "api/*.py",
     "reporting/**/*.py",
@@ -100,7 +99,6 @@ def _job(path: Path, reports: Path, timeout_s: float) -> Job:
         title=title_of(path),
         notebook=str(path.resolve()),
         work=str(reports / f".{name}.{os.getpid()}.part"),
-        runtime=str(socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),
         reports=str(reports),
         again="python -m wildlab.runner.tutorials",
         timeout_s=timeout_s,
@@ -133,7 +131,7 @@ def _mark(notebook: Path) -> str:
     shows = sorted({path for pattern in _SHOWING for path in PACKAGE.glob(pattern)})
     digest = hashlib.sha256(code_key().encode())
     digest.update(" ".join(f"{name} {version(name)}" for name in _PACKAGES).encode())
-    for path in (*shows, notebook):
+    for path in (*shows, *sorted((DATA / "pages").iterdir()), notebook):
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return f"<!-- made from {digest.hexdigest()} -->\n"
 

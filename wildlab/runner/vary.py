@@ -25,8 +25,15 @@ from wildlab.reporting.text import slug
 from wildlab.reporting.verdicts import judge
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.processes.worker_pool import WorkerPool
-from wildlab.runner.seeds.fingerprint import trial_key
-from wildlab.runner.seeds.kept import SeedWork, failed_seeds, make_work, missing_seeds, read_seed, sweep_seeds
+from wildlab.runner.seeds import (
+    SeedWork,
+    failed_seeds,
+    make_work,
+    missing_seeds,
+    read_seed,
+    sweep_seeds,
+    trial_key,
+)
 from wildlab.runner.trials import split_keys
 from wildlab.simulation import load_twin
 from wildlab.simulation.variation import groups_of

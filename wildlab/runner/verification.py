@@ -22,7 +22,7 @@ from wildlab.runner.record.digests import (
 )
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.replay import flights_around
-from wildlab.runner.seeds.kept import SeedWork, read_seed, seed_digest
+from wildlab.runner.seeds import SeedWork, read_seed, seed_digest
 
 
 class Verification(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from bs4 import BeautifulSoup
 
 from wildlab.reporting.metrics import AGAINST
-from wildlab.runner.record.beside import finished_metrics
+from wildlab.runner.record.own_flights import finished_metrics
 from wildlab.sharing.names import Names
 
 #: Numbers that differ by no more than this share are the same.

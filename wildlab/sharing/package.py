@@ -15,7 +15,7 @@ import pyzipper
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.runner.processes.outputs import alive
+from wildlab.runner.processes.job import alive
 
 #: Of every file in a zip: no zip can be older, and this one says nothing of when it was made.
 _TIME = (1980, 1, 1, 0, 0, 0)

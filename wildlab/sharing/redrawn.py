@@ -20,7 +20,7 @@ from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.own_flights import ABOUT, own_flights
-from wildlab.runner.track_many import track_many
+from wildlab.runner.track import track_many
 from wildlab.sharing.agreement import Agreement, compare
 from wildlab.sharing.generalise import Generalised, neutral_learnt
 from wildlab.sharing.reports import ENDS, MANY, Source

@@ -11,11 +11,11 @@ from wildlab.errors import WildlabError
 from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import REPORTS, ROOT
 from wildlab.runner.catalogue import StudyEntry
+from wildlab.runner.processes.job import typed
 from wildlab.runner.record.digests import BEFORE_DIGESTS, has_digests, read_status
 from wildlab.runner.record.own_flights import ABOUT
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
-from wildlab.runner.track_many import NOTEBOOK as MANY_NOTEBOOK
-from wildlab.runner.typed import typed
+from wildlab.runner.track import MANY_NOTEBOOK
 from wildlab.simulation.parameters import load_twin, twin_names
 
 #: What the names of the reports on a flight end in, in the order in which they are read.

@@ -28,7 +28,7 @@ from wildlab.flight.store import Flight, load_flight
 from wildlab.flight.units import UNITS, factor
 from wildlab.geometry.flodell import geodetic_to_enu_linear
 from wildlab.geometry.frames import geodetic_to_ned, matrix_to_euler, quaternion_to_matrix
-from wildlab.runner.track_many import track_many
+from wildlab.runner.track import track_many
 
 ORIGIN = "latitude_deg = 63.44\nlongitude_deg = 10.4\nheight_m = 40.0"
 

@@ -6,30 +6,25 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
-from wildlab.names import figure_name
-from wildlab.reporting.figures import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    PURPLE,
-    VERMILLION,
-    colour,
-    log_band,
-    new_figure,
-    thinned,
+from wildlab.reporting.charts.drawing import (
+    DASHED,
+    LINES,
+    Array,
+    draw_band,
+    draw_line,
+    draw_white_band,
+    finish,
+    new_strips,
+    without_jumps,
 )
+from wildlab.reporting.figures import BLUE, GREY, INK, colour, log_band
 
-Array = NDArray[np.float64]
-
-LINES = (BLUE, VERMILLION, PURPLE)
 #: What legends call sources whose names are not words.
 NAMES = {
     "mekf": "filter (MEKF)",
@@ -67,25 +62,14 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
         By name of the source, which has its fixed colour; all have the same labels.
     """
     labels = list(next(iter(sources.values()))[1])
-    fig, axes = new_figure(5.9, 1.5 * len(labels) + 0.1, rows=len(labels), sharex=True)
+    fig, axes = new_strips(len(labels), 1.5 * len(labels) + 0.1)
+    # Of lines that lie on one another the first is the widest, so that each later one shows it.
+    widths = np.linspace(1.0 + 0.9 * (len(sources) - 1), 1.0, len(sources))
     for ax, label in zip(axes, labels, strict=True):
-        for width, (name, (times, quantities)) in zip(_widths(len(sources)), sources.items(), strict=True):
-            keep = thinned(len(np.asarray(times)))
-            y = np.array(quantities[label], float)[keep]
-            y[1:][np.abs(np.diff(y)) > 180] = np.nan
-            t = np.asarray(times, float)[keep]
-            ax.plot(t, y, lw=width, color=colour(name), label=figure_name(NAMES.get(name, name)))
+        for width, (name, (times, quantities)) in zip(widths, sources.items(), strict=True):
+            draw_line(ax, times, without_jumps(quantities[label]), colour(name), _named(name), width=width)
         ax.set_ylabel(label)
-    if len(sources) > 1:
-        fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
-    axes[0].set_title(title)
-    axes[-1].set_xlabel("time (s)")
-    return fig
-
-
-def _widths(count: int) -> Array:
-    """Widths of lines that lie on one another: the first is the widest, so that each later one shows it."""
-    return np.linspace(1.0 + 0.9 * (count - 1), 1.0, count)
+    return finish(fig, title, "time (s)")
 
 
 def span_words(sources: Mapping[str, Strips]) -> str:
@@ -99,7 +83,7 @@ def span_words(sources: Mapping[str, Strips]) -> str:
             if np.isfinite(known).any():
                 low, high = np.nanmin(known), np.nanmax(known)
                 parts.append(f"{what} {low:.0f} to {high:.0f} {unit}".replace(" °", "°"))
-        said.append(f"{NAMES.get(name, name)}: {', '.join(parts)}")
+        said.append(f"{_named(name)}: {', '.join(parts)}")
     return "; ".join(said)
 
 
@@ -135,41 +119,23 @@ def error_bands(
     largest
         What the strips reach at most, where single errors (the start) would squeeze the rest.
     """
-    fig, axes = new_figure(5.9, 4.9, rows=3, sharex=True)
-    t = np.asarray(times, float)
-    keep = thinned(len(t))
+    fig, axes = new_strips(3, 4.9)
     for i, (ax, label) in enumerate(zip(axes, labels, strict=True)):
-        reach = 0.0
-        shown = {name: np.asarray(error, float)[keep, i] for name, error in errors.items()}
+        shown = {name: np.asarray(error, float)[:, i] for name, error in errors.items()}
+        twice = {name: 2 * np.asarray(sd, float)[:, i] for name, sd in bounds.items()}
         # What scatters most is drawn first, and the bands over all: nothing hides what is narrower.
-        order = sorted(
-            shown, key=lambda name: -np.nanstd(shown[name]) if np.isfinite(shown[name]).any() else 0
-        )
-        for level, name in enumerate(order):
-            e = shown[name]
-            ax.plot(
-                t[keep],
-                e,
-                lw=0.9,
-                color=colour(name),
-                label=figure_name(NAMES.get(name, name)),
-                zorder=2 + 0.1 * level,
-            )
-            reach = max(reach, float(np.nanmax(np.abs(e), initial=0.0)))
-        for name, stated in bounds.items():
-            two = 2 * np.asarray(stated, float)[keep, i]
-            two_of = f"two SD of the {NAMES.get(name, name)}"
-            ax.fill_between(
-                t[keep], -two, two, color=colour(name), alpha=0.2, lw=0, label=figure_name(two_of), zorder=3
-            )
+        for name in sorted(shown, key=lambda name: -_spread(shown[name])):
+            draw_line(ax, times, shown[name], colour(name), _named(name), width=0.9)
+        for name, two in twice.items():
+            draw_band(ax, times, -two, two, colour(name), f"two SD of the {_named(name)}")
             for edge in (-two, two):
-                ax.plot(t[keep], edge, color=INK, lw=0.8, ls=(0, (4, 2)), zorder=3.1)
-            reach = max(reach, float(np.nanmax(two, initial=0.0)))
+                draw_line(ax, times, edge, INK, width=0.8, ls=DASHED["ls"], zorder=3.1)
+        reach = max(float(np.nanmax(np.abs(one), initial=0.0)) for one in (*shown.values(), *twice.values()))
         ax.axhline(0, color=GREY, lw=0.6)
         if reach > 0:
             ax.set_ylim(*(np.array([-1.05, 1.05]) * min(reach, largest or reach)))
         ax.set_ylabel(label)
-    return _finished(fig, axes, title)
+    return finish(fig, title, "time (s)")
 
 
 def deviation_chart(
@@ -184,16 +150,13 @@ def deviation_chart(
     printed
         Six published means, drawn as broken lines; None where there are none.
     """
-    fig, axes = new_figure(5.9, 4.4, rows=2, sharex=True)
-    t, values = np.asarray(times, float), np.asarray(sd, float)
-    keep = thinned(len(t))
-    for ax, first, names, unit in zip(
-        axes, (0, 3), (("north", "east", "down"), ("roll", "pitch", "yaw")), units, strict=True
-    ):
-        for i, (name, color) in enumerate(zip(names, LINES, strict=True)):
-            ax.plot(t[keep], values[keep, first + i], color=color, lw=1.2, label=figure_name(name))
+    fig, axes = new_strips(2, 4.4)
+    values, names = np.asarray(sd, float), (("north", "east", "down"), ("roll", "pitch", "yaw"))
+    for strip, (ax, unit) in enumerate(zip(axes, units, strict=True)):
+        for i, (name, color) in enumerate(zip(names[strip], LINES, strict=False), start=3 * strip):
+            draw_line(ax, times, values[:, i], color, name)
             if printed is not None:
-                ax.axhline(printed[first + i], color=color, lw=1.0, ls=(0, (4, 3)), alpha=0.8)
+                ax.axhline(printed[i], color=color, alpha=0.8, **DASHED)
         ax.set_yscale("log")
         low, high = ax.get_ylim()
         # Over more than a decade and a half, labels in between would lie on one another.
@@ -210,23 +173,18 @@ def deviation_chart(
 def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike, title: str) -> Figure:
     """Biases (K, 6) that a filter estimates, accelerometers (mm/s^2) and gyros (deg/h), within two
     standard deviations."""
-    fig, axes = new_figure(5.9, 4.4, rows=2, sharex=True)
-    t = np.asarray(times, float)
-    keep = thinned(len(t))
-    scales = (1e3, np.degrees(3600.0))
-    for ax, first, scale, label in zip(
-        axes, (0, 3), scales, ("accelerometers (mm/s²)", "gyros (°/h)"), strict=True
-    ):
-        reach = 0.0
-        for i, (name, color) in enumerate(zip(("forward", "right", "down"), LINES, strict=True)):
-            b, s = (scale * np.asarray(a, float)[keep, first + i] for a in (biases, sd))
-            ax.plot(t[keep], b, color=color, lw=1.1, label=figure_name(name))
-            ax.fill_between(t[keep], b - 2 * s, b + 2 * s, color=color, alpha=0.15, lw=0, zorder=3)
-            late = slice(len(b) // 10, None)
-            reach = max(reach, float(np.nanmax(np.abs(b[late]) + 2 * s[late], initial=0.0)))
-        ax.set_ylim(-1.1 * reach, 1.1 * reach)
+    fig, axes = new_strips(2, 4.4)
+    scale = np.repeat([1e3, np.degrees(3600.0)], 3)
+    b, two = scale * np.asarray(biases, float), 2 * scale * np.asarray(sd, float)
+    for strip, (ax, label) in enumerate(zip(axes, ("accelerometers (mm/s²)", "gyros (°/h)"), strict=True)):
+        for i, (name, color) in enumerate(zip(("forward", "right", "down"), LINES, strict=False), 3 * strip):
+            draw_line(ax, times, b[:, i], color, name)
+            draw_band(ax, times, b[:, i] - two[:, i], b[:, i] + two[:, i], color, alpha=0.15)
+        part = slice(3 * strip, 3 * strip + 3)
+        late = (np.abs(b) + two)[len(b) // 10 :, part]
+        ax.set_ylim(*(np.array([-1.1, 1.1]) * float(np.nanmax(late, initial=0.0))))
         ax.set_ylabel(label)
-    return _finished(fig, axes, title)
+    return finish(fig, title, "time (s)")
 
 
 def squares_chart(
@@ -236,52 +194,40 @@ def squares_chart(
 
     ``series`` has times and values by name.
     """
-    fig, axes = new_figure(5.9, 1.6 * len(series) + 0.4, rows=len(series), sharex=True, squeeze=False)
+    fig, axes = new_strips(len(series), 1.6 * len(series) + 0.4)
     low, high = chi_square_interval(dof)
-    for ax, (name, (times, values)) in zip(axes[:, 0], series.items(), strict=True):
-        t, v = np.asarray(times, float), np.asarray(values, float)
-        keep = thinned(len(t))
-        ax.plot(t[keep], v[keep], ".", ms=2, color=BLUE, alpha=0.5, mec="none", rasterized=True)
+    for ax, (name, (times, values)) in zip(axes, series.items(), strict=True):
+        v = np.asarray(values, float)
+        draw_line(ax, times, v, BLUE, ls="none", marker=".", ms=2, alpha=0.5, mec="none", rasterized=True)
         log_band(ax, low, high)
-        ax.set_ylim(
-            min(low / 3, float(np.nanquantile(v, 0.005))), max(high * 3, float(np.nanquantile(v, 0.999)))
-        )
+        lowest, highest = np.nanquantile(v, [0.005, 0.999])
+        ax.set_ylim(min(low / 3, float(lowest)), max(high * 3, float(highest)))
         ax.set_ylabel(f"{what}\n{_short(name)}")
-    axes[0, 0].set_title(title)
-    axes[-1, 0].set_xlabel("time (s)")
-    return fig
+    return finish(fig, title, "time (s)")
 
 
 def speed_chart(sources: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> Figure:
     """Speed over ground by source: times (s) and velocities (N, 3)."""
-    fig, ax = new_figure(5.9, 3.0)
+    fig, (ax,) = new_strips(1, 3.0)
     for name, (times, velocity) in sources.items():
         speed = np.linalg.norm(np.asarray(velocity, float), axis=1)
-        keep = thinned(len(speed))
-        ax.plot(
-            np.asarray(times, float)[keep],
-            speed[keep],
-            lw=1.0,
-            color=colour(name),
-            label=figure_name(NAMES.get(name, name)),
-        )
+        draw_line(ax, times, speed, colour(name), _named(name), width=1.0)
     ax.set_ylim(0, None)
-    ax.set_ylabel("speed over ground (m/s)")
-    return _finished(fig, [ax], title)
+    return finish(fig, title, "time (s)", "speed over ground (m/s)")
 
 
 def correlation_strips(series: Mapping[str, ArrayLike], bounds: Mapping[str, float], title: str) -> Figure:
     """Autocorrelations (elements, lags + 1) of innovations, a strip for each source, with the white band."""
-    fig, axes = new_figure(5.9, 1.5 * len(series) + 0.4, rows=len(series), sharex=True, squeeze=False)
-    for ax, (name, rows) in zip(axes[:, 0], series.items(), strict=True):
-        ax.axhspan(-bounds[name], bounds[name], color=GREEN, alpha=0.2, lw=0)
-        for row, color, axis in zip(np.asarray(rows, float), LINES, ("north", "east", "down"), strict=False):
-            ax.plot(np.arange(1, len(row)), row[1:], color=color, lw=1.1, label=figure_name(axis))
-        top = max(0.2, 1.1 * float(np.nanmax(np.abs(np.asarray(rows, float)[:, 1:]))))
+    fig, axes = new_strips(len(series), 1.5 * len(series) + 0.4)
+    for ax, (name, rows) in zip(axes, series.items(), strict=True):
+        draw_white_band(ax, bounds[name])
+        r = np.asarray(rows, float)[:, 1:]
+        for row, color, axis in zip(r, LINES, ("north", "east", "down"), strict=False):
+            draw_line(ax, 1 + np.arange(len(row)), row, color, axis)
+        top = max(0.2, 1.1 * float(np.nanmax(np.abs(r))))
         ax.set_ylim(-top, top)
         ax.set_ylabel(_short(name))
-    axes[-1, 0].set_xlabel("lag (measurements)")
-    return _finished(fig, axes[:, 0], title, xlabel=None)
+    return finish(fig, title, "lag (measurements)")
 
 
 def velocities_of(nav: pd.DataFrame) -> tuple[Array, Array]:
@@ -289,15 +235,13 @@ def velocities_of(nav: pd.DataFrame) -> tuple[Array, Array]:
     return nav["time_s"].to_numpy(float), nav[["v_north_m_s", "v_east_m_s", "v_down_m_s"]].to_numpy(float)
 
 
+def _named(source: str) -> str:
+    return NAMES.get(source, source)
+
+
 def _short(source: str) -> str:
     return source.replace("second position", "2nd antenna")
 
 
-def _finished(fig: Figure, axes: Sequence[Axes], title: str, xlabel: str | None = "time (s)") -> Figure:
-    handles = axes[0].get_legend_handles_labels()
-    if len(handles[0]) > 1:
-        fig.legend(*handles, loc="outside lower right", ncols=len(handles[0]))
-    axes[0].set_title(title)
-    if xlabel:
-        axes[-1].set_xlabel(xlabel)
-    return fig
+def _spread(values: Array) -> float:
+    return float(np.nanstd(values)) if np.isfinite(values).any() else 0.0

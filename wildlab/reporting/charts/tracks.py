@@ -8,30 +8,30 @@ since the first detection, and ``seen``, (N,) bool, tells the frames with a dete
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.track_errors import SLOWEST_M_S
-from wildlab.names import figure_name
-from wildlab.reporting.figures import (
-    GREEN,
-    GREY,
-    INK,
-    colour,
-    log_band,
-    map_axes,
-    mark_gaps,
-    new_figure,
-    thinned,
+from wildlab.reporting.charts.drawing import (
+    TRUTH,
+    Array,
+    draw_dots,
+    draw_line,
+    draw_way,
+    draw_white_band,
+    finish,
+    mark_place,
+    name_rows,
+    new_strips,
+    without_jumps,
 )
-
-Array = NDArray[np.float64]
+from wildlab.reporting.figures import GREEN, GREY, INK, colour, log_band, map_axes, mark_gaps, new_figure
 
 #: A pause in the detections longer than this (seconds) is shaded.
 GAP_S = 2.0
@@ -41,12 +41,7 @@ FEW = 20
 STEADY = 60.0
 #: Later lines are thinner, so that one which lies on another does not hide it.
 _WIDTHS = (2.6, 1.3, 1.3, 1.0)
-#: The truth is drawn last and broken, so that the tracks show through.
-_TRUTH = {"color": colour("truth"), "lw": 1.1, "ls": (0, (4, 2)), "label": "truth"}
-#: Single measurements, and values at single detections.
-_DOTS = {"ls": "none", "marker": ".", "mec": "none", "rasterized": True}
-#: Room that a legend's entry takes besides its text, and each of its letters, inches.
-_ENTRY, _LETTER = 0.66, 0.077
+_SINCE = "time since the first detection (s)"
 
 
 def track_map(
@@ -64,21 +59,23 @@ def track_map(
     """
     fig, ax = new_figure(5.6, 5.2)
     if aircraft is not None:
-        path = np.asarray(aircraft, float)
-        ax.plot(path[:, 1], path[:, 0], color=GREY, lw=0.8, label="aircraft")
+        draw_way(ax, aircraft, GREY, "aircraft", width=0.8)
     if measured is not None:
         z = np.asarray(measured, float)
-        ax.plot(z[:, 1], z[:, 0], color=GREY, ms=4, alpha=0.5, label="single images", **_DOTS)
-    for width, (subject, states) in zip(_WIDTHS, tracks.items(), strict=False):
-        x = np.asarray(states, float)
-        ax.plot(x[:, 1], x[:, 0], color=colour(subject), lw=width, label=figure_name(names[subject]))
+        draw_dots(ax, z[:, 1], z[:, 0], GREY, "single images", rasterized=True)
+    for subject, states, look in _looks(tracks, names):
+        draw_way(ax, states, colour(subject), **look)
+    draw_way(ax, truth, name="truth", **TRUTH)
     way = np.asarray(truth, float)
-    ax.plot(way[:, 1], way[:, 0], **_TRUTH)
-    _mark_start(ax, way[np.isfinite(way[:, :2]).all(axis=1)])
-    ax.set_title(title)
-    _legend(fig, ax)
+    start, end = way[np.isfinite(way[:, :2]).all(axis=1)][[0, -1]]
+    # Its name is on the side that the way turns away from, but below where all else is below: above is the
+    # title.
+    ax.margins(0.1)
+    low, high = ax.dataLim.intervaly
+    ax.plot(start[1], start[0], "o", color=colour("truth"), ms=5)
+    mark_place(ax, start, "start", below=bool(end[0] > start[0] or start[0] > high - 0.1 * (high - low)))
     map_axes(ax)
-    return fig
+    return finish(fig, title)
 
 
 def error_over_time(
@@ -99,23 +96,25 @@ def error_over_time(
     measured
         The same of the measurements themselves.
     """
-    t, there = np.asarray(times, float), np.asarray(seen, bool)
+    there = np.asarray(times, float)[np.asarray(seen, bool)]
     columns = {subject: _columns(error) for subject, error in errors.items()}
     signed = next(iter(columns.values())).shape[1] == 2
     labels = ("error, north (m)", "error, east (m)") if signed else ("distance from the truth (m)",)
-    fig, strips = new_figure(5.9, 4.6 if signed else 3.6, rows=len(labels), sharex=True, squeeze=False)
-    keep = thinned(len(t))
-    for i, (ax, label) in enumerate(zip(strips[:, 0], labels, strict=True)):
+    fig, strips = new_strips(len(labels), 4.6 if signed else 3.6)
+    for i, (ax, label) in enumerate(zip(strips, labels, strict=True)):
         if measured is not None:
-            z = _columns(measured)[:, i]
-            ax.plot(t, z, color=GREY, ms=3, alpha=0.5, label="single images", **_DOTS)
-        for width, (subject, e) in zip(_WIDTHS, columns.items(), strict=False):
-            ax.plot(t[keep], e[keep, i], color=colour(subject), lw=width, label=figure_name(names[subject]))
+            draw_dots(ax, times, _columns(measured)[:, i], GREY, "single images", size=3, rasterized=True)
+        for subject, e, look in _looks(columns, names):
+            draw_line(ax, times, e[:, i], colour(subject), **look)
         ax.axhline(0, color=GREY, lw=0.6)
-        mark_gaps(ax, t[there], GAP_S)
+        mark_gaps(ax, there, GAP_S)
         ax.set_ylabel(label)
-        _strokes(ax, t[there])
-    return _finished(fig, strips[:, 0], title)
+        # Short strokes along the lower edge, below all lines, where there are detections.
+        bottom, top = ax.get_ylim()
+        ax.set_ylim(bottom - 0.06 * (top - bottom), top)
+        ax.plot(there, np.full(len(there), 0.025), "|", color=INK, ms=6, alpha=0.35,
+                transform=ax.get_xaxis_transform())  # fmt: skip
+    return finish(fig, title, _SINCE)
 
 
 def speed_and_course(
@@ -131,35 +130,27 @@ def speed_and_course(
     Courses of what hardly moves are left out, and so are the jumps over north. Where the target keeps its
     course, the axis shows what is near it.
     """
-    t = np.asarray(times, float)
-    fig, (fast, course) = new_figure(5.9, 4.8, rows=2, sharex=True)
-    keep = thinned(len(t))
-    looks = [
-        {"color": colour(subject), "lw": width, "label": figure_name(names[subject])}
-        for width, subject in zip(_WIDTHS, tracks, strict=False)
-    ]
-    top, courses = 0.0, [course_of(states) for states in (*tracks.values(), truth)]
-    middle, reach = steady_course(courses)
-    for states, look in zip((*tracks.values(), truth), (*looks, _TRUTH), strict=True):
-        x = np.asarray(states, float)[keep]
-        speed = np.hypot(x[:, 2], x[:, 3])
-        angle = (course_of(states)[keep] - middle + 180) % 360 + middle - 180
-        angle[1:][np.abs(np.diff(angle)) > 180] = np.nan
-        fast.plot(t[keep], speed, **look)
-        course.plot(t[keep], angle, **look)
+    fig, (fast, course) = new_strips(2, 4.8)
+    lines = [(states, {"color": colour(name)} | look) for name, states, look in _looks(tracks, names)]
+    lines.append((truth, {"name": "truth"} | TRUTH))
+    middle, reach = steady_course([course_of(states) for states, _ in lines])
+    top = 0.0
+    for states, look in lines:
+        speed = np.hypot(*np.asarray(states, float)[:, 2:4].T)
+        draw_line(fast, times, speed, **look)
+        angle = (course_of(states) - middle + 180) % 360 + middle - 180
+        draw_line(course, times, without_jumps(angle), **look)
         # The start, with no idea of the velocity, would press all the rest flat.
         top = max(top, float(np.nanquantile(speed, 0.99)))
     for ax in (fast, course):
-        mark_gaps(ax, t[np.asarray(seen, bool)], GAP_S)
+        mark_gaps(ax, np.asarray(times, float)[np.asarray(seen, bool)], GAP_S)
     fast.set_ylim(0, 1.2 * top)
-    fast.set_ylabel("speed (m/s)")
-    course.set_ylim(middle - reach, middle + reach)
+    course.set(ylim=(middle - reach, middle + reach), ylabel="course (°)")
     if reach > 180:
         course.set_yticks([0, 90, 180, 270, 360])
     else:
         course.yaxis.set_major_formatter(FuncFormatter(lambda angle, _: f"{angle % 360:g}"))
-    course.set_ylabel("course (°)")
-    return _finished(fig, (fast, course), title)
+    return finish(fig, title, _SINCE, "speed (m/s)")
 
 
 def course_of(states: ArrayLike) -> Array:
@@ -199,23 +190,20 @@ def squares_over_time(
     """
     t, there = np.asarray(times, float), np.asarray(seen, bool)
     low, high = chi_square_interval(2)
-    fig, strips = new_figure(5.9, 2.0 * len(values) + 1.5, rows=len(values), sharex=True, squeeze=False)
-    keep = thinned(len(t))
-    for ax, (what, series) in zip(strips[:, 0], values.items(), strict=True):
+    fig, strips = new_strips(len(values), 2.0 * len(values) + 1.5)
+    for ax, (what, series) in zip(strips, values.items(), strict=True):
         highest = high
-        for width, (subject, v) in zip(_WIDTHS, series.items(), strict=False):
+        for subject, v, look in _looks(series, names):
             y = np.asarray(v, float)
-            look = {"color": colour(subject), "label": figure_name(names[subject])}
             if np.isfinite(y[~there]).any():
-                ax.plot(t[keep], y[keep], lw=width, **look)
+                draw_line(ax, t, y, colour(subject), **look)
             else:
-                ax.plot(t, y, ms=3, alpha=0.6, **look, **_DOTS)
+                draw_dots(ax, t, y, colour(subject), look["name"], size=3, rasterized=True)
             highest = max(highest, float(np.nanmax(y)))
         log_band(ax, low, high)
         mark_gaps(ax, t[there], GAP_S)
-        ax.set_ylim(low / 12, 2 * highest)
-        ax.set_ylabel(what)
-    return _finished(fig, strips[:, 0], title)
+        ax.set(ylim=(low / 12, 2 * highest), ylabel=what)
+    return finish(fig, title, _SINCE)
 
 
 def values_over_flights(
@@ -243,24 +231,20 @@ def values_over_flights(
     fig, ax = new_figure(5.9, 0.62 * len(names) + 1.5)
     if band is not None:
         ax.axvspan(*chi_square_interval(band), color=GREEN, alpha=0.13, lw=0, zorder=0)
-    size = 4.5 if len(values) > FEW else 9.0
     for place, name in enumerate(names):
         row = np.sort(values[name].to_numpy(float))
         color = colour(name.split("-")[0] if name != "inflation" else "kf")
         # Spread out by rank, in a pattern that repeats, so that equal values do not hide one another.
         offset = 0.28 * (2 * ((np.arange(len(row)) * 0.618034) % 1) - 1)
-        ax.plot(row, place + offset, ".", color=color, alpha=0.4, ms=size, mec="none")
+        draw_dots(ax, row, place + offset, color, size=4.5 if len(values) > FEW else 9.0, alpha=0.4)
         ax.plot([np.median(row)] * 2, [place - 0.36, place + 0.36], color=INK, lw=1.6)
         if name in published:
             ax.plot(published[name], place, "D", mfc="white", mec=INK, ms=8, mew=1.6, zorder=5)
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.xaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False))
-    ax.set_yticks(range(len(names)), [figure_name(name) for name in names.values()])
-    ax.set_ylim(len(names) - 0.4, -0.6)
-    ax.grid(axis="y", visible=False)
-    ax.set_xlabel(label)
-    return fig
+    name_rows(ax, list(names.values()))
+    return finish(fig, "", label)
 
 
 def innovation_correlations(
@@ -279,64 +263,25 @@ def innovation_correlations(
     axes
         What the elements are called.
     """
-    fig, strips = new_figure(5.9, 2.1 * len(axes) + 0.6, rows=len(axes), sharex=True, squeeze=False)
-    for i, (ax, name) in enumerate(zip(strips[:, 0], axes, strict=True)):
-        ax.axhspan(-bound, bound, color=GREY, alpha=0.18, lw=0)
-        ax.axhline(0, color=INK, lw=0.6)
-        for width, (subject, r) in zip(_WIDTHS, series.items(), strict=False):
+    fig, strips = new_strips(len(axes), 2.1 * len(axes) + 0.6)
+    for i, (ax, name) in enumerate(zip(strips, axes, strict=True)):
+        draw_white_band(ax, bound)
+        for subject, r, look in _looks(series, names):
             y = np.asarray(r, float)[i]
-            ax.plot(np.arange(len(y)), y, color=colour(subject), lw=width, label=figure_name(names[subject]))
+            draw_line(ax, np.arange(len(y)), y, colour(subject), **look)
         ax.set_ylabel(f"autocorrelation,\n{name}")
-    return _finished(fig, strips[:, 0], title, "lag (detections)")
+    return finish(fig, title, "lag (detections)")
 
 
-def _mark_start(ax: Axes, way: Array) -> None:
-    """A dot where a way (N, 2 or more) begins, and its name on the side that the way turns away from, but
-    below where all else is below: above is the title."""
-    north, east = way[0, 0], way[0, 1]
-    ax.margins(0.1)
-    low, high = ax.dataLim.intervaly
-    below = way[-1, 0] > north or north > high - 0.1 * (high - low)
-    ax.plot(east, north, "o", color=colour("truth"), ms=5)
-    ax.annotate(
-        "start",
-        (east, north),
-        (0, -7 if below else 7),
-        textcoords="offset points",
-        ha="center",
-        va="top" if below else "bottom",
-        fontsize=10,
-        color=INK,
-        bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
-    )
+def _looks(series: Mapping[str, Any], names: Mapping[str, str]) -> list[tuple[str, Any, dict[str, Any]]]:
+    """Subject, values, and name and width of the line of each."""
+    return [
+        (subject, values, {"name": names[subject], "width": width})
+        for width, (subject, values) in zip(_WIDTHS, series.items(), strict=False)
+    ]
 
 
 def _columns(values: ArrayLike) -> Array:
     """(N,) as (N, 1); (N, 2) stays."""
     array = np.asarray(values, float)
     return array.reshape(len(array), -1)
-
-
-def _strokes(ax: Axes, times: Array) -> None:
-    """Short strokes along the lower edge, below all lines, where there are detections."""
-    bottom, top = ax.get_ylim()
-    ax.set_ylim(bottom - 0.06 * (top - bottom), top)
-    edge = ax.get_xaxis_transform()
-    ax.plot(times, np.full(len(times), 0.025), "|", color=INK, ms=6, alpha=0.35, transform=edge)
-
-
-def _finished(
-    fig: Figure, strips: Sequence[Axes], title: str, xlabel: str = "time since the first detection (s)"
-) -> Figure:
-    strips[0].set_title(title)
-    strips[-1].set_xlabel(xlabel)
-    _legend(fig, strips[-1])
-    return fig
-
-
-def _legend(fig: Figure, ax: Axes) -> None:
-    """The names of an axes' lines below the figure, in one row where that is wide enough."""
-    handles, labels = ax.get_legend_handles_labels()
-    width = _ENTRY * len(labels) + _LETTER * sum(map(len, labels))
-    columns = len(labels) if width < fig.get_figwidth() else -(-len(labels) // 2)
-    fig.legend(handles, labels, loc="outside lower center", ncols=columns, markerscale=2)

@@ -9,8 +9,7 @@ from wildlab.reporting.flight_status import Standing, standing
 from wildlab.reporting.front.glimpse import Glimpse
 from wildlab.reporting.front.ratios import drawable, plot, ticks
 from wildlab.reporting.own_flights import OwnFlight, address, verdict_pill
-from wildlab.reporting.page import TAGS
-from wildlab.reporting.report import PILLS
+from wildlab.reporting.page import PILLS, TAGS
 from wildlab.reporting.status import FIRST_LOOK, Number, StudyStatus
 from wildlab.reporting.text import escape, inline
 

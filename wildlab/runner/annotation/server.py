@@ -18,11 +18,17 @@ import sys
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.runner.annotation.page import make_page
-from wildlab.runner.annotation.pictures import picture_of
+from wildlab.flight.files import read_regular
+from wildlab.flight.readers.frames.image import MOST_BYTES, decode
+from wildlab.paths import DATA
+from wildlab.replay.shots import stretched
 from wildlab.runner.annotation.session import Session, check_points
 
 #: Bytes that a page may send at once, and how long it may take for it, s.
@@ -31,6 +37,9 @@ MOST_SENT, PATIENCE_S = 1_000_000, 60
 MOST_LINKS, HEADER_S = 16, 5.0
 #: Pictures that are decoded at once: each may be large.
 AT_ONCE = 2
+#: Colour images with more pixels are sent as JPEG, which takes a twentieth of the time.
+MOST_EXACT = 4_000_000
+QUALITY = 95
 _HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -266,8 +275,70 @@ class _Handler(BaseHTTPRequestHandler):
         """Nothing: the terminal shows the address and the next command."""
 
 
+def make_page(nonce: str) -> str:
+    """The page, whose own script and style alone may run.
+
+    Parameters
+    ----------
+    nonce
+        A number used once, of letters that stand in an attribute.
+
+    Returns
+    -------
+    str
+        HTML; names of images and points come to it as data, and are shown as text.
+    """
+    page, style, script = (
+        (DATA / "pages" / f"click.{kind}").read_text(encoding="utf-8") for kind in ("html", "css", "js")
+    )
+    parts = {"{nonce}": nonce, "{style}": style, "{script}": script}
+    return re.sub(r"\{(nonce|style|script)\}", lambda match: parts[match[0]], page)
+
+
 def _policy(nonce: str) -> str:
     return (
         f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src 'self' data:; "
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
+
+
+class Picture(NamedTuple):
+    """Bytes of a picture and their kind, as browsers call it."""
+
+    data: bytes
+    kind: str
+
+
+def picture_of(path: Path) -> Picture | str:
+    """An image file as a picture with the pixels that it has, or a sentence that says why not.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+
+    Returns
+    -------
+    Picture or str
+        Pixels stand as they are stored: what a file says of turning it is not obeyed.
+    """
+    try:
+        found = decode(read_regular(path, MOST_BYTES))
+    except FileNotFoundError:
+        found = "there is no such file any more"
+    except WildlabError as error:
+        found = f"it {error.problem}"
+    if isinstance(found, str):
+        return f"This image cannot be shown: {found}."
+    image, unit, _ = found
+    if unit not in ("grey", "colour"):
+        image = stretched(image)
+    if image.ndim == 3:
+        image = np.ascontiguousarray(image[..., ::-1])
+    if image.ndim == 3 and image.shape[0] * image.shape[1] > MOST_EXACT:
+        done, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+        kind = "image/jpeg"
+    else:
+        done, packed = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        kind = "image/png"
+    return Picture(packed.tobytes(), kind) if done else "This image cannot be shown."

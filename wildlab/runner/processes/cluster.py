@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import re
 import time
+from contextlib import AbstractContextManager
 from multiprocessing import connection
-from types import TracebackType
 from typing import Any, cast
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.runner.processes.job import Failure
 from wildlab.runner.processes.worker_pool import SeedResult, answer, keep
-from wildlab.runner.seeds.kept import SeedWork
+from wildlab.runner.seeds import SeedWork
 
 _ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.]+\]|[\w.-]+):\d{1,5}")
 #: How long a scheduler may take to answer at first, in seconds.
@@ -25,7 +25,7 @@ PATIENCE_S = 15
 RETRIES = 2
 
 
-class Cluster:
+class Cluster(AbstractContextManager["Cluster"]):
     """A cluster in place of a `worker_pool.WorkerPool`: takes no process of this machine's.
 
     Parameters
@@ -51,12 +51,7 @@ class Cluster:
         self._under_way: dict[Any, tuple[SeedWork, int]] = {}
         self._over: Any = None
 
-    def __enter__(self) -> Cluster:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._under_way and self._client.status == "running":
             self._client.cancel(list(self._under_way), force=True)
         self._client.close(timeout=5)

@@ -6,11 +6,9 @@ import contextlib
 import multiprocessing
 import os
 import signal
-import tempfile
 from collections.abc import Callable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.process import BaseProcess
-from pathlib import Path
 from typing import Any
 
 #: What makes numpy, scipy, numba, OpenCV and Arrow compute on one thread; read when they are imported.
@@ -37,8 +35,7 @@ _PRELOADED = (
     "scipy.spatial.transform",
     "numba",
     "matplotlib.figure",
-    "nbconvert",
-    "papermill",
+    "nbformat",
     "IPython.core.interactiveshell",
 )
 
@@ -112,9 +109,3 @@ def end_below(pid: int) -> None:
         for process in psutil.Process(pid).children(recursive=True):
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
-
-
-def socket_folder() -> Path:
-    """Where sockets may lie: their paths must be short, and macOS's temporary folder is not."""
-    short = Path("/tmp")  # noqa: S108 - a folder of our own is made in it, readable by us alone
-    return short if os.access(short, os.W_OK | os.X_OK) else Path(tempfile.gettempdir())

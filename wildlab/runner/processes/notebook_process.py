@@ -1,14 +1,13 @@
 """One study in a process of its own: flight, notebook, page. `wildlab.runner.run` starts, watches and
 ends it.
 
-A process each, because papermill changes the working directory of the whole process, and because only a
+A process each, because a notebook changes the working directory of the whole process, and because only a
 process can be ended for certain. It gets its own session, so that Ctrl-C reaches the runner alone, which
 then ends everything below this process, kernel included.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
@@ -21,7 +20,7 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
 from wildlab.runner.processes.ending import end_below
-from wildlab.runner.processes.job import Failure, Job
+from wildlab.runner.processes.job import Failure, Job, write_notebook
 
 #: The cells begun in this process, in order.
 _STARTED: list[int] = []
@@ -56,13 +55,12 @@ def _parent_is_gone(timeout_s: float | None) -> bool:
 
 
 def _end_with_parent(job: Job) -> None:
-    """A runner that was killed outright must leave neither processes nor folders behind."""
+    """A runner that was killed outright must leave neither processes nor a folder behind."""
     if _parent_is_gone(timeout_s=None):
         end_below(os.getpid())
-        for _ in range(100):  # the notebook may write into them until it finds them gone
-            for folder in (job.work, job.runtime):
-                shutil.rmtree(folder, ignore_errors=True)
-            if not any(Path(folder).exists() for folder in (job.work, job.runtime)):
+        for _ in range(100):  # the notebook may write into it until it finds it gone
+            shutil.rmtree(job.work, ignore_errors=True)
+            if not Path(job.work).exists():
                 break
             time.sleep(0.01)
         os.kill(os.getpid(), signal.SIGKILL)
@@ -72,10 +70,9 @@ def _keep_to_ourselves(job: Job) -> None:
     """Leave the reader's own settings, history and terminal out of it: the same run everywhere."""
     from wildlab.reporting.figures import QUICK
 
-    runtime = Path(job.runtime)
     os.environ.update(
         JUPYTER_PLATFORM_DIRS="1",
-        IPYTHONDIR=str(runtime / "ipython"),
+        IPYTHONDIR=str(Path(job.work) / ".ipython"),
         # Figures are shown by Report, with alt text, and not a second time by pyplot.
         MPLBACKEND="agg",
         PYDEVD_DISABLE_FILE_VALIDATION="1",
@@ -92,8 +89,7 @@ def _keep_to_ourselves(job: Job) -> None:
 
 def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.files import write_atomic, write_json
-    from wildlab.reporting import html, metrics, privacy
-    from wildlab.reporting.notebook_file import read_notebook
+    from wildlab.reporting import html, metrics, notebooks
     from wildlab.reporting.page import first_look_notice
     from wildlab.reporting.status import look_words
     from wildlab.runner.catalogue import OTHERS
@@ -122,18 +118,13 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     if others:
         given[OTHERS] = [str(other) for other in others]
         shown[OTHERS] = [_relative(other, job) for other in others]
-    executed = folder / "notebook.ipynb"
+    executed, notebook = folder / "notebook.ipynb", notebooks.read_notebook(Path(job.notebook))
+    notebooks.give_parameters(notebook, {**given, "flight": str(flight or ""), "out": str(folder)})
     try:
-        _papermill(
-            pipe,
-            job,
-            {**given, "flight": str(flight or ""), "out": str(folder)},
-            executed,
-        )
+        _execute(pipe, job, notebook, executed)
     finally:
-        if executed.is_file():
-            cleaned = privacy.clean_notebook(read_notebook(executed), shown, job.hidden())
-            write_atomic(executed, json.dumps(cleaned, indent=1, ensure_ascii=False) + "\n")
+        cleaned = notebooks.clean_notebook(notebook, shown, job.hidden())
+        write_notebook(executed, cleaned)
     pipe.send(("stage", "page"))
     if not (folder / "metrics.json").is_file():
         raise WildlabError(
@@ -162,16 +153,15 @@ def _work(pipe: connection.Connection, job: Job) -> None:
 def _tutorial(pipe: connection.Connection, job: Job) -> None:
     """A notebook that takes no parameters and leaves no numbers: only its page."""
     from wildlab.files import write_atomic
-    from wildlab.reporting import privacy
-    from wildlab.reporting.notebook_file import read_notebook
+    from wildlab.reporting import notebooks
     from wildlab.reporting.tutorial import tutorial_page
     from wildlab.runner.record import provenance
 
     pipe.send(("stage", "notebook"))
-    executed = Path(job.work) / "notebook.ipynb"
-    _papermill(pipe, job, {}, executed)
+    notebook = notebooks.read_notebook(Path(job.notebook))
+    _execute(pipe, job, notebook, Path(job.work) / "notebook.ipynb")
     pipe.send(("stage", "page"))
-    cleaned = privacy.clean_notebook(read_notebook(executed), {}, {job.work: "."})
+    cleaned = notebooks.clean_notebook(notebook, {}, {job.work: "."})
     origin = provenance.collect(
         study=job.name, notebook=Path(job.notebook), flight=None, parameters={}, seed=None
     )
@@ -210,59 +200,32 @@ def _relative(flight: Path | None, job: Job) -> str:
     return flight.name
 
 
-def _papermill(pipe: connection.Connection, job: Job, parameters: dict[str, Any], executed: Path) -> None:
-    import papermill
+def _execute(pipe: connection.Connection, job: Job, notebook: Any, executed: Path) -> None:
+    from wildlab.runner.processes.shell import execute_notebook
 
-    from wildlab.reporting.notebook_file import read_notebook
-    from wildlab.runner.processes.shell import IN_PROCESS
+    def on_cell(index: int, count: int) -> None:
+        _STARTED.append(index)
+        pipe.send(("cell", index, count))
 
-    notebook = read_notebook(Path(job.notebook))
-    # Whatever kernel the notebook was last saved with: its cells run in this process.
-    notebook.metadata["kernelspec"] = {"name": "python3", "language": "python", "display_name": "Python 3"}
-    count = len(notebook.cells) + bool(parameters)  # papermill adds a cell with them
-
-    def on_cell(cell: Any, cell_index: int) -> None:
-        _STARTED.append(cell_index)
-        pipe.send(("cell", cell_index, count))
-
-    papermill.execute_notebook(
-        notebook,
-        # papermill reads braces in a path as placeholders.
-        str(executed).replace("{", "{{").replace("}", "}}"),
-        parameters=parameters,
-        kernel_name="python3",
-        language="python",
-        engine_name=IN_PROCESS,
-        progress_bar=False,
-        cwd=str(Path(job.notebook).parent),
-        on_cell_execute=on_cell,
-    )
+    execute_notebook(notebook, Path(job.notebook).parent, executed, on_cell)
 
 
 def _explain(error: BaseException, job: Job) -> Failure:
     import traceback
 
-    from wildlab.reporting.failure import step_of
-    from wildlab.reporting.notebook_file import read_notebook
-    from wildlab.reporting.privacy import clean_text
+    from wildlab.reporting.notebooks import clean_text, read_notebook, step_of
+    from wildlab.runner.processes.shell import CellError
 
-    kind = type(error).__name__
     details = "".join(traceback.format_exception(error))
-    if kind == "PapermillExecutionError":
-        name, message = str(getattr(error, "ename", "")), str(getattr(error, "evalue", ""))
-        details = "\n".join(getattr(error, "traceback", []))
-        ours = name in ("WildlabError", "RunFailed")
-        reason = (
-            message
-            if ours
-            else f"The computation raised {name}: {message}"
-            if message
-            else f"It raised {name}."
-        )
+    if isinstance(error, CellError):
+        details = "\n".join(error.lines)
+        ours = error.name in ("WildlabError", "RunFailed")
+        raised = f"The computation raised {error}" if error.message else f"It raised {error.name}."
+        reason = error.message if ours else raised
     elif isinstance(error, WildlabError):
         reason = str(error)
     else:
-        reason = f"It ended with {kind}: {error}"
+        reason = f"It ended with {type(error).__name__}: {error}"
     step, folder = "", Path(job.work)
     if (folder / "notebook.ipynb").is_file():
         notebook = read_notebook(folder / "notebook.ipynb")

@@ -18,11 +18,10 @@ from typing import Any
 
 from wildlab.runner.processes.cluster import Cluster
 from wildlab.runner.processes.ending import end_tree, start_process
-from wildlab.runner.processes.job import Failure, Job
+from wildlab.runner.processes.job import Failure, Job, clear, install, leave_failure, log_of, sweep
 from wildlab.runner.processes.notebook_process import run_notebook
-from wildlab.runner.processes.outputs import clear, install, leave_failure, log_of, sweep
 from wildlab.runner.processes.worker_pool import WorkerPool
-from wildlab.runner.seeds.kept import (
+from wildlab.runner.seeds import (
     again_words,
     failed_seeds,
     faults,
@@ -295,7 +294,6 @@ def _start(waiting: _Waiting) -> _Running:
     job = waiting.job
     clear(job)
     Path(job.work).mkdir(parents=True)
-    Path(job.runtime).mkdir(parents=True, mode=0o700)
     ours, theirs = connection.Pipe(duplex=False)
     process = start_process(f"wildlab {job.name}", run_notebook, theirs, job)
     theirs.close()

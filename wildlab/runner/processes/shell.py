@@ -1,4 +1,4 @@
-"""A papermill engine that runs a notebook's cells in this process, in a shell of IPython's, without a kernel.
+"""Notebooks whose cells run in this process, in a shell of IPython's, without a kernel.
 
 A kernel is a second process that imports everything once more, which took most of the time of a short page.
 What cells print, show and raise is kept as a kernel would have sent it.
@@ -9,66 +9,79 @@ from __future__ import annotations
 import base64
 import contextlib
 import io
+import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
+import nbformat
 from IPython.core.displayhook import DisplayHook
 from IPython.core.displaypub import DisplayPublisher
 from IPython.core.interactiveshell import InteractiveShell
-from papermill.engines import Engine, NotebookExecutionManager, papermill_engines
 from traitlets.config import Config
 
-from wildlab.reporting.notebook_file import nbformat
-
-#: Its name among papermill's engines.
-IN_PROCESS = "wildlab-in-process"
+from wildlab.files import write_atomic
 
 
-class ShellEngine(Engine):  # type: ignore[misc]
-    """Cells one after the other, until one raises; see papermill on engines."""
+class CellError(Exception):
+    """A cell raised; ``name`` and ``message`` of what, and the lines of the traceback."""
 
-    @classmethod
-    def execute_managed_notebook(
-        cls,
-        nb_man: NotebookExecutionManager,
-        kernel_name: str,
-        *,
-        on_cell_execute: Callable[..., None] | None = None,
-        **_: Any,
-    ) -> None:
-        outputs = _Outputs()
-        shell = _shell(outputs)
-        try:
-            _run_cells(shell, outputs, nb_man, on_cell_execute)
-        finally:
-            # Whatever else this process does, it is no notebook any more.
-            shell.restore_sys_module_state()
-            type(shell).clear_instance()
+    def __init__(self, name: str, message: str, lines: list[str]) -> None:
+        super().__init__(f"{name}: {message}")
+        self.name, self.message, self.lines = name, message, lines
 
 
-def _run_cells(
-    shell: InteractiveShell,
-    outputs: _Outputs,
-    nb_man: NotebookExecutionManager,
-    on_cell_execute: Callable[..., None] | None,
+def execute_notebook(
+    notebook: nbformat.NotebookNode,
+    folder: Path,
+    into: Path | None = None,
+    on_cell: Callable[[int, int], None] = lambda index, count: None,
 ) -> None:
-    for index, cell in enumerate(nb_man.nb.cells):
-        nb_man.cell_start(cell, index)
-        if on_cell_execute is not None:
-            on_cell_execute(cell=cell, cell_index=index)
-        if cell.cell_type == "code":
-            with _streams_into(outputs):
-                result = shell.run_cell(cell.source, store_history=True)
-            cell.outputs, cell.execution_count = outputs.take(), shell.execution_count - 1
-            # What fails to show itself is an error, though the cell goes on.
-            if not result.success or any(one.output_type == "error" for one in cell.outputs):
-                nb_man.cell_exception(cell, cell_index=index)
-        nb_man.cell_complete(cell, cell_index=index)
-        if nb_man.nb.metadata.papermill["exception"]:
-            return
+    """Run the cells of a notebook one after the other, until one raises.
 
+    Parameters
+    ----------
+    notebook
+        Its cells get what they print, show and raise.
+    folder
+        That they run in.
+    into
+        The file that the notebook is written to, as far as it came; None for none.
+    on_cell
+        Called before each cell with its index, and how many there are.
 
-papermill_engines.register(IN_PROCESS, ShellEngine)
+    Raises
+    ------
+    CellError
+        Of the cell that raises, or that cannot show its value.
+    """
+
+    def save() -> None:
+        if into is not None:
+            write_atomic(into, json.dumps(notebook, indent=1, ensure_ascii=False) + "\n")
+
+    outputs = _Outputs()
+    shell = _shell(outputs)
+    try:
+        with contextlib.chdir(folder):
+            for index, cell in enumerate(notebook.cells):
+                save()
+                on_cell(index, len(notebook.cells))
+                if cell.cell_type != "code":
+                    continue
+                with _streams_into(outputs):
+                    result = shell.run_cell(cell.source, store_history=True)
+                cell.outputs, cell.execution_count = outputs.take(), shell.execution_count - 1
+                # What fails to show itself is an error, though the cell goes on.
+                for one in cell.outputs:
+                    if one.output_type == "error":
+                        raise CellError(one.ename, one.evalue, one.traceback)
+                result.raise_error()
+    finally:
+        save()
+        # Whatever else this process does, it is no notebook any more.
+        shell.restore_sys_module_state()
+        type(shell).clear_instance()
 
 
 class _Outputs:

@@ -14,17 +14,17 @@ import os
 import threading
 import time
 import traceback
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from multiprocessing import connection, parent_process
 from multiprocessing.process import BaseProcess
-from types import TracebackType
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
+from wildlab.reporting.notebooks import clean_text
 from wildlab.runner.processes.ending import end_tree, start_process
 from wildlab.runner.processes.job import Failure
-from wildlab.runner.seeds.fingerprint import code_key
-from wildlab.runner.seeds.kept import SeedWork, write_seed
+from wildlab.runner.seeds import SeedWork, code_key, write_seed
 
 
 class SeedResult(NamedTuple):
@@ -40,7 +40,6 @@ def answer(case: str, seed: int, parameters: dict[str, Any], code: str) -> tuple
 
     ``code`` is the runner's `code_key`: numbers of other code are not mixed in.
     """
-    from wildlab.reporting.privacy import clean_text
     from wildlab.studies.protocol import run_trial
 
     try:
@@ -124,19 +123,14 @@ class _Worker:
         self.process.join()
 
 
-class WorkerPool:
+class WorkerPool(AbstractContextManager["WorkerPool"]):
     """The processes of one run. Use it in a ``with``: leaving it ends them all."""
 
     def __init__(self) -> None:
         self._workers: list[_Worker] = []
         self._notes: list[tuple[str, str]] = []
 
-    def __enter__(self) -> WorkerPool:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.shutdown(len(self._workers), idle=False)
 
     @property

@@ -15,7 +15,7 @@ from wildlab.reporting.front.index import MOST_FLIGHTS, PARTNERS, Learn, front_p
 from wildlab.reporting.front.numbers import LEDGER, POSTER, poster_page
 from wildlab.reporting.front.partners import partners_page
 from wildlab.reporting.ledger import ledger_page
-from wildlab.reporting.notebook_file import read_notebook
+from wildlab.reporting.notebooks import read_notebook
 from wildlab.reporting.own_flights import PAGE, flights_page
 from wildlab.reporting.text import escape
 from wildlab.runner.catalogue import StudyEntry

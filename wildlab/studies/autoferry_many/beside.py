@@ -12,7 +12,7 @@ from wildlab.analysis.many.follow import ManyTracks, judged, track_targets
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
-from wildlab.reporting.charts.following import Shown
+from wildlab.reporting.charts.drawing import Shown
 from wildlab.reporting.figures import BLUE, ORANGE, new_figure
 from wildlab.reporting.report import Report
 from wildlab.studies.autoferry_many.judged import BEST, HEADINGS, MODE_WORDS, medians, row_of

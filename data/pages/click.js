@@ -1,6 +1,4 @@
-"""What the page does. Pixels are counted from the middle of the first one; on the canvas its corner is 0."""
-
-SCRIPT = r""""use strict";
+"use strict";
 const base = location.pathname, el = id => document.getElementById(id), canvas = el("canvas");
 const pen = canvas.getContext("2d"), pictures = new Map(), COLOUR = "#ffd23f", CHOSEN = "#56d4ff";
 let state = null, at = 0, picture = null, chosen = -1, name = "", unsaved = new Map();
@@ -240,4 +238,3 @@ fetch(base + "state").then(answer => answer.json()).then(found => {
   const next = state.points.findIndex(one => !one.length);
   return go(next < 0 ? 0 : next);
 }).catch(error => show("Cannot be loaded: " + error.message, true));
-"""

@@ -20,21 +20,105 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import platform
 import shutil
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.runner.seeds.fingerprint import code_key, trial_key
+from wildlab.paths import DATA, PACKAGE
 from wildlab.studies.protocol import Values, find_case
 
+#: A change in any of these rooms can change a number.
+ROOMS = (
+    "geometry",
+    "flight",
+    "simulation",
+    "navigation",
+    "detection",
+    "tracking",
+    "planning",
+    "evaluation",
+    "analysis",
+)
+#: Of the studies their trials can; how they are shown and said cannot.
+TRIALS = ("studies/*/trial.py", "studies/*/trial/*.py")
+#: Packages below them whose version can.
+PACKAGES = (
+    "filterpy",
+    "numba",
+    "numpy",
+    "opencv-python-headless",
+    "pandas",
+    "pyarrow",
+    "pymap3d",
+    "pyproj",
+    "rasterio",
+    "scipy",
+)
 #: Folder of the store among the reports.
 STORE = ".seeds"
 #: What a file held before it had a digest. Such files count as absent.
 _WITHOUT_DIGEST = {"case", "seed", "values"}
+
+
+# -- what numbers depend on: two machines with the same key compute the same thing
+# ------------------------------------------------------------------------------------
+
+
+def trial_key(case: str, parameters: Mapping[str, Any], code: str) -> str:
+    """What a trial's numbers depend on besides the seed, as 64 hexadecimal digits. ``code``: `code_key`."""
+    text = json.dumps([case, dict(parameters), code], sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
+    """What a study's page depends on, as 64 hexadecimal digits: `code_key`, how it is shown and said, what is
+    published, the notebook, and ``given``, whatever the notebook is given."""
+    rooms = ("studies", "reporting", "messages")
+    shown = [path for room in rooms for path in (PACKAGE / room).rglob("*.py")]
+    texts = [*(DATA / "published").glob("*.toml"), *(DATA / "messages").rglob("*.toml")]
+    shown += [DATA / "glossary.toml", *texts, *(DATA / "pages").iterdir()]
+    digest = hashlib.sha256(json.dumps([code, dict(given)], sort_keys=True, allow_nan=False).encode())
+    for path in [*sorted(shown), notebook]:
+        digest.update(path.name.encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def code_key() -> str:
+    """The code of all trials and below them, the twins' parameters and the packages' versions, as 64
+    hexadecimal digits."""
+    code = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")] + [
+        path for pattern in TRIALS for path in PACKAGE.glob(pattern)
+    ]
+    # Twins share parts, so a change of any of their files may be a change of each. Named as in a checkout, so
+    # that a wheel of the same code has the same key.
+    named = [(f"wildlab/{path.relative_to(PACKAGE).as_posix()}", path) for path in code]
+    named += [
+        (f"data/{path.relative_to(DATA).as_posix()}", path) for path in (DATA / "twins").rglob("*.toml")
+    ]
+    versions = [f"{package} {_version(package)}" for package in PACKAGES]
+    digest = hashlib.sha256(" ".join([*platform.python_version_tuple()[:2], *versions]).encode())
+    for name, path in sorted(named):
+        digest.update(name.encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "absent"
+
+
+# -- what is to be computed
+# ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -50,7 +134,7 @@ class SeedWork:
     case
         Whose trial it is (`wildlab.studies.protocol`).
     code, key
-        `code_key` and `trial_key` of `wildlab.runner.seeds.fingerprint`.
+        Of `code_key` and `trial_key`.
     seeds
         All of them, whether they are there already or not; without the one whose flight the figures show.
     """
