@@ -38,6 +38,14 @@ def rates(own: float, stress: float) -> dict[str, Any]:
     }
 
 
+def navigated(rms: float, sd: float, nees: tuple[float, float | None, float | None]) -> dict[str, Any]:
+    """Error and predicted deviation (degrees) of each axis, and NEES of position with its interval."""
+    axes = {f"mekf/rms_{axis}": rms for axis in ("roll", "pitch", "yaw")}
+    axes |= {f"mekf/mean_sd_{axis}": sd for axis in ("roll", "pitch", "yaw")}
+    value, low, high = nees
+    return {**axes, "mekf/nees_position": {"value": value, "centre_low": low, "centre_high": high}}
+
+
 def moments(schmidt: float, ekf: float, n: int = 100) -> dict[str, Any]:
     """Mean NEES of one moment of each of ``n`` flights, with poses as calibrated."""
     return {
@@ -369,6 +377,13 @@ ANSWERS: dict[str, list[Case]] = {
         (outcomes(4, 3, lidar=8, radar=2, ir=1, eo=0), ("filter-neither", "sensors-some")),
         ({}, ("filter-unknown", "sensors-unknown")),
     ],
+    "navigation": [
+        (navigated(1.0, 1.0, (3.5, 2.5, 4.5)), ("attitude-fits", "position-consistent")),
+        (navigated(5.0, 1.0, (9.5, 8.5, 12.0)), ("attitude-overconfident", "position-overconfident")),
+        (navigated(0.1, 1.0, (0.5, 0.4, 0.6)), ("attitude-fits", "position-conservative")),
+        (navigated(1.0, 1.0, (9.5, None, None)), ("attitude-fits", "position-open")),
+        ({}, ("attitude-unknown", "position-unknown")),
+    ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]
 
@@ -407,4 +422,5 @@ def test_facts_that_are_not_known_choose_a_sentence_that_needs_none(case):
 
 def test_every_page_is_a_cases_or_a_flights():
     of_flights = {"detections", "georeferencing", "overview", "repeat-sightings", "tracking", "tracking-many"}
+    of_flights |= {"navigation-logged"}
     assert {path.stem for path in FOLDER.glob("*.toml")} <= set(case_names()) | of_flights

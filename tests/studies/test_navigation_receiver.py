@@ -8,7 +8,7 @@ import pytest
 from wildlab.analysis.navigation_errors import NavigationErrors
 from wildlab.analysis.receiver import Placement, Receiver
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise
-from wildlab.studies.navigation import receiver as words
+from wildlab.studies.navigation import receiver as noise
 
 SCALE = Scale(np.array([2.0, 4.0]), np.array([0.2, 0.5]), 1.0, 300.0)
 COLOURED = ReceiverNoise(SourceNoise(0.1, 0.2, 3.0, 5.0, 50.0, 2.0), SourceNoise(0.5, 0.5))
@@ -39,11 +39,11 @@ def receiver(noise: ReceiverNoise, gross: int = 0, scale: Scale = SCALE) -> Rece
     ],
 )
 def test_what_is_left_is_level_or_colour_or_both_or_nothing(ratio, lag1, left):
-    assert words.left_over(ratio, lag1) == left
+    assert noise.left_over(ratio, lag1) == left
 
 
 def test_tables_have_every_number_that_was_found_and_no_other():
-    table = words.parameters_table(receiver(COLOURED)).set_index(["source", "what"])
+    table = noise.parameters_table(receiver(COLOURED)).set_index(["source", "what"])
     assert len(table) == 6 + 2
     white = table.loc[("position", "white noise, height")]
     assert (white["stated"], white["found"]) == (4.0, pytest.approx(0.8))
@@ -52,16 +52,16 @@ def test_tables_have_every_number_that_was_found_and_no_other():
     )
     assert np.isnan(table.loc[("position", "how long that keeps"), "low"])
     assert table.loc[("velocity", "white noise, level"), "found"] == pytest.approx(0.1)
-    models = words.models_table(receiver(COLOURED))
+    models = noise.models_table(receiver(COLOURED))
     assert models["model"].tolist() == [
-        "as stated",
+        "as configured",
         "positions and an error of second order; velocities white",
     ]
 
 
 @pytest.mark.parametrize(
     ("scale", "verdict"),
-    [(0.5, "nearer to it"), (2.0, "farther from it"), (1.0, "neither nearer nor farther")],
+    [(0.5, "nearer"), (2.0, "farther"), (1.0, "same")],
 )
 def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict):
     rng = np.random.default_rng(1)
@@ -72,23 +72,22 @@ def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict):
         e[:, 6:] = np.radians(size * rng.standard_normal((len(times), 3)))
         return NavigationErrors(times, e, np.ones_like(e), {})
 
-    said = words.words_on_attitude(errors(1.0), errors(scale), 0.0, 900.0)
-    assert verdict in said
+    assert noise.attitude_change(errors(1.0), errors(scale), 0.0, 900.0) == verdict
 
 
 def test_thirds_are_equal_and_leave_nothing_out():
-    found = words.thirds(10.0, 40.0)
+    found = noise.thirds(10.0, 40.0)
     assert [(begin, end) for _, begin, end in found] == [(10.0, 20.0), (20.0, 30.0), (30.0, 40.0)]
 
 
 def test_a_receiver_that_is_not_where_or_when_it_is_said_to_be_gets_advice():
     sd = np.array([0.002, 0.05, 0.05, 0.05])
     as_stated = Placement(0.223, np.array([0.1, 0.0, -0.1]), sd, 0.4)
-    said = words.words_on_placement(as_stated, [0.22, 0.0, 0.0, 0.0])
-    assert "latency_s" not in said and "lever_arm_m" not in said
-    late = words.words_on_placement(as_stated._replace(latency=0.25), [0.22, 0.0, 0.0, 0.0])
-    assert "latency_s = 0.250" in late and "lever_arm_m" not in late
-    moved = words.words_on_placement(
-        as_stated._replace(lever=np.array([0.1, 0.5, 0.0])), [0.22, 0.0, 0.0, 0.0]
-    )
-    assert "lever_arm_m = [0.10, 0.50, 0.00]" in moved and "latency_s" not in moved
+    configured = [0.22, 0.0, 0.0, 0.0]
+    assert noise.placement_message(as_stated, configured).key == "placement-confirmed"
+    late = noise.placement_message(as_stated._replace(latency=0.25), configured)
+    assert late.key == "placement-wrong" and late.values["settings"] == "latency_s = 0.250"
+    moved = noise.placement_message(as_stated._replace(lever=np.array([0.1, 0.5, 0.0])), configured)
+    assert moved.values["settings"] == "lever_arm_m = [0.10, 0.50, 0.00]"
+    unknown = noise.placement_message(as_stated._replace(sd=np.full(4, np.nan)), configured)
+    assert unknown.key == "placement-unknown"

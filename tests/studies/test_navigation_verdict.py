@@ -1,33 +1,33 @@
-"""The verdict on a flight's attitude follows how its errors stand to what the filter states."""
+"""The verdict on a flight's attitude follows how its errors compare with what the filter predicts."""
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.studies.navigation import text
+from wildlab.analysis.overviews.verdict import Verdict
+from wildlab.messages.page_texts import load_texts
+from wildlab.studies.navigation import attitude_of, level_of, verdict_of_attitude
 
-#: Errors of 1.3 degrees, all axes together, where 2.6 are stated; roll and pitch by 0.5.
+#: Errors of 1.3 degrees, all axes together, where 2.6 are predicted.
 FOUND = {"rms_roll": 0.3, "rms_pitch": 0.4, "rms_yaw": 1.2}
 FOUND |= {"mean_sd_roll": 0.6, "mean_sd_pitch": 0.8, "mean_sd_yaw": 2.4}
 
 
-@pytest.mark.parametrize("true", [True, False])
 @pytest.mark.parametrize(
-    ("errors", "ratio", "verdict"),
-    [(1.0, "0.5", "not judged"), (3.9, "1.9", "not judged"), (4.2, "2.1", "look closer")],
+    ("times", "verdict"), [(1.0, Verdict.UNJUDGED), (3.9, Verdict.UNJUDGED), (4.2, Verdict.LOOK)]
 )
-def test_the_verdict_follows_the_ratio(errors, ratio, verdict, true):
-    found = FOUND | {name: value * errors for name, value in FOUND.items() if name.startswith("rms")}
-    sentences, given, reason = text.summary(found, "in the air", true)
-    said = " ".join(sentences)
-    assert given.value == verdict and ratio in reason
-    # 300 m above, roll and pitch move the point by that much.
-    assert f"{1.3 * errors:.2f}" in said and "2.60" in said and f"{150 * np.radians(errors):.1f}" in said
+def test_the_verdict_follows_the_ratio(times, verdict):
+    found = FOUND | {name: value * times for name, value in FOUND.items() if name.startswith("rms")}
+    assert attitude_of(found) == pytest.approx((1.3 * times, 2.6))
+    assert verdict_of_attitude(found) == verdict
+    runs = pd.DataFrame([{("mekf", name): value for name, value in found.items()}])
+    assert level_of(runs) == verdict.level
+    assert level_of(pd.concat([runs, runs])) == Verdict.UNJUDGED.level
 
 
-def test_the_middle_flight_speaks_for_all_of_them():
-    flights = [FOUND | {"rms_yaw": value} for value in (9.0, 1.2, 1.1)]
-    spread = pd.DataFrame([{("mekf", name): value for name, value in one.items()} for one in flights])
-    spread["observer", "rms_yaw"] = 50.0
-    assert text.middle_flight(spread) == FOUND
-    assert not text.summary(FOUND, "in the air", True, 3)[2]
+def test_every_message_of_a_logged_flight_has_a_text():
+    keys = {"plausible", "overconfident", "receiver", "reason", "latency"}
+    keys |= {f"noise-{one}" for one in ("unknown", "confirmed", "estimated")}
+    keys |= {f"attitude-{one}" for one in ("nearer", "farther", "same", "unknown")}
+    keys |= {f"placement-{one}" for one in ("unknown", "confirmed", "wrong")}
+    keys |= {f"observer-{one}" for one in ("course", "field", "biases")}
+    assert set(load_texts("navigation-logged").answers) == keys

@@ -1,7 +1,4 @@
-"""What a report says of a receiver's noise: what was found, what it changed, and what it leaves.
-
-Every sentence is chosen by the numbers that it states.
-"""
+"""A receiver's noise: what was estimated on a flight, what it changed, and what it leaves."""
 
 from __future__ import annotations
 
@@ -11,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from wildlab.analysis.navigate import likelihoods_of_latency
 from wildlab.analysis.navigation_errors import (
     AXES,
     NavigationErrors,
@@ -18,15 +16,18 @@ from wildlab.analysis.navigation_errors import (
     summarise,
     summarise_innovations,
 )
-from wildlab.analysis.receiver import Placement, Receiver, place_receiver
-from wildlab.evaluation.blocks import PROBABILITY, block_mean, time_blocks
-from wildlab.navigation.receiver import SIZE, Candidate, SourceNoise
-from wildlab.reporting.report import Report
+from wildlab.analysis.receiver import Placement, Receiver
+from wildlab.evaluation.blocks import block_mean, time_blocks
+from wildlab.flight.store import Flight
+from wildlab.messages.message import Message
+from wildlab.navigation.receiver import SIZE, Candidate
 
 #: Mean NIS over its ideal within this is of the right level; correlations at lag 1 below that are no colour.
 LEVEL, COLOUR = (0.7, 1.4), 0.3
-#: So many standard deviations from what is stated are said to be off: four numbers are looked at.
+#: So many standard deviations from what is configured are an error: four numbers are looked at.
 FAR = 3.0
+#: Delays of a receiver that are tried, s.
+LATENCIES = np.arange(0.0, 0.41, 0.02)
 _ORDERS = ("white", "and an error of first order", "and an error of second order")
 _PARTS = (
     ("white noise, level", 0),
@@ -39,7 +40,7 @@ _PARTS = (
 
 
 def parameters_table(receiver: Receiver) -> pd.DataFrame:
-    """Every number of the noise that was chosen, beside what is stated.
+    """Every number of the noise that was chosen, and what is configured.
 
     Returns
     -------
@@ -75,8 +76,8 @@ def parameters_table(receiver: Receiver) -> pd.DataFrame:
 
 
 def models_table(receiver: Receiver) -> pd.DataFrame:
-    """Models that were tried: ``model``, ``parameters``, ``gain`` of the log likelihood over what is stated,
-    ``score`` (that less what chance gains) and ``chosen``."""
+    """Models that were tried: ``model``, ``parameters``, ``gain`` of the log likelihood over the configured
+    one, ``score`` (that less what chance gains) and ``chosen``."""
     first = receiver.candidates[0]
     return pd.DataFrame(
         [
@@ -94,48 +95,9 @@ def models_table(receiver: Receiver) -> pd.DataFrame:
 
 def _model(one: Candidate, receiver: Receiver) -> str:
     if one.parameters == 0:
-        return "as stated"
+        return "as configured"
     moving = "" if receiver.scale.velocity is None else f"; velocities {_ORDERS[one.noise.velocity.order]}"
     return f"positions {_ORDERS[one.noise.position.order]}{moving}"
-
-
-def words_on_estimate(receiver: Receiver) -> str:
-    """What was found from how much, and by what it was chosen."""
-    since = f"the {receiver.fixes} fixes from {receiver.begin:.0f} to {receiver.end:.0f} s"
-    left_out = f" {receiver.gross} fixes that no noise explains were left out." if receiver.gross else ""
-    if receiver.noise is None:
-        return (
-            f"From {since}, what is stated of the receiver is as likely as any of the "
-            f"{len(receiver.candidates) - 1} other models of its noise: nothing was changed.{left_out}"
-        )
-    scale = receiver.scale
-    sources = [f"Positions have {_noise(receiver.noise.position, scale.position, 'm', scale.duration)}."]
-    if scale.velocity is not None:
-        sources.append(
-            f"Velocities have {_noise(receiver.noise.velocity, scale.velocity, 'm/s', scale.duration)}."
-        )
-    return (
-        f"The likeliest noise by {since}, of {len(receiver.candidates)} models; no pose found on board has a "
-        f"part in it. {' '.join(sources)}{left_out}"
-    )
-
-
-def _noise(noise: SourceNoise, stated: np.ndarray, unit: str, longest: float) -> str:
-    white = _two(noise.white_level * stated[0]), _two(noise.white_vertical * stated[1])
-    words = f"white noise of {white[0]} {unit} level and {white[1]} {unit} in height"
-    if noise.order == 0:
-        return f"{words}, and no error that lasts"
-    words += (
-        f", and beside it an error of {_two(noise.sd_level)} and {_two(noise.sd_vertical)} {unit} that keeps "
-    )
-    # No flight tells how long an error keeps that outlasts it.
-    words += "for all of that time" if noise.time > 0.99 * longest else f"for {_two(noise.time)} s"
-    return words + (f" and whose change is smooth over {_two(noise.rate_time)} s" if noise.order == 2 else "")
-
-
-def _two(value: float) -> str:
-    """With two digits that count."""
-    return f"{float(f'{value:.2g}'):g}"
 
 
 def left_over(ratio: float, lag1: float) -> tuple[str, ...]:
@@ -152,100 +114,49 @@ def left_over(ratio: float, lag1: float) -> tuple[str, ...]:
     return level if abs(lag1) < COLOUR else (*level, "colour")
 
 
-def words_on_innovations(before: pd.DataFrame, after: pd.DataFrame | None) -> list[str]:
-    """A sentence for each source: NIS and correlation with what is stated and with what was found, and which
-    of the two is left.
-
-    Parameters
-    ----------
-    before, after
-        As `summarise_innovations` gives them; ``after`` is None where nothing was changed.
-    """
-    now = {} if after is None else {row["source"]: row for row in after.to_dict(orient="records")}
-    sentences = []
-    for was in before.to_dict(orient="records"):
-        name = was["source"]
-        then = was["nis"] / was["dof"], was["lag1"]
-        words = f"GNSS {name}: with what is stated the mean NIS is {then[0]:.2f} of its ideal and the "
-        words += f"correlation at lag 1 {then[1]:.2f}"
-        last = then
-        if name in now:
-            last = now[name]["nis"] / now[name]["dof"], now[name]["lag1"]
-            words += f"; with what was found, {last[0]:.2f} and {last[1]:.2f}"
-        sentences.append(
-            f"{words}. {_LEFT[left_over(*last)].format(low=LEVEL[0], high=LEVEL[1], lag=COLOUR)}"
-        )
-    return sentences
-
-
-_LEFT = {
-    (): "Both are as they should be: {low} to {high}, and below {lag}.",
-    ("level",): "What is left is the level, which should be {low} to {high}; the colour is below {lag}.",
-    (
-        "colour",
-    ): "What is left is the colour, which should be below {lag}; the level is within {low} to {high}.",
-    ("level", "colour"): "Both are left: the level should be {low} to {high}, the colour below {lag}.",
-}
-
-
-def words_on_attitude(before: NavigationErrors, after: NavigationErrors, begin: float, end: float) -> str:
-    """Whether the attitude came nearer to the reference by the noise that was found, between two times, s."""
+def attitude_change(before: NavigationErrors, after: NavigationErrors, begin: float, end: float) -> str:
+    """How the attitude's difference from the reference changed between two times, s: ``nearer``, ``farther``,
+    ``same``, or ``unknown`` where the time is too short."""
     inside = (before.times >= begin) & (before.times < end)
     squares = [np.degrees(one.error[inside, 6:]) ** 2 @ np.ones(3) for one in (before, after)]
     known = np.isfinite(squares[0]) & np.isfinite(squares[1])
-    was, now = (float(np.sqrt(one[known].mean())) if known.any() else np.nan for one in squares)
-    change = squares[1] - squares[0]
-    span = block_mean(change[known], time_blocks(before.times[inside][known], seconds=True))
-    if span.low > 0:
-        verdict = "farther from it"
-    elif span.high < 0:
-        verdict = "nearer to it"
-    else:
-        verdict = "neither nearer nor farther"
-    said = "too short a time to say which is nearer."
-    if np.isfinite(span.low):
-        said = (
-            f"{verdict}, by the {100 * PROBABILITY:.0f} % interval of the difference of mean squares over "
-            f"blocks of the flight, {span.low:+.2f} to {span.high:+.2f} degrees squared."
-        )
-    return (
-        f"The attitude is {now:.2f} degrees from the reference with that noise, all three axes together, and "
-        f"{was:.2f} with what is stated: {said}"
-    )
+    change = (squares[1] - squares[0])[known]
+    span = block_mean(change, time_blocks(before.times[inside][known], seconds=True))
+    if not np.isfinite(span.low):
+        return "unknown"
+    return "farther" if span.low > 0 else "nearer" if span.high < 0 else "same"
 
 
-def words_on_placement(found: Placement, stated: ArrayLike) -> str:
-    """How late the receiver is and where its antenna sits, and what of that is not as stated.
+def placement_message(found: Placement, configured: ArrayLike) -> Message:
+    """How late the receiver is and where its antenna sits, and what of that is not as configured.
 
     Parameters
     ----------
     found
-        As `place_receiver` gives it.
-    stated
+        As `wildlab.analysis.receiver.place_receiver` gives it.
+    configured
         (4,) latency, s, and lever arm, m.
     """
-    given = np.asarray(stated, float)
+    given = np.asarray(configured, float)
     likely = np.array([found.latency, *found.lever])
-    looked = np.isfinite(found.sd)
-    if not looked.any():
-        return "How late the receiver is cannot be told from this flight."
-    off = looked & (np.abs(likely - given) > FAR * found.sd)
-    words = (
-        f"With that noise the fixes are likeliest {likely[0]:.3f} s late (SD {found.sd[0]:.3f}; stated "
-        f"{given[0]:.3f})"
-    )
-    if looked[1:].all():
-        arms = [", ".join(f"{value:.2f}" for value in values[1:]) for values in (likely, found.sd, given)]
-        words += f" and the antenna at {arms[0]} m (SD {arms[1]}; stated {arms[2]})"
-    if not off.any():
-        return f"{words}: as stated, within {FAR:.0f} SD."
-    write = [f"latency_s = {likely[0]:.3f}"] if off[0] else []
-    if off[1:].any():
+    known = np.isfinite(found.sd)
+    if not known.any():
+        return Message("placement-unknown")
+    wrong = known & (np.abs(likely - given) > FAR * found.sd)
+    values = {"latency": f"{likely[0]:.3f}", "configured": f"{given[0]:.3f}"}
+    if not wrong.any():
+        return Message("placement-confirmed", values)
+    write = [f"latency_s = {likely[0]:.3f}"] if wrong[0] else []
+    if wrong[1:].any():
         write.append(f"lever_arm_m = [{', '.join(f'{value:.2f}' for value in likely[1:])}]")
-    return (
-        f"{words}: more than {FAR:.0f} SD from what is stated. Unless you know better, write "
-        f"{' and '.join(write)} in [gnss]. No pose found on board has a part in it."
-    )
+    return Message("placement-wrong", {**values, "settings": " and ".join(write)})
+
+
+def latency_message(flight: Flight) -> Message:
+    """How late the receiver is configured to be, and with which delay the flight's fixes are likeliest."""
+    likeliest = float(LATENCIES[int(np.argmax(likelihoods_of_latency(flight, LATENCIES)))])
+    configured = flight.manifest.gnss.latency_s
+    return Message("latency", {"latency": f"{likeliest:.2f}", "configured": f"{configured:.2f}"})
 
 
 def parts_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> pd.DataFrame:
@@ -286,91 +197,8 @@ def parts_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> 
     return pd.DataFrame(rows)
 
 
-def words_on_parts(table: pd.DataFrame) -> str:
-    """Whether one noise does for all parts of the flight; ``table`` as `parts_table` gives it."""
-    amiss = table[table["left"] != ""]
-    if not len(amiss):
-        return "In no part of the flight that is listed below is either left."
-    ratios = table["ratio"]
-    of = "; ".join(f"{row['part']}, {row['source']}: {row['left']}" for _, row in amiss.iterrows())
-    return (
-        f"Part by part, the mean NIS is {ratios.min():.2f} to {ratios.max():.2f} of its ideal. What is left: "
-        f"{of}. One noise for the whole flight does not do for these parts."
-    )
-
-
 def thirds(begin: float, end: float) -> list[tuple[str, float, float]]:
     """The thirds of a time, s, for a flight of which nobody named parts."""
     edges = np.linspace(begin, end, 4)
     names = ("first third", "second third", "last third")
     return [(name, float(edges[i]), float(edges[i + 1])) for i, name in enumerate(names)]
-
-
-def show_receiver(report: Report, studied: Studied, parts: Sequence[tuple[str, float, float]]) -> None:
-    """The section on the receiver's noise of a logged flight, and on the parts of it that are named, s."""
-    receiver = studied.receiver
-    if receiver is None:
-        report.section("How does the receiver err?", f"Not found out: {studied.refusal}.")
-        _, begin, end = parts[0]
-        report.points(words_on_innovations(summarise_innovations(studied.found["mekf"], begin, end), None))
-        return
-    begin, end = receiver.begin, receiver.end
-    report.section("How does the receiver err?", words_on_estimate(receiver))
-    before = summarise_innovations(studied.found["mekf"], begin, end)
-    changed = receiver.noise is not None
-    after = summarise_innovations(studied.found["mekf-receiver"], begin, end) if changed else None
-    by_part = parts_table(studied, parts if len(parts) > 1 else thirds(begin, end))
-    points = [*words_on_innovations(before, after), words_on_parts(by_part)]
-    if changed:
-        both = studied.scored["mekf"], studied.scored["mekf-receiver"]
-        points.append(words_on_attitude(*both, begin, end))
-        gnss = studied.flight.manifest.gnss
-        placed = place_receiver(studied.flight, receiver.chosen.noise)
-        points.append(words_on_placement(placed, [gnss.latency_s, *gnss.lever_arm_m]))
-        points.append("The noise was found from the innovations that are judged here, of one flight.")
-    report.points(points)
-    report.table(
-        by_part,
-        columns={
-            "part": "part",
-            "source": "GNSS",
-            "ratio_before": "NIS over ideal, as stated",
-            "ratio": "as found",
-            "lag1_before": "lag 1, as stated",
-            "lag1": "lag 1, as found",
-            "left": "left",
-            "off_before": "attitude, as stated (°)",
-            "off": "attitude, as found (°)",
-        },
-        digits=2,
-        caption="Innovations by part of the flight, and the RMS rotation between estimate and reference.",
-    )
-    report.table(
-        models_table(receiver),
-        columns={
-            "model": "noise of the receiver",
-            "parameters": "numbers found",
-            "gain": "log likelihood above the stated",
-            "score": "less what chance gains",
-            "chosen": "",
-        },
-        digits={"gain": 1, "score": 1},
-        caption="Models that were tried, each with its likeliest numbers. Chance gains half the logarithm of "
-        "the number of measurements for each number found (Schwarz).",
-    )
-    if changed:
-        report.table(
-            parameters_table(receiver),
-            columns={
-                "source": "GNSS",
-                "what": "what",
-                "unit": "unit",
-                "stated": "stated SD",
-                "found": "found",
-                "low": "from",
-                "high": "to",
-            },
-            digits={"stated": 2, "found": 3, "low": 3, "high": 3},
-            caption="From and to: two standard deviations, by the information that the innovations have. "
-            "Where there is none, the number is at the limit of what was tried: the flight does not tell.",
-        )

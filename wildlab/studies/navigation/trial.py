@@ -21,19 +21,19 @@ def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
     return numbers_of(study_navigation(simulate_twin(twin, seed)), SETTLING_S)
 
 
-def check_claims(spread: pd.DataFrame, tuned: str) -> dict[str, Check]:
+def check_claims(runs: pd.DataFrame, tuned: str) -> dict[str, Check]:
     """What the flights give for each claim of H 7.5.3 and 7.5.4 on its figures, by the claim's id.
 
     Parameters
     ----------
-    spread
+    runs
         What `trial` gives, one row for each flight.
     tuned
-        Subject of the filter that was tuned like the printed one of that flight.
+        Subject of the filter that was tuned like the published one of that flight.
     """
 
     def outside(*names: str) -> Check:
-        share = np.column_stack([spread[tuned, f"inside_{name}"].to_numpy(float) for name in names])
+        share = np.column_stack([runs[tuned, f"inside_{name}"].to_numpy(float) for name in names])
         return Check(measured=1 - share.min(axis=1))
 
     return {

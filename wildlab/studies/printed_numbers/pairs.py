@@ -167,7 +167,7 @@ def pairs_table(pairs: list[Pair]) -> pd.DataFrame:
 def plot_ratios(pairs: list[Pair]) -> Figure:
     """How many times each number is the other, on one logarithmic axis."""
     words = load_words()["pair"]
-    fig, ax = new_figure(7.4, 0.6 + 0.33 * len(pairs))
+    fig, ax = new_figure(5.9, 0.6 + 0.33 * len(pairs))
     rows, ratios = np.arange(len(pairs))[::-1], [one.ratio for one in pairs]
     widest = 1.15 * max(MARGIN, *ratios, *(1 / ratio for ratio in ratios))
     ax.axvspan(1 / MARGIN, MARGIN, color=BLUE, alpha=0.15, lw=0)

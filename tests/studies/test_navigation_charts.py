@@ -5,28 +5,18 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from tests.flight.conftest import make_flight  # noqa: F401 - a fixture
 from wildlab.analysis.navigation_errors import Studied
 from wildlab.flight.store import Flight
 from wildlab.reporting.charts.navigation import mark_period, speed_chart
-from wildlab.reporting.report import Report
-from wildlab.studies.navigation import flown
-
-
-class Shown:
-    """Keeps what a report is given."""
-
-    def __init__(self) -> None:
-        self.figures: dict[str, Any] = {}
-
-    def figure(self, fig: Any, *, name: str, alt: str, caption: str = "") -> None:
-        self.figures[name] = SimpleNamespace(fig=fig, alt=alt, caption=caption)
+from wildlab.studies.navigation import charts
 
 
 def level_nav(times: np.ndarray) -> pd.DataFrame:
@@ -47,22 +37,21 @@ def studied_of(flight: Flight) -> Studied:
     return cast("Studied", SimpleNamespace(flight=flight, found=found, filter="mekf", reference="autopilot"))
 
 
-def show(flight: Flight, figures: int | None) -> dict[str, Any]:
-    report, studied = Shown(), studied_of(flight)
-    if figures is not None:
-        flown.show_paths(cast("Report", report), studied, (0.0, 10.0), figures)
-    flown.show_flight(cast("Report", report), studied, (0.0, 10.0), figures)
-    return report.figures
+def show(flight: Flight, figures: int | None) -> dict[str, Figure]:
+    studied, window = studied_of(flight), (0.0, 10.0)
+    paths = [] if figures is None else charts.path_figures(studied, window, figures)
+    shown = [*paths, *charts.flight_figures(studied, window, figures)]
+    return {one.name or one.text: one.fig for one in shown}
 
 
 def test_observations_are_images_with_a_named_target(make_flight):
     flight = make_flight()
-    assert flown.observation_times(flight).tolist() == [1.0, 8.0]
-    assert flown.tracking_period(flight) == (1.0, 8.0)
+    assert charts.observation_times(flight).tolist() == [1.0, 8.0]
+    assert charts.tracking_period(flight) == (1.0, 8.0)
     # The camera's clock moves them, as it moves everything that is seen.
-    assert flown.tracking_period(make_flight(clocks={"camera_offset_s": 0.5})) == (1.5, 8.5)
+    assert charts.tracking_period(make_flight(clocks={"camera_offset_s": 0.5})) == (1.5, 8.5)
     flight.detections.loc[:, "target_id"] = ""  # type: ignore[union-attr]
-    assert flown.tracking_period(flight) is None
+    assert charts.tracking_period(flight) is None
 
 
 @pytest.mark.parametrize(("figures", "path"), [(23, "fig-7-22"), (33, "fig-7-32"), (13, "paths")])
@@ -76,7 +65,7 @@ def test_counterparts_and_the_period_in_each_of_them(
     for name, one in shown.items():
         if name == path:
             continue
-        for ax in one.fig.axes:
+        for ax in one.axes:
             black = [line.get_xdata()[0] for line in ax.lines if line.get_color() == "black"]
             assert black == [1.0, 8.0]
 
