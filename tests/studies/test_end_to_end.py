@@ -69,10 +69,10 @@ def test_errors_are_along_the_vessels_axes(pair):
 
 def test_numbers_of_a_kind_are_those_of_the_cases(pair, numbers):
     plain = filters.numbers_of(
-        pair.seen[DRAWN], filters.follow(pair.seen[DRAWN], filters.FAST, filters.PUBLISHED)
+        pair.seen[DRAWN], filters.track_target(pair.seen[DRAWN], filters.FAST, filters.PUBLISHED)
     )
     assert numbers["drawn-kf", "mae"] == plain["kf", "mae"]
-    tracked = coloured.follow(pair.seen[RENDERED], coloured.FAST)
+    tracked = coloured.track_target(pair.seen[RENDERED], coloured.FAST)
     assert numbers["rendered-coloured", "mae"] == tracked["coloured"].scored.numbers["mae"]
 
 

@@ -18,11 +18,11 @@ from wildlab.studies.large_ship.trial import (
     WITHOUT,
     centres_of,
     errors_of,
-    follow_both,
     merged_times,
     numbers_of,
     photograph,
     time_to_rest,
+    track_both,
 )
 
 #: Means of H table 6.1, m, north and east, about an origin that is not printed: of receiver and detections.
@@ -36,7 +36,7 @@ def taken():
 
 @pytest.fixture(scope="module")
 def tracked(taken):
-    return follow_both(taken)
+    return track_both(taken)
 
 
 @pytest.fixture(scope="module")

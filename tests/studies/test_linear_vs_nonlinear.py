@@ -139,7 +139,7 @@ def test_over_detections_alone_is_over_every_frame():
     motion = partial(singer, alpha=tuning.singer.alpha, variance=tuning.singer.variance)
     begin = start(seen, tuning.cv, 6, sd_acceleration=tuning.singer.acceleration_0)
     every = run_filter(seen.times, seen.positions, R, positions(), motion, begin)
-    alone = coloured_noise.follow_singer(seen, tuning)
+    alone = coloured_noise.track_by_singer(seen, tuning)
     np.testing.assert_allclose(alone.x, every.x, atol=1e-3)
     np.testing.assert_allclose(alone.P[:, :4, :4], every.P[:, :4, :4], rtol=1e-4, atol=1e-4)
     rows = seen.seen

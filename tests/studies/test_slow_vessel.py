@@ -15,10 +15,10 @@ from wildlab.studies.slow_vessel.trial import (
     check_claims,
     evaluate_sources,
     first_case,
-    follow,
     navigate_vessel,
     subset_of,
     summarise_vessel,
+    track_vessel,
     true_positions,
 )
 
@@ -40,7 +40,7 @@ def test_the_filter_is_a_straight_line_through_the_first_points_where_nothing_ac
     times = np.cumsum(rng.uniform(0.1, 20.0, 30))
     truth = np.array([50.0, -20.0]) + np.outer(times, [0.3, -0.1])
     errors = rng.normal(0, 5, (30, 2))
-    got = follow(scored_points(times, errors, truth))
+    got = track_vessel(scored_points(times, errors, truth))
     t, z = times - times[0], truth + errors
     for axis in range(2):
         A = np.column_stack([np.ones(30), t])
@@ -57,9 +57,9 @@ def test_long_steps_state_more_and_are_the_same_without_pauses():
     rng = np.random.default_rng(5)
     even, errors = np.arange(40) / 7.5, rng.normal(0, 4, (40, 2))
     points = scored_points(even, errors, np.zeros((40, 2)))
-    assert np.allclose(follow(points).error, follow(points, np.inf).error)
+    assert np.allclose(track_vessel(points).error, track_vessel(points, np.inf).error)
     paused = scored_points(np.where(even > 3, even + 60, even), errors, np.zeros((40, 2)))
-    long, short = follow(paused, np.inf).stated, follow(paused).stated
+    long, short = track_vessel(paused, np.inf).predicted, track_vessel(paused).predicted
     assert np.all(long >= short) and np.all(long[even > 3] > short[even > 3])
 
 

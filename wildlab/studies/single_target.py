@@ -78,7 +78,7 @@ def flights_figures(
 
 
 def flight_figures(
-    seen: Sighting, followed: Mapping[str, ScoredTrack], names: Mapping[str, str], numbers: Mapping[str, str]
+    seen: Sighting, tracks: Mapping[str, ScoredTrack], names: Mapping[str, str], numbers: Mapping[str, str]
 ) -> list[Shown]:
     """The flight drawn: paths, tracks, errors, speed and course, NEES and NIS.
 
@@ -86,13 +86,13 @@ def flight_figures(
     ``squares``, as ``"6-05"``; the thesis may have none for ``speed``.
     """
     times, there = seen.times - seen.times[0], seen.seen
-    called = {who: names[who] for who in followed}
-    states = {who: one.track.x[:, :4] for who, one in followed.items()}
+    called = {who: names[who] for who in tracks}
+    states = {who: one.track.x[:, :4] for who, one in tracks.items()}
     errors = {who: np.hypot(*(seen.truth - x)[:, :2].T) for who, x in states.items()}
     measured = np.hypot(*(seen.truth[:, :2] - seen.positions).T)
     values = {
-        "nees": {who: one.scored.nees for who, one in followed.items()},
-        "nis": {who: _at_frames(seen, one.scored.nis) for who, one in followed.items()},
+        "nees": {who: one.scored.nees for who, one in tracks.items()},
+        "nis": {who: _at_frames(seen, one.scored.nis) for who, one in tracks.items()},
     }
     paths = track_map(seen.truth, {}, {}, "", measured=seen.positions, aircraft=seen.poses.p_nc)
     speed = f"fig-{numbers['speed']}" if "speed" in numbers else "speed-and-course"
@@ -121,11 +121,11 @@ def flight_figures(
 
 
 def correlation_figure(
-    followed: Mapping[str, ScoredTrack], names: Mapping[str, str], axes: tuple[str, str], number: str
+    tracks: Mapping[str, ScoredTrack], names: Mapping[str, str], axes: tuple[str, str], number: str
 ) -> Shown:
     """Autocorrelation of the innovations of tracks that see the same; ``number`` of the thesis's figure."""
-    white = {who: innovation_whiteness(one.track.innovation, LAGS) for who, one in followed.items()}
-    called = {who: names[who] for who in followed}
+    white = {who: innovation_whiteness(one.track.innovation, LAGS) for who, one in tracks.items()}
+    called = {who: names[who] for who in tracks}
     correlations = {who: one.autocorrelation for who, one in white.items()}
     bound = max(one.bound for one in white.values())
     return Shown(

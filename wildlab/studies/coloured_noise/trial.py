@@ -105,7 +105,7 @@ def tuning_of(twin: str) -> FilterTunings:
     return TUNINGS[twin]
 
 
-def follow_singer(seen: Sighting, tuning: FilterTunings) -> Track:
+def track_by_singer(seen: Sighting, tuning: FilterTunings) -> Track:
     """Filter 2: Singer's motion, over the detections alone.
 
     The model is continuous in time, so that the frames in between change nothing.
@@ -119,7 +119,7 @@ def follow_singer(seen: Sighting, tuning: FilterTunings) -> Track:
     )  # fmt: skip
 
 
-def follow_coloured(seen: Sighting, tuning: FilterTunings) -> Track:
+def track_by_differences(seen: Sighting, tuning: FilterTunings) -> Track:
     """Filter 3: differences of measurements a second apart at most, H (7.7)-(7.12); over detections alone."""
     rows = seen.seen
     return run_coloured(
@@ -128,33 +128,33 @@ def follow_coloured(seen: Sighting, tuning: FilterTunings) -> Track:
     )  # fmt: skip
 
 
-def follow(seen: Sighting, tuning: FilterTunings) -> dict[str, ScoredTrack]:
+def track_target(seen: Sighting, tuning: FilterTunings) -> dict[str, ScoredTrack]:
     """A sighting through the three filters."""
     tracks = {
         "cv": follow_positions(seen, tuning.cv),
-        "singer": follow_singer(seen, tuning),
-        "coloured": follow_coloured(seen, tuning),
+        "singer": track_by_singer(seen, tuning),
+        "coloured": track_by_differences(seen, tuning),
     }
     return {subject: ScoredTrack(one, evaluate_track(seen, one)) for subject, one in tracks.items()}
 
 
-def follow_varied(seen: Sighting, tuning: FilterTunings) -> dict[str, ScoredTrack]:
+def track_varied(seen: Sighting, tuning: FilterTunings) -> dict[str, ScoredTrack]:
     """The variations of `VARIED`."""
     less = tuning.cv._replace(measurement=LESS_NOISE * tuning.cv.measurement)
     more = tuning.cv._replace(acceleration=MORE_ACCELERATION * tuning.cv.acceleration)
-    tracks = (follow_coloured(seen, tuning._replace(cv=less)), follow_positions(seen, more))
+    tracks = (track_by_differences(seen, tuning._replace(cv=less)), follow_positions(seen, more))
     return {
         subject: ScoredTrack(track, evaluate_track(seen, track))
         for subject, track in zip(VARIED, tracks, strict=True)
     }
 
 
-def beginnings(seen: Sighting, followed: dict[str, ScoredTrack]) -> Numbers:
+def beginnings(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
     """RMS error of the speed (m/s) within `BEGINNING_S` of the first frame, by filter."""
     rows = seen.times - seen.times[0] <= BEGINNING_S
     speed = np.hypot(*seen.truth[rows, 2:].T)
     result: Numbers = {}
-    for who, one in followed.items():
+    for who, one in tracks.items():
         apart = np.hypot(*one.track.x[rows, 2:4].T) - speed
         known = apart[np.isfinite(apart)]
         value = float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
@@ -173,9 +173,9 @@ def trial(seed: int, *, twin: str) -> Numbers:
     """
     tuning = tuning_of(twin)
     _, seen = fly_sighting(twin, seed, OBSERVER)
-    followed = follow(seen, tuning)
-    beside = numbers_beside(seen, tuning.cv, "cv", followed["cv"])
-    return numbers_of(seen, followed | follow_varied(seen, tuning)) | beginnings(seen, followed) | beside
+    tracks = track_target(seen, tuning)
+    beside = numbers_beside(seen, tuning.cv, "cv", tracks["cv"])
+    return numbers_of(seen, tracks | track_varied(seen, tuning)) | beginnings(seen, tracks) | beside
 
 
 def check_claims(spread: pd.DataFrame) -> dict[str, Check]:

@@ -16,7 +16,7 @@ from wildlab.studies.end_to_end.trial import (
     RENDERED,
     FlightPair,
     PixelErrors,
-    followed_by,
+    tracked_filters,
 )
 
 
@@ -58,7 +58,7 @@ def pixel_errors(errors: PixelErrors) -> Figure:
 def track_errors(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """Mean distance of each filter on each flight, with both kinds of detections."""
     fig, ax = new_figure(5.6, 3.0)
-    filters = followed_by(runs)
+    filters = tracked_filters(runs)
     for row, who in enumerate(filters):
         pairs = runs[[(f"{DRAWN}-{who}", "mae"), (f"{RENDERED}-{who}", "mae")]].to_numpy(float)
         for k, (drawn, rendered) in enumerate(pairs):

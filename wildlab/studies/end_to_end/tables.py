@@ -10,7 +10,7 @@ import pandas as pd
 
 from wildlab.evaluation.runs import mean_interval, mean_share_interval
 from wildlab.evaluation.shares import Check, Decision, decide
-from wildlab.studies.end_to_end.trial import DRAWN, KINDS, PIXEL_UNITS, RENDERED, followed_by
+from wildlab.studies.end_to_end.trial import DRAWN, KINDS, PIXEL_UNITS, RENDERED, tracked_filters
 
 #: Of the detections' numbers: shares, shown in per cent, and decimals of the others.
 SHARES = ("detection_rate", "ellipse_coverage_90", "ground_coverage_90_true_poses", "ground_coverage_90")
@@ -62,7 +62,7 @@ def tracks_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
                 for name in ("mae", "nees", "nis")
                 for kind in KINDS
             }
-            for who in followed_by(runs)
+            for who in tracked_filters(runs)
         ]
     )
 

@@ -174,11 +174,11 @@ def detection_numbers(pair: FlightPair, twin: str, seed: int) -> Numbers:
     marks = pair.marks
     found = marks.found & np.isfinite(marks.centre).all(axis=1)
     off = (marks.uv - marks.centre)[found]
-    stated = np.sqrt(np.trace(marks.covariance[found], axis1=1, axis2=2))
+    predicted = np.sqrt(np.trace(marks.covariance[found], axis1=1, axis2=2))
     return result | {
         (RENDERED, "false_alarms_per_image"): float(marks.false.mean()),
         (RENDERED, "ellipse_coverage_90"): float(inside_ellipse(off, marks.covariance[found], 0.9).mean()),
-        (RENDERED, "stated_sd"): float(np.median(stated)),
+        (RENDERED, "stated_sd"): float(np.median(predicted)),
         (RENDERED, "ground_coverage_90_true_poses"): float(_inside_with_true_poses(pair, twin, seed).mean()),
         (RENDERED, "ground_coverage_90"): float(_inside_as_flown(pair, source_of(twin)).mean()),
     }
@@ -202,7 +202,7 @@ def _inside_with_true_poses(pair: FlightPair, twin: str, seed: int) -> NDArray[n
 
 
 def _inside_as_flown(pair: FlightPair, source: str) -> NDArray[np.bool_]:
-    """Whether the ellipses with the flight's own poses and what is stated of them hold the receiver: (K,)."""
+    """(K,) whether the ellipses with the flight's own poses and their reported errors hold the receiver."""
     flight = pair.flights[RENDERED]
     seen = observe(flight, source)
     errors = pose_errors(flight, seen)._replace(pixel=pair.marks.covariance[pair.marks.found])
@@ -218,14 +218,14 @@ def track_numbers(seen: Sighting, twin: str) -> Numbers:
     result: Numbers = {}
     if twin in filters.CASES:
         result |= filters.numbers_of(
-            seen, filters.follow(seen, filters.CASES[twin].tuning, filters.PUBLISHED)
+            seen, filters.track_target(seen, filters.CASES[twin].tuning, filters.PUBLISHED)
         )
     if twin in coloured.TUNINGS:
         tuning = coloured.TUNINGS[twin]
-        followed = coloured.follow(seen, tuning)
-        result |= filters.numbers_of(seen, followed | coloured.follow_varied(seen, tuning))
-        result |= coloured.beginnings(seen, followed)
-        result |= filters.numbers_beside(seen, tuning.cv, "cv", followed["cv"])
+        tracks = coloured.track_target(seen, tuning)
+        result |= filters.numbers_of(seen, tracks | coloured.track_varied(seen, tuning))
+        result |= coloured.beginnings(seen, tracks)
+        result |= filters.numbers_beside(seen, tuning.cv, "cv", tracks["cv"])
     return result
 
 
@@ -269,7 +269,7 @@ def checks_of(spread: pd.DataFrame, kind: str) -> dict[str, dict[str, Check]]:
     return {case: check(own) for case, check in checked.items() if set(_OF[case]) <= subjects}
 
 
-def followed_by(spread: pd.DataFrame) -> tuple[str, ...]:
+def tracked_filters(spread: pd.DataFrame) -> tuple[str, ...]:
     """The filters whose tracks are there with both kinds of detections."""
     columns: Any = spread.columns
     subjects = {who for who, _ in columns}
@@ -292,7 +292,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     apart = np.max(
         [
             np.abs(of(f"{RENDERED}-{who}", "mae") / of(f"{DRAWN}-{who}", "mae") - 1)
-            for who in followed_by(spread)
+            for who in tracked_filters(spread)
         ],
         axis=0,
     )

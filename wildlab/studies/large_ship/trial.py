@@ -83,7 +83,7 @@ class Photographs(NamedTuple):
     shots
         The images and what was found in them, in order.
     length
-        Of the ship, px: its printed length from the printed height, which the detector is told (H 6.4.1).
+        Of the ship, px: its printed length from the printed height, which the detector is given (H 6.4.1).
     """
 
     flight: Flight
@@ -108,7 +108,7 @@ class Tracked(NamedTuple):
     Attributes
     ----------
     seen
-        With times as if the segments followed one another, as in H 6.4.1.
+        With times as if the segments came one after another, as in H 6.4.1.
     marks
         The same detections in the images.
     track
@@ -143,13 +143,13 @@ def photograph(twin: str, seed: int, every: int) -> Photographs:
     if outline is None:
         raise ValueError("the target has no outline")
     shots = list(camera.shoot(exposures_of(flight.table("frames"))[::every]))
-    stated = flight.manifest.geometry_camera()
-    per_metre = float(np.sqrt(stated.fx * stated.fy)) / parameters.flight.altitude.si
+    nominal = flight.manifest.geometry_camera()
+    per_metre = float(np.sqrt(nominal.fx * nominal.fy)) / parameters.flight.altitude.si
     return Photographs(flight, camera, shots, outline.length.si * per_metre)
 
 
 def merged_times(times: Array, groups: NDArray[np.object_]) -> Array:
-    """Times (N,) from zero on, s, as if groups of frames followed one another without a pause.
+    """Times (N,) from zero on, s, as if groups of frames came one after another without a pause.
 
     From the last frame of a group to the first of the next it takes as long as between two frames.
 
@@ -164,7 +164,7 @@ def merged_times(times: Array, groups: NDArray[np.object_]) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.where(same, steps, usual))])
 
 
-def follow(taken: Photographs, marks: Marks) -> Tracked:
+def track_marks(taken: Photographs, marks: Marks) -> Tracked:
     """Put detections on the sea with the autopilot's poses, and track them in the image, H 6.3."""
     target = str(taken.flight.table("detections")["target_id"].iloc[0])
     flight = with_detections(taken.flight, marks, target)
@@ -291,9 +291,9 @@ def share_within(tracked: dict[str, Tracked]) -> float:
     return float((np.abs(distances[0] - distances[1])[later] < APART_M).mean())
 
 
-def follow_both(taken: Photographs) -> dict[str, Tracked]:
+def track_both(taken: Photographs) -> dict[str, Tracked]:
     """With the adjustment and without it, by subject."""
-    return {WITH: follow(taken, taken.marks()), WITHOUT: follow(taken, taken.marks(moved=False))}
+    return {WITH: track_marks(taken, taken.marks()), WITHOUT: track_marks(taken, taken.marks(moved=False))}
 
 
 def trial(seed: int, *, twin: str, every: int) -> Numbers:
@@ -305,4 +305,4 @@ def trial(seed: int, *, twin: str, every: int) -> Numbers:
         If there is no such twin, or the ship is found nowhere.
     """
     taken = photograph(twin, seed, every)
-    return numbers_of(taken, follow_both(taken))
+    return numbers_of(taken, track_both(taken))

@@ -187,7 +187,7 @@ FILTERS: dict[str, Callable[[Sighting, CvTuning], Track]] = {
 }
 
 
-def follow(
+def track_target(
     seen: Sighting, tuning: CvTuning, subjects: tuple[str, ...] = (*PUBLISHED, *BESIDE)
 ) -> dict[str, ScoredTrack]:
     """A sighting through the filters of these names.
@@ -200,26 +200,24 @@ def follow(
     }
 
 
-def numbers_of(seen: Sighting, followed: dict[str, ScoredTrack]) -> Numbers:
+def numbers_of(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
     """What is compared over flights: the numbers of `evaluate_track` by filter.
 
     The subject ``measurements`` has those of `evaluate_measurements`, and ``detections``, how many there are.
     """
-    result = {
-        (who, name): value for who, one in followed.items() for name, value in one.scored.numbers.items()
-    }
+    result = {(who, name): value for who, one in tracks.items() for name, value in one.scored.numbers.items()}
     measured = {**evaluate_measurements(seen), "detections": float(seen.seen.sum())}
     return result | {("measurements", name): value for name, value in measured.items()}
 
 
-def numbers_beside(seen: Sighting, tuning: CvTuning, base: str, followed: ScoredTrack) -> Numbers:
+def numbers_beside(seen: Sighting, tuning: CvTuning, base: str, base_track: ScoredTrack) -> Numbers:
     """Numbers of a filter on the ground with the noise that H 8.2 proposes, and with fewer detections.
 
     The subjects are ``base`` and one of `wildlab.analysis.measurement_noise.VARIATIONS`; ``detections`` says
-    how many each was given. ``followed`` is what the filter itself made of the sighting.
+    how many each was given. ``base_track`` is what the filter itself made of the sighting.
     """
     result: Numbers = {}
-    for name, (given, track) in follow_variations(seen, tuning, followed.track).items():
+    for name, (given, track) in follow_variations(seen, tuning, base_track.track).items():
         who = f"{base}-{name}"
         result |= {(who, key): value for key, value in evaluate_track(seen, track).numbers.items()}
         result[who, "detections"] = float(given.seen.sum())
@@ -240,12 +238,12 @@ def trial(seed: int, *, twin: str, beside: str) -> Numbers:
     """
     case = case_of(twin)
     _, seen = fly_sighting(twin, seed, case.source)
-    followed = follow(seen, case.tuning, EVERYWHERE)
-    found = numbers_of(seen, followed) | numbers_beside(seen, case.tuning, "kf", followed["kf"])
+    tracks = track_target(seen, case.tuning, EVERYWHERE)
+    found = numbers_of(seen, tracks) | numbers_beside(seen, case.tuning, "kf", tracks["kf"])
     if beside:
         case = case_of(beside)
         _, seen = fly_sighting(beside, seed, case.source)
-        other = numbers_of(seen, follow(seen, case.tuning, PUBLISHED))
+        other = numbers_of(seen, track_target(seen, case.tuning, PUBLISHED))
         correlations = [
             abs(other[who, f"lag1_autocorrelation_{axis}"]) for who in PUBLISHED for axis in AXES[who]
         ]

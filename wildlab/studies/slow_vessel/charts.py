@@ -11,7 +11,7 @@ from wildlab.flight.store import Flight
 from wildlab.reporting.charts.georeferencing import aircraft_map, errors_over_time, positions_map
 from wildlab.reporting.figures import colour
 from wildlab.studies.page import Shown
-from wildlab.studies.slow_vessel.trial import COLUMNS, follow, subset_of
+from wildlab.studies.slow_vessel.trial import COLUMNS, subset_of, track_vessel
 
 _PLACE = ["north_m", "east_m"]
 
@@ -42,7 +42,7 @@ def map_figures(flight: Flight, scored: Mapping[str, pd.DataFrame]) -> list[Show
 
 def track_figures(scored: pd.DataFrame) -> list[Shown]:
     """Errors of single images and of the track over time, on the subset and on the whole flight."""
-    tracks = {"fig-5-12a": follow(subset_of(scored)), "fig-5-12b": follow(scored)}
+    tracks = {"fig-5-12a": track_vessel(subset_of(scored)), "fig-5-12b": track_vessel(scored)}
     errors = {name: (np.hypot(*one.measured.T), np.hypot(*one.error.T)) for name, one in tracks.items()}
     reach = 1.05 * max(float(values.max()) for both in errors.values() for values in both)
     return [

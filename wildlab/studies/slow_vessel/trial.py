@@ -74,14 +74,14 @@ class VesselEstimates(NamedTuple):
         (N,) s.
     measured, error
         (N, 2) errors of the detections and of the estimates, north and east, m.
-    stated
+    predicted
         (N,) what the filter takes the distance's standard deviation to be, m.
     """
 
     times: Array
     measured: Array
     error: Array
-    stated: Array
+    predicted: Array
 
 
 def evaluate_sources(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:
@@ -109,7 +109,7 @@ def subset_of(scored: pd.DataFrame) -> pd.DataFrame:
     return scored[scored["group"] == SUBSET]
 
 
-def follow(scored: pd.DataFrame, longest_step: float = STEP_S) -> VesselEstimates:
+def track_vessel(scored: pd.DataFrame, longest_step: float = STEP_S) -> VesselEstimates:
     """The Kalman filter with constant velocity on scored points, started on the first one with zero speed.
 
     H 6.2, with the tuning above. ``longest_step`` (s) is how long an acceleration is held; infinity: from one
@@ -127,8 +127,8 @@ def follow(scored: pd.DataFrame, longest_step: float = STEP_S) -> VesselEstimate
         lambda dt: in_steps(dt, motion, longest_step),
         start_from_first(times, xy, SD_POSITION_0, SD_VELOCITY_0),
     )
-    stated = np.sqrt(np.trace(track.P[:, :2, :2], axis1=1, axis2=2))
-    return VesselEstimates(times, measured, track.x[:, :2] - (xy - measured), stated)
+    predicted = np.sqrt(np.trace(track.P[:, :2, :2], axis1=1, axis2=2))
+    return VesselEstimates(times, measured, track.x[:, :2] - (xy - measured), predicted)
 
 
 def true_positions(flight: Flight, scored: pd.DataFrame) -> Array:
@@ -193,9 +193,9 @@ def summarise_vessel(flight: Flight, scored: dict[str, pd.DataFrame]) -> dict[tu
         (f"filter-{SUBSET}", subset_of(table), STEP_S),
         ("filter-by-detections", table, np.inf),
     ):
-        followed = follow(part, step)
-        error = np.hypot(*followed.error.T)
-        beginning = followed.times <= followed.times[0] + BEGINNING_S
+        found = track_vessel(part, step)
+        error = np.hypot(*found.error.T)
+        beginning = found.times <= found.times[0] + BEGINNING_S
         result |= {
             (subject, "beginning"): float(error[beginning].max()),
             (subject, "mean"): float(error.mean()),

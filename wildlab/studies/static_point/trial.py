@@ -137,17 +137,17 @@ def summarise_at_rest(scored: dict[str, pd.DataFrame]) -> dict[tuple[str, str], 
         result |= table_numbers(column, table)
     table = scored["observer"].sort_values("time_s", kind="stable")
     single = table["error_m"].to_numpy(float)
-    followed = filter_errors(table)
-    distance = np.hypot(*followed.x.T)
+    track = filter_errors(table)
+    distance = np.hypot(*track.x.T)
     pauses = np.flatnonzero(np.diff(table["time_s"]) > BATCH_GAP_S)
     return result | {
         ("observer", "largest"): float(np.nanmax(single)),
         ("observer", "smallest"): float(np.nanmin(single)),
         ("filter", "after_first_batch"): float(distance[pauses[0] if len(pauses) else -1]),
         ("filter", "at_end"): float(distance[-1]),
-        ("filter", "nees_at_end"): float(followed.x[-1] @ np.linalg.solve(followed.P[-1], followed.x[-1])),
-        ("filter", "lag1_north"): float(autocorrelation(followed.innovation[1:, 0], 1)[1]),
-        ("filter", "lag1_east"): float(autocorrelation(followed.innovation[1:, 1], 1)[1]),
+        ("filter", "nees_at_end"): float(track.x[-1] @ np.linalg.solve(track.P[-1], track.x[-1])),
+        ("filter", "lag1_north"): float(autocorrelation(track.innovation[1:, 0], 1)[1]),
+        ("filter", "lag1_east"): float(autocorrelation(track.innovation[1:, 1], 1)[1]),
         ("filter", "coverage"): float(table["inside_90"].mean()),
     }
 
