@@ -72,21 +72,6 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
     return finish(fig, title, "time (s)")
 
 
-def span_words(sources: Mapping[str, Strips]) -> str:
-    """From where to where each quantity goes, by source: for alternative texts."""
-    said = []
-    for name, (_, quantities) in sources.items():
-        parts = []
-        for label, values in quantities.items():
-            what, _, unit = label.rstrip(")").partition(" (")
-            known = np.asarray(values, float)
-            if np.isfinite(known).any():
-                low, high = np.nanmin(known), np.nanmax(known)
-                parts.append(f"{what} {low:.0f} to {high:.0f} {unit}".replace(" °", "°"))
-        said.append(f"{_named(name)}: {', '.join(parts)}")
-    return "; ".join(said)
-
-
 def mark_period(fig: Figure, period: tuple[float, float] | None) -> None:
     """Draw a black line over time at either end of a period, s, in every strip; nothing without one."""
     for ax in fig.axes if period is not None else ():
