@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers import box_files
+from wildlab.flight.readers import boxes
 from wildlab.flight.readers.labels import Labels, read_labels
 
 #: Two animals and a car in an image of 200 x 100 pixels, and an image in which nothing is.
@@ -210,7 +210,7 @@ def test_folders_that_are_none_of_yolo_are_refused(tmp_path, monkeypatch):
         read_labels(tmp_path / "labels")
     write(tmp_path / "data.yaml", "nc: 3\n")
     assert len(read_labels(tmp_path / "labels").boxes) == 2
-    monkeypatch.setattr(box_files, "MOST_FILES", 1)
+    monkeypatch.setattr(boxes, "MOST_FILES", 1)
     with pytest.raises(WildlabError, match="more than 1"):
         read_labels(tmp_path / "labels")
 

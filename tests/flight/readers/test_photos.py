@@ -18,10 +18,10 @@ from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.tracks import near
 from wildlab.errors import WildlabError
 from wildlab.flight.readers import photo_tags
-from wildlab.flight.readers import photo_values as values
+from wildlab.flight.readers import photo_tags as values
 from wildlab.flight.readers.formats import read_folder
 from wildlab.flight.readers.log import RawLog
-from wildlab.flight.readers.photo_values import from_nadir
+from wildlab.flight.readers.photo_tags import from_nadir
 from wildlab.flight.readers.photos import camera_of, is_photos
 
 NOON = datetime(2024, 6, 12, 11, 30, tzinfo=UTC).timestamp()

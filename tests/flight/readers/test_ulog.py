@@ -13,8 +13,7 @@ from tests.flight.readers.mavlink_logs import START_S, message, ulog
 from tests.flight.readers.tracks import Reader, check, near, survives
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.formats import recognise
-from wildlab.flight.readers.px4 import TOPICS, from_local
-from wildlab.flight.readers.ulog import sound_part
+from wildlab.flight.readers.px4 import TOPICS, from_local, sound_part
 
 reader = Reader("ulog")
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.autopilot import (
-    AXES,
     FIELD,
     FIX_PLANE,
     FIX_SPACE,
@@ -23,7 +22,7 @@ from wildlab.flight.readers.autopilot import (
 )
 from wildlab.flight.readers.dataflash import MessageTable, Unit, read_lines, read_records, sniff, text_sniff
 from wildlab.flight.readers.judging import in_order, placed
-from wildlab.flight.readers.log import ANGLES, Array, Clock, Decoded, Mask, Readings, any_of
+from wildlab.flight.readers.log import ANGLES, VELOCITY, Array, Clock, Decoded, Mask, Readings, any_of
 from wildlab.flight.readers.text import percent
 from wildlab.flight.schema import SPEED
 from wildlab.flight.time.leap_seconds import week_to_utc
@@ -422,7 +421,7 @@ def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
     where = {one: np.full(len(table), np.nan) for one in _PLACE} if place is None else place.at(stamps)
     moving = log.first(("XKF1", "NKF1", "EKF1"), "VN", "VE", "VD")
     if moving is not None:
-        v = {f"v_{one}_m_s": moving.get(f"V{one[0].upper()}", unit="m/s") for one in AXES}
+        v = {name: moving.get(f"V{name[2].upper()}", unit="m/s") for name in VELOCITY}
         columns |= at_times(log.of(moving), v, stamps, f"messages {moving.name}")
     high = any_of([np.isfinite(where[one]) for one in _PLACE[2:]], len(table))
     low = np.isfinite(where["latitude_deg"]) & ~high

@@ -17,8 +17,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular
-from wildlab.flight.readers.documents import Field, parse_json
-from wildlab.flight.readers.kml import read_kml
+from wildlab.flight.readers.documents import Field, parse_json, read_kml
 from wildlab.geometry.frames import (
     Array,
     Origin,

@@ -19,9 +19,10 @@ from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 FIX_PLANE, FIX_SPACE = 2, 3
 #: GIMBAL_DEVICE_FLAGS: yaw is held against north; it is given against the vehicle; it is given against north.
 YAW_LOCK, YAW_VEHICLE, YAW_NORTH = 16, 32, 64
-AXES = ("north", "east", "down")
 IMU = ("f_x_m_s2", "f_y_m_s2", "f_z_m_s2", "w_x_rad_s", "w_y_rad_s", "w_z_rad_s")
 FIELD = ("field_x_ut", "field_y_ut", "field_z_ut")
+#: Columns of a place on Earth -> fields of MAVLink and of its relatives.
+LAT_LON = {"latitude_deg": "lat", "longitude_deg": "lon lng"}
 
 
 class Columns(Mapping[str, Any]):
@@ -75,6 +76,11 @@ class Messages:
                 with np.errstate(invalid="ignore"):
                     return np.asarray(self.fields[name]).astype(np.float64)
         return np.full(len(self), np.nan)
+
+    def columns(self, names: Mapping[str, str], divisor: float = 1.0) -> dict[str, Array]:
+        """Columns by our names out of fields (the first of those in a text that it has), divided by a
+        number."""
+        return {ours: self.get(*theirs.split()) / divisor for ours, theirs in names.items()}
 
     def several(self, *names: str) -> Array:
         """Fields beside each other, (N, K)."""

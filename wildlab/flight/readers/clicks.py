@@ -11,22 +11,23 @@ from collections.abc import Iterable, Mapping
 from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Any
-from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import leaves_folder, printable
-from wildlab.flight.readers.box_files import (
+from wildlab.flight.readers.boxes import (
     IMAGE_COLUMNS,
+    Boxes,
+    Marked,
     plain_names,
+    read_json_boxes,
     read_table_clicks,
     read_yolo_folder,
     way_of,
 )
-from wildlab.flight.readers.boxes import Marked, read_json_boxes
-from wildlab.flight.readers.documents import XmlReader
+from wildlab.flight.readers.documents import BrokenXml, parse_xml
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import Decoded, Readings
 from wildlab.flight.readers.photo_tags import read_tags, size_of
@@ -193,67 +194,39 @@ def _is_image(path: Path) -> bool:
         return False
 
 
-class Cvat(XmlReader):
-    """CVAT's format for images, 1.1: image, name and box of each thing, and how many other shapes there
-    are."""
-
-    deepest = 50
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        self.found: list[tuple[str, str, tuple[float, ...]]] = []
-        self.others: Counter[str] = Counter()
-        self._image = self._attribute = ""
-        self._first = 0
-
-    def begin(self, name: str, attributes: dict[str, str]) -> None:
-        if len(self.found) >= MOST:
-            raise WildlabError("marks too much", "export less of it", file=self.path)
-        if name == "image":
-            self._image = attributes.get("name", "")
-        elif self.inside[-1:] == ["image"]:
-            self._first = len(self.found)
-            self._shape(name, attributes)
-        elif name == "attribute":
-            self._attribute = attributes.get("name", "").strip().lower()
-
-    def _shape(self, tag: str, given: dict[str, str]) -> None:
-        if tag == "box":
-            left, top, right, bottom = (number(given.get(one)) for one in ("xtl", "ytl", "xbr", "ybr"))
-            boxes = [(left, top, right - left, bottom - top)]
-        elif tag == "points":
-            places = given.get("points", "").split(";")[: MOST - len(self.found)]
-            pairs = (one.partition(",")[::2] for one in places)
-            boxes = [(number(u), number(v), 0.0, 0.0) for u, v in pairs]
-        else:
-            self.others[tag[:40]] += tag != "tag"
-            return
-        self.found += [(self._image, given.get("label", ""), box) for box in boxes]
-
-    def finish(self, name: str, words: str) -> None:
-        named = words.strip()
-        if name == "attribute" and self._attribute in NAMES and named and "image" in self.inside[:-1]:
-            self.found[self._first :] = [(image, named, box) for image, _, box in self.found[self._first :]]
-
-
 def _cvat(data: bytes, path: Path) -> Marked:
-    reader = Cvat(path)
+    """Boxes and points of CVAT's format for images, 1.1."""
+    left_out: Counter[str] = Counter()
     try:
-        reader.read(data)
-    except expat.ExpatError as error:
-        said = printable(str(error))[:100]
-        if not reader.found:
-            raise WildlabError(f"is not readable XML ({said})", "export it anew", file=path) from None
-        reader.others[f"what stands after the place where the XML breaks off ({said})"] += 1
-    if not reader.found:
+        root = parse_xml(data, path)
+    except BrokenXml as error:
+        if error.root is None or error.root.find(".//image/*") is None:
+            raise
+        root = error.root
+        left_out[f"what stands after the place where it breaks off: it {error.problem}"] += 1
+    boxes = Boxes()
+    for image in root.iter("image"):
+        for shape in image:
+            named = [
+                (one.text or "").strip()
+                for one in shape.iter("attribute")
+                if one.get("name", "").strip().lower() in NAMES
+            ]
+            name = next((one for one in reversed(named) if one), shape.get("label", ""))
+            if shape.tag == "box":
+                left, top, right, bottom = (number(shape.get(one)) for one in ("xtl", "ytl", "xbr", "ybr"))
+                places = [(left, top, right - left, bottom - top)]
+            elif shape.tag == "points":
+                pairs = (one.partition(",") for one in shape.get("points", "").split(";"))
+                places = [(number(u), number(v), 0.0, 0.0) for u, _, v in pairs]
+            else:
+                left_out[f"shape {printable(shape.tag[:40])}"] += shape.tag != "tag"
+                continue
+            boxes.found += [(image.get("name", ""), one, name, np.nan, False) for one in places]
+    if len(boxes.found) > MOST:
+        raise WildlabError("marks too much", "export less of it", file=path)
+    if not boxes.found:
         raise WildlabError(
             "has no box or point of CVAT", "export the task as CVAT for images 1.1", file=path, field="image"
         )
-    images, names, boxes = map(list, zip(*reader.found, strict=True))
-    count = len(boxes)
-    scores, crowd = np.full(count, np.nan), np.zeros(count, bool)
-    left_out = {f"shape {printable(what)}": many for what, many in reader.others.items() if many}
-    return Marked(
-        "CVAT", images, np.array(boxes, float), names, scores, crowd, (), (),
-        left_out=left_out, counted_in="shape",
-    )  # fmt: skip
+    return boxes.marked("CVAT", None, None, left_out=+left_out, counted_in="shape")

@@ -1,11 +1,12 @@
-"""JSON and XML of strangers: parsed within bounds, and values checked when they are asked for."""
+"""JSON, XML and KML of strangers: parsed within bounds, and values checked when they are asked for."""
 
 from __future__ import annotations
 
 import json
 import math
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, Self
+from typing import Any, NamedTuple, NoReturn
+from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from wildlab.errors import WildlabError
@@ -124,65 +125,140 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-class XmlReader:
-    """What expat tells of a file, element by element, without entities, links or else what reaches out.
+#: Bytes of an XML file, elements inside each other, and letters of a name that are kept, at most.
+MOST_XML, DEEPEST, MOST_LETTERS = 50_000_000, 50, 200
 
-    Readers of a format say what becomes of elements in `begin` and `finish`.
+
+class BrokenXml(WildlabError):
+    """XML that breaks off; `root` is what stands before that, None where nothing does."""
+
+    root: Element | None = None
+
+
+def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML") -> Element:
+    """The root of an XML file, without entities, links or else what reaches out; name spaces stand before
+    names.
+
+    Parameters
+    ----------
+    data
+        Its content.
+    path
+        For messages.
+    what
+        What it should be, for messages.
+
+    Raises
+    ------
+    BrokenXml
+        Where it is not XML, or breaks off.
+    WildlabError
+        Where it is too large, declares a document type or entities, or is nested too deeply.
     """
 
-    #: Elements inside each other at most.
-    deepest = 100
+    def fail(problem: str) -> WildlabError:
+        return WildlabError(problem, "export it anew", file=path)
 
-    def __init__(self, path: Path | None = None) -> None:
-        self.path = path
-        #: Names of the elements about the one that is told.
-        self.inside: list[str] = []
-        self._words: list[str] = []
+    def refuse(*_: object) -> NoReturn:
+        raise fail("declares a document type or entities, which no such file needs")
 
-    def read(self, data: bytes) -> Self:
-        """Go through a file.
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        if len(inside) >= DEEPEST:
+            raise fail("its elements are too deep in each other")
+        inside.append(tag)
+        builder.start(tag, attributes)
 
-        Raises
-        ------
-        WildlabError
-            Where it declares a document type or entities, or is nested too deeply.
-        expat.ExpatError
-            Where it is not XML.
-        """
-        parser = expat.ParserCreate(namespace_separator=" ")
-        parser.buffer_text = True
-        parser.StartElementHandler = self._start
-        parser.EndElementHandler = self._end
-        parser.CharacterDataHandler = self._words.append
-        parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = self._refuse
+    def end(tag: str) -> None:
+        builder.end(inside.pop())
+
+    if len(data) > MOST_XML:
+        raise fail(f"has {len(data):,} bytes, and {MOST_XML:,} are the most that is read of XML")
+    inside: list[str] = []
+    builder = TreeBuilder()
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
         parser.Parse(data, True)
-        return self
+    except expat.ExpatError as error:
+        broken = BrokenXml(f"is not {what} ({printable(str(error))[:100]})", "export it anew", file=path)
+        begun = bool(inside)
+        while inside:
+            end("")
+        broken.root = builder.close() if begun else None
+        raise broken from None
+    return builder.close()
 
-    def called(self, tag: str) -> str:
-        """What an element or attribute is called, of its name space and name."""
-        return tag.rpartition(" ")[2]
 
-    def begin(self, name: str, attributes: dict[str, str]) -> None:
-        """An element begins."""
+# -- KML
 
-    def finish(self, name: str, words: str) -> None:
-        """An element ends; the text is that behind the last element within it."""
 
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        if len(self.inside) >= self.deepest:
-            raise WildlabError("its elements are too deep in each other", "export it anew", file=self.path)
-        name = self.called(tag)
-        self._words.clear()
-        self.begin(name, attributes)
-        self.inside.append(name)
+class Placemark(NamedTuple):
+    """A point or a polygon of a placemark.
 
-    def _end(self, tag: str) -> None:
-        self.finish(self.inside.pop(), "".join(self._words))
-        self._words.clear()
+    `rings` of (longitude, latitude, altitude) in degrees and m, the outer one first; of a point one with a
+    single place. The altitude is NaN where there is none; `mode` is KML's ``altitudeMode``.
+    """
 
-    def _refuse(self, *_: object) -> NoReturn:
-        raise WildlabError(
-            "declares a document type or entities, which no such file needs",
-            "export it anew, or take the declaration out",
-            file=self.path,
-        )
+    name: str
+    rings: list[list[tuple[float, float, float]]]
+    mode: str = ""
+
+
+class Kml(NamedTuple):
+    """Polygons and points of a KML file, and how many geometries it has that are no points."""
+
+    polygons: list[Placemark]
+    points: list[Placemark]
+    others: int
+
+
+def read_kml(data: bytes, path: Path) -> Kml:
+    """Polygons and points of a KML file; `path` is for messages.
+
+    Raises
+    ------
+    WildlabError
+        Where it is not KML, declares a document type or entities, or has coordinates that are none.
+    """
+    root = parse_xml(data, path, "KML")
+    for one in root.iter():
+        one.tag = one.tag.rpartition(" ")[2]
+    if root.tag != "kml":
+        raise WildlabError("is XML, and no KML", "export it as KML or GeoJSON", file=path)
+
+    def places(of: Element, where: str) -> list[list[tuple[float, float, float]]]:
+        return [_places(one.text or "", path) for one in of.iterfind(f"{where}coordinates")]
+
+    found = Kml([], [], sum(len(list(root.iter(one))) for one in ("LineString", "Track", "Model", "Polygon")))
+    rings = len(list(root.iter("LinearRing"))) - len(root.findall(".//Polygon//LinearRing"))
+    for mark in root.iter("Placemark"):
+        name = (mark.findtext("name") or "")[:MOST_LETTERS]
+        for one in mark.iter("Point"):
+            mode = (one.findtext("altitudeMode") or "clampToGround").strip()[:MOST_LETTERS]
+            found.points.extend(Placemark(name, [ring[:1]], mode) for ring in places(one, "") if ring)
+        for one in mark.iter("Polygon"):
+            outer = places(one, "outerBoundaryIs//")
+            if not outer:
+                raise WildlabError("a polygon has no outline", "export it anew", file=path)
+            found.polygons.append(Placemark(name, [outer[0], *places(one, "innerBoundaryIs//")]))
+    return found._replace(others=found.others + rings)
+
+
+def _places(words: str, path: Path) -> list[tuple[float, float, float]]:
+    places = []
+    for word in words.split():
+        parts = word.split(",")
+        try:
+            high = float(parts[2]) if len(parts) > 2 and parts[2] else math.nan
+            places.append((float(parts[0]), float(parts[1]), high))
+        except (ValueError, IndexError):
+            raise WildlabError(
+                f"{printable(word)[:40]!r} is no coordinate",
+                "give longitude,latitude with a comma and without blanks between them",
+                file=path,
+                field="coordinates",
+            ) from None
+    return places

@@ -51,7 +51,7 @@ FORMATS: dict[str, Format] = {
     "gpx": Format("gpx", "GPX track", track=True),
     "dji-srt": Format("dji", "DJI subtitles", track=True, start="srt_"),
     "dji-mrk": Format("dji", "DJI time stamps of images", track=True, start="mrk_"),
-    "airdata": Format("airdata", "AirData table", track=True),
+    "airdata": Format("dji", "AirData table", track=True, start="airdata_"),
     "rtklib-pos": Format("rtklib", "RTKLIB positions", track=True),
     "nmea": Format("nmea", "NMEA 0183", track=True),
     "marks-kml": Format("marks", "KML placemarks", start="kml_"),

@@ -12,8 +12,14 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular, unreadable
-from wildlab.flight.readers.box_files import read_table_boxes, read_yolo_folder
-from wildlab.flight.readers.boxes import MOST_BYTES, MOST_IN_FRAME, Marked, read_json_boxes
+from wildlab.flight.readers.boxes import (
+    MOST_BYTES,
+    MOST_IN_FRAME,
+    Marked,
+    read_json_boxes,
+    read_table_boxes,
+    read_yolo_folder,
+)
 
 Array = NDArray[np.float64]
 

@@ -28,8 +28,8 @@ MARKS = ("use", "why")
 HEIGHTS = ("height_ellipsoid_m", "height_sea_m", "height_home_m", "undulation_m")
 #: Of the airframe; of the camera, against north and the horizon.
 ANGLES, WORLD = (tuple(f"{one}{end}_deg" for one in ("roll", "pitch", "yaw")) for end in ("", "_world"))
-_PLACE = ("latitude_deg", "longitude_deg", *HEIGHTS)
-_VELOCITY = ("v_north_m_s", "v_east_m_s", "v_down_m_s")
+PLACE = ("latitude_deg", "longitude_deg", *HEIGHTS)
+VELOCITY = ("v_north_m_s", "v_east_m_s", "v_down_m_s")
 _SPREADS = ("sd_horizontal_m", "sd_vertical_m", "sd_velocity_m_s")
 
 #: Parts of a log, and the columns that each may have beside `TIMES` and `MARKS`.
@@ -37,13 +37,13 @@ PARTS: dict[str, tuple[str, ...]] = {
     # Where the vehicle was and how it was turned, as it found itself; attitude b -> n by roll, pitch and yaw
     # (zyx), or by a quaternion.
     "poses": (
-        *_PLACE,
-        *_VELOCITY,
+        *PLACE,
+        *VELOCITY,
         *(*ANGLES, "q_w", "q_x", "q_y", "q_z"),
         *("sd_horizontal_m", "sd_vertical_m", "sd_tilt_deg", "sd_heading_deg"),
     ),
     # Satellite positions, of the first receiver; `fix` as NMEA and MAVLink number kinds: 3 is in space.
-    "gnss": (*_PLACE, *_VELOCITY, *_SPREADS, "satellites", "fix", "hdop"),
+    "gnss": (*PLACE, *VELOCITY, *_SPREADS, "satellites", "fix", "hdop"),
     # Forward, right, down; at rest and level f is (0, 0, -g).
     "imu": ("f_x_m_s2", "f_y_m_s2", "f_z_m_s2", "w_x_rad_s", "w_y_rad_s", "w_z_rad_s"),
     "magnetometer": tuple(f"field_{axis}_ut" for axis in "xyz"),
@@ -52,16 +52,16 @@ PARTS: dict[str, tuple[str, ...]] = {
     "gimbal": (*WORLD, "pan_deg", "tilt_deg"),
     # Records of the autopilot that the camera was triggered.
     "triggers": (
-        *("number", *_PLACE, *ANGLES),
+        *("number", *PLACE, *ANGLES),
         *("sd_horizontal_m", "sd_vertical_m", "fix", "file"),
     ),
     # Images with what stands in them; `time_log_s` is the camera's own wall clock as if it were UTC.
     "photos": (
-        *("file", *_PLACE, *ANGLES, *WORLD, "sd_horizontal_m", "sd_vertical_m", "fix"),
+        *("file", *PLACE, *ANGLES, *WORLD, "sd_horizontal_m", "sd_vertical_m", "fix"),
         *("width_px", "height_px", "focal_mm", "focal_px", "focal_35mm", "focal_from", "camera"),
     ),
     # Surveyed points that do not move.
-    "marks": ("name", *_PLACE, "sd_horizontal_m", "sd_vertical_m"),
+    "marks": ("name", *PLACE, "sd_horizontal_m", "sd_vertical_m"),
     # Pixels of things in images: a point, and a box where there is one.
     "clicks": (
         *("image", "name", "u_px", "v_px", "score"),

@@ -13,8 +13,7 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable
-from wildlab.flight.readers.documents import number, parse_json, shown
-from wildlab.flight.readers.kml import read_kml
+from wildlab.flight.readers.documents import number, parse_json, read_kml, shown
 from wildlab.flight.readers.log import Decoded, Readings
 from wildlab.flight.readers.text import header_of, plain, read_text_table
 from wildlab.paths import DATA

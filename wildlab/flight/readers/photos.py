@@ -18,7 +18,7 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import unreadable
-from wildlab.flight.readers import photo_values as values
+from wildlab.flight.readers import photo_tags as values
 from wildlab.flight.readers.frames.image import SUFFIXES, file_name, no_images
 from wildlab.flight.readers.log import ANGLES, TEXTS, WORLD, Array, Clock, Decoded, RawLog, Readings, any_of
 from wildlab.flight.readers.photo_tags import Tags, read_tags, size_of

@@ -9,6 +9,7 @@ import re
 import unicodedata
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from itertools import dropwhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -169,10 +170,10 @@ def header_of(head: bytes) -> list[str]:
     return [plain(one) for one in line.replace('"', "").split(_sign(line))] if _sign(line) in line else []
 
 
-def _told(text: str) -> Iterable[tuple[int, str]]:
-    """Lines that say something, with their numbers: none that is empty or begins with ``#``."""
-    lines = enumerate(text.splitlines(), 1)
-    return ((at, one) for at, one in lines if one.strip() and not one.lstrip().startswith("#"))
+def _told(text: str) -> list[tuple[int, str]]:
+    """Lines from the header on, with their numbers: before it, those that begin with ``#`` say nothing."""
+    lines = [(at, one) for at, one in enumerate(text.splitlines(), 1) if one.strip()]
+    return list(dropwhile(lambda one: one[1].lstrip().startswith("#"), lines))
 
 
 def _sign(line: str) -> str:
@@ -185,7 +186,7 @@ def read_text_table(data: bytes, path: Path) -> TextTable:
     Parameters
     ----------
     data
-        The file's content; lines that begin with ``#`` say nothing.
+        The file's content. Lines that begin with ``#`` and have not as many values as columns say nothing.
     path
         For messages.
 
@@ -198,7 +199,7 @@ def read_text_table(data: bytes, path: Path) -> TextTable:
     WildlabError
         Where it has no header, no row, or too many columns.
     """
-    told = list(_told(decode(data).replace("\0", "")))
+    told = _told(decode(data).replace("\0", ""))
     if not told or _sign(told[0][1]) not in told[0][1]:
         raise WildlabError(
             "has no header of columns", "write it as CSV with a first line of names", file=path
@@ -225,7 +226,7 @@ def read_text_table(data: bytes, path: Path) -> TextTable:
         if len(row) == len(header):
             rows.append([one[:MOST_LETTERS] for one in row])
             at.append(line)
-        else:
+        elif not text.lstrip().startswith("#"):
             short.append((line, len(row)))
     if not rows:
         what = "has no row under its header"

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable
 from wildlab.flight.readers.autopilot import (
-    AXES,
     FIELD,
     IMU,
+    LAT_LON,
     Messages,
     at_times,
     device_angles,
@@ -36,7 +36,7 @@ from wildlab.flight.readers.autopilot import (
     wrapped,
 )
 from wildlab.flight.readers.judging import placed
-from wildlab.flight.readers.log import ANGLES, WORLD, Array, Clock, Decoded, Mask, Readings, any_of
+from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Mask, Readings, any_of
 from wildlab.flight.time.fitting import ClockFit
 from wildlab.flight.time.steady import fit_steady
 
@@ -457,11 +457,9 @@ def _poses(vehicle: Vehicle, notes: list[str]) -> Readings | None:
             notes.append(f"{len(position)} positions stand without any attitude: there are no poses")
         return None
     columns = {name: np.degrees(attitude.get(name[:-4])) for name in ANGLES}
-    place = {
-        **{"latitude_deg": position.get("lat") / 1e7, "longitude_deg": position.get("lon") / 1e7},
-        **{"height_sea_m": position.get("alt") / 1e3, "height_home_m": position.get("relative_alt") / 1e3},
-        **{f"v_{axis}_m_s": position.get(f"v{one}") / 1e2 for axis, one in zip(AXES, "xyz", strict=True)},
-    }
+    place = position.columns(LAT_LON, 1e7)
+    place |= position.columns({"height_sea_m": "alt", "height_home_m": "relative_alt"}, 1e3)
+    place |= position.columns(dict(zip(VELOCITY, ("vx", "vy", "vz"), strict=True)), 1e2)
     made = vehicle.readings(attitude, "time_boot_ms", columns)
     where = vehicle.readings(position, "time_boot_ms", {})
     doubtful = any_of(where.unusable.values(), len(position))
@@ -473,21 +471,24 @@ def _poses(vehicle: Vehicle, notes: list[str]) -> Readings | None:
 def _gnss(vehicle: Vehicle) -> Readings:
     found = vehicle.own("GPS_RAW_INT")
 
-    def known(name: str, none: int) -> Array:
-        values = found.get(name)
-        return np.where(values == none, np.nan, values)
+    def known(none: int, divisor: float, **names: str) -> dict[str, Array]:
+        return {
+            name: np.where(one == none / divisor, np.nan, one)
+            for name, one in found.columns(names, divisor).items()
+        }
 
-    speed, course = known("vel", _NO_16) / 1e2, np.radians(known("cog", _NO_16) / 1e2)
+    motion = known(_NO_16, 1e2, speed="vel", course="cog")
+    speed, course = motion["speed"], np.radians(motion["course"])
     columns = {
-        **{"latitude_deg": found.get("lat") / 1e7, "longitude_deg": found.get("lon") / 1e7},
-        "height_sea_m": found.get("alt") / 1e3,
+        **found.columns(LAT_LON, 1e7),
+        **found.columns({"height_sea_m": "alt"}, 1e3),
         # Zeros at the end of a message are not sent: zero and not known look alike.
-        "height_ellipsoid_m": known("alt_ellipsoid", 0) / 1e3,
+        **known(0, 1e3, height_ellipsoid_m="alt_ellipsoid", sd_horizontal_m="h_acc", sd_vertical_m="v_acc"),
+        **known(0, 1e3, sd_velocity_m_s="vel_acc"),
+        **known(_NO_8, 1.0, satellites="satellites_visible"),
+        **known(_NO_16, 1e2, hdop="eph"),
         **{"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)},
-        **{"sd_horizontal_m": known("h_acc", 0) / 1e3, "sd_vertical_m": known("v_acc", 0) / 1e3},
-        "sd_velocity_m_s": known("vel_acc", 0) / 1e3,
-        "satellites": known("satellites_visible", _NO_8),
-        **{"fix": found.get("fix_type"), "hdop": known("eph", _NO_16) / 1e2},
+        "fix": found.get("fix_type"),
     }
     return vehicle.readings(found, "time_usec", columns, fix_reasons(columns["fix"]))
 
@@ -525,10 +526,10 @@ def _triggers(vehicle: Vehicle, notes: list[str]) -> Readings | None:
     if not len(found):
         made = vehicle.readings(trigger, "time_usec", {"number": trigger.get("seq")})
         return made if len(trigger) else None
-    place = {"latitude_deg": found.get("lat") / 1e7, "longitude_deg": found.get("lng") / 1e7}
+    place = found.columns(LAT_LON, 1e7)
     there = placed(*place.values())
-    place |= {"height_sea_m": found.get("alt_msl"), "height_home_m": found.get("alt_rel")}
-    columns = {"number": found.get("img_idx"), **{name: found.get(name[:-4]) for name in ANGLES}}
+    place |= found.columns({"height_sea_m": "alt_msl", "height_home_m": "alt_rel"})
+    columns = found.columns({"number": "img_idx", **{name: name[:-4] for name in ANGLES}})
     columns |= {name: np.where(there, values, np.nan) for name, values in place.items()}
     made = vehicle.readings(found, "time_usec", columns)._replace(anywhere=True)
     if np.isnan(made.columns["time_log_s"]).all():

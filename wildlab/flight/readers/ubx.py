@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers import nmea
-from wildlab.flight.readers.log import Array, Clock, Decoded, Mask, Readings, any_of
+from wildlab.flight.readers.log import VELOCITY, Array, Clock, Decoded, Mask, Readings, any_of
 from wildlab.flight.readers.text import plural
 from wildlab.flight.time.fitting import fit_clock
 from wildlab.flight.time.leap_seconds import WEEK_S, week_to_utc
@@ -261,7 +261,7 @@ def _of_pvt(found: UbxFrames, kind: tuple[int, int]) -> Readings | None:
         "time is not known to the receiver": (row["valid"] & 3) != 3,
     }
     if kind == PVT:
-        columns |= {f"v_{axis}_m_s": row[f"vel_{axis[0]}"] * 1e-3 for axis in ("north", "east", "down")}
+        columns |= {name: row[f"vel_{name[2]}"] * 1e-3 for name in VELOCITY}
         columns["satellites"] = row["satellites"].astype(float)
         carrier = flags >> 6
         better = np.select([carrier == 2, carrier == 1, flags & 2 > 0], [6.0, 5.0, 4.0], kinds)
@@ -282,8 +282,7 @@ def _of_old(found: UbxFrames) -> Readings | None:
     own = row["own_s"]
     columns = {"time_s": _weeks_to_utc(found, own), **_place(found, row)}
     velocity = found.rows(VELNED)
-    for axis in ("north", "east", "down"):
-        columns[f"v_{axis}_m_s"] = _at(own, velocity, velocity[f"vel_{axis[0]}"] * 1e-2)
+    columns |= {name: _at(own, velocity, velocity[f"vel_{name[2]}"] * 1e-2) for name in VELOCITY}
     columns["sd_velocity_m_s"] = _at(own, velocity, velocity["s_acc"] * 1e-2)
     reasons: dict[str, Mask] = {}
     for kind in (STATUS, SOL):

@@ -9,6 +9,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import compress, islice
 from pathlib import Path
 from typing import Any
@@ -105,7 +106,6 @@ class Frames:
     polarity: Polarity = "unknown"
     known: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     even: bool = False
-    _kept: list[Kept] = field(default_factory=list, repr=False)
 
     def __len__(self) -> int:
         if self.count is None:
@@ -187,25 +187,9 @@ class Frames:
             image, valid = filled(image, kept.dead), valid & ~kept.dead
         return replace(frame, image=image, valid=valid)
 
-    @property
-    def overlay(self) -> NDArray[np.bool_] | None:
-        """(H, W) where text is burnt in; None where it cannot be told."""
-        return self.kept.overlay
-
-    @property
-    def size(self) -> tuple[int, ...]:
-        """Height and width of most frames, px; () where no size has a majority."""
-        return self.kept.size
-
-    @property
+    @cached_property
     def kept(self) -> Kept:
-        """What stays from frame to frame; looked for once, in a sample."""
-        if not self._kept:
-            self._kept.append(self._sample())
-        return self._kept[0]
-
-    def _sample(self) -> Kept:
-        """Looks at some frames, once: reading all of a long flight twice would take as long as detecting."""
+        """What stays from frame to frame, by a sample: to read all twice would take as long as detecting."""
         pairs = [(one, two) for one, two in self._some() if one.usable]
         some = [one for one, _ in pairs]
         sizes = Counter(one.image.shape[:2] for one in some).most_common(1)
