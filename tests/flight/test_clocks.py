@@ -13,7 +13,7 @@ from tests.analysis.survey_twin import Survey, simulate
 from wildlab.analysis.georeference import observe
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
-from wildlab.flight.checks.sense.sightings import sightings
+from wildlab.flight.checks.sightings import sightings
 from wildlab.flight.clocks import (
     MAX_GAP_S,
     covariance_columns,

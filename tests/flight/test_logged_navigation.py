@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from wildlab.files import sha256
 from wildlab.flight.catalog import read_catalog
 from wildlab.flight.checks.check import check_flight, usable_for
-from wildlab.flight.checks.inertial_data import FORCE, RATE, turns
-from wildlab.flight.checks.inertial_data import samples as inertial_samples
+from wildlab.flight.checks.inertial import FORCE, RATE, turns
+from wildlab.flight.checks.inertial import samples as inertial_samples
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight

@@ -30,7 +30,7 @@ from wildlab.analysis.receiver import Receiver, receiver_noise
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval, nees, share_inside
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
-from wildlab.flight.checks.flown import FLYING
+from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import covariances, gnss_times, poses_at
 from wildlab.flight.store import Flight
 

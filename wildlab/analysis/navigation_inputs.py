@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.flown import FLYING
+from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight

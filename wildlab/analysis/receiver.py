@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.navigation_inputs import VELOCITY, Inputs, axis_errors, imu_noise, inputs_of
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.flown import FLYING
+from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.gravity import Earth, local_earth

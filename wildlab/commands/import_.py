@@ -106,7 +106,7 @@ def import_(
             click.echo(card.recipe, nl=False)
         return
     from wildlab.flight.card.importing import import_card, recipe_beside
-    from wildlab.flight.checks.sense.sense import sense_sentences
+    from wildlab.flight.checks.check import sense_sentences
 
     if into is None:
         raise click.UsageError("Name the folder of the flight to make: --into FLIGHT.")
@@ -128,7 +128,7 @@ def _flight(
     overwrite: bool,
     terrain: Any,
 ) -> None:
-    from wildlab.flight.checks.sense.sense import sense_sentences
+    from wildlab.flight.checks.check import sense_sentences
     from wildlab.flight.recipe.importing import import_flight
 
     if into is None:

@@ -461,7 +461,7 @@ def show_accuracy(
     unlabelled
         Programs whose answers name no target.
     amiss
-        What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
+        What does not fit together in the flight: `wildlab.flight.checks.check.sense_sentences`.
     applied
         What is to be said of the calibration of another flight that was applied.
     source

@@ -430,7 +430,7 @@ def show_overview(
     gains, numbers
         From `wildlab.analysis.overviews.recommendations`, and the numbers of the other reports behind them.
     amiss
-        What does not fit together: `wildlab.flight.checks.sense.sense.sense_sentences`.
+        What does not fit together: `wildlab.flight.checks.check.sense_sentences`.
     lacking
         Which reports could not be made, and why: clauses.
     judged

@@ -68,7 +68,7 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
     flight, found
         The flight, and its sightings.
     amiss
-        What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
+        What does not fit together in the flight: `wildlab.flight.checks.check.sense_sentences`.
     """
     texts = load_texts("repeat-sightings")
     wording = Wording(report, texts)

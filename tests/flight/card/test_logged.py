@@ -17,7 +17,7 @@ from wildlab.flight.card.roles import Choice
 from wildlab.flight.card.said import paced, sentences_of
 from wildlab.flight.readers.log import Clock, RawLog, make_stream
 from wildlab.flight.readers.parts import stream_of
-from wildlab.flight.recipe.series import LogTable
+from wildlab.flight.recipe.parts import LogTable
 from wildlab.flight.store import Flight
 
 Shared = Callable[..., Path]

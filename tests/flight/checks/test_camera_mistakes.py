@@ -10,9 +10,8 @@ import pymap3d
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.sense.constants import HARD, clock_fit, clock_mistakes
-from wildlab.flight.checks.sense.seen import judge
-from wildlab.flight.checks.sense.sightings import SightingGeometry, Sightings
+from wildlab.flight.checks.known_points import HARD, clock_fit, clock_mistakes, judge
+from wildlab.flight.checks.sightings import SightingGeometry, Sightings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel

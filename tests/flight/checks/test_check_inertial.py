@@ -10,8 +10,7 @@ import pytest
 
 from tests.flight.checks.found import levels
 from wildlab.flight.checks.check import Finding, find, usable_for
-from wildlab.flight.checks.findings import whole
-from wildlab.flight.checks.inertial_data import FORCE, RATE
+from wildlab.flight.checks.inertial import FORCE, RATE
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_quaternion
@@ -101,7 +100,7 @@ def _copy(flight: Flight, nav: bool = True) -> Flight:
 
 
 def _found(flight: Flight) -> list[Finding]:
-    return [whole(one) for one in find(flight, meaning=False) if one.table in ("imu", "gnss")]
+    return [one for one in find(flight, meaning=False) if one.table in ("imu", "gnss")]
 
 
 def _circle() -> Any:

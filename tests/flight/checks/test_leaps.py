@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wildlab.flight.checks.check import sense
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sense.leaps import find_leaps, without_leaps
-from wildlab.flight.checks.sense.positions import positions
-from wildlab.flight.checks.sense.sense import sense
+from wildlab.flight.checks.motion import find_leaps, positions, without_leaps
 from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import Flight
 

@@ -8,11 +8,10 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wildlab.flight.checks import known_points
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sense import nameless
-from wildlab.flight.checks.sense.seen import seen
-from wildlab.flight.checks.sense.sightings import sightings
+from wildlab.flight.checks.sightings import sightings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
@@ -30,7 +29,7 @@ def flown() -> Flight:
 
 
 def told(flight: Flight) -> list[Finding]:
-    return list(seen(flight))
+    return list(known_points.known_points(flight))
 
 
 def turned(flight: Flight, change: Callable[[np.ndarray], np.ndarray]) -> Flight:
@@ -72,8 +71,8 @@ def test_what_meets_targets_often_enough_needs_no_explanation(flown, monkeypatch
     """As where a mount is off by a few degrees, which another mistake may make up for."""
     given = sightings(flown, "autopilot")
     assert given is not None
-    monkeypatch.setattr(nameless, "shares", lambda s: np.full(3, before if s is given else 0.9))
-    assert bool(list(nameless.nameless(flown, given))) is accused
+    monkeypatch.setattr(known_points, "shares", lambda s: np.full(3, before if s is given else 0.9))
+    assert bool(list(known_points.nameless(flown, given))) is accused
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.analysis.survey_twin import CAMERA, Survey, simulate
-from wildlab.flight.checks.sense.seen import _off, seen
+from wildlab.flight.checks.known_points import _off, known_points
 from wildlab.flight.store import Flight
 
 
@@ -24,7 +24,7 @@ def watched(seed: int, clutter: float = 0.0, turned: dict[int, float] | None = N
 
 
 def off(flight: Flight) -> list[str]:
-    return [one.sentence for one in seen(flight) if "one photo off" in one.causes]
+    return [one.sentence for one in known_points(flight) if "one photo off" in one.causes]
 
 
 @pytest.mark.parametrize("seed", range(3))

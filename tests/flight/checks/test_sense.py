@@ -7,12 +7,10 @@ import pandas as pd
 import pytest
 
 from tests.analysis.survey_twin import Survey, simulate
-from wildlab.flight.checks.sense import bounds, camera, ground, motion, origin, stamps, targets, trial
-from wildlab.flight.checks.sense.attitudes import attitude_mistakes
-from wildlab.flight.checks.sense.field import FieldStep, field_mistakes
-from wildlab.flight.checks.sense.inertial_checks import Felt, axes_words, felt_mistakes, other_axes
-from wildlab.flight.checks.sense.places import place_mistakes
-from wildlab.flight.checks.sense.sightings import sightings
+from wildlab.flight.checks import camera, explanation, motion, sensors, tables, times
+from wildlab.flight.checks.attitude import Felt, FieldStep, felt_mistakes, field_mistakes
+from wildlab.flight.checks.mistakes import attitude_mistakes, axes_words, other_axes, place_mistakes
+from wildlab.flight.checks.sightings import sightings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix
@@ -22,8 +20,8 @@ ORIGIN = (np.radians(63.4), np.radians(10.4), 40.0)
 Make = Callable[..., Flight]
 
 
-def _mistake(cause: str, factor: float) -> trial.Mistake[float]:
-    return trial.Mistake(cause, cause, cause, lambda x: x * factor, cause == "fitted")
+def _mistake(cause: str, factor: float) -> explanation.Mistake[float]:
+    return explanation.Mistake(cause, cause, cause, lambda x: x * factor, cause == "fitted")
 
 
 @pytest.mark.parametrize(
@@ -37,7 +35,7 @@ def _mistake(cause: str, factor: float) -> trial.Mistake[float]:
 )
 def test_which_mistakes_are_named(factors, named):
     ways = [_mistake(cause, factor) for cause, factor in factors.items()]
-    found = trial.explain(lambda x: np.full((2, 3), x), 4.0, ways)
+    found = explanation.explain(lambda x: np.full((2, 3), x), 4.0, ways)
     assert [(one.mistake.cause, one.before) for one in found] == [(cause, 4.0) for cause in named]
 
 
@@ -52,7 +50,7 @@ def test_which_mistakes_are_named(factors, named):
     ],
 )
 def test_what_is_far_better(before, after, better):
-    assert trial.far_better(np.full((2, 3), before), np.array([after] * 2)) == better
+    assert explanation.far_better(np.full((2, 3), before), np.array([after] * 2)) == better
 
 
 def test_every_attitude_mistake_gives_rotations():
@@ -132,9 +130,9 @@ def test_beyond_bounds_is_a_problem_with_row_and_value(make_flight, table, colum
     flight.tables["gnss"] = _log()
     names = ["time_s", *(f"f_{a}_m_s2" for a in "xyz"), *(f"w_{a}_rad_s" for a in "xyz")]
     flight.tables["imu"] = pd.DataFrame(np.zeros((20, 7)), columns=names)
-    assert list(bounds.bounds(flight)) == []
+    assert list(tables.bounds(flight)) == []
     flight.tables[table].loc[7, column] = value
-    (found,) = bounds.bounds(flight)
+    (found,) = tables.bounds(flight)
     assert (found.level, found.table, found.field) == ("problem", table, column)
     assert f"row 7 with {value:g}" in found.sentence
 
@@ -158,27 +156,27 @@ def test_numbers_of_a_camera(make_flight, changes, said):
 
 
 def test_a_degree_of_latitude_turns_level_by_a_degree():
-    assert origin.turned(np.array([111_195.0, 0.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
+    assert motion.turned(np.array([111_195.0, 0.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
     # Along a parallel, north turns by the sine of the latitude and level by its cosine.
-    assert origin.turned(np.array([0.0, 49_900.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
+    assert motion.turned(np.array([0.0, 49_900.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(("north", "level"), [(5e3, None), (30e3, "warning"), (300e3, "problem")])
 def test_an_origin_far_away(make_flight, north, level):
     flight = make_flight()
     flight.nav["autopilot"]["north_m"] += north
-    found = list(origin.origin(flight))
+    found = list(motion.origin(flight))
     assert [one.level for one in found] == ([] if level is None else [level])
 
 
 def test_whole_hours_between_stamps_are_a_zone(make_flight):
     flight = make_flight()
-    assert list(stamps.stamps(flight)) == []
+    assert list(times.stamps(flight)) == []
     flight.tables["frames"]["time_s"] += 7200.0
-    (found,) = stamps.stamps(flight)
+    (found,) = times.stamps(flight)
     assert found.table == "frames" and "2 h late" in found.sentence
     flight.tables["frames"]["time_s"] += 400.0  # no whole quarter of an hour
-    assert list(stamps.stamps(flight)) == []
+    assert list(times.stamps(flight)) == []
 
 
 def test_ground_heights_against_the_truth(make_flight):
@@ -186,15 +184,15 @@ def test_ground_heights_against_the_truth(make_flight):
     rows = pd.concat([flight.tables["detections"]] * 4, ignore_index=True)
     rows["target_id"] = "buoy"
     flight.tables["detections"] = rows
-    assert [one for one in ground.ground(flight) if one.field == "plane_down_m"] == []
+    assert [one for one in camera.ground(flight) if one.field == "plane_down_m"] == []
     flight.tables["detections"] = rows.assign(plane_down_m=-45.0)
-    (found,) = [one for one in ground.ground(flight) if one.field == "plane_down_m"]
+    (found,) = [one for one in camera.ground(flight) if one.field == "plane_down_m"]
     assert "45 m above" in found.sentence
 
 
 def test_a_target_seen_beside_its_truth():
     beside = np.random.default_rng(4).normal([25, 0], 2, (60, 2))
-    offset, there, here = targets.offset_of(beside)
+    offset, there, here = sensors.offset_of(beside)
     assert offset == pytest.approx([25, 0], abs=1.5)
     assert there > 0.9
     assert here == 0

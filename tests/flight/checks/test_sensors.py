@@ -13,9 +13,9 @@ from tests.flight.conftest import table
 from wildlab.analysis.scans import scans_of
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
-from wildlab.flight.checks.duplicates import twice
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import looks_of_others, sensors
+from wildlab.flight.checks.tables import duplicates
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
@@ -236,7 +236,7 @@ def test_a_log_that_was_read_twice_is_a_problem(make_flight, source, rows, later
     once = flight.table("detections").iloc[:rows]
     again = with_more(flight, once.assign(frame_id="again " + once["frame_id"], source=source))
     again.tables["frames"] = both
-    found = list(twice(again))
+    found = list(duplicates(again))
     assert [one.level for one in found] == ["problem"] * copied
     assert not copied or f"{rows} of {rows}" in found[0].sentence
 

@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.sound_flights import simulate_sound_flight, sound_flights
+from wildlab.flight.checks.attitude import Felt, heading_error
 from wildlab.flight.checks.check import find
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sense.inertial_checks import Felt, heading_error
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin

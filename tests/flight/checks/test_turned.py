@@ -14,9 +14,7 @@ from tests.flight.checks.watching import add_sensor, level_poses, watch
 from tests.flight.conftest import table
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sense.looks import SourceLooks, seen_at
-from wildlab.flight.checks.sense.scans import _stamped
-from wildlab.flight.checks.sense.turned import best_turn, turned
+from wildlab.flight.checks.sensors import SourceLooks, best_turn
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import wrap
@@ -144,9 +142,9 @@ def test_places_and_bearings_are_turned_alike(by):
     own, places = rng.normal(0, 50, (9, 3)), rng.normal(0, 200, (9, 3))
     nothing = np.zeros((1, 9, 3))
     scan = SourceLooks("a", places, None, own, nothing, lambda t: (own, nothing), np.zeros(9), np.arange(9))
-    bearings = replace(scan, places=None, azimuth=seen_at(scan))
-    np.testing.assert_allclose(wrap(seen_at(turned(scan, by)) - seen_at(turned(bearings, by))), 0, atol=1e-9)
-    new = turned(scan, by).places
+    bearings = replace(scan, places=None, azimuth=scan.seen_at)
+    np.testing.assert_allclose(wrap(scan.turned(by).seen_at - bearings.turned(by).seen_at), 0, atol=1e-9)
+    new = scan.turned(by).places
     assert new is not None
     np.testing.assert_allclose(np.linalg.norm(new - own, axis=1), np.linalg.norm(places - own, axis=1))
 
@@ -160,13 +158,13 @@ def test_positions_are_turned_about_the_own_place():
     scan = SourceLooks(
         "lidar", places, None, own, targets, lambda t: (own, targets), np.zeros(80), np.arange(80)
     )
-    found = best_turn((turned(scan, 6.0),), [])
+    found = best_turn((scan.turned(6.0),), [])
     assert found is not None and abs(found + 6.0) < 0.3
     assert best_turn((scan,), []) is None
     # Another explanation that brings all of it to targets, where the turn leaves a fifth, is the better one.
     other = np.where(np.arange(80)[:, None] % 5 == 0, places + 50.0, places)
-    assert best_turn((turned(replace(scan, places=other), 6.0),), []) is not None
-    assert best_turn((turned(replace(scan, places=other), 6.0),), [(scan,)]) is None
+    assert best_turn((replace(scan, places=other).turned(6.0),), []) is not None
+    assert best_turn((replace(scan, places=other).turned(6.0),), [(scan,)]) is None
 
 
 def test_what_a_sensor_places_goes_with_its_platform_where_its_clock_is_moved():
@@ -179,7 +177,7 @@ def test_what_a_sensor_places_goes_with_its_platform_where_its_clock_is_moved():
 
     at = stamped(0.0)
     scan = SourceLooks("a", places, None, *at[:2], lambda t: at[:2], at[2], np.arange(4), stamped)
-    later = _stamped(scan, 3.0)
+    later = scan.with_stamps(3.0)
     assert later.places is not None
     assert np.allclose(later.places - later.own, places) and np.allclose(later.own[:, 0], 6.0)
     assert np.allclose(later.targets[..., 1], 3.0) and np.allclose(later.heading, 0.3)

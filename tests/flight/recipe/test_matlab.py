@@ -14,7 +14,7 @@ from wildlab.errors import WildlabError
 from wildlab.files import sha256
 from wildlab.flight.recipe import matlab
 from wildlab.flight.recipe.matlab import read_matlab, table_of
-from wildlab.flight.recipe.series import MatlabTable
+from wildlab.flight.recipe.parts import MatlabTable
 
 HERE = Path("log.mat")
 

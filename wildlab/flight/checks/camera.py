@@ -1,196 +1,68 @@
-"""The rest of what `check_flight` looks at: names, places and pixels."""
+"""The camera: its numbers against each other, pixels in the image, and the ground that rays are cut with."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.findings import POSITION, Finding, count, first_row
-from wildlab.flight.clocks import frame_poses
+from wildlab.flight.checks.explanation import Mistake, blame
+from wildlab.flight.checks.findings import Finding, Level, bad_rows
+from wildlab.flight.checks.mistakes import change_by, mistake, rows_of
+from wildlab.flight.checks.sightings import MOST
+from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, poses_at
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.schema import DETECTION_KINDS
 from wildlab.flight.store import Flight
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.ray_ends import BELOW
+from wildlab.geometry.terrain import pixels_to_terrain
 
-#: Truth further from every pose than this belongs to another flight, or has its coordinates exchanged.
-FAR_M = 20_000.0
 #: No lens magnifies one way 2 % more than the other: then the calibration is of something else.
 FOCAL_RATIO = 0.02
-
-
-def truth_place(flight: Flight) -> Iterator[Finding]:
-    """Truth that is nowhere near the flight."""
-    if flight.truth is None or not flight.nav:
-        return
-    poses = np.concatenate([nav[list(POSITION)].to_numpy() for nav in flight.nav.values()])
-    poses = poses[np.isfinite(poses).all(axis=1)]
-    truth = flight.truth[list(POSITION)].to_numpy()
-    if len(poses) == 0 or len(truth) == 0:
-        return
-    low, high = poses.min(axis=0)[:2], poses.max(axis=0)[:2]
-    beyond = np.maximum(np.maximum(low - truth[:, :2], truth[:, :2] - high), 0)
-    distance = np.hypot(beyond[:, 0], beyond[:, 1])
-    far = distance > FAR_M
-    if far.any():
-        name = flight.truth["target_id"].iloc[first_row(far)]
-        yield Finding(
-            "problem",
-            "truth",
-            "north_m",
-            f"{count(far, 'position')} far from the flight: target {name!r} is "
-            f"{distance[far][0] / 1e3:.0f} km from the nearest pose",
-            "check that latitude and longitude are not exchanged, their signs and units, and that it is the "
-            "truth of this flight",
-        )
-        return
-    above = truth[:, 2] < poses[:, 2].min()
-    if above.any():
-        yield Finding(
-            "problem" if above.all() else "warning",
-            "truth",
-            "down_m",
-            f"{count(above, 'position')} above the highest pose of the platform",
-            "check the vertical reference of both and [vertical]; down is positive downwards",
-        )
-
-
-def identity(flight: Flight) -> Iterator[Finding]:
-    """Names that occur twice, or name nothing."""
-    frames, detections, truth = flight.frames, flight.detections, flight.truth
-    for name, nav in flight.nav.items():
-        if "frame_id" in nav:
-            yield from _twice(f"nav/{name}", "frame_id", nav["frame_id"], "each frame has one pose")
-    if frames is not None:
-        yield from _twice("frames", "frame_id", frames["frame_id"], "give each frame its own name")
-    if truth is not None:
-        fixed = truth.loc[truth["time_s"].isna(), "target_id"]
-        yield from _twice(
-            "truth", "target_id", fixed, "a point that never moves has one row: use ids that differ"
-        )
-    if detections is None:
-        return
-    pairs = (
-        detections[["detection_id", "source"]].agg(" of ".join, axis=1) if len(detections) else pd.Series()
-    )
-    yield from _twice("detections", "detection_id", pairs, "a detection may occur once per source")
-    known = set(frames["frame_id"]) if frames is not None else set()
-    lost = ~detections["frame_id"].isin(known).to_numpy()
-    # Another sensor's bearing or position need not belong to an image.
-    lost &= ~((detections["frame_id"] == "") & (detections["kind"] != "pixel")).to_numpy()
-    if lost.any():
-        yield Finding(
-            "problem",
-            "detections",
-            "frame_id",
-            f"{count(lost, 'detection')} in a frame that is not in the table of frames, first "
-            f"{detections['frame_id'].iloc[first_row(lost)]!r}",
-            "add the frame, or mend its name",
-        )
-    if truth is not None and "target_id" in detections:
-        strange = ~detections["target_id"].isin({"", *truth["target_id"]}).to_numpy()
-        if strange.any():
-            yield Finding(
-                "warning",
-                "detections",
-                "target_id",
-                f"{count(strange, 'detection')} of a target without truth, first "
-                f"{detections['target_id'].iloc[first_row(strange)]!r}",
-                "add the target to the truth, or leave the id empty: such detections are not scored",
-            )
-
-
-def _twice(table: str, field: str, names: pd.Series, fix: str) -> Iterator[Finding]:
-    again = names.duplicated().to_numpy()
-    if again.any():
-        example = names.iloc[first_row(again)]
-        yield Finding("problem", table, field, f"{example!r} stands here more than once", fix)
+#: Fields of view (deg) across the image that a camera of a drone may have: long telephoto to fisheye.
+NARROW, WIDE = 1.0, 150.0
+#: Lenses are centred to a few percent of the image; further off, an image was cropped, or it is a mistake.
+OFF_CENTRE, OFF_FAR, CENTRED = 0.08, 0.2, 0.03
+#: A mark is where something was marked, so its ray goes down: more that do not than this share are a fault.
+LOST = 0.5
+#: Ground heights that differ from those of the truth by more than this (m), by so many times what is stated,
+#: and by so many times their own spread.
+STEP_M, STATED, SPREAD = 8.0, 5.0, 3.0
 
 
 def image(flight: Flight) -> Iterator[Finding]:
     """Detections against the camera: pixels in the image, ground below the lens."""
-    camera = flight.manifest.camera
+    camera, detections = flight.manifest.camera, flight.detections
     if camera is not None:
         yield from _calibration(camera)
-    if flight.detections is None:
+    if detections is None:
         return
-    detections = flight.detections
     kind = detections["kind"].to_numpy()
     for name, columns in DETECTION_KINDS.items():
-        if (kind == name).any():
-            for column in columns:
-                bad = (kind == name) & ~np.isfinite(detections[column].to_numpy())
-                if bad.any():
-                    yield Finding(
-                        "problem",
-                        "detections",
-                        column,
-                        f"{count(bad, 'detection')} of kind {name!r} without a number here, first "
-                        f"{detections['detection_id'].iloc[first_row(bad)]!r}",
-                        "fill it, or remove those rows",
-                    )
+        for column in columns if (kind == name).any() else ():
+            bad = (kind == name) & ~np.isfinite(detections[column].to_numpy())
+            named = {"kind": name, "first": detections["detection_id"].to_numpy(object)}
+            yield from bad_rows(bad, "problem", "detections", column, "detection-not-finite", named)
     pixel = kind == "pixel"
     if not pixel.any():
         return
     if camera is None:
-        yield Finding(
-            "problem",
-            "flight.toml",
-            "camera",
-            "there are pixels, and no camera they could be of",
-            "add the part [camera] with the calibration",
-        )
+        yield Finding("problem", "flight.toml", "camera", "no-camera")
         return
     u, v = detections["u_px"].to_numpy(), detections["v_px"].to_numpy()
     outside = pixel & ((u < -0.5) | (u > camera.width_px) | (v < -0.5) | (v > camera.height_px))
-    if outside.any():
-        first = first_row(outside)
-        yield Finding(
-            "problem" if outside[pixel].all() else "warning",
-            "detections",
-            "u_px",
-            f"{count(outside, 'pixel')} outside of the image of {camera.width_px} x {camera.height_px}, "
-            f"first ({u[first]:g}, {v[first]:g})",
-            "check the unit of the pixels and the size of the image",
-        )
-    yield from _ground(flight, pixel)
-
-
-def _calibration(camera: CameraPart) -> Iterator[Finding]:
-    ratio = camera.fx_px / camera.fy_px
-    if abs(ratio - 1) > FOCAL_RATIO:
-        yield Finding(
-            "note",
-            "flight.toml",
-            "camera.fx_px",
-            f"fx and fy differ by {100 * abs(ratio - 1):.1f} %, which no lens with square pixels does",
-            "check the calibration, and expect the boresight estimate to take up part of it",
-        )
-    if not (0 < camera.cx_px < camera.width_px and 0 < camera.cy_px < camera.height_px):
-        yield Finding(
-            "warning",
-            "flight.toml",
-            "camera.cx_px",
-            f"the principal point ({camera.cx_px:g}, {camera.cy_px:g}) lies outside of the image",
-            "check that the calibration is for this image size",
-        )
-
-
-def _ground(flight: Flight, pixel: np.ndarray) -> Iterator[Finding]:
-    detections = flight.detections
-    if detections is None or flight.frames is None or not flight.nav:
-        return
-    if flight.terrain is not None:
-        return  # the ground is that of the map
+    level: Level = "problem" if outside[pixel].all() else "warning"
+    facts: dict[str, Any] = {"width": camera.width_px, "height": camera.height_px, "u": u, "v": v}
+    yield from bad_rows(outside, level, "detections", "u_px", "pixel-outside", facts)
+    if flight.frames is None or not flight.nav or flight.terrain is not None:
+        return  # without a terrain the ground is a plane
     if "plane_down_m" not in detections or not np.isfinite(detections.loc[pixel, "plane_down_m"]).any():
-        yield Finding(
-            "note",
-            "detections",
-            "plane_down_m",
-            "no detection says how high the ground is there",
-            "the height of the truth or of the origin has to serve",
-        )
+        yield Finding("note", "detections", "plane_down_m", "no-ground-height")
         return
     for name in flight.nav:
         try:
@@ -200,11 +72,121 @@ def _ground(flight: Flight, pixel: np.ndarray) -> Iterator[Finding]:
         lens = pd.Series(p[:, 2], index=flight.frames["frame_id"])
         height = detections["frame_id"].map(lens[~lens.index.duplicated()]).to_numpy(float)
         above = pixel & (detections["plane_down_m"].to_numpy() <= height)
-        if above.any():
-            yield Finding(
-                "problem" if above[pixel].all() else "warning",
-                "detections",
-                "plane_down_m",
-                f"{count(above, 'ground plane')} above the camera as nav/{name} has it",
-                "check the vertical reference of both and [vertical]; down is positive downwards",
-            )
+        level = "problem" if above[pixel].all() else "warning"
+        yield from bad_rows(above, level, "detections", "plane_down_m", "plane-above", {"source": name})
+
+
+def _calibration(camera: CameraPart) -> Iterator[Finding]:
+    ratio = camera.fx_px / camera.fy_px
+    if abs(ratio - 1) > FOCAL_RATIO:
+        facts = {"percent": 100 * abs(ratio - 1)}
+        yield Finding("note", "flight.toml", "camera.fx_px", "focal-lengths-differ", facts)
+    if not (0 < camera.cx_px < camera.width_px and 0 < camera.cy_px < camera.height_px):
+        facts = {"cx": camera.cx_px, "cy": camera.cy_px}
+        yield Finding("warning", "flight.toml", "camera.cx_px", "centre-outside", facts)
+
+
+def lens(flight: Flight) -> Iterator[Finding]:
+    """What cannot be the calibration of this image: principal point, focal length and field of view."""
+    camera = flight.manifest.camera
+    if camera is None:
+        return
+    widest = max(camera.width_px / camera.fx_px, camera.height_px / camera.fy_px)
+    across = float(np.degrees(2 * np.arctan(widest / 2)))
+    facts = {"fx": camera.fx_px, "across": across}
+    if across > WIDE:
+        causes = ("focal length in mm",)
+        yield Finding("problem", "flight.toml", "camera.fx_px", "view-wide", facts, causes)
+    elif across < NARROW:
+        yield Finding("warning", "flight.toml", "camera.fx_px", "view-narrow", facts)
+    c = np.array([camera.cx_px, camera.cy_px])
+    size = np.array([camera.width_px, camera.height_px], float)
+    now = _off_centre(c, size)
+    if now <= OFF_CENTRE:
+        return
+    named: list[Mistake[Any]] = []
+    for row in rows_of("centre"):
+        point, of = change_by(row, size)(c), size[row.get("size_order", [0, 1])]
+        if point is not None and _off_centre(point, of) <= CENTRED:
+            width, height = of / row.get("scale", 1.0)
+            stated = {"cx": point[0], "cy": point[1], "width": width, "height": height}
+            named.append(mistake(row, lambda x: x, fitted=False, **stated))
+    inside = bool(((c > 0) & (c < size)).all())
+    if named or (now > OFF_FAR and inside):  # outside of the image: said with the calibration
+        facts = {"cx": c[0], "cy": c[1], "width": size[0], "height": size[1]}
+        code = "centre-explained" if named else "centre-far"
+        yield blame("warning", "flight.toml", "camera.cx_px", code, named, facts)
+
+
+def _off_centre(point: np.ndarray, of: np.ndarray) -> float:
+    return float(np.abs(point / of - 0.5).max())
+
+
+def ground(flight: Flight) -> Iterator[Finding]:
+    """Rays of detections against the ground, and ground against truth."""
+    detections, truth, frames = flight.detections, flight.truth, flight.frames
+    if detections is None or frames is None or flight.manifest.camera is None:
+        return
+    pixel = (detections["kind"] == "pixel").to_numpy()
+    if pixel.sum() < 4 or frames["frame_id"].duplicated().any():
+        return
+    yield from _rays(flight, detections[pixel], frames)
+    if truth is None or not len(truth) or "plane_down_m" not in detections or flight.terrain is not None:
+        return
+    down = detections["plane_down_m"].to_numpy(float)
+    if flight.manifest.scoring.rule == "labelled" and "target_id" in detections:
+        heights = truth.groupby("target_id")["down_m"].median()
+        known = detections["target_id"].map(heights).to_numpy(float)
+    else:
+        known = np.full(len(down), float(truth["down_m"].median()))
+    apart = (down - known)[pixel & np.isfinite(down - known)]
+    if len(apart) < 4:
+        return
+    off = float(np.median(apart))
+    spread = 1.4826 * float(np.median(np.abs(apart - off)))
+    of_truth = float(truth["sd_vertical_m"].median()) if "sd_vertical_m" in truth else np.nan
+    sd = of_truth if np.isfinite(of_truth) else 2.0
+    stated = np.hypot(flight.manifest.uncertainty.plane_height_m or 1.0, sd)
+    if abs(off) > max(STEP_M, STATED * stated, SPREAD * spread):
+        facts = {"off": off, "correction": -off}
+        causes = ("ground heights against truth",)
+        yield Finding("warning", "detections", "plane_down_m", "ground-off-truth", facts, causes)
+
+
+def _rays(flight: Flight, pixels: pd.DataFrame, frames: pd.DataFrame) -> Iterator[Finding]:
+    """The share of rays that meet the ground, where it is known how high that is."""
+    if len(pixels) > MOST:
+        pixels = pixels.iloc[np.linspace(0, len(pixels) - 1, MOST).astype(int)]
+    plane = np.full(len(pixels), np.nan)
+    if "plane_down_m" in pixels:
+        plane = pixels["plane_down_m"].to_numpy(float)
+    if flight.truth is not None and len(flight.truth):
+        plane = np.where(np.isfinite(plane), plane, float(flight.truth["down_m"].median()))
+    terrain, manifest = flight.terrain, flight.manifest
+    frame = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
+    for name, nav in flight.nav.items():
+        if manifest.mount.poses not in ("", name):
+            continue  # the mount says nothing of a camera on these poses
+        try:
+            p, R, _ = poses_at(nav, frame_times(flight)[frame], pixels["frame_id"])
+            pan, tilt = (angle[frame] for angle in gimbal_angles(flight))
+            poses = CameraPoses(manifest.geometry_camera(), manifest.geometry_mount(), p, R, pan, tilt)
+            uv = pixels[["u_px", "v_px"]].to_numpy(float)
+            if terrain is None:
+                met, under = georeference_pixels(poses, uv, plane), p[:, 2] >= plane
+            else:
+                found = pixels_to_terrain(poses, uv, terrain)
+                met, under = found.points, found.became == BELOW
+        except ValueError:  # said by the checks of times
+            continue
+        known = np.isfinite(p).all(axis=1) & (frame >= 0) & (np.isfinite(plane) | (terrain is not None))
+        if known.sum() < 4:
+            continue
+        lost = 1 - float(np.isfinite(met[known, 0]).mean())
+        if lost > LOST:
+            other = "forward" if manifest.mount.looks == "down" else "down"
+            below = float(np.mean(under[known])) > LOST
+            facts = {"percent": 100 * lost, "source": name, "other": other}
+            code = "rays-from-below" if below else "rays-past-ground"
+            level: Level = "problem" if lost > 0.9 else "warning"
+            yield Finding(level, f"nav/{name}", "", code, facts, ("rays miss the ground",))

@@ -1,192 +1,162 @@
-"""What `check_flight` looks at, one function per question. Each yields findings, none changes anything."""
+"""What a finding is: a code with facts. The words lie in ``data/messages/checks.toml``, once."""
 
 from __future__ import annotations
 
 import dataclasses
-import difflib
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Literal
+import re
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from string import Formatter
+from typing import Any, Literal
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
-from wildlab.flight.clocks import covariances
-from wildlab.flight.files import printable
-from wildlab.flight.schema import NAV, TABLES, extra_columns
 from wildlab.flight.store import Flight
+from wildlab.paths import DATA
 
 Level = Literal["problem", "warning", "note"]
 
 #: Logs print quaternions with few digits: four leave an error of 2e-4 in the norm.
 NORM_TOLERANCE = 1e-3
 
-POSE = ("time_s", "north_m", "east_m", "down_m", "q_w", "q_x", "q_y", "q_z")
-QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 POSITION = ("north_m", "east_m", "down_m")
+QUATERNION = ("q_w", "q_x", "q_y", "q_z")
+VELOCITY = ("v_north_m_s", "v_east_m_s", "v_down_m_s")
+POSE = ("time_s", *POSITION, *QUATERNION)
 
 
 @dataclass(frozen=True)
 class Finding:
     """Something to know about a flight.
 
-    ``problem``: what it concerns cannot be used. ``warning``: it can, but look. ``note``: good to know.
-    `table` is ``nav/<source>``, the name of a table, or ``flight.toml``. What `check_flight` returns are
-    whole sentences, which name table and field. `causes`: the usual mistakes that explain it; `corrections`
-    undo them in a flight, or give None where they cannot (`wildlab.flight.checks.corrections`).
+    Attributes
+    ----------
+    level
+        ``problem``: what it concerns cannot be used. ``warning``: it can, but look. ``note``: good to know.
+    table, field
+        ``nav/<source>``, the name of a table, or ``flight.toml``; and what of it.
+    code
+        Of its text in ``data/messages/checks.toml``.
+    facts
+        Numbers, names and choices that the text states.
+    causes
+        The usual mistakes that explain it.
+    corrections
+        Undo them in a flight, or give None where they cannot (`wildlab.flight.checks.explanation`).
     """
 
     level: Level
     table: str
     field: str
-    sentence: str
-    fix: str
+    code: str
+    facts: Mapping[str, Any] = dataclasses.field(default_factory=dict, hash=False)
     causes: tuple[str, ...] = ()
     corrections: tuple[Callable[[Flight], Flight | None], ...] = dataclasses.field(
         default=(), compare=False, repr=False
     )
 
+    @property
+    def clause(self) -> str:
+        """What is so, without place and full stop."""
+        return phrase(messages("checks")[self.code]["said"], self.facts)
 
-def whole(one: Finding) -> Finding:
-    """The finding in whole sentences, the first of which names table and field."""
-    where = ", ".join(filter(None, (one.table, one.field)))
-    return replace(one, sentence=f"{where}: {one.sentence}.", fix=f"{one.fix[:1].upper()}{one.fix[1:]}.")
+    @property
+    def remedy(self) -> str:
+        """What to do, likewise."""
+        return phrase(messages("checks")[self.code]["fix"], self.facts)
 
+    @property
+    def sentence(self) -> str:
+        """What is so, with table and field."""
+        return f"{', '.join(filter(None, (self.table, self.field)))}: {self.clause}."
 
-def values(flight: Flight) -> Iterator[Finding]:
-    """Numbers that are not numbers, and columns nobody knows."""
-    for name, nav in flight.nav.items():
-        for column in POSE:
-            bad = ~np.isfinite(nav[column].to_numpy())
-            if bad.any():
-                yield Finding(
-                    "problem",
-                    f"nav/{name}",
-                    column,
-                    f"{count(bad, 'pose')} not a finite number here, first in row {first_row(bad)}",
-                    "remove those rows, or fill them from the log",
-                )
-        norm = np.linalg.norm(nav[list(QUATERNION)].to_numpy(), axis=1)
-        off = np.abs(norm - 1) > NORM_TOLERANCE
-        if off.any():
-            yield Finding(
-                "problem",
-                f"nav/{name}",
-                "q_w",
-                f"{count(off, 'quaternion')} not normalised, first in row {first_row(off)} with length "
-                f"{norm[off][0]:.4g}",
-                "check the order and the unit of the four columns; a rotation has length 1",
-            )
-        P = covariances(nav)
-        if P is not None:
-            P = P[np.isfinite(P).all(axis=(1, 2))]
-            negative = np.linalg.eigvalsh(P)[:, 0] < -1e-9 * np.trace(P, axis1=1, axis2=2)
-            if negative.any():
-                yield Finding(
-                    "problem",
-                    f"nav/{name}",
-                    "cov_00",
-                    f"{count(negative, 'covariance')} no covariance at all (an eigenvalue below zero)",
-                    "check the order of the 21 columns cov_ij",
-                )
-        yield from _unknown_columns(f"nav/{name}", nav)
-    for name, table in flight.tables.items():
-        for known in TABLES[name].columns:
-            if known.dtype == "float" and known.name in table:
-                value = table[known.name].to_numpy()
-                bad = np.isinf(value) if known.may_be_nan else ~np.isfinite(value)
-                if bad.any():
-                    yield Finding(
-                        "problem",
-                        name,
-                        known.name,
-                        f"{count(bad, 'row')} not a finite number here, first row {first_row(bad)}",
-                        "remove those rows, or fill them",
-                    )
-        yield from _unknown_columns(name, table)
+    @property
+    def fix(self) -> str:
+        """What to do."""
+        return f"{self.remedy[:1].upper()}{self.remedy[1:]}."
 
 
-def _unknown_columns(name: str, table: pd.DataFrame) -> Iterator[Finding]:
-    schema = NAV if name.startswith("nav/") else TABLES[name]
-    for column in extra_columns(schema, table):
-        close = difflib.get_close_matches(column, schema.column_names, n=1)
-        yield Finding(
-            "warning",
-            name,
-            printable(column),
-            "this column is not known, so nothing uses it",
-            f"rename it if you meant {close[0]!r}" if close else "leave it, or take it out",
-        )
+@cache
+def messages(name: str) -> dict[str, Any]:
+    """The texts of one file of ``data/messages``."""
+    return tomllib.loads((DATA / "messages" / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def order(flight: Flight) -> Iterator[Finding]:
-    """Timestamps that run backwards or stand still."""
-    series = [(f"nav/{name}", nav) for name, nav in flight.nav.items() if "frame_id" not in nav]
-    series += [
-        (name, flight.tables[name])
-        for name in ("imu", "gnss", "magnetometer", "gimbal")
-        if name in flight.tables
-    ]
-    for name, table in series:
-        yield from _increasing(name, table["time_s"], "")
-    if flight.truth is not None:
-        for target, rows in flight.truth.groupby("target_id", sort=False):
-            times = rows["time_s"]
-            if times.isna().all():
-                continue
-            if times.isna().any():
-                yield Finding(
-                    "problem",
-                    "truth",
-                    "time_s",
-                    f"target {target!r} has rows with a time and rows without",
-                    "give every row of a moving target its time; a fixed point has one row without",
-                )
-            else:
-                yield from _increasing("truth", times, f" of target {target!r}")
-    if flight.frames is not None:
-        step = np.diff(flight.frames["time_s"].to_numpy())
-        if (step < 0).any():
-            yield from _increasing("frames", flight.frames["time_s"], "")
-        elif again := _same_time(flight.frames):
-            yield Finding(
-                "warning",
-                "frames",
-                "time_s",
-                f"{again} frames have the same time as the one before"
-                + (" of their sensor" if "sensor" in flight.frames else ""),
-                "use stamps with fractions of a second; at 20 m/s half a second is 10 m",
-            )
+#: ``{name:one|other}`` and ``{name>0:one|other}``; each of both may hold fields.
+_CHOICE = re.compile(r"\{(\w+)(>0)?:((?:[^{}|]|\{[^{}]*\})*)\|((?:[^{}|]|\{[^{}]*\})*)\}")
 
 
-def _same_time(frames: pd.DataFrame) -> int:
-    """How many frames have the time of the one before, of the same sensor: two may look at once."""
-    looks = [rows for _, rows in frames.groupby("sensor", sort=False)] if "sensor" in frames else [frames]
-    return sum(int((np.diff(rows["time_s"].to_numpy()) == 0).sum()) for rows in looks)
+class _Phrase(Formatter):
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if format_spec in ("and", "or"):
+            return joined(value, format_spec)
+        if format_spec.startswith("abs"):
+            return self.format_field(abs(value), format_spec[3:])
+        return number(value) if format_spec == "digits" else str(super().format_field(value, format_spec))
 
 
-def _increasing(name: str, times: pd.Series, whose: str) -> Iterator[Finding]:
-    step = np.diff(times.to_numpy())
-    bad = step <= 0
+def phrase(text: str, facts: Mapping[str, Any]) -> str:
+    """A text with its facts.
+
+    Beside what `str.format` knows, ``{n:frame|frames}`` chooses the first where a number is 1 or a fact is
+    so, ``{by>0:late|early}`` where positive; ``{names:and}`` joins a list, ``{by:abs.2f}`` is a size, and
+    ``{size:digits}`` has the digits that are worth reading.
+
+    Examples
+    --------
+    >>> phrase("{n} {n:row|rows} of {names:and}, {off:digits} m", {"n": 2, "names": ["a", "b"], "off": 0.01})
+    '2 rows of a and b, 0.01 m'
+    """
+
+    def choose(found: re.Match[str]) -> str:
+        fact = facts[found[1]]
+        return found[3] if (fact > 0 if found[2] else fact == 1) else found[4]
+
+    return _Phrase().vformat(_CHOICE.sub(choose, text), (), facts)
+
+
+def say(use: str, **facts: Any) -> str:
+    """The clause of what a flight can be used for."""
+    return phrase(messages("checks")["use"][use], facts)
+
+
+def number(value: float) -> str:
+    """A number with the digits that are worth reading."""
+    if value != 0 and abs(value) < 0.095:
+        return f"{value:.2g}"
+    return f"{value:.0f}" if abs(value) >= 20 else f"{value:.1f}"
+
+
+def joined(parts: Sequence[str], last: str = "and") -> str:
+    """``"a, b and c"``."""
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"
+
+
+def bad_rows(
+    bad: NDArray[np.bool_],
+    level: Level | None,
+    table: str,
+    field: str,
+    code: str,
+    facts: Mapping[str, Any] | None = None,
+    causes: tuple[str, ...] = (),
+) -> Iterator[Finding]:
+    """A finding where any row (N,) is bad: how many ``n`` of how many ``of``, and the first, ``row``.
+
+    Without a level it is a problem where all are bad, otherwise a warning. Facts that are columns (N,) or
+    (N, K) are given for the first bad row.
+    """
     if bad.any():
-        row = first_row(bad) + 1
-        yield Finding(
-            "problem",
-            name,
-            "time_s",
-            f"the timestamps{whose} are not increasing in {int(bad.sum())} of {len(bad)} steps: "
-            f"{times.iloc[row - 1]:.3f} s in row {row - 1} is followed by {times.iloc[row]:.3f} s",
-            "look at those rows for a wrong stamp or a clock that was set back, and mend it; else sort the "
-            "rows by time and take out repeated ones",
-        )
+        row = int(np.argmax(bad))
+        counted: dict[str, Any] = {"n": int(bad.sum()), "of": len(bad), "row": row}
+        for key, value in (facts or {}).items():
+            counted[key] = value[row] if isinstance(value, np.ndarray) else value
+        yield Finding(level or ("problem" if bad.all() else "warning"), table, field, code, counted, causes)
 
 
-def count(bad: np.ndarray, what: str) -> str:
-    """``"1 of 20 poses is"``, ``"3 of 20 poses are"``."""
-    n = int(bad.sum())
-    return f"{n} of {len(bad)} {what}s {'is' if n == 1 else 'are'}"
-
-
-def first_row(bad: np.ndarray) -> int:
-    """Row of the first bad value, counted from 0."""
-    return int(np.argmax(bad))
+def part_of(table: str) -> str:
+    """The part of the recipe that a table comes from: ``"poses.x"`` for ``"nav/x"``."""
+    return f"poses.{table.removeprefix('nav/')}" if table.startswith("nav/") else table

@@ -1,22 +1,302 @@
-"""What `check_flight` looks at in inertial and satellite measurements: gaps, clocks, then units and axes.
+"""Inertial and satellite measurements: gaps, clocks, then units and axes.
 
-How long the specific force is does not depend on the attitude, and the receiver's velocity tells it too: so
-two clocks can be compared before anything else is known.
+A receiver says how the velocity changed over a second or so, an inertial sensor what was felt meanwhile: both
+are means over an interval. How long the specific force is does not depend on the attitude, and the receiver's
+velocity tells it too: so two clocks can be compared before anything else is known. What is wrong with units
+and axes gives an attitude that looks plausible: each is held against what knows better, gravity, the course
+over ground, the attitude of a nav source.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks import axes as findings_axes
-from wildlab.flight.checks.corrections import APART, shift_clock
-from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.inertial_data import STEP_S, Array, Inertial, Moves, fixes, moves, samples
+from wildlab.flight.checks.explanation import APART, Correction, change_columns, shift_clock
+from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, Level, say
+from wildlab.flight.clocks import gnss_times
+from wildlab.flight.schema import SECOND_COLUMNS
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import USUAL_GRAVITY
+
+FORCE = tuple(f"f_{axis}_m_s2" for axis in "xyz")
+RATE = tuple(f"w_{axis}_rad_s" for axis in "xyz")
+AXES = "xyz"
+
+#: Intervals are this long or a little longer, where the log's own rate allows: shorter ones are all noise.
+STEP_S = 1.0
+LONGEST_S = 2.5
+#: More intervals than this say nothing new.
+MOST = 3000
+#: Sine of the angle below the horizon from which x is no nose: 45 deg.
+STEEP = 0.7
+#: Turns further than this between two attitudes could as well be the other way round.
+TURN = 2.5
+
+
+class Inertial:
+    """Samples: times (N,), specific force and angular rate, a column per axis (N,) each.
+
+    Ten hours at 250 Hz are nine million rows: columns are not copied, and what is made of them is made of one
+    column at a time.
+    """
+
+    def __init__(self, times: Array, columns: Mapping[str, Array]) -> None:
+        self.times = times
+        self._columns = columns
+        # Of one sensor at a time: asked for many lags in a row, and three columns of ten hours are large.
+        self._kept: tuple[tuple[str, ...], list[Array]] = ((), [])
+
+    def mean_force(self, start: Array, end: Array) -> Array:
+        """Mean over intervals (K,) each, (K, 3); NaN where they are not inside of the samples."""
+        return self._mean(FORCE, start, end)
+
+    def mean_rate(self, start: Array, end: Array) -> Array:
+        """The same of the angular rate."""
+        return self._mean(RATE, start, end)
+
+    def mean_of_forces(self) -> Array:
+        """Mean of all samples of the specific force. (3,)"""
+        return np.array([self._columns[name].mean() for name in FORCE])
+
+    def sizes_of_forces(self) -> Array:
+        """How long the specific force of each sample is. (N,)"""
+        total = np.zeros(len(self.times))
+        for name in FORCE:
+            total += self._columns[name] ** 2
+        return np.sqrt(total, out=total)
+
+    def _mean(self, names: Sequence[str], start: Array, end: Array) -> Array:
+        if self._kept[0] != tuple(names):
+            self._kept = ((), [])
+            self._kept = (tuple(names), [self._sum(name) for name in names])
+        mean = np.empty((len(start), len(names)))
+        for column, total in enumerate(self._kept[1]):
+            mean[:, column] = np.interp(end, self.times, total) - np.interp(start, self.times, total)
+        mean /= (end - start)[:, None]
+        mean[(start < self.times[0]) | (end > self.times[-1])] = np.nan
+        return mean
+
+    def _sum(self, name: str) -> Array:
+        """Integral over time of a column, from the first sample on. (N,)"""
+        value = self._columns[name]
+        total = np.empty(len(value))
+        total[0] = 0.0
+        np.add(value[1:], value[:-1], out=total[1:])
+        total[1:] *= 0.5
+        total[1:] *= np.diff(self.times)
+        return np.cumsum(total, out=total)
+
+
+@dataclass(frozen=True)
+class Moves:
+    """What the receiver says of intervals: start and end (K,), and the velocity at both (K, 3), `measured` or
+    made of positions."""
+
+    start: Array
+    end: Array
+    before: Array
+    after: Array
+    measured: bool
+
+    @property
+    def acceleration(self) -> Array:
+        """Mean over each interval, in n. (K, 3)"""
+        return np.asarray((self.after - self.before) / (self.end - self.start)[:, None])
+
+    @property
+    def force(self) -> Array:
+        """The specific force that goes with it, in n. (K, 3)"""
+        return np.asarray(self.acceleration - [0.0, 0.0, USUAL_GRAVITY])
+
+    def course_rate(self, slowest: float) -> Array:
+        """How fast the course turns, rad/s; NaN below a speed. (K,)"""
+        north, east = self.before[:, 0], self.before[:, 1]
+        turned = np.arctan2(
+            north * self.after[:, 1] - east * self.after[:, 0],
+            north * self.after[:, 0] + east * self.after[:, 1],
+        )
+        speed = np.minimum(np.hypot(north, east), np.hypot(self.after[:, 0], self.after[:, 1]))
+        return np.where(speed > slowest, turned / (self.end - self.start), np.nan)
+
+
+@dataclass(frozen=True)
+class Turns:
+    """What one nav source says of intervals: start and end (K,), and the mean angular rate in b (K, 3)."""
+
+    source: str
+    start: Array
+    end: Array
+    rate: Array
+
+
+def samples(flight: Flight) -> Inertial | None:
+    """The inertial samples, without those that hold no number; None where their times are of no use."""
+    table = flight.imu
+    if table is None:
+        return None
+    columns = {name: table[name].to_numpy(dtype=float) for name in ("time_s", *FORCE, *RATE)}
+    good = np.ones(len(table), bool)
+    for value in columns.values():
+        good &= np.isfinite(value)
+    if not good.all():
+        columns = {name: value[good] for name, value in columns.items()}
+    times = columns.pop("time_s")
+    if len(times) < 2 or (np.diff(times) <= 0).any():
+        return None
+    return Inertial(times, columns)
+
+
+def fixes(flight: Flight) -> pd.DataFrame | None:
+    """Satellite positions, with the flight times they are of as `time_s`; None where these are of no use."""
+    table = flight.gnss
+    if table is None:
+        return None
+    shifted = table.assign(time_s=gnss_times(flight))
+    good = np.isfinite(shifted[["time_s", *POSITION]].to_numpy(float)).all(axis=1)
+    kept: pd.DataFrame = shifted.iloc[np.flatnonzero(good)].reset_index(drop=True)
+    return None if len(kept) < 2 or (np.diff(kept["time_s"].to_numpy(float)) <= 0).any() else kept
+
+
+def moves(table: pd.DataFrame | None) -> Moves | None:
+    """Intervals between satellite positions; their velocities from the positions where there are none."""
+    if table is None:
+        return None
+    times = table["time_s"].to_numpy(float)
+    measured = VELOCITY[0] in table
+    if measured:
+        velocity = table[list(VELOCITY)].to_numpy(float)
+        good = np.isfinite(velocity).all(axis=1)
+        times, velocity = times[good], velocity[good]
+    else:
+        velocity = np.diff(table[list(POSITION)].to_numpy(float), axis=0) / np.diff(times)[:, None]
+        times = (times[1:] + times[:-1]) / 2
+    first, last = intervals(times)
+    if len(first) == 0:
+        return None
+    return Moves(times[first], times[last], velocity[first], velocity[last], measured)
+
+
+def airframe_sources(flight: Flight) -> list[str]:
+    """Nav sources by time that sensors on board, and the course, can be held against.
+
+    Not those of a camera: where the lens lies along x of the poses, and these point down, or are one of
+    several sources and the mount is said to be on them. Nor a twin's truth.
+    """
+    logs = [
+        name for name, nav in flight.nav.items() if not name.startswith("truth") and "frame_id" not in nav
+    ]
+    mount = flight.manifest.mount
+    along_x = mount.looks == "forward" and mount.pan_deg == mount.tilt_deg == 0 and flight.gimbal is None
+
+    def of_camera(name: str) -> bool:
+        w, x, y, z = flight.nav[name][list(QUATERNION)].to_numpy(float).T
+        steep = len(w) > 0 and float(np.nanmedian(2 * (x * z - w * y))) > STEEP
+        return along_x and (steep or (name == mount.poses and len(logs) > 1))
+
+    return [name for name in logs if not of_camera(name)]
+
+
+def turns(flight: Flight) -> Iterator[Turns]:
+    """Intervals of each nav source of the airframe whose poses follow each other closely enough."""
+    for name in airframe_sources(flight):
+        nav = flight.nav[name]
+        values = nav[["time_s", *QUATERNION]].to_numpy(float)
+        values = values[np.isfinite(values).all(axis=1) & (np.abs(values[:, 1:]).sum(axis=1) > 0.5)]
+        times = values[:, 0]
+        if len(times) < 2 or (np.diff(times) <= 0).any():
+            continue
+        first, last = intervals(times, STEP_S / 2, STEP_S)
+        if len(first) == 0:
+            continue
+        q = [Rotation.from_quat(values[at, 1:], scalar_first=True) for at in (first, last)]
+        turned = (q[0].inv() * q[1]).as_rotvec()
+        clear = np.linalg.norm(turned, axis=1) < TURN
+        start, end = times[first][clear], times[last][clear]
+        yield Turns(name, start, end, turned[clear] / (end - start)[:, None])
+
+
+def attitudes_near(nav: pd.DataFrame, times: Array, within_s: float = 0.3) -> tuple[NDArray[np.intp], Array]:
+    """``R_nb`` of the pose nearest to each time, for those times that have one. (K,) rows, (K, 3, 3)"""
+    stamps = nav["time_s"].to_numpy(float)
+    after = np.clip(np.searchsorted(stamps, times), 1, len(stamps) - 1)
+    nearest = np.where(times - stamps[after - 1] < stamps[after] - times, after - 1, after)
+    q = nav[list(QUATERNION)].to_numpy(float)[nearest]
+    near = (np.abs(stamps[nearest] - times) < within_s) & np.isfinite(q).all(axis=1)
+    near &= np.abs(q).sum(axis=1) > 0.5
+    rows = np.flatnonzero(near)
+    if len(rows) == 0:
+        return rows, np.empty((0, 3, 3))
+    return rows, Rotation.from_quat(q[rows], scalar_first=True).as_matrix()
+
+
+def increasing_rows(table: pd.DataFrame, names: Sequence[str], enough: int) -> Array | None:
+    """Finite rows of times and columns (N, 1 + K); None of too few, or where the times do not increase."""
+    values = table[["time_s", *names]].to_numpy(float)
+    values = values[np.isfinite(values).all(axis=1)]
+    return None if len(values) < enough or (np.diff(values[:, 0]) <= 0).any() else values
+
+
+def intervals(
+    times: Array, shortest: float = 0.9 * STEP_S, longest: float = LONGEST_S, most: int = MOST
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and last index of each interval, evenly thinned out to so many."""
+    last = np.searchsorted(times, times + shortest)
+    first = np.flatnonzero(last < len(times))
+    last = last[first]
+    good = times[last] - times[first] <= longest
+    first, last = first[good], last[good]
+    thin = max(1, -(-len(first) // most))
+    return first[::thin], last[::thin]
+
+
+# -- whether a flight goes fast enough for its course to give the heading, as navigation needs at the start
+
+#: Level speed from which an airframe counts as flying, and its course as a heading, m/s.
+FLYING = 8.0
+
+
+def why_no_start(flight: Flight) -> str:
+    """Why nothing gives the heading that navigation starts from: a clause, or nothing where something does.
+
+    Two antennas do, or one fix at `FLYING` or faster while inertial samples are there.
+
+    Parameters
+    ----------
+    flight
+        With the tables ``imu`` and ``gnss``, neither empty.
+
+    Returns
+    -------
+    str
+    """
+    gnss = flight.table("gnss")
+    if len(gnss) < 2:
+        return say("one-fix")
+    if set(SECOND_COLUMNS) <= set(gnss.columns):
+        return ""
+    t, samples = gnss_times(flight), flight.table("imu")["time_s"].to_numpy(float)
+    names = list(VELOCITY[:2])
+    if set(names) <= set(gnss.columns):
+        v = gnss[names].to_numpy(float)
+    else:
+        v = np.gradient(gnss[list(POSITION[:2])].to_numpy(float), t, axis=0)
+    speed = np.hypot(v[:, 0], v[:, 1])
+    speed = speed[(t >= samples[0]) & (t < samples[-1]) & np.isfinite(speed)]
+    if not len(speed):
+        return say("no-fix-with-inertial")
+    return "" if speed.max() >= FLYING else say("slow", flying=FLYING, speed=speed.max())
+
+
+# -- gaps and clocks
 
 #: Longer without a sample than this, the attitude is not measured any more: half a roll takes no longer.
 IMU_GAP_S = 0.5
@@ -42,83 +322,52 @@ def inertial(flight: Flight) -> Iterator[Finding]:
     """Everything about `imu` and `gnss` that makes navigation wrong without looking wrong."""
     imu, table = samples(flight), fixes(flight)
     if imu is not None:
-        yield from _gaps(imu)
+        yield from _gaps("imu", imu.times, IMU_GAP_S)
     if table is not None:
-        yield from _outages(table["time_s"].to_numpy(), imu)
+        # A receiver that falls silent before the end leaves an outage too; before its first fix it had none.
+        times = table["time_s"].to_numpy()
+        last = times[-1] if imu is None or imu.times[0] > times[-1] else max(times[-1], imu.times[-1])
+        yield from _gaps("gnss", np.append(times, last), OUTAGE_S)
     if imu is None:
         return
     apart = list(_overlap(imu, table))
     yield from apart
     moved = None if any(one.level == "problem" for one in apart) else moves(table)
-    wrong = list(findings_axes.units(flight, imu, moved))
+    wrong = [*_force_unit(imu, moved), *_rate_unit(flight, imu, moved)]
     yield from wrong
     if any(one.field.startswith("f_") for one in wrong):
         return
     late = [] if moved is None else list(_offset(flight, imu, moved))
     yield from late
     if not wrong and not late:
-        yield from findings_axes.axes(flight, imu, moved)
+        found = list(_gravity(imu, moved)) or list(_against_attitude(flight, imu, moved))
+        yield from found or _against_course(imu, moved)
 
 
-def _gaps(imu: Inertial) -> Iterator[Finding]:
-    step = np.diff(imu.times)
-    long = step > max(IMU_GAP_S, 5 * float(np.median(step)))
+def _gaps(table: str, times: Array, longest: float) -> Iterator[Finding]:
+    step = np.diff(times)
+    long = step > max(longest, 5 * float(np.median(step)))
     if long.any():
         worst = int(np.argmax(step))
-        yield Finding(
-            "warning",
-            "imu",
-            "time_s",
-            f"nothing was measured for {step[worst]:.1f} s after {imu.times[worst]:.3f} s"
-            + (f", the longest of {int(long.sum())} gaps" if long.sum() > 1 else ""),
-            "look for the lost samples in the raw log; without them attitude and position are a guess there, "
-            "and for a while after",
-        )
-
-
-def _outages(times: Array, imu: Inertial | None) -> Iterator[Finding]:
-    # A receiver that falls silent before the end leaves an outage too; before its first fix it had none.
-    end = times[-1] if imu is None or imu.times[0] > times[-1] else max(times[-1], imu.times[-1])
-    step = np.diff(np.append(times, end))
-    long = step > max(OUTAGE_S, 5 * float(np.median(step)))
-    if long.any():
-        worst = int(np.argmax(step))
-        yield Finding(
-            "warning",
-            "gnss",
-            "time_s",
-            f"there is no satellite position for {step[worst]:.1f} s after {times[worst]:.3f} s"
-            + (f", the longest of {int(long.sum())} outages" if long.sum() > 1 else ""),
-            "expect position and velocity to drift there, and look at the uncertainty stated with them",
-        )
+        facts = {"seconds": step[worst], "after": times[worst], "n": int(long.sum())}
+        yield Finding("warning", table, "time_s", f"{table}-gap", facts)
 
 
 def _overlap(imu: Inertial, table: pd.DataFrame | None) -> Iterator[Finding]:
     if table is None:
         return
-    times = table["time_s"].to_numpy()
-    common = min(times[-1], imu.times[-1]) - max(times[0], imu.times[0])
-    shorter = min(times[-1] - times[0], imu.times[-1] - imu.times[0])
-    if common < COMMON * shorter:
-        runs = (
-            f"the inertial samples run from {imu.times[0]:.3f} s to {imu.times[-1]:.3f} s, the satellite "
-            f"positions from {times[0]:.3f} s to {times[-1]:.3f} s: "
-        )
-        yield Finding(
-            "problem" if common <= 0 else "warning",
-            "gnss",
-            "time_s",
-            runs
-            + ("they do not overlap in time" if common <= 0 else f"only {common:.0f} s are common to both"),
-            "take both stamps from one clock, or state gnss_offset_s in [clocks]; GPS time is ahead of UTC "
-            "by the leap seconds",
-            (APART,),
-        )
+    one, other = imu.times, table["time_s"].to_numpy()
+    common = min(other[-1], one[-1]) - max(other[0], one[0])
+    if common < COMMON * min(other[-1] - other[0], one[-1] - one[0]):
+        facts = {"imu_from": one[0], "imu_to": one[-1], "from": other[0], "to": other[-1], "common": common}
+        level: Level = "problem" if common <= 0 else "warning"
+        code = "imu-gnss-apart" if common <= 0 else "imu-gnss-little-common"
+        yield Finding(level, "gnss", "time_s", code, facts, (APART,))
 
 
 def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
     """Whether what the receiver says was felt is felt at another time."""
-    expected = np.linalg.norm(moved.acceleration - [0.0, 0.0, USUAL_GRAVITY], axis=1)
+    expected = np.linalg.norm(moved.force, axis=1)
 
     def felt_at(lag: float) -> Array:
         return np.asarray(np.linalg.norm(imu.mean_force(moved.start + lag, moved.end + lag), axis=1))
@@ -142,30 +391,193 @@ def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
     middle = coarse[min(peaks, key=lambda i: abs(coarse[i]))]
     fine = np.arange(middle - COARSE_S, middle + COARSE_S + FINE_S / 2, FINE_S)
     near = np.array([alike(lag) for lag in fine])
-    best = float(fine[np.nanargmax(near)])
-    most = float(np.nanmax(near))
+    best, most = float(fine[np.nanargmax(near)]), float(np.nanmax(near))
     unexplained = (1 - here**2) / max(1 - most**2, 1e-12)
     # Overlapping intervals count once.
     likelier = float(np.sum(np.diff(moved.start, append=moved.end[-1]).clip(max=STEP_S))) / STEP_S
     likelier *= 0.5 * np.log(unexplained)
+    facts: dict[str, Any] = {"here": here}
     if most < UNLIKE and moved.measured and np.nanstd(felt_at(0.0)) > VERY_LIVELY:
-        yield Finding(
-            "warning",
-            "gnss",
-            "time_s",
-            "velocity changes of the receiver have nothing in common with what the inertial sensor feels "
-            f"(correlation {here:.2f}, and below {UNLIKE:g} for any offset up to {LAG_S:.0f} s)",
-            "check that both are of the same flight and the same clock",
-        )
+        facts |= {"unlike": UNLIKE, "lag": LAG_S}
+        yield Finding("warning", "gnss", "time_s", "imu-gnss-unlike", facts)
     elif most > ALIKE and abs(best) > OFFSET_S and unexplained > BETTER and likelier > SURE:
         offset = flight.manifest.clocks.gnss_offset_s + best
-        yield Finding(
-            "warning",
-            "gnss",
-            "time_s",
-            f"the stamps seem to be {abs(best):.1f} s {'early' if best > 0 else 'late'} against those of the "
-            f"inertial sensor (correlation of the forces {most:.2f} then, {here:.2f} as it is)",
-            f"take both stamps from one clock, or set gnss_offset_s = {offset:.1f} in [clocks] (latency_s in "
-            "[gnss] if it is the receiver's delay)",
-            corrections=(shift_clock("gnss_offset_s", best),),
+        facts |= {"by": best, "most": most, "offset": offset}
+        correct = (shift_clock("gnss_offset_s", best),)
+        yield Finding("warning", "gnss", "time_s", "imu-gnss-offset", facts, corrections=correct)
+
+
+# -- units and axes
+
+#: Half of all samples lie above and half below: this one does not mind manoeuvres.
+PLAUSIBLE = (5.0, 20.0)  # m/s^2
+IN_G = (0.5, 2.0)
+#: Means over a second of what is felt agree with the receiver much better than this.
+CLOSE = 1.4
+#: deg/s for rad/s is a factor of 57; a tenth of it is beyond any manoeuvre.
+FACTOR = 10.0
+#: Sustained over a second: more than one and a half turns.
+FASTEST = 10.0  # rad/s
+#: Turning counts from here on, flying as well.
+TURNING, SLOWEST = 0.05, 5.0  # rad/s, m/s
+ENOUGH_TURNS = 10
+#: Axes are judged where they were moved (rad/s, m/s^2), by so clear a correlation.
+MOVED_RATE, MOVED_FORCE, CLEAR = 0.02, 0.7, 0.6
+#: So closely the rate about z follows the course where the nose points where it goes.
+FOLLOWS = 0.9
+#: The mean force points within 45 deg of where it should, or away from it.
+ALONG = 0.7
+#: Of so many seconds, spread over the flight, it is asked how far the airframe turned in each.
+SECONDS = 300_000
+
+
+def _force_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
+    """Specific force in g, without gravity, or in another unit."""
+    size, should = float(np.median(imu.sizes_of_forces())), 0.0
+    low, high = PLAUSIBLE
+    if moved is not None and moved.measured:
+        felt_then = np.linalg.norm(imu.mean_force(moved.start, moved.end), axis=1)
+        good = np.isfinite(felt_then)
+        if good.sum() >= ENOUGH:
+            size = float(np.median(felt_then[good]))
+            should = float(np.median(np.linalg.norm(moved.force[good], axis=1)))
+            low, high = should / CLOSE, should * CLOSE
+    if low <= size <= high:
+        return
+    code = "force-long" if size > high else "force-short"
+    if IN_G[0] <= size <= IN_G[1]:
+        code = "force-in-g"
+    scale = np.sqrt(low * high) / size
+    facts = {"size": size, "should": should}
+    correct = change_columns("imu", FORCE, lambda f: scale * f)
+    yield Finding("problem", "imu", "f_z_m_s2", code, facts, corrections=(correct,))
+
+
+def _rate_unit(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
+    """Angular rate in deg/s, or taken for it."""
+
+    def wrong(code: str, ratio: float, **facts: Any) -> Finding:
+        fast = ratio > FACTOR
+        unit = np.radians(1.0) if fast else np.degrees(1.0)
+        correct: tuple[Correction, ...] = (change_columns("imu", RATE, lambda w: unit * w),)
+        certain = fast or code == "rate-against-attitude"
+        level: Level = "problem" if certain else "warning"
+        facts |= {"ratio": ratio, "fast": fast, "unit": "deg/s" if fast else "rad/s"}
+        return Finding(level, "imu", "w_z_rad_s", code, facts, corrections=correct if certain else ())
+
+    for turn in turns(flight):
+        rate = imu.mean_rate(turn.start, turn.end)
+        size = np.linalg.norm(turn.rate, axis=1)
+        good = np.isfinite(rate).all(axis=1) & (size > TURNING)
+        if good.sum() >= ENOUGH_TURNS:
+            ratio = float(np.median(np.linalg.norm(rate[good], axis=1) / size[good]))
+            # Another unit leaves the direction as it was; another clock, or another attitude, does not.
+            if not 1 / FACTOR < ratio < FACTOR and _together(rate[good], turn.rate[good]) > CLEAR:
+                yield wrong("rate-against-attitude", ratio, source=turn.source)
+                return
+    if moved is not None:
+        speed = np.linalg.norm(imu.mean_rate(moved.start, moved.end), axis=1)
+        course = np.abs(moved.course_rate(SLOWEST))
+        good = np.isfinite(speed) & (course > TURNING)
+        if good.sum() >= ENOUGH_TURNS:
+            ratio = float(np.median(speed[good] / course[good]))
+            if not 1 / FACTOR <= ratio <= FACTOR:
+                yield wrong("rate-against-course", ratio)
+                return
+    end = imu.times[imu.times >= imu.times[0] + 1.0]
+    end = end[:: max(1, len(end) // SECONDS)]
+    fast = np.linalg.norm(imu.mean_rate(end - 1.0, end), axis=1) if len(end) else np.zeros(1)
+    if (fastest := float(np.nanmax(fast))) > FASTEST:
+        yield Finding("problem", "imu", "w_z_rad_s", "rate-too-fast", {"turned": fastest / (2 * np.pi)})
+
+
+def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
+    """On average an aircraft neither climbs nor falls: the mean force points to its upper side."""
+    mean = imu.mean_of_forces()
+    size = float(np.linalg.norm(mean))
+    if size < USUAL_GRAVITY / 2 or mean[2] < -ALONG * size:
+        return
+    axis = int(np.argmax(np.abs(mean)))
+    code = "gravity-oblique"
+    corrections: tuple[Correction, ...] = ()
+    facts: dict[str, Any] = {"mean": mean, "down": f"{'-' if mean[axis] > 0 else ''}{AXES[axis]}", "hint": ""}
+    if axis != 2 and abs(mean[axis]) > ALONG * size:
+        code = "gravity-along-other-axis"
+    elif axis == 2 and mean[2] > ALONG * size:
+        code = "gravity-upside-down"
+        corrections = (
+            change_columns("imu", (*FORCE, *RATE), lambda x: x * [1, -1, -1, 1, -1, -1]),
+            change_columns("imu", FORCE, lambda f: -f),
         )
+        both = _turning(imu, moved)
+        about_z = 0.0 if both is None else _together(both[0][:, 2], both[1])
+        if abs(about_z) > CLEAR:
+            facts["hint"] = f" (here the turns say that z points {'up' if about_z < 0 else 'down'})"
+    yield Finding("problem", "imu", f"f_{AXES[axis]}_m_s2", code, facts, corrections=corrections)
+
+
+def _against_attitude(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
+    for turn in turns(flight):
+        rate = imu.mean_rate(turn.start, turn.end)
+        yield from _mapping("rate", rate, turn.rate, MOVED_RATE, turn.source)
+        if moved is not None:
+            rows, R = attitudes_near(flight.nav[turn.source], (moved.start + moved.end) / 2)
+            expected = np.einsum("kji,kj->ki", R, moved.force[rows])
+            felt = imu.mean_force(moved.start, moved.end)[rows]
+            yield from _mapping("force", felt, expected, MOVED_FORCE, turn.source)
+
+
+def _mapping(what: str, measured: Array, expected: Array, moved: float, source: str) -> Iterator[Finding]:
+    """Whether the axes go with those of the attitude, as they are or otherwise."""
+    good = np.isfinite(measured).all(axis=1) & np.isfinite(expected).all(axis=1)
+    if good.sum() < ENOUGH:
+        return
+    measured, expected = measured[good], expected[good]
+    lively = np.flatnonzero((expected.std(axis=0) > moved) & (measured.std(axis=0) > moved / 10))
+    if len(lively) == 0:
+        return
+    C = np.corrcoef(measured[:, lively].T, expected[:, lively].T)[: len(lively), len(lively) :]
+    mine, theirs = linear_sum_assignment(-np.abs(C))
+    best = C[mine, theirs]
+    wrong = (np.abs(best) > CLEAR) & ((mine != theirs) | (best < 0))
+    # An exchange has to be clearly better than no exchange: axes of a manoeuvre may well move together.
+    wrong &= best**2 > C[mine, mine] * np.abs(C[mine, mine]) + 0.2
+    if wrong.any():
+        pairs = [
+            f"{AXES[lively[mine[i]]]} goes with {'minus ' if best[i] < 0 else ''}{AXES[lively[theirs[i]]]}"
+            for i in np.flatnonzero(wrong)
+        ]
+        axis = AXES[lively[mine[int(np.argmax(wrong))]]]
+        field = f"w_{axis}_rad_s" if what == "rate" else f"f_{axis}_m_s2"
+        facts = {"what": what, "rates": what == "rate", "source": source, "pairs": ", ".join(pairs)}
+        yield Finding("warning", "imu", field, "axes-against-attitude", facts)
+
+
+def _together(a: Array, b: Array) -> float:
+    """As a correlation, but about zero: a circle is flown one way all the time."""
+    size = np.sqrt(np.sum(a**2) * np.sum(b**2))
+    return float(np.sum(a * b) / size) if size > 0 else 0.0
+
+
+def _turning(imu: Inertial, moved: Moves | None) -> tuple[Array, Array] | None:
+    """Rates (K, 3) and how fast the course turns (K,), where there are turns."""
+    if moved is None:
+        return None
+    rate, course = imu.mean_rate(moved.start, moved.end), moved.course_rate(SLOWEST)
+    good = np.isfinite(rate).all(axis=1) & np.isfinite(course)
+    return (rate[good], course[good]) if (good & (np.abs(course) > TURNING)).sum() >= ENOUGH else None
+
+
+def _against_course(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
+    """A course to the right is a turn to the right about z; a banked turn raises the nose either way."""
+    both = _turning(imu, moved)
+    if both is None:
+        return
+    rate, course = both
+    turning = np.abs(course) > TURNING
+    about_z, about_y = _together(rate[:, 2], course), _together(rate[turning, 1], np.abs(course[turning]))
+    # Who flies sideways turns as the course does by chance alone, and never as closely.
+    if about_z < -FOLLOWS:
+        yield Finding("warning", "imu", "w_z_rad_s", "z-against-course", {"correlation": about_z})
+    elif about_z > FOLLOWS and about_y < -CLEAR:
+        yield Finding("warning", "imu", "w_y_rad_s", "nose-drops-in-turns", {"correlation": about_y})

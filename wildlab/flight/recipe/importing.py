@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +25,13 @@ from wildlab.flight.manifest_parts import CameraPart, GnssPart, ImuPart, Magneto
 from wildlab.flight.recipe.model import Recipe, read_recipe
 from wildlab.flight.recipe.poses import Fixes, LocalFrame, PoseRows, read_poses
 from wildlab.flight.recipe.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
-from wildlab.flight.recipe.sensors import SensorRows, read_sensors
 from wildlab.flight.recipe.tables import (
     FrameRows,
+    SensorRows,
     frames_of_rows,
     read_detections,
     read_frames,
+    read_sensors,
     read_truth,
 )
 from wildlab.flight.store import Flight, save_flight
@@ -177,15 +179,13 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
         rows = raw.table(block.file, block.separator, "camera")
         for name, column in block.columns.items():
             found = plain_numbers(rows, column, f"camera.{name}")
-            if (found != found[0]).any():
-                row = int(np.argmax(found != found[0]))
-                raise rows.fail(
-                    f"the camera changes: {found[row]:g} here, {found[0]:g} before",
-                    "import the photos of each camera or zoom as a flight of their own",
-                    column,
-                    f"camera.{name}",
-                    row,
-                )
+            rows.refuse(
+                found != found[0],
+                partial(_camera_changes, found),
+                "import the photos of each camera or zoom as a flight of their own",
+                column,
+                f"camera.{name}",
+            )
             data[name] = float(found[0])
     try:
         return check_model(CameraPart, data, path)
@@ -196,6 +196,10 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
             raise WildlabError(error.problem, error.fix, file=path, field=f"camera.{name}") from None
         rows = raw.table(block.file, block.separator, "camera")
         raise rows.fail(error.problem, error.fix, named, f"camera.{name}", 0) from None
+
+
+def _camera_changes(found: NDArray[np.float64], row: int) -> str:
+    return f"the camera changes: {found[row]:g} here, {found[0]:g} before"
 
 
 def _places(recipe: Recipe, poses: dict[str, PoseRows], sensors: dict[str, SensorRows]) -> LocalFrame:
@@ -333,8 +337,8 @@ def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
             blocks = recipe.truth if finding.table == "truth" else recipe.detections
             part, files = finding.table, [block.file for block in blocks]
         raise WildlabError(
-            finding.sentence,
-            finding.fix,
+            finding.clause,
+            finding.remedy,
             file=" and ".join(dict.fromkeys(str(folder / _file(recipe, name)) for name in files)),
             field=f"{finding.field} (from [{part}])",
         )

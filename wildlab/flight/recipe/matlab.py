@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import did_you_mean, printable
-from wildlab.flight.recipe.series import MatlabTable
+from wildlab.flight.recipe.parts import MatlabTable
 
 # Its types know files by name only.
 reader: Any = scipy.io

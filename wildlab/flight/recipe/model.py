@@ -7,9 +7,9 @@ signs, constants, and the few operations named here. `data/recipes/README.md` ex
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AwareDatetime, Field, field_validator, model_validator
+from pydantic import AwareDatetime, Field, ValidationInfo, field_validator, model_validator
 
 from wildlab.flight.files import Strict, check_model, is_safe_name, read_toml
 from wildlab.flight.following import SensorPart, TargetsPart
@@ -23,27 +23,174 @@ from wildlab.flight.manifest_parts import (
     ScoringPart,
     UncertaintyPart,
 )
-from wildlab.flight.recipe.camera_detections import Detections, FramesPart, Truth
 from wildlab.flight.recipe.parts import (
+    Angle,
     Attitude,
+    Gimbal,
+    Inertial,
+    Length,
+    LogTable,
+    Magnetometer,
+    MatlabTable,
+    Pixel,
     Position,
+    Ruled,
+    Satellite,
+    Separator,
+    Series,
     Spreads,
     Stamp,
     Velocity,
     Zone,
 )
-from wildlab.flight.recipe.series import (
-    Gimbal,
-    Inertial,
-    LogTable,
-    Magnetometer,
-    MatlabTable,
-    Satellite,
-    Separator,
-    Series,
-    check_table_names,
-)
 from wildlab.flight.terrain_model import TerrainSays
+
+
+class Group(Strict):
+    """Label of the sub-flight: straight from a column, or by where a number lies between edges.
+
+    `clear`: no number may come closer to an edge than this; else the groups are not as separate as thought.
+    """
+
+    column: str
+    edges: tuple[float, ...] = ()
+    labels: tuple[str, ...] = ()
+    clear: Annotated[float, Field(ge=0)] = 0.0
+
+    @model_validator(mode="after")
+    def _edges_and_labels(self) -> Self:
+        edges, labels = len(self.edges), len(self.labels)
+        if (edges or labels) and labels != edges + 1:
+            raise ValueError(
+                f"{edges} edges make {edges + 1} groups, and there are {labels} labels; "
+                "give one label more than edges, or neither"
+            )
+        if any(b <= a for a, b in zip(self.edges, self.edges[1:], strict=False)):
+            raise ValueError("the edges do not increase; put them in order")
+        return self
+
+
+class FramesPart(Series):
+    """The images: one per row with its `id`, or one per `unique` combination of columns.
+
+    `sensor` names the column that says which of several sensors looked; such frames need no camera.
+    """
+
+    id: str | None = None
+    unique: tuple[str, ...] = ()
+    prefix: str = ""
+    time: Stamp | None = None
+    group: Group | None = None
+    sensor: str | None = None
+    pan: Angle | None = None
+    tilt: Angle | None = None
+
+    rules = (
+        (
+            lambda s: (s.id is None) == (not s.unique),
+            "frames are named by either id or unique; give one of both",
+        ),
+        (
+            lambda s: s.prefix and not s.unique,
+            "a prefix is for frames made by unique; leave it out",
+        ),
+        (
+            lambda s: len(s.given("pan", "tilt")) == 1,
+            "a gimbal has both pan and tilt; give both, one as a value if it is fixed",
+        ),
+    )
+
+
+class PixelPart(Strict):
+    """To the right and downwards."""
+
+    u: Pixel
+    v: Pixel
+
+
+class Ground(Ruled):
+    """How high the ground is at a detection: as down in frame n, or as a height above the ellipsoid, at a
+    place (without one: under the camera)."""
+
+    down: Length | None = None
+    height: Length | None = None
+    latitude: Angle | None = None
+    longitude: Angle | None = None
+
+    rules = (
+        (
+            lambda s: len(s.given("down", "height")) != 1,
+            "the ground has either down or height; give one of both",
+        ),
+        (
+            lambda s: (
+                s.given("latitude", "longitude", "down") not in ((), ("latitude", "longitude"), ("down",))
+            ),
+            "a place is a latitude and a longitude beside a height; give both, or neither",
+        ),
+    )
+
+
+class Detections(Series):
+    """Detections of one source. One of pixel, position, or azimuth says what was measured; with an elevation
+    where the sensor has one, and with a range. `counts_from`: whether the azimuth is zero towards north, or
+    ahead of the platform, as of a radar whose picture is head up; it grows clockwise either way."""
+
+    source: str
+    id: str | None = None
+    prefix: str = ""
+    frame: str | None = None
+    target: str | None = None
+    pixel: PixelPart | None = None
+    position: Position | None = None
+    azimuth: Angle | None = None
+    counts_from: Literal["north", "bow"] = "north"
+    elevation: Angle | None = None
+    range: Length | None = None
+    ground: Ground | None = None
+
+    rules = (
+        (
+            lambda s: (
+                len(s.given("pixel", "position", "azimuth")) != 1
+                or (s.azimuth is None and bool(s.given("elevation", "range")))
+            ),
+            "a detection is a pixel, a position, or an azimuth with or without elevation and range; "
+            "give one of these",
+        ),
+        (
+            lambda s: s.counts_from == "bow" and s.azimuth is None,
+            "only an azimuth counts from the bow; leave counts_from out",
+        ),
+        (
+            lambda s: s.prefix and s.id is not None,
+            "a prefix is for detections without an id; leave it out",
+        ),
+    )
+
+    @property
+    def kind(self) -> str:
+        (what,) = self.given("pixel", "position", "azimuth")
+        return {"azimuth": "bearing" if self.range is None else "range-bearing"}.get(what, what)
+
+
+class Truth(Series):
+    """Where targets really were: `id` names the column, or `target` the one target of the whole file. Without
+    a time they are points that never move."""
+
+    id: str | None = None
+    target: str | None = None
+    time: Stamp | None = None
+    position: Position
+    sd_horizontal: Length | None = None
+    sd_vertical: Length | None = None
+
+    rules = (
+        (
+            lambda s: len(s.given("id", "target")) != 1,
+            "truth is named by either id (a column) or target (one name); give one of both",
+        ),
+    )
 
 
 class Poses(Series):
@@ -60,13 +207,16 @@ class Poses(Series):
     velocity: Velocity | None = None
     spreads: Spreads | None = None
 
-    @model_validator(mode="after")
-    def _one_position(self) -> Self:
-        if (self.position is None) == (self.position_from is None):
-            raise ValueError("poses have either a position or position_from; give one of both")
-        if self.position_from and self.time is None:
-            raise ValueError("position_from is for poses over time; add the time, or give a position")
-        return self
+    rules = (
+        (
+            lambda s: len(s.given("position", "position_from")) != 1,
+            "poses have either a position or position_from; give one of both",
+        ),
+        (
+            lambda s: s.position_from and s.time is None,
+            "position_from is for poses over time; add the time, or give a position",
+        ),
+    )
 
 
 Number = float | str
@@ -113,7 +263,7 @@ class RecipeTime(Strict):
     zone: Zone | None = None
 
 
-class RecipeVertical(Strict):
+class RecipeVertical(Ruled):
     """What the heights are, and a constant to take off where a source is wrong.
 
     `taken_off` names which heights: ``poses``, ``gnss``, ``ground`` (of detections), ``positions``
@@ -125,16 +275,17 @@ class RecipeVertical(Strict):
     taken_off: tuple[Literal["poses", "gnss", "ground", "positions", "truth"], ...] = ()
     note: str = ""
 
-    @model_validator(mode="after")
-    def _says_why(self) -> Self:
-        if self.correction_m and not self.taken_off:
-            raise ValueError(
-                "there is a correction, and taken_off does not say which heights to take it off; "
-                "name some of poses, gnss, ground, positions, truth"
-            )
-        if self.correction_m and not self.note:
-            raise ValueError("there is a correction, and no note says why; add the note")
-        return self
+    rules = (
+        (
+            lambda s: s.correction_m and not s.taken_off,
+            "there is a correction, and taken_off does not say which heights to take it off; "
+            "name some of poses, gnss, ground, positions, truth",
+        ),
+        (
+            lambda s: s.correction_m and not s.note,
+            "there is a correction, and no note says why; add the note",
+        ),
+    )
 
 
 class Recipe(Strict):
@@ -204,17 +355,17 @@ class Recipe(Strict):
             )
         return value
 
-    @field_validator("poses")
+    @field_validator("poses", "tables", "logs")
     @classmethod
-    def _safe_sources(cls, value: dict[str, Poses]) -> dict[str, Poses]:
+    def _safe_names(cls, value: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        what = "nav source" if info.field_name == "poses" else "table"
         for name in value:
             if not is_safe_name(name):
-                raise ValueError(f"{name!r} cannot name a nav source; use letters, digits, - and _ only")
+                raise ValueError(f"{name!r} cannot name a {what}; use letters, digits, - and _ only")
         return value
 
     @model_validator(mode="after")
-    def _safe_tables(self) -> Self:
-        check_table_names({**self.tables, **self.logs})
+    def _names_once(self) -> Self:
         twice = sorted(set(self.tables) & set(self.logs))
         if twice:
             raise ValueError(f"{twice[0]!r} names a table and a log; give each its own name")

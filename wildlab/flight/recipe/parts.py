@@ -1,19 +1,44 @@
-"""The smallest parts of a recipe: quantities with units, times, positions, attitudes."""
+"""The parts of a recipe that are not about one flight: quantities, times, positions, attitudes, tables.
+
+A part has rules: what it may not be, and what to say then.
+"""
 
 from __future__ import annotations
 
 import re
 import zoneinfo
+from collections.abc import Callable
 from datetime import timedelta, timezone, tzinfo
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from wildlab.flight.files import Strict
+from wildlab.flight.files import Strict, did_you_mean, leaves_folder
+from wildlab.flight.manifest_parts import GnssPart, ImuPart, MagnetometerPart
+from wildlab.flight.readers.autoferry import Part
+from wildlab.flight.readers.formats import FOLDERS, FORMATS
+from wildlab.flight.readers.log import PARTS
 from wildlab.flight.units import Dimension, factor
 
 
-class Quantity(Strict):
+class Ruled(Strict):
+    """A part with rules; a rule is what is so where it is broken, and ``"problem; fix"``."""
+
+    rules: ClassVar[tuple[tuple[Callable[[Any], bool], str], ...]] = ()
+
+    @model_validator(mode="after")
+    def _keep_rules(self) -> Self:
+        for broken, message in self.rules:
+            if broken(self):
+                raise ValueError(message)
+        return self
+
+    def given(self, *names: str) -> tuple[str, ...]:
+        """Those of the fields that have a value."""
+        return tuple(name for name in names if getattr(self, name) is not None)
+
+
+class Quantity(Ruled):
     """A column, or one constant for all rows. `negate` turns its sign: a slant is minus the pitch.
 
     `plus` names a column in the same unit that is added first: what a logger had taken off, such as a bias.
@@ -25,15 +50,16 @@ class Quantity(Strict):
     unit: str
     negate: bool = False
 
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
-        if (self.column is None) == (self.value is None):
-            raise ValueError(
-                "a quantity has either a column or a value; name the column, or give one value for all rows"
-            )
-        if self.plus is not None and self.column is None:
-            raise ValueError("plus is added to a column, and there is none; name the column")
-        return self
+    rules = (
+        (
+            lambda s: len(s.given("column", "value")) != 1,
+            "a quantity has either a column or a value; name the column, or give one value for all rows",
+        ),
+        (
+            lambda s: s.plus is not None and s.column is None,
+            "plus is added to a column, and there is none; name the column",
+        ),
+    )
 
 
 def _of(dimension: Dimension) -> AfterValidator:
@@ -81,7 +107,7 @@ def _known_zone(text: str) -> str:
 Zone = Annotated[str, AfterValidator(_known_zone)]
 
 
-class Stamp(Strict):
+class Stamp(Ruled):
     """When: one column, or several that are joined by a blank (a date and a time).
 
     `format` is ``iso`` (ISO 8601), ``unix`` (since 1970), ``elapsed`` (since the epoch), or a pattern as of
@@ -110,18 +136,27 @@ class Stamp(Strict):
             )
         return value
 
-    @model_validator(mode="after")
-    def _some_column(self) -> Self:
-        if (self.column is None) == (not self.columns):
-            raise ValueError("a time has either a column or several columns; name one of both")
-        return self
+    rules = (
+        (
+            lambda s: (s.column is None) == (not s.columns),
+            "a time has either a column or several columns; name one of both",
+        ),
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
         return (self.column,) if self.column is not None else self.columns
 
 
-class Position(Strict):
+#: The coordinates of a position by what they are about.
+FORMS = {
+    "wgs84": ("latitude", "longitude", "height"),
+    "ned": ("north", "east", "down"),
+    "enu": ("east", "north", "up"),
+}
+
+
+class Position(Ruled):
     """Where: latitude, longitude, height (WGS84); or about the origin north, east, down or east, north, up.
 
     `linear`: east and north were made from WGS84 by the linear formula F (2.2)-(2.3).
@@ -136,29 +171,26 @@ class Position(Strict):
     up: Length | None = None
     linear: bool = False
 
-    @model_validator(mode="after")
-    def _one_frame(self) -> Self:
-        if self.form is None:
-            raise ValueError(
-                "a position is latitude, longitude and height, or north, east and down, or east, north and "
-                "up; give all three of one kind and none of another"
-            )
-        if self.linear and self.form != "enu":
-            raise ValueError("linear is about east, north and up; leave it out")
-        return self
+    rules = (
+        (
+            lambda s: s.form is None,
+            "a position is latitude, longitude and height, or north, east and down, or east, north and "
+            "up; give all three of one kind and none of another",
+        ),
+        (
+            lambda s: s.linear and s.form != "enu",
+            "linear is about east, north and up; leave it out",
+        ),
+    )
 
     @property
-    def form(self) -> Literal["wgs84", "ned", "enu"] | None:
-        names = ("latitude", "longitude", "height", "north", "east", "down", "up")
-        given = {name for name in names if getattr(self, name) is not None}
-        if given == {"latitude", "longitude", "height"}:
-            return "wgs84"
-        if given == {"north", "east", "down"}:
-            return "ned"
-        return "enu" if given == {"east", "north", "up"} else None
+    def form(self) -> str | None:
+        """One of `FORMS`."""
+        given = set(self.given(*(name for form in FORMS.values() for name in form)))
+        return next((form for form, names in FORMS.items() if set(names) == given), None)
 
 
-class Velocity(Strict):
+class Velocity(Ruled):
     """North, east, down; or east, north, up; or the speed over ground and its course, with down or up."""
 
     north: Speed | None = None
@@ -168,21 +200,18 @@ class Velocity(Strict):
     down: Speed | None = None
     up: Speed | None = None
 
-    @model_validator(mode="after")
-    def _one_horizontal(self) -> Self:
-        names = ("north", "east", "speed", "course")
-        given = {name for name in names if getattr(self, name) is not None}
-        if given not in ({"north", "east"}, {"speed", "course"}):
-            raise ValueError(
-                "a velocity has either north and east, or speed and course; give both of one kind"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _one_vertical(self) -> Self:
-        if (self.down is None) == (self.up is None):
-            raise ValueError("a velocity has either down or up; give one of both")
-        return self
+    rules = (
+        (
+            lambda s: (
+                s.given("north", "east", "speed", "course") not in (("north", "east"), ("speed", "course"))
+            ),
+            "a velocity has either north and east, or speed and course; give both of one kind",
+        ),
+        (
+            lambda s: len(s.given("down", "up")) != 1,
+            "a velocity has either down or up; give one of both",
+        ),
+    )
 
 
 class PastNadir(Strict):
@@ -205,7 +234,7 @@ class YawFromBearing(Strict):
     largest_deviation_deg: Annotated[float, Field(gt=0, le=180)]
 
 
-class Attitude(Strict):
+class Attitude(Ruled):
     """Roll, pitch and yaw in zyx order, or a quaternion.
 
     `axes` says between which axes: ``frd-ned`` (forward-right-down to north-east-down, as in aviation) or
@@ -222,26 +251,34 @@ class Attitude(Strict):
     inverse: bool = False
     axes: Literal["frd-ned", "flu-enu"] = "frd-ned"
 
-    @model_validator(mode="after")
-    def _one_form(self) -> Self:
-        yaws = (self.yaw is not None) + (self.yaw_from_bearing is not None)
-        angles = (self.roll is not None) + (self.pitch is not None) + yaws
-        if self.quaternion is not None:
-            if angles or self.order is None:
-                raise ValueError(
-                    "a quaternion comes with its order and without angles; "
-                    'add order = "wxyz" or "xyzw", and take out the angles'
-                )
-        elif self.roll is None or self.pitch is None or yaws != 1 or self.order is not None or self.inverse:
-            raise ValueError(
-                "an attitude is roll, pitch and one yaw, or a quaternion with its order; give all of one kind"
-            )
-        if self.yaw_from_bearing is not None and self.axes != "frd-ned":
-            raise ValueError('a bearing counts from north to east; leave axes at "frd-ned"')
-        return self
+    rules = (
+        (
+            lambda s: s.quaternion is not None and (bool(s.angles) or s.order is None),
+            "a quaternion comes with its order and without angles; "
+            'add order = "wxyz" or "xyzw", and take out the angles',
+        ),
+        (
+            lambda s: s.quaternion is None and (s.order is not None or s.inverse or not s.by_angles),
+            "an attitude is roll, pitch and one yaw, or a quaternion with its order; give all of one kind",
+        ),
+        (
+            lambda s: s.yaw_from_bearing is not None and s.axes != "frd-ned",
+            'a bearing counts from north to east; leave axes at "frd-ned"',
+        ),
+    )
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """Those of the angles that are given."""
+        return self.given("roll", "pitch", "yaw", "yaw_from_bearing")
+
+    @property
+    def by_angles(self) -> bool:
+        """Whether it is roll, pitch and one yaw."""
+        return len(self.angles) == 3 and self.angles[:2] == ("roll", "pitch")
 
 
-class Spreads(Strict):
+class Spreads(Ruled):
     """Standard deviations of each pose, as the log has them.
 
     Of the attitude a tilt and a heading, or roll, pitch and yaw, which are read as such by the rule of
@@ -256,12 +293,184 @@ class Spreads(Strict):
     pitch: Angle | None = None
     yaw: Angle | None = None
 
+    rules = (
+        (
+            lambda s: (
+                s.given("tilt", "heading", "roll", "pitch", "yaw")
+                not in (("tilt", "heading"), ("roll", "pitch", "yaw"))
+            ),
+            "spreads of an attitude are tilt and heading, or roll, pitch and yaw; give all of one kind",
+        ),
+    )
+
+
+# -- tables over time, and the sensors on board
+
+Separator = Annotated[str, Field(min_length=1, max_length=1)]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class Block(Ruled):
+    """What every part that reads a table has: the name of its file below the source folder and its separator,
+    or the name of one of the `tables`."""
+
+    file: str
+    separator: Separator = ","
+
+
+class Condition(Ruled):
+    """Which rows count, by a column of numbers. Several limits have to hold all at once."""
+
+    column: str
+    equals: float | None = None
+    differs: float | None = None
+    above: float | None = None
+    below: float | None = None
+
+    rules = (
+        (
+            lambda s: not s.given("equals", "differs", "above", "below"),
+            "a condition says nothing; give it equals, differs, above or below",
+        ),
+    )
+
+
+class Series(Block):
+    """A table over time, of which some rows may not count.
+
+    `changed`: a row counts only where one of these columns differs from the row before, as in logs that
+    repeat the last fix until there is a new one; decided on the whole table. `where`: all of these hold.
+    """
+
+    changed: tuple[str, ...] = ()
+    where: tuple[Condition, ...] = ()
+
+
+class Forces(Strict):
+    """x forward, y right, z down: for each axis of the body the column that measures along it."""
+
+    x: Acceleration
+    y: Acceleration
+    z: Acceleration
+
+
+class Rates(Strict):
+    """About the same axes, each turning right-handed."""
+
+    x: Rate
+    y: Rate
+    z: Rate
+
+
+class Inertial(Series, ImuPart):
+    """As in the manifest; and specific force and angular rate in the axes of the body. At rest and level the
+    force is (0, 0, minus gravity)."""
+
+    time: Stamp
+    force: Forces
+    rate: Rates
+
+
+class Satellite(Series, GnssPart):
+    """As in the manifest; and what the receiver says: where its antenna is, how fast, how well it knows."""
+
+    time: Stamp
+    position: Position
+    velocity: Velocity | None = None
+    sd_horizontal: Length | None = None
+    sd_vertical: Length | None = None
+    sd_velocity: Speed | None = None
+    satellites: str | None = None
+    fix: str | None = None
+
+
+class MagneticFields(Strict):
+    """Along the same axes. In the north it points north and down, in the south north and up."""
+
+    x: MagneticField
+    y: MagneticField
+    z: MagneticField
+
+
+class Magnetometer(Series, MagnetometerPart):
+    """As in the manifest; and the field in the axes of the body."""
+
+    time: Stamp
+    field: MagneticFields
+
+
+class Gimbal(Series):
+    """Angles of the gimbal over time."""
+
+    time: Stamp
+    pan: Angle
+    tilt: Angle
+
+
+def _below(value: str) -> str:
+    if leaves_folder(value):
+        raise ValueError(f"the path {value!r} leaves its folder; name a file below the source folder")
+    return value
+
+
+Below = Annotated[str, AfterValidator(_below)]
+
+
+class MatlabTable(Ruled):
+    """A table out of a MATLAB file: `fields` of equal length, or a `matrix` whose columns have names.
+
+    `struct` is the dotted path of the struct that holds them, empty for variables of the file itself.
+    `labels` names a cell array with the names of the columns; or `columns` are these names.
+    """
+
+    file: Below
+    struct: str = ""
+    fields: tuple[Name, ...] = ()
+    matrix: Name | None = None
+    columns: tuple[Name, ...] = ()
+    labels: Name | None = None
+
+    rules = (
+        (
+            lambda s: (
+                bool(s.fields) == (s.matrix is not None)
+                or bool(s.columns) + (s.labels is not None) != (s.matrix is not None)
+            ),
+            "a table is made of fields, or of a matrix with columns or labels; give one of these",
+        ),
+    )
+
+
+class LogTable(Strict):
+    """A table out of a log of a known format: one of the parts that its reader tells apart.
+
+    ``height`` makes a column ``height_m`` of the heights that count from there, with ``add_m`` added;
+    ``offset_s`` is added to ``time_s``, and makes it of ``time_log_s`` where the log does not know UTC;
+    ``zone`` is that of a wall clock without one. ``triggers`` names another log, whose records of triggers
+    give images their times; ``camera`` takes the images of one camera; ``images`` names the log of the images
+    that pixels have to be of, to be used.
+    """
+
+    file: Below
+    format: str
+    part: str
+    height: Literal["ellipsoid", "sea", "home"] | None = None
+    add_m: float = 0.0
+    offset_s: float = 0.0
+    zone: Zone | None = None
+    triggers: str | None = None
+    camera: str | None = None
+    images: str | None = None
+
     @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        names = ("tilt", "heading", "roll", "pitch", "yaw")
-        given = tuple(name for name in names if getattr(self, name) is not None)
-        if given not in (names[:2], names[2:]):
+    def _known(self) -> Self:
+        formats = {**dict.fromkeys((*FORMATS, *FOLDERS), tuple(PARTS)), "autoferry": get_args(Part)}
+        if self.format not in formats:
+            raise ValueError(f"{self.format!r} is no format of logs; {did_you_mean(self.format, formats)}")
+        if self.part not in formats[self.format]:
             raise ValueError(
-                "spreads of an attitude are tilt and heading, or roll, pitch and yaw; give all of one kind"
+                f"{self.part!r} is no part of a log; {did_you_mean(self.part, formats[self.format])}"
             )
+        if self.add_m and self.height is None:
+            raise ValueError("add_m is added to heights, and height does not say which; add height")
         return self

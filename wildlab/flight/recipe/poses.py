@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.flight.checks.findings import NORM_TOLERANCE
+from wildlab.flight.checks.findings import NORM_TOLERANCE, POSITION, QUATERNION, VELOCITY
 from wildlab.flight.clocks import between, covariance_columns
 from wildlab.flight.recipe.model import Poses, Recipe
-from wildlab.flight.recipe.parts import Attitude, Position, Quantity, Spreads, Velocity, YawFromBearing
+from wildlab.flight.recipe.parts import FORMS, Attitude, Position, Quantity, Spreads, Velocity, YawFromBearing
 from wildlab.flight.recipe.raw import Array, Nanoseconds, RawTable, Text, numbers, plain_numbers, times
 from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
 from wildlab.geometry.flodell import metres_per_degree
@@ -42,7 +42,7 @@ SAME = 1e-9
 class RawPosition:
     """Positions as a table has them, in radians and metres: columns as in `form`."""
 
-    form: Literal["wgs84", "ned", "enu"]
+    form: str
     linear: bool
     values: Array
 
@@ -77,6 +77,16 @@ class LocalFrame:
         return geodetic_to_ned(latitude, longitude, self.origin[2] + c - off, self.origin)
 
 
+def ned_columns(position: Array) -> dict[str, Array]:
+    """Positions (N, 3) in n as columns of a flight."""
+    return dict(zip(POSITION, position.T, strict=True))
+
+
+def velocity_columns(velocity: Array) -> dict[str, Array]:
+    """Velocities (N, 3) in n as columns of a flight."""
+    return dict(zip(VELOCITY, velocity.T, strict=True))
+
+
 @dataclass(frozen=True)
 class Fixes:
     """Satellite positions: flight times (N,) and positions in n (N, 3)."""
@@ -108,10 +118,9 @@ class PoseRows:
             raise ValueError("poses without positions")
         q = matrix_to_quaternion(self.rotation)
         columns: dict[str, Array | Text] = {"time_s": time_s}
-        columns |= dict(zip(("north_m", "east_m", "down_m"), p.T, strict=True))
-        columns |= dict(zip(("q_w", "q_x", "q_y", "q_z"), q.T, strict=True))
+        columns |= ned_columns(p) | dict(zip(QUATERNION, q.T, strict=True))
         if self.velocity is not None:
-            columns |= dict(zip(("v_north_m_s", "v_east_m_s", "v_down_m_s"), self.velocity.T, strict=True))
+            columns |= velocity_columns(self.velocity)
         if self.ids is not None:
             columns["frame_id"] = self.ids
         table = pd.DataFrame(columns)
@@ -128,39 +137,36 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
     WildlabError
         Where a column is missing or a cell is not a number.
     """
-    names = {
-        "wgs84": ("latitude", "longitude", "height"),
-        "ned": ("north", "east", "down"),
-        "enu": ("east", "north", "up"),
-    }
     form = position.form
     if form is None:
         raise ValueError("a position without a form")
     columns = []
-    for name in names[form]:
+    for name in FORMS[form]:
         dimension: Literal["angle", "length"] = "angle" if name in ("latitude", "longitude") else "length"
         values = numbers(table, getattr(position, name), dimension, f"{part}.{name}")
         limit = {"latitude": np.pi / 2, "longitude": 2 * np.pi}.get(name, np.inf)
-        if (np.abs(values) > limit).any():
-            row = int(np.argmax(np.abs(values) > limit))
-            raise table.fail(
-                f"{np.degrees(values[row]):g} deg is no {name}",
-                "check the column and its unit in the recipe",
-                getattr(position, name).column or "value",
-                f"{part}.{name}",
-                row,
-            )
+
+        def beyond(row: int, values: Array = values, name: str = name) -> str:
+            return f"{np.degrees(values[row]):g} deg is no {name}"
+
+        table.refuse(
+            np.abs(values) > limit,
+            beyond,
+            "check the column and its unit in the recipe",
+            getattr(position, name).column or "value",
+            f"{part}.{name}",
+        )
         columns.append(values)
     nowhere = (columns[0] == 0) & (columns[1] == 0)
     # A receiver writes zeros until it knows where it is; a local position may well be zero.
-    if form == "wgs84" and nowhere.any():
-        raise table.fail(
+    if form == "wgs84":
+        table.refuse(
+            nowhere,
             f"latitude and longitude are both 0, here and in {int(nowhere.sum()) - 1} other rows: no "
             "position was known yet",
             "take out these rows",
             (position.latitude.column if position.latitude else None) or "value",
             f"{part}.latitude",
-            int(np.argmax(nowhere)),
         )
     return RawPosition(form, position.linear, np.column_stack(columns))
 
@@ -242,16 +248,13 @@ def _read_attitude(table: RawTable, attitude: Attitude, part: str) -> Array:
     if attitude.order == "xyzw":
         q = q[:, [3, 0, 1, 2]]
     norm = np.linalg.norm(q, axis=1)
-    off = np.abs(norm - 1) > NORM_TOLERANCE
-    if off.any():
-        row = int(np.argmax(off))
-        raise table.fail(
-            f"the quaternion is not normalised, its length is {norm[row]:.4g}",
-            "check that these are the four parts of a rotation, and mend or take out the row",
-            ", ".join(attitude.quaternion),
-            f"{part}.quaternion",
-            row,
-        )
+    table.refuse(
+        np.abs(norm - 1) > NORM_TOLERANCE,
+        lambda row: f"the quaternion is not normalised, its length is {norm[row]:.4g}",
+        "check that these are the four parts of a rotation, and mend or take out the row",
+        ", ".join(attitude.quaternion),
+        f"{part}.quaternion",
+    )
     return q * np.array([1, -1, -1, -1]) if attitude.inverse else q
 
 
@@ -285,15 +288,15 @@ def _same(
     table: RawTable, values: Array, frame: NDArray[np.intp], first: NDArray[np.intp], ids: Text, part: str
 ) -> None:
     differs = np.abs(values - values[first][frame]).max(axis=1) > SAME
-    if differs.any():
-        row = int(np.argmax(differs))
-        raise table.fail(
-            f"this row of frame {ids[row]!r} says something else than line {table.lines[first[frame[row]]]}",
-            "give each frame one pose, or name more columns that tell frames apart",
-            "pose",
-            part,
-            row,
-        )
+    table.refuse(
+        differs,
+        lambda row: (
+            f"this row of frame {ids[row]!r} says something else than line {table.lines[first[frame[row]]]}"
+        ),
+        "give each frame one pose, or name more columns that tell frames apart",
+        "pose",
+        part,
+    )
 
 
 def _yaw_from_bearing(
@@ -311,11 +314,8 @@ def _yaw_from_bearing(
     north, east = np.empty(len(frame)), np.empty(len(frame))
     for number, row in enumerate(first):
         rows = frame == number
-        origin = (
-            float(position.values[row, 0]),
-            float(position.values[row, 1]),
-            float(position.values[row, 2]),
-        )
+        a, b, c = position.values[row].tolist()
+        origin = (a, b, c)
         there = geodetic_to_ned(latitude[rows], longitude[rows], np.full(rows.sum(), origin[2]), origin)
         north[rows], east[rows] = there[:, 0], there[:, 1]
     yaw = np.arctan2(east, north) - beside

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -26,8 +27,7 @@ from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.parts import of_images, stamped_by, stream_of
 from wildlab.flight.recipe.delimited import is_packed, packed, read_delimited
 from wildlab.flight.recipe.matlab import read_matlab, table_of
-from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone
-from wildlab.flight.recipe.series import LogTable, MatlabTable, Series
+from wildlab.flight.recipe.parts import LogTable, MatlabTable, Quantity, Series, Stamp, parse_zone
 from wildlab.flight.units import Dimension, factor
 
 Array = NDArray[np.float64]
@@ -73,6 +73,14 @@ class RawTable:
         """An error about this table, to be raised."""
         where = "" if row is None else f"{self.counted_in} {self.lines[row]}: "
         return WildlabError(where + problem, fix, file=self.path, field=f"{printable(column)} (in [{part}])")
+
+    def refuse(
+        self, bad: NDArray[np.bool_], problem: str | Callable[[int], str], fix: str, column: str, part: str
+    ) -> None:
+        """Raise about the first of the rows (N,) that are bad, where there is one."""
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise self.fail(problem if isinstance(problem, str) else problem(row), fix, column, part, row)
 
 
 @dataclass
@@ -244,7 +252,7 @@ def texts(table: RawTable, column: str, part: str, *, may_be_empty: bool = False
     else:  # numbers, as a name or a label: without a needless fraction
         cells = np.array(["" if np.isnan(one) else f"{one:.15g}" for one in found], dtype=object)
     if not may_be_empty:
-        _refuse_empty(cells == "", table, column, part)
+        table.refuse(cells == "", *_EMPTY, column, part)
     return cells
 
 
@@ -261,10 +269,8 @@ def _column(table: RawTable, column: str, part: str) -> Any:
     return packed(found) if not is_packed(found) and found.dtype == object else found
 
 
-def _refuse_empty(empty: NDArray[np.bool_], table: RawTable, column: str, part: str) -> None:
-    if empty.any():
-        row = int(np.argmax(empty))
-        raise table.fail("this cell is empty", "fill it, or take out the row", column, part, row)
+#: Problem and remedy.
+_EMPTY = "this cell is empty", "fill it, or take out the row"
 
 
 def numbers(
@@ -306,13 +312,9 @@ def _refuse_degrees(found: Array, table: RawTable, column: str, part: str) -> No
     known = found[np.isfinite(found)]
     leaps = np.abs(np.diff(known)) > 2 * np.pi
     if part.rsplit(".", 1)[-1] in ("roll", "pitch") or np.abs(known[0]) > 2 * np.pi or leaps.any():
-        raise table.fail(
-            f"the angles run from {known.min():.4g} to {known.max():.4g}, which no angle in radians does",
-            'write unit = "deg", if they are in degrees',
-            column,
-            part,
-            int(np.argmax(beyond)),
-        )
+        run = f"from {known.min():.4g} to {known.max():.4g}"
+        problem = f"the angles run {run}, which no angle in radians does"
+        table.refuse(beyond, problem, 'write unit = "deg", if they are in degrees', column, part)
 
 
 def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool = False) -> Array:
@@ -333,20 +335,18 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
             found[block] = pd.to_numeric(pd.Series(words), errors="coerce").to_numpy(dtype=float)
             empty[block] = words == ""
         if not may_be_empty:
-            _refuse_empty(empty, table, column, part)
+            table.refuse(empty, *_EMPTY, column, part)
         bad = ~np.isfinite(found) & ~empty
     else:
         found = np.asarray(cells, float)
         bad = np.isinf(found) if may_be_empty else ~np.isfinite(found)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise table.fail(
-            f"{_short(table.cell(column, row))} is not a finite number",
-            "mend the cell (a point before the decimals, no unit behind them), or take out the row",
-            column,
-            part,
-            row,
-        )
+    table.refuse(
+        bad,
+        lambda row: f"{_short(table.cell(column, row))} is not a finite number",
+        "mend the cell (a point before the decimals, no unit behind them), or take out the row",
+        column,
+        part,
+    )
     return np.asarray(found)
 
 
@@ -365,50 +365,33 @@ def times(table: RawTable, stamp: Stamp, part: str, zone: str | None, epoch: dat
     name = " + ".join(stamp.names)
     columns = [texts(table, column, part) for column in stamp.names]
     cells = np.array([" ".join(parts) for parts in zip(*columns, strict=True)], dtype=object)
+
+    def refuse(lost: NDArray[np.bool_], problem: str, fix: str) -> None:
+        table.refuse(lost, lambda row: problem.replace("{}", _short(cells[row]), 1), fix, name, part)
+
     own = "%z" in stamp.format
     if stamp.format == "iso":
         zoned = np.array([bool(_ZONED.fullmatch(cell)) for cell in cells])
         own = bool(zoned.all())
-        if zoned.any() and not own:
-            row = int(np.argmin(zoned))
-            problem = f"{_short(cells[row])} has no time zone, and others in this column have"
-            raise table.fail(problem, "write all of them alike", name, part, row)
+        if zoned.any():
+            problem = "{} has no time zone, and others in this column have"
+            refuse(~zoned, problem, "write all of them alike")
     pattern = "ISO8601" if stamp.format == "iso" else stamp.format
     try:
         found = pd.DatetimeIndex(pd.to_datetime(cells, format=pattern, errors="coerce", utc=own))
     except ValueError as error:
         raise table.fail(f"the format {pattern!r} cannot be used ({error})", "mend it", name, part) from None
-    lost = np.asarray(pd.isna(found))
-    if lost.any():
-        row = int(np.argmax(lost))
-        raise table.fail(
-            f"{_short(cells[row])} is not a time of the format {stamp.format!r}",
-            "mend the cell, or the format in the recipe",
-            name,
-            part,
-            row,
-        )
+    problem = f"{{}} is not a time of the format {stamp.format!r}"
+    refuse(pd.isna(found), problem, "mend the cell, or the format in the recipe")
     if not own:
         zone = stamp.zone or zone
         if zone is None:
-            raise table.fail(
-                f"{_short(cells[0])} has no time zone, and the recipe names none",
-                'add zone to [time], such as zone = "UTC" or "Europe/Oslo"',
-                name,
-                part,
-                0,
-            )
+            problem = f"{_short(cells[0])} has no time zone, and the recipe names none"
+            fix = 'add zone to [time], such as zone = "UTC" or "Europe/Oslo"'
+            raise table.fail(problem, fix, name, part, 0)
         found = found.tz_localize(parse_zone(zone), ambiguous="NaT", nonexistent="NaT")
-        lost = np.asarray(pd.isna(found))
-        if lost.any():
-            row = int(np.argmax(lost))
-            raise table.fail(
-                f"{_short(cells[row])} does not exist or exists twice in {zone}, where the clocks change",
-                "give the zone as an offset such as +02:00",
-                name,
-                part,
-                row,
-            )
+        problem = f"{{}} does not exist or exists twice in {zone}, where the clocks change"
+        refuse(pd.isna(found), problem, "give the zone as an offset such as +02:00")
     return found.tz_convert(None).to_numpy("datetime64[ns]").astype(np.int64)
 
 
@@ -421,10 +404,13 @@ def _counted(table: RawTable, stamp: Stamp, part: str, epoch: datetime | None) -
     seconds = plain_numbers(table, name, part) * factor(stamp.unit, "time")
     start = 0 if stamp.format == "unix" or epoch is None else nanoseconds(epoch)
     far = np.abs(seconds) + abs(start) / 1e9 > _LATEST_S
-    if far.any():
-        row = int(np.argmax(far))
-        problem = f"{_short(table.cell(name, row))} {stamp.unit} is centuries away"
-        raise table.fail(problem, "check the unit of the time in the recipe (s, ms or us)", name, part, row)
+    table.refuse(
+        far,
+        lambda row: f"{_short(table.cell(name, row))} {stamp.unit} is centuries away",
+        "check the unit of the time in the recipe (s, ms or us)",
+        name,
+        part,
+    )
     return np.asarray(start + np.round(seconds * 1e9).astype(np.int64))
 
 

@@ -1,15 +1,23 @@
-"""Frames, detections and truth of a recipe."""
+"""Tables of a recipe beside the poses: sensors on board, frames, detections and truth."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 import pandas as pd
 
-from wildlab.flight.recipe.camera_detections import Detections, FramesPart, Ground, Truth
-from wildlab.flight.recipe.model import Recipe
-from wildlab.flight.recipe.poses import LocalFrame, read_position
+from wildlab.flight.recipe.model import Detections, FramesPart, Ground, Recipe, Truth
+from wildlab.flight.recipe.parts import Block, Satellite, Series
+from wildlab.flight.recipe.poses import (
+    LocalFrame,
+    RawPosition,
+    ned_columns,
+    read_position,
+    read_velocity,
+    velocity_columns,
+)
 from wildlab.flight.recipe.raw import (
     Array,
     Nanoseconds,
@@ -21,8 +29,83 @@ from wildlab.flight.recipe.raw import (
     texts,
     times,
 )
-from wildlab.flight.recipe.series import Block
+from wildlab.flight.units import Dimension
 from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic, wrap
+
+#: Columns of a flight's tables: name, quantity of the recipe's part, dimension.
+Columns = tuple[tuple[str, str, Dimension], ...]
+_GIMBAL: Columns = (("pan_rad", "pan", "angle"), ("tilt_rad", "tilt", "angle"))
+_SPREADS: Columns = (
+    ("sd_horizontal_m", "sd_horizontal", "length"),
+    ("sd_vertical_m", "sd_vertical", "length"),
+)
+ON_BOARD: dict[str, Columns] = {
+    "imu": (
+        *((f"f_{axis}_m_s2", f"force.{axis}", "acceleration") for axis in "xyz"),
+        *((f"w_{axis}_rad_s", f"rate.{axis}", "rate") for axis in "xyz"),
+    ),
+    "gnss": (*_SPREADS, ("sd_velocity_m_s", "sd_velocity", "speed")),
+    "magnetometer": tuple((f"field_{axis}_ut", f"field.{axis}", "field") for axis in "xyz"),
+    "gimbal": _GIMBAL,
+}
+
+
+def read_columns(
+    rows: RawTable, block: Series, part: str, columns: Columns, *, may_be_empty: bool = False
+) -> dict[str, Array]:
+    """Those of the columns whose quantity the block has, (N,) each.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing, or a cell is not a number.
+    """
+    quantities = [(name, key, attrgetter(key)(block), dimension) for name, key, dimension in columns]
+    return {
+        name: numbers(rows, quantity, dimension, f"{part}.{key}", may_be_empty=may_be_empty)
+        for name, key, quantity, dimension in quantities
+        if quantity is not None
+    }
+
+
+@dataclass(frozen=True)
+class SensorRows:
+    """One table without its times and positions; its stamps, and the raw positions of a receiver."""
+
+    columns: dict[str, Array]
+    stamps: Nanoseconds
+    position: RawPosition | None = None
+
+    def table(self, start: int, places: LocalFrame) -> pd.DataFrame:
+        """The table of the flight; `start` is its epoch in nanoseconds since 1970."""
+        columns: dict[str, Array] = {"time_s": (self.stamps - start) / 1e9}
+        if self.position is not None:
+            columns |= ned_columns(places.ned(self.position, "gnss"))
+        return pd.DataFrame(columns | self.columns)
+
+
+def read_sensors(recipe: Recipe, raw: RawFiles) -> dict[str, SensorRows]:
+    """Those of `imu`, `gnss`, `magnetometer` and `gimbal` that the recipe has.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing, a cell is not a number or not a time, or no row counts.
+    """
+    found = {}
+    for name, block in recipe.on_board.items():
+        rows, columns, position = raw.series(block, name), {}, None
+        if isinstance(block, Satellite):
+            position = read_position(rows, block.position, "gnss.position")
+            if block.velocity is not None:
+                columns = velocity_columns(read_velocity(rows, block.velocity, "gnss.velocity"))
+        columns |= read_columns(rows, block, name, ON_BOARD[name], may_be_empty=name == "gnss")
+        for key in ("satellites", "fix") if isinstance(block, Satellite) else ():
+            if (column := getattr(block, key)) is not None:
+                columns[key] = plain_numbers(rows, column, f"gnss.{key}", may_be_empty=True)
+        stamps = times(rows, block.time, f"{name}.time", recipe.time.zone, recipe.time.epoch)
+        found[name] = SensorRows(columns, stamps, position)
+    return found
 
 
 @dataclass(frozen=True)
@@ -60,26 +143,25 @@ def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
         columns["group"] = _groups(rows, block)
     if block.sensor is not None:
         columns["sensor"] = texts(rows, block.sensor, "frames.sensor")
-    if block.pan is not None and block.tilt is not None:
-        columns["pan_rad"] = numbers(rows, block.pan, "angle", "frames.pan")
-        columns["tilt_rad"] = numbers(rows, block.tilt, "angle", "frames.tilt")
+    columns |= read_columns(rows, block, "frames", _GIMBAL)
     stamps = None
     if block.time is not None:
         stamps = times(rows, block.time, "frames.time", recipe.time.zone, recipe.time.epoch)
         columns["stamp"] = stamps
     table = pd.DataFrame(columns)
     if block.id is None:
-        differs = (table != table.iloc[first[frame]].reset_index(drop=True)).to_numpy().any(axis=1)
-        if differs.any():
-            row = int(np.argmax(differs))
-            raise rows.fail(
+        others = table.iloc[first[frame]].reset_index(drop=True)
+        differs = np.asarray((table != others).to_numpy().any(axis=1))
+        rows.refuse(
+            differs,
+            lambda row: (
                 f"this row of frame {of_row[row]!r} says something else than line "
-                f"{rows.lines[first[frame[row]]]}",
-                "name more columns in unique",
-                ", ".join(block.unique),
-                "frames",
-                row,
-            )
+                f"{rows.lines[first[frame[row]]]}"
+            ),
+            "name more columns in unique",
+            ", ".join(block.unique),
+            "frames",
+        )
     table = table.iloc[first].reset_index(drop=True).drop(columns="stamp", errors="ignore")
     return FrameRows(table, None if stamps is None else stamps[first], of_row)
 
@@ -170,16 +252,14 @@ def read_detections(
         columns["v_px"] = numbers(rows, block.pixel.v, "pixel", f"{part}.pixel.v", image=image)
     elif block.position is not None:
         position = places.ned(read_position(rows, block.position, f"{part}.position"), "positions")
-        columns |= dict(zip(("north_m", "east_m", "down_m"), position.T, strict=True))
+        columns |= ned_columns(position)
     elif block.azimuth is not None:
         azimuth = numbers(rows, block.azimuth, "angle", f"{part}.azimuth")
         if block.counts_from == "bow":
             azimuth = np.asarray(wrap(azimuth + _headings(rows, frame, lens, part)), np.float64)
         columns["azimuth_rad"] = azimuth
-        if block.elevation is not None:
-            columns["elevation_rad"] = numbers(rows, block.elevation, "angle", f"{part}.elevation")
-        if block.range is not None:
-            columns["range_m"] = numbers(rows, block.range, "length", f"{part}.range")
+        beside: Columns = (("elevation_rad", "elevation", "angle"), ("range_m", "range", "length"))
+        columns |= read_columns(rows, block, part, beside)
     if block.ground is not None:
         under = np.full((len(rows), 3), np.nan)
         if frame is not None:
@@ -199,16 +279,16 @@ def _headings(rows: RawTable, frame: Text | None, lens: pd.DataFrame, part: str)
         )
     heading = lens["heading"].reindex(frame).to_numpy()
     unknown = ~np.isfinite(heading)
-    if unknown.any():
-        row = int(np.argmax(unknown))
-        raise rows.fail(
+    rows.refuse(
+        unknown,
+        lambda row: (
             f"this bearing counts from the bow, and no pose says where that points in frame {frame[row]!r}: "
-            f"{int(unknown.sum())} of {len(frame)} are so",
-            "give poses for as long as anything is detected, or leave these rows out with `where`",
-            "counts_from",
-            part,
-            row,
-        )
+            f"{int(unknown.sum())} of {len(frame)} are so"
+        ),
+        "give poses for as long as anything is detected, or leave these rows out with `where`",
+        "counts_from",
+        part,
+    )
     return np.asarray(heading, np.float64)
 
 
@@ -247,9 +327,5 @@ def read_truth(
         time_s = (times(rows, block.time, f"{part}.time", recipe.time.zone, recipe.time.epoch) - start) / 1e9
     position = places.ned(read_position(rows, block.position, f"{part}.position"), "truth")
     columns: dict[str, Text | Array] = {"target_id": names, "time_s": time_s}
-    columns |= dict(zip(("north_m", "east_m", "down_m"), position.T, strict=True))
-    for name, quantity in (("sd_horizontal_m", block.sd_horizontal), ("sd_vertical_m", block.sd_vertical)):
-        if quantity is not None:
-            part_of = f"{part}.{name.removesuffix('_m')}"
-            columns[name] = numbers(rows, quantity, "length", part_of, may_be_empty=True)
+    columns |= ned_columns(position) | read_columns(rows, block, part, _SPREADS, may_be_empty=True)
     return pd.DataFrame(columns)

@@ -11,7 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.sense.trial import Misfit, halves_of, robust_scale
+from wildlab.flight.checks.explanation import Misfit
+from wildlab.flight.checks.findings import POSE, POSITION
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
@@ -20,7 +21,6 @@ from wildlab.geometry.mount import Mount, camera_pose
 
 #: So many points say all there is to say, and fewer than so many say nothing.
 MOST, ENOUGH = 200, 4
-POSE = ("time_s", "north_m", "east_m", "down_m", "q_w", "q_x", "q_y", "q_z", "frame_id")
 #: A position makes no angle beyond this (rad): else a point that is near would be expected anywhere.
 NEAR = 0.1
 #: Points and images in a half that can be looked at by itself.
@@ -28,8 +28,8 @@ ENOUGH_HALF, IMAGES_HALF = 4, 2
 #: What is usual where neither log nor manifest says: position (m, horizontal and vertical), attitude (rad).
 USUAL_HORIZONTAL, USUAL_VERTICAL, USUAL_ATTITUDE, USUAL_PIXEL = 2.0, 3.0, np.radians(1.5), 2.0
 #: A mount turned by a few degrees and a position some metres off are no wrong meaning: they are allowed for.
-#: Standard deviations (rad, m).
-ALLOWED_TURN, ALLOWED_HORIZONTAL, ALLOWED_VERTICAL = np.radians(3.0), 3.0, 5.0
+#: Standard deviations (rad, m), of three turns and three shifts.
+ALLOWED = np.array([np.radians(3.0)] * 3 + [3.0, 3.0, 5.0])
 ROUNDS = 4
 #: Attitudes are not known better than this at the lens, whatever is stated: mounts give and clocks differ.
 LEAST_ATTITUDE = np.radians(0.3)
@@ -104,24 +104,16 @@ class Sightings:
 
         def looked(shift: float) -> SightingGeometry:
             at = self.looked(shift)
-            return SightingGeometry(
-                at.p_nb[rows], at.R_nb[rows], at.points[:, rows], at.pan[rows], at.tilt[rows]
-            )
+            p, R, pan, tilt = (value[rows] for value in (at.p_nb, at.R_nb, at.pan, at.tilt))
+            return SightingGeometry(p, R, at.points[:, rows], pan, tilt)
 
-        return replace(
-            self,
-            pan=self.pan[rows],
-            tilt=self.tilt[rows],
-            uv=self.uv[rows],
-            p_nb=self.p_nb[rows],
-            R_nb=self.R_nb[rows],
-            points=self.points[:, rows],
-            image=self.image[rows],
-            sd=self.sd[rows],
-            looked=looked,
-            labels=self.labels[rows],
-            frames=self.frames[rows],
-        )
+        names = ("pan", "tilt", "uv", "p_nb", "R_nb", "image", "sd", "labels", "frames")
+        taken = {name: getattr(self, name)[rows] for name in names}
+        return replace(self, points=self.points[:, rows], looked=looked, **taken)
+
+    def shifted(self, by: float) -> Sightings:
+        """The same sightings, had the camera's clock been so many seconds later."""
+        return replace(self, **self.looked(by)._asdict())
 
 
 def sightings(flight: Flight, source: str) -> Sightings | None:
@@ -138,23 +130,21 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
     -------
     Sightings or None
     """
-    manifest = flight.manifest
-    if manifest.camera is None or flight.detections is None or flight.truth is None:
+    manifest, frames, detections, truth = flight.manifest, flight.frames, flight.detections, flight.truth
+    if manifest.camera is None or detections is None or truth is None or not len(truth):
         return None
-    frames = flight.frames
-    if frames is None or frames["frame_id"].duplicated().any() or not len(flight.truth):
+    if frames is None or frames["frame_id"].duplicated().any() or "u_px" not in detections:
         return None
-    if "u_px" not in flight.detections:
-        return None
-    detections = flight.detections
+    if manifest.mount.poses not in ("", source):
+        return None  # the mount says nothing of a camera on these poses
     rows = (detections["kind"] == "pixel").to_numpy() & np.isfinite(detections["u_px"].to_numpy())
     named = "target_id" in detections and manifest.scoring.rule == "labelled"
     if named:
-        ids = detections["target_id"]
-        labelled = rows & ids.isin(flight.truth["target_id"]).to_numpy()
+        names = detections["target_id"]
+        labelled = rows & names.isin(truth["target_id"]).to_numpy()
         # Where none names a target, as a detector's do not, each may be of any of them; or of something else.
         named = bool(labelled.any())
-        rows = labelled if named else rows & (ids.isna() | (ids == "")).to_numpy()
+        rows = labelled if named else rows & (names.isna() | (names == "")).to_numpy()
     frame = pd.Index(frames["frame_id"]).get_indexer(pd.Index(detections["frame_id"]))
     chosen = np.flatnonzero(rows & (frame >= 0))
     if len(chosen) > MOST:
@@ -162,13 +152,10 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
     if len(chosen) < ENOUGH:
         return None
     frame, detections = frame[chosen], detections.iloc[chosen]
-    if flight.manifest.mount.poses not in ("", source):
-        return None  # the mount says nothing of a camera on these poses
     nav = flight.nav[source]
-    brief = nav[[name for name in nav if name in POSE]]  # at other times without covariances: those take long
+    brief = nav[[name for name in nav if name in (*POSE, "frame_id")]]  # covariances take long
     ids = detections["frame_id"]
     labels = detections["target_id"].to_numpy(object) if named else None
-    tracks = _tracks(flight, labels)
     try:
         times = frame_times(flight)[frame]
         still = tuple(angle[frame] for angle in gimbal_angles(flight))
@@ -180,9 +167,9 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
             if moving is not None:
                 turns = np.unwrap(moving[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
                 pan, tilt = between(moving["time_s"].to_numpy(float), turns, times + shift, "gimbal").T
-            return SightingGeometry(p, R, _points(tracks, times + shift, labels), pan, tilt)
+            return SightingGeometry(p, R, _points(flight, times + shift, labels), pan, tilt)
 
-        p, R, points, pan, tilt = looked(0.0)
+        at = looked(0.0)
         _, _, P = poses_at(nav, times, ids)
     except (WildlabError, ValueError):  # said by the checks of times
         return None
@@ -193,12 +180,8 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         source=source,
         camera=manifest.geometry_camera(),
         mount=manifest.geometry_mount(),
-        pan=pan,
-        tilt=tilt,
         uv=detections[["u_px", "v_px"]].to_numpy(float),
-        p_nb=p,
-        R_nb=R,
-        points=points,
+        **at._asdict(),
         image=number,
         sd=_expected(flight, P, len(chosen)),
         origin=manifest.origin_tuple(),
@@ -209,53 +192,37 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         named=named,
         between_s=float(np.median(np.diff(nav["time_s"]))) if len(nav) > 1 else 0.0,
     )
-    known = np.isfinite(p).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
-    known &= np.isfinite(points).all(axis=2).any(axis=0) & np.isfinite(found.pan + found.tilt)
+    known = np.isfinite(at.p_nb).all(axis=1) & np.isfinite(at.R_nb).all(axis=(1, 2))
+    known &= np.isfinite(at.points).all(axis=2).any(axis=0) & np.isfinite(at.pan + at.tilt)
     return found.take(known) if known.sum() >= ENOUGH else None
 
 
-#: Times (K,) and places (K, 3) of each target; of those that never move, without times.
-_Tracks = dict[str, tuple[Array | None, Array]]
-
-
-def _tracks(flight: Flight, labels: NDArray[np.object_] | None) -> _Tracks:
-    truth, offset = flight.table("truth"), flight.manifest.clocks.truth_offset_s
-    tracks: _Tracks = {}
-    for name, rows in truth.groupby("target_id", sort=False):
-        if labels is None or name in labels:
-            at = rows["time_s"].to_numpy(float) + offset
-            place = rows[["north_m", "east_m", "down_m"]].to_numpy(float)
-            tracks[str(name)] = (None, place[:1]) if np.isnan(at).all() else (at, place)
-    return tracks
-
-
-def _points(tracks: _Tracks, times: Array, labels: NDArray[np.object_] | None) -> Array:
+def _points(flight: Flight, times: Array, labels: NDArray[np.object_] | None) -> Array:
     """(M, N, 3) where the targets are; with labels (1, N, 3)."""
-
-    def of(name: str, rows: NDArray[np.bool_]) -> Array:
-        at, place = tracks[name]
-        if at is None:
-            return np.broadcast_to(place, (int(rows.sum()), 3))
-        return between(at, place, times[rows], f"truth of {name!r}")
-
-    if labels is None:
-        return np.stack([of(name, np.full(len(times), True)) for name in tracks])
-    found = np.full((1, len(times), 3), np.nan)
-    for name in tracks:
-        rows = labels == name
-        found[0, rows] = of(name, rows)
-    return found
+    offset = flight.manifest.clocks.truth_offset_s
+    found = []
+    one = np.full((1, len(times), 3), np.nan)
+    for name, track in flight.table("truth").groupby("target_id", sort=False):
+        rows = np.full(len(times), True) if labels is None else labels == name
+        if not rows.any():
+            continue
+        at, place = track["time_s"].to_numpy(float) + offset, track[list(POSITION)].to_numpy(float)
+        if np.isnan(at).all():
+            there = np.broadcast_to(place[:1], (int(rows.sum()), 3))
+        else:
+            there = between(at, place, times[rows], f"truth of {name!r}")
+        found.append(there)
+        one[0, rows] = there
+    return np.stack(found) if labels is None else one
 
 
 def _expected(flight: Flight, P: Array | None, n: int) -> Array:
     stated = flight.manifest.uncertainty
-    level = stated.position_horizontal_m or USUAL_HORIZONTAL
-    vertical = stated.position_vertical_m or USUAL_VERTICAL
     angles = [stated.tilt_deg, stated.tilt_deg, stated.heading_deg]
-    turn = float(np.mean([USUAL_ATTITUDE if a is None else np.radians(a) for a in angles]))
-    least = max(USUAL_ATTITUDE if a is None else np.radians(a) for a in angles)
-    place = np.hypot(level, vertical) / np.sqrt(2)
-    sd = np.tile([turn, place, stated.pixel_px or USUAL_PIXEL, least], (n, 1))
+    turns = [USUAL_ATTITUDE if angle is None else np.radians(angle) for angle in angles]
+    level = stated.position_horizontal_m or USUAL_HORIZONTAL
+    place = np.hypot(level, stated.position_vertical_m or USUAL_VERTICAL) / np.sqrt(2)
+    sd = np.tile([float(np.mean(turns)), place, stated.pixel_px or USUAL_PIXEL, max(turns)], (n, 1))
     if P is not None:
         with np.errstate(invalid="ignore"):
             own = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
@@ -277,16 +244,30 @@ class Missed:
     R_nc: Array
     expected: Array
 
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """Rows (N,) whose pixel has a ray."""
+        return np.asarray(np.isfinite(self.turn).all(axis=1))
 
-def missed(s: Sightings, offset: Array | None = None) -> Missed:
+    @property
+    def angle(self) -> Array:
+        """Sizes (N,) of the misses, rad."""
+        return np.asarray(np.linalg.norm(self.turn, axis=1))
+
+    @property
+    def across(self) -> Array:
+        """(N, 3, 3): how misses grow with a turn in c."""
+        d = self.towards
+        return np.asarray(np.eye(3) - d[:, :, None] * d[:, None, :])
+
+
+def missed(s: Sightings) -> Missed:
     """How far the rays of clicks miss the known points, as angles at the lens.
 
     Other than on the ground or in the image, it is a number also for a ray into the sky, or a point behind
     the lens. With several points that may be meant, it is the nearest one's.
     """
     p, R = camera_pose(s.mount, s.p_nb, s.R_nb, s.pan, s.tilt)
-    if offset is not None:
-        p = p + offset
     xy = normalise(s.camera, s.uv)
     r = np.column_stack([xy, np.ones(len(xy))])
     r /= np.linalg.norm(r, axis=1)[:, None]
@@ -312,46 +293,37 @@ def missed(s: Sightings, offset: Array | None = None) -> Missed:
     return Missed(turn, distance, d, R, expected)
 
 
-def allowed_for(m: Missed, rows: NDArray[np.bool_]) -> Array:
-    """A small turn of the camera and a small shift of the position, (6,), that take most of the misses away.
+def robust_scale(size: Array) -> float:
+    """Standard deviation per axis of errors in two dimensions, from the median of their sizes (N,)."""
+    return float(np.median(size)) / 1.1774 if len(size) else float("nan")
 
-    Robust least squares on some of the rows, held near zero by what is usual of both.
+
+def left_over(m: Missed, fit: NDArray[np.bool_]) -> Array:
+    """Sizes (N,) of the misses less what is allowed for, in radians, by a fit to some rows.
+
+    Allowed for are a small turn of the camera and a small shift of the position: robust least squares, held
+    near zero by what is usual of both.
     """
-    J = _jacobian(m)[rows]
-    e, expected = m.turn[rows], m.expected[rows]
-    usual = np.array([ALLOWED_TURN] * 3 + [ALLOWED_HORIZONTAL] * 2 + [ALLOWED_VERTICAL])
+    shift = np.cross(np.swapaxes(m.R_nc, 1, 2), m.towards[:, :, None], axisa=1, axisb=1, axisc=1)
+    J = np.concatenate([m.across, shift / np.maximum(m.distance, 1.0)[:, None, None]], axis=2)
+    e, expected, rows = m.turn[fit], m.expected[fit], J[fit]
     value = np.zeros(6)
     for _ in range(ROUNDS):
-        left = e - J @ value
-        size = np.linalg.norm(left, axis=1)
+        size = np.linalg.norm(e - rows @ value, axis=1)
         scale = np.maximum(robust_scale(size), expected / 3)
         weight = 1 / (1 + (size / (2 * scale)) ** 2) / scale**2
-        A = np.einsum("nia,n,nib->ab", J, weight, J) + np.diag(usual**-2.0)
-        value = np.linalg.solve(A, np.einsum("nia,n,ni->a", J, weight, e))
-    return value
-
-
-def _jacobian(m: Missed) -> Array:
-    """(N, 3, 6): how misses grow with a turn in c and a shift in n."""
-    d = m.towards
-    across = np.eye(3) - d[:, :, None] * d[:, None, :]
-    shift = np.cross(np.swapaxes(m.R_nc, 1, 2), d[:, :, None], axisa=1, axisb=1, axisc=1)
-    return np.concatenate([across, shift / np.maximum(m.distance, 1.0)[:, None, None]], axis=2)
-
-
-def finite(m: Missed) -> NDArray[np.bool_]:
-    """Rows (N,) whose pixel has a ray."""
-    return np.asarray(np.isfinite(m.turn).all(axis=1))
+        A = np.einsum("nia,n,nib->ab", rows, weight, rows) + np.diag(ALLOWED**-2.0)
+        value = np.linalg.solve(A, np.einsum("nia,n,ni->a", rows, weight, e))
+    return np.asarray(np.linalg.norm(m.turn - J @ value, axis=1))
 
 
 def glance(s: Sightings) -> Array:
     """The misfit of the whole alone, (2,)."""
     m = missed(s)
-    good = finite(m)
+    good = m.good
     if good.mean() < 0.5 or good.sum() < ENOUGH:
         return np.full(2, np.inf)
-    plain = np.linalg.norm(m.turn, axis=1) / m.expected
-    return np.array([robust_scale((left_over(m, good) / m.expected)[good]), robust_scale(plain[good])])
+    return _sizes(m, good, good)
 
 
 def misfit(s: Sightings) -> Misfit:
@@ -362,56 +334,35 @@ def misfit(s: Sightings) -> Misfit:
     NaN where a half is too small, infinite where the lens has no rays.
     """
     m = missed(s)
-    good = finite(m)
+    good = m.good
     if good.mean() < 0.5 or good.sum() < ENOUGH:
         return np.full((2, 3), np.inf)
-    first, second = halves_of(s.image)
-    plain = np.linalg.norm(m.turn, axis=1) / m.expected
     result = np.full((2, 3), np.nan)
-    result[:, 0] = robust_scale((left_over(m, good) / m.expected)[good]), robust_scale(plain[good])
-    parts = (first & good, second & good)
+    result[:, 0] = _sizes(m, good, good)
+    parts = [half & good for half in halves_of(s.image)]
     if all(part.sum() >= ENOUGH_HALF and len(np.unique(s.image[part])) >= IMAGES_HALF for part in parts):
         for column, (fit, judged) in enumerate((parts, parts[::-1]), start=1):
-            result[0, column] = robust_scale((left_over(m, fit) / m.expected)[judged])
-            result[1, column] = robust_scale(plain[judged])
+            result[:, column] = _sizes(m, fit, judged)
     return result
 
 
-def left_over(m: Missed, fit: NDArray[np.bool_]) -> Array:
-    """Sizes (N,) of the misses less what is allowed for, in radians, by a fit to some rows."""
-    return np.asarray(np.linalg.norm(m.turn - _jacobian(m) @ allowed_for(m, fit), axis=1))
+def _sizes(m: Missed, fit: NDArray[np.bool_], judged: NDArray[np.bool_]) -> Array:
+    sizes = (left_over(m, fit), m.angle)
+    return np.array([robust_scale((size / m.expected)[judged]) for size in sizes])
 
 
-def metres(s: Sightings) -> float:
-    """Median distance (m) by which the rays pass the known points; all of it for points behind the lens."""
+def halves_of(groups: NDArray[np.intp]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Rows of every other group (N,), and the rest: errors that drift are then the same in both."""
+    first = np.searchsorted(np.unique(groups), groups) % 2 == 0
+    return first, ~first
+
+
+def metres(s: Sightings, plain: bool = True) -> float:
+    """Median distance (m) by which the rays pass the known points, all of it for points behind the lens;
+    as it is, or with small constant errors of mount and position taken off."""
     m = missed(s)
-    good = finite(m)
-    angle = np.linalg.norm(m.turn[good], axis=1)
-    past = m.distance[good] * np.sin(np.minimum(angle, np.pi / 2))
-    return float(np.median(past)) if good.any() else float("nan")
-
-
-def metres_left(s: Sightings) -> float:
-    """The same where small constant errors of mount and position are taken off."""
-    m = missed(s)
-    good = finite(m)
+    good = m.good
     if not good.any():
         return float("nan")
-    return float(np.median((m.distance * np.sin(np.minimum(left_over(m, good), np.pi / 2)))[good]))
-
-
-def degrees(s: Sightings) -> float:
-    """The median angle by which the rays pass the known points, in degrees."""
-    m = missed(s)
-    good = finite(m)
-    return float(np.degrees(np.median(np.linalg.norm(m.turn[good], axis=1)))) if good.any() else float("nan")
-
-
-def with_attitude(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sightings | None]:
-    """From a change of attitudes (N, 3, 3) that of sightings."""
-
-    def change(s: Sightings) -> Sightings | None:
-        R = undo(s.R_nb)
-        return None if R is None else replace(s, R_nb=R)
-
-    return change
+    angle = m.angle if plain else left_over(m, good)
+    return float(np.median((m.distance * np.sin(np.minimum(angle, np.pi / 2)))[good]))
