@@ -121,9 +121,7 @@ def camera_of_images(
     if images.log is None:
         return None, images.problem
     if stated is not None:
-        columns = images.log.parts["photos"].columns
-        sizes = np.column_stack([columns["width_px"], columns["height_px"]])
-        sizes = np.unique(sizes[np.isfinite(sizes).all(axis=1)], axis=0)
+        sizes = _sizes(images.log.parts["photos"])
         if len(sizes) and (sizes != (stated.width_px, stated.height_px)).any():
             seen = ", ".join(f"{w:.0f} x {h:.0f}" for w, h in sizes[:4])
             own = f"{stated.width_px} x {stated.height_px}"
@@ -137,33 +135,15 @@ def camera_of_images(
         return None, error.problem
     if found is None:
         return None, "no tag of theirs says the focal length in pixels"
-    width, height, focal = found["width_px"], found["height_px"], found["focal_px"]
-    camera = CameraPart(
-        name=found["camera"] or "not stated",
-        width_px=width,
-        height_px=height,
-        fx_px=focal,
-        fy_px=focal,
-        cx_px=(width - 1) / 2,
-        cy_px=(height - 1) / 2,
-    )
-    return camera, (
-        f"{width} x {height} px with a focal length of {focal:.0f} px by {found['how']}; its centre and a "
-        "lens without distortion are assumed"
-    )
+    focal = found["focal_px"]
+    how = f"{focal:.0f} px by {found['how']}"
+    return _pinhole(found["camera"], found["width_px"], found["height_px"], focal, how)
 
 
-def _by_focal_length(photos: Stream, focal_px: float) -> tuple[CameraPart | None, str]:
-    """A camera of that focal length, as large as the images."""
-    columns = photos.columns
-    sizes = np.column_stack([columns["width_px"], columns["height_px"]])
-    sizes = np.unique(sizes[np.isfinite(sizes).all(axis=1)], axis=0)
-    if len(sizes) != 1:
-        return None, "they are of several sizes" if len(sizes) else "nothing says how large they are"
-    width, height = (int(one) for one in sizes[0])
-    names = {str(one) for one in columns.get("camera", ())} - {""}
+def _pinhole(name: str, width: int, height: int, focal_px: float, how: str) -> tuple[CameraPart | None, str]:
+    """A camera whose centre and distortion are not known, and how its focal length is."""
     camera = CameraPart(
-        name=names.pop() if len(names) == 1 else "not stated",
+        name=name or "not stated",
         width_px=width,
         height_px=height,
         fx_px=focal_px,
@@ -172,9 +152,26 @@ def _by_focal_length(photos: Stream, focal_px: float) -> tuple[CameraPart | None
         cy_px=(height - 1) / 2,
     )
     return camera, (
-        f"{width} x {height} px with a focal length of {focal_px:g} px, as you stated it; its centre and a "
-        "lens without distortion are assumed"
+        f"{width} x {height} px with a focal length of {how}; its centre and a lens without distortion are "
+        "assumed"
     )
+
+
+def _sizes(photos: Stream) -> NDArray[np.float64]:
+    """Widths and heights of the images, each pair once, (K, 2)."""
+    sizes = np.column_stack([photos.columns["width_px"], photos.columns["height_px"]])
+    return np.asarray(np.unique(sizes[np.isfinite(sizes).all(axis=1)], axis=0))
+
+
+def _by_focal_length(photos: Stream, focal_px: float) -> tuple[CameraPart | None, str]:
+    """A camera of that focal length, as large as the images."""
+    sizes = _sizes(photos)
+    if len(sizes) != 1:
+        return None, "they are of several sizes" if len(sizes) else "nothing says how large they are"
+    width, height = (int(one) for one in sizes[0])
+    names = {str(one) for one in photos.columns.get("camera", ())} - {""}
+    name = names.pop() if len(names) == 1 else ""
+    return _pinhole(name, width, height, focal_px, f"{focal_px:g} px, as you stated it")
 
 
 #: What the clock of images says of a zone that was stated, in front of it.

@@ -1,18 +1,22 @@
-"""A recipe in the making: what the user states, the tables that it asks for, and what was decided."""
+"""A recipe in the making: what the user states, the tables that it asks for, and what was decided.
+
+What the heights of a card's flight count from is decided once those of all its logs are brought together.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any
+from typing import Any, Literal, NamedTuple, cast
+
+import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.flight.card.blocks import has_utc, stream_of
 from wildlab.flight.card.found import OTHER
-from wildlab.flight.card.heights import Heights, Key, heights_of
-from wildlab.flight.card.roles import Choice
+from wildlab.flight.card.roles import PARTS_SHOWN, Choice
+from wildlab.flight.heights import NO_GRID, choose_reference
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.log import Stream
 from wildlab.flight.toml import dump_toml
@@ -86,6 +90,132 @@ def _comment(text: str) -> str:
     return "# " + re.sub(r"[\x00-\x1f\x7f\u0085\u2028\u2029]+", " ", text)
 
 
+def stream_of(choice: Choice, part: str) -> Stream:
+    """A part that a role asks for.
+
+    Raises
+    ------
+    WildlabError
+        Where no row of it can be used, as where a role was stated that the file does not have the data for.
+    """
+    stream = choice.found.part(part)
+    if stream is None:
+        raise WildlabError(
+            f"{choice.found.shown} is to be {choice.role!r}, and has no {PARTS_SHOWN.get(part, part)} that "
+            "can be used",
+            f"say what else it is, or leave it out: --role {choice.found.name}=nothing",
+            field="--role",
+        )
+    return stream
+
+
+def has_utc(stream: Stream) -> bool:
+    """Whether some row that can be used has a time in UTC."""
+    times = stream.columns.get("time_s")
+    return times is not None and bool(np.isfinite(times[stream.used]).any())
+
+
+def angles(stream: Stream) -> tuple[str, str] | None:
+    """Which angles a part has: beginning and end of their columns' names, None without any."""
+    for end in ("_world_deg", "_deg"):
+        names = [f"{axis}{end}" for axis in ("roll", "pitch", "yaw")]
+        if all(name in stream.columns for name in names):
+            values = np.column_stack([stream.columns[name] for name in names])[stream.used]
+            if np.isfinite(values).all(axis=1).any():
+                return "", end
+    return None
+
+
+Kind = Literal["ellipsoid", "sea", "home"]
+#: A part of a file: (name of the file, part).
+Key = tuple[str, str]
+
+
+class Chosen(NamedTuple):
+    """Which heights of a part are taken, and what is added to them, m."""
+
+    kind: Kind
+    add_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Heights:
+    """The reference of a flight, for each part how it gets there, and sentences on it."""
+
+    reference: str
+    chosen: dict[Key, Chosen]
+    said: list[str] = field(default_factory=list)
+
+    def of(self, file: str, part: str) -> Chosen | None:
+        """How a part's heights are taken; None where it has none."""
+        return self.chosen.get((file, part))
+
+
+def heights_of(
+    streams: Mapping[Key, Stream],
+    own: Collection[Key],
+    geoid_m: float | None,
+    take_off_m: float | None = None,
+) -> Heights:
+    """One reference for all parts with heights, see `wildlab.flight.heights.choose_reference`; the take-off
+    where none has any other.
+
+    Parameters
+    ----------
+    streams
+        The parts that have positions.
+    own
+        Those of the vehicle itself.
+    geoid_m
+        How far the geoid is above the ellipsoid, m, where the user states it.
+    take_off_m
+        Height of the take-off above sea level, m, likewise.
+
+    Returns
+    -------
+    Heights
+
+    Raises
+    ------
+    WildlabError
+        Where there is no one reference for all.
+    """
+    names = {key: f"{key[0]} ({key[1]})" for key in streams}
+    by_name = {names[key]: stream for key, stream in streams.items()}
+    alone = streams and set(streams) <= set(own) and all(map(_above_take_off_alone, streams.values()))
+    if alone and take_off_m is None:
+        said = ["Heights count from the take-off, since the log has no others; --take-off states its height."]
+        return Heights("take-off", {key: Chosen("home") for key in streams}, said)
+    try:
+        plan = choose_reference(by_name, [names[key] for key in own if key in names], geoid_m, take_off_m)
+    except WildlabError as error:
+        option = "--take-off" if "take-off" in error.problem else "--geoid"
+        fix = f"{error.fix} ({option} METRES), or leave a file out (--role FILE=nothing)"
+        raise WildlabError(error.problem, fix, field=option) from None
+    chosen = {
+        key: Chosen(cast(Kind, use.column.removeprefix("height_").removesuffix("_m")), round(use.add_m, 4))
+        for key, name in names.items()
+        if (use := plan.uses.get(name)) is not None
+    }
+    said = [f"Heights of {name}: {use.reason}." for name, use in plan.uses.items() if use.add_m]
+    said += [f"{name} has places and no heights." for name in plan.without]
+    if plan.reference == "sea" and chosen:
+        said.insert(
+            0,
+            "Heights count from mean sea level, since no log says how high the geoid is there and "
+            f"{NO_GRID}; --geoid states it.",
+        )
+    return Heights({"sea": "mean sea level"}.get(plan.reference, plan.reference), chosen, said)
+
+
+def _above_take_off_alone(stream: Stream) -> bool:
+    """Whether a part has heights above the take-off, and none of another kind in any row that can be used."""
+    others = [stream.columns.get(f"height_{kind}_m") for kind in ("ellipsoid", "sea")]
+    if any(one is not None and np.isfinite(one[stream.used]).any() for one in others):
+        return False
+    return "height_home_m" in stream.columns
+
+
 class Sources:
     """The logs' tables that a recipe asks for, each named once."""
 
@@ -93,6 +223,10 @@ class Sources:
         self.wishes, self.streams = wishes, streams
         self.heights: Heights = heights_of(streams, own, wishes.geoid_m, wishes.take_off_m)
         self.logs: dict[str, dict[str, Any]] = {}
+
+    def over_time(self, choice: Choice, part: str, name: str) -> dict[str, Any]:
+        """What every block over time has: its table, which of its rows count, and their times."""
+        return {"file": self.table(choice, part, name), "where": USED, "time": UTC}
 
     def table(self, choice: Choice, part: str, name: str) -> str:
         """The name of a table of one part of a log, with its heights and stamps brought to the flight's."""

@@ -9,10 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from wildlab.flight.card.blocks import angles, has_utc, position, quantity, stream_of, truth_spreads
 from wildlab.flight.card.images import camera_of_images, clock_of_images
-from wildlab.flight.card.proposal import NO_ANGLE, TIMED, USED, UTC, Proposal, Sources
+from wildlab.flight.card.proposal import (
+    NO_ANGLE,
+    TIMED,
+    USED,
+    UTC,
+    Proposal,
+    Sources,
+    angles,
+    has_utc,
+    stream_of,
+)
 from wildlab.flight.card.roles import Choice
+from wildlab.flight.card.vehicle import position, quantity, truth_spreads
 from wildlab.flight.files import printable
 from wildlab.flight.readers.log import Stream
 
@@ -125,13 +135,8 @@ def add_targets(proposal: Proposal, sources: Sources, by_role: Mapping[str, Sequ
     for number, one in enumerate(by_role.get("target", ()), 1):
         part = "gnss" if one.found.part("gnss") is not None else "poses"
         stream = stream_of(one, part)
-        block: dict[str, Any] = {
-            "file": sources.table(one, part, f"target-{number}"),
-            "where": USED,
-            "target": names.get(one.target, one.target),
-            "time": UTC,
-            "position": position(),
-        }
+        block = sources.over_time(one, part, f"target-{number}")
+        block |= {"target": names.get(one.target, one.target), "position": position()}
         truth.append(block | truth_spreads(stream))
     for number, one in enumerate(by_role.get("marks", ()), 1):
         stream = stream_of(one, "marks")
