@@ -154,6 +154,16 @@ def outcomes(gained: int, spoilt: int, **kept: int) -> dict[str, Any]:
     }
 
 
+def many(swaps: int, ours: tuple[float, float], theirs: tuple[float, float]) -> dict[str, Any]:
+    """Tracks that go over to another boat, and ranges of both trackers' median GOSPA."""
+    both = {"gospa_median": ours, "gospa_median_stone_soup": theirs}
+    found: dict[str, Any] = {
+        f"elsewhere/both/{name}": {"value": low, "low": low, "high": high}
+        for name, (low, high) in both.items()
+    }
+    return found | {"scenario-2/both/swaps": swaps}
+
+
 ANSWERS: dict[str, list[Case]] = {
     "schmidt": [
         (moments(2.0, 2.1), ("schmidt-consistent", "ekf-consistent")),
@@ -383,6 +393,12 @@ ANSWERS: dict[str, list[Case]] = {
         (navigated(0.1, 1.0, (0.5, 0.4, 0.6)), ("attitude-fits", "position-conservative")),
         (navigated(1.0, 1.0, (9.5, None, None)), ("attitude-fits", "position-open")),
         ({}, ("attitude-unknown", "position-unknown")),
+    ],
+    "autoferry-many": [
+        (many(swaps=0, ours=(5.0, 6.0), theirs=(8.0, 9.0)), ("boats-tracked", "peer-worse")),
+        (many(swaps=3, ours=(8.0, 9.0), theirs=(5.0, 6.0)), ("boats-swapped", "peer-better")),
+        (many(swaps=0, ours=(5.0, 6.0), theirs=(5.5, 7.0)), ("boats-tracked", "peer-alike")),
+        ({}, ("boats-unknown", "peer-missing")),
     ],
 }
 CASES = [name for name in case_names() if find_case(name).answer is not None]

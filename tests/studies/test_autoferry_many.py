@@ -9,8 +9,7 @@ import pytest
 from wildlab.evaluation.identities import Moment, compare_identities
 from wildlab.flight.following import parse_settings
 from wildlab.flight.toml import dump_toml
-from wildlab.studies.autoferry_many import judged as words
-from wildlab.studies.autoferry_many import tuning
+from wildlab.studies.autoferry_many import scores, tuning
 from wildlab.studies.autoferry_many.tuning import Lasting, Tuned, anees_of, draw, order
 
 OFFSETS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
@@ -50,7 +49,7 @@ def rows() -> pd.DataFrame:
 
 
 def test_what_it_was_tuned_on_is_in_no_median():
-    middle = words.medians(rows(), "s1").set_index("mode")
+    middle = scores.medians(rows(), "s1").set_index("mode")
     assert middle["best"].to_dict() == {"radar": 8.0, "lidar": 5.0, "both": 8.0}
     assert middle["most"].to_dict() == {"radar": 16.0, "lidar": 10.0, "both": 16.0}
     assert (middle["of"] == 2).all()
@@ -72,12 +71,6 @@ def test_what_is_assumed_of_the_truth_chooses_no_draw():
     for sd in (0.0, 2.0):
         lives = compare_identities([one._replace(truth_sd=sd)], 5.0)
         assert anees_of(lives) == 9 / 2 and anees_of(lives, alone=False) == 9 / (1 + sd**2) / 2
-
-
-def test_the_table_of_draws_has_each_scenario_once():
-    table = words.spread_table(rows(), "s1")
-    assert list(table) == ["by", "draw", "s1 (tuned here)", "s2", "s3"] and len(table) == 6
-    assert table["s2"].tolist() == [9.0, 18.0, 4.0, 8.0, 8.0, 16.0]
 
 
 @pytest.mark.slow

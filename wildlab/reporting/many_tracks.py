@@ -14,7 +14,7 @@ import pandas as pd
 from wildlab.analysis.following.judged import FEWEST
 from wildlab.analysis.following.noise_model import ToldValue
 from wildlab.analysis.many.errors import counted_twice, of_platform
-from wildlab.analysis.many.follow import CUTOFF_M, ManyTracks
+from wildlab.analysis.many.follow import ManyTracks
 from wildlab.analysis.many.target_model import HERE
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
@@ -330,15 +330,6 @@ def record(report: Report, followed: ManyTracks, lives: Identities | None) -> No
         if life.visible:
             report.metric("tracked", f"target-{number}", life.tracked, "1", n=life.visible)
             report.metric("time_to_confirm", f"target-{number}", life.time_to_confirm, "s")
-
-
-def caption_of_gospa(cutoff: float = CUTOFF_M) -> str:
-    """What GOSPA counts, with a cut-off in m."""
-    return (
-        f"GOSPA adds the distances of tracks from their targets, and {cutoff / np.sqrt(2):.1f} m for every "
-        f"target without a track and every track on nothing, as squares; beyond {cutoff:g} m a track is on "
-        "no target."
-    )
 
 
 def show_many(report: Report, followed: ManyTracks, lives: Identities | None) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.studies.autoferry_many.drawing import even, scale
+from wildlab.studies.autoferry_many.tuning import even, scale
 from wildlab.tracking.many import Scan, Shown
 from wildlab.tracking.many.run import in_reach
 from wildlab.tracking.many.tracks import moves

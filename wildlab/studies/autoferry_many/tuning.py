@@ -21,7 +21,6 @@ from wildlab.flight.following import (
 from wildlab.flight.store import Flight
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST
 from wildlab.studies.autoferry.tracks import tune_sensor
-from wildlab.studies.autoferry_many.drawing import even, scale
 
 #: The ways to look: by one sensor, by both, and with the cameras too.
 MODES: dict[str, tuple[str, ...]] = {
@@ -41,6 +40,16 @@ USUAL_REACH_M = 105.0
 BOAT_LENGTH_M, BOAT_BEAM_M, SHIP_LENGTH_M, SHIP_BEAM_M = 6.0, 2.5, 28.0, 8.0
 #: Nothing in a harbour is faster, m/s.
 FASTEST_M_S = 10.0
+
+
+def scale(rng: np.random.Generator, low: float, high: float) -> float:
+    """A random number between two above zero, evenly over their logarithm."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def even(rng: np.random.Generator, low: float, high: float) -> float:
+    """A random number between two others."""
+    return float(rng.uniform(low, high))
 
 
 class Ranked(Protocol):
