@@ -15,6 +15,7 @@ import numpy as np
 
 from benchmarks.timing import best_of
 from wildlab.geometry.frames import Array
+from wildlab.tracking.association import association_probabilities_by_enumeration
 from wildlab.tracking.many import (
     POINT,
     ManySensorModel,
@@ -23,7 +24,6 @@ from wildlab.tracking.many import (
     association_probabilities,
     run_many,
 )
-from wildlab.tracking.many.probabilities import association_probabilities_by_enumeration
 
 TARGETS, MEASUREMENTS, SCANS = 50, 100, 60
 EYE = ManySensorModel("eye", 0.9, 50 / 1e6, 0.0, 1e9, 5.0, (0.0,), (0.0,), (0.0,))

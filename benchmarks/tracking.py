@@ -22,11 +22,12 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
-from wildlab.tracking import measurement
+from wildlab.tracking import sensors
 from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.records import Start
+from wildlab.tracking.run import run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 
 RUNS, UPDATES = 10_000, 141
@@ -131,7 +132,7 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
     rows.append(("KF, wildlab, the same, last estimates kept", last, last / theirs, ""))
 
     noise, view = 4.0 * np.eye(2), BatchCamera(poses, 0.0)
-    sensor = measurement.pixels(poses, 0.0)
+    sensor = sensors.pixels(poses, 0.0)
     for name, uncertainty in (("pixel EKF", None), ("pixel Schmidt", pose)):
 
         def loop(uncertainty: PoseUncertainty | None = uncertainty) -> object:

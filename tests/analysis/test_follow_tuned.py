@@ -15,7 +15,7 @@ from wildlab.analysis.following.judged import _between, apart
 from wildlab.analysis.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
 from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
-from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.motion import white_acceleration
 
 
 def later(flight: Flight, seconds: float) -> Flight:

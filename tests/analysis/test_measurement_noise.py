@@ -11,6 +11,8 @@ from wildlab.analysis.measurement_noise import (
     VARIATIONS,
     follow_variations,
     interval_of_news,
+    noise_by_altitude,
+    noise_by_direction,
     noises_of,
     thinned,
 )
@@ -21,7 +23,6 @@ from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.noise import noise_by_altitude, noise_by_direction
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 TUNING = CvTuning(0.05, 10.0, 10.0, 7.0, 20.0)

@@ -36,9 +36,9 @@ from wildlab.geometry.camera import project
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate, simulate_twin
-from wildlab.tracking.measurement import positions
 from wildlab.tracking.run import run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.sensors import positions
 
 TUNING = CvTuning(acceleration=0.05, position_0=10, velocity_0=10, measurement=7, pixel=30)
 

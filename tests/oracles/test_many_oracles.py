@@ -7,7 +7,7 @@ import pytest
 
 from wildlab.tracking.many import association_probabilities
 from wildlab.tracking.many.existence import weights
-from wildlab.tracking.many.update import compare
+from wildlab.tracking.many.tracks import compare
 
 
 @pytest.mark.parametrize("seed", range(6))

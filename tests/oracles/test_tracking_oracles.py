@@ -9,12 +9,13 @@ from filterpy.kalman import EKF, KalmanFilter, UnscentedKalmanFilter
 from filterpy.kalman import MerweScaledSigmaPoints as SigmaPoints
 
 from tests.tracking.poses import overflight
-from wildlab.tracking import measurement as m
+from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import run_batch
+from wildlab.tracking.filters import run_unscented
 from wildlab.tracking.motion import constant_velocity, singer
-from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.records import Start
+from wildlab.tracking.run import run_filter
 from wildlab.tracking.smoothing import run_smoothed, smooth
-from wildlab.tracking.unscented import run_unscented
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 

@@ -12,7 +12,7 @@ from wildlab.studies.autoferry_many import comparison, scores, stone_soup, tunin
 from wildlab.studies.autoferry_many.stone_soup import Choice, Eye, draw_choice, run_stone_soup
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many import ManySensorModel, Scan, Shown
-from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.motion import white_acceleration
 
 R = np.full((1, 2, 2), np.nan)  # of a scan: never used, since noise is one of the choices
 

@@ -39,8 +39,8 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     gather,
 )
 from wildlab.studies.crossing_vessels.trial.joint import JOINT
+from wildlab.tracking.many.appearance import Appearance
 from wildlab.tracking.many.bank import Bank, Looks
-from wildlab.tracking.many.bank_rules import Appearance
 
 TWIN, SEED = "crossing-vessels", 7
 SHAPE = (100, 200)

@@ -33,8 +33,8 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     apart_times,
     gather,
 )
+from wildlab.tracking.many.appearance import Appearance
 from wildlab.tracking.many.bank import Bank, Looks
-from wildlab.tracking.many.bank_rules import Appearance
 
 INTERVAL = 0.5
 

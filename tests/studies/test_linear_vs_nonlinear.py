@@ -11,9 +11,9 @@ from wildlab.errors import WildlabError
 from wildlab.reporting.published import load_claims
 from wildlab.studies.coloured_noise import trial as coloured_noise
 from wildlab.studies.linear_vs_nonlinear import trial as linear_vs_nonlinear
-from wildlab.tracking.measurement import positions
 from wildlab.tracking.motion import singer
 from wildlab.tracking.run import run_filter
+from wildlab.tracking.sensors import positions
 
 
 def flights(*changes: dict[tuple[str, str], float]) -> pd.DataFrame:

@@ -14,8 +14,8 @@ from wildlab.studies.crossing_vessels.trial.reacquisition import (
     outcome,
     owners,
 )
+from wildlab.tracking.many.appearance import Appearance
 from wildlab.tracking.many.bank import Bank, Looks
-from wildlab.tracking.many.bank_rules import Appearance
 
 INTERVAL = 0.5
 WITHOUT, WITH, GUESSED_WITHOUT, GUESSED_WITH = WAYS

@@ -10,12 +10,13 @@ from tests.tracking.poses import CAMERA, CROOKED, overflight
 from tests.tracking.test_schmidt import random_pose_covariance
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.tracking import measurement as m
 from wildlab.tracking import schmidt
+from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.batch_kernels import limit_one
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.records import Start
+from wildlab.tracking.run import run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 
 CV = partial(constant_velocity, sd_acceleration=0.2)

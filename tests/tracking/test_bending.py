@@ -7,11 +7,16 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from tests.tracking.level_sensors import ranges_bearings
 from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, posed
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.tracking.bending import left_out, second_derivatives, share_left_out
-from wildlab.tracking.measurement import pixels, ranges_bearings
-from wildlab.tracking.sensors import Sensor
+from wildlab.tracking.sensors import (
+    Sensor,
+    left_out,
+    pixels,
+    second_derivatives,
+    share_left_out,
+)
 
 SHAPE = np.array([[1.0, 0.3], [0.3, 0.6]])
 

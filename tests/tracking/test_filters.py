@@ -9,20 +9,19 @@ from hypothesis import strategies as st
 from scipy.linalg import block_diag, expm
 
 from tests.tracking.full_filter import beside, full_filter
+from tests.tracking.level_sensors import bearings, consider, measured_from, ranges_bearings
 from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import wrap
-from wildlab.tracking import measurement as m
-from wildlab.tracking.coloured import difference_model, run_coloured, thin
-from wildlab.tracking.consider_parameters import consider
-from wildlab.tracking.imm import run_imm
-from wildlab.tracking.maritime import white_acceleration
-from wildlab.tracking.motion import constant_velocity, rest, singer
-from wildlab.tracking.platforms import measured_from
-from wildlab.tracking.run import Start, run_filter, start_from_first
+from wildlab.tracking import sensors as m
+from wildlab.tracking.filters import difference_model, run_coloured, run_imm, run_unscented, thin
+from wildlab.tracking.initiation import start_from_first
+from wildlab.tracking.motion import constant_velocity, rest, singer, white_acceleration
+from wildlab.tracking.predictions import predict_range_bearing
+from wildlab.tracking.records import Start
+from wildlab.tracking.run import run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 from wildlab.tracking.smoothing import run_smoothed, smooth
-from wildlab.tracking.unscented import run_unscented
 
 ROUGH = partial(constant_velocity, sd_acceleration=0.3)
 SINGER = partial(singer, alpha=0.1, variance=0.2)
@@ -188,12 +187,12 @@ def test_on_a_linear_model_all_are_the_kalman_filter(gate):
 def test_the_unscented_filter_sees_the_bend(rng):
     """Range and bearing of a far target across a wide arc: its mean range is larger, and so is S."""
     P = np.diag([1.0, 40.0**2, 1, 1])  # across the line of sight
-    sensor = m.ranges_bearings(np.zeros(2), 0.0)
+    sensor = ranges_bearings(np.zeros(2), 0.0)
     start = Start(0.0, np.array([100.0, 0, 0, 0]), P)
     R = np.diag([1.0, 0.01]) ** 2
     track = run_unscented([0.0], [[100.0, 0.0]], R, sensor, CV, start)
     x = rng.multivariate_normal(start.x, P, 400_000)
-    z = m.predict_range_bearing(x[:, :2], np.zeros(2), 0.0).z
+    z = predict_range_bearing(x[:, :2], np.zeros(2), 0.0).z
     assert abs(track.innovation[0, 0] - (100 - z[:, 0].mean())) < 0.6  # about seven metres too short
     extended = run_filter([0.0], [[100.0, 0.0]], R, sensor, CV, start)
     sampled = np.cov(z.T) + R
@@ -204,8 +203,8 @@ def test_the_unscented_filter_sees_the_bend(rng):
 def test_bearings_are_averaged_across_the_wrap(rng):
     times = 0.5 * np.arange(80)
     own = np.column_stack([200 * np.cos(0.1 * times), 200 * np.sin(0.1 * times)])
-    z = m.predict_range_bearing(np.zeros(2), own, 0.0).z[:, 1:] + rng.normal(0, 0.02, (80, 1))
-    sensor, R = m.bearings(own, 0.0), 4e-4 * np.eye(1)
+    z = predict_range_bearing(np.zeros(2), own, 0.0).z[:, 1:] + rng.normal(0, 0.02, (80, 1))
+    sensor, R = bearings(own, 0.0), 4e-4 * np.eye(1)
     start = Start(0.0, np.array([10.0, 10, 0, 0]), np.diag([400.0, 400, 1, 1]))
     for track in (
         run_unscented(times, wrap(z), R, sensor, CALM, start),
@@ -339,7 +338,7 @@ def test_it_is_the_mean_given_all_measurements(motion, seed):
 @given(SEEDS)
 def test_covariances_are_never_above_the_filters(seed):
     times, z, R = linear_run(seed)
-    for pose in (None, consider({"platform_north": 3.0, "heading": 0.02}, correlation_time={"heading": 4.0})):
+    for pose in (None, consider({"platform_north": 3.0, "heading": 0.02}, {"heading": 4.0})):
         sensor = measured_from([-100.0, 30.0])
         filtered = run_filter(times, z, R, sensor, WA, START, pose=pose)
         smoothed = run_smoothed(times, z, R, sensor, WA, START, pose=pose)
@@ -356,7 +355,9 @@ def test_its_covariance_is_its_errors_with_considered_ones(time):
     """The smoother is linear in what is random: its true covariance, one source of randomness at a time."""
     N, bias = 12, 2.0
     times = np.arange(1.0, N + 1)
-    pose = consider({"platform_north": bias, "platform_east": bias}, correlation_time=time)
+    pose = consider(
+        {"platform_north": bias, "platform_east": bias}, {"platform_north": time, "platform_east": time}
+    )
     sensor, R = measured_from([0.0, 0.0]), np.eye(2)
     start = Start(0.0, np.zeros(4), np.diag([9.0, 9.0, 1.0, 1.0]))
     F, Q = WA(1.0)
@@ -375,36 +376,12 @@ def test_its_covariance_is_its_errors_with_considered_ones(time):
     np.testing.assert_allclose(found[0].P, e @ np.swapaxes(e, 1, 2), atol=1e-8)
 
 
-def test_between_rows_before_and_behind():
-    times, z, R = linear_run(3)
-    asked = np.sort(np.concatenate([[times[0] - 5, times[-1] + 3], times, times[:-1] + 0.4 * np.diff(times)]))
-    for pose in (None, consider({"heading": 0.0})):
-        sensor = measured_from([0.0, 0.0])
-        given = (R, sensor, WA, START)
-        rows = np.sort(np.concatenate([times, asked]))
-        filled = np.full((len(rows), 2), np.nan)
-        noise = np.tile(np.eye(2), (len(rows), 1, 1))
-        place = np.searchsorted(rows, times)
-        for i, k in enumerate(place):
-            k = k + (1 if i and place[i - 1] == place[i] else 0)
-            filled[k], noise[k] = z[i], R[i]
-        found = run_smoothed(times, z, *given, pose=pose, output_times=asked)
-        # A model that is continuous in time does not mind rows in between at which nothing is seen.
-        every = run_smoothed(rows, filled, noise, *given[1:], pose=pose, output_times=asked)
-        np.testing.assert_allclose(found.x, every.x, atol=1e-6)
-        np.testing.assert_allclose(found.P, every.P, atol=1e-6)
-        before = asked < 0
-        assert np.isnan(found.x[before]).all()
-
-
 def test_a_start_without_variance_and_one_row():
     start = Start(0.0, np.zeros(2), np.zeros((2, 2)))
     track = run_filter([1.0, 2.0], np.ones((2, 2)), np.eye(2), m.positions(), rest, start)
     np.testing.assert_array_equal(smooth(track, rest).x, 0.0)
     alone = Start(0.0, np.zeros(2), np.eye(2))
-    found = run_smoothed(
-        [1.0], np.ones((1, 2)), np.eye(2), m.positions(), rest, alone, output_times=[0.0, 1.0]
-    )
+    found = run_smoothed([1.0], np.ones((1, 2)), np.eye(2), m.positions(), rest, alone)
     np.testing.assert_allclose(found.x, 0.5)
     begun = Start(0.0, np.zeros(2), np.eye(2), row=0)
     found = run_smoothed([0.0], np.ones((1, 2)), np.eye(2), m.positions(), rest, begun)

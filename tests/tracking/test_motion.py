@@ -16,14 +16,14 @@ STEPS = st.just(0.0) | st.floats(1e-6, 200)
 CONTINUOUS = {
     "rest": motion.rest,
     "random walk": partial(motion.random_walk, density=0.7),
+    "white acceleration": partial(motion.white_acceleration, density=0.7),
+    "at rest": partial(motion.white_acceleration, density=0.0),
     "singer, slow": partial(motion.singer, alpha=0.02, variance=0.3),
     "singer, fast": partial(motion.singer, alpha=4.0, variance=0.3),
     "singer, no fading": partial(motion.singer, alpha=0.0, variance=0.3),
 }
 HELD = {
-    "constant position": partial(motion.constant_position, sd_velocity=0.4),
     "constant velocity": partial(motion.constant_velocity, sd_acceleration=0.4),
-    "constant velocity, Flodell": partial(motion.flodell_constant_velocity, sd_acceleration=0.4),
     "singer as printed": partial(motion.singer, alpha=0.1, variance=0.3, printed=True),
 }
 ALL = CONTINUOUS | HELD
@@ -69,8 +69,6 @@ def test_constant_velocity_is_the_print():
     G = np.array([[T**2 / 2, 0], [0, T**2 / 2], [T, 0], [0, T]])
     assert np.allclose(F, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]])
     assert np.allclose(Q, sd**2 * G @ G.T)
-    _, Q = motion.flodell_constant_velocity(T, sd)
-    assert np.allclose(Q, np.diag([0, 0, 1, 1]) * sd**2 * T**2)
 
 
 @given(alpha=st.floats(1e-3, 3), dt=st.floats(1e-3, 5))

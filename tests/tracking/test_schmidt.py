@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from tests.tracking.full_filter import beside, full_filter
 from tests.tracking.poses import GENERATORS, overflight
-from wildlab.tracking import measurement as m
 from wildlab.tracking import schmidt
+from wildlab.tracking import sensors as m
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.records import Start
+from wildlab.tracking.run import run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 
 CV = partial(constant_velocity, sd_acceleration=0.2)

@@ -10,9 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.georeference import Observations
-from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.terrain import Met, Terrain, pixels_to_terrain
+from wildlab.geometry.terrain import Terrain
 
 Array = NDArray[np.float64]
 
@@ -33,26 +32,6 @@ class Shift(NamedTuple):
     largest: float
 
 
-def rays_of(observations: Observations) -> Met:
-    """Where the rays of observations meet their terrain, and what became of them.
-
-    Parameters
-    ----------
-    observations
-        Of a flight with terrain.
-
-    Returns
-    -------
-    Met
-
-    Raises
-    ------
-    WildlabError
-        Where there is no terrain.
-    """
-    if observations.terrain is None:
-        raise WildlabError("the flight has no terrain", "lay one: wildlab terrain", field="terrain")
-    return pixels_to_terrain(observations.poses, observations.uv, observations.terrain)
 
 
 def level_of(observations: Observations) -> Array:

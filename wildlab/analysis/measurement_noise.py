@@ -7,14 +7,13 @@ image. That detections are left out until their errors are new is not in H.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.track import CvTuning, Sighting, follow_positions
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.geometry.camera import normalise
-from wildlab.tracking.coloured import thin
-from wildlab.tracking.noise import noise_by_altitude, noise_by_direction
-from wildlab.tracking.run import Track
+from wildlab.tracking.filters import thin
+from wildlab.tracking.records import Track
 
 Array = NDArray[np.float64]
 
@@ -25,6 +24,59 @@ NOISES = ("noise-by-altitude", "noise-by-tilt", "noise-by-place")
 THINNED = "thinned"
 #: All variations of the filter here.
 VARIATIONS = (*NOISES, THINNED)
+
+
+def noise_by_altitude(height: ArrayLike, fraction: float = 0.05) -> Array:
+    """Georeferenced positions, H 6.2.4: standard deviation a fraction of the height above the plane.
+
+    Parameters
+    ----------
+    height
+        (N,) of the camera above the plane, m.
+    fraction
+        Without a unit, the same north and east; 0.05 is what H 6.4.4 flies with.
+
+    Returns
+    -------
+    R, (N, 2, 2), m^2.
+    """
+    sd = fraction * np.asarray(height, float)
+    return np.asarray(sd[:, None, None] ** 2 * np.eye(2))
+
+
+def noise_by_direction(rays: ArrayLike, height: ArrayLike, fraction: float = 0.05) -> Array:
+    """Georeferenced positions whose rays err by an angle: what H 8.2 proposes beyond the height alone.
+
+    A ray ``a`` off the vertical meets the plane at ``h / cos a``, and slantwise: an angle moves the point by
+    ``h / cos(a)^2`` times it along the ray's bearing, and by ``h / cos a`` across. A ray straight down has
+    the noise of `noise_by_altitude`.
+
+    Parameters
+    ----------
+    rays
+        (N, 3) in n, of any length: of the camera's axis, which the airframe's tilt turns, or of the pixel.
+    height
+        (N,) of the camera above the plane, m.
+    fraction
+        The angle's standard deviation about each axis across the ray, rad.
+
+    Returns
+    -------
+    R, (N, 2, 2), m^2; NaN at and above the horizon.
+
+    Examples
+    --------
+    >>> straight_down = [[0.0, 0.0, 2.0]]
+    >>> bool(np.allclose(noise_by_direction(straight_down, [200.0]), noise_by_altitude([200.0])))
+    True
+    """
+    d, h = np.asarray(rays, float), np.asarray(height, float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.where(d[:, 2:] > 0, d[:, :2] / d[:, 2:], np.nan)
+    # 1 / cos(a)^2 is one more than the slope's square: across once, and along once more.
+    steep = 1 + np.einsum("ni,ni->n", slope, slope)
+    shape = steep[:, None, None] * (np.eye(2) + slope[:, :, None] * slope[:, None, :])
+    return np.asarray((fraction * h)[:, None, None] ** 2 * shape)
 
 
 def noises_of(seen: Sighting, fraction: float = FRACTION) -> dict[str, Array]:

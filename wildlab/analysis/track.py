@@ -25,10 +25,11 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
-from wildlab.tracking.measurement import Sensor, pixels
+from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import Motion, constant_velocity
-from wildlab.tracking.run import Start, Track, start_from_first
+from wildlab.tracking.records import Start, Track
 from wildlab.tracking.schmidt import Change, PoseUncertainty
+from wildlab.tracking.sensors import Sensor, pixels
 
 Array = NDArray[np.float64]
 

@@ -18,9 +18,8 @@ from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman, schmidt
 from wildlab.tracking.batch_kernels import Flags, filter_batch
-from wildlab.tracking.inputs import check_rows, check_start, checked
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.records import Start, Track
+from wildlab.tracking.records import Start, Track, check_rows, check_start, checked
 from wildlab.tracking.schmidt import PoseUncertainty
 
 
@@ -41,7 +40,7 @@ class BatchTracks(NamedTuple):
 
 
 class BatchCamera(NamedTuple):
-    """The camera of all runs: what `wildlab.tracking.measurement.pixels` takes.
+    """The camera of all runs: what `wildlab.tracking.sensors.pixels` takes.
 
     The rows of ``poses`` are those of all runs alike, (N,), or (B, N): each has its own. ``plane_down`` is a
     scalar or (N,).

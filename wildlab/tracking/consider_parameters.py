@@ -25,11 +25,10 @@ shrinks every direction and leaves one.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
@@ -70,85 +69,6 @@ class Considered(NamedTuple):
 
 #: What a filter takes as ``pose``: the six errors of a pose, or any.
 Considers = PoseUncertainty | Considered
-
-
-def consider(
-    sds: Mapping[str, ArrayLike],
-    *,
-    correlation_time: float | Mapping[str, float] = np.inf,
-    change: Change = "bias",
-    shared: bool | Collection[str] = True,
-) -> Considered:
-    """Uncorrelated errors by their standard deviations.
-
-    Parameters
-    ----------
-    sds
-        Standard deviation of each error by name, in its own unit: a number, or (N,). ``attitude`` and
-        ``platform_position`` stand for three, ``tilt`` for two.
-    correlation_time
-        s, one for all, or by name; those that are not named last for ever.
-    change
-        See `wildlab.tracking.schmidt`.
-    shared
-        Whether targets have them in common: all, none, or those that are named.
-
-    Returns
-    -------
-    Considered
-        With a covariance (k, k), or (N, k, k) where any deviation has rows.
-
-    Raises
-    ------
-    WildlabError
-        For a standard deviation that is negative or no number, rows of different number, a correlation time
-        that is negative or of an error that is not named.
-
-    Examples
-    --------
-    >>> errors = consider({"heading": 0.03, "range_bias": 2.0}, correlation_time={"range_bias": 60.0})
-    >>> errors.names, errors.correlation_time
-    (('heading', 'range_bias'), (inf, 60.0))
-    """
-
-    def one_by_one(name: str) -> tuple[str, ...]:
-        return TOGETHER.get(name, (name,))
-
-    columns = {one: np.asarray(sd, float) for name, sd in sds.items() for one in one_by_one(name)}
-    for name, sd in columns.items():
-        if sd.ndim > 1 or not (np.isfinite(sd) & (sd >= 0)).all():
-            raise WildlabError(
-                f"a standard deviation of {sd if sd.ndim == 0 else 'some rows'} for {name}",
-                "give a number that is not negative, or one for each row", field=f"sds.{name}",
-            )  # fmt: skip
-    lengths = {len(sd) for sd in columns.values() if sd.ndim}
-    if len(lengths) > 1:
-        raise WildlabError(
-            f"standard deviations of {sorted(lengths)} rows", "give one for each row", field="sds"
-        )
-    times = dict.fromkeys(columns, np.inf)
-    if isinstance(correlation_time, Mapping):
-        for name, time in correlation_time.items():
-            for one in one_by_one(name):
-                if one not in times:
-                    raise WildlabError(
-                        f"{one} has a correlation time and no standard deviation",
-                        f"name some of {', '.join(columns)}", field="correlation_time",
-                    )  # fmt: skip
-                times[one] = float(time)
-    else:
-        times = dict.fromkeys(columns, float(correlation_time))
-    common = {one for name in shared for one in one_by_one(name)} if isinstance(shared, Collection) else None
-    rows = (lengths.pop(),) if lengths else ()
-    sd = np.stack([np.broadcast_to(one, rows) for one in columns.values()], axis=-1)
-    names = tuple(columns)
-    return Considered(
-        names,
-        sd[..., :, None] * sd[..., None, :] * np.eye(len(names)),
-        tuple(times.values()),
-        change,
-        tuple(bool(shared) if common is None else name in common for name in names),
-    )
 
 
 def consider_all(*several: Considers) -> Considered:
@@ -243,12 +163,6 @@ class Errors(NamedTuple):
     def transition(self, row: int, dt: float) -> Array:
         """``Psi`` (k, k) of the errors themselves, from the row before."""
         return np.asarray(self.left(row, dt) @ self.phi[row])
-
-    def spread(self, row: int, H_pose: Array) -> Array:
-        """What the errors add to a prediction's covariance (m, m), H (7.40)."""
-        H = self.of(H_pose)
-        S = H @ self.covariance[row] @ H.T
-        return np.asarray((S + S.T) / 2)
 
 
 def errors_of(pose: Considers | None, sensor: Sensor, n_rows: int) -> Errors | None:

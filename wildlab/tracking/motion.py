@@ -5,14 +5,13 @@ interval, so measurements may come at any times. Fix the parameters with `functo
 
     motion = partial(constant_velocity, sd_acceleration=0.05)
 
-States are ordered position, velocity, acceleration: ``[pN, pE]``, ``[pN, pE, vN, vE]``,
-``[pN, pE, vN, vE, aN, aE]``, in metres and seconds. A step of zero gives ``F = I`` and ``Q = 0`` in every
-model.
+States are ordered position, velocity, acceleration: ``[pN, pE]``, ``[pN, pE, vN, vE]``, ``[pN, pE, vN, vE,
+aN, aE]``, in metres and seconds. A step of zero gives ``F = I`` and ``Q = 0`` in every model.
 
-Two families behave differently where an interval is cut in two. `random_walk` and `singer` are continuous in
-time: two steps amount to one. H (6.1), F (4.5) and F (4.6) hold their noise constant over a step, and
-one long step is far more uncertain than many short ones: predict as often as the camera takes pictures, by
-giving the filter also the frames without a detection, or by `in_steps`.
+Two families behave differently where an interval is cut in two. `random_walk`, `white_acceleration` and
+`singer` are continuous in time: two steps amount to one. H (6.1), F (4.5) and F (4.6) hold their noise
+constant over a step, and one long step is far more uncertain than many short ones: predict as often as the
+camera takes pictures, by giving the filter also the frames without a detection, or by `in_steps`.
 """
 
 from __future__ import annotations
@@ -84,30 +83,6 @@ def random_walk(dt: float, density: float) -> tuple[Array, Array]:
     return np.eye(2), density**2 * dt * np.eye(2)
 
 
-def constant_position(dt: float, sd_velocity: float) -> tuple[Array, Array]:
-    """F (4.5): a velocity (m/s) drawn anew for each step and held over it, state ``[pN, pE]``.
-
-    Parameters
-    ----------
-    dt
-        s.
-    sd_velocity
-        Standard deviation of that velocity, m/s, the same north and east.
-
-    Returns
-    -------
-    F, Q
-        (2, 2) each, ``Q`` in m^2.
-
-    Raises
-    ------
-    WildlabError
-        For a step that is negative or not finite.
-    """
-    _check_step(dt)
-    return np.eye(2), (sd_velocity * dt) ** 2 * np.eye(2)
-
-
 def constant_velocity(dt: float, sd_acceleration: float) -> tuple[Array, Array]:
     """H (6.1)-(6.2): an acceleration (m/s^2) drawn anew for each step and held over it.
 
@@ -135,13 +110,22 @@ def constant_velocity(dt: float, sd_acceleration: float) -> tuple[Array, Array]:
     return _both(np.array([[1.0, dt], [0.0, 1.0]])), _both(sd_acceleration**2 * np.outer(gamma, gamma))
 
 
-def flodell_constant_velocity(dt: float, sd_acceleration: float) -> tuple[Array, Array]:
-    """F (4.6) as printed: the noise enters the velocity alone, state ``[pN, pE, vN, vE]``.
+def white_acceleration(dt: float, density: float) -> tuple[Array, Array]:
+    """Velocity driven by white acceleration, state ``[pN, pE, vN, vE]``.
 
-    The text beside it speaks of a double integral into the position, which is `constant_velocity`.
+    Continuous in time: two steps amount to one, so that sensors of different rates assume the same boat.
+
+    Parameters
+    ----------
+    dt
+        s, not negative.
+    density
+        m/s per square root of a second: the standard deviation of each axis of the velocity that grows in a
+        second.
     """
-    F, _ = constant_velocity(dt, sd_acceleration)
-    return F, np.diag([0.0, 0.0, 1.0, 1.0]) * (sd_acceleration * dt) ** 2
+    F, _ = constant_velocity(dt, 0.0)
+    Q = density**2 * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+    return F, np.asarray(np.kron(Q, np.eye(2)), float)
 
 
 def singer_variance(max_acceleration: float, p_max: float, p_zero: float) -> float:

@@ -70,26 +70,6 @@ def predict_pixel(position: ArrayLike, poses: CameraPoses, plane_down: ArrayLike
     return _through(camera.matrix[:2, :2] @ J, project(camera, inner.z), inner)
 
 
-def predict_azimuth_elevation(position: ArrayLike, poses: CameraPoses, plane_down: ArrayLike) -> Prediction:
-    """Azimuth ``atan2(y, x)`` and elevation ``atan(z / hypot(x, y))`` in c, H (6.9), radians.
-
-    The print's one-argument arctangent cannot tell a target from the one opposite; the two-argument one can.
-    NaN behind the camera and exactly on its axis, where the azimuth is not defined.
-    """
-    inner = target_in_camera(position, poses, plane_down)
-    x, y, z = np.moveaxis(inner.z, -1, 0)
-    level2 = x * x + y * y
-    seen = (z > 0) & (level2 > 0)
-    level2, z = np.where(seen, level2, np.nan), np.where(seen, z, np.nan)
-    level, range2 = np.sqrt(level2), level2 + z * z
-    J = np.zeros((*level.shape, 2, 3))
-    J[..., 0, 0], J[..., 0, 1] = -y / level2, x / level2
-    J[..., 1, 0], J[..., 1, 1] = -z * x / (level * range2), -z * y / (level * range2)
-    J[..., 1, 2] = level / range2
-    angles = np.stack([np.arctan2(y + 0 * z, x), np.arctan2(z, level)], axis=-1)
-    return _through(J, angles, inner)
-
-
 def azimuth_elevation_of_pixel(camera: Camera, uv: ArrayLike) -> Array:
     """Detected pixels as azimuth and elevation, H (6.10). (..., 2) pixels -> (..., 2) radians.
 
@@ -151,42 +131,3 @@ def predict_position(position: ArrayLike, platform: ArrayLike) -> Prediction:
     pose[..., 0, 0] = pose[..., 1, 1] = -1.0
     pose[..., 0, 5], pose[..., 1, 5] = offset[..., 1], -offset[..., 0]
     return Prediction(p, np.broadcast_to(np.eye(2), (*p.shape, 2)), pose)
-
-
-def predict_polar(
-    position: ArrayLike, platform: ArrayLike, R_nb: ArrayLike, plane_down: ArrayLike
-) -> Prediction:
-    """Range (m), azimuth and elevation (rad) of a target in the frame b of a tilted platform.
-
-    Parameters
-    ----------
-    position
-        (..., 2) north, east of the target, whose down coordinate is ``plane_down``, scalar or (...).
-    platform
-        (..., 3) position of the sensor in n.
-    R_nb
-        (..., 3, 3) takes a vector from b to n.
-
-    Returns
-    -------
-    Prediction of (..., 3): range along the line of sight; azimuth from the first axis of b to the second;
-    elevation above their plane. NaN at zero range, and straight up or down, where the azimuth is not defined.
-    """
-    p = np.asarray(position, float)
-    down = np.broadcast_to(np.asarray(plane_down, float), p.shape[:-1])[..., None]
-    offset = np.concatenate([p, down], axis=-1) - np.asarray(platform, float)
-    R_bn = np.swapaxes(np.asarray(R_nb, float), -1, -2)
-    p_b = np.einsum("...ij,...j->...i", R_bn, offset)
-    x, y, z = np.moveaxis(p_b, -1, 0)
-    level2 = x * x + y * y
-    level2 = np.where(level2 > 0, level2, np.nan)
-    level, range2 = np.sqrt(level2), level2 + z * z
-    J = np.zeros((*level.shape, 3, 3))
-    J[..., 0, :] = p_b / np.sqrt(range2)[..., None]
-    J[..., 1, 0], J[..., 1, 1] = -y / level2, x / level2
-    J[..., 2, 0], J[..., 2, 1] = z * x / (level * range2), z * y / (level * range2)
-    J[..., 2, 2] = -level / range2
-    seen = np.stack([np.sqrt(range2), np.arctan2(y, x) + 0 * level, np.arctan2(-z, level)], axis=-1)
-    R_bn = np.broadcast_to(R_bn, (*p_b.shape, 3))
-    by_pose = np.concatenate([-R_bn, skew(p_b)], axis=-1)
-    return _through(J, seen, Prediction(p_b, R_bn[..., :2], by_pose))

@@ -1,4 +1,7 @@
-"""What goes into a run of a filter and what comes out, and how it goes from row to row."""
+"""What goes into a run of a filter, checked, what comes out, and how it goes from row to row.
+
+A `WildlabError` names the field and the row that is wrong.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.geometry.validation import check_covariance, gate_threshold
 from wildlab.tracking.kalman import predict
 from wildlab.tracking.motion import Motion
 
@@ -24,16 +29,12 @@ class Start(NamedTuple):
         (n,) and (n, n), in the order of the motion model.
     row
         The measurement that ``x`` was made from, which is not used again, nor any before it. -1: none.
-    C
-        (n, k) cross-covariance of the state's error (truth minus estimate) with the errors that the filter
-        considers, in their order; None: zero. A start made from a measurement has one.
     """
 
     time: float
     x: Array
     P: Array
     row: int = -1
-    C: Array | None = None
 
 
 class Track(NamedTuple):
@@ -146,3 +147,130 @@ def step_through(
         track.innovation[absent] = np.nan
         track.S[absent[:, :, None] | absent[:, None, :]] = np.nan
     return track
+
+
+def checked(
+    times: ArrayLike,
+    measurements: ArrayLike,
+    R: ArrayLike,
+    gate_probability: float,
+    output_times: ArrayLike | None,
+    sizes: NDArray[np.int64] | None = None,
+) -> FilterInputs:
+    """FilterInputs of a run with all their axes, or a `WildlabError` that names the row.
+
+    ``sizes`` (N,) says how many elements a row measures; None: all. The others are taken for zeros that were
+    measured with a noise of one: a prediction of zero that nothing changes makes them weigh nothing.
+    """
+    t, z = np.asarray(times, float), np.asarray(measurements, float)
+    if z.ndim == 2:
+        z = z[:, None, :]
+    if t.ndim != 1 or z.ndim != 3 or len(z) != len(t):
+        raise WildlabError(
+            f"{t.shape} times and {np.shape(measurements)} measurements",
+            "give one row of measurements for each time",
+            field="measurements",
+        )
+    _check_order(t, "times")
+    out = t if output_times is None else np.asarray(output_times, float)
+    _check_order(out, "output_times")
+    N, K, m = z.shape
+    R = np.asarray(R, float)
+    R = R[:, None] if R.ndim == 3 else R
+    if R.shape not in ((m, m), (N, 1, m, m), (N, K, m, m)):
+        raise WildlabError(
+            f"R has the shape {R.shape} for {N} rows of {K} measurements with {m} elements",
+            "give (m, m), (N, m, m) or (N, K, m, m)",
+            field="R",
+        )
+    if sizes is not None:
+        z, R = _filled(z, R, np.asarray(sizes))
+    known = np.isfinite(R).all(axis=(-1, -2))
+    flat = R[known]
+    lowest = np.linalg.eigvalsh(flat)
+    bad = (lowest[:, 0] <= 1e-14 * np.abs(lowest[:, -1])) | (
+        np.abs(flat - np.swapaxes(flat, -1, -2)).max(axis=(-1, -2)) > 1e-9 * np.abs(lowest[:, -1])
+    )
+    if bad.any():
+        marked = np.zeros(known.shape, bool)
+        marked[known] = bad
+        row = int(np.flatnonzero(np.broadcast_to(marked, (N, K)).any(axis=1))[0])
+        raise WildlabError(
+            f"R of row {row} is not a covariance: it is not symmetric or not positive definite",
+            "give every measurement a noise in all its elements",
+            field="R",
+        )
+    # A measurement of which a part is missing is none, and neither is one without a covariance.
+    usable = np.where((known & np.isfinite(z).all(axis=-1))[..., None], z, np.nan)
+    threshold = gate_threshold(gate_probability, m)
+    thresholds = np.full(N, threshold)
+    if sizes is not None:
+        for size in np.unique(sizes):
+            thresholds[sizes == size] = gate_threshold(gate_probability, int(size))
+    return FilterInputs(t, usable, np.broadcast_to(R, (N, K, m, m)), out, threshold, thresholds, sizes)
+
+
+def _filled(z: Array, R: Array, sizes: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Zeros measured with a noise of one in the place of elements that rows do not have."""
+    N, _, m = z.shape
+    if sizes.shape != (N,):
+        raise WildlabError(
+            f"{len(sizes)} rows for {N} rows of measurements", "give one for each measurement", field="sensor"
+        )
+    absent = np.arange(m) >= sizes[:, None]
+    z, R = z.copy(), np.array(np.broadcast_to(R, (N, R.shape[1] if R.ndim == 4 else 1, m, m)))
+    z[np.broadcast_to(absent[:, None], z.shape)] = 0.0
+    R[np.broadcast_to((absent[:, :, None] | absent[:, None, :])[:, None], R.shape)] = 0.0
+    rows, element = np.nonzero(absent)
+    R[rows, :, element, element] = 1.0
+    return z, R
+
+
+def single_detection(given: FilterInputs) -> FilterInputs:
+    """The same inputs, for a filter that takes no more than one detection a row."""
+    if given.z.shape[1] != 1:
+        raise WildlabError(
+            "several detections in a frame", "choose one first, or use run_filter", field="measurements"
+        )
+    return given
+
+
+def check_start(start: Start) -> None:
+    """Refuse a start that is not finite, whose shapes do not fit, or whose ``P`` is no covariance.
+
+    ``x`` may be (n,) or (B, n), ``P`` (n, n) or (B, n, n).
+    """
+    x, P = np.asarray(start.x, float), np.asarray(start.P, float)
+    if x.ndim not in (1, 2) or P.ndim not in (2, 3) or P.shape[-2:] != (x.shape[-1],) * 2:
+        raise WildlabError(f"x of the shape {x.shape}, P {P.shape}", "give (n,) and (n, n)", field="start")
+    if not np.isfinite(start.time):
+        raise WildlabError(f"a time of {start.time}", "give seconds", field="start.time")
+    lost = np.argwhere(~np.isfinite(x))
+    if len(lost):
+        row = ", ".join(str(i) for i in lost[0])
+        raise WildlabError(
+            f"row {row} is {x[tuple(lost[0])]}", "give every state a value to start from", field="start.x"
+        )
+    check_covariance(P, "start.P")
+
+
+def check_rows(rows: int | None, wanted: int, what: str) -> None:
+    """Refuse ``rows`` of something that goes with ``wanted`` measurements; None is one value for all."""
+    if rows is not None and rows != wanted:
+        raise WildlabError(
+            f"{rows} rows for {wanted} rows of measurements", "give one for each measurement", field=what
+        )
+
+
+def _check_order(times: Array, field: str) -> None:
+    lost = np.flatnonzero(~np.isfinite(times))
+    if len(lost):
+        raise WildlabError(f"row {lost[0]} has no time ({times[lost[0]]})", "leave the row out", field=field)
+    back = np.flatnonzero(np.diff(times) < 0)
+    if len(back):
+        row = int(back[0]) + 1
+        raise WildlabError(
+            f"row {row} at {times[row]} s comes after row {row - 1} at {times[row - 1]} s",
+            "sort the rows by time, with all that belongs to them",
+            field=field,
+        )

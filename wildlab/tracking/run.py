@@ -17,12 +17,18 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking import schmidt
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.consider_parameters import Considers, Errors, errors_of
-from wildlab.tracking.initiation import start_from_first as start_from_first
-from wildlab.tracking.inputs import check_cross, check_rows, check_start, checked
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.records import Start as Start
-from wildlab.tracking.records import State, predict_by_motion, record, step_through
+from wildlab.tracking.records import (
+    State,
+    check_rows,
+    check_start,
+    checked,
+    predict_by_motion,
+    record,
+    step_through,
+)
 from wildlab.tracking.records import Track as Track
 from wildlab.tracking.sensors import Sensor, angles_at, check_states, on_state
 
@@ -78,7 +84,7 @@ def run_filter(
         (m, m), (N, m, m) or (N, K, m, m), in the sensor's units squared. A measurement whose ``R`` has NaN is
         not used.
     sensor
-        From `wildlab.tracking.measurement`, with a pose for each row.
+        From `wildlab.tracking.sensors`, with a pose for each row.
     motion
         From `wildlab.tracking.motion`.
     start
@@ -146,7 +152,7 @@ def filter_in_steps(
     check_states(sensor, len(start.x))
     errors = errors_of(pose, sensor, len(given.times))
     n, steps = len(start.x), list[Step]()
-    C = check_cross(start, n, errors.k) if errors is not None else np.zeros((n, 0))
+    C = np.zeros((n, 0 if errors is None else errors.k))
 
     last, x_last = _first_row(start, given.times), np.asarray(start.x, float)
 

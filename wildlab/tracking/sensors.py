@@ -1,30 +1,45 @@
 """What a sensor is to a filter: it takes a row of the run and a target to a `Prediction`.
 
+Beside its derivatives with respect to the target (north, east, and velocity where it is seen) a prediction
+has those with respect to named errors, which a filter may consider. A target that a sensor cannot see has a
+prediction of NaN, and a filter leaves the measurement out. Rows of several sensors are `merge`d into one run.
 
-Beside its derivatives with respect to the target (north, east; the sensors of H 6.7 see no velocity, but
-`positions_or_velocities` does) a prediction has those with respect to named errors, which a filter may
-consider: the six of `wildlab.tracking.predictions.POSE` from the sensors here, any number from
-`wildlab.tracking.considering`.
+A track may be too uncertain for a linearisation, H 3.4.2. The extended filter takes a measurement for a plane
+over the region where the target may be. With the second derivatives ``D_i`` of its elements, an error ``e``
+of the position leaves out ``e' D_i e / 2``. For a normal ``e`` with covariance P these have the second
+moments
 
-A target that a sensor cannot see has a prediction of NaN, and a filter leaves the measurement out.
+``B_ij = (tr(D_i P) tr(D_j P) + 2 tr(D_i P D_j P)) / 4``.
+
+Of a position that is far less certain than one measurement makes it, the filter takes over the measurement,
+and what was left out with it: its posterior has the measurement's noise N and lacks B. Where B is larger than
+N in some direction, the error that is not reported is larger than the one that is, and a new start on the
+measurement is nearer to the truth than the update.
+
+A camera at the distance d, with the focal length f in pixels and its axis off the plumb line by a, leaves out
+about ``f s^2 sin(a) / d^2`` for a standard deviation s of the position: with a noise of n pixels the bound is
+``s = d sqrt(n / (f sin(a)))``, near the geometric mean of the distance and what the noise is on the ground.
+Straight down over level ground nothing is bent.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, wrap
-from wildlab.tracking.predictions import POSE, Prediction
+from wildlab.tracking.predictions import POSE, Prediction, predict_pixel
 
 #: Row and measurement -> where a ray starts and where it goes, (3,) and (3,) in n.
 Ray = Callable[[int, Array], tuple[Array, Array]]
-#: Row and measurement -> the position (2,) that it speaks of.
-Locate = Callable[[int, Array], Array]
+#: Of the distance over which derivatives are compared, m: small beside any distance to a target, and large
+#: beside what rounding does to coordinates of kilometres.
+STEP_M = 0.01
 
 
 class Sensor(NamedTuple):
@@ -44,11 +59,11 @@ class Sensor(NamedTuple):
         (m,) what the elements are called: the bias of one is ``"<element>_bias"``.
     considers
         (k,) the errors that ``H_pose`` has derivatives for, by name.
-    ray, locate
-        For a start: the ray of a measurement; the position of one. None where a measurement has none.
+    ray
+        For a start: the ray of a measurement. None where it has none.
     sizes, row_angles
         (N,) and (N, m): where rows measure different things, how many of the m elements each has, which come
-        first, and which of them are angles. None: all rows alike. See `wildlab.tracking.combined`.
+        first, and which of them are angles. None: all rows alike. See `wildlab.tracking.sensors`.
     """
 
     predict: Callable[[int, Array], Prediction]
@@ -58,7 +73,6 @@ class Sensor(NamedTuple):
     elements: tuple[str, ...] = ()
     considers: tuple[str, ...] = POSE
     ray: Ray | None = None
-    locate: Locate | None = None
     sizes: NDArray[np.int64] | None = None
     row_angles: NDArray[np.bool_] | None = None
 
@@ -95,3 +109,307 @@ def row_of(values: ArrayLike, row: int, base: int) -> Array:
     """Row of (N, ...), or the one value of all rows; ``base`` is the number of axes of a single value."""
     a = np.asarray(values, float)
     return np.asarray(a[row] if a.ndim > base else a)
+
+
+def positions() -> Sensor:
+    """Georeferenced positions (north, east), m in n, H (6.3). They have no pose left that could be wrong."""
+
+    def predict(row: int, position: Array) -> Prediction:
+        return Prediction(np.array(position, float), np.eye(2), np.zeros((2, 6)))
+
+    return Sensor(predict, (False, False), elements=("north", "east"))
+
+
+def pixels(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
+    """Pixels (u, v) of a target on a horizontal plane, H (6.4).
+
+    Parameters
+    ----------
+    poses
+        Of the camera, one for each of N rows, or one for all.
+    plane_down
+        Down coordinate in n of the plane that the target is on, m: a scalar, or (N,).
+
+    Returns
+    -------
+    Sensor
+        Of (2,) pixels, NaN for a target that is not in front of the camera; for N rows, or for any number
+        where pose and plane are the same for all.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of planes than of poses.
+    """
+    planes = np.shape(plane_down)
+    if planes:
+        poses.require_rows(planes, "plane_down")
+    rows = poses.rows or planes
+
+    def predict(row: int, position: Array) -> Prediction:
+        return predict_pixel(position, poses.take(row), row_of(plane_down, row, 0))
+
+    return Sensor(predict, (False, False), rows[0] if rows else None, elements=("u", "v"))
+
+
+def renamed(sensor: Sensor, names: Mapping[str, str]) -> Sensor:
+    """The same sensor with other names for some errors, which are then its own and not another sensor's.
+
+    Parameters
+    ----------
+    sensor
+        Any.
+    names
+        From the old name to the new.
+
+    Returns
+    -------
+    Sensor
+    """
+    return sensor._replace(considers=tuple(names.get(one, one) for one in sensor.considers))
+
+
+class SensorMeasurements(NamedTuple):
+    """What one sensor measured.
+
+    Attributes
+    ----------
+    times
+        (N,) s, in order.
+    measurements
+        (N, m), or (N, K, m) with up to K detections in a frame; NaN where there are fewer.
+    R
+        (m, m), (N, m, m) or (N, K, m, m).
+    sensor
+        For N rows, or for any number.
+    """
+
+    times: ArrayLike
+    measurements: ArrayLike
+    R: ArrayLike
+    sensor: Sensor
+
+
+class Merged(NamedTuple):
+    """Several sensors' rows in order of time, as a filter takes them; see `merge`."""
+
+    times: Array  # (N,)
+    measurements: Array  # (N, m), or (N, K, m); NaN behind the elements that a row has
+    R: Array  # (N, m, m), or (N, K, m, m)
+    sensor: Sensor
+    which: NDArray[np.int64]  # (N,) the sensor of a row
+    rows: NDArray[np.int64]  # (N,) its row there
+
+
+def combined(sensors: Sequence[Sensor], which: ArrayLike) -> Sensor:
+    """One sensor whose rows belong to different ones.
+
+    Measurements for it are (N, m) with m the most elements that any of them has: a row has its own first,
+    and what is behind them is not looked at, neither there nor in ``R``. The errors of the same name are the
+    same for all; `renamed` makes those of one sensor its own.
+
+    Parameters
+    ----------
+    sensors
+        Each made for all N rows, or for its own rows only, in their order, or for any number.
+    which
+        (N,) index of the sensor of each row.
+
+    Returns
+    -------
+    Sensor
+        For N rows, with the errors of all; derivatives for those that a row's sensor does not have are zero.
+
+    Raises
+    ------
+    WildlabError
+        For indices that there are no sensors for, or a sensor of another number of rows.
+    """
+    kinds = np.asarray(which, np.int64)
+    if (
+        kinds.ndim != 1
+        or not len(sensors)
+        or (len(kinds) and not (0 <= kinds.min() <= kinds.max() < len(sensors)))
+    ):
+        raise WildlabError(
+            f"rows of the sensors {sorted(set(kinds.ravel().tolist()))} of {len(sensors)}",
+            "give the index of a sensor for each row", field="which",
+        )  # fmt: skip
+    N, own_row = len(kinds), np.arange(len(kinds))
+    for i, sensor in enumerate(sensors):
+        mine = np.flatnonzero(kinds == i)
+        if sensor.sizes is not None:
+            raise WildlabError(f"sensor {i} is a combined one", "combine all at once", field="sensors")
+        if sensor.rows not in (None, N, len(mine)):
+            raise WildlabError(
+                f"sensor {i} is made for {sensor.rows} rows, and has {len(mine)} of {N}",
+                "make it for its own rows, or for all", field="sensors",
+            )  # fmt: skip
+        if sensor.rows is not None and sensor.rows != N:
+            own_row[mine] = np.arange(len(mine))
+    m = max(len(sensor.angles) for sensor in sensors)
+    states = max(sensor.states for sensor in sensors)
+    names = tuple(dict.fromkeys(name for sensor in sensors for name in sensor.considers))
+    columns = [[names.index(name) for name in sensor.considers] for sensor in sensors]
+    angles = np.array([[*sensor.angles, *[False] * (m - len(sensor.angles))] for sensor in sensors], bool)
+    sizes = np.array([len(sensor.angles) for sensor in sensors], np.int64)
+
+    def predict(row: int, state: Array) -> Prediction:
+        i = kinds[row]
+        seen = sensors[i].predict(int(own_row[row]), state[..., : sensors[i].states])
+        size = sizes[i]
+        z, H, H_pose = (np.zeros((*state.shape[:-1], m, *more)) for more in ((), (states,), (len(names),)))
+        z[..., :size], H[..., :size, :] = seen.z, on_state(seen.H_position, states)
+        H_pose[..., :size, columns[i]] = seen.H_pose
+        return Prediction(z, H, H_pose)
+
+    return Sensor(
+        predict, tuple(bool(one.any()) for one in angles.T), N, states, considers=names,
+        sizes=sizes[kinds], row_angles=angles[kinds],
+    )  # fmt: skip
+
+
+def merge(parts: Sequence[SensorMeasurements]) -> Merged:
+    """What several sensors measured, in one order of time; at equal times in the order of the sensors.
+
+    Parameters
+    ----------
+    parts
+        Of each sensor.
+
+    Returns
+    -------
+    Merged
+        Measurements with their noise, and the combined sensor for them.
+
+    Raises
+    ------
+    WildlabError
+        For nothing, shapes that do not fit each other, and as `combined`.
+    """
+    if not parts:
+        raise WildlabError("no sensor", "give what one measured, or more", field="parts")
+    times = [np.asarray(one.times, float) for one in parts]
+    values = [np.asarray(one.measurements, float) for one in parts]
+    values = [z[:, None] if z.ndim == 2 else z for z in values]
+    for i, (t, z, one) in enumerate(zip(times, values, parts, strict=True)):
+        if t.ndim != 1 or z.ndim != 3 or len(z) != len(t) or z.shape[2] != len(one.sensor.angles):
+            raise WildlabError(
+                f"{t.shape} times and {np.shape(one.measurements)} measurements of sensor {i}",
+                f"give (N,) and (N, {len(one.sensor.angles)}), or (N, K, {len(one.sensor.angles)})",
+                field="parts",
+            )
+    K, m = max(z.shape[1] for z in values), max(z.shape[2] for z in values)
+    which = np.concatenate([np.full(len(t), i) for i, t in enumerate(times)])
+    rows = np.concatenate([np.arange(len(t)) for t in times])
+    order = np.argsort(np.concatenate(times), kind="stable")
+    N = len(which)
+    z_all, R_all = np.full((N, K, m), np.nan), np.full((N, K, m, m), np.nan)
+    for i, (z, one) in enumerate(zip(values, parts, strict=True)):
+        _, k, size = z.shape
+        R = np.asarray(one.R, float)
+        R = R[:, None] if R.ndim == 3 else R
+        mine = which == i
+        z_all[mine, :k, :size] = z
+        try:
+            block = np.broadcast_to(R, (len(z), k, size, size))
+        except ValueError as error:
+            raise WildlabError(
+                f"R of the shape {np.shape(one.R)} for {z.shape} measurements of sensor {i}",
+                "give (m, m), (N, m, m) or (N, K, m, m)", field="R",
+            ) from error  # fmt: skip
+        padded = np.full((len(z), K, m, m), np.nan)
+        padded[:, :k, :size, :size] = block
+        R_all[mine] = padded
+    which, rows = which[order], rows[order]
+    sensor = combined([_of_rows(one.sensor, rows[which == i]) for i, one in enumerate(parts)], which)
+    z_all, R_all = z_all[order], R_all[order]
+    if K == 1:
+        z_all, R_all = z_all[:, 0], R_all[:, 0]
+    return Merged(np.concatenate(times)[order], z_all, R_all, sensor, which, rows)
+
+
+def _of_rows(sensor: Sensor, rows: NDArray[np.int64]) -> Sensor:
+    """The sensor with its rows in another order, which they take when their times were not in order."""
+    if sensor.rows is None:
+        return sensor
+    return sensor._replace(predict=lambda row, state: sensor.predict(int(rows[row]), state), rows=len(rows))
+
+
+def second_derivatives(sensor: Sensor, row: int, state: ArrayLike) -> Array:
+    """Second derivatives of what a sensor should see, by differences of its first.
+
+    Parameters
+    ----------
+    sensor
+        Any.
+    row
+        Of the run.
+    state
+        (n,) north, east, m, and velocity where the sensor sees it.
+
+    Returns
+    -------
+    (m, 2, 2)
+        With respect to north and east, in the sensor's units over m^2; NaN where the target is not seen.
+    """
+    at = np.asarray(state, float)
+    columns = []
+    for axis in range(2):
+        step = np.zeros_like(at)
+        step[axis] = STEP_M
+        ahead, behind = (
+            sensor.predict(row, (at + sign * step)[: sensor.states]).H_position[..., :2] for sign in (1, -1)
+        )
+        columns.append((ahead - behind) / (2 * STEP_M))
+    D = np.stack(columns, axis=-1)
+    return np.asarray((D + np.swapaxes(D, -1, -2)) / 2)
+
+
+def left_out(P: ArrayLike, D: ArrayLike) -> Array:
+    """Second moments (m, m) of what a linearisation leaves out: B of the module.
+
+    Parameters
+    ----------
+    P
+        (..., 2, 2) m^2, of the position.
+    D
+        (..., m, 2, 2) from `second_derivatives`.
+
+    Returns
+    -------
+    (..., m, m), in the measurement's units squared.
+
+    Examples
+    --------
+    >>> left_out(np.eye(2), [[[0.0, 0.0], [0.0, 2.0]]]).tolist()
+    [[3.0]]
+    """
+    bent = np.asarray(D, float) @ np.asarray(P, float)[..., None, :, :]
+    traces = np.trace(bent, axis1=-2, axis2=-1)
+    both = traces[..., :, None] * traces[..., None, :]
+    return np.asarray((both + 2 * np.einsum("...iab,...jba->...ij", bent, bent)) / 4)
+
+
+def share_left_out(P: ArrayLike, D: ArrayLike, noise: ArrayLike) -> float:
+    """What a linearisation leaves out over what a measurement is uncertain by.
+
+    Parameters
+    ----------
+    P
+        (2, 2) m^2, of the position.
+    D
+        (m, 2, 2) from `second_derivatives`.
+    noise
+        (m, m): all that a measurement may be wrong by, N of the module.
+
+    Returns
+    -------
+    float
+        The largest of the variances' ratio over all directions. Above one the track is too uncertain; NaN
+        where that cannot be said.
+    """
+    B, N = left_out(P, D), np.asarray(noise, float)
+    if not (np.isfinite(B).all() and np.isfinite(N).all()):
+        return float("nan")
+    return float(np.linalg.eigvals(np.linalg.solve(N, B)).real.max())

@@ -114,7 +114,6 @@ def run_smoothed(
     *,
     pose: Considers | None = None,
     gate_probability: float = 1.0,
-    output_times: ArrayLike | None = None,
 ) -> Track:
     """`run_filter`, and back over what it found.
 
@@ -122,9 +121,6 @@ def run_smoothed(
     ----------
     times, measurements, R, sensor, motion, start, pose, gate_probability
         As in `run_filter`.
-    output_times
-        (M,) s, in order; the measurements' own when not given. Behind the last measurement the estimate is
-        the filter's.
 
     Returns
     -------
@@ -137,8 +133,7 @@ def run_smoothed(
         As `run_filter`.
     """
     track, steps, errors = filter_in_steps(
-        times, measurements, R, sensor, motion, start, pose=pose, gate_probability=gate_probability,
-        output_times=output_times,
+        times, measurements, R, sensor, motion, start, pose=pose, gate_probability=gate_probability
     )  # fmt: skip
     steps = [_first(start, steps[0].row if steps else 0, errors.k if errors else 0), *steps]
     nodes = _smooth_plain(steps) if errors is None else _smooth_considered(steps, errors)
@@ -148,8 +143,6 @@ def run_smoothed(
         i = int(np.searchsorted(node_times, time, "right")) - 1
         if i >= 0 and time == node_times[i]:
             x[out], P[out] = nodes[i].x, nodes[i].P
-        elif 0 <= i < len(steps) - 1:
-            x[out], P[out] = _between(steps[i], steps[i + 1], nodes[i + 1], motion, float(time))
     return track._replace(x=x, P=P)
 
 
@@ -168,8 +161,7 @@ class _Node(NamedTuple):
 def _first(start: Start, row: int, k: int) -> Step:
     """The start, as a row at which nothing was measured."""
     x, P = np.asarray(start.x, float), np.asarray(start.P, float)
-    n = len(x)
-    C = np.zeros((n, k)) if start.C is None or k == 0 else np.asarray(start.C, float)
+    n, C = len(x), np.zeros((len(x), k))
     row = start.row if start.row >= 0 else max(row - 1, 0)
     return Step(row, float(start.time), np.eye(n), np.zeros((n, n)), x, P, C, x, P, C)
 
@@ -201,7 +193,7 @@ def _over_known(cross: Array, covariance: Array, sd: Array) -> Array:
 
 
 def _smooth_plain(steps: Sequence[Step]) -> list[_Node]:
-    """Rauch, Tung and Striebel's smoother, with what `_between` asks of it."""
+    """Rauch, Tung and Striebel's smoother."""
     n = len(steps[0].x)
     none = np.zeros((n, 0))
     x, P = steps[-1].x, steps[-1].P
@@ -257,23 +249,6 @@ def _best_gain(by_state: Array, by_errors: Array, P_prior: Array, C_prior: Array
     spread = D @ _joint(P_prior, C_prior, node.P_errors) @ D.T + node.N
     cross = np.hstack([by_state, by_errors]) @ D.T
     return _over_known(cross, (spread + spread.T) / 2, np.sqrt(np.maximum(np.diag(P_prior), 0)))
-
-
-def _between(before: Step, after: Step, node: _Node, motion: Motion, time: float) -> tuple[Array, Array]:
-    """Estimate between two rows: as if the motion had been asked for both parts of the step."""
-    F1, Q1 = motion(time - before.time)
-    F2, Q2 = motion(after.time - time)
-    x, P = F1 @ before.x, F1 @ before.P @ F1.T + Q1
-    P_prior = F2 @ P @ F2.T + Q2
-    if not node.B.shape[1]:
-        return _back(x, P, F2, F2 @ x, P_prior, node.x, node.P)
-    by_errors = F1 @ before.C @ node.psi.T
-    C_prior = F2 @ by_errors
-    gain = _best_gain(P @ F2.T, by_errors, P_prior, C_prior, node)
-    D = np.hstack([np.eye(len(x)) - node.A, -node.B])
-    spread = D @ _joint(P_prior, C_prior, node.P_errors) @ D.T + node.N
-    P = P - gain @ spread @ gain.T
-    return x + gain @ (node.x - F2 @ x), (P + P.T) / 2
 
 
 def _filled(covariance: Array) -> Array:

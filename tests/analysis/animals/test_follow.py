@@ -29,7 +29,7 @@ from wildlab.planning.high_level import SEARCH
 from wildlab.planning.moving import walks
 from wildlab.tracking.particles import ImageLook, Rules, walk_of
 from wildlab.tracking.particles.clouds import Inside
-from wildlab.tracking.particles.particle_sets import Moves
+from wildlab.tracking.particles.steps import Moves
 
 CAMERA = Camera(640, 480, 1267.0, 1117.0, 356.0, 216.6)
 DETECTOR = Detector(detected=0.9, sd=1.0, border=0.0, height=0.7)

@@ -11,9 +11,9 @@ from scipy.stats import multivariate_normal, norm
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
-from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
-from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
-from wildlab.tracking.many.reacquisition import look_differences, place_costs, reachable, recognise
+from wildlab.tracking.association import Assignment, global_nearest
+from wildlab.tracking.many.appearance import feature_distances, image_features, veto, with_features
+from wildlab.tracking.many.life import look_differences, place_costs, reachable, recognise
 
 entries = st.one_of(st.integers(-5, 30), st.sampled_from([np.nan, np.inf]))
 matrices = st.tuples(st.integers(0, 4), st.integers(0, 4)).flatmap(
@@ -64,21 +64,9 @@ def test_without_a_gate_as_many_as_possible_and_the_least_among_those(d):
     assert sum(d[pair] for pair in found) == pytest.approx(least)
 
 
-@given(matrices, gates)
-def test_nearest_is_the_least_of_each_column(d, gate):
-    found = nearest(d, gate)
-    for column, row in enumerate(found):
-        inside = [value for value in d[:, column] if np.isfinite(value) and value <= gate]
-        assert (row == -1) == (not inside)
-        if inside:
-            assert d[row, column] == min(inside)
-
-
 def test_the_gate_itself_is_inside():
     assert global_nearest([[9.0]], 9.0).track.tolist() == [0]
-    assert nearest([[9.0]], 9.0).tolist() == [0]
     assert global_nearest([[9.1]], 9.0).track.tolist() == [-1]
-    assert nearest([[9.1]], 9.0).tolist() == [-1]
 
 
 @pytest.mark.parametrize(
@@ -91,9 +79,8 @@ def test_the_gate_itself_is_inside():
     ],
 )
 def test_what_is_refused(distances, gate, words):
-    for function in (global_nearest, nearest):
-        with pytest.raises(WildlabError, match=words):
-            function(distances, gate)
+    with pytest.raises(WildlabError, match=words):
+        global_nearest(distances, gate)
 
 
 values = arrays(np.float64, (3, 2), elements=st.floats(-50, 50))

@@ -14,11 +14,9 @@ from scipy.stats import chi2
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
+from wildlab.tracking.association import global_nearest
 from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many.assignment import global_nearest
-from wildlab.tracking.many.bank import Looks, Tuning, run_bank
-from wildlab.tracking.many.bank_life import Life, nobody
-from wildlab.tracking.many.bank_rules import (
+from wildlab.tracking.many.appearance import (
     DISTANCE,
     FEATURES,
     RULES,
@@ -26,13 +24,14 @@ from wildlab.tracking.many.bank_rules import (
     VETO,
     Appearance,
     associate,
-    compare_looks,
+    feature_distances,
     limits_of,
 )
-from wildlab.tracking.many.features import feature_distances
-from wildlab.tracking.measurement import positions
+from wildlab.tracking.many.bank import Life, Looks, Tuning, compare_looks, nobody, run_bank
 from wildlab.tracking.motion import constant_velocity, in_steps
-from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.records import Start
+from wildlab.tracking.run import run_filter
+from wildlab.tracking.sensors import positions
 
 INTERVAL = 0.5
 TUNING = Tuning(17.5, 0.2, 5.0, gate_threshold(0.99, 2), 5.0)

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
-from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
-from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
-from wildlab.tracking.many.probabilities import (
+from wildlab.tracking.association import (
     association_probabilities,
     association_probabilities_by_enumeration,
     belief_propagation,
 )
+from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
+from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
 
 shares = st.floats(0.01, 0.99)
 

@@ -10,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.many.test_run import BOTH, LONG, SHIP
-from wildlab.tracking.many.hulls import STEERS_M_S, Gathered, gather, hull_noise, near_side, on_one_hull
+from wildlab.tracking.many.target_model import (
+    STEERS_M_S,
+    Gathered,
+    gather,
+    hull_noise,
+    near_side,
+    on_one_hull,
+)
 from wildlab.tracking.many.tracks import begin
 
 

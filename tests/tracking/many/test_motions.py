@@ -12,13 +12,20 @@ from hypothesis import strategies as st
 from tests.tracking.many.test_run import POINTS, looks
 from tests.tracking.many.test_update import OPEN, SURE
 from tests.tracking.poses import GENERATORS
-from wildlab.tracking.imm import run_imm
-from wildlab.tracking.many.motions import at_least, each_motion, interact, largest_of, of_hulls
+from wildlab.tracking.filters import run_imm
 from wildlab.tracking.many.run import follow_many
-from wildlab.tracking.many.target_model import POINT, Hull
-from wildlab.tracking.maritime import white_acceleration
-from wildlab.tracking.measurement import positions
+from wildlab.tracking.many.target_model import (
+    POINT,
+    Hull,
+    at_least,
+    each_motion,
+    interact,
+    largest_of,
+    of_hulls,
+)
+from wildlab.tracking.motion import white_acceleration
 from wildlab.tracking.records import Start
+from wildlab.tracking.sensors import positions
 
 BOTH = (Hull("boat", 6.0, 2.0, 0.6), Hull("ship", 30.0, 8.0, 0.4))
 

@@ -13,13 +13,12 @@ from tests.tracking.many.test_run import look
 from tests.tracking.many.test_update import OPEN, SURE
 from tests.tracking.poses import GENERATORS
 from wildlab.evaluation.consistency import chi_square_interval, nees
-from wildlab.tracking.many.run import Shown, run_many
-from wildlab.tracking.many.smoothing import smooth_considering, smooth_many
+from wildlab.tracking.many.run import Shown, run_many, smooth_considering, smooth_many
 from wildlab.tracking.many.target_model import Hull, own_columns, own_lasting
-from wildlab.tracking.maritime import white_acceleration
-from wildlab.tracking.measurement import positions
+from wildlab.tracking.motion import white_acceleration
 from wildlab.tracking.records import Start, Track
 from wildlab.tracking.run import run_filter
+from wildlab.tracking.sensors import positions
 from wildlab.tracking.smoothing import smooth
 
 H = np.eye(2, 4)

@@ -13,14 +13,13 @@ from scipy.stats import multivariate_normal, norm
 from tests.tracking.many.test_run import EYE, POINTS, lines, look, looks
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
-from wildlab.tracking.bending import left_out
-from wildlab.tracking.many.probabilities import association_probabilities
-from wildlab.tracking.many.run import follow_many, run_many
+from wildlab.tracking.association import association_probabilities
+from wildlab.tracking.many.run import follow_many, moved_together, run_many, told_by_others
 from wildlab.tracking.many.target_model import Scan
-from wildlab.tracking.many.together import moved_together, told_by_others
-from wildlab.tracking.many.update import Compared, compare, compare_bearings, update
-from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.many.tracks import Compared, compare, compare_bearings, update
+from wildlab.tracking.motion import white_acceleration
 from wildlab.tracking.schmidt import update_schmidt
+from wildlab.tracking.sensors import left_out
 
 H = np.eye(2, 4)
 

@@ -11,30 +11,25 @@ from scipy.stats import poisson
 
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
-from wildlab.tracking.motion import constant_position, constant_velocity, in_steps
+from wildlab.tracking.many.existence import count_interval, count_probabilities
+from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.particles import (
     SCHEMES,
     Cloud,
-    count_interval,
-    count_probabilities,
     draw,
-    drift,
     effective_size,
-    existence_after,
     log_likelihood,
     moments,
     move,
-    move_by_sight,
     resample,
     sight_of,
     start_gaussian,
-    start_inside,
     stay_inside,
     walk_of,
     weigh,
     weigh_unseen,
 )
-from wildlab.tracking.particles.kernels import pick, take
+from wildlab.tracking.particles.clouds import pick, take
 
 
 def some_cloud(seed, animals=3, particles=40, n=4):
@@ -104,18 +99,6 @@ def test_a_start_has_its_mean_and_covariance(rng):
     assert not np.array_equal(cloud.x[0], cloud.x[1])
 
 
-def test_a_start_in_an_enclosure_is_even_in_it():
-    def triangle(places):
-        return (places[..., 0] > 0) & (places[..., 1] > 0) & (places.sum(axis=-1) < 60)
-
-    cloud = start_inside(triangle, [0, 0], [60, 60], 3, 5000, np.random.default_rng(2))
-    assert cloud.x.shape == (3, 5000, 2) and triangle(cloud.x).all()
-    # Of a triangle: mean a third of its side, variance side^2 / 18.
-    mean, covariance = moments(cloud)
-    assert np.abs(mean - 20).max() < 5 * np.sqrt(200 / 5000)
-    assert np.abs(covariance[:, 0, 0] - 200).max() < 12
-
-
 def test_several_measurements_are_multiplied(rng):
     x, z = rng.normal(0, 5, (2, 7, 2)), rng.normal(0, 5, (3, 2))
     R = np.array([[4.0, 1.0], [1.0, 2.0]])
@@ -123,14 +106,7 @@ def test_several_measurements_are_multiplied(rng):
 
     wanted = sum(multivariate_normal(one, R).logpdf(x) for one in z)
     np.testing.assert_allclose(log_likelihood(x, z, R), wanted)
-    np.testing.assert_allclose(log_likelihood(x, z, R, measure=lambda p: p + 0.0), wanted)
     assert (log_likelihood(x, np.zeros((0, 2)), R) == 0).all()
-
-
-def test_who_cannot_be_measured_has_not_been():
-    measure = lambda p: np.where(p[..., :1] > 0, p, np.nan)  # noqa: E731
-    given_each = log_likelihood([[1.0, 0.0], [-1.0, 0.0]], [1.0, 0.0], np.eye(2), measure)
-    assert np.isfinite(given_each[0]) and given_each[1] == -np.inf
 
 
 def test_a_footprint_is_read_at_the_nearest_node(rng):
@@ -145,10 +121,6 @@ def test_a_footprint_is_read_at_the_nearest_node(rng):
     assert sight(np.array([np.nan, 0.0])) == 0
 
 
-def nowhere(places):
-    return np.zeros(places.shape[:-1], bool)
-
-
 @pytest.mark.parametrize(
     ("act", "words"),
     [
@@ -157,7 +129,6 @@ def nowhere(places):
         (lambda: weigh_unseen(some_cloud(0), -0.1), "0 to 1"),
         (lambda: weigh_unseen(some_cloud(0), 1.1), "0 to 1"),
         (lambda: weigh_unseen(some_cloud(0), np.nan), "0 to 1"),
-        (lambda: start_inside(nowhere, [0, 0], [1, 1], 1, 5, np.random.default_rng()), "0 lie"),
         (lambda: start_gaussian([[0.0, 0.0]], np.eye(2), 0, np.random.default_rng()), "at least one"),
         (lambda: log_likelihood([[0.0, 0.0]], [0.0, 0.0], np.diag([1.0, 0.0])), "no inverse"),
         (lambda: log_likelihood([[0.0, 0.0]], [0.0, 0.0], np.diag([1.0, -1.0])), "variance"),
@@ -280,16 +251,6 @@ def test_the_interval_is_the_shortest_that_holds_enough(existence, unseen, proba
     assert np.isclose(count.mean, np.arange(len(p)) @ p)
 
 
-def test_looking_n_times_for_one_that_is_not_seen():
-    r = 0.7
-    for _ in range(5):
-        r = float(existence_after(r, 0.4))
-    assert np.isclose(r, 0.7 * 0.4**5 / (0.3 + 0.7 * 0.4**5))
-    assert (
-        existence_after(1.0, 0.0) == 0 and existence_after(1.0, 1e-9) == 1 and existence_after(0.0, 1e9) == 0
-    )
-
-
 @pytest.mark.parametrize("existence, unseen", [([1.2], 0.0), ([np.nan], 0.0), ([0.5], -1.0), ([0.5], np.inf)])
 def test_what_cannot_be_counted_is_refused(existence, unseen):
     with pytest.raises(WildlabError, match="0 to 1"):
@@ -326,7 +287,11 @@ def test_a_cloud_moves_as_its_model_says(rng):
 @pytest.mark.parametrize("step", [0.5, 1.0, 3.0])
 def test_the_walk_does_not_depend_on_how_often_it_is_predicted(step):
     """It spreads as (4.5) does when (4.5) is taken in its own step, and as (4.5) alone does not."""
-    walk, printed = walk_of(0.5, step), partial(constant_position, sd_velocity=0.5)
+    walk = walk_of(0.5, step)
+
+    def printed(dt):
+        return np.eye(2), (0.5 * dt) ** 2 * np.eye(2)
+
     _, half_an_hour = walk(1800.0)
     np.testing.assert_allclose(half_an_hour, in_steps(1800.0, printed, step)[1], rtol=1e-9)
     np.testing.assert_allclose(half_an_hour, 600 * walk(3.0)[1], rtol=1e-9)
@@ -339,73 +304,13 @@ def test_a_walk_without_a_step_is_refused(sd, step):
         walk_of(sd, step)
 
 
-@pytest.mark.parametrize("dt", [0.1, 60.0, 4000.0])
-def test_one_place_draws_as_the_closed_form_says(dt):
-    """Ornstein and Uhlenbeck: exact for any step, and a plain walk for a short one."""
-    rng, place = np.random.default_rng(2), np.array([50.0, -20.0])
-    density, spread = 0.6, 25.0
-    after = drift(np.zeros((N, 2)), dt, rng, density=density, places=[place], spread=spread)
-    rate = density**2 / (2 * spread**2)
-    variance = spread**2 * (1 - np.exp(-2 * rate * dt))
-    assert (np.abs(after.mean(axis=0) - place * (1 - np.exp(-rate * dt))) < 5 * np.sqrt(variance / N)).all()
-    assert near(np.cov(after.T), variance * np.eye(2))
-    if dt == 0.1:
-        np.testing.assert_allclose(variance, density**2 * dt, rtol=1e-3)
-
-
-def test_in_the_long_run_they_are_where_the_places_are(rng):
-    """A mixture about its places, each with its share; those who start in it stay in it."""
-    places, shares, spread = np.array([[0.0, 0.0], [0.0, 50.0]]), np.array([0.3, 0.7]), 25.0
-    where = places[rng.choice(2, 8000, p=shares)] + spread * rng.standard_normal((8000, 2))
-    away = np.zeros((8000, 2))
-    for _ in range(400):
-        both = np.stack([where, away])
-        where, away = drift(both, 30.0, rng, density=1.0, places=places, spread=spread, shares=shares)
-    assert abs(where[:, 1].mean() - 35) < 2.0  # 0.3 * 0 + 0.7 * 50
-    assert abs(where[:, 1].std() - np.sqrt(25**2 + 0.21 * 50**2)) < 1.5
-    assert abs(where[:, 0].std() - 25) < 0.7
-    # Started all in one place, they forget it.
-    assert abs(away[:, 1].mean() - 35) < 2.0
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"places": np.zeros((0, 2))},
-        {"shares": [1.0]},
-        {"shares": [0.0, 0.0]},
-        {"spread": 0.0},
-        {"density": 0.0},
-    ],
-)
-def test_places_that_do_not_draw_are_refused(wrong):
-    told = {"density": 1.0, "places": [[0.0, 0.0], [1.0, 1.0]], "spread": 1.0, "shares": [1.0, 1.0]} | wrong
-    with pytest.raises(WildlabError, match=r"place|spread"):
-        drift(np.zeros((1, 2)), 1.0, np.random.default_rng(0), **told)
-
-
-def test_in_sight_they_keep_their_velocity_and_out_of_sight_they_forget_it(rng):
-    start = np.array([[0.0, 0.0, 2.0, 0.0]] * 2)
-    cloud = start_gaussian(start, np.diag([1.0, 1.0, 0.01, 0.01]), N, rng)
-    motion = partial(constant_velocity, sd_acceleration=0.1)
-    after = move_by_sight(
-        cloud, [True, False], 10.0, rng, motion=motion, sd_velocity=0.5,
-        density=0.5, places=[[0.0, 100.0]], spread=10.0,
-    )  # fmt: skip
-    mean, covariance = moments(after)
-    F, Q = motion(10.0)
-    assert np.abs(mean[0] - [20, 0, 2, 0]).max() < 0.2
-    assert near(covariance[0], F @ np.diag([1.0, 1.0, 0.01, 0.01]) @ F.T + Q)
-    assert np.abs(mean[1, 2:]).max() < 0.02 and near(covariance[1, 2:, 2:], 0.25 * np.eye(2))
-    assert abs(mean[1, 0]) < 0.1 and mean[1, 1] > 0.5  # not 20 m on, but towards the place
-    np.testing.assert_array_equal(after.w, cloud.w)
-
-
 def test_nobody_leaves_and_all_of_the_enclosure_is_used(rng):
     def half_disc(places):
         return (np.hypot(places[..., 0], places[..., 1]) < 50) & (places[..., 0] > 0)
 
-    cloud = start_inside(half_disc, [0, -50], [50, 50], 1, 20_000, rng)
+    tried = rng.uniform([0, -50], [50, 50], (60_000, 2))
+    tried = tried[half_disc(tried)][:20_000]
+    cloud = Cloud(tried[None], np.full((1, 20_000), 1 / 20_000))
     corner = Cloud(np.full_like(cloud.x, 1.0), cloud.w)
     for _ in range(400):
         cloud = stay_inside(cloud, move(cloud, walk_of(2.0, 1.0), 10.0, rng), half_disc)

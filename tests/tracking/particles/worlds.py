@@ -1,13 +1,14 @@
-"""Small worlds for trackers: a fence, animals that walk, an aircraft with a view, a block that hides."""
+"""Small worlds for trackers: a fence, and the exact answer on a grid (the point mass filter, F 4.2)."""
+
+from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.tracking.particles import ImageLook, Rules, move, stay_inside, walk_of
+from wildlab.tracking.particles import Rules, move, stay_inside, walk_of
 
 SIZE = np.array([120.0, 90.0])
 WALK = walk_of(0.5, 1.0)
 NOISE = 2.0  # m
-VIEW = np.array([25.0, 15.0])  # half of what an image shows, m
 
 
 def inside(places):
@@ -21,38 +22,35 @@ def moves(cloud, seen, dt, rng):
 RULES = Rules(moves, particles=400, scheme="systematic")
 
 
-def footprint(k):
-    """Lanes to and fro: 50 m by 30 m, which move on by half their length."""
-    lane, along = divmod(k, 5)
-    lane %= 3
-    return np.array([12.0 + 24.0 * (along if lane % 2 == 0 else 4 - along), 15.0 + 30.0 * lane])
+class Grid(NamedTuple):
+    """The middles (C, 2) m of the cells of an enclosure, and the side of a cell, m."""
+
+    places: np.ndarray
+    step: float
 
 
-def sight_from(middle, probability):
-    def sight(places):
-        seen = (np.abs(places - middle) <= VIEW).all(axis=-1)
-        hidden = (np.abs(places - [60.0, 45.0]) <= [8.0, 8.0]).all(axis=-1)
-        return np.where(seen & ~hidden, probability, 0.0)
-
-    return sight
+def grid_over(inside, low, high, step):
+    """The cells whose middle lies in an enclosure."""
+    axes = [np.arange(low[a] + step / 2, high[a], step) for a in range(2)]
+    every = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    return Grid(every[inside(every)], step)
 
 
-def world(rng, animals, images=30, dt=4.0, probability=0.8, clutter=2e-5):
-    """What each image shows."""
-    at = rng.uniform(0, SIZE, (animals, 2))
-    looks = []
-    for k in range(images):
-        if k:
-            step = at + rng.standard_normal((animals, 2)) * np.sqrt(WALK(dt)[1][0, 0])
-            at = np.where(inside(step)[:, None], step, at)
-        middle = footprint(k)
-        sight = sight_from(middle, probability)
-        seen = at[rng.random(animals) < sight(at)]
-        z = seen + NOISE * rng.standard_normal(seen.shape)
-        low, high = np.maximum(middle - VIEW, 0), np.minimum(middle + VIEW, SIZE)
-        false = rng.uniform(low, high, (rng.poisson(clutter * np.prod(high - low)), 2))
-        both = rng.permutation(np.concatenate([z, false]))
-        looks.append(
-            ImageLook(k * dt, both, np.tile(NOISE**2 * np.eye(2), (len(both), 1, 1)), sight, clutter)
-        )
-    return looks
+def walk_matrix(grid, density, dt):
+    """(C, C) probability of going to the row's cell from the column's; a step that leads out is not taken."""
+    sd = density * np.sqrt(dt)
+    reach = int(np.ceil(8 * sd / grid.step)) + 1
+    line = np.exp(-0.5 * (grid.step * np.arange(-reach, reach + 1) / sd) ** 2)
+    line /= line.sum()
+    steps = np.rint((grid.places[:, None] - grid.places[None]) / grid.step).astype(int)
+    near = (np.abs(steps) <= reach).all(axis=-1)
+    at = np.where(near[..., None], steps + reach, 0)
+    matrix = np.where(near, line[at[..., 0]] * line[at[..., 1]], 0.0)
+    matrix[np.diag_indices(len(matrix))] += 1 - matrix.sum(axis=0)
+    return matrix
+
+
+def grid_weigh(p, likelihood):
+    """Measurement update of a grid, F (4.9)-(4.10) with all cells as particles; and the evidence."""
+    raw = p * likelihood
+    return raw / raw.sum(), raw.sum()

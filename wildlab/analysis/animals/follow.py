@@ -18,8 +18,7 @@ from wildlab.geometry.terrain import Terrain
 from wildlab.tracking.kalman import update
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.particles import ImageLook, Rules, mahalanobis_squared, moments, nearest_animal, no_herd
-from wildlab.tracking.particles.clouds import Cloud, Inside
-from wildlab.tracking.particles.moves import move, stay_inside
+from wildlab.tracking.particles.clouds import Cloud, Inside, move, stay_inside
 from wildlab.tracking.particles.steps import step_nearest
 
 #: A walk within a fence is cut into steps no longer than this, s; and tracks are looked at as often.

@@ -15,7 +15,7 @@ from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 from wildlab.geometry.visibility import lines_clear
-from wildlab.tracking.particles.likelihoods import Sight
+from wildlab.tracking.particles.clouds import Sight
 
 #: Further than this from the camera nothing is looked for, m: where its image shows the horizon.
 FURTHEST = 150.0

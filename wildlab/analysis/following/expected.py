@@ -8,8 +8,14 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.analysis.scans import Scans, Truth
 from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.frames import Array
-from wildlab.tracking.measurement import Prediction, Sensor, difference, predict_pixel, predict_range_bearing
-from wildlab.tracking.predictions import POSE, predict_position
+from wildlab.tracking.predictions import (
+    POSE,
+    Prediction,
+    predict_pixel,
+    predict_position,
+    predict_range_bearing,
+)
+from wildlab.tracking.sensors import Sensor, difference
 
 _LEVEL = ("platform_north", "platform_east", "heading", "clock")
 #: Errors that may be considered, by kind of detection: the columns of ``H_pose``, in this order. Those of a

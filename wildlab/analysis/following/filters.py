@@ -25,13 +25,11 @@ from wildlab.analysis.following.noise_model import NoiseModel, TargetModel
 from wildlab.analysis.scans import Scans
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.tracking.coloured import run_coloured, thin
-from wildlab.tracking.imm import run_imm
-from wildlab.tracking.maritime import white_acceleration
-from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Ends, Start, Track, run_filter
+from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
+from wildlab.tracking.motion import Motion, white_acceleration
+from wildlab.tracking.records import Start, Track
+from wildlab.tracking.run import Ends, run_filter
 from wildlab.tracking.smoothing import run_smoothed, smooth
-from wildlab.tracking.unscented import run_unscented
 
 #: What the name of a filter ends with whose estimates know later detections too, and those that can.
 SMOOTHED = "-smoothed"

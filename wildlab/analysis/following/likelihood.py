@@ -20,7 +20,8 @@ from wildlab.errors import WildlabError
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
-from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.records import Start
+from wildlab.tracking.run import run_filter
 
 #: Looks of a sensor that are gone over: enough to tell, and few enough to go over often.
 MOST_LOOKS = 600

@@ -7,7 +7,7 @@ ends, and a new one starts on the next detection, in the same way as the first.
 It ends at the first look at which it was without a detection for longer than a filter on differences would
 wait (`NoiseModel.longest_gap_s`), and what a linearisation leaves out of a detection, by the geometry in
 which the target was last seen, is more than all that the detection may be wrong by: its noise and the
-considered errors (`wildlab.tracking.bending`). Where it is seen again sooner but from nearer, the geometry of
+considered errors (`wildlab.tracking.sensors`). Where it is seen again sooner but from nearer, the geometry of
 that look decides too. The filter with white noise decides for all, as it chooses the detections for all: they
 are compared over the same looks.
 
@@ -29,9 +29,9 @@ from wildlab.analysis.following.initiation import place_of
 from wildlab.analysis.following.noise_model import NoiseModel
 from wildlab.analysis.scans import Scans, Truth
 from wildlab.geometry.frames import Array
-from wildlab.tracking.bending import second_derivatives, share_left_out
 from wildlab.tracking.records import Start, Track
 from wildlab.tracking.run import Ends
+from wildlab.tracking.sensors import second_derivatives, share_left_out
 
 
 class Piece(NamedTuple):

@@ -40,15 +40,12 @@ from wildlab.analysis.following.sensor_tracks import (
 from wildlab.analysis.scans import Scans, Truth, truths_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
-from wildlab.tracking.combined import Merged, SensorMeasurements, merge
 from wildlab.tracking.consider_parameters import Considered, consider_all
-from wildlab.tracking.considering import renamed
-from wildlab.tracking.imm import run_imm
+from wildlab.tracking.filters import run_imm, run_unscented
 from wildlab.tracking.records import Start, Track
 from wildlab.tracking.run import Ends, run_filter
-from wildlab.tracking.sensors import Sensor
+from wildlab.tracking.sensors import Merged, Sensor, SensorMeasurements, merge, renamed
 from wildlab.tracking.smoothing import run_smoothed, smooth
-from wildlab.tracking.unscented import run_unscented
 
 #: Filters that take looks of several sensors.
 ABLE = ("ekf", "ukf", "imm", "schmidt")

@@ -39,7 +39,7 @@ from wildlab.evaluation.consistency import average, chi_square_interval, positio
 from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.store import Flight
-from wildlab.tracking.run import Start, Track
+from wildlab.tracking.records import Start, Track
 
 Array = NDArray[np.float64]
 

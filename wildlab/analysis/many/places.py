@@ -22,7 +22,7 @@ from wildlab.analysis.scans import Scans
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image, project
-from wildlab.tracking.coloured import thin
+from wildlab.tracking.filters import thin
 from wildlab.tracking.many import Scan
 from wildlab.tracking.many.target_model import Sees
 
@@ -155,7 +155,7 @@ def places_of(
 
 
 def thinned(places: PlacedLooks, apart_s: float) -> PlacedLooks:
-    """Only looks at least so far apart, see `wildlab.tracking.coloured.thin`."""
+    """Only looks at least so far apart, see `wildlab.tracking.filters.thin`."""
     kept = np.flatnonzero(thin([scan.time for scan in places.scans], apart_s))
     return places._replace(
         scans=[places.scans[row] for row in kept], named=[places.named[row] for row in kept]

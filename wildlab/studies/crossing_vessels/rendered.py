@@ -43,9 +43,8 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     arrange,
 )
 from wildlab.studies.crossing_vessels.trial.joint import JOINT, joint_numbers
+from wildlab.tracking.many.appearance import Appearance, image_features
 from wildlab.tracking.many.bank import Bank
-from wildlab.tracking.many.bank_rules import Appearance
-from wildlab.tracking.many.features import image_features
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

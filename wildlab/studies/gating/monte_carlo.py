@@ -26,8 +26,9 @@ from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import Mount
 from wildlab.studies.gating import kernels
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import azimuth_elevation_of_pixel, on_state
 from wildlab.tracking.motion import constant_velocity
+from wildlab.tracking.predictions import azimuth_elevation_of_pixel
+from wildlab.tracking.sensors import on_state
 
 #: The three forms of H table 6.6, in its order.
 FORMS = ("position", "pixels", "angles")

@@ -33,11 +33,10 @@ from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import white_bound
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.imm import run_imm
-from wildlab.tracking.measurement import Sensor, pixels
+from wildlab.tracking.filters import run_imm, run_unscented
 from wildlab.tracking.motion import Motion, constant_velocity, in_steps
-from wildlab.tracking.run import Start, Track
-from wildlab.tracking.unscented import run_unscented
+from wildlab.tracking.records import Start, Track
+from wildlab.tracking.sensors import Sensor, pixels
 
 Array = NDArray[np.float64]
 #: Numbers of a flight by (subject, name).

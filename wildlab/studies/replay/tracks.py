@@ -13,8 +13,9 @@ from wildlab.flight.clocks import truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.replay.scene import Estimates, Points
-from wildlab.tracking.measurement import positions
-from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.records import Start
+from wildlab.tracking.run import run_filter
+from wildlab.tracking.sensors import positions
 
 #: Variance that a place gains in a second, m^2, along each axis: a metre in a second, chosen.
 WALK = 1.0

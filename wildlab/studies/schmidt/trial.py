@@ -45,7 +45,7 @@ from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
-from wildlab.tracking.run import Track
+from wildlab.tracking.records import Track
 from wildlab.tracking.schmidt import PoseUncertainty
 
 Array = NDArray[np.float64]

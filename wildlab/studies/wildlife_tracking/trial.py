@@ -40,7 +40,7 @@ from wildlab.studies.uav_coverage import trial as uav
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.particles import Rules, walk_of
 from wildlab.tracking.particles.clouds import Inside
-from wildlab.tracking.particles.particle_sets import Moves
+from wildlab.tracking.particles.steps import Moves
 
 #: The platforms; and by what animals are followed.
 GONDOLA, UAV = "gondola", "uav"

@@ -5,23 +5,40 @@ A matrix of distances has a row for each measurement and a column for each track
 - `run_many`: all targets of all sensors, by joint probabilities with existence, visibility and hulls (H 8.2).
 - `smooth_many`: back over all tracks once the flight is over.
 - `association_probabilities`, `belief_propagation`: which measurement is probably whose.
-- `global_nearest`, `nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
+- `global_nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
   look like.
 - `run_bank`: a bank of filters on positions, with any of these.
 - `pair_scans`, `judge_start`, `outlived`: the life of a track. `Life`: what a bank is told of it.
 - `reachable`, `place_costs`, `look_differences`, `recognise`: whether a new track is one that had ended.
 """
 
-from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
-from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
-from wildlab.tracking.many.bank_life import Life
-from wildlab.tracking.many.bank_rules import Appearance
-from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
-from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
-from wildlab.tracking.many.probabilities import association_probabilities, belief_propagation
-from wildlab.tracking.many.reacquisition import look_differences, place_costs, reachable, recognise
-from wildlab.tracking.many.run import Shown, follow_many, run_many
-from wildlab.tracking.many.smoothing import smooth_many
+from wildlab.tracking.association import (
+    Assignment,
+    association_probabilities,
+    belief_propagation,
+    global_nearest,
+)
+from wildlab.tracking.many.appearance import (
+    Appearance,
+    feature_distances,
+    image_features,
+    veto,
+    with_features,
+)
+from wildlab.tracking.many.bank import Bank, Life, Looks, Tuning, run_bank
+from wildlab.tracking.many.life import (
+    CONFIRMED,
+    DROPPED,
+    UNDECIDED,
+    judge_start,
+    look_differences,
+    outlived,
+    pair_scans,
+    place_costs,
+    reachable,
+    recognise,
+)
+from wildlab.tracking.many.run import Shown, follow_many, run_many, smooth_many
 from wildlab.tracking.many.target_model import (
     POINT,
     Hull,
@@ -55,7 +72,6 @@ __all__ = [
     "image_features",
     "judge_start",
     "look_differences",
-    "nearest",
     "outlived",
     "own_lasting",
     "pair_scans",

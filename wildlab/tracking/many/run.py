@@ -1,40 +1,164 @@
-"""All targets of a flight at once: scan after scan, whichever sensor it is of."""
+"""All targets of a flight at once: scan after scan, whichever sensor it is of.
+
+Errors that a look's measurements share move all of them: what one target tells of them serves another. Given
+these errors, targets are independent. What each target's measurements tell of them is kept as one Gaussian,
+of which a pair that nobody is sure of makes little; and what all others tell, never a target itself, says
+where its measurement is to be expected. That is repeated, since all are surer then: belief propagation
+between the targets' associations and the errors. Only the probabilities of association come from it.
+Estimates are corrected with the errors considered and not estimated, as of H 7.4: what other targets tell of
+them would be used again at the next look as if it were new. Where errors last, places relative to each other
+are known well nevertheless; where each look has another error, they are known no better than the places
+themselves.
+
+Back over the tracks, once the flight is over, which measurements were of which target stays as it was taken
+at the time, and the covariance knows nothing of what was taken wrongly: among many false measurements it is
+too small. Kinds of hull stay merged; targets that may also go calmly are smoothed by the lively motion.
+Errors that last, ``o``, stay considered and are not estimated. An estimate is corrected by what the smoother
+changed at the next row, ``x^s_k = x_k + G (x^s_k+1 - x_k+1|k)``, with the ``G`` of Rauch, Tung and Striebel's
+for the joint state. With ``e`` for truth minus estimate, the smoothed error is ``A e_k + B o_k`` and what is
+new, of covariance ``N``, and the three follow one row back: as in `wildlab.tracking.smoothing`, but from the
+moments before and after a measurement in place of its gain.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.tracking.association import association_probabilities
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
-from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
-from wildlab.tracking.many.motions import at_least, each_motion, largest_of, of_hulls
-from wildlab.tracking.many.probabilities import association_probabilities
 from wildlab.tracking.many.target_model import (
+    LEAST_KIND,
     ManySensorModel,
     ManyTargetModel,
     Scan,
+    at_least,
+    each_motion,
+    gather,
+    hull_noise,
+    largest_of,
+    near_side,
+    of_hulls,
     own_columns,
     own_lasting,
 )
-from wildlab.tracking.many.together import moved_together, of_all
 from wildlab.tracking.many.tracks import (
+    Compared,
     Tracks,
     alive,
     begin,
     both,
+    compare,
+    compare_bearings,
     judged_by_motion,
     later,
+    likelihoods,
     no_tracks,
+    update,
     without_doubles,
 )
-from wildlab.tracking.many.update import Compared, compare, compare_bearings, update
+from wildlab.tracking.motion import white_acceleration
+from wildlab.tracking.schmidt import fade
 
-Array = NDArray[np.float64]
+#: How often what all tell each other is asked again. After the second time little changes.
+ROUNDS = 2
+
+
+def of_all(values: Array, near: NDArray[np.intp], count: int) -> Array:
+    """(T, K, G) of measurements by number ``near`` (T, G), -1 none, as (T, K, count); zero elsewhere."""
+    dense = np.zeros((*values.shape[:2], count))
+    track, place = np.nonzero(near >= 0)
+    dense[track, :, near[track, place]] = values[track, :, place]
+    return dense
+
+
+def told_by_others(compared: Compared, weight: Array) -> tuple[Array, Array]:
+    """What all other targets tell each one of the shared errors.
+
+    Parameters
+    ----------
+    compared
+        T tracks of K kinds beside M measurements.
+    weight
+        (T, K, M) how probable it is that a target is there, of that kind, and the measurement its own.
+
+    Returns
+    -------
+    mean, covariance
+        (T, k) and (T, k, k), in standard deviations of the errors.
+    """
+    nu, S, _, _, G = compared
+    k = G.shape[-1]
+    probable = weight.sum(axis=(1, 2))
+    share = np.divide(
+        weight, probable[:, None, None], out=np.zeros_like(weight), where=probable[:, None, None] > 0
+    )
+    middle = np.einsum("tkm,tkmi->ti", share, nu)
+    moved = np.einsum("tkm,tkmij->tij", share, G)
+    off = nu - middle[:, None, None]
+    alone = S - G @ np.swapaxes(G, -1, -2) + off[..., :, None] * off[..., None, :]
+    spread = np.einsum("tkm,tkmij->tij", share, alone)
+    spread[probable <= 0] = np.eye(2)
+    by_spread = np.swapaxes(np.linalg.solve(spread, moved), -1, -2) * probable[:, None, None]
+    information, told = by_spread @ moved, (by_spread @ middle[..., None])[..., 0]
+    covariance = np.linalg.inv(np.eye(k) + information.sum(axis=0) - information)
+    mean = (covariance @ (told.sum(axis=0) - told)[..., None])[..., 0]
+    return mean, covariance
+
+
+def moved_together(
+    compared: Compared,
+    near: NDArray[np.intp],
+    kinds: Array,
+    probabilities: Array,
+    gate: float,
+    probable: Callable[[Array], Array],
+) -> tuple[Compared, Array]:
+    """Likelihoods and probabilities of association with one value of each shared error for all targets.
+
+    Parameters
+    ----------
+    compared
+        T tracks of K kinds beside G measurements each, without regard to other targets.
+    near
+        (T, G) which of M measurements these are, -1 none.
+    kinds
+        (T, K).
+    probabilities
+        (T, 1 + M) by `compared`.
+    gate
+        As in `wildlab.tracking.many.tracks.compare`.
+    probable
+        From likelihoods (T, K, M) to probabilities (T, 1 + M).
+
+    Returns
+    -------
+    compared, probabilities
+        The first with other likelihoods, the rest as it was.
+    """
+    if len(kinds) < 2 or not near.size:
+        return compared, probabilities
+    nu, S, likelihood, _, G = compared
+    alone, count = S - G @ np.swapaxes(G, -1, -2), probabilities.shape[1] - 1
+    for _ in range(ROUNDS):
+        mine = np.where(near >= 0, np.take_along_axis(probabilities, near + 1, axis=1), 0.0)
+        of_kind = kinds[..., None] * likelihood
+        of_any = of_kind.sum(axis=1, keepdims=True)
+        share = np.divide(of_kind, of_any, out=np.zeros_like(of_kind), where=of_any > 0)
+        mean, covariance = told_by_others(compared, share * mine[:, None])
+        left = nu - np.einsum("tkmij,tj->tkmi", G, mean)
+        spread = alone + G @ covariance[:, None, None] @ np.swapaxes(G, -1, -2)
+        likelihood = np.where((near >= 0)[:, None], likelihoods(left, spread, gate), 0.0)
+        probabilities = probable(of_all(likelihood, near, count))
+    return compared._replace(likelihood=likelihood), probabilities
+
 
 #: A measurement less probable than this to be of any track is of none of them.
 TAKEN = 0.3
@@ -351,3 +475,102 @@ def _shown(
     return Shown(
         scan.time, scan.sensor, mine.identity, x, P, mine.existence, of_hulls(mine.kinds, targets), C
     )
+
+
+def smooth_many(
+    shown: Sequence[Shown], density: float, lasting_s: Sequence[float] = ()
+) -> list[tuple[Array, Array]]:
+    """Smoothed estimates of all tracks at all scans.
+
+    Where a track was not shown for a while, it is smoothed on either side by itself: what its filter learnt
+    meanwhile is not known here.
+
+    Parameters
+    ----------
+    shown
+        From `run_many`.
+    density
+        `ManyTargetModel.density` that it was run with.
+    lasting_s
+        As `run_many` was given; behind it `wildlab.tracking.many.target_model.own_lasting` of its sensors.
+
+    Returns
+    -------
+    list of x, P
+        For each scan (N, 4) and (N, 4, 4), in the order of its ``identity``.
+    """
+    after = [(one.x.copy(), one.P.copy()) for one in shown]
+    rows: dict[int, list[tuple[int, int]]] = {}
+    for scan, one in enumerate(shown):
+        for place, identity in enumerate(one.identity.tolist()):
+            rows.setdefault(identity, []).append((scan, place))
+    for where in rows.values():
+        scans = np.array([scan for scan, _ in where])
+        for part in np.split(np.arange(len(where)), np.flatnonzero(np.diff(scans) > 1) + 1):
+            mine = [where[k] for k in part]
+            times = [shown[scan].time for scan, _ in mine]
+            x, P, C = (
+                np.array([getattr(shown[scan], name)[place] for scan, place in mine]) for name in "xPC"
+            )
+            x, P = smooth_considering(times, x, P, C, density, lasting_s)
+            for (scan, place), mean, covariance in zip(mine, x, P, strict=True):
+                after[scan][0][place], after[scan][1][place] = mean, covariance
+    return after
+
+
+def smooth_considering(
+    times: Sequence[float], x: Array, P: Array, C: Array, density: float, lasting_s: Sequence[float] = ()
+) -> tuple[Array, Array]:
+    """Back over one track.
+
+    Parameters
+    ----------
+    times
+        (N,) s, in order.
+    x, P, C
+        (N, 4), (N, 4, 4) and (N, 4, k) with all measurements up to then.
+    density, lasting_s
+        As in `smooth_many`.
+
+    Returns
+    -------
+    x, P
+        With all measurements. Without shared errors those of Rauch, Tung and Striebel.
+    """
+    after, spread = x.copy(), P.copy()
+    # The smoothed error is A e + B o and what later measurements and motion add, of covariance N.
+    A, B, N = np.eye(4), np.zeros_like(C[-1]), np.zeros((4, 4))
+    for row in range(len(times) - 2, -1, -1):
+        dt = times[row + 1] - times[row]
+        F, Q = white_acceleration(dt, density)
+        left = np.array([fade(dt, float(one)) for one in lasting_s])
+        P_ahead, C_ahead = F @ P[row] @ F.T + Q, F @ C[row] * left
+        # The best gain leaves the error after a measurement uncorrelated with the innovation, so with the
+        # error before it has its own covariance in common; no more than there was, where mixtures grow.
+        size, axes = eigh(P[row + 1], P_ahead)
+        axes = P_ahead @ axes
+        common = (axes * np.minimum(size, 1)) @ axes.T
+        of_state, of_errors = _regress(common, C[row + 1], P_ahead, C_ahead)
+        N = N + A @ _positive(P[row + 1] - of_state @ common - of_errors @ C[row + 1].T) @ A.T
+        G, _ = _regress(P[row] @ F.T, C[row] * left, P_ahead, C_ahead)
+        after[row] = x[row] + G @ (after[row + 1] - F @ x[row])
+        by_motion, by_change = G @ (A @ of_state - np.eye(4)), G @ (A @ of_errors + B)
+        N = G @ N @ G.T + by_motion @ Q @ by_motion.T + (by_change * (1 - left**2)) @ by_change.T
+        A, B = np.eye(4) + by_motion @ F, by_change * left
+        both = A @ C[row] @ B.T
+        smoothed = A @ P[row] @ A.T + both + both.T + B @ B.T + N
+        spread[row] = (smoothed + smoothed.T) / 2
+    return after, spread
+
+
+def _positive(covariance: Array) -> Array:
+    """Without the directions in which it is below zero."""
+    values, axes = np.linalg.eigh((covariance + covariance.T) / 2)
+    return np.asarray((axes * np.maximum(values, 0.0)) @ axes.T)
+
+
+def _regress(by_state: Array, by_errors: Array, P: Array, C: Array) -> tuple[Array, Array]:
+    """Coefficients (n, 4) and (n, k) of a state's error and of errors of variance one, with covariances
+    ``P`` and ``C`` of their own, from the covariances (n, 4) and (n, k) with both."""
+    of_state = np.asarray(np.linalg.solve(P - C @ C.T, (by_state - by_errors @ C.T).T).T, float)
+    return of_state, by_errors - of_state @ C

@@ -1,4 +1,9 @@
-"""What a tracker of many targets is told of them, of their hulls and of the sensors."""
+"""What a tracker of many targets is told, and what follows for one target: hulls and motions.
+
+Kinds of targets differ by the hull of which a part is seen. With two motions (interacting multiple models, H
+3.2.3) each kind goes lively or calm, and changes now and then: a kind is then two columns, side by side,
+which share their hull.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +11,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from wildlab.geometry.frames import Array
 
 
 class Hull(NamedTuple):
@@ -199,3 +204,260 @@ class Scan(NamedTuple):
 
 #: One kind of target, as small as a point.
 POINT = Hull("point", 0.0, 0.0)
+
+
+def densities_of(targets: ManyTargetModel) -> tuple[float, ...]:
+    """Of each of the M motions: the usual one and, where there is one, the calm one."""
+    return (targets.density,) if targets.calm >= 1 else (targets.density, targets.calm * targets.density)
+
+
+def each_motion(
+    sensors: Sequence[ManySensorModel], targets: ManyTargetModel
+) -> tuple[tuple[ManySensorModel, ...], ManyTargetModel]:
+    """The same with a column for each motion of each hull."""
+    count = len(densities_of(targets))
+    if count == 1:
+        return tuple(sensors), targets
+
+    def twice(values: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(value for value in values for _ in range(count))
+
+    eyes = tuple(
+        one._replace(
+            rough_m=twice(one.rough_m),
+            along_m=twice(one.along_m),
+            near_side_m=twice(one.near_side_m),
+            near_end_m=twice(one.near_end_m),
+        )
+        for one in sensors
+    )
+    hulls = tuple(hull._replace(share=hull.share / count) for hull in targets.hulls for _ in range(count))
+    return eyes, targets._replace(hulls=hulls)
+
+
+def of_hulls(kinds: Array, targets: ManyTargetModel) -> Array:
+    """(T, K) of columns as (T, H) of hulls."""
+    count = len(densities_of(targets))
+    return np.asarray(kinds.reshape(len(kinds), kinds.shape[1] // count, count).sum(axis=-1))
+
+
+def largest_of(hulls: tuple[Hull, ...]) -> NDArray[np.bool_]:
+    """(K,) which columns are of the largest kind of hull."""
+    largest = max(hulls, key=lambda hull: hull.length_m)
+    return np.array([hull == largest for hull in hulls], bool)
+
+
+def at_least(kinds: Array, least: float, targets: ManyTargetModel) -> Array:
+    """(T, K) with no hull less probable than that, beside another; sums may exceed one."""
+    count = len(densities_of(targets))
+    parts = kinds.reshape(len(kinds), kinds.shape[1] // count, count)
+    hulls = parts.sum(axis=-1, keepdims=True)
+    if hulls.shape[1] < 2:
+        return kinds
+    within = np.divide(parts, hulls, out=np.full_like(parts, 1 / count), where=hulls > 0)
+    return np.asarray((np.maximum(hulls, least) * within).reshape(kinds.shape))
+
+
+def interact(
+    x: Array, P: Array, C: Array, kinds: Array, dt: float, stay_s: float
+) -> tuple[Array, Array, Array, Array]:
+    """Both motions of each hull mixed, by how many targets change from one to the other within ``dt`` s.
+
+    Parameters
+    ----------
+    x, P, C, kinds
+        (T, K, 4), (T, K, 4, 4), (T, K, 4, k) and (T, K) of `wildlab.tracking.many.tracks.Tracks`, with two
+        columns for each hull.
+    stay_s
+        For how long each lasts, in the mean.
+
+    Returns
+    -------
+    The same after mixing.
+    """
+    stays = (1 + np.exp(-2 * dt / stay_s)) / 2
+    change = np.array([[stays, 1 - stays], [1 - stays, stays]])
+    T, K = kinds.shape
+
+    def by_hull(values: Array) -> Array:
+        return values.reshape(T, K // 2, 2, *values.shape[2:])
+
+    joint = change * by_hull(kinds)[..., None]
+    after = joint.sum(axis=2)
+    share = np.divide(joint, after[:, :, None], out=np.zeros_like(joint), where=after[:, :, None] > 0)
+    x, P, C = by_hull(x), by_hull(P), by_hull(C)
+    mean = np.einsum("thij,this->thjs", share, x)
+    off = x[:, :, :, None] - mean[:, :, None]
+    P = np.einsum("thij,thisr->thjsr", share, P) + np.einsum("thij,thijs,thijr->thjsr", share, off, off)
+    C = np.einsum("thij,thisk->thjsk", share, C)
+    return mean.reshape(T, K, 4), P.reshape(T, K, 4, 4), C.reshape(T, K, *C.shape[3:]), after.reshape(T, K)
+
+
+#: At this speed, m/s, a target's course is half believed to be its heading; a slower one points anywhere.
+STEERS_M_S = 0.5
+#: No scan makes a kind of hull more probable than by this factor, however many measurements it has.
+MOST_TOLD = 20.0
+#: A kind of hull never gets less probable than this: what was wrongly merged once must find its way back.
+LEAST_KIND = 0.02
+
+
+def near_side(x: ArrayLike, platform: ArrayLike, sensor: ManySensorModel) -> Array:
+    """Where on its hull a target is seen, from the hull's middle: the near side of an ellipse.
+
+    ``sensor.near_side_m`` is how far that is where the hull is seen from its side, ``near_end_m`` where it is
+    seen along its heading, and as often as not where nobody knows the heading (`STEERS_M_S`).
+
+    Parameters
+    ----------
+    x
+        (T, K, 4) north, east and velocities, for each kind of hull.
+    platform
+        (2,) where it is looked from.
+
+    Returns
+    -------
+    (T, K, 2) m, towards the platform; never more than half-way to it.
+    """
+    to = np.asarray(platform, float) - np.asarray(x, float)[..., :2]
+    distance = np.linalg.norm(to, axis=-1, keepdims=True)
+    side = np.asarray(sensor.near_side_m)[:, None]
+    end = np.asarray(sensor.near_end_m or sensor.near_side_m)[:, None]
+    v = np.asarray(x, float)[..., 2:]
+    square = (v**2).sum(axis=-1, keepdims=True)
+    course = (to * v).sum(axis=-1, keepdims=True) ** 2
+    # How much of the heading lies in the line of sight: the square of a cosine.
+    known = np.divide(course, square * distance**2, out=np.zeros_like(course), where=square * distance > 0)
+    steers = square / (square + STEERS_M_S**2)
+    along = steers * known + (1 - steers) / 2
+    length = np.minimum(np.sqrt(along * end**2 + (1 - along) * side**2), distance / 2)
+    return np.asarray(np.divide(to, distance, out=np.zeros_like(to), where=distance > 0) * length)
+
+
+def hull_noise(x: ArrayLike, sensor: ManySensorModel) -> Array:
+    """Covariances (T, K, 2, 2), m^2, of which part of a hull is seen; ``x`` (T, K, 4).
+
+    Along the hull it is longer. Where a target hardly moves its heading is not known: half of it is then
+    along either axis.
+    """
+    v = np.asarray(x, float)[..., 2:]
+    square = (v**2).sum(axis=-1)[..., None, None]
+    steers = square / (square + STEERS_M_S**2)
+    outer = v[..., :, None] * v[..., None, :]
+    heading = np.divide(outer, square, out=np.zeros_like(outer), where=square > 0)
+    along = steers * heading + (1 - steers) * np.eye(2) / 2
+    rough, length = np.asarray(sensor.rough_m), np.asarray(sensor.along_m)
+    return np.asarray(rough[:, None, None] ** 2 * np.eye(2) + length[:, None, None] ** 2 * along)
+
+
+def lasting_part(noise: Array, correlation: float) -> Array:
+    """What one standard deviation of the lasting error of each axis moves a measurement by (..., 2, 2), m.
+
+    ``noise`` (..., 2, 2) m^2: its whole covariance, of which ``correlation`` lasts. The symmetric root, which
+    turns with the covariance.
+    """
+    det = noise[..., 0, 0] * noise[..., 1, 1] - noise[..., 0, 1] * noise[..., 1, 0]
+    root = np.sqrt(np.maximum(det, 0.0))[..., None, None]
+    scale = np.sqrt(np.trace(noise, axis1=-2, axis2=-1)[..., None, None] + 2 * root)
+    return np.asarray(np.sqrt(correlation) * (noise + root * np.eye(2)) / scale)
+
+
+class Gathered(NamedTuple):
+    """Measurements with those of one hull merged.
+
+    ``z`` (M', 2), ``R`` (M', 2, 2) and ``shared`` (M', 2, k); ``kinds`` (T, K) of the tracks, which several
+    measurements tell something of.
+    """
+
+    z: Array
+    R: Array
+    shared: Array
+    kinds: Array
+
+
+def gather(
+    z: Array,
+    R: Array,
+    shared: Array,
+    mean: Array,
+    kinds: Array,
+    established: NDArray[np.bool_],
+    likelihood: Array,
+    sensor: ManySensorModel,
+    hulls: tuple[Hull, ...],
+) -> Gathered:
+    """Merge the measurements of a scan that lie along one large hull to one of the part that is followed.
+
+    Each counts in the share in which it is of that part, by its likelihood: what a ship shows in every scan
+    keeps the track where it is, and its stern, seen now and then, pulls it less. How far the parts lie from
+    each other is noise of what they are merged to.
+
+    Each measurement goes to the established track that it is likeliest of, or where no gate takes it, to the
+    one whose hull it may lie on. Where one track has two and more, it is of the largest kind, or the others
+    are clutter: the kinds learn the ratio of both densities. They are merged where the largest is likelier.
+
+    Parameters
+    ----------
+    z, R, shared
+        (M, 2), (M, 2, 2) and (M, 2, k).
+    mean
+        (T, 2) where tracks of the largest kind would be.
+    kinds
+        (T, K) probabilities.
+    established
+        (T,) tracks that may have a hull; a new one is too young for it.
+    likelihood
+        (T, K, M).
+    """
+    largest = largest_of(hulls)
+    hull = hulls[int(largest.argmax())]
+    one = sensor.bearings or not sensor.several
+    if one or len(z) < 2 or not established.any() or hull.length_m <= 0:
+        return Gathered(z, R, shared, kinds)
+    kinds = kinds.copy()
+    of_any = np.einsum("tk,tkm->tm", kinds, likelihood)
+    whose = of_any.argmax(axis=0)
+    taken = of_any.max(axis=0) > 0
+    free = np.ones(len(z), bool)
+    merged_z, merged_R, merged_shared = [], [], []
+    of_largest = np.einsum("tk,tkm->tm", kinds[:, largest], likelihood[:, largest])
+    further = 1.0 / (hull.length_m * max(hull.beam_m, 1.0)) / sensor.clutter
+    for track in np.flatnonzero(established):
+        on_hull = np.linalg.norm(z - mean[track], axis=1) < 0.6 * hull.length_m
+        mine = (taken & (whose == track) & (likelihood[track, largest] > 0).any(axis=0)) | (~taken & on_hull)
+        rows = np.flatnonzero(mine & free)
+        if len(rows) < 2:
+            continue
+        low, high = z[rows].min(axis=0), z[rows].max(axis=0)
+        if np.linalg.norm(high - low) >= hull.length_m:
+            continue
+        kinds[track, largest] *= min(further ** (len(rows) - 1), MOST_TOLD)
+        kinds[track] /= kinds[track].sum()
+        if kinds[track, largest].sum() > 0.5:
+            free[rows] = False
+            share = of_largest[track, rows]
+            share = share / share.sum() if share.any() else np.full(len(rows), 1 / len(rows))
+            middle = share @ z[rows]
+            merged_z.append(middle)
+            off = z[rows] - middle
+            merged_R.append(R[rows].mean(axis=0) + (share[:, None] * off).T @ off)
+            merged_shared.append(np.einsum("m,mik->ik", share, shared[rows]))
+    if not merged_z:
+        return Gathered(z, R, shared, kinds)
+    pairs = ((z, merged_z), (R, merged_R), (shared, merged_shared))
+    z, R, shared = (np.concatenate([alone[free], np.array(merged)]) for alone, merged in pairs)
+    return Gathered(z, R, shared, kinds)
+
+
+def on_one_hull(x: ArrayLike, other: ArrayLike, hull: Hull) -> bool:
+    """Whether two tracks (4,) with like velocities lie along the course of the first, on one hull."""
+    a, b = np.asarray(x, float), np.asarray(other, float)
+    speed = float(np.linalg.norm(a[2:]))
+    if speed <= STEERS_M_S or np.linalg.norm(a[2:] - b[2:]) >= ALIKE_M_S:
+        return False
+    ahead, apart = a[2:] / speed, b[:2] - a[:2]
+    across = abs(ahead[0] * apart[1] - ahead[1] * apart[0])
+    return bool(abs(apart @ ahead) < hull.length_m and across < max(hull.beam_m, 1.0) / 2 + 1.0)
+
+
+#: Velocities of two parts of one hull differ by less than this, m/s.
+ALIKE_M_S = 1.5

@@ -1,22 +1,84 @@
-"""Clouds of particles: what they say together, and how a measurement weighs them; F 4.2.2-4.2.4."""
+"""Clouds of particles, F 4.2: how they move, how a measurement or its absence weighs them, and a new set
+where few carry the weight.
+
+Particles move by the motion model itself (prior sampling, F (4.15)). F's random walk (4.5) draws a velocity
+for each step and holds it over that step, and F does not say how long a step is. The spread after a time
+depends on it: n steps of length T add n (sd T)^2, so ten times as many steps in the same time spread the
+cloud a tenth as far in variance. `walk_of` turns a standard deviation of velocities *and* the step they last
+into a walk that gives the same spread however often it is predicted. The loops that numpy goes through
+several times are compiled.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 from wildlab.geometry.validation import check_covariance
-from wildlab.tracking.particles.kernels import weighted_moments
+from wildlab.tracking.motion import Motion, random_walk
+
+
+@compiled
+def pick(cumulative: Array, points: Array) -> NDArray[np.int64]:
+    """Which particle each point falls on: the first whose cumulative weight lies above it.
+
+    Both (A, N) and (A, M), ascending along the last axis, the points in [0, 1) and the last weight 1. One
+    walk along both replaces a search for each point.
+    """
+    rows, wanted = points.shape
+    found = np.empty((rows, wanted), np.int64)
+    for a in range(rows):
+        i = 0
+        for k in range(wanted):
+            while cumulative[a, i] <= points[a, k]:
+                i += 1
+            found[a, k] = i
+    return found
+
+
+@compiled
+def take(x: Array, chosen: NDArray[np.int64]) -> Array:
+    """The chosen particles (A, M) of each animal's (A, N, n): (A, M, n)."""
+    rows, wanted = chosen.shape
+    n = x.shape[2]
+    found = np.empty((rows, wanted, n))
+    for a in range(rows):
+        for k in range(wanted):
+            i = chosen[a, k]
+            for c in range(n):
+                found[a, k, c] = x[a, i, c]
+    return found
+
+
+@compiled
+def weighted_moments(x: Array, w: Array) -> tuple[Array, Array]:
+    """Means (A, n) and covariances (A, n, n) of particles (A, N, n) with weights (A, N), F (4.12)-(4.13)."""
+    rows, particles, n = x.shape
+    mean, covariance, off = np.zeros((rows, n)), np.zeros((rows, n, n)), np.empty(n)
+    for a in range(rows):
+        for i in range(particles):
+            for c in range(n):
+                mean[a, c] += w[a, i] * x[a, i, c]
+        for i in range(particles):
+            for c in range(n):
+                off[c] = x[a, i, c] - mean[a, c]
+                for d in range(c + 1):
+                    covariance[a, c, d] += w[a, i] * off[c] * off[d]
+        for c in range(n):
+            for d in range(c):
+                covariance[a, d, c] = covariance[a, c, d]
+    return mean, covariance
+
 
 #: Places (..., 2) m -> whether each lies in an enclosure.
 Inside = Callable[[Array], NDArray[np.bool_]]
-#: Rounds of drawing places before an area counts as one that has no room.
-ROUNDS = 1000
 
 
 class Cloud(NamedTuple):
@@ -204,50 +266,6 @@ def start_gaussian(mean: ArrayLike, covariance: ArrayLike, particles: int, rng: 
     return Cloud(middle[:, None] + noise, even(A, particles))
 
 
-def start_inside(
-    inside: Inside, low: ArrayLike, high: ArrayLike, animals: int, particles: int, rng: np.random.Generator
-) -> Cloud:
-    """Clouds that know nothing but the enclosure: anywhere in it with equal chance.
-
-    Parameters
-    ----------
-    inside
-        The enclosure: (..., 2) m -> (...) bool.
-    low, high
-        (2,) m: a rectangle that holds it.
-    animals, particles
-        How many, and of how many particles each.
-    rng
-        Random numbers.
-
-    Returns
-    -------
-    Cloud
-        With states (A, N, 2).
-
-    Raises
-    ------
-    WildlabError
-        Where there is no particle, or no place in the enclosure was found.
-    """
-    wanted = animals * _some(particles)
-    corner, far = np.asarray(low, float), np.asarray(high, float)
-    found, have = list[Array](), 0
-    for _ in range(ROUNDS):
-        tried = rng.uniform(corner, far, (max(wanted, 64), 2))
-        found.append(tried[np.asarray(inside(tried), bool)])
-        have += len(found[-1])
-        if have >= wanted:
-            break
-    else:
-        raise WildlabError(
-            f"of {ROUNDS * max(wanted, 64)} places in the rectangle {have} lie in the enclosure",
-            "give the enclosure and the rectangle about it in the same metres north and east",
-            field="inside",
-        )
-    return Cloud(np.concatenate(found)[:wanted].reshape(animals, particles, 2), even(animals, particles))
-
-
 def even(animals: int, particles: int) -> Array:
     """Equal weights (A, N)."""
     return np.full((animals, particles), 1.0 / particles)
@@ -263,3 +281,288 @@ def _some(particles: int) -> int:
     if particles < 1:
         raise WildlabError(f"{particles} particles", "give at least one for each animal", field="particles")
     return particles
+
+
+#: ``multinomial`` draws with replacement, as F has it; ``systematic`` takes points at equal distances.
+SCHEMES = ("multinomial", "systematic")
+#: F's share of the particles at which SIS resamples, beside (4.14).
+FLODELL_THRESHOLD = 2 / 3
+
+
+def resample(
+    cloud: Cloud,
+    rng: np.random.Generator,
+    scheme: str = "multinomial",
+    threshold: float = FLODELL_THRESHOLD,
+) -> tuple[Cloud, NDArray[np.bool_]]:
+    """Draw the particles anew of those animals whose effective size has fallen to the threshold.
+
+    Parameters
+    ----------
+    cloud
+        Of A animals.
+    rng
+        Random numbers.
+    scheme
+        One of `SCHEMES`. Both give a particle N times its weight of copies in the mean; systematic ones
+        differ from that by less than one copy.
+    threshold
+        Share of the number of particles. 1 resamples always, which is SIR; less is SIS, with F's 2/3.
+
+    Returns
+    -------
+    cloud, resampled
+        Where it was resampled, (A,) bool, weights are equal.
+
+    Raises
+    ------
+    WildlabError
+        For a scheme that there is not, or a threshold that is not from 0 to 1.
+    """
+    if not 0 <= threshold <= 1:
+        raise WildlabError(
+            f"a threshold of {threshold} of the particles", "give 0 to 1, where 1 is SIR", field="threshold"
+        )
+    N = cloud.w.shape[1]
+    due = effective_size(cloud.w) <= threshold * N * (1 + 1e-9)  # sums are rounded
+    if not due.any():
+        return cloud, due
+    chosen = draw(cloud.w[due], rng, scheme)
+    if due.all():
+        return Cloud(take(np.ascontiguousarray(cloud.x), chosen), np.full_like(cloud.w, 1 / N)), due
+    x, w = cloud.x.copy(), cloud.w.copy()
+    x[due] = take(cloud.x[due], chosen)
+    w[due] = 1 / N
+    return Cloud(x, w), due
+
+
+def draw(w: ArrayLike, rng: np.random.Generator, scheme: str = "multinomial") -> NDArray[np.int64]:
+    """Which particles to take, as many as there were.
+
+    Parameters
+    ----------
+    w
+        (A, N) weights that sum to one.
+    rng
+        Random numbers.
+    scheme
+        One of `SCHEMES`.
+
+    Returns
+    -------
+    (A, N) indices along the last axis, ascending; never one of a particle without weight.
+
+    Raises
+    ------
+    WildlabError
+        For a scheme that there is not.
+
+    Examples
+    --------
+    >>> print(draw([[0.0, 0.5, 0.0, 0.5]], np.random.default_rng(1), "systematic"))
+    [[1 1 3 3]]
+    """
+    weights = np.atleast_2d(np.asarray(w, float))
+    A, N = weights.shape
+    if scheme == "systematic":
+        points = (np.arange(N) + rng.random((A, 1))) / N
+    elif scheme == "multinomial":
+        points = _sorted_uniform(A, N, rng)
+    else:
+        raise WildlabError(
+            f"there is no resampling called {scheme!r}", f"take one of {', '.join(SCHEMES)}", field="scheme"
+        )
+    cumulative = np.cumsum(weights, axis=1)
+    cumulative /= cumulative[:, -1:]
+    return pick(cumulative, np.minimum(points, np.nextafter(1.0, 0.0)))
+
+
+def _sorted_uniform(A: int, N: int, rng: np.random.Generator) -> Array:
+    """Independent numbers from 0 to 1 in order, (A, N): sums of exponential gaps, without sorting."""
+    gaps = np.cumsum(rng.standard_exponential((A, N + 1)), axis=1)
+    return np.asarray(gaps[:, :-1] / gaps[:, -1:])
+
+
+#: Places (..., 2) m -> probability that an image has a detection of an animal that is there.
+Sight = Callable[[Array], Array]
+
+
+def log_likelihood(positions: ArrayLike, z: ArrayLike, R: ArrayLike) -> Array:
+    """Of all measurements that a track was given, F (4.11): each one's, multiplied.
+
+    Several measurements of one animal in one image count as independent looks at it. Where they are pieces of
+    one outline, or of animals side by side, the estimate is surer of itself than it should be.
+
+    Parameters
+    ----------
+    positions
+        (..., 2) m of the particles.
+    z
+        (M, m), or (m,) for one: on the ground, m.
+    R
+        Their covariances, (M, m, m) or (m, m) for all.
+
+    Returns
+    -------
+    (...) with the constant of the normal distribution; 0 for no measurement.
+
+    Raises
+    ------
+    WildlabError
+        Where an ``R`` is no covariance or has no inverse.
+
+    Examples
+    --------
+    >>> print(np.round(log_likelihood([[0.0, 0.0], [2.0, 0.0]], [[0.0, 0.0]], np.eye(2)), 3))
+    [-1.838 -3.838]
+    """
+    x, found = np.asarray(positions, float), np.atleast_2d(np.asarray(z, float))
+    total = np.zeros(x.shape[:-1])
+    if not found.size:
+        return total
+    m = found.shape[-1]
+    covariances = np.broadcast_to(np.asarray(R, float), (len(found), m, m))
+    check_covariance(covariances, "R")
+    try:
+        roots = np.linalg.cholesky(covariances)
+    except np.linalg.LinAlgError as error:
+        raise WildlabError(
+            "the covariance of a measurement has no inverse", "give noise in every direction", field="R"
+        ) from error
+    for one, root in zip(found, roots, strict=True):
+        white = (one - x) @ np.linalg.inv(root).T
+        constant = m / 2 * np.log(2 * np.pi) + np.log(np.diagonal(root)).sum()
+        total -= 0.5 * np.einsum("...i,...i->...", white, white) + constant
+    return total
+
+
+def sight_of(mask: ArrayLike, north: float, east: float, step: float, probability: float = 1.0) -> Sight:
+    """A footprint as a function of places, from the nodes of a grid that an image shows.
+
+    Parameters
+    ----------
+    mask
+        (rows to the north, columns to the east): bool where a node is in the footprint and nothing hides it,
+        or the probability of detection there.
+    north, east
+        Of the first node, m.
+    step
+        Between nodes, m.
+    probability
+        With which the detector finds an animal that is in sight.
+
+    Returns
+    -------
+    Sight
+        Of the node nearest to a place; 0 off the grid.
+
+    Raises
+    ------
+    WildlabError
+        Where a probability is not from 0 to 1, or the step not above zero.
+
+    Examples
+    --------
+    >>> sight = sight_of([[True, False], [True, True]], north=0.0, east=0.0, step=10.0, probability=0.8)
+    >>> print(sight(np.array([[1.0, 2.0], [1.0, 8.0], [-20.0, 0.0]])))
+    [0.8 0.  0. ]
+    """
+    shown = probability * np.asarray(mask, float)
+    if not ((shown >= 0) & (shown <= 1)).all() or not step > 0:
+        raise WildlabError(
+            "a mask of probabilities outside 0 to 1, or a step that is not above zero",
+            "give bools or probabilities of detection, and metres between nodes",
+            field="mask",
+        )
+    rows, columns = shown.shape
+
+    def sight(places: Array) -> Array:
+        at = np.asarray(places, float)
+        i, j = (np.rint((at[..., a] - start) / step) for a, start in enumerate((north, east)))
+        on = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
+        row, column = (np.where(on, one, 0).astype(np.intp) for one in (i, j))
+        return np.asarray(np.where(on, shown[row, column], 0.0))
+
+    return sight
+
+
+def walk_of(sd_velocity: float, step: float) -> Motion:
+    """F (4.5) with the step that its noise depends on: as spread out after any number of steps.
+
+    Parameters
+    ----------
+    sd_velocity
+        Of the velocity drawn for each step, m/s, the same north and east.
+    step
+        How long an animal keeps to it, s; not the time between two images.
+
+    Returns
+    -------
+    Motion
+        `wildlab.tracking.motion.random_walk` with the density sd sqrt(step).
+
+    Raises
+    ------
+    WildlabError
+        For a spread below zero, or a step that is not above it.
+
+    Examples
+    --------
+    >>> F, Q = walk_of(0.5, 1.0)(1800.0)  # half an hour at half a metre a second
+    >>> print(round(float(np.sqrt(Q[0, 0])), 1))
+    21.2
+    """
+    if not (sd_velocity >= 0 and 0 < step < np.inf):
+        raise WildlabError(
+            f"velocities of {sd_velocity} m/s that last {step} s",
+            "give zero or more, and more than zero",
+            field="step",
+        )
+    return partial(random_walk, density=sd_velocity * float(np.sqrt(step)))
+
+
+def move(cloud: Cloud, motion: Motion, dt: float, rng: np.random.Generator) -> Cloud:
+    """Time update by a motion model, F (4.16); weights stay as they are, F (4.18).
+
+    Parameters
+    ----------
+    cloud
+        With the states of the model.
+    motion
+        As the other filters take it: a step in seconds -> F, Q.
+    dt
+        s.
+    rng
+        Random numbers.
+
+    Returns
+    -------
+    Cloud
+    """
+    F, Q = motion(dt)
+    noise = rng.standard_normal(cloud.x.shape) @ root_of(Q).T
+    return Cloud(cloud.x @ F.T + noise, cloud.w)
+
+
+def stay_inside(before: Cloud, after: Cloud, inside: Inside) -> Cloud:
+    """The enclosure as prior while animals move: a particle whose step leads out stays where it was.
+
+    In the long run a walk is then anywhere in the enclosure with equal chance. A velocity that led out is
+    given up as well.
+
+    Parameters
+    ----------
+    before, after
+        Clouds at two times, the same particles.
+    inside
+        The enclosure: (..., 2) m -> (...) bool.
+
+    Returns
+    -------
+    Cloud
+        With the weights of ``after``.
+    """
+    kept = np.asarray(inside(after.x[..., :2]), bool)
+    stayed = before.x.copy()
+    stayed[..., 2:] = 0.0
+    return Cloud(np.where(kept[..., None], after.x, stayed), after.w)

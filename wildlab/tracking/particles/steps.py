@@ -1,51 +1,289 @@
 """Many animals, image after image: tracks that start, are lost and are found again, F 4.3 and 5.3.
 
-Two rules, kept apart. `step_nearest` is F's: each detection takes its closest track, whose particles it
-weighs by (4.11); what lies in no gate starts a track. `step_counting` gives a track one detection at most
-and keeps the probability that each track is an animal, and how many were never seen: it counts. Both step
-once for an image, so that whoever plans the flight can look at the tracks in between.
+Each detection takes its closest track, whose particles it weighs by (4.11); what lies in no gate starts a
+track. A step is one image, so that whoever plans the flight can look at the tracks in between.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.validation import gate_threshold
+from wildlab.tracking.association import nearest_within
 from wildlab.tracking.kalman import update
-from wildlab.tracking.particles.association import mahalanobis_squared, nearest_animal, one_to_one
 from wildlab.tracking.particles.clouds import (
+    FLODELL_THRESHOLD,
     Cloud,
+    Sight,
     effective_size,
+    log_likelihood,
     moments,
+    resample,
     start_gaussian,
     weigh,
     weigh_unseen,
 )
-from wildlab.tracking.particles.counting import existence_after
-from wildlab.tracking.particles.likelihoods import log_likelihood
-from wildlab.tracking.particles.particle_sets import (
-    Herd,
-    ImageLook,
-    Rules,
-    kept,
-    moved,
-    start_tracks,
-    with_new,
-)
-from wildlab.tracking.particles.resampling import resample
+
+
+def mahalanobis_squared(mean: ArrayLike, covariance: ArrayLike, z: ArrayLike, R: ArrayLike) -> Array:
+    """Squares of D_M, F (4.19), between A animals and M detections.
+
+    D_M is a root, and F (4.20) compares it with a quantile of the chi-square distribution, which is that of
+    its square. It is the square that is compared here. By the letter of (4.20) a gate of 99 % is one of 9.21
+    standard deviations, which shuts out next to nothing.
+
+    Parameters
+    ----------
+    mean, covariance
+        (A, n) and (A, n, n); north and east, m, are the first two.
+    z
+        (M, 2) m.
+    R
+        (M, 2, 2), or (2, 2) for all, m^2.
+
+    Returns
+    -------
+    (A, M)
+    """
+    x, P = np.asarray(mean, float)[:, None, :2], np.asarray(covariance, float)[:, None, :2, :2]
+    found = np.asarray(z, float).reshape(-1, 2)
+    S = P + np.broadcast_to(np.asarray(R, float), (len(found), 2, 2))
+    off = found - x
+    return np.asarray(np.einsum("ami,ami->am", off, np.linalg.solve(S, off[..., None])[..., 0]))
+
+
+def nearest_animal(squared: ArrayLike, gate_probability: float) -> NDArray[np.int64]:
+    """F's modified nearest neighbour, F 4.3.1: each *detection* takes its closest track within the gate.
+
+    A track may be taken by several detections, whose likelihoods (4.11) multiplies, and a group of animals
+    gets fewer tracks than it has animals: how many tracks there are is no count of animals.
+
+    Parameters
+    ----------
+    squared
+        (A, M) as `mahalanobis_squared` has it.
+    gate_probability
+        Probability that an animal's own detection is let in, in (0, 1]; 1 is no gate.
+
+    Returns
+    -------
+    (M,) index of the track, -1 where none lies within the gate.
+
+    Raises
+    ------
+    WildlabError
+        For a probability outside (0, 1].
+
+    Examples
+    --------
+    >>> print(nearest_animal([[1.0, 4.0, 30.0], [2.0, 90.0, 20.0]], 0.99))
+    [ 0  0 -1]
+    """
+    d = np.asarray(squared, float)
+    if not len(d):
+        return np.full(d.shape[1], -1)
+    return nearest_within(d.T, gate_probability, 2)
+
+
+def one_to_one(gain: ArrayLike) -> NDArray[np.int64]:
+    """The pairs that gain most together, no track and no detection in two of them.
+
+    Parameters
+    ----------
+    gain
+        (A, M) what a pair gains over leaving both alone, such as the logarithm of a ratio of likelihoods; no
+        pair is made that gains nothing. Minus infinity outside the gate.
+
+    Returns
+    -------
+    (M,) index of the track, -1 where there is none.
+
+    Raises
+    ------
+    WildlabError
+        Where a gain is NaN or infinite.
+
+    Examples
+    --------
+    >>> print(one_to_one([[5.0, 4.0, -1.0], [4.0, 1.0, -1.0]]))
+    [ 1  0 -1]
+    """
+    worth = np.asarray(gain, float)
+    if np.isnan(worth).any() or (worth == np.inf).any():
+        raise WildlabError(
+            "what a pair gains is not a number", "give minus infinity where there is no pair", field="gain"
+        )
+    A, M = worth.shape
+    # A column for each track that stays alone, which gains nothing.
+    padded = np.concatenate([np.where(worth > 0, worth, -1.0), np.zeros((A, A))], axis=1)
+    rows, columns = linear_sum_assignment(padded, maximize=True)
+    found = np.full(M, -1)
+    pairs = columns < M
+    found[columns[pairs]] = rows[pairs]
+    return found
+
+
+#: Clouds, which animals the last image showed (A,), seconds, random numbers -> clouds.
+Moves = Callable[[Cloud, NDArray[np.bool_], float, np.random.Generator], Cloud]
+
+
+class ImageLook(NamedTuple):
+    """One image.
+
+    Attributes
+    ----------
+    time
+        s.
+    z
+        (M, 2) detections on the ground, north and east, m; NaN where a ray met none.
+    R
+        (M, 2, 2) their covariances, m^2.
+    sight
+        Probability of a detection of an animal at a place: footprint, line of sight and detector.
+    """
+
+    time: float
+    z: Array
+    R: Array
+    sight: Sight
+
+
+class Rules(NamedTuple):
+    """What is the same for all images.
+
+    Attributes
+    ----------
+    moves
+        How animals move.
+    particles
+        Of each animal; F has 500.
+    gate_probability
+        That an animal's own detection is let in.
+    negative
+        Whether images without a detection count, F 4.2.2.
+    start_sd
+        Standard deviations of what a detection does not tell, such as (0.5, 0.5) m/s for two velocities.
+    lost_trace
+        A track whose covariance has a greater trace is lost, F 5.3, m^2.
+    lost_doubt
+        A track is lost once images that had to show it would all have missed it with less than this
+        probability, F 5.3.4.
+    scheme, threshold
+        As `resample` takes them.
+    """
+
+    moves: Moves
+    particles: int = 500
+    gate_probability: float = 0.99
+    negative: bool = True
+    start_sd: tuple[float, ...] = ()
+    lost_trace: float = np.inf
+    lost_doubt: float = 0.0
+    scheme: str = "multinomial"
+    threshold: float = FLODELL_THRESHOLD
+
+
+class Herd(NamedTuple):
+    """What is known after an image; A tracks.
+
+    Attributes
+    ----------
+    time
+        s; NaN before the first image.
+    cloud
+        States (A, N, n), weights (A, N).
+    identity
+        (A,) numbers from 1, never given twice.
+    seen_at
+        (A,) s, when each was last detected.
+    missed
+        (A,) probability that all images since then would have missed it.
+    lost
+        (A,) bool. A lost one is kept, moves on, and may be found again.
+    born
+        How many identities were given.
+    """
+
+    time: float
+    cloud: Cloud
+    identity: NDArray[np.int64]
+    seen_at: Array
+    missed: Array
+    lost: NDArray[np.bool_]
+    born: int
+
+
+def no_herd(rules: Rules) -> Herd:
+    """Before the first image, where nothing is known.
+
+    Parameters
+    ----------
+    rules
+        Of the flight.
+
+    Returns
+    -------
+    Herd
+        Without a track.
+    """
+    n = 2 + len(rules.start_sd)
+    nothing = np.zeros(0)
+    return Herd(
+        np.nan, Cloud(np.zeros((0, rules.particles, n)), np.zeros((0, rules.particles))),
+        np.zeros(0, np.int64), nothing, nothing, np.zeros(0, bool), 0,
+    )  # fmt: skip
+
+
+def moved(herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator) -> Herd:
+    """All tracks at the time of an image."""
+    dt = 0.0 if np.isnan(herd.time) else look.time - herd.time
+    if not dt >= 0:
+        raise WildlabError(
+            f"an image at {look.time} s after one at {herd.time} s", "sort the images by time", field="time"
+        )
+    if dt == 0:
+        return herd._replace(time=look.time)
+    cloud = herd.cloud
+    if len(herd.identity):
+        cloud = rules.moves(cloud, herd.seen_at == herd.time, dt, rng)
+    return herd._replace(time=look.time, cloud=cloud)
+
+
+def start_tracks(z: Array, R: Array, rules: Rules, rng: np.random.Generator) -> Cloud:
+    """Clouds (M, N, n) about detections (M, 2) with covariances (M, 2, 2)."""
+    n, M = 2 + len(rules.start_sd), len(z)
+    mean, covariance = np.zeros((M, n)), np.zeros((M, n, n))
+    mean[:, :2], covariance[:, :2, :2] = z, R
+    covariance[:, range(2, n), range(2, n)] = np.square(rules.start_sd)
+    return start_gaussian(mean, covariance, rules.particles, rng)
+
+
+def with_new(herd: Herd, cloud: Cloud, time: float) -> Herd:
+    """The same with new tracks (M, N, n) behind, at the time of the image."""
+    count = len(cloud.w)
+    if not count:
+        return herd
+    return herd._replace(
+        cloud=Cloud(np.concatenate([herd.cloud.x, cloud.x]), np.concatenate([herd.cloud.w, cloud.w])),
+        identity=np.append(herd.identity, herd.born + 1 + np.arange(count)),
+        seen_at=np.append(herd.seen_at, np.full(count, time)),
+        missed=np.append(herd.missed, np.ones(count)),
+        lost=np.append(herd.lost, np.zeros(count, bool)),
+        born=herd.born + count,
+    )
+
 
 Integers = NDArray[np.int64]
 
-#: A track that is less probable than this is given up where animals are counted.
-LEAST_EXISTENCE = 1e-3
 #: A detection that leaves a cloud with fewer particles' worth of weight than this says more than they can.
 LEAST_EFFECTIVE = 10.0
-#: What stands for a density of zero, 1/m^2, so that ratios stay finite.
-LEAST_DENSITY = 1e-100
 
 
 def step_nearest(
@@ -77,10 +315,9 @@ def step_nearest(
     WildlabError
         For an image that is earlier than the one before.
     """
-    return _of_usable(_nearest, herd, look, rules, rng)
-
-
-def _nearest(herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
+    z, R = np.asarray(look.z, float).reshape(-1, 2), np.asarray(look.R, float).reshape(-1, 2, 2)
+    usable = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
+    look = look._replace(z=z[usable], R=R[usable])
     herd = moved(herd, look, rules, rng)
     mean, covariance = moments(herd.cloud)
     squared = mahalanobis_squared(mean, covariance, look.z, look.R)
@@ -108,8 +345,12 @@ def _nearest(herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator
     new = np.flatnonzero(taken < 0)
     names = np.where(taken >= 0, np.append(herd.identity, 0)[taken], 0)
     names[new] = herd.born + 1 + np.arange(len(new))
-    herd = with_new(herd, start_tracks(look.z[new], look.R[new], rules, rng), np.ones(len(new)), look.time)
-    return _resampled(_lost(herd, rules), rules, rng), names
+    herd = _lost(with_new(herd, start_tracks(look.z[new], look.R[new], rules, rng), look.time), rules)
+    if len(herd.identity):
+        herd = herd._replace(cloud=resample(herd.cloud, rng, rules.scheme, rules.threshold)[0])
+    aligned = np.zeros(len(z), np.int64)
+    aligned[usable] = names
+    return herd, aligned
 
 
 def _revived(
@@ -137,135 +378,8 @@ def _revived(
     return Cloud(x, w)
 
 
-def step_counting(
-    herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator
-) -> tuple[Herd, Integers]:
-    """Tracking that counts, one image on: one detection at most for a track, and each with its probability.
-
-    A detection is of a track, of an animal that was never seen, or false: each pair gains the logarithm of
-    how much more likely the first is than the others, and the pairs that gain most together are taken. Then
-    each track is updated as if that pairing were sure (integrated probabilistic data association with one
-    candidate), and a detection without a track starts one that is an animal with the probability that it is
-    of one never seen. Images without a detection count always: existence means nothing without them.
-
-    Parameters
-    ----------
-    herd
-        What was known; begin with `expect`.
-    look
-        The image, with the density of false detections.
-    rules
-        Of the flight. Nothing is lost: what is less probable than `LEAST_EXISTENCE` ends.
-    rng
-        Random numbers.
-
-    Returns
-    -------
-    herd, taken
-        What is known now; (M,) the identity that each detection was given, 0 where it was not used: NaN, or
-        no track's and false without much doubt.
-
-    Raises
-    ------
-    WildlabError
-        For an image that is earlier than the one before.
-    """
-    return _of_usable(_counting, herd, look, rules, rng)
-
-
-def _counting(herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
-    herd = moved(herd, look, rules, rng)
-    A, M = len(herd.identity), len(look.z)
-    sight, of_unseen = look.sight(herd.cloud.x[..., :2]), look.sight(herd.unseen.x[0, :, :2])
-    # Density of detections of animals never seen, at each detection; and of all that is no track's.
-    unseen_each = np.array([
-        of_unseen * np.exp(log_likelihood(herd.unseen.x[0, :, :2], z, R))
-        for z, R in zip(look.z, look.R, strict=True)
-    ]).reshape(M, herd.unseen.x.shape[1])  # fmt: skip
-    new_density = herd.expected_unseen * (unseen_each @ herd.unseen.w[0])
-    other = np.maximum(new_density + look.clutter, LEAST_DENSITY)
-    gate = gate_threshold(rules.gate_probability, 2)
-    near = mahalanobis_squared(*moments(herd.cloud), look.z, look.R) <= gate
-    # Of the pairs within the gate alone: a frame full of glitter has more pairs than fit into memory.
-    seen_each, density = dict[tuple[int, int], Array](), np.zeros((A, M))
-    for a, j in np.argwhere(near).tolist():
-        each = sight[a] * np.exp(log_likelihood(herd.cloud.x[a, :, :2], look.z[j], look.R[j]))
-        seen_each[a, j], density[a, j] = each, herd.existence[a] * float(each @ herd.cloud.w[a])
-    nothing = 1 - herd.existence * np.einsum("an,an->a", sight, herd.cloud.w)
-    with np.errstate(divide="ignore"):
-        gain = np.log(density) - np.log(other) - np.log(np.maximum(nothing, LEAST_DENSITY))[:, None]
-    taken = one_to_one(np.where(density > 0, gain, -np.inf))
-    likely = 1 - sight
-    for j in np.flatnonzero(taken >= 0).tolist():
-        likely[taken[j]] += seen_each[int(taken[j]), j] / other[j]
-    with np.errstate(divide="ignore"):
-        cloud, log_evidence = weigh(herd.cloud, np.log(likely))
-    seen = np.isin(np.arange(A), taken)
-    existence = np.where(
-        log_evidence > 700, 1.0, existence_after(herd.existence, np.exp(np.minimum(log_evidence, 700)))
-    )
-    missed = np.where(seen, 1.0, herd.missed * np.exp(np.where(seen, 0.0, log_evidence)))
-    unseen, expected = _unseen_after(herd, of_unseen, unseen_each, _doubt(gain, taken, new_density / other))
-    new = np.flatnonzero((taken < 0) & (new_density > LEAST_EXISTENCE * other))
-    names = np.where(taken >= 0, np.append(herd.identity, 0)[taken], 0)
-    names[new] = herd.born + 1 + np.arange(len(new))
-    herd = herd._replace(
-        cloud=cloud, existence=existence, missed=missed, unseen=unseen,
-        seen_at=np.where(seen, look.time, herd.seen_at),
-        expected_unseen=expected,
-    )  # fmt: skip
-    fresh = start_tracks(look.z[new], look.R[new], rules, rng)
-    herd = with_new(herd, fresh, new_density[new] / other[new], look.time)
-    herd = kept(herd, herd.existence >= LEAST_EXISTENCE)
-    if herd.unseen.x.size:
-        herd = herd._replace(unseen=resample(herd.unseen, rng, "systematic")[0])
-    return _resampled(herd, rules, rng), names
-
-
-def _of_usable(
-    step: Callable[[Herd, ImageLook, Rules, np.random.Generator], tuple[Herd, Integers]],
-    herd: Herd,
-    look: ImageLook,
-    rules: Rules,
-    rng: np.random.Generator,
-) -> tuple[Herd, Integers]:
-    """One of the steps with the detections that met the ground; the others keep their place, with 0."""
-    z, R = np.asarray(look.z, float).reshape(-1, 2), np.asarray(look.R, float).reshape(-1, 2, 2)
-    usable = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
-    herd, names = step(herd, look._replace(z=z[usable], R=R[usable]), rules, rng)
-    aligned = np.zeros(len(z), np.int64)
-    aligned[usable] = names
-    return herd, aligned
-
-
-def _doubt(gain: Array, taken: Integers, new: Array) -> Array:
-    """(M,) how probable it is that a detection that a track took is of an animal never seen."""
-    mine = np.where(taken >= 0, gain[taken, np.arange(len(taken))] if len(gain) else 0.0, np.inf)
-    return np.where(taken >= 0, new / (1 + np.exp(np.minimum(mine, 700))), 0.0)
-
-
-def _unseen_after(herd: Herd, sight: Array, seen_each: Array, doubt: Array) -> tuple[Cloud, float]:
-    """Where animals never seen may be, and how many: those the image did not show, and those it may have."""
-    w, total = herd.unseen.w[0], herd.expected_unseen
-    if not len(w):
-        return herd.unseen, total
-    left = total * w * (1 - sight)
-    for one, share in zip(seen_each, doubt, strict=True):
-        if share > 0:
-            left = left + share * (one * w) / (one @ w)
-    if not left.sum() > 0:
-        return herd.unseen, 0.0
-    return Cloud(herd.unseen.x, (left / left.sum())[None]), float(left.sum())
-
-
 def _lost(herd: Herd, rules: Rules) -> Herd:
     """Both rules by which an animal that was known is lost, F 5.3 and 5.3.4."""
     _, covariance = moments(herd.cloud)
     trace = np.trace(covariance[:, :2, :2], axis1=1, axis2=2)
     return herd._replace(lost=herd.lost | (trace > rules.lost_trace) | (herd.missed < rules.lost_doubt))
-
-
-def _resampled(herd: Herd, rules: Rules, rng: np.random.Generator) -> Herd:
-    if not len(herd.identity):
-        return herd
-    return herd._replace(cloud=resample(herd.cloud, rng, rules.scheme, rules.threshold)[0])

@@ -31,10 +31,9 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     gather,
 )
 from wildlab.studies.crossing_vessels.trial.joint import joint_numbers
-from wildlab.tracking.many import bank_rules as rules
+from wildlab.tracking.many import appearance as rules
+from wildlab.tracking.many.appearance import Appearance, image_features
 from wildlab.tracking.many.bank import Bank, run_bank
-from wildlab.tracking.many.bank_rules import Appearance
-from wildlab.tracking.many.features import image_features
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

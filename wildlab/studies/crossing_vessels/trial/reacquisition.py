@@ -11,10 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.tracking.many import bank_rules as rules
-from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
-from wildlab.tracking.many.bank_life import Life
-from wildlab.tracking.many.bank_rules import Appearance
+from wildlab.tracking.many import appearance as rules
+from wildlab.tracking.many.appearance import Appearance
+from wildlab.tracking.many.bank import Bank, Life, Looks, Tuning, run_bank
 
 Index = NDArray[np.int64]
 #: A track ends so long after its last detection, s: longer than nearly all pauses while a vessel is in view,
