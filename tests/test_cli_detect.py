@@ -17,7 +17,7 @@ from tests.analysis.test_detect import folder, picture
 from tests.commands import refuse, succeed
 from tests.test_cli_camera import huge_png
 from wildlab import cli
-from wildlab.analysis.detecting.said import too_few_or_many
+from wildlab.analysis.detecting.command import too_few_or_many
 from wildlab.flight.store import save_flight
 from wildlab.simulation.twins import simulate_twin
 

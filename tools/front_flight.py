@@ -21,7 +21,7 @@ from wildlab.analysis.georeference import (
     observe,
 )
 from wildlab.analysis.overviews.image_coverage import cover_images
-from wildlab.analysis.track import CvTuning, follow_schmidt, sighting
+from wildlab.analysis.tracks.sighting import CvTuning, follow_schmidt, sighting
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.reporting.front.flight import FILE

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from tests.analysis.building import manifest_of, poses_table
-from wildlab.analysis.following.follow import TrackingResult
-from wildlab.analysis.following.judged import judged
-from wildlab.analysis.following.noise_model import NoiseModel, of_flight, of_sensor
-from wildlab.analysis.scans import Scans, scans_of
+from wildlab.analysis.tracks.judged import judged
+from wildlab.analysis.tracks.noise_model import NoiseModel, of_flight, of_sensor
+from wildlab.analysis.tracks.scans import Scans, scans_of
+from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
 

@@ -5,8 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wildlab.analysis import camera_text as text
-from wildlab.analysis.camera import BoardImage, camera_file, coverage, odd_views, solve_boards
+from wildlab.analysis.camera import (
+    MATTERS_PX,
+    BoardImage,
+    camera_file,
+    coverage,
+    odd_views,
+    rim_px,
+    solve_boards,
+)
 from wildlab.detection.boards import Board
 from wildlab.geometry.board_views import Views, parameters_of, project_board
 from wildlab.geometry.camera import Camera
@@ -61,8 +68,8 @@ def test_the_file_has_all_that_was_found(good):
 
 
 def test_focal_lengths_that_are_known_well_are_not_complained_of(good):
-    assert text.rim_px(good.found) < text.MATTERS_PX
+    assert rim_px(good.found) < MATTERS_PX
     flat = solve_boards(images(8, 0.1, 1.0), BOARD, 640, 512, "none").found
     sd = dict(zip(flat.names, np.sqrt(np.diag(flat.covariance)), strict=True))
     by_hand = max(sd["fx"] / flat.camera.fx, sd["fy"] / flat.camera.fy) * np.hypot(320, 256)
-    assert text.rim_px(flat) == pytest.approx(by_hand) and by_hand > text.MATTERS_PX
+    assert rim_px(flat) == pytest.approx(by_hand) and by_hand > MATTERS_PX

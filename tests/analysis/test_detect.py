@@ -14,11 +14,15 @@ from tests.refused import refused
 from wildlab.analysis.detecting import detect as subject
 from wildlab.analysis.detecting.command import samples_of
 from wildlab.analysis.detecting.detect import detect_frame, run_detection
-from wildlab.analysis.detecting.fit import fit_thresholds
+from wildlab.analysis.detecting.fit import fit_shapes, fit_thresholds
 from wildlab.analysis.detecting.judged import judge_detections
-from wildlab.analysis.detecting.methods import METHODS, for_distance
-from wildlab.analysis.detecting.shape_fit import fit_shapes
-from wildlab.analysis.detecting.thresholds import read_thresholds, thresholds_from, write_thresholds
+from wildlab.analysis.detecting.methods import (
+    METHODS,
+    for_distance,
+    read_thresholds,
+    thresholds_from,
+    write_thresholds,
+)
 from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast
 from wildlab.detection.shape import Shape, fit_shape

@@ -10,9 +10,7 @@ import pytest
 
 from wildlab.analysis.detecting.command import samples_of
 from wildlab.analysis.detecting.detect import detect_frame
-from wildlab.analysis.detecting.fit import Fitted, Sample, candidates, fit_thresholds
-from wildlab.analysis.detecting.part_fit import fit_part
-from wildlab.analysis.detecting.shape_fit import fit_shapes
+from wildlab.analysis.detecting.fit import Fitted, Sample, candidates, fit_part, fit_shapes, fit_thresholds
 from wildlab.detection.detections import Detections
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import open_frames

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wildlab.analysis.detecting.fit import Sample
-from wildlab.analysis.detecting.part_fit import (
+from wildlab.analysis.detecting.fit import (
     Found,
+    Sample,
     fit_part,
     found_labels,
     part_of,

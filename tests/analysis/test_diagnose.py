@@ -13,8 +13,7 @@ from tests.analysis.survey_twin import CAMERA, Survey, simulate
 from tests.refused import refused
 from tests.sound_flights import simulate_sound_flight
 from wildlab.analysis.camera_clock import by_points_in_words
-from wildlab.analysis.diagnose import diagnose
-from wildlab.analysis.diagnosis import find_implausible
+from wildlab.analysis.diagnose import diagnose, find_implausible
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, observe
 from wildlab.analysis.learn import learn_from

@@ -8,12 +8,10 @@ import pytest
 
 from tests.analysis.robots import boat, joined, paused, robot, robot_flight, rows_of
 from tests.refused import refused
-from wildlab.analysis.following.estimates import estimates_table, write_estimates
-from wildlab.analysis.following.expected import SLOTS, predict_scan
-from wildlab.analysis.following.follow import follow_targets
-from wildlab.analysis.following.judged import apart, judged, worth_of_errors
-from wildlab.analysis.following.noise_model import errors_named
-from wildlab.analysis.scans import KINDS, Scans, scans_of, truths_at
+from wildlab.analysis.tracks.judged import apart, estimates_table, judged, worth_of_errors, write_estimates
+from wildlab.analysis.tracks.noise_model import errors_named
+from wildlab.analysis.tracks.scans import KINDS, SLOTS, Scans, predict_scan, scans_of, truths_at
+from wildlab.analysis.tracks.tracker import track
 from wildlab.flight.following import CONSIDERED, Settings
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
@@ -24,7 +22,7 @@ from wildlab.flight.store import Flight
 @pytest.mark.parametrize("seed", range(2))
 def test_a_considered_heading_is_inside_the_bounds_where_the_white_filter_is_not(seed):
     off = 2.0 if seed % 2 else -2.0
-    rows = rows_of(follow_targets(robot_flight(seed, heading_off_deg=off, heading_sd_deg=2.0)))
+    rows = rows_of(track(robot_flight(seed, heading_off_deg=off, heading_sd_deg=2.0)))
     assert list(rows.index[:2]) == ["ekf", "schmidt"]
     assert rows.loc["schmidt", "verdict"] == "consistent"
     assert rows.loc["ekf", "verdict"] == "overconfident" and rows.loc["ekf", "nees"] > 20
@@ -37,7 +35,7 @@ def test_every_filter_follows(kind):
     flight = robot_flight(2, kind=kind, heading_sd_deg=1.0)
     settings = Settings(sensors={"radar": {"thinning_s": 2.0}})
     names = ("ekf", "ukf", "imm", "coloured", "schmidt", "thinned")
-    rows = rows_of(follow_targets(flight, filters=names, settings=settings, smooth=True))
+    rows = rows_of(track(flight, filters=names, settings=settings, smooth=True))
     assert set(names) <= set(rows.index)
     assert {"ekf-smoothed", "schmidt-smoothed"} <= set(rows.index) and "coloured-smoothed" not in rows.index
     assert (rows["rmse"] < 3.0).all()
@@ -57,12 +55,12 @@ def test_a_range_along_the_line_of_sight_knows_how_far_below_the_target_is():
     seen = flight.tables["detections"]
     level = seen["range_m"].to_numpy(float)
     seen["range_m"] = np.hypot(level, high)
-    truth = follow_targets(flight)
+    truth = track(flight)
     assert rows_of(truth).loc["ekf", "rmse"] < 1.5
     # With an elevation nothing has to be known of heights.
     seen["elevation_rad"] = -np.arctan2(high, level)
     flight.tables["truth"]["down_m"] = 500.0
-    assert rows_of(follow_targets(flight)).loc["ekf", "rmse"] < 1.5
+    assert rows_of(track(flight)).loc["ekf", "rmse"] < 1.5
 
 
 def test_bearings_with_elevation_start_where_they_meet_the_plane():
@@ -73,7 +71,7 @@ def test_bearings_with_elevation_start_where_they_meet_the_plane():
     distance = np.hypot(*(boat(t) - robot(t)).T)
     noise = np.random.default_rng(0).normal(0, np.radians(0.3), len(t))
     seen["elevation_rad"] = -np.arctan2(high, distance) + noise
-    rows = rows_of(follow_targets(flight))
+    rows = rows_of(track(flight))
     assert rows.loc["ekf", "rmse"] < 4.0 and rows.loc["ekf", "detections"] > 230
 
 
@@ -83,7 +81,7 @@ def test_velocities_help_positions_in_one_track():
         robot_flight(1, kind="position", position_sd=5.0),
         robot_flight(2, kind="velocity", sensor="flow"),
     )
-    rows = judged(follow_targets(flight, sensors=["radar", "flow"])).set_index(["sensor", "filter"])
+    rows = judged(track(flight, sensors=["radar", "flow"])).set_index(["sensor", "filter"])
     assert rows.loc[("together", "ekf"), "rmse"] < 0.7 * rows.loc[("radar", "ekf"), "rmse"]
 
 
@@ -125,7 +123,7 @@ def test_every_kind_has_its_errors_and_units():
 
 def test_without_names_the_nearest_in_the_gate_is_taken_from_near_the_truth_on():
     flight = robot_flight(4, labelled=False, clutter=3)
-    followed = follow_targets(flight)
+    followed = track(flight)
     rows = rows_of(followed)
     assert rows.loc["ekf", "rmse"] < 1.5
     own = followed.tracks[0].detection
@@ -133,7 +131,7 @@ def test_without_names_the_nearest_in_the_gate_is_taken_from_near_the_truth_on()
 
 
 def test_without_names_and_truth_all_are_of_one():
-    followed = follow_targets(robot_flight(4, labelled=False, truth=False))
+    followed = track(robot_flight(4, labelled=False, truth=False))
     assert not followed.truth and [one.target for one in followed.tracks] == ["target"]
     assert rows_of(followed).loc["ekf", "detections"] > 230
 
@@ -141,15 +139,14 @@ def test_without_names_and_truth_all_are_of_one():
 def test_names_may_be_left_aside():
     flight = robot_flight(4, clutter=3)
     settings = Settings(targets={"identified": "gate"})
-    assert rows_of(follow_targets(flight, settings=settings)).loc["ekf", "rmse"] < 1.5
+    assert rows_of(track(flight, settings=settings)).loc["ekf", "rmse"] < 1.5
     with refused("names its target"):
-        follow_targets(robot_flight(labelled=False), settings=Settings(targets={"identified": "label"}))
+        track(robot_flight(labelled=False), settings=Settings(targets={"identified": "label"}))
 
 
 def test_a_named_target_is_found_again_after_a_pause_and_an_unnamed_one_is_not():
     named, unnamed = (
-        follow_targets(paused(robot_flight(5, labelled=labelled), 31, 61)).tracks[0]
-        for labelled in (True, False)
+        track(paused(robot_flight(5, labelled=labelled), 31, 61)).tracks[0] for labelled in (True, False)
     )
     assert np.isfinite(named.estimate[-1]).all() and np.isnan(unnamed.estimate[-1]).all()
 
@@ -159,12 +156,12 @@ def test_a_named_target_is_found_again_after_a_pause_and_an_unnamed_one_is_not()
 
 def test_late_looks_are_put_in_order_and_change_nothing():
     flight = robot_flight(6)
-    straight = follow_targets(flight)
+    straight = track(flight)
     frames = flight.tables["frames"]
     order = np.arange(len(frames))
     order[10:13] = [12, 10, 11]
     flight.tables["frames"] = frames.iloc[order].reset_index(drop=True)
-    late = follow_targets(flight)
+    late = track(flight)
     np.testing.assert_array_equal(straight.tracks[0].estimate, late.tracks[0].estimate)
     assert len(late.notes) == 1 and straight.notes == []
 
@@ -175,7 +172,7 @@ def test_late_looks_are_put_in_order_and_change_nothing():
 def test_two_sensors_in_one_track_share_what_the_platform_has_wrong():
     one = robot_flight(1, heading_off_deg=2.0, heading_sd_deg=2.0)
     other = robot_flight(51, kind="position", heading_off_deg=2.0, sensor="lidar")
-    followed = follow_targets(joined(one, other))
+    followed = track(joined(one, other))
     rows = rows_of(followed, "together")
     assert rows.loc["schmidt", "verdict"] == "consistent"
     assert rows.loc["ekf", "verdict"] == "overconfident"
@@ -191,27 +188,27 @@ def test_what_is_not_there_is_said():
     flight = robot_flight()
     for name, unknown in (("targets", "ship"), ("sensors", "sonar"), ("filters", "magic")):
         with refused(f"'{unknown}'"):
-            follow_targets(flight, **{name: [unknown]})
+            track(flight, **{name: [unknown]})
     with refused("'boat'"):
-        follow_targets(robot_flight(labelled=False, truth=False), targets=["boat"])
+        track(robot_flight(labelled=False, truth=False), targets=["boat"])
     flight.tables["detections"] = flight.tables["detections"].iloc[:0]
     with refused("no detections"):
-        follow_targets(flight)
+        track(flight)
     sequence = make_manifest(
         {**robot_flight().manifest.model_dump(exclude_none=True), "time": {"kind": "sequence"}}
     )
     with refused("no time"):
-        follow_targets(Flight(sequence, flight.nav, flight.tables))
+        track(Flight(sequence, flight.nav, flight.tables))
 
 
 def test_a_filter_that_detections_cannot_go_through_is_left_out_with_the_reason():
     settings = Settings(sensors={"radar": {"range_m": 90.0, "range_sd_m": 30.0}})
-    followed = follow_targets(robot_flight(kind="bearing"), filters=["coloured"], settings=settings)
+    followed = track(robot_flight(kind="bearing"), filters=["coloured"], settings=settings)
     assert list(rows_of(followed).index) == ["ekf"]
     assert "'coloured'" in followed.notes[0]
     wrong = Settings(sensors={"radar": {"considered": {"range_bias": {"sd_m": 2.0}}}})
     with refused("'range_bias'"):
-        follow_targets(robot_flight(kind="bearing"), settings=wrong)
+        track(robot_flight(kind="bearing"), settings=wrong)
 
 
 # --- out ----------------------------------------------------------------------------------------------------
@@ -219,7 +216,7 @@ def test_a_filter_that_detections_cannot_go_through_is_left_out_with_the_reason(
 
 def test_estimates_say_what_was_used_and_how_sure_they_are(tmp_path):
     flight = robot_flight(2, heading_sd_deg=1.0)
-    followed = follow_targets(flight)
+    followed = track(flight)
     table = estimates_table(followed.tracks, followed.scans)
     write_estimates(table, tmp_path)
     read = pd.read_parquet(tmp_path / "estimates.parquet")

@@ -8,13 +8,19 @@ import pytest
 from tests.analysis.robots import KNOWN, believed, robot_flight, rows_of
 from tests.analysis.survey_twin import Survey, simulate
 from tests.refused import refused
-from wildlab.analysis.following.consider_parameters import spread_of
-from wildlab.analysis.following.expected import predict_scan
-from wildlab.analysis.following.follow import follow_targets
-from wildlab.analysis.following.noise_model import ASSUMED, ROUGH, STATED, of_flight, of_sensor, of_targets
-from wildlab.analysis.following.roughness import roughness
-from wildlab.analysis.following.tuned import tune_flight
-from wildlab.analysis.scans import scans_of
+from wildlab.analysis.tracks.noise_model import (
+    ASSUMED,
+    ROUGH,
+    STATED,
+    of_flight,
+    of_sensor,
+    of_targets,
+    roughness,
+    spread_of,
+)
+from wildlab.analysis.tracks.scans import predict_scan, scans_of
+from wildlab.analysis.tracks.tracker import track
+from wildlab.analysis.tracks.tuned import tune_flight
 from wildlab.flight.following import parse_settings
 from wildlab.flight.manifest import manifest_toml, parse_manifest
 from wildlab.geometry.attitude_uncertainty import pose_covariance
@@ -145,7 +151,7 @@ def test_bearings_near_south_are_neighbours():
 def test_noise_that_nobody_knows_is_asked_for():
     flight = robot_flight(seconds=1.6)
     with refused("'range'"):
-        follow_targets(flight)
+        track(flight)
 
 
 # --- tuning -------------------------------------------------------------------------------------------------
@@ -156,7 +162,7 @@ def test_truth_tells_a_heading_and_the_other_flight_is_judged_by_it():
     found = tune_flight(robot_flight(8, name="first", heading_off_deg=2.0), ["radar"])
     assert found.against == "truth" and found.flight == "first"
     assert np.degrees(found.sensors["radar"].heading_sd_rad) == pytest.approx(2.0, rel=0.4)
-    followed = follow_targets(robot_flight(9, heading_off_deg=-2.0), tuned=found)
+    followed = track(robot_flight(9, heading_off_deg=-2.0), tuned=found)
     assert any(one.source == "tuned on first" for one in followed.said)
     rows = rows_of(followed)
     assert rows.loc["schmidt", "nees"] < rows.loc["ekf", "nees"]

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from tests.analysis.robots import KNOWN, joined, paused, robot_flight, rows_of, seen_only
-from wildlab.analysis.following import sensor_tracks
-from wildlab.analysis.following.estimates import estimates_table
-from wildlab.analysis.following.follow import TrackingResult, follow_targets
-from wildlab.analysis.following.judged import UNKNOWN, judged, seen_of, used_of
-from wildlab.analysis.following.noise_model import NoiseModel, TargetModel
-from wildlab.analysis.following.reinitialisation import Geometry, ends_by, part_of
-from wildlab.analysis.following.sensor_tracks import SensorTrack
-from wildlab.analysis.scans import Scans, Truth
+from wildlab.analysis.tracks import tracker, tracks
+from wildlab.analysis.tracks.initiation import Geometry, ends_by
+from wildlab.analysis.tracks.inputs import SensorInputs
+from wildlab.analysis.tracks.judged import UNKNOWN, estimates_table, judged, seen_of, used_of
+from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel
+from wildlab.analysis.tracks.scans import Scans, Truth
+from wildlab.analysis.tracks.tracker import TrackingResult
+from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.flight.following import parse_settings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
@@ -63,8 +63,12 @@ def beliefs(scans: Scans) -> NoiseModel:
 
 
 def follow(pause_s: float = 200.0) -> list[SensorTrack]:
-    scans, truth = watched(pause_s)
-    return sensor_tracks.follow(scans, truth, beliefs(scans), TARGETS, FILTERS)
+    return by_camera(*watched(pause_s))
+
+
+def by_camera(scans: Scans, truth: Truth) -> list[SensorTrack]:
+    one = SensorInputs(scans, beliefs(scans), [truth])
+    return tracks.track_target({"camera": one}, "deer", TARGETS, FILTERS)
 
 
 def off_after(one: SensorTrack) -> float:
@@ -75,23 +79,23 @@ def off_after(one: SensorTrack) -> float:
 
 def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch):
     on_ground = NOISE_PX / CAMERA.fx * HEIGHT / np.cos(TILT) ** 2
-    tracks = follow()
-    for one in tracks:
+    followed = follow()
+    for one in followed:
         assert len(one.starts) == 2 and one.times[one.starts[1]] == pytest.approx(210.0)
         assert off_after(one) < 2 * np.sqrt(2) * on_ground
-    monkeypatch.setattr(sensor_tracks, "ends_of", lambda *given: None)
+    monkeypatch.setattr(tracks, "_ends", lambda *given: None)
     without = follow()
     assert len(without[0].starts) == 1
-    assert off_after(without[0]) > 10 * off_after(tracks[0])
+    assert off_after(without[0]) > 10 * off_after(followed[0])
 
 
 def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silently():
-    tracks = follow()
+    followed = follow()
     scans, _ = watched()
     sensor = {"camera": scans}, {"camera": beliefs(scans)}
-    rows = judged(TrackingResult(tracks, *sensor, TARGETS, [], [], True))
-    first = tracks[0]
-    for one in tracks:
+    rows = judged(TrackingResult(followed, *sensor, TARGETS, [], [], True))
+    first = followed[0]
+    for one in followed:
         assert (np.isfinite(one.estimate) == np.isfinite(first.estimate)).all()
         assert (one.starts == first.starts).all() and (one.detection == first.detection).all()
     for _, row in rows.iterrows():
@@ -130,7 +134,7 @@ def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(
     monkeypatch,
 ):
     with_ends = follow(0.0)
-    monkeypatch.setattr(sensor_tracks, "ends_of", lambda *given: None)
+    monkeypatch.setattr(tracks, "_ends", lambda *given: None)
     for one, other in zip(with_ends, follow(0.0), strict=True):
         assert len(one.starts) == 1 and not one.without.any()
         for name in ("estimate", "covariance", "innovation", "S", "nis", "nees"):
@@ -139,11 +143,16 @@ def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(
 
 def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there():
     scans, truth = watched()
-    tracks = follow()
-    rows = slice(int(tracks[0].starts[1]), len(scans.times))
+    whole = follow()
+    rows = slice(int(whole[0].starts[1]), len(scans.times))
     later = truth._replace(position=truth.position[rows], velocity=truth.velocity[rows])
-    alone = sensor_tracks.follow(part_of(scans, rows), later, beliefs(scans), TARGETS, FILTERS)
-    for one, other in zip(tracks, alone, strict=True):
+    cut = {
+        name: value[rows] for name, value in scans._asdict().items()
+        if isinstance(value, np.ndarray) and len(value) == len(scans.times)
+    }  # fmt: skip
+    assert scans.poses is not None
+    alone = by_camera(scans._replace(**cut, poses=scans.poses.take(rows)), later)
+    for one, other in zip(whole, alone, strict=True):
         assert np.array_equal(one.estimate[rows], other.estimate, equal_nan=True)
         assert np.array_equal(one.nis[rows], other.nis, equal_nan=True)
 
@@ -152,7 +161,7 @@ def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there():
 def test_positions_and_bearings_alone_do_not_end_so(kind):
     near = "[sensors.radar]\nrange_m = 90.0\nrange_sd_m = 30.0\n"
     flight = paused(robot_flight(1, kind=kind), 40, 90)
-    one = follow_targets(flight, settings=parse_settings(near + KNOWN)).tracks[0]
+    one = tracker.track(flight, settings=parse_settings(near + KNOWN)).tracks[0]
     assert len(one.starts) == 1 and not one.without.any()
 
 
@@ -163,7 +172,7 @@ def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track(
     flight = joined(*(paused(one, 40, 130) for one in flights))
     noise = "".join(f"[sensors.{n}.noise]\nrange_m = 0.1\nazimuth_deg = 0.1\n" for n in ("radar", "lidar"))
     settings = parse_settings(noise + "[targets]\nacceleration_m_s_sqrt_s = 0.5\nstart_speed_m_s = 2.0\n")
-    found = follow_targets(flight, settings=settings, filters=["ekf", "ukf", "imm"], smooth=True)
+    found = tracker.track(flight, settings=settings, filters=["ekf", "ukf", "imm"], smooth=True)
     rows = rows_of(found, "together")
     assert set(rows.index) == {"ekf", "ekf-smoothed", "ukf", "ukf-smoothed", "imm"}
     assert (rows["anew"] == 1).all() and (rows["gone"] > 0).all() and (rows["gone_seen"] == 0).all()
@@ -174,7 +183,7 @@ def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track(
 
 
 def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen():
-    followed = follow_targets(paused(robot_flight(3), 40, 90), settings=parse_settings(KNOWN))
+    followed = tracker.track(paused(robot_flight(3), 40, 90), settings=parse_settings(KNOWN))
     row = rows_of(followed).loc["ekf"]
     one = next(one for one in followed.tracks if one.filter == "ekf")
     away, used = np.hypot(*one.error[:, :2].T), used_of(one)
@@ -193,7 +202,7 @@ def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen():
 def test_of_one_or_three_detections_nothing_is_judged(count):
     flight = robot_flight(3)
     few = seen_only(flight, np.arange(len(flight.tables["frames"])) < count)
-    rows = rows_of(follow_targets(few, settings=parse_settings(KNOWN)))
+    rows = rows_of(tracker.track(few, settings=parse_settings(KNOWN)))
     assert set(rows["verdict"]) == {UNKNOWN} and set(rows["nis_verdict"]) == {UNKNOWN}
     assert (rows["used"] == count).all()
 
@@ -202,5 +211,5 @@ def test_a_track_that_lost_its_target_is_judged_where_the_target_was_seen():
     """What a gate no longer lets in was seen all the same."""
     flight = robot_flight(3, labelled=False)
     flight.tables["detections"].loc[119:, "range_m"] += 6.0  # after a minute
-    row = rows_of(follow_targets(flight, settings=parse_settings(KNOWN))).loc["ekf"]
+    row = rows_of(tracker.track(flight, settings=parse_settings(KNOWN))).loc["ekf"]
     assert row["compared"] > row["used"]

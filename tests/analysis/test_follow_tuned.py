@@ -10,9 +10,9 @@ from filterpy.kalman import KalmanFilter
 from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, joined, paused, robot_flight, rows_of, seen_only
 from tests.refused import refused
-from wildlab.analysis.following.follow import follow_targets
-from wildlab.analysis.following.judged import _between, apart
-from wildlab.analysis.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
+from wildlab.analysis.tracks import tracker
+from wildlab.analysis.tracks.judged import _between, apart
+from wildlab.analysis.tracks.tuned import read_tuned, refuse_same, tune_flight, tuned_text
 from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
 from wildlab.tracking.motion import white_acceleration
@@ -41,7 +41,7 @@ def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
     """Tuned on one flight, judged on another: filterpy's filter and smoother, and sums written out."""
     tuned = tune_flight(robot_flight(1, kind="position", position_sd=1.0), ["radar"], None, "innovations")
     flight = robot_flight(2, kind="position", position_sd=1.0, name="judged")
-    followed = follow_targets(flight, tuned=tuned, smooth=True, filters=["ekf"])
+    followed = tracker.track(flight, tuned=tuned, smooth=True, filters=["ekf"])
     track, back = followed.tracks
     scans = followed.scans["radar"]
     z, t, sd = scans.detections[:, 0], scans.times, np.array(tuned.sensors["radar"].own_sds)
@@ -67,7 +67,7 @@ def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
 def test_innovations_are_likeliest_at_what_was_tuned():
     flight = robot_flight(1, kind="position", position_sd=1.0)
     tuned = tune_flight(flight, ["radar"], None, "innovations")
-    scans = follow_targets(flight, tuned=tuned).scans["radar"]
+    scans = tracker.track(flight, tuned=tuned).scans["radar"]
     z, t = scans.detections[:, 0], scans.times
 
     def log_likelihood(density, sd):
@@ -100,7 +100,7 @@ def test_a_clock_that_nothing_tells_of_is_not_said_to_be_tuned():
     by_innovations = tune_flight(flight, ["radar"], None, "innovations")
     assert by_truth.sensors["radar"].clock_tuned
     for tuned, said in ((by_truth, True), (by_innovations, False)):
-        told = follow_targets(other, tuned=read_tuned(tuned_text(tuned))).said
+        told = tracker.track(other, tuned=read_tuned(tuned_text(tuned))).said
         assert any(one.what == "to be added to its stamps" for one in told) is said
 
 
@@ -129,7 +129,7 @@ def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_
     settings = parse_settings(
         "[sensors.radar.noise]\nposition_m = 1.0\n[targets]\npatience_s = 10.0\ngate_probability = 0.9999\n"
     )
-    followed = [follow_targets(f, settings=settings, smooth=True, filters=["ekf"]) for f in (torn, short)]
+    followed = [tracker.track(f, settings=settings, smooth=True, filters=["ekf"]) for f in (torn, short)]
     one, two = (each.tracks[1] for each in followed)
     assert one.filter == "ekf-smoothed" and np.isfinite(one.estimate[:, 0]).sum() > 60
     known = np.isfinite(two.estimate[:, 0])
@@ -137,7 +137,7 @@ def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_
 
 
 def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
-    track = follow_targets(robot_flight(1, kind="position"), filters=["ekf"]).tracks[0]
+    track = tracker.track(robot_flight(1, kind="position"), filters=["ekf"]).tracks[0]
     for dt in (0.0, 0.3):
         P = _between(track, track.times[20:21] + dt, 0.7)[1][0]
         F, Q = white_acceleration(dt, 0.7)
@@ -146,5 +146,5 @@ def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
 
 def test_smoothed_tracks_are_not_held_against_each_other():
     both = joined(*(robot_flight(k, kind="position", sensor=f"radar-{k}") for k in (1, 2)))
-    names = {one.filter for one in apart(follow_targets(both, smooth=True, filters=["ekf"]))}
+    names = {one.filter for one in apart(tracker.track(both, smooth=True, filters=["ekf"]))}
     assert names == {"ekf"}

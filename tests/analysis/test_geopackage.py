@@ -17,7 +17,7 @@ import pytest
 from tests.refused import refused
 from wildlab.analysis.geopackage import Layer, write_geopackage
 from wildlab.analysis.georeference import covariances_of, georeference, observe
-from wildlab.analysis.ground_file import CORNERS, write_points
+from wildlab.analysis.ground import CORNERS, write_points
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
 from wildlab.simulation.twins import simulate_twin

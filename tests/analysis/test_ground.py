@@ -10,11 +10,10 @@ from scipy.ndimage import gaussian_filter
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
 from tests.analysis.conftest import changed, score
-from tests.refused import refused
 from wildlab.analysis.evaluate import errors_of
 from wildlab.analysis.georeference import georeference, heights_left_in, observe
-from wildlab.analysis.ground import on_level, rays_of, shift_from_level
-from wildlab.analysis.track import sighting
+from wildlab.analysis.ground import on_level, shift_from_level
+from wildlab.analysis.tracks.sighting import sighting
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.store import Flight
@@ -77,7 +76,7 @@ def test_with_exact_poses_points_are_the_marks():
     points = georeference(flight, seen, np.random.default_rng(0))
     marks = flight.table("truth")[["north_m", "east_m", "down_m"]].to_numpy()
     np.testing.assert_allclose(points[["north_m", "east_m", "down_m"]].to_numpy(), marks, atol=1e-6)
-    assert rays_of(seen).counts() == {"met the ground": len(points)}
+    assert pixels_to_terrain(seen.poses, seen.uv, seen.terrain).counts() == {"met the ground": len(points)}
     # Targets' own heights are the best that level ground can have; without them it lies under the camera.
     assert shift_from_level(seen, points).largest < 1e-6
     unknown = replace(seen, level=np.full(len(points), np.nan))
@@ -118,7 +117,7 @@ def test_rays_that_meet_no_ground_are_counted():
     nav.loc[1, "east_m"] = 4000.0
     seen = observe(flight)
     points = georeference(flight, seen, np.random.default_rng(0))
-    counts = rays_of(seen).counts()
+    counts = pixels_to_terrain(seen.poses, seen.uv, seen.terrain).counts()
     lost = points["north_m"].isna()
     assert len(counts) == 4  # of each fate some
     assert counts["met the ground"] == (~lost).sum() and sum(counts.values()) == len(points)
@@ -172,10 +171,3 @@ def test_a_check_holds_the_survey_against_the_map():
     holed[60:] = np.nan
     assert findings(holed, "a hole") == ["warning"]
     assert findings(holed, "beyond the border") == []
-
-
-def test_without_terrain_it_is_said():
-    flight = flown()
-    flight.terrain = None
-    with refused("no terrain"):
-        rays_of(observe(flight))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.analysis.measurement_noise import (
+from wildlab.analysis.pose_noise import (
     FRACTION,
     NOISES,
     VARIATIONS,
@@ -16,7 +16,7 @@ from wildlab.analysis.measurement_noise import (
     noises_of,
     thinned,
 )
-from wildlab.analysis.track import CvTuning, Sighting, follow_positions
+from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_positions
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
@@ -111,7 +111,7 @@ def test_noise_of_its_own_for_each_row_is_used():
 
 @pytest.mark.slow
 def test_on_a_twin_each_variation_has_its_own_track():
-    from wildlab.analysis.track import sighting
+    from wildlab.analysis.tracks.sighting import sighting
 
     seen = sighting(simulate_twin("slow-vessel-eight", 1, ("imu", "gnss")), "autopilot")
     base = follow_positions(seen, TUNING)

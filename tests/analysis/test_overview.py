@@ -18,13 +18,19 @@ from tests.analysis.conftest import build, changed, receiver, without_poses
 from tests.analysis.robots import KNOWN, robot_flight
 from tests.planning.ground import FLAT
 from tests.refused import refused
-from wildlab.analysis.following.follow import follow_targets
-from wildlab.analysis.following.judged import judged as judged_tracks
-from wildlab.analysis.overviews.image_coverage import cover_images, ground_height
-from wildlab.analysis.overviews.lost import Recovered
+from wildlab.analysis.overviews.image_coverage import Recovered, cover_images, ground_height
 from wildlab.analysis.overviews.overview import TROUBLES, look_over
-from wildlab.analysis.overviews.recommendations import gains_of, numbers_of, possible_gain
-from wildlab.analysis.overviews.verdict import Evidence, Verdict, parts_of, verdict_of
+from wildlab.analysis.overviews.verdict import (
+    Evidence,
+    Verdict,
+    gains_of,
+    numbers_of,
+    parts_of,
+    possible_gain,
+    verdict_of,
+)
+from wildlab.analysis.tracks.judged import judged as judged_tracks
+from wildlab.analysis.tracks.tracker import track
 from wildlab.evaluation.streams import pace_of, runs_of
 from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
 from wildlab.flight.following import parse_settings
@@ -350,7 +356,7 @@ def test_a_gain_that_is_large_and_not_certain_is_possible(gain, possible):
 @pytest.mark.parametrize("off_deg", [2.0, 0.0])
 def test_tracks_that_their_own_report_doubts_are_not_sound_here(off_deg, tmp_path):
     """The verdict of a true report on tracking, through its metrics.json, is read by the overview."""
-    followed = follow_targets(
+    followed = track(
         robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=parse_settings(KNOWN)
     )
     rows = judged_tracks(followed)

@@ -11,15 +11,12 @@ import pytest
 from tests.flight.test_area import collection, feature, polygon
 from tests.planning.test_courses import curvature
 from tests.refused import refused
+from wildlab.analysis.plans.command import missions
 from wildlab.analysis.plans.coverage import cover
-from wildlab.analysis.plans.files import missions
-from wildlab.analysis.plans.forbidden import nearest_ground, refuse_near
-from wildlab.analysis.plans.heights import TOLERANCE, follow
-from wildlab.analysis.plans.plan import make_plan
+from wildlab.analysis.plans.plan import make_plan, nearest_ground, refuse_near
 from wildlab.analysis.plans.said import plan_result
-from wildlab.analysis.plans.sorties import fly_rows
-from wildlab.analysis.plans.view import look
-from wildlab.analysis.plans.wanted import LIMITS, Wanted
+from wildlab.analysis.plans.sorties import TOLERANCE, fly_rows, follow
+from wildlab.analysis.plans.wanted import LIMITS, Wanted, look
 from wildlab.flight.writers.mission import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain

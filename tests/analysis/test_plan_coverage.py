@@ -10,11 +10,10 @@ import pytest
 
 from tests.analysis.test_plan import CAMERA, hills, plan
 from tests.flight.test_area import collection, feature, polygon
-from wildlab.analysis.plans.coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
-from wildlab.analysis.plans.outlines import simplified
+from wildlab.analysis.plans.coverage import Covered, cover, gimbal_rate, images_of
 from wildlab.analysis.plans.plan import make_plan
 from wildlab.analysis.plans.said import animals_in, plan_result
-from wildlab.analysis.plans.wanted import Wanted
+from wildlab.analysis.plans.wanted import FURTHEST, Wanted, simplified
 from wildlab.geometry.camera import normalise, project
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]

@@ -9,7 +9,7 @@ import pytest
 
 from tests.refused import refused
 from wildlab.analysis.pose_noise import APART_S, covariance_of, estimate_from_sighting
-from wildlab.analysis.track import Sighting, sighting
+from wildlab.analysis.tracks.sighting import Sighting, sighting
 from wildlab.evaluation.pose_noise import KINDS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import rotation_vector_to_matrix

@@ -10,6 +10,7 @@ import pytest
 from tests.planning.ground import FLAT, with_wall
 from tests.refused import refused
 from wildlab.analysis.search import (
+    Rules,
     SearchByChance,
     SearchInRows,
     World,
@@ -17,8 +18,8 @@ from wildlab.analysis.search import (
     grid_over,
     rows_at,
     search,
+    survey,
 )
-from wildlab.analysis.survey import Rules, survey
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.high_level import SEARCH
 from wildlab.planning.information import SearchSensor

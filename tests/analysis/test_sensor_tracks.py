@@ -8,12 +8,12 @@ import pytest
 
 from tests.analysis.robots import robot, robot_flight, seen_only
 from tests.refused import refused
-from wildlab.analysis.following.expected import errors_near
-from wildlab.analysis.following.initiation import start_near
-from wildlab.analysis.following.noise_model import from_tuning
-from wildlab.analysis.following.sensor_tracks import SensorTrack, follow_flight, table
-from wildlab.analysis.following.sensor_tuning import SensorTuning
-from wildlab.analysis.scans import scans_of, sensors_of, truths_at
+from wildlab.analysis.tracks.comparison import follow_flight, table
+from wildlab.analysis.tracks.initiation import start_near
+from wildlab.analysis.tracks.noise_model import from_tuning
+from wildlab.analysis.tracks.scans import errors_near, scans_of, sensors_of, truths_at
+from wildlab.analysis.tracks.sensor_tuning import SensorTuning
+from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.studies.autoferry.tracks import BOATS, tune_sensor
 
 EXACT = {"kind": "position", "range_sd": 0.0, "bearing_sd_deg": 0.0, "position_sd": 0.0}

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tests.refused import refused
 from wildlab.analysis.navigate import PUBLISHED_LIKE, navigate_mekf
 from wildlab.analysis.navigation_errors import NavigationErrors, errors_against
-from wildlab.analysis.sighting_errors import (
+from wildlab.analysis.pose_noise import (
     PAUSE_S,
     TURNING,
     flight_numbers,
@@ -20,7 +20,7 @@ from wildlab.analysis.sighting_errors import (
     premise_numbers,
     rms,
 )
-from wildlab.analysis.track import (
+from wildlab.analysis.tracks.sighting import (
     CvTuning,
     Sighting,
     evaluate_measurements,

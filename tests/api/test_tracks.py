@@ -11,14 +11,20 @@ import pytest
 
 import wildlab
 from tests.analysis.robots import KNOWN, joined, robot_flight
-from wildlab.analysis.consistency import Series, mean_of_runs
-from wildlab.analysis.following.estimates import STATE, estimates_table
-from wildlab.analysis.following.follow import TOGETHER, follow_targets
-from wildlab.analysis.following.judged import judged
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated
-from wildlab.analysis.navigation_errors import comparison_times
-from wildlab.analysis.track import FILTERS, CvTuning, evaluate_track, follow_schmidt, sighting, truth_states
+from wildlab.analysis.navigation_errors import Series, comparison_times, mean_of_runs
+from wildlab.analysis.tracks import tracker
+from wildlab.analysis.tracks.judged import STATE, estimates_table, judged
+from wildlab.analysis.tracks.sighting import (
+    FILTERS,
+    CvTuning,
+    evaluate_track,
+    follow_schmidt,
+    sighting,
+    truth_states,
+)
+from wildlab.analysis.tracks.tracks import TOGETHER
 from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
 from wildlab.evaluation.consistency import Average, chi_square_interval
@@ -134,7 +140,7 @@ SETTINGS = {"targets": {"acceleration_m_s_sqrt_s": 0.2}}
 
 def test_a_track_is_the_commands(ship):
     """What `wildlab track` writes is the table of the same function, see tests of that command."""
-    found = follow_targets(ship, settings=check_model(Settings, SETTINGS, None))
+    found = tracker.track(ship, settings=check_model(Settings, SETTINGS, None))
     table = estimates_table(found.tracks, found.scans)
     for name in ("ekf", "schmidt"):
         one, rows = wildlab.track(ship, filter=name, settings=SETTINGS), table[table["filter"] == name]
@@ -289,7 +295,7 @@ def test_a_track_is_judged_as_the_command_judges_it():
     """Radar and bearings together: numbers, degrees of freedom and bands."""
     flight = joined(robot_flight(3), robot_flight(103, kind="bearing", sensor="cam"))
     told = parse_settings(KNOWN + "[sensors.cam.noise]\nazimuth_deg = 0.3\n")
-    rows = judged(follow_targets(flight, settings=told, filters=["ekf"])).query("filter == 'ekf'")
+    rows = judged(tracker.track(flight, settings=told, filters=["ekf"])).query("filter == 'ekf'")
     row = rows[rows["kind"] == TOGETHER].iloc[0]
     track = wildlab.track(flight, filter="ekf", settings=told)
     nis, nees = (wildlab.consistency(track).means[name] for name in ("NIS", "NEES position"))

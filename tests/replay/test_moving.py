@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.following.estimates import COLUMNS
-from wildlab.analysis.following.judged import LEADING
+from wildlab.analysis.tracks.judged import COLUMNS, LEADING
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.replay.gather import scene_of

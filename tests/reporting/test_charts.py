@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from tests.figure_text import overlapping
-from wildlab.analysis.following.sensor_tracks import Array, SensorTrack
 from wildlab.analysis.overviews.overview import Path
+from wildlab.analysis.tracks.tracks import Array, SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, errors_shown
 from wildlab.reporting.charts.navigation import (

@@ -8,9 +8,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.diagnosis import Diagnosis
-from wildlab.analysis.overviews.recommendations import CAUSES, causes_told, gains_of, possible_gain
-from wildlab.analysis.overviews.verdict import WORTH, Evidence, verdict_of
+from wildlab.analysis.diagnose import Diagnosis
+from wildlab.analysis.overviews.verdict import (
+    CAUSES,
+    WORTH,
+    Evidence,
+    causes_told,
+    gains_of,
+    possible_gain,
+    verdict_of,
+)
 from wildlab.evaluation.axes import AlongAxis
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict

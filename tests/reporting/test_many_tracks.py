@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.figure_text import overlapping
-from wildlab.analysis.following.noise_model import ToldValue
+from wildlab.analysis.tracks.noise_model import ToldValue
 from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackLife, compare_identities
 from wildlab.evaluation.sets import gospa
 from wildlab.messages.page_texts import load_texts

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.following.judged import Apart, leading_filter
+from wildlab.analysis.tracks.judged import Apart, leading_filter
 from wildlab.evaluation.consistency import Average
 from wildlab.messages.page_texts import load_texts
 from wildlab.reporting import tracking as page

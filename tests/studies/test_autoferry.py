@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pandas as pd
 import pytest
 
-from wildlab.analysis.following.sensor_tracks import FILTERS, follow_flight, table
-from wildlab.analysis.following.sensor_tuning import SensorTuning
+from wildlab.analysis.tracks.comparison import FILTERS, follow_flight, table
+from wildlab.analysis.tracks.sensor_tuning import SensorTuning
 from wildlab.flight.store import Flight
 from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes
 from wildlab.studies.autoferry.tracks import BOATS

@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.following.sensor_tracks import COLUMNS, SensorTrack, table
-from wildlab.analysis.following.sensor_tuning import SensorTuning
+from wildlab.analysis.tracks.comparison import COLUMNS, table
+from wildlab.analysis.tracks.sensor_tuning import SensorTuning
+from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.messages.page_texts import load_texts
 from wildlab.reporting.report import Report, open_report

@@ -40,7 +40,23 @@ from wildlab.studies.gating.readings import (
     verdict,
 )
 from wildlab.studies.gating.variations import variations, vary
-from wildlab.tracking.measurement import predict_azimuth_elevation, predict_pixel
+from wildlab.tracking.predictions import Prediction, predict_pixel, target_in_camera
+
+
+def predict_azimuth_elevation(position, poses, plane_down) -> Prediction:
+    """Azimuth and elevation in c, H (6.9), with their derivatives: what the kernels are held against."""
+    inner = target_in_camera(position, poses, plane_down)
+    x, y, z = np.moveaxis(inner.z, -1, 0)
+    seen = (z > 0) & (x * x + y * y > 0)
+    level2, z = np.where(seen, x * x + y * y, np.nan), np.where(seen, z, np.nan)
+    level, range2 = np.sqrt(level2), level2 + z * z
+    J = np.zeros((*level.shape, 2, 3))
+    J[..., 0, 0], J[..., 0, 1] = -y / level2, x / level2
+    J[..., 1, 0], J[..., 1, 1] = -z * x / (level * range2), -z * y / (level * range2)
+    J[..., 1, 2] = level / range2
+    angles = np.stack([np.arctan2(y, x), np.arctan2(z, level)], axis=-1)
+    return Prediction(angles, J @ inner.H_position, J @ inner.H_pose)
+
 
 FEEDS = ("own", "assigned", "nothing")
 

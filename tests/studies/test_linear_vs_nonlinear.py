@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.track import follow_positions, start
+from wildlab.analysis.tracks.sighting import follow_positions, start
 from wildlab.errors import WildlabError
 from wildlab.reporting.published import load_claims
 from wildlab.studies.coloured_noise import trial as coloured_noise

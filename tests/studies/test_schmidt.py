@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from wildlab.analysis.navigation_errors import SETTLING_S, errors_against
-from wildlab.analysis.pose_noise import covariance_of
-from wildlab.analysis.sighting_errors import pauses
-from wildlab.analysis.track import Sighting, follow_schmidt
+from wildlab.analysis.pose_noise import covariance_of, pauses
+from wildlab.analysis.tracks.sighting import Sighting, follow_schmidt
 from wildlab.errors import WildlabError
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.store import Flight

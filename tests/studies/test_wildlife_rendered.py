@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.analysis.animals.follow import FollowedAnimals, Found, Known
-from wildlab.analysis.animals.frames import NONE, Framed
-from wildlab.analysis.animals.images import Images
+from wildlab.analysis.animals.images import NONE, Framed, Images
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses

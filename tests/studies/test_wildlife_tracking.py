@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 
 from wildlab.analysis.animals.follow import Found, Known
-from wildlab.analysis.animals.measures import (
+from wildlab.analysis.animals.revisit import (
+    Patrolled,
     found_on_visits,
     next_lap,
     out_of_sight,
     sight_numbers,
     turns,
 )
-from wildlab.analysis.animals.revisit import Patrolled
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
 from wildlab.planning.high_level import SEARCH

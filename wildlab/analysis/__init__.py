@@ -17,7 +17,6 @@ from wildlab.lazy import offer
 if TYPE_CHECKING:
     from wildlab.analysis.accuracy import Accuracy, judge_accuracy
     from wildlab.analysis.calibrate import Calibrated, calibrate_flight
-    from wildlab.analysis.consistency import Series, mean_of_runs, navigation_series, worth
     from wildlab.analysis.evaluate import errors_of, recorded_answers, score_points, unlabelled_programs
     from wildlab.analysis.georeference import (
         USUAL,
@@ -35,10 +34,17 @@ if TYPE_CHECKING:
         navigate_mekf,
         navigate_observer,
     )
-    from wildlab.analysis.navigation_errors import NavigationErrors, errors_against
+    from wildlab.analysis.navigation_errors import (
+        NavigationErrors,
+        Series,
+        errors_against,
+        mean_of_runs,
+        navigation_series,
+        worth,
+    )
     from wildlab.analysis.receiver import Placement, Receiver, place_receiver, receiver_noise
     from wildlab.analysis.repeats import Repeats, judge_repeats
-    from wildlab.analysis.track import (
+    from wildlab.analysis.tracks.sighting import (
         CvTuning,
         Scored,
         Sighting,

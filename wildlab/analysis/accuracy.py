@@ -8,10 +8,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.diagnose import diagnose
-from wildlab.analysis.diagnosis import FEWEST_IMAGES, Diagnosis
-from wildlab.analysis.error_axes import NearestRule, axes_of, look_at_nearest_rule
-from wildlab.analysis.evaluate import blocks_of, errors_of, score_points
+from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
+from wildlab.analysis.evaluate import (
+    NearestRule,
+    axes_of,
+    blocks_of,
+    errors_of,
+    look_at_nearest_rule,
+    score_points,
+)
 from wildlab.analysis.georeference import (
     Observations,
     calibrated,

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.diagnosis import nonzero
+from wildlab.analysis.diagnose import nonzero
 from wildlab.analysis.evaluate import blocks_of
 from wildlab.analysis.flow import Reading, camera_poses_at
 from wildlab.analysis.georeference import georeference, observe, truth_of

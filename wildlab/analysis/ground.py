@@ -1,19 +1,24 @@
-"""What the ground of a flight is: its terrain where it has one, and what a level plane would have given."""
+"""What the ground of a flight is: its terrain, and files of it; and what a level plane would have given."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from wildlab.analysis.georeference import Observations
+from wildlab.analysis.geopackage import Layer, write_geopackage
+from wildlab.analysis.georeference import Observations, covariances_of
+from wildlab.errors import WildlabError
+from wildlab.files import write_atomic, write_csv
+from wildlab.flight.store import Flight
+from wildlab.geometry.ellipses import ellipse_axes
+from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.terrain import Terrain
-
-Array = NDArray[np.float64]
 
 
 class Shift(NamedTuple):
@@ -30,8 +35,6 @@ class Shift(NamedTuple):
     n: int
     median: float
     largest: float
-
-
 
 
 def level_of(observations: Observations) -> Array:
@@ -110,3 +113,173 @@ def ground_sentences(observations: Observations, points: pd.DataFrame) -> list[s
             f"{unbounded} of {placed} points have no ellipse: more than 5 % of their samples meet no ground"
         )
     return said
+
+
+#: What is written, by the end of the name.
+SUFFIXES = (".csv", ".geojson", ".gpkg")
+#: Share of the truth that the ellipses are to hold, and corners of one as a polygon.
+LEVEL, CORNERS = 0.9, 72
+#: What heights on a map count from.
+ELLIPSOID = "height above the WGS 84 ellipsoid"
+
+
+def with_axes(points: pd.DataFrame) -> pd.DataFrame:
+    """The points with half axes (m) and bearing (deg) of their 90 % ellipses.
+
+    Parameters
+    ----------
+    points
+        From `wildlab.analysis.georeference.georeference`.
+
+    Returns
+    -------
+    DataFrame
+        With ``long_90_m``, ``short_90_m`` and ``bearing_deg``.
+    """
+    long, short, bearing = ellipse_axes(covariances_of(points))
+    return points.assign(long_90_m=long, short_90_m=short, bearing_deg=np.degrees(bearing) % 180)
+
+
+def write_points(flight: Flight, points: pd.DataFrame, path: Path, source: str = "") -> None:
+    """Write points as CSV (metres from the flight's origin), or as GeoJSON or GeoPackage (WGS84 longitude,
+    latitude, height above the ellipsoid).
+
+    Parameters
+    ----------
+    flight
+        Whose they are.
+    points
+        From `wildlab.analysis.georeference.georeference`; those without a place are in the CSV alone.
+    path
+        Ends with one of `SUFFIXES`.
+    source
+        The poses that they come from.
+
+    Raises
+    ------
+    WildlabError
+        Where it ends otherwise.
+    """
+    vertical = "down from the flight's origin" if path.suffix == ".csv" else ELLIPSOID
+    table = _described(flight, points, vertical, source)
+    if path.suffix == ".csv":
+        write_csv(path, table, "%.3f")
+    elif path.suffix == ".geojson":
+        write_atomic(path, points_geojson(flight, points, source))
+    elif path.suffix == ".gpkg":
+        write_geopackage(path, _layers(flight, table))
+    else:
+        raise WildlabError(
+            f"nobody knows how to write {path.suffix!r}", f"end it with {' or '.join(SUFFIXES)}", file=path
+        )
+
+
+def points_geojson(flight: Flight, points: pd.DataFrame, source: str = "") -> str:
+    """Points as the text of a GeoJSON file, as `write_points` writes it: exact places.
+
+    Parameters
+    ----------
+    flight, points, source
+        As for `write_points`.
+
+    Returns
+    -------
+    str
+        One feature for each point that has a place.
+    """
+    table = _described(flight, points, ELLIPSOID, source)
+    return json.dumps(_geojson(flight, table), allow_nan=False, separators=(",", ":"))
+
+
+def _described(flight: Flight, points: pd.DataFrame, vertical: str, source: str) -> pd.DataFrame:
+    return with_axes(points).assign(
+        level=LEVEL,
+        method=_methods(flight, points),
+        vertical_reference=vertical,
+        source=source,
+        flight=flight.name,
+    )
+
+
+def _methods(flight: Flight, points: pd.DataFrame) -> list[str]:
+    """Of each point: what it lies on, and how its ellipse was found."""
+    ground = "level ground" if flight.terrain is None else "terrain"
+    return [f"{ground}, ellipse {kind}" if kind else ground for kind in points["ellipse"].fillna("")]
+
+
+#: What goes along with a point into a map, and its type there.
+PROPERTIES = {
+    "detection_id": "TEXT",
+    "frame_id": "TEXT",
+    "target_id": "TEXT",
+    "time_s": "REAL",
+    "long_90_m": "REAL",
+    "short_90_m": "REAL",
+    "bearing_deg": "REAL",
+    "level": "REAL",
+    "ellipse": "TEXT",
+    "method": "TEXT",
+    "vertical_reference": "TEXT",
+    "source": "TEXT",
+    "flight": "TEXT",
+}
+
+
+def _placed(flight: Flight, table: pd.DataFrame) -> tuple[pd.DataFrame, Array]:
+    """The points with a place, and (N, 3) longitude, latitude (degrees), height above the ellipsoid (m)."""
+    placed = table[table["north_m"].notna() & table["down_m"].notna()]
+    return placed, _degrees(flight, placed[["north_m", "east_m", "down_m"]].to_numpy(float))
+
+
+def _degrees(flight: Flight, place: Array) -> Array:
+    llh = ned_to_geodetic(place, flight.manifest.origin_tuple())
+    return np.stack([np.degrees(llh[:, 1]), np.degrees(llh[:, 0]), llh[:, 2]], axis=1)
+
+
+def _layers(flight: Flight, table: pd.DataFrame) -> list[Layer]:
+    placed, degrees = _placed(flight, table)
+
+    def columns(rows: pd.DataFrame) -> dict[str, tuple[str, list[object]]]:
+        return {name: (kind, rows[name].tolist()) for name, kind in PROPERTIES.items() if name in rows}
+
+    known = placed[placed["long_90_m"].notna() & placed["short_90_m"].notna()]
+    shapes = [_degrees(flight, ring)[:, :2] for ring in _rings(known)]
+    about = f"Where the detections of {flight.name} lie on the ground."
+    return [
+        Layer("detections", "Detections", about, "POINT", list(degrees), columns(placed)),
+        Layer(
+            "ellipses",
+            f"Ellipses ({100 * LEVEL:.0f} %)",
+            f"Each is to hold the true place in {100 * LEVEL:.0f} % of all cases.",
+            "POLYGON",
+            shapes,
+            columns(known),
+        ),
+    ]
+
+
+def _rings(placed: pd.DataFrame) -> Array:
+    """(N, CORNERS, 3) m in n, the ellipses at the heights of their points."""
+    turn = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
+    along = placed["long_90_m"].to_numpy(float)[:, None] * np.cos(turn)
+    across = placed["short_90_m"].to_numpy(float)[:, None] * np.sin(turn)
+    bearing = np.radians(placed["bearing_deg"].to_numpy(float))[:, None]
+    north = along * np.cos(bearing) - across * np.sin(bearing)
+    east = along * np.sin(bearing) + across * np.cos(bearing)
+    middle = placed[["north_m", "east_m", "down_m"]].to_numpy(float)[:, None, :]
+    return np.asarray(middle + np.stack([north, east, np.zeros_like(north)], axis=2))
+
+
+def _geojson(flight: Flight, table: pd.DataFrame) -> dict[str, object]:
+    placed, degrees = _placed(flight, table)
+    kept = [name for name in PROPERTIES if name in placed]
+    features = []
+    for (longitude, latitude, height), row in zip(degrees, placed[kept].to_dict("records"), strict=True):
+        properties = {
+            key: None if isinstance(v, float) and not np.isfinite(v) else v for key, v in row.items()
+        }
+        place = [round(float(longitude), 8), round(float(latitude), 8), round(float(height), 3)]
+        features.append(
+            {"type": "Feature", "geometry": {"type": "Point", "coordinates": place}, "properties": properties}
+        )
+    return {"type": "FeatureCollection", "features": features}

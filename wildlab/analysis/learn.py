@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.analysis.accuracy import noise_without
-from wildlab.analysis.diagnose import diagnose
-from wildlab.analysis.diagnosis import Diagnosis
+from wildlab.analysis.diagnose import Diagnosis, diagnose
 from wildlab.analysis.evaluate import score_points
 from wildlab.analysis.georeference import Observations, calibrated, georeference, observe
 from wildlab.analysis.pose_noise import as_deviations

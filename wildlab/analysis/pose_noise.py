@@ -1,10 +1,12 @@
-"""How noisy a flight's poses were, from the errors of its known points, and ellipses that know it."""
+"""How wrong poses and places are: of sightings beside the truth, of poses from held-out points, and the noise
+of positions that follows the view (H 8.2).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.calibrate import fit_flight
 from wildlab.analysis.evaluate import blocks_of, errors_of, known_points, score_points
@@ -15,16 +17,321 @@ from wildlab.analysis.georeference import (
     georeference,
     pose_errors,
 )
-from wildlab.analysis.track import Sighting
+from wildlab.analysis.navigation_errors import AXES, PLACES, NavigationErrors, errors_against
+from wildlab.analysis.navigation_inputs import VELOCITY
+from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_positions
 from wildlab.errors import WildlabError
 from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
+from wildlab.evaluation.track_errors import SLOWEST_M_S
+from wildlab.evaluation.whiteness import effective_sample_size
+from wildlab.flight.clocks import poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import level_axes, tilt_and_heading
 from wildlab.geometry.calibration import split_images
+from wildlab.geometry.camera import normalise
+from wildlab.geometry.frames import Array, matrix_to_euler, wrap
 from wildlab.geometry.uncertainty import ground_jacobians
+from wildlab.tracking.filters import thin
+from wildlab.tracking.records import Track
 
-Array = NDArray[np.float64]
+#: A time without detections that is longer is a pause, s.
+PAUSE_S = 2.0
+#: From this bank on an airframe turns, rad.
+TURNING = np.radians(20.0)
+#: Columns of `wildlab.analysis.navigation_errors.NavigationErrors` that are a pose's, and their names.
+_POSE = [0, 1, 2, 6, 7, 8]
+NAMES = (*PLACES, *AXES)
+
+
+def pauses(seen: Sighting) -> list[NDArray[np.intp]]:
+    """Rows of the frames of each pause, from the first to the last without a detection.
+
+    Parameters
+    ----------
+    seen
+        From `wildlab.analysis.tracks.sighting.sighting`.
+
+    Returns
+    -------
+    list of (K,) arrays
+        In order of time; empty where no two detections are further apart than `PAUSE_S`.
+    """
+    rows = np.flatnonzero(seen.seen)
+    long = np.flatnonzero(np.diff(seen.times[rows]) > PAUSE_S)
+    return [np.arange(rows[i] + 1, rows[i + 1]) for i in long]
+
+
+def pose_numbers(own: NavigationErrors) -> dict[str, float]:
+    """What poses state of themselves and how far they are off; m and degrees.
+
+    Parameters
+    ----------
+    own
+        Errors of a nav source against the true poses of the camera's airframe, at the frames:
+        ``errors_against(flight.nav["truth"], flight.nav[source], seen.times)``.
+
+    Returns
+    -------
+    dict
+        ``mean_sd_north`` to ``mean_sd_yaw``, means of what is stated, and ``rms_north`` to ``rms_yaw``.
+    """
+    numbers = {}
+    for i, name in zip(_POSE, NAMES, strict=True):
+        numbers[f"mean_sd_{name}"] = shown(name, mean(own.sd[:, i]))
+        numbers[f"rms_{name}"] = shown(name, rms(own.error[:, i]))
+    return numbers
+
+
+def premise_numbers(flight: Flight, seen: Sighting, source: str, own: NavigationErrors) -> dict[str, float]:
+    """What sentences on the poses speak of; degrees.
+
+    Parameters
+    ----------
+    flight
+        With the nav sources ``autopilot`` and ``source``.
+    seen
+        With the poses of that source.
+    own
+        As for `pose_numbers`.
+
+    Returns
+    -------
+    dict
+        ``sd_spread``: the range that nine of ten of a stated deviation lie in over its median, of the
+        coordinate or angle that changes most. ``difference_roll`` to ``difference_yaw``: RMS against the
+        autopilot; ``outside_...``: share beyond two deviations. ``difference_turning``, ``..._straight`` and
+        ``rms_turning``, ``..._straight``: roll's, against autopilot and truth, while the airframe turns and
+        not. ``shift_px``: RMS over detections and both axes of what the pose's error moves the target by in
+        the image; ``largest_shift_px``: the farthest that it does.
+    """
+    sd = own.sd[np.isfinite(own.sd[:, 0])][:, _POSE]
+    low, middle, high = np.quantile(sd, (0.05, 0.5, 0.95), axis=0)
+    numbers = {"sd_spread": float(((high - low) / middle).max())}
+    beside = errors_against(flight.nav["autopilot"], flight.nav[source], seen.times)
+    for i, name in enumerate(AXES, 6):
+        off = beside.error[:, i]
+        beyond = np.where(np.isfinite(off), np.abs(off) > 2 * beside.sd[:, i], np.nan)
+        numbers[f"difference_{name}"] = shown(name, rms(off))
+        numbers[f"outside_{name}"] = mean(beyond)
+    turns = np.abs(matrix_to_euler(seen.poses.R_nb)[:, 0]) > TURNING
+    for word, rows in (("turning", turns), ("straight", ~turns)):
+        numbers[f"difference_{word}"] = shown("roll", rms(beside.error[rows, 6]))
+        numbers[f"rms_{word}"] = shown("roll", rms(own.error[rows, 6]))
+    rows = np.flatnonzero(seen.seen)
+    J = ground_jacobians(seen.poses.take(rows), seen.uv[rows], seen.plane_down[rows])
+    shift = np.linalg.solve(J.pixel, J.pose @ own.error[rows][:, _POSE, None])
+    far = np.hypot(*shift[:, :, 0].T)
+    return numbers | {"shift_px": rms(shift.ravel()), "largest_shift_px": float(np.nanmax(far))}
+
+
+def flight_numbers(flight: Flight, seen: Sighting) -> dict[str, float]:
+    """How a twin was flown, and over what.
+
+    Parameters
+    ----------
+    flight
+        With the nav source ``truth`` and inertial samples.
+    seen
+        What its camera saw.
+
+    Returns
+    -------
+    dict
+        ``detections``, ``pauses``; shares of the frames in which the airframe is ``turning`` and the target
+        ``moving`` faster than `SLOWEST_M_S`; ``crab`` (deg), RMS of heading minus course on straight legs;
+        ``settled``, for how long (s) there were inertial samples when the target was first seen.
+    """
+    nav = flight.nav["truth"]
+    p, R, _ = poses_at(nav, seen.times)
+    roll, _, yaw = matrix_to_euler(R).T
+    north, east = (np.interp(seen.times, nav["time_s"], nav[name]) for name in VELOCITY[:2])
+    turns = np.abs(roll) > TURNING
+    crab = wrap(yaw - np.arctan2(east, north))[~turns & np.isfinite(p[:, 0])]
+    return {
+        "detections": float(seen.seen.sum()),
+        "pauses": float(len(pauses(seen))),
+        "turning": float(turns.mean()),
+        "moving": mean(np.hypot(*seen.truth[:, 2:].T) > SLOWEST_M_S),
+        "crab": float(np.degrees(rms(crab))),
+        "settled": float(seen.times[0] - flight.table("imu")["time_s"].iloc[0]),
+    }
+
+
+def shown(name: str, value: float) -> float:
+    """A number of a pose for a reader: angles (by their name) in degrees, coordinates as they are."""
+    return float(np.degrees(value)) if name in AXES else value
+
+
+def mean(values: ArrayLike) -> float:
+    """Mean of the known values; NaN where there is none."""
+    array = np.asarray(values, float)
+    known = array[np.isfinite(array)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def rms(values: ArrayLike) -> float:
+    """Root mean square of the known values; NaN where there is none."""
+    return float(np.sqrt(mean(np.square(np.asarray(values, float)))))
+
+
+#: Standard deviation of a position as a share of the height, H 6.4.4: the only one that is printed.
+FRACTION = 0.05
+#: What the noise follows, each with what those before it follow.
+NOISES = ("noise-by-altitude", "noise-by-tilt", "noise-by-place")
+THINNED = "thinned"
+#: All variations of the filter here.
+VARIATIONS = (*NOISES, THINNED)
+
+
+def noise_by_altitude(height: ArrayLike, fraction: float = 0.05) -> Array:
+    """Georeferenced positions, H 6.2.4: standard deviation a fraction of the height above the plane.
+
+    Parameters
+    ----------
+    height
+        (N,) of the camera above the plane, m.
+    fraction
+        Without a unit, the same north and east; 0.05 is what H 6.4.4 flies with.
+
+    Returns
+    -------
+    R, (N, 2, 2), m^2.
+    """
+    sd = fraction * np.asarray(height, float)
+    return np.asarray(sd[:, None, None] ** 2 * np.eye(2))
+
+
+def noise_by_direction(rays: ArrayLike, height: ArrayLike, fraction: float = 0.05) -> Array:
+    """Georeferenced positions whose rays err by an angle: what H 8.2 proposes beyond the height alone.
+
+    A ray ``a`` off the vertical meets the plane at ``h / cos a``, and slantwise: an angle moves the point by
+    ``h / cos(a)^2`` times it along the ray's bearing, and by ``h / cos a`` across. A ray straight down has
+    the noise of `noise_by_altitude`.
+
+    Parameters
+    ----------
+    rays
+        (N, 3) in n, of any length: of the camera's axis, which the airframe's tilt turns, or of the pixel.
+    height
+        (N,) of the camera above the plane, m.
+    fraction
+        The angle's standard deviation about each axis across the ray, rad.
+
+    Returns
+    -------
+    R, (N, 2, 2), m^2; NaN at and above the horizon.
+
+    Examples
+    --------
+    >>> straight_down = [[0.0, 0.0, 2.0]]
+    >>> bool(np.allclose(noise_by_direction(straight_down, [200.0]), noise_by_altitude([200.0])))
+    True
+    """
+    d, h = np.asarray(rays, float), np.asarray(height, float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.where(d[:, 2:] > 0, d[:, :2] / d[:, 2:], np.nan)
+    # 1 / cos(a)^2 is one more than the slope's square: across once, and along once more.
+    steep = 1 + np.einsum("ni,ni->n", slope, slope)
+    shape = steep[:, None, None] * (np.eye(2) + slope[:, :, None] * slope[:, None, :])
+    return np.asarray((fraction * h)[:, None, None] ** 2 * shape)
+
+
+def noises_of(seen: Sighting, fraction: float = FRACTION) -> dict[str, Array]:
+    """Covariances (N, 2, 2) m^2 of a sighting's georeferenced detections, by `NOISES`.
+
+    By the height of the camera above the target's plane; by the direction of the camera's axis as well, which
+    roll and pitch turn away from the vertical; by the direction of the detection's own ray in its place.
+
+    Parameters
+    ----------
+    seen
+        From `wildlab.analysis.tracks.sighting.sighting`.
+    fraction
+        Of the height, per axis, for a ray straight down.
+
+    Returns
+    -------
+    dict
+        NaN where there is no pose; the last also where there is no detection.
+    """
+    height, R_nc = seen.plane_down - seen.poses.p_nc[:, 2], seen.poses.R_nc
+    ahead = np.column_stack([normalise(seen.poses.camera, seen.uv), np.ones(len(seen.uv))])
+    rays = np.einsum("nij,nj->ni", R_nc, ahead)
+    found = (
+        noise_by_altitude(height, fraction),
+        noise_by_direction(R_nc[:, :, 2], height, fraction),
+        noise_by_direction(rays, height, fraction),
+    )
+    return dict(zip(NOISES, found, strict=True))
+
+
+def interval_of_news(seen: Sighting, track: Track) -> float:
+    """From one detection to the next whose innovation is new, s; found without the truth.
+
+    Innovations of neighbouring images are alike. They are worth fewer independent ones than there are
+    (`effective_sample_size`); the interval is that of the detections times how many are worth one.
+
+    Parameters
+    ----------
+    seen
+        What was followed.
+    track
+        What a filter made of all of it.
+
+    Returns
+    -------
+    float
+        The larger one of the two elements; of one or two innovations the interval of the detections.
+    """
+    rows = np.isfinite(track.innovation).all(axis=1)
+    innovation, times = track.innovation[rows], seen.times[seen.seen]
+    usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    if len(innovation) < 3:
+        return usual
+    worth = min(effective_sample_size(one, len(one) - 1) for one in innovation.T)
+    return usual * len(innovation) / min(worth, len(innovation))
+
+
+def thinned(seen: Sighting, interval: float) -> Sighting:
+    """The same frames, but of the detections only such as are an interval (s) apart.
+
+    Parameters
+    ----------
+    seen
+        From `wildlab.analysis.tracks.sighting.sighting`.
+    interval
+        s.
+
+    Returns
+    -------
+    Sighting
+        With NaN in place of those left out.
+    """
+    kept = thin(seen.times, interval, seen.seen)[:, None]
+    return seen._replace(uv=np.where(kept, seen.uv, np.nan), positions=np.where(kept, seen.positions, np.nan))
+
+
+def follow_variations(seen: Sighting, tuning: CvTuning, track: Track) -> dict[str, tuple[Sighting, Track]]:
+    """A sighting through each of `VARIATIONS`: what the filter was given of it, and its track.
+
+    Parameters
+    ----------
+    seen
+        From `wildlab.analysis.tracks.sighting.sighting`.
+    tuning
+        Of the filter that all this varies, `wildlab.analysis.tracks.sighting.follow_positions`.
+    track
+        What that filter made of the sighting.
+
+    Returns
+    -------
+    dict
+    """
+    fewer = thinned(seen, interval_of_news(seen, track))
+    noisy = {name: (seen, follow_positions(seen, tuning, R)) for name, R in noises_of(seen).items()}
+    return noisy | {THINNED: (fewer, follow_positions(fewer, tuning))}
+
 
 #: Images nearer in time than this say the same of a pose whose error wanders over tens of seconds, s.
 APART_S = 1.0
@@ -122,7 +429,7 @@ def estimate_from_sighting(flight: Flight, seen: Sighting) -> PoseNoise:
     flight
         What it states of the pixel and of the ground's height is assumed.
     seen
-        From `wildlab.analysis.track.sighting`, with truth.
+        From `wildlab.analysis.tracks.sighting.sighting`, with truth.
 
     Returns
     -------

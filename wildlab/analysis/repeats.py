@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.diagnose import diagnose
-from wildlab.analysis.diagnosis import FEWEST_IMAGES, Diagnosis
+from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
 from wildlab.analysis.georeference import Observations, covariances_of, georeference
 from wildlab.errors import WildlabError
 from wildlab.evaluation.causes import mean_of_others

@@ -10,11 +10,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.consistency import Series, mean_of_runs, navigation_series
-from wildlab.analysis.following.filters import SMOOTHED
-from wildlab.analysis.following.follow import TOGETHER, WHITE, TrackingResult, follow_targets
-from wildlab.analysis.following.judged import FEW_INDEPENDENT, seen_of, verdict, worth_of_errors
-from wildlab.analysis.following.sensor_tracks import SensorTrack
 from wildlab.analysis.georeference import (
     assumed_deviations,
     assumed_pose_covariance,
@@ -25,12 +20,20 @@ from wildlab.analysis.navigate import MekfTuning, Navigated, navigate_mekf, navi
 from wildlab.analysis.navigation_errors import (
     REFERENCES,
     NavigationErrors,
+    Series,
     comparison_times,
     errors_against,
     flown_part,
+    mean_of_runs,
+    navigation_series,
     summarise,
 )
-from wildlab.analysis.track import FILTERS, CvTuning, follow_schmidt, sighting
+from wildlab.analysis.tracks import tracker
+from wildlab.analysis.tracks.filters import SMOOTHED
+from wildlab.analysis.tracks.judged import FEW_INDEPENDENT, seen_of, verdict, worth_of_errors
+from wildlab.analysis.tracks.sighting import FILTERS, CvTuning, follow_schmidt, sighting
+from wildlab.analysis.tracks.tracker import WHITE, TrackingResult
+from wildlab.analysis.tracks.tracks import TOGETHER, SensorTrack
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import Average, nees, position_nees
 from wildlab.evaluation.track_errors import summarise_track, track_errors
@@ -246,7 +249,7 @@ def track(
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
     filter
-        Of `wildlab.analysis.following.filters`: ``"ekf"``, ``"schmidt"``, ``"ukf"``, ``"imm"``,
+        Of `wildlab.analysis.tracks.filters`: ``"ekf"``, ``"schmidt"``, ``"ukf"``, ``"imm"``,
         ``"coloured"``, ``"thinned"``. Left out: the Schmidt filter where there are errors to consider, else
         the extended one. With a ``tuning``: ``"schmidt"``, ``"ekf"`` on pixels (H 7.4, 6.3), or ``"kf"`` on
         georeferenced positions (H 6.2).
@@ -293,7 +296,7 @@ def track(
         told = read_settings(Path(told))
     elif isinstance(told, Mapping):
         told = check_model(Settings, told, None)
-    found = follow_targets(
+    found = tracker.track(
         flight,
         settings=told,
         filters=[] if filter is None else [filter],

@@ -99,8 +99,7 @@ def camera(
         raise WildlabError("this file is there already", "name another, or add --overwrite", file=into)
     from rich.progress import track
 
-    from wildlab.analysis.camera import calibrate_images, camera_file
-    from wildlab.analysis.camera_text import sentences
+    from wildlab.analysis.camera import calibrate_images, camera_file, sentences
     from wildlab.detection.boards import Board
     from wildlab.flight.camera_file import write_camera
     from wildlab.flight.readers.frames.image import still_files

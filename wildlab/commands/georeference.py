@@ -37,8 +37,7 @@ def georeference(flight: Path, into: Path, overwrite: bool, source: str | None, 
 
     from wildlab.analysis.georeference import georeference as to_ground
     from wildlab.analysis.georeference import observe
-    from wildlab.analysis.ground import ground_sentences
-    from wildlab.analysis.ground_file import SUFFIXES, write_points
+    from wildlab.analysis.ground import SUFFIXES, ground_sentences, write_points
     from wildlab.flight.store import load_flight
     from wildlab.runner.evaluate import tell_source
 

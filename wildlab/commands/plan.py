@@ -164,8 +164,7 @@ def plan(
       wildlab plan fence.geojson --camera camera.toml --terrain dem.tif --animals 5 --into flight
       wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --into flight
     """
-    from wildlab.analysis.plans.command import plan_flight
-    from wildlab.analysis.plans.files import PAGE
+    from wildlab.analysis.plans.command import PAGE, plan_flight
     from wildlab.analysis.plans.wanted import Wanted
     from wildlab.files import write_atomic
 

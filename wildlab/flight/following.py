@@ -1,7 +1,7 @@
 """What a tracking filter is told of sensors and targets: ``[sensors.NAME]`` and ``[targets]`` of a flight, or
 a file of its own.
 
-Nothing of it has to be stated: `wildlab.analysis.following.noise_model` says what is assumed in its place.
+Nothing of it has to be stated: `wildlab.analysis.tracks.noise_model` says what is assumed in its place.
 """
 
 from __future__ import annotations

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.evaluate import score_points
 from wildlab.analysis.georeference import Observations, covariances_of, georeference, observe
-from wildlab.analysis.overviews.image_coverage import FLATTEST, ground_height
-from wildlab.analysis.overviews.lost import POSITION, ordered
+from wildlab.analysis.overviews.image_coverage import FLATTEST, POSITION, ground_height, ordered
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at
@@ -41,7 +40,7 @@ def scene_of(
     source
         Name of the ``nav`` table; left out, the best known one.
     estimates
-        A table of tracks, as `wildlab.analysis.following.estimates.estimates_table` makes it.
+        A table of tracks, as `wildlab.analysis.tracks.judged.estimates_table` makes it.
 
     ellipses
         Whether points on the ground get their covariance, which takes most of the time.

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wildlab.analysis.following.estimates import read_estimates
-from wildlab.analysis.following.judged import LEADING
 from wildlab.analysis.overviews.overview import length_of_way
+from wildlab.analysis.tracks.judged import LEADING, read_estimates
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.replay.gather import scene_of

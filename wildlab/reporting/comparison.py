@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.following.judged import LEADING
 from wildlab.analysis.overviews.verdict import Verdict
+from wildlab.analysis.tracks.judged import LEADING
 from wildlab.reporting.arrange import LIMITS, arranged
 from wildlab.reporting.charts.drawing import dots_chart
 from wildlab.reporting.glossary import with_glossary

@@ -14,10 +14,9 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis.accuracy import Accuracy
-from wildlab.analysis.diagnosis import CAUSES, Diagnosis
+from wildlab.analysis.diagnose import CAUSES, Diagnosis
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import georeference, heights_left_in
-from wildlab.analysis.overviews.recommendations import is_possible
 from wildlab.analysis.overviews.verdict import (
     FEW_POINTS,
     MANY_LOST,
@@ -25,6 +24,7 @@ from wildlab.analysis.overviews.verdict import (
     WORTH,
     Evidence,
     Verdict,
+    is_possible,
     verdict_of,
 )
 from wildlab.evaluation.ellipses import EllipseVerdict

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis.accuracy import Accuracy
-from wildlab.analysis.diagnosis import Diagnosis
+from wildlab.analysis.diagnose import Diagnosis
 from wildlab.analysis.evaluate import errors_of
-from wildlab.analysis.ground_file import points_geojson, with_axes
+from wildlab.analysis.ground import points_geojson, with_axes
 from wildlab.evaluation.axes import AlongAxis
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.overviews.alarms import (
+from wildlab.analysis.overviews.overview import (
     APART_M,
     APART_SD,
     APART_SHARE,
@@ -19,18 +19,25 @@ from wildlab.analysis.overviews.alarms import (
     JUMP_M,
     LEANT_DEG,
     Alarm,
+    Issue,
+    Overview,
     beside_satellites,
+    length_of_way,
+    troubled_for,
 )
-from wildlab.analysis.overviews.overview import Issue, Overview, length_of_way, troubled_for
-from wildlab.analysis.overviews.recommendations import (
+from wildlab.analysis.overviews.verdict import (
     LISTED,
     MOST,
+    WORTH,
     Gain,
+    Numbers,
+    Verdict,
     doubted,
     error_measured,
+    evidence_of,
     possible_gain,
+    verdict_of,
 )
-from wildlab.analysis.overviews.verdict import WORTH, Numbers, Verdict, evidence_of, verdict_of
 from wildlab.evaluation.vibration import FINE, FLOOR_HZ, HARMFUL
 from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS, gnss_times
 from wildlab.messages.message import Message
@@ -428,7 +435,7 @@ def show_overview(
     overview
         From `wildlab.analysis.overviews.overview.look_over`.
     gains, numbers
-        From `wildlab.analysis.overviews.recommendations`, and the numbers of the other reports behind them.
+        From `wildlab.analysis.overviews.verdict`, and the numbers of the other reports behind them.
     amiss
         What does not fit together: `wildlab.flight.checks.check.sense_sentences`.
     lacking

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 
+from wildlab.analysis.plans.command import origin_text
 from wildlab.analysis.plans.coverage import Covered
-from wildlab.analysis.plans.files import origin_text
 from wildlab.analysis.plans.plan import Plan
 from wildlab.analysis.plans.said import count, head_count, hectares, minutes, percent
 from wildlab.flight.readers.area import Area

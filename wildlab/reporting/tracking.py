@@ -1,6 +1,6 @@
 """The page on a flight's tracks: how wrong they are, and whether their filters know.
 
-What is said follows by rules from the table of tracks (`wildlab.analysis.following.judged.judged`); the words
+What is said follows by rules from the table of tracks (`wildlab.analysis.tracks.judged.judged`); the words
 lie in ``data/messages/en/tracking.toml``.
 """
 
@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.following.follow import TOGETHER, TrackingResult
-from wildlab.analysis.following.judged import (
+from wildlab.analysis.overviews.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
+from wildlab.analysis.tracks.judged import (
     CAUTIOUS,
     CONSISTENT,
     FEW_INDEPENDENT,
@@ -24,9 +24,9 @@ from wildlab.analysis.following.judged import (
     leading_filter,
     verdict,
 )
-from wildlab.analysis.following.noise_model import ROUGH, ToldValue
-from wildlab.analysis.following.tuned import Tuned
-from wildlab.analysis.overviews.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
+from wildlab.analysis.tracks.noise_model import ROUGH, ToldValue, Tuned
+from wildlab.analysis.tracks.tracker import TrackingResult
+from wildlab.analysis.tracks.tracks import TOGETHER
 from wildlab.flight.store import Flight
 from wildlab.messages.message import Message
 from wildlab.messages.page_texts import load_texts, significant
@@ -174,9 +174,9 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[Apart]) -> Verdict:
     Parameters
     ----------
     rows
-        From `wildlab.analysis.following.judged.judged`.
+        From `wildlab.analysis.tracks.judged.judged`.
     pairs
-        From `wildlab.analysis.following.judged.apart`.
+        From `wildlab.analysis.tracks.judged.apart`.
 
     Returns
     -------
@@ -433,7 +433,7 @@ def show_tracks(
     flight, followed
         The flight, and its tracks.
     rows, pairs
-        From `wildlab.analysis.following.judged`: a row a track, and sensors beside each other.
+        From `wildlab.analysis.tracks.judged`: a row a track, and sensors beside each other.
     tuned
         What another flight taught.
     source

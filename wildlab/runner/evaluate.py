@@ -10,10 +10,10 @@ from typing import Any
 import pandas as pd
 from rich.console import Console
 
-from wildlab.analysis.following.follow import refuse_unusable
-from wildlab.analysis.following.sensor_tuning import FEWEST
 from wildlab.analysis.navigation_errors import reference_of
 from wildlab.analysis.navigation_inputs import imu_noise
+from wildlab.analysis.tracks.sensor_tuning import FEWEST
+from wildlab.analysis.tracks.tracker import refuse_unusable
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.learnt import learnt_toml, read_learnt, refuse_other_camera

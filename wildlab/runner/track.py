@@ -13,11 +13,12 @@ from typing import Any, cast
 
 from rich.console import Console
 
-from wildlab.analysis.following.follow import refuse_unusable, sensors_with_detections
-from wildlab.analysis.following.noise_model import of_flight
-from wildlab.analysis.following.tuned import Against, refuse_same, tune_flight, tuned_text
-from wildlab.analysis.many.target_model import refuse_unfit as refuse_unfit_settings
-from wildlab.analysis.scans import sensors_of
+from wildlab.analysis.tracks.inputs import sensors_with_detections
+from wildlab.analysis.tracks.noise_model import Against, of_flight
+from wildlab.analysis.tracks.scans import sensors_of
+from wildlab.analysis.tracks.target_model import refuse_unfit as refuse_unfit_settings
+from wildlab.analysis.tracks.tracker import refuse_unusable
+from wildlab.analysis.tracks.tuned import refuse_same, tune_flight, tuned_text
 from wildlab.errors import WildlabError
 from wildlab.flight.following import Settings, read_settings
 from wildlab.flight.store import Flight, load_flight
@@ -74,7 +75,7 @@ def track_flight(
     against
         ``"truth"`` or ``"innovations"``: how it is tuned; truth where there is any, if left out.
     filters, targets, sensors, source
-        As `wildlab.analysis.following.follow.follow_targets`.
+        As `wildlab.analysis.tracks.tracker.track`.
     settings
         A settings file.
     **places
@@ -151,7 +152,7 @@ def track_many(
     Parameters
     ----------
     sensors, source
-        As `wildlab.analysis.many.follow.track_targets`.
+        As `wildlab.analysis.tracks.tracker.track`.
     settings
         A settings file.
     console, **places

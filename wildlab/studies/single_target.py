@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.measurement_noise import VARIATIONS
-from wildlab.analysis.track import Sighting
+from wildlab.analysis.pose_noise import VARIATIONS
+from wildlab.analysis.tracks.sighting import Sighting
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.reporting.charts.tracks import (
     error_over_time,

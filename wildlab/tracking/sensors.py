@@ -322,11 +322,27 @@ def merge(parts: Sequence[SensorMeasurements]) -> Merged:
         padded[:, :k, :size, :size] = block
         R_all[mine] = padded
     which, rows = which[order], rows[order]
-    sensor = combined([_of_rows(one.sensor, rows[which == i]) for i, one in enumerate(parts)], which)
+    own = [_of_rows(one.sensor, rows[which == i]) for i, one in enumerate(parts)]
+    sensor = combined(own, which) if len(own) > 1 else own[0]
     z_all, R_all = z_all[order], R_all[order]
     if K == 1:
         z_all, R_all = z_all[:, 0], R_all[:, 0]
     return Merged(np.concatenate(times)[order], z_all, R_all, sensor, which, rows)
+
+
+def cut(merged: Merged, rows: slice) -> Merged:
+    """Some rows, one after the other."""
+    sensor, first, n = merged.sensor, rows.start, len(merged.times)
+    if rows == slice(0, n):
+        return merged
+    part = sensor._replace(
+        predict=lambda row, state: sensor.predict(row + first, state),
+        rows=len(merged.times[rows]),
+        sizes=None if sensor.sizes is None else sensor.sizes[rows],
+        row_angles=None if sensor.row_angles is None else sensor.row_angles[rows],
+    )
+    times, z, R, _, which, own = merged
+    return Merged(times[rows], z[rows], R[rows], part, which[rows], own[rows])
 
 
 def _of_rows(sensor: Sensor, rows: NDArray[np.int64]) -> Sensor:

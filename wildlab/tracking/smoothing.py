@@ -208,7 +208,7 @@ def _smooth_plain(steps: Sequence[Step]) -> list[_Node]:
 def _smooth_considered(steps: Sequence[Step], errors: Errors) -> list[_Node]:
     """The smoother of the module."""
     n, k = len(steps[0].x), errors.k
-    known, unmoved = _filled(errors.covariance), np.eye(n)
+    known, unmoved = known_before(errors.covariance), np.eye(n)
     A, B, N = _updated(steps[-1], unmoved, np.zeros((n, k)), np.zeros((n, n)))
     x, P = steps[-1].x, steps[-1].P
     nodes = []
@@ -251,7 +251,7 @@ def _best_gain(by_state: Array, by_errors: Array, P_prior: Array, C_prior: Array
     return _over_known(cross, (spread + spread.T) / 2, np.sqrt(np.maximum(np.diag(P_prior), 0)))
 
 
-def _filled(covariance: Array) -> Array:
+def known_before(covariance: Array) -> Array:
     """(N, k, k) with the one before where there is none, and the first that is known before that."""
     known = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
     if not known.any():

@@ -15,8 +15,7 @@ from wildlab.analysis.animals.follow import (
     follow,
     next_look,
 )
-from wildlab.analysis.animals.frames import NONE
-from wildlab.analysis.animals.images import Detector, Images, footprint_circles, sight_from, take_images
+from wildlab.analysis.animals.images import NONE, Detector, Images, footprint_circles, sight_from, take_images
 from wildlab.analysis.animals.revisit import Aircraft, Patrolled, Visits, patrol
 from wildlab.analysis.plans.flown import ExecutionErrors
 from wildlab.geometry.camera import Camera

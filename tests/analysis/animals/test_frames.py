@@ -8,12 +8,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from wildlab.analysis.animals.frames import (
+from wildlab.analysis.animals.images import (
+    FURTHEST,
     NEAR,
     NONE,
     TOO_LARGE,
+    Detector,
     Frame,
     Framed,
+    Images,
     Scenery,
     Thermal,
     furnish,
@@ -22,7 +25,6 @@ from wildlab.analysis.animals.frames import (
     render_frame,
     take_frames,
 )
-from wildlab.analysis.animals.images import FURTHEST, Detector, Images
 from wildlab.analysis.plans.flown import ExecutionErrors
 from wildlab.detection.detections import Detections, describe
 from wildlab.geometry.camera import Camera

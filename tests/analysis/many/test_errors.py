@@ -17,7 +17,8 @@ from wildlab.analysis.georeference import (
     observe,
     pose_errors,
 )
-from wildlab.analysis.many.errors import (
+from wildlab.analysis.tracks.many import tracks_table
+from wildlab.analysis.tracks.places import (
     OF_COVARIANCE,
     LastingErrors,
     OfPose,
@@ -31,8 +32,8 @@ from wildlab.analysis.many.errors import (
     stated_roots,
     told_errors,
 )
-from wildlab.analysis.many.follow import track_targets, tracks_table
-from wildlab.analysis.scans import scans_of
+from wildlab.analysis.tracks.scans import scans_of
+from wildlab.analysis.tracks.tracker import track
 from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, rotation_vector_to_matrix
@@ -158,7 +159,7 @@ def test_a_heading_that_is_off_is_in_the_covariance_of_tracks():
     nees = []
     flight = robot_flight(heading_off_deg=3.0, labelled=False)
     for considered in ("", "[sensors.radar.considered.heading]\nsd_deg = 3.0\n"):
-        followed = track_targets(flight, settings=parse_settings(NOISE + considered))
+        followed = track(flight, "joint", settings=parse_settings(NOISE + considered))
         own = []
         for one in followed.shown[20:]:
             e = one.x[:, :2] - boat(np.array([one.time]))
@@ -226,7 +227,7 @@ def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one():
 
 def test_tables_of_tracks_are_smoothed_by_what_lasts():
     told = NOISE + "[sensors.radar.considered.heading]\nsd_deg = 3.0\ncorrelation_time_s = 5.0\n"
-    followed = track_targets(robot_flight(labelled=False, seconds=60.0), settings=parse_settings(told))
+    followed = track(robot_flight(labelled=False, seconds=60.0), "joint", settings=parse_settings(told))
     table = tracks_table(followed)
     after = smooth_many(followed.shown, followed.targets.density, followed.lasting_s)
     forever = smooth_many(followed.shown, followed.targets.density, [np.inf])
@@ -239,7 +240,7 @@ def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_la
     flight = robot_flight(labelled=False, seconds=30.0)
     covariances = []
     for more in ("", "[sensors.radar]\ncorrelation = 0.0\n", "[sensors.radar]\ncorrelation = 0.8\n"):
-        table = tracks_table(track_targets(flight, settings=parse_settings(more + NOISE)))
+        table = tracks_table(track(flight, "joint", settings=parse_settings(more + NOISE)))
         assert np.isfinite(table["smoothed_north_m"]).all()
         covariances.append(float(table["smoothed_p_00"].mean()) if "smoothed_p_00" in table else np.nan)
     assert np.isnan(covariances[0]) and covariances[2] > 1.5 * covariances[1]

@@ -11,8 +11,8 @@ import pytest
 from tests.analysis.robots import believed, boat, robot, robot_flight
 from tests.refused import refused
 from wildlab.analysis.georeference import georeference, observe
-from wildlab.analysis.many.places import PlacedLooks, _of_ranges, places_of, sees_of
-from wildlab.analysis.scans import Scans, scans_of
+from wildlab.analysis.tracks.places import PlacedLooks, _of_ranges, places_of, sees_of
+from wildlab.analysis.tracks.scans import Scans, scans_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses

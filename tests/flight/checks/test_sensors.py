@@ -10,7 +10,7 @@ import pytest
 
 from tests.flight.checks.watching import level_poses, watch
 from tests.flight.conftest import table
-from wildlab.analysis.scans import scans_of
+from wildlab.analysis.tracks.scans import scans_of
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding

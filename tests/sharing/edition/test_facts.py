@@ -8,9 +8,9 @@ import pytest
 
 from tests.analysis.robots import KNOWN, robot_flight
 from tests.sharing.edition.flights import flight, overview, report
-from wildlab.analysis.following.follow import follow_targets
-from wildlab.analysis.following.judged import judged
-from wildlab.analysis.overviews.recommendations import numbers_of
+from wildlab.analysis.overviews.verdict import numbers_of
+from wildlab.analysis.tracks.judged import judged
+from wildlab.analysis.tracks.tracker import track
 from wildlab.flight.following import parse_settings
 from wildlab.reporting import tracking
 from wildlab.reporting.metrics import read_metrics
@@ -96,7 +96,7 @@ def test_whether_a_camera_detected_anything(pictured, others):
 def test_a_filter_is_as_sure_as_the_tracking_report_found(off_deg, tmp_path):
     """Through the report's own metrics.json: a filter that knows of no error of the heading."""
     settings = parse_settings(KNOWN)
-    followed = follow_targets(robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=settings)
+    followed = track(robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=settings)
     made = open_report(study="f-tracking", kind="logged", flight="f", out=str(tmp_path))
     rows = judged(followed)
     tracking.record(made, rows)

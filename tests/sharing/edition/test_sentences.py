@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
-from wildlab.analysis.overviews.alarms import ALARMS
-from wildlab.analysis.overviews.recommendations import CAUSES
-from wildlab.analysis.overviews.verdict import PARTS, Verdict
+from wildlab.analysis.overviews.overview import ALARMS
+from wildlab.analysis.overviews.verdict import CAUSES, PARTS, Verdict
 from wildlab.messages.catalogue import languages, load_language, say
 from wildlab.messages.message import Message, length
 from wildlab.sharing.edition.facts import _TROUBLES, Alarm, Facts, Gain

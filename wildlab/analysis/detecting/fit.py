@@ -1,24 +1,393 @@
-"""Thresholds chosen from labelled frames, and judged on frames that they were not chosen from."""
+"""Thresholds, shapes and parts chosen from labelled frames, and judged on frames that they were not chosen
+from.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.detecting.detect import detect_frame
+from wildlab.analysis.detecting.judged import ELLIPSE
 from wildlab.analysis.detecting.methods import METHODS
-from wildlab.detection.contrast import Contrast
+from wildlab.detection.contrast import Contrast, Proposals, propose
+from wildlab.detection.detections import Detections
+from wildlab.detection.shape import PERMISSIVE, Shape, choose, fit_shape
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.detection.warm import Warm
+from wildlab.detection.warm import Warm, to_grey
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates
+from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.flight.readers.frames import Frame
+from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.frames import Array
 
-Array = NDArray[np.float64]
+Counts = NDArray[np.intp]
+
+#: What is tried: where regions come from and end, how far detections are apart, how sure they are at least.
+REGIONS = tuple(
+    replace(PERMISSIVE, window_px=window, of_peak=share) for window in (41, 81) for share in (0.0, 0.4, 0.6)
+)
+APART = (0.0, 10.0, 20.0)
+LEAST = tuple(np.arange(-3.0, 2.1, 0.5).tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Regions of one frame, which of them belong to a label, and which are judged at all."""
+
+    proposals: Proposals
+    wanted: NDArray[np.bool_]
+    judged: NDArray[np.bool_]
+
+
+def fit_shapes(
+    samples: Sequence[Sample], *, rule: Rule | None = None, tell: Callable[[int, int], None] | None = None
+) -> Fitted:
+    """Learn a classifier of shapes, and judge each frame with one that did not see its group.
+
+    Parameters
+    ----------
+    samples
+        Labelled frames of three groups or more: thresholds are chosen inside those that it learns from.
+    rule
+        When a detection and a label belong together.
+    tell
+        Called with how many steps are done, and of how many.
+
+    Returns
+    -------
+    Fitted
+        ``defaults`` is that of regions without a classifier.
+
+    Raises
+    ------
+    WildlabError
+        Where there are fewer than three groups, or no label at all.
+    """
+    groups = checked_groups(samples, 3)
+    names = list(dict.fromkeys(groups.tolist()))
+    seen: list[list[_Seen]] = []
+    for at, sample in enumerate(samples):
+        seen.append([_look(sample, number, rule) for number in range(len(REGIONS))])
+        if tell:
+            tell(at + 1, len(samples) + len(names) + 1)
+    held_out = np.zeros((len(samples), 3), np.intp)
+    chosen: dict[str, Shape] = {}
+    for at, name in enumerate(names):
+        learnt = _learn(seen, samples, groups, np.flatnonzero(groups != name), rule)
+        chosen[name] = learnt
+        for row in np.flatnonzero(groups == name).tolist():
+            held_out[row] = _count(choose(_of(seen[row], learnt), learnt), samples[row], rule)
+        if tell:
+            tell(len(samples) + at + 1, len(samples) + len(names) + 1)
+    everywhere = range(len(samples))
+    final = _learn(seen, samples, groups, np.arange(len(samples)), rule)
+    inside = [_count(choose(_of(seen[row], final), final), samples[row], rule) for row in everywhere]
+    raw = [_count(seen[row][-1].proposals.detections, samples[row], rule) for row in everywhere]
+    if tell:
+        tell(len(samples) + len(names) + 1, len(samples) + len(names) + 1)
+    labels = groups.tolist()
+    tried = len(REGIONS) * len(APART) * len(LEAST)
+    out, at_home, plain = (rates(one, labels) for one in (held_out, np.array(inside), np.array(raw)))
+    return Fitted(final, out, at_home, plain, held_out, chosen, tried)
+
+
+def _look(sample: Sample, number: int, rule: Rule | None) -> _Seen:
+    frame = sample.frame
+    regions = replace(REGIONS[number], warm_is_bright=frame.polarity != "black-hot")
+    image = frame.image if frame.image.ndim == 2 else to_grey(frame.image)
+    proposals = propose(image, frame.valid, regions)
+    found = match(_boxes(proposals.detections), sample.boxes, rule, sample.ignore)
+    wanted = np.zeros(len(proposals.detections), bool)
+    wanted[found.pairs[:, 0]] = True
+    judged = np.ones(len(wanted), bool)
+    judged[found.ignored] = False
+    return _Seen(proposals, wanted, judged)
+
+
+def _of(seen: Sequence[_Seen], learnt: Shape) -> Proposals:
+    """The regions of a frame that a classifier was learnt for."""
+    return seen[REGIONS.index(learnt.regions)].proposals
+
+
+def _learn(
+    seen: Sequence[Sequence[_Seen]],
+    samples: Sequence[Sample],
+    groups: NDArray[np.str_],
+    rows: NDArray[np.intp],
+    rule: Rule | None,
+) -> Shape:
+    """The classifier of some frames; how sure and how far apart by leaving out group after group."""
+    best: tuple[float, Shape] | None = None
+    inner = list(dict.fromkeys(groups[rows].tolist()))
+    for number, regions in enumerate(REGIONS):
+        counts = np.zeros((len(APART), len(LEAST), 3), np.intp)
+        for name in inner:
+            learnt = _fit(seen, number, rows[groups[rows] != name])
+            if learnt is None:
+                continue
+            for row in rows[groups[rows] == name].tolist():
+                counts += _counts_of(seen[row][number].proposals, learnt, samples[row], rule)
+        found, invented, missed = np.moveaxis(counts, -1, 0).astype(float)
+        f1 = 2 * found / np.maximum(2 * found + invented + missed, 1)
+        a, b = np.unravel_index(int(np.argmax(f1)), f1.shape)
+        whole = _fit(seen, number, rows)
+        if whole is not None and (best is None or f1[a, b] > best[0]):
+            best = float(f1[a, b]), replace(whole, regions=regions, apart_px=APART[a], least=LEAST[b])
+    # Without a label in these frames nothing can be learnt: nothing is found then.
+    return best[1] if best is not None else _nothing()
+
+
+def _nothing() -> Shape:
+    columns = 2 * 9
+    return Shape(REGIONS[0], (0.0,) * columns, (1.0,) * columns, (0.0,) * columns, -100.0)
+
+
+def _fit(seen: Sequence[Sequence[_Seen]], number: int, rows: NDArray[np.intp]) -> Shape | None:
+    some = [seen[row][number] for row in rows.tolist()]
+    wanted = np.concatenate([one.wanted[one.judged] for one in some]) if some else np.zeros(0, bool)
+    if not 0 < wanted.sum() < len(wanted):
+        return None
+    features = np.concatenate([one.proposals.features[one.judged] for one in some])
+    return fit_shape(features, wanted, REGIONS[number])
+
+
+def _counts_of(proposals: Proposals, learnt: Shape, sample: Sample, rule: Rule | None) -> Counts:
+    """(A, L, 3) found, invented and missed for every distance and every sureness."""
+    result = np.zeros((len(APART), len(LEAST), 3), np.intp)
+    for a, apart in enumerate(APART):
+        # The surest of those that are near each other is the same for every limit below it.
+        kept = choose(proposals, replace(learnt, least=LEAST[0], apart_px=apart))
+        for b, least in enumerate(LEAST):
+            result[a, b] = _count(kept.select(kept.score >= least), sample, rule)
+    return result
+
+
+def _count(found: Detections, sample: Sample, rule: Rule | None) -> Counts:
+    return match(_boxes(found), sample.boxes, rule, sample.ignore).counts
+
+
+def _boxes(found: Detections) -> NDArray[np.float64]:
+    return np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
+
+
+class Found(NamedTuple):
+    """Labels that were found: where from the detection they lie, and what is known of the detection.
+
+    Attributes
+    ----------
+    off
+        (N, 2) from the detection to the middle of its label, px.
+    covariance
+        (N, 2, 2) of the detection without any part, px^2.
+    major
+        (N,) its major axis, px.
+    """
+
+    off: Array
+    covariance: Array
+    major: Array
+
+    def inside(self, part: float) -> NDArray[np.bool_]:
+        """(N,) bool: whether the 90 % ellipses with that part hold the labels."""
+        wider = (part * self.major)[:, None, None] ** 2 * np.eye(2)
+        return inside_ellipse(self.off, self.covariance + wider, ELLIPSE)
+
+
+def parts_needed(found: Found) -> Array:
+    """The part with which each ellipse just reaches its label.
+
+    Parameters
+    ----------
+    found
+        N of them.
+
+    Returns
+    -------
+    (N,) shares of the major axis; 0 where the ellipse is wide enough without.
+    """
+    reach = -2 * np.log(1 - ELLIPSE)
+    powers, directions = np.linalg.eigh(found.covariance)
+    a, b = np.moveaxis(np.einsum("nij,ni->nj", directions, found.off) ** 2 / reach, -1, 0)
+    first, second = np.moveaxis(powers, -1, 0)
+    # Of a / (first + s) + b / (second + s) = 1 the larger s.
+    half = (first + second - a - b) / 2
+    rest = first * second - a * second - b * first
+    s = -half + np.sqrt(np.maximum(half**2 - rest, 0.0))
+    return np.asarray(np.sqrt(np.maximum(s, 0.0)) / found.major)
+
+
+def part_of(needed: ArrayLike) -> float:
+    """The part that holds the next label with the ellipses' probability.
+
+    Parameters
+    ----------
+    needed
+        (N,) of `parts_needed`.
+
+    Returns
+    -------
+    float
+        Of N + 1 that are alike the next is any: so it is the one at nine tenths of these, not of N. NaN of
+        fewer than nine, which no part can be said of.
+
+    Examples
+    --------
+    >>> part_of([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]), part_of([0.1] * 8)
+    (0.9, nan)
+    """
+    ordered = np.sort(np.asarray(needed, float))
+    at = int(np.ceil(ELLIPSE * (len(ordered) + 1) - 1e-9))
+    return float(ordered[at - 1]) if at <= len(ordered) else float("nan")
+
+
+def found_labels(method: str, samples: Sequence[Sample], thresholds: Any, rule: Rule | None = None) -> Found:
+    """Labels that a method finds, with its ellipses as they are without any part.
+
+    Parameters
+    ----------
+    method, thresholds
+        Of those that have a part.
+    samples
+        Labelled frames.
+    rule
+        When a detection and a label belong together.
+
+    Returns
+    -------
+    Found
+    """
+    bare = with_part(thresholds, 0.0)
+    parts: list[tuple[Array, Array, Array]] = []
+    for sample in samples:
+        found = detect_frame(sample.frame, method, bare)
+        boxes = np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
+        pairs = match(boxes, sample.boxes, rule, sample.ignore).pairs
+        if len(pairs):
+            own, label = pairs.T
+            middle = sample.boxes[label, :2] + sample.boxes[label, 2:] / 2
+            parts.append((middle - found.uv[own], found.covariance[own], found.axes[own, 0]))
+    if not parts:
+        return Found(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0))
+    return Found(*(np.concatenate(one) for one in zip(*parts, strict=True)))
+
+
+def part_in(thresholds: Any) -> float | None:
+    """The part of thresholds; None of such that have none."""
+    own = getattr(thresholds, "regions", thresholds)
+    return getattr(own, "part", None)
+
+
+def with_part(thresholds: Any, part: float) -> Any:
+    """The same thresholds with another part."""
+    if hasattr(thresholds, "regions"):
+        return replace(thresholds, regions=replace(thresholds.regions, part=part))
+    return replace(thresholds, part=part)
+
+
+class PartFit(NamedTuple):
+    """A part, and what choosing it so is worth.
+
+    Attributes
+    ----------
+    part
+        Chosen by all labels that were found; NaN of too few.
+    labels
+        How many these are.
+    held_out
+        Which share of labels the ellipses hold, each with a part that was chosen without its group; None
+        where there were too few.
+    """
+
+    part: float
+    labels: int
+    held_out: Interval | None
+
+    def as_plain(self) -> dict[str, Any]:
+        """For a JSON file."""
+        names = ("estimate", "low", "high")
+        return {
+            "part": round(self.part, 5) if np.isfinite(self.part) else None,
+            "labels_found": self.labels,
+            "held_out_coverage_90": None
+            if self.held_out is None
+            else {name: round(value, 4) for name, value in zip(names, self.held_out, strict=True)},
+        }
+
+
+def fit_part(
+    method: str,
+    samples: Sequence[Sample],
+    thresholds: Any,
+    rule: Rule | None = None,
+) -> PartFit | None:
+    """The part of ellipses from labelled frames, judged on groups that it was not chosen from.
+
+    Parameters
+    ----------
+    method, thresholds
+        What finds them.
+    samples
+        Labelled frames of two groups or more.
+    rule
+        When a detection and a label belong together.
+
+    Returns
+    -------
+    PartFit, or None for a method whose ellipses have no part.
+    """
+    if part_in(thresholds) is None:
+        return None
+    found = [found_labels(method, [one], thresholds, rule) for one in samples]
+    needed = [parts_needed(one) for one in found]
+    groups = [one.group for one in samples]
+    inside: list[NDArray[np.bool_]] = []
+    for name in dict.fromkeys(groups):
+        part = part_of(np.concatenate([n for n, group in zip(needed, groups, strict=True) if group != name]))
+        if np.isfinite(part):
+            inside += [one.inside(part) for one, group in zip(found, groups, strict=True) if group == name]
+    held = np.concatenate([np.zeros(0, bool), *inside])
+    every = np.concatenate(needed)
+    share = share_interval(int(held.sum()), len(held)) if len(held) else None
+    return PartFit(part_of(every), len(every), share)
+
+
+def part_sentence(fit: PartFit, default: float) -> str:
+    """What was chosen, from how many labels, and what it holds of others.
+
+    Parameters
+    ----------
+    fit
+        Of a run.
+    default
+        What holds where nothing could be chosen.
+
+    Returns
+    -------
+    str
+    """
+    if not np.isfinite(fit.part):
+        return (
+            f"Ellipses keep the default part of {100 * default:.3g} % of the length: {fit.labels} labels "
+            "were found, and nine are the fewest that one can be chosen from."
+        )
+    start = (
+        f"So that 90 % ellipses hold the labels' middles, {100 * fit.part:.2g} % of the length is taken for "
+        f"what is not seen ({fit.labels} labels were found)"
+    )
+    if fit.held_out is None:
+        return f"{start}; what it holds of others is not known."
+    share = fit.held_out
+    return (
+        f"{start}; of labels that it was not chosen from they hold {100 * share.estimate:.0f} % "
+        f"({100 * share.low:.0f} to {100 * share.high:.0f})."
+    )
+
 
 #: What is tried of each threshold. Lengths in px and levels go up by about a half, as what they gain does.
 GRIDS: dict[str, dict[str, tuple[Any, ...]]] = {

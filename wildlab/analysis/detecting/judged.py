@@ -1,9 +1,12 @@
-"""Detections of a run beside labels of the same frames: what was found, missed and invented."""
+"""Detections of a run beside labels of the same frames, and detectors beside each other: what was found and
+missed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +16,9 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates
 from wildlab.evaluation.runs import Interval, share_interval
-from wildlab.flight.readers.labels import Labels
+from wildlab.evaluation.score_curve import Curve, ScoredFrame, curve_along_score, difference_of_f1
+from wildlab.flight.files import printable
+from wildlab.flight.readers.labels import Labels, choose_classes, read_labels
 from wildlab.geometry.ellipses import inside_ellipse
 
 #: Probability of the ellipses that are held against labels.
@@ -288,3 +293,297 @@ def _about(own: pd.DataFrame, boxes: NDArray[np.float64]) -> NDArray[np.float64]
     """Boxes of the same sizes about the centroids: it is these that are the detections."""
     uv = own[["u_px", "v_px"]].to_numpy(float)
     return np.concatenate([uv - boxes[:, 2:] / 2, boxes[:, 2:]], axis=1)
+
+
+NOTHING = np.zeros((0, 4))
+
+
+@dataclass(frozen=True, eq=False)
+class Other:
+    """What another detector found.
+
+    Attributes
+    ----------
+    name
+        How it is called.
+    boxes
+        Its boxes, of the classes that are judged.
+    classes
+        Which of its classes are taken.
+    told
+        Sentences on what was made of its file.
+    """
+
+    name: str
+    boxes: Labels
+    classes: tuple[str, ...]
+    told: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """What a detector is worth on the frames that are judged.
+
+    Attributes
+    ----------
+    name
+        How it is called.
+    rates
+        Of all its boxes.
+    curve
+        Along its score; None where not each box has one.
+    lowest
+        The lowest score of a box that is judged; NaN where boxes have none.
+    beyond
+        F1 of this detector minus that of the first one, with an interval over the same draws.
+    told
+        Sentences on what is not judged.
+    """
+
+    name: str
+    rates: Rates
+    curve: Curve | None
+    lowest: float
+    beyond: Interval
+    told: tuple[str, ...]
+
+    def as_plain(self) -> dict[str, Any]:
+        """Numbers for JSON, None in place of NaN.
+
+        Returns
+        -------
+        dict
+        """
+
+        def plain(values: Sequence[float]) -> dict[str, float | None]:
+            named = zip(("estimate", "low", "high"), values, strict=True)
+            return {key: round(one, 4) if np.isfinite(one) else None for key, one in named}
+
+        found: dict[str, Any] = {"name": self.name, **plain_rates(self.rates)}
+        found["average_precision"] = None if self.curve is None else plain(self.curve.average_precision)
+        found["lowest_score"] = self.lowest if np.isfinite(self.lowest) else None
+        return found | {"f1_beyond_ours": plain(self.beyond), "told": list(self.told)}
+
+
+def named_file(text: str) -> tuple[str, Path]:
+    """Name and file of another detector, from ``name=file`` or a file alone.
+
+    Parameters
+    ----------
+    text
+        As it was given; a file that is there is never taken apart.
+
+    Returns
+    -------
+    str, Path
+
+    Examples
+    --------
+    >>> named_file("yolo=runs/labels")
+    ('yolo', PosixPath('runs/labels'))
+    """
+    name, sign, rest = text.partition("=")
+    if sign and name and rest and not _exists(Path(text)):
+        return name, Path(rest)
+    return Path(text).stem or text, Path(text)
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # a name that is too long, a folder that is closed
+        return False
+
+
+def read_others(
+    files: Sequence[str], labels: Labels, classes: tuple[str, ...] = (), own: tuple[str, ...] = ()
+) -> list[Other]:
+    """Boxes of other detectors.
+
+    Parameters
+    ----------
+    files
+        As `named_file` takes them.
+    labels
+        The truth.
+    classes
+        Which classes of the labels are looked for.
+    own
+        Which classes of the other detectors are meant by that; empty takes those of the same names, or all
+        where a detector has none of these.
+
+    Returns
+    -------
+    list of Other
+
+    Raises
+    ------
+    WildlabError
+        As `read_labels`, and where two have one name, or a detector has none of its own classes.
+    """
+    found: list[Other] = []
+    for text in files:
+        name, path = named_file(text)
+        if name in {one.name for one in found}:
+            raise WildlabError(
+                f"two detectors are called {printable(name)!r}",
+                "name them, as in --also one=FILE",
+            )
+        every = read_labels(path, truth=labels)
+        known = tuple(one for one in every.marked.known_kinds if one)
+        taken = tuple(one for one in own or classes if one in known)
+        if own and not taken:
+            there = ", ".join(printable(one) for one in known[:20]) or "none"
+            raise WildlabError(f"has none of the classes {', '.join(own)}", f"there are {there}", file=path)
+        told = [f"{count} x {reason}" for reason, count in every.marked.left_out.items()]
+        told = [f"Left out: {'; '.join(told)}."] if told else []
+        if classes and not taken and known:
+            some = ", ".join(printable(one) for one in known[:8])
+            told.append(f"All its classes are taken ({some}): none is called {', '.join(classes)}.")
+        boxes = choose_classes(every.marked, path, taken) if taken else every
+        found.append(Other(printable(name), boxes, taken, tuple(told)))
+    return found
+
+
+def compare_detectors(
+    name: str,
+    detections: pd.DataFrame,
+    others: Sequence[Other],
+    frames: pd.DataFrame,
+    labels: Labels,
+    rule: Rule | None = None,
+) -> list[Compared]:
+    """Our detections and those of others, each against the same labels.
+
+    Parameters
+    ----------
+    name
+        What ours are called.
+    detections, frames
+        As `wildlab.analysis.detect.Detected` has them.
+    others
+        From `read_others`.
+    labels
+        The truth. All frames that it names and the run has are judged, for everyone.
+    rule
+        When a detection and a label belong together.
+
+    Returns
+    -------
+    list of Compared
+        Ours first.
+
+    Raises
+    ------
+    WildlabError
+        Where a file says that a frame is of another size.
+    """
+    judged = []
+    columns = (frames[one] for one in ("frame_id", "width_px", "height_px"))
+    for frame, width, height in zip(*columns, strict=True):
+        if (known := labels.name_of(str(frame))) is not None:
+            judged.append((str(frame), known, int(width), int(height)))
+    truth = [labels.boxes_of(frame, known, width, height) for frame, known, width, height in judged]
+    groups = [labels.group[known] for _, known, _, _ in judged]
+    ours = boxes_by_frame(detections)
+    empty = (NOTHING, np.zeros(0))
+    sets: list[tuple[str, list[Any], tuple[str, ...]]] = [
+        (name, [ours.get(frame, empty) for frame, _, _, _ in judged], ())
+    ]
+    for other in others:
+        boxes, told = _of_other(other, judged, labels.marked.relative)
+        sets.append((other.name, boxes, (*other.told, *told)))
+    result: list[Compared] = []
+    first = None
+    for called, found, told in sets:
+        scored = [ScoredFrame(a[0], a[1], b[0], b[1]) for a, b in zip(found, truth, strict=True)]
+        counts = np.array([match(one.boxes, one.labels, rule, one.ignore).counts for one in scored])
+        first = counts if first is None else first
+        scores = np.concatenate([np.zeros(0), *(one.scores for one in scored)])
+        complete = bool(np.isfinite(scores).all())
+        curve = curve_along_score(scored, groups, rule) if complete else None
+        lowest = float(scores.min()) if complete and len(scores) else float("nan")
+        beyond = difference_of_f1(counts, first, groups)
+        result.append(Compared(called, rates(counts, groups), curve, lowest, beyond, told))
+    return result
+
+
+def _of_other(
+    other: Other, judged: list[tuple[str, str, int, int]], relative: bool
+) -> tuple[list[tuple[Any, Any]], tuple[str, ...]]:
+    """Boxes and scores of each judged frame, and what is to be told of the others."""
+    boxes, seen = [], set()
+    without, sizeless = 0, 0
+    for frame, _, width, height in judged:
+        name = other.boxes.name_of(frame)
+        if name is None:
+            without += 1
+            boxes.append((NOTHING, np.zeros(0)))
+            continue
+        seen.add(name)
+        own, scores = other.boxes.boxes_of(frame, name, width, height)[0], other.boxes.scores[name]
+        if not width and (relative or other.boxes.marked.relative):
+            # Shares of an image that could not be read are nowhere: boxes on it cannot be right or wrong.
+            sizeless += len(own)
+            own, scores = NOTHING, np.zeros(0)
+        boxes.append((own, scores))
+    told = []
+    beside = {name: len(own) for name, own in other.boxes.boxes.items() if name not in seen}
+    if beside:
+        told.append(
+            f"Not judged: {sum(beside.values())} boxes on {len(beside)} images that are not among the "
+            f"{len(judged)} judged."
+        )
+    if without:
+        told.append(f"It says nothing of {without} of the {len(judged)} judged frames: nothing found there.")
+    if sizeless:
+        told.append(f"Not judged: {sizeless} boxes on images that could not be read.")
+    return boxes, tuple(told)
+
+
+def curve_table(compared: Sequence[Compared]) -> pd.DataFrame:
+    """Precision and recall along the score, of all detectors that have scores.
+
+    Parameters
+    ----------
+    compared
+        From `compare_detectors`.
+
+    Returns
+    -------
+    DataFrame
+        ``detector``, ``score``, ``found``, ``invented``, ``missed``, ``precision``, ``recall``, ``f1``; a row
+        for each level.
+    """
+    columns = ["detector", "score", "found", "invented", "missed", "precision", "recall", "f1"]
+    rows: list[tuple[Any, ...]] = []
+    for one in compared:
+        if one.curve is not None:
+            numbers = np.column_stack([one.curve.levels, one.curve.counts, *one.curve[2:5]])
+            rows += [(one.name, *row) for row in numbers.tolist()]
+    table = pd.DataFrame(rows, columns=columns)
+    return table.astype({"found": int, "invented": int, "missed": int})
+
+
+def compared_sentences(one: Compared, first: Compared) -> list[str]:
+    """What came out for a detector, as lines that are printed.
+
+    Parameters
+    ----------
+    one
+        The detector.
+    first
+        Ours, whose rates are printed already.
+
+    Returns
+    -------
+    list of str
+    """
+    plain = one.as_plain()
+    area, beyond = plain["average_precision"], plain["f1_beyond_ours"]
+    lines = [] if one is first else [f"{one.name}, all its boxes: {rates_sentence(plain)}"]
+    if area is not None and area["estimate"] is not None and plain["lowest_score"] is not None:
+        lines.append(f"{one.name}, along the score: average precision {rate_words(area)}.")
+    if one is not first and beyond["estimate"] is not None:
+        lines.append(f"{one.name}, F1 minus that of {first.name}: {rate_words(beyond, '+')}.")
+    return lines + [f"{one.name}: {line}" for line in one.told]

@@ -1,19 +1,254 @@
-"""What a flight is planned for: the aircraft, the camera, the rules; and which numbers are no such thing."""
+"""What a flight is planned for: the aircraft, the camera, the rules, the areas; and which numbers are no such
+thing.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.readers.area import Area, crossing, ring_area
 from wildlab.flight.terrain_model import TerrainSays
 from wildlab.flight.writers.mission import Heights, Vehicle
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array
+from wildlab.geometry.georeference import intersect_plane, pixel_rays
+from wildlab.planning.areas import contains, edge_directions
+from wildlab.planning.courses import fly
+from wildlab.planning.gimbal import GimbalAngles, camera_attitudes
+from wildlab.planning.patterns import lawn_mower
+
+#: Points to a side on which overlapping areas are counted.
+ACROSS = 200
+
+
+def simplified(ring: Array, tolerance: float) -> Array:
+    """A ring with fewer corners, none of which lies further from it than a tolerance (Douglas and Peucker).
+
+    Parameters
+    ----------
+    ring
+        (K, 2) metres, not closed, that does not cross itself.
+    tolerance
+        Metres; corners that lie nearer to the simpler ring are left out.
+
+    Returns
+    -------
+    (L, 2) metres, some of the corners in their order. The ring itself where the simpler one would cross
+    itself or bound next to nothing.
+
+    Examples
+    --------
+    >>> ring = np.array([[0.0, 0.0], [0.0, 50.0], [0.2, 100.0], [100.0, 100.0], [100.0, 0.0]])
+    >>> print(len(simplified(ring, 1.0)))
+    4
+    """
+    if len(ring) <= 4:
+        return ring
+    # Two corners far apart are kept for certain; each half between them is thinned by itself.
+    first = int(np.argmax(((ring - ring.mean(axis=0)) ** 2).sum(axis=1)))
+    turned = np.roll(ring, -first, axis=0)
+    far = int(np.argmax(((turned - turned[0]) ** 2).sum(axis=1)))
+    closed = np.concatenate([turned, turned[:1]])
+    kept = {0, far}
+    todo = [(0, far), (far, len(closed) - 1)]
+    while todo:
+        begin, end = todo.pop()
+        if end - begin < 2:
+            continue
+        off = _distances(closed[begin + 1 : end], closed[begin], closed[end])
+        worst = int(np.argmax(off))
+        if off[worst] > tolerance:
+            middle = begin + 1 + worst
+            kept.add(middle)
+            todo += [(begin, middle), (middle, end)]
+    simpler = turned[sorted(kept)]
+    if len(simpler) < 3 or ring_area(simpler) < ring_area(ring) / 2 or crossing(simpler) is not None:
+        return ring
+    return simpler
+
+
+def sizes_alone(areas: Sequence[Area]) -> dict[str, float]:
+    """How much of each area lies in no area before it: together, what all of them cover.
+
+    Parameters
+    ----------
+    areas
+        Outlines and holes in n.
+
+    Returns
+    -------
+    dict
+        Square metres, by name. Where areas overlap, counted on `ACROSS` points to a side.
+    """
+    found = {}
+    for k, area in enumerate(areas):
+        low, high = area.outline.min(axis=0), area.outline.max(axis=0)
+        near = [
+            one
+            for one in areas[:k]
+            if (one.outline.min(axis=0) < high).all() and (one.outline.max(axis=0) > low).all()
+        ]
+        share = 0.0
+        if near:
+            side = [low[axis] + (high - low)[axis] * (np.arange(ACROSS) + 0.5) / ACROSS for axis in (0, 1)]
+            points = np.stack(np.meshgrid(*side, indexing="ij"), axis=-1).reshape(-1, 2)
+            points = points[_within(area, points)]
+            before = np.zeros(len(points), bool)
+            for one in near:
+                before |= _within(one, points)
+            share = float(before.mean()) if len(points) else 0.0
+        found[area.name] = area.size * (1 - share)
+    return found
+
+
+def _within(area: Area, points: Array) -> NDArray[np.bool_]:
+    """Which points (N, 2) lie in an area, and not in its holes."""
+    inside = np.asarray(contains(area.outline, points))
+    for hole in area.holes:
+        inside &= ~contains(hole, points)
+    return inside
+
+
+def _distances(points: Array, a: Array, b: Array) -> Array:
+    """How far points (N, 2) are from the segment a-b, metres."""
+    along = b - a
+    share = np.clip((points - a) @ along / max(float(along @ along), 1e-300), 0, 1)
+    return np.asarray(np.linalg.norm(points - a - share[:, None] * along, axis=1))
+
+
+#: Rows and columns of the image that are looked at; angles of a swing.
+SAMPLES = 65
+#: Ground that is further away than this many heights is not counted as seen: animals in it are small, and
+#: whatever stands hides them (F 8.2).
+FURTHEST = 4.0
+#: Where the camera starts: one height above the ground.
+_LENS = np.array([0.0, 0.0, -1.0])
+
+
+class GroundView(NamedTuple):
+    """What is seen from a height, all in heights: multiply by the height for metres.
+
+    Attributes
+    ----------
+    width
+        Of the strip that is seen across the way, with all swings.
+    ahead
+        (2,) nearest and furthest ground that one image shows, ahead of the aircraft.
+    slant
+        From the lens to the ground in the middle of one image.
+    middle
+        That ground, ahead of the aircraft.
+    """
+
+    width: float
+    ahead: tuple[float, float]
+    slant: float
+    middle: float
+
+    @property
+    def length(self) -> float:
+        """Of the ground in one image, along the way."""
+        return self.ahead[1] - self.ahead[0]
+
+    def pixels(self, camera: Camera, length: float, height: float) -> float:
+        """Across how many pixels something of a length (m) is seen from a height (m)."""
+        return math.sqrt(camera.fx * camera.fy) * length / (self.slant * height)
+
+
+def look(camera: Camera, tilt_deg: float, gimbal: str = "fixed", swing_deg: float = 0.0) -> GroundView:
+    """What a camera sees of flat ground.
+
+    Parameters
+    ----------
+    camera
+        Its intrinsic parameters.
+    tilt_deg
+        Below the horizon; 90 is straight down.
+    gimbal, swing_deg
+        As for `wildlab.analysis.plan_wanted.Wanted`.
+
+    Returns
+    -------
+    View
+        Without a swing the width is that of the middle one of the image's rows that see ground no further
+        away than `FURTHEST` heights, for a camera that looks down of the narrowest one. A swing adds what
+        that row sees at its ends.
+
+    Raises
+    ------
+    WildlabError
+        Where no row sees such ground, or it does not at the end of a swing.
+    """
+    across, down = np.linspace(0, camera.width - 1, SAMPLES), np.linspace(0, camera.height - 1, SAMPLES)
+    uv = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
+    rays = pixel_rays(camera, uv, _attitude(tilt_deg))
+    points = intersect_plane(rays, _LENS, 0.0).reshape(SAMPLES, SAMPLES, 3)
+    slant: Array = np.linalg.norm(points - _LENS, axis=-1)
+    with np.errstate(invalid="ignore"):
+        seen = (slant <= FURTHEST).all(axis=1)
+    if not seen.any():
+        edge = math.degrees(math.asin(float(np.nanmax(rays[:, 2] / np.linalg.norm(rays, axis=1)))))
+        where = f"{abs(edge):.0f} degrees {'above' if edge < 0 else 'below'} the horizon"
+        raise WildlabError(
+            f"a camera tilted {tilt_deg:g} degrees below the horizon sees no ground near enough: the lowest "
+            f"it looks is {where}",
+            f"tilt it further down (90 is straight down), so that ground within {FURTHEST:g} heights is seen",
+            field="--tilt",
+        )
+    rows = np.flatnonzero(seen)
+    middle = int(rows[len(rows) // 2])
+    if gimbal != "fixed":
+        width = _swept(camera, tilt_deg, gimbal, swing_deg, float(down[middle]))
+    elif tilt_deg > 80:
+        # With a bent lens an edge is a curve: what lies between its innermost points is surely seen.
+        width = float(points[rows, -1, 1].min() - points[rows, 0, 1].max())
+    else:
+        width = float(np.ptp(points[middle, :, 1]))
+    ahead = points[rows, :, 0]
+    centre = points[middle, SAMPLES // 2]
+    return GroundView(
+        width,
+        (float(ahead.min()), float(ahead.max())),
+        float(slant[middle, SAMPLES // 2]),
+        float(centre[0]),
+    )
+
+
+def _attitude(tilt_deg: float, roll: Array | float = 0.0, yaw: Array | float = 0.0) -> Array:
+    """``R_nc`` of a camera on an aircraft that flies level to the north; (3, 3) or (N, 3, 3)."""
+    turned = np.broadcast_arrays(np.atleast_1d(roll), np.atleast_1d(yaw), -math.radians(tilt_deg))
+    angles = GimbalAngles(np.zeros(len(turned[0])), turned[0], turned[2], turned[1])
+    found = camera_attitudes(np.zeros(len(turned[0])), angles)
+    return found[0] if np.ndim(roll) == np.ndim(yaw) == 0 else found
+
+
+def _swept(camera: Camera, tilt_deg: float, gimbal: str, swing_deg: float, row: float) -> float:
+    """How wide the strip is that a row of the image sees in a whole swing, in heights."""
+    angles = np.radians(np.linspace(-swing_deg, swing_deg, SAMPLES))
+    R = _attitude(tilt_deg, yaw=angles) if gimbal == "yaw" else _attitude(tilt_deg, roll=angles)
+    sides = []
+    for column in (0.0, (camera.width - 1) / 2, camera.width - 1.0):
+        uv = np.tile([column, row], (SAMPLES, 1))
+        points = intersect_plane(pixel_rays(camera, uv, R), _LENS, 0.0)
+        far = np.linalg.norm(points - _LENS, axis=1)
+        if not (far <= FURTHEST).all():
+            raise WildlabError(
+                f"a swing of {swing_deg:g} degrees looks at ground more than {FURTHEST:g} heights away, or "
+                "over the horizon",
+                "swing less far with --swing, or tilt the camera further down",
+                field="--swing",
+            )
+        sides.append(points[:, 1])
+    return float(np.max(sides) - np.min(sides))
+
 
 #: The least height that is chosen without being asked for, and above treetops, metres.
 LEAST_HEIGHT, CLEARANCE = 10.0, 10.0
@@ -219,3 +454,50 @@ class Wanted:
     def usable_s(self) -> float:
         """Seconds that one flight may take; infinite where nobody said how long a battery lasts."""
         return math.inf if self.battery_min is None else 60.0 * self.battery_min * (1.0 - self.reserve)
+
+
+#: Directions that are flown through for each area, at most.
+MOST_TRIED = 12
+
+
+def directions(outlines: Sequence[Array], distance: float, wanted: Wanted) -> list[float] | None:
+    """Of the rows over each area.
+
+    Parameters
+    ----------
+    outlines
+        (K, 2) each, metres.
+    distance
+        Between rows, metres.
+    wanted
+        A direction, or the aircraft and the wind.
+
+    Returns
+    -------
+    list of float or None
+        Radians from north to the east, as stated or the quickest of those along the edges of each outline,
+        without the ways there and back. None where the shortest rows are the quickest: a multicopter stops
+        to turn, and its autopilot holds its speed over the ground.
+    """
+    if wanted.direction_deg is not None:
+        return [math.radians(wanted.direction_deg)] * len(outlines)
+    if wanted.vehicle == "multicopter":
+        return None
+    turn = math.pi * wanted.turn_radius_m
+
+    def seconds(outline: Array, angle: float) -> float:
+        rows = lawn_mower(outline, distance, direction=angle, turn=turn)
+        course = fly(
+            rows,
+            wanted.speed_m_s,
+            turn_radius=wanted.turn_radius_m,
+            wind=wanted.drift,
+            spacing=wanted.turn_radius_m / 10,
+        )
+        return course.duration
+
+    def quickest(outline: Array) -> float:
+        tried = [float(one) for one in edge_directions(outline, MOST_TRIED)]
+        return min(tried, key=lambda angle: seconds(outline, angle))
+
+    return [quickest(outline) for outline in outlines]

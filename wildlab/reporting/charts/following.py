@@ -11,10 +11,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from wildlab.analysis.following.filters import SMOOTHED
-from wildlab.analysis.following.follow import TrackingResult
-from wildlab.analysis.following.judged import seen_of, whitened
-from wildlab.analysis.following.sensor_tracks import SensorTrack
+from wildlab.analysis.tracks.filters import SMOOTHED
+from wildlab.analysis.tracks.judged import seen_of, whitened
+from wildlab.analysis.tracks.tracker import TrackingResult
+from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
 from wildlab.geometry.frames import Array

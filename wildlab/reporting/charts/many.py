@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from wildlab.analysis.many.follow import ManyTracks, known_looks
+from wildlab.analysis.tracks.many import ManyTracks, known_looks
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.drawing import (

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from wildlab.analysis.overviews.recommendations import numbers_of
+from wildlab.analysis.overviews.verdict import numbers_of
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight

@@ -6,10 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from wildlab.analysis.overviews.alarms import ALARMS
-from wildlab.analysis.overviews.overview import TROUBLES
-from wildlab.analysis.overviews.recommendations import causes_told, doubted, error_left, possible_gain
-from wildlab.analysis.overviews.verdict import WORTH
+from wildlab.analysis.overviews.overview import ALARMS, TROUBLES
+from wildlab.analysis.overviews.verdict import WORTH, causes_told, doubted, error_left, possible_gain
 from wildlab.reporting.own_flights import OwnFlight
 
 NAN = math.nan
@@ -35,7 +33,7 @@ class Alarm(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """One thing to fix, as `wildlab.analysis.overviews.recommendations.Gain`: ``value`` of ``of``."""
+    """One thing to fix, as `wildlab.analysis.overviews.verdict.Gain`: ``value`` of ``of``."""
 
     key: str
     causes: tuple[str, ...]
@@ -217,7 +215,7 @@ def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
     report = flight.report("tracking")
     if report is None:
         return []
-    from wildlab.analysis.following.judged import LEADING
+    from wildlab.analysis.tracks.judged import LEADING
     from wildlab.reporting.tracking import band_name
 
     rows = [(subject, entry) for (name, subject), entry in report.numbers.items() if name == "rmse"]

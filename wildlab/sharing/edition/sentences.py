@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wildlab.analysis.overviews.recommendations import MOST
-from wildlab.analysis.overviews.verdict import WORTH, Verdict
+from wildlab.analysis.overviews.verdict import MOST, WORTH, Verdict
 from wildlab.messages.message import Message, Quantity, Value, duration, length, number, share
 from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.tracking import NEAR_THE_BAND

@@ -9,7 +9,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from wildlab.analysis.following.sensor_tracks import FILTERS, SensorTrack
+from wildlab.analysis.tracks.comparison import FILTERS
+from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.following.sensor_tracks import FILTERS, WHITE
+from wildlab.analysis.tracks.comparison import FILTERS, WHITE
 from wildlab.evaluation.runs import share_interval as wilson
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def beside_white(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     Parameters
     ----------
     table
-        Rows of `wildlab.analysis.following.sensor_tracks.table`, of one flight or many.
+        Rows of `wildlab.studies.autoferry.tracks.table`, of one flight or many.
     keys
         Columns that name a case: what was followed, by what, when.
 
@@ -88,7 +88,7 @@ def outcomes(table: pd.DataFrame, keys: Sequence[str], fixed: str) -> pd.DataFra
     Parameters
     ----------
     table
-        Rows of `wildlab.analysis.following.sensor_tracks.table`.
+        Rows of `wildlab.studies.autoferry.tracks.table`.
     keys
         Columns that name a case.
     fixed
@@ -170,7 +170,7 @@ def choose_filter(table: pd.DataFrame, keys: Sequence[str]) -> str:
     Parameters
     ----------
     table
-        Rows of `wildlab.analysis.following.sensor_tracks.table` of that flight.
+        Rows of `wildlab.studies.autoferry.tracks.table` of that flight.
     keys
         Columns that name a case.
     """

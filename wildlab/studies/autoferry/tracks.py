@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.following.noise_model import of_targets
-from wildlab.analysis.following.sensor_tracks import COLUMNS, SensorTrack, table
-from wildlab.analysis.following.sensor_tuning import SensorTuning, tune
-from wildlab.analysis.scans import sensors_of
+from wildlab.analysis.tracks.comparison import COLUMNS, table
+from wildlab.analysis.tracks.noise_model import of_targets
+from wildlab.analysis.tracks.scans import sensors_of
+from wildlab.analysis.tracks.sensor_tuning import SensorTuning, tune
+from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.flight.following import read_settings
 from wildlab.flight.store import Flight
 from wildlab.paths import DATA
@@ -28,7 +29,7 @@ def case_of(flight: Flight) -> str:
 
 
 def tune_sensor(flight: Flight, sensor: str) -> SensorTuning:
-    """Everything of a sensor from one scenario, see `wildlab.analysis.following.sensor_tuning.tune`."""
+    """Everything of a sensor from one scenario, see `wildlab.analysis.tracks.sensor_tuning.tune`."""
     return tune(flight, sensor, BOATS.reach)
 
 
@@ -38,7 +39,7 @@ def tune_sensors(flight: Flight) -> dict[str, SensorTuning]:
 
 
 def tracks_table(followed: Mapping[str, Sequence[SensorTrack]]) -> pd.DataFrame:
-    """A row for each track, with its ``case``: `wildlab.analysis.following.sensor_tracks.table` of all."""
+    """A row for each track, with its ``case``: `wildlab.analysis.tracks.tracks.table` of all."""
     each = [table(ones, BOATS.size_m).assign(case=case) for case, ones in followed.items()]
     return pd.concat(each, ignore_index=True)
 

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.many.follow import ManyTracks, judged, track_targets
+from wildlab.analysis.tracks.many import ManyTracks, judged
+from wildlab.analysis.tracks.tracker import track
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
@@ -89,7 +90,7 @@ def judge_stone_soup(
     choices = [draw_choice(rng, FAR_M) for rng in generators]
     for mode in position_modes():
         given = {
-            case: track_targets(flight, settings=settings[mode], sensors=MODES[mode])
+            case: track(flight, "joint", settings=settings[mode], sensors=MODES[mode])
             for case, flight in flights.items()
         }
         reach = {case: reach_of(flight, mode) for case, flight in flights.items()}

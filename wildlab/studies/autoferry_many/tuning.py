@@ -7,7 +7,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from wildlab.analysis.many.follow import judged, track_targets
+from wildlab.analysis.tracks.many import judged
+from wildlab.analysis.tracks.tracker import track
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.following import (
     HullPart,
@@ -207,7 +208,7 @@ def gospa_of(lives: Identities | None) -> float:
 def follow_mode(flight: Flight, mode: str, settings: Settings) -> Identities | None:
     """A scenario by the sensors of a mode, beside its true boats."""
     return judged(
-        track_targets(flight, settings=settings, sensors=MODES[mode]), reach_of(flight, mode), JUDGED_AT
+        track(flight, "joint", settings=settings, sensors=MODES[mode]), reach_of(flight, mode), JUDGED_AT
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.track import CvTuning, Sighting, evaluate_track, follow_positions
+from wildlab.analysis.tracks.sighting import CvTuning, Sighting, evaluate_track, follow_positions
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.studies.linear_vs_nonlinear.trial import (

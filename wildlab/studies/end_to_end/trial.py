@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.georeference import observe, pose_errors
 from wildlab.analysis.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
-from wildlab.analysis.track import Sighting, sighting
+from wildlab.analysis.tracks.sighting import Sighting, sighting
 from wildlab.detection.ground import RISE
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check

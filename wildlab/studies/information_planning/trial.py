@@ -11,16 +11,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.search import (
+    Rules,
     SearchByChance,
     SearchByInformation,
     Searched,
     Searcher,
     SearchInRows,
+    Surveyed,
     World,
     grid_over,
     search,
+    survey,
 )
-from wildlab.analysis.survey import Rules, Surveyed, survey
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.geometry.frames import Array

@@ -20,7 +20,7 @@ from wildlab.analysis.rendered import (
     marks_of,
     with_detections,
 )
-from wildlab.analysis.track import CvTuning, Sighting, follow_pixels, sighting
+from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_pixels, sighting
 from wildlab.flight.store import Flight
 from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.georeference import georeference_pixels

@@ -3,8 +3,8 @@
 A premise is about the flight and its poses, never about what the claim measures.
 
 A time average is held against the band of such an average: as many independent values as it is worth
-(`wildlab.analysis.consistency.worth`). Single values are held against the band of single values. What vague
-words are taken to mean stands with the claims, in ``data/published/schmidt.toml``.
+(`wildlab.analysis.navigation_errors.worth`). Single values are held against the band of single values. What
+vague words are taken to mean stands with the claims, in ``data/published/schmidt.toml``.
 """
 
 from __future__ import annotations

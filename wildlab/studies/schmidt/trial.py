@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.consistency import worth
 from wildlab.analysis.navigate import PUBLISHED_LIKE, navigate_mekf
-from wildlab.analysis.navigation_errors import errors_against
-from wildlab.analysis.pose_noise import covariance_of, estimate_from_sighting
-from wildlab.analysis.sighting_errors import NAMES as POSE_NAMES
-from wildlab.analysis.sighting_errors import (
+from wildlab.analysis.navigation_errors import errors_against, worth
+from wildlab.analysis.pose_noise import NAMES as POSE_NAMES
+from wildlab.analysis.pose_noise import (
+    covariance_of,
+    estimate_from_sighting,
     flight_numbers,
     mean,
     pauses,
@@ -27,7 +27,7 @@ from wildlab.analysis.sighting_errors import (
     premise_numbers,
     shown,
 )
-from wildlab.analysis.track import (
+from wildlab.analysis.tracks.sighting import (
     CvTuning,
     Scored,
     Sighting,

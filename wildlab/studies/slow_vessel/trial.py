@@ -21,9 +21,10 @@ from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.static_point.trial import TABLE_NAMES, differ, table_numbers
-from wildlab.tracking.measurement import positions
+from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import constant_velocity, in_steps
-from wildlab.tracking.run import run_filter, start_from_first
+from wildlab.tracking.run import run_filter
+from wildlab.tracking.sensors import positions
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.analysis.animals.frames import NEAR, TOO_LARGE
+from wildlab.analysis.animals.images import NEAR, TOO_LARGE
 from wildlab.detection.detections import Detections
 from wildlab.detection.warm import (
     Warm,

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from wildlab.analysis.animals.follow import FollowedAnimals, Known
-from wildlab.analysis.animals.frames import NONE
+from wildlab.analysis.animals.images import NONE
 from wildlab.analysis.animals.revisit import Patrolled
 from wildlab.evaluation.runs import mean_interval
 from wildlab.geometry.frames import Array

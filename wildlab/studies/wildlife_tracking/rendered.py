@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.analysis.animals.follow import FollowedAnimals, follow
-from wildlab.analysis.animals.frames import (
+from wildlab.analysis.animals.images import (
     NONE,
     Frame,
     Framed,
     FrameMatch,
+    Images,
     Thermal,
     furnish,
     ground_distance,
@@ -27,8 +28,7 @@ from wildlab.analysis.animals.frames import (
     render_frame,
     take_frames,
 )
-from wildlab.analysis.animals.images import Images
-from wildlab.analysis.animals.measures import out_of_sight, sight_numbers
+from wildlab.analysis.animals.revisit import out_of_sight, sight_numbers
 from wildlab.detection.detections import Detections
 from wildlab.detection.warm import find_warm, gate_from_distance, to_grey
 from wildlab.errors import WildlabError

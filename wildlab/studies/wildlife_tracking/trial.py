@@ -15,14 +15,17 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.animals.follow import FollowedAnimals, Follower, Kalman, Particles, follow
 from wildlab.analysis.animals.images import Detector, Images, take_images
-from wildlab.analysis.animals.measures import (
+from wildlab.analysis.animals.revisit import (
+    Aircraft,
+    Patrolled,
+    Visits,
     found_on_visits,
     next_lap,
     out_of_sight,
+    patrol,
     sight_numbers,
     turns,
 )
-from wildlab.analysis.animals.revisit import Aircraft, Patrolled, Visits, patrol
 from wildlab.analysis.plans.flown import ExecutionErrors, with_errors
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array

@@ -12,7 +12,7 @@ from wildlab.analysis.georeference import (
     observe,
 )
 from wildlab.analysis.rendered import exposures_of
-from wildlab.analysis.track import truth_states
+from wildlab.analysis.tracks.sighting import truth_states
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels

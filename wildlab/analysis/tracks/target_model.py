@@ -6,17 +6,14 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wildlab.analysis.following.noise_model import ASSUMED, STATED, ToldValue
-from wildlab.analysis.following.noise_model import TargetModel as Following
-from wildlab.analysis.many.places import PLACED, PlacedLooks
+from wildlab.analysis.tracks.noise_model import ASSUMED, STATED, ToldValue
+from wildlab.analysis.tracks.noise_model import TargetModel as Following
+from wildlab.analysis.tracks.places import PLACED, PlacedLooks
 from wildlab.errors import WildlabError
 from wildlab.flight.following import HullPart, ManyTargetsPart, SensorPart, Settings, read_settings
 from wildlab.paths import DATA
 from wildlab.tracking.many import Hull, ManySensorModel, ManyTargetModel
-
-Array = NDArray[np.float64]
 
 #: How probable it is that what is in view is detected, where nobody says.
 DETECTION = 0.8
@@ -69,7 +66,7 @@ def of_many(settings: Settings, following: Following, places: list[PlacedLooks])
     Parameters
     ----------
     settings
-        From `wildlab.analysis.following.noise_model.of_flight`.
+        From `wildlab.analysis.tracks.noise_model.of_flight`.
     following
         What filters of one target are told of the targets.
     places

@@ -14,21 +14,21 @@
 
 from __future__ import annotations
 
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.analysis.following.consider_parameters import errors_of, spread_of
-from wildlab.analysis.following.expected import predict_scan, sensor_of
-from wildlab.analysis.following.initiation import place_of
-from wildlab.analysis.following.noise_model import NoiseModel, TargetModel
-from wildlab.analysis.scans import Scans
+from wildlab.analysis.tracks.initiation import place_of
+from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel, errors_of, spread_of
+from wildlab.analysis.tracks.scans import Scans, predict_scan
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.tracking.consider_parameters import Considered
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
-from wildlab.tracking.motion import Motion, white_acceleration
+from wildlab.tracking.motion import Motion
 from wildlab.tracking.records import Start, Track
-from wildlab.tracking.run import Ends, run_filter
+from wildlab.tracking.run import run_filter
+from wildlab.tracking.sensors import Merged
 from wildlab.tracking.smoothing import run_smoothed, smooth
 
 #: What the name of a filter ends with whose estimates know later detections too, and those that can.
@@ -38,11 +38,6 @@ NAMES = ("ekf", "ukf", "imm", "coloured", "schmidt", "thinned")
 #: The two motions of ``imm``: as lively as the target is believed to be, and a third of it; each lasts so
 #: long, s.
 CALM, STAY_S = 1 / 3, 30.0
-
-
-def motion_of(targets: TargetModel, share: float = 1.0) -> Motion:
-    """Constant velocity with white acceleration."""
-    return partial(white_acceleration, density=share * targets.density)
 
 
 def possible(scans: Scans, beliefs: NoiseModel) -> dict[str, str]:
@@ -59,92 +54,82 @@ def possible(scans: Scans, beliefs: NoiseModel) -> dict[str, str]:
     }
 
 
-def white_noise(scans: Scans, sds: Array) -> Array:
-    """(N, m, m) of one detection a look, or (m, m): its own where it has one."""
-    return np.diag(np.asarray(sds, float) ** 2)
+class Measured(NamedTuple):
+    """A target's detections: looks ``merged`` with white noise, its ``own`` (N, m), the track ``first`` that
+    the filter with white noise made of them, and where it begins."""
+
+    merged: Merged
+    own: Array
+    first: Track
+    begin: Start
 
 
-def choose(
-    scans: Scans,
-    seen: Array,
-    beliefs: NoiseModel,
-    targets: TargetModel,
-    begin: Start,
-    *,
-    gate: bool = True,
-    ends: Ends | None = None,
-) -> Track:
-    """The filter with white noise, which chooses the nearest of ``seen`` (N, K, m), in its gate or of all.
-
-    ``ends`` as in `run_filter`.
-    """
-    sensor = sensor_of(scans, np.zeros_like(scans.platform))
-    return run_filter(
-        scans.times, seen, white_noise(scans, beliefs.white), sensor, motion_of(targets), begin,
-        gate_probability=targets.gate_probability if gate else 1.0, ends=ends,
-    )  # fmt: skip
-
-
-def follow_with(
+def run_named(
     name: str,
-    scans: Scans,
-    own: Array,
-    first: Track,
-    beliefs: NoiseModel,
+    measured: Measured,
     targets: TargetModel,
-    begin: Start,
-) -> Track:
-    """One filter on the detections (N, m) that the white one, ``first``, chose.
+    considering: tuple[Merged, Considered] | None,
+    alone: tuple[Scans, NoiseModel, slice] | None,
+) -> Track | None:
+    """One filter on the detections that the white one chose.
+
+    Parameters
+    ----------
+    considering
+        The same detections with what is new at each, and the errors that are considered beside it.
+    alone
+        Of one sensor its looks, what is believed of it, and which looks these are. None: there are several.
+
+    Returns
+    -------
+    Track
+        None where several sensors have nothing to consider.
 
     Raises
     ------
     WildlabError
-        Where there is no such filter, or the detections cannot go through it.
+        Where there is no such filter, or the detections of the one sensor cannot go through it.
     """
     base = name.removesuffix(SMOOTHED)
-    why = possible(scans, beliefs).get(base, "there is no such filter")
-    if why:
-        able = ", ".join(one for one, reason in possible(scans, beliefs).items() if not reason)
-        raise WildlabError(
-            f"the filter {name!r} cannot follow by the sensor {scans.sensor!r}: {why}",
-            f"use one of {able}",
-            field="--filter",
-        )
-    motion, smoothed = motion_of(targets), name != base
-    sensor = sensor_of(scans, np.zeros_like(scans.platform))
-    white = white_noise(scans, beliefs.white)
-    if base == "ekf":
-        return without_innovations(smooth(first, motion)) if smoothed else first
-    if base == "ukf":
-        track = run_unscented(scans.times, own, white, sensor, motion, begin)
-        return without_innovations(smooth(track, motion)) if smoothed else track
-    if base == "imm":
-        both = [motion_of(targets, CALM), motion]
-        return run_imm(scans.times, own, white, sensor, both, (STAY_S, STAY_S), begin).track
-    if base == "coloured":
-        return _coloured(scans, own, beliefs, motion, begin)
+    base, smoothed = "ekf" if base == "kf" else base, name.endswith(SMOOTHED)
+    if alone is not None:
+        able = possible(*alone[:2])
+        if why := able.get(base, "there is no such filter"):
+            raise WildlabError(
+                f"the filter {name!r} cannot follow by the sensor {alone[0].sensor!r}: {why}",
+                f"use one of {', '.join(one for one, reason in able.items() if not reason)}",
+                field="--filter",
+            )
+    (times, _, R, sensor, *_), own, first, begin = measured
+    R, motion = R if R.ndim == 3 else R[:, 0], targets.motion()
     run = run_smoothed if smoothed else run_filter
-    if base == "thinned":
-        kept = thin(scans.times, beliefs.thinning_s, first.used)[:, None]
-        track = run(scans.times, np.where(kept, own, np.nan), white, sensor, motion, begin)
+    if base == "coloured" and alone is not None:
+        return _coloured(*alone, own, motion, begin)
+    if base == "imm":
+        both = [targets.motion(CALM), motion]
+        return run_imm(times, own, R, sensor, both, (STAY_S, STAY_S), begin).track
+    if base in ("ekf", "ukf"):
+        track = first if base == "ekf" else run_unscented(times, own, R, sensor, motion, begin)
+        track = smooth(track, motion) if smoothed else track
+    elif base == "thinned" and alone is not None:
+        kept = thin(times, alone[1].thinning_s, first.used)[:, None]
+        track = run(times, np.where(kept, own, np.nan), R, sensor, motion, begin)
+    elif considering is not None:
+        track = run(*considering[0][:4], motion, begin, pose=considering[1])
     else:
-        errors = errors_of(scans, beliefs)
-        # An error of the clock moves the target by what the filter with white noise says it moves.
-        drift = np.nan_to_num(first.x[:, 2:4] - scans.platform_velocity)
-        noise = white_noise(scans, beliefs.noise)
-        track = run(scans.times, own, noise, sensor_of(scans, drift), motion, begin, pose=errors)
-    return without_innovations(track) if smoothed else track
+        return None
+    if not smoothed:
+        return track
+    # The innovations of a smoothed track are the filter's, and not counted twice.
+    nothing = (np.full_like(one, np.nan) for one in (track.innovation, track.S, track.nis))
+    return track._replace(**dict(zip(("innovation", "S", "nis"), nothing, strict=True)))
 
 
-def without_innovations(track: Track) -> Track:
-    """A smoothed track: its innovations are the filter's, and not counted twice."""
-    nothing = np.full_like(track.nis, np.nan)
-    return track._replace(
-        innovation=np.full_like(track.innovation, np.nan), S=np.full_like(track.S, np.nan), nis=nothing
-    )
-
-
-def _coloured(scans: Scans, own: Array, beliefs: NoiseModel, motion: Motion, begin: Start) -> Track:
+def _coloured(
+    scans: Scans, beliefs: NoiseModel, rows: slice, seen: Array, motion: Motion, begin: Start
+) -> Track:
+    own = np.full((len(scans.times), seen.shape[-1]), np.nan)
+    own[rows] = seen
     positions, R = _positions(scans, own, beliefs)
     gap, F_c = beliefs.longest_gap_s, beliefs.fading
     used = np.flatnonzero(np.isfinite(positions[:, 0]))
@@ -157,8 +142,10 @@ def _coloured(scans: Scans, own: Array, beliefs: NoiseModel, motion: Motion, beg
         driving = (1 + F_c**2) * total - 2 * F_c * lasting
     else:
         total, driving = R, (1 + F_c**2 - 2 * F_c * beliefs.lasting) * R
-    R_w = np.where(whole[:, None, None], total, driving)
-    return run_coloured(scans.times, positions, R_w, motion, begin, F_c=np.eye(2) * F_c, longest_gap=gap)
+    R_w = np.where(whole[:, None, None], total, driving)[rows]
+    return run_coloured(
+        scans.times[rows], positions[rows], R_w, motion, begin, F_c=np.eye(2) * F_c, longest_gap=gap
+    )
 
 
 def _positions(scans: Scans, own: Array, beliefs: NoiseModel) -> tuple[Array, Array]:

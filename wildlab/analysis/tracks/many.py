@@ -1,4 +1,4 @@
-"""All targets of a flight followed at once: what `wildlab track --many` does, as one call."""
+"""All targets of a flight followed at once: what `wildlab track --many` does."""
 
 from __future__ import annotations
 
@@ -9,23 +9,24 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.following.follow import (
-    notes_of_absent,
-    notes_of_sources,
-    order_notes,
-    refuse_without_times,
-    sensors_with_detections,
+from wildlab.analysis.tracks.inputs import TrackingInputs, order_notes
+from wildlab.analysis.tracks.noise_model import STATED, ToldValue
+from wildlab.analysis.tracks.places import (
+    UNKNOWN_EFFECT,
+    PlacedLooks,
+    laid_out,
+    lasting_of,
+    places_of,
+    said_of_pixels,
+    thinned,
 )
-from wildlab.analysis.following.noise_model import STATED, ToldValue, of_flight, of_sensor, of_targets
-from wildlab.analysis.many.errors import UNKNOWN_EFFECT, laid_out, lasting_of, said_of_pixels
-from wildlab.analysis.many.places import ABLE, PlacedLooks, places_of, thinned
-from wildlab.analysis.many.target_model import of_many, unknown_lasting
-from wildlab.analysis.scans import scans_of, truth_deviations, truths_at
+from wildlab.analysis.tracks.scans import truth_deviations, truths_at
+from wildlab.analysis.tracks.target_model import of_many, unknown_lasting
 from wildlab.errors import WildlabError
 from wildlab.evaluation.identities import Identities, compare_identities
 from wildlab.evaluation.identities import Moment as Compared
-from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.tracking.many import (
     ManySensorModel,
     ManyTargetModel,
@@ -36,11 +37,10 @@ from wildlab.tracking.many import (
     smooth_many,
 )
 
-Array = NDArray[np.float64]
-
 #: From this distance a track is on no target, and a target without a track: the cut-off of GOSPA, m, where no
 #: ``reach_m`` is stated.
 CUTOFF_M = 20.0
+BEARINGS_ALONE = "no sensor detects places: bearings alone begin no track."
 
 
 class ManyTracks(NamedTuple):
@@ -99,45 +99,26 @@ class ManyTracks(NamedTuple):
         return (self.scans[-1].time - self.scans[0].time) / 60 if len(self.scans) > 1 else 0.0
 
 
-def track_targets(
-    flight: Flight,
-    *,
-    settings: Settings | None = None,
-    sensors: Sequence[str] = (),
-    source: str | None = None,
-) -> ManyTracks:
-    """Follow all targets by all sensors at once, whatever detections name.
+def track_jointly(flight: Flight, inputs: TrackingInputs, source: str | None = None) -> ManyTracks:
+    """Track all targets by all sensors at once, whatever detections name.
 
     Parameters
     ----------
-    settings
-        What is told besides ``flight.toml``.
-    sensors
-        Names; left out: all that detect places.
+    inputs
+        Of the flight, read for ``"joint"``.
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Raises
     ------
     WildlabError
-        Where there is no such sensor, no detection, no time, noise nobody knows, or no detection tells a
-        place.
+        Where no detection tells a place.
     """
-    refuse_without_times(flight)
-    told = of_flight(flight, settings)
-    following, said = of_targets(told.targets)
-    said = [one for one in said if one.what.startswith(("acceleration", "speed"))]
-    left_out = notes_of_sources(flight)
-    notes = [*notes_of_absent(flight, told), *left_out]
+    told = inputs.settings
+    said = [one for one in inputs.said if one.what.startswith(("acceleration", "speed"))]
+    notes = list(inputs.notes)
     places: dict[str, PlacedLooks] = {}
-    for name in sensors_with_detections(flight, sensors):
-        looks = scans_of(flight, name, 0.0, source)
-        if looks.kind not in ABLE and not sensors:
-            notes.append(f"{name} was left out: what it detects ({looks.kind}) tells nothing of a place.")
-            continue
-        belief, more = of_sensor(flight, looks, told)
-        if belief.offset_s:
-            looks = scans_of(flight, name, belief.offset_s, source)
+    for name, (looks, belief, _, more) in inputs.sensors.items():
         told_here, unused = _considered_apart(list(dict.fromkeys(more)), looks.kind)
         said += told_here
         if looks.kind == "pixel":
@@ -162,13 +143,13 @@ def track_targets(
             notes.append(f"{found.without} detections of {name} have no place on the ground.")
     if all(one.bearings for one in places.values()):
         raise WildlabError(
-            " ".join(["no sensor detects places: bearings alone begin no track.", *left_out]).rstrip("."),
+            " ".join([BEARINGS_ALONE, *inputs.strays]).rstrip("."),
             "give detections the source of their sensor's name"
-            if left_out
+            if inputs.strays
             else "follow one target by its bearings: wildlab track without --many",
             file=flight.folder, field="detections.kind",
         )  # fmt: skip
-    beliefs = of_many(told, following, list(places.values()))
+    beliefs = of_many(told, inputs.targets, list(places.values()))
     lasting_s, shared = laid_out(
         [(one.errors, [scan.shared for scan in one.scans]) for one in places.values()]
     )
@@ -199,7 +180,7 @@ def track_targets(
         [*said, *beliefs.said],
         notes,
         lasting_s,
-        following.reach_m if np.isfinite(following.reach_m) else CUTOFF_M,
+        inputs.targets.reach_m if np.isfinite(inputs.targets.reach_m) else CUTOFF_M,
         truth_sd,
         bool(told.targets.many is not None and told.targets.many.others),
         unknown_lasting(told, places),

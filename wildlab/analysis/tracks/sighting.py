@@ -23,6 +23,7 @@ from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
 from wildlab.tracking.initiation import start_from_first
@@ -30,8 +31,6 @@ from wildlab.tracking.motion import Motion, constant_velocity
 from wildlab.tracking.records import Start, Track
 from wildlab.tracking.schmidt import Change, PoseUncertainty
 from wildlab.tracking.sensors import Sensor, pixels
-
-Array = NDArray[np.float64]
 
 #: The velocity of the truth is taken over this time: from one fix of a single-frequency receiver to the next,
 #: a course means little.

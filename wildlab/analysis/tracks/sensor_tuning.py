@@ -10,16 +10,22 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import curve_fit, nnls
 
-from wildlab.analysis.following.expected import SLOTS, across, errors_near, predict_scan
-from wildlab.analysis.scans import Scans, Truth, scans_of, truths_at
+from wildlab.analysis.tracks.scans import (
+    SLOTS,
+    Scans,
+    Truth,
+    across,
+    errors_near,
+    predict_scan,
+    scans_of,
+    truths_at,
+)
 from wildlab.errors import WildlabError
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
-
-Array = NDArray[np.float64]
+from wildlab.geometry.frames import Array
 
 #: Offsets tried, s: the largest known delays are three.
 OFFSETS_S = np.arange(-5.0, 2.001, 0.05)

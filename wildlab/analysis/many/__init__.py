@@ -1,1 +1,0 @@
-"""Many targets of a flight at once: what the tracker is told, what it is given, and how it did."""
