@@ -1,5 +1,7 @@
 """Error summaries against closed forms and simulated truth."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,9 @@ def test_scatter_finds_what_was_put_in():
 
 def test_scatter_of_single_clicks_per_image_is_not_guessed():
     assert np.isnan(scatter_by_image(np.ones((5, 2)), np.arange(5)).image_share)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isnan(scatter_by_image(np.full((3, 2), np.nan), np.arange(3)).whole_m)
     errors = np.random.default_rng(1).normal(0, 1, (38, 2))
     for pairs, known in ((9, False), (10, True)):
         images = np.r_[np.arange(28), np.arange(pairs)]

@@ -108,11 +108,11 @@ def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
     e, group = e[keep], np.unique(np.asarray(image)[keep], return_inverse=True)[1]
     count = np.bincount(group)
     n, k = len(e), len(count)
-    mean = e.mean(axis=0)
-    of_image = np.stack([np.bincount(group, weights=e[:, axis]) / count for axis in (0, 1)], axis=-1)
     if n - k < FEWEST_WITHIN or k < 2:
         nan = np.full(2, np.nan)
         return Scatter(float("nan"), float("nan"), float("nan"), nan, nan, nan, float("nan"))
+    mean = e.mean(axis=0)
+    of_image = np.stack([np.bincount(group, weights=e[:, axis]) / count for axis in (0, 1)], axis=-1)
     within = ((e - of_image[group]) ** 2).sum(axis=0) / (n - k)
     mean_square = (count[:, None] * (of_image - mean) ** 2).sum(axis=0) / (k - 1)
     usual = (n - (count**2).sum() / n) / (k - 1)
