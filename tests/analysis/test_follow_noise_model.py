@@ -173,3 +173,11 @@ def test_truth_that_is_not_there_is_no_teacher():
         tune_flight(robot_flight(truth=False), ["radar"], against="truth")
     with refused("only"):
         tune_flight(robot_flight(truth=False, seconds=6.0), ["radar"])
+
+
+def test_targets_at_rest_have_neither_acceleration_nor_speed():
+    still = "[targets]\nacceleration_m_s_sqrt_s = 0\nstart_speed_m_s = 0\n"
+    targets, _ = of_targets(parse_settings(still).targets)
+    assert targets == targets.at_rest and not targets.motion()(3.0)[1].any()
+    with refused("acceleration_m_s_sqrt_s = 0"):
+        parse_settings("[targets]\nstart_speed_m_s = 0\n")

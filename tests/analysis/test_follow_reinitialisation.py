@@ -66,9 +66,11 @@ def follow(pause_s: float = 200.0) -> list[SensorTrack]:
     return by_camera(*watched(pause_s))
 
 
-def by_camera(scans: Scans, truth: Truth) -> list[SensorTrack]:
+def by_camera(
+    scans: Scans, truth: Truth, filters: tuple[str, ...] = FILTERS, targets: TargetModel = TARGETS
+) -> list[SensorTrack]:
     one = SensorInputs(scans, beliefs(scans), [truth])
-    return tracks.track_target({"camera": one}, "deer", TARGETS, FILTERS)
+    return tracks.track_target({"camera": one}, "deer", targets, filters)
 
 
 def off_after(one: SensorTrack) -> float:
@@ -155,6 +157,31 @@ def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there():
     for one, other in zip(whole, alone, strict=True):
         assert np.array_equal(one.estimate[rows], other.estimate, equal_nan=True)
         assert np.array_equal(one.nis[rows], other.nis, equal_nan=True)
+
+
+def test_a_target_at_rest_is_one_track_through_any_gap():
+    """By a motion model without acceleration and speed, told or because its truth has no time."""
+    scans, truth = watched()
+    assert scans.poses is not None
+    rng, n = np.random.default_rng(1), len(scans.times)
+    place = np.tile(truth.position[0], (n, 1))
+    uv = ground_to_pixel(
+        CAMERA, np.column_stack([place, np.zeros(n)]), scans.poses.p_nc, scans.poses.R_nc
+    ) + rng.normal(0, NOISE_PX, (n, 2))  # fmt: skip
+    uv[np.isnan(scans.detections[:, 0, 0])] = np.nan
+    scans, still = scans._replace(detections=uv[:, None]), Truth("deer", place, 0 * place, 0.0)
+    assert len(by_camera(scans, still)[0].starts) == 2
+    rest = TARGETS._replace(density=0.0, start_speed_m_s=0.0)
+    told = by_camera(scans, still, (*FILTERS, "ekf-smoothed"), rest)
+    marked = by_camera(scans, still._replace(fixed=True), (*FILTERS, "ekf-smoothed"))
+    on_ground = NOISE_PX / CAMERA.fx * HEIGHT / np.cos(TILT) ** 2
+    for one, other in zip(told, marked, strict=True):
+        assert np.array_equal(one.estimate, other.estimate, equal_nan=True)
+        assert len(one.starts) == 1 and not one.estimate[-1, 2:].any()
+        assert np.hypot(*one.error[-1, :2]) < on_ground
+        # On differences nothing is learnt of an error that stays.
+        few = 1 if one.filter == "coloured" else 50
+        assert np.sqrt(one.covariance[-1, 0, 0]) < on_ground / np.sqrt(few)
 
 
 @pytest.mark.parametrize("kind", ["position", "bearing"])

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.many.follow import ManyTracks, judged, track_targets
+from wildlab.analysis.tracks.many import ManyTracks, judged, track_targets
 from wildlab.errors import WildlabError
 from wildlab.studies.autoferry_many import comparison, scores, stone_soup, tuning
 from wildlab.studies.autoferry_many.stone_soup import Choice, Eye, draw_choice, run_stone_soup

@@ -57,7 +57,7 @@ def test_each_has_its_own_correlation_time(rng):
     track = run_filter(times, z, R, sensor, CV, START, pose=pose)
 
     def look(row, x):
-        seen = sensor.predict(row, x[:4])
+        seen = sensor.predict(row, x[:2])
         H = np.hstack([m.on_state(seen.H_position, 4), seen.H_pose[:, [5, 1, 0]]])
         return m.difference(z[row], seen.z, sensor.angles), H
 

@@ -77,8 +77,8 @@ def test_range_and_bearing_and_their_derivatives(target, platform, yaw):
     assert np.allclose(ahead, target, atol=1e-6)
     assert -np.pi <= seen.z[1] < np.pi
 
-    def away(position, p, turned):
-        return m.difference(p.predict_range_bearing(position, p, turned).z, seen.z, (False, True))
+    def away(position, at, turned):
+        return m.difference(p.predict_range_bearing(position, at, turned).z, seen.z, (False, True))
 
     step = 1e-3 * min(seen.z[0], 10)
     by_position = slope(lambda d: away(target + d, platform, yaw), 2, [step] * 2)

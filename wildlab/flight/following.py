@@ -27,6 +27,7 @@ CONSIDERED: dict[str, str] = {
 MOST_HULLS = 5
 
 Above = Annotated[float, Field(gt=0, le=1e6)]
+NotNegative = Annotated[float, Field(ge=0, le=1e6)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 Probability = Annotated[float, Field(gt=0, lt=1)]
 Lengths = tuple[Annotated[float, Field(ge=0, le=1000)], ...]
@@ -180,15 +181,16 @@ class TargetsPart(Strict):
     """The targets.
 
     ``acceleration_m_s_sqrt_s``: the standard deviation of each axis of the velocity that grows in a second.
-    ``start_speed_m_s``: of each axis at the start. ``gate_probability``: that a target's own detection is let
-    in. ``patience_s``: without one for longer, a track ends. ``reach_m`` and ``reach_deg``: what lies no
-    farther from the true place of a target than this may be its detection, where none has a name.
-    ``size_m``: a track that is nearer to its target than this is with it. ``identified``: detections belong
-    to the target they name, to the one in whose gate they are nearest, or all to one.
+    ``start_speed_m_s``: of each axis at the start; where both are zero targets are at rest.
+    ``gate_probability``: that a target's own detection is let in. ``patience_s``: without one for longer, a
+    track ends. ``reach_m`` and ``reach_deg``: what lies no farther from the true place of a target than this
+    may be its detection, where none has a name. ``size_m``: a track that is nearer to its target than this is
+    with it. ``identified``: detections belong to the target they name, to the one in whose gate they are
+    nearest, or all to one.
     """
 
-    acceleration_m_s_sqrt_s: Above | None = None
-    start_speed_m_s: Above | None = None
+    acceleration_m_s_sqrt_s: NotNegative | None = None
+    start_speed_m_s: NotNegative | None = None
     gate_probability: Annotated[float, Field(gt=0, lt=1)] | None = None
     patience_s: Above | None = None
     reach_m: Above | None = None
@@ -196,6 +198,12 @@ class TargetsPart(Strict):
     size_m: Above | None = None
     identified: Literal["label", "gate", "one"] | None = None
     many: ManyTargetsPart | None = None
+
+    @model_validator(mode="after")
+    def _at_rest(self) -> TargetsPart:
+        if self.start_speed_m_s == 0 and self.acceleration_m_s_sqrt_s != 0:
+            raise ValueError("without a start_speed_m_s targets are at rest; set acceleration_m_s_sqrt_s = 0")
+        return self
 
 
 class Settings(Strict):

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.following.judged import FEWEST
-from wildlab.analysis.following.noise_model import ToldValue
-from wildlab.analysis.many.errors import counted_twice, of_platform
-from wildlab.analysis.many.follow import ManyTracks
-from wildlab.analysis.many.target_model import HERE
+from wildlab.analysis.tracks.judged import FEWEST
+from wildlab.analysis.tracks.many import ManyTracks
+from wildlab.analysis.tracks.noise_model import ToldValue
+from wildlab.analysis.tracks.places import counted_twice, of_platform
+from wildlab.analysis.tracks.target_model import HERE
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
 from wildlab.messages.message import Message
@@ -25,7 +25,7 @@ from wildlab.reporting.quantities import length
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import listed
 from wildlab.reporting.wording import Wording
-from wildlab.tracking.particles import Count, count_interval, count_probabilities
+from wildlab.tracking.many.existence import Count, count_interval, count_probabilities
 
 #: A target is tracked well where it has a track at this share of the scans at which it can be seen; below
 #: half it is lost.
@@ -340,7 +340,7 @@ def show_many(report: Report, followed: ManyTracks, lives: Identities | None) ->
     report
         Is added to.
     followed, lives
-        From `wildlab.analysis.many.follow`: the tracks, and their lives beside the true targets'.
+        From `wildlab.analysis.tracks.many`: the tracks, and their lives beside the true targets'.
     """
     wording = Wording(report, load_texts("tracking-many"))
     names, level = wording.texts.subjects, level_of(followed, lives)

@@ -65,6 +65,17 @@ def test_each_track_is_smoothed_by_itself_and_on_either_side_of_an_absence(seed,
         assert np.allclose(after[k][0][orders[k].index(2)], other[0][k])
 
 
+def test_a_target_at_rest_is_where_all_measurements_say():
+    z = np.random.default_rng(0).normal(0, 5, (6, 2))
+    start = Start(0.0, np.zeros(4), np.diag([25.0, 25.0, 0.0, 0.0]))
+    still = partial(white_acceleration, density=0.0)
+    one = run_filter(np.arange(1.0, 7.0), z, np.eye(2), positions(), still, start)
+    after = smooth_many([shown(one.times[k], [1], one.x[k], one.P[k]) for k in range(6)], 0.0)
+    for x, P in after:
+        np.testing.assert_allclose(x[0], one.x[-1], atol=1e-12)
+        np.testing.assert_allclose(P[0], one.P[-1], atol=1e-12)
+
+
 def test_what_was_given_is_not_changed_and_nothing_stays_nothing():
     looks = [shown(t, [1], np.array([t, 0, 1, 0]), np.eye(4)) for t in (0.0, 1.0)]
     kept = [one.x.copy() for one in looks]

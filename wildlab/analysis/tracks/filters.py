@@ -17,6 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wildlab.analysis.tracks.initiation import place_of
 from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel, errors_of, spread_of
@@ -25,10 +26,10 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.consider_parameters import Considered
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
-from wildlab.tracking.motion import Motion
+from wildlab.tracking.motion import Motion, rest
 from wildlab.tracking.records import Start, Track
 from wildlab.tracking.run import run_filter
-from wildlab.tracking.sensors import Merged
+from wildlab.tracking.sensors import Merged, Sensor
 from wildlab.tracking.smoothing import run_smoothed, smooth
 
 #: What the name of a filter ends with whose estimates know later detections too, and those that can.
@@ -109,7 +110,12 @@ def run_named(
         both = [targets.motion(CALM), motion]
         return run_imm(times, own, R, sensor, both, (STAY_S, STAY_S), begin).track
     if base in ("ekf", "ukf"):
-        track = first if base == "ekf" else run_unscented(times, own, R, sensor, motion, begin)
+        if base == "ekf":
+            track = first
+        elif targets.start_speed_m_s:
+            track = run_unscented(times, own, R, sensor, motion, begin)
+        else:
+            track = _unscented_at_rest(times, own, R, sensor, begin)
         track = smooth(track, motion) if smoothed else track
     elif base == "thinned" and alone is not None:
         kept = thin(times, alone[1].thinning_s, first.used)[:, None]
@@ -121,8 +127,19 @@ def run_named(
     if not smoothed:
         return track
     # The innovations of a smoothed track are the filter's, and not counted twice.
-    nothing = (np.full_like(one, np.nan) for one in (track.innovation, track.S, track.nis))
-    return track._replace(**dict(zip(("innovation", "S", "nis"), nothing, strict=True)))
+    innovation, S, nis = (np.full_like(one, np.nan) for one in (track.innovation, track.S, track.nis))
+    return track._replace(innovation=innovation, S=S, nis=nis)
+
+
+def _unscented_at_rest(times: Array, own: Array, R: Array, sensor: Sensor, begin: Start) -> Track:
+    """Sigma points of the place alone: a speed that is known to be zero has no spread."""
+    start = begin._replace(x=begin.x[:2], P=begin.P[:2, :2])
+    track = run_unscented(times, own, R, sensor, rest, start)
+    x, P = np.zeros((len(times), 4)), np.zeros((len(times), 4, 4))
+    x[:, :2], P[:, :2, :2] = track.x, track.P
+    gone: NDArray[np.bool_] = np.asarray(~np.isfinite(track.x).all(axis=1))
+    x[gone], P[gone] = np.nan, np.nan
+    return track._replace(x=x, P=P)
 
 
 def _coloured(

@@ -116,8 +116,13 @@ class TargetModel(NamedTuple):
     size_m: float
     identified: str | None
 
+    @property
+    def at_rest(self) -> TargetModel:
+        """The same of a target that never moves."""
+        return self._replace(density=0.0, start_speed_m_s=0.0)
+
     def motion(self, share: float = 1.0) -> Motion:
-        """Constant velocity with white acceleration, or a share of it."""
+        """Constant velocity with white acceleration, or a share of it; without any, and no speed, rest."""
         return partial(white_acceleration, density=share * self.density)
 
     def reach(self, kind: str) -> float:

@@ -106,13 +106,14 @@ class Scans(NamedTuple):
 class Truth(NamedTuple):
     """Where one target was at N scans: ``position`` and ``velocity`` (N, 2), NaN where not known.
 
-    ``sd_m`` of each axis of the position; zero where the truth does not say.
+    ``sd_m`` of each axis of the position; zero where the truth does not say. ``fixed``: it never moves.
     """
 
     target: str
     position: Array
     velocity: Array
     sd_m: float
+    fixed: bool = False
 
     @property
     def covariance(self) -> Array:
@@ -331,8 +332,16 @@ def truths_at(flight: Flight, times: ArrayLike) -> list[Truth]:
     sd = {}
     if "sd_horizontal_m" in truth:
         sd = truth.groupby("target_id")["sd_horizontal_m"].median().to_dict()
+    # A row without a time is of a point that never moves.
+    moving = set(truth.loc[truth["time_s"].notna(), "target_id"].astype(str))
     return [
-        Truth(name, p[:, :2], (a - b)[:, :2] / OVER_S, float(np.nan_to_num(sd.get(name, 0.0))))
+        Truth(
+            name,
+            p[:, :2],
+            (a - b)[:, :2] / OVER_S,
+            float(np.nan_to_num(sd.get(name, 0.0))),
+            name not in moving,
+        )
         for name, p, a, b in zip(names, position, ahead, behind, strict=True)
     ]
 

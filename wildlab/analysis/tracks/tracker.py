@@ -24,7 +24,14 @@ from wildlab.analysis.tracks.inputs import (
     read_inputs,
 )
 from wildlab.analysis.tracks.many import ManyTracks, track_jointly
-from wildlab.analysis.tracks.noise_model import OF_UNNAMED, NoiseModel, TargetModel, ToldValue, Tuned
+from wildlab.analysis.tracks.noise_model import (
+    OF_UNNAMED,
+    STATED,
+    NoiseModel,
+    TargetModel,
+    ToldValue,
+    Tuned,
+)
 from wildlab.analysis.tracks.scans import Scans
 from wildlab.analysis.tracks.tracks import SensorTrack, track_target
 from wildlab.errors import WildlabError
@@ -144,6 +151,9 @@ def _track_each(
     _refuse_unknown(targets, known, flight)
     if all(one.scans.labelled for one in inputs.sensors.values()):
         said = [one for one in said if one.subject != "targets" or one.what not in OF_UNNAMED]
+    truths = [truth for one in inputs.sensors.values() for truth in one.truths]
+    if still := {truth.target for truth in truths if truth.fixed}:
+        said.append(ToldValue("targets", "at rest, as their truth has no time", str(len(still)), STATED))
     names = [name for name in (filters or (WHITE, "schmidt")) if name in ABLE]
     names = list(dict.fromkeys([WHITE, *(_with_smoothed(names) if smooth else names)]))
     for target in sorted(known):
@@ -154,7 +164,6 @@ def _track_each(
         }
         if len(able) > 1 and (not targets or target in targets):
             tracks += track_target(able, target, inputs.targets, names)
-    truths = [truth for one in inputs.sensors.values() for truth in one.truths]
     return TrackingResult(
         tracks,
         {name: one.scans for name, one in inputs.sensors.items()},

@@ -126,6 +126,8 @@ def track_target(
     WildlabError
         Where the detections cannot go through one of the filters.
     """
+    if any(one.split(target)[0].fixed for one in inputs.values()):
+        targets = targets.at_rest
     chosen = choose(inputs, target, targets)
     looks, truth, merged, pieces, first, own, ids = chosen
     sizes = np.asarray(merged.sensor.sizes, np.int64) if len(inputs) > 1 else np.empty(0, np.int64)

@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.measurement_noise import follow_variations
 from wildlab.analysis.navigate import navigate_observer
-from wildlab.analysis.track import (
+from wildlab.analysis.pose_noise import follow_variations
+from wildlab.analysis.tracks.sighting import (
     CvTuning,
     Scored,
     Sighting,
@@ -172,7 +172,7 @@ def _interacting(seen: Sighting, tuning: CvTuning) -> Track:
 
 
 def start_on_detections(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
-    """As `wildlab.analysis.track.start`, its row counted among the detections alone."""
+    """As `wildlab.analysis.tracks.sighting.start`, its row counted among the detections alone."""
     rows = np.flatnonzero(seen.seen)
     begin = start(seen, tuning, n, **more)
     return begin._replace(row=int(np.searchsorted(rows, begin.row)))
@@ -212,7 +212,7 @@ def numbers_of(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
 def numbers_beside(seen: Sighting, tuning: CvTuning, base: str, base_track: ScoredTrack) -> Numbers:
     """Numbers of a filter on the ground with the noise that H 8.2 proposes, and with fewer detections.
 
-    The subjects are ``base`` and one of `wildlab.analysis.measurement_noise.VARIATIONS`; ``detections`` says
+    The subjects are ``base`` and one of `wildlab.analysis.pose_noise.VARIATIONS`; ``detections`` says
     how many each was given. ``base_track`` is what the filter itself made of the sighting.
     """
     result: Numbers = {}

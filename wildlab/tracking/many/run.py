@@ -538,11 +538,17 @@ def smooth_considering(
         With all measurements. Without shared errors those of Rauch, Tung and Striebel.
     """
     after, spread = x.copy(), P.copy()
+    if not P[:, 2:].any() and P.shape[1] == 4:  # at rest: a speed that is known is not smoothed
+        after[:, :2], spread[:, :2, :2] = smooth_considering(
+            times, x[:, :2], P[:, :2, :2], C[:, :2], density, lasting_s
+        )
+        return after, spread
     # The smoothed error is A e + B o and what later measurements and motion add, of covariance N.
-    A, B, N = np.eye(4), np.zeros_like(C[-1]), np.zeros((4, 4))
+    n = x.shape[1]
+    A, B, N = np.eye(n), np.zeros_like(C[-1]), np.zeros((n, n))
     for row in range(len(times) - 2, -1, -1):
         dt = times[row + 1] - times[row]
-        F, Q = white_acceleration(dt, density)
+        F, Q = (one[:n, :n] for one in white_acceleration(dt, density))
         left = np.array([fade(dt, float(one)) for one in lasting_s])
         P_ahead, C_ahead = F @ P[row] @ F.T + Q, F @ C[row] * left
         # The best gain leaves the error after a measurement uncorrelated with the innovation, so with the
@@ -554,9 +560,9 @@ def smooth_considering(
         N = N + A @ _positive(P[row + 1] - of_state @ common - of_errors @ C[row + 1].T) @ A.T
         G, _ = _regress(P[row] @ F.T, C[row] * left, P_ahead, C_ahead)
         after[row] = x[row] + G @ (after[row + 1] - F @ x[row])
-        by_motion, by_change = G @ (A @ of_state - np.eye(4)), G @ (A @ of_errors + B)
+        by_motion, by_change = G @ (A @ of_state - np.eye(n)), G @ (A @ of_errors + B)
         N = G @ N @ G.T + by_motion @ Q @ by_motion.T + (by_change * (1 - left**2)) @ by_change.T
-        A, B = np.eye(4) + by_motion @ F, by_change * left
+        A, B = np.eye(n) + by_motion @ F, by_change * left
         both = A @ C[row] @ B.T
         smoothed = A @ P[row] @ A.T + both + both.T + B @ B.T + N
         spread[row] = (smoothed + smoothed.T) / 2

@@ -263,6 +263,8 @@ def _is_of(
 
 def _as_fast(x: Array, other: Array, P: Array) -> bool:
     v = x[2:] - other[2:]
+    if not v.any():  # also of targets at rest, whose speeds have no spread
+        return True
     return bool(v @ np.linalg.solve(P[2:, 2:], v) < SAME_VELOCITY)
 
 
