@@ -9,6 +9,7 @@ import pytest
 
 from tests.flight.readers.tracks import Reader, spoilt
 from wildlab.errors import WildlabError
+from wildlab.flight.readers import documents
 from wildlab.flight.readers.log import RawLog
 
 marks_kml, marks_geojson, marks_csv = (Reader(f"marks-{one}") for one in ("kml", "geojson", "csv"))
@@ -154,6 +155,16 @@ def test_damaged_files_end_in_a_sentence(reader, data):
 def test_what_is_refused(reader, data, problem):
     with pytest.raises(WildlabError, match=problem):
         reader.read(HERE, data)
+
+
+def test_more_of_xml_than_memory_is_for_is_refused(monkeypatch):
+    for name, most, problem in (
+        ("MOST_ELEMENTS", 5, "more than 5 elements"),
+        ("MOST_XML", 99, "99 are the most"),
+    ):
+        with monkeypatch.context() as bound, pytest.raises(WildlabError, match=problem):
+            bound.setattr(documents, name, most)
+            marks_kml.read(HERE, kml(POINTS))
 
 
 OLDER = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}

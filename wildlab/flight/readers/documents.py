@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -125,8 +126,8 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-#: Bytes of an XML file, elements inside each other, and letters of a name that are kept, at most.
-MOST_XML, DEEPEST, MOST_LETTERS = 50_000_000, 50, 200
+#: Bytes and elements of an XML file, elements inside each other, and letters of a name, at most.
+MOST_XML, MOST_ELEMENTS, DEEPEST, MOST_LETTERS = 50_000_000, 1_000_000, 50, 200
 
 
 class BrokenXml(WildlabError):
@@ -165,6 +166,8 @@ def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML")
     def start(tag: str, attributes: dict[str, str]) -> None:
         if len(inside) >= DEEPEST:
             raise fail("its elements are too deep in each other")
+        if next(counted) >= MOST_ELEMENTS:
+            raise fail(f"has more than {MOST_ELEMENTS:,} elements")
         inside.append(tag)
         builder.start(tag, attributes)
 
@@ -173,6 +176,7 @@ def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML")
 
     if len(data) > MOST_XML:
         raise fail(f"has {len(data):,} bytes, and {MOST_XML:,} are the most that is read of XML")
+    counted = count()
     inside: list[str] = []
     builder = TreeBuilder()
     parser = expat.ParserCreate(namespace_separator=" ")

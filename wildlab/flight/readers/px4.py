@@ -99,6 +99,7 @@ class _Walk:
     def __init__(self, data: bytes, topics: frozenset[str]) -> None:
         self.data, self.topics = data, topics
         self.formats: dict[str, list[tuple[str, int, str]]] = {}
+        self.measured: dict[str, tuple[int, int] | None] = {}
         self.names: dict[int, str] = {}
         self.instances: Counter[str] = Counter()
         # Fewest and most bytes of a topic's data: fields that only fill up may be left away at the end.
@@ -175,7 +176,11 @@ class _Walk:
 
     def measure(self, name: str) -> tuple[int, int] | None:
         """Fewest and most bytes of a topic; None where its definition cannot be true."""
-        fields = self.formats.get(name, [])
+        if name not in self.measured and name in self.formats:
+            self.measured[name] = self._measure(name, self.formats[name])
+        return self.measured.get(name)
+
+    def _measure(self, name: str, fields: list[tuple[str, int, str]]) -> tuple[int, int] | None:
         flat = self.flatten(name, 0)
         if flat is None or not 0 < flat[0] <= LONGEST or flat[1] > MOST_FIELDS:
             return None
