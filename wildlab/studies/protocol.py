@@ -101,6 +101,15 @@ class Study:
         return tuple(name for name in inspect.signature(self.trial).parameters if name != "seed")
 
 
+def name_metrics(units: Mapping[str, str]) -> Callable[[str, str], Metric | None]:
+    """A `Study.metric_of` that records the numbers named in ``units`` under their names, and no others."""
+
+    def metric_of(subject: str, name: str) -> Metric | None:
+        return Metric(name, subject, units[name]) if name in units else None
+
+    return metric_of
+
+
 def case_names() -> tuple[str, ...]:
     """All cases: the folders of `wildlab.studies`."""
     found = pkgutil.iter_modules(studies.__path__)

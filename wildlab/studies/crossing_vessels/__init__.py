@@ -9,12 +9,7 @@ from wildlab.studies.crossing_vessels.outcomes import check_claims
 from wildlab.studies.crossing_vessels.trial import joint
 from wildlab.studies.crossing_vessels.trial import reacquisition as again
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.UNITS.get(name)
-    return None if unit is None else Metric(name, subject, unit)
+from wildlab.studies.protocol import Study, name_metrics
 
 
 def answer(facts: Facts) -> list[str]:
@@ -35,6 +30,6 @@ STUDY = Study(
     ),
     trial.trial,
     check_claims,
-    _metric,
+    name_metrics(trial.UNITS),
     answer,
 )

@@ -10,7 +10,7 @@ from wildlab.evaluation.shares import HOLDS, MOSTLY
 from wildlab.studies.gondola_coverage import trial
 from wildlab.studies.gondola_coverage.trial import ADAPT, DOWN, ROLL, STRATEGIES
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study, name_metrics
 
 #: Quantities of the page's tables, by its key.
 TABLES = {
@@ -19,11 +19,6 @@ TABLES = {
 }
 #: The settings that are compared in words: of the thesis's limits the middle one.
 PLAIN, ADAPTIVE = list(ROLL)[1], list(ADAPT)[1]
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
 
 
 def with_share_outside(runs: pd.DataFrame) -> pd.DataFrame:
@@ -48,4 +43,6 @@ def answer(facts: Facts) -> list[str]:
     return [swing, f"adaptive-{kind}"]
 
 
-STUDY = Study("gondola-coverage", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study(
+    "gondola-coverage", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer
+)

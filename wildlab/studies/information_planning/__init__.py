@@ -8,14 +8,9 @@ from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT
 from wildlab.studies.information_planning import trial
 from wildlab.studies.information_planning.trial import INFORMATION, SWING
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study, name_metrics
 
 _SIDES = {HOLDS: "sooner", MOSTLY: "sooner", MOSTLY_NOT: "later", FAILS: "later"}
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
 
 
 def answer(facts: Facts) -> list[str]:
@@ -29,4 +24,11 @@ def answer(facts: Facts) -> list[str]:
     return [f"free-{swing}", f"fixed-{fixed}"]
 
 
-STUDY = Study("information-planning", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study(
+    "information-planning",
+    trial.SUBJECTS,
+    trial.trial,
+    trial.check_claims,
+    name_metrics(trial.RECORDED),
+    answer,
+)

@@ -7,12 +7,7 @@ import math
 from wildlab.studies.large_ship import trial
 from wildlab.studies.large_ship.claims import check_claims
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.UNITS.get(name)
-    return None if unit is None else Metric(name, subject, unit)
+from wildlab.studies.protocol import Study, name_metrics
 
 
 def answer(facts: Facts) -> list[str]:
@@ -30,6 +25,6 @@ STUDY = Study(
     (*trial.SUBJECTS, trial.DETECTOR),
     trial.trial,
     check_claims,
-    _metric,
+    name_metrics(trial.UNITS),
     answer,
 )

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from wildlab.studies.optical_flow_velocity import trial
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
+from wildlab.studies.protocol import Study, name_metrics
 
 
 def answer(facts: Facts) -> list[str]:
@@ -20,4 +15,11 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study("optical-flow-velocity", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study(
+    "optical-flow-velocity",
+    trial.SUBJECTS,
+    trial.trial,
+    trial.check_claims,
+    name_metrics(trial.RECORDED),
+    answer,
+)

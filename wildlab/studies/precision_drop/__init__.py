@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from wildlab.studies.page import Facts
 from wildlab.studies.precision_drop import trial
-from wildlab.studies.protocol import Metric, Study
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
+from wildlab.studies.protocol import Study, name_metrics
 
 
 def answer(facts: Facts) -> list[str]:
@@ -17,4 +12,6 @@ def answer(facts: Facts) -> list[str]:
     return [f"mean-{facts.outcome('within-a-few-metres')}", f"single-{facts.outcome('single-is-inaccurate')}"]
 
 
-STUDY = Study("precision-drop", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study(
+    "precision-drop", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer
+)

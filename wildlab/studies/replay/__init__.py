@@ -6,16 +6,11 @@ import math
 
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.replay import trial
 from wildlab.studies.replay.trial import CLOCK, NONE
 
 _CLOCK = {HOLDS: "better", MOSTLY: "better", MOSTLY_NOT: "no-better", FAILS: "no-better"}
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
 
 
 def answer(facts: Facts) -> list[str]:
@@ -28,4 +23,4 @@ def answer(facts: Facts) -> list[str]:
     return [f"view-{view}", f"clock-{clock}"]
 
 
-STUDY = Study("replay", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study("replay", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer)

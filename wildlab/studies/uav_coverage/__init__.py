@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.uav_coverage import trial
 from wildlab.studies.uav_coverage.trial import DOWN, LOW, LOW_CLOSE, YAW
 
@@ -17,11 +17,6 @@ TABLES = {
 }
 #: A plan that sees so much of the enclosures leaves little to gain; so small a difference is none.
 NEARLY_ALL, SMALL = 0.95, 0.02
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
 
 
 def answer(facts: Facts) -> list[str]:
@@ -42,4 +37,6 @@ def answer(facts: Facts) -> list[str]:
     return [f"camera-{camera}", f"half-height-{height}"]
 
 
-STUDY = Study("uav-coverage", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study(
+    "uav-coverage", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer
+)

@@ -5,13 +5,8 @@ from __future__ import annotations
 import math
 
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.vessel_detection import trial
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
 
 
 def answer(facts: Facts) -> list[str]:
@@ -23,4 +18,6 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study("vessel-detection", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study(
+    "vessel-detection", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer
+)

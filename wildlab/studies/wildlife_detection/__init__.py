@@ -5,18 +5,13 @@ from __future__ import annotations
 import math
 
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.claims import check_claims
 from wildlab.studies.wildlife_detection.trial import METHODS, PROPOSED, SUBTRACTED
 
 #: An F1 from which on a method is called usable: half of what it reports, or of what is there, is right.
 USABLE = 0.5
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
 
 
 def answer(facts: Facts) -> list[str]:
@@ -33,5 +28,10 @@ def answer(facts: Facts) -> list[str]:
 
 
 STUDY = Study(
-    "wildlife-detection", (*trial.SUBJECTS, "ground", "herd"), trial.trial, check_claims, _metric, answer
+    "wildlife-detection",
+    (*trial.SUBJECTS, "ground", "herd"),
+    trial.trial,
+    check_claims,
+    name_metrics(trial.RECORDED),
+    answer,
 )

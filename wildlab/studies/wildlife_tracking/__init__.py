@@ -6,18 +6,13 @@ import math
 
 from wildlab.evaluation.shares import FAILS, HOLDS
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.wildlife_tracking import trial
 from wildlab.studies.wildlife_tracking.claims import check_claims
 from wildlab.studies.wildlife_tracking.trial import GONDOLA, NEGATIVE, UAV
 
 #: The particle filter of each platform.
 _FILTERS = (f"{GONDOLA}-{NEGATIVE}", f"{UAV}-{NEGATIVE}")
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = trial.RECORDED.get(name)
-    return None if unit is None else Metric(name, subject, unit)
 
 
 def answer(facts: Facts) -> list[str]:
@@ -42,4 +37,6 @@ def _reacquired(facts: Facts) -> str:
     return "hard" if verdicts == {HOLDS} else "easy" if verdicts == {FAILS} else "open"
 
 
-STUDY = Study("wildlife-tracking", trial.SUBJECTS, trial.trial, check_claims, _metric, answer)
+STUDY = Study(
+    "wildlife-tracking", trial.SUBJECTS, trial.trial, check_claims, name_metrics(trial.RECORDED), answer
+)
