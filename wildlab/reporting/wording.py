@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import pandas as pd
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 from wildlab.messages.message import Message
@@ -54,7 +55,9 @@ class Wording:
         """A figure with its file's name (the key where empty), alt text and caption; its title is set."""
         text, name = self.texts.figures[key], name or key
         if text.title:
-            fig.axes[0].set_title(self.say(text.title))
+            # Over the whole figure: beside long names on an axis there is no room for it above the axes.
+            look = {"fontsize": rcParams["axes.titlesize"], "fontweight": rcParams["axes.titleweight"]}
+            fig.suptitle(self.say(text.title), x=0.01, ha="left", **look)
         caption = f"{self.say(text.caption)} {counterpart(name, self.thesis)}".strip()
         return fig, name, self.say(text.alt), caption
 
