@@ -15,6 +15,7 @@ from wildlab.reporting import figures
 from wildlab.reporting.charts import drawing, georeferencing, navigation, tracks
 from wildlab.reporting.figure_text import least_size
 from wildlab.reporting.figures import PHONE_WIDTH
+from wildlab.reporting.quantities import nice_length
 
 
 def test_ellipse_holds_its_share_of_samples():
@@ -41,7 +42,7 @@ def test_nothing_is_drawn_where_nothing_is_known():
 
 @pytest.mark.parametrize(("about", "length"), [(7.3, 5), (10, 10), (0.024, 0.02), (1999, 1000)])
 def test_nice_length(about, length):
-    assert figures.nice_length(about) == pytest.approx(length)
+    assert nice_length(about) == pytest.approx(length)
 
 
 def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path, monkeypatch):

@@ -17,6 +17,7 @@ from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.paths import NOTEBOOKS
+from wildlab.runner import seeds as fingerprint
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.processes import cluster
 from wildlab.runner.processes.progress import shown
@@ -26,7 +27,6 @@ from wildlab.runner.run import _notes
 from wildlab.runner.seeds import (
     SeedWork,
     failed_seeds,
-    fingerprint,
     make_work,
     other_seeds,
     read_seed,

@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
-from wildlab.runner.vary import AS_IT_IS, Moved, turned_table, turned_words, vary_study
+from wildlab.runner.vary import AS_IT_IS, Moved, turned_table, vary_study
 
 BASE = Moved(AS_IT_IS, 1.0, {"a": "holds", "b": "undecided"})
 
@@ -21,9 +21,6 @@ def test_verdicts_that_are_others_than_as_it_is_have_turned():
     table = turned_table(moved)
     assert table["turned"].tolist()[:2] == [1.0, 0.0] and np.isnan(table["turned"].iloc[2])
     assert table["which"].tolist() == ["b: undecided → holds", "", "this course cannot be flown"]
-    words = turned_words((table, 20), "s")
-    assert "1 of 2" in words and "wind: speed times 0.5" in words and "1 cannot" in words
-    assert "0 of 1" in turned_words((table.iloc[1:2], 20), "s")
 
 
 @pytest.mark.parametrize("factors", [(), (0.0,), (-1.0,), (float("nan"),), (1.0,)])

@@ -31,6 +31,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.quantiles import chi2_quantile
 from wildlab.paths import DATA
 from wildlab.reporting.figure_text import END_LABEL, FULL_SIZE, fit_text, least_size
+from wildlab.reporting.quantities import nice_length
 from wildlab.reporting.text import escape, inline
 
 DPI = 190
@@ -186,12 +187,6 @@ def map_axes(ax: Axes, *, scale_bar: bool = True, east: str = "east (m)", north:
     )
 
 
-def nice_length(about: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above ``about``."""
-    power = 10.0 ** math.floor(math.log10(about))
-    return max(step * power for step in (1, 2, 5) if step * power <= about * (1 + 1e-9))
-
-
 def ellipse(
     ax: Axes,
     mean_en: ArrayLike,
@@ -324,7 +319,8 @@ def png_bytes(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     fit_text(figure)
     with _laid_out(figure):
-        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+        # `savefig` would draw it twice.
+        FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
     return buffer.getvalue()
 
 

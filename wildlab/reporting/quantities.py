@@ -67,3 +67,15 @@ def duration(seconds: float) -> str:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)
     return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def nice_length(about: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above ``about``.
+
+    Examples
+    --------
+    >>> nice_length(7.3), nice_length(1999.0)
+    (5.0, 1000.0)
+    """
+    power = 10.0 ** math.floor(math.log10(about))
+    return max(step * power for step in (1, 2, 5) if step * power <= about * (1 + 1e-9))

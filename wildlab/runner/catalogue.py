@@ -35,12 +35,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS
-from wildlab.reporting.notebooks import read_notebook
 from wildlab.studies.protocol import Study, case_names, find_case
 
 #: What the runner gives to every notebook; a study's own parameters may not use these names.
@@ -202,6 +200,8 @@ def plain_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(value: Any, name: str) -> Any:
+    import numpy as np  # which listing studies does not need
+
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if isinstance(value, np.generic | np.ndarray):
@@ -225,6 +225,8 @@ def check_notebook(notebook: Path, parameters: Sequence[str]) -> int:
         If the notebook is absent or not one, has no or several cells tagged ``parameters``, or does not
         know one of the parameters.
     """
+    from wildlab.reporting.notebooks import read_notebook  # takes a while, too
+
     if not notebook.is_file():
         raise WildlabError(
             "there is no such notebook", "restore it, or name another in studies.toml", file=notebook.name

@@ -82,7 +82,7 @@ def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
     rooms = ("studies", "reporting", "messages")
     shown = [path for room in rooms for path in (PACKAGE / room).rglob("*.py")]
     texts = [*(DATA / "published").glob("*.toml"), *(DATA / "messages").rglob("*.toml")]
-    shown += [DATA / "glossary.toml", *texts, *(DATA / "pages").iterdir()]
+    shown += [DATA / "glossary.toml", *texts, *(DATA / "pages").glob("*")]
     digest = hashlib.sha256(json.dumps([code, dict(given)], sort_keys=True, allow_nan=False).encode())
     for path in [*sorted(shown), notebook]:
         digest.update(path.name.encode())

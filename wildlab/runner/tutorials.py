@@ -131,7 +131,7 @@ def _mark(notebook: Path) -> str:
     shows = sorted({path for pattern in _SHOWING for path in PACKAGE.glob(pattern)})
     digest = hashlib.sha256(code_key().encode())
     digest.update(" ".join(f"{name} {version(name)}" for name in _PACKAGES).encode())
-    for path in (*shows, *sorted((DATA / "pages").iterdir()), notebook):
+    for path in (*shows, *sorted((DATA / "pages").glob("*")), notebook):
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return f"<!-- made from {digest.hexdigest()} -->\n"
 

@@ -20,7 +20,7 @@ from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.published import published_rows
-from wildlab.reporting.report import Report, open_report
+from wildlab.reporting.report import open_report
 from wildlab.reporting.text import slug
 from wildlab.reporting.verdicts import judge
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
@@ -185,30 +185,6 @@ def kept_table(study: str, out: str = "") -> tuple[pd.DataFrame, int] | None:
 COLUMNS = {"group": "chosen parameters", "factor": "times", "turned": "verdicts turned", "which": "which"}
 
 
-def turned_words(kept: tuple[pd.DataFrame, int] | None, study: str) -> str:
-    """What a report says over the table, or how to get one."""
-    if kept is None:
-        return (
-            "How much hangs on what was chosen for the simulated flight has not been computed here: "
-            f"`wildlab vary {study}` moves each group of chosen parameters and shows which verdicts turn."
-        )
-    table, seeds = kept
-    done = table[table["turned"].notna()]
-    fragile = done[done["turned"] > 0]
-    lost = len(table) - len(done)
-    words = (
-        f"Groups of chosen parameters were multiplied, the filters' tuning left alone, each over {seeds} "
-        f"flights: {len(fragile)} of {len(done)} moves turn a verdict"
-    )
-    if len(fragile):
-        worst = fragile.sort_values("turned", ascending=False).iloc[0]
-        words += (
-            f", most of all {worst['group']} times {worst['factor']:g} ({worst['turned']:.0f} of "
-            f"{worst['of']:.0f})"
-        )
-    return words + (f"; {lost} cannot be flown" if lost else "") + "."
-
-
 def _work(
     study: StudyEntry,
     case: Study,
@@ -270,11 +246,3 @@ def _verdicts(study: StudyEntry, case: Study, work: SeedWork, told: dict[str, An
         if compared is not None:
             found[f"{row['name']} of {row['subject']}"] = compared.words
     return found
-
-
-def choices_section(report: Report, study: str, out: str = "") -> None:
-    """The section of a report on what hangs on a twin's chosen parameters; arguments as of `kept_table`."""
-    kept = kept_table(study, out)
-    report.section("What hangs on what was chosen", turned_words(kept, study))
-    if kept is not None:
-        report.table(kept[0], columns=COLUMNS, digits={"factor": 2, "turned": 0}, fold="Every move")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.ellipses import ellipse_axes
 from wildlab.reporting.animation.shown import Course, Ellipses, Outlines, ShownFlight, checked
-from wildlab.reporting.figures import nice_length
+from wildlab.reporting.quantities import nice_length
 from wildlab.reporting.text import escape
 
 Array = NDArray[np.float64]
