@@ -16,6 +16,7 @@ from wildlab.flight.catalog import is_fetched
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import by_hand
 from wildlab.runner.catalogue import StudyEntry, load_studies
+from wildlab.runner.open_study import open_study
 from wildlab.runner.processes.shell import CellError
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
@@ -137,3 +138,10 @@ def test_a_kernel_of_jupyter_runs_a_notebook_too():
     )
     outputs = [output for cell in shown.cells for output in cell.get("outputs", [])]
     assert outputs and not any(output.output_type == "error" for output in outputs)
+
+
+def test_a_report_on_an_own_flight_is_of_the_study_that_its_name_begins_with():
+    own = open_study("autoferry-many-mine", flight="flights/mine")
+    assert (own.name, own.entry.name) == ("autoferry-many-mine", "autoferry-many")
+    with pytest.raises(WildlabError, match="no study"):
+        open_study("autoferry-many-mine")

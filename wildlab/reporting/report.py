@@ -173,7 +173,8 @@ class Report:
             for value, label in tiles
             if known(value) and known(label)
         ]
-        self._show(f'<ul class="tiles">{"".join(items)}</ul>')
+        if items:
+            self._show(f'<ul class="tiles">{"".join(items)}</ul>')
 
     def section(self, title: str, intro: str = "", part: str = "") -> None:
         """``<h2>`` and, if given, a paragraph. ``part`` is one of `wildlab.reporting.arrange`: what to do

@@ -47,7 +47,7 @@ def open_study(
     Parameters
     ----------
     study
-        Its name in ``studies.toml``.
+        Its name in ``studies.toml``; of a report on somebody's own flight with that flight's name behind it.
     flight, others
         Folders of its flights, as the runner gives them; left out, its twin is simulated for ``seed``, or its
         data set is imported.
@@ -72,10 +72,12 @@ def open_study(
     >>> open_study("consistency-bounds").case.case
     'consistency-bounds'
     """
-    entry = find_study(study, load_studies())
+    studies = load_studies()
+    named = [one for one in studies if flight and study.startswith(f"{one}-")]
+    entry = find_study(study if study in studies or not named else max(named, key=len), studies)
     if entry.case is None:
         raise WildlabError(f"the study {study!r} is of no case", "name its case", field="case")
-    return OpenStudy(entry, find_case(entry.case), flight, tuple(others), seed, seeds, out)
+    return OpenStudy(study, entry, find_case(entry.case), (flight, *others), seed, seeds, out)
 
 
 class OpenStudy:
@@ -83,23 +85,24 @@ class OpenStudy:
 
     def __init__(
         self,
+        name: str,
         entry: StudyEntry,
         case: Study,
-        flight: str,
-        others: Sequence[str],
+        folders: tuple[str, ...],
         seed: int,
         seeds: int | None,
         out: str,
     ) -> None:
-        self.entry, self.case, self.seed, self.seeds, self.out = entry, case, seed, seeds, out
-        self._folders = flight, others
+        self.name, self.entry, self.case = name, entry, case
+        self.seed, self.seeds, self.out = seed, seeds, out
+        self._folders = folders
 
     @cached_property
     def flights(self) -> list[Flight]:
         """Its flights, the one that the figures show first; none where it is a calculation."""
         if self.entry.kind == "computed":
             return []
-        return flights_for(self.entry.name, self._folders[0], self._folders[1], self.seed)
+        return flights_for(self.entry.name, self._folders[0], self._folders[1:], self.seed)
 
     @property
     def data(self) -> Flight:
@@ -112,8 +115,8 @@ class OpenStudy:
         first = self.flights[0] if self.flights else None
         name = "" if first is None else first.name
         return open_report(
-            study=self.entry.name,
-            flight=name if len(self.flights) < 2 else self.entry.name,
+            study=self.name,
+            flight=name if len(self.flights) < 2 else self.name,
             kind=self.entry.kind if first is None else first.manifest.kind,
             seed=self.seed,
             seeds=self.seeds,
@@ -145,7 +148,7 @@ class OpenStudy:
         return trials_table(
             self.case.case,
             self.seeds or 1,
-            study=self.entry.name,
+            study=self.name,
             seed=self.seed,
             drawn=drawn,
             out=self.out,
@@ -192,7 +195,7 @@ class OpenStudy:
         own = (self.twin,) if self.flights and self.twin else ()
         if own or twins:
             show_twins(self.report, [*own, *(one for one in twins if one not in own)], self.entry.name)
-        kept = vary.kept_table(self.entry.name, self.out)
+        kept = vary.kept_table(self.name, self.out)
         if kept is not None:
             self.report.table(
                 kept[0],

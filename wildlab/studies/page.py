@@ -124,7 +124,9 @@ def show_page(
     # All are filled in, so that a fault of one that is not chosen shows.
     sentences = {key: wording.say(text) for key, text in texts.answers.items()}
     report.summary([sentences[key] for key in answer(facts)])
-    report.tiles([tile_of(report, one, wording) for one in texts.tiles])
+    # A number may be of several flights or of a sensor that somebody's own flight has not.
+    there = [one for one in texts.tiles if (one.name, one.subject) in report.recorded]
+    report.tiles([tile_of(report, one, wording) for one in there])
     first, *others = figures
     wording.figure(first.text, first.fig, first.name, main=True)
     report.published("Published and here", PUBLISHED_CAPTION, texts.subjects, texts.quantities)
