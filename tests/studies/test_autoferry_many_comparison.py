@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.many import ManyTracks, judged, track_targets
+from wildlab.analysis.tracks.many import ManyTracks, judged
+from wildlab.analysis.tracks.tracker import track
 from wildlab.errors import WildlabError
 from wildlab.studies.autoferry_many import comparison, scores, stone_soup, tuning
 from wildlab.studies.autoferry_many.stone_soup import Choice, Eye, draw_choice, run_stone_soup
@@ -196,7 +197,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, mo
     # One of them by hand, from the flight on.
     row = rows[(rows["case"] == "scenario-17") & (rows["mode"] == "radar") & (rows["rank"] == 2)].iloc[0]
     drawn = draw_choice(np.random.default_rng(1).spawn(2)[row["draw"] - 1], comparison.FAR_M)
-    given = track_targets(scenario(17), settings=settings, sensors=["radar"])
+    given = track(scenario(17), "joint", settings=settings, sensors=["radar"])
     shown = run_stone_soup(given.scans, ["radar"], drawn)
     lives = judged(given._replace(shown=shown), tuning.reach_of(scenario(17), "radar"))
     assert tuning.gospa_of(lives) == row["gospa"]
