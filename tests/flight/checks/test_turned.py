@@ -141,7 +141,9 @@ def test_places_and_bearings_are_turned_alike(by):
     rng = np.random.default_rng(5)
     own, places = rng.normal(0, 50, (9, 3)), rng.normal(0, 200, (9, 3))
     nothing = np.zeros((1, 9, 3))
-    scan = SourceLooks("a", places, None, own, nothing, lambda t: (own, nothing), np.zeros(9), np.arange(9))
+    scan = SourceLooks(
+        "a", places, None, own, nothing, np.zeros(9), np.arange(9), lambda t, u: (own, nothing, np.zeros(9))
+    )
     bearings = replace(scan, places=None, azimuth=scan.seen_at)
     np.testing.assert_allclose(wrap(scan.turned(by).seen_at - bearings.turned(by).seen_at), 0, atol=1e-9)
     new = scan.turned(by).places
@@ -154,9 +156,10 @@ def test_positions_are_turned_about_the_own_place():
     rng = np.random.default_rng(6)
     own = np.column_stack([np.linspace(0, 200, 80), np.zeros((80, 2))])
     targets = np.tile([[[150.0, 120.0, 0.0]], [[30.0, -160.0, 0.0]]], (1, 80, 1))
+    zeros = np.zeros(80)
     places = targets[rng.integers(0, 2, 80), np.arange(80)] + rng.normal(0, 0.5, (80, 3))
     scan = SourceLooks(
-        "lidar", places, None, own, targets, lambda t: (own, targets), np.zeros(80), np.arange(80)
+        "lidar", places, None, own, targets, zeros, np.arange(80), lambda t, u: (own, targets, zeros)
     )
     found = best_turn((scan.turned(6.0),), [])
     assert found is not None and abs(found + 6.0) < 0.3
@@ -172,11 +175,10 @@ def test_what_a_sensor_places_goes_with_its_platform_where_its_clock_is_moved():
     places, own = np.array([[30.0, 5.0, 0.0]] * 4), np.zeros((4, 3))
     targets = np.zeros((2, 4, 3))
 
-    def stamped(by: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def stamped(by: float, _: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return own + np.array([2.0 * by, 0, 0]), targets + np.array([0, by, 0]), np.full(4, 0.1 * by)
 
-    at = stamped(0.0)
-    scan = SourceLooks("a", places, None, *at[:2], lambda t: at[:2], at[2], np.arange(4), stamped)
+    scan = SourceLooks("a", places, None, *stamped(0.0, 0.0), np.arange(4), stamped)
     later = scan.with_stamps(3.0)
     assert later.places is not None
     assert np.allclose(later.places - later.own, places) and np.allclose(later.own[:, 0], 6.0)

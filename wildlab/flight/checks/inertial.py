@@ -500,7 +500,11 @@ def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     axis = int(np.argmax(np.abs(mean)))
     code = "gravity-oblique"
     corrections: tuple[Correction, ...] = ()
-    facts: dict[str, Any] = {"mean": mean, "down": f"{'-' if mean[axis] > 0 else ''}{AXES[axis]}", "hint": ""}
+    facts: dict[str, Any] = {
+        "mean": mean.tolist(),
+        "down": f"{'-' if mean[axis] > 0 else ''}{AXES[axis]}",
+        "hint": "",
+    }
     if axis != 2 and abs(mean[axis]) > ALONG * size:
         code = "gravity-along-other-axis"
     elif axis == 2 and mean[2] > ALONG * size:

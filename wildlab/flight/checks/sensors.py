@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -107,19 +105,18 @@ def sensors(flight: Flight) -> Iterator[Finding]:
 @dataclass(frozen=True)
 class SourceLooks:
     """What one source saw: places (N, 3) in n or azimuths (N,), from where (N, 3), and the targets (M, N, 3);
-    own place and targets had the truth been later by so much; where the bow pointed, (N,) rad from north
-    towards east; the number of the look (N,), counted from 0 without gaps; own place, targets and bow had the
-    sensor's stamps been later; and how far away (N,) m, where it says so beside the azimuth."""
+    where the bow pointed, (N,) rad from north towards east; the number of the look (N,), counted from 0
+    without gaps; own place, targets and bow had the sensor's stamps and then the truth been later by so much;
+    and how far away (N,) m, where it says so beside the azimuth."""
 
     source: str
     places: Array | None
     azimuth: Array | None
     own: Array
     targets: Array
-    at: Callable[[float], tuple[Array, Array]]
     heading: Array
     look: NDArray[np.intp]
-    stamped: Callable[[float], tuple[Array, Array, Array]] | None = None
+    at: Callable[[float, float], tuple[Array, Array, Array]]
     distance: Array | None = None
 
     @property
@@ -141,9 +138,7 @@ class SourceLooks:
 
     def with_stamps(self, by: float) -> SourceLooks:
         """The same looks had the sensor's stamps been later: what it placed about itself goes along."""
-        if self.stamped is None:
-            return self
-        own, targets, heading = self.stamped(by)
+        own, targets, heading = self.at(by, 0.0)
         places = None if self.places is None else self.places + (own - self.own)
         return replace(self, own=own, targets=targets, heading=heading, places=places)
 
@@ -169,18 +164,15 @@ def scans_of(flight: Flight) -> Scans:
         rows, frame = rows[frame >= 0], frame[frame >= 0]
         times = frame_times(flight)[frame] + _clock(flight, str(source))
 
-        def seen_from(
+        def at(
             shift: float, of_truth: float, times: Array = times, ids: pd.Series = rows["frame_id"]
         ) -> tuple[Array, Array, Array]:
             own, R, _ = poses_at(nav, times + shift, ids)
             targets = truth_at(truth, times + shift + of_truth, offset_s=offset)[1]
             return own, targets, np.arctan2(R[:, 1, 0], R[:, 0, 0])
 
-        def at(shift: float, seen_from: Any = seen_from) -> tuple[Array, Array]:
-            return seen_from(0.0, shift)[:2]  # type: ignore[no-any-return]
-
         try:
-            own, targets, heading = seen_from(0.0, 0.0)
+            own, targets, heading = at(0.0, 0.0)
         except (WildlabError, ValueError):  # said by the checks of times
             continue
         if len(rows) < ENOUGH:
@@ -193,10 +185,9 @@ def scans_of(flight: Flight) -> Scans:
                 None if position else rows["azimuth_rad"].to_numpy(float),
                 own,
                 targets,
-                at,
                 heading,
                 np.unique(frame, return_inverse=True)[1],
-                partial(seen_from, of_truth=0.0),
+                at,
                 rows["range_m"].to_numpy(float) if kind == "range-bearing" else None,
             )
         )
@@ -298,7 +289,7 @@ def common_mistakes(flight: Flight) -> Iterator[Mistake[Scans]]:
             hours = abs(seconds) >= 3600
 
             def later(s: SourceLooks, by: float = seconds) -> SourceLooks:
-                own, targets = s.at(by)
+                own, targets, _ = s.at(0.0, by)
                 return replace(s, own=own, targets=targets)
 
             yield mistake(
@@ -330,13 +321,12 @@ def source_mistakes(one: SourceLooks, offset_s: float = 0.0) -> Iterator[Mistake
     offset_s
         That offset.
     """
-    if one.stamped is not None:
-        # The clock of the sensor alone: what it saw stays, and all else is where it was at other times.
-        by = min(CLOCKS, key=lambda t: float(misfit((one.with_stamps(t),))[0, 0]))
-        if by != 0:
-            undo = _each(lambda s: s.with_stamps(by))
-            facts = {"source": one.source, "by": by, "offset": offset_s + by}
-            yield mistake(one_row("sensor-clock"), undo, fitted=True, **facts)
+    # The clock of the sensor alone: what it saw stays, and all else is where it was at other times.
+    by = min(CLOCKS, key=lambda t: float(misfit((one.with_stamps(t),))[0, 0]))
+    if by != 0:
+        undo = _each(lambda s: s.with_stamps(by))
+        row = one_row("sensor-clock")
+        yield mistake(row, undo, fitted=True, source=one.source, by=by, offset=offset_s + by)
     groups = {"seen-places": "places", "range": "distance", "azimuth": "azimuth"}
     for group, field in groups.items():
         if getattr(one, field) is not None:
