@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ from wildlab.reporting.metrics import document
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
 from wildlab.runner.record.provenance import provenance_of_flight
+
+_CODED = re.compile(r"sha256|fingerprint|epoch")
 
 
 def leave_report(
@@ -49,7 +52,10 @@ def everything(flight: Path, *more: str) -> str:
     loaded = load_flight(flight)
     # First and last rows: of every group, and few enough to be read quickly.
     shown = "".join(
-        f"<h2>{escape(name)}</h2>{pd.concat([table.head(3), table.tail(3)]).to_html()}"
+        f"<h2>{escape(name)}</h2>{pd.concat([table.head(3), table.tail(3)]).to_html(border=0)}"
         for name, table in {**loaded.nav, **loaded.tables}.items()
     )
-    return f"<pre>{escape(' '.join((manifest_toml(loaded.manifest), *more)))}</pre>{shown}"
+    # Hashes and stamps are of no form that a report has.
+    stated = "\n".join(line for line in manifest_toml(loaded.manifest).splitlines() if not _CODED.match(line))
+    shown = shown.replace(' style="text-align: right;"', "")
+    return f"<pre>{escape(' '.join((stated, *more)))}</pre>{shown}"

@@ -20,6 +20,7 @@ from wildlab.analysis.navigation_errors import REFERENCES, reference_of
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import PREFERRED, Flight, save_flight
+from wildlab.geometry.camera import normalise
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.strapdown import integrate_strapdown
 from wildlab.navigation.timeline import ImuSamples
@@ -244,6 +245,24 @@ def test_what_is_computed_from_the_copy_is_what_is_computed_from_the_flight():
     np.testing.assert_allclose(
         velocity(np.zeros(1))[0], next(iter(copy.nav.values()))[list(VELOCITY)].iloc[0]
     )
+
+
+@pytest.mark.parametrize(
+    ("fx", "rounded"), [(1159.2, 1150.0), (765.0, 765.0), (1012.0, 1000.0), (4321.0, 4300.0)]
+)
+def test_the_camera_is_one_of_many_and_sees_the_same(fx, rounded):
+    """Calibrated focal lengths and principal points would link all copies of one camera."""
+    lens = {"fx_px": fx, "fy_px": 1.01 * fx, "cx_px": 311.7, "cy_px": 262.3, "skew_px": 0.4, "k1": -0.2}
+    camera = {"name": "Boson of Letaba", "width_px": 640, "height_px": 512, **lens}
+    flight = canary(imu=False, camera=camera, uncertainty={"pixel_px": 2.0})
+    found = made(flight)
+    there = found.flight.manifest.camera
+    assert there is not None and (there.name, there.fx_px) == ("camera", pytest.approx(rounded))
+    assert (there.cx_px, there.cy_px) == (319.5, 255.5)
+    assert found.pixels == pytest.approx(rounded / fx)
+    assert found.flight.manifest.uncertainty.pixel_px == pytest.approx(2.0 * rounded / fx)
+    rays = [normalise(seen.poses.camera, seen.uv) for seen in (observe(flight), observe(found.flight))]
+    np.testing.assert_allclose(rays[0], rays[1], atol=1e-9)
 
 
 def test_the_new_origin_follows_from_the_flight_alone():

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings
 from wildlab.flight.toml import dump_toml
-from wildlab.sharing.names import Names
-from wildlab.sharing.settings import QUARTER, neutral_settings, whole_quarters
+from wildlab.sharing.names import QUARTER, Names, neutral_settings, whole_quarters
 
 TOLD = """
 [sensors."Letaba mast"]

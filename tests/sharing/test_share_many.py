@@ -28,7 +28,7 @@ from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
 from wildlab.runner.track import track_many
 from wildlab.sharing import generalise, redrawn
-from wildlab.sharing import settings as neutral
+from wildlab.sharing import names as neutral
 from wildlab.sharing.share import share
 
 HERE = {"latitude_deg": -24.873165, "longitude_deg": 31.486297, "height_m": 317.43}
@@ -173,7 +173,7 @@ def settings_left(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("broken", "found"),
-    [(hulls_left, "Shingwedzi"), (hulls_of_the_flight_left, "mokoro"), (settings_left, "Pafuri")],
+    [(hulls_left, "Shingwedzi"), (hulls_of_the_flight_left, "thandis"), (settings_left, "Pafuri")],
 )
 def test_a_name_that_is_left_in_is_found_and_there_is_no_copy(
     broken,
@@ -219,7 +219,7 @@ def test_the_true_report_on_many_targets(tmp_path, monkeypatch):
     assert data == other.file.read_bytes()
     whole = unpacked(data).lower()
     assert whole.count(b"ihdr") >= 3 and b"track,from" in whole.replace(b'"', b"")
-    assert b"all targets at once, by sensor-1" in whole and b"kind a 4 m, kind b 9 m" in whole
+    assert b"sensor-1" in whole and b"kind a 4 m, kind b 9 m" in whole
     for secret in SECRETS:
         assert secret.encode() not in whole, secret
     lines = "\n".join(one.lines)

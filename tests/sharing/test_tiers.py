@@ -16,8 +16,18 @@ from wildlab.flight.checksums import accept_changes, confirmed_locations, with_c
 from wildlab.flight.manifest import FILE_NAME, manifest_toml, read_manifest
 from wildlab.flight.manifest_parts import LocationsPart
 from wildlab.sharing import tiers
-from wildlab.sharing.cells import Cell, cell_of, generalisation_words, half_diagonal, place_words, round_up
-from wildlab.sharing.tiers import TIERS, confirmed_treatment, load_tiers, treatment_of
+from wildlab.sharing.tiers import (
+    TIERS,
+    Cell,
+    cell_of,
+    confirmed_treatment,
+    generalisation_words,
+    half_diagonal,
+    load_tiers,
+    place_words,
+    round_up,
+    treatment_of,
+)
 
 GEOD = Geod(ellps="WGS84")
 

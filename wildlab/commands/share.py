@@ -54,8 +54,8 @@ def share(
     For the public the place is withheld or is a cell of the flight's category (locations.category in
     flight.toml), dates are months, names are neutral, pictures are left out. For partners it may be what
     was agreed with them (locations.agreed_category). Reports are computed and drawn again from generalised
-    data; then every byte is looked through, and where something is found there is no copy. The team gets
-    the reports as they are, without the names of this machine.
+    data; a page is written from what is known to be ours alone, and looked through: where something else is
+    found there is no copy. The team gets the reports as they are, without the names of this machine.
 
     7-Zip, WinZip, Keka and The Unarchiver open what --encrypt makes (AES-256); `unzip`, and often what
     Windows or macOS has built in, do not.

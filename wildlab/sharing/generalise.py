@@ -1,8 +1,9 @@
 """A flight, generalised: the same motion, seen from a point that is not named, on a day that is not told.
 
 Nothing is masked afterwards. Coordinates count from the middle of the flight, heights from its ground, time
-from its first sample; names are neutral; the sensors measure what they would have at the cell's middle. What
-is computed from such a flight is what would be computed from the true one, to rounding errors.
+from its first sample; names are neutral; the sensors measure what they would have at the cell's middle; the
+camera has rounded focal lengths, and pixels where it would have seen the same. What is computed from such a
+flight is what would be computed from the true one, to rounding errors, but for the size of pixels.
 """
 
 from __future__ import annotations
@@ -20,15 +21,22 @@ from wildlab.errors import WildlabError
 from wildlab.flight.following import SensorPart
 from wildlab.flight.learnt import Learnt
 from wildlab.flight.manifest import Manifest, make_manifest
+from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import local_earth
-from wildlab.sharing.cells import Cell, cell_of
 from wildlab.sharing.inertial import USUAL_DECLINATION_DEG, USUAL_INCLINATION_DEG, moved_field, moved_imu
-from wildlab.sharing.names import Names, learn_names, renamed
+from wildlab.sharing.names import (
+    QUARTER,
+    Names,
+    learn_names,
+    neutral_hulls,
+    renamed,
+    scale_pixels,
+    whole_quarters,
+)
 from wildlab.sharing.removed import Removed, removed_from
-from wildlab.sharing.settings import QUARTER, neutral_hulls, whole_quarters
-from wildlab.sharing.tiers import Treatment
+from wildlab.sharing.tiers import Cell, Treatment, cell_of
 
 #: Where a flight is put whose place is withheld: a latitude that is nobody's.
 NOWHERE = (45.0, 0.0)
@@ -60,6 +68,8 @@ class Generalised:
         For the sender only.
     clocks
         By the true name of a sensor, what was added to its stamps so that its offset tells no zone, s.
+    pixels
+        How much larger a pixel's distance from the principal point is.
     """
 
     flight: Flight
@@ -68,6 +78,7 @@ class Generalised:
     names: Names
     removed: tuple[Removed, ...]
     clocks: dict[str, float] = field(default_factory=dict)
+    pixels: float = 1.0
 
 
 def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Generalised:
@@ -107,6 +118,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
         for source, table in flight.nav.items()
     }
     best = _poses(flight)
+    camera, pixels = rounded_camera(manifest.camera)
     tables: dict[str, pd.DataFrame] = {}
     for key, table in flight.tables.items():
         table = renamed(table, names, key)
@@ -118,6 +130,8 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
             if moved is None:
                 continue
             table, stretch = moved
+        elif key == "detections" and manifest.camera is not None and camera is not None:
+            table = _moved_pixels(table, manifest.camera, camera, pixels)
         offset = {"frames": "camera", "truth": "truth", "gnss": "gnss"}.get(key)
         table = _moved(table, shift, start - (folded[f"{offset}_offset_s"] if offset else 0.0))
         # Another clock's stamps tell the zone, and no report looks at them.
@@ -125,7 +139,9 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
     field = manifest.magnetometer.hard_iron_ut
     iron = None if field is None or "magnetometer" not in tables else tuple(stretch * one for one in field)
     epoch, when = _date(manifest, first_pose(flight), treatment)
-    data = _manifest(manifest, names, clocks, name)
+    data = _manifest(manifest, names, clocks, name, pixels)
+    if camera is not None:
+        data["camera"] = camera.model_dump()
     data["origin"] = {"latitude_deg": there[0], "longitude_deg": there[1], "height_m": 0.0}
     data["time"] = {"kind": manifest.time.kind} | ({"epoch": epoch} if epoch else {})
     data["magnetometer"] = _field_part(manifest, iron, "magnetometer" in tables)
@@ -141,7 +157,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
     made = Flight(make_manifest(data), nav, tables, None, terrain)
     at = "withheld" if cell is None else f"{cell.latitude_deg:g}, {cell.longitude_deg:g}, a cell's middle"
     removed = tuple(removed_from(true, made, names, start, when, at))
-    return Generalised(made, cell, when, names, removed, zones)
+    return Generalised(made, cell, when, names, removed, zones, pixels)
 
 
 def _of_one_zone(flight: Flight) -> tuple[Flight, dict[str, float]]:
@@ -222,11 +238,47 @@ def first_pose(flight: Flight) -> float:
     return float(min(stamps)) if stamps else first_stamp(flight)
 
 
-def neutral_learnt(learnt: Learnt) -> Learnt:
-    """A calibration from another flight, without that flight's name and what it is told by."""
+def rounded_camera(camera: CameraPart | None) -> tuple[CameraPart | None, float]:
+    """A camera that many others are, and how much larger its pixels' distances from the principal point are.
+
+    The focal length is rounded to half a unit of its second digit (1159 to 1150), and the principal point is
+    the middle of the image: calibrated ones tell one camera from all others. Both focal lengths are scaled
+    alike, so that noise in pixels stays the same in both directions.
+    """
+    if camera is None:
+        return None, 1.0
+    step = 10.0 ** math.floor(math.log10(camera.fx_px)) / 20
+    more = round(camera.fx_px / step) * step / camera.fx_px
+    changed = {name: getattr(camera, name) * more for name in ("fx_px", "fy_px", "skew_px")}
+    changed |= {"cx_px": (camera.width_px - 1) / 2, "cy_px": (camera.height_px - 1) / 2}
+    return camera.model_copy(update={**changed, "name": "camera"}), more
+
+
+def _moved_pixels(table: pd.DataFrame, true: CameraPart, made: CameraPart, more: float) -> pd.DataFrame:
+    """Detections where the other camera would have seen them."""
+    moved = {
+        "u_px": (more, made.cx_px - true.cx_px * more),
+        "v_px": (more, made.cy_px - true.cy_px * more),
+        "area_px": (more**2, 0.0),
+        "major_px": (more, 0.0),
+        "minor_px": (more, 0.0),
+    }
+    return table.assign(
+        **{name: table[name] * factor + add for name, (factor, add) in moved.items() if name in table}
+    )
+
+
+def neutral_learnt(learnt: Learnt, made: Generalised) -> Learnt:
+    """A calibration from another flight for a generalised one, without that flight's name and fingerprint."""
     data = learnt.model_dump(exclude_none=True)
     data["learnt_on"] |= {"flight": "another", "source": "poses", "fingerprint": _NOBODY}
-    data["camera"] |= {"name": "camera"}
+    camera = made.flight.manifest.camera
+    data["camera"] = {**data["camera"], "name": "camera"} if camera is None else camera.model_dump()
+    scale_pixels(data["noise"], made.pixels)
+    more = [made.pixels if one.unit == "px" else 1.0 for one in learnt.parameter]
+    for one, factor in zip(data["parameter"], more, strict=True):
+        one |= {key: one[key] * factor for key in ("value", "low", "high")}
+    data["covariance"] = tuple(map(tuple, np.array(learnt.covariance) * np.outer(more, more))) if more else ()
     return Learnt.model_validate(data)
 
 
@@ -271,7 +323,9 @@ def _date(manifest: Manifest, began: float, treatment: Treatment) -> tuple[datet
     ), f"{day} {words}" if treatment.date == "day" else words
 
 
-def _manifest(manifest: Manifest, names: Names, clocks: dict[str, float], name: str) -> dict[str, Any]:
+def _manifest(
+    manifest: Manifest, names: Names, clocks: dict[str, float], name: str, pixels: float
+) -> dict[str, Any]:
     """The parts of the manifest that say how, not where, when or who. What is not named here is left out."""
     parts: dict[str, Any] = {
         key: getattr(manifest, key).model_dump(exclude_none=True)
@@ -281,15 +335,16 @@ def _manifest(manifest: Manifest, names: Names, clocks: dict[str, float], name: 
     for part in ("imu", "gnss"):
         parts[part] |= {"name": "", "note": ""}
     parts["uncertainty"]["note"] = ""
-    if manifest.camera is not None:
-        parts["camera"] = manifest.camera.model_dump() | {"name": "camera"}
+    scale_pixels(parts["uncertainty"], pixels)
     if manifest.terrain is not None:
         # The sides of a map's cells in metres tell its latitude, its reference tells the zone.
         parts["terrain"] = manifest.terrain.model_dump(exclude_none=True) | {
             "source": "map", "sha256": _NOBODY, "crs": "n", "added_m": 0.0,
             "cell_m": (manifest.terrain.step_m, manifest.terrain.step_m),
         }  # fmt: skip
-    parts["sensors"] = {names.of("sensor", key): _sensor(part) for key, part in manifest.sensors.items()}
+    parts["sensors"] = {
+        names.of("sensor", key): _sensor(part, pixels) for key, part in manifest.sensors.items()
+    }
     if manifest.twin is not None:
         # That nobody flew it stays; its parameters and its seed would make it again, with its place.
         parts["twin"] = {"name": "twin", "seed": 0}
@@ -302,8 +357,10 @@ def _manifest(manifest: Manifest, names: Names, clocks: dict[str, float], name: 
     }
 
 
-def _sensor(part: SensorPart) -> dict[str, Any]:
-    return part.model_dump(exclude_none=True, exclude_unset=True)
+def _sensor(part: SensorPart, pixels: float) -> dict[str, Any]:
+    data = part.model_dump(exclude_none=True, exclude_unset=True)
+    scale_pixels(data.get("noise", {}), pixels)
+    return data
 
 
 def _field_part(manifest: Manifest, iron: tuple[float, ...] | None, there: bool) -> dict[str, Any]:

@@ -7,6 +7,8 @@ import glob
 import io
 import os
 import shutil
+import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -31,17 +33,42 @@ _PRIVATE = "wildlab-share-"
 SHORTEST = 12
 
 
+#: Waits until the process that started it is gone, however it ended, and removes a folder until it stays
+#: away: what that process had started may still write into it.
+_WATCH = """
+import os, shutil, sys, time
+sys.stdin.buffer.read()
+for _ in range(20):
+    if not os.path.lexists(sys.argv[1]):
+        break
+    shutil.rmtree(sys.argv[1], ignore_errors=True)
+    time.sleep(0.25)
+"""
+
+
 @contextlib.contextmanager
 def private_folder() -> Iterator[Path]:
-    """A folder among the system's temporary ones that nobody else may open; gone afterwards, however it ends,
-    or, where this process was killed, when the next copy is made."""
+    """A folder among the system's temporary ones that nobody else may open; gone afterwards, however it ends.
+
+    A process of its own watches over it, so that nothing is left where this one is killed; and where the
+    machine lost its power, it is gone when the next copy is made.
+    """
     for left in Path(tempfile.gettempdir()).glob(f"{_PRIVATE}*"):
         pid = left.name.removeprefix(_PRIVATE).partition("-")[0]
         own = not left.is_symlink() and left.is_dir() and left.stat().st_uid == os.getuid()
         if own and pid.isdecimal() and not alive(int(pid)):
             shutil.rmtree(left, ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix=f"{_PRIVATE}{os.getpid()}-") as folder:
-        yield Path(folder)
+        command = [sys.executable, "-I", "-S", "-c", _WATCH, folder]
+        watch = subprocess.Popen(  # noqa: S603 - our own words
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True, cwd=tempfile.gettempdir(),
+        )  # fmt: skip
+        try:
+            yield Path(folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            watch.communicate()
 
 
 def sweep_beside(target: Path) -> None:

@@ -23,8 +23,8 @@ from wildlab.runner.record.own_flights import ABOUT, own_flights
 from wildlab.runner.track import track_many
 from wildlab.sharing.agreement import Agreement, compare
 from wildlab.sharing.generalise import Generalised, neutral_learnt
+from wildlab.sharing.names import neutral_settings
 from wildlab.sharing.reports import ENDS, MANY, Source
-from wildlab.sharing.settings import neutral_settings
 
 #: What `wildlab evaluate` does not set of these, `wildlab track` was told.
 _TOLD = ("filters", "targets", "sensors", "settings", "tuned", "smooth")
@@ -90,7 +90,7 @@ def redraw(
     """
     name = made.flight.name
     copy, reports = work / name, work / "reports"
-    kept = None if flight.calibration is None else neutral_learnt(read_learnt(flight.calibration))
+    kept = None if flight.calibration is None else neutral_learnt(read_learnt(flight.calibration), made)
     save_flight(made.flight, copy, calibration=kept)
     told = _told(source, made)
     learnt: Learnt | None = told["calibration"]
@@ -156,7 +156,7 @@ def _many(
     try:
         text, file = str(given.get("settings") or ""), None
         if text:
-            told, left_out = neutral_settings(parse_settings(text), made.names, made.clocks)
+            told, left_out = neutral_settings(parse_settings(text), made.names, made.clocks, made.pixels)
             file = work / "settings.toml"
             write_atomic(file, dump_toml(told.model_dump(exclude_none=True)))
             notes = [
@@ -203,6 +203,6 @@ def _told(source: Source, made: Generalised) -> dict[str, Any]:
     poses, calibration = given.get("source"), given.get("calibration")
     return {
         "source": made.names.of("poses", str(poses)) if poses else None,
-        "calibration": neutral_learnt(parse_learnt(str(calibration))) if calibration else None,
+        "calibration": neutral_learnt(parse_learnt(str(calibration)), made) if calibration else None,
         "notes": notes,
     }

@@ -1,16 +1,29 @@
-"""What a copy does not have, as a list for the sender alone."""
+"""What a copy does not have, and what no copy can hide, as a list for the sender alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import pandas as pd
 
+from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import Flight
-from wildlab.sharing.names import Names
-from wildlab.sharing.settings import hulls_of
+from wildlab.sharing.names import Names, hulls_of
+
+#: What remains in a copy whatever is done to its numbers, for whoever knows where to look.
+REMAINS = (
+    "The path has its shape: rows look the same everywhere, but a path along a river, a road or a fence can "
+    "be laid on a map of them. So can the tracks of animals.",
+    "North is up, and lengths are true: both are what the report is about.",
+    "Heights and their changes along a path that follows the ground are those of the ground. Terrain is not "
+    "drawn, yet enough of such heights can be laid on an elevation map.",
+    "Who has the flight's raw logs, or was there, knows it again by its numbers: a copy hides the place from "
+    "strangers, not the flight from those who know it.",
+    "Two flights that both name a cell, and are known to be of one place, tell where their cells meet.",
+    "What you write around the file (subject, file name, the address it comes from) is not looked at.",
+)
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,7 @@ def removed_from(
         ("description", was.description, ""),
         ("platform", was.platform.name, now.platform.name),
         ("camera", was.camera.name if was.camera else "", "camera"),
+        ("focal lengths and principal point (px)", _lens(was), _lens(now)),
         ("inertial unit", f"{was.imu.name} {was.imu.note}".strip(), ""),
         ("receiver", f"{was.gnss.name} {was.gnss.note}".strip(), ""),
         ("magnetometer", f"{was.magnetometer.name} {was.magnetometer.note}".strip(), ""),
@@ -89,6 +103,11 @@ def removed_from(
     yield from _renamed(names)
 
 
+def _lens(manifest: Manifest) -> str:
+    c = manifest.camera
+    return "" if c is None else f"{c.fx_px:g}, {c.fy_px:g}, {c.cx_px:g}, {c.cy_px:g}"
+
+
 def _copied(made: Flight, name: str, flight: Flight) -> pd.DataFrame | None:
     if not name.startswith("nav/"):
         return made.tables.get(name)
@@ -103,3 +122,40 @@ def _renamed(names: Names) -> Iterator[Removed]:
         if kind in ("frame", "detection") and known:
             (a, first), *_, (b, last) = (*known.items(), *known.items())
             yield Removed(f"{len(known)} names of {kind}s", f"{a} to {b}", f"{first} to {last}")
+
+
+def removed_lines(removed: Sequence[Removed]) -> list[str]:
+    """One line for each thing: what, what it was, and what stands in its place."""
+    return [
+        f"{one.what}: {one.was!r} -> {one.now}" if one.was else f"{one.what}: {one.now}" for one in removed
+    ]
+
+
+def sender_list(
+    file: str, told: Sequence[tuple[str, Sequence[str]]], notes: Sequence[str], *, generalised: bool
+) -> list[str]:
+    """The whole list.
+
+    Parameters
+    ----------
+    file
+        Name of the copy.
+    told
+        Heading and lines for each flight and study.
+    notes
+        Sentences on the copy as a whole.
+    generalised
+        Whether there is a place to be hidden in it.
+
+    Returns
+    -------
+    list of str
+    """
+    lines = [f"For the sender of {file} alone. Do not send this list: it says what the copy hides.", ""]
+    for heading, ones in told:
+        lines += [heading, *(f"  {line}" for line in ones), ""]
+    if generalised:
+        lines += ["What a copy cannot hide", *(f"  {line}" for line in REMAINS), ""]
+    if notes:
+        lines += ["Also", *(f"  {line}" for line in notes), ""]
+    return lines[:-1]

@@ -77,14 +77,19 @@ def sources_of(
     """
     if (path / FILE_NAME).is_file():
         mine = provenance_of_flight(path)
-        ours = [
-            one
-            for one in _made(reports, mine["name"])
-            if same_flight(read_provenance(one).get("flight") or {}, mine)
-        ]
+        made = _made(reports, mine["name"])
+        ours = [one for one in made if same_flight(read_provenance(one).get("flight") or {}, mine)]
         if not ours:
-            fix = f"name the report itself, or evaluate it here: {typed('wildlab evaluate', path)}"
-            raise WildlabError(f"{reports.name}/ has no report on this flight as it is", fix, file=path)
+            other = "".join(
+                f"; {one.name} is of other tables, or was made before they were changed" for one in made
+            )
+            names = ", ".join(f"{mine['name']}{end}" for end in ENDS)
+            raise WildlabError(
+                f"there is no report on this flight as it is in {reports.resolve()}, which was searched for "
+                f"{names}{other}",
+                f"name the report itself, or evaluate the flight here: {typed('wildlab evaluate', path)}",
+                file=path,
+            )
         path = ours[0]
     folder = path.parent if path.name == "report.html" else path
     if not folder.is_dir():
@@ -93,11 +98,8 @@ def sources_of(
         there = _made(folder.parent, folder.name)
         raise WildlabError("there is no such report", _instead(there) if there else fix, file=path)
     if (folder / "report.html").is_file():
-        source = _source(folder, studies)
-        if not source.logged:
-            return [source], []
-        source = _with_siblings(source, folder.parent, studies)
-        return [source], _of_other_tables(source, folder.parent, studies)
+        source, left_out = _with_siblings(_source(folder, studies), studies)
+        return [source], left_out
     found: dict[str, Source] = {}
     single: list[Source] = []
     left_out = []
@@ -111,8 +113,8 @@ def sources_of(
     # The flight as it was evaluated is the one that is meant; targets may have been followed before that.
     for source in sorted(single, key=lambda one: one.folders[0].name == f"{one.name}{MANY}"):
         if source.name not in found:
-            found[source.name] = _with_siblings(source, folder, studies) if source.logged else source
-            left_out += _of_other_tables(found[source.name], folder, studies) if source.logged else []
+            found[source.name], more = _with_siblings(source, studies)
+            left_out += more
     if not found:
         why = f" ({left_out[0]})" if left_out else ""
         raise WildlabError(
@@ -135,10 +137,9 @@ def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
     given = provenance.get("parameters")
     parameters = {folder.name: given if isinstance(given, dict) else {}}
     entry = studies.get(folder.name)
-    if not isinstance(flight, dict) or (entry is not None and of_a_study(flight, folder.parent)):
-        return Source(folder.name, (folder,), False, {}, parameters)
-    if entry is not None and (entry.dataset is not None or entry.twin is not None):
-        # Of the catalogue: everybody has the data.
+    # Of the catalogue: everybody has the data.
+    public = entry is not None and (entry.dataset is not None or entry.twin is not None)
+    if not isinstance(flight, dict) or public or (entry is not None and of_a_study(flight, folder.parent)):
         return Source(folder.name, (folder,), False, {}, parameters)
     name = str(flight.get("name", ""))
     if not _drawn_again(folder, name, provenance):
@@ -203,41 +204,34 @@ def of_a_study(flight: dict[str, Any], reports: Path) -> bool:
     return True
 
 
-def _with_siblings(source: Source, reports: Path, studies: dict[str, StudyEntry]) -> Source:
-    """All reports on the flight, in their usual order."""
+def _with_siblings(source: Source, studies: dict[str, StudyEntry]) -> tuple[Source, list[str]]:
+    """All reports on the flight beside one, in their usual order; and sentences on those of its name that do
+    not go along, since they are of other tables or not as they were written, and on those that nothing tells
+    it of."""
+    if not source.logged:
+        return source, []
+    reports = source.folders[0].parent
     folders: list[Path] = []
     parameters: dict[str, dict[str, Any]] = {}
-    for end in ENDS:
-        folder = reports / f"{source.name}{end}"
-        if not (folder / "report.html").is_file():
-            continue
-        try:
-            one = _source(folder, studies)
-        except WildlabError:
-            continue
-        if one.logged and one.name == source.name and same_flight(one.flight, source.flight):
-            folders.append(folder)
-            parameters |= one.parameters
-    return Source(source.name, tuple(folders), True, source.flight, parameters)
-
-
-def _of_other_tables(source: Source, reports: Path, studies: dict[str, StudyEntry]) -> list[str]:
-    """Sentences on reports on a flight of this name that do not go along: they are of other tables,
-    or not as they were written; and on those that nothing tells it of."""
     left_out = []
-    for end in ENDS:
-        folder = reports / f"{source.name}{end}"
-        if folder in source.folders or not (folder / "report.html").is_file():
+    for folder in (reports / f"{source.name}{end}" for end in ENDS):
+        if not (folder / "report.html").is_file():
             continue
         try:
             one = _source(folder, studies)
         except WildlabError as error:
             left_out += [str(error)] if read_status(folder).get("state") == "damaged" else []
             continue
-        if one.logged and one.name == source.name:
+        if not one.logged or one.name != source.name:
+            continue
+        if same_flight(one.flight, source.flight):
+            folders.append(folder)
+            parameters |= one.parameters
+        else:
             left_out.append(f"{folder}: this report was made from other tables than the flight's others.")
-    old = [folder.name for folder in source.folders if not has_digests(read_status(folder))]
-    return [*left_out, *([f"{', '.join(old)}: {BEFORE_DIGESTS}."] if old else [])]
+    old = ", ".join(folder.name for folder in folders if not has_digests(read_status(folder)))
+    left_out += [f"{old}: {BEFORE_DIGESTS}."] if old else []
+    return Source(source.name, tuple(folders), True, source.flight, parameters), left_out
 
 
 def same_flight(one: dict[str, Any], other: dict[str, Any]) -> bool:
@@ -290,19 +284,23 @@ def flight_folder(source: Source, given: Path | None, around: Iterable[Path] = (
     for folder in candidates(source.name, around):
         if same_flight(provenance_of_flight(folder), source.flight):
             return folder
+    searched = ", ".join(map(str, _places(around))) or "no folder flights/ here"
     raise WildlabError(
-        f"the flight {source.name!r} that this report was made from is not found, and figures are drawn "
-        "again from generalised data, never masked",
+        f"the flight {source.name!r} that this report was made from is in none of {searched}, and figures "
+        "are drawn again from generalised data, never masked",
         f"say where it is: {again}",
         file=source.folders[0],
     )
 
 
+def _places(around: Iterable[Path]) -> list[Path]:
+    """Where flights lie: ``flights`` here, beside the reports, and in wildlab's own folder."""
+    places = [Path("flights"), *around, *([ROOT / "flights"] if ROOT is not None else [])]
+    return [place for place in dict.fromkeys(place.resolve() for place in places) if place.is_dir()]
+
+
 def candidates(name: str, around: Iterable[Path]) -> Sequence[Path]:
     """Flight folders in ``flights`` here and beside the reports, those of the same name first."""
-    places = [Path("flights"), *around, *([ROOT / "flights"] if ROOT is not None else [])]
-    found = []
-    for place in dict.fromkeys(place.resolve() for place in places):
-        if place.is_dir():
-            found += [one for one in sorted(place.iterdir()) if (one / FILE_NAME).is_file()]
+    folders = [folder for place in _places(around) for folder in sorted(place.iterdir())]
+    found = [folder for folder in folders if (folder / FILE_NAME).is_file()]
     return sorted(dict.fromkeys(found), key=lambda folder: folder.name != name)

@@ -6,10 +6,10 @@ import getpass
 import re
 import socket
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,9 +22,9 @@ from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import normal_gravity
 from wildlab.paths import ROOT
 from wildlab.sharing.generalise import Generalised, first_stamp, new_origin
+from wildlab.sharing.names import names_in
 from wildlab.sharing.reports import Source
 from wildlab.sharing.scan import Secrets
-from wildlab.sharing.settings import hulls_of, names_in
 from wildlab.sharing.tiers import Treatment
 
 #: So many places of each table are looked for; the scan finds what is near to one of them.
@@ -43,7 +43,7 @@ def machine_secrets() -> Secrets:
             words.append(ask())
         except (OSError, KeyError):
             continue
-    return Secrets(words=tuple(dict.fromkeys(words)), may_stay="all")
+    return Secrets(words=tuple(dict.fromkeys(words)))
 
 
 def flight_secrets(
@@ -68,26 +68,24 @@ def flight_secrets(
     """
     m = flight.manifest
     moments = []
-    if m.time.epoch is not None:
+    # A day may be told to those who are told it.
+    if m.time.epoch is not None and treatment.date == "month":
         first = m.time.epoch.timestamp() + first_stamp(flight)
         moments = [datetime.fromtimestamp(t, UTC) for t in (first, first + _length(flight))]
-    own = replace(
-        machine_secrets(),
+    paths = (str(folder.resolve()), *(str(one.resolve()) for one in source.folders))
+    words = (*_texts(m.model_dump()), *_names(made), *_told(source, made), *paths, *_hashes(source))
+    return Secrets(
         places=_places(flight),
         near_m=_NEAR,
         cell_deg=treatment.cell_deg or 0.0,
+        words=tuple(dict.fromkeys(words)),
         moments=tuple(moments),
-        # A day may be told to those who are told it; the scan knows no finer step than the month.
-        may_stay="month" if treatment.date == "month" else "all",
         numbers=tuple(_numbers(m)),
     )
-    paths = (str(folder.resolve()), *(str(one.resolve()) for one in source.folders))
-    return own.with_words(*dict.fromkeys((*_words(m, made), *_told(source, made), *paths, *_hashes(source))))
 
 
 def all_of(several: Sequence[Secrets]) -> Secrets:
-    """The secrets of all, as strictly as the strictest of them: nobody's may be in the copy of another."""
-    order = ("nothing", "year", "month", "all")
+    """The secrets of all: nobody's may be in the copy of another."""
     with_places = [one for one in several if len(one.places)]
     return Secrets(
         places=np.concatenate([one.places for one in several]),
@@ -95,7 +93,6 @@ def all_of(several: Sequence[Secrets]) -> Secrets:
         cell_deg=max((one.cell_deg for one in with_places), default=0.0),
         words=tuple(dict.fromkeys(word for one in several for word in one.words)),
         moments=tuple(moment for one in several for moment in one.moments),
-        may_stay=min((one.may_stay for one in several), key=order.index),
         numbers=tuple(number for one in several for number in one.numbers),
     )
 
@@ -133,20 +130,17 @@ def _numbers(m: Manifest) -> Iterator[float]:
         yield from (one for one in (m.terrain.added_m, *m.terrain.cell_m) if one and one != m.terrain.step_m)
 
 
-def _words(m: Manifest, made: Generalised) -> Iterator[str]:
-    yield from (m.name, m.platform.name, m.imu.name, m.gnss.name, m.magnetometer.name)
-    yield from (
-        m.description,
-        m.imu.note,
-        m.gnss.note,
-        m.magnetometer.note,
-        m.vertical.note,
-        m.uncertainty.note,
-    )
-    yield m.camera.name if m.camera is not None else ""
-    yield from (m.terrain.source, m.terrain.crs) if m.terrain is not None else ()
-    yield from (one.file for one in m.sources)
-    yield from hulls_of(m.targets)
+def _texts(value: Any) -> Iterator[str]:
+    """All that is stated in words, whatever it is."""
+    if isinstance(value, str):
+        # Kinds of hulls of a generalised flight have letters.
+        yield from () if re.fullmatch("kind [A-Z]", value) else (value,)
+    elif isinstance(value, Mapping | list | tuple):
+        for one in value.values() if isinstance(value, Mapping) else value:
+            yield from _texts(one)
+
+
+def _names(made: Generalised) -> Iterator[str]:
     for kind, known in made.names.by_kind.items():
         # A true name like target-7 is what a neutral one looks like, and says as little.
         yield from (name for name in _some(known) if not re.fullmatch(rf"{kind}[-_ ]?\d*", name))

@@ -19,11 +19,11 @@ from wildlab.messages.message import Day
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import load_studies
 from wildlab.sharing.agreement import agreement_words
-from wildlab.sharing.cells import generalisation_words, place_words
+from wildlab.sharing.allowed import foreign
 from wildlab.sharing.document import Chapter, joined, read_part
 from wildlab.sharing.edition.edition import Place, edition_html
 from wildlab.sharing.edition.facts import facts_of
-from wildlab.sharing.edition.flight_map import map_of
+from wildlab.sharing.edition.picture import map_of
 from wildlab.sharing.generalise import Generalised, generalise
 from wildlab.sharing.package import (
     OPENED_WITH,
@@ -35,11 +35,18 @@ from wildlab.sharing.package import (
     zip_bytes,
 )
 from wildlab.sharing.redrawn import Redrawn, redraw
+from wildlab.sharing.removed import removed_lines, sender_list
 from wildlab.sharing.reports import Source, flight_folder, sources_of
-from wildlab.sharing.scan import Secrets, not_searched, scan_contents
+from wildlab.sharing.scan import Secrets, not_searched, scan
 from wildlab.sharing.secrets import all_of, flight_secrets, machine_secrets
-from wildlab.sharing.tiers import Tier, Treatment, confirmed_treatment, load_tiers
-from wildlab.sharing.told import removed_lines, sender_list
+from wildlab.sharing.tiers import (
+    Tier,
+    Treatment,
+    confirmed_treatment,
+    generalisation_words,
+    load_tiers,
+    place_words,
+)
 
 #: Of what the scan found, so many are named.
 _MOST = 5
@@ -70,10 +77,8 @@ class Shared:
 
 
 class _Prepared(NamedTuple):
-    """A flight that is to be drawn again: where it lies, it and its generalised copy, and what must not be
-    in the copy."""
+    """A flight that is to be drawn again, its generalised copy, and what must not be in the copy."""
 
-    folder: Path
     flight: Flight
     made: Generalised
     treatment: Treatment
@@ -81,11 +86,10 @@ class _Prepared(NamedTuple):
 
 
 class _Document(NamedTuple):
-    """What is said of one flight or study: to those who get the copy, to the scan, and to the sender."""
+    """What is said of one flight or study: to those who get the copy, and to the sender."""
 
     name: str
     chapter: Chapter
-    secrets: Secrets
     told: tuple[str, tuple[str, ...]]
     edition: str = ""
 
@@ -137,8 +141,7 @@ def share(
     WildlabError
         Where the report, or its flight, cannot be used.
     RunFailed
-        Where a report could not be made again, or something was found in the copy that must not be sent:
-        then there is no copy.
+        Where a report could not be made again, or has anything that must not be sent: then there is no copy.
     """
     zipped = zipped or password is not None
     if password is not None:
@@ -147,30 +150,28 @@ def share(
     sources, left_out = sources_of(report, studies, reports)
     if flight is None and (report / FILE_NAME).is_file():
         flight = report
-    if flight is not None and sum(source.logged for source in sources) != 1:
+    flights = [source for source in sources if source.logged]
+    if flight is not None and len(flights) != 1:
         raise WildlabError(
             "a flight is named, and this is not one flight's report", "leave --flight out", field="--flight"
         )
     exact = load_tiers().tier[tier].exact
     words = _language(edition, sources, exact)
-    flights = [source for source in sources if source.logged]
     calls = _calls(sources, exact)
     target = _target(calls[0] if len(sources) == 1 else "reports", tier, out, zipped)
     told = target.with_name(f"{target.name}.for-the-sender.txt")
-    refuse_existing(target, overwrite)
-    refuse_existing(told, overwrite)
+    for file in (target, told):
+        refuse_existing(file, overwrite)
     sweep_beside(target)
     around = [source.folders[0].resolve().parent.parent / "flights" for source in flights]
     # All are found, and the copy's name is looked through, before the first is computed, which takes minutes.
-    folders = [
-        None if exact or not source.logged else flight_folder(source, flight, around) for source in sources
-    ]
+    folders = [None if exact or not one.logged else flight_folder(one, flight, around) for one in sources]
     prepared = [
         None if folder is None else _prepare(folder, source, tier, name)
         for source, name, folder in zip(sources, calls, folders, strict=True)
     ]
-    secrets = all_of([machine_secrets() if one is None else one.secrets for one in prepared])
-    _refuse_leaks({target.name: b""}, target.name, secrets)
+    secrets = all_of([machine_secrets(), *(one.secrets for one in prepared if one is not None)])
+    _refuse_leaks({target.name: ""}, target, secrets)
     documents: list[_Document] = []
     for source, name, one in zip(sources, calls, prepared, strict=True):
         first = 1 + sum(len(document.chapter.parts) for document in documents)
@@ -178,13 +179,13 @@ def share(
             documents.append(_generalised(one, source, tier, first, words, notebooks, console))
         else:
             documents.append(_copied(source, tier, name, first))
-    files = {name: page.encode("utf-8") for name, page in _pages(documents, target, zipped).items()}
-    # What is inside of a zip is looked through before it may be encrypted.
-    _refuse_leaks(files, target.name, secrets)
+    pages = _pages(documents, target, zipped, len(flights))
+    _refuse_leaks(pages, target, secrets)
     notes = [*left_out, *not_searched(secrets), *([] if password is None else [OPENED_WITH])]
     lines = sender_list(
         target.name, [document.told for document in documents], notes, generalised=any(folders)
     )
+    files = {name: page.encode("utf-8") for name, page in pages.items()}
     put(zip_bytes(files, password) if zipped else files[target.name], target, overwrite)
     write_atomic(told, "\n".join(lines) + "\n")
     told.chmod(0o600)
@@ -204,39 +205,32 @@ def _calls(sources: Sequence[Source], exact: bool) -> list[str]:
 
 
 def _target(name: str, tier: Tier, out: Path | None, zipped: bool) -> Path:
-    ending = ".zip" if zipped else ".html"
-    if out is None:
-        return Path(f"{name}-{tier}{ending}")
-    if out.suffix.lower() != ending:
-        what = "a zip" if zipped else "a page"
+    what, ending = ("a zip", ".zip") if zipped else ("a page", ".html")
+    if out is not None and out.suffix.lower() != ending:
         raise WildlabError(
             f"the copy is {what}", f"give it a name that ends in {ending}", file=out, field="--out"
         )
-    return out
+    return Path(f"{name}-{tier}{ending}") if out is None else out
 
 
-def _pages(documents: Sequence[_Document], target: Path, zipped: bool) -> dict[str, str]:
+def _pages(documents: Sequence[_Document], target: Path, zipped: bool, flights: int) -> dict[str, str]:
     """The pages by name: one of all, or one of each."""
     if zipped:
         reports = {f"{one.name}.html": joined([one.chapter], one.chapter.heading) for one in documents}
         return reports | {f"{one.name}-one-sheet.html": one.edition for one in documents if one.edition}
     if documents[0].edition:
         return {target.name: documents[0].edition}
-    flights = sum(one.secrets.places.size > 0 for one in documents)
-    counts = [(flights, "flight"), (len(documents) - flights, "study")]
-    said = " and ".join(f"{n} {what if n == 1 else _PLURAL[what]}" for n, what in counts if n)
+    studies = len(documents) - flights
+    counts = [(flights, "flight", "flights"), (studies, "study", "studies")]
+    said = " and ".join(f"{n} {one if n == 1 else many}" for n, one, many in counts if n)
     return {target.name: joined([one.chapter for one in documents], f"Reports on {said}")}
-
-
-_PLURAL = {"flight": "flights", "study": "studies"}
 
 
 def _prepare(folder: Path, source: Source, tier: Tier, name: str) -> _Prepared:
     flight = load_flight(folder)
     treatment = confirmed_treatment(flight.manifest.locations, confirmed_locations(folder), tier)
     made = generalise(flight, treatment, name)
-    secrets = flight_secrets(flight, made, treatment, source, folder)
-    return _Prepared(folder, flight, made, treatment, secrets)
+    return _Prepared(flight, made, treatment, flight_secrets(flight, made, treatment, source, folder))
 
 
 def _generalised(
@@ -253,21 +247,28 @@ def _generalised(
     with private_folder() as work:
         drawn = redraw(one.flight, made, source, work, notebooks=notebooks, console=console)
         parts = [
-            read_part(folder / "report.html", number, exact=False)
+            read_part(folder / "report.html", number, exact=False, generalised=True)
             for number, folder in enumerate(drawn.folders.values(), first)
         ]
     when = f" Flown {'on' if treatment.date == 'day' else 'in'} {made.when}." if made.when else ""
     about = [
         *(f"There is no report on {what}: it could not be made." for what in drawn.missing),
         "Times count from the first sample, heights from the ground of the flight.",
-        "Names of the flight, of targets, files and sensors are replaced by neutral ones, and photographs "
-        "are left out.",
+        "Names of the flight, of targets, files and sensors are replaced by neutral ones, focal lengths are "
+        "rounded, and photographs are left out.",
         "Every figure and every number was computed again from generalised data. "
         + agreement_words(drawn.agreement),
         generalisation_words(made.cell, treatment.category),
     ]
     heading = f"{'A flight' if name == 'flight' else name.replace('-', ' ').capitalize()}, {_WORDS[tier]}"
     otherwise = drawn.agreement.otherwise
+    named = next(filter(None, map(foreign, otherwise)), "")
+    if named:
+        raise RunFailed(
+            f"there is no copy, since it differs from your reports, and cannot say how without {named!r}",
+            "evaluate the flight again and share that",
+            file=source.folders[0],
+        )
     if words is not None and otherwise:
         raise RunFailed(
             f"the sheet would not say what your reports say: {' '.join(otherwise)}",
@@ -276,19 +277,16 @@ def _generalised(
         )
     lead = " ".join([*([BEWARE, *otherwise] if otherwise else []), place_words(made.cell) + when])
     chapter = Chapter(heading, lead, tuple(line.strip() for line in about), tuple(parts))
-    told = f"Flight {source.name}", tuple(_told(drawn, treatment))
-    return _Document(
-        name, chapter, one.secrets, told, "" if words is None else _sheet(drawn, name, treatment, words)
-    )
+    sheet = "" if words is None else _sheet(drawn, name, treatment, words)
+    return _Document(name, chapter, (f"Flight {source.name}", tuple(_told(drawn, treatment))), sheet)
 
 
 def _sheet(drawn: Redrawn, name: str, treatment: Treatment, words: Language) -> str:
     """The flight on one sheet, from its generalised copy alone."""
     made = drawn.made
-    place = Place("withheld")
+    place = Place()
     if made.cell is not None:
-        middle = made.cell.latitude_deg, made.cell.longitude_deg
-        place = Place("generalised", made.cell.uncertainty_m, middle_deg=middle)
+        place = Place(made.cell.uncertainty_m, (made.cell.latitude_deg, made.cell.longitude_deg))
     epoch = made.flight.manifest.time.epoch
     day = None if epoch is None else Day(epoch.date(), treatment.date == "day")
     return edition_html(
@@ -330,20 +328,20 @@ def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:
 
 def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
     """A study's reports, or a flight's for those who have it, as they are."""
+    exact = load_tiers().tier[tier].exact
     parts = [
-        read_part(one / "report.html", number, exact=load_tiers().tier[tier].exact)
+        read_part(one / "report.html", number, exact=exact, generalised=False)
         for number, one in enumerate(source.folders, first)
     ]
     about = (
         _EXACT if source.logged else "Simulated, or computed from public data: it has no place to be hidden."
     )
-    chapter = Chapter(f"{name}, {_WORDS[tier]}", about, (), tuple(parts))
     heading = f"{'Flight' if source.logged else 'Study'} {source.name}"
     removed = "removed: links to files beside the report, and what this machine and its users are called"
-    return _Document(name, chapter, machine_secrets(), (heading, (removed,)))
+    return _Document(name, Chapter(f"{name}, {_WORDS[tier]}", about, (), tuple(parts)), (heading, (removed,)))
 
 
-def _refuse_leaks(files: Mapping[str, bytes], name: str, secrets: Secrets) -> None:
+def _refuse_leaks(pages: Mapping[str, str], target: Path, secrets: Secrets) -> None:
     """Look through all that is to be sent, and refuse it where something must not be in it.
 
     Raises
@@ -351,14 +349,18 @@ def _refuse_leaks(files: Mapping[str, bytes], name: str, secrets: Secrets) -> No
     RunFailed
         Naming what was found, how it is written, and where.
     """
-    found = list(dict.fromkeys(scan_contents(files.items(), secrets)))
+    found = scan(pages, secrets)
     if not found:
         return
     several = "; ".join(f"{one} ({one.found!r})" if one.found else str(one) for one in found[:_MOST])
     more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    named = all(one.file.startswith("the name of the file") for one in found)
     raise RunFailed(
         f"there is no copy, since this was found in it: {several}{more}",
-        "rename what the flight calls so (flight.toml, its tables), evaluate it again, and share it again; "
-        "if it is a place or a date, keep the report to yourself and tell the makers of wildlab",
-        file=name,
+        "give the copy another name: --out FILE"
+        if named
+        else "rename what the flight calls so (flight.toml, its tables), evaluate it again, and share it "
+        "again; if it is a place or a date, keep the report to yourself and tell the makers of wildlab",
+        file=target,
+        field="--out" if named else "",
     )

@@ -18,7 +18,7 @@ WHOLE = Facts(
     seen=1846.0, things=5.0, placed=1840.0, error_median=3.47, error_p90=9.57, compared=1846, scatter=NAN,
     sightings=0, tracks=5, track_error=4.1, track_sure=0.9, alarms=(), troubles=(("few_satellites", 62.0),),
     gains=(Gain("cause", ("boresight",), 1.9, 4.9, 0.39), Gain("images_without_pose", (), 120, 812, 0.15)),
-    possible=None, failed=(), lacking=(),
+    possible=None, failed=(),
 )  # fmt: skip
 #: A flight of which nothing is known.
 EMPTY = WHOLE._replace(

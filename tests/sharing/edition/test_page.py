@@ -19,22 +19,20 @@ from tests.flight.conftest import make_flight  # noqa: F401 - a fixture of anoth
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from tests.sharing.left import leave_report
 from wildlab.analysis.georeference import observe
-from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.messages.catalogue import load_language
 from wildlab.messages.message import Day
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.page import POLICY
+from wildlab.runner.record.own_flights import own_flights
 from wildlab.sharing.edition.edition import Place, edition_html
-from wildlab.sharing.edition.facts import Alarm
-from wildlab.sharing.edition.flight_map import map_of
-from wildlab.sharing.edition.make import make_edition
+from wildlab.sharing.edition.facts import Alarm, facts_of
 from wildlab.sharing.edition.picture import (
     FOOT,
     HEIGHT,
     WIDTH,
-    ImagePicture,
     MapPicture,
+    map_of,
     nice_length,
     picture_html,
 )
@@ -76,7 +74,7 @@ def pages(browser: Any, tmp_path: Path) -> Iterator[Any]:
 @pytest.mark.parametrize("case", CASES)
 def test_seen_by_everybody(case, pages):
     facts, picture = CASES[case]
-    html = edition_html(facts, name="f", place=Place("withheld"), picture=picture)
+    html = edition_html(facts, name="f", place=Place(), picture=picture)
     for options in ({}, {"color_scheme": "dark"}):
         page = pages(html, 1200, **options)
         assert [one["id"] for one in Axe().run(page).response["violations"]] == []
@@ -101,36 +99,29 @@ def test_seen_by_everybody(case, pages):
 @pytest.mark.parametrize("case", CASES)
 def test_it_asks_nobody_and_runs_nothing(case):
     facts, picture = CASES[case]
-    html = edition_html(facts, name="f", place=Place("withheld"), picture=picture)
+    html = edition_html(facts, name="f", place=Place(), picture=picture)
     assert POLICY in html and "<script" not in html and "http" not in html.replace("http-equiv", "")
     assert len(html) < 200_000
 
 
 def test_names_are_harmless():
-    html = edition_html(
-        WHOLE, name="<script>x</script>{p90}", place=Place("generalised", 1600.0, '<img src="x">')
-    )
+    html = edition_html(WHOLE, name="<script>x</script>{p90}", place=Place(1600.0))
     assert "<script" not in html and "<img" not in html and "&lt;script&gt;x&lt;/script&gt;{p90}" in html
 
 
 def test_places_and_days_are_said_as_far_as_they_are_given():
-    told = edition_html(WHOLE, name="f", place=Place("generalised", 1600.0, "Rounded.", (-24.9, 31.5)))
-    assert "24.9° S, 31.5° E" in told and "1.6\u00a0km" in told and "Rounded." in told and "2026" not in told
-    month = edition_html(WHOLE, name="f", place=Place("withheld"), day=Day(date(2026, 3, 14), False))
+    told = edition_html(WHOLE, name="f", place=Place(1600.0, (-24.9, 31.5)))
+    assert "24.9° S, 31.5° E" in told and "1.6\u00a0km" in told and "2026" not in told
+    month = edition_html(WHOLE, name="f", place=Place(), day=Day(date(2026, 3, 14), False))
     assert (
         "March 2026" in month
         and "14" not in re.sub(r"<style>.*?</style>", "", month, flags=re.S).split("<h1>")[0]
     )
     # A distance from what is not shown says nothing.
-    nowhere = edition_html(WHOLE, name="f", place=Place("generalised", 1600.0))
+    nowhere = edition_html(WHOLE, name="f", place=Place(1600.0))
     assert "1.6" not in nowhere.partition("<main>")[2]
-    norwegian = edition_html(
-        WHOLE, name="f", place=Place("generalised", 920.0, "", (58.66, -16.4)), language="nb"
-    )
+    norwegian = edition_html(WHOLE, name="f", place=Place(920.0, (58.66, -16.4)), language="nb")
     assert "58,66° N, 16,4° V" in norwegian
-
-
-WITHHELD = Place("withheld")
 
 
 def leave(folder: Path, **numbers: tuple[str, float]) -> None:
@@ -143,21 +134,18 @@ def sound(reports: Path) -> None:
     leave(reports / "f-overview", **counts, reports_beside=("flight", 1.0))
 
 
+def made(reports: Path, **more: Any) -> str:
+    (own,) = own_flights(reports, ())
+    return edition_html(facts_of(own), name="flight 1", place=Place(), **more)
+
+
 def test_the_page_of_a_folder_of_reports(tmp_path):
     sound(tmp_path)
     error = {"horizontal_error_median": ("logged-pose", 6.4), "horizontal_error_p90": ("logged-pose", 9.0)}
     leave(tmp_path / "f", **error)
-    html = make_edition(tmp_path, "f", place=WITHHELD, called="flight 1")
+    html = made(tmp_path)
     assert "6.4\u00a0metres" in html and "flight 1" in html
-    assert "6,4\u00a0meter" in make_edition(tmp_path, "f", place=WITHHELD, language="nb")
-
-
-def test_a_flight_that_was_not_evaluated(tmp_path):
-    with pytest.raises(WildlabError, match="'g'"):
-        make_edition(tmp_path, "g", place=WITHHELD)
-    sound(tmp_path)
-    with pytest.raises(WildlabError, match=r"some on f\."):
-        make_edition(tmp_path, "g", place=WITHHELD)
+    assert "6,4\u00a0meter" in made(tmp_path, language="nb")
 
 
 def test_the_map_of_a_flight(make_flight, tmp_path):  # noqa: F811
@@ -170,7 +158,7 @@ def test_the_map_of_a_flight(make_flight, tmp_path):  # noqa: F811
     expected = georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
     assert np.array_equal(drawn.seen, expected, equal_nan=True) and len(drawn.truth) == 3
     sound(tmp_path)
-    html = make_edition(tmp_path, "f", place=WITHHELD, flight=flight)
+    html = made(tmp_path, picture=map_of(flight))
     assert len(re.findall('<path class="way"', html)) == 1 and '<circle class="true"' in html
 
 
@@ -229,16 +217,6 @@ def test_what_is_drawn_where_less_is_known():
     assert "3 of 4" in picture_html(None, EMPTY._replace(seen=4.0, placed=3.0), EN)
     assert picture_html(None, EMPTY, EN) == ""
     assert picture_html(MapPicture(NONE, NONE, NONE), EMPTY, EN) == ""
-
-
-def test_an_image_goes_in_as_an_image():
-    html = picture_html(ImagePicture(b"<svg xmlns='x'><script>alert(1)</script></svg>", 'a "map"'), EMPTY, EN)
-    assert '<img src="data:image/svg+xml;base64,' in html and "<script" not in html
-    assert 'alt="a &quot;map&quot;"' in html
-    with pytest.raises(WildlabError, match="neither PNG"):
-        picture_html(ImagePicture(b"GIF89a", "x"), EMPTY, EN)
-    with pytest.raises(WildlabError, match="no words"):
-        picture_html(ImagePicture(b"\x89PNG", " "), EMPTY, EN)
 
 
 @given(st.floats(1e-3, 1e7))

@@ -174,7 +174,7 @@ facts = st.builds(
     alarms=st.lists(alarms, max_size=4).map(tuple), troubles=st.lists(troubles, max_size=3).map(tuple),
     gains=st.lists(gains, max_size=4).map(tuple),
     possible=st.one_of(st.none(), gains.filter(lambda one: one.value == one.value)),
-    failed=st.lists(st.sampled_from(["overview", *PARTS]), unique=True).map(tuple), lacking=st.just(()),
+    failed=st.lists(st.sampled_from(["overview", *PARTS]), unique=True).map(tuple),
     doubted=st.lists(st.sampled_from(PARTS), unique=True).map(tuple),
     pictured=st.one_of(maybe, st.just(0.0)), track_worst=maybe,
 )  # fmt: skip

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import statistics
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from wildlab.analysis.overviews.overview import ALARMS, TROUBLES
-from wildlab.analysis.overviews.verdict import WORTH, causes_told, doubted, error_left, possible_gain
+from wildlab.analysis.overviews.verdict import causes_told, doubted, error_left, possible_gain
 from wildlab.reporting.own_flights import OwnFlight
 
 NAN = math.nan
@@ -75,8 +76,8 @@ class Facts(NamedTuple):
         A gain that is not certain.
     doubted
         Reports that ask for a closer look themselves: ``georeferencing``, ``tracking``, ``navigation``.
-    failed, lacking
-        Those of `PARTS`, and ``overview``, that failed, and that the records do not allow.
+    failed
+        Those of `PARTS`, and ``overview``, that failed.
     flown
         Whether it is known that the sensors flew. Else they may be a boat's, or stand somewhere.
     """
@@ -103,7 +104,6 @@ class Facts(NamedTuple):
     gains: tuple[Gain, ...]
     possible: Gain | None
     failed: tuple[str, ...]
-    lacking: tuple[str, ...]
     doubted: tuple[str, ...] = ()
     pictured: float = NAN
     track_worst: float = NAN
@@ -113,6 +113,11 @@ class Facts(NamedTuple):
     def other_sensors(self) -> bool:
         """Whether all that was detected was so by other sensors than a camera, as a radar."""
         return self.seen > 0 and self.pictured == 0
+
+    @property
+    def tracked(self) -> bool:
+        """Whether tracks were held against true places."""
+        return self.tracks > 0 and math.isfinite(self.track_error)
 
 
 def facts_of(flight: OwnFlight) -> Facts:
@@ -142,6 +147,10 @@ def facts_of(flight: OwnFlight) -> Facts:
                 for v in [value(name, s)]}  # fmt: skip
     tracks = _leading_tracks(flight)
     possible = possible_gain({key: entry for key, entry in numbers.items() if entry["value"] is not None})
+    uncertain = None
+    if possible is not None:
+        share = possible.value / possible.of if possible.of > 0 else 0.0
+        uncertain = Gain("possible", causes_told(numbers), possible.value, possible.of, share)
     failed = tuple(one.about for one in flight.reports if one.state != "done")
     return Facts(
         twin=flight.kind == "twin",
@@ -166,26 +175,11 @@ def facts_of(flight: OwnFlight) -> Facts:
         alarms=tuple(one for one in alarms if math.isfinite(one.size)),
         troubles=tuple(sorted(troubles.items(), key=lambda one: -one[1])),
         gains=_gains(flight),
-        possible=None if possible is None else _possible(flight, possible.value, possible.of),
+        possible=uncertain,
         failed=tuple(about for about in ("overview", *PARTS) if about in failed),
-        lacking=tuple(sorted(_lacking(flight), key=PARTS.index)),
         doubted=doubted(numbers),
         flown=value("height_above_ground") >= FLYING and value("path_length") >= FLYING,
     )
-
-
-def _possible(flight: OwnFlight, value: float, of: float) -> Gain:
-    return Gain("possible", _causes(flight), value, of, value / of if of > 0 else 0.0)
-
-
-def _lacking(flight: OwnFlight) -> set[str]:
-    """Parts that the records do not allow: an overview names them, and what is neither done nor failed."""
-    there = {one.about for one in flight.reports}
-    return {part for part in PARTS if part not in there}
-
-
-def _causes(flight: OwnFlight) -> tuple[str, ...]:
-    return causes_told(flight.numbers)
 
 
 def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
@@ -205,7 +199,7 @@ def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
         else:
             lost = overview.numbers.get(("lost", key))
             value, of = (NAN, NAN) if lost is None else (float(lost["value"]), float(lost["n"]))
-        causes = _causes(flight) if key == "cause" else ()
+        causes = causes_told(flight.numbers) if key == "cause" else ()
         found.append(Gain(key, causes, value, of, float(entry["value"])))
     return tuple(sorted(found, key=lambda one: -one.share))
 
@@ -233,12 +227,6 @@ def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
     return found
 
 
-def _median(values: Sequence[float]) -> float:
-    known = sorted(value for value in values if math.isfinite(value))
-    middle = len(known) // 2
-    if not known:
-        return NAN
-    return known[middle] if len(known) % 2 else (known[middle - 1] + known[middle]) / 2
-
-
-__all__ = ["PARTS", "WORTH", "Alarm", "Facts", "Gain", "facts_of"]
+def _median(values: Iterable[float]) -> float:
+    known = [value for value in values if math.isfinite(value)]
+    return statistics.median(known) if known else NAN

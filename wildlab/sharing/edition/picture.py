@@ -1,18 +1,18 @@
-"""The one picture of the page, drawn here as SVG in the page's own colours: a map, or what the numbers say.
-
-A picture that somebody else made (PNG, JPEG, WebP, SVG) goes in as it is, as an image: nothing in it runs.
-"""
+"""The one picture of the page, as SVG in the page's own colours: a map, or what the numbers say."""
 
 from __future__ import annotations
 
-import base64
 import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.analysis.georeference import observe
+from wildlab.analysis.overviews.overview import look_over
 from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.geometry.georeference import georeference_pixels
 from wildlab.messages.catalogue import Language, say
 from wildlab.messages.message import Message, length, number
 from wildlab.reporting.georeferencing import FEW
@@ -29,8 +29,6 @@ FOOT = 46.0
 MOST_POINTS, MOST_DOTS = 600, 400
 #: Marks a text of the drawing that counts in steps.
 IN_STEPS = 'class="steps"'
-#: First bytes of the kinds of images that a page may hold.
-KINDS = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpeg", b"RIFF": "webp", b"<svg": "svg+xml", b"<?xm": "svg+xml"}
 
 
 class MapPicture(NamedTuple):
@@ -51,11 +49,43 @@ class MapPicture(NamedTuple):
     truth: Array
 
 
-class ImagePicture(NamedTuple):
-    """An image file, and what is on it in words, in the language of the page."""
+def map_of(flight: Flight, source: str | None = None) -> MapPicture | None:
+    """Way, sightings and true places of a flight, as it is: generalise it before, where that is needed.
 
-    data: bytes
-    alt: str
+    Parameters
+    ----------
+    flight
+        Whatever it lacks.
+    source
+        Name of its poses; None for the best known ones.
+
+    Returns
+    -------
+    MapPicture or None
+        None where there is nothing to put on it. Without poses there is no way of the aircraft on it.
+    """
+    overview = look_over(flight, source)
+    path = overview.path
+    flown = path is not None and path.who.startswith("nav/")
+    way = path.place[:, :2] if flown and path is not None else np.empty((0, 2))
+    found = MapPicture(way, _seen(flight, overview.source), _true(flight))
+    return found if any(np.isfinite(one).any() for one in found) else None
+
+
+def _seen(flight: Flight, source: str | None) -> Array:
+    if source is None or flight.detections is None or flight.manifest.camera is None:
+        return np.empty((0, 2))
+    try:
+        seen = observe(flight, source)
+    except WildlabError:
+        return np.empty((0, 2))
+    return georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
+
+
+def _true(flight: Flight) -> Array:
+    if flight.truth is None:
+        return np.empty((0, 2))
+    return flight.truth[["north_m", "east_m"]].to_numpy(float)
 
 
 def nice_length(most: float) -> float:
@@ -74,7 +104,7 @@ def nice_length(most: float) -> float:
     return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= most * (1 + 1e-12))
 
 
-def picture_html(picture: MapPicture | ImagePicture | None, facts: Facts, language: Language) -> str:
+def picture_html(picture: MapPicture | None, facts: Facts, language: Language) -> str:
     """The picture with its caption, or nothing where there is nothing to draw.
 
     Parameters
@@ -90,14 +120,7 @@ def picture_html(picture: MapPicture | ImagePicture | None, facts: Facts, langua
     -------
     str
         A ``<figure>``.
-
-    Raises
-    ------
-    WildlabError
-        If an image is none of the kinds that a page may hold.
     """
-    if isinstance(picture, ImagePicture):
-        return _figure(_image(picture), "")
     if picture is not None and len(_known(picture.path)) + len(_known(picture.seen)) >= 2:
         return _map(picture, language)
     return _drawn(facts, language)
@@ -106,18 +129,6 @@ def picture_html(picture: MapPicture | ImagePicture | None, facts: Facts, langua
 def _figure(drawing: str, caption: str) -> str:
     below = f"<figcaption>{caption}</figcaption>" if caption else ""
     return f"<figure>{drawing}{below}</figure>"
-
-
-def _image(picture: ImagePicture) -> str:
-    kind = next((kind for begin, kind in KINDS.items() if picture.data.lstrip().startswith(begin)), None)
-    if kind is None:
-        raise WildlabError(
-            "the picture is neither PNG, JPEG, WebP nor SVG", "give one of these", field="picture"
-        )
-    if not picture.alt.strip():
-        raise WildlabError("the picture has no words", "say in a sentence what is on it", field="picture")
-    data = base64.b64encode(picture.data).decode("ascii")
-    return f'<img src="data:image/{kind};base64,{data}" alt="{escape(picture.alt)}">'
 
 
 def _svg(content: str, alt: str) -> str:

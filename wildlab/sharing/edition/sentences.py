@@ -161,9 +161,9 @@ def _next(facts: Facts, advice: tuple[Message, ...]) -> Message:
 
 def _tiles(facts: Facts) -> tuple[tuple[Value, Message], ...]:
     found: list[tuple[Value, Message]] = []
-    if facts.compared >= FEW and math.isfinite(facts.error_median):
+    if facts.compared >= FEW:
         found.append((length(facts.error_median), Message("tile.error")))
-    elif facts.tracks and math.isfinite(facts.track_error):
+    elif facts.tracked:
         worst: dict[str, Value] = {"worst": length(facts.track_worst)}
         label = Message("tile.tracks", worst) if _unlike(facts) else Message("tile.track")
         found.append((length(facts.track_error), label))
@@ -179,7 +179,7 @@ def _tiles(facts: Facts) -> tuple[tuple[Value, Message], ...]:
 
 def _measured(facts: Facts) -> tuple[Message, ...]:
     found: list[Message] = []
-    if facts.compared >= FEW and math.isfinite(facts.error_median) and math.isfinite(facts.error_p90):
+    if facts.compared >= FEW:
         values: dict[str, Value] = {
             "median": length(facts.error_median),
             "p90": length(facts.error_p90),
@@ -191,7 +191,7 @@ def _measured(facts: Facts) -> tuple[Message, ...]:
     elif math.isfinite(facts.scatter):
         apart = length(MEDIAN_DISTANCE * facts.scatter)
         found.append(Message("measured.scatter", {"apart": apart, "sightings": number(facts.sightings)}))
-    if facts.tracks and math.isfinite(facts.track_error):
+    if facts.tracked:
         off: dict[str, Value] = {"error": length(facts.track_error)}
         if _unlike(facts):
             off |= {"n": number(facts.tracks), "worst": length(facts.track_worst)}
@@ -218,11 +218,6 @@ def _measured(facts: Facts) -> tuple[Message, ...]:
 def _unlike(facts: Facts) -> bool:
     """Whether some track was farther off than is typical: then the worst is said too."""
     return facts.tracks > 1 and facts.track_worst > facts.track_error
-
-
-def _followed_alone(facts: Facts) -> bool:
-    """Whether tracks were held against true places, and single sightings of other sensors never are."""
-    return facts.other_sensors and facts.tracks > 0 and math.isfinite(facts.track_error)
 
 
 def _alarm(alarm: Alarm) -> Message:
@@ -316,7 +311,8 @@ def _advice(facts: Facts) -> tuple[Message, ...]:
     if facts.possible is not None:
         found.append(Message("do.possible", {"gain": length(facts.possible.value)}))
     if not facts.compared and "georeferencing" not in facts.failed:
-        if not _followed_alone(facts):
+        # Single sightings of other sensors never are.
+        if not (facts.other_sensors and facts.tracked):
             found.append(Message("do.known_tracks" if facts.other_sensors else "do.known_places"))
     elif facts.compared < FEW and facts.compared:
         found.append(Message("do.more_places", {"few": number(FEW)}))
@@ -344,8 +340,7 @@ def _do(gain: Gain) -> Message:
 def _unknown(facts: Facts) -> tuple[Message, ...]:
     found = [Message(f"unknown.failed_{part}") for part in facts.failed]
     if not facts.compared and "georeferencing" not in facts.failed:
-        tracked = facts.tracks > 0 and math.isfinite(facts.track_error)
-        found.append(Message("unknown.error_sightings" if tracked else "unknown.error"))
+        found.append(Message("unknown.error_sightings" if facts.tracked else "unknown.error"))
     elif 0 < facts.compared < FEW:
         values: dict[str, Value] = {"median": length(facts.error_median)}
         found.append(Message("unknown.few", values, facts.compared))

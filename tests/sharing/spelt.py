@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import math
+import struct
 from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import cache
@@ -132,7 +134,80 @@ SPELLINGS: dict[str, Callable[[float, float], str]] = {
     "ECEF in km": lambda a, b: "{:.4f} {:.4f} {:.4f}".format(*(v / 1000 for v in ecef(a, b))),
     "Web Mercator": _grid(3857),
     "World Mercator": _grid(3395),
+    "semicircles": lambda a, b: f"{round(a * 2**31 / 180)} {round(b * 2**31 / 180)}",
+    "turns": lambda a, b: f"{a / 360:.8f} {b / 360:.8f}",
+    "float32": lambda a, b: f"{float(np.float32(a))!r} {float(np.float32(b))!r}",
 }  # fmt: skip
+
+
+def _tile(latitude: float, longitude: float, zoom: int = 16) -> str:
+    """Of a map on the web."""
+    x = (longitude + 180) / 360 * 2**zoom
+    y = (1 - math.asinh(math.tan(math.radians(latitude))) / math.pi) / 2 * 2**zoom
+    return f"{zoom}/{int(x)}/{int(y)}"
+
+
+def _bytes(latitude: float, longitude: float, order: str = "<ff") -> bytes:
+    return struct.pack(order, latitude, longitude)
+
+
+#: Spellings that the second wall does not know: they are of no form that a report has.
+CODED: dict[str, Callable[[float, float], str]] = {
+    "a tile of a map": _tile,
+    "a tile, by letters": lambda a, b: "z16-x" + "-y".join(_tile(a, b).split("/")[1:]),
+    "base32": lambda a, b: base64.b32encode(f"{a:.4f} {b:.4f}".encode()).decode(),
+    "base64": lambda a, b: base64.b64encode(f"{a:.4f} {b:.4f}".encode()).decode(),
+    "base85": lambda a, b: base64.b85encode(f"{a:.4f} {b:.4f}".encode()).decode(),
+    "hexadecimal": lambda a, b: f"{a:.4f} {b:.4f}".encode().hex(),
+    "float32, hexadecimal": lambda a, b: _bytes(a, b).hex(),
+    "float32, base64": lambda a, b: base64.b64encode(_bytes(a, b)).decode(),
+    "float64, hexadecimal": lambda a, b: f"{a.hex()} {b.hex()}",
+    "bits": lambda a, b: f"{int.from_bytes(_bytes(a, b), 'big'):b}",
+    "an integer of 64 bits": lambda a, b: str(int.from_bytes(_bytes(a, b), "big")),
+    "fractions, as in EXIF": lambda a, b: " ".join(
+        f"{x}/1 {y}/1 {round(float(z) * 100)}/100" for x, y, z in (sexagesimal(a, 2), sexagesimal(b, 2))
+    ),
+    "Well-Known Binary": lambda a, b: struct.pack("<BIdd", 1, 1, b, a).hex(),
+    "an encoded polyline": lambda a, b: "".join(_polyline(round(v * 1e5)) for v in (a, b)),
+    "JSON escapes": lambda a, b: "".join(f"\\u{ord(c):04x}" for c in f"{a:.4f} {b:.4f}"),
+    "percent": lambda a, b: "".join(f"%{ord(c):02X}" for c in f"{a:.4f} {b:.4f}"),
+    "digits as words": lambda a, b: f"{round(a * 1e7)}x{round(b * 1e7)}",
+}  # fmt: skip
+
+
+def _polyline(value: int) -> str:
+    """As routes are handed over on the web."""
+    value = ~(value << 1) if value < 0 else value << 1
+    letters = ""
+    while value >= 0x20:
+        letters += chr((0x20 | value & 0x1F) + 63)
+        value >>= 5
+    return letters + chr(value + 63)
+
+
+#: The day of `WHEN` and others of its week, in the spellings that are looked for; %-codes of strftime.
+DATES = (
+    "%Y-%m-%d", "%Y/%m/%d", "%Y:%m:%d", "%Y_%m_%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y",
+    "%-m/%-d/%y", "%-d/%-m/%y", "%-d.%-m.%y", "%m/%d/%y", "%d.%m.%y", "%y-%m-%d", "%Y%m%d", "%d%m%Y", "%m%d%Y",
+    "%y%m%d", "%d%m%y", "%Y%m%d%H%M%S", "%Y%m%dT%H%M", "%Y-%m-%dT%H:%M:%SZ", "%Y-%j", "%Y%j", "%j/%Y", "day %-j",
+    "day of year %j", "DOY %j", "%G-W%V-%u", "%GW%V", "%-d %B %Y", "%B %-d, %Y", "%-d. %b %Y", "%b %-d '%y",
+    "%-dth of %B %Y", "%Y %b %-d", "%A, %-d %B %Y", "%H:%M:%S", "%-H:%M:%S",
+)  # fmt: skip
+
+
+def counted(moment: datetime) -> dict[str, str]:
+    """A moment as counts of time."""
+    unix, gps = moment.timestamp(), (moment - datetime(1980, 1, 6, tzinfo=UTC)).total_seconds() + 18
+    return {
+        "seconds": f"{unix:.0f}", "with a fraction": f"{unix + 0.25:.2f}", "ms": f"{unix * 1e3:.0f}",
+        "us": f"{unix * 1e6:.0f}", "ns": f"{unix * 1e9:.0f}", "GPS seconds": f"{gps:.0f}",
+        "GPS week and seconds": f"week {gps // 604_800:.0f}, {gps % 604_800:.1f} s",
+        "GPS week and ms": f"{gps // 604_800:.0f},{gps % 604_800 * 1e3:.0f}",
+        "days since 1970": f"{unix / 86_400:.4f}", "a spreadsheet's": f"{unix / 86_400 + 25_569:.5f}",
+        "Julian date": f"{unix / 86_400 + 2_440_587.5:.4f}", "MJD": f"{unix / 86_400 + 40_587:.4f}",
+        "Matlab's": f"{unix / 86_400 + 719_529:.4f}",
+    }  # fmt: skip
+
 
 #: One of each thing that is looked for: what kind it is found as, and how it is written.
 LEAKS: dict[str, tuple[str, str]] = {

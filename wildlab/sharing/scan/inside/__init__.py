@@ -1,1 +1,0 @@
-"""What is inside of files: one file per family of formats."""
