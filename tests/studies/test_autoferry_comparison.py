@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from wildlab.studies.autoferry.comparison import (
     MOSTLY,
@@ -17,7 +16,6 @@ from wildlab.studies.autoferry.comparison import (
     of_use,
     off_ideal,
     outcomes,
-    share_interval,
     stays,
     with_hindsight,
 )
@@ -186,11 +184,6 @@ def test_a_sensor_is_of_use_where_a_filter_keeps_most_of_its_tracks():
 
 def test_a_factor_too_small_is_as_wrong_as_one_too_large():
     np.testing.assert_allclose(off_ideal([2.0, 4.0, 1.0, 20.0]), [0, np.log(2), np.log(2), np.log(10)])
-
-
-def test_the_share_of_none_has_no_interval():
-    assert share_interval(4, 20) == pytest.approx((0.081, 0.416), abs=5e-4)
-    assert np.isnan(share_interval(0, 0)).all()
 
 
 def test_claims_are_decided_case_by_case_and_means_by_the_band_of_a_mean():

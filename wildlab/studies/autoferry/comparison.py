@@ -15,7 +15,6 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.tracks.comparison import FILTERS, WHITE
-from wildlab.evaluation.runs import share_interval as wilson
 
 Array = NDArray[np.float64]
 
@@ -225,13 +224,6 @@ def with_hindsight(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
         gainers = group.loc[group["outcome"] == "gained", "filter"].tolist()
         rows.append(dict(zip(keys, key, strict=True)) | {"gained": bool(gainers), "filters": gainers})
     return pd.DataFrame(rows, columns=[*keys, "gained", "filters"])
-
-
-def share_interval(k: int, n: int) -> tuple[float, float]:
-    """95 % interval (Wilson) of a share of which ``k`` of ``n`` was seen; NaN for none of none."""
-    if n == 0:
-        return float("nan"), float("nan")
-    return wilson(k, n)[1:]
 
 
 def check_claims(table: pd.DataFrame, keys: Sequence[str]) -> dict[str, NDArray[np.bool_]]:
