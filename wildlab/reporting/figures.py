@@ -320,7 +320,8 @@ def png_bytes(figure: Figure) -> bytes:
     fit_text(figure)
     with _laid_out(figure):
         # `savefig` would draw it twice.
-        FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.print_png(buffer, metadata={"Software": None})
     return buffer.getvalue()
 
 
