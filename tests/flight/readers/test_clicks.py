@@ -12,7 +12,7 @@ from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.tracks import near, spoilt
 from wildlab.errors import WildlabError
 from wildlab.flight.readers import clicks
-from wildlab.flight.readers.judging import judge_log
+from wildlab.flight.readers.formats import read_folder, read_log
 from wildlab.flight.readers.log import RawLog
 from wildlab.names import csv_cell, from_csv_cell
 
@@ -22,12 +22,8 @@ BOXES = [("a.jpg", "A1", 10.0, 20.0, 4.0, 6.0), ("b.jpg", "B <b>", 0.0, 0.5, 100
 SIZES = {"a.jpg": (200.0, 100.0), "b.jpg": (200.0, 100.0)}
 
 
-def read(path: Path, data: bytes, sizes: clicks.Sizes | None = None) -> RawLog:
-    return judge_log("clicks", clicks.decode(path, data, sizes=sizes), False)
-
-
-def read_folder(folder: Path, sizes: clicks.Sizes | None = None) -> RawLog:
-    return judge_log("clicks", clicks.folder_decode(folder, sizes=sizes), False)
+def read(path: Path, data: bytes) -> RawLog:
+    return read_log(path, data, "clicks")
 
 
 def column(log: RawLog, name: str) -> list[Any]:
@@ -81,14 +77,12 @@ def test_boxes_out_of_every_format(data):
     check_boxes(read(HERE, data))
 
 
-def test_shares_of_an_image_want_its_size():
+def test_shares_of_an_image_want_its_size(tmp_path):
     assert clicks.sniff(MEGADETECTOR, "x")
-    log = read(HERE, MEGADETECTOR, sizes=SIZES)
-    check_boxes(log)
+    log = read(tmp_path / "md.json", MEGADETECTOR)
     assert column(log, "score") == [0.5, 0.5]
-    without = read(HERE, MEGADETECTOR)
-    assert column(without, "why") == ["no place in the image"] * 2
-    assert any("2 of 2" in one for one in without.notes)
+    assert column(log, "why") == ["no place in the image"] * 2
+    assert any("2 of 2" in one for one in log.notes)
 
 
 def write_yolo(folder: Path, classes: Path) -> None:
@@ -100,11 +94,10 @@ def write_yolo(folder: Path, classes: Path) -> None:
 
 def test_yolo_folder(tmp_path):
     write_yolo(tmp_path, tmp_path)
-    check_boxes(read_folder(tmp_path, SIZES), stems=True)
-    assert not read_folder(tmp_path).parts["clicks"].used.any()
+    assert not read_folder(tmp_path, "clicks-yolo")[0].parts["clicks"].used.any()
     (tmp_path / "none").mkdir()
     with pytest.raises(WildlabError, match="no text file"):
-        read_folder(tmp_path / "none")
+        read_folder(tmp_path / "none", "clicks-yolo")
 
 
 @pytest.mark.parametrize("layout", [("", ""), ("images", "labels"), ("images/train", "labels/train")])
@@ -115,7 +108,7 @@ def test_sizes_of_images_beside_labels(tmp_path, layout):
     for name in SIZES:
         made.write(images, name, size=(200, 100))
     write_yolo(labels, tmp_path)
-    check_boxes(read_folder(labels), stems=True)
+    check_boxes(read_folder(labels, "clicks-yolo")[0], stems=True)
     # MegaDetector names images with their folders, and a file may name what lies elsewhere.
     check_boxes(read(images / "md.json", MEGADETECTOR))
     above = MEGADETECTOR.replace(b"a.jpg", b"../../../a.jpg").replace(b"b.jpg", b"/etc/b.jpg")
@@ -185,7 +178,7 @@ def test_damaged_files_end_in_a_sentence(data):
     for one in spoilt(data):
         clicks.sniff(one, "x")
         try:
-            part = read(HERE, one, sizes=SIZES).parts["clicks"]
+            part = read(HERE, one).parts["clicks"]
         except WildlabError:
             continue
         assert np.isfinite(part.columns["u_px"][part.used]).all()

@@ -7,7 +7,7 @@ images that lie beside; without one such rows say so and are not used.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -34,8 +34,6 @@ from wildlab.flight.readers.photo_tags import read_tags, size_of
 from wildlab.flight.readers.text import header_of, number, plural
 
 Array = NDArray[np.float64]
-#: Width and height by the name of an image, px.
-Sizes = Mapping[str, tuple[float, float]]
 
 #: Attributes of CVAT that name a thing more closely than its label.
 NAMES = frozenset({"name", "target", "target_id", "id", "marker"})
@@ -56,19 +54,8 @@ def sniff(head: bytes, name: str) -> bool:
     return image and way_of(names, points_first=True) is not None
 
 
-def decode(path: Path, data: bytes, zone: str | None = None, sizes: Sizes | None = None) -> Decoded:
-    """Clicks and boxes of one file.
-
-    Parameters
-    ----------
-    path
-        For messages, and to find the images beside it.
-    data
-        The file's content.
-    zone
-        Not used: nothing here has a time.
-    sizes
-        For formats that give shares of images; left out, those of images beside the file.
+def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+    """Clicks and boxes of one file; images whose sizes are wanted lie beside it.
 
     Raises
     ------
@@ -77,11 +64,11 @@ def decode(path: Path, data: bytes, zone: str | None = None, sizes: Sizes | None
     """
     start = data.lstrip(b"\xef\xbb\xbf \r\n\t")[:1]
     if start in (b"{", b"["):
-        return _decoded(read_json_boxes(data, path), sizes, path, path.parent)
-    return _decoded(_cvat(data, path) if start == b"<" else read_table_clicks(data, path), sizes, path, path)
+        return _decoded(read_json_boxes(data, path), path, path.parent)
+    return _decoded(_cvat(data, path) if start == b"<" else read_table_clicks(data, path), path, path)
 
 
-def folder_decode(folder: Path, zone: str | None = None, sizes: Sizes | None = None) -> Decoded:
+def folder_decode(folder: Path, zone: str | None = None) -> Decoded:
     """Boxes of a folder of YOLO's text files, one for each image; ``image`` is its name without the ending.
 
     Raises
@@ -89,17 +76,18 @@ def folder_decode(folder: Path, zone: str | None = None, sizes: Sizes | None = N
     WildlabError
         Where there is no such file, or a line is wrong.
     """
-    return _decoded(read_yolo_folder(folder), sizes, folder, folder)
+    return _decoded(read_yolo_folder(folder), folder, folder)
 
 
-def _decoded(marked: Marked, sizes: Sizes | None, path: Path, folder: Path) -> Decoded:
+def _decoded(marked: Marked, path: Path, folder: Path) -> Decoded:
     at = np.flatnonzero(~marked.crowd)
     if not len(at):
         raise WildlabError("marks nothing", "give a file with boxes or points", file=path)
     boxes, names = marked.boxes[at], [marked.names[row] for row in at]
     notes = [f"{marked.format}: {plural(len(at), 'box')}"] if marked.counted_in == "box" else []
     if marked.relative:
-        known = _known(sizes_beside(folder, names) if sizes is None else sizes, names)
+        sizes = sizes_beside(folder, names)
+        known = np.array([sizes.get(one, (np.nan, np.nan)) for one in names], float)
         boxes = boxes * np.concatenate([known, known], axis=1)
         without = int((~np.isfinite(known).all(axis=1)).sum())
         if without:
@@ -128,19 +116,6 @@ def _decoded(marked: Marked, sizes: Sizes | None, path: Path, folder: Path) -> D
 
 def _plain(name: str) -> PurePosixPath:
     return PurePosixPath(name.replace("\\", "/"))
-
-
-def _known(sizes: Sizes, names: list[str]) -> Array:
-    """(N, 2) width and height of each image, NaN where they are not known."""
-    short: dict[str, tuple[float, float]] = {}
-    for name, size in sizes.items():
-        short |= {_plain(name).stem: size, _plain(name).name: size}
-    nothing = (np.nan, np.nan)
-    found = [
-        sizes.get(one) or short.get(_plain(one).name) or short.get(_plain(one).stem) or nothing
-        for one in names
-    ]
-    return np.array(found, float).reshape(-1, 2)
 
 
 def sizes_beside(folder: Path, names: Iterable[str]) -> dict[str, tuple[float, float]]:

@@ -116,11 +116,10 @@ class MessageTable(Messages):
 
 
 class Records(NamedTuple):
-    """Messages of a binary log: by name, how many, bytes of no message, and in how many stretches these
+    """Messages of a binary log by name, bytes of no message, and in how many stretches these
     lie."""
 
     tables: dict[str, MessageTable]
-    messages: int
     lost_bytes: int
     places: int
 
@@ -156,7 +155,7 @@ def read_records(data: bytes) -> Records:
     begins = _boundaries(heads, ends, len(raw))
     heads, which, ends = heads[begins], which[begins], ends[begins]
     lost, places = _left_over(raw, heads, ends)
-    return Records(_tables(raw, known, heads, which), len(heads), lost, places)
+    return Records(_tables(raw, known, heads, which), lost, places)
 
 
 def _definitions(data: bytes, raw: Bytes, heads: Index) -> tuple[list[Definition], Index]:
