@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from wildlab.errors import WildlabError
 from wildlab.flight.camera_file import parse_camera
@@ -37,6 +38,20 @@ from wildlab.flight.recipe.tables import (
 from wildlab.flight.store import Flight, save_flight
 from wildlab.flight.terrain.laying import lay_terrain
 from wildlab.flight.terrain_model import TerrainSays
+
+#: Parts that a manifest has as the recipe states them.
+_AS_STATED = (
+    "name",
+    "locations",
+    "platform",
+    "mount",
+    "clocks",
+    "uncertainty",
+    "scoring",
+    "sensors",
+    "targets",
+)
+_ON_BOARD: dict[str, type[BaseModel]] = {"imu": ImuPart, "gnss": GnssPart, "magnetometer": MagnetometerPart}
 
 
 def import_flight(
@@ -273,44 +288,26 @@ def _manifest(
     description: str,
 ) -> Manifest:
     latitude, longitude, height = places.origin
-    origin = (
-        recipe.origin.model_dump()
-        if recipe.origin is not None
-        else {
-            "latitude_deg": math.degrees(latitude),
-            "longitude_deg": math.degrees(longitude),
-            "height_m": height,
-        }
-    )
-    vertical = recipe.vertical
+    place = {
+        "latitude_deg": math.degrees(latitude),
+        "longitude_deg": math.degrees(longitude),
+        "height_m": height,
+    }
+    on_board = {
+        name: {key: getattr(recipe.on_board[name], key) for key in part.model_fields}
+        for name, part in _ON_BOARD.items()
+        if name in recipe.on_board
+    }
     return make_manifest(
         {
-            "name": recipe.name,
+            **{name: getattr(recipe, name) for name in _AS_STATED},
+            **on_board,
             "kind": "logged",
             "description": description,
-            "locations": recipe.locations,
-            "origin": origin,
-            "platform": recipe.platform,
+            "origin": place if recipe.origin is None else recipe.origin.model_dump(),
             "camera": camera,
-            "mount": recipe.mount,
-            "imu": {} if recipe.imu is None else {k: getattr(recipe.imu, k) for k in ImuPart.model_fields},
-            "gnss": {}
-            if recipe.gnss is None
-            else {k: getattr(recipe.gnss, k) for k in GnssPart.model_fields},
-            "magnetometer": {}
-            if recipe.magnetometer is None
-            else {k: getattr(recipe.magnetometer, k) for k in MagnetometerPart.model_fields},
             "time": {"kind": recipe.time.kind, "epoch": epoch},
-            "clocks": recipe.clocks,
-            "vertical": {
-                "reference": vertical.reference,
-                "correction_m": vertical.correction_m,
-                "note": vertical.note,
-            },
-            "uncertainty": recipe.uncertainty,
-            "scoring": recipe.scoring,
-            "sensors": recipe.sensors,
-            "targets": recipe.targets,
+            "vertical": recipe.vertical.model_dump(include={"reference", "correction_m", "note"}),
             "sources": [
                 {"file": name, "sha256": digest, "what": recipe.files.get(name, "")}
                 for name, digest in raw.hashes.items()
