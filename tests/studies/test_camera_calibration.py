@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from wildlab.geometry.camera import Camera
 from wildlab.studies.camera_calibration import mounting
 from wildlab.studies.camera_calibration.intrinsics import (
     calibrations,
-    ground_shift,
     measure_centres,
     neglected_distortion,
     theoretical,
@@ -19,11 +17,6 @@ def test_the_data_sheet_is_that_of_the_print_but_for_its_last_digit():
     sheet = theoretical()
     assert sheet.fx == pytest.approx(1117.7, abs=0.06) and sheet.fy == pytest.approx(sheet.fx)
     assert (sheet.cx, sheet.cy) == (320, 256)
-    assert ground_shift(TAU2, TAU2, (0.0, 0.0)) == 0
-    moved = Camera(640, 512, 1000.0, 1000.0, 330.0, 256.0)
-    assert ground_shift(Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0), moved, (100.0, 100.0), 100.0) == (
-        pytest.approx(1.0)
-    )
 
 
 def test_centres_of_rendered_circles_are_found():

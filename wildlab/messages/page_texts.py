@@ -38,7 +38,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -264,8 +264,3 @@ def fill(text: str, recorded: Mapping[tuple[str, str], Entry], values: Mapping[s
 def words_of(names: Mapping[str, str], name: str) -> str:
     """What a subject or quantity is called: its words, or its name with blanks."""
     return names.get(name, name.replace("_", " ").replace("-", " "))
-
-
-def texts_of(names: Mapping[str, str], chosen: Sequence[str]) -> dict[str, str]:
-    """The words for each of ``chosen``, in that order: for legends."""
-    return {name: words_of(names, name) for name in chosen}

@@ -12,7 +12,7 @@ from wildlab.detection.boards import Board, find_board, grey8
 from wildlab.evaluation.replication import propagate_rounding
 from wildlab.evaluation.runs import Interval
 from wildlab.geometry.board_views import Views, parameters_of, project_board
-from wildlab.geometry.camera import Camera, camera_from_data_sheet, normalise
+from wildlab.geometry.camera import Camera, camera_from_data_sheet
 from wildlab.geometry.directions import direction_differences
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
@@ -148,9 +148,3 @@ def neglected_distortion(rng: np.random.Generator, k1: float, images: int = IMAG
     uv = project_board(parameters_of(bent), views, GRID.points).uv
     found = calibrate_camera(GRID.points, uv, 640, 512, PINHOLE, resample=False)
     return found.rms, float(np.linalg.norm(direction_differences(found.camera, bent), axis=1).max())
-
-
-def ground_shift(one: Camera, other: Camera, uv: tuple[float, float], height: float = HEIGHT) -> float:
-    """How far apart two cameras that look straight down put a pixel on the ground, metres."""
-    a, b = normalise(one, [uv])[0], normalise(other, [uv])[0]
-    return float(height * np.linalg.norm(a - b))
