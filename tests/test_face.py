@@ -19,8 +19,13 @@ import wildlab
 from tests.rooms import LAZY
 from wildlab import paths
 from wildlab.analysis.navigate import PUBLISHED_LIKE
-from wildlab.analysis.navigation_errors import NavigationErrors, Series, mean_of_runs, navigation_series
-from wildlab.analysis.tracks.judged import worth
+from wildlab.analysis.navigation_errors import (
+    NavigationErrors,
+    Series,
+    mean_of_runs,
+    navigation_series,
+    worth,
+)
 from wildlab.api.points import Points
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.manifest import replace_in_manifest

@@ -48,7 +48,8 @@ def predict_azimuth_elevation(position, poses, plane_down) -> Prediction:
     inner = target_in_camera(position, poses, plane_down)
     x, y, z = np.moveaxis(inner.z, -1, 0)
     seen = (z > 0) & (x * x + y * y > 0)
-    level2, z = np.where(seen, x * x + y * y, np.nan), np.where(seen, z, np.nan)
+    x, y, z = (np.where(seen, v, np.nan) for v in (x, y, z))
+    level2 = x * x + y * y
     level, range2 = np.sqrt(level2), level2 + z * z
     J = np.zeros((*level.shape, 2, 3))
     J[..., 0, 0], J[..., 0, 1] = -y / level2, x / level2

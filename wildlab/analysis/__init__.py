@@ -40,10 +40,10 @@ if TYPE_CHECKING:
         errors_against,
         mean_of_runs,
         navigation_series,
+        worth,
     )
     from wildlab.analysis.receiver import Placement, Receiver, place_receiver, receiver_noise
     from wildlab.analysis.repeats import Repeats, judge_repeats
-    from wildlab.analysis.tracks.judged import worth
     from wildlab.analysis.tracks.sighting import (
         CvTuning,
         Scored,

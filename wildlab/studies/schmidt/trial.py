@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.navigate import PUBLISHED_LIKE, navigate_mekf
-from wildlab.analysis.navigation_errors import errors_against
+from wildlab.analysis.navigation_errors import errors_against, worth
 from wildlab.analysis.pose_noise import NAMES as POSE_NAMES
 from wildlab.analysis.pose_noise import (
     covariance_of,
@@ -27,7 +27,6 @@ from wildlab.analysis.pose_noise import (
     premise_numbers,
     shown,
 )
-from wildlab.analysis.tracks.judged import worth
 from wildlab.analysis.tracks.sighting import (
     CvTuning,
     Scored,
