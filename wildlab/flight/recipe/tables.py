@@ -40,9 +40,13 @@ _SPREADS: Columns = (
     ("sd_vertical_m", "sd_vertical", "length"),
 )
 ON_BOARD: dict[str, Columns] = {
-    "imu": (
-        *((f"f_{axis}_m_s2", f"force.{axis}", "acceleration") for axis in "xyz"),
-        *((f"w_{axis}_rad_s", f"rate.{axis}", "rate") for axis in "xyz"),
+    "imu": tuple(
+        column
+        for axis in "xyz"
+        for column in (
+            (f"f_{axis}_m_s2", f"force.{axis}", "acceleration"),
+            (f"w_{axis}_rad_s", f"rate.{axis}", "rate"),
+        )
     ),
     "gnss": (*_SPREADS, ("sd_velocity_m_s", "sd_velocity", "speed")),
     "magnetometer": tuple((f"field_{axis}_ut", f"field.{axis}", "field") for axis in "xyz"),
