@@ -37,6 +37,10 @@ _ANGLES = (
 CODE_DEG = 0.0025
 _GEOHASH = "0123456789bcdefghjkmnpqrstuvwxyz"
 _PLUS = "23456789CFGHJMPQRVWX"
+_LOOKS_LIKE = {
+    "a plus code": re.compile(rf"[{_PLUS}]{{4}}\+[{_PLUS}]{{2}}", re.IGNORECASE),
+    "MGRS": re.compile(r"\d\s?[C-X]\s?[A-Z]{2}\s?\d{2}", re.IGNORECASE),
+}
 #: Letters of MGRS' squares: neither I nor O.
 _SQUARES = "ABCDEFGHJKLMNPQRSTUVWXYZ"
 
@@ -103,7 +107,9 @@ class Places:
     def found_in(self, text: str, numbers: Numbers) -> Iterator[Hit]:
         """Where a place stands in a text, whose numbers are given."""
         for name, pattern in self.codes.items():
-            for match in pattern.finditer(text):
+            # Thousands of codes are only looked for where anything looks like one.
+            there = name not in _LOOKS_LIKE or _LOOKS_LIKE[name].search(text)
+            for match in pattern.finditer(text) if there else ():
                 if not match[0].isdigit() and (name != "a geohash" or _is_geohash(match[0])):
                     yield Hit(match.start(), match.end(), "place", name)
         for encoding, ranges in zip(self.encodings, self.ranges, strict=True):

@@ -124,7 +124,7 @@ class Finding:
         return f"{self.file}: {self.kind}: {self.written}"
 
 
-def scan(files: Mapping[str, str], secrets: Secrets) -> list[Finding]:
+def scan(files: Mapping[str, str], secrets: Secrets | Sought) -> list[Finding]:
     """What must not be in texts and their names, and is.
 
     Parameters
@@ -132,7 +132,7 @@ def scan(files: Mapping[str, str], secrets: Secrets) -> list[Finding]:
     files
         Texts by the names under which they are sent.
     secrets
-        What is looked for.
+        What is looked for; prepared before, where several are looked through.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def scan(files: Mapping[str, str], secrets: Secrets) -> list[Finding]:
     >>> print(scan({"page.html": "<p>60&deg; 7' 24.3&quot; N, 10&deg; 15' 0.8&quot; E</p>"}, known)[0])
     page.html: place: latitude and longitude, degrees, minutes and seconds
     """
-    sought = Sought(secrets)
+    sought = secrets if isinstance(secrets, Sought) else Sought(secrets)
     findings: list[Finding] = []
     for name, content in files.items():
         for where, text in ((f"the name of the file {name}", name), (name, content)):

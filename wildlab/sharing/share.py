@@ -37,7 +37,7 @@ from wildlab.sharing.package import (
 from wildlab.sharing.redrawn import Redrawn, redraw
 from wildlab.sharing.removed import removed_lines, sender_list
 from wildlab.sharing.reports import Source, flight_folder, sources_of
-from wildlab.sharing.scan import Secrets, not_searched, scan
+from wildlab.sharing.scan import Secrets, Sought, not_searched, scan
 from wildlab.sharing.secrets import all_of, flight_secrets, machine_secrets
 from wildlab.sharing.tiers import (
     Tier,
@@ -171,7 +171,8 @@ def share(
         for source, name, folder in zip(sources, calls, folders, strict=True)
     ]
     secrets = all_of([machine_secrets(), *(one.secrets for one in prepared if one is not None)])
-    _refuse_leaks({target.name: ""}, target, secrets)
+    sought = Sought(secrets)
+    _refuse_leaks({target.name: ""}, target, sought)
     documents: list[_Document] = []
     for source, name, one in zip(sources, calls, prepared, strict=True):
         first = 1 + sum(len(document.chapter.parts) for document in documents)
@@ -180,7 +181,7 @@ def share(
         else:
             documents.append(_copied(source, tier, name, first))
     pages = _pages(documents, target, zipped, len(flights))
-    _refuse_leaks(pages, target, secrets)
+    _refuse_leaks(pages, target, sought)
     notes = [*left_out, *not_searched(secrets), *([] if password is None else [OPENED_WITH])]
     lines = sender_list(
         target.name, [document.told for document in documents], notes, generalised=any(folders)
@@ -341,7 +342,7 @@ def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
     return _Document(name, Chapter(f"{name}, {_WORDS[tier]}", about, (), tuple(parts)), (heading, (removed,)))
 
 
-def _refuse_leaks(pages: Mapping[str, str], target: Path, secrets: Secrets) -> None:
+def _refuse_leaks(pages: Mapping[str, str], target: Path, sought: Sought) -> None:
     """Look through all that is to be sent, and refuse it where something must not be in it.
 
     Raises
@@ -349,7 +350,7 @@ def _refuse_leaks(pages: Mapping[str, str], target: Path, secrets: Secrets) -> N
     RunFailed
         Naming what was found, how it is written, and where.
     """
-    found = scan(pages, secrets)
+    found = scan(pages, sought)
     if not found:
         return
     several = "; ".join(f"{one} ({one.found!r})" if one.found else str(one) for one in found[:_MOST])
