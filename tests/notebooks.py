@@ -8,7 +8,6 @@ from typing import Any
 import nbformat
 
 from wildlab.paths import NOTEBOOKS
-from wildlab.reporting.notebooks import give_parameters
 from wildlab.reporting.report import Report
 from wildlab.runner.processes.shell import execute_notebook
 
@@ -52,8 +51,7 @@ def write(folder: Path, name: str, node: nbformat.NotebookNode) -> Path:
 def run_here(name: str, **parameters: Any) -> list[dict[str, Any]]:
     """The notebook of that name, run in this process with some of its parameters: what its cells show, by
     kind (``text/html``, ``image/png``)."""
-    executed = nbformat.read(NOTEBOOKS / name, as_version=4)
-    give_parameters(executed, parameters)
-    execute_notebook(executed, NOTEBOOKS)
+    notebook = nbformat.read(NOTEBOOKS / name, as_version=4)
+    executed = execute_notebook(notebook, NOTEBOOKS, parameters=parameters)
     outputs = [output for cell in executed.cells for output in cell.get("outputs", [])]
     return [dict(output["data"]) for output in outputs if "data" in output]

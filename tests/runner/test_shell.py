@@ -15,7 +15,6 @@ import papermill
 import pytest
 from IPython.core.getipython import get_ipython
 
-from wildlab.reporting.notebooks import give_parameters
 from wildlab.runner.processes.ending import ONE_THREAD, start_process
 from wildlab.runner.processes.shell import CellError, execute_notebook
 
@@ -39,11 +38,7 @@ CELLS = [
 
 
 def execute(cells: list[str], where: Path, **parameters: Any) -> Any:
-    notebook = written(cells)
-    if parameters:
-        give_parameters(notebook, parameters)
-    execute_notebook(notebook, where, where / "ours.ipynb")
-    return notebook
+    return execute_notebook(written(cells), where, where / "ours.ipynb", parameters)
 
 
 def written(cells: list[str]) -> Any:

@@ -320,7 +320,7 @@ def verdict_of_accuracy(
     evidence = evidence_of(logged, lost, ellipses, diagnosis, problems)
     verdict, total = verdict_of(evidence), logged.n + lost
     gain = gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
-    reasons = (
+    reasons: tuple[tuple[str, bool, dict[str, str]], ...] = (
         ("reason-contradictions", problems > 0, {"problems": str(problems)}),
         ("reason-lost", lost > MANY_LOST * total or not logged.n, {"lost": str(lost), "total": str(total)}),
         ("reason-gain", gain >= WORTH, {"share": percent_of(gain)}),
@@ -366,7 +366,7 @@ def limits(
     rest = offset - ZONE_S * round(offset / ZONE_S)
     timed = manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
     nearest = found.nearest
-    conditional = (
+    conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": str(found.lost)}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
@@ -470,11 +470,11 @@ def show_accuracy(
     texts, shown = load_texts("georeferencing"), flight.manifest.locations.sensitivity == "open"
     programs = named(programs, "program", shown=shown)
     others = record_accuracy(report, found, programs)
-    groups = {name: rows for name, rows in found.scored.groupby("group") if name}
-    groups = dict(sorted(groups.items(), key=lambda one: (len(one[0]), one[0])))
-    groups = named(groups, "part", shown=shown)
-    for name, rows in groups.items():
-        record_errors(report, f"logged-pose/{name}", rows)
+    by_name = {str(name): rows for name, rows in found.scored.groupby("group") if name}
+    ordered = dict(sorted(by_name.items(), key=lambda one: (len(one[0]), one[0])))
+    groups = named(ordered, "part", shown=shown)
+    for name, part in groups.items():
+        record_errors(report, f"logged-pose/{name}", part)
     wording = Wording(report, texts)
     report.head(texts.subjects["question"], _subtitle(flight, found))
     problems = sum(one.startswith("problem") for one in amiss)

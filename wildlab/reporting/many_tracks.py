@@ -202,7 +202,7 @@ def limits(followed: ManyTracks) -> list[Message]:
     estimated = [followed.truth_sd[name] for name in followed.truth_estimated if name in followed.truth_sd]
     exact = len(followed.truth) - sum(sd > 0 for sd in followed.truth_sd.values())
     truth = bool(followed.truth)
-    conditional = (
+    conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
         ("others", truth and not followed.others, {}),
         ("beside", truth and followed.others, {}),
         ("truth-estimated", bool(estimated), {"sd": f"{max(estimated, default=0.0):.2g}"}),

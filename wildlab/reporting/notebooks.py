@@ -44,17 +44,10 @@ _SHOWN_HEADING = re.compile(r"<h[1-6][^>]*>(.*?)</h[1-6]>", re.S)
 _TAG = re.compile(r"<[^>]+>")
 #: The tag of the cell with what a run was given.
 INJECTED = "injected-parameters"
+#: The tag of the cells in which papermill says where a run stopped.
+_ERROR_MARK = "papermill-error-cell-tag"
 _KERNEL_CELL = re.compile(r"(/[\w.+@-]+)*/ipykernel_\d+/\d+\.py")
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
-
-
-def give_parameters(notebook: nbformat.NotebookNode, parameters: Mapping[str, Any]) -> None:
-    """Put a cell with parameters, plain values, below the one tagged ``parameters``, or first of all."""
-    tagged = [
-        i for i, cell in enumerate(notebook.cells, start=1) if "parameters" in cell.metadata.get("tags", [])
-    ]
-    cell = nbformat.v4.new_code_cell(_assigned(parameters), metadata={"tags": [INJECTED]})
-    notebook.cells.insert(next(iter(tagged), 0), cell)
 
 
 def _assigned(parameters: Mapping[str, Any]) -> str:
@@ -105,7 +98,10 @@ def clean_notebook(
         As in `clean_text`.
     """
     copy: nbformat.NotebookNode = nbformat.from_dict(_clean(dict(notebook), folders))
+    copy.metadata.pop("papermill", None)
+    copy.cells = [cell for cell in copy.cells if _ERROR_MARK not in cell.metadata.get("tags", [])]
     for cell in copy.cells:
+        cell.metadata.pop("papermill", None)
         cell.metadata.pop("execution", None)
         if INJECTED in cell.metadata.get("tags", []):
             cell.source = _assigned(parameters)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from wildlab.analysis.overviews.overview import (
     APART_M,
@@ -458,7 +459,8 @@ def show_overview(
     report.tiles(tiles(overview))
     show_advice(report, wording.messages(_with_remedies(gains[:MOST])))
     if overview.problems:
-        report.alert(*wording.messages([Message("tables", {"problems": str(overview.problems)})]), [])
+        (title,) = wording.messages([Message("tables", {"problems": str(overview.problems)})])
+        report.alert(title, [])
     show_contradictions(report, amiss, shown=shown)
     _show_figures(wording, overview)
     record(report, overview, gains, counts)
@@ -499,7 +501,7 @@ def _show_figures(wording: Wording, overview: Overview) -> None:
         )
 
 
-def _figures_over_time(overview: Overview, clock: charts.Clock) -> Iterator[tuple[str, charts.Figure]]:
+def _figures_over_time(overview: Overview, clock: charts.Clock) -> Iterator[tuple[str, Figure]]:
     named = {name: pace for name, pace in overview.streams.items() if pace.n}
     if named and overview.flight.manifest.time.kind == "utc":
         yield "streams", charts.streams_chart(named, clock, "")

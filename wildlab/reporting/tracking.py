@@ -215,7 +215,7 @@ def answer(rows: pd.DataFrame, pairs: Sequence[Apart]) -> list[Message]:
         "n": str(len(mine)),
         "filter": short_words(str(mine["filter"].iloc[0])),
         "rmse": length(float(mine["rmse"].median())) if with_truth else "",
-        "times": significant(float(ratio.median())),
+        "times": significant(float(np.nanmedian(ratio))),
         **{key: str(int((mine[column] == word).sum())) for key, word in _COUNTED.items()},
     }
     found = set(mine[column])

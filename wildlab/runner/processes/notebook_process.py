@@ -1,7 +1,7 @@
 """One study in a process of its own: flight, notebook, page. `wildlab.runner.run` starts, watches and
 ends it.
 
-A process each, because a notebook changes the working directory of the whole process, and because only a
+A process each, because papermill changes the working directory of the whole process, and because only a
 process can be ended for certain. It gets its own session, so that Ctrl-C reaches the runner alone, which
 then ends everything below this process, kernel included.
 """
@@ -118,13 +118,13 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     if others:
         given[OTHERS] = [str(other) for other in others]
         shown[OTHERS] = [_relative(other, job) for other in others]
-    executed, notebook = folder / "notebook.ipynb", notebooks.read_notebook(Path(job.notebook))
-    notebooks.give_parameters(notebook, {**given, "flight": str(flight or ""), "out": str(folder)})
+    executed = folder / "notebook.ipynb"
     try:
-        _execute(pipe, job, notebook, executed)
+        _execute(pipe, job, {**given, "flight": str(flight or ""), "out": str(folder)}, executed)
     finally:
-        cleaned = notebooks.clean_notebook(notebook, shown, job.hidden())
-        write_notebook(executed, cleaned)
+        if executed.is_file():
+            cleaned = notebooks.clean_notebook(notebooks.read_notebook(executed), shown, job.hidden())
+            write_notebook(executed, cleaned)
     pipe.send(("stage", "page"))
     if not (folder / "metrics.json").is_file():
         raise WildlabError(
@@ -158,8 +158,7 @@ def _tutorial(pipe: connection.Connection, job: Job) -> None:
     from wildlab.runner.record import provenance
 
     pipe.send(("stage", "notebook"))
-    notebook = notebooks.read_notebook(Path(job.notebook))
-    _execute(pipe, job, notebook, Path(job.work) / "notebook.ipynb")
+    notebook = _execute(pipe, job, {}, Path(job.work) / "notebook.ipynb")
     pipe.send(("stage", "page"))
     cleaned = notebooks.clean_notebook(notebook, {}, {job.work: "."})
     origin = provenance.collect(
@@ -200,14 +199,16 @@ def _relative(flight: Path | None, job: Job) -> str:
     return flight.name
 
 
-def _execute(pipe: connection.Connection, job: Job, notebook: Any, executed: Path) -> None:
+def _execute(pipe: connection.Connection, job: Job, parameters: dict[str, Any], executed: Path) -> Any:
+    from wildlab.reporting.notebooks import read_notebook
     from wildlab.runner.processes.shell import execute_notebook
 
     def on_cell(index: int, count: int) -> None:
         _STARTED.append(index)
         pipe.send(("cell", index, count))
 
-    execute_notebook(notebook, Path(job.notebook).parent, executed, on_cell)
+    notebook = read_notebook(Path(job.notebook))
+    return execute_notebook(notebook, Path(job.notebook).parent, executed, parameters, on_cell)
 
 
 def _explain(error: BaseException, job: Job) -> Failure:

@@ -1,4 +1,4 @@
-"""Notebooks whose cells run in this process, in a shell of IPython's, without a kernel.
+"""A papermill engine that runs a notebook's cells in this process, in a shell of IPython's, without a kernel.
 
 A kernel is a second process that imports everything once more, which took most of the time of a short page.
 What cells print, show and raise is kept as a kernel would have sent it.
@@ -9,18 +9,21 @@ from __future__ import annotations
 import base64
 import contextlib
 import io
-import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import nbformat
+import papermill
 from IPython.core.displayhook import DisplayHook
 from IPython.core.displaypub import DisplayPublisher
 from IPython.core.interactiveshell import InteractiveShell
+from papermill.engines import Engine, NotebookExecutionManager, papermill_engines
+from papermill.exceptions import PapermillExecutionError
 from traitlets.config import Config
 
-from wildlab.files import write_atomic
+#: Its name among papermill's engines.
+IN_PROCESS = "wildlab-in-process"
 
 
 class CellError(Exception):
@@ -31,57 +34,104 @@ class CellError(Exception):
         self.name, self.message, self.lines = name, message, lines
 
 
+class ShellEngine(Engine):  # type: ignore[misc]
+    """Cells one after the other, until one raises; see papermill on engines."""
+
+    @classmethod
+    def execute_managed_notebook(
+        cls,
+        nb_man: NotebookExecutionManager,
+        kernel_name: str,
+        *,
+        on_cell_execute: Callable[..., None] | None = None,
+        **_: Any,
+    ) -> None:
+        outputs = _Outputs()
+        shell = _shell(outputs)
+        try:
+            _run_cells(shell, outputs, nb_man, on_cell_execute)
+        finally:
+            # Whatever else this process does, it is no notebook any more.
+            shell.restore_sys_module_state()
+            type(shell).clear_instance()
+
+
+papermill_engines.register(IN_PROCESS, ShellEngine)
+
+
 def execute_notebook(
     notebook: nbformat.NotebookNode,
     folder: Path,
     into: Path | None = None,
+    parameters: Mapping[str, Any] | None = None,
     on_cell: Callable[[int, int], None] = lambda index, count: None,
-) -> None:
-    """Run the cells of a notebook one after the other, until one raises.
+) -> nbformat.NotebookNode:
+    """Run the cells of a notebook by papermill, one after the other, until one raises.
 
     Parameters
     ----------
     notebook
-        Its cells get what they print, show and raise.
+        As it was written.
     folder
-        That they run in.
+        That its cells run in.
     into
-        The file that the notebook is written to, as far as it came; None for none.
+        The file that the executed notebook is written to, as far as it came; None for none.
+    parameters
+        What a cell below the one tagged ``parameters`` sets; plain values.
     on_cell
         Called before each cell with its index, and how many there are.
+
+    Returns
+    -------
+    NotebookNode
+        With what the cells have printed, shown and raised.
 
     Raises
     ------
     CellError
         Of the cell that raises, or that cannot show its value.
     """
-
-    def save() -> None:
-        if into is not None:
-            write_atomic(into, json.dumps(notebook, indent=1, ensure_ascii=False) + "\n")
-
-    outputs = _Outputs()
-    shell = _shell(outputs)
+    # Whatever kernel it was last saved with: its cells run in this process.
+    notebook.metadata["kernelspec"] = {"name": "python3", "language": "python", "display_name": "Python 3"}
+    count = len(notebook.cells) + bool(parameters)  # papermill adds a cell with them
     try:
-        with contextlib.chdir(folder):
-            for index, cell in enumerate(notebook.cells):
-                save()
-                on_cell(index, len(notebook.cells))
-                if cell.cell_type != "code":
-                    continue
-                with _streams_into(outputs):
-                    result = shell.run_cell(cell.source, store_history=True)
-                cell.outputs, cell.execution_count = outputs.take(), shell.execution_count - 1
-                # What fails to show itself is an error, though the cell goes on.
-                for one in cell.outputs:
-                    if one.output_type == "error":
-                        raise CellError(one.ename, one.evalue, one.traceback)
-                result.raise_error()
-    finally:
-        save()
-        # Whatever else this process does, it is no notebook any more.
-        shell.restore_sys_module_state()
-        type(shell).clear_instance()
+        executed: nbformat.NotebookNode = papermill.execute_notebook(
+            notebook,
+            # papermill reads braces in a path as placeholders.
+            None if into is None else str(into).replace("{", "{{").replace("}", "}}"),
+            parameters=dict(parameters or {}),
+            kernel_name="python3",
+            language="python",
+            engine_name=IN_PROCESS,
+            progress_bar=False,
+            cwd=str(folder),
+            on_cell_execute=lambda cell, cell_index: on_cell(cell_index, count),
+        )
+    except PapermillExecutionError as error:
+        raise CellError(str(error.ename), str(error.evalue), list(error.traceback)) from None
+    return executed
+
+
+def _run_cells(
+    shell: InteractiveShell,
+    outputs: _Outputs,
+    nb_man: NotebookExecutionManager,
+    on_cell_execute: Callable[..., None] | None,
+) -> None:
+    for index, cell in enumerate(nb_man.nb.cells):
+        nb_man.cell_start(cell, index)
+        if on_cell_execute is not None:
+            on_cell_execute(cell=cell, cell_index=index)
+        if cell.cell_type == "code":
+            with _streams_into(outputs):
+                result = shell.run_cell(cell.source, store_history=True)
+            cell.outputs, cell.execution_count = outputs.take(), shell.execution_count - 1
+            # What fails to show itself is an error, though the cell goes on.
+            if not result.success or any(one.output_type == "error" for one in cell.outputs):
+                nb_man.cell_exception(cell, cell_index=index)
+        nb_man.cell_complete(cell, cell_index=index)
+        if nb_man.nb.metadata.papermill["exception"]:
+            return
 
 
 class _Outputs:

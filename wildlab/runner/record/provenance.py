@@ -34,7 +34,7 @@ PACKAGES = [
     "pyproj",
     "opencv-python-headless",
     "matplotlib",
-    "ipython",
+    "papermill",
 ]
 
 
