@@ -88,8 +88,13 @@ class _Report(NamedTuple):
 
 
 def _said(report: Path, numbers: Mapping[tuple[str, str], float]) -> _Report:
-    soup = BeautifulSoup((report / "report.html").read_text(encoding="utf-8"), "html.parser")
-    title, word = soup.h1, soup.select_one("p.verdict .pill")
+    text = (report / "report.html").read_text(encoding="utf-8")
+    # What is asked and answered stands before the figures, which are most of a page.
+    for piece in (text.partition("<figure")[0], text):
+        soup = BeautifulSoup(piece, "html.parser")
+        title, word = soup.h1, soup.select_one("p.verdict .pill")
+        if title is not None and word is not None:
+            break
     against = tuple(subject for name, subject in numbers if name == AGAINST)
     return _Report(
         "" if title is None else title.get_text(" ", strip=True),

@@ -313,20 +313,14 @@ def _is_geohash(code: str) -> bool:
     return len(code) >= 8 or any(letter.isdigit() for letter in code)
 
 
-def _interleaved(latitude: float, longitude: float, bits: int) -> int:
-    """Halvings of the Earth, east or west first, as the digits of one number."""
+def geohash(latitude: float, longitude: float, length: int) -> str:
+    """The geohash of a place (deg, WGS84), so many letters long."""
     low, high, number = [-180.0, -90.0], [180.0, 90.0], 0
-    for k in range(bits):
+    for k in range(5 * length):
         axis, value = k % 2, (longitude, latitude)[k % 2]
         middle = (low[axis] + high[axis]) / 2
         number = number << 1 | int(value >= middle)
         (low if value >= middle else high)[axis] = middle
-    return number
-
-
-def geohash(latitude: float, longitude: float, length: int) -> str:
-    """The geohash of a place (deg, WGS84), so many letters long."""
-    number = _interleaved(latitude, longitude, 5 * length)
     return "".join(_GEOHASH[number >> 5 * k & 31] for k in reversed(range(length)))
 
 
