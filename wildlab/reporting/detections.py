@@ -190,7 +190,7 @@ def detections_page(
     thresholds
         By name, as plain values.
     curves
-        Of detectors that are compared, as of `wildlab.analysis.detection_compared.curve_table`; None where
+        Of detectors that are compared, as of `wildlab.analysis.detecting.judged.curve_table`; None where
         there is only ours.
 
     Returns

@@ -48,9 +48,9 @@ def plan_page(
     plan
         From `wildlab.analysis.plans.plan.make_plan`.
     covered
-        Of each area, from `wildlab.analysis.plan_coverage.cover`.
+        Of each area, from `wildlab.analysis.plans.coverage.cover`.
     result
-        From `wildlab.analysis.plan_said.plan_result`.
+        From `wildlab.analysis.plans.said.plan_result`.
     exact
         Whether it may tell where on the Earth this is.
 

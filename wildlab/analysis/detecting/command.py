@@ -172,7 +172,7 @@ class Wanted:
     images, into
         Where frames are, and where what comes out goes.
     method
-        One of `wildlab.analysis.detection_methods.METHODS`.
+        One of `wildlab.analysis.detecting.methods.METHODS`.
     labels
         By which the detections are judged.
     fit

@@ -47,7 +47,7 @@ def detect_frame(frame: Frame, method: str, thresholds: Any) -> Detections:
     frame
         One with a problem has none.
     method
-        One of `wildlab.analysis.detection_methods.METHODS`.
+        One of `wildlab.analysis.detecting.methods.METHODS`.
     thresholds
         Of that method.
 

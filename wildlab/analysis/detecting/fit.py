@@ -485,7 +485,7 @@ def candidates(method: str, count: int = TRIED, seed: int = 1) -> list[Any]:
     Parameters
     ----------
     method
-        One of `wildlab.analysis.detection_methods.METHODS`.
+        One of `wildlab.analysis.detecting.methods.METHODS`.
     count
         How many at most.
     seed

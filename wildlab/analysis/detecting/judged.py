@@ -199,7 +199,7 @@ def judge_detections(
     Parameters
     ----------
     detections, frames
-        As `wildlab.analysis.detect.Detected` has them.
+        As `wildlab.analysis.detecting.detect.Detected` has them.
     labels
         Of the same frames.
     rule
@@ -274,7 +274,7 @@ def boxes_by_frame(
     Parameters
     ----------
     detections
-        As `wildlab.analysis.detect.Detected` has them.
+        As `wildlab.analysis.detecting.detect.Detected` has them.
 
     Returns
     -------
@@ -460,7 +460,7 @@ def compare_detectors(
     name
         What ours are called.
     detections, frames
-        As `wildlab.analysis.detect.Detected` has them.
+        As `wildlab.analysis.detecting.detect.Detected` has them.
     others
         From `read_others`.
     labels

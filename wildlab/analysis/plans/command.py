@@ -31,7 +31,7 @@ def missions(plan: Plan) -> list[Mission]:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plan.make_plan`.
+        From `wildlab.analysis.plans.plan.make_plan`.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def plan_texts(plan: Plan) -> dict[str, str]:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plan.make_plan`.
+        From `wildlab.analysis.plans.plan.make_plan`.
 
     Returns
     -------

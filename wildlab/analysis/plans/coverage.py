@@ -95,7 +95,7 @@ def cover(plan: Plan, tell: Callable[[int, int], None] = lambda done, of: None) 
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plan.make_plan`.
+        From `wildlab.analysis.plans.plan.make_plan`.
     tell
         Called with how many areas are done, of how many.
 
@@ -129,7 +129,7 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plan.make_plan`.
+        From `wildlab.analysis.plans.plan.make_plan`.
     sortie
         One of its flights.
 

@@ -29,9 +29,9 @@ def swing_advice(plan: Plan, covered: Sequence[Covered]) -> list[str]:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plan.make_plan`.
+        From `wildlab.analysis.plans.plan.make_plan`.
     covered
-        Of each area, from `wildlab.analysis.plan_coverage.cover`.
+        Of each area, from `wildlab.analysis.plans.coverage.cover`.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def sharp_speed(plan: Plan) -> float | None:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plan.make_plan`.
+        From `wildlab.analysis.plans.plan.make_plan`.
 
     Returns
     -------
@@ -101,9 +101,9 @@ def plan_result(plan: Plan, covered: Sequence[Covered]) -> dict[str, Any]:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plan.make_plan`.
+        From `wildlab.analysis.plans.plan.make_plan`.
     covered
-        Of each area, from `wildlab.analysis.plan_coverage.cover`.
+        Of each area, from `wildlab.analysis.plans.coverage.cover`.
 
     Returns
     -------

@@ -39,7 +39,7 @@ def tune_sensors(flight: Flight) -> dict[str, SensorTuning]:
 
 
 def tracks_table(followed: Mapping[str, Sequence[SensorTrack]]) -> pd.DataFrame:
-    """A row for each track, with its ``case``: `wildlab.analysis.tracks.tracks.table` of all."""
+    """A row for each track, with its ``case``: `wildlab.analysis.tracks.comparison.table` of all."""
     each = [table(ones, BOATS.size_m).assign(case=case) for case, ones in followed.items()]
     return pd.concat(each, ignore_index=True)
 
