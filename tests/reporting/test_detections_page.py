@@ -105,7 +105,7 @@ RUNS = [
     (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES}),
      ["labels", "ellipses-small", "reason-judged"]),
     (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES | {"high": 0.95}}),
-     ["labels", "ellipses-right", "reason-judged"]),
+     ["labels", "ellipses-open", "reason-judged"]),
     (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES | {"low": 0.95, "high": 0.99}}),
      ["labels", "ellipses-large", "reason-judged"]),
 ]  # fmt: skip

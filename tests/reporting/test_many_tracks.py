@@ -194,6 +194,7 @@ def test_names_are_only_text():
 
 NEVER = {"a": TargetLife(61, 0.0, np.nan, 0, 0), "b": TargetLife(61, 1.0, 0.0, 0, 0)}
 SHORT = {"a": TargetLife(61, 0.7, 0.0, 0, 0)}
+LOST = TargetLife(61, 0.4, 0.0, 0, 0)
 OUT = {"a": TargetLife(0, np.nan, np.nan, 0, 0)}
 
 
@@ -203,6 +204,8 @@ OUT = {"a": TargetLife(0, np.nan, np.nan, 0, 0)}
         (followed(), lives(), ["several", "identities"], "sound"),
         (followed(), lives(targets=SHORT), ["one", "identities"], "short"),
         (followed(), lives(targets=NEVER), ["never", "identities"], "never"),
+        (followed(), lives(targets={"a": NEVER["a"]}), ["never-any", "identities"], "never"),
+        (followed(), lives(targets=NEVER | {"a": LOST}, breaks=1), ["several", "identities"], "lost"),
         (followed(), lives(targets=OUT), ["none-in-reach"], "unjudged"),
         (followed(), None, ["no-truth"], "unjudged"),
         (followed(0), lives(), ["no-track"], "none"),

@@ -72,6 +72,7 @@ CASES = [
     (judged(Verdict.LOOK, overview=LASTING), ["issue"]),
     (judged(Verdict.LOOK, possible=gain(share=0.2), doubts=("tracking",)), ["possible", "doubts"]),
     (judged(Verdict.LOOK), ["look"]),
+    (judged(Verdict.MEND, doubts=("georeferencing",)), ["part", "doubts"]),
 ]
 
 
@@ -104,6 +105,7 @@ COUNTS = {"worth": 0, "troubled": 0}
         (judged(Verdict.LOOK, doubts=("tracking",)), {"troubled": 1}, "reason-doubts"),
         (judged(Verdict.LOOK), {"troubled": 1}, "reason-troubled"),
         (judged(Verdict.UNJUDGED), {}, "reason-unjudged"),
+        (judged(Verdict.UNJUDGED, judged=1), {}, "reason-unjudged"),
         (judged(Verdict.SOUND, judged=2), {}, "reason-sound"),
     ],
 )

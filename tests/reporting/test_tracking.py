@@ -73,8 +73,9 @@ def test_a_filter_that_its_detections_surprise_is_looked_at(nis, level):
             "errors-consistent",
         ),
         ({"nees_worth": 4.0}, "neutral", "errors-unknown"),
-        ({"nees": 5.3, "verdict": "overconfident", "rmse": 1.0}, "warn", "errors-overconfident"),
+        ({"nees": 9.0, "verdict": "overconfident", "rmse": 1.0}, "warn", "errors-overconfident"),
         ({"nees": 0.1, "verdict": "too cautious", "rmse": 1.0}, "warn", "errors-conservative"),
+        ({"nees": 0.45, "verdict": "too cautious", "rmse": 1.0}, "warn", "errors-doubtful"),
     ],
 )
 def test_verdict_and_answer_follow_the_leading_filter(changes, level, first):
@@ -84,9 +85,26 @@ def test_verdict_and_answer_follow_the_leading_filter(changes, level, first):
 def test_tracks_that_differ_are_counted():
     both = pd.concat([rows(), rows(target="other", nees=9.0, verdict="overconfident", rmse=1.0).iloc[1:]])
     first = page.answer(both, [])[0]
-    assert first.key == "errors-mixed"
+    assert first.key == "errors-mixed" and first.values["judged"] == "2"
     assert [first.values[one] for one in ("n", "consistent", "overconfident")] == ["2", "1", "1"]
     assert page.reason(both).values["counts"] == "1 consistent, 1 overconfident"
+
+
+def test_what_could_not_be_judged_is_in_no_number_and_makes_nothing_sound():
+    """One track that is consistent, and nine that are far off and were not judged."""
+    others = [rows(target=f"t{k}", rmse=40.0, nees=30.0, verdict="not judged").iloc[1:] for k in range(9)]
+    many = pd.concat([rows().iloc[1:], *others])
+    first = page.answer(many, [])[0]
+    assert first.key == "errors-mixed" and (first.values["judged"], first.values["rmse"]) == ("1", "4.0 m")
+    assert colour(many) != "good" == colour(pd.concat([rows().iloc[1:], *others[:0]]))
+
+
+def test_few_values_make_a_no_a_perhaps_not():
+    near = rows(nees=5.3, verdict="overconfident", rmse=1.0)
+    assert keys(near)[0] == "errors-doubtful"
+    assert keys(rows(nees=9.0, verdict="overconfident", rmse=1.0))[0] == "errors-overconfident"
+    few = blind(nis=2.5, nis_verdict="overconfident", nis_worth=6.0)
+    assert keys(few)[0] == "innovations-doubtful"
 
 
 def blind(**changes: object) -> pd.DataFrame:

@@ -437,6 +437,14 @@ def test_facts_that_are_not_known_choose_a_sentence_that_needs_none(case):
 
 
 def test_every_page_is_a_cases_or_a_flights():
-    of_flights = {"detections", "georeferencing", "overview", "repeat-sightings", "tracking", "tracking-many"}
+    of_flights = {
+        "published",
+        "detections",
+        "georeferencing",
+        "overview",
+        "repeat-sightings",
+        "tracking",
+        "tracking-many",
+    }
     of_flights |= {"navigation-logged"}
     assert {path.stem for path in FOLDER.glob("*.toml")} <= set(case_names()) | of_flights

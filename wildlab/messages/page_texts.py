@@ -165,10 +165,17 @@ def measure(value: float, unit: str) -> str:
 
     Examples
     --------
-    >>> measure(9.81, "m"), measure(0.31, "deg"), measure(2.04, "1")
-    ('9.8 m', '0.31°', '2.0')
+    >>> measure(9.81, "m"), measure(0.31, "deg"), measure(2.04, "1"), measure(99.6, "%")
+    ('9.8 m', '0.31°', '2.0', '99.6 %')
     """
-    return f"{significant(value)}{_UNITS.get(unit, f' {unit}')}"
+    if unit == "%":
+        return percent_of(value / 100)
+    return f"{significant(value)}{unit_words(unit)}"
+
+
+def unit_words(unit: str) -> str:
+    """What follows a number with that unit: a blank and the unit, nothing for "1"."""
+    return _UNITS.get(unit, f" {unit}")
 
 
 def percent_of(value: float) -> str:

@@ -68,9 +68,11 @@ def answer(result: Mapping[str, Any]) -> list[Message]:
     }
     said = [Message("held-out" if where == "held-out" else "labels", values)]
     share = (result.get("judged") or {}).get("ellipse_coverage_90")
-    if share:
-        kind = "small" if share["high"] < ELLIPSE else "large" if share["low"] > ELLIPSE else "right"
-        said.append(Message(f"ellipses-{kind}", {"share": percent_of(share["estimate"])}))
+    # Of labels that thresholds were chosen from, it would be no test.
+    if share and not result.get("fit"):
+        kind = "small" if share["high"] < ELLIPSE else "large" if share["low"] > ELLIPSE else "open"
+        ends = {end: percent_of(share[end]) for end in ("low", "high")}
+        said.append(Message(f"ellipses-{kind}", {"share": percent_of(share["estimate"]), **ends}))
     return said
 
 

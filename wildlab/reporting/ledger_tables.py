@@ -7,7 +7,7 @@ import math
 from wildlab.evaluation.replication import Closeness, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
 from wildlab.reporting.counts import tally
-from wildlab.reporting.published import SHARE_OF_IMAGES
+from wildlab.reporting.published import CALCULATED, SHARE_OF_IMAGES
 from wildlab.reporting.spread import MANY, spread_key
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus
 from wildlab.reporting.text import NOTHING, escape, number
@@ -74,7 +74,7 @@ def summed_up(one: StudyStatus) -> str:
 def _strip_heading(one: StudyStatus) -> str:
     over = f"{one.seeds} {flights_of(one)}" if one.seeds and one.seeds > 1 else "here"
     fewest = min((n.over for n in one.numbers if n.over is not None), default=MANY)
-    band = f'<i class="band"></i>{spread_key(fewest)}' if any(_has_band(n) for n in one.numbers) else ""
+    band = f'<i class="band"></i>{spread_key(fewest)}' if any(has_band(n) for n in one.numbers) else ""
     return (
         f'{over}, as ratio to the print <span class="key"><i class="full"></i>here{band}'
         '<i class="hollow"></i>print</span>'
@@ -86,9 +86,9 @@ def flights_of(one: StudyStatus) -> str:
     return "runs" if one.study.kind == "computed" else "flights"
 
 
-def _has_band(n: Number) -> bool:
-    # Of a share of images the bounds are those of its interval, not of flights.
-    return n.low is not None and n.high is not None and n.kind != SHARE_OF_IMAGES
+def has_band(n: Number) -> bool:
+    # Of a share of images the bounds are those of its interval, of a calculation those of rounded inputs.
+    return n.low is not None and n.high is not None and n.kind not in (SHARE_OF_IMAGES, CALCULATED)
 
 
 def _row(n: Number, *, ran: bool) -> str:
@@ -165,7 +165,7 @@ def strip(n: Number) -> str:
             for r in (0.25, 0.5, 2, 4)
         ),
     ]
-    if _has_band(n):
+    if has_band(n):
         low, high = n.low / n.published, n.high / n.published  # type: ignore[operator]
         left, right = place(low), place(high)
         parts.append(

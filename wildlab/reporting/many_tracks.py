@@ -148,13 +148,16 @@ def answer(followed: ManyTracks, lives: Identities | None) -> list[Message]:
         "rmse": length(rms_error(lives)) if on_target(lives) else "–",
         "never": str(never),
     }
-    first = Message("never" if never else "one" if len(seen) == 1 else "several", values)
+    first = Message(
+        "never-any" if never == len(seen) else "never" if never else "one" if len(seen) == 1 else "several",
+        values,
+    )
     false = sum(track.false for track in lives.tracks.values())
     counts = {
         "swaps": str(lives.swaps),
         "breaks": str(lives.breaks),
         "false": str(false),
-        "tracks": str(tracks),
+        "tracks": str(len(lives.tracks)),
     }
     if reach := needed_reach(followed):
         return [first, Message("reach", {"cutoff": f"{followed.cutoff_m:g}", "reach": f"{reach:.0f}"})]
@@ -176,6 +179,7 @@ def reason(followed: ManyTracks, lives: Identities | None) -> Message:
     counts = (
         ("swaps", lives.swaps, len(lives.tracks)),
         ("never", sum(life.tracked == 0 for life in seen), len(seen)),
+        ("lost", sum(0 < life.tracked < HALF for life in seen), len(seen)),
         ("breaks", lives.breaks, len(seen)),
         ("false", false, len(lives.tracks)),
         ("nothing", int(false_share(lives) > 1 - FOLLOWED), 1),

@@ -158,6 +158,8 @@ def answer(found: Judged) -> list[Message]:
     overview, worth = found.overview, [gain for gain in found.gains if gain.share >= WORTH]
     lasting = [one for one in overview.troubles if one.seconds >= 1]
     said: list[Message] = [alarm_message(one, overview) for one in overview.alarms]
+    if found.verdict in (Verdict.ALARM, Verdict.MEND) and not said and not found.problems:
+        said.append(Message("part", {"verdict": found.verdict.value}))
     if found.problems:
         said.append(Message("problems", {"problems": str(found.problems)}))
     said += [gain_message(gain) for gain in (worth or found.gains)[:1]]
@@ -187,7 +189,7 @@ def reason(found: Judged, counts: Mapping[str, int]) -> Message:
         return Message("reason-doubts", {"reports": listed(list(found.doubts))})
     if counts["troubled"]:
         return Message("reason-troubled", {"count": str(counts["troubled"])})
-    if not found.judged:
+    if found.verdict == Verdict.UNJUDGED:
         return Message("reason-unjudged")
     return Message("reason-sound", {"count": str(found.judged)})
 

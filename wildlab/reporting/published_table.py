@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from wildlab.evaluation.replication import Closeness, Compatibility
-from wildlab.messages.page_texts import words_of
-from wildlab.reporting.ledger_tables import PILLS, strip
+from wildlab.messages.page_texts import fill, load_texts, words_of
+from wildlab.reporting.ledger_tables import PILLS, has_band, strip
 from wildlab.reporting.status import Number
 from wildlab.reporting.text import NOTHING, escape, inline, number
 
@@ -22,7 +22,7 @@ SIGNS: Mapping[str, tuple[str, str]] = {
 }
 #: Rows beyond these are folded away.
 LONGEST = 12
-_HEADINGS = ("", "", "published", "here", "published ○, here ●, flights ▬", "close", "within")
+_HEADINGS = ("", "", "published", "here", "published ○, here ●", "close", "within")
 
 
 def published_table(
@@ -44,10 +44,12 @@ def published_table(
     """
     if not numbers:
         return ""
-    labels = [f' data-label="{escape(one)}"' if one else "" for one in _HEADINGS]
+    band = ", range ▬" if any(map(has_band, numbers)) else ""
+    headings = [one + band if "●" in one else one for one in _HEADINGS]
+    labels = [f' data-label="{escape(one)}"' if one else "" for one in headings]
     heads = "".join(
         f'<th role="columnheader" scope="col"{_text(i)}>{one}</th>' if one else '<td role="cell"></td>'
-        for i, one in enumerate(_HEADINGS)
+        for i, one in enumerate(headings)
     )
     rows = "".join(_row(one, subjects, quantities, labels) for one in numbers)
     return (
@@ -93,6 +95,14 @@ def claims_table(rows: Sequence[tuple[str, str, str, str, str]]) -> str:
         f'<table class="many" role="table"><thead role="rowgroup"><tr role="row">{heads}</tr></thead>'
         f'<tbody role="rowgroup">{"".join(body)}</tbody></table></div>'
     )
+
+
+def caption_of(numbers: Sequence[Number]) -> str:
+    """What *close* and *within* mean for the kinds of numbers that there are, and where these are from."""
+    texts = load_texts("published").answers
+    kinds = list(dict.fromkeys(one.kind for one in numbers))
+    said = [texts[kind.replace(" ", "-")] for kind in kinds]
+    return " ".join([*said, texts["signs"], fill(texts["sources"], {}, {"sources": sources_of(numbers)})])
 
 
 def sources_of(numbers: Sequence[Number]) -> str:

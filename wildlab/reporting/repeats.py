@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from wildlab.analysis.overviews.verdict import MANY_LOST, VERDICT_LEVEL, Evidence, Verdict, verdict_of
+from wildlab.analysis.overviews.verdict import (
+    FEW_POINTS,
+    MANY_LOST,
+    VERDICT_LEVEL,
+    Evidence,
+    Verdict,
+    verdict_of,
+)
 from wildlab.analysis.repeats import Repeats
 from wildlab.flight.store import Flight
 from wildlab.messages.message import Message
@@ -40,7 +47,7 @@ def answer(found: Repeats) -> Message:
         "things": str(spread.things),
         "ratio": significant(spread.consistent),
     }
-    if math.isnan(spread.consistent):
+    if math.isnan(spread.consistent) or spread.sightings < FEW_POINTS:
         return Message("scatter", values)
     if spread.consistent > CLOSE:
         return Message("ellipses-small", values)

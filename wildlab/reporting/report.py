@@ -35,7 +35,7 @@ from wildlab.reporting.figures import figure_html, png_bytes, save_figure
 from wildlab.reporting.flight_status import Standing, standing
 from wildlab.reporting.page import PILLS, TAGS
 from wildlab.reporting.published import load_claims, published_rows
-from wildlab.reporting.published_table import LONGEST, claims_table, published_table, sources_of
+from wildlab.reporting.published_table import LONGEST, caption_of, claims_table, published_table
 from wildlab.reporting.tables import csv_link, table_html
 from wildlab.reporting.text import escape, inline, known, maths, prose, slug
 from wildlab.reporting.verdicts import compared_number, judge
@@ -290,15 +290,13 @@ class Report:
         html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
 
-    def published(
-        self, title: str, caption: str, subjects: Mapping[str, str], quantities: Mapping[str, str]
-    ) -> None:
+    def published(self, title: str, subjects: Mapping[str, str], quantities: Mapping[str, str]) -> None:
         """The section of the published numbers beside those recorded so far; nothing where there are none.
 
         Parameters
         ----------
-        title, caption
-            Of the section, and of its table.
+        title
+            Of the section.
         subjects, quantities
             Words for the numbers' subjects and names.
         """
@@ -307,7 +305,7 @@ class Report:
         numbers = [compared_number(row, recorded, self.seeds, self.kind) for row in rows]
         if not numbers:
             return
-        about = f"<figcaption>{inline(caption)} {escape(sources_of(numbers))}.</figcaption>"
+        about = f"<figcaption>{inline(caption_of(numbers))}</figcaption>"
         table = published_table(numbers, subjects, quantities)
         html = f'<figure class="table">{table}{about}</figure>'
         self.section(title)

@@ -21,6 +21,7 @@ from wildlab.analysis.tracks.judged import (
     OVERCONFIDENT,
     UNKNOWN,
     Apart,
+    is_at_rest,
     leading_filter,
     verdict,
 )
@@ -188,7 +189,8 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[Apart]) -> Verdict:
     if (rows["compared"] > 0).any():
         against = int(mine["verdict"].isin([OVERCONFIDENT, CAUTIOUS]).sum())
         troubled = against + len(surprised(mine)) + (worse_together(rows) is not None)
-        sound = (mine["verdict"] == CONSISTENT).any() and not mine.apply(on_few, axis=1).any()
+        # Of tracks that mostly could not be judged a consistent one says little.
+        sound = (mine["verdict"] == CONSISTENT).mean() > 0.5 and not mine.apply(on_few, axis=1).any()
         return verdict_of(Evidence(troubled=troubled, judged=int(sound)))
     used = [one for one in pairs if one.filter == leading_filter(mine)]
     agree = all(verdict(one.squares) == CONSISTENT for one in used)
@@ -210,24 +212,28 @@ def answer(rows: pd.DataFrame, pairs: Sequence[Apart]) -> list[Message]:
     mine = leading_rows(rows)
     with_truth = bool((rows["compared"] > 0).any())
     column, what = ("verdict", "nees") if with_truth else ("nis_verdict", "nis")
-    ratio = np.sqrt(mine[what] / (2.0 if with_truth else mine["dof"]))
+    judged = mine[mine[column] != UNKNOWN]
+    # Numbers are of the tracks that the verdict is on; where there is none, of all.
+    shown = judged if len(judged) else mine
+    ratio = np.sqrt(shown[what] / (2.0 if with_truth else shown["dof"]))
     values = {
         "n": str(len(mine)),
         "filter": short_words(str(mine["filter"].iloc[0])),
-        "rmse": length(float(mine["rmse"].median())) if with_truth else "",
-        "times": significant(float(np.nanmedian(ratio))),
+        "judged": str(len(judged)),
+        "rmse": length(float(shown["rmse"].median())) if with_truth else "",
+        "times": significant(float(pd.Series(ratio).median())),
         **{key: str(int((mine[column] == word).sum())) for key, word in _COUNTED.items()},
     }
-    found = set(mine[column])
-    few = bool(mine.apply(on_few, axis=1, what=what).any())
-    if found <= {UNKNOWN} or (few and found <= {CONSISTENT, UNKNOWN}):
+    found = set(judged[column])
+    few = bool(shown.apply(on_few, axis=1, what=what).any())
+    if not found or (few and found == {CONSISTENT}):
         kind = "unknown"
-    elif len(found - {UNKNOWN}) == 1:
-        kind = {CONSISTENT: "consistent", OVERCONFIDENT: "overconfident", CAUTIOUS: "conservative"}[
-            next(iter(found - {UNKNOWN}))
-        ]
-    else:
+    elif len(found) > 1 or 2 * len(judged) <= len(mine):
         kind = "mixed"
+    elif few:
+        kind = "doubtful"
+    else:
+        kind = next(key for key, word in _COUNTED.items() if word in found)
     first = Message(f"{'errors' if with_truth else 'innovations'}-{kind}", values)
     beside = _beside(rows, mine, pairs, with_truth=with_truth)
     return [first, *([beside] if beside is not None else [])]
@@ -451,7 +457,9 @@ def show_tracks(
     report.table(table, columns=columns, digits=text.digits, caption=text.caption)
     record_restarts(report, rows)
     _show_figures(report, flight, followed, rows, source)
-    limits = ["truth", "same-detections"] if followed.truth else ["innovations", "same-detections"]
+    limits = ["truth" if followed.truth else "innovations", "same-detections"]
+    if any(map(is_at_rest, followed.tracks)):
+        limits.append("at-rest")
     report.limits(wording.messages(Message(f"limit-{one}") for one in limits))
     report.section("Details")
     restarts = restarts_table(followed, rows)

@@ -16,16 +16,12 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, Check
-from wildlab.messages.page_texts import FORMS, PageTexts, TileText
+from wildlab.messages.page_texts import FORMS, PageTexts, TileText, unit_words
 from wildlab.reporting.report import Report
+from wildlab.reporting.text import number
 from wildlab.reporting.wording import Wording
 from wildlab.studies.fit_and_prediction import simulated_section
 from wildlab.studies.monte_carlo import CLAIM_COLUMNS, CLAIMS_EXPLAINED, decide_claims
-
-PUBLISHED_CAPTION = (
-    "Close: our median is within a factor of 1.25. Within: the published flight could be one more of ours. "
-    "✓ yes, ✗ no, ? undecided. Published in"
-)
 
 
 class Shown(NamedTuple):
@@ -129,7 +125,7 @@ def show_page(
     report.tiles([tile_of(report, one, wording) for one in there])
     first, *others = figures
     wording.figure(first.text, first.fig, first.name, main=True)
-    report.published("Published and here", PUBLISHED_CAPTION, texts.subjects, texts.quantities)
+    report.published("Published and here", texts.subjects, texts.quantities)
     _claims(report, decided)
     ordered = sorted((tables or {}).items(), key=lambda one: not texts.tables[one[0]].open)
     for key, frame in ordered:
@@ -160,14 +156,23 @@ def tile_of(report: Report, tile: TileText, wording: Wording) -> tuple[str, str]
     entry = report.recorded[tile.name, tile.subject]
     words = wording.say(tile.text)
     low, high = entry.get("low"), entry.get("high")
-    if low is not None and high is not None:
-        form = FORMS["percent" if tile.form == "percent" else "number"]
-        ends = [form({**entry, "value": end}) for end in (low, high)]
-        words += f" ({' to '.join(ends)})" if ends[0] != ends[1] else ""
     printed = report.printed(tile.name, tile.subject)
+    # Beside a published number ours has its digits: 95.93 beside 96.83 is not 96 beside 97.
+    plain = tile.form == "value" and printed is not None and entry["value"] is not None
+    digits = int(printed["digits"]) if printed is not None else 0
+
+    def shown(value: Any, form: str) -> str:
+        return number(value, digits) if plain else FORMS[form]({**entry, "value": value})
+
+    if low is not None and high is not None:
+        ends = [shown(end, "percent" if tile.form == "percent" else "number") for end in (low, high)]
+        # The range of flights, or the interval of the number itself.
+        whose = "flights: " if entry.get("centre_low") is not None else ""
+        words += f" ({whose}{' to '.join(ends)})" if ends[0] != ends[1] else ""
     if printed is not None:
-        words += f"; published {printed['value']:g}"
-    return FORMS[tile.form](entry), words
+        words += f"; published {shown(printed['value'], tile.form if not plain else 'number')}"
+    unit = unit_words(entry["unit"]) if plain else ""
+    return shown(entry["value"], tile.form) + unit, words
 
 
 def _claims(report: Report, decided: pd.DataFrame | None) -> None:

@@ -234,7 +234,7 @@ def apart(followed: TrackingResult) -> list[Apart]:
         # Smoothed ones lean on the motion that both assume, twice: their distance proves little.
         apart_from = [one for one in tracks if one.sensor in followed.scans and not name.endswith(SMOOTHED)]
         for a, b in combinations(apart_from, 2):
-            x, P = _between(b, a.times, followed.targets.density)
+            x, P = _between(b, a.times, 0.0 if is_at_rest(b) else followed.targets.density)
             gap = a.estimate[:, :2] - x
             both = np.isfinite(gap).all(axis=1)
             if not both.any():
@@ -244,6 +244,11 @@ def apart(followed: TrackingResult) -> list[Apart]:
             rms = float(np.sqrt(np.mean(np.sum(gap[both] ** 2, axis=1))))
             found.append(Apart(target, name, a.sensor, b.sensor, rms, int(both.sum()), mean_of(squares, 2)))
     return found
+
+
+def is_at_rest(one: SensorTrack) -> bool:
+    """Whether a track is of a target that never moves: it has no velocity to be uncertain of."""
+    return not np.nan_to_num(one.covariance[:, 2:4, 2:4]).any()
 
 
 def _between(one: SensorTrack, times: Array, density: float) -> tuple[Array, Array]:

@@ -1,9 +1,9 @@
 """The hot loop of the Monte Carlo of H 6.4.3, compiled: run after run, image by image, two detections each.
 
-What it computes is what `wildlab.tracking.association.innovation_squared` and `wildlab.tracking.kalman.correct`
-compute; tests hold it against filters written out for single runs. A target in or behind the plane of the
-lens has no expected measurement, and neither has an azimuth on the axis: NaN, and nothing is associated by
-it.
+What it computes is what `wildlab.tracking.association.innovation_squared` and
+`wildlab.tracking.kalman.correct` compute; tests hold it against filters written out for single runs. A target
+in or behind the plane of the lens has no expected measurement, and neither has an azimuth on the axis: NaN,
+and nothing is associated by it.
 """
 
 from __future__ import annotations
