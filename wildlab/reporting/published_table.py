@@ -125,7 +125,7 @@ def _row(
         number(one.here, one.digits + 1),
         strip(one),
         _sign(near) + (" fitted" if one.fitted else ""),
-        _sign(inside),
+        _sign(inside) + (' <span class="dim">counted elsewhere</span>' if one.again else ""),
     )
     tags = [
         f'<{tag} role="{role}"{_text(i)}{labels[i]}>{cell}</{tag[:2]}>'
