@@ -113,7 +113,7 @@ def foreign(text: str) -> str:
     Examples
     --------
     >>> foreign("The mean error is 6.4 m (5.9 to 7.0), of target-2."), foreign("seen near Skukuza")
-    ('', 'Skukuza')
+    ('', 'skukuza')
     >>> foreign("9/17/23"), foreign("u4pruydqqvj"), foreign("1694960631")
     ('9/17/23', 'u4pruydqqvj', '1694960631')
     """

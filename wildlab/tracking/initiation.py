@@ -68,16 +68,23 @@ def start_from_first(
 def start_from_position(
     time: float, position: ArrayLike, covariance: ArrayLike, sd_velocity: float, row: int = -1
 ) -> Start:
-    """Start at rest on a position (2,), m, that is known with a covariance (2, 2).
+    """Start at rest on a position that is known with a covariance.
 
     Parameters
     ----------
     time
         s.
+    position, covariance
+        (2,) north and east, m in n, and (2, 2), m^2.
     sd_velocity
         m/s, the same north and east.
     row
         The measurement that the position was made from; -1: none.
+
+    Returns
+    -------
+    Start
+        Of the state ``[pN, pE, vN, vE]``; position and velocity uncorrelated.
     """
     x, P = np.zeros(4), np.zeros((4, 4))
     x[:2], P[:2, :2], P[2:, 2:] = position, covariance, sd_velocity**2 * np.eye(2)

@@ -122,6 +122,16 @@ def white_acceleration(dt: float, density: float) -> tuple[Array, Array]:
     density
         m/s per square root of a second: the standard deviation of each axis of the velocity that grows in a
         second.
+
+    Returns
+    -------
+    F, Q
+        (4, 4) each, in m and s.
+
+    Raises
+    ------
+    WildlabError
+        For a step that is negative or not finite.
     """
     F, _ = constant_velocity(dt, 0.0)
     Q = density**2 * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])

@@ -112,7 +112,13 @@ def row_of(values: ArrayLike, row: int, base: int) -> Array:
 
 
 def positions() -> Sensor:
-    """Georeferenced positions (north, east), m in n, H (6.3). They have no pose left that could be wrong."""
+    """Georeferenced positions, H (6.3). They have no pose left that could be wrong.
+
+    Returns
+    -------
+    Sensor
+        Of (2,) north and east, m in n; for any number of rows.
+    """
 
     def predict(row: int, position: Array) -> Prediction:
         return Prediction(np.array(position, float), np.eye(2), np.zeros((2, 6)))
