@@ -52,7 +52,15 @@ def test_what_it_was_tuned_on_is_in_no_median():
     middle = scores.medians(rows(), "s1").set_index("mode")
     assert middle["best"].to_dict() == {"radar": 8.0, "lidar": 5.0, "both": 8.0}
     assert middle["most"].to_dict() == {"radar": 16.0, "lidar": 10.0, "both": 16.0}
-    assert (middle["of"] == 2).all()
+    assert (middle["of"] == 2).all() and (middle["tracked"] == 90.0).all()
+    # One break in each of the two scenarios, by the best draw alone.
+    assert (middle["changes"] == 2).all()
+
+
+def test_what_was_not_counted_is_no_zero():
+    counted = ["tracked", "swaps", "breaks"]
+    middle = scores.medians(rows().drop(columns=counted), "s1")
+    assert middle[["tracked", "changes"]].isna().all(axis=None)
 
 
 def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first():

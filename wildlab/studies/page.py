@@ -15,13 +15,25 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, Check
+from wildlab.evaluation.shares import (
+    ALMOST_ALL,
+    ALMOST_NONE,
+    FAILS,
+    HOLDS,
+    MOSTLY,
+    MOSTLY_NOT,
+    NO_PREMISE,
+    Check,
+)
 from wildlab.messages.page_texts import FORMS, PageTexts, TileText, unit_words
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import number
 from wildlab.reporting.wording import Wording
 from wildlab.studies.fit_and_prediction import simulated_section
 from wildlab.studies.monte_carlo import CLAIM_COLUMNS, CLAIMS_EXPLAINED, decide_claims
+
+#: Of so many flights each, ranges that lie apart are no chance: a rank test's two-sided probability is 3 %.
+ENOUGH_APART = 4
 
 
 class Shown(NamedTuple):
@@ -36,6 +48,15 @@ class Shown(NamedTuple):
 class Facts:
     """What a study has recorded, for the rules that choose its sentences; NaN where something is not known.
 
+    Parameters
+    ----------
+    recorded
+        Entries of ``metrics.json`` by name and subject.
+    verdicts
+        Of claims, by their id.
+    shares
+        By a claim's id the 95 % interval of the share of flights on which it is true, where it has one.
+
     Examples
     --------
     >>> facts = Facts({("mae", "ekf"): {"value": 9.4, "low": 5.0, "high": 14.0}}, {"nis-similar": "holds"})
@@ -44,9 +65,12 @@ class Facts:
     """
 
     def __init__(
-        self, recorded: Mapping[tuple[str, str], Mapping[str, Any]], verdicts: Mapping[str, str]
+        self,
+        recorded: Mapping[tuple[str, str], Mapping[str, Any]],
+        verdicts: Mapping[str, str],
+        shares: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
-        self.recorded, self.verdicts = recorded, verdicts
+        self.recorded, self.verdicts, self.shares = recorded, verdicts, shares or {}
 
     def value(self, subject: str, name: str, what: str = "value") -> float:
         """A recorded number, or another entry of it: ``low``, ``high``, ``centre_low``, ``n``."""
@@ -63,11 +87,43 @@ class Facts:
         return yes if verdict in (HOLDS, MOSTLY) else no if verdict in (FAILS, MOSTLY_NOT) else unclear
 
     def outcome(self, claim: str) -> str:
-        """How a claim came out, as the end of a text's key: ``holds``, ``fails``, ``open``, or ``unknown``
-        where it was not tested."""
+        """How a claim came out, as the end of a text's key.
+
+        Returns
+        -------
+        str
+            ``holds``; ``fails``; ``split`` where it is true on some flights and not on others, so many that
+            nearly all and nearly none are ruled out; ``few`` where it is undecided otherwise; ``unknown``
+            where it was not tested.
+        """
         if self.verdicts.get(claim, NO_PREMISE) == NO_PREMISE:
             return "unknown"
-        return self.choose(claim, "holds", "fails", "open")
+        low, high = self.shares.get(claim, (0.0, 1.0))
+        split = low > ALMOST_NONE and high < ALMOST_ALL
+        return self.choose(claim, "holds", "fails", "split" if split else "few")
+
+    def compare(self, first: tuple[str, str], second: tuple[str, str]) -> str:
+        """Which of two numbers, by (subject, name), is larger.
+
+        Returns
+        -------
+        str
+            ``more`` or ``less`` where the intervals of their medians lie apart, or the ranges of
+            `ENOUGH_APART` flights; ``unclear`` where they overlap; ``few`` where there is no interval;
+            ``unknown`` without a number.
+        """
+        if math.isnan(self.value(*first) + self.value(*second)):
+            return "unknown"
+        one, other = self._bounds(*first), self._bounds(*second)
+        if any(math.isnan(end) for end in (*one, *other)):
+            return "few"
+        return "more" if one[0] > other[1] else "less" if other[0] > one[1] else "unclear"
+
+    def _bounds(self, subject: str, name: str) -> tuple[float, float]:
+        flights = self.value(subject, name, "flights")
+        ends = ("low", "high") if flights == ENOUGH_APART else ("centre_low", "centre_high")
+        low, high = (self.value(subject, name, end) for end in ends)
+        return low, high
 
 
 Answer = Callable[[Facts], Sequence[str]]
@@ -115,7 +171,11 @@ def show_page(
     """
     wording = Wording(report, texts, values, thesis)
     decided = None if checks is None else decide_claims(report, report.study, checks)
-    facts = Facts(report.recorded, {one["id"]: one["verdict"] for one in report.claims})
+    facts = Facts(
+        report.recorded,
+        {one["id"]: one["verdict"] for one in report.claims},
+        {one["id"]: (one["low"], one["high"]) for one in report.claims if one["low"] is not None},
+    )
     report.head(title, wording.say(texts.subtitle))
     # All are filled in, so that a fault of one that is not chosen shows.
     sentences = {key: wording.say(text) for key, text in texts.answers.items()}

@@ -9,28 +9,23 @@ from wildlab.studies.protocol import Study
 
 #: Where nothing was tuned, by lidar and radar together.
 _BOTH = "elsewhere/both"
+#: Boats that have a track in so many of the scans (%) are followed nearly all the time, or most of it.
+NEARLY_ALL, MOST = 90.0, 50.0
 
 
 def answer(facts: Facts) -> list[str]:
-    """How often tracks change their boat, then how Stone Soup compares: by ranges over the best draws."""
-    swaps = [
-        facts.value(who, name) for name, who in facts.recorded if name == "swaps" and who.endswith("/both")
-    ]
-    known = not math.isnan(facts.value(_BOTH, "gospa_median"))
-    return [
-        "boats-unknown" if not known else "boats-swapped" if sum(swaps) else "boats-tracked",
-        f"peer-{_peer(facts)}",
-    ]
+    """How much boats are tracked and how often their tracks change, then how Stone Soup compares."""
+    ahead = facts.value(_BOTH, "scenarios_ahead")
+    return [f"boats-{_boats(facts)}", "peer-missing" if math.isnan(ahead) else "peer-compared"]
 
 
-def _peer(facts: Facts) -> str:
-    ours, theirs = (
-        tuple(facts.value(_BOTH, name, end) for end in ("low", "high"))
-        for name in ("gospa_median", "gospa_median_stone_soup")
-    )
-    if any(math.isnan(one) for one in (*ours, *theirs)):
-        return "missing"
-    return "worse" if ours[1] < theirs[0] else "better" if ours[0] > theirs[1] else "alike"
+def _boats(facts: Facts) -> str:
+    tracked, changes = (facts.value(_BOTH, name) for name in ("tracked_median", "track_changes"))
+    if math.isnan(tracked + changes):
+        return "unknown"
+    if tracked < MOST:
+        return "lost"
+    return "tracked" if tracked >= NEARLY_ALL and not changes else "partly"
 
 
 STUDY = Study("autoferry-many", (), answer=answer)

@@ -59,11 +59,16 @@ def judge_all(flights: Mapping[str, Flight], tuned: Mapping[str, list[Tuned]]) -
 
 def medians(rows: pd.DataFrame, first: str) -> pd.DataFrame:
     """For each mode the median GOSPA of the scenarios that nothing was tuned on: of the best draw, and the
-    smallest and largest of the best few."""
+    smallest and largest of the best few.
+
+    Of the best draw there is also how much boats are ``tracked`` (%), on the median, and how many ``changes``
+    of a boat's track there are in all: NaN where that was not counted.
+    """
     elsewhere = rows[rows["case"] != first]
     found = []
     for mode, own in elsewhere.dropna(subset=["gospa"]).groupby("mode", sort=False):
         by_rank = own.groupby("rank")["gospa"].median()
+        best = own[own["rank"] == 1].reindex(columns=["tracked", "swaps", "breaks"])
         found.append(
             {
                 "mode": mode,
@@ -72,6 +77,8 @@ def medians(rows: pd.DataFrame, first: str) -> pd.DataFrame:
                 "most": by_rank.max(),
                 "of": own["case"].nunique(),
                 "draws": len(by_rank),
+                "tracked": best["tracked"].astype(float).quantile(),
+                "changes": best[["swaps", "breaks"]].to_numpy(float).sum(),
             }
         )
     return pd.DataFrame(found)
@@ -92,6 +99,8 @@ def record(report: Report, rows: pd.DataFrame, middle: pd.DataFrame) -> None:
             "gospa_median", f"elsewhere/{one['mode']}", one["best"], "m", n=int(one["of"]), low=one["least"],
             high=one["most"],
         )  # fmt: skip
+        for name, column, unit in (("tracked_median", "tracked", "%"), ("track_changes", "changes", "1")):
+            report.metric(name, f"elsewhere/{one['mode']}", one[column], unit, n=int(one["of"]))
 
 
 def scenarios_table(rows: pd.DataFrame, theirs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
@@ -103,15 +112,23 @@ def scenarios_table(rows: pd.DataFrame, theirs: pd.DataFrame, names: Mapping[str
 
 
 def values(recorded: Mapping[tuple[str, str], Mapping[str, Any]]) -> dict[str, float]:
-    """Numbers of the page's answer: medians of ``ours``, of ``radar`` alone and of ``theirs`` (m; NaN where
-    not recorded), and how many ``swaps`` there are by lidar and radar."""
-    medians = {
-        "ours": ("gospa_median", "elsewhere/both"),
-        "radar": ("gospa_median", "elsewhere/radar"),
-        "theirs": ("gospa_median_stone_soup", "elsewhere/both"),
+    """Numbers of the page's answer by lidar and radar where nothing was tuned; NaN where not recorded.
+
+    Returns
+    -------
+    dict
+        ``tracked`` (%), ``changes`` of a boat's track, in how many scenarios the GOSPA is smaller than Stone
+        Soup's (``ahead``), ``of`` how many.
+    """
+
+    def of(name: str, what: str = "value") -> float:
+        found = recorded.get((name, "elsewhere/both"), {}).get(what)
+        # Whole numbers are shown as such.
+        return float("nan") if found is None else int(found) if float(found).is_integer() else float(found)
+
+    return {
+        "tracked": of("tracked_median"),
+        "changes": of("track_changes"),
+        "ahead": of("scenarios_ahead"),
+        "of": of("scenarios_ahead", "n"),
     }
-    found = {name: float(recorded.get(key, {}).get("value", np.nan)) for name, key in medians.items()}
-    swaps = [
-        one["value"] for (name, who), one in recorded.items() if name == "swaps" and who.endswith("/both")
-    ]
-    return found | {"swaps": int(sum(swaps))}

@@ -37,7 +37,7 @@ def answer(facts: Facts) -> list[str]:
     nearer = abs(math.log(differenced / 2)) < abs(math.log(plain / 2))
     otherwise = "nearer" if nearer else "not-gained"
     return [
-        f"consistency-{facts.choose('differencing-consistent', 'gained', otherwise, otherwise)}",
+        f"consistency-{facts.choose('differencing-consistent', 'gained', otherwise)}",
         f"accuracy-{facts.choose('differencing-costs', 'lost', 'gained')}",
     ]
 

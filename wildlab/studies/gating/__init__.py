@@ -18,9 +18,10 @@ def answer(facts: Facts) -> list[str]:
     )
     if math.isnan(own[0] + stress[0]):
         return ["rate-unknown", "stress-unknown"]
-    lower = own[0] - stress[0] > 2 * math.hypot(own[1], stress[1])
+    lost, error = own[0] - stress[0], 2 * math.hypot(own[1], stress[1])
+    stress_test = "lower" if lost > error else "higher" if -lost > error else "unclear"
     agree = facts.outcome("forms-agree") == "holds"
-    return ["rate-forms-agree" if agree else "rate-by-form", "stress-lower" if lower else "stress-same"]
+    return ["rate-forms-agree" if agree else "rate-by-form", f"stress-{stress_test}"]
 
 
 STUDY = Study("gating", FORMS, answer=answer)

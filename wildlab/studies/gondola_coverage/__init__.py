@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 import pandas as pd
 
-from wildlab.evaluation.shares import HOLDS, MOSTLY
 from wildlab.studies.gondola_coverage import trial
 from wildlab.studies.gondola_coverage.trial import ADAPT, DOWN, ROLL, STRATEGIES
 from wildlab.studies.page import Facts
@@ -31,16 +28,15 @@ def with_share_outside(runs: pd.DataFrame) -> pd.DataFrame:
 
 def answer(facts: Facts) -> list[str]:
     """What a swing adds to a camera that looks straight down, then what the adaptive swing adds to that."""
-    down, plain, adaptive = (facts.value(one, "seen") for one in (DOWN, PLAIN, ADAPTIVE))
-    if math.isnan(down + plain + adaptive):
+    swing = facts.compare((PLAIN, "seen"), (DOWN, "seen"))
+    if "unknown" in (swing, facts.compare((ADAPTIVE, "seen"), (DOWN, "seen"))):
         return ["unknown"]
-    swing = "roll-more" if plain > down else "roll-no-more"
-    inside, more = (
-        facts.verdicts.get(claim) in (HOLDS, MOSTLY)
-        for claim in ("adaptive-least-outside", "adaptive-sees-more")
-    )
-    kind = "not-better" if not inside else "more-inside" if more else "less-outside"
-    return [swing, f"adaptive-{kind}"]
+    inside, more = (facts.outcome(claim) for claim in ("adaptive-least-outside", "adaptive-sees-more"))
+    seen = {"holds": "sees-more", "fails": "sees-no-more"}.get(more, "inside")
+    return [
+        f"roll-{swing if swing in ('more', 'less') else 'open'}",
+        f"adaptive-{seen if inside == 'holds' else 'not-better'}",
+    ]
 
 
 STUDY = Study(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from wildlab.studies.line_of_sight import claims, trial
 from wildlab.studies.line_of_sight.trial import ANGLES, HEIGHT, INCIDENCES, RAYS, TREES
 from wildlab.studies.page import Facts
@@ -29,25 +27,13 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
-def _compared(facts: Facts, first: tuple[str, str], second: tuple[str, str]) -> str:
-    """Which of two recorded shares is larger, where the intervals of their medians lie apart."""
-    one, other = facts.value(*first), facts.value(*second)
-    if math.isnan(one) or math.isnan(other):
-        return "unknown"
-    if facts.value(*first, "centre_low") > facts.value(*second, "centre_high"):
-        return "more"
-    if facts.value(*second, "centre_low") > facts.value(*first, "centre_high"):
-        return "less"
-    return "alike"
-
-
 def answer(facts: Facts) -> list[str]:
     """Which algorithm is nearer to the exact line of sight, then what trees would hide."""
     seen = f"agreement_{HEIGHT}m"
     slant, above = (f"hidden_{degrees}deg" for degrees in (INCIDENCES[-1], INCIDENCES[0]))
     return [
-        f"rays-{_compared(facts, (RAYS, seen), (ANGLES, seen))}",
-        f"trees-{_compared(facts, (TREES, slant), (TREES, above))}",
+        f"rays-{facts.compare((RAYS, seen), (ANGLES, seen))}",
+        f"trees-{facts.compare((TREES, slant), (TREES, above))}",
     ]
 
 

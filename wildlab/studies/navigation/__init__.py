@@ -16,6 +16,8 @@ from wildlab.studies.protocol import Metric, Study
 
 #: A difference of so many predicted ones is more than the filter can account for.
 OVERCONFIDENT = 2.0
+#: Errors up to so many times as large, or as small, as predicted are near to what is predicted.
+NEAR = 1.5
 #: NEES of three coordinates, on average, of a consistent filter.
 IDEAL_NEES = 3.0
 _ATTITUDE = tuple(f"{of}_{axis}" for of in ("rms", "mean_sd") for axis in AXES)
@@ -52,20 +54,31 @@ def level_of(runs: pd.DataFrame) -> int:
 
 def answer(facts: Facts) -> list[str]:
     """How large errors of attitude are by what the filter predicts, and whether positions are consistent."""
-    rms, sd = attitude_of({name: facts.value("mekf", name) for name in _ATTITUDE})
-    attitude = "unknown" if math.isnan(rms + sd) else "overconfident" if rms > OVERCONFIDENT * sd else "fits"
+    return [f"attitude-{_attitude(facts)}", f"position-{_position(facts)}"]
+
+
+def _attitude(facts: Facts) -> str:
+    """By the axis whose errors are largest by what is predicted: a good axis does not make up for it."""
+    times = {
+        axis: facts.value("mekf", f"rms_{axis}") / facts.value("mekf", f"mean_sd_{axis}") for axis in AXES
+    }
+    if any(math.isnan(one) for one in times.values()):
+        return "unknown"
+    worst = max(times, key=lambda axis: times[axis])
+    return f"overconfident-{worst}" if times[worst] > OVERCONFIDENT else "fits"
+
+
+def _position(facts: Facts) -> str:
     nees, low, high = (
         facts.value("mekf", "nees_position", end) for end in ("value", "centre_low", "centre_high")
     )
     if math.isnan(nees):
-        position = "unknown"
-    elif math.isnan(low + high):
-        position = "open"
-    else:
-        position = (
-            "overconfident" if low > IDEAL_NEES else "conservative" if high < IDEAL_NEES else "consistent"
-        )
-    return [f"attitude-{attitude}", f"position-{position}"]
+        return "unknown"
+    if math.isnan(low + high):
+        return "few"
+    if low > IDEAL_NEES or high < IDEAL_NEES:
+        return "overconfident" if low > IDEAL_NEES else "conservative"
+    return "near" if low >= IDEAL_NEES / NEAR**2 and high <= IDEAL_NEES * NEAR**2 else "unclear"
 
 
 STUDY = Study("navigation", ("mekf", *TUNINGS), trial.trial, trial.check_claims, _metric, answer)

@@ -14,10 +14,10 @@ _CLOCK = {HOLDS: "better", MOSTLY: "better", MOSTLY_NOT: "no-better", FAILS: "no
 
 
 def answer(facts: Facts) -> list[str]:
-    """How often there is no animal in view, then what setting the clock by hand changes."""
+    """How often several tracks run and no animal is in view, then what setting the clock by hand changes."""
     empty = facts.value(NONE, "share_of_frames")
     gain = facts.value(CLOCK, "error_unset") - facts.value(CLOCK, "error_set")
-    view = "unknown" if math.isnan(empty) else "empty" if empty > 0.5 else "busy"
+    view = "unknown" if math.isnan(empty) else "empty" if empty > 0.5 else "other"
     verdict = facts.verdicts.get("manual-sync-increases-precision", "")
     clock = "unknown" if math.isnan(gain) else _CLOCK.get(verdict, "open")
     return [f"view-{view}", f"clock-{clock}"]

@@ -43,7 +43,8 @@ def consistency_of(facts: Facts, who: str) -> str:
         return "unknown"
     low, high = chi_square_interval(2, runs=int(flights))
     if low <= mean <= high:
-        return "consistent"
+        # So few flights that errors `NEARLY` times as large, or as small, would not show decide nothing.
+        return "consistent" if math.sqrt(low / 2) > 1 / NEARLY and math.sqrt(high / 2) < NEARLY else "few"
     if 1 / NEARLY < math.sqrt(mean / 2) < NEARLY:
         return "nearly"
     return "overconfident" if mean > high else "conservative"

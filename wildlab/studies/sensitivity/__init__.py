@@ -20,10 +20,9 @@ def answer(facts: Facts) -> list[str]:
     growth = {name: error(name, "400m") / error(name, "100m") for name in ("roll", "north")}
     if any(math.isnan(one) for one in growth.values()):
         return ["unknown"]
-    return [
-        "tilt-grows" if growth["roll"] > ALIKE else "tilt-alike",
-        "position-grows" if growth["north"] > ALIKE else "position-alike",
-    ]
+    alike = {name: 1 / ALIKE <= times <= ALIKE for name, times in growth.items()}
+    tilt = "alike" if alike["roll"] else "grows" if growth["roll"] > 1 else "shrinks"
+    return [f"tilt-{tilt}", "position-alike" if alike["north"] else "position-differs"]
 
 
 STUDY = Study("sensitivity", ("level", "turn", "ascent"), answer=answer)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.uav_coverage import trial
@@ -21,20 +19,30 @@ NEARLY_ALL, SMALL = 0.95, 0.02
 
 def answer(facts: Facts) -> list[str]:
     """What turning the camera adds from the usual height, then what half the height costs."""
-    down, yaw, low, close = (facts.value(plan, "seen") for plan in (DOWN, YAW, LOW, LOW_CLOSE))
-    if math.isnan(down + yaw):
-        camera = "unknown"
-    elif abs(yaw - down) <= SMALL:
-        camera = "both-see-nearly-all" if down >= NEARLY_ALL else "alike"
-    else:
-        camera = "yaw" if yaw > down else "down"
-    if math.isnan(low + close + yaw):
-        height = "unknown"
-    elif low >= yaw - SMALL:
-        height = "alike"
-    else:
-        height = "closer-rows" if close > low + SMALL else "lost"
-    return [f"camera-{camera}", f"half-height-{height}"]
+    return [f"camera-{_camera(facts)}", f"half-height-{_half_height(facts)}"]
+
+
+def _camera(facts: Facts) -> str:
+    down, yaw = (facts.value(plan, "seen") for plan in (DOWN, YAW))
+    found = facts.compare((YAW, "seen"), (DOWN, "seen"))
+    if found in ("unknown", "few"):
+        return "unknown" if found == "unknown" else "open"
+    if abs(yaw - down) <= SMALL:
+        return "both-see-nearly-all" if min(down, yaw) >= NEARLY_ALL else "alike"
+    return {"more": "yaw", "less": "down"}.get(found, "open")
+
+
+def _half_height(facts: Facts) -> str:
+    lost = facts.compare((LOW, "seen"), (YAW, "seen"))
+    gained = facts.compare((LOW_CLOSE, "seen"), (LOW, "seen"))
+    if "unknown" in (lost, gained):
+        return "unknown"
+    low, close, yaw = (facts.value(plan, "seen") for plan in (LOW, LOW_CLOSE, YAW))
+    if lost == "less" and low < yaw - SMALL:
+        if gained == "more" and close > low + SMALL:
+            return "closer-rows"
+        return "lost"
+    return "open"
 
 
 STUDY = Study(

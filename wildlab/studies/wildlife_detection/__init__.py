@@ -19,12 +19,28 @@ def answer(facts: Facts) -> list[str]:
     by_night, in_sun = (facts.value(SUBTRACTED, f"f1_{weather}") for weather in ("night", "noon"))
     if math.isnan(by_night + in_sun):
         return ["unknown"]
-    low, high = facts.value(SUBTRACTED, "f1_night", "low"), facts.value(SUBTRACTED, "f1_noon", "high")
-    best = max(
-        facts.value(one, "f1_noon") for one in (*METHODS, *PROPOSED) if facts.value(one, "f1_noon") >= 0
+    return [f"sun-{_in_sun(facts)}", f"noon-{_at_noon(facts)}"]
+
+
+def _in_sun(facts: Facts) -> str:
+    """What intervals over images show of background subtraction."""
+    night, noon = (
+        [facts.value(SUBTRACTED, f"f1_{weather}", end) for end in ("low", "high")]
+        for weather in ("night", "noon")
     )
-    sun = "breaks" if high < low else "harmless"
-    return [f"sun-{sun}", f"noon-{'usable' if best >= USABLE else 'unusable'}"]
+    if noon[1] < USABLE:
+        return "breaks" if noon[1] < night[0] else "low"
+    if night[0] >= USABLE and noon[0] >= USABLE:
+        return "costs" if noon[1] < night[0] else "harmless"
+    return "open"
+
+
+def _at_noon(facts: Facts) -> str:
+    """Whether any method is usable in full sun."""
+    known = [one for one in (*METHODS, *PROPOSED) if not math.isnan(facts.value(one, "f1_noon"))]
+    if any(facts.value(one, "f1_noon", "low") >= USABLE for one in known):
+        return "usable"
+    return "unusable" if all(facts.value(one, "f1_noon", "high") < USABLE for one in known) else "open"
 
 
 STUDY = Study(

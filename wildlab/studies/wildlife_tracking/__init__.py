@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from wildlab.evaluation.shares import FAILS, HOLDS
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.wildlife_tracking import trial
@@ -33,8 +32,8 @@ def _consistency(facts: Facts) -> str:
 def _reacquired(facts: Facts) -> str:
     if any(math.isnan(facts.value(one, "right_share")) for one in _FILTERS):
         return "unknown"
-    verdicts = {facts.verdicts.get(claim) for claim in ("hard-to-associate", "same-problem-uav")}
-    return "hard" if verdicts == {HOLDS} else "easy" if verdicts == {FAILS} else "open"
+    found = {facts.outcome(claim) for claim in ("hard-to-associate", "same-problem-uav")}
+    return "hard" if found == {"holds"} else "easy" if found == {"fails"} else "open"
 
 
 STUDY = Study(
