@@ -215,13 +215,14 @@ def answer(rows: pd.DataFrame, pairs: Sequence[Apart]) -> list[Message]:
     judged = mine[mine[column] != UNKNOWN]
     # Numbers are of the tracks that the verdict is on; where there is none, of all.
     shown = judged if len(judged) else mine
-    ratio = np.sqrt(shown[what] / (2.0 if with_truth else shown["dof"]))
+    known = shown.dropna(subset=[what])
+    ratio = np.sqrt(known[what] / (2.0 if with_truth else known["dof"]))
     values = {
         "n": str(len(mine)),
         "filter": short_words(str(mine["filter"].iloc[0])),
         "judged": str(len(judged)),
         "rmse": length(float(shown["rmse"].median())) if with_truth else "",
-        "times": significant(float(pd.Series(ratio).median())),
+        "times": significant(float(np.median(ratio)) if len(ratio) else np.nan),
         **{key: str(int((mine[column] == word).sum())) for key, word in _COUNTED.items()},
     }
     found = set(judged[column])
