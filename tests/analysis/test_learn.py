@@ -147,6 +147,17 @@ def test_where_nothing_gains_for_certain_the_noise_alone_is_kept():
     assert np.allclose(applied.observations.poses.p_nb, observe(flight).poses.p_nb)
 
 
+def test_a_tilt_that_is_not_certain_is_no_noise():
+    """The same short flight with and without it: what never varies is no part of the noise."""
+    noises = []
+    for tilt in (0.0, 3.0):
+        flight = simulate(Survey(seed=3, images=10, every_s=1.0, tilt_deg=tilt))
+        kept, diagnosis = learn_flight(flight, np.random.default_rng(0))
+        assert not diagnosis.counts and kept.parameter == ()
+        noises.append(list(kept.noise.model_dump().values()))
+    np.testing.assert_allclose(noises[1], noises[0], rtol=0.1)
+
+
 def test_noise_of_roll_pitch_and_yaw_in_older_files_is_read_as_tilt_and_heading():
     text = learnt_toml(learnt())
     noise = learnt().noise

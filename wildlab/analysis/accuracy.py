@@ -195,10 +195,10 @@ def _learn_noise(
     rng: np.random.Generator,
     source: str | None,
 ) -> tuple[PoseNoise | None, float]:
-    """Noise of the poses once what is certain is taken off, and how honest ellipses from it are."""
+    """Noise of the poses once a constant error is taken off, and how honest ellipses from it are."""
     if diagnosis is None:
         return None, float("nan")
-    names = diagnosis.calibration.names if diagnosis.counts else ()
+    names = diagnosis.calibration.names
     known = diagnosis.scored[diagnosis.inliers].reset_index(drop=True)
     if known["frame_id"].nunique() < FEWEST_IMAGES:
         return None, float("nan")
@@ -217,7 +217,10 @@ def noise_without(
     rng: np.random.Generator,
     source: str | None = None,
 ) -> PoseNoise:
-    """Noise of the poses with what is certain taken off, and without what is far out.
+    """Noise of the poses with the winner's constants taken off, and without what is far out.
+
+    Whether the winner is certain does not matter: what stays the same in all images is no noise, whichever
+    cause it has, and left in it would be booked as noise of whatever resembles it.
 
     Parameters
     ----------
@@ -232,7 +235,7 @@ def noise_without(
     """
     known = diagnosis.scored[diagnosis.inliers].reset_index(drop=True)
     placed = observations
-    if diagnosis.counts:
+    if diagnosis.winner.causes:
         placed = calibrated(flight, source, observations, diagnosis.calibration)
         rows = placed.table["detection_id"].isin(known["detection_id"]).to_numpy()
         known = score_points(flight, georeference(flight, placed.take(rows), rng))
