@@ -499,7 +499,7 @@ def show_accuracy(
             wording.table("published", beside)
     if diagnosis is not None:
         if corrections is not None and (diagnosis.counts or possible_share(logged, diagnosis)):
-            wording.table("parameters", corrections)
+            wording.table("parameters" if diagnosis.counts else "parameters-possible", corrections)
         if diagnosis.outliers:
             wording.table("outliers", outliers_table(diagnosis.outliers))
     if logged.n:

@@ -176,7 +176,8 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     if own is None and camera is None and receiver is None and not placed:
         raise WildlabError(
             "nothing here says where a camera was",
-            "name the log of the flight, or say with --role which file it is",
+            "name the log of the flight, say with --role which file it is, or describe your own tables "
+            "in a recipe (data/recipes/README.md)",
         )
     streams = _streams(own, camera, receiver, images, by_role)
     aboard = {one.found.name for one in (own, camera, receiver, images) if one is not None}
