@@ -1,9 +1,10 @@
 """Names that strangers gave to things, made harmless where they are shown: the one door into figures, pages
-and tables."""
+and tables; and several in a row."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 #: With what a spreadsheet takes the value of a cell for a formula.
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -55,3 +56,14 @@ def from_csv_cell(text: str) -> str:
     ('=2+2', "'tis")
     """
     return text[1:] if text.startswith("'") and text.lstrip("'").startswith(FORMULA) else text
+
+
+def listed(parts: Sequence[str], last: str = "and") -> str:
+    """Several words in a row.
+
+    Examples
+    --------
+    >>> listed(["roll", "pitch", "yaw"]), listed(["a", "b"], "or"), listed(["a"])
+    ('roll, pitch and yaw', 'a or b', 'a')
+    """
+    return "".join(parts) if len(parts) < 2 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"

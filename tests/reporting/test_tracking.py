@@ -82,6 +82,17 @@ def test_verdict_and_answer_follow_the_leading_filter(changes, level, first):
     assert colour(rows(**changes)) == level and keys(rows(**changes))[0] == first
 
 
+def test_how_many_times_errors_are_what_is_predicted():
+    """A mean NEES or NIS of 50 with two elements: errors are five times as large."""
+    surprised = rows().assign(
+        nees=50.0, nis=[18.0, 50.0], verdict="overconfident", nis_verdict="overconfident"
+    )
+    assert page.answer(surprised, [])[0].values["times"] == "5.0"
+    unseen = surprised.assign(compared=0, nees=np.nan, verdict="not judged", nis=50.0)
+    assert page.answer(unseen, [])[0].values["times"] == "5.0"
+    assert page.answer(unseen.assign(nis=75.0, dof=3.0), [])[0].values["times"] == "5.0"
+
+
 def test_tracks_that_differ_are_counted():
     both = pd.concat([rows(), rows(target="other", nees=9.0, verdict="overconfident", rmse=1.0).iloc[1:]])
     first = page.answer(both, [])[0]

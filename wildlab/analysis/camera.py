@@ -31,6 +31,7 @@ from wildlab.geometry.intrinsics import (
     view_errors,
 )
 from wildlab.geometry.lens_choice import LensChoice, choose_lens
+from wildlab.names import listed
 
 #: In how many images codes are looked for where boards are found without them.
 LOOKED_AT = 2
@@ -492,7 +493,7 @@ def confusion_sentences(found: CameraCalibration) -> list[str]:
     """Which parameters the views cannot tell apart, and what would help."""
     said = []
     for group in confused(found.found):
-        names = _listed([WORDS.get(one, one) for one in group])
+        names = listed([WORDS.get(one, one) for one in group])
         what = f"The views cannot tell {names} apart"
         if len(group) == 1:
             what = f"The views hardly tell {names}"
@@ -525,7 +526,7 @@ def odd_sentences(found: CameraCalibration) -> list[str]:
     names = [one.name for one in found.views]
     rms = [found.held_out[names.index(name)] for name in found.odd]
     usual = float(np.median([e for n, e in zip(names, found.held_out, strict=True) if n not in found.odd]))
-    which = _listed([f"{name} ({error:.2f} px)" for name, error in zip(found.odd, rms, strict=True)])
+    which = listed([f"{name} ({error:.2f} px)" for name, error in zip(found.odd, rms, strict=True)])
     moved = ", ".join(
         f"{name} {found.found.value(name):.1f} -> {rest.value(name):.1f}"
         for name in found.found.names
@@ -558,7 +559,3 @@ def sentences(found: CameraCalibration) -> list[str]:
         *odd_sentences(found),
         *number_sentence(found),
     ]
-
-
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

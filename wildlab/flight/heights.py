@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.log import Stream
+from wildlab.names import listed
 
 Array = NDArray[np.float64]
 
@@ -162,7 +163,7 @@ def choose_reference(
     homeless = [name for name in names if not ways[name]]
     if homeless:
         raise WildlabError(
-            f"the heights of {_listed(homeless)} count from take-off, and nothing says how high that was",
+            f"the heights of {listed(homeless)} count from take-off, and nothing says how high that was",
             "state the height of the take-off above sea level",
             field="heights",
         )
@@ -189,7 +190,7 @@ def choose_reference(
     low = [name for name in names if "ellipsoid" not in ways[name]]
     high = [name for name in names if "sea" not in ways[name]]
     raise WildlabError(
-        f"the heights of {_listed(low)} count from sea level and those of {_listed(high)} from the "
+        f"the heights of {listed(low)} count from sea level and those of {listed(high)} from the "
         "ellipsoid, and nothing says how far apart these are there",
         f"state the geoid's height above the ellipsoid; {NO_GRID}",
         field="heights",
@@ -294,7 +295,3 @@ def _first_fix(home: Stream, fixes: Stream, fixed: str) -> float | None:
         if len(good):
             return float(height[good[0]] - np.interp(other[good[0]], t, h))
     return None
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

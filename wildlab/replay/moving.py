@@ -8,6 +8,7 @@ from wildlab.analysis.overviews.overview import length_of_way
 from wildlab.analysis.tracks.judged import LEADING, read_estimates
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
+from wildlab.names import listed
 from wildlab.replay.gather import scene_of
 from wildlab.replay.scene import Estimates, ReplayScene
 from wildlab.replay.words import minutes, plain
@@ -108,8 +109,7 @@ def said(scene: ReplayScene) -> str:
         parts.append("a cross where a target really was")
     if len(scene.truth) > MOST_TARGETS:
         parts[-1] += f" (the first {MOST_TARGETS} of {len(scene.truth)})"
-    listed = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-    return f"{minutes(scene.length)} of flight, over and over: {listed}. North is up."
+    return f"{minutes(scene.length)} of flight, over and over: {listed(parts)}. North is up."
 
 
 def alt(scene: ReplayScene) -> str:

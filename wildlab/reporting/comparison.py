@@ -10,6 +10,7 @@ import pandas as pd
 
 from wildlab.analysis.overviews.verdict import Verdict
 from wildlab.analysis.tracks.judged import LEADING
+from wildlab.names import listed
 from wildlab.reporting.arrange import LIMITS, arranged
 from wildlab.reporting.charts.drawing import dots_chart
 from wildlab.reporting.glossary import with_glossary
@@ -19,7 +20,7 @@ from wildlab.reporting.page import TAGS, page
 from wildlab.reporting.quantities import area, duration, way_length
 from wildlab.reporting.report import open_report
 from wildlab.reporting.tables import csv_link
-from wildlab.reporting.text import NOTHING, listed, metres, number, percent
+from wildlab.reporting.text import NOTHING, metres, number, percent
 
 #: Rounding errors of what is zero.
 NO_MORE = 1e-9

@@ -32,6 +32,7 @@ from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.store import Flight
 from wildlab.messages.message import Message
 from wildlab.messages.page_texts import PageTexts, load_texts, measure, percent_of, significant
+from wildlab.names import listed
 from wildlab.reporting.arrange import ADVICE
 from wildlab.reporting.charts.georeferencing import error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
@@ -52,7 +53,6 @@ from wildlab.reporting.georeferencing_tables import (
 from wildlab.reporting.ground import terrain_section
 from wildlab.reporting.published import load_published
 from wildlab.reporting.report import Report
-from wildlab.reporting.text import listed
 from wildlab.reporting.wording import Wording
 
 #: Fewer points than this say little about a flight.

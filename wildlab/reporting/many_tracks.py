@@ -20,10 +20,10 @@ from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
 from wildlab.messages.message import Message
 from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.names import listed
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.quantities import length
 from wildlab.reporting.report import Report
-from wildlab.reporting.text import listed
 from wildlab.reporting.wording import Wording
 from wildlab.tracking.many.existence import Count, count_interval, count_probabilities
 

@@ -43,11 +43,12 @@ from wildlab.evaluation.vibration import FINE, FLOOR_HZ, HARMFUL
 from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS, gnss_times
 from wildlab.messages.message import Message
 from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.names import listed
 from wildlab.reporting import quantities
 from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.georeferencing import show_advice, show_contradictions, words_of_causes
 from wildlab.reporting.report import Report
-from wildlab.reporting.text import listed, metres, number
+from wildlab.reporting.text import metres, number
 from wildlab.reporting.wording import Wording
 
 #: Subject of what is recorded of the whole flight.
@@ -499,7 +500,7 @@ def _show_figures(wording: Wording, overview: Overview) -> None:
     row = [wording.captioned(key, fig) for key, fig in _figures_over_time(overview, clock)]
     for i in range(0, len(row), 2):
         report.figures(
-            row[i : i + 2], fold=listed([wording.texts.figures[one[1]].title for one in row[i : i + 2]])
+            row[i : i + 2], fold="; ".join(wording.texts.figures[one[1]].title for one in row[i : i + 2])
         )
 
 

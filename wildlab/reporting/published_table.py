@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from wildlab.evaluation.replication import Closeness, Compatibility
-from wildlab.messages.page_texts import fill, load_texts, words_of
+from wildlab.messages.page_texts import fill, load_texts, unit_words, words_of
+from wildlab.names import listed
 from wildlab.reporting.ledger_tables import PILLS, has_band, strip
 from wildlab.reporting.status import Number
 from wildlab.reporting.text import NOTHING, escape, inline, number
@@ -107,14 +108,13 @@ def caption_of(numbers: Sequence[Number]) -> str:
 
 def sources_of(numbers: Sequence[Number]) -> str:
     """The tables that the published numbers are from: "H table 7.5 and H table 7.6"."""
-    found = list(dict.fromkeys(one.source for one in numbers))
-    return " and ".join([", ".join(found[:-1]), found[-1]]) if len(found) > 1 else "".join(found)
+    return listed(list(dict.fromkeys(one.source for one in numbers)))
 
 
 def _row(
     one: Number, subjects: Mapping[str, str], quantities: Mapping[str, str], labels: Sequence[str]
 ) -> str:
-    unit = {"1": "", "deg": "°"}.get(one.unit, one.unit)
+    unit = unit_words(one.unit).strip()
     quantity = words_of(quantities, one.name) + (f" ({unit})" if unit else "")
     quantity += ", size" if one.by_size else ""
     near, inside = one.answers

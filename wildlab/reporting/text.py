@@ -173,17 +173,6 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
 
 
-def listed(parts: Sequence[str], last: str = "and") -> str:
-    """Several words in a row.
-
-    Examples
-    --------
-    >>> listed(["roll", "pitch", "yaw"]), listed(["a", "b"], "or"), listed(["a"])
-    ('roll, pitch and yaw', 'a or b', 'a')
-    """
-    return "".join(parts) if len(parts) < 2 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"
-
-
 def metres(value: float, low: float | None = None, high: float | None = None) -> str:
     """``4.3 m``, or with its interval ``4.3 m (3.9 to 4.8)``."""
     digits = 1 if not abs(value) < 0.95 else 2

@@ -28,8 +28,9 @@ from wildlab.runner import vary
 from wildlab.runner.by_hand import flights_for
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.trials import trials_table
+from wildlab.studies.fit_and_prediction import show_twins
 from wildlab.studies.monte_carlo import record_spread
-from wildlab.studies.page import Shown, show_page, show_twins
+from wildlab.studies.page import Shown, show_page
 from wildlab.studies.protocol import Study, find_case
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from wildlab.names import listed
 from wildlab.reporting.published import load_published
 from wildlab.reporting.report import Report
 from wildlab.simulation.parameters import (
@@ -90,8 +91,8 @@ def fit_words(published: pd.DataFrame, twin: TwinParameters | str | Path) -> str
     parts = []
     if tables:
         groups = dict.fromkeys(group for group, _, p in each_parameter(parameters) if p.fitted_to)
-        what = _listed([group.replace("_", " ") for group in groups])
-        parts.append(f"Of this twin's parameters {what} were fitted to {_listed(tables)} ({_NOT_KNOWN}).")
+        what = listed([group.replace("_", " ") for group in groups])
+        parts.append(f"Of this twin's parameters {what} were fitted to {listed(tables)} ({_NOT_KNOWN}).")
     else:
         parts.append("No parameter of this twin was fitted to a published table.")
     apart = tables_apart(published)
@@ -102,40 +103,28 @@ def fit_words(published: pd.DataFrame, twin: TwinParameters | str | Path) -> str
             parts.append(f"{what} beside {one.source} {verb} no test: {'; '.join(one.reasons)}.")
     predicted = [one.source for one in apart if not one.used]
     if predicted:
-        parts.append(f"What stands beside {_listed(predicted)} is a prediction.")
+        parts.append(f"What stands beside {listed(predicted)} is a prediction.")
     return " ".join(parts)
 
 
 _NOT_KNOWN = "sizes were chosen by how near they bring these tables; what causes such errors is not known"
 
 
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
-
-
-def simulated_section(report: Report, *twins: str, study: str = "", about: str = "", used: str = "") -> None:
-    """The section of a report on what was simulated: every parameter of its twins, folded away.
+def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
+    """The section of a report on what was simulated: every parameter of each twin, folded away.
 
     Parameters
     ----------
     twins
         Their names.
     study
-        Left out where no published table stands beside the twin.
-    about
-        What to say of it.
-    used
-        Which of the parameters the study takes; left out, all.
+        Whose published tables stand beside them.
     """
-    report.section("What was simulated", about)
+    report.section("What was simulated")
     for twin in twins:
-        twin_table(report, twin, study, used)
-
-
-def twin_table(report: Report, twin: str, study: str = "", used: str = "") -> None:
-    """The table of `simulated_section` alone, for one twin."""
-    table = parameters_table(twin)
-    fitted = f" {fit_words(load_published(study), twin)}" if study else ""
-    told = f"The twin {twin}: {status_words(table)}"
-    taken = f", of which the study takes {used}" if used else ""
-    report.table(table, fold=told, caption=f"Every parameter of the twin{taken}.{fitted}")
+        table = parameters_table(twin)
+        report.table(
+            table,
+            fold=f"The twin {twin}: {status_words(table)}",
+            caption=f"Every parameter of the twin. {fit_words(load_published(study), twin)}",
+        )

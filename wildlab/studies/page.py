@@ -29,7 +29,6 @@ from wildlab.messages.page_texts import FORMS, PageTexts, TileText, unit_words
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import number
 from wildlab.reporting.wording import Wording
-from wildlab.studies.fit_and_prediction import simulated_section
 from wildlab.studies.monte_carlo import CLAIM_COLUMNS, CLAIMS_EXPLAINED, decide_claims
 
 #: Of so many flights each, ranges that lie apart are no chance: a rank test's two-sided probability is 3 %.
@@ -37,8 +36,7 @@ ENOUGH_APART = 4
 
 
 class Shown(NamedTuple):
-    """A figure, the key of its texts, and its file's name where that is another. The text's title is put over
-    its first axes."""
+    """A figure, the key of its texts, and its file's name where that is another."""
 
     fig: Figure
     text: str
@@ -204,11 +202,6 @@ def show_page(
             wording.table(key, frame)
     rule = [] if decided is None or decided.empty else [CLAIMS_EXPLAINED]
     report.method("\n\n".join([texts.method, *rule]).strip())
-
-
-def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
-    """What was simulated: each twin's parameters, folded away."""
-    simulated_section(report, *twins, study=study)
 
 
 def tile_of(report: Report, tile: TileText, wording: Wording) -> tuple[str, str]:
