@@ -84,7 +84,7 @@ def claims_table(rows: Sequence[tuple[str, str, str, str, str]]) -> str:
         where = f' <span class="dim">{escape(source)}</span>' if source else ""
         pill = f'<span class="pill {PILLS.get(verdict, "")}">{escape(verdict)}</span>'
         cells = "".join(
-            f'<td role="cell" class="text" data-label="{label}">{escape(one)}</td>'
+            f'<td role="cell" class="text" data-label="{label}">{inline(one)}</td>'
             for label, one in zip(headings[2:], effects, strict=False)
         )
         body.append(

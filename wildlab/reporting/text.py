@@ -15,6 +15,8 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.names import visible
 
+#: A number and its sign stay on one line.
+_PERCENT = re.compile(r"(\d) %")
 _BOLD = re.compile(r"\*\*(.+?)\*\*", re.S)
 _CODE = re.compile(r"`([^`\n]+)`")
 _MATHS = re.compile(r"(?<!\\)\$\$(.+?)\$\$|(?<!\\)\$([^$\n]+?)\$", re.S)
@@ -33,7 +35,8 @@ def escape(text: object) -> str:
 
 def inline(text: object) -> str:
     """Escaped ``text`` in which ``**bold**`` and a `````code````` span keep their meaning."""
-    return _CODE.sub(_code, _BOLD.sub(r"<b>\1</b>", escape(text)))
+    kept = _PERCENT.sub("\\1\N{NO-BREAK SPACE}%", escape(text))
+    return _CODE.sub(_code, _BOLD.sub(r"<b>\1</b>", kept))
 
 
 def _code(match: re.Match[str]) -> str:

@@ -24,7 +24,7 @@ from wildlab.evaluation.shares import (
 from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, share_below
-from wildlab.reporting.text import percent
+from wildlab.reporting.text import number, percent
 from wildlab.reporting.verdicts import size_name
 from wildlab.studies.protocol import Study
 
@@ -243,7 +243,7 @@ def _share_words(found: Any, check: Check) -> str:
 
 def _difference_words(apart: Any, unit: str) -> str:
     digits = 1 if abs(apart.estimate) >= 10 else 2
-    mean, low, high = (f"{value:.{digits}f}".replace("-", "−") for value in apart)
+    mean, low, high = (number(value, digits) for value in apart)
     return f"{mean} ({low} to {high}) {unit}".rstrip()
 
 
