@@ -17,7 +17,7 @@ from rasterio.windows import Window
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.flight.terrain.laying import lay_terrain
+from wildlab.flight.terrain import lay_terrain
 from wildlab.flight.terrain_model import TerrainSays
 from wildlab.geometry.frames import geodetic_to_ned
 

@@ -118,7 +118,7 @@ def terrain(flight: Path, map_: Path, **stated: Any) -> None:
     """
     from wildlab.flight.checks.terrain import terrain_sentence
     from wildlab.flight.store import load_flight, save_flight
-    from wildlab.flight.terrain.laying import lay_terrain
+    from wildlab.flight.terrain import lay_terrain
 
     laid = lay_terrain(load_flight(flight), map_, says_of_map(map_, stated, "--"))
     save_flight(laid, flight, overwrite=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.flight.readers.tracks import Reader, columns_of, near
-from wildlab.flight.time.leap_seconds import week_to_utc
+from wildlab.flight.time_scales import week_to_utc
 
 dji_mrk = Reader("dji-mrk")
 

@@ -17,8 +17,8 @@ from wildlab.flight.files import printable
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.log import Stream
 from wildlab.flight.readers.photos import camera_of, of_camera
-from wildlab.flight.time.matching import match_triggers
-from wildlab.flight.time.whole_hours import hours_words, whole_hours
+from wildlab.flight.time_scales import hours_words, whole_hours
+from wildlab.flight.trigger_matching import match_triggers
 
 #: Time zones are whole quarters of an hour, s.
 QUARTER_S = 900.0

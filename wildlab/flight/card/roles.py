@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.card.found import Found
 from wildlab.flight.files import did_you_mean
-from wildlab.flight.time.whole_hours import hours_words, whole_hours
+from wildlab.flight.time_scales import hours_words, whole_hours
 from wildlab.geometry.frames import geodetic_to_ned
 
 Array = NDArray[np.float64]

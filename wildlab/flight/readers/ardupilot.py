@@ -12,6 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import fit_steady
 from wildlab.flight.readers.autopilot import (
     FIELD,
     FIX_PLANE,
@@ -25,8 +26,7 @@ from wildlab.flight.readers.judging import in_order, placed
 from wildlab.flight.readers.log import ANGLES, VELOCITY, Array, Clock, Decoded, Mask, Readings, any_of
 from wildlab.flight.readers.text import percent
 from wildlab.flight.schema import SPEED
-from wildlab.flight.time.leap_seconds import week_to_utc
-from wildlab.flight.time.steady import fit_steady
+from wildlab.flight.time_scales import week_to_utc
 
 #: Fixes are written down by a loop that runs so often, s, at its slowest.
 LOOP_S = 0.02

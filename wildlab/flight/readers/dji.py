@@ -26,11 +26,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import ClockFit, fit_clock
 from wildlab.flight.readers.log import ANGLES, PLACE, VELOCITY, WORLD, Array, Clock, Decoded, Mask, Readings
 from wildlab.flight.readers.text import calendar_s, decode, number, numbers, plural, stamp_s
-from wildlab.flight.time.fitting import ClockFit, fit_clock
-from wildlab.flight.time.leap_seconds import WEEK_S, week_to_utc
-from wildlab.flight.time.zones import wall_to_utc
+from wildlab.flight.time_scales import WEEK_S, wall_to_utc, week_to_utc
 
 #: What is said of a clock without a zone.
 NO_ZONE = "local time without a zone"

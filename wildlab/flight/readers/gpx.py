@@ -18,7 +18,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.readers import text
 from wildlab.flight.readers.log import Array, Clock, Decoded, Readings
-from wildlab.flight.time.leap_seconds import GPS_START_S
+from wildlab.flight.time_scales import GPS_START_S
 
 #: GPX has a depth of five; extensions add a few.
 DEEPEST = 64

@@ -28,7 +28,7 @@ from wildlab.flight.readers.log import (
 )
 from wildlab.flight.readers.text import LATEST_S, plural
 from wildlab.flight.schema import DOWN, SPEED
-from wildlab.flight.time.leap_seconds import GPS_START_S
+from wildlab.flight.time_scales import GPS_START_S
 
 #: A log does not run for longer than this, s: stamps so far from all others are wrong, if they are few.
 LONGEST_S, FEW = 7 * 86400.0, 5

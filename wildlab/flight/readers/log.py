@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.flight.time.fitting import ClockFit
+from wildlab.flight.clock_fitting import ClockFit
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

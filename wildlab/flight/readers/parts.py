@@ -10,7 +10,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import of_camera
-from wildlab.flight.time.matching import match_triggers
+from wildlab.flight.trigger_matching import match_triggers
 
 
 class Wanted(Protocol):

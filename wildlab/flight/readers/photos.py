@@ -23,7 +23,7 @@ from wildlab.flight.readers.frames.image import SUFFIXES, file_name, no_images
 from wildlab.flight.readers.log import ANGLES, TEXTS, WORLD, Array, Clock, Decoded, RawLog, Readings, any_of
 from wildlab.flight.readers.photo_tags import Tags, read_tags, size_of
 from wildlab.flight.readers.text import plural
-from wildlab.flight.time.zones import wall_to_utc
+from wildlab.flight.time_scales import wall_to_utc
 
 #: Images of a folder at most.
 MOST_IMAGES = 200_000

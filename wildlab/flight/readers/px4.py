@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import ClockFit, fit_steady
 from wildlab.flight.files import printable
 from wildlab.flight.readers.autopilot import (
     FIELD,
@@ -39,8 +40,6 @@ from wildlab.flight.readers.autopilot import (
 )
 from wildlab.flight.readers.judging import placed
 from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Readings
-from wildlab.flight.time.fitting import ClockFit
-from wildlab.flight.time.steady import fit_steady
 
 # -- what can be believed
 

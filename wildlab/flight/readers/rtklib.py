@@ -20,7 +20,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.readers import text
 from wildlab.flight.readers.log import Array, Clock, Decoded, Readings
 from wildlab.flight.readers.text import number, numbers, plural, stamp_s
-from wildlab.flight.time.leap_seconds import GPS_START_S, WEEK_S, gps_to_utc
+from wildlab.flight.time_scales import GPS_START_S, WEEK_S, gps_to_utc
 
 #: Quality of a solution -> kind of fix: fixed, float, by satellite, differential, single, precise point.
 _FIXES = {1.0: 6.0, 2.0: 5.0, 3.0: 4.0, 4.0: 4.0, 5.0: 3.0, 6.0: 8.0, 7.0: 1.0}

@@ -7,7 +7,7 @@ times longer.
 
 The ground station stamps what it receives, late by up to seconds; the vehicle stamps what it measures,
 since it was switched on. What goes with what is fitted along the lower edge of the receipts
-(`wildlab.flight.time.fitting`), or, where the vehicle knows UTC, on what it says itself (``SYSTEM_TIME``).
+(`wildlab.flight.clock_fitting`), or, where the vehicle knows UTC, on what it says itself (``SYSTEM_TIME``).
 One vehicle is read, that which sent most attitudes; ground stations and other vehicles are named in the
 notes.
 """
@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import ClockFit, fit_steady
 from wildlab.flight.files import printable
 from wildlab.flight.readers.autopilot import (
     FIELD,
@@ -37,8 +38,6 @@ from wildlab.flight.readers.autopilot import (
 )
 from wildlab.flight.readers.judging import placed
 from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Mask, Readings, any_of
-from wildlab.flight.time.fitting import ClockFit
-from wildlab.flight.time.steady import fit_steady
 
 #: So many sound frames say what a file is, where its name does not.
 ENOUGH = 3

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import fit_clock
 from wildlab.flight.readers import nmea
 from wildlab.flight.readers.log import VELOCITY, Array, Clock, Decoded, Mask, Readings, any_of
 from wildlab.flight.readers.text import plural
-from wildlab.flight.time.fitting import fit_clock
-from wildlab.flight.time.leap_seconds import WEEK_S, week_to_utc
+from wildlab.flight.time_scales import WEEK_S, week_to_utc
 from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 Rows = NDArray[Any]

@@ -36,7 +36,7 @@ from wildlab.flight.recipe.tables import (
     read_truth,
 )
 from wildlab.flight.store import Flight, save_flight
-from wildlab.flight.terrain.laying import lay_terrain
+from wildlab.flight.terrain import lay_terrain
 from wildlab.flight.terrain_model import TerrainSays
 
 #: Parts that a manifest has as the recipe states them.

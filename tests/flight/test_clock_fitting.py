@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.flight.time.fitting import SURE, ClockFit, fit_clock, rate_is_off, shortfall
-from wildlab.flight.time.steady import fit_steady
+from wildlab.flight.clock_fitting import SURE, ClockFit, fit_clock, fit_steady, rate_is_off, shortfall
 
 EPOCH = 1.7e9
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.time.fitting import ClockFit, fit_clock
+from wildlab.flight.clock_fitting import ClockFit, fit_clock
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -1,0 +1,91 @@
+"""GPS time and UTC, against the table of leap seconds as the world has it; clocks whole and half hours off."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.flight.card.test_images import START, TAKEN, images, own
+from tests.flight.card.test_roles import log
+from wildlab.flight.card.images import clock_of_images
+from wildlab.flight.card.roles import choose_roles
+from wildlab.flight.time_scales import gps_to_utc, leap_seconds, utc_to_gps, week_to_utc, whole_hours
+
+#: TAI - UTC from each date on (IERS); GPS time is 19 s behind TAI.
+TAI_MINUS_UTC = {
+    (1981, 7): 20, (1982, 7): 21, (1983, 7): 22, (1985, 7): 23, (1988, 1): 24, (1990, 1): 25, (1991, 1): 26,
+    (1992, 7): 27, (1993, 7): 28, (1994, 7): 29, (1996, 1): 30, (1997, 7): 31, (1999, 1): 32, (2006, 1): 33,
+    (2009, 1): 34, (2012, 7): 35, (2015, 7): 36, (2017, 1): 37,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("month", "tai"), TAI_MINUS_UTC.items())
+def test_each_border(month, tai):
+    start = datetime(*month, 1, tzinfo=UTC).timestamp()
+    assert leap_seconds([start - 1, start, start + 1]).tolist() == [tai - 20, tai - 19, tai - 19]
+    # GPS time runs on through the leap second; UTC, which has no number for it here, stands for it.
+    gps = start - 315964800 + tai - 19
+    at = gps_to_utc([gps - 2, gps - 1, gps, gps + 1]) - start
+    assert at.tolist() == [-1.0, 0.0, 0.0, 1.0]
+
+
+def test_known_instants():
+    # The epoch; the two roll-overs of the ten-bit week, and one day between.
+    cases = {
+        (0, 0.0): "1980-01-06T00:00:00",
+        (1024, 0.0): "1999-08-21T23:59:47",
+        (2048, 0.0): "2019-04-06T23:59:42",
+        (1834, 86400.0): "2015-03-01T23:59:44",
+    }
+    for (week, seconds), text in cases.items():
+        utc = datetime.fromisoformat(text).replace(tzinfo=UTC).timestamp()
+        assert float(week_to_utc(week, seconds)) == utc
+
+
+@given(st.floats(315964800, 2.2e9))
+def test_there_and_back(utc):
+    assert float(gps_to_utc(utc_to_gps(utc))) == pytest.approx(utc, abs=1e-6)
+
+
+@given(st.lists(st.floats(0, 1.8e9), min_size=2))
+def test_utc_never_goes_back(gps):
+    assert (np.diff(gps_to_utc(np.sort(gps))) >= 0).all()
+
+
+def test_not_known_stays_so():
+    assert np.isnan(leap_seconds(np.nan)) and np.isnan(gps_to_utc(np.nan)) and np.isnan(utc_to_gps(np.nan))
+
+
+@given(st.integers(-28, 28).filter(bool), st.floats(60, 1500), st.floats(0, 0.05))
+def test_a_flight_of_minutes_tells_every_half_hour(halves, seconds, late):
+    flight = (START, START + seconds)
+    moved = tuple(one + 1800.0 * halves + late * seconds for one in flight)
+    assert whole_hours((moved[0], moved[1]), flight) == -1800.0 * halves
+
+
+def test_what_several_steps_bring_together_is_not_guessed_and_what_meets_is_left():
+    long = (0.0, 6 * 3600.0)
+    assert whole_hours((8 * 3600.0, 8 * 3600.0 + 600), long) is None
+    assert whole_hours((100.0, 700.0), (0.0, 900.0)) is None
+    assert whole_hours((4000.0, 4600.0), (0.0, 600.0)) is None
+    assert whole_hours(None, (0.0, 600.0)) is None
+
+
+@pytest.mark.parametrize("hours", [1, -1, -5.5])
+def test_images_a_zone_off_say_what_to_type(hours):
+    stamps = TAKEN + 3600.0 * hours
+    clock = clock_of_images(images(stamps, stamps), own(), None)
+    assert f"--camera-offset {-3600.0 * hours:g} " in clock.said
+    assert clock.offset_s == 0.0  # whose clock it is nobody knows: it is said, and not done
+    after = clock_of_images(images(stamps, stamps), own(), -3600.0 * hours)
+    right = clock_of_images(images(TAKEN, TAKEN), own(), None)
+    assert "--camera-offset" not in after.said + right.said
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(3600.0, True), (-1800.0, True), (2500.0, False)])
+def test_another_log_a_zone_off_says_what_to_write(seconds, said):
+    boat, drone = log("boat", north=80.0, begin=seconds), log("drone", attitude=True)
+    (why,) = (one.why for one in choose_roles((boat, drone), {}) if one.found.name == "boat")
+    assert (f"offset_s = {-seconds:g}" in why) is said

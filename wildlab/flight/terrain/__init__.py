@@ -1,1 +1,0 @@
-"""Elevation maps into flights: what is said of a map, how it is read, and how it comes into frame n."""

@@ -1,0 +1,214 @@
+"""Time scales and zones: GPS time, UTC, wall clocks, and clocks that are off by whole hours."""
+
+from __future__ import annotations
+
+import re
+import zoneinfo
+from datetime import UTC, datetime, timedelta, timezone, tzinfo
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+
+Array = NDArray[np.float64]
+
+#: 1980-01-06, when both were alike, in s since 1970.
+GPS_START_S = 315964800.0
+WEEK_S = 604800.0
+#: First days on which UTC was one second further behind GPS time (IERS Bulletin C); none is announced since.
+LEAP_DAYS = (
+    *("1981-07-01", "1982-07-01", "1983-07-01", "1985-07-01", "1988-01-01", "1990-01-01", "1991-01-01"),
+    *("1992-07-01", "1993-07-01", "1994-07-01", "1996-01-01", "1997-07-01", "1999-01-01", "2006-01-01"),
+    *("2009-01-01", "2012-07-01", "2015-07-01", "2017-01-01"),
+)
+#: The same in s since 1970, UTC.
+_STARTS = np.array([datetime.fromisoformat(day).replace(tzinfo=UTC).timestamp() for day in LEAP_DAYS])
+
+
+def leap_seconds(utc_s: ArrayLike) -> Array:
+    """GPS time minus UTC, s, at UTC times (...) in s since 1970.
+
+    Parameters
+    ----------
+    utc_s
+        (...) s since 1970; NaN stays NaN.
+
+    Returns
+    -------
+    (...)
+
+    Examples
+    --------
+    >>> from datetime import UTC, datetime
+    >>> at = [datetime(year, 6, 1, tzinfo=UTC).timestamp() for year in (2014, 2025)]
+    >>> leap_seconds(at).tolist()
+    [16.0, 18.0]
+    """
+    at = np.asarray(utc_s, float)
+    return np.where(np.isnan(at), np.nan, np.searchsorted(_STARTS, at, side="right").astype(float))
+
+
+def gps_to_utc(gps_s: ArrayLike) -> Array:
+    """UTC in s since 1970 of GPS time (...) in s since 6 January 1980.
+
+    Parameters
+    ----------
+    gps_s
+        (...) s: weeks times 604800, and the time of week.
+
+    Returns
+    -------
+    (...) s since 1970
+
+    Examples
+    --------
+    >>> from datetime import UTC, datetime
+    >>> datetime.fromtimestamp(float(gps_to_utc(1867 * 604800 + 16)), UTC).isoformat()
+    '2015-10-17T23:59:59+00:00'
+    """
+    counted = np.asarray(gps_s, float) + GPS_START_S
+    # A leap second begins where GPS time, too, is ahead by it.
+    behind = np.searchsorted(_STARTS + np.arange(1, len(_STARTS) + 1), counted, side="right")
+    return np.asarray(np.where(np.isnan(counted), np.nan, counted - behind))
+
+
+def week_to_utc(week: ArrayLike, time_of_week_s: ArrayLike) -> Array:
+    """UTC in s since 1970 of a GPS week (...) and the s since it began (...)."""
+    return gps_to_utc(np.asarray(week, float) * WEEK_S + np.asarray(time_of_week_s, float))
+
+
+def utc_to_gps(utc_s: ArrayLike) -> Array:
+    """GPS time (...) in s since 6 January 1980 of UTC (...) in s since 1970; the inverse of `gps_to_utc`."""
+    at = np.asarray(utc_s, float)
+    return np.asarray(at - GPS_START_S + leap_seconds(at))
+
+
+def find_zone(text: str) -> tzinfo:
+    """A time zone by its IANA name, or as a fixed offset such as ``+02:00``.
+
+    Parameters
+    ----------
+    text
+        As a person gives it.
+
+    Returns
+    -------
+    tzinfo
+
+    Raises
+    ------
+    WildlabError
+        Where it is neither.
+
+    Examples
+    --------
+    >>> find_zone("-03:30").utcoffset(None)
+    datetime.timedelta(days=-1, seconds=73800)
+    """
+    fixed = re.fullmatch(r"([+-])(0[0-9]|1[0-4]):([0-5][0-9])", text)
+    if fixed:
+        size = timedelta(hours=int(fixed[2]), minutes=int(fixed[3]))
+        return timezone(-size if fixed[1] == "-" else size)
+    try:
+        return zoneinfo.ZoneInfo(text)
+    except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
+        raise WildlabError(
+            f"{text[:60]!r} is not a time zone",
+            "give UTC, a name as Europe/Oslo, or an offset as +02:00",
+            field="zone",
+        ) from None
+
+
+def wall_to_utc(wall_s: ArrayLike, zone: str) -> NDArray[np.float64]:
+    """UTC of wall clocks, s since 1970.
+
+    Parameters
+    ----------
+    wall_s
+        (...) what the clock showed, in s since 1970 as if it were UTC; NaN stays NaN. Of an hour that a zone
+        has twice, the first is taken.
+    zone
+        As of `find_zone`.
+
+    Returns
+    -------
+    (...)
+
+    Raises
+    ------
+    WildlabError
+        Where the zone is none.
+
+    Examples
+    --------
+    >>> float(wall_to_utc(1718191800.0, "Europe/Oslo"))
+    1718184600.0
+    """
+    found = find_zone(zone)
+    wall = np.asarray(wall_s, float)
+
+    def shift(one: float) -> float:
+        if not np.isfinite(one):
+            return np.nan
+        try:
+            there = datetime.fromtimestamp(one, UTC).replace(tzinfo=found)
+            return (there.utcoffset() or timedelta()).total_seconds()
+        except (ValueError, OverflowError, OSError):
+            return np.nan
+
+    ahead = np.array([shift(float(one)) for one in wall.ravel()]).reshape(wall.shape)
+    return np.asarray(wall - ahead)
+
+
+Span = tuple[float, float]
+
+#: Share of the shorter that has to lie within the other then, and the farthest that zones are apart, s.
+WITHIN, FARTHEST_S = 0.9, 14 * 3600.0
+HALF_HOUR_S = 1800.0
+
+
+def whole_hours(one: Span | None, other: Span | None) -> float | None:
+    """What to add to the stamps of one so that it was under way with the other: half hours and hours alone.
+
+    Parameters
+    ----------
+    one, other
+        First and last stamp, s.
+
+    Returns
+    -------
+    float or None
+        Seconds; None where they share time as they are, where no such step brings them together, and where
+        several do: of these whole hours go before half ones.
+
+    Examples
+    --------
+    >>> whole_hours((3600.0, 4500.0), (0.0, 900.0)), whole_hours((3000.0, 3900.0), (0.0, 900.0))
+    (-3600.0, None)
+    """
+    if one is None or other is None or _shared(one, other, 0.0) > 0:
+        return None
+    steps = np.arange(HALF_HOUR_S, FARTHEST_S + 1, HALF_HOUR_S)
+    found = [float(by) for by in (*steps, *-steps) if _shared(one, other, float(by)) >= WITHIN]
+    whole = [by for by in found if by % 3600 == 0]
+    chosen = found if len(found) == 1 else whole
+    return chosen[0] if len(chosen) == 1 else None
+
+
+def hours_words(seconds: float) -> str:
+    """``1 h``, ``5 h 30 min``, ``30 min``: of a length, whatever its sign.
+
+    Examples
+    --------
+    >>> hours_words(-3600.0), hours_words(19800.0), hours_words(1800.0)
+    ('1 h', '5 h 30 min', '30 min')
+    """
+    hours, minutes = divmod(round(abs(seconds) / 60), 60)
+    return " ".join([*([f"{hours} h"] if hours else []), *([f"{minutes} min"] if minutes else [])])
+
+
+def _shared(one: Span, other: Span, by: float) -> float:
+    """Share of the shorter that both have once ``by`` is added to the first."""
+    common = min(one[1] + by, other[1]) - max(one[0] + by, other[0])
+    return max(common, 0.0) / max(min(one[1] - one[0], other[1] - other[0]), 1.0)
