@@ -39,10 +39,10 @@ from tests.sound_logs import (
     sample_times,
     smooth,
 )
+from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
-from wildlab.flight.toml import dump_toml
 
 KINDS = ("fixed wing", "multirotor", "gimbal oblique", "nadir", "gondola", "boat")
 SEEDS = range(1, 11)

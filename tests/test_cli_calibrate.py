@@ -9,7 +9,7 @@ from tests.analysis.survey_twin import Survey, simulate
 from tests.commands import refuse, succeed
 from wildlab.errors import WildlabError
 from wildlab.evaluation.runs import Interval
-from wildlab.flight.learnt import parse_learnt, read_learnt, write_learnt
+from wildlab.flight.calibration_files import parse_learnt, read_learnt, write_learnt
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.paths import DATA
@@ -49,7 +49,7 @@ def learn(monkeypatch, **found):
     learnt = SimpleNamespace(gain=None, parameter=())
     both = learnt, SimpleNamespace(**found)
     monkeypatch.setattr("wildlab.analysis.learn.learn_flight", lambda *_: both)
-    monkeypatch.setattr("wildlab.flight.learnt.write_learnt", lambda *_: None)
+    monkeypatch.setattr("wildlab.flight.calibration_files.write_learnt", lambda *_: None)
 
 
 def test_causes_that_are_inseparable_are_named(folder, tmp_path, monkeypatch):

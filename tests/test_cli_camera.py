@@ -10,7 +10,7 @@ import pytest
 
 from tests.commands import refuse, succeed
 from wildlab.detection.boards import Board
-from wildlab.flight.camera_file import read_camera
+from wildlab.flight.calibration_files import read_camera
 from wildlab.geometry.camera import Camera
 from wildlab.simulation.boards import board_image, board_views
 

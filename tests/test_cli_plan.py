@@ -100,7 +100,7 @@ def test_wrong_use_leaves_nothing(area, tmp_path, given, said):
 
 
 def test_a_calibrated_camera_is_taken(area, tmp_path):
-    from wildlab.flight.camera_file import BoardPart, CameraFile, EvidencePart, write_camera
+    from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, write_camera
     from wildlab.flight.manifest_parts import CameraPart
 
     content = CameraFile(

@@ -12,8 +12,8 @@ from wildlab.analysis.tracks.judged import judged
 from wildlab.analysis.tracks.noise_model import NoiseModel, of_flight, of_sensor
 from wildlab.analysis.tracks.scans import Scans, scans_of
 from wildlab.analysis.tracks.tracker import TrackingResult
-from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import parse_settings
 
 
 def boat(t: np.ndarray) -> np.ndarray:

@@ -12,9 +12,9 @@ from wildlab.analysis.tracks.judged import apart, estimates_table, judged, worth
 from wildlab.analysis.tracks.noise_model import errors_named
 from wildlab.analysis.tracks.scans import KINDS, SLOTS, Scans, predict_scan, scans_of, truths_at
 from wildlab.analysis.tracks.tracker import track
-from wildlab.flight.following import CONSIDERED, Settings
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import CONSIDERED, Settings
 
 # --- a heading that is off ----------------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel
 from wildlab.analysis.tracks.scans import Scans, Truth
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.analysis.tracks.tracks import SensorTrack
-from wildlab.flight.following import parse_settings
+from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix

@@ -13,8 +13,8 @@ from tests.refused import refused
 from wildlab.analysis.tracks import tracker
 from wildlab.analysis.tracks.judged import _between, apart
 from wildlab.analysis.tracks.tuned import read_tuned, refuse_same, tune_flight, tuned_text
-from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import parse_settings
 from wildlab.tracking.motion import white_acceleration
 
 

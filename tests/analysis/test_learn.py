@@ -11,8 +11,14 @@ from tests.refused import refused
 from wildlab.analysis.diagnose import diagnose
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.analysis.learn import apply_learnt, corrected_flight, learn_flight
+from wildlab.flight.calibration_files import (
+    LearntParameter,
+    learnt_toml,
+    parse_learnt,
+    read_learnt,
+    write_learnt,
+)
 from wildlab.flight.checks.check import sense_sentences
-from wildlab.flight.learnt import LearntParameter, learnt_toml, parse_learnt, read_learnt, write_learnt
 
 
 def tuesday(**more):

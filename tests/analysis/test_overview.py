@@ -33,8 +33,8 @@ from wildlab.analysis.tracks.judged import judged as judged_tracks
 from wildlab.analysis.tracks.tracker import track
 from wildlab.evaluation.streams import pace_of, runs_of
 from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
-from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.reporting.overview import counts_of, show_overview

@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.flight.store import Flight
-from wildlab.flight.toml import dump_toml
 
 MANIFEST: dict[str, Any] = tomllib.loads("""
 name = "small-flight"

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from tests.flight.conftest import MANIFEST, fault
 from wildlab.errors import WildlabError
+from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import make_manifest, manifest_toml, read_manifest, replace_in_manifest
-from wildlab.flight.toml import dump_toml
 
 text = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 numbers = st.floats(allow_nan=False, allow_infinity=False)

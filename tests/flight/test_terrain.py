@@ -16,9 +16,9 @@ from rasterio.windows import Window
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
+from wildlab.flight.manifest_parts import TerrainSays
 from wildlab.flight.store import Flight
 from wildlab.flight.terrain import lay_terrain
-from wildlab.flight.terrain_model import TerrainSays
 from wildlab.geometry.frames import geodetic_to_ned
 
 #: Where the made flights are: 46.8 north, 14.6 east, in zone 33, 700 m above the ellipsoid.

@@ -1,4 +1,4 @@
-"""GPS time and UTC, against the table of leap seconds as the world has it; clocks whole and half hours off."""
+"""GPS time and UTC, against the table of leap seconds as the world has it; clocks off by half hours."""
 
 from datetime import UTC, datetime
 

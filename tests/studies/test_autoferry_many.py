@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from wildlab.evaluation.identities import Moment, compare_identities
-from wildlab.flight.following import parse_settings
-from wildlab.flight.toml import dump_toml
+from wildlab.flight.files import dump_toml
+from wildlab.flight.tracking_settings import parse_settings
 from wildlab.studies.autoferry_many import scores, tuning
 from wildlab.studies.autoferry_many.tuning import Lasting, Tuned, anees_of, draw, order
 

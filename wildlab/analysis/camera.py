@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_board, grey8
 from wildlab.errors import WildlabError
-from wildlab.flight.camera_file import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
+from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.frames.image import file_name, read_image
 from wildlab.geometry.board_views import parameters_of

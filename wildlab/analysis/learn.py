@@ -15,7 +15,7 @@ from wildlab.analysis.georeference import Observations, calibrated, georeference
 from wildlab.analysis.pose_noise import as_deviations
 from wildlab.analysis.repeats import compare_sightings
 from wildlab.errors import WildlabError
-from wildlab.flight.learnt import (
+from wildlab.flight.calibration_files import (
     UNITS,
     Conditions,
     Learnt,
@@ -185,7 +185,7 @@ def apply_learnt(flight: Flight, source: str | None, observations: Observations,
     observations
         As logged.
     learnt
-        From `wildlab.flight.learnt.read_learnt`.
+        From `wildlab.flight.calibration_files.read_learnt`.
 
     Returns
     -------

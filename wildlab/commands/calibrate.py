@@ -36,8 +36,8 @@ def calibrate(
     import numpy as np
 
     from wildlab.analysis.learn import learn_flight
+    from wildlab.flight.calibration_files import write_learnt
     from wildlab.flight.checks.check import sense_sentences
-    from wildlab.flight.learnt import write_learnt
     from wildlab.flight.store import load_flight
     from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
 

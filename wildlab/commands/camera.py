@@ -101,7 +101,7 @@ def camera(
 
     from wildlab.analysis.camera import calibrate_images, camera_file, sentences
     from wildlab.detection.boards import Board
-    from wildlab.flight.camera_file import write_camera
+    from wildlab.flight.calibration_files import write_camera
     from wildlab.flight.readers.frames.image import still_files
 
     columns, rows = board or circles or (0, 0)

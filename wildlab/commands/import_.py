@@ -161,7 +161,7 @@ def _tell(name: str) -> None:
 
 
 def _wishes(raw: tuple[Path, ...], into: Path | None, options: dict[str, Any]) -> Wishes:
-    from wildlab.flight.camera_file import read_camera
+    from wildlab.flight.calibration_files import read_camera
     from wildlab.flight.card.importing import safe_name
     from wildlab.flight.card.proposal import Wishes
     from wildlab.flight.recipe.parts import parse_zone

@@ -246,7 +246,7 @@ def lens(
     """
     import math
 
-    from wildlab.flight.camera_file import read_camera
+    from wildlab.flight.calibration_files import read_camera
     from wildlab.geometry.camera import Camera
 
     if camera is not None:

@@ -13,7 +13,7 @@ from wildlab.errors import WildlabError
 from wildlab.terminal import shown, stopped
 
 if TYPE_CHECKING:
-    from wildlab.flight.terrain_model import TerrainSays
+    from wildlab.flight.manifest_parts import TerrainSays
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -75,7 +75,7 @@ def says_of_map(map_: Path, stated: Mapping[str, Any], prefix: str) -> TerrainSa
         Where a value is wrong.
     """
     from wildlab.flight.files import check_model
-    from wildlab.flight.terrain_model import TerrainSays
+    from wildlab.flight.manifest_parts import TerrainSays
 
     given = {name.removeprefix("terrain_"): one for name, one in stated.items() if one is not None}
     if "heights" in given:

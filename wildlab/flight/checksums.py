@@ -18,11 +18,10 @@ from typing import get_args
 
 from wildlab.errors import WildlabError
 from wildlab.files import sha256, write_atomic
-from wildlab.flight.files import TOML_LIMIT, inside, read_regular
+from wildlab.flight.files import TOML_LIMIT, dump_toml, inside, read_regular
 from wildlab.flight.manifest import FILE_NAME, parse_manifest, read_manifest
 from wildlab.flight.manifest_parts import LocationsPart, Sensitivity
 from wildlab.flight.schema import TABLES
-from wildlab.flight.toml import dump_toml
 
 TERRAIN = "terrain.tif"
 #: What was learnt on another flight, where this one came with it.

@@ -13,8 +13,7 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import Strict, check_model, is_safe_name, parse_toml, read_toml
-from wildlab.flight.following import SensorPart, TargetsPart
+from wildlab.flight.files import Strict, check_model, dump_toml, is_safe_name, parse_toml, read_toml
 from wildlab.flight.manifest_parts import (
     CameraPart,
     ClocksPart,
@@ -28,13 +27,13 @@ from wildlab.flight.manifest_parts import (
     ScoringPart,
     Sha256,
     SourcePart,
+    TerrainPart,
     TimePart,
     TwinPart,
     UncertaintyPart,
     VerticalPart,
 )
-from wildlab.flight.terrain_model import TerrainPart
-from wildlab.flight.toml import dump_toml
+from wildlab.flight.tracking_settings import SensorPart, TargetsPart
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Origin
 from wildlab.geometry.mount import Mount
@@ -62,7 +61,7 @@ class Manifest(Strict):
     terrain: TerrainPart | None = None
     uncertainty: UncertaintyPart = UncertaintyPart()
     scoring: ScoringPart = ScoringPart()
-    #: What tracking filters are told, see `wildlab.flight.following`.
+    #: What tracking filters are told, see `wildlab.flight.tracking_settings`.
     sensors: dict[str, SensorPart] = Field(default_factory=dict)
     targets: TargetsPart = TargetsPart()
     twin: TwinPart | None = None

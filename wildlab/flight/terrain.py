@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.manifest_parts import TerrainPart, TerrainSays
 from wildlab.flight.readers.terrain import ElevationMap, Heights, open_elevation
-from wildlab.flight.store import Flight
-from wildlab.flight.terrain_file import MOST_NODES
-from wildlab.flight.terrain_model import TerrainPart, TerrainSays
+from wildlab.flight.store import MOST_NODES, Flight
 from wildlab.geometry.frames import Origin, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
 

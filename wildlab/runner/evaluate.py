@@ -15,8 +15,8 @@ from wildlab.analysis.navigation_inputs import imu_noise
 from wildlab.analysis.tracks.sensor_tuning import FEWEST
 from wildlab.analysis.tracks.tracker import refuse_unusable
 from wildlab.errors import WildlabError
+from wildlab.flight.calibration_files import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import Use, find, usable_for
-from wildlab.flight.learnt import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import StudyEntry, load_studies

@@ -18,11 +18,11 @@ import pandas as pd
 
 from wildlab.analysis.overviews.image_coverage import ground_height
 from wildlab.errors import WildlabError
-from wildlab.flight.following import SensorPart
-from wildlab.flight.learnt import Learnt
+from wildlab.flight.calibration_files import Learnt
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import SensorPart
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import local_earth
 from wildlab.sharing.inertial import USUAL_DECLINATION_DEG, USUAL_INCLINATION_DEG, moved_field, moved_imu

@@ -10,11 +10,11 @@ from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_atomic
+from wildlab.flight.calibration_files import Learnt, parse_learnt, read_learnt, write_learnt
 from wildlab.flight.checksums import CALIBRATION
-from wildlab.flight.following import parse_settings
-from wildlab.flight.learnt import Learnt, parse_learnt, read_learnt, write_learnt
+from wildlab.flight.files import dump_toml
 from wildlab.flight.store import Flight, save_flight
-from wildlab.flight.toml import dump_toml
+from wildlab.flight.tracking_settings import parse_settings
 from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight

@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
-from wildlab.flight.following import parse_settings
 from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import normal_gravity
 from wildlab.paths import ROOT

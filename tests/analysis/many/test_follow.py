@@ -9,7 +9,7 @@ from tests.analysis.robots import boat, joined, robot_flight
 from tests.refused import refused
 from wildlab.analysis.tracks.many import complete_looks, judged, known_looks, tracks_table
 from wildlab.analysis.tracks.tracker import track
-from wildlab.flight.following import parse_settings, settings_over
+from wildlab.flight.tracking_settings import parse_settings, settings_over
 
 
 def test_a_boat_among_clutter_is_found_without_its_name():

@@ -10,7 +10,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.files import sha256
-from wildlab.flight.camera_file import CameraFile, read_camera, write_camera
+from wildlab.flight.calibration_files import CameraFile, read_camera, write_camera
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, truth_at
 from wildlab.flight.files import check_model

@@ -22,9 +22,9 @@ from wildlab.analysis.plans.wanted import (
     sizes_alone,
 )
 from wildlab.errors import WildlabError
+from wildlab.flight.manifest_parts import TerrainSays
 from wildlab.flight.readers.area import Area, Areas, read_areas
 from wildlab.flight.terrain import CutOut, terrain_about
-from wildlab.flight.terrain_model import TerrainSays
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.areas import contains

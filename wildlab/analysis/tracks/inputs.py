@@ -22,8 +22,8 @@ from wildlab.analysis.tracks.places import ABLE
 from wildlab.analysis.tracks.scans import Scans, Truth, scans_of, sensors_of, truths_at
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.sensors import looks_of_others
-from wildlab.flight.following import Settings, absent_sensors
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import Settings, absent_sensors
 
 #: What a target is called of which nobody says a name.
 UNNAMED = "target"

@@ -18,8 +18,8 @@ from wildlab.analysis.georeference import assumed_deviations
 from wildlab.analysis.tracks.scans import SLOTS, Scans
 from wildlab.analysis.tracks.sensor_tuning import SensorTuning
 from wildlab.errors import WildlabError
-from wildlab.flight.following import CONSIDERED, Settings, TargetsPart, read_settings, settings_over
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import CONSIDERED, Settings, TargetsPart, read_settings, settings_over
 from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.frames import Array, wrap
 from wildlab.paths import DATA
@@ -105,7 +105,7 @@ class NoiseModel(NamedTuple):
 
 
 class TargetModel(NamedTuple):
-    """Of the targets, see `wildlab.flight.following.TargetsPart`; ``reach_...`` and ``size_m`` may be NaN."""
+    """Of the targets, see `wildlab.flight.tracking_settings.TargetsPart`; some lengths may be NaN."""
 
     density: float
     start_speed_m_s: float

@@ -11,7 +11,7 @@ from wildlab.analysis.tracks.noise_model import ASSUMED, STATED, ToldValue
 from wildlab.analysis.tracks.noise_model import TargetModel as Following
 from wildlab.analysis.tracks.places import PLACED, PlacedLooks
 from wildlab.errors import WildlabError
-from wildlab.flight.following import HullPart, ManyTargetsPart, SensorPart, Settings, read_settings
+from wildlab.flight.tracking_settings import HullPart, ManyTargetsPart, SensorPart, Settings, read_settings
 from wildlab.paths import DATA
 from wildlab.tracking.many import Hull, ManySensorModel, ManyTargetModel
 

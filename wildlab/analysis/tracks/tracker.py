@@ -35,8 +35,8 @@ from wildlab.analysis.tracks.noise_model import (
 from wildlab.analysis.tracks.scans import Scans
 from wildlab.analysis.tracks.tracks import SensorTrack, track_target
 from wildlab.errors import WildlabError
-from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import Settings
 
 #: The filter without anything but white noise, which the others are held against.
 WHITE = "ekf"

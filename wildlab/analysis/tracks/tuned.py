@@ -18,8 +18,8 @@ from wildlab.analysis.tracks.sensor_tuning import FEWEST, SensorTuning, tune
 from wildlab.analysis.tracks.tracks import choose
 from wildlab.errors import WildlabError
 from wildlab.flight.checksums import checksums_of
-from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import Settings
 from wildlab.geometry.frames import Array
 from wildlab.tracking.records import Start
 from wildlab.tracking.run import run_filter

@@ -20,10 +20,10 @@ from wildlab.flight.card.roles import Choice, choose_roles
 from wildlab.flight.card.seen import add_frames, add_seen, add_targets
 from wildlab.flight.card.vehicle import add_poses, add_satellites, add_vehicle, uncertainty_of
 from wildlab.flight.files import is_safe_name, printable
+from wildlab.flight.manifest_parts import TerrainSays
 from wildlab.flight.readers.log import Stream
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
-from wildlab.flight.terrain_model import TerrainSays
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,10 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.card.found import OTHER
 from wildlab.flight.card.roles import PARTS_SHOWN, Choice
+from wildlab.flight.files import dump_toml
 from wildlab.flight.heights import NO_GRID, choose_reference
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.log import Stream
-from wildlab.flight.toml import dump_toml
 
 #: Rows that can be used.
 USED: list[dict[str, Any]] = [{"column": "use", "equals": 1.0}]

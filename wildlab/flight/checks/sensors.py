@@ -27,8 +27,8 @@ from wildlab.flight.checks.explanation import (
 from wildlab.flight.checks.findings import POSITION, Finding, Level, joined
 from wildlab.flight.checks.mistakes import change_by, mistake, one_row, place_mistakes, rows_of
 from wildlab.flight.clocks import frame_times, poses_at, truth_at
-from wildlab.flight.following import Settings, absent_sensors
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import Settings, absent_sensors
 from wildlab.geometry.frames import Array, wrap
 
 #: A detection is of a target within this of it: so far (m) and a share of the distance, or this angle (rad).

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from wildlab.errors import WildlabError
-from wildlab.flight.camera_file import parse_camera
+from wildlab.flight.calibration_files import parse_camera, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import find
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
-from wildlab.flight.learnt import read_learnt, refuse_other_camera
 from wildlab.flight.manifest import Manifest, make_manifest
-from wildlab.flight.manifest_parts import CameraPart, GnssPart, ImuPart, MagnetometerPart
+from wildlab.flight.manifest_parts import CameraPart, GnssPart, ImuPart, MagnetometerPart, TerrainSays
 from wildlab.flight.recipe.model import Recipe, read_recipe
 from wildlab.flight.recipe.poses import Fixes, LocalFrame, PoseRows, read_poses
 from wildlab.flight.recipe.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
@@ -37,7 +36,6 @@ from wildlab.flight.recipe.tables import (
 )
 from wildlab.flight.store import Flight, save_flight
 from wildlab.flight.terrain import lay_terrain
-from wildlab.flight.terrain_model import TerrainSays
 
 #: Parts that a manifest has as the recipe states them.
 _AS_STATED = (

@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AwareDatetime, Field, ValidationInfo, field_validator, model_validator
 
 from wildlab.flight.files import Strict, check_model, is_safe_name, read_toml
-from wildlab.flight.following import SensorPart, TargetsPart
 from wildlab.flight.manifest_parts import (
     CameraPart,
     ClocksPart,
@@ -21,6 +20,7 @@ from wildlab.flight.manifest_parts import (
     OriginPart,
     PlatformPart,
     ScoringPart,
+    TerrainSays,
     UncertaintyPart,
 )
 from wildlab.flight.recipe.parts import (
@@ -43,7 +43,7 @@ from wildlab.flight.recipe.parts import (
     Velocity,
     Zone,
 )
-from wildlab.flight.terrain_model import TerrainSays
+from wildlab.flight.tracking_settings import SensorPart, TargetsPart
 
 
 class Group(Strict):

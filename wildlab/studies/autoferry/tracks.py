@@ -12,8 +12,8 @@ from wildlab.analysis.tracks.noise_model import of_targets
 from wildlab.analysis.tracks.scans import sensors_of
 from wildlab.analysis.tracks.sensor_tuning import SensorTuning, tune
 from wildlab.analysis.tracks.tracks import SensorTrack
-from wildlab.flight.following import read_settings
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import read_settings
 from wildlab.paths import DATA
 from wildlab.reporting.report import Report
 from wildlab.studies.autoferry.comparison import KEYS, OUTCOMES, Held, consistent, stays

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from wildlab.analysis.tracks.many import ManyTracks, judged
 from wildlab.analysis.tracks.tracker import track
 from wildlab.evaluation.identities import Identities
-from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import Settings
 from wildlab.reporting.figures import BLUE, ORANGE, new_figure
 from wildlab.reporting.report import Report
 from wildlab.studies.autoferry_many.scores import BEST, medians, row_of

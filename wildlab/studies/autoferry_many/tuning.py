@@ -10,7 +10,8 @@ import numpy as np
 from wildlab.analysis.tracks.many import judged
 from wildlab.analysis.tracks.tracker import track
 from wildlab.evaluation.identities import Identities
-from wildlab.flight.following import (
+from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import (
     HullPart,
     ManySensorPart,
     ManyTargetsPart,
@@ -19,7 +20,6 @@ from wildlab.flight.following import (
     Settings,
     TargetsPart,
 )
-from wildlab.flight.store import Flight
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST
 from wildlab.studies.autoferry.tracks import tune_sensor
 
