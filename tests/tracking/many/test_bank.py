@@ -393,3 +393,24 @@ def test_an_impossible_confirmation_is_refused():
     looks, _ = still([COMES_BACK])
     with pytest.raises(WildlabError, match="6 of 5 scans"):
         follow(looks, Life(confirm=(6, 5)))
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    GENERATORS, st.sampled_from(RULES), st.sampled_from([Life(), Life(max_age=8.0), Life(max_absence=3.0)])
+)
+def test_compiled_images_are_those_that_are_written_out(rng, rule, life):
+    """Two targets seen now and then with clutter: with the loop over quiet images and without it."""
+    image = np.sort(np.r_[np.repeat(np.arange(40), 2), rng.integers(0, 120, 30)])
+    owner = np.arange(len(image)) % 2
+    looks = Looks(image, 200.0 * owner[:, None] + rng.normal(0, 12, (len(image), 2)), INTERVAL)
+    known = np.where(
+        rng.random((len(image), 2)) < 0.9, rng.normal(0, 1, (len(image), 2)) + 3 * owner[:, None], np.nan
+    )
+    appearance = Appearance(known, np.ones(2), np.array([1.0, 0.5]))
+    tuning = TUNING._replace(life=life)
+    compiled = run_bank(looks, tuning, rule, appearance)
+    everywhere = {int(one): lambda places: np.ones(len(places), bool) for one in range(121)}
+    written = run_bank(looks._replace(sees=everywhere), tuning, rule, appearance)
+    for name in SAME:
+        assert np.allclose(getattr(compiled, name), getattr(written, name), rtol=1e-9, equal_nan=True), name

@@ -7,7 +7,7 @@ again by where its target can have come to and by what it looks like.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -18,12 +18,14 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import innovation_squared
 from wildlab.tracking.kalman import predict, update
+from wildlab.tracking.many import bank_kernel
 from wildlab.tracking.many.appearance import (
     DISTANCE,
     FEATURES,
     RULES,
     STATE,
     Appearance,
+    Limits,
     alike_limit,
     associate,
     estimated_distances,
@@ -416,7 +418,18 @@ def run_bank(
     once_more = None if by is None else recall
     states: list[tuple[Index, Array, Array]] = []
     waiting, before, views = np.empty(0, int), 0, looks.sees or {}
-    for image, rows in _images(looks.image):
+    images, firsts = np.unique(looks.image, return_index=True)
+    ends = np.append(firsts, len(looks.image))[1:]
+    quiet = _quiet_images(looks, tuning, rule, by, limits, images, ends, motion)
+    while len(states) < len(images):
+        if quiet is not None and len(alive.number):
+            alive, xs, Ps = quiet(len(states), before, alive, track)
+            if len(xs):
+                states += [(alive.number, *one) for one in zip(xs, Ps, strict=True)]
+                waiting, before = waiting[:0], int(images[len(states) - 1])
+                continue
+        k = len(states)
+        image, rows = int(images[k]), np.arange(firsts[k], ends[k])
         z = looks.positions[rows]
         free = np.ones(len(rows), bool)
         if len(alive.number):
@@ -479,7 +492,50 @@ def run_bank(
     x, P = _padded(states, len(book.started))
     numbers = (np.array(one, int) for one in (book.started, book.identity, book.ended))
     first, identity, ended = numbers
-    return Bank(track, first, np.unique(looks.image), x, P, identity, ended, np.array(book.believed, bool))
+    return Bank(track, first, images, x, P, identity, ended, np.array(book.believed, bool))
+
+
+#: Place of the first image, number of the one before, tracks and (D,) numbers of tracks -> the tracks after
+#: all images that are quiet, none or more, and their states after each.
+_Quiet = Callable[[int, int, Alive, Index], tuple[Alive, Array, Array]]
+
+
+def _quiet_images(
+    looks: Looks, tuning: Tuning, rule: str, appearance: Appearance | None, limits: Limits, images: Index,
+    ends: Index, motion: Motion,
+) -> _Quiet | None:  # fmt: skip
+    """What follows tracks while nothing but updates happens; None where views or confirmation count."""
+    life = tuning.life
+    if looks.sees is not None or life.confirm:
+        return None
+    gaps, steps = np.unique(np.diff(images, prepend=images[0]), return_inverse=True)
+    F, Q = (np.array([motion(int(gap))[part] for gap in gaps]) for part in (0, 1))
+    R = tuning.measurement**2 * np.eye(2)
+    sd, weights, features = np.ones(0), np.ones(0), np.empty((len(looks.image), 0))
+    if appearance is not None:
+        sd, features = appearance.sd, appearance.features
+        weights = appearance.weights if rule == FEATURES else appearance.used
+    counts = np.arange(len(sd) + 1.0)
+    wider = gate_with_more(tuning.gate, weights.sum() + 0 * counts) - gate_with_more(tuning.gate, counts)
+    longest = np.array([life.max_absence, life.max_age, life.max_sd])
+    z = np.ascontiguousarray(looks.positions)
+    features, code = np.ascontiguousarray(features), RULES.index(rule)
+
+    def follow(start: int, before: int, alive: Alive, track: Index) -> tuple[Alive, Array, Array]:
+        parts: list[Any] = [np.ascontiguousarray(one) for one in alive]
+        now = Alive._make(parts)
+        taken = np.full(len(track), -1)
+        xs, Ps = (np.empty((len(images), *one.shape)) for one in (now.x, now.P))
+        stop = bank_kernel.follow_quietly(
+            start, before, images, ends, z, features, steps, F, Q, R, code, *limits, sd, weights, wider,
+            looks.interval, longest, now.x, now.P, now.x_then, now.P_then, now.stored, now.total, now.known,
+            now.last, now.absent, taken, xs, Ps,
+        )  # fmt: skip
+        done = taken >= 0
+        track[done] = now.number[taken[done]]
+        return now, xs[start:stop], Ps[start:stop]
+
+    return follow
 
 
 class _Book(NamedTuple):
@@ -560,13 +616,6 @@ def _check(looks: Looks, rule: str, appearance: Appearance | None) -> None:
             "sort them by image, and leave out those without a position",
             field="looks",
         )
-
-
-def _images(image: Index) -> Iterator[tuple[int, Index]]:
-    numbers, first = np.unique(image, return_index=True)
-    ends = np.append(first, len(image))[1:]
-    for number, a, b in zip(numbers, first, ends, strict=True):
-        yield int(number), np.arange(a, b)
 
 
 def _motion(images: int, sd: float, interval: float) -> tuple[Array, Array]:
