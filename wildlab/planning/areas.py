@@ -186,7 +186,15 @@ def inside_of(corners: ArrayLike) -> Callable[[Array], NDArray[np.bool_]]:
     edges = np.roll(fence, -1, axis=0) - fence
     inward = np.stack([-edges[:, 1], edges[:, 0]])
     least = np.einsum("ki,ik->k", fence, inward)
-    return lambda points: np.asarray((points @ inward > least).all(axis=-1))
+
+    def inside(points: Array) -> NDArray[np.bool_]:
+        north, east, within = points[..., 0], points[..., 1], np.ones(points.shape[:-1], bool)
+        # Side by side: numpy is slow to ask whether all of a few are true.
+        for (a, b), limit in zip(inward.T, least, strict=True):
+            within &= a * north + b * east > limit
+        return within
+
+    return inside
 
 
 def rectangle(north: float, east: float, length: float, width: float, course: float) -> Array:

@@ -250,19 +250,25 @@ def run_filter(name: str, world: World, seed: int) -> FollowedAnimals:
     return follow(world.images, world.land, world.detector, follower_of(name, world, seed), world.motion)
 
 
-def run_patrol(world: World, seed: int, visits: Visits) -> Patrolled:
-    """One search of all enclosures in rows, with visits to animals that are known (F 5.3)."""
+def patrol_times(world: World) -> Array:
+    """When the images of a search are taken, (T,) s."""
+    return np.arange(0.0, LAPS * world.lap, PATROL_S)
+
+
+def run_patrol(world: World, herd: Array, seed: int, visits: Visits) -> Patrolled:
+    """One search of all enclosures in rows, with visits to animals that are known (F 5.3).
+
+    ``herd`` (T, A, 2): where they are at `patrol_times`, m.
+    """
     twin = world.twin
     pattern = rows_of(twin, world.fences)
-    times = np.arange(0.0, LAPS * world.lap, PATROL_S)
     aircraft = Aircraft(
         uav.camera_of(twin), rolling(twin), twin.flight.altitude.si, twin.flight.airspeed.si, world.errors,
         world.detector,
     )  # fmt: skip
     return patrol(
-        world.land, aircraft, pattern.rows.reshape(-1, 2), np.repeat(pattern.area, 2), world.lives, times,
-        herds(twin, world.fences, times, seed), particles_of(world, seed, True), visits,
-        stream(seed, "patrol"),
+        world.land, aircraft, pattern.rows.reshape(-1, 2), np.repeat(pattern.area, 2), world.lives,
+        patrol_times(world), herd, particles_of(world, seed, True), visits, stream(seed, "patrol"),
     )  # fmt: skip
 
 
@@ -305,15 +311,14 @@ def _uniform_trace(fence: Array) -> float:
     return float((sides**2).sum() / 12)
 
 
-def patrol_numbers(world: World, flown: Patrolled, seed: int, until: float) -> dict[str, float]:
+def patrol_numbers(world: World, herd: Array, flown: Patrolled, until: float) -> dict[str, float]:
     """What is compared of a search with visits and of one without, by name.
 
     Animals out of sight count while their enclosure is searched, which is when they may be visited, and up to
     ``until``, s: when the shorter of the two searches ended.
     """
-    truth = herds(world.twin, world.fences, np.arange(0.0, LAPS * world.lap, PATROL_S), seed)
     done = np.minimum(np.repeat(flown.done, world.lives), until)
-    away = out_of_sight(flown.known[::EVERY], flown.found, flown.times, truth, done)
+    away = out_of_sight(flown.known[::EVERY], flown.found, flown.times, herd, done)
     back = found_on_visits(flown)
     return {
         **sight_numbers(away),
@@ -324,7 +329,7 @@ def patrol_numbers(world: World, flown: Patrolled, seed: int, until: float) -> d
         "visits": float(len(back)),
         "given_up": float(len(flown.given_up)),
         "done": float(np.isfinite(flown.done).mean()),
-        "animals_share": len({one.animal for one in flown.found}) / truth.shape[1],
+        "animals_share": len({one.animal for one in flown.found}) / herd.shape[1],
     }
 
 
@@ -352,9 +357,12 @@ def all_runs(seed: int, twin: str, second: str) -> tuple[Runs, dict[tuple[str, s
     followed = {
         (name, one): run_filter(one, world, seed) for name, world in worlds.items() for one in FILTERS
     }
+    uav_world = worlds[UAV]
+    herd = herds(uav_world.twin, uav_world.fences, patrol_times(uav_world), seed)
     patrolled = {
-        REVISITS: run_patrol(worlds[UAV], seed, VISITS), ROWS: run_patrol(worlds[UAV], seed, ROWS_ALONE)
-    }  # fmt: skip
+        name: run_patrol(uav_world, herd, seed, visits)
+        for name, visits in ((REVISITS, VISITS), (ROWS, ROWS_ALONE))
+    }
     numbers: dict[tuple[str, str], float] = {}
     for name, world in worlds.items():
         numbers |= {(name, key): value for key, value in platform_numbers(world).items()}
@@ -363,7 +371,7 @@ def all_runs(seed: int, twin: str, second: str) -> tuple[Runs, dict[tuple[str, s
         numbers |= {(f"{name}-{one}", key): value for key, value in found.items()}
     both = min(float(flown.times[-1]) for flown in patrolled.values())
     for name, flown in patrolled.items():
-        found = patrol_numbers(worlds[UAV], flown, seed, both)
+        found = patrol_numbers(uav_world, herd, flown, both)
         numbers |= {(name, key): value for key, value in found.items()}
     return Runs(worlds, followed, patrolled), numbers
 

@@ -77,6 +77,31 @@ def weighted_moments(x: Array, w: Array) -> tuple[Array, Array]:
     return mean, covariance
 
 
+@compiled
+def weighed(w: Array, given: Array) -> tuple[Array, Array, bool]:
+    """New weights (A, N), log evidence (A,), and whether the log likelihoods (A, N) are all known."""
+    rows, particles = w.shape
+    after, log_evidence = w.copy(), np.full(rows, -np.inf)
+    for a in range(rows):
+        top = -np.inf
+        for i in range(particles):
+            if np.isnan(given[a, i]) or given[a, i] == np.inf:
+                return after, log_evidence, False
+            if w[a, i] > 0 and given[a, i] > top:
+                top = given[a, i]
+        if top == -np.inf:
+            continue
+        # The largest one of those that have any weight is taken out, so that the sum is not zero.
+        total = 0.0
+        for i in range(particles):
+            after[a, i] = w[a, i] * np.exp(given[a, i] - top) if w[a, i] > 0 else 0.0
+            total += after[a, i]
+        for i in range(particles):
+            after[a, i] /= total
+        log_evidence[a] = np.log(total) + top
+    return after, log_evidence, True
+
+
 #: Places (..., 2) m -> whether each lies in an enclosure.
 Inside = Callable[[Array], NDArray[np.bool_]]
 
@@ -140,21 +165,13 @@ def weigh(cloud: Cloud, log_likelihood: ArrayLike) -> Weighed:
     [[0.75 0.25]] [0.6]
     """
     given = np.broadcast_to(np.asarray(log_likelihood, float), cloud.w.shape)
-    if np.isnan(given).any() or (given == np.inf).any():
+    w, log_evidence, known = weighed(np.ascontiguousarray(cloud.w), np.ascontiguousarray(given))
+    if not known:
         raise WildlabError(
             "a likelihood is not a number",
             "give minus infinity where a particle cannot have made the measurement",
             field="log_likelihood",
         )
-    # The largest one of those that have any weight is taken out, so that no sum comes out as zero.
-    top = np.where(cloud.w > 0, given, -np.inf).max(axis=1, keepdims=True)
-    possible = np.isfinite(top[:, 0])
-    top = np.where(possible[:, None], top, 0.0)
-    raw = np.where(cloud.w > 0, cloud.w * np.exp(np.minimum(given - top, 0.0)), 0.0)
-    total = raw.sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        w = np.where(possible[:, None], raw / total[:, None], cloud.w)
-        log_evidence = np.where(possible, np.log(total) + top[:, 0], -np.inf)
     return Weighed(Cloud(cloud.x, w), log_evidence)
 
 

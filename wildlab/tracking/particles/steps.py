@@ -319,22 +319,7 @@ def step_nearest(
     usable = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
     look = look._replace(z=z[usable], R=R[usable])
     herd = moved(herd, look, rules, rng)
-    mean, covariance = moments(herd.cloud)
-    squared = mahalanobis_squared(mean, covariance, look.z, look.R)
-    taken = nearest_animal(np.where(herd.lost[:, None], np.inf, squared), rules.gate_probability)
-    # Then those that were lost, one detection each: a lap later no two are likely to be one animal's.
-    limit = min(gate_threshold(rules.gate_probability, 2), 1e6)
-    free = taken < 0
-    again = one_to_one(np.where(herd.lost[:, None] & free, limit - squared, -np.inf))
-    taken = np.where(free, again, taken)
-    given = np.zeros(herd.cloud.w.shape)
-    seen = np.zeros(len(herd.identity), bool)
-    for j in np.flatnonzero(taken >= 0):
-        a = taken[j]
-        given[a] += log_likelihood(herd.cloud.x[a, :, :2], look.z[j], look.R[j])
-        seen[a] = True
-    found, _ = weigh(herd.cloud, given)
-    found = _revived(found, seen, mean, covariance, taken, look, rng)
+    taken, seen, found = _associated(herd, look, rules, rng)
     unseen, log_nothing = weigh_unseen(herd.cloud, look.sight(herd.cloud.x[..., :2]))
     missed = np.where(seen, 1.0, herd.missed * np.exp(log_nothing))
     w = np.where(seen[:, None], found.w, unseen.w) if rules.negative else found.w
@@ -345,12 +330,39 @@ def step_nearest(
     new = np.flatnonzero(taken < 0)
     names = np.where(taken >= 0, np.append(herd.identity, 0)[taken], 0)
     names[new] = herd.born + 1 + np.arange(len(new))
-    herd = _lost(with_new(herd, start_tracks(look.z[new], look.R[new], rules, rng), look.time), rules)
+    if len(new):
+        herd = with_new(herd, start_tracks(look.z[new], look.R[new], rules, rng), look.time)
+    herd = _lost(herd, rules)
     if len(herd.identity):
         herd = herd._replace(cloud=resample(herd.cloud, rng, rules.scheme, rules.threshold)[0])
     aligned = np.zeros(len(z), np.int64)
     aligned[usable] = names
     return herd, aligned
+
+
+def _associated(
+    herd: Herd, look: ImageLook, rules: Rules, rng: np.random.Generator
+) -> tuple[Integers, NDArray[np.bool_], Cloud]:
+    """The track (M,) of each detection, -1 for none; which tracks (A,) took any; their clouds after it."""
+    taken, seen = np.zeros(0, np.int64), np.zeros(len(herd.identity), bool)
+    if not len(look.z):
+        # Of no use where clouds without a detection are weighed by that.
+        return taken, seen, herd.cloud if rules.negative else weigh(herd.cloud, 0.0).cloud
+    mean, covariance = moments(herd.cloud)
+    squared = mahalanobis_squared(mean, covariance, look.z, look.R)
+    taken = nearest_animal(np.where(herd.lost[:, None], np.inf, squared), rules.gate_probability)
+    # Then those that were lost, one detection each: a lap later no two are likely to be one animal's.
+    limit = min(gate_threshold(rules.gate_probability, 2), 1e6)
+    free = taken < 0
+    again = one_to_one(np.where(herd.lost[:, None] & free, limit - squared, -np.inf))
+    taken = np.where(free, again, taken)
+    given = np.zeros(herd.cloud.w.shape)
+    for j in np.flatnonzero(taken >= 0):
+        a = taken[j]
+        given[a] += log_likelihood(herd.cloud.x[a, :, :2], look.z[j], look.R[j])
+        seen[a] = True
+    found = weigh(herd.cloud, given).cloud
+    return taken, seen, _revived(found, seen, mean, covariance, taken, look, rng)
 
 
 def _revived(
