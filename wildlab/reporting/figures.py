@@ -38,7 +38,7 @@ DPI = 190
 #: What a figure has of the inches that a chart asks for: letters of 10 points then have 11 pixels on a phone,
 #: where 6 inches asked for are 361 pixels.
 WIDTH, HEIGHT = 0.76, 0.82
-#: Set in the environment of a first look, whose figures are soon replaced: no PDF, half of a figure's time.
+#: Set in the environment of a first look and of pages on a user's flight: no PDF, half of a figure's time.
 QUICK = "WILDLAB_QUICK_FIGURES"
 #: Points of a line beyond which a figure only grows: more than a screen has columns.
 MOST_POINTS = 3000
@@ -375,7 +375,7 @@ def _shown(figure: Figure, about: dict[str, Any]) -> tuple[bytes, dict[str, Any]
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> bytes:
-    """Write ``name.png`` into ``folder``, and but for a first look ``name.pdf``: the same bytes each time.
+    """Write ``name.png`` into ``folder``, and ``name.pdf`` unless `QUICK`: the same bytes each time.
 
     Parameters
     ----------

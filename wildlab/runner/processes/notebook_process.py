@@ -79,7 +79,7 @@ def _keep_to_ourselves(job: Job) -> None:
         PYTHONHASHSEED="0",
         TZ="UTC",
     )
-    if job.first_look:
+    if job.first_look or job.flight:
         os.environ[QUICK] = "1"
     log = os.open(Path(job.work) / ".log", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     for stream in (1, 2):
