@@ -12,7 +12,7 @@ from benchmarks.timing import best_of
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose
-from wildlab.studies.sensitivity.tables import TAU2
+from wildlab.studies.sensitivity import TAU2
 
 N = 1_000_000
 

@@ -343,7 +343,7 @@ def test_no_copyleft_in_the_lock():
         ("analysis/a.py", "from wildlab.reporting import page", "analysis may not import reporting"),
         ("attic/a.py", "x = 1", "the room attic is not in MAY_IMPORT"),
         ("flight/a.py", "from IPython.display import display", "know about notebooks"),
-        ("studies/autoferry_many/comparison.py", "import stonesoup.tracker", "is an oracle"),
+        ("studies/autoferry_many/tuning.py", "import stonesoup.tracker", "is an oracle"),
         ("analysis/a.py", "from osgeo import gdal", "is an oracle"),
         ("detection/a.py", "from ultralytics import YOLO", "copyleft"),
         ("flight/a.py", "import pickle", "can run code"),

@@ -18,7 +18,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_pose
-from wildlab.studies.sensitivity.tables import TAU2
+from wildlab.studies.sensitivity import TAU2
 
 SPEED = 15.0
 

@@ -27,7 +27,7 @@ from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
 from wildlab.navigation.timeline import ImuSamples
 from wildlab.paths import DATA
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.navigation.receiver import left_over
+from wildlab.studies.navigation.logged import left_over
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from wildlab.analysis.tracks.noise_model import from_tuning
 from wildlab.analysis.tracks.scans import errors_near, scans_of, sensors_of, truths_at
 from wildlab.analysis.tracks.sensor_tuning import SensorTuning
 from wildlab.analysis.tracks.tracks import SensorTrack
-from wildlab.studies.autoferry.tracks import BOATS, tune_sensor
+from wildlab.studies.autoferry import BOATS, tune_sensor
 
 EXACT = {"kind": "position", "range_sd": 0.0, "bearing_sd_deg": 0.0, "position_sd": 0.0}
 

@@ -10,7 +10,7 @@ from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.uncertainty import ground_jacobians
-from wildlab.studies.sensitivity.tables import TAU2
+from wildlab.studies.sensitivity import TAU2
 
 ASSUMED = {
     "position_horizontal": 2.0,

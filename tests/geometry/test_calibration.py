@@ -17,7 +17,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, mount_rotation
-from wildlab.studies.sensitivity.tables import TAU2
+from wildlab.studies.sensitivity import TAU2
 
 PLAIN = Mount("down")
 TRUE = Mount("down", misalignment=(0.03, -0.04, 0.02))

@@ -17,7 +17,7 @@ from wildlab.geometry.uncertainty import (
     ray_flatness,
     sample_ground,
 )
-from wildlab.studies.sensitivity.tables import TAU2
+from wildlab.studies.sensitivity import TAU2
 
 BENT = Camera(640, 512, 700.0, 705.0, 322.0, 250.0, 1.5, (-0.1, 0.05, 0.001, -0.002, 0.0))
 ZERO = np.zeros(3)

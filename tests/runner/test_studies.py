@@ -22,9 +22,9 @@ from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.run import run_studies
 from wildlab.runner.trials import split_keys
-from wildlab.studies.line_of_sight.timing import WAYS
+from wildlab.studies.line_of_sight import WAYS
 from wildlab.studies.line_of_sight.trial import HEIGHTS, VIEW
-from wildlab.studies.printed_numbers.pairs import all_pairs
+from wildlab.studies.printed_numbers import all_pairs
 from wildlab.studies.protocol import run_trial
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,7 @@ from wildlab.analysis.tracks.sensor_tuning import SensorTuning
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
 from wildlab.paths import DATA
-from wildlab.studies.autoferry.tracks import tune_sensor
+from wildlab.studies.autoferry import tune_sensor
 
 __all__ = ["make_flight"]
 

@@ -10,8 +10,8 @@ import pytest
 from wildlab.analysis.tracks.comparison import FILTERS, follow_flight, table
 from wildlab.analysis.tracks.sensor_tuning import SensorTuning
 from wildlab.flight.store import Flight
+from wildlab.studies.autoferry import BOATS
 from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes
-from wildlab.studies.autoferry.tracks import BOATS
 
 pytestmark = pytest.mark.slow
 SCENARIOS = (2, 3, 13)

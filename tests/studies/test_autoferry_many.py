@@ -9,7 +9,8 @@ import pytest
 from wildlab.evaluation.identities import Moment, compare_identities
 from wildlab.flight.files import dump_toml
 from wildlab.flight.tracking_settings import parse_settings
-from wildlab.studies.autoferry_many import scores, tuning
+from wildlab.studies import autoferry_many
+from wildlab.studies.autoferry_many import tuning
 from wildlab.studies.autoferry_many.tuning import Lasting, Tuned, anees_of, draw, order
 
 OFFSETS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
@@ -49,7 +50,7 @@ def rows() -> pd.DataFrame:
 
 
 def test_what_it_was_tuned_on_is_in_no_median():
-    middle = scores.medians(rows(), "s1").set_index("mode")
+    middle = autoferry_many.medians(rows(), "s1").set_index("mode")
     assert middle["best"].to_dict() == {"radar": 8.0, "lidar": 5.0, "both": 8.0}
     assert middle["most"].to_dict() == {"radar": 16.0, "lidar": 10.0, "both": 16.0}
     assert (middle["of"] == 2).all() and (middle["tracked"] == 90.0).all()
@@ -59,7 +60,7 @@ def test_what_it_was_tuned_on_is_in_no_median():
 
 def test_what_was_not_counted_is_no_zero():
     counted = ["tracked", "swaps", "breaks"]
-    middle = scores.medians(rows().drop(columns=counted), "s1")
+    middle = autoferry_many.medians(rows().drop(columns=counted), "s1")
     assert middle[["tracked", "changes"]].isna().all(axis=None)
 
 

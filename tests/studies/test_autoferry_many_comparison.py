@@ -9,7 +9,8 @@ import pytest
 from wildlab.analysis.tracks.many import ManyTracks, judged
 from wildlab.analysis.tracks.tracker import track
 from wildlab.errors import WildlabError
-from wildlab.studies.autoferry_many import comparison, scores, stone_soup, tuning
+from wildlab.studies import autoferry_many
+from wildlab.studies.autoferry_many import stone_soup, tuning
 from wildlab.studies.autoferry_many.stone_soup import Choice, Eye, draw_choice, run_stone_soup
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many import ManySensorModel, Scan, Shown
@@ -127,9 +128,9 @@ def test_it_is_judged_at_our_looks_by_our_truths(monkeypatch):
         given.append(args)
         return true
 
-    monkeypatch.setattr(comparison, "run_stone_soup", run)
+    monkeypatch.setattr(autoferry_many, "run_stone_soup", run)
     ours = followed(scans, none)
-    theirs = comparison.replace_tracks(ours, dense())
+    theirs = autoferry_many.replace_tracks(ours, dense())
     assert given == [(scans, ["lidar", "radar"], dense())] and given[0][0] is ours.scans
     assert theirs._replace(shown=ours.shown) == ours
     lives, other = judged(ours, {"Havfruen": 55.0}), judged(theirs, {"Havfruen": 55.0})
@@ -157,15 +158,15 @@ def table(values: dict[str, tuple[float, ...]], spread: float = 1.0) -> pd.DataF
 
 def test_its_gospa_stands_after_ours_and_with_its_own_scenario():
     ours, other = table({"radar": (1, 2, 3, 4)}), table({"radar": (5, 6, 7, 8)}).iloc[::-1]
-    joined = scores.scenarios_table(ours, other, {"radar": "Radar"})
+    joined = autoferry_many.scenarios_table(ours, other, {"radar": "Radar"})
     assert joined["theirs"].tolist() == [5, 6, 7, 8] and set(joined["mode"]) == {"Radar"}
 
 
 def test_draws_are_those_of_their_seed_and_within_their_ranges():
-    one, same, other = (draw_choice(np.random.default_rng(n), comparison.FAR_M) for n in (1, 1, 2))
+    one, same, other = (draw_choice(np.random.default_rng(n), autoferry_many.FAR_M) for n in (1, 1, 2))
     assert one == same != other
     for seed in range(50):
-        drawn = draw_choice(np.random.default_rng(seed), comparison.FAR_M)
+        drawn = draw_choice(np.random.default_rng(seed), autoferry_many.FAR_M)
         assert 105 <= drawn.eyes["lidar"].far_m <= 140 and drawn.eyes["radar"].far_m == 200
         assert 2 <= drawn.hits <= 6 and (drawn.moves_m == 0 or 4 <= drawn.moves_m <= 12)
 
@@ -174,21 +175,24 @@ def test_without_the_library_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr(stone_soup.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(WildlabError, match=r"\[oracles\]"):
         run_stone_soup([], [], dense())
-    none = comparison.judge_stone_soup({}, {}, 40, 1)
+    none = autoferry_many.judge_stone_soup({}, {}, 40, 1)
     ours = table({"radar": (1, 2, 3, 4)})
-    assert not len(none) and scores.scenarios_table(ours, none, {"radar": "Radar"})["theirs"].isna().all()
-    assert comparison.gospa_chart(ours, none, "scenario-2", {}) is None
+    assert (
+        not len(none)
+        and autoferry_many.scenarios_table(ours, none, {"radar": "Radar"})["theirs"].isna().all()
+    )
+    assert autoferry_many.gospa_chart(ours, none, "scenario-2", {}) is None
 
 
 @pytest.mark.slow
 def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, monkeypatch):  # type: ignore[no-untyped-def]
     pytest.importorskip("stonesoup")
     flights = {f"scenario-{n}": scenario(n) for n in (2, 17)}
-    monkeypatch.setattr(comparison, "FOR_EACH", 1)
+    monkeypatch.setattr(autoferry_many, "FOR_EACH", 1)
     monkeypatch.setattr(tuning, "tune_sensor", lambda flight, sensor: tunings[sensor])
     settings = tuning.draw(np.random.default_rng(1), tuning.errors_of(scenario(2)))
-    rows = comparison.judge_stone_soup(flights, dict.fromkeys(tuning.MODES, settings), 2, 1)
-    assert rows["mode"].unique().tolist() == comparison.position_modes() and len(rows) == 2 * 2 * 3
+    rows = autoferry_many.judge_stone_soup(flights, dict.fromkeys(tuning.MODES, settings), 2, 1)
+    assert rows["mode"].unique().tolist() == autoferry_many.position_modes() and len(rows) == 2 * 2 * 3
     first = rows[rows["case"] == "scenario-2"]
     assert (first["gospa"] == first["tuned_gospa"]).all()
     for _, own in first.groupby("mode"):
@@ -196,7 +200,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, mo
         assert rule == sorted(rule) and sorted(own["draw"]) == [1, 2]
     # One of them by hand, from the flight on.
     row = rows[(rows["case"] == "scenario-17") & (rows["mode"] == "radar") & (rows["rank"] == 2)].iloc[0]
-    drawn = draw_choice(np.random.default_rng(1).spawn(2)[row["draw"] - 1], comparison.FAR_M)
+    drawn = draw_choice(np.random.default_rng(1).spawn(2)[row["draw"] - 1], autoferry_many.FAR_M)
     given = track(scenario(17), "joint", settings=settings, sensors=["radar"])
     shown = run_stone_soup(given.scans, ["radar"], drawn)
     lives = judged(given._replace(shown=shown), tuning.reach_of(scenario(17), "radar"))
@@ -205,7 +209,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, mo
 
 def test_what_is_compared_are_medians_of_the_scenarios_that_nothing_is_tuned_on():
     ours, theirs = table({"radar": (1, 7, 8, 9)}), table({"radar": (9, 9, 9, 8)})
-    (found,) = comparison.compared(ours, theirs, "scenario-2").to_dict("records")
+    (found,) = autoferry_many.compared(ours, theirs, "scenario-2").to_dict("records")
     assert (found["ours"], found["theirs"], found["smaller"], found["of"]) == (8.0, 9.0, 2, 3)
     assert (found["ours_least"], found["ours_most"]) == (8.0, 9.0)
-    assert comparison.compared(ours, theirs[theirs["case"] == "scenario-2"], "scenario-2").empty
+    assert autoferry_many.compared(ours, theirs[theirs["case"] == "scenario-2"], "scenario-2").empty

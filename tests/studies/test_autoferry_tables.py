@@ -12,8 +12,7 @@ from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.messages.page_texts import load_texts
 from wildlab.reporting.report import Report, open_report
-from wildlab.studies.autoferry import charts
-from wildlab.studies.autoferry import tracks as recorded_tracks
+from wildlab.studies import autoferry
 from wildlab.studies.autoferry.comparison import KEYS, Held, of_use, outcomes, with_hindsight
 
 NAMES = load_texts("autoferry").subjects
@@ -67,7 +66,7 @@ def recorded(report: Report) -> dict[tuple[str, str], float]:
 
 
 def test_every_track_has_the_numbers_of_its_kind(report, tracks):
-    recorded_tracks.record_tracks(report, tracks)
+    autoferry.record_tracks(report, tracks)
     found = recorded(report)
     lidar = {name for name, subject in found if subject == "lidar/a/scenario-3/kf"}
     camera = {name for name, subject in found if subject == "eo/a/scenario-3/ekf"}
@@ -82,8 +81,8 @@ def test_every_track_has_the_numbers_of_its_kind(report, tracks):
 
 def test_what_was_fitted_is_recorded_with_its_interval(report):
     tunings = {"lidar": LIDAR, "eo": CAMERA}
-    recorded_tracks.record_tunings(report, tunings)
-    rows = recorded_tracks.tunings_table(tunings, NAMES)
+    autoferry.record_tunings(report, tunings)
+    rows = autoferry.tunings_table(tunings, NAMES)
     assert rows["offset"].tolist() == ["−0.90 (−1.1 to −0.8)", "−1.00 (−2.0 to 0.5)"]
     assert rows["sd"].tolist() == ["3.0 m", "2.0°"]
     metric = next(m for m in report._metrics if m["subject"] == "lidar" and m["name"] == "clock_offset")
@@ -128,14 +127,14 @@ def test_nothing_of_use_is_a_page_all_the_same(report):
     use = of_use(rows)
     useful = rows[rows["sensor"].isin(use.loc[use["of_use"], "sensor"])]
     held = Held("schmidt", rows, use, judged(useful), with_hindsight(useful, KEYS))
-    for one in recorded_tracks.tables(held, {}, NAMES).values():
+    for one in autoferry.tables(held, {}, NAMES).values():
         report.table(one)
-    recorded_tracks.record(report, rows.iloc[:0], {}, held)
-    charts.mean_nees(rows, NAMES)
+    autoferry.record(report, rows.iloc[:0], {}, held)
+    autoferry.mean_nees(rows, NAMES)
 
 
 def test_tables_count_every_track():
-    rows = recorded_tracks.outcomes_table(FEW, NAMES).set_index("sensor")
+    rows = autoferry.outcomes_table(FEW, NAMES).set_index("sensor")
     assert rows["tracks"].to_dict() == {"Lidar": 3, "Radar": 1, "all": 4}
     assert rows.loc["all"].tolist() == [4, 1, 0, 0, 0, 2, 1]
     assert (rows.drop(columns="tracks").sum(axis=1) == rows["tracks"]).all()
@@ -143,7 +142,7 @@ def test_tables_count_every_track():
 
 def test_outcomes_are_recorded_with_their_denominator(report):
     use = of_use(made("ir", ["lost"] * 5))
-    recorded_tracks.record_outcomes(report, FEW, use, "schmidt")
+    autoferry.record_outcomes(report, FEW, use, "schmidt")
     found = {(m["name"], m["subject"]): (m["value"], m["n"]) for m in report._metrics}
     assert found["tracks_gained", "schmidt/lidar"] == (1, 3)
     assert found["tracks_spoilt", "schmidt/all-sensors"] == (2, 4)
@@ -153,7 +152,7 @@ def test_outcomes_are_recorded_with_their_denominator(report):
 
 
 def test_overview_is_of_the_tracks_that_stay(tracks):
-    rows = recorded_tracks.overview_table(tracks, NAMES).set_index(["sensor", "filter"])
+    rows = autoferry.overview_table(tracks, NAMES).set_index(["sensor", "filter"])
     assert rows.loc[("Lidar", "white noise"), "kept"] == "1 of 2"
     assert rows.loc[("Lidar", "white noise"), "rmse"] == pytest.approx(4.0)
     assert rows.loc[("Lidar", "white noise"), "inside"] == "0 of 1"
@@ -163,7 +162,7 @@ def test_overview_is_of_the_tracks_that_stay(tracks):
 
 def test_nees_over_time_shows_each_filter_and_the_band(followed):
     mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
-    figure = charts.nees_chart(mine, NAMES)
+    figure = autoferry.nees_chart(mine, NAMES)
     (ax,) = figure.axes
     assert ax.get_yscale() == "log"
     low, high = chi_square_interval(2)
@@ -174,7 +173,7 @@ def test_nees_over_time_shows_each_filter_and_the_band(followed):
 
 def test_innovations_beside_the_band_of_white_noise(followed):
     mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
-    figure = charts.innovations_chart([one for one in mine if one.filter != "schmidt"], NAMES)
+    figure = autoferry.innovations_chart([one for one in mine if one.filter != "schmidt"], NAMES)
     (ax,) = figure.axes
     assert len(ax.get_lines()) == 4
     assert all(line.get_ydata()[0] == pytest.approx(1.0) for line in ax.get_lines())

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from wildlab.studies.camera_calibration import mounting
-from wildlab.studies.camera_calibration.intrinsics import (
+from wildlab.studies.camera_calibration import calibration
+from wildlab.studies.camera_calibration.calibration import (
     calibrations,
     measure_centres,
     neglected_distortion,
     theoretical,
 )
-from wildlab.studies.sensitivity.tables import PRINTED_MISALIGNMENT_DEG, TAU2
+from wildlab.studies.sensitivity import PRINTED_MISALIGNMENT_DEG, TAU2
 
 
 def test_the_data_sheet_is_that_of_the_print_but_for_its_last_digit():
@@ -36,20 +36,22 @@ def test_the_more_a_lens_bends_the_more_neglecting_it_costs():
 
 
 def test_the_room_without_errors_gives_the_printed_angles():
-    one, angle = mounting.calibrate_once(np.random.default_rng(4), "clicks", 0.0)
+    one, angle = calibration.calibrate_once(np.random.default_rng(4), "clicks", 0.0)
     assert angle < 1e-8
-    np.testing.assert_allclose(np.degrees(mounting.printed_angles(one)), PRINTED_MISALIGNMENT_DEG, atol=1e-6)
+    np.testing.assert_allclose(
+        np.degrees(calibration.printed_angles(one)), PRINTED_MISALIGNMENT_DEG, atol=1e-6
+    )
 
 
-@pytest.mark.parametrize("cause", mounting.CAUSES)
+@pytest.mark.parametrize("cause", calibration.CAUSES)
 def test_each_cause_is_sized_to_leave_what_is_printed(cause):
-    one = mounting.explain(np.random.default_rng(5), cause, 4)
-    assert one.left == pytest.approx(mounting.PRINTED_ERROR, rel=0.5)
+    one = calibration.explain(np.random.default_rng(5), cause, 4)
+    assert one.left == pytest.approx(calibration.PRINTED_ERROR, rel=0.5)
     assert one.ground == pytest.approx(350 * np.tan(one.angle))
 
 
 def test_the_printed_error_at_the_height_of_the_flight():
-    found = mounting.error_from_height()
+    found = calibration.error_from_height()
     assert found.estimate == pytest.approx(6.68, abs=0.005)
     # The corners of what 0.0229 m and 1.2 m are rounded from, to first order.
     assert found.low == pytest.approx(0.02285 * 350 / 1.25, abs=0.02)

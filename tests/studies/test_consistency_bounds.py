@@ -3,7 +3,7 @@
 import numpy as np
 
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED
-from wildlab.studies.consistency_bounds.squares import decide
+from wildlab.studies.consistency_bounds import decide
 
 
 def test_a_share_is_decided_by_its_interval():

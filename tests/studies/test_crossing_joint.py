@@ -5,22 +5,29 @@ from types import SimpleNamespace
 import pytest
 
 from tests.studies.test_crossing_vessels import INTERVAL, passing
-from wildlab.studies.crossing_vessels.trial import joint
-from wildlab.studies.crossing_vessels.trial.crossing import BOATS, EVERY
+from wildlab.studies.crossing_vessels.trial import (
+    BOATS,
+    EVERY,
+    JOINT,
+    density_of,
+    joint_numbers,
+    joint_of,
+    joint_swapped,
+)
 
 
 @pytest.mark.slow
 def test_joint_association_of_two_far_apart_is_two_tracks():
     crossing = passing(closest=400, noise=5)
-    numbers = joint.joint_numbers(crossing)
-    assert len(joint.joint_of(crossing, joint.density_of(INTERVAL)).tracks) == 2
-    assert numbers[joint.JOINT, "swaps"] == numbers[joint.JOINT, "swapped"] == 0
-    assert numbers[joint.JOINT, "gospa"] < 10
+    numbers = joint_numbers(crossing)
+    assert len(joint_of(crossing, density_of(INTERVAL)).tracks) == 2
+    assert numbers[JOINT, "swaps"] == numbers[JOINT, "swapped"] == 0
+    assert numbers[JOINT, "gospa"] < 10
 
 
 def test_the_density_spreads_velocities_as_the_tuning_does():
     # An acceleration of 0.2 m/s^2 held over each of two images a second, for 50 s.
-    assert joint.density_of(0.5) ** 2 * 50 == pytest.approx(100 * (0.2 * 0.5) ** 2)
+    assert density_of(0.5) ** 2 * 50 == pytest.approx(100 * (0.2 * 0.5) ** 2)
 
 
 @pytest.mark.parametrize(
@@ -35,4 +42,4 @@ def test_shared_tracks_are_swapped_where_each_has_the_others(after, end, expecte
     for time in times:
         pair = (1, 2) if time < 300 else after if time < 460 else end
         told.append({boat: name for boat, name in zip(BOATS, pair, strict=True) if name is not None})
-    assert joint.joint_swapped(crossing, SimpleNamespace(followed=told)) == expected
+    assert joint_swapped(crossing, SimpleNamespace(followed=told)) == expected

@@ -13,13 +13,16 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.scene.render import SeenBody
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.crossing_vessels import charts
+from wildlab.studies import crossing_vessels
+from wildlab.studies.crossing_vessels import detected_table, rendered_table
 from wildlab.studies.crossing_vessels import rendered as study
-from wildlab.studies.crossing_vessels.outcomes import detected_table, rendered_table
 from wildlab.studies.crossing_vessels.rendered import (
+    WHOLE,
     Placed,
     Rendering,
+    Spotted,
     associate,
+    count,
     drawn_at_sea,
     follow,
     frames_in,
@@ -27,18 +30,22 @@ from wildlab.studies.crossing_vessels.rendered import (
     part_of,
     render_crossing,
     render_flights,
+    spot,
 )
-from wildlab.studies.crossing_vessels.spotted import WHOLE, Spotted, count, spot
-from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES, follow_by, identities_of, wrong_of
-from wildlab.studies.crossing_vessels.trial.crossing import (
+from wildlab.studies.crossing_vessels.trial import (
     BOATS,
+    DISTANCE,
+    FEATURES,
+    JOINT,
     NONE,
     WINDOW_S,
     Crossing,
     apart_times,
+    follow_by,
     gather,
+    identities_of,
+    wrong_of,
 )
-from wildlab.studies.crossing_vessels.trial.joint import JOINT
 from wildlab.tracking.many.appearance import Appearance
 from wildlab.tracking.many.bank import Bank, Looks
 
@@ -340,8 +347,8 @@ def test_flights_are_those_after_the_chosen_one(monkeypatch):
 
 @pytest.mark.slow
 def test_a_frame_is_the_same_when_it_is_seen_again(rendering):
-    exposure = charts.telling_exposures(rendering)[0]
-    picture = charts.picture_of(TWIN, rendering, exposure)
+    exposure = crossing_vessels.telling_exposures(rendering)[0]
+    picture = crossing_vessels.picture_of(TWIN, rendering, exposure)
     np.testing.assert_array_equal(
         picture.spotted.uv, rendering.spotted.uv[rendering.spotted.exposure == exposure]
     )
@@ -366,4 +373,4 @@ def test_tables_and_figure_are_of_what_was_rendered(rendering):
     assert table.loc[DISTANCE, "frames_wrong"] == pytest.approx(100 * one.wrong / one.own)
     assert table.loc[DISTANCE, "frames_swapped"] == 2 * one.swapped
     assert np.isnan(table.loc[JOINT, "drawn_wrong"]), "no detection is one track's"
-    assert charts.plot_frames(TWIN, [rendering]) is not None
+    assert crossing_vessels.plot_frames(TWIN, [rendering]) is not None

@@ -8,30 +8,27 @@ from wildlab.analysis.georeference import observe
 from wildlab.geometry.validation import gate_threshold
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.crossing_vessels import STUDY
+from wildlab.studies.crossing_vessels import STUDY, check_claims
 from wildlab.studies.crossing_vessels import trial as study
-from wildlab.studies.crossing_vessels.outcomes import check_claims
 from wildlab.studies.crossing_vessels.rendered import part_of
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
     FEATURES,
     LOOKS,
     SUBJECTS,
+    TUNING,
     VETO,
+    Crossing,
     all_numbers,
+    apart_times,
     distances_of,
     dressed,
     follow_by,
+    gather,
     looks_of,
     photograph,
     swapped,
     wrong_of,
-)
-from wildlab.studies.crossing_vessels.trial.crossing import (
-    TUNING,
-    Crossing,
-    apart_times,
-    gather,
 )
 from wildlab.tracking.many.appearance import Appearance
 from wildlab.tracking.many.bank import Bank, Looks

@@ -7,8 +7,8 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.reporting.published import load_claims
+from wildlab.studies import end_to_end
 from wildlab.studies.coloured_noise import trial as coloured
-from wildlab.studies.end_to_end import tables
 from wildlab.studies.end_to_end.trial import (
     COLOURED,
     DRAWN,
@@ -113,11 +113,11 @@ def test_verdicts_stand_side_by_side():
         DRAWN: {"one": {"a": Check(true=many), "b": Check(true=many)}},
         RENDERED: {"one": {"a": Check(true=many), "b": Check(true=~many)}},
     }
-    table = tables.verdicts_table(checks, claims)
+    table = end_to_end.verdicts_table(checks, claims)
     assert table["flights"].tolist() == [0, 40]
     assert table["verdict_drawn"].tolist() == ["holds", "holds"]
     assert table["verdict_rendered"].tolist() == ["holds", "does not hold"]
-    assert tables.count_turned(table) == 1
+    assert end_to_end.count_turned(table) == 1
     assert table[RENDERED].tolist() == ["holds: 40 of 40", "does not hold: 0 of 40"]
 
 
@@ -144,8 +144,8 @@ def test_own_claims_follow_the_numbers(numbers):
 
 def test_intervals_of_shares_stay_within_all_and_none():
     values = pd.Series([0.9, 1.0, 1.0])
-    assert tables.interval_text(values, 100, 0, share=True) == "97 (82 to 100)"
-    assert tables.interval_text(values, 100, 0) == "97 (82 to 111)"
+    assert end_to_end.interval_text(values, 100, 0, share=True) == "97 (82 to 100)"
+    assert end_to_end.interval_text(values, 100, 0) == "97 (82 to 111)"
 
 
 def test_a_count_has_no_end_at_one(numbers):
@@ -153,7 +153,7 @@ def test_a_count_has_no_end_at_one(numbers):
         spread_of(numbers, {(RENDERED, "false_alarms_per_image"): alarms}, flights=1)
         for alarms in (1.0, 1.2, 1.4)
     ]
-    table = tables.detections_table(pd.concat(rows), {name: name for name in PIXEL_UNITS}).set_index(
+    table = end_to_end.detections_table(pd.concat(rows), {name: name for name in PIXEL_UNITS}).set_index(
         "quantity"
     )
     assert table.loc["false_alarms_per_image", RENDERED] == "1.200 (0.703 to 1.697)"

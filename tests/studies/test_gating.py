@@ -16,7 +16,18 @@ from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.reporting.report import open_report
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.gating import kernels
+from wildlab.studies.gating import (
+    DEFAULT,
+    READINGS,
+    claim_margins,
+    kernels,
+    metrics_of,
+    standard_error,
+    subject,
+    variations,
+    vary,
+    verdict,
+)
 from wildlab.studies.gating import monte_carlo as gating
 from wildlab.studies.gating.monte_carlo import (
     GATES,
@@ -30,16 +41,6 @@ from wildlab.studies.gating.monte_carlo import (
     overflight,
     streams,
 )
-from wildlab.studies.gating.readings import (
-    DEFAULT,
-    READINGS,
-    claim_margins,
-    metrics_of,
-    standard_error,
-    subject,
-    verdict,
-)
-from wildlab.studies.gating.variations import variations, vary
 from wildlab.tracking.predictions import Prediction, predict_pixel, target_in_camera
 
 

@@ -12,7 +12,8 @@ from wildlab.messages.page_texts import load_texts
 from wildlab.planning.areas import contains
 from wildlab.planning.planner import Horizon
 from wildlab.reporting.published import load_claims
-from wildlab.studies.information_planning import STUDY, timing
+from wildlab.studies import information_planning
+from wildlab.studies.information_planning import STUDY
 from wildlab.studies.information_planning.trial import (
     AHEAD,
     BUDGET_S,
@@ -175,13 +176,13 @@ def test_each_planner_by_information_has_its_own_settings():
 
 def test_what_planning_takes_is_measured_for_each_world(monkeypatch):
     clock = iter(np.arange(0.0, 1e6, 0.25))
-    monkeypatch.setattr(timing, "process_time", lambda: next(clock))
-    cost = timing.planning_cost([2], "uav-search")
+    monkeypatch.setattr(information_planning, "process_time", lambda: next(clock))
+    cost = information_planning.planning_cost([2], "uav-search")
     # Two intervals of a quarter of a second for each decision, one to choose and one to add.
     assert cost["decision"].tolist() == [0.5]
     assert cost["load"].iloc[0] == pytest.approx(0.5 / 3, rel=0.4) and cost["load"].iloc[0] < 0.5 / 3
-    monkeypatch.setattr(timing, "TIMED", 0)
-    assert timing.planning_cost([2, 3], "uav-search").empty
+    monkeypatch.setattr(information_planning, "TIMED", 0)
+    assert information_planning.planning_cost([2, 3], "uav-search").empty
 
 
 def test_every_subject_has_a_name_and_every_number_a_unit():

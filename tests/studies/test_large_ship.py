@@ -6,8 +6,7 @@ import pytest
 
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.large_ship import STUDY
-from wildlab.studies.large_ship.claims import check_claims, scatter_left
+from wildlab.studies.large_ship import STUDY, check_claims, scatter_left
 from wildlab.studies.large_ship.trial import (
     DETECTOR,
     NEAR_M,

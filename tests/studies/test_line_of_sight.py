@@ -8,8 +8,8 @@ from wildlab.geometry.line_of_sight import field_of_view, in_field_of_view
 from wildlab.geometry.terrain import Terrain
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import grow_trees, synthetic_landscape
-from wildlab.studies.line_of_sight import STUDY, claims
-from wildlab.studies.line_of_sight.timing import WAYS, furthest_ratio, timed
+from wildlab.studies import line_of_sight
+from wildlab.studies.line_of_sight import STUDY, WAYS, furthest_ratio, timed
 from wildlab.studies.line_of_sight.trial import (
     ANGLES,
     EXACT,
@@ -100,7 +100,7 @@ def test_trees_hide_what_stands_below_them_and_more_at_a_slant():
 
 
 def test_claims_follow_from_what_was_found(spread):
-    checks = claims.check_claims(spread, times_of())
+    checks = line_of_sight.check_claims(spread, times_of())
     assert checks["letter-hides-everything"].holds().all()
     assert checks["trees-count-with-incidence"].holds().all()
     assert checks["shortening-pays-high-up"].holds().all()
@@ -113,7 +113,7 @@ def test_claims_follow_from_what_was_found(spread):
     for way in (RAYS, ANGLES):
         for height in HEIGHTS:
             turned[way, f"agreement_{height}m"] = 0.8
-    checks = claims.check_claims(turned, times_of())
+    checks = line_of_sight.check_claims(turned, times_of())
     for claim in ("letter-hides-everything", "trees-count-with-incidence", "shortening-pays-high-up"):
         assert not checks[claim].holds().any(), claim
     assert not checks["view-grows-linearly"].holds(0.1).any()
@@ -123,9 +123,9 @@ def test_claims_follow_from_what_was_found(spread):
 @pytest.mark.parametrize(("rays", "alike"), [(1.4, True), (1.6, False), ((1.0, 0.2), False)])
 def test_times_are_alike_where_they_are_at_every_height(spread, rays, alike):
     times = times_of(rays=rays)
-    check = claims.check_claims(spread, times)["run-times-similar"]
+    check = line_of_sight.check_claims(spread, times)["run-times-similar"]
     assert check.holds(1.5).all() == alike
-    dear = claims.check_claims(spread, times_of(view=2.0))["occlusion-costs-more"]
+    dear = line_of_sight.check_claims(spread, times_of(view=2.0))["occlusion-costs-more"]
     assert not dear.holds().any() and dear.unit == "µs"
 
 

@@ -16,7 +16,7 @@ from tests.flight.conftest import make_flight  # noqa: F401 - a fixture
 from wildlab.analysis.navigation_errors import Studied
 from wildlab.flight.store import Flight
 from wildlab.reporting.charts.navigation import mark_period, speed_chart
-from wildlab.studies.navigation import charts
+from wildlab.studies import navigation
 
 
 def level_nav(times: np.ndarray) -> pd.DataFrame:
@@ -39,19 +39,19 @@ def studied_of(flight: Flight) -> Studied:
 
 def show(flight: Flight, figures: int | None) -> dict[str, Figure]:
     studied, window = studied_of(flight), (0.0, 10.0)
-    paths = [] if figures is None else charts.path_figures(studied, window, figures)
-    shown = [*paths, *charts.flight_figures(studied, window, figures)]
+    paths = [] if figures is None else navigation.path_figures(studied, window, figures)
+    shown = [*paths, *navigation.flight_figures(studied, window, figures)]
     return {one.name or one.text: one.fig for one in shown}
 
 
 def test_observations_are_images_with_a_named_target(make_flight):
     flight = make_flight()
-    assert charts.observation_times(flight).tolist() == [1.0, 8.0]
-    assert charts.tracking_period(flight) == (1.0, 8.0)
+    assert navigation.observation_times(flight).tolist() == [1.0, 8.0]
+    assert navigation.tracking_period(flight) == (1.0, 8.0)
     # The camera's clock moves them, as it moves everything that is seen.
-    assert charts.tracking_period(make_flight(clocks={"camera_offset_s": 0.5})) == (1.5, 8.5)
+    assert navigation.tracking_period(make_flight(clocks={"camera_offset_s": 0.5})) == (1.5, 8.5)
     flight.detections.loc[:, "target_id"] = ""  # type: ignore[union-attr]
-    assert charts.tracking_period(flight) is None
+    assert navigation.tracking_period(flight) is None
 
 
 @pytest.mark.parametrize(("figures", "path"), [(23, "fig-7-22"), (33, "fig-7-32"), (13, "paths")])

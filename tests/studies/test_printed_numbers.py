@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from wildlab.studies.printed_numbers import formulas
-from wildlab.studies.printed_numbers.formulas import FORMULAS, Computed, formulas_table
-from wildlab.studies.printed_numbers.pairs import (
+from wildlab.studies import printed_numbers
+from wildlab.studies.printed_numbers import (
+    FORMULAS,
     MARGIN,
+    Computed,
     Pair,
     all_pairs,
+    formulas_table,
     load_numbers,
     load_words,
     rescaled_nis,
@@ -101,7 +103,7 @@ def test_formulas_are_judged_by_what_they_give():
 
 
 def test_formulas_of_planning_differ_from_what_they_should_follow_from():
-    table = formulas.planning_table()
+    table = printed_numbers.planning_table()
     assert table["verdict"].tolist() == ["differ"] * 4 + ["not defined"] * 2 + ["differ"]
     # sin(theta) where cos(theta)^2 belongs, for 80 m above and 67.1 m aside.
     r2 = 80.0**2 + 60.0**2 + 30.0**2
@@ -111,11 +113,11 @@ def test_formulas_of_planning_differ_from_what_they_should_follow_from():
 
 def test_a_formula_that_follows_is_not_called_different(monkeypatch):
     """Were (A.1) the derivative, they would agree."""
-    sensor = formulas.SearchSensor(1.0, 1.0, sd=1.0, reach=1.0, nearest=1e-9)
+    sensor = printed_numbers.SearchSensor(1.0, 1.0, sd=1.0, reach=1.0, nearest=1e-9)
 
     def right(points, p_nc, sd):
         turn = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-        return turn @ formulas.bearing_information(points, p_nc, sensor) @ turn.T
+        return turn @ printed_numbers.bearing_information(points, p_nc, sensor) @ turn.T
 
-    monkeypatch.setattr(formulas, "as_printed", right)
-    assert [one.verdict for one in formulas.information_formulas().values()][:3] == ["agree"] * 3
+    monkeypatch.setattr(printed_numbers, "as_printed", right)
+    assert [one.verdict for one in printed_numbers.information_formulas().values()][:3] == ["agree"] * 3

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.studies.crossing_vessels.outcomes import reacquired_shares, reacquisition_table
-from wildlab.studies.crossing_vessels.trial.crossing import TUNING
-from wildlab.studies.crossing_vessels.trial.reacquisition import (
-    UNITS,
+from wildlab.studies.crossing_vessels import reacquired_shares, reacquisition_table
+from wildlab.studies.crossing_vessels.trial import (
+    REACQUIRED_UNITS,
+    TUNING,
     WAYS,
     Outcome,
     again_numbers,
@@ -84,13 +84,15 @@ def test_far_apart_all_are_found_by_place_and_near_each_other_by_looks_alone():
     looks, boat = laps(apart=2000.0)
     same = Appearance(np.zeros((len(boat), 1)), np.ones(1), np.ones(1))
     numbers = again_numbers(looks, boat, same, sure)
-    assert {name for _, name in numbers} == set(UNITS) and {way for way, _ in numbers} == set(WAYS)
+    assert {name for _, name in numbers} == set(REACQUIRED_UNITS) and {way for way, _ in numbers} == set(WAYS)
     for way in WAYS:
-        assert [numbers[way, name] for name in UNITS] == [10, 0, 0, 1], "the second vessel is new once"
+        assert [numbers[way, name] for name in REACQUIRED_UNITS] == [10, 0, 0, 1], (
+            "the second vessel is new once"
+        )
     looks, boat = laps()
     told = Appearance(20.0 * boat[:, None].astype(float), np.ones(1), np.ones(1))
     numbers = again_numbers(looks, boat, told, sure)
-    assert [numbers[WITH, name] for name in UNITS] == [10, 0, 0, 1]
+    assert [numbers[WITH, name] for name in REACQUIRED_UNITS] == [10, 0, 0, 1]
     assert numbers[WITHOUT, "found_wrong"] == 11, "whoever comes by is taken for who came by before"
 
 
@@ -111,7 +113,7 @@ def spread_of(*flights):
             {
                 (way, name): float(one)
                 for way, found in flight.items()
-                for name, one in zip(UNITS, found, strict=True)
+                for name, one in zip(REACQUIRED_UNITS, found, strict=True)
             }
             for flight in flights
         ]

@@ -12,7 +12,7 @@ from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.replay.scene import Points
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.replay.tracks import EVERY_S, WALK, track_targets
+from wildlab.studies.replay import EVERY_S, WALK, track_targets
 from wildlab.studies.replay.trial import (
     CLOCK,
     NONE,

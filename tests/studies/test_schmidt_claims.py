@@ -8,8 +8,7 @@ import pytest
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.schmidt.claims import apart, band, check_claims
-from wildlab.studies.schmidt.pose_covariances import covariances_table, curve_table, predicted_error
+from wildlab.studies.schmidt import apart, band, check_claims, covariances_table, curve_table, predicted_error
 from wildlab.studies.schmidt.trial import FACTORS, FILTERS, MORE_NAMES, NAMES, NEES_NAMES, PUBLISHED, SUBJECTS
 
 STUDIES = ("schmidt-fast-vessel", "schmidt-slow-vessel-eight", "schmidt-drifting-vessel-eight")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from wildlab.geometry.terrain import Terrain
-from wildlab.studies.sensitivity import heights
-from wildlab.studies.sensitivity.heights import PITCHES_DEG, coarser, shifts
+from wildlab.studies import sensitivity
+from wildlab.studies.sensitivity import PITCHES_DEG, coarser, shifts
 
 
 @pytest.fixture(scope="module")
@@ -15,7 +15,7 @@ def found():
 
 def test_on_level_land_a_metre_costs_the_cotangent(monkeypatch):
     flat = Terrain(np.full((251, 501), 20.0, np.float32), -250.0, -500.0, 2.0)
-    monkeypatch.setattr(heights, "synthetic_landscape", lambda seed: flat)
+    monkeypatch.setattr(sensitivity, "synthetic_landscape", lambda seed: flat)
     for one in shifts(lands=2, rays=40):
         assert np.allclose(one.off["level"], 1 / np.tan(np.radians(one.pitch)), atol=1e-6)
         assert np.allclose([one.off["plane"], one.off["coarse"]], 0.0, atol=1e-6)

@@ -11,7 +11,8 @@ from wildlab.simulation.scene import (
     CameraResponse,
     sensor_of,
 )
-from wildlab.studies.wildlife_detection import STUDY, claims, trial
+from wildlab.studies import wildlife_detection
+from wildlab.studies.wildlife_detection import STUDY, trial
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
     BY_EMPTY,
@@ -43,18 +44,20 @@ def numbers():
 def test_a_seed_has_all_numbers(numbers):
     spread = pd.DataFrame([numbers] * 3)
     decided = {claim["id"] for claim in load_claims("wildlife-detection") if "needs" not in claim}
-    assert decided == set(claims.check_claims(spread))
+    assert decided == set(wildlife_detection.check_claims(spread))
     for subject in (*METHODS, *PROPOSED):
-        at = claims.places([CLOUDY])
-        assert claims.counts_of(spread, subject, at).shape == (9, 3)
-    assert not claims.counts_of(spread, SMALL, ["never"]).size
+        at = wildlife_detection.places([CLOUDY])
+        assert wildlife_detection.counts_of(spread, subject, at).shape == (9, 3)
+    assert not wildlife_detection.counts_of(spread, SMALL, ["never"]).size
     assert STUDY.metric_of("herd", "mean_rise") is not None
     assert STUDY.metric_of(CONSTANT, "found_night_15") is None
 
 
 def test_the_sun_makes_ground_as_warm_as_animals(numbers):
-    at = {weather: [numbers["ground", f"as_warm_{one}"] for one in claims.places([weather])] for weather in
-          (NIGHT, NOON)}  # fmt: skip
+    at = {
+        weather: [numbers["ground", f"as_warm_{one}"] for one in wildlife_detection.places([weather])]
+        for weather in (NIGHT, NOON)
+    }
     assert np.nanmean(at[NIGHT]) < 0.1 < np.nanmean(at[NOON])
     assert numbers["herd", "mean_rise"] > 0
     assert numbers["ground", "level_after"] > numbers["ground", "level_before"]
@@ -85,7 +88,7 @@ def test_claims_turn(numbers):
     thresholds = {c["id"]: c.get("threshold") for c in load_claims("wildlife-detection")}
 
     def true(spread):
-        found = claims.check_claims(spread)
+        found = wildlife_detection.check_claims(spread)
         return {key: bool(check.holds(thresholds[key]).all()) for key, check in found.items()}
 
     good = true(spread_of(numbers))
@@ -122,7 +125,7 @@ def test_claims_turn(numbers):
 
 def check_of(claim, spread):
     threshold = next(c for c in load_claims("wildlife-detection") if c["id"] == claim).get("threshold")
-    return claims.check_claims(spread)[claim].holds(threshold)
+    return wildlife_detection.check_claims(spread)[claim].holds(threshold)
 
 
 @pytest.mark.parametrize(("claim", "subject"), [("too-hot", "not_hot"), ("size-from-ground", "sized")])
@@ -144,8 +147,8 @@ def test_the_threshold_is_higher_than_needed_where_that_without_the_herd_finds_m
 
 
 def test_a_fall_is_a_part_of_what_was(numbers):
-    assert claims.fall([1.0, 0.2], [0.8, 0.0]).tolist() == pytest.approx([0.2, 1.0])
-    assert np.isnan(claims.fall([0.0], [0.0])).all()
+    assert wildlife_detection.fall([1.0, 0.2], [0.8, 0.0]).tolist() == pytest.approx([0.2, 1.0])
+    assert np.isnan(wildlife_detection.fall([0.0], [0.0])).all()
     # From 0.2 to zero is by all of it, and by no more than the threshold of 0.2.
     low = {"adaptive_offset__found": 1.0, "adaptive_offset__missed": 8.0}
     gone = spread_of(numbers, **low, adaptive_offset__found_after=0.0)
@@ -154,7 +157,7 @@ def test_a_fall_is_a_part_of_what_was(numbers):
 
 
 def test_thresholds_lie_where_their_measures_can_be(numbers):
-    checks = claims.check_claims(spread_of(numbers))
+    checks = wildlife_detection.check_claims(spread_of(numbers))
     assert checks["subtraction-and-constant-good"].reaches(0.35)
     assert not checks["subtraction-and-constant-good"].reaches(1.4)
     assert not checks["constant-fails"].reaches(1.0)
@@ -169,16 +172,16 @@ def test_the_herd_is_also_searched_with_the_threshold_of_the_empty_place(numbers
 def test_false_alarms_are_not_fewer_than_none(numbers):
     spread = spread_of(numbers)
     spread.loc[0, [(CONSTANT, "invented_noon_15")]] = 9.0
-    found = claims.false_alarms(spread, CONSTANT, claims.places([NOON]))
+    found = wildlife_detection.false_alarms(spread, CONSTANT, wildlife_detection.places([NOON]))
     assert found.estimate == pytest.approx(9 / 36)
     assert found.low == 0 and found.high > found.estimate
 
 
 def test_a_premise_that_is_not_met_decides_nothing(numbers):
     still = spread_of(numbers, ground__level_after=62.0)
-    assert not claims.check_claims(still)["constant-fails"].premise.any()
+    assert not wildlife_detection.check_claims(still)["constant-fails"].premise.any()
     none = spread_of(numbers, adaptive_51__pieces=np.nan)
-    assert not claims.check_claims(none)["small-block-splits"].premise.any()
+    assert not wildlife_detection.check_claims(none)["small-block-splits"].premise.any()
 
 
 def test_printed_settings_are_the_theses():

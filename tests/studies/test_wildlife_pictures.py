@@ -14,7 +14,8 @@ from wildlab.simulation.scene import (
     tree,
 )
 from wildlab.simulation.scene.drawn_land import LandDraw, draw_layout
-from wildlab.studies.wildlife_detection import charts, trial
+from wildlab.studies import wildlife_detection
+from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
     CONSTANT,
@@ -71,8 +72,8 @@ def test_readings_are_what_they_are_called():
     assert read_as(base, "off-mean").level == -65
     # Taken off the mean, everything is above.
     picture = picture_of(rhino())
-    assert charts.above(picture, read_as(METHODS[ADAPTIVE], "off-mean")).all()
-    assert not charts.above(picture, METHODS[ADAPTIVE]).all()
+    assert wildlife_detection.above(picture, read_as(METHODS[ADAPTIVE], "off-mean")).all()
+    assert not wildlife_detection.above(picture, METHODS[ADAPTIVE]).all()
 
 
 def test_what_is_proposed_follows_from_the_ground():

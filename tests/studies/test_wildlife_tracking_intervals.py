@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.evaluation.runs import mean_interval
-from wildlab.studies.wildlife_tracking.tables import positive_interval
+from wildlab.studies.wildlife_tracking import positive_interval
 
 NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
 #: Of the whole study, and of a first look.

@@ -46,7 +46,7 @@ ROOMS = (
     "analysis",
 )
 #: Of the studies their trials can; how they are shown and said cannot.
-TRIALS = ("studies/*/trial.py", "studies/*/trial/*.py")
+TRIALS = "studies/*/trial.py"
 #: Packages below them whose version can.
 PACKAGES = (
     "filterpy",
@@ -93,9 +93,7 @@ def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
 def code_key() -> str:
     """The code of all trials and below them, the twins' parameters and the packages' versions, as 64
     hexadecimal digits."""
-    code = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")] + [
-        path for pattern in TRIALS for path in PACKAGE.glob(pattern)
-    ]
+    code = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")] + [*PACKAGE.glob(TRIALS)]
     # Twins share parts, so a change of any of their files may be a change of each. Named as in a checkout, so
     # that a wheel of the same code has the same key.
     named = [(f"wildlab/{path.relative_to(PACKAGE).as_posix()}", path) for path in code]

@@ -62,7 +62,7 @@ def beside_white(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     Parameters
     ----------
     table
-        Rows of `wildlab.studies.autoferry.tracks.table`, of one flight or many.
+        Rows of `wildlab.studies.autoferry.table`, of one flight or many.
     keys
         Columns that name a case: what was followed, by what, when.
 
@@ -87,7 +87,7 @@ def outcomes(table: pd.DataFrame, keys: Sequence[str], fixed: str) -> pd.DataFra
     Parameters
     ----------
     table
-        Rows of `wildlab.studies.autoferry.tracks.table`.
+        Rows of `wildlab.studies.autoferry.table`.
     keys
         Columns that name a case.
     fixed
@@ -169,7 +169,7 @@ def choose_filter(table: pd.DataFrame, keys: Sequence[str]) -> str:
     Parameters
     ----------
     table
-        Rows of `wildlab.studies.autoferry.tracks.table` of that flight.
+        Rows of `wildlab.studies.autoferry.table` of that flight.
     keys
         Columns that name a case.
     """

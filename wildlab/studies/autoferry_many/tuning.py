@@ -21,7 +21,7 @@ from wildlab.flight.tracking_settings import (
     TargetsPart,
 )
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST
-from wildlab.studies.autoferry.tracks import tune_sensor
+from wildlab.studies.autoferry import tune_sensor
 
 #: The ways to look: by one sensor, by both, and with the cameras too.
 MODES: dict[str, tuple[str, ...]] = {

@@ -3,9 +3,157 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from wildlab.evaluation.shares import Check
+from wildlab.geometry.intrinsics import PINHOLE
+from wildlab.geometry.mounting import Mounting
+from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, new_figure
+from wildlab.reporting.verdicts import error_name
+from wildlab.studies.camera_calibration.calibration import (
+    CONSTANT,
+    PRINTED_AT_HEIGHT,
+    Cause,
+    Centres,
+    error_from_height,
+    printed_angles,
+    theoretical,
+    theoretical_focal_length,
+)
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
+from wildlab.studies.sensitivity import TAU2
+
+
+class Recorded(NamedTuple):
+    """A number of ``metrics.json``."""
+
+    name: str
+    subject: str
+    value: float
+    unit: str
+    n: int | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+def metrics_of(
+    calibrated: pd.DataFrame, causes: Sequence[Cause], mounted: Sequence[Mounting]
+) -> list[Recorded]:
+    """What is recorded.
+
+    Parameters
+    ----------
+    calibrated
+        Of `wildlab.studies.camera_calibration.calibration.calibrations`.
+    causes
+        Of `wildlab.studies.camera_calibration.calibration.explain`, that of the clicks first.
+    mounted
+        Calibrations whose angles are compared with the printed ones.
+    """
+    sheet, focal, height = theoretical(), theoretical_focal_length(), error_from_height()
+    n, angles = len(calibrated), np.degrees([printed_angles(one) for one in mounted]).T
+    found = [
+        Recorded("focal_length", "data-sheet", focal.estimate, "px", low=focal.low, high=focal.high),
+        Recorded("centre_column", "data-sheet", sheet.cx, "px"),
+        Recorded("centre_row", "data-sheet", sheet.cy, "px"),
+        Recorded("offset_columns", "tau2-data-sheet", abs(TAU2.cx - sheet.cx), "px"),
+        Recorded("offset_rows", "tau2-data-sheet", abs(TAU2.cy - sheet.cy), "px"),
+    ]
+    for name in PINHOLE:
+        values = calibrated[name].to_numpy(float)
+        sd = values.std(ddof=1)
+        found += [
+            Recorded(name, "tau2", values.mean(), "px", n),
+            Recorded(error_name(name), "tau2", sd / n**0.5, "px", n),
+            Recorded(f"sd_{name}", "tau2", sd, "px", n),
+        ]
+    for name, values in zip(("roll", "tilt", "pan"), angles, strict=True):
+        count = len(values)
+        found += [
+            Recorded(name, "mounting", values.mean(), "deg", count),
+            Recorded(error_name(name), "mounting", values.std(ddof=1) / count**0.5, "deg", count),
+        ]
+    return [
+        *found,
+        Recorded("error_left", "mounting", causes[0].left, "m", n),
+        Recorded(error_name("error_left"), "mounting", causes[0].left_error, "m", n),
+        Recorded("error_at_350_m", "mounting", height.estimate, "m", low=height.low, high=height.high),
+    ]
+
+
+def check_claims(calibrated: pd.DataFrame) -> dict[str, Check]:
+    """By the claim's id: how far the focal lengths of a second set of images are from the first's, px."""
+    moved = np.abs(calibrated[["fx", "fy"]].to_numpy() - calibrated[["second_fx", "second_fy"]].to_numpy())
+    return {"second-set": Check(measured=moved.max(axis=1))}
+
+
+def parameters_table(calibrated: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """The camera's parameters as printed; their mean, spread, predicted spread and coverage (%)."""
+    return pd.DataFrame(
+        [
+            {
+                "parameter": names[name],
+                "published": getattr(TAU2, name),
+                "mean": calibrated[name].mean(),
+                "spread": calibrated[name].std(ddof=1),
+                "predicted": calibrated[f"sd_{name}"].mean(),
+                "inside": 100 * calibrated[f"inside_{name}"].mean(),
+            }
+            for name in PINHOLE
+        ]
+    )
+
+
+def distortion_table(cost: Mapping[float, tuple[float, float]]) -> pd.DataFrame:
+    """What neglecting a bent lens costs, by its ``k1``: of `neglected_distortion`."""
+    return pd.DataFrame([{"k1": k1, "rms": rms, "largest": largest} for k1, (rms, largest) in cost.items()])
+
+
+def causes_table(causes: Sequence[Cause]) -> pd.DataFrame:
+    """What each cause leaves, and what it does from the height of the flight; angles in degrees."""
+    return pd.DataFrame([{**one._asdict(), "angle": np.degrees(one.angle)} for one in causes])
+
+
+def circle_grid(centres: Centres, calibrated: pd.DataFrame) -> Figure:
+    """One of the rendered images with its centres, and the principal points of all calibrations."""
+    fig, axes = new_figure(5.9, 3.1, columns=2)
+    axes[0].imshow(centres.image, cmap="gray")
+    axes[0].plot(*centres.uv.T, "+", color=VERMILLION, ms=5)
+    axes[0].set(xlabel="u (px)", ylabel="v (px)", title="Centres found")
+    axes[0].grid(visible=False)
+    axes[1].plot(calibrated["cx"], calibrated["cy"], "o", color=BLUE, ms=4, label="calibrations")
+    axes[1].plot(TAU2.cx, TAU2.cy, "x", color=INK, ms=8, mew=2, label="truth")
+    axes[1].set(xlabel="principal point, column (px)", ylabel="row (px)", title="Principal point")
+    axes[1].set_aspect("equal", "datalim")
+    fig.legend(*axes[1].get_legend_handles_labels(), loc="outside lower right", ncols=2)
+    return fig
+
+
+def mounting_causes(causes: Sequence[Cause]) -> Figure:
+    """The error on the ground from the height of the flight that each cause makes, and the printed one."""
+    fig, ax = new_figure(5.6, 3.0)
+    grounds = [*(one.ground for one in causes), PRINTED_AT_HEIGHT]
+    y = np.arange(len(causes))[::-1]
+    for at, one in zip(y, causes, strict=True):
+        ax.plot(one.ground, at, "o", color=GREEN if one.name in CONSTANT else BLUE, ms=8)
+        ax.annotate(f"{one.ground:.1f} m", (one.ground, at), (0, 8), textcoords="offset points", ha="center")
+    ax.axvline(PRINTED_AT_HEIGHT, color=INK, ls="--", lw=1)
+    ax.set_xscale("log")
+    ax.set_yticks(y, [one.name for one in causes])
+    ax.set(
+        xlabel="error on the ground from 350 m (m)",
+        xlim=(min(grounds) / 2, 2 * max(grounds)),
+        ylim=(-0.6, len(causes) - 0.3),
+    )
+    ax.grid(axis="y", visible=False)
+    return fig
+
 
 #: A focal length known to less than this, px, and a mounting error below this from 350 m, m, are small.
 WELL_PX, SMALL_M = 1.0, 1.0

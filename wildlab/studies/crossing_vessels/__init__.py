@@ -3,13 +3,291 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from wildlab.analysis.rendered import Photographer
+from wildlab.evaluation.shares import Check
+from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
+from wildlab.reporting.spread import bounds_of
 from wildlab.studies.crossing_vessels import trial
-from wildlab.studies.crossing_vessels.outcomes import check_claims
-from wildlab.studies.crossing_vessels.trial import joint
-from wildlab.studies.crossing_vessels.trial import reacquisition as again
+from wildlab.studies.crossing_vessels.rendered import WHOLE, Counted, CrossingTracks, Rendering, Spotted, spot
+from wildlab.studies.crossing_vessels.trial import (
+    BOATS,
+    DISTANCE,
+    FEATURES,
+    JOINT,
+    LOOKS,
+    NAMES,
+    NONE,
+    SEPARATIONS,
+    SUBJECTS,
+    TUNING,
+    WAYS,
+    Flown,
+    curve_subject,
+    looks_of,
+)
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study, name_metrics
+
+Array = NDArray[np.float64]
+
+
+def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
+    """What the flights give for each claim of H 6.4.4, by the claim's id.
+
+    Parameters
+    ----------
+    runs
+        What `trial` gives, one row for each flight.
+    """
+
+    def of(subject: str, name: str) -> Array:
+        return runs[subject, name].to_numpy(float)
+
+    def worse(subject: str) -> Array:
+        """The larger share of wrong associations of the two vessels."""
+        return np.maximum(*(of(subject, f"wrong_rate_boat_{n}") for n in (1, 2)))
+
+    met = of(LOOKS, "closest") < TUNING.measurement
+    swapped = of(DISTANCE, "swapped") > 0
+    size, intensity, hu = (of(LOOKS, f"separation_{name}") for name in ("size", "intensity", "hu"))
+    wrong, wrong_without = of(FEATURES, "wrong"), of(DISTANCE, "wrong")
+    return {
+        "swap-without-features": Check(true=swapped, premise=met),
+        "never-recovers": Check(true=of(DISTANCE, "swapped_at_end") > 0, premise=swapped),
+        "accurate-though-swapped": Check(true=of(DISTANCE, "any_near_share") > 0.5, premise=swapped),
+        "size-best": Check(true=(size > intensity) & (size > hu)),
+        "intensity-differs": Check(measured=intensity, above=True),
+        "hu-similar": Check(measured=hu),
+        "no-swap-with-features": Check(true=of(FEATURES, "swapped") == 0, premise=met),
+        "mostly-within-20-m": Check(true=of(FEATURES, "near_share") > 0.5),
+        "most-correct-in-contrast": Check(
+            true=(worse(FEATURES) < 0.5) & (worse(DISTANCE) >= 0.5), premise=met
+        ),
+        "fewer-wrong": Check(
+            true=wrong < wrong_without, first=wrong, second=wrong_without, unit="detections"
+        ),
+    }
+
+
+def rules_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """One row for each rule: the flights swapped (%), and medians over flights."""
+    medians = ("wrong", "unassigned", "tracks", "swaps", "breaks", "mae", "gospa", "anees")
+    return pd.DataFrame(
+        [
+            {"rule": names[rule], "swapped": 100 * float(runs[rule, "swapped"].mean())}
+            | {name: float(runs[rule, name].median()) if (rule, name) in runs else np.nan for name in medians}
+            for rule in (*SUBJECTS, JOINT)
+        ]
+    )
+
+
+def reacquired_shares(runs: pd.DataFrame, subject: str, name: str) -> Array:
+    """(n,) of the tracks of each flight that could be reacquired or were, which share was; NaN for none.
+
+    Tracks that are rightly new do not count.
+    """
+    parts = {one: runs[subject, one].to_numpy(float) for one in ("found_right", "found_wrong", "not_found")}
+    total = sum(parts.values())
+    return np.where(total > 0, parts[name] / np.where(total > 0, total, 1.0), np.nan)
+
+
+def reacquisition_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """One row for each way: mean shares of tracks (%), and flights (%) with none wrong, of those with any."""
+    rows = []
+    for way in WAYS:
+        shares = {
+            name: pd.Series(reacquired_shares(runs, way, name)).dropna()
+            for name in ("found_right", "found_wrong", "not_found")
+        }
+        none_wrong = 100 * float((shares["found_wrong"] == 0).mean())
+        means = {name: 100 * float(one.mean()) for name, one in shares.items()}
+        rows.append({"way": names[way], **means, "none_wrong": none_wrong})
+    return pd.DataFrame(rows)
+
+
+def detected_table(flights: Sequence[Rendering]) -> pd.DataFrame:
+    """What the detector makes of both vessels in rendered frames, a row for each flight."""
+    rows = []
+    for one in flights:
+        near: Counted = one.near
+        counts = {name: getattr(near, name) for name in ("whole", "found", "joined", "missed")}
+        rows.append({"flight": str(one.seed), **counts, "false": near.false + one.sea.false})
+    return pd.DataFrame(rows)
+
+
+def rendered_table(flights: Sequence[Rendering], names: Mapping[str, str]) -> pd.DataFrame:
+    """One row for each rule: flights swapped, and detections wrong (%), drawn and from rendered frames."""
+
+    def row(rule: str) -> dict[str, object]:
+        cells: dict[str, object] = {"rule": names[rule]}
+        for way in ("drawn", "frames", "inside"):
+            tracks: list[CrossingTracks] = [getattr(one, way) for one in flights]
+            found = [one.by_rule[rule] for one in tracks]
+            own = sum(one.own or 0 for one in found)
+            cells[f"{way}_swapped"] = sum(one.swapped for one in found)
+            cells[f"{way}_wrong"] = 100 * sum(one.wrong or 0 for one in found) / own if own else np.nan
+        return cells
+
+    return pd.DataFrame([row(rule) for rule in (*SUBJECTS, JOINT)])
+
+
+#: Tracks by the vessel whose detections started them, as in H figure 6.21.
+_COLOURS = (BLUE, ORANGE)
+#: Of the height of a map, left free below everything on it for the scale bar.
+FREE = 0.3
+#: Around the boxes of a frame, px, and how wide what is shown is at least.
+AROUND, LEAST = 30, 200
+_AXES = {"size": "ln of the size in m²", "intensity": "intensity (counts)", "hu": "ln of Hu's first moment"}
+
+
+def plot_tracks(flown: Flown, names: Mapping[str, str]) -> Figure:
+    """True paths and tracks without features and with them (H figures 6.23 and 6.24)."""
+    fig, axes = new_figure(5.9, 6.6, rows=2)
+    for ax, rule in zip(axes, (DISTANCE, FEATURES), strict=True):
+        bank, crossing = flown.banks[rule], flown.crossing
+        for number, boat in enumerate(BOATS):
+            north, east = crossing.truth[number].T
+            ax.plot(east, north, color=INK, lw=1.2, ls=("-", "--")[number], label=f"{boat}, true")
+        for track, first in enumerate(bank.started):
+            owner = int(crossing.boat[first])
+            new = track == int(np.flatnonzero(crossing.boat[bank.started] == owner)[0])
+            label = f"track that {BOATS[owner]} started" if new else None
+            x = bank.x[:, track]
+            ax.plot(x[:, 1], x[:, 0], color=_COLOURS[owner], lw=1.4, alpha=0.85, label=label)
+        ax.set_title(names[rule])
+        low, high = ax.get_ylim()
+        ax.set_ylim(low - FREE * (high - low), high)
+        map_axes(ax, scale_bar=ax is axes[-1])
+    axes[0].set_xlabel("")
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return fig
+
+
+def plot_features(looks: list[Array]) -> Figure:
+    """Features of both vessels in rendered images (H figure 6.21)."""
+    fig, axes = new_figure(5.9, 3.2, columns=3)
+    apart = looks_of(looks)
+    rng = np.random.default_rng(0)  # to keep points apart, across
+    for ax, (k, name) in zip(axes, enumerate(NAMES), strict=True):
+        for number, pool in enumerate(looks):
+            across = number + rng.uniform(-0.18, 0.18, len(pool))
+            ax.plot(across, pool[:, k], "o", color=_COLOURS[number], ms=5, alpha=0.7, mew=0)
+        ax.set(xlim=(-0.5, 1.5), xticks=[0, 1], xticklabels=["1", "2"], xlabel="boat", ylabel=_AXES[name])
+        ax.grid(False, axis="x")
+        value = apart["looks", f"separation_{name}"]
+        ax.set_title(f"{value:.0f} apart" if value >= 10 else f"{value:.1f} apart")
+    return fig
+
+
+def plot_separation(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """Wrong associations and swaps over the separation of a made-up feature."""
+    fig, (top, low) = new_figure(5.9, 4.6, rows=2, sharex=True)
+    subjects = [curve_subject(separation) for separation in SEPARATIONS]
+    middle = np.array([runs[one, "wrong"].median() for one in subjects])
+    bounds = np.array([bounds_of(runs[one, "wrong"]) for one in subjects])
+    if np.isfinite(bounds).all():
+        top.fill_between(SEPARATIONS, *bounds.T, color=BLUE, alpha=0.18, lw=0)
+    top.plot(SEPARATIONS, middle, "o-", color=BLUE)
+    share = [100 * runs[one, "swapped"].mean() for one in subjects]
+    low.plot(SEPARATIONS, share, "o-", color=BLUE, label="one made-up feature")
+    for rule, color in ((DISTANCE, GREY), (FEATURES, VERMILLION)):
+        top.axhline(runs[rule, "wrong"].median(), color=color, lw=1.3, ls="--")
+        low.axhline(100 * runs[rule, "swapped"].mean(), color=color, lw=1.3, ls="--", label=names[rule])
+    top.set_yscale("symlog", linthresh=1)
+    # None wrong lies a little above the axis, where its line is seen.
+    top.set(ylabel="wrong", ylim=(-0.4, None))
+    low.set(ylabel="swapped (%)", ylim=(-3, 103), xticks=SEPARATIONS)
+    low.set_xlabel("difference of the two (spreads of the feature)")
+    fig.legend(*low.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return fig
+
+
+class Picture(NamedTuple):
+    """A frame of the crossing: its counts (H, W), its detections and their boxes, (D, 4) px; m apart."""
+
+    exposure: int
+    counts: NDArray[np.uint16]
+    spotted: Spotted
+    box: NDArray[np.float64]
+    apart: float
+
+
+def telling_exposures(one: Rendering) -> list[int]:
+    """Of the frames with both whole in view: where they are nearest and detected each alone, and as one.
+
+    None, one or two of these; a frame without any detection has no place among them.
+    """
+    spotted, crossing = one.spotted, one.frames.crossing
+    images = np.unique(crossing.looks.image)
+    both = (spotted.share >= WHOLE).all(axis=1)
+    chosen = []
+    for kind in (spotted.found.all(axis=1), spotted.joined.any(axis=1)):
+        rows = np.flatnonzero(np.isin(images, spotted.frames[both & kind]))
+        if len(rows) and np.isfinite(crossing.apart[rows]).any():
+            chosen.append(int(images[rows[np.nanargmin(crossing.apart[rows])]]))
+    return chosen
+
+
+def picture_of(twin: str, one: Rendering, exposure: int) -> Picture:
+    """A frame rendered and searched again."""
+    camera = Photographer(twin, one.seed)
+    _, counts = camera.image(exposure)
+    shot = next(iter(camera.shoot([exposure])))
+    crossing = one.frames.crossing
+    apart = float(crossing.apart[np.searchsorted(np.unique(crossing.looks.image), exposure)])
+    rows, columns = counts.shape
+    return Picture(exposure, counts, spot([shot], (rows, columns)), shot.detections.box, apart)
+
+
+def plot_frames(twin: str, flights: Sequence[Rendering]) -> Figure | None:
+    """The two at the crossing, each detected alone, and as one: of the first flight that has most of these.
+
+    None where both are whole in no frame with a detection.
+    """
+    chosen = [telling_exposures(one) for one in flights]
+    most = max((len(found) for found in chosen), default=0)
+    if not most:
+        return None
+    at = next(k for k, found in enumerate(chosen) if len(found) == most)
+    pictures = [picture_of(twin, flights[at], exposure) for exposure in chosen[at]]
+    fig, axes = new_figure(5.9, 3.1 if most > 1 else 4.6, columns=most, squeeze=False)
+    for ax, picture in zip(axes.flat, pictures, strict=True):
+        (left, top), (right, bottom) = _part(picture)
+        shown = picture.counts[top:bottom, left:right]
+        low, high = np.percentile(shown, (0.5, 99.8))
+        ax.imshow(picture.counts, cmap="gray", vmin=low, vmax=high, interpolation="nearest")
+        for (x, y, width, height), boat, both in zip(
+            picture.box, picture.spotted.boat, picture.spotted.both, strict=True
+        ):
+            colour = VERMILLION if boat == NONE else GREEN if both else _COLOURS[boat]
+            box = Rectangle((x - 4, y - 4), width + 8, height + 8, fill=False, ec=colour, lw=1.8)
+            ax.add_patch(box)
+        ax.set(xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5), xticks=[], yticks=[])
+        ax.grid(False)
+        ax.set_title(f"{picture.apart:.0f} m apart")
+    return fig
+
+
+def _part(picture: Picture) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Corners of the part that is shown, px: all boxes, and some sea about them."""
+    rows, columns = picture.counts.shape
+    low = picture.box[:, :2].min(axis=0) - AROUND
+    high = (picture.box[:, :2] + picture.box[:, 2:]).max(axis=0) + AROUND
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST / 2).max()
+    size = np.array([columns, rows])
+    half = min(half, size.min() / 2)
+    middle = np.clip(middle, half, size - half)
+    first, last = np.floor(middle - half).astype(int), np.ceil(middle + half).astype(int)
+    return (int(first[0]), int(first[1])), (min(int(last[0]), columns), min(int(last[1]), rows))
 
 
 def answer(facts: Facts) -> list[str]:
@@ -23,10 +301,10 @@ STUDY = Study(
     "crossing-vessels",
     (
         *trial.SUBJECTS,
-        joint.JOINT,
+        JOINT,
         trial.LOOKS,
         *map(trial.curve_subject, trial.SEPARATIONS),
-        *again.WAYS,
+        *WAYS,
     ),
     trial.trial,
     check_claims,

@@ -3,11 +3,188 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from wildlab.evaluation.runs import mean_interval, mean_share_interval
+from wildlab.evaluation.shares import Check, Decision, decide
+from wildlab.reporting.figures import BLUE, ORANGE, VERMILLION, new_figure
+from wildlab.simulation.scene.flights import corner_of
 from wildlab.studies.end_to_end import trial
+from wildlab.studies.end_to_end.trial import (
+    DRAWN,
+    KINDS,
+    MARGIN,
+    PIXEL_UNITS,
+    RENDERED,
+    FlightPair,
+    PixelErrors,
+    tracked_filters,
+)
 from wildlab.studies.linear_vs_nonlinear.trial import UNITS
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
+
+#: Of the detections' numbers: shares, shown in per cent, and decimals of the others.
+SHARES = ("detection_rate", "ellipse_coverage_90", "ground_coverage_90_true_poses", "ground_coverage_90")
+DECIMALS = {"false_alarms_per_image": 3}
+
+
+def interval_text(values: pd.Series, scale: float = 1.0, decimals: int = 1, *, share: bool = False) -> str:
+    """Mean over flights with its 95 % interval, that of a ``share`` within 0 and 1; alone of one flight.
+
+    Examples
+    --------
+    >>> interval_text(pd.Series([1.0, 2.0, 3.0]))
+    '2.0 (−0.5 to 4.5)'
+    """
+    found = mean_share_interval(values) if share else mean_interval(values)
+    mean, low, high = (f"{scale * end:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for end in found)
+    return mean if np.isnan(found.low) else f"{mean} ({low} to {high})"
+
+
+def detections_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """The detections themselves, drawn and rendered: means over flights with intervals, shares in per cent.
+
+    ``names`` says what each quantity is called.
+    """
+    rows = []
+    for name in (one for one in PIXEL_UNITS if one != "images"):
+        share = name in SHARES
+        row = {"quantity": names[name]}
+        for kind in KINDS:
+            known = (kind, name) in runs
+            decimals = 0 if share else DECIMALS.get(name, 2)
+            row[kind] = (
+                interval_text(runs[kind, name], 100.0 if share else 1.0, decimals, share=share)
+                if known
+                else ""
+            )
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def tracks_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """Each filter's mean distance, NEES and NIS with both kinds: medians over flights."""
+    middle = runs.median()
+    return pd.DataFrame(
+        [
+            {"filter": names[who]}
+            | {
+                f"{name}_{kind}": float(middle[f"{kind}-{who}", name])
+                for name in ("mae", "nees", "nis")
+                for kind in KINDS
+            }
+            for who in tracked_filters(runs)
+        ]
+    )
+
+
+def decision_text(decision: Decision) -> str:
+    """A verdict with what it is by.
+
+    Examples
+    --------
+    >>> decision_text(decide([True, True, False]))
+    'undecided: 2 of 3'
+    """
+    return f"{decision.verdict}: {decision.true} of {decision.met}" if decision.met else decision.verdict
+
+
+def verdicts_table(
+    checks: Mapping[str, Mapping[str, Mapping[str, Check]]], claims: Mapping[str, Sequence[Mapping[str, Any]]]
+) -> pd.DataFrame:
+    """Every claim with its verdict by either kind of detections.
+
+    Parameters
+    ----------
+    checks
+        By kind, case and the claim's id.
+    claims
+        Of each case, as `wildlab.reporting.published.load_claims` gives them.
+
+    Returns
+    -------
+    DataFrame
+        ``claim``, ``source``; for each kind the ``verdict_`` and, under its own name, that with its counts;
+        ``flights``, on how many the claim comes out otherwise.
+    """
+    rows = []
+    for case, several in claims.items():
+        for claim in several:
+            threshold = None if "threshold" not in claim else float(claim["threshold"])
+            row: dict[str, Any] = {"claim": claim["text"], "source": claim["source"]}
+            true = {}
+            for kind in KINDS:
+                check = checks[kind][case][claim["id"]]
+                true[kind] = check.holds(threshold)
+                decision = decide(true[kind], check.premise)
+                row |= {f"verdict_{kind}": decision.verdict, kind: decision_text(decision)}
+            row["flights"] = int((true[DRAWN] != true[RENDERED]).sum())
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def count_turned(verdicts: pd.DataFrame) -> int:
+    """How many claims have another verdict by the rendered detections than by the drawn ones."""
+    return int((verdicts[f"verdict_{DRAWN}"] != verdicts[f"verdict_{RENDERED}"]).sum())
+
+
+def frame(pair: FlightPair) -> Figure:
+    """A frame about the vessel, with what is drawn, what is found and where its outline's centre is."""
+    rows = np.flatnonzero(pair.marks.found)
+    row = int(rows[len(rows) // 2])
+    exposure = int(pair.marks.exposure[row])
+    window = pair.camera.flight.window(exposure, MARGIN)
+    _, counts = pair.camera.image(exposure, window)
+    corner = corner_of(window)
+    fig, ax = new_figure(5.2, 4.2)
+    low, high = np.quantile(counts, [0.005, 0.998])  # but for dead pixels
+    ax.imshow(counts, cmap="gray", vmin=low, vmax=high, interpolation="nearest")
+    ax.plot(*(pair.drawn_uv[row] - corner), "x", color=VERMILLION, ms=10, mew=2, label="drawn")
+    ax.plot(*(pair.marks.uv[row] - corner), "+", color=BLUE, ms=12, mew=2, label="found")
+    ax.plot(*(pair.marks.centre[row] - corner), "o", mfc="none", mec=ORANGE, ms=9, mew=1.6, label="centre")
+    ax.set(xticks=[], yticks=[])
+    ax.grid(False)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return fig
+
+
+def pixel_errors(errors: PixelErrors) -> Figure:
+    """Errors of both kinds in the image, along the vessel's axes."""
+    fig, axes = new_figure(5.9, 3.4, columns=2)
+    for ax, e, color, name in zip(axes, errors, (VERMILLION, BLUE), ("Drawn", "Rendered"), strict=True):
+        known = e[np.isfinite(e).all(axis=1)]
+        ax.plot(known[:, 1], known[:, 0], "o", color=color, ms=3, alpha=0.5, mew=0)
+        ax.plot(*known.mean(axis=0)[::-1], "k+", ms=12, mew=2)
+        reach = 1.1 * float(np.abs(known).max())
+        ax.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="to the right (px)")
+        ax.set_aspect("equal", adjustable="box")
+        ax.set_title(name)
+    axes[0].set_ylabel("ahead (px)")
+    return fig
+
+
+def track_errors(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """Mean distance of each filter on each flight, with both kinds of detections."""
+    fig, ax = new_figure(5.6, 3.0)
+    filters = tracked_filters(runs)
+    for row, who in enumerate(filters):
+        pairs = runs[[(f"{DRAWN}-{who}", "mae"), (f"{RENDERED}-{who}", "mae")]].to_numpy(float)
+        for k, (drawn, rendered) in enumerate(pairs):
+            y = row + 0.5 * ((k + 0.5) / len(pairs) - 0.5)
+            ax.plot([drawn, rendered], [y, y], color="0.75", lw=1)
+            ax.plot(drawn, y, "x", color=VERMILLION, ms=5, label="drawn" if row == k == 0 else None)
+            ax.plot(rendered, y, "o", color=BLUE, ms=4, label="rendered" if row == k == 0 else None)
+    ax.set_yticks(range(len(filters)), [names[who] for who in filters])
+    ax.set(xlabel="mean distance from the truth (m)", ylim=(len(filters) - 0.5, -0.5))
+    ax.set_xlim(left=0)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
+    return fig
 
 
 def _metric(subject: str, name: str) -> Metric | None:

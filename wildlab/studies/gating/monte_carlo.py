@@ -86,7 +86,7 @@ class Choices:
         Process noise of H (6.1), m/s^2: that of the slow vessel of H 6.4.2, the same 10 m of noise beside it.
     updated_with
         The main object's ``own`` measurement whatever was assigned, the one that was ``assigned``, or
-        nothing: see `wildlab.studies.gating.readings`.
+        nothing: see `wildlab.studies.gating`.
     angles_update
         What updates the track that angles gate. H 6.3.2: pixels are used in the update and angles for gating.
     azimuth

@@ -3,11 +3,159 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+
+from wildlab.evaluation.shares import Check
+from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.studies.large_ship import trial
-from wildlab.studies.large_ship.claims import check_claims
+from wildlab.studies.large_ship.trial import (
+    DETECTOR,
+    NEAR_M,
+    START_S,
+    SUBJECTS,
+    WITH,
+    WITHOUT,
+    Photographs,
+    Tracked,
+    errors_of,
+)
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study, name_metrics
+
+Array = NDArray[np.float64]
+
+
+def scatter_left(spread: pd.DataFrame) -> Array:
+    """What true poses would leave of a flight's scatter, (flights,): the larger of both kinds of centres.
+
+    Parameters
+    ----------
+    spread
+        What `trial` gives, one row for each flight.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = [
+            spread[who, "sd_true_poses"].to_numpy(float) / spread[who, "sd_both"].to_numpy(float)
+            for who in SUBJECTS
+        ]
+    return np.asarray(np.max(left, axis=0))
+
+
+def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+    """What the flights give for each claim of H 6.4.1, by the claim's id.
+
+    Parameters
+    ----------
+    spread
+        What `trial` gives, one row for each flight.
+    """
+
+    def both(name: str) -> tuple[Array, Array]:
+        return spread[WITH, name].to_numpy(float), spread[WITHOUT, name].to_numpy(float)
+
+    def of(name: str) -> Array:
+        return spread[DETECTOR, name].to_numpy(float)
+
+    north, east = both("sd_north"), both("sd_east")
+    shares = {float(limit): both(f"share_near_{limit}") for limit in NEAR_M}
+    near, far = shares[NEAR_M[1]]
+    rest, rest_without = (np.nan_to_num(times, nan=np.inf) for times in both("time_to_rest"))
+    known = np.isfinite(rest) | np.isfinite(rest_without)
+    logged = [np.hypot(*pair) for pair in zip(north, east, strict=True)]
+    return {
+        "mean-nearer": Check.smaller(*both("error_of_mean"), "m"),
+        "variance-increases": Check(
+            true=(north[0] > north[1]) & (east[0] > east[1]), first=logged[0], second=logged[1], unit="m"
+        ),
+        "more-near-centre": Check(
+            by_threshold={limit: one > other for limit, (one, other) in shares.items()},
+            first=near,
+            second=far,
+        ),
+        "mostly-a-part": Check(true=of("share_cut") > 0.5),
+        "not-every-image-adjusted": Check(true=of("share_moved") < 1.0),
+        "more-accurate-after-start": Check.smaller(*both("mae_after_start"), "m"),
+        "within-five-metres": Check(true=of("share_within_5_m") > 0.5),
+        "rest-sooner": Check(true=rest < rest_without, premise=known),
+        "speed-near-zero": Check(measured=np.max(both("speed_after_start"), axis=0)),
+        "mainly-navigation": Check(measured=scatter_left(spread), reach=(0, 1)),
+        "high-success-rate": Check(measured=1 - of("detection_rate")),
+    }
+
+
+_COLOURS = {WITH: BLUE, WITHOUT: VERMILLION}
+
+
+def images(taken: Photographs) -> Figure:
+    """An image that shows much of the ship, and one that shows about half of it (H figures 6.2, 4.8)."""
+    plain, moved = taken.marks(moved=False), taken.marks()
+    whole = int(np.argmax(np.where(plain.found, plain.share, -1.0)))
+    cut = moved.moved if moved.moved.any() else plain.found
+    part = int(np.argmin(np.where(cut, np.abs(plain.share - 0.5), 2.0)))
+    height, width = taken.shape
+    beyond = [max(float((-at).max()), *(at - [width, height])) for at in plain.centre[[whole, part]]]
+    reach = max(0.0, *beyond) + 25
+    fig, axes = new_figure(5.9, 3.1, columns=2)
+    for ax, row, name in zip(axes, (whole, part), ("Most in view", "Nearest to half"), strict=True):
+        _, counts = taken.camera.image(int(plain.exposure[row]))
+        low, high = np.quantile(counts, [0.01, 0.99])
+        ax.imshow(counts, cmap="gray", vmin=low, vmax=high, interpolation="nearest")
+        shot = taken.shots[row]
+        one = shot.detections.select(shot.judged.found[1][:1])
+        angle = float(np.degrees(one.orientation[0]))
+        ax.add_patch(
+            Ellipse(tuple(one.uv[0]), *one.axes[0], angle=angle, fill=False, ec=VERMILLION, lw=1.6)
+        )  # fmt: skip
+        ax.plot(*plain.uv[row], "x", color=VERMILLION, ms=8, mew=2, label="found")
+        ax.plot(*moved.uv[row], "+", color=BLUE, ms=10, mew=2, label="moved")
+        ax.plot(*plain.centre[row], "o", mfc="none", mec=ORANGE, ms=9, mew=1.6, label="true")
+        ax.set(xlim=(-reach, width + reach), ylim=(height + reach, -reach), xticks=[], yticks=[])
+        ax.set_facecolor("0.92")
+        ax.grid(False)
+        ax.set_title(f"{name}: {100 * plain.share[row]:.0f} %")
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return fig
+
+
+def positions(tracked: Mapping[str, Tracked], names: Mapping[str, str]) -> Figure:
+    """Georeferenced positions about the ship's receiver, with and without (H figure 6.3)."""
+    fig, axes = new_figure(5.9, 3.7, columns=2)
+    errors = {who: -errors_of(one)[0][one.seen.seen] for who, one in tracked.items()}
+    for ax, (who, e) in zip(axes, errors.items(), strict=True):
+        ax.plot(e[:, 1], e[:, 0], "o", color=_COLOURS[who], ms=4, alpha=0.6, mew=0)
+        ax.plot(*e.mean(axis=0)[::-1], "+", color=INK, ms=12, mew=2)
+        ax.plot(0, 0, "o", mfc="none", mec=GREEN, ms=9, mew=2)
+        ax.set_title(names[who].capitalize())
+    reach = 1.08 * max(float(np.abs(e).max()) for e in errors.values())
+    for ax in axes:
+        ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
+        map_axes(ax, scale_bar=False)
+    axes[1].set_ylabel("")
+    return fig
+
+
+def errors_and_speed(tracked: Mapping[str, Tracked], names: Mapping[str, str]) -> Figure:
+    """Distance from the receiver and estimated speed over the joined segments (H figure 6.4)."""
+    fig, axes = new_figure(5.9, 4.6, rows=2, sharex=True)
+    for who, one in tracked.items():
+        times = one.seen.times
+        distance, speed = np.hypot(*errors_of(one)[1].T), np.hypot(*one.track.x[:, 2:4].T)
+        axes[0].plot(times, distance, color=_COLOURS[who], label=names[who])
+        axes[1].plot(times, speed, color=_COLOURS[who])
+    for ax in axes:
+        ax.axvline(START_S, color=INK, lw=0.8, ls=":")
+        ax.set_ylim(bottom=0)
+    axes[0].set_ylabel("distance (m)")
+    axes[1].set_ylabel("speed (m/s)")
+    axes[1].set_xlabel("time, segments joined (s)")
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return fig
 
 
 def answer(facts: Facts) -> list[str]:

@@ -2,10 +2,316 @@
 
 from __future__ import annotations
 
-from wildlab.studies.line_of_sight import claims, trial
-from wildlab.studies.line_of_sight.trial import ANGLES, HEIGHT, INCIDENCES, RAYS, TREES
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike
+
+from wildlab.evaluation.runs import mean_interval, mean_share_interval
+from wildlab.evaluation.shares import Check
+from wildlab.geometry.frames import Array
+from wildlab.geometry.line_of_sight import cast_rays, compare_angles, field_of_view, in_field_of_view
+from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.visibility import lines_clear
+from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
+from wildlab.reporting.spread import bounds_of
+from wildlab.reporting.text import number, percent, percent_between
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.landscape import synthetic_landscape
+from wildlab.studies.line_of_sight import trial
+from wildlab.studies.line_of_sight.trial import (
+    ANGLES,
+    EXACT,
+    FEWEST,
+    HEIGHT,
+    HEIGHTS,
+    INCIDENCES,
+    LETTER,
+    RAYS,
+    STEP,
+    TILT,
+    TOLERANCE,
+    TREES,
+    VIEW,
+    WHOLE_RAYS,
+    TerrainView,
+    camera_of,
+    look,
+    nodes_of,
+    settings,
+)
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Metric, Study
+
+#: How often each call is timed; the quickest counts.
+REPEATS = 5
+#: What is timed.
+WAYS = (RAYS, WHOLE_RAYS, ANGLES, EXACT)
+#: Over how many lands at most: more would tell no more of a ratio than this.
+MOST = 20
+#: Grid points in view that are timed, at most; and of the whole map one in so many.
+MOST_POINTS, PART = 2000, 10
+
+
+def best_times(calls: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
+    """Fewest seconds of the processor for each call, all in turn: what else a machine does only adds."""
+    for call in calls.values():
+        call()  # the first one compiles, and fills the caches
+    times: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(repeats):
+        for name, call in calls.items():
+            begun = time.process_time()
+            call()
+            times[name].append(time.process_time() - begun)
+    return {name: min(each) for name, each in times.items()}
+
+
+def timed(seeds: Iterable[int], twin: str, repeats: int = REPEATS) -> pd.DataFrame:
+    """Times of the three ways over views like those of the trials.
+
+    Parameters
+    ----------
+    seeds
+        Of the lands; the first `MOST` are taken.
+    twin
+        Whose camera it is.
+    repeats
+        Of each call, of which the quickest counts.
+
+    Returns
+    -------
+    DataFrame
+        A row for each seed; columns (way, height): seconds a grid point in view; `VIEW`: seconds for each
+        grid point of the map to tell whether it is in view.
+    """
+    camera, rows, lands = camera_of(twin), {}, list(seeds)[:MOST]
+    angles = field_of_view(camera)
+    for seed in lands:
+        land, rng = synthetic_landscape(seed), stream(seed, "times")
+        row: dict[tuple[str, int], float] = {}
+        _, points = nodes_of(land)
+        for height in HEIGHTS:
+            view = look(land, camera, rng, height, TILT)
+            # In the order of the map: to fetch heights from all over it would be what takes the time.
+            some = np.sort(rng.permutation(len(view.nodes))[:MOST_POINTS])
+            nodes, ends, lens = view.nodes[some], view.points[some], view.p_nc
+            found = best_times(
+                {
+                    RAYS: partial(cast_rays, land, nodes, lens, STEP, TOLERANCE),
+                    WHOLE_RAYS: partial(cast_rays, land, nodes, lens, STEP, TOLERANCE, shorten=False),
+                    ANGLES: partial(compare_angles, land, nodes, lens),
+                    EXACT: partial(lines_clear, land, ends, lens),
+                    VIEW: partial(in_field_of_view, angles, points[::PART], lens, view.R_nc),
+                },
+                repeats,
+            )
+            for way, seconds in found.items():
+                count = len(points[::PART]) if way == VIEW else len(some)
+                row[way, height] = seconds / count if count >= FEWEST else np.nan
+        rows[seed] = row
+    names = [(way, height) for height in HEIGHTS for way in (*WAYS, VIEW)]
+    values = np.array([[row[name] for name in names] for row in rows.values()])
+    return pd.DataFrame(values, pd.Index(rows, name="seed"), pd.MultiIndex.from_tuples(names))
+
+
+def seconds(times: pd.DataFrame, way: str) -> Array:
+    """(lands, heights) of one way, s a grid point."""
+    return np.column_stack([times[way, height].to_numpy(float) for height in HEIGHTS])
+
+
+def furthest_ratio(times: pd.DataFrame, way: str, beside: str) -> Array:
+    """(lands,) where both differ most, how many times the quicker's time the slower one takes."""
+    apart = np.abs(np.log(seconds(times, way) / seconds(times, beside)))
+    return np.asarray(np.exp(np.nanmax(apart, axis=1)))
+
+
+#: A ratio of times, the larger over the smaller, is never below this.
+EQUAL = 1.0
+
+
+def at_heights(runs: pd.DataFrame, subject: str, name: str) -> Array:
+    """(lands, heights) of one number."""
+    return np.column_stack([runs[subject, f"{name}_{height}m"] for height in HEIGHTS])
+
+
+def disagreement(runs: pd.DataFrame, way: str) -> Array:
+    """(lands,) share of grid points answered otherwise than exactly by a way, mean over heights."""
+    return np.asarray(1 - np.nanmean(at_heights(runs, way, "agreement"), axis=1))
+
+
+def saved(runs: pd.DataFrame) -> Array:
+    """(lands, heights) how many times as many steps rays take that begin at the camera."""
+    return at_heights(runs, WHOLE_RAYS, "steps") / at_heights(runs, RAYS, "steps")
+
+
+def hidden(runs: pd.DataFrame) -> Array:
+    """(lands, incidences) share of what is seen without trees that trees hide."""
+    return np.column_stack([runs[TREES, f"hidden_{degrees}deg"] for degrees in INCIDENCES])
+
+
+def check_claims(runs: pd.DataFrame, times: pd.DataFrame) -> dict[str, Check]:
+    """What the lands give for each claim, by the claim's id.
+
+    Parameters
+    ----------
+    runs
+        What `trial` gives, one row for each land.
+    times
+        What `timed` gives, one row for each land that was timed.
+    """
+    trees, factor = hidden(runs), saved(runs)
+    cheap = np.nanmax(seconds(times, VIEW), axis=1)
+    dear = np.nanmin(np.hstack([seconds(times, way) for way in (RAYS, ANGLES)]), axis=1)
+    letter = np.column_stack([runs[LETTER, f"seen_{name}"] for name, *_ in settings()])
+    return {
+        "run-times-similar": _times(times, RAYS),
+        "run-times-similar-from-the-camera": _times(times, WHOLE_RAYS),
+        "occlusion-costs-more": Check(true=dear > cheap, first=1e6 * dear, second=1e6 * cheap, unit="µs"),
+        "shortening-pays-high-up": Check(
+            true=factor[:, -1] > factor[:, 0], first=factor[:, -1], second=factor[:, 0], unit="times"
+        ),
+        "view-grows-linearly": Check(measured=np.abs(runs[VIEW, "exponent"].to_numpy(float) - 1)),
+        "trees-count-with-incidence": Check(
+            true=np.asarray((np.diff(trees, axis=1) > 0).all(axis=1)), first=trees[:, -1], second=trees[:, 0]
+        ),
+        "algorithms-agree": Check(
+            measured=np.maximum(disagreement(runs, RAYS), disagreement(runs, ANGLES)), reach=(0.0, 1.0)
+        ),
+        "letter-hides-everything": Check(true=np.asarray(np.nanmax(letter, axis=1) == 0)),
+    }
+
+
+def _times(times: pd.DataFrame, way: str) -> Check:
+    return Check(measured=furthest_ratio(times, way, ANGLES), reach=(EQUAL, np.inf))
+
+
+_COLOURS = {RAYS: BLUE, WHOLE_RAYS: GREEN, ANGLES: VERMILLION, EXACT: INK}
+
+
+def agreement_over_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """Agreement of both algorithms with the exact line of sight."""
+    values = {way: 100 * at_heights(runs, way, "agreement") for way in (RAYS, ANGLES)}
+    fig, ax = _over_height(values, names, 100.0)
+    ax.set_ylabel("correct points (%)")
+    return fig
+
+
+def times_over_height(times: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """Time per grid point: the counterpart of F figure 7.1."""
+    fig, ax = new_figure(5.6, 3.6)
+    for way in WAYS:
+        values = 1e6 * seconds(times, way)
+        low, high = np.transpose([bounds_of(pd.Series(column)) for column in values.T])
+        ax.fill_between(HEIGHTS, low, high, color=_COLOURS[way], alpha=0.15, lw=0)
+        ax.plot(HEIGHTS, np.nanmedian(values, axis=0), "o-", color=_COLOURS[way], label=names[way])
+    _heights(ax)
+    ax.set(yscale="log", ylabel="time per grid point (µs)")
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return fig
+
+
+def steps_over_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """Steps per grid point."""
+    values = {way: at_heights(runs, way, "steps") for way in (RAYS, WHOLE_RAYS, ANGLES)}
+    fig, ax = _over_height(values, names)
+    ax.set(yscale="log", ylabel="steps per grid point")
+    return fig
+
+
+def hidden_over_incidence(runs: pd.DataFrame) -> Figure:
+    """Share of the ground that trees hide."""
+    fig, ax = new_figure(5.6, 3.2)
+    _band(ax, INCIDENCES, 100 * hidden(runs), GREEN, "")
+    ax.set(xlabel="incidence, from straight down (°)", ylabel="ground hidden by trees (%)", ylim=(0, None))
+    ax.set_xticks(INCIDENCES)
+    return fig
+
+
+def view_map(land: Terrain, view: TerrainView, names: Mapping[str, str]) -> Figure:
+    """One view on the map: what is seen, and where each algorithm says something else."""
+    exact = lines_clear(land, view.points, view.p_nc)
+    ways = {
+        RAYS: cast_rays(land, view.nodes, view.p_nc, STEP, TOLERANCE).clear,
+        ANGLES: compare_angles(land, view.nodes, view.p_nc).clear,
+    }
+    fig, axes = new_figure(5.8, 3.9, columns=2, sharey=True)
+    north, east = view.points[:, 0], view.points[:, 1]
+    about = np.vstack([view.points, view.p_nc])
+    low, high = about.min(axis=0) - 10, about.max(axis=0) + 10
+    rows, columns = land.height.shape
+    south, most, west, furthest = land.extent
+    for ax, (way, clear) in zip(axes, ways.items(), strict=True):
+        ax.contour(
+            np.linspace(west, furthest, columns), np.linspace(south, most, rows), land.height,
+            levels=np.arange(0, 60, 5), colors=GREY, linewidths=0.5,
+        )  # fmt: skip
+        for which, colour in ((~exact & ~clear, INK), (clear & ~exact, ORANGE), (exact & ~clear, VERMILLION)):
+            ax.plot(east[which], north[which], ".", ms=2.2, color=colour)
+        ax.plot(view.p_nc[1], view.p_nc[0], "^", color=BLUE, ms=7)
+        ax.set_title(f"{names[way]}: {percent(float((clear != exact).mean()))} wrong", fontsize=10)
+        ax.set(xlim=(low[1], high[1]), ylim=(low[0], high[0]))
+    map_axes(axes[0])
+    map_axes(axes[1], north="")
+    marks = {"hidden": INK, "wrongly visible": ORANGE, "wrongly hidden": VERMILLION, "camera": BLUE}
+    handles = [
+        Line2D([], [], marker="o", ls="", color=colour, label=label) for label, colour in marks.items()
+    ]
+    fig.legend(handles=handles, loc="outside lower center", ncols=4)
+    return fig
+
+
+def tables(runs: pd.DataFrame, times: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Shares of grid points by height and tilt, with the 95 % interval of their mean over terrains, and
+    median times (µs)."""
+    shares = []
+    for name, height, tilt in settings():
+        row = {"where": f"{height:.0f} m, {tilt:.0f}°", "seen": _share(runs[EXACT, f"seen_{name}"])}
+        for way in (RAYS, ANGLES):
+            row[way] = _share(runs[way, f"agreement_{name}"])
+            wrong = [percent(float(runs[way, f"{what}_{name}"].mean())) for what in ("too_many", "too_few")]
+            row[f"{way}-wrong"] = " / ".join(wrong)
+        shares.append(row)
+    taken = [
+        {"height": f"{height} m"} | {way: number(1e6 * float(times[way, height].median()), 2) for way in WAYS}
+        for height in HEIGHTS
+    ]
+    return {"agreement": pd.DataFrame(shares), "times": pd.DataFrame(taken)}
+
+
+def _share(values: ArrayLike) -> str:
+    return percent_between(mean_share_interval(values))
+
+
+def _over_height(
+    values: Mapping[str, Array], names: Mapping[str, str], most: float = np.inf
+) -> tuple[Figure, Axes]:
+    fig, ax = new_figure(5.6, 3.4)
+    for way, each in values.items():
+        _band(ax, HEIGHTS, each, _COLOURS[way], names[way], most)
+    _heights(ax)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return fig, ax
+
+
+def _band(ax: Axes, x: Sequence[float], values: Array, colour: str, label: str, most: float = np.inf) -> None:
+    """Mean over terrains and its 95 % interval."""
+    if len(values) > 1:
+        ends = np.clip([mean_interval(column)[1:] for column in values.T], 0.0, most)
+        ax.fill_between(np.asarray(x, float), ends[:, 0], ends[:, 1], color=colour, alpha=0.18, lw=0)
+    ax.plot(x, np.nanmean(values, axis=0), "o-", color=colour, label=label)
+
+
+def _heights(ax: Axes) -> None:
+    ax.set(xscale="log", xlabel="height above the ground (m)")
+    ax.set_xticks(HEIGHTS, [str(height) for height in HEIGHTS])
+    ax.minorticks_off()
+
 
 #: Names of the numbers that are recorded begin with these; and their units.
 _UNITS = {
@@ -37,4 +343,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study("line-of-sight", trial.SUBJECTS, trial.trial, claims.check_claims, _metric, answer)
+STUDY = Study("line-of-sight", trial.SUBJECTS, trial.trial, check_claims, _metric, answer)

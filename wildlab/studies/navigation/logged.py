@@ -4,27 +4,220 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from wildlab.analysis.navigation_errors import Studied, calibrated, summarise
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from wildlab.analysis.navigate import likelihoods_of_latency
+from wildlab.analysis.navigation_errors import (
+    AXES,
+    NavigationErrors,
+    Studied,
+    calibrated,
+    summarise,
+    summarise_innovations,
+)
 from wildlab.analysis.navigation_inputs import heading_from
 from wildlab.analysis.overviews.verdict import VERDICT_LEVEL
-from wildlab.analysis.receiver import place_receiver
+from wildlab.analysis.receiver import Placement, Receiver, place_receiver
+from wildlab.evaluation.blocks import block_mean, time_blocks
 from wildlab.flight.store import Flight
 from wildlab.messages.message import Message
 from wildlab.messages.page_texts import load_texts, significant
+from wildlab.navigation.receiver import SIZE, Candidate
 from wildlab.reporting.report import Report
 from wildlab.reporting.wording import Wording
-from wildlab.studies.navigation import OVERCONFIDENT, attitude_of, verdict_of_attitude
-from wildlab.studies.navigation.charts import differences_table, innovations_table, logged_figures
-from wildlab.studies.navigation.receiver import (
-    attitude_change,
-    latency_message,
-    models_table,
-    parameters_table,
-    parts_table,
-    placement_message,
-    thirds,
+from wildlab.studies.navigation import (
+    OVERCONFIDENT,
+    attitude_of,
+    differences_table,
+    innovations_table,
+    logged_figures,
+    verdict_of_attitude,
 )
 from wildlab.studies.page import tile_of
+
+#: Mean NIS over its ideal within this is of the right level; correlations at lag 1 below that are no colour.
+LEVEL, COLOUR = (0.7, 1.4), 0.3
+#: So many standard deviations from what is configured are an error: four numbers are looked at.
+FAR = 3.0
+#: Delays of a receiver that are tried, s.
+LATENCIES = np.arange(0.0, 0.41, 0.02)
+_ORDERS = ("white", "and an error of first order", "and an error of second order")
+_PARTS = (
+    ("white noise, level", 0),
+    ("white noise, height", 1),
+    ("slow error, level", 0),
+    ("slow error, height", 1),
+    ("how long that keeps", None),
+    ("over what its change is smooth", None),
+)
+
+
+def parameters_table(receiver: Receiver) -> pd.DataFrame:
+    """Every number of the noise that was chosen, and what is configured.
+
+    Returns
+    -------
+    DataFrame
+        ``source``, ``what``, ``unit``, ``stated``, ``found``, ``low`` and ``high`` (two standard deviations
+        by the information in the innovations; NaN at the limit of what was tried).
+    """
+    rows = []
+    scale, chosen = receiver.scale, receiver.chosen
+    for index, (name, noise, stated, unit) in enumerate(
+        (("position", chosen.noise.position, scale.position, "m"),
+         ("velocity", chosen.noise.velocity, scale.velocity, "m/s"))
+    ):  # fmt: skip
+        if stated is None:
+            continue
+        for place, (what, axis) in enumerate(_PARTS):
+            if place > 1 and (noise.order == 0 or (place == 5 and noise.order == 1)):
+                continue
+            value = noise[place] * (stated[axis] if place < 2 and axis is not None else 1.0)
+            spread = float(np.exp(2 * chosen.sd[SIZE * index + place]))
+            rows.append(
+                {
+                    "source": name,
+                    "what": what,
+                    "unit": "s" if axis is None else unit,
+                    "stated": stated[axis] if place < 2 and axis is not None else np.nan,
+                    "found": value,
+                    "low": value / spread,
+                    "high": value * spread,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def models_table(receiver: Receiver) -> pd.DataFrame:
+    """Models that were tried: ``model``, ``parameters``, ``gain`` of the log likelihood over the configured
+    one, ``score`` (that less what chance gains) and ``chosen``."""
+    first = receiver.candidates[0]
+    return pd.DataFrame(
+        [
+            {
+                "model": _model(one, receiver),
+                "parameters": one.parameters,
+                "gain": one.log_likelihood - first.log_likelihood,
+                "score": one.score - first.score,
+                "chosen": "chosen" if one is receiver.chosen else "",
+            }
+            for one in receiver.candidates
+        ]
+    )
+
+
+def _model(one: Candidate, receiver: Receiver) -> str:
+    if one.parameters == 0:
+        return "as configured"
+    moving = "" if receiver.scale.velocity is None else f"; velocities {_ORDERS[one.noise.velocity.order]}"
+    return f"positions {_ORDERS[one.noise.position.order]}{moving}"
+
+
+def left_over(ratio: float, lag1: float) -> tuple[str, ...]:
+    """What innovations still have that they should not: ``"level"``, ``"colour"``, both or nothing.
+
+    Parameters
+    ----------
+    ratio
+        Mean NIS over its ideal.
+    lag1
+        Largest correlation at lag 1.
+    """
+    level = () if LEVEL[0] <= ratio <= LEVEL[1] else ("level",)
+    return level if abs(lag1) < COLOUR else (*level, "colour")
+
+
+def attitude_change(before: NavigationErrors, after: NavigationErrors, begin: float, end: float) -> str:
+    """How the attitude's difference from the reference changed between two times, s: ``nearer``, ``farther``,
+    ``same``, or ``unknown`` where the time is too short."""
+    inside = (before.times >= begin) & (before.times < end)
+    squares = [np.degrees(one.error[inside, 6:]) ** 2 @ np.ones(3) for one in (before, after)]
+    known = np.isfinite(squares[0]) & np.isfinite(squares[1])
+    change = (squares[1] - squares[0])[known]
+    span = block_mean(change, time_blocks(before.times[inside][known], seconds=True))
+    if not np.isfinite(span.low):
+        return "unknown"
+    return "farther" if span.low > 0 else "nearer" if span.high < 0 else "same"
+
+
+def placement_message(found: Placement, configured: ArrayLike) -> Message:
+    """How late the receiver is and where its antenna sits, and what of that is not as configured.
+
+    Parameters
+    ----------
+    found
+        As `wildlab.analysis.receiver.place_receiver` gives it.
+    configured
+        (4,) latency, s, and lever arm, m.
+    """
+    given = np.asarray(configured, float)
+    likely = np.array([found.latency, *found.lever])
+    known = np.isfinite(found.sd)
+    if not known.any():
+        return Message("placement-unknown")
+    wrong = known & (np.abs(likely - given) > FAR * found.sd)
+    values = {"latency": f"{likely[0]:.3f}", "configured": f"{given[0]:.3f}"}
+    if not wrong.any():
+        return Message("placement-confirmed", values)
+    write = [f"latency_s = {likely[0]:.3f}"] if wrong[0] else []
+    if wrong[1:].any():
+        write.append(f"lever_arm_m = [{', '.join(f'{value:.2f}' for value in likely[1:])}]")
+    return Message("placement-wrong", {**values, "settings": " and ".join(write)})
+
+
+def latency_message(flight: Flight) -> Message:
+    """How late the receiver is configured to be, and with which delay the flight's fixes are likeliest."""
+    likeliest = float(LATENCIES[int(np.argmax(likelihoods_of_latency(flight, LATENCIES)))])
+    configured = flight.manifest.gnss.latency_s
+    return Message("latency", {"latency": f"{likeliest:.2f}", "configured": f"{configured:.2f}"})
+
+
+def parts_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> pd.DataFrame:
+    """Innovations and attitude in parts of a flight (words, from, to, s), with what is stated and as found.
+
+    Returns
+    -------
+    DataFrame
+        A row for each part and source: ``part``, ``source``; NIS over its ideal and correlation at lag 1
+        (``ratio_before``, ``lag1_before``, ``ratio``, ``lag1``); RMS of the attitude's difference from the
+        reference (``off_before``, ``off``, degrees); and what is ``left``, in words. Where nothing was
+        changed, before is now.
+    """
+    rows = []
+    last = "mekf-receiver" if "mekf-receiver" in studied.found else "mekf"
+    for words, begin, end in parts:
+        now = summarise_innovations(studied.found[last], begin, end)
+        was = summarise_innovations(studied.found["mekf"], begin, end)
+        off = {}
+        for who in ("mekf", last):
+            numbers = summarise(studied.scored[who], begin, end)
+            off[who] = float(np.linalg.norm([numbers[f"rms_{axis}"] for axis in AXES]))
+        for (_, before), (_, after) in zip(was.iterrows(), now.iterrows(), strict=True):
+            ratio, lag1 = after["nis"] / after["dof"], after["lag1"]
+            rows.append(
+                {
+                    "part": words,
+                    "source": after["source"],
+                    "ratio_before": before["nis"] / before["dof"],
+                    "lag1_before": before["lag1"],
+                    "ratio": ratio,
+                    "lag1": lag1,
+                    "off_before": off["mekf"],
+                    "off": off[last],
+                    "left": " and ".join(left_over(ratio, lag1)),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def thirds(begin: float, end: float) -> list[tuple[str, float, float]]:
+    """The thirds of a time, s, for a flight of which nobody named parts."""
+    edges = np.linspace(begin, end, 4)
+    names = ("first third", "second third", "last third")
+    return [(name, float(edges[i]), float(edges[i + 1])) for i, name in enumerate(names)]
+
 
 Part = tuple[str, float, float]
 

@@ -3,12 +3,364 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal
 
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.detection.warm import Warm
+from wildlab.evaluation.matching import Rates, rates, shares
+from wildlab.evaluation.runs import Interval, mean_interval
+from wildlab.evaluation.shares import Check
+from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.wildlife_detection import trial
-from wildlab.studies.wildlife_detection.claims import check_claims
-from wildlab.studies.wildlife_detection.trial import METHODS, PROPOSED, SUBTRACTED
+from wildlab.studies.wildlife_detection.trial import (
+    ADAPTIVE,
+    BY_BLOCK,
+    BY_EMPTY,
+    BY_MEAN,
+    BY_MEDIAN,
+    BY_SIZE,
+    CLOUDY,
+    CONSTANT,
+    COUNTS,
+    ENHANCED,
+    LARGE,
+    METHODS,
+    NIGHT,
+    NOON,
+    NOT_HOT,
+    OVER_MEAN,
+    PRINTED,
+    PROPOSED,
+    READ_AT,
+    READINGS,
+    SMALL,
+    SUBTRACTED,
+    VIEWS,
+    WEATHERS,
+    DetectionScore,
+    Picture,
+    find,
+    judge,
+    read_subject,
+)
+
+Array = NDArray[np.float64]
+#: How many grey levels the ground changes at least where it "changes too much": a tenth of all.
+TOO_MUCH = 25.0
+#: The reading of figures 7.7 and 7.8 for the claims, that of `METHODS`.
+CLAIMED = "pieces_offset_65"
+
+
+def places(weathers: Iterable[str] = tuple(WEATHERS), heights: Iterable[int] = tuple(VIEWS)) -> list[str]:
+    """Names of pictures: of those weathers, from those heights."""
+    tall = list(heights)
+    return [f"{weather}_{height}" for weather in weathers for height in tall]
+
+
+def counts_of(runs: pd.DataFrame, subject: str, at: Sequence[str]) -> Array:
+    """(images, 3) found, invented and missed of all seeds; an image that was not looked at has no row."""
+    named = [[(subject, f"{name}_{one}") for name in COUNTS] for one in at]
+    rows = [runs[one].to_numpy(float) for one in named if one[0] in runs.columns]
+    table = np.concatenate([np.zeros((0, 3)), *rows])
+    return np.asarray(table[np.isfinite(table).all(axis=1)])
+
+
+def rates_of(runs: pd.DataFrame, subject: str, at: Sequence[str]) -> Rates:
+    """Precision, recall and F1 over all images, with intervals over images."""
+    return rates(counts_of(runs, subject, at))
+
+
+def false_alarms(runs: pd.DataFrame, subject: str, at: Sequence[str]) -> Interval:
+    """How many an image, with the interval of the mean, which ends at zero."""
+    invented = counts_of(runs, subject, at)[:, 1]
+    if len(invented) < 2:
+        return Interval(float(invented.mean()) if len(invented) else np.nan, np.nan, np.nan)
+    found = mean_interval(invented)
+    return Interval(found.estimate, max(found.low, 0.0), found.high)
+
+
+def rates_metrics(runs: pd.DataFrame) -> list[tuple[str, str, Interval, int]]:
+    """Name, subject, value with interval, and number of images of each method's rates in each weather."""
+    found = []
+    for subject in (*METHODS, *PROPOSED):
+        for weather in WEATHERS:
+            at = places([weather])
+            one, alarms = rates_of(runs, subject, at), false_alarms(runs, subject, at)
+            if one.groups:
+                values = {"recall": one.recall, "f1": one.f1, "false_alarms_per_image": alarms}
+                found += [(f"{name}_{weather}", subject, each, one.groups) for name, each in values.items()]
+    return found
+
+
+def by_seed(runs: pd.DataFrame, subject: str, at: Sequence[str]) -> Array:
+    """(seeds, 3) sums of found, invented and missed."""
+    return np.stack(
+        [runs[[(subject, f"{name}_{one}") for one in at]].to_numpy(float).sum(axis=1) for name in COUNTS],
+        axis=1,
+    )
+
+
+def f1(counts: Array) -> Array:
+    """(...) of (..., 3) counts: zero where nothing was found, NaN where there was nothing."""
+    return np.asarray(shares(counts)[..., 2])
+
+
+def fall(before: ArrayLike, after: ArrayLike) -> Array:
+    """By which part an F1 falls: 1 is all of it. NaN where it was zero."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(1 - np.asarray(after, float) / np.asarray(before, float))
+
+
+def _recall(counts: Array) -> Array:
+    return np.asarray(shares(counts)[..., 1])
+
+
+def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
+    """What the pictures of each seed give for each claim, by the claim's id.
+
+    Parameters
+    ----------
+    runs
+        What `wildlab.studies.wildlife_detection.trial.trial` gives, one row for each seed.
+    """
+
+    def of(subject: str, name: str) -> Array:
+        return runs[subject, name].to_numpy(float)
+
+    cloudy = places([CLOUDY])
+    changed = np.abs(of("ground", "level_after") - of("ground", "level_before")) > TOO_MUCH
+    drop = {
+        method: fall(f1(by_seed(runs, method, ["before"])), f1(by_seed(runs, method, ["after"])))
+        for method in (CONSTANT, OVER_MEAN)
+    }
+    seen = {method: f1(by_seed(runs, method, ["before"])) > 0 for method in drop}
+    pieces = {method: of(method, CLAIMED) for method in (SMALL, LARGE)}
+    left = {
+        method: np.mean([of(method, f"background_{one}") for one in cloudy], axis=0)
+        for method in (SUBTRACTED, ENHANCED)
+    }
+    recall = {method: _recall(by_seed(runs, method, cloudy)) for method in (SUBTRACTED, ENHANCED)}
+    herd = {method: _recall(by_seed(runs, method, ["herd"])) for method in (BY_MEAN, BY_MEDIAN, BY_EMPTY)}
+    good = {
+        method: f1(by_seed(runs, method, cloudy))
+        for method in (CONSTANT, OVER_MEAN, SUBTRACTED, ENHANCED, BY_MEAN)
+    }
+    warm = {
+        weather: np.nanmean([of("ground", f"as_warm_{one}") for one in places([weather])], axis=0)
+        for weather in (NIGHT, NOON)
+    }
+    everywhere = places()
+    noon = {method: by_seed(runs, method, places([NOON])) for method in (SUBTRACTED, NOT_HOT)}
+    gated = {method: by_seed(runs, method, everywhere) for method in (SUBTRACTED, BY_SIZE)}
+    block = {method: f1(by_seed(runs, method, everywhere)) for method in (SUBTRACTED, BY_BLOCK)}
+
+    def filtered(without: Array, filtered: Array) -> Check:
+        # A further filter can only take away: it has to be worth what it costs.
+        with_it, plain = f1(filtered), f1(without)
+        return Check(
+            true=(filtered[:, 1] < without[:, 1]) & (with_it > plain),
+            first=with_it, second=plain, premise=without[:, 1] > 0, unit="F1",
+        )  # fmt: skip
+
+    return {
+        "constant-fails": Check(
+            true=seen[CONSTANT], measured=drop[CONSTANT], above=True, premise=changed & seen[CONSTANT],
+            reach=(-np.inf, 1),
+        ),
+        "adaptive-copes": Check(
+            true=seen[OVER_MEAN], measured=drop[OVER_MEAN], premise=changed & seen[OVER_MEAN],
+            reach=(-np.inf, 1),
+        ),
+        "small-block-splits": Check(true=pieces[SMALL] > 1, premise=np.isfinite(pieces[SMALL])),
+        "large-block-whole": Check(true=pieces[LARGE] == 1, premise=np.isfinite(pieces[LARGE])),
+        "enhancement-takes-background": Check(
+            true=left[ENHANCED] > left[SUBTRACTED], first=left[ENHANCED], second=left[SUBTRACTED],
+            unit="grey levels",
+        ),
+        "enhancement-misses": Check(
+            true=recall[ENHANCED] < recall[SUBTRACTED], first=recall[ENHANCED], second=recall[SUBTRACTED],
+            premise=recall[SUBTRACTED] > 0,
+        ),
+        "combinations-best": Check(
+            true=np.minimum(good[SUBTRACTED], good[ENHANCED]) > np.maximum(good[CONSTANT], good[OVER_MEAN]),
+            first=np.minimum(good[SUBTRACTED], good[ENHANCED]),
+            second=np.maximum(good[CONSTANT], good[OVER_MEAN]),
+        ),
+        "subtraction-and-constant-good": Check(measured=good[BY_MEAN], above=True, reach=(0, 1)),
+        "herd-biases-mean": Check(measured=of("herd", "mean_rise"), above=True),
+        "threshold-higher-than-needed": Check(
+            true=herd[BY_EMPTY] > herd[BY_MEAN], first=herd[BY_EMPTY], second=herd[BY_MEAN],
+        ),
+        "median-rises-less": Check(
+            true=np.abs(of("herd", "median_rise")) < np.abs(of("herd", "mean_rise")),
+            first=of("herd", "median_rise"), second=of("herd", "mean_rise"), unit="grey levels",
+        ),
+        "median-finds-more": Check(
+            true=herd[BY_MEDIAN] > herd[BY_MEAN], first=herd[BY_MEDIAN], second=herd[BY_MEAN],
+        ),
+        "sun-breaks": Check(measured=warm[NOON], above=True),
+        "night-keeps": Check(measured=warm[NIGHT]),
+        "too-hot": filtered(noon[SUBTRACTED], noon[NOT_HOT]),
+        "size-from-ground": filtered(gated[SUBTRACTED], gated[BY_SIZE]),
+        "block-from-distance": Check(
+            true=block[BY_BLOCK] > block[SUBTRACTED], first=block[BY_BLOCK], second=block[SUBTRACTED]
+        ),
+    }  # fmt: skip
+
+
+_COLOURS = {CONSTANT: BLUE, OVER_MEAN: VERMILLION, SUBTRACTED: GREEN, ENHANCED: PURPLE, BY_SIZE: ORANGE}
+
+
+def above(picture: Picture, thresholds: Warm) -> NDArray[np.uint8]:
+    """The image after threshold: white where it is above (F figures 7.5 to 7.11)."""
+    return np.where(trial.above(picture, thresholds), np.uint8(255), np.uint8(0))
+
+
+def _panel(ax: Axes, image: NDArray[Any], title: str) -> None:
+    ax.imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
+    ax.set_title(title, fontsize=10)
+    ax.set(xticks=[], yticks=[])
+    ax.grid(False)
+
+
+def _boxes(ax: Axes, picture: Picture, thresholds: Warm, frame: bool = True) -> DetectionScore:
+    found = find(picture, thresholds)
+    judged = judge(picture, found)
+    right = {row for rows in judged.rows.values() for row in rows[:1]}
+    rows, columns = picture.counts.shape
+    for row, (left, top, width, height) in enumerate(found.box):
+        colour = SKY if row in right else VERMILLION
+        ax.add_patch(Rectangle((left - 3, top - 3), width + 6, height + 6, fill=False, ec=colour, lw=1.3))
+    if frame:
+        ax.set(xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
+    return judged
+
+
+def image_by_method(picture: Picture, names: Mapping[str, str]) -> Figure:
+    """One image through each method side by side, as in F figures 7.5 to 7.11."""
+    methods = (CONSTANT, OVER_MEAN, LARGE, SUBTRACTED, ENHANCED)
+    fig, axes = new_figure(5.6, 6.1, rows=3, columns=2)
+    _panel(axes.flat[0], picture.grey, "8 bits")
+    for ax, method in zip(axes.flat[1:], methods, strict=True):
+        _thresholded(ax, picture, method, names)
+    return fig
+
+
+def image_by_sun(before: Picture, after: Picture, names: Mapping[str, str]) -> Figure:
+    """A sequence over which the background changes: constant and adaptive threshold (F figures 7.5, 7.6)."""
+    fig, axes = new_figure(5.6, 8.1, rows=4, columns=2)
+    for column, (when, picture) in enumerate((("under clouds", before), ("sun out", after))):
+        _panel(axes[0, column], picture.grey, f"{when}, 8 bits")
+        for row, method in enumerate((CONSTANT, ADAPTIVE, OVER_MEAN), start=1):
+            _thresholded(axes[row, column], picture, method, names)
+    return fig
+
+
+def animal_by_block(picture: Picture, kind: Literal["floor", "offset"], level: float) -> Figure:
+    """The largest animal with the small and the large block (F figures 7.7, 7.8)."""
+    number = max(picture.animals, key=lambda one: picture.animals[one])
+    v, u = np.nonzero(picture.view.labels == number)
+    fig, axes = new_figure(5.6, 2.9, rows=1, columns=2)
+    for ax, method in zip(axes.flat, (SMALL, LARGE), strict=True):
+        thresholds = replace(METHODS[method], level=level, level_is=kind)
+        _panel(ax, above(picture, thresholds), "")
+        count = len(_boxes(ax, picture, thresholds, frame=False).rows[number])
+        ax.set_title(f"block {thresholds.block_px} px: {count} detection{'s' * (count != 1)}")
+        middle, half = np.array([np.mean(u), np.mean(v)]), 0.9 * max(float(np.ptp(u)), float(np.ptp(v)), 40.0)
+        ax.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] + half, middle[1] - half))
+    return fig
+
+
+def rates_by_weather(
+    runs: pd.DataFrame, what: Literal["recall", "false"], names: Mapping[str, str]
+) -> Figure:
+    """Recall, or false alarms per image, by weather and method with their intervals."""
+    methods = (CONSTANT, OVER_MEAN, SUBTRACTED, ENHANCED, BY_SIZE)
+    fig, ax = new_figure(5.6, 3.9)
+    most = 1.0
+    for k, method in enumerate(methods):
+        shift = 0.14 * (k - (len(methods) - 1) / 2)
+        for row, weather in enumerate(WEATHERS):
+            at = places([weather])
+            if what == "recall":
+                one, scale = rates_of(runs, method, at).recall, 100
+            else:
+                one, scale = false_alarms(runs, method, at), 1
+            ends = [scale * max(one.low, 0), scale * one.high]
+            ax.plot(ends, [row + shift] * 2, color=_COLOURS[method], lw=2)
+            label = names[method] if row == 0 else None
+            ax.plot(scale * one.estimate, row + shift, "o", color=_COLOURS[method], label=label)
+            most = max(most, one.estimate)
+    ax.set_yticks(range(len(WEATHERS)), [names[one] for one in WEATHERS])
+    ax.set_ylim(len(WEATHERS) - 0.5, -0.5)
+    if what == "recall":
+        ax.set(xlabel="animals found (%)", xlim=(-2, 102))
+    else:
+        ax.set_xlabel("false alarms per image")
+        ax.set_xlim(left=-0.02 * most)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
+    return fig
+
+
+def f1_by_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """F1 by height without sun."""
+    dark = [weather for weather in WEATHERS if weather != NOON]
+    fig, ax = new_figure(5.6, 3.4)
+    for k, method in enumerate((CONSTANT, SUBTRACTED, ENHANCED, BY_SIZE)):
+        found = [rates_of(runs, method, places(dark, [height])).f1 for height in VIEWS]
+        x = np.arange(len(VIEWS)) + 0.08 * (k - 1.5)
+        ax.vlines(x, [one.low for one in found], [one.high for one in found], color=_COLOURS[method], lw=2)
+        ax.plot(x, [one.estimate for one in found], "o-", color=_COLOURS[method], label=names[method])
+    ax.set_xticks(range(len(VIEWS)), [f"{height} m" for height in VIEWS])
+    ax.set(ylabel="F1", ylim=(-0.02, 1.02), xlabel="height above the ground")
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
+    return fig
+
+
+def tables(runs: pd.DataFrame, names: Mapping[str, str]) -> dict[str, pd.DataFrame]:
+    """F1 of every method by weather, and of the printed settings by what their level may mean."""
+    methods = [
+        {"method": names[method]}
+        | {weather: _ranged(rates_of(runs, method, places([weather])).f1) for weather in WEATHERS}
+        for method in (*METHODS, *PROPOSED)
+    ]
+    heights = [str(height) for height in READ_AT]
+    readings = [
+        {"reading": names[reading]}
+        | {one: _ranged(rates_of(runs, read_subject(one, reading), heights).f1) for one in PRINTED}
+        | {
+            when: _ranged(rates_of(runs, read_subject(ADAPTIVE, reading), [when]).f1)
+            for when in ("before", "after")
+        }
+        for reading in READINGS
+    ]
+    return {"methods": pd.DataFrame(methods), "readings": pd.DataFrame(readings)}
+
+
+def _thresholded(ax: Axes, picture: Picture, method: str, names: Mapping[str, str]) -> None:
+    """The image after a method's threshold, with its detections."""
+    _panel(ax, above(picture, METHODS[method]), "")
+    found, invented, missed = _boxes(ax, picture, METHODS[method]).counts
+    ax.set_title(
+        f"{names[method]}\n{found:.0f} of {found + missed:.0f} found, {invented:.0f} false", fontsize=10
+    )
+
+
+def _ranged(one: Interval) -> str:
+    if not np.isfinite(one.low):
+        return f"{one.estimate:.2f}"
+    return f"{one.estimate:.2f} ({max(one.low, 0):.2f} to {one.high:.2f})"
+
 
 #: An F1 from which on a method is called usable: half of what it reports, or of what is there, is right.
 USABLE = 0.5

@@ -1,0 +1,561 @@
+"""Two vessels that cross, as one flight saw them: detections on the sea, and where the two were."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.analysis.georeference import (
+    Observations,
+    observe,
+)
+from wildlab.analysis.rendered import Photographer, exposures_of
+from wildlab.analysis.tracks.sighting import truth_states
+from wildlab.evaluation.identities import Identities, Moment, compare_identities
+from wildlab.flight.clocks import frame_times
+from wildlab.flight.store import Flight
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.validation import gate_threshold
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.many import POINT, ManySensorModel, ManyTargetModel, run_many
+from wildlab.tracking.many import Scan as Look
+from wildlab.tracking.many import appearance as rules
+from wildlab.tracking.many.appearance import Appearance, image_features
+from wildlab.tracking.many.bank import Bank, Life, Looks, Tuning, run_bank
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+#: Numbers of a flight by (subject, name).
+Numbers = dict[tuple[str, str], float]
+
+#: The vessels as H 6.4.4 names them.
+BOATS = ("boat 1", "boat 2")
+#: Boat of a detection that is of neither.
+NONE = -1
+#: H 6.4.4; the gate is of 99 %, of the 95 to 99 % of H 3.3, and the largest speed, which serves the start
+#: alone, the deviation of the first velocity. Both are chosen.
+TUNING = Tuning(
+    measurement=17.5, acceleration=0.2, velocity_0=5.0, gate=gate_threshold(0.99, 2), max_speed=5.0
+)
+#: Apart again are vessels twice the measurement noise from each other; how a crossing went is seen in the two
+#: minutes from then on, several laps, and how it ended in the last two. Chosen.
+APART_M, WINDOW_S = 2 * TUNING.measurement, 120.0
+#: Tracks are held against the vessels at every so many images with a detection: neighbours tell the same.
+EVERY = 5
+
+
+class Crossing(NamedTuple):
+    """What one flight saw of the two.
+
+    Attributes
+    ----------
+    looks
+        All detections.
+    boat
+        (D,) 0 or 1: whose each is, as by manual classification; `NONE` where it is of nothing.
+    times
+        (K,) s, of the images with detections.
+    truth
+        (2, K, 2) where the two were by their own receivers, m.
+    """
+
+    looks: Looks
+    boat: Index
+    times: Array
+    truth: Array
+
+    @property
+    def apart(self) -> Array:
+        """(K,) distance between the two, m."""
+        return np.asarray(np.linalg.norm(self.truth[0] - self.truth[1], axis=-1))
+
+
+def gather(flight: Flight, source: str = "autopilot") -> Crossing:
+    """The detections of both vessels on the sea, with the poses of a source."""
+    seen = observe(flight, source)
+    return arrange(flight, seen, np.array([BOATS.index(name) for name in seen.table["target_id"]]))[0]
+
+
+def arrange(flight: Flight, seen: Observations, boat: Index) -> tuple[Crossing, Index]:
+    """Observations on the sea, in order; and which of them are left, in that order, to have a place.
+
+    ``boat`` (N,) is 0 or 1, or `NONE` for a detection of nothing.
+    """
+    positions = georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
+    number = exposures_of(seen.table).astype(int)
+    stamps = frame_times(flight)
+    at = {one: stamp for one, stamp in zip(exposures_of(flight.table("frames")), stamps, strict=True)}
+    order = np.lexsort((boat, number))
+    order = order[np.isfinite(positions[order]).all(axis=1)]
+    images = np.unique(number[order])
+    times = np.array([at[int(one)] for one in images])
+    looks = Looks(number[order], positions[order], float(np.median(np.diff(stamps))))
+    truth = np.stack([truth_states(flight, name, times)[:, :2] for name in BOATS])
+    return Crossing(looks, boat[order], times, truth), order
+
+
+def apart_times(crossing: Crossing) -> tuple[float, float]:
+    """When the two were last `APART_M` from each other before they were nearest, and first after it, s.
+
+    The first and the last time where they never were.
+    """
+    apart, times = crossing.apart, crossing.times
+    nearest = int(np.nanargmin(apart))
+    before, after = (np.flatnonzero(part > APART_M) for part in (apart[:nearest], apart[nearest:]))
+    return (
+        float(times[before[-1]] if len(before) else times[0]),
+        float(times[nearest + after[0]] if len(after) else times[-1]),
+    )
+
+
+#: Joint integrated data association beside them, by distance alone (H 8.2 names it as what would come next).
+JOINT = "jipda"
+#: What joint association is told: the printed noise of `TUNING`, as white acceleration of the same strength.
+#: Chosen, once: nearly all that is in view is detected and hardly anything else is; a vessel is in view for
+#: some seconds in each lap and then for half a minute not, and both are there for good.
+SENSOR = ManySensorModel(
+    name="camera", detection=0.95, clutter=1e-8, near_m=0.0, far_m=np.inf, patience_s=np.inf,
+    rough_m=(0.0,), along_m=(0.0,), near_side_m=(0.0,),
+)  # fmt: skip
+TARGETS = ManyTargetModel(
+    hulls=(POINT,), density=TUNING.acceleration, start_speed_m_s=TUNING.velocity_0, lifetime_s=1e6, birth=0.9,
+    visible_s=5.0, hidden_s=30.0, gate=float(np.sqrt(TUNING.gate)), confirmed=0.9, hits=2, shown=0.5,
+    forgotten=1e-3, lost_m=1e4, fastest_m_s=np.inf, moves_m=0.0, over_s=0.0, apart_m=0.0,
+)  # fmt: skip
+
+
+def joint_of(crossing: Crossing, density: float) -> Identities:
+    """The same detections by joint integrated data association, against the vessels at every image."""
+    number = np.searchsorted(np.unique(crossing.looks.image), crossing.looks.image)
+    R = TUNING.measurement**2 * np.eye(2)
+    looks = [
+        Look(float(time), 0, np.zeros(2), crossing.looks.positions[rows], np.tile(R, (int(rows.sum()), 1, 1)))
+        for k, time in enumerate(crossing.times)
+        for rows in [number == k]
+    ]
+    ignored, scans = np.zeros(2, bool), []
+    for k, one in enumerate(run_many(looks, [SENSOR], TARGETS._replace(density=density))):
+        if k % EVERY:
+            continue
+        known = np.isfinite(crossing.truth[:, k]).all(axis=1)
+        shown = np.isin([0, 1], crossing.boat[number == k])
+        scans.append(
+            Moment(
+                one.time, one.x[:, :2], one.P[:, :2, :2], one.identity.tolist(), crossing.truth[known, k],
+                [BOATS[n] for n in np.flatnonzero(known)], shown[known], ignored[known],
+            )
+        )  # fmt: skip
+    return compare_identities(scans, APART_M)
+
+
+def density_of(interval: float) -> float:
+    """White acceleration that spreads velocities as fast as `TUNING`'s, which is held from image to image.
+
+    An acceleration drawn anew every T s adds (sd T)^2 to the variance of a velocity each time.
+    """
+    return TUNING.acceleration * float(np.sqrt(interval))
+
+
+def joint_swapped(crossing: Crossing, told: Identities) -> tuple[bool, bool]:
+    """As `swapped`, of tracks that are shared: whether each is on the other vessel than before the crossing.
+
+    A vessel's track is the one that is on it most often: before the crossing since the beginning, after it in
+    `WINDOW_S` from when the two are apart again, and at the end in the last.
+    """
+    times = crossing.times
+    until, since = apart_times(crossing)
+    at = times[::EVERY]
+
+    def mostly(low: float, high: float) -> list[object]:
+        rows = np.flatnonzero((at >= low) & (at <= high))
+        found: list[object] = []
+        for boat in BOATS:
+            names = [told.followed[row][boat] for row in rows if boat in told.followed[row]]
+            found.append(max(sorted(set(names), key=str), key=names.count) if names else None)
+        return found
+
+    before = mostly(float(times[0]), until)
+
+    def exchanged(after: list[object]) -> bool:
+        return None not in before and after[0] == before[1] and after[1] == before[0]
+
+    end = float(times[-1])
+    return exchanged(mostly(since, since + WINDOW_S)), exchanged(mostly(end - WINDOW_S, end))
+
+
+def joint_numbers(crossing: Crossing) -> Numbers:
+    """What `UNITS` names of joint association; it gives no detection to one track alone."""
+    told = joint_of(crossing, density_of(crossing.looks.interval))
+    after, end = joint_swapped(crossing, told)
+    anees = [track.anees for track in told.tracks.values() if np.isfinite(track.anees)]
+    return {
+        (JOINT, "swapped"): float(after),
+        (JOINT, "swapped_at_end"): float(end),
+        (JOINT, "swaps"): float(told.swaps),
+        (JOINT, "breaks"): float(told.breaks),
+        (JOINT, "gospa"): float(np.mean([one.distance for one in told.gospa])),
+        (JOINT, "anees"): float(np.median(anees)) if anees else np.nan,
+    }
+
+
+#: A track ends so long after its last detection, s: longer than nearly all pauses while a vessel is in view,
+#: shorter than those between laps. Chosen.
+MAX_AGE_S = 10.0
+#: By so much must a kept track be likelier than the others; and so little is hardly more than none. Chosen.
+SURE, GUESS = 19.0, 1.0 + 1e-6
+
+
+class ReacquisitionRule(NamedTuple):
+    """How tracks are found again: by which rule, and by which ratio of likelihoods."""
+
+    rule: str
+    likelier: float
+
+
+#: By distance alone and with looks; where it is no guess, and whichever is the likeliest.
+WAYS = {
+    "again-without-features": ReacquisitionRule(rules.DISTANCE, SURE),
+    "again-with-features": ReacquisitionRule(rules.FEATURES, SURE),
+    "again-guessed-without-features": ReacquisitionRule(rules.DISTANCE, GUESS),
+    "again-guessed-with-features": ReacquisitionRule(rules.FEATURES, GUESS),
+}
+#: Names of the numbers that are recorded, and their units: tracks, by `Outcome`.
+REACQUIRED_UNITS = {"found_right": "1", "found_wrong": "1", "not_found": "1", "rightly_new": "1"}
+
+
+class Outcome(NamedTuple):
+    """Tracks that began when others had ended.
+
+    Attributes
+    ----------
+    right, wrong
+        Those taken for a track of the same vessel, and of the other one.
+    missed
+        Those taken for none, although one of the same vessel was kept.
+    new
+        Those taken for none where none of the same vessel was kept.
+    """
+
+    right: int
+    wrong: int
+    missed: int
+    new: int
+
+
+def owners(boat: Index, track: Index, count: int) -> Index:
+    """(T,) whose each track is: of whom most of its detections are, of the first one's where as many.
+
+    Parameters
+    ----------
+    boat
+        (D,) whose each detection is, 0 or 1.
+    track
+        (D,) the track of each; -1 where it has none.
+    count
+        Of tracks, each with a detection.
+
+    Examples
+    --------
+    >>> owners(np.array([1, 0, 0, 1, 0]), np.array([0, 0, 1, 1, 1]), 2).tolist()
+    [1, 0]
+    """
+    found = np.zeros(count, np.int64)
+    for number in range(count):
+        own = boat[track == number]
+        share = own.mean()
+        found[number] = own[0] if share == 0.5 else share > 0.5
+    return found
+
+
+def outcome(image: Index, boat: Index, bank: Bank) -> Outcome:
+    """How tracks that began when others had ended were taken.
+
+    Parameters
+    ----------
+    image, boat
+        (D,) the image of each detection, and whose it is.
+    bank
+        Of these detections.
+    """
+    count = len(bank.started)
+    owner = owners(boat, bank.track, count)
+    of = [image[bank.track == number] for number in range(count)]
+    right, wrong, missed, new = 0, 0, 0, 0
+    left = np.ones(count, bool)
+    for number in range(count):
+        before = np.arange(number)
+        same = before[bank.identity[before] == bank.identity[number]]
+        kept = [one for one in before[left[before]] if bank.ended[one] >= 0 and of[one][-1] < of[number][0]]
+        if len(same):
+            left[same[-1]] = False
+            right += owner[same[-1]] == owner[number]
+            wrong += owner[same[-1]] != owner[number]
+        elif kept:
+            own = (owner[kept] == owner[number]).any()
+            missed, new = missed + int(own), new + int(not own)
+    return Outcome(int(right), int(wrong), missed, new)
+
+
+def again_numbers(
+    looks: Looks, boat: Index, appearance: Appearance, tuning: Tuning
+) -> dict[tuple[str, str], float]:
+    """What `UNITS` names of a flight, by each of `WAYS`.
+
+    Parameters
+    ----------
+    looks, boat
+        All detections, and whose each is.
+    appearance
+        What they look like.
+    tuning
+        Of filters and gates; here its tracks end.
+    """
+    numbers: dict[tuple[str, str], float] = {}
+    for subject, way in WAYS.items():
+        life = Life(max_age=MAX_AGE_S, likelier=way.likelier)
+        bank = run_bank(looks, tuning._replace(life=life), way.rule, appearance)
+        found = outcome(looks.image, boat, bank)
+        numbers |= {(subject, name): float(one) for name, one in zip(REACQUIRED_UNITS, found, strict=True)}
+    return numbers
+
+
+#: By distance alone; with features weighed in; with features as a veto; with features in the state.
+DISTANCE, FEATURES, VETO, STATE = "without-features", "with-features", "veto", "features-in-state"
+RULES = {DISTANCE: rules.DISTANCE, FEATURES: rules.FEATURES, VETO: rules.VETO, STATE: rules.STATE}
+SUBJECTS = tuple(RULES)
+#: What the rendered images show.
+LOOKS = "looks"
+#: H figure 6.21, in its order.
+NAMES = ("size", "intensity", "hu")
+#: Spreads of a detection's features that association is told, in the units of `image_features`, and their
+#: weights. Chosen, once for all flights: about what rendered images of six other flights of the twin had.
+TOLD_SD, WEIGHTS = np.array([0.1, 8.0, 0.05]), np.ones(3)
+#: By how many of its spreads a made-up feature of the two differs, on average; zero tells nothing.
+SEPARATIONS = (0, 1, 2, 3, 4, 6)
+#: H 6.4.4: positions are mostly within this of the true ones.
+NEAR_M = 20.0
+#: Around a vessel, px: as wide as the longest is in the image, so that the sea about it is rendered too.
+MARGIN = 40
+#: Names of the numbers that are recorded, and their units.
+UNITS = {
+    **{f"wrong_rate_boat_{n}": "1" for n in (1, 2)}, "wrong": "1", "unassigned": "1", "tracks": "1",
+    "swapped": "1", "swapped_at_end": "1", "swaps": "1", "breaks": "1",
+    "near_share": "1", "any_near_share": "1", "mae": "m", "gospa": "m", "anees": "1", "closest": "m",
+    "detections": "1",
+    **REACQUIRED_UNITS,
+    **{f"separation_{name}": "1" for name in NAMES}, **{f"spread_{name}": "1" for name in NAMES},
+}  # fmt: skip
+
+
+def photograph(twin: str, seed: int, flight: Flight, images: int) -> list[Array]:
+    """Features of the two in rendered images, (n, 3) each: of ``images`` at random of those that show it.
+
+    Size is taken on the ground at the distance that the true pose has; an image in which the detector finds
+    nothing of a vessel adds nothing.
+    """
+    camera, rng = Photographer(twin, seed), stream(seed, "images of the vessels")
+    detections = flight.table("detections")
+    shown = [exposures_of(detections[detections["target_id"] == name]) for name in BOATS]
+    wanted = [set(rng.permutation(one)[:images].tolist()) for one in shown]
+    found: list[list[Array]] = [[], []]
+    for shot in camera.shoot(sorted(set.union(*wanted)), margin=MARGIN):
+        poses = camera.flight.poses.take(np.array([shot.exposure]))
+        for number, rows in shot.judged.found.items():
+            if not rows or shot.exposure not in wanted[number - 1]:
+                continue
+            one = shot.detections.select(rows[:1])
+            distance = np.linalg.norm(georeference_pixels(poses, one.uv, np.zeros(1)) - poses.p_nc, axis=1)
+            per_px = distance / np.sqrt(poses.camera.fx * poses.camera.fy)
+            found[number - 1].append(image_features(one.area, one.intensity, one.hu, per_px)[0])
+    return [np.array(rows, float).reshape(-1, len(NAMES)) for rows in found]
+
+
+def dressed(crossing: Crossing, looks: list[Array], seed: int) -> Appearance:
+    """Each detection looks like one of those rendered of its vessel, drawn with replacement."""
+    rng = stream(seed, "looks of the detections")
+    features = np.full((len(crossing.boat), len(NAMES)), np.nan)
+    for number, pool in enumerate(looks):
+        own = np.flatnonzero(crossing.boat == number)
+        if len(pool):
+            features[own] = pool[rng.integers(len(pool), size=len(own))]
+    return Appearance(features, TOLD_SD, WEIGHTS)
+
+
+def made_up(crossing: Crossing, separation: float, seed: int) -> Appearance:
+    """One normal feature, by so many of its spreads different between the two; the same noise for all."""
+    noise = stream(seed, "made-up feature").normal(size=len(crossing.boat))
+    return Appearance((noise + separation * crossing.boat)[:, None], np.ones(1), np.ones(1))
+
+
+def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
+    """(D,) which vessels' detections went to a track that the other vessel's detection started."""
+    owner = np.append(crossing.boat[bank.started], NONE)[bank.track]  # track -1: of none
+    return np.asarray((owner != NONE) & (crossing.boat != NONE) & (owner != crossing.boat))
+
+
+def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
+    """Whether the two have each other's track just after the crossing, and at the end.
+
+    That is, of each more than half of its detections in `WINDOW_S` went to a track of the other; a vessel
+    without detections then has no track of the other.
+    """
+    at = np.searchsorted(bank.images, crossing.looks.image)
+    _, from_s = apart_times(crossing)
+    wrong, when = wrong_of(crossing, bank), crossing.times[at]
+
+    def both(since: float) -> bool:
+        inside = (when >= since) & (when <= since + WINDOW_S)
+        of = [wrong[inside & (crossing.boat == number)] for number in (0, 1)]
+        return all(len(one) > 0 and one.mean() > 0.5 for one in of)
+
+    return both(from_s), both(float(crossing.times[-1] - WINDOW_S))
+
+
+def identities_of(crossing: Crossing, bank: Bank) -> Identities:
+    """Tracks against vessels at every `EVERY`-th image; visible is who was detected in it."""
+    count = len(bank.images)
+    shown = np.zeros((count, 2), bool)
+    own = crossing.boat != NONE
+    shown[np.searchsorted(bank.images, crossing.looks.image)[own], crossing.boat[own]] = True
+    ignored = np.zeros(2, bool)
+    scans = []
+    for row in range(0, count, EVERY):
+        known = np.isfinite(crossing.truth[:, row]).all(axis=1)
+        there = np.flatnonzero(np.isfinite(bank.x[row, :, 0]))
+        scans.append(
+            Moment(
+                float(crossing.times[row]), bank.x[row, there, :2], bank.P[row, there, :2, :2],
+                there.tolist(), crossing.truth[known, row], [BOATS[k] for k in np.flatnonzero(known)],
+                shown[row, known], ignored[known],
+            )
+        )  # fmt: skip
+    return compare_identities(scans, APART_M)
+
+
+def numbers_of(crossing: Crossing, banks: dict[str, Bank]) -> Numbers:
+    """What `UNITS` names of the tracks by each rule."""
+    numbers: Numbers = {}
+    for subject, bank in banks.items():
+        wrong, told = wrong_of(crossing, bank), identities_of(crossing, bank)
+        own, any_one = distances_of(crossing, bank)
+        after, end = swapped(crossing, bank)
+        anees = [track.anees for track in told.tracks.values() if np.isfinite(track.anees)]
+        numbers |= {
+            (subject, "wrong"): float(wrong.sum()),
+            (subject, "unassigned"): float((bank.track < 0).sum()),
+            (subject, "tracks"): float(len(bank.started)),
+            (subject, "swapped"): float(after),
+            (subject, "swapped_at_end"): float(end),
+            (subject, "swaps"): float(told.swaps),
+            (subject, "breaks"): float(told.breaks),
+            (subject, "gospa"): float(np.mean([one.distance for one in told.gospa])),
+            (subject, "anees"): float(np.median(anees)) if anees else np.nan,
+            (subject, "mae"): float(np.nanmean(own)),
+            # Of the vessel with less.
+            (subject, "near_share"): float(np.min(_share_near(own))),
+            (subject, "any_near_share"): float(np.min(_share_near(any_one))),
+        }
+        for number in (0, 1):
+            rate = float(wrong[crossing.boat == number].mean())
+            numbers[subject, f"wrong_rate_boat_{number + 1}"] = rate
+    return numbers
+
+
+def distances_of(crossing: Crossing, bank: Bank) -> tuple[Array, Array]:
+    """(2, K) how far each vessel is from its own first track, and from the nearest of all, m.
+
+    NaN before its track has started.
+    """
+    away = np.linalg.norm(crossing.truth[:, :, None] - bank.x[None, :, :, :2], axis=-1)
+    own = np.full(away.shape[:2], np.nan)
+    for number in (0, 1):
+        tracks = np.flatnonzero(crossing.boat[bank.started] == number)
+        if len(tracks):
+            own[number] = away[number, :, tracks[0]]
+    started = np.isfinite(own)
+    nearest = np.where(np.isfinite(away), away, np.inf).min(axis=-1, initial=np.inf)
+    return own, np.where(started, nearest, np.nan)
+
+
+def _share_near(distances: Array) -> Array:
+    """(2,) share of the known distances within `NEAR_M`."""
+    known = np.isfinite(distances)
+    return np.asarray((distances < NEAR_M).sum(axis=1) / np.maximum(known.sum(axis=1), 1))
+
+
+def looks_of(looks: list[Array]) -> Numbers:
+    """How far apart the two look: differences of the means, in units of the spread within a vessel."""
+    numbers: Numbers = {}
+    for k, name in enumerate(NAMES):
+        groups = [pool[:, k][np.isfinite(pool[:, k])] for pool in looks]
+        enough = all(len(group) > 1 for group in groups)
+        spread = float(np.sqrt(np.mean([group.var(ddof=1) for group in groups]))) if enough else np.nan
+        apart = abs(float(groups[0].mean() - groups[1].mean())) if enough else np.nan
+        numbers[LOOKS, f"spread_{name}"] = spread
+        numbers[LOOKS, f"separation_{name}"] = apart / spread if spread > 0 else np.nan
+    return numbers
+
+
+def curve_subject(separation: float) -> str:
+    """What tracks with the made-up feature are called."""
+    return f"separation-{separation:g}"
+
+
+def curve_of(crossing: Crossing, seed: int) -> Numbers:
+    """Mistakes and swaps with the made-up feature, over its separation."""
+    numbers: Numbers = {}
+    for separation in SEPARATIONS:
+        bank = follow_by(crossing, FEATURES, made_up(crossing, separation, seed))
+        subject = curve_subject(separation)
+        numbers[subject, "wrong"] = float(wrong_of(crossing, bank).sum())
+        numbers[subject, "swapped"] = float(swapped(crossing, bank)[0])
+    return numbers
+
+
+class Flown(NamedTuple):
+    """A flight, what its camera saw of the two, how they looked, and their tracks by each rule."""
+
+    crossing: Crossing
+    looks: list[Array]
+    banks: dict[str, Bank]
+
+
+def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flown:
+    """One simulated flight through every rule; ``flight`` where it is at hand."""
+    flight = flight or simulate_twin(twin, seed, ("imu", "gnss"))
+    crossing, looks = gather(flight), photograph(twin, seed, flight, images)
+    appearance = dressed(crossing, looks, seed)
+    return Flown(crossing, looks, {rule: follow_by(crossing, rule, appearance) for rule in SUBJECTS})
+
+
+def follow_by(crossing: Crossing, subject: str, appearance: Appearance | None = None) -> Bank:
+    """All detections, tracked with the printed tuning by one of `RULES`."""
+    return run_bank(crossing.looks, TUNING, RULES[subject], appearance)
+
+
+def all_numbers(flown: Flown, seed: int) -> Numbers:
+    """What the trial gives of a flight that was flown."""
+    crossing, appearance = flown.crossing, dressed(flown.crossing, flown.looks, seed)
+    return {
+        **numbers_of(flown.crossing, flown.banks),
+        **again_numbers(crossing.looks, crossing.boat, appearance, TUNING),
+        **joint_numbers(flown.crossing),
+        **looks_of(flown.looks),
+        **curve_of(flown.crossing, seed),
+        (LOOKS, "detections"): float(len(flown.crossing.boat)),
+        (LOOKS, "closest"): float(np.nanmin(flown.crossing.apart)),
+    }
+
+
+def trial(seed: int, *, twin: str, images: int) -> Numbers:
+    """One simulated flight by `all_numbers`.
+
+    Raises
+    ------
+    WildlabError
+        If there is no such twin.
+    """
+    return all_numbers(fly(seed, twin, images), seed)
