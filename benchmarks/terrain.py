@@ -21,7 +21,7 @@ from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.geometry.terrain import Terrain, intersect_terrain
-from wildlab.geometry.visibility import SHORT_OF, lines_clear
+from wildlab.geometry.viewsheds import SHORT_OF, lines_clear
 from wildlab.simulation.landscape import synthetic_landscape
 
 RAYS = 1_000_000

@@ -19,7 +19,7 @@ from wildlab.detection.flow import (
 )
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.flow import CameraMotion, flow_between, motion_between
 from wildlab.geometry.flow_uncertainty import FlowErrors, mean_velocity
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix

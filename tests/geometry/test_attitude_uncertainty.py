@@ -14,7 +14,7 @@ from wildlab.geometry.attitude_uncertainty import (
 )
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.ellipses import ellipse_axes
+from wildlab.geometry.covariances import ellipse_axes
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.terrain import Terrain

@@ -3,8 +3,8 @@
 import numpy as np
 
 from wildlab.geometry.camera import Camera, normalise, project
-from wildlab.geometry.directions import direction_differences, image_raster
 from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.intrinsics import direction_differences, image_raster
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 

@@ -13,16 +13,16 @@ from wildlab.geometry.board_views import (
     project_board,
 )
 from wildlab.geometry.camera import Camera, project
-from wildlab.geometry.directions import direction_sd
 from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.geometry.intrinsics import (
     LENSES,
     PINHOLE,
     calibrate_camera,
+    choose_lens,
     confused,
+    direction_sd,
     view_errors,
 )
-from wildlab.geometry.lens_choice import choose_lens
 from wildlab.simulation.boards import board_views
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0, 0.0, (-0.2, 0.1, 0.001, -0.002, 0.0))

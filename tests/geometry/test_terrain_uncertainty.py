@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain

@@ -7,7 +7,7 @@ import pytest
 
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import lines_clear
 
 rasterio = pytest.importorskip("rasterio")
 

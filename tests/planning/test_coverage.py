@@ -15,7 +15,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import visible_nodes
+from wildlab.geometry.viewsheds import visible_nodes
 from wildlab.planning.areas import area_of, check_area, contains, rectangle
 from wildlab.planning.coverage import cover, nodes_in, share_seen
 from wildlab.planning.moving import first_seen, walks

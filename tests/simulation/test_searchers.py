@@ -9,7 +9,7 @@ from wildlab.flight.clocks import gimbal_angles
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import lines_clear
 from wildlab.simulation.animal_motion import animal_paths
 from wildlab.simulation.gimbal import gimbal_angles as true_angles
 from wildlab.simulation.land import ground_heights, twin_land

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from wildlab.analysis.georeference import observe
-from wildlab.geometry.validation import gate_threshold
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import STUDY, check_claims

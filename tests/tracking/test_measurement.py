@@ -13,9 +13,9 @@ from scipy.stats import chi2
 
 from tests.tracking.level_sensors import bearings, measured_from, ranges_bearings
 from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, posed
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
-from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking import predictions as p
 from wildlab.tracking import sensors as m
 from wildlab.tracking.association import nearest_within

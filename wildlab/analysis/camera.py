@@ -19,18 +19,19 @@ from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.frames.image import file_name, read_image
 from wildlab.geometry.board_views import parameters_of
-from wildlab.geometry.directions import direction_sd
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import (
     FEWEST,
     LENSES,
     PINHOLE,
     Intrinsics,
+    LensChoice,
     calibrate_camera,
+    choose_lens,
     confused,
+    direction_sd,
     view_errors,
 )
-from wildlab.geometry.lens_choice import LensChoice, choose_lens
 from wildlab.names import listed
 
 #: In how many images codes are looked for where boards are found without them.

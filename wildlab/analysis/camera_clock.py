@@ -22,9 +22,14 @@ from wildlab.flight.clocks import frame_times
 from wildlab.flight.readers.frames import Frame
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_clock import (
+    FEWEST,
+    ClockByMotion,
+    ClockByPoints,
+    clock_by_motion,
+    clock_by_points,
+)
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.clock_by_motion import FEWEST, ClockByMotion, clock_by_motion
-from wildlab.geometry.clock_by_points import ClockByPoints, clock_by_points
 from wildlab.geometry.frames import matrix_to_rotation_vector
 
 Array = NDArray[np.float64]

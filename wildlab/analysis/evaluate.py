@@ -14,7 +14,7 @@ from wildlab.evaluation.ambiguity import ambiguous, largest_visible
 from wildlab.evaluation.blocks import time_blocks
 from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array
 from wildlab.geometry.robust import student_scale
 

@@ -15,7 +15,7 @@ from wildlab.analysis.georeference import Observations, covariances_of
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.store import Flight
-from wildlab.geometry.ellipses import ellipse_axes
+from wildlab.geometry.covariances import ellipse_axes
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.terrain import Terrain

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
 from wildlab.planning.followers import PatternPlanner, RandomWalk
 from wildlab.planning.high_level import (

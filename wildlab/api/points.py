@@ -12,7 +12,7 @@ from wildlab.analysis.georeference import covariances_of, observe
 from wildlab.analysis.georeference import georeference as to_ground
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.store import Flight
-from wildlab.geometry.quantiles import chi2_quantile
+from wildlab.geometry.covariances import chi2_quantile
 from wildlab.summary_table import Brief, Summary
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.runs import Interval
-from wildlab.geometry.quantiles import normal_quantile, student_quantile
+from wildlab.geometry.covariances import normal_quantile, student_quantile
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.intp]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.blocks import FEWEST, PROBABILITY, block_mean
 from wildlab.evaluation.runs import Interval
-from wildlab.geometry.quantiles import chi2_quantile
+from wildlab.geometry.covariances import chi2_quantile
 
 Array = NDArray[np.float64]
 Word = Literal["honest", "too small", "too large", "undecided", "too few"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.quantiles import normal_quantile, student_quantile
+from wildlab.geometry.covariances import normal_quantile, student_quantile
 
 
 class Interval(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.quantiles import chi2_beyond, normal_quantile
+from wildlab.geometry.covariances import chi2_beyond, normal_quantile
 
 Array = NDArray[np.float64]
 

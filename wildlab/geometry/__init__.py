@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         PARAMETERS,
         Calibration,
         Fit,
+        Mounting,
         PosesAt,
         apply_calibration,
         calibrate,
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
         differentiate,
         fit_points,
         georeference_calibrated,
+        mounting_from_points,
         split_images,
         undetermined_parameter,
         with_covariance,
@@ -78,8 +80,7 @@ if TYPE_CHECKING:
         undistort_approximately,
     )
     from wildlab.geometry.camera_poses import CameraPoses
-    from wildlab.geometry.directions import direction_differences, direction_sd, image_raster
-    from wildlab.geometry.ellipses import ellipse_axes, inside_ellipse
+    from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
     from wildlab.geometry.flodell import geodetic_to_enu_linear, linear_enu_error, metres_per_degree
     from wildlab.geometry.flow import (
         CameraMotion,
@@ -141,12 +142,16 @@ if TYPE_CHECKING:
         LENSES,
         PINHOLE,
         Intrinsics,
+        LensChoice,
         calibrate_camera,
+        choose_lens,
         confused,
+        direction_differences,
+        direction_sd,
         free_columns,
+        image_raster,
         view_errors,
     )
-    from wildlab.geometry.lens_choice import LensChoice, choose_lens
     from wildlab.geometry.line_of_sight import (
         Looked,
         cast_rays,
@@ -161,8 +166,6 @@ if TYPE_CHECKING:
         helgesen_misalignment,
         mount_rotation,
     )
-    from wildlab.geometry.mounting import Mounting, mounting_from_points
-    from wildlab.geometry.ray_ends import RAY_STATUS
     from wildlab.geometry.robust import (
         RobustFit,
         fit_linear,
@@ -176,6 +179,7 @@ if TYPE_CHECKING:
         intersect_terrain,
         pixels_to_terrain,
     )
+    from wildlab.geometry.terrain_kernels import RAY_STATUS
     from wildlab.geometry.terrain_uncertainty import (
         TerrainCovariance,
         TerrainJacobians,
@@ -200,15 +204,13 @@ if TYPE_CHECKING:
         Footprint,
         Hidden,
         Viewshed,
+        VisibleBlock,
         footprint,
         ground_per_pixel,
         hidden_by,
-        viewshed,
-    )
-    from wildlab.geometry.visibility import (
-        VisibleBlock,
         image_border,
         lines_clear,
+        viewshed,
         visible_nodes,
         widest_view,
     )

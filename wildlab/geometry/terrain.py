@@ -16,7 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import matching, pixel_rays
-from wildlab.geometry.ray_ends import RAY_STATUS
+from wildlab.geometry.terrain_kernels import RAY_STATUS
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.frames import Array, rotation_vector_to_matrix, skew
 from wildlab.geometry.georeference import georeference_pixels, intersect_plane, matching
-from wildlab.geometry.quantiles import chi2_quantile
 
 #: Ratio of the second-order to the first-order term above which the linear ellipse is not trusted.
 FLAT = 0.1

@@ -25,9 +25,9 @@ from scipy.linalg import block_diag
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.compilation import announced
+from wildlab.geometry.covariances import check_covariance, gate_threshold
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import Earth
-from wildlab.geometry.validation import check_covariance, gate_threshold
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather, set_out
 from wildlab.navigation.kernels import Integers

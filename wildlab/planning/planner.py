@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.information import SearchSensor, trace_of_inverse
 from wildlab.planning.legs import (
     Flying,

@@ -1,6 +1,6 @@
 """Which nodes of a terrain each of many images shows: all images at once, and lines of sight exact.
 
-`wildlab.geometry.visibility.visible_nodes` does the same for one image; a plan has thousands, and their nodes
+`wildlab.geometry.viewsheds.visible_nodes` does the same for one image; a plan has thousands, and their nodes
 are looked at together.
 """
 
@@ -17,7 +17,7 @@ from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import image_border, lines_clear, widest_view
+from wildlab.geometry.viewsheds import image_border, lines_clear, widest_view
 
 #: Lines of sight that are looked at together; what they take is some tens of megabytes.
 _TOGETHER = 250_000

@@ -28,7 +28,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.quantiles import chi2_quantile
+from wildlab.geometry.covariances import chi2_quantile
 from wildlab.paths import DATA
 from wildlab.reporting.figure_text import END_LABEL, FULL_SIZE, fit_text, least_size
 from wildlab.reporting.quantities import nice_length

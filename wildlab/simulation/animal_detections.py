@@ -7,7 +7,7 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import in_image
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import lines_clear
 from wildlab.simulation.animal_motion import animal_paths
 from wildlab.simulation.camera_view import Exposures, marks, numbered
 from wildlab.simulation.error_models import stream

@@ -21,8 +21,8 @@ from scipy.sparse.csgraph import connected_components
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.compilation import announced, compiled
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array
-from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.sensors import difference
 
 

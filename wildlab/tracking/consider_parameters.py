@@ -31,8 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.covariances import check_covariance
 from wildlab.geometry.frames import Array
-from wildlab.geometry.validation import check_covariance
 from wildlab.tracking import schmidt
 from wildlab.tracking.predictions import POSE
 from wildlab.tracking.schmidt import Change, PoseUncertainty

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.covariances import check_covariance, gate_threshold
 from wildlab.geometry.frames import Array
-from wildlab.geometry.validation import check_covariance, gate_threshold
 from wildlab.tracking.kalman import predict
 from wildlab.tracking.motion import Motion
 

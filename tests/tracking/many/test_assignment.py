@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import multivariate_normal, norm
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.validation import gate_threshold
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.tracking.association import Assignment, global_nearest
 from wildlab.tracking.many.appearance import feature_distances, image_features, veto, with_features
 from wildlab.tracking.many.life import look_differences, place_costs, reachable, recognise

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
-from wildlab.geometry.validation import gate_threshold
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.tracking.association import global_nearest
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.appearance import (

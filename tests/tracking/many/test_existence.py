@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
-from wildlab.geometry.validation import gate_threshold
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.tracking.association import (
     association_probabilities,
     association_probabilities_by_enumeration,

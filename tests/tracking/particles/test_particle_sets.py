@@ -5,7 +5,7 @@ import pytest
 
 from tests.tracking.particles.worlds import NOISE, RULES, SIZE, WALK
 from wildlab.errors import WildlabError
-from wildlab.geometry.validation import gate_threshold
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.tracking import kalman
 from wildlab.tracking.particles import (
     ImageLook,

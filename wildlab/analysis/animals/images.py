@@ -18,7 +18,7 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import lines_clear
 from wildlab.simulation.scene.animals import ANIMALS, animal, stone, tree
 from wildlab.simulation.scene.bodies import Body
 from wildlab.simulation.scene.ground import Land, Weather, rolling_land

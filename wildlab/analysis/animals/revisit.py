@@ -17,8 +17,8 @@ from wildlab.analysis.animals.images import Detector, footprint_circles, put_on_
 from wildlab.analysis.plans.flown import ExecutionErrors, displaced, drawn_errors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.frames import Array
-from wildlab.geometry.quantiles import chi2_quantile
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course
 from wildlab.planning.high_level import SEARCH, all_positioned, best_goal

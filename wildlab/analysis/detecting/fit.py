@@ -23,7 +23,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.flight.readers.frames import Frame
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array
 
 Counts = NDArray[np.intp]

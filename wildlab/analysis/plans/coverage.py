@@ -22,7 +22,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
 from wildlab.planning.gimbal import (
     GimbalAngles,

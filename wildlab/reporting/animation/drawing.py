@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.ellipses import ellipse_axes
+from wildlab.geometry.covariances import ellipse_axes
 from wildlab.reporting.animation.shown import Course, Ellipses, Outlines, ShownFlight, checked
 from wildlab.reporting.quantities import nice_length
 from wildlab.reporting.text import escape

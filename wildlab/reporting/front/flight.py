@@ -71,7 +71,7 @@ class FrontFlight(NamedTuple):
     @property
     def held(self) -> float:
         """Share of the instants at which the ellipse holds the target."""
-        from wildlab.geometry.ellipses import inside_ellipse
+        from wildlab.geometry.covariances import inside_ellipse
 
         (ellipses,), (truth,) = self.shown.ellipses, self.shown.truth
         missed = _between(truth, ellipses.times) - ellipses.centres

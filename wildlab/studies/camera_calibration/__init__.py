@@ -11,8 +11,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.evaluation.shares import Check
+from wildlab.geometry.calibration import Mounting
 from wildlab.geometry.intrinsics import PINHOLE
-from wildlab.geometry.mounting import Mounting
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, new_figure
 from wildlab.reporting.verdicts import error_name
 from wildlab.studies.camera_calibration.calibration import (

@@ -12,14 +12,13 @@ from wildlab.detection.boards import Board, find_board, grey8
 from wildlab.evaluation.replication import propagate_rounding
 from wildlab.evaluation.runs import Interval
 from wildlab.geometry.board_views import Views, parameters_of, project_board
+from wildlab.geometry.calibration import Mounting, mounting_from_points
 from wildlab.geometry.camera import Camera, camera_from_data_sheet
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.directions import direction_differences
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
+from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera, direction_differences
 from wildlab.geometry.mount import Mount, camera_rotation, helgesen_misalignment
-from wildlab.geometry.mounting import Mounting, mounting_from_points
 from wildlab.simulation.boards import board_image, board_views
 from wildlab.studies.sensitivity import TAU2, helgesen_mount
 

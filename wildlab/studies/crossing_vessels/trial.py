@@ -16,8 +16,8 @@ from wildlab.analysis.tracks.sighting import truth_states
 from wildlab.evaluation.identities import Identities, Moment, compare_identities
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.validation import gate_threshold
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.many import POINT, ManySensorModel, ManyTargetModel, run_many

@@ -20,7 +20,7 @@ from wildlab.detection.ground import RISE
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 from wildlab.simulation.parameters import load_twin

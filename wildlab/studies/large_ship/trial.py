@@ -22,7 +22,7 @@ from wildlab.analysis.rendered import (
 )
 from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_pixels, sighting
 from wildlab.flight.store import Flight
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.uncertainty import ground_covariance
 from wildlab.simulation.parameters import load_twin

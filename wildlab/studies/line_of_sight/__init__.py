@@ -18,7 +18,7 @@ from wildlab.evaluation.shares import Check
 from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles, field_of_view, in_field_of_view
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import lines_clear
 from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.spread import bounds_of
 from wildlab.reporting.text import number, percent, percent_between

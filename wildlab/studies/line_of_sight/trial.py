@@ -18,8 +18,7 @@ from wildlab.geometry.flodell import camera_rotation
 from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import Looked, cast_rays, compare_angles, field_of_view, in_field_of_view
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.viewsheds import footprint
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.viewsheds import footprint, lines_clear
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import grow_trees, synthetic_landscape
 from wildlab.simulation.parameters import load_twin

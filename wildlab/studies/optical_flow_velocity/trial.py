@@ -22,7 +22,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
-from wildlab.geometry.quantiles import student_quantile
+from wildlab.geometry.covariances import student_quantile
 from wildlab.simulation.scene.flights import SceneFlight, VesselLook, corner_of
 from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
 

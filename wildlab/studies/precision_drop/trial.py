@@ -20,7 +20,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN

@@ -18,7 +18,7 @@ from wildlab.detection.floating import FloatingObjects, find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, Pooled
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight

@@ -14,9 +14,8 @@ from matplotlib.figure import Figure
 from wildlab.detection.boards import Board
 from wildlab.geometry.board_views import INTRINSICS, parameters_of, project_board
 from wildlab.geometry.camera import Camera, normalise, undistort, undistort_approximately
-from wildlab.geometry.directions import direction_differences
 from wildlab.geometry.frames import Array
-from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
+from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera, direction_differences
 from wildlab.reporting.figures import new_figure
 from wildlab.reporting.verdicts import error_name
 from wildlab.simulation.boards import board_views

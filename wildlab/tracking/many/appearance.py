@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array
-from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.association import Assignment, global_nearest
 
 

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.compilation import compiled
+from wildlab.geometry.covariances import check_covariance
 from wildlab.geometry.frames import Array
-from wildlab.geometry.validation import check_covariance
 from wildlab.tracking.motion import Motion, random_walk
 
 

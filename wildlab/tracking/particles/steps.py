@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array
-from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.association import nearest_within
 from wildlab.tracking.kalman import update
 from wildlab.tracking.particles.clouds import (

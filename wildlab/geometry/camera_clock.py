@@ -1,0 +1,431 @@
+"""The offset of a camera's clock: by known points, or by how images moved as it turned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.geometry.calibration import BORESIGHT, BOUNDS, PARAMETERS, Fit, with_covariance
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.corrections import Calibration, apply_calibration
+from wildlab.geometry.frames import Array
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.robust import fit_linear, student_cost
+
+#: Poses of the camera at N sightings, and the points (N, 3) m in n that they are of, had the camera's clock
+#: been so many seconds later.
+SeenAt = Callable[[float], tuple[CameraPoses, Array]]
+
+#: Offsets (s) that are tried: far ones in steps that a flight's turns are longer than, near ones finely.
+FAR_S, FAR_STEP_S, FINE_STEP_S = 30.0, 0.5, 0.05
+#: Share of the sightings that has to have a pose under an offset.
+SHARE = 0.8
+#: Half of the stretch (s) that the derivative by the clock is taken over: see `wildlab.geometry.calibration`.
+STEP_S = 0.2
+#: An offset this far away (s) is another one, not the flank of the best.
+APART_S = 1.5
+#: Logarithm of how much more likely the best offset has to be than any other, for each draw of the errors.
+CERTAIN = 5.0
+
+
+class ClockByPoints(NamedTuple):
+    """What to add to the camera's stamps, from known points.
+
+    Attributes
+    ----------
+    offset_s, sd_s
+        s; the standard deviation follows from how far the estimate moves when one draw is left out. NaN where
+        there are fewer than two.
+    angles
+        (3,) rad, the boresight that goes with it: roll, tilt, pan of the camera's base, to be added.
+    offsets, cost
+        (K,) s and the curve: negative log-likelihood of a sighting, on average, under each offset with the
+        boresight that suits it best. NaN where too few have a pose.
+    rival_s, margin
+        The best offset that is not the flank of this one, and how much less likely all sightings together are
+        under it, as a logarithm by draws: errors of one draw are counted once.
+    points, images, draws
+        What it rests on.
+    """
+
+    offset_s: float
+    sd_s: float
+    angles: Array
+    offsets: Array
+    cost: Array
+    rival_s: float
+    margin: float
+    points: int
+    images: int
+    draws: int
+
+    @property
+    def certain(self) -> bool:
+        """Whether one offset stands out, with a known uncertainty, a boresight that can be, and inside of
+        what was tried."""
+        tried = self.offsets[np.isfinite(self.cost)]
+        inside = tried.min() + APART_S / 2 < self.offset_s < tried.max() - APART_S / 2
+        can_be = (np.abs(self.angles) <= [BOUNDS[name] for name in BORESIGHT]).all()
+        return bool(np.isfinite(self.sd_s) and self.margin > CERTAIN and inside and can_be)
+
+
+def clock_by_points(
+    seen_at: SeenAt,
+    uv: ArrayLike,
+    image: Sequence[object] | NDArray[np.generic],
+    draw: Sequence[object] | NDArray[np.generic] | None = None,
+) -> ClockByPoints | None:
+    """The offset of the camera's clock that minimises robust reprojection residuals.
+
+    Under each offset the boresight (three angles) is the best there: a misaligned camera shifts points along
+    the track, as a late clock does, but the same way on every course.
+
+    Parameters
+    ----------
+    seen_at
+        Poses and points under an offset, NaN where one is not known.
+    uv
+        (N, 2) pixels at which the points were seen.
+    image
+        (N,) which image each is in.
+    draw
+        (N,) which share their error; those of an image, if not given.
+
+    Returns
+    -------
+    ClockByPoints, or None where fewer than four sightings have a pose and a point under any offset.
+    """
+    pixels = np.asarray(uv, float)
+
+    kept: dict[float, tuple[CameraPoses, Array]] = {}
+
+    def residuals(offset: float, angles: Array) -> Array:
+        if offset not in kept:
+            kept.clear()
+            kept[offset] = seen_at(offset)
+        poses, points = kept[offset]
+        trial = Calibration(BORESIGHT, angles, np.zeros((3, 3)), {}, 0, 0)
+        turned = replace(poses, mount=apply_calibration(trial, poses.mount))
+        return np.asarray(ground_to_pixel(poses.camera, points, turned.p_nc, turned.R_nc) - pixels)
+
+    def best_angles(offset: float, start: Array, rounds: int) -> tuple[Array, Array]:
+        """Angles and residuals (N, 2) there, NaN for what has none."""
+        angles, r = start, residuals(offset, start)
+        for _ in range(rounds):
+            good = np.isfinite(r).all(axis=1)
+            if good.sum() < 4:
+                break
+            J = _derivatives(partial(residuals, offset), angles)[good]
+            step = fit_linear(np.nan_to_num(J), r[good]).x
+            trial = residuals(offset, angles + step)
+            if not np.isfinite(trial[good]).all() or student_cost(_squares(trial[good])) > student_cost(
+                _squares(r[good])
+            ):
+                break
+            angles, r = angles + step, trial
+        return angles, r
+
+    def curve(offsets: Array, start: Array) -> tuple[Array, list[Array]]:
+        found = [best_angles(float(o), start, 3) for o in offsets]
+        good = [np.isfinite(r).all(axis=1) for _, r in found]
+        enough = max(4.0, SHARE * max(int(g.sum()) for g in good))
+        cost = [
+            student_cost(_squares(r[g])) / g.sum() if g.sum() >= enough else np.nan
+            for (_, r), g in zip(found, good, strict=True)
+        ]
+        return np.array(cost), [angles for angles, _ in found]
+
+    far = np.arange(-FAR_S, FAR_S + FAR_STEP_S / 2, FAR_STEP_S)
+    cost, angles = curve(far, np.zeros(3))
+    if not np.isfinite(cost).any():
+        return None
+    k = int(np.nanargmin(cost))
+    fine = far[k] + np.arange(-2 * FAR_STEP_S, 2 * FAR_STEP_S + FINE_STEP_S / 2, FINE_STEP_S)
+    fine_cost, fine_angles = curve(fine, angles[k])
+    if np.isfinite(fine_cost).any():
+        k = int(np.nanargmin(fine_cost))
+        offset, turn = float(fine[k]), fine_angles[k]
+    else:
+        offset, turn = float(far[k]), angles[k]
+    offset, turn, fit = _settled(residuals, offset, turn)
+    groups = np.asarray(image if draw is None else draw)
+    calibration = with_covariance(fit, np.asarray(image), groups)
+    offsets, every = np.append(far, fine), np.append(cost, fine_cost)
+    order = np.argsort(offsets, kind="stable")
+    rival, margin = _rival(far, cost, offset, float(np.nanmin(every)), calibration.n_draws)
+    return ClockByPoints(
+        offset,
+        calibration.sd("clock"),
+        turn,
+        offsets[order],
+        every[order],
+        rival,
+        margin,
+        calibration.n_points,
+        calibration.n_images,
+        calibration.n_draws,
+    )
+
+
+def _settled(
+    residuals: Callable[[float, Array], Array], offset: float, turn: Array
+) -> tuple[float, Array, Fit]:
+    """Offset and angles where derivatives wider than the log's noise see nothing to gain."""
+    near = np.stack([residuals(offset + step, turn) for step in (0.0, -STEP_S, STEP_S)])
+    usable = np.asarray(np.isfinite(near).all(axis=(0, 2)), np.bool_)
+    sizes = np.array([PARAMETERS["clock"]] + [PARAMETERS[name] for name in BORESIGHT])
+    start, x = offset, np.concatenate([[offset], turn])
+    for _ in range(12):
+        r = residuals(x[0], x[1:])[usable]
+        by_clock = (residuals(x[0] + STEP_S, x[1:]) - residuals(x[0] - STEP_S, x[1:]))[usable] / (2 * STEP_S)
+        by_angle = _derivatives(partial(residuals, float(x[0])), x[1:])[usable]
+        J = np.nan_to_num(np.concatenate([by_clock[..., None], by_angle], axis=-1))
+        r = np.nan_to_num(r, nan=1e4)
+        step = fit_linear(J, r).x if len(r) else np.zeros(4)
+        if abs(x[0] + step[0] - start) > APART_S:
+            break
+        x = x + step
+        if (np.abs(step) < 1e-4 * sizes).all():
+            break
+    return float(x[0]), x[1:], Fit(("clock", *BORESIGHT), x, {}, usable, J, r)
+
+
+def _derivatives(residuals: Callable[[Array], Array], angles: Array) -> Array:
+    """(N, 2, 3) by each angle."""
+    return np.stack(
+        [(residuals(angles + 1e-5 * e) - residuals(angles - 1e-5 * e)) / 2e-5 for e in np.eye(3)], axis=-1
+    )
+
+
+def _squares(r: Array) -> Array:
+    return np.asarray((r**2).sum(axis=1))
+
+
+def _rival(offsets: Array, cost: Array, best: float, least: float, draws: int) -> tuple[float, float]:
+    """The best offset that is apart from the best of all, and by how much that is less likely."""
+    other = np.where(np.abs(offsets - best) > APART_S, cost, np.nan)
+    if not np.isfinite(other).any():
+        return float("nan"), 0.0
+    k = int(np.nanargmin(other))
+    return float(offsets[k]), float((other[k] - least) * draws)
+
+
+#: Steps (s) near the best offset.
+MOTION_STEP_S = 0.005
+#: Samples of the log closer than this (s) are thinned.
+LOG_STEP_S = 0.01
+#: Another peak is one that is so many times the width of the best away, and so many seconds.
+WIDTHS, PEAKS_APART_S = 2.0, 0.3
+#: Pairs of images that are needed, and the share of those with the most that an offset must have of them.
+FEWEST, PAIRS_SHARE = 30, 0.7
+#: Stretches of time whose errors are taken to be independent.
+DRAWS = 20
+#: The correlation that a peak has to have, and the logarithm of how much more likely it has to be than any
+#: other, for each draw of the errors.
+LEAST, MOTION_CERTAIN = 0.3, 5.0
+
+
+class ClockByMotion(NamedTuple):
+    """What to add to the camera's stamps, from the motion of images.
+
+    Attributes
+    ----------
+    offset_s, sd_s
+        s; the standard deviation follows from how far the peak moves when one stretch of time is left out.
+    offsets, correlation
+        (K,) s and the curve: how well motion seen and motion logged go together under each offset, from 0 to
+        1, negative where they go against each other. NaN where too few pairs have both.
+    rival_s, rival_correlation, margin
+        The next best peak, and how much less likely it is, as a logarithm by draws.
+    gain
+        Motion seen for a motion logged: about 1 where camera, mount and log belong together.
+    pairs
+        Of images that it rests on.
+    """
+
+    offset_s: float
+    sd_s: float
+    offsets: Array
+    correlation: Array
+    rival_s: float
+    rival_correlation: float
+    margin: float
+    gain: float
+    pairs: int
+
+    @property
+    def peak(self) -> float:
+        """The best correlation."""
+        return float(np.nanmax(self.correlation))
+
+    @property
+    def certain(self) -> bool:
+        """Whether one peak stands out, of a height that means something and not at the edge."""
+        tried = self.offsets[np.isfinite(self.correlation)]
+        inside = tried.min() + PEAKS_APART_S < self.offset_s < tried.max() - PEAKS_APART_S
+        likely = self.peak >= LEAST and self.margin > MOTION_CERTAIN and 0.3 < self.gain < 3.0
+        return bool(inside and likely and np.isfinite(self.sd_s))
+
+
+def clock_by_motion(
+    spans: ArrayLike, motion: ArrayLike, times: ArrayLike, turned: ArrayLike, moved: ArrayLike | None = None
+) -> ClockByMotion | None:
+    """The offset of the camera's clock by the peak of the correlation of two motions.
+
+    What is seen at the principal point is ``(-w_y, w_x, -w_z)`` of the camera's angular velocity, and
+    ``(-v_x, -v_y, 0) / depth`` of its velocity; a common gain, one over a mean depth, and a constant for each
+    of the three are fitted under each offset, so that neither the scale of the log nor a bias of gyros or
+    the steady motion over the ground counts.
+
+    Parameters
+    ----------
+    spans
+        (N, 2) s by the camera's clock, of two images each.
+    motion
+        (N, 3) how the scene moved between them, from `wildlab.detection.image_motion`; NaN is left out.
+    times
+        (T,) s of the log, increasing.
+    turned
+        (T, 3) rad, the integral of the camera's angular velocity in c up to each.
+    moved
+        (T, 3) m, the integral of its velocity in c.
+
+    Returns
+    -------
+    ClockByMotion, or None where fewer than `FEWEST` pairs lie within the log under any offset.
+    """
+    span, seen = np.asarray(spans, float), np.asarray(motion, float)
+    good = np.isfinite(span).all(axis=1) & np.isfinite(seen).all(axis=1) & (span[:, 1] > span[:, 0])
+    span = span[good]
+    if len(span) < FEWEST:
+        return None
+    apart = (span[:, 1] - span[:, 0])[:, None]
+    seen = seen[good] / apart
+    # A pair that is followed wrongly is far out; half of the scatter tells how far.
+    middle = np.median(seen, axis=0)
+    scale = 1.4826 * np.median(np.abs(seen - middle), axis=0)
+    seen = np.clip(seen, middle - 8 * scale, middle + 8 * scale)
+    t = np.asarray(times, float)
+    sums = np.asarray(turned, float)
+    sums = sums if moved is None else np.hstack([sums, np.asarray(moved, float)])
+    # Between samples closer than these, integrals are as good as straight.
+    near = (t >= span.min() - FAR_S - 1) & (t <= span.max() + FAR_S + 1)
+    if near.sum() < 2:
+        return None
+    t, sums = t[near], sums[near]
+    every = max(1, int(LOG_STEP_S / max(float(np.median(np.diff(t))), 1e-6)))
+    t, sums = np.append(t[:-1:every], t[-1]), np.vstack([sums[:-1:every], sums[-1]])
+
+    def logged(offset: float) -> tuple[Array, Array]:
+        """Which pairs lie within the log, and mean rates (n, 3 or 6) of these."""
+        at = span + offset
+        inside = (at[:, 0] >= t[0]) & (at[:, 1] <= t[-1])
+        ends = [np.stack([np.interp(at[inside, k], t, one) for one in sums.T], axis=1) for k in (0, 1)]
+        return inside, (ends[1] - ends[0]) / apart[inside]
+
+    def fit(offset: float) -> tuple[float, float, Array]:
+        """Correlation, gain and squares (N,) left over, NaN outside; whitened by the scatter seen."""
+        inside, rates = logged(offset)
+        left = np.full(len(span), np.nan)
+        if inside.sum() < FEWEST or inside.sum() < PAIRS_SHARE * most:
+            return np.nan, np.nan, left
+        y = seen[inside] - seen[inside].mean(axis=0)
+        weight = 1 / np.maximum(y.std(axis=0), 1e-12)
+        w = rates[:, :3] - rates[:, :3].mean(axis=0)
+        columns = [(np.stack([-w[:, 1], w[:, 0], -w[:, 2]], axis=1) * weight).ravel()]
+        if rates.shape[1] > 3:
+            v = rates[:, 3:] - rates[:, 3:].mean(axis=0)
+            columns.append((np.stack([-v[:, 0], -v[:, 1], 0 * v[:, 0]], axis=1) * weight).ravel())
+        target = (y * weight).ravel()
+        # Translation alone explains some of it under any offset; what turning adds is the signal.
+        rest = columns[1:]
+        for other in rest:
+            along = float(other @ other)
+            if along > 0:
+                columns[0] = columns[0] - other * (other @ columns[0]) / along
+                target = target - other * (other @ target) / along
+        power = float(columns[0] @ columns[0])
+        gain = float(columns[0] @ target) / power if power > 0 else 0.0
+        over = target - gain * columns[0]
+        total = float(target @ target)
+        share = 1 - float(over @ over) / total if total > 0 else 0.0
+        left[inside] = (over.reshape(-1, 3) ** 2).sum(axis=1) / total
+        return float(np.sign(gain) * np.sqrt(max(share, 0.0))), gain, left
+
+    step = float(np.clip(np.median(apart) / 2, 0.02, 0.25))
+    far = np.arange(-FAR_S, FAR_S + step / 2, step)
+    within = [((span[:, 0] + o >= t[0]) & (span[:, 1] + o <= t[-1])).sum() for o in far]
+    most = max(within)
+    if most < FEWEST:
+        return None
+    coarse = np.array([fit(float(o))[0] for o in far])
+    if not np.isfinite(coarse).any():
+        return None
+    top = float(far[np.nanargmax(coarse)])
+    fine = np.arange(top - 2 * step, top + 2 * step + MOTION_STEP_S / 2, MOTION_STEP_S)
+    fits = [fit(float(o)) for o in fine]
+    heights = np.array([one[0] for one in fits])
+    k = int(np.nanargmax(heights)) if np.isfinite(heights).any() else 0
+    offset = _vertex(fine, 1 - heights**2, k)
+    offsets, curve = np.append(far, fine), np.append(coarse, heights)
+    order = np.argsort(offsets, kind="stable")
+    offsets, curve = offsets[order], curve[order]
+    rival = _other_peak(offsets, curve, offset)
+    best, other = float(np.nanmax(curve)), float(curve[rival]) if rival is not None else 0.0
+    margin = DRAWS / 2 * float(np.log((1 - max(other, 0.0) ** 2) / max(1 - best**2, 1e-9)))
+    return ClockByMotion(
+        offset,
+        _spread(fine, np.array([one[2] for one in fits]), span.mean(axis=1), offset),
+        offsets,
+        curve,
+        float(offsets[rival]) if rival is not None else float("nan"),
+        other,
+        margin,
+        fits[k][1],
+        int(np.isfinite(fits[k][2]).sum()),
+    )
+
+
+def _vertex(x: Array, y: Array, k: int) -> float:
+    """Where the parabola through some values about the least has its vertex."""
+    half = max(3, len(x) // 8)
+    a, b = max(k - half, 0), min(k + half + 1, len(x))
+    good = np.isfinite(y[a:b])
+    if good.sum() < 3:
+        return float(x[k])
+    square, line, _ = np.polyfit(x[a:b][good] - x[k], y[a:b][good], 2)
+    moved = -line / (2 * square) if square > 0 else 0.0
+    return float(np.clip(x[k] + moved, x[a], x[b - 1]))
+
+
+def _other_peak(offsets: Array, curve: Array, offset: float) -> int | None:
+    """The highest local peak that is not the flank of the best."""
+    best = float(np.nanmax(curve))
+    wide = np.abs(offsets - offset)[np.isfinite(curve) & (curve < best / 2)]
+    width = max(WIDTHS * float(wide.min()) if len(wide) else np.inf, PEAKS_APART_S)
+    outside = np.flatnonzero(np.isfinite(curve) & (np.abs(offsets - offset) > width))
+    if not len(outside):
+        # A peak so wide that nothing lies beside it: the whole curve is its flank.
+        return int(np.nanargmin(curve))
+    return int(outside[np.argmax(curve[outside])])
+
+
+def _spread(offsets: Array, squares: Array, at: Array, offset: float) -> float:
+    """Standard deviation of the offset, by leaving out one stretch of time after the other."""
+    known = np.isfinite(squares).all(axis=0)
+    if known.sum() < FEWEST:
+        return float("nan")
+    order = np.argsort(at[known], kind="stable")
+    parts = np.array_split(np.flatnonzero(known)[order], DRAWS)
+    total = squares[:, known].sum(axis=1)
+    moved = []
+    for part in parts:
+        without = total - squares[:, part].sum(axis=1)
+        moved.append(_vertex(offsets, without, int(np.argmin(without))))
+    apart = np.array(moved) - np.mean(moved)
+    return float(np.sqrt((len(parts) - 1) / len(parts) * (apart**2).sum()))
