@@ -8,7 +8,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +49,14 @@ def sha256(path: Path) -> str:
     """SHA-256 of a file, as 64 hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def digest(about: Any, files: Iterable[tuple[str, Path]] = ()) -> str:
+    """SHA-256 of plain values and of named files, whether they are there or not, as 64 hexadecimal digits."""
+    whole = hashlib.sha256(json.dumps(about, sort_keys=True, allow_nan=False).encode())
+    for name, path in files:
+        whole.update(f"{name} {sha256(path) if path.is_file() else 'absent'}\n".encode())
+    return whole.hexdigest()
 
 
 def write_csv(path: Path, table: pd.DataFrame, float_format: str | None = None) -> None:

@@ -14,7 +14,7 @@ from tests.notebooks import run_here
 from wildlab.errors import WildlabError
 from wildlab.flight.catalog import is_fetched
 from wildlab.paths import NOTEBOOKS
-from wildlab.runner import by_hand
+from wildlab.runner import flights
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.open_study import open_study
 from wildlab.runner.processes.shell import CellError
@@ -31,28 +31,28 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...
         calls.append(given)
         return tmp_path / str(len(calls))
 
-    monkeypatch.setattr(by_hand, "twin_flight", make)
-    monkeypatch.setattr(by_hand, "dataset_flight", make)
-    monkeypatch.setattr(by_hand, "load_flight", lambda folder: folder)
+    monkeypatch.setattr(flights, "twin_flight", make)
+    monkeypatch.setattr(flights, "dataset_flight", make)
+    monkeypatch.setattr(flights, "load_flight", lambda folder: folder)
     return calls
 
 
 def test_a_study_by_hand_makes_its_own_twin(made, tmp_path):
-    assert by_hand.flight_for("schmidt-fast-vessel", "", 7) == tmp_path / "1"
-    assert made == [("fast-vessel", 7, by_hand.REPORTS)]
+    assert flights.flight_for("schmidt-fast-vessel", "", 7) == tmp_path / "1"
+    assert made == [("fast-vessel", 7, flights.REPORTS)]
 
 
 def test_a_study_by_hand_imports_all_flights_of_its_data_set(made):
     study = STUDIES["autoferry"]
-    assert len(by_hand.flights_for("autoferry", "", [], 1)) == 1 + len(study.beside)
+    assert len(flights.flights_for("autoferry", "", [], 1)) == 1 + len(study.beside)
     assert [recipe for _, recipe, _ in made] == [study.recipe, *study.beside]
     assert {dataset for dataset, _, _ in made} == {"autoferry"}
 
 
 def test_a_flight_that_is_given_is_taken(made, tmp_path):
     # The name is no study's: `wildlab evaluate` names reports after flights.
-    assert by_hand.flight_for("tuesday", str(tmp_path), 1) == tmp_path
-    assert by_hand.flights_for("tuesday", "a", ["b"], 1) == [Path("a"), Path("b")]
+    assert flights.flight_for("tuesday", str(tmp_path), 1) == tmp_path
+    assert flights.flights_for("tuesday", "a", ["b"], 1) == [Path("a"), Path("b")]
     assert made == []
 
 
@@ -62,13 +62,13 @@ def test_a_flight_that_is_given_is_taken(made, tmp_path):
 )
 def test_without_a_flight_a_sentence_says_what_to_do(study, sentence):
     with pytest.raises(WildlabError, match=f"(?i){sentence}"):
-        by_hand.flight_for(study, "", 1)
+        flights.flight_for(study, "", 1)
 
 
 def test_without_its_data_set_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
     with pytest.raises(WildlabError, match="wildlab fetch openathena"):
-        by_hand.flight_for("survey-markers", "", 1)
+        flights.flight_for("survey-markers", "", 1)
 
 
 OF_FLIGHTS = {
@@ -107,8 +107,8 @@ def test_a_notebook_runs_by_hand(name, tmp_path, monkeypatch):
     # What it makes and computes is kept there, and not among the reports of this checkout.
     kept = tmp_path / "reports"
     monkeypatch.setattr("wildlab.paths.REPORTS", kept)
-    monkeypatch.setattr(by_hand, "REPORTS", kept)
-    monkeypatch.setattr("wildlab.runner.trials.REPORTS", kept)
+    monkeypatch.setattr(flights, "REPORTS", kept)
+    monkeypatch.setattr("wildlab.runner.open_study.REPORTS", kept)
 
     if study.dataset is not None and not is_fetched(study.dataset):
         with pytest.raises(CellError, match=f"wildlab fetch {study.dataset}"):

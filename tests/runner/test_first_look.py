@@ -17,10 +17,9 @@ from wildlab.reporting.page import first_look_notice
 from wildlab.reporting.status import look_words
 from wildlab.runner import run as running
 from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
-from wildlab.runner.first_look import THERE, has_whole_report, plan_passes, quick_first
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.run import make_job, run_studies
+from wildlab.runner.run import THERE, has_whole_report, make_job, plan_passes, quick_first, run_studies
 from wildlab.runner.seeds import write_seed
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import builtins
 import json
 import math
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -17,23 +19,28 @@ from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.paths import NOTEBOOKS
+from wildlab.runner import open_study
 from wildlab.runner import seeds as fingerprint
 from wildlab.runner.catalogue import load_studies
+from wildlab.runner.open_study import trials_table
 from wildlab.runner.processes import cluster
+from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.progress import shown
-from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.processes.scheduling import Outcome, _waiting
 from wildlab.runner.processes.worker_pool import WorkerPool, answer
 from wildlab.runner.run import _notes
 from wildlab.runner.seeds import (
     SeedWork,
     failed_seeds,
     make_work,
+    missing_seeds,
     other_seeds,
     read_seed,
+    seed_digest,
+    set_aside,
     sweep_seeds,
     write_seed,
 )
-from wildlab.runner.trials import trials_table
 from wildlab.studies import protocol
 
 PARAMETERS = {"twin": "static-antenna", "not its own": 3}
@@ -96,6 +103,167 @@ def test_the_code_key_follows_code_twins_and_versions(tmp_path, monkeypatch):
     keys.append(fingerprint.code_key())
     assert keys[0] == keys[1] and keys[6] == keys[7] == keys[8], "neither time nor what stands above moves it"
     assert len(set(keys)) == 7
+
+
+VALUES = {
+    "schmidt/nees_inside": 0.9333333333333333,
+    "schmidt/median_nees": 3.25e-7,
+    "ekf/max_error": 1.0,
+    "ekf/none": math.nan,
+    "ekf/beyond": -math.inf,
+    "ekf/zero": -0.0,
+}
+
+
+def kept_work(folder: Path, *seeds: int, key: str = "k") -> SeedWork:
+    return SeedWork(folder, "study", "case", {"twin": "t"}, "code", key, seeds or (1, 2, 3))
+
+
+def rewrite(change: Callable[[dict[str, Any]], object]) -> Callable[[str], str]:
+    """A damage that leaves a file laid out as it was."""
+
+    def changed(text: str) -> str:
+        content = json.loads(text)
+        change(content)
+        return json.dumps(content, indent=1) + "\n"
+
+    return changed
+
+
+@given(
+    values=st.dictionaries(
+        st.text("abc_-", min_size=1, max_size=4).map("s/{}".format), st.floats(), min_size=1, max_size=4
+    ),
+    place=st.integers(0, 10**6),
+    bit=st.integers(0, 7),
+)
+def test_a_turned_bit_is_never_read(tmp_path_factory, values, place, bit):
+    one = kept_work(tmp_path_factory.getbasetemp() / "bits", 1)
+    write_seed(one, 1, values)
+    turned = bytearray((one.folder / "1.json").read_bytes())
+    turned[place % len(turned)] ^= 1 << bit
+    (one.folder / "1.json").write_bytes(bytes(turned))
+    assert read_seed(one, 1) is None
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: "",
+        lambda text: text[:-1],
+        lambda text: text[: len(text) // 2],
+        lambda text: text + "\n",
+        lambda text: "[" * 5000,
+        lambda text: "[]",
+        lambda text: "1",
+        lambda text: text.replace("0.9333333333333333", "0.8333333333333333"),
+        lambda text: text.replace("3.25e-07", "0.000000325"),
+        lambda text: text.replace('"nan"', "NaN"),
+        rewrite(lambda content: content["values"].pop("ekf/zero")),
+        rewrite(lambda content: content["values"].update({"ekf/more": 1.0})),
+        rewrite(lambda content: content["values"].update({"ekf/zero": 0.0})),
+        rewrite(lambda content: content["names"].pop()),
+        rewrite(lambda content: content.pop("digest")),
+        rewrite(lambda content: content.update(seed=2)),
+        rewrite(lambda content: content.update(case="another")),
+    ],
+)
+def test_whatever_was_done_to_a_file_it_is_not_read(tmp_path, damage):
+    one = kept_work(tmp_path)
+    write_seed(one, 1, VALUES)
+    path = one.folder / "1.json"
+    assert missing_seeds(one) == [2, 3]
+    text = damage(path.read_text())
+    assert text != path.read_text()
+    path.write_text(text)
+    assert read_seed(one, 1) is None and missing_seeds(one) == [1, 2, 3]
+    assert set_aside(one) == [1]
+
+
+def test_a_file_of_another_key_study_or_seed_is_not_read(tmp_path):
+    one, other = kept_work(tmp_path), kept_work(tmp_path, key="another")
+    for its in (one, other):
+        for seed in its.seeds:
+            write_seed(its, seed, VALUES)
+    shutil.copy(other.folder / "1.json", one.folder / "1.json")
+    shutil.copy(one.folder / "3.json", one.folder / "2.json")
+    assert missing_seeds(one) == [1, 2] and missing_seeds(replace(one, case="another")) == [1, 2, 3]
+
+
+def test_a_file_without_a_digest_counts_as_absent(tmp_path):
+    one = kept_work(tmp_path, 1)
+    one.folder.mkdir(parents=True)
+    (one.folder / "1.json").write_text('{"case": "case", "seed": 1, "values": {"a/b": 1.0}}')
+    assert missing_seeds(one) == [1] and set_aside(one) == []
+
+
+def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path):
+    one = kept_work(tmp_path, 1)
+    turned = dict(reversed(VALUES.items()))
+    assert seed_digest(one, 1, VALUES) == seed_digest(replace(one, study="b", code="c"), 1, turned)
+    others = [
+        seed_digest(one, 2, VALUES),
+        seed_digest(replace(one, key="l"), 1, VALUES),
+        seed_digest(replace(one, case="l"), 1, VALUES),
+        seed_digest(one, 1, VALUES | {"ekf/zero": 0.0}),
+        seed_digest(one, 1, {name.replace("zero", "nought"): value for name, value in VALUES.items()}),
+        seed_digest(one, 1, VALUES | {"ekf/max_error": math.nextafter(1.0, 2.0)}),
+        seed_digest(one, 1, {name: value for name, value in VALUES.items() if name != "ekf/none"}),
+    ]
+    assert len({seed_digest(one, 1, VALUES), *others}) == 8
+
+
+def test_provenance_lists_digests_and_what_was_damaged(tmp_path):
+    one = kept_work(tmp_path)
+    for seed in one.seeds:
+        write_seed(one, seed, {"a/b": float(seed)})
+    first = one.provenance()
+    assert first["digests"] == {str(seed): seed_digest(one, seed, {"a/b": seed}) for seed in one.seeds}
+    assert first["damaged"] == {"count": 0, "seeds": []}
+    write_seed(one, 2, {"a/b": 2.5})
+    second = one.provenance()
+    assert first["digest"] != second["digest"] and first["digests"]["1"] == second["digests"]["1"]
+    (one.folder / "3.json").write_text("{")
+    assert set_aside(one) == [3] and set_aside(one) == [] and missing_seeds(one) == [3]
+    write_seed(one, 3, {"a/b": 3.0})
+    sweep_seeds(one)
+    third = one.provenance()
+    assert third["damaged"] == {"count": 1, "seeds": [3]} and third["digest"] == second["digest"]
+
+
+def test_a_run_computes_damaged_seeds_again_and_says_so(tmp_path):
+    one = kept_work(tmp_path)
+    for seed in (1, 2):
+        write_seed(one, seed, VALUES)
+    (one.folder / "2.json").write_text("{}")
+    waiting, told = _waiting(Job(one.study, "", "", "", "", seeds=one)), list[tuple[str, object]]()
+    waiting.start(lambda name, event, what: told.append((event, what)))
+    assert list(waiting.seeds) == [2, 3] and not waiting.ready
+    assert dict(told)["seeds"] == (2, 3) and str(dict(told)["again"]).endswith("1 seed (2)")
+
+
+@pytest.mark.parametrize(
+    ("kept", "sentence"),
+    [
+        ({"a/b": 1.0}, "Seed 3 has numbers of other names than seed 1: 'a/b', 'a/c'"),
+        (None, "seed 3 do not read back"),
+    ],
+)
+def test_numbers_that_do_not_go_together_are_an_error(tmp_path, monkeypatch, kept, sentence):
+    one = work(tmp_path, 3)
+    write_seed(one, 1, {"a/c": 1.0})
+
+    def compute(work: SeedWork, missing: list[int]) -> None:
+        assert missing == [3]
+        if kept is not None:
+            write_seed(work, 3, kept)
+
+    monkeypatch.setattr(open_study, "_compute", compute)
+    with pytest.raises(RunFailed, match=sentence):
+        trials_table(
+            "static-point", 3, study="study", seed=2, drawn={}, out=str(tmp_path / "study"),
+            twin="static-antenna",
+        )  # fmt: skip
 
 
 def test_sweeping_keeps_what_is_in_use(tmp_path):

@@ -21,11 +21,10 @@ from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.run import run_studies
-from wildlab.runner.trials import split_keys
 from wildlab.studies.line_of_sight import WAYS
 from wildlab.studies.line_of_sight.trial import HEIGHTS, VIEW
 from wildlab.studies.printed_numbers import all_pairs
-from wildlab.studies.protocol import run_trial
+from wildlab.studies.protocol import run_trial, split_keys
 
 pytestmark = pytest.mark.slow
 

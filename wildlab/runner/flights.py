@@ -1,20 +1,57 @@
-"""The flight a study needs: made once, and kept in ``reports/.flights`` until its source changes."""
+"""The flights a study needs: made once, and kept in ``reports/.flights`` until their source changes."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
-from wildlab.files import sha256, write_atomic
-from wildlab.paths import DATA, PACKAGE
+from wildlab.files import digest, write_atomic
+from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.paths import DATA, PACKAGE, REPORTS
+from wildlab.runner.catalogue import find_study, load_studies
 
 #: A change in any of these rooms can change a flight.
 _ROOMS = ("geometry", "flight", "simulation")
+
+
+def flight_for(study: str, flight: str, seed: int) -> Flight:
+    """The flight in the folder ``flight``; where that is "", the first of `flights_for`."""
+    return flights_for(study, flight, (), seed)[0]
+
+
+def flights_for(study: str, flight: str, others: Sequence[str], seed: int) -> list[Flight]:
+    """The flights of a study, the first one first.
+
+    Parameters
+    ----------
+    study
+        Its name in ``studies.toml``.
+    flight, others
+        Folders, as the runner gives them. Where ``flight`` is "", the study's own twin is simulated for
+        ``seed``, or its own data set is imported; both are kept with those of the runner.
+
+    Raises
+    ------
+    WildlabError
+        If no flight is given and there is no such study, it has no flight, or its data set is not here; says
+        how to get it.
+    """
+    if flight:
+        return [load_flight(Path(folder)) for folder in (flight, *others)]
+    entry = find_study(study, load_studies())
+    if entry.twin is not None:
+        return [load_flight(twin_flight(entry.twin, seed, REPORTS))]
+    if entry.recipe is None:
+        raise WildlabError(
+            f"the study {study!r} has no flight of its own", "name a flight's folder", field="flight"
+        )
+    recipes = (entry.recipe, *entry.beside)
+    return [load_flight(dataset_flight(entry.dataset, recipe, REPORTS)) for recipe in recipes]
 
 
 def twin_flight(twin: str, seed: int, reports: Path) -> Path:
@@ -28,7 +65,7 @@ def twin_flight(twin: str, seed: int, reports: Path) -> Path:
     from wildlab.simulation.twins import simulate_twin
 
     # Twins share parts, so a change of any of their files may be a change of this one.
-    key = _fingerprint([f"{twin} {seed}"], sorted((DATA / "twins").rglob("*.toml")))
+    key = _key([twin, seed], sorted((DATA / "twins").rglob("*.toml")))
     return _kept(reports, f"{twin}-{seed}", key, lambda _: simulate_twin(twin, seed))
 
 
@@ -46,7 +83,7 @@ def dataset_flight(dataset: str | None, recipe: str, reports: Path) -> Path:
     recipe_path = DATA / "recipes" / recipe
     source = dataset_source(dataset) if dataset else None
     raw = sorted(path for path in source.rglob("*") if path.is_file()) if source else []
-    key = _fingerprint([str(dataset), recipe], [recipe_path, *raw])
+    key = _key([dataset, recipe], [recipe_path, *raw])
 
     def build(folder: Path) -> Any:
         return import_flight(recipe_path, source, folder, overwrite=False)
@@ -83,8 +120,6 @@ def _kept(reports: Path, name: str, key: str, build: Callable[[Path], Any]) -> P
     try:
         flight = build(part)
         if not part.is_dir():
-            from wildlab.flight.store import save_flight
-
             save_flight(flight, part)
         # Another study that needs the same flight may be building it too: it has the same content, so whoever
         # comes last may win. The key goes first and comes last, so that it never vouches for another content.
@@ -99,11 +134,7 @@ def _kept(reports: Path, name: str, key: str, build: Callable[[Path], Any]) -> P
     return target
 
 
-def _fingerprint(words: Iterable[str], files: Iterable[Path]) -> str:
-    import numpy as np
-
-    digest = hashlib.sha256(repr([np.__version__, *words]).encode())
-    code = sorted(path for room in _ROOMS for path in (PACKAGE / room).glob("**/*.py"))
-    for path in [*code, *files]:
-        digest.update(f"{path.name} {sha256(path) if path.is_file() else 'absent'}\n".encode())
-    return digest.hexdigest()
+def _key(made_from: Sequence[Any], files: Iterable[Path]) -> str:
+    """What a flight depends on: ``made_from``, files, and the code that makes it."""
+    code = sorted(path for room in _ROOMS for path in (PACKAGE / room).rglob("*.py"))
+    return digest([version("numpy"), *made_from], [(path.name, path) for path in [*code, *files]])

@@ -13,25 +13,36 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
+from wildlab.errors import RunFailed, WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.messages.page_texts import PageTexts, load_texts
+from wildlab.paths import REPORTS
 from wildlab.replay.moving import show_moving
 from wildlab.reporting.report import Report, open_report
 from wildlab.runner import vary
-from wildlab.runner.by_hand import flights_for
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
-from wildlab.runner.trials import trials_table
+from wildlab.runner.flights import flights_for
+from wildlab.runner.processes.worker_pool import WorkerPool
+from wildlab.runner.seeds import (
+    SeedWork,
+    damaged_line,
+    failed_seeds,
+    make_work,
+    missing_seeds,
+    read_seed,
+    set_aside,
+)
 from wildlab.studies.fit_and_prediction import show_twins
 from wildlab.studies.monte_carlo import record_spread
 from wildlab.studies.page import Shown, show_page
-from wildlab.studies.protocol import Study, find_case
+from wildlab.studies.protocol import Study, find_case, split_keys
 
 
 def open_study(
@@ -207,3 +218,76 @@ class OpenStudy:
         if self.flights:
             show_moving(self.report, self.data)
         self.report.save()
+
+
+def trials_table(
+    case: str,
+    seeds: int,
+    *,
+    study: str,
+    seed: int,
+    drawn: Mapping[tuple[str, str], float],
+    out: str = "",
+    **parameters: Any,
+) -> pd.DataFrame:
+    """The numbers of all flights: columns (subject, name), one row for each seed, the flight drawn first.
+
+    `wildlab run` has computed them before the notebook starts. In a notebook opened by hand, those that are
+    not there yet, and those whose kept numbers are damaged, are computed now, in a process beside the kernel,
+    and kept.
+
+    Parameters
+    ----------
+    case
+        Whose trial it is (``case`` in ``studies.toml``).
+    seeds
+        How many flights, the one drawn included.
+    seed, drawn
+        Seed of the flight that the figures show, and what the notebook has computed on it.
+    out
+        The notebook's parameter: the report's folder, beside which the store is.
+    parameters
+        The trial's.
+
+    Raises
+    ------
+    WildlabError
+        If a parameter is missing, a seed fails, or its numbers have other names than those of the others; it
+        names the seed.
+    """
+    reports = Path(out).parent if out else REPORTS
+    work = make_work(reports, study, case, seed, seeds, parameters)
+    if damaged := set_aside(work):
+        print(f"{study}: {damaged_line(damaged)}")
+    if missing := missing_seeds(work):
+        _compute(work, missing)
+    rows = {one: read_seed(work, one) for one in work.seeds}
+    first = next(iter(rows.values()), None) or {}
+    for one, values in rows.items():
+        if values is None:
+            raise RunFailed(
+                f"the numbers of seed {one} do not read back as they were written",
+                "see whether the disk is full or failing, and run it again",
+            )
+        if values.keys() != first.keys():
+            apart = ", ".join(sorted(map(repr, values.keys() ^ first.keys()))[:3])
+            raise RunFailed(
+                f"seed {one} has numbers of other names than seed {work.seeds[0]}: {apart}",
+                "let the trial give the same names for each seed, and NaN for what a flight has no value for",
+            )
+    tables = [dict(drawn), *(split_keys(values) for values in rows.values() if values is not None)]
+    return pd.DataFrame(tables, index=pd.Index([seed, *work.seeds], name="seed"))
+
+
+def _compute(work: SeedWork, missing: Sequence[int]) -> None:
+    failures: list[tuple[int, str]] = []
+    with WorkerPool() as pool:
+        for done, one in enumerate(missing):
+            print(f"\r{work.study}: {done} of {len(missing)} seeds", end="", flush=True)
+            pool.submit(work, one)
+            while not (results := pool.collect(wait_s=0.25)):
+                pass
+            failures += [(result.seed, result.failure.reason) for result in results if result.failure]
+    print(f"\r{work.study}: {len(missing) - len(failures)} of {len(missing)} seeds", flush=True)
+    if failures:
+        raise RunFailed(failed_seeds(failures), "mend that; the seeds that are finished are kept")

@@ -4,15 +4,19 @@ A run works in a folder beside its report's. Only when it is over are the files 
 ``reports/<name>/``, and ``status.json`` comes last: as long as it is not there, nothing beside it is to be
 trusted. A failed run leaves a page that says so; a run that is broken off (Ctrl-C) leaves the former report
 as it was.
+
+A run of all studies goes twice over them. The first pass leaves first looks, pages from a few flights each,
+the quick studies first; the second puts the full numbers in their place, page by page, and computes no flight
+again that the first one had. Whenever it is broken off, every page that is there says what it shows.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
@@ -29,12 +33,16 @@ from wildlab.runner.catalogue import (
     load_studies,
     plain_parameters,
 )
-from wildlab.runner.first_look import plan_passes, quick_first
 from wildlab.runner.processes.job import Job, other_reports, typed_in_report
 from wildlab.runner.processes.progress import outcome_line, pass_line, shown
 from wildlab.runner.processes.scheduling import Listener, Outcome, run_jobs
+from wildlab.runner.record.digests import read_status
 from wildlab.runner.record.front_page import build_ledger
-from wildlab.runner.seeds import SeedWork, code_key, make_work, page_key
+from wildlab.runner.seeds import SeedWork, code_key, make_work, missing_seeds, page_key
+
+#: Guessed seconds of a study that has not been run here yet. Only their order matters.
+GUESSED_S = {"computed": 5.0, "logged": 30.0, "twin": 60.0}
+THERE = "its full report is there already, from the same code, data and parameters"
 
 
 def make_job(
@@ -161,7 +169,7 @@ def run_studies(
     ----------
     everything
         Run all studies, the quick ones first, and twice: a first look at each, then the full numbers (see
-        `wildlab.runner.first_look`). One whose public data are not here is skipped, and says so; asked for by
+        `plan_passes`). One whose public data are not here is skipped, and says so; asked for by
         name, it is an error. One that is kept apart is left out.
     first_look
         Take the first look alone, at all studies or those named.
@@ -319,3 +327,63 @@ def _absent_data(study: StudyEntry) -> WildlabError | None:
     except WildlabError as error:
         return error
     return None
+
+
+class Passes(NamedTuple):
+    """What each pass runs, and what the first one leaves alone."""
+
+    first: list[Job]
+    second: list[Job]
+    kept: list[Outcome]
+
+
+def plan_passes(whole: Sequence[Job], looks: Mapping[str, Job]) -> Passes:
+    """Which jobs go into which pass.
+
+    A study whose full numbers cost no more than a first look is run once, in full, in the first pass: one
+    without anything to take less of, and one all of whose seeds are there. A full report from the same code,
+    data and parameters is not replaced by a first look.
+
+    Parameters
+    ----------
+    whole
+        The full jobs, in the order in which they are to be run.
+    looks
+        The jobs of first looks by name; of some studies there is none.
+    """
+    first, second, kept = [], [], []
+    for job in whole:
+        look = looks.get(job.name)
+        seeded = set(look.first_look) == {"seeds"} if look else False
+        if look is None or (seeded and job.seeds is not None and not missing_seeds(job.seeds)):
+            first.append(job)
+            continue
+        second.append(job)
+        if has_whole_report(job):
+            kept.append(Outcome(job.name, "skipped", 0.0, THERE, Path(job.reports) / job.name))
+        else:
+            first.append(look)
+    return Passes(first, second, kept)
+
+
+def has_whole_report(job: Job) -> bool:
+    """Whether the report of this very job is there, and not a first look."""
+    folder = Path(job.reports) / job.name
+    status = read_status(folder)
+    return (
+        status.get("state") == "done"
+        and status.get("fingerprint") == job.fingerprint
+        and not status.get("first_look")
+        and (folder / "report.html").is_file()
+    )
+
+
+def quick_first(studies: Sequence[StudyEntry], reports: Path) -> list[StudyEntry]:
+    """The studies by how long they took when they were last run, or by what they need: no flight, a logged
+    one, simulated ones."""
+
+    def cost(study: StudyEntry) -> float:
+        seconds = read_status(reports / study.name).get("seconds")
+        return float(seconds) if isinstance(seconds, (int, float)) else GUESSED_S[study.kind]
+
+    return sorted(studies, key=cost)

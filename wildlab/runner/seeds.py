@@ -11,25 +11,25 @@ infinity: they are the texts "nan", "inf" and "-inf".
 Each file carries a digest of all that it says, and it is read only where it is, byte for byte, what would be
 written for the numbers that stand in it: a bit that the disk has turned, a number gone or added by hand, or a
 file of another key or seed would else become a verdict. Such a file is *damaged*: it is set aside as
-``<seed>.damaged``, and its seed is computed again. So is a seed whose numbers have other names than those of
-most seeds.
+``<seed>.damaged``, and its seed is computed again.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
 import platform
 import shutil
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic
+from wildlab.files import digest, write_atomic
 from wildlab.paths import DATA, PACKAGE
 from wildlab.studies.protocol import Values, find_case
 
@@ -72,8 +72,7 @@ _WITHOUT_DIGEST = {"case", "seed", "values"}
 
 def trial_key(case: str, parameters: Mapping[str, Any], code: str) -> str:
     """What a trial's numbers depend on besides the seed, as 64 hexadecimal digits. ``code``: `code_key`."""
-    text = json.dumps([case, dict(parameters), code], sort_keys=True, allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return digest([case, dict(parameters), code])
 
 
 def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
@@ -83,11 +82,7 @@ def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
     shown = [path for room in rooms for path in (PACKAGE / room).rglob("*.py")]
     texts = [*(DATA / "published").glob("*.toml"), *(DATA / "messages").rglob("*.toml")]
     shown += [DATA / "glossary.toml", *texts, *(DATA / "pages").glob("*")]
-    digest = hashlib.sha256(json.dumps([code, dict(given)], sort_keys=True, allow_nan=False).encode())
-    for path in [*sorted(shown), notebook]:
-        digest.update(path.name.encode())
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
+    return digest([code, dict(given)], [(path.name, path) for path in [*sorted(shown), notebook]])
 
 
 def code_key() -> str:
@@ -100,19 +95,16 @@ def code_key() -> str:
     named += [
         (f"data/{path.relative_to(DATA).as_posix()}", path) for path in (DATA / "twins").rglob("*.toml")
     ]
-    versions = [f"{package} {_version(package)}" for package in PACKAGES]
-    digest = hashlib.sha256(" ".join([*platform.python_version_tuple()[:2], *versions]).encode())
-    for name, path in sorted(named):
-        digest.update(name.encode())
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
+    versions = {package: package_version(package) for package in PACKAGES}
+    return digest([platform.python_version_tuple()[:2], versions], sorted(named))
 
 
-def _version(package: str) -> str:
+def package_version(package: str) -> str | None:
+    """The version of a package; None where it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:
-        return "absent"
+        return None
 
 
 # -- what is to be computed
@@ -214,8 +206,7 @@ def seed_digest(work: SeedWork, seed: int, values: Values) -> str:
     Of their canonical form: names in alphabetical order, floats as the shortest text that reads back the
     same. So it is the same wherever, and in whatever order, the same numbers were computed.
     """
-    said = [work.case, work.key, seed, sorted(_plain(values).items())]
-    return hashlib.sha256(json.dumps(said, allow_nan=False).encode()).hexdigest()
+    return digest([work.case, work.key, seed, sorted(_plain(values).items())])
 
 
 def write_seed(work: SeedWork, seed: int, values: Values) -> None:
@@ -230,96 +221,31 @@ def read_seed(work: SeedWork, seed: int) -> Values | None:
 
 
 def missing_seeds(work: SeedWork) -> list[int]:
-    """The seeds that are to be computed, ascending: see `take_stock`."""
-    return list(take_stock(work).missing)
+    """The seeds that are to be computed, ascending: nothing is there, or it is damaged."""
+    return [seed for seed in work.seeds if _look(work, seed).values is None]
 
 
-class Stock(NamedTuple):
-    """What is kept of a study's seeds. Each of its fields lists seeds, ascending.
+def set_aside(work: SeedWork) -> list[int]:
+    """Move damaged files to ``<seed>.damaged``, and list their seeds.
 
-    Attributes
-    ----------
-    absent
-        Nothing is there, or a file without a digest, as they once were.
-    damaged
-        Something is there that is not what was written for this case, key and seed.
-    unlike
-        Numbers with other names than those of most seeds.
-    missing
-        All of these.
+    There they can be looked at, and `SeedWork.provenance` finds that there were any even if the run that
+    computes them again is broken off.
     """
-
-    absent: tuple[int, ...]
-    damaged: tuple[int, ...]
-    unlike: tuple[int, ...]
-
-    @property
-    def missing(self) -> tuple[int, ...]:
-        return tuple(sorted({*self.absent, *self.damaged, *self.unlike}))
-
-
-def take_stock(work: SeedWork, fresh: Collection[int] = ()) -> Stock:
-    """Which of a study's seeds are to be computed, and why. Changes nothing.
-
-    Parameters
-    ----------
-    fresh
-        Seeds computed in this very run. Where two sets of names are equally common, the one that more of them
-        have counts as the right one.
-    """
-    looks = {seed: _look(work, seed) for seed in work.seeds}
-    names = {seed: frozenset(look.values) for seed, look in looks.items() if look.values is not None}
-    common = _common_names(names, fresh)
-    return Stock(
-        tuple(seed for seed, look in looks.items() if look.values is None and not look.damaged),
-        tuple(seed for seed, look in looks.items() if look.damaged),
-        tuple(seed for seed, found in names.items() if found != common),
-    )
-
-
-def set_aside(work: SeedWork, damaged: Iterable[int]) -> None:
-    """Move damaged files to ``<seed>.damaged``, where they can be looked at, and where `SeedWork.provenance`
-    finds that there were any even if the run that computes them again is broken off."""
+    damaged = [seed for seed in work.seeds if _look(work, seed).damaged]
     for seed in damaged:
-        try:
+        # Another run may be faster.
+        with contextlib.suppress(FileNotFoundError):
             _file(work, seed).replace(_aside(work, seed))
-        except FileNotFoundError:
-            continue  # another run was faster
+    return damaged
 
 
-def faults(work: SeedWork, fresh: Collection[int]) -> list[tuple[int, str]]:
-    """(seed, reason) of seeds that were computed in this run and are still not as they should be."""
-    stock = take_stock(work, fresh)
-    gone = "what was written for it does not read back; see whether the disk is full or failing"
-    found = [(seed, gone) for seed in (*stock.absent, *stock.damaged) if seed in fresh]
-    names = {seed: frozenset(read_seed(work, seed) or ()) for seed in work.seeds}
-    common = _common_names(names, fresh)
-    like = min((seed for seed, its in names.items() if its == common), default=0)
-    for seed in stock.unlike:
-        if seed in fresh:
-            less, more = _some(common - names[seed]), _some(names[seed] - common)
-            apart = " and ".join([f"lacks {less}"] * bool(less) + [f"has {more} besides"] * bool(more))
-            found.append(
-                (
-                    seed,
-                    f"its numbers have other names than those of seed {like}: it {apart}; let the trial give "
-                    "the same names for each seed, and NaN for what a flight has no value for",
-                )
-            )
-    return sorted(found)
-
-
-def again_words(stock: Stock) -> list[str]:
+def damaged_line(damaged: Sequence[int]) -> str:
     """What a run says of kept numbers that it does not use."""
-    words = []
-    if stock.damaged:
-        words.append(f"kept numbers are damaged and are computed again: {_seeds(stock.damaged)}")
-    if stock.unlike:
-        words.append(
-            "kept numbers have other names than those of most seeds and are computed again: "
-            f"{_seeds(stock.unlike)}"
-        )
-    return words
+    shown = _first(damaged)
+    return (
+        "kept numbers are damaged and are computed again: "
+        f"{len(damaged)} seed{'s' * (len(damaged) != 1)} ({shown})"
+    )
 
 
 class _Look(NamedTuple):
@@ -367,29 +293,8 @@ def _aside(work: SeedWork, seed: int) -> Path:
     return work.folder / f"{seed}.damaged"
 
 
-def _common_names(names: Mapping[int, frozenset[str]], fresh: Collection[int]) -> frozenset[str]:
-    """The names that most seeds have; of equally common ones those of more fresh seeds, or of the first."""
-    groups: dict[frozenset[str], list[int]] = {}
-    for seed, found in names.items():
-        groups.setdefault(found, []).append(seed)
-    new = set(fresh)
-
-    def weight(its: frozenset[str]) -> tuple[int, int, int]:
-        seeds = groups[its]
-        return len(seeds), len(new.intersection(seeds)), -seeds[0]
-
-    return max(groups, key=weight, default=frozenset())
-
-
-def _some(names: Collection[str]) -> str:
-    """The first names in quotes, and how many there are besides."""
-    shown = ", ".join(repr(name) for name in sorted(names)[:2])
-    return shown + (f" and {len(names) - 2} more" if len(names) > 2 else "")
-
-
-def _seeds(seeds: Sequence[int]) -> str:
-    shown = ", ".join(str(seed) for seed in seeds[:8]) + (", ..." if len(seeds) > 8 else "")
-    return f"{len(seeds)} seed{'s' * (len(seeds) != 1)} ({shown})"
+def _first(seeds: Sequence[int]) -> str:
+    return ", ".join(str(seed) for seed in seeds[:8]) + (", ..." if len(seeds) > 8 else "")
 
 
 def sweep_seeds(work: SeedWork) -> None:
@@ -407,6 +312,5 @@ def sweep_seeds(work: SeedWork) -> None:
 def failed_seeds(failures: Sequence[tuple[int, str]]) -> str:
     """(seed, reason) of each seed that failed as a clause: the first one's reason, the others' numbers."""
     (first, reason), *others = sorted(failures)
-    numbers = ", ".join(str(seed) for seed, _ in others[:8]) + (", ..." if len(others) > 8 else "")
-    also = f" (so did {len(others)} more: {numbers})" if others else ""
+    also = f" (so did {len(others)} more: {_first([seed for seed, _ in others])})" if others else ""
     return f"seed {first} failed{also}: {reason.rstrip('.')}"

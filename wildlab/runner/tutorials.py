@@ -9,7 +9,6 @@ would, and no page; the others go on.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import os
 import shutil
 import sys
@@ -20,7 +19,7 @@ from pathlib import Path
 from rich.console import Console
 
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic
+from wildlab.files import digest, write_atomic
 from wildlab.paths import DATA, NOTEBOOKS, PACKAGE, REPORTS
 from wildlab.reporting.notebooks import read_notebook
 from wildlab.runner.catalogue import load_studies
@@ -129,11 +128,8 @@ def _kept(path: Path, reports: Path, mark: str) -> bool:
 def _mark(notebook: Path) -> str:
     """What a page is made from, as the comment that ends it."""
     shows = sorted({path for pattern in _SHOWING for path in PACKAGE.glob(pattern)})
-    digest = hashlib.sha256(code_key().encode())
-    digest.update(" ".join(f"{name} {version(name)}" for name in _PACKAGES).encode())
-    for path in (*shows, *sorted((DATA / "pages").glob("*")), notebook):
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return f"<!-- made from {digest.hexdigest()} -->\n"
+    files = [(path.name, path) for path in (*shows, *sorted((DATA / "pages").glob("*")), notebook)]
+    return f"<!-- made from {digest([code_key(), *map(version, _PACKAGES)], files)} -->\n"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -34,11 +34,10 @@ from wildlab.runner.seeds import (
     sweep_seeds,
     trial_key,
 )
-from wildlab.runner.trials import split_keys
 from wildlab.simulation import load_twin
 from wildlab.simulation.variation import groups_of
 from wildlab.studies.monte_carlo import decide_claims, record_spread
-from wildlab.studies.protocol import VARIED, Study
+from wildlab.studies.protocol import VARIED, Study, split_keys
 
 #: Where tables are kept among the reports.
 STORE = ".vary"

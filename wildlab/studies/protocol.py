@@ -24,7 +24,7 @@ A *trial* is what is computed on one simulated flight, a pure function::
   kept numbers of a seed are good as long as these files and the rooms below them do not change.
 
 `wildlab.runner` spreads the seeds over processes or machines, and the notebook reads the table with
-`wildlab.runner.trials.trials_table`.
+`wildlab.runner.open_study.trials_table`.
 """
 
 from __future__ import annotations
@@ -160,3 +160,12 @@ def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:
         fault = "gives nothing" if wrong is None else f"names a number {wrong!r}"
         raise WildlabError(f"the trial of {case!r} {fault}", "give numbers by (subject, name)")
     return values
+
+
+def split_keys(values: Mapping[str, float]) -> dict[tuple[str, str], float]:
+    """Keys "subject/name" as (subject, name)."""
+    result = {}
+    for key, value in values.items():
+        subject, _, name = key.partition("/")
+        result[subject, name] = value
+    return result

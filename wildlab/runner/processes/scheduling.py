@@ -21,14 +21,7 @@ from wildlab.runner.processes.ending import end_tree, start_process
 from wildlab.runner.processes.job import Failure, Job, clear, install, leave_failure, log_of, sweep
 from wildlab.runner.processes.notebook_process import run_notebook
 from wildlab.runner.processes.worker_pool import WorkerPool
-from wildlab.runner.seeds import (
-    again_words,
-    failed_seeds,
-    faults,
-    set_aside,
-    sweep_seeds,
-    take_stock,
-)
+from wildlab.runner.seeds import damaged_line, failed_seeds, missing_seeds, set_aside, sweep_seeds
 
 
 @dataclass(frozen=True)
@@ -43,7 +36,7 @@ class Outcome:
 
 
 #: Called with (name, event, what). First of all ("", "plan", how many seeds and cells there are to do); then
-#: for each study "start" None, "seeds" (to compute, all), "again" text (why kept numbers are not used),
+#: for each study "start" None, "seeds" (to compute, all), "again" text (which kept numbers are not used),
 #: "seed" (done, to compute), "note" text, "stage" (text,), "cell" (index, count), "end" Outcome.
 Listener = Callable[[str, str, Any], None]
 
@@ -58,33 +51,14 @@ class _Waiting:
     under_way: int = 0
     count: int = 0
     failures: list[tuple[int, Failure]] = field(default_factory=list)
-    #: Seeds that were computed in this run, and what is said of kept numbers that were no good.
-    fresh: set[int] = field(default_factory=set)
-    again: list[str] = field(default_factory=list)
-    checked: bool = False
+    #: Seeds whose kept numbers were damaged.
+    damaged: list[int] = field(default_factory=list)
     started: float | None = None
     began: str = ""
 
     @property
     def ready(self) -> bool:
         return not self.seeds and not self.under_way
-
-    def check(self) -> list[str]:
-        """Once all seeds are there: whether their numbers go together. Seeds that do not are to be computed
-        again if this run has not done so yet, which is said, and have failed if it has."""
-        work = self.job.seeds
-        if self.checked or self.failures or work is None:
-            return []
-        stock = take_stock(work, self.fresh)
-        again = [seed for seed in stock.missing if seed not in self.fresh]
-        if again:
-            set_aside(work, stock.damaged)
-            self.seeds.extend(again)
-            self.count += len(again)
-            return again_words(stock)
-        self.checked = True
-        self.failures = [(seed, Failure(f"{reason}.")) for seed, reason in faults(work, self.fresh)]
-        return []
 
     def start(self, tell: Listener) -> None:
         """Note the time of its first step."""
@@ -93,8 +67,8 @@ class _Waiting:
             tell(self.job.name, "start", None)
             if self.job.seeds is not None:
                 tell(self.job.name, "seeds", (self.count, len(self.job.seeds.seeds)))
-            for words in self.again:
-                tell(self.job.name, "again", words)
+            if self.damaged:
+                tell(self.job.name, "again", damaged_line(self.damaged))
 
 
 def run_jobs(
@@ -134,9 +108,8 @@ def run_jobs(
 def _waiting(job: Job) -> _Waiting:
     if job.seeds is None:
         return _Waiting(job, deque())
-    stock = take_stock(job.seeds)
-    set_aside(job.seeds, stock.damaged)
-    return _Waiting(job, deque(stock.missing), count=len(stock.missing), again=again_words(stock))
+    damaged, missing = set_aside(job.seeds), missing_seeds(job.seeds)
+    return _Waiting(job, deque(missing), count=len(missing), damaged=damaged)
 
 
 @dataclass
@@ -172,10 +145,6 @@ class _Scheduler:
     def start_notebooks(self) -> None:
         for one in [one for one in self.waiting if one.ready]:
             one.start(self.tell)
-            for words in one.check():
-                self.tell(one.job.name, "again", words)
-            if not one.ready:
-                continue
             if one.failures:
                 self.waiting.remove(one)
                 self.end(one.job, _finish_without_notebook(one))
@@ -216,7 +185,6 @@ class _Scheduler:
                 self.known.add(one.job.seeds.case)
             if result.failure is not None:
                 one.failures.append((result.seed, result.failure))
-            one.fresh.add(result.seed)
             self.tell(one.job.name, "seed", (one.count - len(one.seeds) - one.under_way, one.count))
         for name, text in self.pool.notes():
             self.tell(name, "note", text)

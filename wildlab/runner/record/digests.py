@@ -3,14 +3,13 @@ would else become another number or another verdict."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
-from wildlab.files import sha256, write_json
+from wildlab.files import digest, sha256, write_json
 
 STATUS = "status.json"
 #: Of ``status.json``: the digests of the other files by name, and that of all else that it says.
@@ -39,7 +38,7 @@ def seal(folder: Path, status: Mapping[str, Any], names: tuple[str, ...]) -> Non
     )
     there = sorted({*(name for name in names if (folder / name).is_file()), *figures} - _LATER)
     content = {**status, FILES: {name: sha256(folder / name) for name in there}}
-    write_json(folder / STATUS, {**content, OWN: _digest(content)})
+    write_json(folder / STATUS, {**content, OWN: digest(content)})
 
 
 def misfits(folder: Path, status: Mapping[str, Any]) -> list[WildlabError]:
@@ -56,14 +55,14 @@ def misfits(folder: Path, status: Mapping[str, Any]) -> list[WildlabError]:
         return []
     files = status.get(FILES)
     content = {key: value for key, value in status.items() if key != OWN}
-    if not isinstance(files, dict) or status.get(OWN) != _digest(content):
+    if not isinstance(files, dict) or status.get(OWN) != digest(content):
         return [WildlabError("it is not as it was written", AGAIN, file=folder / STATUS, field=OWN)]
     found = []
-    for name, digest in files.items():
+    for name, written in files.items():
         path = folder / name
         if not path.is_file():
             found.append(WildlabError("this file is missing", AGAIN, file=path, field=f"{FILES}.{name}"))
-        elif sha256(path) != digest:
+        elif sha256(path) != written:
             problem = (
                 f"its SHA-256 is not the one in {STATUS}: it was damaged or changed since it was written"
             )
@@ -94,8 +93,3 @@ def read_status(folder: Path) -> dict[str, Any]:
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     reason = f"{Path(found[0].file or '').name} is not as the run wrote it{more}; see: wildlab verify"
     return {"state": "damaged", "reason": reason, "seconds": 0.0}
-
-
-def _digest(content: Mapping[str, Any]) -> str:
-    """SHA-256 of the canonical form, as 64 hexadecimal digits."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -10,7 +10,6 @@ import subprocess
 import tomllib
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -22,20 +21,10 @@ from wildlab.flight.files import flight_name
 from wildlab.paths import LOCK, ROOT
 from wildlab.reporting.arrange import ALERT
 from wildlab.reporting.text import escape
+from wildlab.runner.seeds import PACKAGES, package_version
 
-#: The packages whose version can move a number.
-PACKAGES = [
-    "numpy",
-    "scipy",
-    "pandas",
-    "numba",
-    "filterpy",
-    "pymap3d",
-    "pyproj",
-    "opencv-python-headless",
-    "matplotlib",
-    "papermill",
-]
+#: The packages whose version can move a number, or how it is shown.
+SHOWN_BY = (*PACKAGES, "matplotlib", "papermill")
 
 
 def git_state(root: Path | None = ROOT) -> dict[str, Any]:
@@ -107,7 +96,7 @@ def collect(
         "seed": seed,
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
-        "packages": {name: found for name in PACKAGES if (found := _version(name)) is not None},
+        "packages": {name: found for name in SHOWN_BY if (found := package_version(name)) is not None},
     }
 
 
@@ -152,13 +141,6 @@ def changed_notice(provenance: dict[str, Any]) -> str:
         f"{escape(changed)} is not as it was written: changed by hand, or damaged.</b> This report uses it "
         "as it is. If the change is meant: <code>wildlab check --accept</code></p></section>"
     )
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def footer(
