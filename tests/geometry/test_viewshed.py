@@ -9,10 +9,9 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, in_image
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.georeference import HIT, ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
-from wildlab.geometry.terrain_kernels import HIT
 from wildlab.geometry.viewsheds import footprint, ground_per_pixel, hidden_by, lines_clear, viewshed
 
 CAMERA = Camera(160, 128, 250.0, 220.0, 83.0, 60.0, 0.4, (0.1, 0.0, 0.0, 0.0, 0.0))

@@ -9,10 +9,9 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, in_image
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.georeference import MISSED, ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.terrain import Terrain, intersect_terrain
-from wildlab.geometry.terrain_kernels import MISSED
 from wildlab.geometry.viewsheds import SHORT_OF, lines_clear, visible_nodes
 
 CAMERA = Camera(160, 128, 250.0, 250.0, 80.0, 64.0)

@@ -15,9 +15,8 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import pose_covariance
 from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.georeference import RAY_STATUS, georeference_pixels
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
-from wildlab.geometry.terrain_kernels import RAY_STATUS
 from wildlab.geometry.terrain_uncertainty import terrain_covariance
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
@@ -288,7 +287,7 @@ def georeference(
     DataFrame
         The table of the observations with ``north_m``, ``east_m``, ``down_m``, the covariance ``cov_nn``,
         ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found). Over terrain also ``ray``:
-        what became of it, in the words of `wildlab.geometry.terrain_kernels.RAY_STATUS`.
+        what became of it, in the words of `wildlab.geometry.georeference.RAY_STATUS`.
     """
     o = observations
     if errors is None:

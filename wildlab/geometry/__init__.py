@@ -123,6 +123,7 @@ if TYPE_CHECKING:
         wrap,
     )
     from wildlab.geometry.georeference import (
+        RAY_STATUS,
         georeference_pixels,
         ground_to_pixel,
         intersect_plane,
@@ -179,7 +180,6 @@ if TYPE_CHECKING:
         intersect_terrain,
         pixels_to_terrain,
     )
-    from wildlab.geometry.terrain_kernels import RAY_STATUS
     from wildlab.geometry.terrain_uncertainty import (
         TerrainCovariance,
         TerrainJacobians,

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.geometry.georeference import matching, pixel_rays
-from wildlab.geometry.terrain_kernels import RAY_STATUS
+from wildlab.geometry.georeference import RAY_STATUS, matching, pixel_rays
 
 
 @dataclass(frozen=True, eq=False)

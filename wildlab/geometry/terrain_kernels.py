@@ -19,18 +19,8 @@ from typing import Any
 import numpy as np
 
 from wildlab.geometry.compilation import compiled
+from wildlab.geometry.georeference import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 
-#: What becomes of a ray.
-HIT, MISSED, NO_DATA, BELOW, NOT_KNOWN = 0, 1, 2, 3, 4
-
-#: The same in words.
-RAY_STATUS = {
-    HIT: "met the ground",
-    MISSED: "left the map without meeting the ground",
-    NO_DATA: "came to where the map has no height",
-    BELOW: "started below the ground",
-    NOT_KNOWN: "has no direction or no start",
-}
 #: Any array: the types are the compiler's business.
 Array = Any
 

@@ -12,9 +12,8 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, distort, in_image, normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, wrap
-from wildlab.geometry.georeference import ground_to_pixel, matching, pixel_rays
+from wildlab.geometry.georeference import HIT, ground_to_pixel, matching, pixel_rays
 from wildlab.geometry.terrain import Terrain, _to_grid, intersect_terrain, pixels_to_terrain
-from wildlab.geometry.terrain_kernels import HIT
 
 #: A line of sight ends this share of its length before the point: the point lies on the ground itself.
 SHORT_OF = 1e-7

@@ -18,9 +18,8 @@ from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.schema import DETECTION_KINDS
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.georeference import BELOW, georeference_pixels
 from wildlab.geometry.terrain import pixels_to_terrain
-from wildlab.geometry.terrain_kernels import BELOW
 
 #: No lens magnifies one way 2 % more than the other: then the calibration is of something else.
 FOCAL_RATIO = 0.02
