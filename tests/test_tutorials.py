@@ -20,10 +20,9 @@ from tests.notebooks import write
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS, ROOT
 from wildlab.reporting import new_figure, with_alt
-from wildlab.reporting.figure_text import FULL_SIZE
-from wildlab.reporting.figures import WIDTH
+from wildlab.reporting.figures import FULL_SIZE, WIDTH
+from wildlab.reporting.notebook_pages import tutorial_page
 from wildlab.reporting.text import maths
-from wildlab.reporting.tutorial import tutorial_page
 from wildlab.runner import tutorials
 
 TUTORIALS = tutorials.tutorial_notebooks()

@@ -24,7 +24,7 @@ from wildlab.analysis.overviews.image_coverage import cover_images
 from wildlab.analysis.tracks.sighting import CvTuning, follow_schmidt, sighting
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.reporting.front.flight import FILE
+from wildlab.reporting.front_page import FILE
 from wildlab.simulation.twins import simulate_twin
 
 Array = NDArray[np.float64]

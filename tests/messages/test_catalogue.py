@@ -14,15 +14,21 @@ from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.messages.catalogue import (
-    FOLDER,
+    EDITIONS,
+    Day,
+    Message,
+    Quantity,
+    duration,
     languages,
+    length,
     load_language,
+    number,
     placeholders,
     say,
+    share,
 )
-from wildlab.messages.message import Day, Message, Quantity, duration, length, number, share
 
-ENGLISH = FOLDER / "en.toml"
+ENGLISH = EDITIONS / "en.toml"
 SPACE = "\u00a0"
 
 
@@ -42,7 +48,7 @@ def test_all_files_have_the_same_keys_and_placeholders():
     english = whole(ENGLISH)
     assert languages()[0] == "en" and {"nb", "sv"} <= set(languages())
     for code in languages():
-        other = whole(FOLDER / f"{code}.toml")
+        other = whole(EDITIONS / f"{code}.toml")
         assert set(other) == set(english), code
         for key, text in english.items():
             if isinstance(text, str):
@@ -140,7 +146,7 @@ def test_a_text_that_cannot_be_used_is_named(tmp_path, text, field, problem):
 
 
 def test_a_language_that_is_not_there():
-    for code in ("xx", "../edition/en"):
+    for code in ("xx", "../en/replay"):
         with pytest.raises(WildlabError, match="no language"):
             load_language(code)
 

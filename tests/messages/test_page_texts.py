@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.messages.page_texts import FOLDER, fill, load_texts, measure, percent_of, significant
+from wildlab.messages.catalogue import FOLDER, fill, load_texts
+from wildlab.messages.quantities import measure, percent_of, significant
 
 PAGES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 MAE = {("mae", "ekf"): {"value": 9.81, "unit": "m", "low": 5.12, "high": 16.3, "n": 40}}

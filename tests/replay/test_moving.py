@@ -11,8 +11,7 @@ import pytest
 from wildlab.analysis.tracks.judged import COLUMNS, LEADING
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.replay.gather import scene_of
-from wildlab.replay.moving import MOST_BYTES, moving_flight, show_moving
+from wildlab.replay.scene import MOST_BYTES, moving_flight, scene_of, show_moving
 from wildlab.reporting.report import open_report
 from wildlab.simulation.twins import simulate_twin
 

@@ -12,8 +12,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import save_flight
-from wildlab.replay.page import page, parts_of
-from wildlab.replay.viewer import Viewer, read_viewer
+from wildlab.replay.page import Viewer, page, parts_of, read_viewer
 from wildlab.runner.replay import PAGE, RECORDING, replay
 from wildlab.simulation.twins import simulate_twin
 

@@ -19,10 +19,9 @@ from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry import CameraPoses, Terrain, inside_ellipse, project
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.replay.gather import MOST_FRAMES, footprints, scene_of
+from wildlab.replay.images import Shot
 from wildlab.replay.recording import save_recording
-from wildlab.replay.scene import ellipse_rings, mesh
-from wildlab.replay.shots import Shot
+from wildlab.replay.scene import MOST_FRAMES, ellipse_rings, footprints, mesh, scene_of
 from wildlab.simulation.twins import simulate_twin
 
 ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

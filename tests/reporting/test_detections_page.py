@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.detections import LISTED, ROOM, advice, answer, detections_page, rates_shown, reason
 
 JPEG = bytes(cv2.imencode(".jpg", np.zeros((8, 8, 3), np.uint8))[1].tobytes())

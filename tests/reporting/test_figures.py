@@ -11,11 +11,10 @@ from matplotlib.figure import Figure
 
 from tests.figure_text import overlapping
 from tests.reporting.test_html import contrast
+from wildlab.messages.quantities import nice_length
 from wildlab.reporting import figures
 from wildlab.reporting.charts import drawing, georeferencing, navigation, tracks
-from wildlab.reporting.figure_text import least_size
-from wildlab.reporting.figures import PHONE_WIDTH
-from wildlab.reporting.quantities import nice_length
+from wildlab.reporting.figures import PHONE_WIDTH, least_size
 
 
 def test_ellipse_holds_its_share_of_samples():

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
-from wildlab.reporting.front import ratios
-from wildlab.reporting.front.glimpse import MOST_PIXELS, WIDE, read_glimpse, smaller
+from wildlab.reporting import published_marks as ratios
+from wildlab.reporting.front_page import MOST_PIXELS, WIDE, read_glimpse, smaller
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Number
 
 CLOSE, NOT_CLOSE = Closeness.CLOSE, Closeness.NOT_CLOSE
@@ -46,7 +46,7 @@ def on_axis(ratio: float, width: float) -> float:
     st.sampled_from((1, 3, 5)),
 )
 def test_every_number_is_drawn_where_its_ratio_lies(given_, levels):
-    marks = ratios.arranged([number(*one) for one in given_], 320.0, levels)
+    marks = ratios.arrange_marks([number(*one) for one in given_], 320.0, levels)
     assert sorted((round(one.x, 6), one.closeness, one.beyond) for one in marks) == sorted(
         (round(on_axis(ratio, 320.0), 6), verdict, (ratio > 8) - (ratio < 1 / 8)) for ratio, verdict in given_
     )
@@ -58,7 +58,7 @@ def test_every_number_is_drawn_where_its_ratio_lies(given_, levels):
 def test_no_mark_hides_another_where_there_is_room(given_):
     numbers = [number(one) for one in given_]
     levels = ratios.levels_for(numbers, 320.0, 29)
-    marks = ratios.arranged(numbers, 320.0, levels)
+    marks = ratios.arrange_marks(numbers, 320.0, levels)
     for row in {one.y for one in marks}:
         xs = sorted(one.x for one in marks if one.y == row)
         assert all(b - a >= 2 * 3.6 for a, b in pairwise(xs))

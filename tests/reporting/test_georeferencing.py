@@ -19,7 +19,7 @@ from wildlab.analysis.georeference import georeference, observe
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing
 from wildlab.reporting.georeferencing import EXACT, truth_kinds
 from wildlab.reporting.georeferencing_tables import POINT_COLUMNS, noise_table, point_links

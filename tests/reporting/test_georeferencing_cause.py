@@ -25,10 +25,10 @@ from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.outliers import Outlier
 from wildlab.evaluation.runs import Interval
 from wildlab.geometry.calibration import Calibration
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing as page
 from wildlab.reporting import georeferencing_tables as tables
-from wildlab.reporting.ground import terrain_message
+from wildlab.reporting.georeferencing_tables import terrain_message
 from wildlab.reporting.report import open_report
 
 MANY = summarise(np.tile([3.0, 4.0], (50, 1)))

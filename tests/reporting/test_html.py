@@ -14,11 +14,10 @@ from hypothesis import strategies as st
 
 from tests.notebooks import notebook, shown
 from wildlab.errors import WildlabError
-from wildlab.reporting import html
-from wildlab.reporting.arrange import ADVICE, LIMITS, METHOD, arranged
+from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.figures import new_figure
-from wildlab.reporting.glossary import MOST, Word, with_glossary, words
-from wildlab.reporting.notebooks import read_notebook
+from wildlab.reporting.layout import ADVICE, LIMITS, METHOD, MOST, Word, arranged, with_glossary, words
+from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.reporting.page import STYLE, failure_page, page
 from wildlab.reporting.report import Report, open_report
 

@@ -14,12 +14,11 @@ from tests.figure_text import overlapping
 from wildlab.analysis.tracks.noise_model import ToldValue
 from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackLife, compare_identities
 from wildlab.evaluation.sets import gospa
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import figures
 from wildlab.reporting import many_tracks as page
 from wildlab.reporting.charts import many as charts
-from wildlab.reporting.figure_text import least_size
-from wildlab.reporting.figures import PHONE_WIDTH
+from wildlab.reporting.figures import PHONE_WIDTH, least_size
 from wildlab.tracking.many import POINT, Hull, Shown
 
 

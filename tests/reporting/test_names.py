@@ -25,9 +25,9 @@ from wildlab.names import FORMULA
 from wildlab.reporting.charts import drawing, following, georeferencing, many, navigation, overview, tracks
 from wildlab.reporting.charts.following import beside_plain_shown
 from wildlab.reporting.detections import precision_over_recall
-from wildlab.reporting.figure_text import _harmless as _harmless_texts
-from wildlab.reporting.figure_text import fit_text
-from wildlab.reporting.tables import csv_link
+from wildlab.reporting.figures import _harmless as _harmless_texts
+from wildlab.reporting.figures import fit_text
+from wildlab.reporting.text import csv_link
 from wildlab.runner.annotation.session import Point, Session
 
 PACKAGE = Path(wildlab.__file__).parent

@@ -17,11 +17,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
+from wildlab.messages.quantities import known, number, percent, percent_between
 from wildlab.reporting.figures import QUICK, new_figure
 from wildlab.reporting.metrics import claim, document, metric, read_metrics, write_metrics
 from wildlab.reporting.report import Report, open_report
-from wildlab.reporting.tables import MOST_BYTES, csv_link, data_link, table_html
-from wildlab.reporting.text import escape, inline, known, maths, number, percent, percent_between, prose, slug
+from wildlab.reporting.text import MOST_BYTES, csv_link, data_link, escape, inline, maths, prose, slug, table_html
 
 
 def report(out: Path | None = None, study: str = "consistency-bounds") -> Report:
@@ -179,7 +179,7 @@ def test_every_cell_says_which_column_it_is_of():
         )
     # A style that makes blocks of rows takes the table away from who hears it; roles give it back.
     assert {one["role"] for one in soup.find_all(role=True)} == {
-        *("table", "rowgroup", "row", "columnheader", "rowheader", "cell")
+        *("group", "table", "rowgroup", "row", "columnheader", "rowheader", "cell")
     }
     assert soup.table is not None and soup.table["class"] == ["many"]
     assert "many" not in table_html(frame[["a", "b"]], {}, None)

@@ -10,9 +10,9 @@ import pytest
 
 from wildlab.analysis.tracks.judged import Apart, leading_filter
 from wildlab.evaluation.consistency import Average
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
+from wildlab.messages.quantities import NOTHING
 from wildlab.reporting import tracking as page
-from wildlab.reporting.text import NOTHING
 
 
 def rows(**changes: object) -> pd.DataFrame:

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, UNDECIDED
-from wildlab.reporting.flight_status import (
+from wildlab.reporting.published import bounds_of, share_below, spread_key
+from wildlab.reporting.report import open_report
+from wildlab.reporting.status import (
     ALONE,
     AS_PUBLISHED,
     IN_PART,
@@ -21,8 +23,6 @@ from wildlab.reporting.flight_status import (
     OPEN,
     standing,
 )
-from wildlab.reporting.report import open_report
-from wildlab.reporting.spread import bounds_of, share_below, spread_key
 from wildlab.studies import monte_carlo
 from wildlab.studies.protocol import Metric, Study
 

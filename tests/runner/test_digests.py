@@ -16,7 +16,7 @@ from tests.sharing.canary import canary
 from wildlab import cli
 from wildlab.errors import WildlabError
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.reporting import html
+from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.report import open_report
 from wildlab.runner.compare import compare_flights

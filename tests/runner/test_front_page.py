@@ -6,7 +6,7 @@ import base64
 import json
 import re
 import tomllib
-from html import unescape
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -18,15 +18,12 @@ from bs4 import BeautifulSoup
 
 from tests.runner.test_ledger import a_study, ran
 from tools.front_flight import simulated
-from wildlab.reporting import html, metrics
-from wildlab.reporting.counts import CALCULATIONS, counted
-from wildlab.reporting.flight_status import standing
-from wildlab.reporting.front.cards import card_html, study_card
-from wildlab.reporting.front.flight import FILE, load_front_flight
-from wildlab.reporting.front.glimpse import Glimpse
-from wildlab.reporting.front.index import flight_words, front_page
+from wildlab.reporting import metrics
+from wildlab.reporting import notebook_pages as html
+from wildlab.reporting.front_page import FILE, Glimpse, case_cards, front_page, load_front_flight
 from wildlab.reporting.published import published_rows
-from wildlab.reporting.status import StudyStatus
+from wildlab.reporting.published_tables import CALCULATIONS, counted
+from wildlab.reporting.status import Case, StudyStatus, standing
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.record.status import study_status
@@ -86,7 +83,7 @@ def some(tmp_path: Path) -> list[StudyStatus]:
 
 
 def page_of(studies: list[StudyStatus]) -> str:
-    made = [study_card(one, Glimpse()) for one in studies if one.state != "not run"]
+    made = case_cards((one, Glimpse()) for one in studies if one.state != "not run")
     return front_page(studies, load_front_flight(), study_cards=made)
 
 
@@ -114,12 +111,24 @@ def test_counts_are_those_of_the_files(some, tmp_path):
 
 
 def test_cards_say_the_word_that_reports_say(some):
-    cards = {one.study.name: study_card(one, Glimpse(sentence="A first sentence.")) for one in some}
+    made = case_cards((one, Glimpse(sentence="A first sentence.")) for one in some if one.state != "not run")
+    done, _, failed, looked = made
     expected = standing([n.compared for n in some[0].numbers if n.compared], [])
-    assert expected.word in cards["done"].verdict and expected.reason in unescape(cards["done"].verdict)
-    assert cards["done"].sentence == "A first sentence." and len(cards["done"].numbers) == 3
-    assert "failed" in cards["failed"].verdict and cards["failed"].sentence == "It <b>broke</b>."
-    assert "&lt;b&gt;broke" in card_html(cards["failed"]) and "5 of 200" in cards["looked"].verdict
+    assert done.answers[0].word == expected.word and len(done.numbers) == 3
+    assert done.sentence == "A first sentence."
+    assert failed.answers[0].word == "failed" and failed.sentence == "It <b>broke</b>."
+    assert "&lt;b&gt;broke" in page_of(some) and "5 of 200" in looked.answers[0].note
+
+
+def test_twins_of_a_case_share_a_card(some):
+    """Each keeps its own report and verdict, and the strip shows the numbers of both."""
+    two = [
+        replace(one, study=one.study.model_copy(update={"case": "both", "twin": f"twin-{k}"}))
+        for k, one in enumerate(some[:2])
+    ]
+    (card,) = case_cards(((one, Glimpse()) for one in two), [Case("both", "H 1", "What both show.")])
+    assert card.title == "What both show." and [one.name for one in card.answers] == ["twin 0", "twin 1"]
+    assert [one.folder for one in card.answers] == ["done", "other"] and len(card.numbers) == 4
 
 
 def test_the_caption_follows_from_the_arrays():
@@ -135,7 +144,8 @@ def test_the_caption_follows_from_the_arrays():
     off = np.median(np.linalg.norm(p - at[0], axis=1))
     missed = at[1] - xe
     held = np.mean(np.einsum("ni,nij,nj->n", missed, np.linalg.inv(P), missed) <= -2 * np.log(0.1))
-    words = flight_words(load_front_flight())
+    caption = BeautifulSoup(front_page([], load_front_flight()), "html.parser").figcaption
+    words = caption.get_text() if caption else ""
     assert f"{off:.0f} m" in words and str(len(t)) in words
     assert f"{100 * held:.1f} %" in words.replace("\u00a0", " ")
 

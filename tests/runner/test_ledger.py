@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.reporting import html, metrics
-from wildlab.reporting.cases import load_cases
-from wildlab.reporting.counts import Tally, tally
+from wildlab.reporting import metrics
+from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.published import load_claims, load_published
+from wildlab.reporting.published_tables import Tally, tally
+from wildlab.reporting.status import load_cases
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.record.status import as_plain, study_status
 

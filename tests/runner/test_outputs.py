@@ -19,7 +19,7 @@ from tests.notebooks import notebook, write
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.paths import ROOT
-from wildlab.reporting import notebooks as privacy
+from wildlab.reporting import notebook_pages as privacy
 from wildlab.runner.catalogue import STANDARD_PARAMETERS, check_notebook, plain_parameters
 from wildlab.runner.processes import job as outputs
 from wildlab.runner.record import provenance

@@ -7,8 +7,8 @@ import pytest
 from tests.runner.test_ledger import PUBLISHED, a_study, published, ran
 from wildlab.evaluation.replication import SIZES
 from wildlab.reporting import metrics
-from wildlab.reporting.counts import CALCULATIONS, FITTED, PREDICTED, counted, group_of, tally
 from wildlab.reporting.published import ONE_FLIGHT, load_published, quantity_kind
+from wildlab.reporting.published_tables import CALCULATIONS, FITTED, PREDICTED, counted, group_of, tally
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.record.status import study_status
 

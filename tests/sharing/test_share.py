@@ -30,9 +30,9 @@ from wildlab.reporting.metrics import AGAINST, metric
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
 from wildlab.runner.processes.scheduling import Outcome
-from wildlab.sharing import redrawn
-from wildlab.sharing.agreement import share_apart
+from wildlab.sharing import recomputation as redrawn
 from wildlab.sharing.reports import of_a_study
+from wildlab.sharing.sender_list import share_apart
 from wildlab.sharing.share import BEWARE, share
 from wildlab.simulation.parameters import load_twin
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDABLE, UNDECIDED
-from wildlab.messages.page_texts import FOLDER, load_texts
+from wildlab.messages.catalogue import FOLDER, load_texts
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import case_names, find_case
 

@@ -10,7 +10,7 @@ from wildlab.analysis.tracks.comparison import COLUMNS, table
 from wildlab.analysis.tracks.sensor_tuning import SensorTuning
 from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies import autoferry
 from wildlab.studies.autoferry.comparison import KEYS, Held, of_use, outcomes, with_hindsight

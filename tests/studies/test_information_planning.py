@@ -8,7 +8,7 @@ import pytest
 
 from wildlab.analysis.search import rows_at
 from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
 from wildlab.planning.areas import contains
 from wildlab.planning.planner import Horizon
 from wildlab.reporting.published import load_claims

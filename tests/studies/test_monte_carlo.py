@@ -11,8 +11,8 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.evaluation import share_interval
 from wildlab.evaluation.shares import UNDECIDABLE, Check
+from wildlab.reporting.published import judge
 from wildlab.reporting.report import Report, open_report
-from wildlab.reporting.verdicts import judge
 from wildlab.studies import monte_carlo
 from wildlab.studies.protocol import Metric, Study
 

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
-from wildlab.messages.page_texts import PageTexts, TileText
-from wildlab.reporting.published_table import published_table
+from wildlab.messages.catalogue import PageTexts, TileText
+from wildlab.reporting.published_tables import published_table
+from wildlab.reporting.report import Wording
 from wildlab.reporting.status import Number
-from wildlab.reporting.wording import Wording
 from wildlab.studies.page import tile_of
 
 

@@ -9,8 +9,7 @@ import pytest
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_euler
 from wildlab.geometry.mount import Mount, helgesen_misalignment
-from wildlab.reporting.published import load_published
-from wildlab.reporting.verdicts import judge
+from wildlab.reporting.published import judge, load_published
 from wildlab.studies.sensitivity import (
     IMAGE_CENTRE,
     PRINTED_MISALIGNMENT_DEG,

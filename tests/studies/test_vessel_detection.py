@@ -11,9 +11,9 @@ from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.reporting.published import judge as judge_number
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.reporting.report import open_report
-from wildlab.reporting.verdicts import judge as judge_number
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene import EVEN, IDEAL, Scene, expose, rectangle, render, sensor_of
 from wildlab.simulation.scene.flights import SceneFlight

@@ -25,7 +25,7 @@ def list_(out: Path | None, as_json: bool, rule: bool) -> None:
     """
     from wildlab.evaluation.shares import HOLDS
     from wildlab.flight.catalog import is_fetched
-    from wildlab.reporting.counts import tally
+    from wildlab.reporting.published_tables import tally
     from wildlab.runner.catalogue import load_studies
     from wildlab.runner.record.status import as_plain, study_status
 

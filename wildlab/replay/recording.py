@@ -1,15 +1,12 @@
-"""A scene as a recording for rerun's viewer: an ``.rrd`` file.
-
-In it x is east, y north and z up, metres, as rerun's views want it. The one time line counts seconds from the
-first pose (or images, where the flight knows no time); rerun's own ones, which say when the file was made,
-are left out, and so are its properties (when it was begun, what it was called).
-"""
+"""A scene as a rerun recording, with its views, the words beside them, and the colours of the reports."""
 
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Callable, Mapping
+from math import isfinite
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -17,8 +14,7 @@ import numpy as np
 
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import ned_to_enu
-from wildlab.replay.blueprint import blueprint_of
-from wildlab.replay.gather import scene_of
+from wildlab.replay.images import Shot
 from wildlab.replay.scene import (
     Array,
     Estimates,
@@ -26,23 +22,224 @@ from wildlab.replay.scene import (
     Points,
     ReplayScene,
     Target,
+    _visible,
     ellipse_rings,
     heights,
     mesh,
-)
-from wildlab.replay.shots import Shot
-from wildlab.replay.words import (
-    FLOWN,
-    GROUND,
-    SIGHTING,
-    TRUTH,
-    VIEW,
-    about,
-    of_filter,
-    path_part,
+    minutes,
     plain,
-    rgba,
+    scene_of,
 )
+from wildlab.reporting.figures import BLUE, GREY, ORANGE, colour
+
+FLOWN, VIEW, SIGHTING, TRUTH, GROUND = BLUE, "#1b7f79", ORANGE, "#111111", "#d8e6ee"
+
+
+def rgba(colour: str, alpha: float = 1.0) -> tuple[int, int, int, int]:
+    """``#rrggbb`` as four numbers to 255.
+
+    Examples
+    --------
+    >>> rgba("#ff8000", 0.5)
+    (255, 128, 0, 128)
+    """
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return red, green, blue, round(255 * alpha)
+
+
+def of_filter(name: str) -> str:
+    """The colour that reports give a filter; grey where they know none."""
+    found = colour(name)
+    return found if found.startswith("#") and len(found) == 7 else GREY
+
+
+def in_markdown(name: str) -> str:
+    """A name in a text that is Markdown: a link, a picture, a heading or HTML in it stays letters.
+
+    Examples
+    --------
+    >>> in_markdown("![a](http://b)")
+    '\\\\!\\\\[a\\\\]\\\\(http\\\\:\\\\/\\\\/b\\\\)'
+    """
+    return re.sub(r"([!-/:-@\[-`{-~])", r"\\\1", plain(name))
+
+
+def path_part(name: str) -> str:
+    """A name as one part of an entity's path.
+
+    Examples
+    --------
+    >>> path_part("a/b c"), path_part("")
+    ('a\\\\/b\\\\ c', 'no name')
+    """
+    import rerun_bindings
+
+    return str(rerun_bindings.escape_entity_path_part(plain(name))) or "no name"
+
+
+def about_scene(scene: ReplayScene, pictures: int) -> str:
+    """The panel of words beside the views, as Markdown."""
+    shown = []
+    if scene.path is not None:
+        shown.append(f"**blue**: the aircraft and its way, poses of *{in_markdown(scene.path.source)}*")
+    if scene.views is not None:
+        posed = "**green-blue**: the camera and what it sees of the ground"
+        shown.append(f"{posed}, {len(scene.views.times)} frames")
+    if pictures:
+        shown.append(f"{pictures} images, reduced")
+    if scene.sightings is not None and len(scene.sightings.frame):
+        shown.append(f"**orange**: {len(scene.sightings.frame)} detections in the images")
+    if scene.points is not None:
+        shown.append(f"**orange**: {len(scene.points.times)} detections on the ground, with 90 % ellipses")
+    for name in dict.fromkeys(one.filter for one in scene.tracks):
+        count = sum(one.filter == name for one in scene.tracks)
+        of = "track" if count == 1 else "tracks"
+        shown.append(f"{count} {of} by the filter *{in_markdown(name)}*, with 90 % ellipses")
+    if scene.truth:
+        count = len(scene.truth)
+        shown.append(f"**black**: where {count} {'target' if count == 1 else 'targets'} really were")
+    ground = "terrain" if scene.terrain is not None else "level ground" if isfinite(scene.ground) else ""
+    shown += [ground] if ground else []
+    flight = "a simulated flight" if scene.kind == "twin" else "a recorded flight"
+    time = f"lasts {minutes(scene.length)}" if scene.timed else "its times number the images"
+    lines = [
+        f"# {in_markdown(scene.name)}",
+        "",
+        f"This is {flight}; it {time}." if scene.timed else f"This is {flight}; {time}.",
+        "",
+        "Shown:",
+        "",
+        *(f"- {one}" for one in shown),
+    ]
+    if scene.lacks:
+        lines += ["", "Not shown:", "", *(f"- {_clause(one)}" for one in scene.lacks)]
+    lines += ["", "Lengths are metres; x is east, y north, z up. Where on Earth this is it does not say."]
+    return "\n".join(lines) + "\n"
+
+
+def _clause(text: str) -> str:
+    return re.sub(r"([!-&(-+/<-@\[-`{-~])", r"\\\1", "".join(c for c in text if c.isspace() or _visible(c)))
+
+
+#: Seconds for which ellipses of single detections stay, and playback takes for a long flight, at least.
+STAY_S, PLAYED_S = 10.0, 120.0
+
+
+def blueprint_of(scene: ReplayScene, *, narrow: bool = False) -> Any:
+    """The layout of a scene, with rerun's panels folded but for the time line.
+
+    Parameters
+    ----------
+    scene
+        From `wildlab.replay.scene.scene_of`.
+    narrow
+        For a phone held upright: the map, and below it all else in tabs.
+    """
+    import rerun.blueprint as rrb
+
+    line = "flight_time" if scene.timed else "image"
+    now = rrb.TimeRangeBoundary.cursor_relative()
+    if scene.timed:
+        recent = rrb.TimeRangeBoundary.cursor_relative(seconds=-STAY_S)
+    else:
+        recent = rrb.TimeRangeBoundary.cursor_relative(seq=-3)
+    since = rrb.TimeRangeBoundary.infinite()
+    low, high = scene.extent
+    middle, size = (
+        (low + high) / 2,
+        max(float(np.linalg.norm((high - low)[:2])) + 1.2 * float(high[2] - low[2]), 10.0),
+    )
+    target = np.array([middle[1], middle[0], -high[2]])
+    views: list[Any] = [
+        rrb.Spatial3DView(
+            origin="/world",
+            name="Map, from above",
+            background=rrb.Background(color=(246, 248, 249)),
+            line_grid=rrb.LineGrid3D(visible=False),
+            eye_controls=rrb.EyeControls3D(
+                kind=rrb.Eye3DKind.Orbital,
+                position=target + size * np.array([0.0, -0.35, 0.75]),
+                look_target=target,
+                eye_up=(0.0, 0.0, 1.0),
+            ),
+            overrides={
+                "world/points/places": rrb.VisibleTimeRanges(timeline=line, start=since, end=now),
+                "world/points/ellipses": rrb.VisibleTimeRanges(timeline=line, start=recent, end=now),
+            },
+        )
+    ]
+    right: list[Any] = []
+    if scene.views is not None:
+        right.append(
+            rrb.Spatial2DView(
+                origin="/world/camera/image",
+                name="Image",
+                background=rrb.Background(color=(246, 248, 249)),
+            )
+        )
+    right.append(rrb.TextDocumentView(origin="/about", name="What is shown"))
+    plots = _plots(rrb, scene)
+    if narrow:
+        # The words first: nothing else says what it is.
+        body: list[Any] = [*views, rrb.Tabs(*right[::-1], *plots, active_tab=0)]
+        shares = [3, 2]
+    else:
+        beside = rrb.Vertical(*right, row_shares=[3, 2][: len(right)])
+        body = [rrb.Horizontal(*views, beside, column_shares=[3, 2])]
+        shares = [7, 3]
+        if plots:
+            body.append(rrb.Horizontal(*plots))
+    speed = max(1.0, round(scene.length / PLAYED_S)) if scene.timed else 1.0
+    return rrb.Blueprint(
+        rrb.Vertical(*body, row_shares=shares[: len(body)]),
+        rrb.TopPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TimePanel(
+            state="collapsed", timeline=line, playback_speed=speed, play_state="playing", loop_mode="all"
+        ),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _plots(rrb: Any, scene: ReplayScene) -> list[Any]:
+    edge = rrb.TimeRangeBoundary
+    if scene.timed:
+        margin = 0.02 * scene.length
+        ends = edge.absolute(seconds=-margin), edge.absolute(seconds=scene.length + margin)
+    else:
+        ends = edge.absolute(seq=0), edge.absolute(seq=int(scene.length))
+    whole = rrb.TimeAxis(view_range=rrb.TimeRange(start=ends[0], end=ends[1]))
+
+    def plot(part: str, name: str, top: float) -> Any:
+        return rrb.TimeSeriesView(
+            origin=f"/plots/{part}",
+            name=name,
+            axis_x=whole,
+            axis_y=rrb.ScalarAxis(range=(0.0, top)),
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        )
+
+    judged = scene.tracks or ((scene.points,) if scene.points is not None else ())
+    errors = _known([one.error for one in judged])
+    nees = _known([one.nees for one in judged])
+    found = []
+    # A few large values would press all others flat; they are there when the plot is moved.
+    if len(errors):
+        found.append(plot("error", "Error (m)", 1.3 * max(float(np.quantile(errors, 0.98)), 1e-3)))
+    if len(nees):
+        found.append(plot("nees", "NEES, and its 95 % band", max(12.0, 1.2 * float(np.quantile(nees, 0.95)))))
+    if scene.path is not None:
+        highest = float(heights(scene).max())
+        found.append(plot("height", "Height above ground (m)", 1.2 * max(highest, 1.0)))
+    return found
+
+
+def _known(parts: list[Any]) -> Any:
+    values = np.concatenate(parts) if parts else np.empty(0)
+    return values[np.isfinite(values)]
+
 
 #: Whose layouts and recordings belong together.
 APPLICATION = "wildlab replay"
@@ -70,7 +267,7 @@ def save_recording(
     Parameters
     ----------
     scene
-        From `wildlab.replay.gather.scene_of`.
+        From `wildlab.replay.scene.scene_of`.
     into
         The file; what is there is replaced.
     shots
@@ -111,7 +308,7 @@ def log_scene(scene: ReplayScene) -> Any:
     Parameters
     ----------
     scene
-        From `wildlab.replay.gather.scene_of`.
+        From `wildlab.replay.scene.scene_of`.
 
     Returns
     -------
@@ -141,7 +338,9 @@ class _Writer:
         self.size = max(float(np.linalg.norm((high - low)[:2])), 1.0)
 
     def all(self, shots: Mapping[int, Shot], tell: Callable[[str], None]) -> None:
-        self.static("about", self.rr.TextDocument(about(self.scene, len(shots)), media_type="text/markdown"))
+        self.static(
+            "about", self.rr.TextDocument(about_scene(self.scene, len(shots)), media_type="text/markdown")
+        )
         self.static("world", self.rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         tell("the ground")
         self.ground()

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from wildlab.reporting.published import load_claims, load_published
     from wildlab.reporting.report import Report, open_report
 else:
-    __getattr__, __dir__ = offer(__name__, folders=("animation", "charts", "front"))
+    __getattr__, __dir__ = offer(__name__, folders=("charts",))
 
 __all__ = [
     "Report",

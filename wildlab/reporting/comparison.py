@@ -10,17 +10,15 @@ import pandas as pd
 
 from wildlab.analysis.overviews.verdict import Verdict
 from wildlab.analysis.tracks.judged import LEADING
+from wildlab.messages.quantities import NOTHING, area, duration, metres, number, percent, way_length
 from wildlab.names import listed
-from wildlab.reporting.arrange import LIMITS, arranged
 from wildlab.reporting.charts.drawing import dots_chart
-from wildlab.reporting.glossary import with_glossary
-from wildlab.reporting.html import examine
+from wildlab.reporting.layout import LIMITS, arranged, with_glossary
+from wildlab.reporting.notebook_pages import examine
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.reporting.page import TAGS, page
-from wildlab.reporting.quantities import area, duration, way_length
 from wildlab.reporting.report import open_report
-from wildlab.reporting.tables import csv_link
-from wildlab.reporting.text import NOTHING, metres, number, percent
+from wildlab.reporting.text import csv_link
 
 #: Rounding errors of what is zero.
 NO_MORE = 1e-9

@@ -13,17 +13,14 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.analysis.detecting.judged import ELLIPSE, rate_words
-from wildlab.messages.message import Message
-from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.messages.catalogue import Message, load_texts
+from wildlab.messages.quantities import NOTHING, percent_of
 from wildlab.names import figure_name
-from wildlab.reporting.arrange import ADVICE, arranged
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
-from wildlab.reporting.glossary import with_glossary
-from wildlab.reporting.html import examine
+from wildlab.reporting.layout import ADVICE, arranged, with_glossary
+from wildlab.reporting.notebook_pages import examine
 from wildlab.reporting.page import page
-from wildlab.reporting.report import open_report
-from wildlab.reporting.text import NOTHING
-from wildlab.reporting.wording import Wording
+from wildlab.reporting.report import Wording, open_report
 
 #: Bytes of pictures on a page at most: it is sent by mail. What has no room is left out, and that is said.
 ROOM = 2_500_000
@@ -203,7 +200,7 @@ def detections_page(
     Raises
     ------
     WildlabError
-        If the page would break a promise of `wildlab.reporting.html.examine`.
+        If the page would break a promise of `wildlab.reporting.notebook_pages.examine`.
     """
     report = open_report(study="detections", kind="images")
     wording = Wording(report, load_texts("detections"))

@@ -30,10 +30,9 @@ from wildlab.analysis.overviews.verdict import (
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.store import Flight
-from wildlab.messages.message import Message
-from wildlab.messages.page_texts import PageTexts, load_texts, measure, percent_of, significant
+from wildlab.messages.catalogue import Message, PageTexts, load_texts
+from wildlab.messages.quantities import measure, percent_of, significant
 from wildlab.names import listed
-from wildlab.reporting.arrange import ADVICE
 from wildlab.reporting.charts.georeferencing import error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
 from wildlab.reporting.georeferencing_tables import (
@@ -49,11 +48,11 @@ from wildlab.reporting.georeferencing_tables import (
     parts_table,
     point_links,
     significant_parameters,
+    terrain_section,
 )
-from wildlab.reporting.ground import terrain_section
+from wildlab.reporting.layout import ADVICE
 from wildlab.reporting.published import load_published
-from wildlab.reporting.report import Report
-from wildlab.reporting.wording import Wording
+from wildlab.reporting.report import Report, Wording
 
 #: Fewer points than this say little about a flight.
 FEW = FEW_POINTS

@@ -18,13 +18,11 @@ from wildlab.analysis.tracks.places import counted_twice, of_platform
 from wildlab.analysis.tracks.target_model import HERE
 from wildlab.evaluation.identities import Identities
 from wildlab.evaluation.sets import Gospa
-from wildlab.messages.message import Message
-from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.messages.catalogue import Message, load_texts
+from wildlab.messages.quantities import length, percent_of
 from wildlab.names import listed
 from wildlab.reporting.charts import many as charts
-from wildlab.reporting.quantities import length
-from wildlab.reporting.report import Report
-from wildlab.reporting.wording import Wording
+from wildlab.reporting.report import Report, Wording
 from wildlab.tracking.many.existence import Count, count_interval, count_probabilities
 
 #: A target is tracked well where it has a track at this share of the scans at which it can be seen; below

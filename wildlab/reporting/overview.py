@@ -41,15 +41,13 @@ from wildlab.analysis.overviews.verdict import (
 )
 from wildlab.evaluation.vibration import FINE, FLOOR_HZ, HARMFUL
 from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS, gnss_times
-from wildlab.messages.message import Message
-from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.messages import quantities
+from wildlab.messages.catalogue import Message, load_texts
+from wildlab.messages.quantities import metres, number, percent_of
 from wildlab.names import listed
-from wildlab.reporting import quantities
 from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.georeferencing import show_advice, show_contradictions, words_of_causes
-from wildlab.reporting.report import Report
-from wildlab.reporting.text import metres, number
-from wildlab.reporting.wording import Wording
+from wildlab.reporting.report import Report, Wording
 
 #: Subject of what is recorded of the whole flight.
 FLIGHT = "flight"

@@ -5,21 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
-from urllib.parse import quote
 
 from wildlab.analysis.overviews.verdict import Verdict, evidence_of, verdict_of
-from wildlab.reporting.page import PILLS, TAGS, page
-from wildlab.reporting.quantities import duration
-from wildlab.reporting.text import NOTHING, escape
+from wildlab.reporting.page import PILLS, TAGS, page, render
 
 #: The page, beside the ledger.
 PAGE = "flights.html"
-#: How to begin, where there is none yet.
-BEGIN = (
-    "None was evaluated here yet. <code>wildlab import CARD --into flights/tuesday</code> makes a flight of "
-    "what the aircraft logged, <code>wildlab simulate slow-vessel --into flights/trial</code> makes one up; "
-    "<code>wildlab evaluate flights/tuesday</code> writes its reports, and they are shown here."
-)
 #: What the verdict follows from, of the overview.
 COUNTS = {"problems": "problems", "worth": "worth_fixing", "troubled": "troubled", "judged": "reports_beside"}
 
@@ -109,17 +100,10 @@ class OwnFlight(NamedTuple):
         return float("nan") if found is None else found
 
 
-def address(folder: str) -> str:
-    """Of the report in a folder, for a link: a folder may be called ``javascript:x`` or ``a?b``."""
-    return f"{escape(quote(folder, safe=''))}/report.html"
-
-
-def verdict_pill(flight: OwnFlight) -> str:
-    """The verdict as HTML."""
+def pill_of(flight: OwnFlight) -> tuple[str, str]:
+    """The verdict in a word, and the colour that goes with it."""
     word = flight.verdict
-    if word is None:
-        return '<span class="pill">no overview</span>'
-    return f'<span class="pill {PILLS[word.colour]}">{escape(word)}</span>'
+    return ("no overview", "") if word is None else (word.value, PILLS[word.colour])
 
 
 def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
@@ -137,74 +121,17 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
     str
         HTML. It names flights and reports, and no place.
     """
-    rows = "".join(_row(flight) for flight in flights)
-    head = "".join(
-        f'<th scope="col" class="text">{title}</th>'
-        for title in ("flight", "verdict", "kind", "length", "reports", "evaluated")
+    reports = [one for flight in flights for one in (*flight.reports, *flight.earlier)]
+    body = render(
+        "flights",
+        flights=[(one, *pill_of(one), TAGS.get(one.kind, one.kind)) for one in flights],
+        judged=sum(one.verdict not in (None, Verdict.UNJUDGED) for one in flights),
+        damaged=[one.folder for one in reports if one.state == "damaged"],
+        comparison=comparison,
     )
-    judged = sum(flight.verdict not in (None, Verdict.UNJUDGED) for flight in flights)
-    parts = [
-        "<header><h1>Flights evaluated here</h1>",
-        f'<p class="sub">{len(flights)} flight{"s" * (len(flights) != 1)}, {judged} of them judged. '
-        '<a href="ledger.html">The ledger of the theses</a> is another page.</p></header>',
-    ]
-    if flights:
-        parts.append(
-            '<div class="scroll" role="region" tabindex="0" aria-label="Flights"><table>'
-            f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
-        )
-    else:
-        parts.append(f"<p>{BEGIN}</p>")
-    if comparison:
-        parts.append(f'<p><a href="{escape(comparison)}">Flights compared on one page</a></p>')
-    damaged = [
-        one.folder
-        for flight in flights
-        for one in (*flight.reports, *flight.earlier)
-        if one.state == "damaged"
-    ]
-    if damaged:
-        parts.append(
-            f"<p>{len(damaged)} report{'s' * (len(damaged) != 1)} not as written, and not used: "
-            f"{escape(', '.join(damaged))}. What does not fit: <code>wildlab verify</code>.</p>"
-        )
-    meanings = {
-        Verdict.ALARM: "its position jumps, or it leans as nobody flies on purpose",
-        Verdict.MEND: "something in its tables cannot be used or contradicts itself",
-        Verdict.FIX: "a gain was measured that is worth it",
-        Verdict.LOOK: "something is wrong, and what mending it gains was not measured for certain",
-        Verdict.SOUND: "it was judged, and none of these is so",
-        Verdict.UNJUDGED: "no report could judge its errors",
-    }
-    legend = "; ".join(f"<b>{word}</b>: {meaning}" for word, meaning in meanings.items())
-    parts.append(f'<p class="note">{legend}.</p>')
-    made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return page(
         title="Flights evaluated here",
-        body="\n".join(parts),
+        body=body,
         kicker='<a href="index.html">wildlab</a> › flights',
-        footer=f"<p>Put together {made}.</p>",
-    )
-
-
-def _row(flight: OwnFlight) -> str:
-    links = ", ".join(
-        f'<a href="{address(one.folder)}">{escape(one.about)}</a>'
-        + ("" if one.state == "done" else f" ({escape(one.state)})")
-        for one in flight.reports
-    )
-    old = ", ".join(f'<a href="{address(one.folder)}">{escape(one.about)}</a>' for one in flight.earlier)
-    links += f'<br><span class="dim">of an earlier evaluation: {old}</span>' if old else ""
-    length = duration(flight.length_s) if flight.length_s == flight.length_s else NOTHING
-    cells = (
-        verdict_pill(flight),
-        escape(TAGS.get(flight.kind, flight.kind)),
-        escape(length),
-        links,
-        escape(flight.finished or NOTHING),
-    )
-    return (
-        f'<tr><th scope="row" class="text">{escape(flight.name)}</th>'
-        + "".join(f'<td class="text">{cell}</td>' for cell in cells)
-        + "</tr>"
+        footer=f"<p>{datetime.now(UTC):%Y-%m-%d %H:%M} UTC</p>",
     )

@@ -1,15 +1,17 @@
 """The one page frame of everything we show: head, security policy, style.
 
 Reports, failure pages and the ledger all come out of `page`, so a page that asks the network for something,
-or runs something, cannot be made by accident: the policy in its head forbids both.
+or runs something, cannot be made by accident: the policy in its head forbids both. What is more than a few
+elements is a template of ``data/pages``, which escapes whatever is put into it.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from wildlab.paths import DATA
-from wildlab.reporting.text import escape, inline
+from markupsafe import Markup
+
+from wildlab.reporting.text import escape, read_style, render
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 
@@ -24,7 +26,7 @@ TAGS = {
 #: The pill that goes with the colour of a bar.
 PILLS = {"good": "yes", "warn": "part", "bad": "no", "neutral": ""}
 #: How every page looks.
-STYLE = (DATA / "pages" / "page.css").read_text(encoding="utf-8").strip()
+STYLE = read_style("page")
 
 
 def first_look_notice(look: str, again: str) -> str:
@@ -37,10 +39,7 @@ def first_look_notice(look: str, again: str) -> str:
     again
         What to type for the full numbers.
     """
-    return (
-        f'<p class="look"><span class="pill part">first look</span> {escape(look)}. '
-        f"For the full numbers: <code>make reports</code>, or <code>{escape(again)}</code>.</p>"
-    )
+    return render("first-look", look=look, again=again)
 
 
 def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: str = "") -> str:
@@ -55,16 +54,15 @@ def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: st
     style
         CSS that this page has besides `STYLE`.
     """
-    above = f'<p class="kicker">{kicker}</p>\n' if kicker else ""
-    below = f"<footer>{footer}</footer>\n" if footer else ""
-    rules = f"{STYLE}\n{style}" if style else STYLE
+    parts = {"body": body, "kicker": kicker, "footer": footer, "style": f"{STYLE}\n{style}".strip()}
     return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        '<meta name="referrer" content="no-referrer">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{rules}\n</style>\n</head>\n<body>\n"
-        f"<main>\n{above}{body}\n</main>\n{below}</body>\n</html>\n"
+        render(
+            "page",
+            title=title,
+            policy=POLICY,
+            **{name: Markup(part) for name, part in parts.items()},  # noqa: S704 - HTML, as the caller says
+        )
+        + "\n"
     )
 
 
@@ -86,30 +84,6 @@ def failure_page(
     again
         What to type to run it again.
     """
-    study = str(status["study"])
-    where = (
-        f"It stopped in the step <b>{escape(step)}</b>"
-        if step
-        else "It stopped before its first step was done"
-    )
-    after = f"{where}, after {status['seconds']:.0f} s."
-    steps = [
-        "If the sentence above names a file, an option or a download, mend that first.",
-        f"Run it again: `{again}`",
-        "If it stops again, open `notebook.ipynb` beside this page: it is the run as far as it came, "
-        "and its last cells show what was being computed.",
-    ]
-    body = (
-        f"<header><h1>{inline(title)}</h1></header>\n"
-        '<section class="summary bad" aria-label="Summary"><p>'
-        "<b>This study failed, so there are no results to show.</b></p>"
-        f'<p class="verdict"><span class="pill no">did not finish</span> {inline(status["reason"])}</p>'
-        f"</section>\n<p>{after}</p>\n"
-        f"<h2>What to do</h2>\n<ol>{''.join(f'<li>{inline(step)}</li>' for step in steps)}</ol>\n"
-    )
-    if details.strip():
-        body += (
-            '<details><summary>Technical details</summary><pre tabindex="0" role="group" '
-            f'aria-label="Traceback">{escape(details.strip())}</pre></details>\n'
-        )
-    return page(title=f"Failed: {title}", body=body, kicker=f"wildlab › {escape(study)}", footer=footer)
+    body = render("failure", status=status, title=title, step=step, details=details.strip(), again=again)
+    kicker = f"wildlab › {escape(str(status['study']))}"
+    return page(title=f"Failed: {title}", body=body, kicker=kicker, footer=footer)

@@ -20,13 +20,14 @@ from wildlab.analysis.plans.said import count, head_count, hectares, minutes, pe
 from wildlab.flight.readers.area import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
+from wildlab.messages.quantities import NOTHING
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.figures import png_bytes as png
-from wildlab.reporting.glossary import with_glossary
-from wildlab.reporting.html import examine
+from wildlab.reporting.layout import with_glossary
+from wildlab.reporting.notebook_pages import examine
 from wildlab.reporting.page import page
-from wildlab.reporting.text import NOTHING, escape
+from wildlab.reporting.text import escape
 
 #: Colours of flights, over and over.
 FLIGHTS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
@@ -62,7 +63,7 @@ def plan_page(
     Raises
     ------
     WildlabError
-        If the page would break a promise of `wildlab.reporting.html.examine`.
+        If the page would break a promise of `wildlab.reporting.notebook_pages.examine`.
     """
     n = len(result["sorties"])
     title = f"{count(n, 'flight')} of {minutes(result['duration_s'])}{' in all' if n > 1 else ''}"

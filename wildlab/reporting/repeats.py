@@ -15,8 +15,8 @@ from wildlab.analysis.overviews.verdict import (
 )
 from wildlab.analysis.repeats import Repeats
 from wildlab.flight.store import Flight
-from wildlab.messages.message import Message
-from wildlab.messages.page_texts import load_texts, significant
+from wildlab.messages.catalogue import Message, load_texts
+from wildlab.messages.quantities import significant
 from wildlab.reporting.georeferencing import (
     cause_message,
     short_length,
@@ -24,8 +24,7 @@ from wildlab.reporting.georeferencing import (
     show_models,
 )
 from wildlab.reporting.georeferencing_tables import parameters_table
-from wildlab.reporting.report import Report
-from wildlab.reporting.wording import Wording
+from wildlab.reporting.report import Report, Wording
 
 #: Ellipses whose size is off by less than this factor fit the spread.
 CLOSE = 1.25

@@ -1,8 +1,8 @@
 """`Report`: what a notebook writes its report with.
 
 Each method shows one part of the page as HTML and collects the numbers for ``metrics.json``. What gives a
-number that is not known is left out (`wildlab.reporting.text.known`). All text is escaped; ``**bold**`` and a
-code span in backquotes are the only marks::
+number that is not known is left out (`wildlab.messages.quantities.known`). All text is escaped; ``**bold**``
+and a code span in backquotes are the only marks::
 
     report = open_report(study=study, kind="twin", flight=flight, seed=seed, out=out)
     report.head("How far off is a position read from one photo?", "29 photos from 55 m")
@@ -12,6 +12,8 @@ code span in backquotes are the only marks::
     report.figure(fig, name="fig-5-04a", alt="Scatter of 103 errors ...", caption="Error of every click.")
     report.metric("horizontal_error_mean", "logged-pose", 2.92, "m", n=103)
     report.save()
+
+Words come out of the page's catalogue by `Wording`, with the numbers recorded so far.
 """
 
 from __future__ import annotations
@@ -24,21 +26,21 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 from wildlab.errors import WildlabError
+from wildlab.messages.catalogue import Message, PageTexts, fill
+from wildlab.messages.quantities import known
 from wildlab.reporting import metrics as schema
-from wildlab.reporting.animation import ShownFlight, animated_flight, pausable
-from wildlab.reporting.animation.drawing import PAUSE_STYLE
-from wildlab.reporting.arrange import ALERT, LIMITS, METHOD, VERDICT
+from wildlab.reporting.animation import PAUSE_STYLE, ShownFlight, animated_flight, pausable
 from wildlab.reporting.figures import figure_html, png_bytes, save_figure
-from wildlab.reporting.flight_status import Standing, standing
+from wildlab.reporting.layout import ALERT, LIMITS, METHOD, VERDICT
 from wildlab.reporting.page import PILLS, TAGS
-from wildlab.reporting.published import load_claims, published_rows
-from wildlab.reporting.published_table import LONGEST, caption_of, claims_table, published_table
-from wildlab.reporting.tables import csv_link, table_html
-from wildlab.reporting.text import escape, inline, known, maths, prose, slug
-from wildlab.reporting.verdicts import compared_number, judge
+from wildlab.reporting.published import compared_number, judge, load_claims, published_rows
+from wildlab.reporting.published_tables import LONGEST, caption_of, effects_table, published_table
+from wildlab.reporting.status import Standing, standing
+from wildlab.reporting.text import csv_link, escape, inline, maths, prose, slug, table_html
 
 LEVELS = ("good", "warn", "bad", "neutral")
 #: What is said where no number is known that anything could be said by.
@@ -177,7 +179,7 @@ class Report:
             self._show(f'<ul class="tiles">{"".join(items)}</ul>')
 
     def section(self, title: str, intro: str = "", part: str = "") -> None:
-        """``<h2>`` and, if given, a paragraph. ``part`` is one of `wildlab.reporting.arrange`: what to do
+        """``<h2>`` and, if given, a paragraph. ``part`` is one of `wildlab.reporting.layout`: what to do
         (`ADVICE`) stands before all other sections, wherever it was shown."""
         marked = f' data-part="{part}"' if part else ""
         heading = f'<h2 id="{slug(title)}"{marked}>{inline(title)}</h2>'
@@ -279,14 +281,13 @@ class Report:
                 )
             frame = frame[list(columns)]
         self._tables += 1
-        body, caption = table_html(frame, columns or {}, digits), known(caption)
-        label = f"<b>Table {self._tables}.</b> {inline(caption)}" if caption else ""
-        if link := csv_link(frame, f"{self.study}-table-{self._tables}", f"Table {self._tables} as CSV"):
+        name, caption = f"Table {self._tables}", known(caption)
+        body = table_html(frame, columns or {}, digits, caption or fold or name)
+        label = f"<b>{name}.</b> {inline(caption)}" if caption else ""
+        if link := csv_link(frame, f"{self.study}-table-{self._tables}", f"{name} as CSV"):
             label += f' <span class="get">{link}</span>'
-        described = f' aria-label="{escape(caption or fold or f"Table {self._tables}")}"'
         long = " long" if len(frame) > LONGEST_UNBROKEN else ""
-        box = f'<div class="scroll" role="group" tabindex="0"{described}>{body}</div>'
-        html = f'<figure class="table{long}">{box}'
+        html = f'<figure class="table{long}">{body}'
         html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
 
@@ -332,10 +333,10 @@ class Report:
             for one in self._claims
         ]
         self.section(title)
-        self._show(f'<figure class="table">{claims_table(rows)}</figure>')
+        self._show(f'<figure class="table">{effects_table(rows)}</figure>')
 
     def files(self, intro: str, links: Sequence[str]) -> None:
-        """Files that the page itself hands over, each from `wildlab.reporting.tables.data_link`."""
+        """Files that the page itself hands over, each from `wildlab.reporting.text.data_link`."""
         self._show(f'<p>{inline(intro)} <span class="get">{" ".join(links)}</span></p>')
 
     def math(self, latex: str) -> None:
@@ -466,3 +467,83 @@ def _close(fig: Figure) -> None:
     pyplot = sys.modules.get("matplotlib.pyplot")
     if pyplot is not None:
         pyplot.close(fig)
+
+
+_FIGURE = re.compile(r"fig-([0-9a-c])-([0-9]+[a-z]?)")
+
+
+class Wording:
+    """The texts of a page, for its report.
+
+    Parameters
+    ----------
+    report
+        Is added to; its recorded numbers stand for placeholders ``{subject/name}``.
+    texts
+        Of the page.
+    values
+        For placeholders without a subject, on the whole page.
+    thesis
+        Whose figures the figures' names number: "H" or "F".
+    """
+
+    def __init__(
+        self, report: Report, texts: PageTexts, values: Mapping[str, Any] | None = None, thesis: str = "H"
+    ) -> None:
+        self.report, self.texts, self.values, self.thesis = report, texts, dict(values or {}), thesis
+
+    def say(self, text: str, values: Mapping[str, Any] | None = None) -> str:
+        """A text with its numbers."""
+        return fill(text, self.report.recorded, self.values | dict(values or {}))
+
+    def messages(self, messages: Iterable[Message]) -> list[str]:
+        """The sentences of the catalogue for some messages.
+
+        Raises
+        ------
+        KeyError
+            If one has no text, or a placeholder no value: a fault of ours.
+        """
+        return [self.say(self.texts.answers[one.key], one.values) for one in messages]
+
+    def captioned(self, key: str, fig: Figure, name: str = "") -> tuple[Figure, str, str, str]:
+        """A figure with its file's name (the key where empty), alt text and caption; its title is set."""
+        text, name = self.texts.figures[key], name or key
+        if text.title:
+            # Over the whole figure: beside long names on an axis there is no room for it above the axes.
+            look = {"fontsize": rcParams["axes.titlesize"], "fontweight": rcParams["axes.titleweight"]}
+            fig.suptitle(self.say(text.title), x=0.01, ha="left", **look)
+        caption = f"{self.say(text.caption)} {counterpart(name, self.thesis)}".strip()
+        return fig, name, self.say(text.alt), caption
+
+    def figure(self, key: str, fig: Figure, name: str = "", *, main: bool = False) -> None:
+        """Show a figure; ``main`` for the page's own."""
+        fig, name, alt, caption = self.captioned(key, fig, name)
+        self.report.figure(fig, name=name, alt=alt, caption=caption, main=main)
+
+    def table(self, key: str, frame: pd.DataFrame, values: Mapping[str, Any] | None = None) -> None:
+        """Show a table: in sight under its title, or folded away behind it."""
+        text = self.texts.tables[key]
+        title, caption = self.say(text.title, values), self.say(text.caption, values)
+        columns = {name: self.say(heading, values) for name, heading in text.columns.items()} or None
+        if text.open:
+            self.report.section(title)
+        self.report.table(
+            frame,
+            columns=columns,
+            digits=text.digits or None,
+            caption=caption,
+            fold="" if text.open else title,
+        )
+
+
+def counterpart(name: str, thesis: str) -> str:
+    """The figure of a thesis that a file of that name answers to, as the end of a caption.
+
+    Examples
+    --------
+    >>> counterpart("fig-7-19a", "H"), counterpart("fig-b-02", "F"), counterpart("track-map", "H")
+    ('H figure 7.19a.', 'F figure B.2.', '')
+    """
+    found = _FIGURE.fullmatch(name)
+    return f"{thesis} figure {found[1].upper()}.{found[2].lstrip('0')}." if found else ""

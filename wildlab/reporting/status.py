@@ -1,16 +1,137 @@
-"""What became of a study: every published number and claim beside what came out here.
-
-The verdicts on numbers are those of `wildlab.evaluation.replication`, on claims those of
-`wildlab.evaluation.shares`. Nothing is claimed of a first look, whose numbers come from fewer flights than
-the study's own.
-"""
+"""What became of a study: every published number and claim beside what came out here."""
 
 from __future__ import annotations
 
+import tomllib
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
-from wildlab.evaluation.replication import Comparison
+from wildlab.errors import WildlabError
+from wildlab.evaluation.replication import Comparison, Reproduction
+from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
+from wildlab.paths import DATA
+
+FILE = DATA / "cases.toml"
+
+
+class Case(NamedTuple):
+    """One case of a thesis: its name, its section ("H 5.6.1"), and what it shows, a sentence."""
+
+    id: str
+    section: str
+    shows: str
+
+
+def load_cases(path: Path = FILE) -> list[Case]:
+    """All cases, in the order of the theses.
+
+    Parameters
+    ----------
+    path
+        Left out, ``data/cases.toml``.
+
+    Returns
+    -------
+    list of Case
+
+    Raises
+    ------
+    WildlabError
+        If the file cannot be read, or an entry is not a case.
+
+    Examples
+    --------
+    >>> load_cases()[0].id
+    'camera-calibration'
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        return [Case(**{key: str(value) for key, value in entry.items()}) for entry in content["case"]]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise WildlabError(f"it is no list of cases ({error})", "mend the file", file=path.name) from error
+
+
+#: As published, in all that was decided; in part; in less than half of it.
+AS_PUBLISHED, IN_PART, NOT_AS_PUBLISHED = "as published", "partly as published", "not as published"
+#: Less than half was decided; nothing was judged.
+OPEN, ALONE = "undecided", "not compared"
+LEVELS = {AS_PUBLISHED: "good", IN_PART: "warn", NOT_AS_PUBLISHED: "bad", OPEN: "neutral", ALONE: "neutral"}
+#: What is said of several claims with a verdict; of others, that they are not judged.
+_CLAIMS = {
+    HOLDS: "hold",
+    MOSTLY: "hold on most flights",
+    UNDECIDED: "undecided",
+    MOSTLY_NOT: "fail on most flights",
+    FAILS: "do not hold",
+}
+
+
+class Standing(NamedTuple):
+    """A verdict in a word or two, why, and the colour that goes with the word (`Report.summary`)."""
+
+    word: str
+    reason: str
+    level: str
+
+
+def standing(numbers: Iterable[Comparison], claims: Iterable[str]) -> Standing:
+    """What single verdicts come to.
+
+    Parameters
+    ----------
+    numbers
+        Of `wildlab.evaluation.replication`, one for each published number. What was fitted to its number is
+        counted apart.
+    claims
+        Of `wildlab.evaluation.shares`, one for each claim.
+
+    Returns
+    -------
+    Standing
+        Its counts add up to the totals that it gives. It is as published where all that is decided is
+        reproduced or holds, and at least half of what is judged is decided.
+
+    Examples
+    --------
+    >>> standing([], ["holds", "holds", "holds on most flights"])
+    Standing(word='partly as published', reason='3 claims: 2 hold, 1 hold on most flights.', level='warn')
+    >>> standing([], []).word
+    'not compared'
+    """
+    numbers, claims = list(numbers), list(claims)
+    given = Counter(one.reproduction for one in numbers if not one.fitted)
+    fitted = Counter(one.reproduction for one in numbers if one.fitted)
+    told = Counter(claims)
+    good = given[Reproduction.REPRODUCED] + told[HOLDS]
+    bad = given[Reproduction.CONTRADICTED] + told[FAILS] + told[MOSTLY_NOT]
+    decided = good + bad + told[MOSTLY]
+    judged = decided + given[Reproduction.OPEN] + told[UNDECIDED]
+    if not judged:
+        word = ALONE
+    elif 2 * decided < judged:
+        word = OPEN
+    elif good == decided:
+        word = AS_PUBLISHED
+    else:
+        word = IN_PART if 2 * bad <= decided else NOT_AS_PUBLISHED
+    said = []
+    for what, counts in (("number", given), ("fitted number", fitted)):
+        parts = [f"{counts[one]} {one}" for one in Reproduction if counts[one]]
+        said += [_counted(counts.total(), what, parts)] if parts else []
+    parts = [f"{told[one]} {words}" for one, words in _CLAIMS.items() if told[one]]
+    rest = len(claims) - sum(told[one] for one in _CLAIMS)
+    parts += [f"{rest} not judged"] if rest else []
+    said += [_counted(len(claims), "claim", parts)] if parts else []
+    reason = "; ".join(said) + "." if said else "No published number or claim is judged here."
+    return Standing(word, reason, LEVELS[word])
+
+
+def _counted(total: int, what: str, parts: Sequence[str]) -> str:
+    return f"{total} {what}{'s' * (total != 1)}: {', '.join(parts)}"
+
 
 #: Of a number that no run has given yet.
 MISSING = "not reproduced yet"

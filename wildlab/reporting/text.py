@@ -1,4 +1,4 @@
-"""Text that is safe to put into a page: everything escaped, three marks allowed.
+"""Text and tables that are safe to put into a page: everything escaped, three marks allowed.
 
 Names of flights, targets and columns come out of other people's logs. They reach a page through the functions
 below and no other way, so that ``<script>`` in a target's name is a strange name and nothing more.
@@ -6,26 +6,32 @@ below and no other way, so that ``<script>`` in a target's name is a strange nam
 
 from __future__ import annotations
 
+import base64
 import html
-import math
 import re
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from wildlab.errors import WildlabError
+from wildlab.files import csv_text
+from wildlab.messages.quantities import NOTHING, duration, known, number, percent
 from wildlab.names import visible
+from wildlab.paths import DATA
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: A number and its sign stay on one line.
 _PERCENT = re.compile(r"(\d) %")
+_MARKS = re.compile(r"\*\*(.+?)\*\*|`(.+?)`")
 _BOLD = re.compile(r"\*\*(.+?)\*\*", re.S)
 _CODE = re.compile(r"`([^`\n]+)`")
 _MATHS = re.compile(r"(?<!\\)\$\$(.+?)\$\$|(?<!\\)\$([^$\n]+?)\$", re.S)
 _MATHML_TAG = re.compile(r"</?m[a-z]+(?: [a-zA-Z:]+=\"[^\"<>]*\")*\s*/?>")
-
-#: A number that is not known, and where one sentence ends and another begins.
-_NAN, _SENTENCE = re.compile(r"(?<![\w-])nan(?![\w-])"), re.compile(r"(?<=[.!?])\s+(?=[^a-z])")
-#: What a number that could not be computed looks like.
-NOTHING = "–"
 
 
 def escape(text: object) -> str:
@@ -94,91 +100,192 @@ def _paragraph(text: str) -> str:
     return re.sub(r"<p>\s*</p>", "", f"<p>{''.join(pieces)}</p>")
 
 
-def number(value: Any, digits: int | None = None) -> str:
-    """A number as a reader wants it: a true minus sign, ``digits`` decimals, three figures if not told."""
-    try:
-        value = float(value)
-    except (TypeError, ValueError):
-        return NOTHING
-    if math.isnan(value):
-        return NOTHING
-    if math.isinf(value):
-        return "∞" if value > 0 else "−∞"
-    if digits is None:
-        magnitude = abs(value)
-        if magnitude != 0 and not 1e-4 <= magnitude < 1e7:
-            return f"{value:.2e}".replace("-", "−")
-        digits = 0 if magnitude >= 100 else max(0, 2 - math.floor(math.log10(magnitude))) if magnitude else 0
-    shown = f"{value:.{max(0, digits)}f}"
-    if float(shown) == 0:
-        shown = shown.lstrip("-")
-    return shown.replace("-", "−")
-
-
-def percent(share: float, digits: int = 1) -> str:
-    """A share in per cent; with more digits where it would be rounded to all or to none.
-
-    Parameters
-    ----------
-    share
-        From 0 to 1; a mean count may be above.
-    digits
-        Behind the point.
-
-    Returns
-    -------
-    str
-        "nan %" where it is not known; see `known`.
-
-    Examples
-    --------
-    >>> percent(0.9999), percent(1.0), percent(0.004, 0), percent(0.0004)
-    ('99.99 %', '100 %', '0.4 %', '0.04 %')
-    """
-    if not math.isfinite(share):
-        return "nan %"
-    least = min(share, 1 - share)
-    if least < 1e-9:
-        return f"{100 * share:.0f} %"
-    digits = max(digits, math.ceil(-math.log10(199 * least)))
-    return f"{100 * share:.{digits}f} %"
-
-
-def percent_between(share: Sequence[float], digits: int = 1) -> str:
-    """A share in per cent with its interval, where it has one: estimate, low and high end, from 0 to 1.
-
-    Examples
-    --------
-    >>> percent_between((0.5, 0.25, 0.75)), percent_between((0.5, math.nan, math.nan))
-    ('50.0 % (25.0 % to 75.0 %)', '50.0 %')
-    """
-    estimate, low, high = (percent(one, digits) for one in share)
-    return estimate if math.isnan(share[1]) or low == high else f"{estimate} ({low} to {high})"
-
-
-def known(text: str) -> str:
-    """``text`` without the sentences that give a number which is not known.
-
-    Whatever a page says goes through this: Python writes NaN as "nan", and what has one in it says nothing.
-
-    Examples
-    --------
-    >>> known("It is 3.0 m off. By 2 flights it is nan m. Two are left.")
-    'It is 3.0 m off. Two are left.'
-    """
-    if not _NAN.search(text):
-        return text
-    return " ".join(one for one in _SENTENCE.split(text) if not _NAN.search(one))
-
-
 def slug(text: str) -> str:
     """Letters, digits and hyphens only: for the names of files and the ids of headings."""
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
 
 
-def metres(value: float, low: float | None = None, high: float | None = None) -> str:
-    """``4.3 m``, or with its interval ``4.3 m (3.9 to 4.8)``."""
-    digits = 1 if not abs(value) < 0.95 else 2
-    if low is None or high is None or not math.isfinite(low + high):
-        return f"{value:.{digits}f} m"
-    return f"{value:.{digits}f} m ({low:.{digits}f} to {high:.{digits}f})"
+#: Bytes of a file that is put into a link; larger ones are not embedded.
+MOST_BYTES = 500_000
+#: Columns of a table that still fits a phone beside one another.
+NARROW = 3
+#: Columns that say where on Earth something is: they are in no link.
+_PLACES = re.compile(
+    r"^(lat|latitude|lon|lng|longitude|mgrs|utm\w*|ecef\w*|easting\w*|northing\w*)(_|$)", re.I
+)
+
+
+FOLDER = DATA / "pages"
+
+
+def read_style(name: str) -> str:
+    """A style sheet of ``data/pages``."""
+    return (FOLDER / f"{name}.css").read_text(encoding="utf-8").strip()
+
+
+@cache
+def _templates() -> Environment:
+    found = Environment(
+        loader=FileSystemLoader(FOLDER),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        # Names of strangers turn no text around.
+        finalize=lambda value: value if hasattr(value, "__html__") else visible(value),
+    )
+    found.filters["inline"] = marked
+    found.filters |= {"percent": percent, "duration": duration}
+    return found
+
+
+def marked(text: object) -> Markup:
+    """Text with its marks, as HTML; what is HTML stays as it is."""
+    return text if isinstance(text, Markup) else Markup(inline(text))  # noqa: S704 - escaped there
+
+
+def render(template: str, /, **values: Any) -> Markup:
+    """HTML of a template of ``data/pages``: values are escaped, but for those that are `Markup` already.
+
+    Parameters
+    ----------
+    template
+        Its name, without ending.
+    **values
+        By name; one that is missing is an error.
+    """
+    return Markup(_templates().get_template(f"{template}.html").render(values).strip())  # noqa: S704 - escaped
+
+
+def pill(word: object, colour: str = "") -> Markup:
+    """A verdict in its colour: "yes", "part", "no" or ""."""
+    return Markup('<span class="pill {}">{}</span>').format(colour, word)
+
+
+def dim(text: object) -> Markup:
+    """Text of less weight."""
+    return Markup('<span class="dim">{}</span>').format(text)
+
+
+def table(
+    heads: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    label: str,
+    *,
+    text: Collection[int] = (0,),
+    wide: bool = False,
+    many: bool = False,
+) -> Markup:
+    """A table that scrolls sideways where it has to.
+
+    Parameters
+    ----------
+    heads
+        Of the columns, with marks; one that is "" is no heading.
+    rows
+        Cells, escaped here but for HTML (`Markup`). The last cell of a short row spans what is left.
+    label
+        What it is, for who hears the page.
+    text
+        Columns of words, to the left; all others hold numbers.
+    wide
+        Whether the first column holds sentences.
+    many
+        Whether a phone shows it as a list. Roles are written out: what a style turns into a list would else
+        be no table to who hears it.
+    """
+    labels = [
+        one.striptags() if isinstance(one, Markup) else _MARKS.sub(lambda found: found[1] or found[2], one)
+        for one in heads
+    ]
+    return render(
+        "table", heads=heads, labels=labels, rows=rows, label=label, text=text, wide=wide, many=many
+    )
+
+
+def table_html(
+    frame: pd.DataFrame,
+    headings: Mapping[str, str],
+    digits: Mapping[str, int] | int | None,
+    label: str = "",
+) -> Markup:
+    """The table of a frame without its index: numbers to the right, text to the left.
+
+    Parameters
+    ----------
+    frame
+        Its columns.
+    headings
+        By column; the column's name where there is none.
+    digits
+        Decimals by column, or for all; three figures otherwise.
+    label
+        What it is, for who hears the page.
+    """
+    import pandas as pd  # `wildlab list` makes no table, and is there in half the time
+
+    cells: list[list[Markup | str]] = []
+    text = []
+    for k, name in enumerate(frame):
+        column = frame[name]
+        numeric = pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_bool_dtype(column)
+        decimals = digits if isinstance(digits, int) else (digits or {}).get(str(name))
+        if decimals is None and pd.api.types.is_integer_dtype(column):
+            decimals = 0
+        text += [] if numeric else [k]
+        cells.append([number(value, decimals) if numeric else _cell(value) for value in column])
+    titles = [headings.get(str(name), str(name)) for name in frame]
+    rows = list(zip(*cells, strict=True))
+    return table(titles, rows, label, text=text, many=len(titles) > NARROW)
+
+
+def csv_link(frame: pd.DataFrame, name: str, words: str = "CSV") -> str:
+    """A link that hands over a table as CSV, all digits; "" where it is too large, empty, or holds places.
+
+    Parameters
+    ----------
+    frame
+        Its columns are named in the file as here.
+    name
+        Of the file, without ending; anything but letters, digits and hyphens is replaced.
+    words
+        Of the link.
+
+    Returns
+    -------
+    str
+        ``<a download>`` with the file within.
+    """
+    if frame.empty or any(_PLACES.match(str(column)) for column in frame):
+        return ""
+    return data_link(csv_text(frame).encode("utf-8"), "text/csv", f"{slug(name)}.csv", words)
+
+
+def data_link(content: bytes, kind: str, name: str, words: str) -> str:
+    """A link with a file within; "" where the file is too large for that.
+
+    Parameters
+    ----------
+    content
+        Of the file.
+    kind
+        ``text/csv`` or ``application/geo+json``.
+    name
+        It is saved under.
+    words
+        Of the link.
+    """
+    if len(content) > MOST_BYTES:
+        return ""
+    data = base64.b64encode(content).decode("ascii")
+    return f'<a class="data" download="{escape(name)}" href="data:{kind};base64,{data}">{escape(words)}</a>'
+
+
+def _cell(value: object) -> Markup | str:
+    import pandas as pd
+
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None or (isinstance(value, float) and value != value) or value is pd.NaT or value is pd.NA:
+        return NOTHING
+    return marked(known(str(value))) or (NOTHING if str(value) else "")

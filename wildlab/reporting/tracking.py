@@ -29,15 +29,12 @@ from wildlab.analysis.tracks.noise_model import ROUGH, ToldValue, Tuned
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.analysis.tracks.tracks import TOGETHER
 from wildlab.flight.store import Flight
-from wildlab.messages.message import Message
-from wildlab.messages.page_texts import load_texts, significant
+from wildlab.messages.catalogue import Message, load_texts
+from wildlab.messages.quantities import NOTHING, length, significant
 from wildlab.reporting.charts import following as charts
 from wildlab.reporting.charts.following import beside_plain_shown
-from wildlab.reporting.filter_names import filter_words, short_words
-from wildlab.reporting.quantities import length
-from wildlab.reporting.report import Report
-from wildlab.reporting.text import NOTHING
-from wildlab.reporting.wording import Wording
+from wildlab.reporting.figures import filter_words, short_words
+from wildlab.reporting.report import Report, Wording
 
 #: A target tracked by all sensors together may be this many times as far off as by the best one alone.
 ALIKE = 1.2

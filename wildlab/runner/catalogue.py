@@ -225,7 +225,7 @@ def check_notebook(notebook: Path, parameters: Sequence[str]) -> int:
         If the notebook is absent or not one, has no or several cells tagged ``parameters``, or does not
         know one of the parameters.
     """
-    from wildlab.reporting.notebooks import read_notebook  # takes a while, too
+    from wildlab.reporting.notebook_pages import read_notebook  # takes a while, too
 
     if not notebook.is_file():
         raise WildlabError(

@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
-from wildlab.messages.page_texts import PageTexts, load_texts
+from wildlab.messages.catalogue import PageTexts, load_texts
 from wildlab.paths import REPORTS
-from wildlab.replay.moving import show_moving
+from wildlab.replay.scene import show_moving
 from wildlab.reporting.report import Report, open_report
 from wildlab.runner import vary
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies

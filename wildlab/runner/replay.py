@@ -19,12 +19,10 @@ from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import REPORTS
-from wildlab.replay.gather import scene_of
-from wildlab.replay.page import page
+from wildlab.replay.images import Shot, read_shots
+from wildlab.replay.page import page, read_viewer
 from wildlab.replay.recording import narrow_layout, save_recording
-from wildlab.replay.scene import ReplayScene
-from wildlab.replay.shots import Shot, read_shots
-from wildlab.replay.viewer import read_viewer
+from wildlab.replay.scene import ReplayScene, scene_of
 from wildlab.runner.evaluate import tell_source
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 

@@ -21,7 +21,7 @@ from rich.console import Console
 from wildlab.errors import WildlabError
 from wildlab.files import digest, write_atomic
 from wildlab.paths import DATA, NOTEBOOKS, PACKAGE, REPORTS
-from wildlab.reporting.notebooks import read_notebook
+from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.progress import shown

@@ -19,10 +19,9 @@ import pandas as pd
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.reporting.published import published_rows
+from wildlab.reporting.published import judge, published_rows
 from wildlab.reporting.report import open_report
 from wildlab.reporting.text import slug
-from wildlab.reporting.verdicts import judge
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.processes.worker_pool import WorkerPool
 from wildlab.runner.seeds import (

@@ -12,11 +12,11 @@ from bs4.element import NavigableString, PageElement
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
-from wildlab.reporting.animation.drawing import PAUSE_STYLE
-from wildlab.reporting.animation.drawing import STYLE as DRAWING_STYLE
+from wildlab.reporting.animation import PAUSE_STYLE
+from wildlab.reporting.animation import STYLE as DRAWING_STYLE
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
-from wildlab.sharing.allowed import Writer
+from wildlab.sharing.allow_list import Writer
 
 #: A report is a tenth of this.
 _MOST_BYTES = 100_000_000
@@ -70,7 +70,7 @@ def read_part(report: Path, number: int, *, exact: bool, generalised: bool) -> P
         Whether it is for those who have the flight and wildlab: then the foot of the page says by which
         hashes its data and code are known and when it was made, and advice may be a command to type.
     generalised
-        Whether it may have no words and numbers but those of `wildlab.sharing.allowed`.
+        Whether it may have no words and numbers but those of `wildlab.sharing.allow_list`.
 
     Returns
     -------

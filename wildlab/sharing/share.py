@@ -14,17 +14,14 @@ from wildlab.files import write_atomic
 from wildlab.flight.checksums import confirmed_locations
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, load_flight
-from wildlab.messages.catalogue import Language, load_language
-from wildlab.messages.message import Day
+from wildlab.messages.catalogue import Day, Language, load_language
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import load_studies
-from wildlab.sharing.agreement import agreement_words
-from wildlab.sharing.allowed import foreign
+from wildlab.sharing.allow_list import foreign
 from wildlab.sharing.document import Chapter, joined, read_part
-from wildlab.sharing.edition.edition import Place, edition_html
-from wildlab.sharing.edition.facts import facts_of
-from wildlab.sharing.edition.picture import map_of
-from wildlab.sharing.generalise import Generalised, generalise
+from wildlab.sharing.edition import Place, edition_html, map_of
+from wildlab.sharing.edition_story import facts_of
+from wildlab.sharing.generalisation import Generalised, generalise
 from wildlab.sharing.package import (
     OPENED_WITH,
     check_password,
@@ -34,11 +31,10 @@ from wildlab.sharing.package import (
     sweep_beside,
     zip_bytes,
 )
-from wildlab.sharing.redrawn import Redrawn, redraw
-from wildlab.sharing.removed import removed_lines, sender_list
+from wildlab.sharing.recomputation import Redrawn, redraw
 from wildlab.sharing.reports import Source, flight_folder, sources_of
-from wildlab.sharing.scan import Secrets, Sought, not_searched, scan
-from wildlab.sharing.secrets import all_of, flight_secrets, machine_secrets
+from wildlab.sharing.scan import Secrets, Sought, all_of, flight_secrets, machine_secrets, not_searched, scan
+from wildlab.sharing.sender_list import agreement_words, removed_lines, sender_list
 from wildlab.sharing.tiers import (
     Tier,
     Treatment,

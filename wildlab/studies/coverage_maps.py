@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from wildlab.evaluation.runs import mean_share_interval
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
+from wildlab.messages.quantities import percent_between
 from wildlab.planning.coverage import Coverage
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, map_axes, new_figure
-from wildlab.reporting.text import percent_between
 
 #: Quantities of `means_table` that are no shares: hectares, minutes and seconds in their units.
 _SCALES = {"ground": 1e-4, "outside": 1e-4, "time": 1 / 60, "in_sight": 1.0}

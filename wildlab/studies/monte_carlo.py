@@ -21,11 +21,16 @@ from wildlab.evaluation.shares import (
     decide_check,
     paired_difference,
 )
-from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
+from wildlab.messages.quantities import number, percent
+from wildlab.reporting.published import (
+    SHARE_OF_IMAGES,
+    bounds_of,
+    load_claims,
+    quantity_kind,
+    share_below,
+    size_name,
+)
 from wildlab.reporting.report import Report
-from wildlab.reporting.spread import bounds_of, share_below
-from wildlab.reporting.text import number, percent
-from wildlab.reporting.verdicts import size_name
 from wildlab.studies.protocol import Study
 
 #: Headings of the table that `decide_claims` gives.

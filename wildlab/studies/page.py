@@ -1,6 +1,6 @@
 """The one form of a study's page: answer, main figure, numbers, published and ours, claims, figures.
 
-A study computes; its texts lie in ``data/messages/en/<case>.toml`` (`wildlab.messages.page_texts`). What is
+A study computes; its texts lie in ``data/messages/en/<case>.toml`` (`wildlab.messages.catalogue`). What is
 recorded (`wildlab.reporting.report.Report.metric`) are the facts from which the texts' numbers come, and by
 which the study's ``answer`` chooses its sentences.
 """
@@ -25,10 +25,9 @@ from wildlab.evaluation.shares import (
     NO_PREMISE,
     Check,
 )
-from wildlab.messages.page_texts import FORMS, PageTexts, TileText, unit_words
-from wildlab.reporting.report import Report
-from wildlab.reporting.text import number
-from wildlab.reporting.wording import Wording
+from wildlab.messages.catalogue import PageTexts, TileText
+from wildlab.messages.quantities import FORMS, number, unit_words
+from wildlab.reporting.report import Report, Wording
 from wildlab.studies.monte_carlo import CLAIM_COLUMNS, CLAIMS_EXPLAINED, decide_claims
 
 #: Of so many flights each, ranges that lie apart are no chance: a rank test's two-sided probability is 3 %.

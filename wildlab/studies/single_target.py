@@ -1,6 +1,6 @@
 """Figures and tables of one target's tracks: of the flight drawn, and over many flights.
 
-Figures have the keys of their texts (`wildlab.messages.page_texts`), and no titles.
+Figures have the keys of their texts (`wildlab.messages.catalogue`), and no titles.
 """
 
 from __future__ import annotations

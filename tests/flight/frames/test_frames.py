@@ -15,7 +15,7 @@ from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.frames.image import images_below, still_files
 from wildlab.flight.readers.frames.scene import find_clipped, find_no_data, find_overlay
 from wildlab.flight.readers.frames.thermal import Planck, gather_pieces, read_records, to_kelvin
-from wildlab.replay.shots import read_shots
+from wildlab.replay.images import read_shots
 
 
 def scene(seed: int = 1, shape: tuple[int, int] = (96, 128)) -> np.ndarray:

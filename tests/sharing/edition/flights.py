@@ -8,7 +8,7 @@ from typing import Any
 
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.own_flights import OwnFlight, OwnReport
-from wildlab.sharing.edition.facts import Facts, Gain
+from wildlab.sharing.edition_story import Facts, Gain
 
 NAN = math.nan
 

@@ -20,22 +20,22 @@ from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from tests.sharing.left import leave_report
 from wildlab.analysis.georeference import observe
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.messages.catalogue import load_language
-from wildlab.messages.message import Day
+from wildlab.messages.catalogue import Day, load_language
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.page import POLICY
 from wildlab.runner.record.own_flights import own_flights
-from wildlab.sharing.edition.edition import Place, edition_html
-from wildlab.sharing.edition.facts import Alarm, facts_of
-from wildlab.sharing.edition.picture import (
+from wildlab.sharing.edition import (
     FOOT,
     HEIGHT,
     WIDTH,
     MapPicture,
+    Place,
+    edition_html,
     map_of,
     nice_length,
     picture_html,
 )
+from wildlab.sharing.edition_story import Alarm, facts_of
 
 MAP = MapPicture(
     np.array([[0.0, 0.0], [0.0, 400.0], [300.0, 400.0], [300.0, 0.0]]),

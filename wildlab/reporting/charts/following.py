@@ -18,6 +18,7 @@ from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
 from wildlab.geometry.frames import Array
+from wildlab.messages.quantities import length
 from wildlab.reporting.charts.drawing import (
     LINES,
     TRUTH,
@@ -30,10 +31,20 @@ from wildlab.reporting.charts.drawing import (
     new_strips,
 )
 from wildlab.reporting.charts.tracks import innovation_correlations
-from wildlab.reporting.figure_text import Powers
-from wildlab.reporting.figures import INK, ORANGE, colour, log_band, map_axes, mark_gaps, new_figure, thinned
-from wildlab.reporting.filter_names import WORDS, filter_words, short_words
-from wildlab.reporting.quantities import length
+from wildlab.reporting.figures import (
+    INK,
+    ORANGE,
+    WORDS,
+    Powers,
+    colour,
+    filter_words,
+    log_band,
+    map_axes,
+    mark_gaps,
+    new_figure,
+    short_words,
+    thinned,
+)
 
 SENSOR_COLOURS = (*LINES[:4], ORANGE, LINES[4])
 #: Lags of innovations shown, detections; metres beyond the targets' ways that a map shows, as a share.

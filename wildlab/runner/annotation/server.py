@@ -28,7 +28,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames.image import MOST_BYTES, decode
 from wildlab.paths import DATA
-from wildlab.replay.shots import stretched
+from wildlab.replay.images import stretched
 from wildlab.runner.annotation.session import Session, check_points
 
 #: Bytes that a page may send at once, and how long it may take for it, s.

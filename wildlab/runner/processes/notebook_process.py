@@ -89,7 +89,7 @@ def _keep_to_ourselves(job: Job) -> None:
 
 def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.files import write_atomic, write_json
-    from wildlab.reporting import html, metrics, notebooks
+    from wildlab.reporting import metrics, notebook_pages
     from wildlab.reporting.page import first_look_notice
     from wildlab.reporting.status import look_words
     from wildlab.runner.catalogue import OTHERS
@@ -123,7 +123,9 @@ def _work(pipe: connection.Connection, job: Job) -> None:
         _execute(pipe, job, {**given, "flight": str(flight or ""), "out": str(folder)}, executed)
     finally:
         if executed.is_file():
-            cleaned = notebooks.clean_notebook(notebooks.read_notebook(executed), shown, job.hidden())
+            cleaned = notebook_pages.clean_notebook(
+                notebook_pages.read_notebook(executed), shown, job.hidden()
+            )
             write_notebook(executed, cleaned)
     pipe.send(("stage", "page"))
     if not (folder / "metrics.json").is_file():
@@ -138,7 +140,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     write_json(folder / "provenance.json", origin)
     look = look_words(job.first_look)
     notice = first_look_notice(look, job.again) if look else ""
-    page = html.report_page(
+    page = notebook_pages.report_page(
         cleaned,
         study=job.name,
         footer=provenance.footer(origin),
@@ -153,18 +155,19 @@ def _work(pipe: connection.Connection, job: Job) -> None:
 def _tutorial(pipe: connection.Connection, job: Job) -> None:
     """A notebook that takes no parameters and leaves no numbers: only its page."""
     from wildlab.files import write_atomic
-    from wildlab.reporting import notebooks
-    from wildlab.reporting.tutorial import tutorial_page
+    from wildlab.reporting import notebook_pages
     from wildlab.runner.record import provenance
 
     pipe.send(("stage", "notebook"))
     notebook = _execute(pipe, job, {}, Path(job.work) / "notebook.ipynb")
     pipe.send(("stage", "page"))
-    cleaned = notebooks.clean_notebook(notebook, {}, {job.work: "."})
+    cleaned = notebook_pages.clean_notebook(notebook, {}, {job.work: "."})
     origin = provenance.collect(
         study=job.name, notebook=Path(job.notebook), flight=None, parameters={}, seed=None
     )
-    page = tutorial_page(cleaned, name=Path(job.notebook).stem, footer=provenance.footer(origin, beside=()))
+    page = notebook_pages.tutorial_page(
+        cleaned, name=Path(job.notebook).stem, footer=provenance.footer(origin, beside=())
+    )
     write_atomic(Path(job.work) / "report.html", page)
 
 
@@ -200,7 +203,7 @@ def _relative(flight: Path | None, job: Job) -> str:
 
 
 def _execute(pipe: connection.Connection, job: Job, parameters: dict[str, Any], executed: Path) -> Any:
-    from wildlab.reporting.notebooks import read_notebook
+    from wildlab.reporting.notebook_pages import read_notebook
     from wildlab.runner.processes.shell import execute_notebook
 
     def on_cell(index: int, count: int) -> None:
@@ -214,7 +217,7 @@ def _execute(pipe: connection.Connection, job: Job, parameters: dict[str, Any], 
 def _explain(error: BaseException, job: Job) -> Failure:
     import traceback
 
-    from wildlab.reporting.notebooks import clean_text, read_notebook, step_of
+    from wildlab.reporting.notebook_pages import clean_text, read_notebook, step_of
     from wildlab.runner.processes.shell import CellError
 
     details = "".join(traceback.format_exception(error))

@@ -21,7 +21,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
-from wildlab.reporting.notebooks import clean_text
+from wildlab.reporting.notebook_pages import clean_text
 from wildlab.runner.processes.ending import end_tree, start_process
 from wildlab.runner.processes.job import Failure
 from wildlab.runner.seeds import SeedWork, code_key, write_seed

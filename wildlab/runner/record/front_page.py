@@ -7,16 +7,22 @@ from pathlib import Path
 
 from wildlab.files import write_atomic
 from wildlab.paths import NOTEBOOKS, REPORTS, ROOT
-from wildlab.reporting.cases import load_cases
-from wildlab.reporting.front.cards import flight_card, study_card
-from wildlab.reporting.front.flight import load_front_flight
-from wildlab.reporting.front.glimpse import read_glimpse
-from wildlab.reporting.front.index import MOST_FLIGHTS, PARTNERS, Learn, front_page
-from wildlab.reporting.front.numbers import LEDGER, POSTER, poster_page
-from wildlab.reporting.front.partners import partners_page
+from wildlab.reporting.front_page import (
+    MOST_FLIGHTS,
+    PARTNERS,
+    Learn,
+    case_cards,
+    flight_card,
+    front_page,
+    load_front_flight,
+    partners_page,
+    read_glimpse,
+)
 from wildlab.reporting.ledger import ledger_page
-from wildlab.reporting.notebooks import read_notebook
+from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.reporting.own_flights import PAGE, flights_page
+from wildlab.reporting.published_marks import LEDGER, POSTER, numbers_page
+from wildlab.reporting.status import load_cases
 from wildlab.reporting.text import escape
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.record.own_flights import own_flights
@@ -42,7 +48,7 @@ def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     write_atomic(reports / PAGE, flights_page(own, compared if (reports / compared).is_file() else ""))
     cases = load_cases()
     write_atomic(reports / LEDGER, ledger_page(statuses, code=code, cases=cases))
-    write_atomic(reports / POSTER, poster_page(statuses))
+    write_atomic(reports / POSTER, numbers_page(statuses))
     newest = sorted(own, key=lambda flight: flight.finished, reverse=True)
     shared = [flight.reports[0].folder for flight in newest if flight.reports[0].state == "done"]
     write_atomic(reports / PARTNERS, partners_page(shared))
@@ -50,11 +56,14 @@ def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     whole = front_page(
         statuses,
         load_front_flight(),
-        study_cards=[
-            study_card(one, read_glimpse(reports / one.study.name / "report.html"))
-            for one in statuses
-            if one.state != "not run"
-        ],
+        study_cards=case_cards(
+            (
+                (one, read_glimpse(reports / one.study.name / "report.html"))
+                for one in statuses
+                if one.state != "not run"
+            ),
+            cases,
+        ),
         flight_cards=[
             flight_card(flight, read_glimpse(reports / flight.reports[0].folder / "report.html"))
             for flight in newest[:MOST_FLIGHTS]
@@ -62,10 +71,7 @@ def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
         flights=len(own),
         cases=len(cases),
         learn=_learn(reports),
-        again="`make tutorials` runs the tutorials, `make docs` writes the reference; they are then "
-        "linked here."
-        if ROOT
-        else "`python -m wildlab.runner.tutorials` runs the tutorials; they are then linked here.",
+        checkout=ROOT is not None,
         code=code,
     )
     write_atomic(path, whole)

@@ -19,7 +19,7 @@ from wildlab.files import sha256
 from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.files import flight_name
 from wildlab.paths import LOCK, ROOT
-from wildlab.reporting.arrange import ALERT
+from wildlab.reporting.layout import ALERT
 from wildlab.reporting.text import escape
 from wildlab.runner.seeds import PACKAGES, package_version
 

@@ -10,9 +10,8 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.reporting.metrics import read_metrics
-from wildlab.reporting.published import FOLDER, load_claims, published_rows
+from wildlab.reporting.published import FOLDER, compared_number, load_claims, published_rows
 from wildlab.reporting.status import FIRST_LOOK, Claim, Number, StudyStatus, look_words
-from wildlab.reporting.verdicts import compared_number
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.record.digests import BEFORE_DIGESTS, STATUS, has_digests, read_status
 

@@ -14,7 +14,7 @@ from wildlab.evaluation.shares import Check
 from wildlab.geometry.calibration import Mounting
 from wildlab.geometry.intrinsics import PINHOLE
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, new_figure
-from wildlab.reporting.verdicts import error_name
+from wildlab.reporting.published import error_name
 from wildlab.studies.camera_calibration.calibration import (
     CONSTANT,
     PRINTED_AT_HEIGHT,

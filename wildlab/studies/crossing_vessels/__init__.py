@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wildlab.analysis.rendered import Photographer
 from wildlab.evaluation.shares import Check
 from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
-from wildlab.reporting.spread import bounds_of
+from wildlab.reporting.published import bounds_of
 from wildlab.studies.crossing_vessels import trial
 from wildlab.studies.crossing_vessels.rendered import WHOLE, Counted, CrossingTracks, Rendering, Spotted, spot
 from wildlab.studies.crossing_vessels.trial import (

@@ -28,7 +28,7 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
-from wildlab.reporting.spread import bounds_of
+from wildlab.reporting.published import bounds_of
 from wildlab.studies.gating.monte_carlo import (
     FORMS,
     GATES,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from wildlab.analysis.search import Searched, Searcher, rows_at, search
 from wildlab.evaluation.runs import mean_share_interval, share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT
+from wildlab.messages.quantities import percent_between
 from wildlab.planning.legs import Leg, Platform
 from wildlab.reporting.figures import (
     BLUE,
@@ -27,7 +28,6 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
-from wildlab.reporting.text import percent_between
 from wildlab.studies.information_planning import trial
 from wildlab.studies.information_planning.trial import (
     BUDGET_S,

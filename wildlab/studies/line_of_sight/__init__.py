@@ -19,9 +19,9 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles, field_of_view, in_field_of_view
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
+from wildlab.messages.quantities import number, percent, percent_between
 from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
-from wildlab.reporting.spread import bounds_of
-from wildlab.reporting.text import number, percent, percent_between
+from wildlab.reporting.published import bounds_of
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.studies.line_of_sight import trial

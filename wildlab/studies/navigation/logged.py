@@ -22,11 +22,10 @@ from wildlab.analysis.overviews.verdict import VERDICT_LEVEL
 from wildlab.analysis.receiver import Placement, Receiver, place_receiver
 from wildlab.evaluation.blocks import block_mean, time_blocks
 from wildlab.flight.store import Flight
-from wildlab.messages.message import Message
-from wildlab.messages.page_texts import load_texts, significant
+from wildlab.messages.catalogue import Message, load_texts
+from wildlab.messages.quantities import significant
 from wildlab.navigation.receiver import SIZE, Candidate
-from wildlab.reporting.report import Report
-from wildlab.reporting.wording import Wording
+from wildlab.reporting.report import Report, Wording
 from wildlab.studies.navigation import (
     OVERCONFIDENT,
     attitude_of,

@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 
 from wildlab.detection.colour import Colour, coloured, find_coloured
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, new_figure
-from wildlab.reporting.spread import bounds_of, spread_key
+from wildlab.reporting.published import bounds_of, spread_key
 from wildlab.simulation.scene.coloured import ColourView
 from wildlab.studies.page import Facts
 from wildlab.studies.precision_drop import trial

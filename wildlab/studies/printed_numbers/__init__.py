@@ -15,12 +15,12 @@ from wildlab.flight.files import read_toml
 from wildlab.geometry.flodell import camera_rotation, geodetic_to_enu_linear, metres_per_degree
 from wildlab.geometry.frames import Array, ned_to_enu
 from wildlab.geometry.line_of_sight import compare_angles, in_field_of_view
+from wildlab.messages.quantities import number
 from wildlab.paths import DATA
 from wildlab.planning.high_level import utilities
 from wildlab.planning.information import SearchSensor, as_printed, bearing_information
 from wildlab.reporting.figures import BLUE, INK, VERMILLION, new_figure
 from wildlab.reporting.published import published_values
-from wildlab.reporting.text import number
 from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study

@@ -24,7 +24,7 @@ from wildlab.reporting.charts.tracks import (
     values_over_flights,
 )
 from wildlab.reporting.figures import GREEN, GREY, INK, colour, new_figure
-from wildlab.reporting.spread import bounds_of
+from wildlab.reporting.published import bounds_of
 from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Metric, Study
 from wildlab.studies.schmidt import trial

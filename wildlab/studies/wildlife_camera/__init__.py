@@ -17,7 +17,7 @@ from wildlab.geometry.camera import Camera, normalise, undistort, undistort_appr
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera, direction_differences
 from wildlab.reporting.figures import new_figure
-from wildlab.reporting.verdicts import error_name
+from wildlab.reporting.published import error_name
 from wildlab.simulation.boards import board_views
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study

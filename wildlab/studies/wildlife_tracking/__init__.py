@@ -21,6 +21,7 @@ from wildlab.analysis.animals.revisit import Patrolled
 from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
 from wildlab.evaluation.shares import Check, Pooled
 from wildlab.geometry.frames import Array
+from wildlab.messages.quantities import number, percent_between
 from wildlab.reporting.figures import (
     BLUE,
     GREY,
@@ -32,7 +33,6 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
-from wildlab.reporting.text import number, percent_between
 from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.wildlife_tracking import trial

@@ -1,0 +1,73 @@
+"""Pictures of a replay: only their pixels are left, in so many bytes, of the right frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from wildlab.errors import WildlabError
+from wildlab.replay import images as shots
+from wildlab.replay.images import LONGEST, read_shots, reduction
+
+
+def picture(path: Path, level: int, size: tuple[int, int] = (64, 48)) -> None:
+    exif = Image.Exif()
+    exif[0x010E] = "SECRET PLACE"
+    exif.get_ifd(0x8825)[2] = (58.0, 39.0, 43.2)
+    rng = np.random.default_rng(level)
+    pixels = (level + rng.integers(-12, 13, size[::-1])).astype(np.uint8)
+    Image.fromarray(pixels).save(path, exif=exif, comment=b"SECRET WORDS")
+
+
+def test_pixels_alone_come_along_and_stand_at_their_frames(tmp_path):
+    for i in range(3):
+        picture(tmp_path / f"IMG_{i}.JPG", 40 + 80 * i)
+    found = read_shots(tmp_path, ["IMG_2", "IMG_0.JPG", "other"], (64, 48))
+    assert sorted(found.by_row) == [0, 1]
+    levels = {}
+    for row, shot in found.by_row.items():
+        assert b"SECRET" not in shot.jpeg and b"Exif" not in shot.jpeg and shot.scale == 1.0
+        levels[row] = int(np.median(cv2.imdecode(np.frombuffer(shot.jpeg, np.uint8), 0)))
+    assert levels[0] == pytest.approx(200, abs=3) and levels[1] == pytest.approx(40, abs=3)
+
+
+def test_images_of_another_shape_or_broken_ones_are_told(tmp_path):
+    picture(tmp_path / "a.jpg", 90)
+    picture(tmp_path / "b.jpg", 91)
+    picture(tmp_path / "c.jpg", 92, (48, 64))
+    (tmp_path / "d.jpg").write_bytes(b"\xff\xd8 no image")
+    found = read_shots(tmp_path, ["a", "b", "c", "d"], (64, 48))
+    assert sorted(found.by_row) == [0, 1]
+    assert len(found.lacks) == 2 and any("48 x 64" in one for one in found.lacks)
+
+
+def test_images_of_another_flight_are_refused(tmp_path):
+    picture(tmp_path / "a.jpg", 90)
+    with pytest.raises(WildlabError, match="none of these images"):
+        read_shots(tmp_path, ["x", "y"], None)
+
+
+def test_all_of_them_fit(tmp_path, monkeypatch):
+    rng = np.random.default_rng(0)
+    for i in range(12):
+        noise = rng.integers(0, 255, (480, 640)).astype(np.uint8)
+        cv2.imwrite(str(tmp_path / f"{i:02}.png"), cv2.GaussianBlur(noise, (0, 0), 2))
+    monkeypatch.setattr(shots, "MOST_BYTES", 120_000)
+    monkeypatch.setattr(shots, "MOST_IMAGES", 8)
+    seen: list[tuple[int, int]] = []
+    found = read_shots(
+        tmp_path, [f"{i:02}" for i in range(12)], (640, 480), lambda done, of: seen.append((done, of))
+    )
+    assert len(found.by_row) == 8 and {0, 11} <= set(found.by_row) and "8 of 12" in found.lacks[0]
+    assert sum(len(one.jpeg) for one in found.by_row.values()) <= 120_000
+    assert len({one.scale for one in found.by_row.values()}) == 1 and seen[-1] == (8, 8)
+
+
+def test_no_image_is_enlarged_and_none_is_longer_than_a_screen():
+    assert reduction(320, 240, 1) == 1.0
+    assert 4000 * reduction(4000, 3000, 1) == pytest.approx(LONGEST)
+    assert reduction(4000, 3000, 900) < reduction(4000, 3000, 100)

@@ -1,0 +1,270 @@
+"""The one order of a report, and the words of it that not every reader knows."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from bs4 import BeautifulSoup, Tag
+from bs4.element import NavigableString, PageElement
+
+from wildlab.errors import WildlabError
+from wildlab.paths import DATA
+from wildlab.reporting.text import escape, slug
+
+#: What a heading or a block may say it is, in the order of the page; "" is a section like any other.
+ORDER = HEAD, SUMMARY, ALERT, MAIN, TILES, OPENING, ADVICE, LIMITS, SECTION, METHOD = (
+    "head",
+    "summary",
+    "alert",
+    "main",
+    "tiles",
+    "opening",
+    "advice",
+    "limits",
+    "",
+    "method",
+)
+#: The verdict is shown when all numbers are there, and read in the summary.
+VERDICT = "verdict"
+_LEVELS = {"good", "warn", "bad", "neutral"}
+#: What a block is by its class, where it does not say it.
+_BY_CLASS = {"summary": SUMMARY, "look": ALERT, "tiles": TILES}
+
+
+def arranged(body: str) -> str:
+    """The parts of a report in the order of a page.
+
+    Parameters
+    ----------
+    body
+        HTML as a notebook showed it, one part after the other.
+
+    Returns
+    -------
+    str
+        HTML. Where there is no ``<header>``, nothing is moved: it is no report.
+    """
+    soup = BeautifulSoup(body, "html.parser")
+    if soup.header is None:
+        return body
+    arrange_parts(soup)
+    return re.sub(r"\n\s*\n+", "\n", str(soup)).strip()
+
+
+def arrange_parts(soup: BeautifulSoup) -> None:
+    """Put the parts of a report in the order of a page; see `arranged`."""
+    if soup.header is None:
+        return
+    groups: dict[str, list[PageElement]] = {part: [] for part in (*ORDER, VERDICT)}
+    at = OPENING
+    for node in list(soup.contents):
+        node.extract()
+        if isinstance(node, NavigableString) and not node.strip():
+            continue
+        part = _part_of(node) if isinstance(node, Tag) else None
+        if part is not None and isinstance(node, Tag) and node.name == "h2":
+            at = part
+        groups[at if part is None else part].append(node)
+    soup.extend(node for part in ORDER for node in groups[part])
+    _put_first(soup, _main_picture([one for part in (OPENING, ADVICE, SECTION) for one in groups[part]]))
+    _judge(groups[SUMMARY], groups[VERDICT])
+    for marked in soup.select("[data-part], [data-main]"):
+        del marked["data-part"], marked["data-main"]
+    _drop_bare_headings(soup)
+    _number_figures(soup)
+
+
+def _part_of(node: Tag) -> str | None:
+    """What a block is; None for one that belongs to the section it stands in."""
+    said = node.get("data-part")
+    if said is not None:
+        return str(said)
+    by_class = [_BY_CLASS[name] for name in node.get_attribute_list("class") if name in _BY_CLASS]
+    return HEAD if node.name == "header" else SECTION if node.name == "h2" else next(iter(by_class), None)
+
+
+def _judge(summaries: list[PageElement], verdicts: list[PageElement]) -> None:
+    """Put the last verdict into the summary, and give its bar the colour that goes with the word."""
+    box = next((one for one in summaries if isinstance(one, Tag)), None)
+    last = verdicts[-1] if verdicts else None
+    if box is None or not isinstance(last, Tag):
+        return
+    level = str(last.attrs.pop("data-level", "neutral"))
+    classes = [str(name) for name in box.get_attribute_list("class") if name not in _LEVELS]
+    box["class"] = " ".join([*classes, level])
+    box.append(last)
+
+
+def _main_picture(blocks: list[PageElement]) -> Tag | None:
+    """The figure that stands first: the one marked so, else the first that is not folded away."""
+    figures = [
+        one
+        for block in blocks
+        if isinstance(block, Tag)
+        for one in ([block] if block.name == "figure" else block.find_all("figure"))
+        if one.find("img") and not one.find_parent("details")
+    ]
+    marked = [one for one in figures if one.get("data-main") is not None]
+    return next(iter(marked or figures), None)
+
+
+def _put_first(soup: BeautifulSoup, chosen: Tag | None) -> None:
+    """Put the main picture below summary and alerts, and take away the row that it alone stood in."""
+    if chosen is None:
+        return
+    row = chosen.parent
+    chosen.extract()
+    if row is not None and row.name == "div" and not row.find("figure"):
+        row.extract()
+    above = [one for one in soup.find_all(recursive=False) if _part_of(one) in (HEAD, SUMMARY, ALERT)]
+    above[-1].insert_after(chosen)
+
+
+def _drop_bare_headings(soup: BeautifulSoup) -> None:
+    """Headings of sections whose only figure stands above now, and which say nothing besides."""
+    for heading in soup.find_all(["h2", "h3"]):
+        after = heading.find_next_sibling()
+        if (
+            after is None
+            or after.name == "h2"
+            or (after.name == "h3" and heading.name == "h3")
+            or (after.name == "details" and "method" in after.get_attribute_list("class"))
+        ):
+            heading.decompose()
+
+
+def _number_figures(soup: BeautifulSoup) -> None:
+    """Count figures as they now stand; tables keep their numbers, for they keep their order."""
+    figures = [one for one in soup.find_all("figure") if one.find("img")]
+    for ordinal, figure in enumerate(figures, start=1):
+        box = figure.find("div", class_="scroll")
+        if isinstance(box, Tag) and str(box.get("aria-label", "")).startswith("Figure "):
+            box["aria-label"] = f"Figure {ordinal}"
+        label = figure.select_one("figcaption > b")
+        if label is not None and re.fullmatch(r"Figure \d+\.", label.get_text()):
+            label.string = f"Figure {ordinal}."
+
+
+FILE = DATA / "glossary.toml"
+#: Words of one page at most; those it uses most.
+MOST = 10
+#: Where a word is no running text, or has a meaning of its own.
+_NOT_IN = re.compile("a|h[1-6]|code|pre|summary|math|svg|style|script|title|thead|footer|dl|button")
+
+
+class Word(NamedTuple):
+    """A word: what it is called in the list, how it is written in text, and what it means."""
+
+    name: str
+    match: tuple[str, ...]
+    text: str
+
+    @property
+    def anchor(self) -> str:
+        """The id of its explanation."""
+        return f"word-{slug(self.name)}"
+
+
+@cache
+def words(file: Path = FILE) -> tuple[Word, ...]:
+    """All words of the glossary.
+
+    Raises
+    ------
+    WildlabError
+        If a word lacks a part, or two share a name or a way of writing.
+    """
+    found = []
+    for row in tomllib.loads(file.read_text(encoding="utf-8")).get("word", []):
+        if lacking := [field for field in Word._fields if not row.get(field)]:
+            problem = f"the word {row.get('name', '?')!r} has no {lacking[0]}"
+            raise WildlabError(problem, "write it", file=file.name, field=lacking[0])
+        found.append(Word(row["name"], tuple(row["match"]), row["text"]))
+    spellings = [spelling.lower() for word in found for spelling in word.match]
+    for many in ([word.anchor for word in found], spellings):
+        for one in many:
+            if many.count(one) > 1:
+                raise WildlabError(f"{one!r} is explained twice", "keep one", file=file.name, field="match")
+    return tuple(found)
+
+
+def with_glossary(body: str, known: Sequence[Word] | None = None) -> str:
+    """A page's body with its words explained: a list before the method, and a link at each first use.
+
+    Parameters
+    ----------
+    body
+        HTML.
+    known
+        The words to look for; those of `words` by default.
+
+    Returns
+    -------
+    str
+        HTML; as it was, where it uses none of them.
+    """
+    soup = BeautifulSoup(body, "html.parser")
+    return str(soup) if explain_words(soup, known) else body
+
+
+def explain_words(soup: BeautifulSoup, known: Sequence[Word] | None = None) -> bool:
+    """Explain the words of a page's body, see `with_glossary`; whether it uses any."""
+    known = words() if known is None else known
+    # The longest spelling first; one of small letters also begins a sentence.
+    written = {spelling: word for word in known for spelling in word.match}
+    begun = {one[0].upper() + one[1:]: word for one, word in written.items() if one[0].islower()}
+    by_spelling = begun | written
+    longest = sorted(map(re.escape, by_spelling), key=len, reverse=True)
+    pattern = re.compile(rf"(?<![\w-])(?:{'|'.join(longest)})(?![\w-])")
+    found = [
+        (node, matches)
+        for node in soup.find_all(string=True)
+        if type(node) is NavigableString
+        and (matches := list(pattern.finditer(node)))
+        and not any(_NOT_IN.fullmatch(one.name) for one in node.parents)
+    ]
+    top = soup.find("h2")
+    before = set() if top is None else {id(text) for text in top.find_all_previous(string=True)}
+    uses = Counter(by_spelling[match[0]].name for _, matches in found for match in matches)
+    first = {by_spelling[match[0]].name for node, matches in found if id(node) in before for match in matches}
+    order = {word.name: i for i, word in enumerate(known)}
+    # Those of the first screens come before all others: not everybody reads on.
+    kept = sorted(uses, key=lambda name: (name not in first, -uses[name], order[name]))[:MOST]
+    if not kept:
+        return False
+    waiting = set(kept)
+    # What is folded away is linked only where there is no other use.
+    for node, matches in sorted(found, key=lambda one: one[0].find_parent("details") is not None):
+        pieces: list[PageElement] = []
+        at = 0
+        for match in matches:
+            word = by_spelling[match[0]]
+            if word.name in waiting:
+                waiting.discard(word.name)
+                link = soup.new_tag("a", attrs={"class": "word", "href": f"#{word.anchor}"}, string=match[0])
+                pieces += [NavigableString(node[at : match.start()]), link]
+                at = match.end()
+        if pieces:
+            node.replace_with(*pieces, NavigableString(node[at:]))
+    items = "".join(
+        f'<dt id="{word.anchor}">{escape(word.name)}</dt><dd>{escape(word.text)}</dd>'
+        for word in sorted((word for word in known if word.name in kept), key=lambda word: word.name.lower())
+    )
+    listed = BeautifulSoup(
+        '<details class="plain" id="glossary"><summary>Words used here</summary>'
+        f'<dl class="words">{items}</dl></details>',
+        "html.parser",
+    )
+    method = soup.find("details", class_="method")
+    for part in list(listed.contents):
+        if isinstance(method, Tag):
+            method.insert_before(part)
+        else:
+            soup.append(part)
+    return True
