@@ -115,18 +115,19 @@ _PLACES = re.compile(
 )
 
 
-FOLDER = DATA / "pages"
+#: The folder of templates and styles.
+TEMPLATES = DATA / "pages"
 
 
 def read_style(name: str) -> str:
     """A style sheet of ``data/pages``."""
-    return (FOLDER / f"{name}.css").read_text(encoding="utf-8").strip()
+    return (TEMPLATES / f"{name}.css").read_text(encoding="utf-8").strip()
 
 
 @cache
 def _templates() -> Environment:
     found = Environment(
-        loader=FileSystemLoader(FOLDER),
+        loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
