@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -10,41 +11,35 @@ import pandas as pd
 
 from wildlab.analysis.overviews.verdict import Verdict
 from wildlab.analysis.tracks.judged import LEADING
+from wildlab.messages.catalogue import Message, fill, load_texts
 from wildlab.messages.quantities import NOTHING, area, duration, metres, number, percent, way_length
 from wildlab.names import listed
+from wildlab.paths import DATA
 from wildlab.reporting.charts.drawing import dots_chart
-from wildlab.reporting.layout import LIMITS, arranged, with_glossary
-from wildlab.reporting.notebook_pages import examine
-from wildlab.reporting.own_flights import OwnFlight
-from wildlab.reporting.page import TAGS, page
-from wildlab.reporting.report import open_report
+from wildlab.reporting.layout import LIMITS
+from wildlab.reporting.notebook_pages import finished_page
+from wildlab.reporting.own_flights import OwnFlight, pill_of
+from wildlab.reporting.page import TAGS
+from wildlab.reporting.report import Wording, open_report
 from wildlab.reporting.text import csv_link
 
 #: Rounding errors of what is zero.
 NO_MORE = 1e-9
-#: What is said where a flight lacks a number; the reason follows.
-NOT_MEASURED = "not measured"
 
 
 class Quantity(NamedTuple):
-    """A number that flights are compared by.
+    """A number that flights are compared by, as ``data/compared.toml`` has it.
 
     Attributes
     ----------
-    key
-        Column of the CSV.
-    label
-        What it is called.
-    about
-        The report that gives it.
-    name, subject
-        Of the number there.
-    unit
-        Of the axis of its figure.
-    words
-        Takes value, low and high (NaN where there are none) and gives what the table shows.
+    key, label
+        Column of the CSV, and what it is called.
+    report, name, subject
+        The report that gives it, and the number there.
+    unit, written
+        Of the axis of its figure; how it is written, a key of `FORMATS`.
     n
-        What its ``n`` counts; "" where it says nothing.
+        What its ``n`` counts; "" where nothing.
     goal
         What would be ideal, for the figure; None where there is no such.
     drawn
@@ -53,165 +48,28 @@ class Quantity(NamedTuple):
 
     key: str
     label: str
-    about: str
+    report: str
     name: str
     subject: str
     unit: str
-    words: Callable[[float, float, float], str]
+    written: str
     n: str = ""
     goal: float | None = None
     drawn: bool = False
 
 
-def _m(value: float, low: float, high: float) -> str:
-    return metres(value, low, high) if np.isfinite(low + high) else metres(value)
-
-
-def _unit(unit: str) -> Callable[[float, float, float], str]:
-    return lambda value, low, high: f"{number(value)} {unit}".strip()
-
-
-def _share(value: float, low: float, high: float) -> str:
-    return percent(value, 0)
-
-
-QUANTITIES = (
-    Quantity("duration_s", "length", "overview", "duration", "flight", "s", lambda v, *_: duration(v)),
-    Quantity("path_m", "path", "overview", "path_length", "flight", "m", lambda v, *_: way_length(v)),
-    Quantity(
-        "height_m",
-        "height above ground, median and middle 90 %",
-        "overview",
-        "height_above_ground",
-        "flight",
-        "m",
-        _m,
-        drawn=True,
-    ),
-    Quantity(
-        "images_with_pose",
-        "images with a pose",
-        "overview",
-        "images_with_pose",
-        "flight",
-        "%",
-        _share,
-        "images",
-        1.0,
-        True,
-    ),
-    Quantity(
-        "area_m2",
-        "ground in the images",
-        "overview",
-        "area_seen",
-        "flight",
-        "m²",
-        lambda v, *_: area(v),
-        "images",
-    ),
-    Quantity("detections", "detections", "overview", "detections", "flight", "", _unit("")),
-    Quantity("gnss_hz", "satellite positions", "overview", "rate", "gnss", "Hz", _unit("Hz"), "positions"),
-    Quantity(
-        "gnss_paused_s",
-        "pauses of the satellite receiver",
-        "overview",
-        "paused",
-        "gnss",
-        "s",
-        _unit("s"),
-        "pauses",
-    ),
-    Quantity("imu_hz", "inertial samples", "overview", "rate", "imu", "Hz", _unit("Hz"), "samples"),
-    Quantity(
-        "imu_paused_s",
-        "pauses of the inertial sensor",
-        "overview",
-        "paused",
-        "imu",
-        "s",
-        _unit("s"),
-        "pauses",
-    ),
-    Quantity(
-        "shaking_max",
-        "strongest shaking",
-        "overview",
-        "shaking_max",
-        "flight",
-        "m/s²",
-        _unit("m/s²"),
-        "samples",
-        None,
-        True,
-    ),
-    Quantity(
-        "error_mean_m",
-        "mean error of a position",
-        "georeferencing",
-        "horizontal_error_mean",
-        "logged-pose",
-        "m",
-        _m,
-        "points",
-        None,
-        True,
-    ),
-    Quantity(
-        "error_p90_m",
-        "error of nine in ten",
-        "georeferencing",
-        "horizontal_error_p90",
-        "logged-pose",
-        "m",
-        _m,
-        "points",
-        None,
-        True,
-    ),
-    Quantity("gain_m", "gain by its cause", "georeferencing", "gain", "winner", "m", _m, "points", 0.0, True),
-    Quantity(
-        "ellipses_hold",
-        "truth in the 90 % ellipses",
-        "georeferencing",
-        "ellipse_coverage_90",
-        "logged-pose",
-        "%",
-        _share,
-        "points",
-        0.9,
-        True,
-    ),
-    Quantity("roll_deg", "roll against the reference", "navigation", "rms_roll", "mekf", "°", _unit("°")),
-    Quantity("pitch_deg", "pitch against the reference", "navigation", "rms_pitch", "mekf", "°", _unit("°")),
-    Quantity(
-        "yaw_deg", "yaw against the reference", "navigation", "rms_yaw", "mekf", "°", _unit("°"), drawn=True
-    ),
-    Quantity(
-        "track_rmse_m",
-        "track error",
-        "tracking",
-        "rmse",
-        "leading filter",
-        "m",
-        _unit("m"),
-        "comparisons",
-        None,
-        True,
-    ),
-    Quantity(
-        "track_nees_inside",
-        "NEES of the track inside its 95 % band",
-        "tracking",
-        "fraction_nees_inside",
-        "leading filter",
-        "%",
-        _share,
-        "comparisons",
-        0.95,
-        True,
-    ),
+QUANTITIES = tuple(
+    Quantity(**row) for row in tomllib.loads((DATA / "compared.toml").read_text("utf-8"))["quantity"]
 )
+#: How value, low and high end (NaN where there are none) of a number are written, with its unit.
+FORMATS: Mapping[str, Callable[[float, float, float, str], str]] = {
+    "duration": lambda value, *_: duration(value),
+    "way": lambda value, *_: way_length(value),
+    "area": lambda value, *_: area(value),
+    "share": lambda value, *_: percent(value, 0),
+    "length": lambda value, low, high, _: metres(value, low, high),
+    "number": lambda value, low, high, unit: f"{number(value)} {unit}".strip(),
+}
 
 
 def entry_of(flight: OwnFlight, quantity: Quantity) -> Mapping[str, Any] | None:
@@ -229,14 +87,14 @@ def entry_of(flight: OwnFlight, quantity: Quantity) -> Mapping[str, Any] | None:
     dict or None
         As ``metrics.json`` has it.
     """
-    report = flight.report(quantity.about)
+    report = flight.report(quantity.report)
     if report is None:
         return None
     entry = report.numbers.get((quantity.name, quantity.subject))
     if quantity.subject == "mekf":
         # What the page on the navigation speaks of, where the receiver's noise was found.
         entry = report.numbers.get((quantity.name, "mekf-receiver"), entry)
-    if quantity.about == "tracking":
+    if quantity.report == "tracking":
         best = next((subject for name, subject in report.numbers if name == LEADING), "ekf")
         alike = [
             one
@@ -259,18 +117,20 @@ def why_not(flight: OwnFlight, quantity: Quantity) -> str:
     -------
     str
     """
-    report = flight.report(quantity.about)
-    overview = flight.report("overview")
+    report, overview = flight.report(quantity.report), flight.report("overview")
     if report is None:
         lacking = [] if overview is None else overview.lacking
-        said = next((one for one in lacking if one.startswith(quantity.about)), "")
-        reason = said.partition("(")[2].removesuffix(")")
-        return reason or f"there is no report on the {quantity.about}"
-    if report.state != "done":
-        return f"the report on the {quantity.about} is {report.state}"
-    if quantity.about == "tracking" and any(name == quantity.name for name, _ in report.numbers):
-        return "several tracks, none of which stands for all"
-    return f"the {quantity.about} has no such number of this flight"
+        reason = next((one for one in lacking if one.startswith(quantity.report)), "")
+        if reason := reason.partition("(")[2].removesuffix(")"):
+            return reason
+        key = "no-report"
+    elif report.state != "done":
+        key = "not-done"
+    else:
+        several = quantity.report == "tracking" and any(name == quantity.name for name, _ in report.numbers)
+        key = "several" if several else "no-number"
+    state = "" if report is None else report.state
+    return fill(load_texts("comparison").answers[key], {}, {"report": quantity.report, "state": state})
 
 
 def flights_table(flights: Sequence[OwnFlight]) -> pd.DataFrame:
@@ -291,7 +151,7 @@ def flights_table(flights: Sequence[OwnFlight]) -> pd.DataFrame:
         row: dict[str, object] = {
             "flight": flight.name,
             "kind": flight.kind,
-            "verdict": flight.verdict or "no overview",
+            "verdict": pill_of(flight)[0],
             "evaluated": flight.finished,
         }
         for quantity in QUANTITIES:
@@ -318,69 +178,70 @@ def comparison_page(flights: Sequence[OwnFlight]) -> str:
         HTML. Other reports are named, not linked: the page is mailed alone.
     """
     report = open_report(study="comparison", kind="computed")
-    report.head(f"{len(flights)} flights compared", ", ".join(flight.name for flight in flights))
-    worst, level = _worst(flights)
-    report.summary([_counted(flights)], level=level, verdict=worst)
-    report.section("Side by side")
-    report.table(
-        _aligned(flights),
-        columns={"quantity": "", **{f"flight{k}": flight.name for k, flight in enumerate(flights)}},
-        caption="Each number with its interval where there is one, and in brackets what it is over.",
-    )
-    figures = [made for quantity in QUANTITIES if quantity.drawn and (made := _figure(flights, quantity))]
+    wording = Wording(report, load_texts("comparison"), {"n": len(flights)})
+    texts, title = wording.texts.subjects, wording.say(wording.texts.subjects["title"])
+    report.head(title, ", ".join(flight.name for flight in flights))
+    report.summary(wording.messages([_counted(flights)]), **_worst(flights, wording))
+    side = wording.texts.tables["flights"]
+    report.section(side.title)
+    names = {f"flight{k}": flight.name for k, flight in enumerate(flights)}
+    report.table(_aligned(flights, texts), columns={"quantity": "", **names}, caption=side.caption)
+    figures = [made for one in QUANTITIES if one.drawn and (made := _figure(flights, one, wording))]
     if figures:
-        report.section("All flights on one axis", "Only what was measured on two flights or more is drawn.")
+        report.section(texts["drawn"], texts["drawn-intro"])
         for k in range(0, len(figures), 2):
             report.figures(figures[k : k + 2])
-    reasons = _reasons(flights)
-    if reasons:
-        report.section("What was not measured, and why", part=LIMITS)
+    if reasons := wording.messages(_reasons(flights)):
+        report.section(texts["reasons"], part=LIMITS)
         report.points(reasons)
-    report.section("Their reports")
+    report.section(texts["reports"])
     report.points(f"{flight.name}: {', '.join(one.about for one in flight.reports)}" for flight in flights)
-    link = csv_link(flights_table(flights), "flights", "All numbers, a row for each flight, as CSV")
-    footer = f"<p>{link or 'All numbers, a row for each flight, are in flights.csv beside this page'}.</p>"
-    body = with_glossary(arranged("\n".join(report.parts)))
-    whole = page(title="Flights compared", body=body, kicker="wildlab › flights › comparison", footer=footer)
-    examine(whole, "comparison")
-    return whole
+    link = csv_link(flights_table(flights), "flights", texts["csv"])
+    return finished_page(
+        report.parts,
+        title=title,
+        name="comparison",
+        kicker="wildlab › flights › comparison",
+        footer=f"<p>{link or texts['beside']}.</p>",
+    )
 
 
-def _worst(flights: Sequence[OwnFlight]) -> tuple[tuple[str, str], str]:
-    """The verdict that presses most, whose it is, and its colour."""
+def _worst(flights: Sequence[OwnFlight], wording: Wording) -> dict[str, Any]:
+    """The verdict that presses most with whose it is, and its colour."""
     words = [flight.verdict or Verdict.UNJUDGED for flight in flights]
     # A flight that could not be judged may be worse than a sound one.
     word = max(words, key=lambda one: 0.5 if one == Verdict.UNJUDGED else one.level)
-    whose = [flight.name for flight, one in zip(flights, words, strict=True) if one == word]
-    return (word, f"So is {listed(whose)}, and nothing here presses more."), word.colour
+    whose = listed([flight.name for flight, one in zip(flights, words, strict=True) if one == word])
+    return {
+        "verdict": (word.value, *wording.messages([Message("worst", {"flights": whose})])),
+        "level": word.colour,
+    }
 
 
-def _counted(flights: Sequence[OwnFlight]) -> str:
-    words = [flight.verdict or "no overview" for flight in flights]
+def _counted(flights: Sequence[OwnFlight]) -> Message:
+    words = [pill_of(flight)[0] for flight in flights]
     counts = "; ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
-    return f"{len(flights)} flights: {counts}."
+    return Message("counted", {"counts": counts})
 
 
-def _aligned(flights: Sequence[OwnFlight]) -> pd.DataFrame:
-    rows: list[dict[str, str]] = []
-
-    def row(label: str, cells: Sequence[str]) -> None:
-        rows.append({"quantity": label, **{f"flight{k}": cell for k, cell in enumerate(cells)}})
-
-    row("verdict", [f"**{flight.verdict or 'no overview'}**" for flight in flights])
-    row("what it is", [TAGS.get(flight.kind, flight.kind) for flight in flights])
-    row("evaluated", [flight.finished or NOTHING for flight in flights])
+def _aligned(flights: Sequence[OwnFlight], texts: Mapping[str, str]) -> pd.DataFrame:
+    rows = [
+        (texts["verdict"], *(f"**{pill_of(flight)[0]}**" for flight in flights)),
+        (texts["kind"], *(TAGS.get(flight.kind, flight.kind) for flight in flights)),
+        (texts["evaluated"], *(flight.finished or NOTHING for flight in flights)),
+    ]
     for quantity in QUANTITIES:
         entries = [entry_of(flight, quantity) for flight in flights]
         if any(entry is not None for entry in entries):
-            row(quantity.label, [NOT_MEASURED if one is None else _cell(one, quantity) for one in entries])
-    return pd.DataFrame(rows)
+            cells = (texts["not-measured"] if one is None else _cell(one, quantity) for one in entries)
+            rows.append((quantity.label, *cells))
+    return pd.DataFrame(rows, columns=["quantity", *(f"flight{k}" for k in range(len(flights)))])
 
 
 def _cell(entry: Mapping[str, Any], quantity: Quantity) -> str:
     value, low, high = (_plain(entry[part]) for part in ("value", "low", "high"))
     over = f" ({entry['n']} {quantity.n})" if quantity.n and entry["n"] is not None else ""
-    return f"{quantity.words(value, low, high)}{over}"
+    return f"{FORMATS[quantity.written](value, low, high, quantity.unit)}{over}"
 
 
 def _plain(value: Any) -> float:
@@ -390,32 +251,36 @@ def _plain(value: Any) -> float:
     return 0.0 if abs(float(value)) < NO_MORE else float(value)
 
 
-def _figure(flights: Sequence[OwnFlight], quantity: Quantity) -> tuple[Any, str, str, str] | None:
+def _figure(
+    flights: Sequence[OwnFlight], quantity: Quantity, wording: Wording
+) -> tuple[Any, str, str, str] | None:
     found = [(flight.name, entry) for flight in flights if (entry := entry_of(flight, quantity)) is not None]
     if len(found) < 2:
         return None
     scale = 100.0 if quantity.unit == "%" else 1.0
-
-    def values(part: str) -> list[float]:
-        return [scale * _plain(entry[part]) for _, entry in found]
-
-    value, low, high = values("value"), values("low"), values("high")
+    value, low, high = (
+        [scale * _plain(entry[part]) for _, entry in found] for part in ("value", "low", "high")
+    )
     least, most = int(np.argmin(value)), int(np.argmax(value))
     unit = f" ({quantity.unit})" if quantity.unit else ""
     title = f"{quantity.label[:1].upper()}{quantity.label[1:]}"
-    of = f"{title}{unit} of {len(found)} of {len(flights)} flights"
-    said = (
-        f"{of}: {number(value[least])} on each."
-        if value[least] == value[most]
-        else f"{of}: least on {found[least][0]}, {number(value[least])}, most on {found[most][0]}, "
-        f"{number(value[most])}."
-    )
+    values = {
+        "what": f"{title}{unit}",
+        "n": len(found),
+        "all": len(flights),
+        "value": number(value[least]),
+        "first": found[least][0],
+        "least": number(value[least]),
+        "last": found[most][0],
+        "most": number(value[most]),
+    }
+    (words,) = wording.messages([Message("same" if value[least] == value[most] else "span", values)])
     goal = None if quantity.goal is None else scale * quantity.goal
     chart = dots_chart([name for name, _ in found], value, low, high, f"{quantity.label}{unit}", title, goal)
-    return chart, quantity.key.replace("_", "-"), said, said
+    return chart, quantity.key.replace("_", "-"), words, words
 
 
-def _reasons(flights: Sequence[OwnFlight]) -> list[str]:
+def _reasons(flights: Sequence[OwnFlight]) -> list[Message]:
     """What flights lack, those that lack the same for the same reason together."""
     found: dict[tuple[str, str], list[str]] = {}
     for flight in flights:
@@ -423,5 +288,6 @@ def _reasons(flights: Sequence[OwnFlight]) -> list[str]:
             if entry_of(flight, quantity) is None:
                 found.setdefault((flight.name, why_not(flight, quantity)), []).append(quantity.label)
     return [
-        f"**{name}**: {', '.join(dict.fromkeys(labels))}: {why}." for (name, why), labels in found.items()
+        Message("reason", {"flight": name, "quantities": ", ".join(dict.fromkeys(labels)), "why": why})
+        for (name, why), labels in found.items()
     ]

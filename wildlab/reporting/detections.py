@@ -17,9 +17,8 @@ from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, percent_of
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
-from wildlab.reporting.layout import ADVICE, arranged, with_glossary
-from wildlab.reporting.notebook_pages import examine
-from wildlab.reporting.page import page
+from wildlab.reporting.layout import ADVICE
+from wildlab.reporting.notebook_pages import finished_page
 from wildlab.reporting.report import Wording, open_report
 
 #: Bytes of pictures on a page at most: it is sent by mail. What has no room is left out, and that is said.
@@ -228,11 +227,7 @@ def detections_page(
         report.section(names["by-image"])
         wording.figure("by-image", detections_by_image(counts))
     _show_details(wording, result, thresholds)
-    whole = page(
-        title=title, body=with_glossary(arranged("\n".join(report.parts))), kicker="wildlab › detections"
-    )
-    examine(whole, name)
-    return whole
+    return finished_page(report.parts, title=title, name=name, kicker="wildlab › detections")
 
 
 def _tiles(result: Mapping[str, Any], names: Mapping[str, str]) -> list[tuple[str, str]]:

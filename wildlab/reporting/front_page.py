@@ -35,9 +35,10 @@ from wildlab.reporting.animation import (
 )
 from wildlab.reporting.own_flights import PAGE as FLIGHTS
 from wildlab.reporting.own_flights import OwnFlight, pill_of
-from wildlab.reporting.page import PILLS, TAGS, page, read_style, render
+from wildlab.reporting.page import PILLS, TAGS, page
 from wildlab.reporting.published_tables import counted
 from wildlab.reporting.status import FIRST_LOOK, Case, Number, StudyStatus
+from wildlab.reporting.text import read_style, render
 
 Array = NDArray[np.float64]
 

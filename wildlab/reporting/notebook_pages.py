@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from html import unescape
 from html.parser import HTMLParser
@@ -256,6 +256,26 @@ def report_page(
         footer=_folded("How to reproduce this page", footer + cited),
     )
     examine(whole, study)
+    return whole
+
+
+def finished_page(parts: Sequence[str], *, title: str, name: str, kicker: str, footer: str = "") -> str:
+    """The whole page of a report that no notebook made, examined.
+
+    Parameters
+    ----------
+    parts
+        HTML of its parts, as `wildlab.reporting.report.Report` has them.
+    title, name
+        Of the page, and what it is called in errors.
+    kicker, footer
+        HTML above and below it.
+    """
+    soup = BeautifulSoup("\n".join(parts), "html.parser")
+    arrange_parts(soup)
+    explain_words(soup)
+    whole = page(title=title, body=str(soup), kicker=kicker, footer=footer)
+    examine(whole, name)
     return whole
 
 

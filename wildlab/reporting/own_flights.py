@@ -7,7 +7,8 @@ from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 from wildlab.analysis.overviews.verdict import Verdict, evidence_of, verdict_of
-from wildlab.reporting.page import PILLS, TAGS, page, render
+from wildlab.reporting.page import PILLS, TAGS, page
+from wildlab.reporting.text import render
 
 #: The page, beside the ledger.
 PAGE = "flights.html"

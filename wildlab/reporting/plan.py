@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 
@@ -20,14 +19,12 @@ from wildlab.analysis.plans.said import count, head_count, hectares, minutes, pe
 from wildlab.flight.readers.area import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
+from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
-from wildlab.reporting.figures import png_bytes as png
-from wildlab.reporting.layout import with_glossary
-from wildlab.reporting.notebook_pages import examine
-from wildlab.reporting.page import page
-from wildlab.reporting.text import escape
+from wildlab.reporting.notebook_pages import finished_page
+from wildlab.reporting.report import Wording, open_report
 
 #: Colours of flights, over and over.
 FLIGHTS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
@@ -66,69 +63,49 @@ def plan_page(
         If the page would break a promise of `wildlab.reporting.notebook_pages.examine`.
     """
     n = len(result["sorties"])
-    title = f"{count(n, 'flight')} of {minutes(result['duration_s'])}{' in all' if n > 1 else ''}"
-    names = ", ".join(one["name"] for one in result["areas"][:4])
+    report = open_report(study="plan", kind="computed")
+    values = {"flights": count(n, "flight"), "time": minutes(result["duration_s"])}
+    wording = Wording(report, load_texts("plan"), values)
+    texts, names = wording.texts.subjects, ", ".join(one["name"] for one in result["areas"][:4])
     more = len(result["areas"]) - 4
     names += f" and {count(more, 'more area')}" if more > 0 else ""
-    place = f"n begins at {origin_text(plan)} (latitude, longitude)" if exact else "where it is, is withheld"
-    parts = [
-        f'<header><h1>{escape(title)}</h1><p class="sub">{escape(names)}; {escape(place)}</p></header>',
-        _summary(result),
-        _tiles(plan, result),
-        "<h2>Where it flies, and what it sees</h2>",
-        _figure(*_map(plan, covered, result)),
-        "<h2>Areas</h2>",
-        _areas(result),
-        "<h2>Flights</h2>",
-        _flights(result),
-    ]
+    (title,) = wording.messages([Message("title-many" if n > 1 else "title")])
+    place = wording.say(texts["exact"], {"origin": origin_text(plan)}) if exact else texts["withheld"]
+    report.head(title, f"{names}; {place}")
+    against = " ".join(result["warnings"])
+    reason = against or wording.texts.answers["no-objection"]
+    word = texts["look-closer" if against else "no-objection"]
+    report.summary(result["sentences"], level="warn" if against else "neutral", verdict=(word, reason))
+    report.tiles(_tiles(plan, result, wording))
+    report.section(texts["map"])
+    _show_map(wording, plan, covered, result)
+    wording.table("areas", _areas(result))
+    wording.table("flights", _flights(result))
     if plan.terrain is not None:
-        parts += ["<h2>Heights</h2>", _figure(*_heights(plan, plan.terrain))]
-    parts += ["<h2>What this rests on</h2>", _points(result["assumed"])]
-    whole = page(title=title, body=with_glossary("\n".join(parts)), kicker="wildlab › plan")
-    examine(whole, "plan")
-    return whole
+        report.section(texts["heights"])
+        _show_heights(wording, plan, plan.terrain)
+    report.section(texts["assumed"])
+    report.points(result["assumed"])
+    return finished_page(report.parts, title=title, name="plan", kicker="wildlab › plan")
 
 
-def _summary(result: Mapping[str, Any]) -> str:
-    first, *then = result["sentences"]
-    against = result["warnings"]
-    level, pill, word = ("warn", "part", "look closer") if against else ("neutral", "", "no objection")
-    reason = " ".join(against) or "No check of the plan objects to it."
-    return (
-        f'<section class="summary {level}" aria-label="Summary"><p><b>{escape(first)}</b> '
-        f'{escape(" ".join(then))}</p><p class="verdict"><span class="pill {pill}">{word}</span> '
-        f"{escape(reason)}</p></section>"
-    )
-
-
-def _tiles(plan: Plan, result: Mapping[str, Any]) -> str:
-    longest = max(one["duration_s"] for one in result["sorties"])
-    tiles = [
-        (minutes(longest), f"the longest flight, from take-off to {_ending(plan)}"),
-        (percent(result["seen"]), "of the ground is seen"),
-    ]
+def _tiles(plan: Plan, result: Mapping[str, Any], wording: Wording) -> list[tuple[str, str]]:
+    texts, longest = wording.texts.subjects, max(one["duration_s"] for one in result["sorties"])
+    # A return of a fixed wing circles over home until the pilot lands it.
+    ending = "landing" if plan.wanted.vehicle == "multicopter" else "home"
+    tiles = [(minutes(longest), texts[f"longest-{ending}"]), (percent(result["seen"]), texts["seen"])]
     if result["expected_finds"] is not None:
-        living = head_count(result["animals"])
-        tiles.append((head_count(result["expected_finds"]), f"finds expected, of {living} animals"))
-    tiles += [
-        (f"{result['height_m']:.0f} m", "above the ground"),
-        (f"{result['animal_pixels']:.0f} px", "across what is looked for"),
-        (f"{result['furthest_m']:.0f} m", "from take-off at the most"),
+        words = wording.say(texts["finds"], {"animals": head_count(result["animals"])})
+        tiles.append((head_count(result["expected_finds"]), words))
+    return [
+        *tiles,
+        (f"{result['height_m']:.0f} m", texts["height"]),
+        (f"{result['animal_pixels']:.0f} px", texts["pixels"]),
+        (f"{result['furthest_m']:.0f} m", texts["furthest"]),
     ]
-    return (
-        '<ul class="tiles">'
-        + "".join(f"<li><b>{escape(big)}</b><span>{escape(small)}</span></li>" for big, small in tiles)
-        + "</ul>"
-    )
 
 
-def _ending(plan: Plan) -> str:
-    """With what a flight ends: a return of a fixed wing circles over home until the pilot lands it."""
-    return "landing" if plan.wanted.vehicle == "multicopter" else "home and down"
-
-
-def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> tuple[Figure, str, str]:
+def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> None:
     fig, ax = new_figure(5.8, 5.2)
     there = [_draw_covered(ax, one) for one in covered]
     for area, name in zip(plan.areas.areas, plan.names, strict=True):
@@ -149,8 +126,6 @@ def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> t
     ax.set(ylim=(low[0] - 0.10 * side.max(), high[0] + 0.06 * side.max()))
     map_axes(ax)
     ax.set_aspect("equal", adjustable="box")
-    rows = len(plan.pattern.rows)
-    ax.set_title(f"{percent(result['seen'])} is seen, in {count(len(plan.sorties), 'flight')}")
     handles, _ = ax.get_legend_handles_labels()
     shown = np.any(there, axis=0)
     handles += [
@@ -159,18 +134,21 @@ def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> t
         if some
     ]
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
-    spread = _extent(plan)
-    alt = (
-        f"Map, north up, of {count(len(plan.areas.areas), 'area')} over {spread[0]:.0f} m by "
-        f"{spread[1]:.0f} m with {count(rows, 'row')} of "
-        f"{count(len(plan.sorties), 'flight')} and the take-off point."
-    )
-    alt += " " + " ".join(
+    north, east = np.ptp(np.concatenate([area.outline for area in plan.areas.areas]), axis=0)
+    each = " ".join(
         f"{one['name']}: {percent(one['seen'])} seen, {percent(one['hidden'])} hidden, "
         f"{percent(one['blurred'])} blurred."
         for one in result["areas"][:NAMED]
     )
-    return fig, alt, "North is up. Arrows show which way a row is flown; the triangle is the take-off point."
+    wording.values |= {
+        "seen": percent(result["seen"]),
+        "areas": count(len(plan.areas.areas), "area"),
+        "rows": count(len(plan.pattern.rows), "row"),
+        "north": f"{north:.0f}",
+        "east": f"{east:.0f}",
+        "each": each,
+    }
+    wording.figure("map", fig, main=True)
 
 
 def _drawn(plan: Plan) -> tuple[Array, Array]:
@@ -205,7 +183,7 @@ def _draw_covered(ax: Axes, one: Covered) -> list[bool]:
     return [bool((which & one.inside).any()) for which in kinds]
 
 
-def _heights(plan: Plan, terrain: Terrain) -> tuple[Figure, str, str]:
+def _show_heights(wording: Wording, plan: Plan, terrain: Terrain) -> None:
     """The ground below each flight, and the way above it, from the take-off point's height."""
     fig, ax = new_figure(6.0, 3.0)
     base = float(plan.sorties[0].way.ground[0])
@@ -221,13 +199,14 @@ def _heights(plan: Plan, terrain: Terrain) -> tuple[Figure, str, str]:
         low, high = min(low, float(np.nanmin(ground))), max(high, float(way.height.max()) - base)
         top, begin = max(top, float(np.nanmax(ground))), float(along[-1])
     ax.set(xlabel="way (km)", ylabel="above take-off (m)", ylim=(low - 5, high + 10), xlim=(0, begin / 1000))
-    least, most = min(one.way.least for one in plan.sorties), max(one.way.most for one in plan.sorties)
-    ax.set_title(f"{least:.0f} to {most:.0f} m above the ground")
-    alt = (
-        f"The way and the ground below it over {begin / 1000:.1f} km. From the take-off point, the ground "
-        f"lies between {low:.0f} and {top:.0f} m; the way is {least:.0f} to {most:.0f} m above it."
-    )
-    return fig, alt, "The flights one after the other, each in its colour of the map."
+    wording.values |= {
+        "least": f"{min(one.way.least for one in plan.sorties):.0f}",
+        "most": f"{max(one.way.most for one in plan.sorties):.0f}",
+        "way": f"{begin / 1000:.1f}",
+        "low": f"{low:.0f}",
+        "high": f"{top:.0f}",
+    }
+    wording.figure("heights", fig)
 
 
 def _draw_area(ax: Axes, area: Area, name: str) -> None:
@@ -262,87 +241,41 @@ def _arrow(ax: Axes, row: Array, colour: str) -> None:
     )
 
 
-def _extent(plan: Plan) -> Array:
-    points = np.concatenate([area.outline for area in plan.areas.areas])
-    return np.asarray(np.ptp(points, axis=0))
-
-
-def _flights(result: Mapping[str, Any]) -> str:
-    battery = any(one["of_battery"] is not None for one in result["sorties"])
-    heads = ["flight", "areas", "time", "of a battery", "rows", "way points", "km", "above ground, m"]
+def _flights(result: Mapping[str, Any]) -> pd.DataFrame:
     rows = []
     for one in result["sorties"]:
         low, high = one["least_above_ground_m"], one["most_above_ground_m"]
-        span = f"{low:.0f}" if round(low) == round(high) else f"{low:.0f} to {high:.0f}"
+        used = one["of_battery"]
         rows.append(
-            [
-                one["name"],
-                ", ".join(one["areas"]),
-                minutes(one["duration_s"]),
-                NOTHING if one["of_battery"] is None else f"{100 * one['of_battery']:.0f} %",
-                str(one["rows"]),
-                str(one["way_points"]),
-                f"{one['length_m'] / 1000:.1f}",
-                span,
-            ]
+            {
+                "flight": one["name"],
+                "areas": ", ".join(one["areas"]),
+                "time": minutes(one["duration_s"]),
+                "battery": NOTHING if used is None else f"{100 * used:.0f} %",
+                "rows": one["rows"],
+                "points": one["way_points"],
+                "km": one["length_m"] / 1000,
+                "above": f"{low:.0f}" if round(low) == round(high) else f"{low:.0f} to {high:.0f}",
+            }
         )
-    if not battery:
-        heads, rows = _without(3, heads, rows)
-    return _table(heads, rows, text=2)
+    return pd.DataFrame(rows)
 
 
-def _areas(result: Mapping[str, Any]) -> str:
-    heads = ["area", "size", "seen", "hidden", "finds", "rows", "row distance, m", "time"]
-    rows = [
+def _areas(result: Mapping[str, Any]) -> pd.DataFrame:
+    return pd.DataFrame(
         [
-            one["name"],
-            hectares(one["size_m2"]),
-            percent(one["seen"]),
-            percent(one["hidden"]),
-            NOTHING
-            if one["expected_finds"] is None
-            else f"{head_count(one['expected_finds'])} of {head_count(one['animals'])}",
-            str(one["rows"]),
-            f"{one['row_distance_m']:.1f}",
-            minutes(one["seconds"]),
+            {
+                "area": one["name"],
+                "size": hectares(one["size_m2"]),
+                "seen": percent(one["seen"]),
+                "hidden": percent(one["hidden"]),
+                "finds": NOTHING
+                if one["expected_finds"] is None
+                else f"{head_count(one['expected_finds'])} of {head_count(one['animals'])}",
+                "rows": one["rows"],
+                "distance": one["row_distance_m"],
+                "time": minutes(one["seconds"]),
+            }
+            for one in result["areas"]
         ]
-        for one in result["areas"]
-    ]
-    if all(one["expected_finds"] is None for one in result["areas"]):
-        heads, rows = _without(4, heads, rows)
-    note = (
-        '<p class="note">Times are of rows and the turns between them, without the ways there and back.</p>'
-    )
-    return _table(heads, rows, text=1) + note
-
-
-def _without(column: int, heads: list[str], rows: list[list[str]]) -> tuple[list[str], list[list[str]]]:
-    return heads[:column] + heads[column + 1 :], [row[:column] + row[column + 1 :] for row in rows]
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], text: int) -> str:
-    """A table whose first columns are words."""
-
-    def kind(column: int) -> str:
-        return ' class="text"' if column < text else ""
-
-    head = "".join(f'<th scope="col"{kind(k)}>{escape(one)}</th>' for k, one in enumerate(heads))
-    body = "".join(
-        f'<tr><th scope="row" class="text">{escape(row[0])}</th>'
-        + "".join(f"<td{kind(k)}>{escape(one)}</td>" for k, one in enumerate(row[1:], start=1))
-        + "</tr>"
-        for row in rows
-    )
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def _points(sentences: Sequence[str]) -> str:
-    return "<ul>" + "".join(f"<li>{escape(one)}</li>" for one in sentences) + "</ul>"
-
-
-def _figure(figure: Figure, alt: str, caption: str) -> str:
-    encoded = base64.b64encode(png(figure)).decode("ascii")
-    return (
-        f'<figure><img alt="{escape(alt)}" src="data:image/png;base64,{encoded}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
     )

@@ -16,9 +16,10 @@ from typing import NamedTuple
 from markupsafe import Markup
 
 from wildlab.evaluation.replication import KINDS, Closeness, Compatibility
-from wildlab.reporting.page import page, read_style, render
+from wildlab.reporting.page import page
 from wildlab.reporting.published_tables import PREDICTED, WIDEST, Counts, counted, groups_table, tally
 from wildlab.reporting.status import FIRST_LOOK, Number, Standing, StudyStatus, standing
+from wildlab.reporting.text import read_style, render
 
 #: Answers to "close?" in the order in which they are drawn, the last on top, and how each is drawn.
 SHAPES: dict[str, tuple[str, str]] = {
