@@ -21,7 +21,17 @@ from wildlab.messages.quantities import known, number, percent, percent_between
 from wildlab.reporting.figures import QUICK, new_figure
 from wildlab.reporting.metrics import claim, document, metric, read_metrics, write_metrics
 from wildlab.reporting.report import Report, open_report
-from wildlab.reporting.text import MOST_BYTES, csv_link, data_link, escape, inline, maths, prose, slug, table_html
+from wildlab.reporting.text import (
+    MOST_BYTES,
+    csv_link,
+    data_link,
+    escape,
+    inline,
+    maths,
+    prose,
+    slug,
+    table_html,
+)
 
 
 def report(out: Path | None = None, study: str = "consistency-bounds") -> Report:
