@@ -27,8 +27,9 @@ from wildlab.reporting.metrics import metric
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
 from wildlab.runner.track import track_many
-from wildlab.sharing import generalise, redrawn
+from wildlab.sharing import generalisation as generalise
 from wildlab.sharing import names as neutral
+from wildlab.sharing import recomputation as redrawn
 from wildlab.sharing.share import share
 
 HERE = {"latitude_deg": -24.873165, "longitude_deg": 31.486297, "height_m": 317.43}
