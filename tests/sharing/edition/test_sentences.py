@@ -27,7 +27,7 @@ def keys(items: tuple[Message, ...]) -> list[str]:
 
 def test_a_flight_of_which_all_is_known():
     story = tell(WHOLE)
-    assert keys(story.measured) == ["measured.error_steps", "measured.track", "measured.things"]
+    assert keys(story.measured) == ["measured.error", "measured.track", "measured.things"]
     assert keys(story.advice) == ["do.cause_boresight", "do.images_without_pose", "do.trouble_few_satellites"]
     assert keys(story.wrong) == ["trouble.few_satellites", "lost.images_without_pose"]
     assert story.trusted and story.verdict.key == "verdict.fix" and story.next == story.advice[0]
@@ -47,7 +47,7 @@ def test_a_part_that_failed_is_not_known_and_asked_for_again():
 
 def test_few_points_say_nothing_of_accuracy():
     story = tell(WHOLE._replace(compared=9))
-    assert "measured.error_steps" not in keys(story.measured) and "unknown.few" in keys(story.unknown)
+    assert "measured.error" not in keys(story.measured) and "unknown.few" in keys(story.unknown)
     assert all(label.key != "tile.error" for _, label in story.tiles)
     assert "do.more_places" in keys(story.advice)
 
