@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.order_statistics import LEVEL, prediction_interval, prediction_rank
@@ -25,6 +26,7 @@ from wildlab.evaluation.replication import (
     not_judged,
 )
 from wildlab.evaluation.runs import share_interval
+from wildlab.flight.files import Strict, check_model
 from wildlab.paths import DATA
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.status import MISSING, Number
@@ -217,48 +219,60 @@ if TYPE_CHECKING:
 
 FOLDER = DATA / "published"
 
-_REQUIRED: dict[str, dict[str, Any]] = {
-    "number": {
-        "study": str,
-        "name": str,
-        "subject": str,
-        "value": (Decimal, int),
-        "unit": str,
-        "source": str,
-    },
-    "claim": {"study": str, "id": str, "text": str, "source": str},
-}
-_OPTIONAL: dict[str, dict[str, Any]] = {
-    "number": {
-        "within": (Decimal, int),
-        "kind": str,
-        "runs": int,
-        "again": bool,
-        "fitted": str,
-        "unjudged": str,
-    },
-    "claim": {
-        "premise": str,
-        "threshold": (Decimal, int),
-        "reason": str,
-        "own": bool,
-        "fitted": str,
-        "needs": str,
-    },
-}
 CALCULATED, MEAN_OF_RUNS, ONE_FLIGHT = "calculated", "mean of runs", "one flight"
 #: Of a rate: all images of all flights together are compared, not one flight's.
 SHARE_OF_IMAGES = "share of images"
-#: What a file says of all its numbers, and the words allowed; the first is taken where it says nothing.
-_OF_FILE = {
-    "kind": (ONE_FLIGHT, CALCULATED, MEAN_OF_RUNS, SHARE_OF_IMAGES),
-    "signs": ("defined", "undefined"),
-    "last_digit": ("rounded", "within one"),
-}
 _COLUMNS = [
     *("name", "subject", "value", "digits", "unit", "source", "rounding"),
     *("kind", "by_size", "runs", "again", "fitted", "unjudged"),
 ]
+#: A number in print, 7.90 or 5, without quotes.
+Printed = Annotated[Decimal, Field(strict=True)] | Annotated[int, Field(strict=True)]
+Kind = Literal["one flight", "calculated", "mean of runs", "share of images"]
+
+
+class PublishedNumber(Strict):
+    """An entry ``[[number]]``. Decimals keep the digits of the print: 7.90 says how far it can be trusted."""
+
+    study: str
+    name: str
+    subject: str
+    value: Printed
+    unit: str
+    source: str
+    within: Printed | None = None
+    kind: Kind | None = None
+    runs: int | None = None
+    again: bool = False
+    fitted: str = ""
+    unjudged: str = ""
+
+
+class PublishedClaim(Strict):
+    """An entry ``[[claim]]``."""
+
+    study: str
+    id: str
+    text: str
+    source: str
+    premise: str | None = None
+    threshold: Printed | None = None
+    reason: str | None = None
+    own: bool = False
+    fitted: str = ""
+    needs: str | None = None
+
+
+class PublishedFile(Strict):
+    """A whole file, and what it says of all its numbers."""
+
+    kind: Kind = "one flight"
+    signs: Literal["defined", "undefined"] = "defined"
+    last_digit: Literal["rounded", "within one"] = "rounded"
+    number: tuple[PublishedNumber, ...] = ()
+    claim: tuple[PublishedClaim, ...] = ()
+
+
 #: What a quantity is, by its name; the first pattern that fits.
 _QUANTITIES = (
     (re.compile(r"(mean_)?sd_\w+"), "standard deviation"),
@@ -337,30 +351,26 @@ def quantity_kind(name: str) -> str:
 def published_rows(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
     """The rows of `load_published`, with its arguments and errors."""
     rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for entry in _entries("number", folder):
-        if entry["study"] != study:
-            continue
-        name, subject = entry["name"], entry["subject"]
-        if (name, subject) in rows:
-            raise WildlabError(
-                f"{name} of {subject} of study {study!r} is given twice", "keep one of them", file=folder.name
-            )
-        rows[name, subject] = {
-            "name": name,
-            "subject": subject,
-            "value": float(entry["value"]),
-            "digits": _decimals(entry["value"]),
-            "unit": entry["unit"],
-            "source": entry["source"],
-            "rounding": _rounding(entry),
-            "kind": entry["kind"],
-            "by_size": entry["signs"] == "undefined" and quantity_kind(name) == "signed mean",
-            "runs": float(entry.get("runs", math.nan)),
-            "again": bool(entry.get("again", False)),
-            "fitted": entry.get("fitted", ""),
-            "unjudged": entry.get("unjudged", ""),
+    for file, one in _numbers(study, folder):
+        key = one.name, one.subject
+        if key in rows:
+            problem = f"{one.name} of {one.subject} of study {study!r} is given twice"
+            raise WildlabError(problem, "keep one of them", file=folder.name)
+        rows[key] = {
+            **one.model_dump(include={"name", "subject", "unit", "source", "again", "fitted", "unjudged"}),
+            "value": float(one.value),
+            "digits": _decimals(one.value),
+            "rounding": _rounding(one, file),
+            "kind": one.kind or file.kind,
+            "by_size": file.signs == "undefined" and quantity_kind(one.name) == "signed mean",
+            "runs": math.nan if one.runs is None else float(one.runs),
         }
     return list(rows.values())
+
+
+def _numbers(study: str, folder: Path) -> Iterator[tuple[PublishedFile, PublishedNumber]]:
+    for file in _files(folder):
+        yield from ((file, one) for one in file.number if one.study == study)
 
 
 def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
@@ -378,81 +388,45 @@ def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
     -------
     list of dict
     """
-    return [dict(entry) for entry in _entries("claim", folder) if entry["study"] == study]
+    return [
+        one.model_dump(exclude_unset=True)
+        for file in _files(folder)
+        for one in file.claim
+        if one.study == study
+    ]
 
 
-def _entries(kind: str, folder: Path) -> list[dict[str, Any]]:
-    entries: list[dict[str, Any]] = []
+def _files(folder: Path) -> list[PublishedFile]:
+    found = []
     for path in sorted(folder.glob("*.toml")):
         try:
             state = path.stat()
-            entries += _read(path, kind, state.st_mtime_ns, state.st_size)
+            found.append(_read(path, state.st_mtime_ns, state.st_size))
         except (OSError, ValueError) as error:
             raise WildlabError(f"it cannot be read ({error})", "mend the file", file=path.name) from error
-    return entries
+    return found
 
 
 @lru_cache(maxsize=256)
-def _read(path: Path, kind: str, changed: int, size: int) -> list[dict[str, Any]]:
-    """The entries of a file, read once as long as it stays the same: each study asks for all of them."""
-    # Decimals, so that 7.90 keeps its second digit: it says how far the print can be trusted.
+def _read(path: Path, changed: int, size: int) -> PublishedFile:
+    """A file, read once as long as it stays the same: each study asks for all of them."""
     content = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
-    unknown = set(content) - set(_REQUIRED) - set(_OF_FILE)
-    if unknown:
-        raise WildlabError(
-            f"the table [[{min(unknown)}]] is unknown", "use [[number]] or [[claim]]", file=path.name
-        )
-    of_file = {key: content.get(key, words[0]) for key, words in _OF_FILE.items()}
-    for key, value in of_file.items():
-        _check_word(key, value, path.name, key)
-    values = [entry.get("value", 0) for entry in content.get("number", [])]
-    of_file["digits"] = max((_decimals(one) for one in values if isinstance(one, (Decimal, int))), default=0)
-    for index, entry in enumerate(content.get(kind, []), 1):
-        _check_entry(entry, kind, f"[[{kind}]] {index}", path.name)
-    return [of_file | entry if kind == "number" else dict(entry) for entry in content.get(kind, [])]
+    file = check_model(PublishedFile, content, Path(path.name))
+    for one in file.number:
+        metric(one.name, one.subject, float(one.value), one.unit)
+    return file
 
 
-def _check_word(key: str, value: Any, file: str, where: str) -> None:
-    words = _OF_FILE[key]
-    if value not in words:
-        raise WildlabError(f"{key!r} is {value!r}", f"use one of: {', '.join(words)}", file=file, field=where)
-
-
-def _check_entry(entry: dict[str, Any], kind: str, where: str, file: str) -> None:
-    types = _REQUIRED[kind] | _OPTIONAL[kind]
-    for key in _REQUIRED[kind]:
-        if key not in entry:
-            raise WildlabError(f"{key!r} is missing", "add it", file=file, field=where)
-    for key, value in entry.items():
-        if key not in types:
-            raise WildlabError(
-                f"the key {key!r} is unknown", f"use: {', '.join(types)}", file=file, field=where
-            )
-        if not isinstance(value, types[key]) or (isinstance(value, bool) and types[key] is not bool):
-            raise WildlabError(
-                f"{key!r} is {value!r}",
-                "give text in quotes, a number without, or true",
-                file=file,
-                field=where,
-            )
-    if "kind" in entry:
-        _check_word("kind", entry["kind"], file, where)
-    if kind == "number":
-        if not math.isfinite(entry["value"]) or not math.isfinite(entry.get("within", 0)):
-            raise WildlabError("a number is not finite", "give the printed value", file=file, field=where)
-        metric(entry["name"], entry["subject"], float(entry["value"]), entry["unit"])
-
-
-def _rounding(entry: Mapping[str, Any]) -> float:
+def _rounding(one: PublishedNumber, file: PublishedFile) -> float:
     """What the print leaves open to each side: half of the last digit, or of one of so many images."""
-    if "within" in entry:
-        return float(entry["within"])
-    if entry["last_digit"] == "within one":
+    if one.within is not None:
+        return float(one.within)
+    if file.last_digit == "within one":
         # One table, one last digit: 21 stands beside 21.2, its zero left out.
-        return float(10.0 ** -entry["digits"])
-    if "runs" in entry and entry["kind"] != MEAN_OF_RUNS:
-        return 0.5 / float(entry["runs"])
-    return float(0.5 * 10.0 ** -_decimals(entry["value"]))
+        return float(10.0 ** -max(_decimals(other.value) for other in file.number))
+    if one.runs is not None and (one.kind or file.kind) != MEAN_OF_RUNS:
+        return 0.5 / float(one.runs)
+    return float(0.5 * 10.0 ** -_decimals(one.value))
 
 
 def _decimals(value: Decimal | int) -> int:
