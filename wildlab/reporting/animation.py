@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import ellipse_axes
 from wildlab.messages.quantities import nice_length
-from wildlab.reporting.text import escape
+from wildlab.reporting.text import escape, read_style
 
 Array = NDArray[np.float64]
 
@@ -160,24 +160,7 @@ AIRCRAFT = (
 )
 
 # The page's own colours where it has them. Only water and the sheet that the camera lights have none there.
-STYLE = """.flown{--from:#dcebf2;--to:#b7d5e3;--lit:#fff;--point:#c2500a;display:block;width:100%;height:auto;
-overflow:hidden;border-radius:.8rem;color:var(--ink,#18222d);background:linear-gradient(var(--from),var(--to))}
-.flown text{font:13px system-ui,sans-serif;fill:currentColor}
-.flown .gone{fill:none;stroke:currentColor;stroke-opacity:.34;stroke-width:1.3;stroke-dasharray:2 5}
-.flown .true{fill:none;stroke:currentColor;stroke-width:1.4;stroke-dasharray:6 4;stroke-opacity:.8}
-.flown .cross{fill:none;stroke:currentColor;stroke-width:2.4}
-.flown .lit{fill:var(--lit);fill-opacity:.36;stroke:var(--lit);stroke-opacity:.9;stroke-linejoin:round}
-.flown .held{fill:var(--blue,#0072b2);fill-opacity:.16;stroke:var(--blue,#0072b2);stroke-width:2}
-.flown .point{fill:var(--point)}.flown .points{stroke:var(--point);stroke-width:6;stroke-linecap:round}
-.flown .craft{fill:currentColor}.flown .rule{fill:none;stroke:currentColor;stroke-width:1.8}
-.flown .still{display:none}
-.halt[open]+.flown .moves{display:none}.halt[open]+.flown .still{display:inline}
-@media screen and (prefers-color-scheme:dark){.flown{--from:#1d3f52;--to:#142c3b;--lit:#cfe6f2;
---point:#ff9d5c}
-.flown .lit{fill-opacity:.17;stroke-opacity:.6}}
-@media (prefers-reduced-motion:reduce){.flown .moves{display:none}.flown .still{display:inline}}
-@media print{.flown .moves{display:none}.flown .still{display:inline}
-.flown{print-color-adjust:exact;-webkit-print-color-adjust:exact}}"""
+STYLE = read_style("flight")
 
 
 class _Map(NamedTuple):
@@ -277,11 +260,7 @@ def pausable(svg: str) -> str:
 
 
 #: How the fold of `pausable` looks; for the page's style.
-PAUSE_STYLE = """.motion{display:flex;flex-direction:column-reverse}
-.halt,details.halt{border:0;margin:.25rem 0 0;padding:0;font-size:.82rem}
-.halt .go,.halt[open] .stop{display:none}
-.halt[open] .go{display:inline}
-@media (prefers-reduced-motion:reduce){.halt{display:none}}@media print{.halt{display:none}}"""
+PAUSE_STYLE = read_style("pause")
 
 
 def _within(shown: ShownFlight) -> ShownFlight:

@@ -25,7 +25,7 @@ from wildlab.errors import WildlabError
 from wildlab.paths import PACKAGE, ROOT
 from wildlab.reporting.layout import VERDICT, arrange_parts, explain_words
 from wildlab.reporting.page import page
-from wildlab.reporting.text import escape, maths
+from wildlab.reporting.text import escape, maths, read_style
 
 
 def read_notebook(path: Path) -> nbformat.NotebookNode:
@@ -417,19 +417,7 @@ class _Examiner(HTMLParser):
 #: The classes of nbconvert's own wrappers.
 _WRAPPERS = re.compile("^(cell|inner_cell|output(_wrapper|_area|_subarea)?|text_cell_render|prompt|input)$")
 # Code at a line in blue, what it printed on grey. The colours hold 4.5:1 on white.
-TUTORIAL_STYLE = """
-.highlight pre { background: none; border-left: 3px solid var(--blue); padding: .1rem 0 .1rem .9rem;
-  margin: 1.1rem 0 .6rem }
-.highlight .k, .highlight .kn, .highlight .kc, .highlight .ow { color: var(--link); font-weight: 600 }
-.highlight .s1, .highlight .s2, .highlight .sa, .highlight .s { color: var(--good) }
-.highlight .c1 { color: var(--dim); font-style: italic }
-.highlight .mi, .highlight .mf { color: var(--warn) }
-table { width: auto }
-tbody th { text-align: left }
-caption { text-align: left; font-weight: 600; padding: .3rem 0 }
-caption ~ tbody td, caption ~ tbody th { text-align: left; white-space: normal; max-width: 34rem }
-figure img { width: auto }
-@media print { pre { white-space: pre-wrap; break-inside: avoid } }"""
+TUTORIAL_STYLE = read_style("tutorial")
 
 
 def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "") -> str:

@@ -14,22 +14,13 @@ from bs4 import BeautifulSoup
 
 from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import Flight
+from wildlab.messages.catalogue import fill, load_texts
 from wildlab.reporting.metrics import AGAINST
 from wildlab.runner.record.own_flights import finished_metrics
 from wildlab.sharing.names import Names, hulls_of
 
 #: What remains in a copy whatever is done to its numbers, for whoever knows where to look.
-REMAINS = (
-    "The path has its shape: rows look the same everywhere, but a path along a river, a road or a fence can "
-    "be laid on a map of them. So can the tracks of animals.",
-    "North is up, and lengths are true: both are what the report is about.",
-    "Heights and their changes along a path that follows the ground are those of the ground. Terrain is not "
-    "drawn, yet enough of such heights can be laid on an elevation map.",
-    "Who has the flight's raw logs, or was there, knows it again by its numbers: a copy hides the place from "
-    "strangers, not the flight from those who know it.",
-    "Two flights that both name a cell, and are known to be of one place, tell where their cells meet.",
-    "What you write around the file (subject, file name, the address it comes from) is not looked at.",
-)
+REMAINS = load_texts("sharing").limits
 
 
 @dataclass(frozen=True)
@@ -295,15 +286,14 @@ def agreement_words(found: Agreement) -> str:
     """For the page: what it says of its own numbers; nothing where nothing was compared."""
     if not found.compared:
         return ""
-    if found.same == found.compared:
-        return (
-            f"All {found.compared} numbers are those of the report that was made from the exact data, to "
-            f"{SAME:.1%} or better."
-        )
-    return (
-        f"Of {found.compared} numbers, {found.same} are those of the report that was made from the exact "
-        f"data, to {SAME:.1%} or better; the others differ, by {found.worst:.1%} at most."
-    )
+    values = {
+        "compared": found.compared,
+        "same": found.same,
+        "to": f"{SAME:.1%}",
+        "worst": f"{found.worst:.1%}",
+    }
+    key = "agrees" if found.same == found.compared else "differs"
+    return fill(load_texts("sharing").answers[key], {}, values)
 
 
 def _neutral(subject: str, names: Names) -> str:

@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, read_toml
 from wildlab.flight.manifest_parts import LocationsPart
+from wildlab.messages.catalogue import fill, load_texts
 from wildlab.paths import DATA
 
 Tier = Literal["public", "partner", "team"]
@@ -259,26 +260,25 @@ def round_up(metres: float) -> float:
 
 def place_words(cell: Cell | None) -> str:
     """Where it was, in words; without a cell, that it is not told."""
+    texts = load_texts("sharing").answers
     if cell is None:
-        return "The place is withheld: distances are in metres from a point that is not named."
-    lat, lon = _side(cell.latitude_deg, "N", "S"), _side(cell.longitude_deg, "E", "W")
-    return (
-        f"The flight was near {lat}, {lon}: in a cell of {cell.size_deg:g}° about that point, which is up "
-        f"to {distance_words(cell.uncertainty_m)} from it. Distances are in metres from a point that is not "
-        "named."
-    )
+        return texts["withheld"]
+    values = {
+        "latitude": _side(cell.latitude_deg, "N", "S"),
+        "longitude": _side(cell.longitude_deg, "E", "W"),
+        "size": f"{cell.size_deg:g}",
+        "uncertainty": distance_words(cell.uncertainty_m),
+    }
+    return fill(texts["cell"], {}, values)
 
 
 def generalisation_words(cell: Cell | None, category: int) -> str:
     """The text for Darwin Core's ``dataGeneralizations`` (or ``informationWithheld``)."""
-    of = f"(category {category} of GBIF's guide to sensitive species)"
+    texts, values = load_texts("sharing").answers, {"category": str(category)}
     if cell is None:
-        return f"informationWithheld: coordinates, heights above sea level and terrain withheld {of}."
-    return (
-        f"dataGeneralizations: coordinates rounded to {cell.size_deg:g} degrees {of}; "
-        f"coordinateUncertaintyInMeters {cell.uncertainty_m:.0f}; heights above sea "
-        "level and terrain withheld."
-    )
+        return fill(texts["information-withheld"], {}, values)
+    values |= {"size": f"{cell.size_deg:g}", "metres": f"{cell.uncertainty_m:.0f}"}
+    return fill(texts["data-generalizations"], {}, values)
 
 
 def distance_words(metres: float) -> str:
