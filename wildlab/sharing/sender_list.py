@@ -20,7 +20,7 @@ from wildlab.runner.record.own_flights import finished_metrics
 from wildlab.sharing.names import Names, hulls_of
 
 #: What remains in a copy whatever is done to its numbers, for whoever knows where to look.
-REMAINS = load_texts("sharing").limits
+REMAINS = tuple(text for key, text in load_texts("sharing").answers.items() if key.startswith("remains-"))
 
 
 @dataclass(frozen=True)
