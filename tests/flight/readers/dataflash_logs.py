@@ -222,9 +222,6 @@ def second_generation(truth: Truth, seconds: float = 40.0, origin: bool = True) 
 
 # Columns of ATT stand in another order than any release had them.
 THIRD = """
-    UNIT QbZ TimeUS,Id,Label
-    MULT Qbd TimeUS,Id,Mult
-    FMTU QBNN TimeUS,FmtType,UnitIds,MultIds
     VER QBZ TimeUS,Maj,FWS
     ATT cQCc Pitch,TimeUS,Yaw,Roll
     XKQ QBffff TimeUS,C,Q1,Q2,Q3,Q4
@@ -241,18 +238,9 @@ THIRD = """
 
 
 def third_generation(truth: Truth, seconds: float = 40.0, attitude: bool = True) -> Log:
-    """An instance per sensor, units beside, ACC and GYR apart, a gimbal, images numbered; no fix at first."""
+    """An instance per sensor, ACC and GYR apart, a gimbal, images numbered; no fix at first."""
     log = Log(THIRD)
     began = round(truth.boot_s * 1e6)
-    units = {"-": "", "s": "s", "#": "instance", "G": "Gauss", "d": "deg", "h": "degheading", "k": "deg/s"}
-    for letter, label in units.items():
-        log.add("UNIT", began, ord(letter), label)
-    for letter, value in {"-": 0, "0": 1, "B": 0.01, "C": 0.001, "F": 1e-6}.items():
-        log.add("MULT", began, ord(letter), value)
-    log.add("FMTU", began, log.kinds["MAG"][0], "s#GGG-s", "F-CCC-F")
-    log.add("FMTU", began, log.kinds["ATT"][0], "dshd", "BFBB")
-    # Rates in degrees: no release logs them so, but the format can say it.
-    log.add("FMTU", began, log.kinds["GYR"][0], "s#skkk", "F-F000")
     log.add("VER", began, 4, "ArduPlane V4.2.3 (55685c43)")
     fix = truth.boot_s + 10
 
@@ -266,7 +254,7 @@ def third_generation(truth: Truth, seconds: float = 40.0, attitude: bool = True)
             log.add("XKQ", us, each, np.cos(half), 0, 0, np.sin(half))
             log.add("XKF1", us, each, 9.9 + each, -9.9, -0.5)
             log.add("ACC", us + 900, each, us, 0.1 + each, 0.2, -9.8)
-            log.add("GYR", us + 1000, each, us + 500, *np.degrees([0.01, 0.02, 0.03]))
+            log.add("GYR", us + 1000, each, us + 500, 0.01, 0.02, 0.03)
         log.add("MAG", us, 0, 200, -100, 400, 1, 0)
         log.add("MNT", us, 0, 0, 1.0, 0, -60.0, 0, 20.0, 0, 110.0)
         sea, home, _ = truth.heights(t)

@@ -87,7 +87,7 @@ def test_a_flight_comes_back(make, text, year):
         if name == "gnss" or "v_north_m_s" in columns:
             near(columns, 1e-3, v_north_m_s=9.9, v_east_m_s=-9.9, v_down_m_s=-0.5)
         if name == "magnetometer":
-            # 200 milligauss are 20 microtesla, said or not.
+            # 200 milligauss are 20 microtesla.
             near(columns, field_x_ut=20.0, field_y_ut=-10.0, field_z_ut=40.0)
 
 

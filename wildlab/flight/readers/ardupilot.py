@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import fit_steady
 from wildlab.flight.readers.autopilot import (
-    FIELD,
     FIX_PLANE,
     FIX_SPACE,
     IMU,
     at_times,
     usable,
 )
-from wildlab.flight.readers.dataflash import MessageTable, Unit, read_lines, read_records, sniff, text_sniff
+from wildlab.flight.readers.dataflash import MessageTable, read_lines, read_records, sniff, text_sniff
 from wildlab.flight.readers.judging import in_order, placed
-from wildlab.flight.readers.log import ANGLES, VELOCITY, Array, Clock, Decoded, Mask, Readings, any_of
+from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Mask, Readings, any_of
 from wildlab.flight.readers.text import percent
 from wildlab.flight.schema import SPEED
 from wildlab.flight.time_scales import week_to_utc
@@ -44,8 +43,23 @@ _STEP_M = 0.011131884502145034
 _VEHICLE = re.compile(
     r"\b(?:Ardu\w+|APM:?\w+|AntennaTracker|Blimp|Rover|Sub)\s+V?\d[\w.()-]*(?: \([0-9a-f]+\))?"
 )
-#: Columns of a place -> their names with units.
-_PLACE = ("latitude_deg", "longitude_deg", "height_sea_m", "height_home_m")
+#: Columns of a place -> fields of messages that have it.
+PLACE = {
+    "latitude_deg": "Lat",
+    "longitude_deg": "Lng",
+    "height_sea_m": "Alt",
+    "height_home_m": "RelHomeAlt RelAlt",
+}
+_PLACE = tuple(PLACE)
+#: The same of messages GPS, and of GPA beside them.
+GNSS = {
+    **{"latitude_deg": "Lat", "longitude_deg": "Lng", "height_sea_m": "Alt", "v_down_m_s": "VZ"},
+    **{"satellites": "NSats", "fix": "Status", "hdop": "HDop"},
+}
+GPA = {
+    **{"sd_horizontal_m": "HAcc", "sd_vertical_m": "VAcc", "sd_velocity_m_s": "SAcc"},
+    "undulation_m": "Und",
+}
 
 
 class ArdupilotLog(NamedTuple):
@@ -151,9 +165,7 @@ def _decoded(
         "gnss": gnss,
         "poses": _poses(log, place),
         "imu": _imu(log),
-        "magnetometer": _magnetometer(log),
-        "gimbal": _gimbal(log),
-        "triggers": _triggers(log),
+        **{name: _sensor(log, name) for name in SENSORS},
     }
     parts = {name: part for name, part in found.items() if part is not None and len(part.columns["time_s"])}
     if not parts:
@@ -291,24 +303,20 @@ class PlaceTrack(NamedTuple):
 
 def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Readings:
     """Satellite positions of one receiver, with what messages GPA say of how sure it was."""
-    get, stamps = receiver.get, log.of(receiver)
-    speed, course = get("Spd", unit="m/s"), np.radians(get("GCrs", unit="deg"))
-    fix, down = get("Status"), get("VZ", unit="m/s")
+    stamps, columns = log.of(receiver), receiver.columns(GNSS)
+    speed, course = receiver.get("Spd"), np.radians(receiver.get("GCrs"))
     # A fix may be written down late; its own time then says so. One far from the clock's is damaged.
     clock, own = log.utc(stamps), gps_utc(receiver)
-    columns = {
+    columns |= {
         "time_s": np.where(_true_fix(receiver) & (np.abs(own - clock) < LATEST_S), own, clock),
         "time_log_s": stamps,
-        **{"latitude_deg": get("Lat", unit="deg"), "longitude_deg": get("Lng", unit="deg")},
-        **{"height_sea_m": get("Alt", unit="m"), "v_down_m_s": down},
         **{"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)},
-        **{"satellites": get("NSats"), "fix": fix, "hdop": get("HDop")},
-        **_accuracies(receiver, log, stamps, down),
+        **_accuracies(receiver, log, stamps, columns["v_down_m_s"]),
     }
     unusable = {
-        "no fix": ~(fix >= FIX_PLANE),
-        "a fix without height": ~(fix >= FIX_SPACE),
-        "no GPS week": np.isfinite(get("GWk", "Week")) & np.isnan(own),
+        "no fix": ~(columns["fix"] >= FIX_PLANE),
+        "a fix without height": ~(columns["fix"] >= FIX_SPACE),
+        "no GPS week": np.isfinite(receiver.get("GWk", "Week")) & np.isnan(own),
         # Its parts to the north and east may each be possible.
         "impossible speed": speed > SPEED[1],
     }
@@ -328,13 +336,9 @@ def _accuracies(receiver: MessageTable, log: ArdupilotLog, stamps: Array, down: 
         at = order[np.clip(np.searchsorted(theirs[order], wanted), 0, len(order) - 1)]
         met = theirs[at] == wanted
         made = {}
-        for column, name, most in (
-            ("sd_horizontal_m", "HAcc", WORST_SPREAD_M),
-            ("sd_vertical_m", "VAcc", WORST_SPREAD_M),
-            ("sd_velocity_m_s", "SAcc", WORST_SPREAD_M),
-            ("undulation_m", "Und", WORST_UNDULATION_M),
-        ):
+        for column, name in GPA.items():
             values = table.get(name)[at]
+            most = WORST_UNDULATION_M if name == "Und" else WORST_SPREAD_M
             made[column] = np.where(met & (values != 0) & (np.abs(values) < most), values, np.nan)
         # ArduPilot has it the other way round: sea level minus ellipsoid.
         made["undulation_m"] = -made["undulation_m"]
@@ -351,11 +355,7 @@ def _place_of(name: str, log: ArdupilotLog) -> PlaceTrack | None:
     if name in ("XKF1", "NKF1"):
         columns = _from_origin(table, log)
     else:
-        columns = {
-            **{"latitude_deg": table.get("Lat", unit="deg"), "longitude_deg": table.get("Lng", unit="deg")},
-            "height_sea_m": table.get("Alt", unit="m"),
-            "height_home_m": table.get("RelHomeAlt", "RelAlt", unit="m"),
-        }
+        columns = table.columns(PLACE)
         if table.has("RelOriginAlt"):
             # Before the filter has its origin, heights count from nothing.
             nowhere = np.isnan(table.get("RelOriginAlt"))
@@ -371,7 +371,7 @@ def _place_of_gnss(gnss: Readings, receiver: MessageTable, log: ArdupilotLog) ->
         stamps = (gnss.columns["time_s"] - clock.offset_s) / clock.rate
     used = usable("gnss", gnss) & np.isfinite(stamps)
     columns = {one: gnss.columns[one][used] for one in _PLACE[:3]}
-    columns["height_home_m"] = receiver.get("RelAlt", "RAlt", unit="m")[used]
+    columns["height_home_m"] = receiver.get("RelAlt", "RAlt")[used]
     return PlaceTrack(receiver.name, stamps[used], columns) if used.any() else None
 
 
@@ -381,14 +381,14 @@ def _from_origin(table: MessageTable, log: ArdupilotLog) -> dict[str, Array]:
     origins = log.tables["ORGN"]
     # Type 0 is where the filter counts from; 1 is home.
     origins = origins.take(origins.get("Type") == 0) if origins.has("Type") else origins
-    latitude, longitude = origins.get("Lat", unit="deg"), origins.get("Lng", unit="deg")
+    latitude, longitude = origins.get("Lat"), origins.get("Lng")
     since = log.of(origins)
     kept = in_order(since, placed(latitude, longitude))
     if not kept.any():
         return {}
     at = np.maximum(np.searchsorted(since[kept], log.of(table), side="right") - 1, 0)
     latitude_0, longitude_0 = latitude[kept][at], longitude[kept][at]
-    north, east, down = (table.get(one, unit="m") for one in ("PN", "PE", "PD"))
+    north, east, down = (table.get(one) for one in ("PN", "PE", "PD"))
     step = north / _STEP_M * 1e-7
     # The width of a degree halfway, as the autopilot has it: so its own degrees come back.
     width = np.maximum(np.cos(np.radians(latitude_0 + step / 2)), 0.01)
@@ -401,27 +401,66 @@ def _from_origin(table: MessageTable, log: ArdupilotLog) -> dict[str, Array]:
 
 # -- motion
 
+#: Parts -> messages that have them, best first; a field that they need; our columns of theirs; a factor.
+SENSORS: dict[str, tuple[tuple[str, ...], str, dict[str, str], float]] = {
+    # Milligauss.
+    "magnetometer": (
+        ("MAG", "MAG2", "MAG3"), "MagX", {f"field_{one}_ut": f"Mag{one.upper()}" for one in "xyz"}, 0.1,
+    ),
+    # Against north and the horizon, and its yaw against the airframe.
+    "gimbal": (
+        ("MNT", "MNT1", "MOUNT"), "Pitch",
+        dict(zip((*WORLD, "pan_deg"), ("Roll", "Pitch", "YawE", "YawB"), strict=True)), 1.0,
+    ),
+    # The first generation has only GPS time, of the fix before: the messages around tell more closely.
+    "triggers": (
+        ("CAM", "TRIG"), "Lat",
+        {
+            **{"latitude_deg": "Lat", "longitude_deg": "Lng", "number": "Img"},
+            **{name: f"{name[:-4].title()} {name[0].upper()}" for name in ANGLES},
+            **{"height_sea_m": "Alt", "height_home_m": "RelAlt"},
+        }, 1.0,
+    ),
+}  # fmt: skip
+
+
+def _sensor(log: ArdupilotLog, part: str) -> Readings | None:
+    """A part of the first sensor of its kind, as `SENSORS` has it; None where the log has none."""
+    names, needed, fields, factor = SENSORS[part]
+    table = log.first(names, needed)
+    if table is None:
+        return None
+    there = {ours: theirs for ours, theirs in fields.items() if any(map(table.has, theirs.split()))}
+    if part == "triggers" and not table.has("RelAlt"):
+        # Without it, copters and planes meant different things by `Alt`.
+        there.pop("height_sea_m", None)
+    columns = {name: values * factor for name, values in table.columns(there).items()}
+    if part == "triggers":
+        # Before the first fix images have no place, but they were taken.
+        known = placed(columns["latitude_deg"], columns["longitude_deg"])
+        columns |= {name: np.where(known, columns[name], np.nan) for name in _PLACE[:2]}
+    return log.readings(table, columns)
+
 
 def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
     """Attitudes with the positions at their times; None where the log has no attitude.
 
     Attitudes are those of messages ATT, else quaternions of XKQ or NKQ, else of AHR2.
     """
-    euler, q = ("Roll", "Pitch", "Yaw"), ("Q1", "Q2", "Q3", "Q4")
+    euler = dict(zip(ANGLES, ("Roll", "Pitch", "Yaw"), strict=True))
+    q = dict(zip(("q_w", "q_x", "q_y", "q_z"), ("Q1", "Q2", "Q3", "Q4"), strict=True))
     filters = ("XKQ", "XKQ1", "NKQ", "NKQ1", "XKQ2", "NKQ2")
     ways = ((("ATT",), euler), (filters, q), (("AHR2", "AHRS"), euler))
-    found = ((table, fields) for names, fields in ways if (table := log.first(names, *fields)) is not None)
-    table, fields = next(found, (None, ()))
+    found = ((table, one) for names, one in ways if (table := log.first(names, *one.values())) is not None)
+    table, fields = next(found, (None, euler))
     if table is None:
         return None
-    names = ANGLES if fields == euler else ("q_w", "q_x", "q_y", "q_z")
-    unit: Unit | None = "deg" if fields == euler else None
-    columns = {name: table.get(one, unit=unit) for name, one in zip(names, fields, strict=True)}
     stamps = log.of(table)
     where = {one: np.full(len(table), np.nan) for one in _PLACE} if place is None else place.at(stamps)
+    columns = table.columns(fields)
     moving = log.first(("XKF1", "NKF1", "EKF1"), "VN", "VE", "VD")
     if moving is not None:
-        v = {name: moving.get(f"V{name[2].upper()}", unit="m/s") for name in VELOCITY}
+        v = moving.columns({name: f"V{name[2].upper()}" for name in VELOCITY})
         columns |= at_times(log.of(moving), v, stamps, f"messages {moving.name}")
     high = any_of([np.isfinite(where[one]) for one in _PLACE[2:]], len(table))
     low = np.isfinite(where["latitude_deg"]) & ~high
@@ -430,68 +469,17 @@ def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
 
 def _imu(log: ArdupilotLog) -> Readings | None:
     """Specific force and rates of turn of the first IMU; None where the log has none."""
-    gyros, forces = ([f"{start}{axis}" for axis in "XYZ"] for start in ("Gyr", "Acc"))
-    table = log.first(("IMU", "IMU2", "IMU3"), "GyrX", "AccX")
-    force = table or next(iter(log.sensors("ACC", "ACC1", "ACC2", "ACC3")), None)
-    table = table or next(iter(log.sensors("GYR", "GYR1", "GYR2", "GYR3")), None)
+    f, w = (dict(zip(IMU[at : at + 3], (f"{start}{axis}" for axis in "XYZ"), strict=True))
+            for at, start in ((0, "Acc"), (3, "Gyr")))  # fmt: skip
+    both = log.first(("IMU", "IMU2", "IMU3"), "GyrX", "AccX")
+    force = both or log.first(("ACC", "ACC1", "ACC2", "ACC3"))
+    table = both or log.first(("GYR", "GYR1", "GYR2", "GYR3"))
     if table is None or force is None:
         return None
-    f = {name: force.get(one, unit="m/s2") for name, one in zip(IMU[:3], forces, strict=True)}
+    forces = force.columns(f)
     if force is not table:
-        f = at_times(log.of(force), f, log.of(table), f"messages {force.name}")
-    w = {name: table.get(one, unit="rad/s") for name, one in zip(IMU[3:], gyros, strict=True)}
-    return log.readings(table, f | w)
-
-
-def _magnetometer(log: ArdupilotLog) -> Readings | None:
-    """The field that the first compass found; None where the log has none."""
-    fields = ("MagX", "MagY", "MagZ")
-    table = log.first(("MAG", "MAG2", "MAG3"), *fields)
-    if table is None:
-        return None
-    return log.readings(
-        table, {name: table.get(one, unit="uT") for name, one in zip(FIELD, fields, strict=True)}
-    )
-
-
-def _gimbal(log: ArdupilotLog) -> Readings | None:
-    """Where the first gimbal looks: against north and the horizon, and its yaw against the airframe."""
-    table = log.first(("MNT", "MNT1", "MOUNT"), "Roll", "Pitch")
-    if table is None:
-        return None
-    fields = {
-        "roll_world_deg": "Roll",
-        "pitch_world_deg": "Pitch",
-        "yaw_world_deg": "YawE",
-        "pan_deg": "YawB",
-    }
-    columns = {name: table.get(one, unit="deg") for name, one in fields.items() if table.has(one)}
-    return log.readings(table, columns)
-
-
-def _triggers(log: ArdupilotLog) -> Readings | None:
-    """When the camera took an image: messages CAM, else TRIG, of the first camera.
-
-    The first generation has only GPS time, of the fix before: the messages around tell more closely.
-    """
-    table = log.first(("CAM", "TRIG"), "Lat", "Lng")
-    if table is None:
-        return None
-    get = table.get
-    latitude, longitude = get("Lat", unit="deg"), get("Lng", unit="deg")
-    # Before the first fix images have no place, but they were taken.
-    known = placed(latitude, longitude)
-    columns = {
-        "latitude_deg": np.where(known, latitude, np.nan),
-        "longitude_deg": np.where(known, longitude, np.nan),
-        **{name: get(name[:-4].title(), name[0].upper(), unit="deg") for name in ANGLES},
-    }
-    if table.has("RelAlt"):
-        # Without it, copters and planes meant different things by `Alt`.
-        columns |= {"height_sea_m": get("Alt", unit="m"), "height_home_m": get("RelAlt", unit="m")}
-    if table.has("Img"):
-        columns["number"] = get("Img")
-    return log.readings(table, columns)
+        forces = at_times(log.of(force), forces, log.of(table), f"messages {force.name}")
+    return log.readings(table, forces | table.columns(w))
 
 
 def _notes(

@@ -13,8 +13,8 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal, NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -47,20 +47,6 @@ _NAME = re.compile(rb"[A-Za-z0-9_]{1,4}\0*")
 _FMT_LINE = re.compile(rb"^\s*FMT\s*,\s*\d+\s*,\s*\d+\s*,\s*\w+\s*,\s*\w*\s*,", re.MULTILINE)
 _LINE = re.compile(r"\s*([A-Z][A-Z0-9_]{0,3})\s*,")
 
-Unit = Literal["deg", "rad/s", "m", "m/s", "m/s2", "uT"]
-#: Wanted unit -> label in messages UNIT -> what takes a value to the wanted one.
-_LABELS: dict[Unit, dict[str, float]] = {
-    "deg": dict.fromkeys(("deg", "degheading", "deglatitude", "deglongitude"), 1.0)
-    | {"rad": math.degrees(1)},
-    "rad/s": {"rad/s": 1.0, "deg/s": math.radians(1)},
-    "m": {"m": 1.0},
-    "m/s": {"m/s": 1.0},
-    "m/s2": {"m/s/s": 1.0},
-    "uT": {"Gauss": 100.0},
-}
-#: Where the log says no units: a magnetic field is in milligauss, all else in the unit that is wanted.
-_UNSAID: dict[Unit, float] = {"uT": 0.1}
-
 
 class Definition(NamedTuple):
     """What a message FMT says: the number of a kind, its bytes with the head, name, characters and fields."""
@@ -83,18 +69,13 @@ class MessageTable(Messages):
     ----------
     characters
         Format character of each field.
-    units
-        Label and multiplier of fields, as messages FMTU, UNIT and MULT have them.
     """
 
     characters: Mapping[str, str] = field(default_factory=dict)
-    units: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
-    def get(self, *names: str, unit: Unit | None = None) -> Array:
-        """As `Messages.get`, in a unit; fields of text are none."""
-        numeric = [one for one in names if self.characters.get(one, "a") not in NO_NUMBER]
-        values = super().get(*numeric)
-        return values if unit is None or not numeric else values * self._factor(numeric[0], unit)
+    def get(self, *names: str) -> Array:
+        """As `Messages.get`; fields of text are none."""
+        return super().get(*(one for one in names if self.characters.get(one, "a") not in NO_NUMBER))
 
     def instances(self) -> list[MessageTable]:
         """One table per sensor, in their order; itself where messages do not say which."""
@@ -103,16 +84,6 @@ class MessageTable(Messages):
                 which = self.get(name)
                 return [self.take(which == one) for one in np.unique(which)]
         return [self] if len(self) else []
-
-    def _factor(self, name: str, unit: Unit) -> float:
-        usual = _UNSAID.get(unit, 1.0)
-        label, by = self.units.get(name, ("", 0.0))
-        if label not in _LABELS[unit]:
-            return usual
-        # The multiplier is one of raw values: a character that divides has it in it.
-        if self.characters[name] in DIVISORS:
-            return _LABELS[unit][label]
-        return _LABELS[unit][label] * by if by > 0 and math.isfinite(by) else usual
 
 
 class Records(NamedTuple):
@@ -239,13 +210,11 @@ def _tables(raw: Bytes, known: list[Definition], heads: Index, which: Index) -> 
     by_kind = np.argsort(which, kind="stable")
     cuts = np.searchsorted(which[by_kind], np.arange(len(known) + 1))
     parts: dict[str, list[MessageTable]] = {}
-    kinds: dict[str, int] = {}
     for version, one in enumerate(known):
         rows = by_kind[cuts[version] : cuts[version + 1]]
         if len(rows):
             parts.setdefault(one.name, []).append(_table(raw, one, heads[rows], rows + 1))
-            kinds[one.name] = one.kind
-    return with_units({name: merge(tables) for name, tables in parts.items()}, kinds)
+    return {name: merge(tables) for name, tables in parts.items()}
 
 
 def _table(raw: Bytes, one: Definition, heads: Index, rows: Index) -> MessageTable:
@@ -257,11 +226,8 @@ def _table(raw: Bytes, one: Definition, heads: Index, rows: Index) -> MessageTab
         if not made:
             made.append(sliding_window_view(raw, one.length)[heads].view(np.dtype(layout))[:, 0])
         at = one.fields.index(name)
-        return (
-            made[0][str(at)] / DIVISORS[one.characters[at]]
-            if one.characters[at] in DIVISORS
-            else made[0][str(at)]
-        )
+        raw_values = made[0][str(at)]
+        return raw_values / DIVISORS[one.characters[at]] if one.characters[at] in DIVISORS else raw_values
 
     return MessageTable(one.name, Columns(one.fields, column), rows, _characters(one))
 
@@ -288,30 +254,6 @@ def merge(tables: Sequence[MessageTable]) -> MessageTable:
         return np.concatenate(parts)[order]
 
     return MessageTable(tables[0].name, Columns(names, column), rows[order], characters)
-
-
-def with_units(tables: dict[str, MessageTable], kinds: Mapping[str, int]) -> dict[str, MessageTable]:
-    """The same tables with what FMTU, UNIT and MULT say of their fields; `kinds`: number of each by name."""
-    if not {"FMTU", "UNIT", "MULT"} <= set(tables):
-        return tables
-    units, mults, said = tables["UNIT"], tables["MULT"], tables["FMTU"]
-    label = dict(zip(_letters(units), units.texts("Label"), strict=False))
-    multiplier = dict(zip(_letters(mults), mults.get("Mult").tolist(), strict=False))
-    ids = zip(said.texts("UnitIds"), said.texts("MultIds"), strict=False)
-    of_kind = dict(zip(said.get("FmtType").tolist(), ids, strict=False))
-    made = {}
-    for name, table in tables.items():
-        both = zip(table.fields, *of_kind.get(kinds.get(name, -1), ("", "")), strict=False)
-        own = {one: (label.get(unit, ""), multiplier.get(by, 0.0)) for one, unit, by in both}
-        made[name] = replace(table, units=own)
-    return made
-
-
-def _letters(table: MessageTable) -> list[str]:
-    """Ids of units: characters, stored as numbers."""
-    if table.characters.get("Id", "") in TEXTS:
-        return table.texts("Id")
-    return [chr(int(one)) if 0 < one < 128 else "" for one in table.get("Id")]
 
 
 # -- as text
@@ -352,7 +294,7 @@ def read_lines(data: bytes) -> tuple[dict[str, MessageTable], list[tuple[int, st
         )
     ]
     title = next((line for line in lines[:20] if "V" in line and "," not in line), "")
-    return with_units(tables, {name: known[name].kind for name in tables}), lost, title
+    return tables, lost, title
 
 
 def _line_definitions(lines: list[str]) -> dict[str, Definition]:
