@@ -77,6 +77,7 @@ def jpeg(size: tuple[int, int] = (40, 30), exif: Any = None, xmp: bytes = b"", m
 def tiff(exif: Any, size: tuple[int, int] = (12, 8)) -> bytes:
     """Bytes of a TIFF with tags and a size, and no image."""
     exif[0x0100], exif[0x0101] = size
+    exif[0x0111], exif[0x0117] = 0, 1
     return bytes(exif.tobytes().removeprefix(b"Exif\0\0"))
 
 

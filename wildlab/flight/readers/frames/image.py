@@ -15,15 +15,16 @@ from PIL import Image
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular, unreadable
-from wildlab.flight.readers.frames.headers import Header, read_header
 from wildlab.flight.readers.frames.scene import find_clipped, find_no_data, problem_of
 from wildlab.flight.readers.frames.thermal import (
     AS_COUNTS,
     RECORDS,
-    decode_image,
     gather_pieces,
+    open_image,
+    pixels_of,
     read_dji,
     read_records,
+    segments_of,
     to_kelvin,
 )
 
@@ -182,8 +183,7 @@ def read_image(path: Path, *, polarity: Polarity = "unknown") -> Frame:
     if isinstance(found, str):
         return spoilt(name, found)
     image, unit, note = found
-    warm = unit == "kelvin" or note == AS_COUNTS
-    note = "; ".join(one for one in (note, _turn(data)) if one)
+    warm = unit == "kelvin" or note.startswith(AS_COUNTS)
     return masked(Frame(name, None, image, unit, "white-hot" if warm else polarity, NOTHING, note=note))
 
 
@@ -194,20 +194,17 @@ def masked(frame: Frame) -> Frame:
     return spoilt(frame.name, problem, frame.time) if problem else replace(frame, valid=valid)
 
 
-def _turn(data: bytes) -> str:
+def _turned(image: Image.Image) -> str:
     """What is said of an image that viewers show turned: its pixels stay those of the sensor."""
-    if data[:2] != b"\xff\xd8":
-        return ""
     try:
-        with Image.open(io.BytesIO(data)) as opened:
-            orientation = opened.getexif().get(ORIENTATION, 1)
-    except Exception:  # whatever a broken EXIF gives: the picture itself was decoded
+        orientation = image.getexif().get(ORIENTATION, 1)
+    except Exception:  # whatever a broken EXIF gives: the picture itself may be sound
         return ""
     if orientation in (None, 1) or not isinstance(orientation, int):
         return ""
     return (
-        f"some images say that viewers are to show them turned (EXIF orientation {orientation}); pixels here "
-        "are counted in the image as it is stored, and labels have to be drawn in that"
+        f"some images say that viewers are to show them turned (EXIF orientation {orientation}): pixels and "
+        "labels count in the image as it is stored"
     )
 
 
@@ -232,37 +229,34 @@ def decode(data: bytes) -> tuple[NDArray[Any], Unit, str] | str:
     if data[:4] in RECORDS:
         records = _radiometric(data)
         return records if isinstance(records, str) else (*records, "")
-    header = read_header(data)
-    if not isinstance(header, Header):
-        return header
-    if header.problem:
-        return header.problem
-    note = ""
-    if header.kind == "jpeg":
-        pieces = gather_pieces(data)
-        found = _radiometric(pieces) if pieces else ""
-        if not isinstance(found, str):
-            return (*found, "")
-        # Records without a raw image: the picture is still a picture.
-        counts, note = read_dji(data, header.width, header.height)
-        if counts is not None:
-            return counts, "counts", note
-    image = decode_image(data)
-    if image is None:
-        return f"its content cannot be decoded as {header.kind.upper()}"
-    if image.shape[:2] != (header.height, header.width):
-        return f"its header claims {header.width} x {header.height} pixels and it holds other ones"
-    picture = as_grey_or_colour(image)
+    if not data:
+        return "the file is empty"
+    image = open_image(io.BytesIO(data), whole=True)
+    if isinstance(image, str):
+        return image
+    segments = segments_of(image)
+    turned = _turned(image) if segments else ""
+    pieces = gather_pieces(segments)
+    found = _radiometric(pieces) if pieces else ""
+    if not isinstance(found, str):
+        return (*found, turned)
+    # Records without a raw image: the picture is still a picture.
+    counts, note = read_dji(segments, *image.size)
+    note = "; ".join(one for one in (note, turned) if one)
+    if counts is not None:
+        return counts, "counts", note
+    pixels = pixels_of(image, data)
+    picture = pixels if isinstance(pixels, str) else as_grey_or_colour(pixels)
     return picture if isinstance(picture, str) else (*picture, note)
 
 
 def as_grey_or_colour(image: NDArray[Any]) -> tuple[NDArray[Any], Unit] | str:
-    """What OpenCV decoded, with its unit: three alike colours are one.
+    """Decoded pixels with their unit: three alike colours are one.
 
     Parameters
     ----------
     image
-        (H, W), or (H, W, 3 or 4) blue first.
+        (H, W), or (H, W, 3) red first.
 
     Returns
     -------
@@ -274,17 +268,12 @@ def as_grey_or_colour(image: NDArray[Any]) -> tuple[NDArray[Any], Unit] | str:
     >>> as_grey_or_colour(np.full((2, 2, 3), 7, np.uint8))[1]
     'grey'
     """
-    if image.ndim == 3 and image.shape[2] in (3, 4):
-        image = image[..., :3]
+    if image.ndim == 3:
         # A sample tells: whole pictures take as long as the detection.
         sample = image[:: max(1, image.shape[0] // 64), :: max(1, image.shape[1] // 64)].astype(np.int32)
         if np.ptp(sample, axis=2).max() > GREY:
-            if image.dtype != np.uint8:
-                return f"it is a colour image of {8 * image.dtype.itemsize} bits, and 8 are read"
-            return np.ascontiguousarray(image[..., ::-1]), "colour"
+            return np.ascontiguousarray(image), "colour"
         image = np.ascontiguousarray(image[..., 1])
-    if image.ndim != 2:
-        return f"it has {image.shape[2]} channels, and 1, 3 or 4 are read"
     if image.dtype == np.uint8:
         return image, "grey"
     if image.dtype == np.uint16:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, regular_size
-from wildlab.flight.readers.frames.headers import MOST_PIXELS
 from wildlab.flight.readers.frames.image import (
     NOTHING,
     SUFFIXES,
@@ -45,7 +44,7 @@ from wildlab.flight.readers.frames.scene import (
     measure_vignetting,
     without_vignetting,
 )
-from wildlab.flight.readers.frames.thermal import quiet
+from wildlab.flight.readers.frames.thermal import MOST_PIXELS, quiet
 
 #: What the problems of such frames have in them.
 CORRECTIONS = ("flat-field correction", "picture is held")
@@ -462,7 +461,7 @@ def read_video(
 
 def as_frame(name: str, time: float | None, picture: Any, polarity: Polarity) -> Frame:
     """A decoded picture (H, W, 3), blue first, as a frame with its mask."""
-    found = as_grey_or_colour(picture)
+    found = as_grey_or_colour(np.ascontiguousarray(picture[..., ::-1]))
     if isinstance(found, str):
         return spoilt(name, found, time)
     return masked(Frame(name, time, *found, polarity, NOTHING))

@@ -1,4 +1,4 @@
-"""Thermal images inside files: FLIR's own records and DJI's raw numbers.
+"""What image files hold: pixels as Pillow decodes them, FLIR's own records, and DJI's raw numbers.
 
 A radiometric JPEG of FLIR carries records in pieces, in its APP1 segments; an ``.fff`` file is nothing
 else. The raw image is either plain 16-bit numbers or a PNG, and that PNG may hold its two bytes the wrong
@@ -15,21 +15,103 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Callable, Iterable, Iterator
+import warnings
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, TiffImagePlugin
 
-from wildlab.flight.readers.frames.headers import MOST_PIXELS, Header, jpeg_pieces, read_header
-
+#: The most pixels that are decoded: four times the largest camera sensors that fly on small aircraft.
+MOST_PIXELS = 100_000_000
+#: Kinds of files that are read, as Pillow calls them.
+FORMATS = ("PNG", "JPEG", TiffImagePlugin.TiffImageFile.format)
 _PIECE = b"FLIR\0"
 #: What FLIR's records begin with, and kinds of records.
 RECORDS, RAW, CAMERA = (b"FFF\0", b"AFF\0"), 1, 32
 #: Records that are looked at.
 MOST_RECORDS = 256
+
+# -- pixels
+
+
+def open_image(stream: BinaryIO, *, whole: bool = False) -> Image.Image | str:
+    """An image of which only the header was read, or a clause that says why it is none; where it has to be
+    whole, the checksums of a PNG are held against its content.
+
+    Examples
+    --------
+    >>> open_image(io.BytesIO(b"GIF89a"))
+    'it is no PNG, JPEG or TIFF file that can be read'
+    """
+    try:
+        with warnings.catch_warnings():
+            # Pillow warns of what is broken and goes on; what is left is judged below.
+            warnings.simplefilter("ignore")
+            found = Image.open(stream, formats=FORMATS)
+            if whole:
+                found.verify()
+                found = Image.open(stream, formats=FORMATS)
+            pixels = found.width * found.height
+    except Image.DecompressionBombError:
+        pixels = MOST_PIXELS + 1
+    except Exception:  # Pillow raises whatever comes first of a broken header
+        return "it is no PNG, JPEG or TIFF file that can be read"
+    if pixels > MOST_PIXELS:
+        return f"it claims more than {MOST_PIXELS:,} pixels, the most that is decoded"
+    return found
+
+
+def pixels_of(image: Image.Image, data: bytes) -> NDArray[Any] | str:
+    """Numbers of an image, (H, W) or (H, W, 3) red first, or a clause that says why it has none.
+
+    Parameters
+    ----------
+    image
+        Of `open_image`.
+    data
+        The same file: TIFF is decoded by OpenCV, since Pillow's decoder writes to the terminal.
+    """
+    deep = image.mode == "RGB" and any(";16" in str(one) for one in image.tile)  # type: ignore[attr-defined]
+    try:
+        if image.format == "TIFF":
+            with quiet():
+                found = np.asarray(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED))
+            found = found[..., 2::-1] if found.ndim == 3 else found
+        else:
+            if image.mode in ("1", "LA", "La"):
+                image = image.convert("L")
+            elif image.mode not in ("L", "RGB") and not image.mode.startswith("I"):
+                image = image.convert("RGB")
+            found = np.asarray(image)
+    except Exception:  # Pillow raises whatever comes first of a broken file
+        found = np.empty(0)
+    if found.ndim < 2 or found.shape[:2] != (image.height, image.width):
+        return "the file is cut off or damaged"
+    if deep:
+        return "it is a colour image of 16 bits, and 8 are read"
+    return found.astype(np.uint16) if image.mode.startswith("I;16") else found
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """While this lasts, OpenCV writes nothing to the terminal."""
+    before = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(before)
+
+
+def segments_of(image: Image.Image) -> list[tuple[str, bytes]]:
+    """Application segments of a JPEG, each with its name: ``APP1``."""
+    return list(getattr(image, "applist", ()))
+
+
+# -- FLIR
 
 
 class Planck(NamedTuple):
@@ -57,65 +139,35 @@ class Radiometric(NamedTuple):
     planck: Planck | None
 
 
-def flir_order(pieces: Iterable[bytes]) -> list[int]:
-    """Which of the contents of APP1 segments (or their beginnings) are pieces of FLIR's records, in their
-    order.
-
-    Empty where there are none, or one is missing.
-    """
+def gather_pieces(segments: list[tuple[str, bytes]]) -> bytes:
+    """FLIR's records of a JPEG, put together from its segments; b"" where it has none, or one is missing."""
     found = {
-        one[6]: (at, one[7]) for at, one in enumerate(pieces) if one.startswith(_PIECE) and len(one) >= 8
+        one[6]: (one[8:], one[7])
+        for name, one in segments
+        if name == "APP1" and one.startswith(_PIECE) and len(one) >= 8
     }
-    last = max((last for _, last in found.values()), default=-1)
-    return [found[number][0] for number in range(last + 1)] if set(found) >= set(range(last + 1)) else []
+    numbers = range(1 + max((last for _, last in found.values()), default=-1))
+    return b"".join(found[number][0] for number in numbers) if set(found) >= set(numbers) else b""
 
 
-def gather_pieces(data: bytes) -> bytes:
-    """FLIR's records of a JPEG, put together from its APP1 segments; b"" where it has none.
-
-    Parameters
-    ----------
-    data
-        All bytes of the JPEG.
-
-    Returns
-    -------
-    bytes
-        Beginning with ``FFF``; empty, too, where a piece is missing.
-    """
-    pieces = _segments(data, 0xE1)
-    return b"".join(pieces[at][8:] for at in flir_order(pieces))
-
-
-def _segments(data: bytes, marker: int) -> list[bytes]:
-    found = jpeg_pieces(io.BytesIO(data), len(data)).found
-    return [data[one.at : one.at + one.length] for one in found if one.kind == marker]
-
-
-def find_records(take: Callable[[int, int], bytes]) -> dict[int, tuple[int, int]]:
-    """Where the records of each kind stand, and their lengths, of FLIR's records; empty where these are none.
-
-    Parameters
-    ----------
-    take
-        Gives bytes from a place, as many as asked for or as there are.
+def find_records(data: bytes) -> dict[int, bytes]:
+    """The first record of each kind, of FLIR's records; empty where these are none.
 
     Raises
     ------
     struct.error
         Where they are cut off.
     """
-    head = take(0, 64)
-    if head[:4] not in RECORDS:
+    if data[:4] not in RECORDS:
         return {}
     # The version is a small number in the right order of bytes.
-    order = ">" if struct.unpack_from(">I", head, 20)[0] < 0x10000 else "<"
-    start, count = struct.unpack_from(f"{order}II", head, 24)
-    index = take(start, 32 * min(count, MOST_RECORDS))
-    found: dict[int, tuple[int, int]] = {}
-    for place in range(0, len(index) - 31, 32):
-        (kind,) = struct.unpack_from(f"{order}H", index, place)
-        found.setdefault(kind, struct.unpack_from(f"{order}II", index, place + 12))
+    order = ">" if struct.unpack_from(">I", data, 20)[0] < 0x10000 else "<"
+    start, count = struct.unpack_from(f"{order}II", data, 24)
+    found: dict[int, bytes] = {}
+    for place in range(start, min(start + 32 * min(count, MOST_RECORDS), len(data) - 31), 32):
+        (kind,) = struct.unpack_from(f"{order}H", data, place)
+        at, length = struct.unpack_from(f"{order}II", data, place + 12)
+        found.setdefault(kind, data[at : at + length])
     return found
 
 
@@ -140,19 +192,14 @@ def read_records(data: bytes) -> Radiometric | str:
     Examples
     --------
     >>> read_records(b"nothing")
-    'it has no records of FLIR'
+    'its records of FLIR hold no raw image'
     """
-    if data[:4] not in RECORDS:
-        return "it has no records of FLIR"
     try:
-        found = find_records(lambda at, length: data[at : at + length])
-        raw, camera = (data[at : at + n] for at, n in (found.get(one, (0, 0)) for one in (RAW, CAMERA)))
-        if sum(found.get(RAW, (0, 0))) > len(data):
-            return "the file is cut off inside its raw image"
-        counts = _raw_image(raw)
+        found = find_records(data)
+        counts = _raw_image(found.get(RAW, b""))
     except struct.error:
         return "its records of FLIR are cut off"
-    return counts if isinstance(counts, str) else Radiometric(counts, _planck(camera))
+    return counts if isinstance(counts, str) else Radiometric(counts, _planck(found.get(CAMERA, b"")))
 
 
 def _raw_image(record: bytes) -> NDArray[np.uint16] | str:
@@ -162,16 +209,13 @@ def _raw_image(record: bytes) -> NDArray[np.uint16] | str:
     width, height = struct.unpack_from(f"{order}HH", record, 2)
     body = record[32:]
     if body.startswith(b"\x89PNG"):
-        claim = read_header(body)
-        problem = claim.problem if isinstance(claim, Header) else claim
-        if problem:
-            return f"its raw image: {problem}"
-        found = decode_image(body)
-        if found is None or found.ndim != 2 or found.dtype != np.uint16:
-            return "its raw image is no 16-bit PNG that can be decoded"
-        return smoother_order(np.asarray(found, np.uint16))
+        image = open_image(io.BytesIO(body), whole=True)
+        found = image if isinstance(image, str) else pixels_of(image, body)
+        if isinstance(found, str) or found.ndim != 2 or found.dtype != np.uint16:
+            return f"its raw image is no PNG of 16 bits ({found if isinstance(found, str) else found.dtype})"
+        return smoother_order(found)
     if not 0 < width * height <= MOST_PIXELS or len(body) < 2 * width * height:
-        return f"its raw image claims {width} x {height} pixels and has {len(body):,} bytes"
+        return f"its raw image claims {width} x {height} pixels and has {len(body):,} bytes: it is cut off"
     plain = np.frombuffer(body, f"{order}u2", width * height).reshape(height, width)
     return plain.astype(np.uint16)
 
@@ -246,24 +290,26 @@ def to_kelvin(counts: NDArray[np.uint16], planck: Planck) -> NDArray[np.float32]
 
 #: What is said of such a file.
 AS_COUNTS = (
-    "DJI's own thermal data (APP3) are read as counts: how they become temperatures is known to DJI's "
-    "program library alone, which is not open; the preview picture is not used"
+    "DJI's thermal data (APP3) are read as counts: only DJI's own library, which is not open, makes "
+    "temperatures of them"
 )
 AS_PREVIEW = (
-    "DJI's own thermal data (APP3) have another size than the picture and are not read, and DJI's program "
-    "library for them is not open: the preview picture is used, with its own gain and palette"
+    "DJI's thermal data (APP3) have another size than the picture and are not read: the preview picture is "
+    "used, with its own gain and palette"
 )
 #: The fewest bytes of APP3 that are taken for an image: others keep small notes there.
 LEAST = 4096
 
 
-def read_dji(data: bytes, width: int, height: int) -> tuple[NDArray[np.uint16] | None, str]:
+def read_dji(
+    segments: list[tuple[str, bytes]], width: int, height: int
+) -> tuple[NDArray[np.uint16] | None, str]:
     """Raw numbers of DJI's sensor out of a JPEG, and what is to be said.
 
     Parameters
     ----------
-    data
-        All bytes of the JPEG.
+    segments
+        As `segments_of` gives them.
     width, height
         Of its picture, px.
 
@@ -272,56 +318,11 @@ def read_dji(data: bytes, width: int, height: int) -> tuple[NDArray[np.uint16] |
     counts, note
         (H, W) uint16, or None where there are none of the picture's size; the note is "" where the file has
         no thermal data of DJI at all.
-
-    Examples
-    --------
-    >>> read_dji(b"no JPEG", 8, 8)
-    (None, '')
     """
-    named = any(b"DJI" in one or b"drone-dji" in one for one in _segments(data, 0xE1))
-    raw = b"".join(_segments(data, 0xE3))
+    named = any(b"DJI" in one or b"drone-dji" in one for name, one in segments if name == "APP1")
+    raw = b"".join(one for name, one in segments if name == "APP3")
     if not named or len(raw) < LEAST:
         return None, ""
     if len(raw) != 2 * width * height:
         return None, AS_PREVIEW
     return smoother_order(np.frombuffer(raw, "<u2").reshape(height, width).astype(np.uint16)), AS_COUNTS
-
-
-# -- OpenCV
-
-
-def decode_image(data: bytes) -> NDArray[Any] | None:
-    """Numbers of an image file, as OpenCV has them.
-
-    Parameters
-    ----------
-    data
-        All bytes of a file whose header was looked at (`read_header`).
-
-    Returns
-    -------
-    (H, W) or (H, W, C), blue first, or None
-        None where it cannot be decoded.
-
-    Examples
-    --------
-    >>> decode_image(b"no image") is None
-    True
-    """
-    with quiet():
-        try:
-            found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-        except cv2.error:
-            return None
-    return None if found is None else np.asarray(found)
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """While this lasts, OpenCV writes nothing to the terminal."""
-    before = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
-        yield
-    finally:
-        cv2.utils.logging.setLogLevel(before)
