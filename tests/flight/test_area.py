@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.area import crossing, parse_areas, read_areas, ring_area
+from wildlab.flight.readers.vector import crossing, parse_areas, read_areas, ring_area
 from wildlab.geometry.frames import ned_to_geodetic
 
 LAT, LON = 58.66, 16.46

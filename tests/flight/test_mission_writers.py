@@ -7,7 +7,7 @@ import pytest
 from defusedxml import minidom
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.area import parse_areas
+from wildlab.flight.readers.vector import parse_areas
 from wildlab.flight.writers.maps import plan_geojson, plan_kml
 from wildlab.flight.writers.mission import MOST_ITEMS, Mission, mission_items
 from wildlab.flight.writers.qgc_plan import qgc_plan

@@ -16,7 +16,7 @@ from wildlab.analysis.plans.command import origin_text
 from wildlab.analysis.plans.coverage import Covered
 from wildlab.analysis.plans.plan import Plan
 from wildlab.analysis.plans.said import count, head_count, hectares, minutes, percent
-from wildlab.flight.readers.area import Area
+from wildlab.flight.readers.vector import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.messages.catalogue import Message, load_texts

@@ -9,7 +9,7 @@ import pytest
 
 from tests.flight.readers.tracks import Reader, spoilt
 from wildlab.errors import WildlabError
-from wildlab.flight.readers import documents
+from wildlab.flight.readers import text
 from wildlab.flight.readers.log import RawLog
 
 marks_kml, marks_geojson, marks_csv = (Reader(f"marks-{one}") for one in ("kml", "geojson", "csv"))
@@ -142,10 +142,10 @@ def test_damaged_files_end_in_a_sentence(reader, data):
         (marks_kml, kml(POINTS).replace(b"10.4,63.44", b"a,b"), "is no coordinate"),
         (marks_geojson, b"{", "is not readable JSON"),
         (marks_geojson, b"[" * 100_000, "is not readable JSON"),
-        (marks_geojson, b'{"type": "FeatureCollection", "features": 5}', "has no point"),
+        (marks_geojson, b'{"type": "FeatureCollection", "features": 5}', "a list is wanted"),
         (marks_geojson, b'{"type": "Point", "coordinates": ["a"]}', "has no point"),
-        (marks_geojson, b"5", "has no point"),
-        (marks_geojson, geojson(POINTS, crs={"properties": {"name": "EPSG::25832"}}), "coordinate system"),
+        (marks_geojson, b"5", "an object is wanted"),
+        (marks_geojson, geojson(POINTS, crs={"properties": {"name": "EPSG::25832"}}), "WGS84 is wanted"),
         (marks_csv, table(POINTS, "name,lat,lon,altitude"), "'altitude' does not"),
         (marks_csv, table(POINTS, "name,lat,lon,note"), "no column of heights"),
         (marks_csv, table(POINTS, "Punkt;Rechtswert;Hochwert;Höhe NHN", ";"), "eastings and northings"),
@@ -163,7 +163,7 @@ def test_more_of_xml_than_memory_is_for_is_refused(monkeypatch):
         ("MOST_XML", 99, "99 are the most"),
     ):
         with monkeypatch.context() as bound, pytest.raises(WildlabError, match=problem):
-            bound.setattr(documents, name, most)
+            bound.setattr(text, name, most)
             marks_kml.read(HERE, kml(POINTS))
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pymap3d
 import pytest
 
 from tests.flight.readers.tracks import Reader, check, columns_of, near
+from wildlab.errors import WildlabError
 
 rtklib_pos = Reader("rtklib-pos")
 
@@ -33,13 +33,6 @@ def week(utc_s: float, sep: str = " ") -> str:
     return f"{int(gps // 604800)}{sep}{gps % 604800:.3f}"
 
 
-def dms(value: float) -> str:
-    size = abs(value)
-    minutes = (size - int(size)) * 60
-    sign = "-" if value < 0 else ""
-    return f"{sign}{int(size)} {int(minutes):02d} {(minutes - int(minutes)) * 60:.7f}"
-
-
 def document(scale: str, stamps: list[str], places: list[str], **other: object) -> str:
     names, rest, sep = other.get("names", LLH), other.get("rest", REST), str(other.get("sep", " "))
     quality = other.get("quality", [1] * len(stamps))
@@ -58,25 +51,13 @@ def llh() -> list[str]:
     return [f"{a:.9f} {b:.9f} {c:.4f}" for a, b, c in zip(LATITUDE, LONGITUDE, HEIGHT, strict=True)]
 
 
-def ecef() -> list[str]:
-    xyz = np.column_stack(pymap3d.geodetic2ecef(LATITUDE, LONGITUDE, HEIGHT))
-    return ["{:.6f} {:.6f} {:.6f}".format(*one) for one in xyz]
-
-
-def in_dms() -> list[str]:
-    return [f"{dms(a)} {dms(b)} {c:.4f}" for a, b, c in zip(LATITUDE, LONGITUDE, HEIGHT, strict=True)]
-
-
 GPST = [calendar(at, 18.0) for at in UTC_S]
 WAYS = {
     "calendar GPST": document("GPST", GPST, llh()),
     "week and time": document("GPST", [week(at) for at in UTC_S], llh()),
     "UTC": document("UTC", [calendar(at, 0.0) for at in UTC_S], llh()),
-    "JST": document("JST", [calendar(at, 9 * 3600.0) for at in UTC_S], llh()),
     "commas": document("GPST", GPST, llh(), sep=","),
     "semicolons, week": document("GPST", [week(at) for at in UTC_S], llh(), sep=";"),
-    "dms": document("GPST", GPST, in_dms(), names="latitude(d'\") longitude(d'\")  height(m)"),
-    "ecef": document("GPST", GPST, ecef(), names="x-ecef(m) y-ecef(m) z-ecef(m)"),
     "no header": "".join(f"{t} {p} 1 12 0.3 0.4 0.9\n" for t, p in zip(GPST, llh(), strict=True)),
     "CRLF": document("GPST", GPST, llh()).replace("\n", "\r\n"),
     "backwards": document("GPST", GPST[::-1], llh()[::-1]),
@@ -94,8 +75,7 @@ def test_every_way_gives_the_same_track(way):
     near(stream.columns, 1e-3, time_s=UTC_S)
     near(stream.columns, 2e-9, latitude_deg=LATITUDE, longitude_deg=LONGITUDE)
     near(stream.columns, 1e-4, height_ellipsoid_m=HEIGHT, fix=6)
-    if way != "ecef":
-        near(stream.columns, sd_horizontal_m=math.sqrt((0.3**2 + 0.4**2) / 2), sd_vertical_m=0.9)
+    near(stream.columns, sd_horizontal_m=math.sqrt((0.3**2 + 0.4**2) / 2), sd_vertical_m=0.9)
     assert bool(log.notes) == (way in ("backwards", "no header"))
     assert stream.rows[0] == {"backwards": 4 + COUNT, "no header": 1}.get(way, 5)
 
@@ -127,21 +107,14 @@ def test_geodetic_heights_velocities_and_quality():
     assert columns["why"][:8].tolist() == ["no fix", *[""] * 6, "estimated, not measured"]
 
 
-def test_spreads_and_velocity_of_ecef():
-    """A covariance and a velocity turned by pymap3d come back."""
-    rest = "Q ns sdx(m) sdy(m) sdz(m) sdxy(m) sdyz(m) sdzx(m) vx(m/s) vy(m/s) vz(m/s)"
-    turn = np.column_stack(
-        [pymap3d.enu2uvw(east, north, up, LATITUDE[0], LONGITUDE[0]) for north, east, up in np.eye(3)]
-    )
-    cov = turn @ np.diag([0.2, 0.3, 0.8]) ** 2 @ turn.T
-    roots = np.sign(cov) * np.sqrt(np.abs(cov))
-    values = [*roots.diagonal(), roots[0, 1], roots[1, 2], roots[2, 0], *(turn @ [1.0, 2.0, 3.0])]
-    names, tail = "x-ecef(m) y-ecef(m) z-ecef(m)", " ".join(f"{v:.9f}" for v in values)
-    columns = columns_of(
-        rtklib_pos, document("GPST", GPST[:1], ecef()[:1], names=names, rest=rest, tail=tail)
-    )
-    near(columns, 1e-6, sd_horizontal_m=math.sqrt((0.04 + 0.09) / 2), sd_vertical_m=0.8)
-    near(columns, 1e-6, v_north_m_s=1.0, v_east_m_s=2.0, v_down_m_s=-3.0)
+@pytest.mark.parametrize(
+    ("scale", "names"),
+    [("GPST", "x-ecef(m) y-ecef(m) z-ecef(m)"), ("JST", LLH), ("GPST", LLH.replace("deg", "d'\"")),
+     ("GPST", "e-baseline(m) n-baseline(m) u-baseline(m)")],
+)  # fmt: skip
+def test_other_solutions_are_refused_with_what_to_set(scale, names):
+    with pytest.raises(WildlabError, match="out-solformat = llh"):
+        rtklib_pos.read(Path("x.pos"), document(scale, GPST, llh(), names=names).encode())
 
 
 def test_reordered_and_missing_columns():

@@ -23,7 +23,7 @@ from wildlab.analysis.plans.wanted import (
 )
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest_parts import TerrainSays
-from wildlab.flight.readers.area import Area, Areas, read_areas
+from wildlab.flight.readers.vector import Area, Areas, read_areas
 from wildlab.flight.terrain import CutOut, terrain_about
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain

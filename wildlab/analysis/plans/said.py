@@ -15,7 +15,7 @@ from wildlab.analysis.plans.plan import Plan
 from wildlab.analysis.plans.sorties import Sortie, fly_rows
 from wildlab.analysis.plans.wanted import FURTHEST
 from wildlab.flight.files import printable
-from wildlab.flight.readers.area import Area
+from wildlab.flight.readers.vector import Area
 
 #: Share of ground in blurred images alone from which a speed is looked for, and of images to be sharp there.
 MUCH, NEARLY_ALL = 0.5, 0.95

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.documents import Field, parse_json
+from wildlab.flight.readers.text import Field, parse_json
 
 Part = Literal["frames", "lidar", "radar", "ir", "eo", "truth"]
 

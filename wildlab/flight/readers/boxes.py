@@ -23,9 +23,16 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular, unreadable
-from wildlab.flight.readers.documents import Field, number, parse_json, shown
-from wildlab.flight.readers.text import TextTable, plain, read_text_table
-from wildlab.flight.readers.text import number as decimal
+from wildlab.flight.readers.text import (
+    Field,
+    TextTable,
+    finite,
+    number,
+    parse_json,
+    plain,
+    read_text_table,
+    shown,
+)
 
 Array = NDArray[np.float64]
 
@@ -111,13 +118,13 @@ class Boxes:
         WildlabError
             Where it is not four numbers with sizes of zero or more, or the score is no number.
         """
-        box = tuple(map(number, at.value)) if isinstance(at.value, list | tuple) else ()
+        box = tuple(map(finite, at.value)) if isinstance(at.value, list | tuple) else ()
         fix = "mend it, or take the entry out"
         if len(box) != 4 or not all(map(math.isfinite, box)):
             raise at.fail("four numbers are wanted: left, top, width, height", fix)
         if min(box[2:]) < 0:
             raise at.fail("a box has no size below zero", fix)
-        sure = math.nan if score is None else number(score)
+        sure = math.nan if score is None else finite(score)
         if score is not None and not math.isfinite(sure):
             raise at._replace(value=score).fail("the score of a box is a number", "mend it, or leave it out")
         self.found.append((name, box, kind, sure, crowd))
@@ -206,7 +213,7 @@ def _truth(whole: Field, group: str | None) -> Marked:
         key = _once(one.member("id"), "image", ids).identity()
         name = _once(one.member("file_name"), "image", groups).name()
         ids[key] = name
-        width, height = (number(one.member(side).value) for side in ("width", "height"))
+        width, height = (finite(one.member(side).value) for side in ("width", "height"))
         if min(width, height) >= 1:
             sizes[name] = (int(width), int(height))
         if group is not None and group not in one.value:
@@ -592,7 +599,7 @@ def read_yolo_folder(path: Path) -> Marked:
 
 def _line(boxes: Boxes, line: Field, names: dict[int, str]) -> None:
     words = line.value.split()
-    values = [decimal(word) for word in words]
+    values = [number(word) for word in words]
     if len(values) not in (5, 6) or not words[0].isdecimal() or not np.isfinite(values).all():
         raise line.fail(
             "class, centre, size and perhaps a score are wanted",

@@ -27,11 +27,10 @@ from wildlab.flight.readers.boxes import (
     read_yolo_folder,
     way_of,
 )
-from wildlab.flight.readers.documents import BrokenXml, parse_xml
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import Decoded, Readings
 from wildlab.flight.readers.photo_tags import read_tags, size_of
-from wildlab.flight.readers.text import header_of, number, plural
+from wildlab.flight.readers.text import BrokenXml, header_of, number, parse_xml, plural
 
 Array = NDArray[np.float64]
 

@@ -1,21 +1,25 @@
-"""Text that people and programs write: encodings, numbers, stamps, tables with a sign between values."""
+"""Text of strangers, within bounds: encodings, numbers, stamps, tables, JSON, XML."""
 
 from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 import re
 import unicodedata
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from itertools import dropwhile
+from itertools import count, dropwhile
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, NoReturn
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
 
 import numpy as np
 
 from wildlab.errors import WildlabError
+from wildlab.flight.files import printable
 from wildlab.flight.readers.log import Array
 from wildlab.names import from_csv_cell
 
@@ -234,3 +238,188 @@ def read_text_table(data: bytes, path: Path) -> TextTable:
             what = "line {} has {} values, and there are {} columns".format(*short[0], len(header))
         raise WildlabError(what, "give one row for each thing", file=path)
     return TextTable(header, rows, at, sign != ",", short)
+
+
+# -- JSON and XML
+
+
+class Field(NamedTuple):
+    """A value of a JSON file and where it stands: ``images[3].bbox``."""
+
+    value: Any
+    where: str
+    path: Path
+
+    def fail(self, wanted: str, fix: str = "mend it") -> WildlabError:
+        """An error that says what is there and what is wanted, to be raised."""
+        return WildlabError(
+            f"is {shown(self.value)}, and {wanted}", fix, file=self.path, field=self.where or None
+        )
+
+    def member(self, key: str) -> Field:
+        """A member of an object; of one that is not there the value is None."""
+        if not isinstance(self.value, dict):
+            raise self.fail("an object is wanted")
+        return Field(self.value.get(key), f"{self.where}.{key}" if self.where else key, self.path)
+
+    def items(self) -> list[Field]:
+        """What stands in a list."""
+        if not isinstance(self.value, list):
+            raise self.fail("a list is wanted")
+        return [Field(one, f"{self.where}[{at}]", self.path) for at, one in enumerate(self.value)]
+
+    def number(self, most: float = math.inf) -> float:
+        """A finite number that is no further from zero than `most`."""
+        found = finite(self.value)
+        if math.isnan(found):
+            raise self.fail("a finite number is wanted")
+        if abs(found) > most:
+            raise self.fail(f"no more than {most:g} is wanted")
+        return found
+
+    def name(self) -> str:
+        """A text that is not empty."""
+        if not isinstance(self.value, str) or not self.value:
+            raise self.fail("a name is wanted")
+        return self.value
+
+    def identity(self) -> int | str:
+        """A whole number or a text."""
+        if isinstance(self.value, bool) or not isinstance(self.value, int | str):
+            raise self.fail("a number or a name is wanted")
+        return self.value
+
+
+def parse_json(data: bytes, path: Path, what: str = "readable JSON", *, plain: bool = True) -> Field:
+    """The content of a JSON file.
+
+    Parameters
+    ----------
+    data
+        UTF-8.
+    path
+        For messages.
+    what
+        What it should be, for messages.
+    plain
+        Whether numbers that are none (``NaN``) and names that stand twice in an object are refused.
+
+    Raises
+    ------
+    WildlabError
+        Where it is not JSON, or nested too deeply.
+    """
+
+    def constant(name: str) -> float:
+        if plain:
+            raise ValueError(f"{name} is not JSON")
+        return float(name)
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if plain and len(found) < len(pairs):
+            raise ValueError("a name stands twice in one object")
+        return found
+
+    try:
+        text = data.decode("utf-8-sig")
+        return Field(json.loads(text, parse_constant=constant, object_pairs_hook=once), "", path)
+    except (ValueError, RecursionError) as error:
+        said = printable(str(error) or "its brackets are too deep")[:100]
+        raise WildlabError(f"is not {what} ({said})", "write it anew, in UTF-8", file=path) from None
+
+
+def finite(value: Any) -> float:
+    """A JSON value as a finite number, NaN where it is none.
+
+    Examples
+    --------
+    >>> finite(3), finite("3"), finite(True), finite(10**400)
+    (3.0, nan, nan, nan)
+    """
+    try:
+        found = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
+    except OverflowError:
+        return math.nan
+    return found if math.isfinite(found) else math.nan
+
+
+def shown(value: Any) -> str:
+    """A value of a hostile file, short and printable, in at most 60 characters."""
+    if value is None:
+        return "missing"
+    try:
+        text = printable(repr(value))
+    except ValueError:  # an integer with thousands of digits
+        text = "a number with too many digits"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+#: Bytes and elements of an XML file, and elements inside each other, at most.
+MOST_XML, MOST_ELEMENTS, DEEPEST = 50_000_000, 1_000_000, 50
+
+
+class BrokenXml(WildlabError):
+    """XML that breaks off; `root` is what stands before that, None where nothing does."""
+
+    root: Element | None = None
+
+
+def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML") -> Element:
+    """The root of an XML file, without entities, links or else what reaches out; name spaces stand before
+    names.
+
+    Parameters
+    ----------
+    data
+        Its content.
+    path
+        For messages.
+    what
+        What it should be, for messages.
+
+    Raises
+    ------
+    BrokenXml
+        Where it is not XML, or breaks off.
+    WildlabError
+        Where it is too large, declares a document type or entities, or is nested too deeply.
+    """
+
+    def fail(problem: str) -> WildlabError:
+        return WildlabError(problem, "export it anew", file=path)
+
+    def refuse(*_: object) -> NoReturn:
+        raise fail("declares a document type or entities, which no such file needs")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        if len(inside) >= DEEPEST:
+            raise fail("its elements are too deep in each other")
+        if next(counted) >= MOST_ELEMENTS:
+            raise fail(f"has more than {MOST_ELEMENTS:,} elements")
+        inside.append(tag)
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        builder.end(inside.pop())
+
+    if len(data) > MOST_XML:
+        raise fail(f"has {len(data):,} bytes, and {MOST_XML:,} are the most that is read of XML")
+    counted = count()
+    inside: list[str] = []
+    builder = TreeBuilder()
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        broken = BrokenXml(f"is not {what} ({printable(str(error))[:100]})", "export it anew", file=path)
+        begun = bool(inside)
+        while inside:
+            end("")
+        broken.root = builder.close() if begun else None
+        raise broken from None
+    return builder.close()
