@@ -17,7 +17,7 @@ from wildlab.analysis.plans.plan import make_plan, nearest_ground, refuse_near
 from wildlab.analysis.plans.said import plan_result
 from wildlab.analysis.plans.sorties import TOLERANCE, fly_rows, follow
 from wildlab.analysis.plans.wanted import LIMITS, Wanted, look
-from wildlab.flight.writers.mission import CHANGE_SPEED, mission_items
+from wildlab.flight.writers import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
 

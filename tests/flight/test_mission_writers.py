@@ -8,10 +8,15 @@ from defusedxml import minidom
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.vector import parse_areas
-from wildlab.flight.writers.maps import plan_geojson, plan_kml
-from wildlab.flight.writers.mission import MOST_ITEMS, Mission, mission_items
-from wildlab.flight.writers.qgc_plan import qgc_plan
-from wildlab.flight.writers.waypoints import waypoints_text
+from wildlab.flight.writers import (
+    MOST_ITEMS,
+    Mission,
+    mission_items,
+    plan_geojson,
+    plan_kml,
+    qgc_plan,
+    waypoints_text,
+)
 
 HOME = (58.66, 16.46, 71.5)
 

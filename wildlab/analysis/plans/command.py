@@ -15,10 +15,7 @@ from wildlab.analysis.plans.said import plan_result
 from wildlab.analysis.plans.wanted import Wanted
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
-from wildlab.flight.writers.maps import plan_geojson, plan_kml
-from wildlab.flight.writers.mission import Mission
-from wildlab.flight.writers.qgc_plan import qgc_plan
-from wildlab.flight.writers.waypoints import waypoints_text
+from wildlab.flight.writers import Mission, plan_geojson, plan_kml, qgc_plan, waypoints_text
 
 #: Files besides those of each flight. All but the page and its numbers hold positions on the Earth.
 MAPS = ("plan.geojson", "plan.kml")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest_parts import TerrainSays
 from wildlab.flight.readers.vector import Area, crossing, ring_area
-from wildlab.flight.writers.mission import Heights, Vehicle
+from wildlab.flight.writers import Heights, Vehicle
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import intersect_plane, pixel_rays
