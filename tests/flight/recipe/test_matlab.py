@@ -13,8 +13,8 @@ import scipy.io
 from wildlab.errors import WildlabError
 from wildlab.files import sha256
 from wildlab.flight.recipe import matlab
-from wildlab.flight.recipe.matlab import read_matlab, table_of
-from wildlab.flight.recipe.parts import MatlabTable
+from wildlab.flight.recipe.quantities import MatlabTable
+from wildlab.flight.recipe.source_files import read_matlab, table_of
 
 HERE = Path("log.mat")
 

@@ -22,8 +22,8 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checksums import accept_changes
 from wildlab.flight.clocks import covariances
-from wildlab.flight.recipe.parts import Attitude, parse_zone
-from wildlab.flight.recipe.poses import _rotation
+from wildlab.flight.recipe.quantities import Attitude, parse_zone
+from wildlab.flight.recipe.tables import _rotation
 from wildlab.flight.store import Flight, load_flight
 from wildlab.flight.units import UNITS, factor
 from wildlab.geometry.flodell import geodetic_to_enu_linear

@@ -46,14 +46,11 @@ def both(*changes: Change) -> Change:
             "recipe.toml, poses.log.position.latitude: 'degree' is not a unit",
         ),
         (
-            in_recipe("poses.log.position.height.unit", "deg"),
-            "recipe.toml, poses.log.position.height: not of length",
-        ),
-        (
             in_table("nav.csv", ",140,1,0,0,0\n2024-06-12T09:30:04Z", ",,1,0,0,0\n2024-06-12T09:30:04Z"),
             "nav.csv, height: line 5: this cell is empty",
         ),
-        (in_table("nav.csv", "63.440200", "nan"), "nav.csv, lat: line 4: 'nan'"),
+        (in_table("nav.csv", "63.440200", '"63,44"'), "nav.csv, lat: line 4: '63,44' has a decimal comma"),
+        (in_table("nav.csv", "63.440200", "63,44"), "nav.csv, lat: 63,44 is read as two cells"),
         (in_table("nav.csv", "63.440200", "634.4"), "nav.csv, lat: no latitude"),
         (in_table("nav.csv", "63.440200,10.4,", "0,0,"), "nav.csv, lat: both 0"),
         (
@@ -62,7 +59,6 @@ def both(*changes: Change) -> Change:
             ),
             "nav.csv, qw, qx, qy, qz: length is 1.414",
         ),
-        (in_recipe("camera.fx_px", 0.0), "recipe.toml, camera.fx_px: length is 0"),
         (
             both(
                 in_recipe("camera.file", "buoy.csv"),
@@ -74,10 +70,6 @@ def both(*changes: Change) -> Change:
         (
             in_table("nav.csv", "09:30:03Z", "09:30:01Z"),
             "nav.csv, time_s (from [poses.log]): followed by 1.000 s",
-        ),
-        (
-            in_table("photos.csv", "09:30:03Z", "09:30:01Z"),
-            "photos.csv, time_s (from [frames]): not increasing",
         ),
         (
             in_table("photos.csv", "T09", "T11"),
@@ -96,7 +88,6 @@ def both(*changes: Change) -> Change:
             both(in_recipe("truth.1.time.format", "unix"), in_table("boat.csv", "\n4,", "\n1718184602000,")),
             "boat.csv, t: centuries away",
         ),
-        (in_recipe("time.epoch", None), "recipe.toml: since an epoch"),
         (
             in_table("buoy.csv", "63.44,10.401", "10.401,63.44"),
             "buoy.csv, north_m (from [truth]): far from the flight",
@@ -108,7 +99,6 @@ def both(*changes: Change) -> Change:
             in_recipe("detections.0.ground.height.value", 500.0),
             "clicks.csv, plane_down_m (from [detections]): 3 of 3 ground",
         ),
-        (in_recipe("detections.0.pixels", 1), "recipe.toml, detections[0].pixels: Did you mean 'pixel'"),
         (in_recipe("poses", {}), "recipe.toml: no poses"),
         (
             lambda raw: raw.recipe["poses"].update({"../x": raw.recipe["poses"].pop("log")}),
@@ -118,14 +108,10 @@ def both(*changes: Change) -> Change:
             in_recipe("poses.log.file", "../../etc/passwd"),
             "recipe.toml, poses.log.file: leaves the folder",
         ),
-        (in_recipe("files", {"../secret.txt": ""}), "recipe.toml, files.file: leaves the folder"),
-        (in_recipe("poses.log.file", "."), "raw, poses.log.file: is a folder"),
-        (in_recipe("poses.log.attitude.order", None), "recipe.toml, poses.log.attitude: with its order"),
         (
             in_recipe("poses.log.attitude", "roll = {value = 0.0, unit = 'deg'}"),
             "recipe.toml, poses.log.attitude: roll",
         ),
-        (in_recipe("poses.log.time", None), "recipe.toml: neither a time"),
         (
             in_recipe(
                 "poses.log.position",
@@ -139,7 +125,6 @@ def both(*changes: Change) -> Change:
         ),
         (in_table("nav.csv", "2024-06-12T09:30:03Z,", ""), "nav.csv: line 5 has 7"),
         (lambda raw: raw.tables.update({"nav.csv": "time,lat\n"}), "nav.csv: no rows"),
-        (lambda raw: raw.tables.update({"nav.csv": ""}), "nav.csv: no rows"),
         (
             in_table("nav.csv", ",", ";"),
             "nav.csv, lat: single name",

@@ -23,14 +23,17 @@ from wildlab.flight.files import TOML_LIMIT, check_model, inside
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.flight.manifest_parts import CameraPart, GnssPart, ImuPart, MagnetometerPart, TerrainSays
 from wildlab.flight.recipe.model import Recipe, read_recipe
-from wildlab.flight.recipe.poses import Fixes, LocalFrame, PoseRows, read_poses
 from wildlab.flight.recipe.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
 from wildlab.flight.recipe.tables import (
+    Fixes,
     FrameRows,
+    LocalFrame,
+    PoseRows,
     SensorRows,
     frames_of_rows,
     read_detections,
     read_frames,
+    read_poses,
     read_sensors,
     read_truth,
 )

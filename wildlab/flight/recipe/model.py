@@ -23,7 +23,7 @@ from wildlab.flight.manifest_parts import (
     TerrainSays,
     UncertaintyPart,
 )
-from wildlab.flight.recipe.parts import (
+from wildlab.flight.recipe.quantities import (
     Angle,
     Attitude,
     Gimbal,

@@ -24,16 +24,17 @@ from wildlab.flight.files import did_you_mean, inside, printable, read_regular
 from wildlab.flight.readers.autoferry import Part, read_part
 from wildlab.flight.readers.formats import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.log import RawLog, Stream
-from wildlab.flight.readers.parts import of_images, stamped_by, stream_of
-from wildlab.flight.recipe.delimited import is_packed, packed, read_delimited
-from wildlab.flight.recipe.matlab import read_matlab, table_of
-from wildlab.flight.recipe.parts import LogTable, MatlabTable, Quantity, Series, Stamp, parse_zone
+from wildlab.flight.readers.photos import of_camera
+from wildlab.flight.recipe.quantities import LogTable, MatlabTable, Quantity, Series, Stamp, parse_zone
+from wildlab.flight.recipe.source_files import is_packed, packed, read_delimited, read_matlab, table_of
+from wildlab.flight.trigger_matching import match_triggers
 from wildlab.flight.units import Dimension, factor
 
 Array = NDArray[np.float64]
 Text = NDArray[np.object_]
 Nanoseconds = NDArray[np.int64]
 
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+", re.ASCII)
 #: Stamps that end so carry their own zone.
 _ZONED = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d.*(?:[Zz]|[+-]\d\d(?::?\d\d)?)")
 #: The most bytes of a raw file that are read: ten hours of 250 a second are one gigabyte of text.
@@ -162,7 +163,7 @@ class RawFiles:
                 cells, frames = read_part(path, data, cast(Part, block.part))
                 self._tables[name, ""] = RawTable(path, tuple(cells), cells, frames, "frame")
             else:
-                stream = stream_of(self._log(block, f"logs.{name}"), block, path)
+                stream = log_part(self._log(block, f"logs.{name}"), block, path)
                 if block.triggers is not None:
                     stream = stamped_by(stream, self._triggers(block.triggers, name), path)
                 if block.images is not None:
@@ -181,7 +182,7 @@ class RawFiles:
                 file=self.recipe,
                 field=f"logs.{images}.triggers",
             )
-        return stream_of(self._log(other, f"logs.{triggers}"), other, self.folder / other.file)
+        return log_part(self._log(other, f"logs.{triggers}"), other, self.folder / other.file)
 
     def _images(self, images: str, pixels: str) -> Stream:
         """The images that pixels have to be of."""
@@ -340,13 +341,16 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
     else:
         found = np.asarray(cells, float)
         bad = np.isinf(found) if may_be_empty else ~np.isfinite(found)
-    table.refuse(
-        bad,
-        lambda row: f"{_short(table.cell(column, row))} is not a finite number",
-        "mend the cell (a point before the decimals, no unit behind them), or take out the row",
-        column,
-        part,
-    )
+    if bad.any():
+        row = int(np.argmax(bad))
+        cell = table.cell(column, row)
+        problem, fix = (
+            "is not a finite number",
+            "mend the cell (no unit behind it), or take out the row",
+        )
+        if _DECIMAL_COMMA.fullmatch(cell):
+            problem, fix = "has a decimal comma", "write a decimal point in place of it, in all of the column"
+        raise table.fail(f"{_short(cell)} {problem}", fix, column, part, row)
     return np.asarray(found)
 
 
@@ -421,3 +425,140 @@ def nanoseconds(when: datetime) -> int:
 
 def _short(text: str) -> str:
     return repr(text if len(text) <= 60 else text[:57] + "...")
+
+
+# -- parts of logs
+
+
+def log_part(log: RawLog, wanted: LogTable, path: Path) -> Stream:
+    """The part, with the columns ``height_m`` and ``stem`` (of ``file`` or ``image``) where they make sense.
+
+    Parameters
+    ----------
+    log
+        Read.
+    wanted
+        The part, what heights count from and what is added to them, what is added to stamps.
+    path
+        Only for messages.
+
+    Returns
+    -------
+    Stream
+        Rows without a stamp or a height that the recipe asked for are marked as not used.
+
+    Raises
+    ------
+    WildlabError
+        Where the log has no such part or no such heights.
+    """
+    if wanted.part not in log.parts:
+        there = ", ".join(log.parts) or "nothing that can be used"
+        raise WildlabError(
+            f"this log has no {wanted.part}", f"use what it has: {there}", file=path, field="part"
+        )
+    if wanted.camera is not None and "photos" in log.parts:
+        log = of_camera(log, wanted.camera)
+    stream = log.parts[wanted.part]
+    columns = dict(stream.columns)
+    use, why = columns["use"].copy(), columns["why"].copy()
+    if "time_s" in columns or "time_log_s" in columns:
+        known = columns.get("time_s", np.full(len(stream), np.nan))
+        # The log's own stamps, where the recipe says what they count from; those of images may stand alone.
+        stated = wanted.offset_s or wanted.part == "photos"
+        if stated and not np.isfinite(known).any() and "time_log_s" in columns:
+            known = columns["time_log_s"]
+        columns["time_s"] = known + wanted.offset_s
+    if wanted.height is not None:
+        name = f"height_{wanted.height}_m"
+        if name not in columns:
+            there = ", ".join(one for one in columns if one.startswith("height_")) or "none"
+            problem = f"its {wanted.part} have no heights of the kind {wanted.height!r}"
+            raise WildlabError(problem, f"there are {there}", file=path, field="height")
+        columns["height_m"] = columns[name] + wanted.add_m
+        lost = (use == 1.0) & ~np.isfinite(columns["height_m"])
+        use[lost], why[lost] = 0.0, "no height"
+    for name in ("file", "image"):
+        if name in columns:
+            columns["stem"] = np.array([Path(str(one)).stem for one in columns[name]], dtype=object)
+    done = Stream({**columns, "use": use, "why": why}, stream.rows, stream.counted_in)
+    return _by_time(done) if wanted.part == "photos" else done
+
+
+def _by_time(stream: Stream) -> Stream:
+    """Images in the order of their stamps: counters begin again, and copies have names of their own."""
+    times = stream.columns.get("time_s")
+    if times is None or not np.isfinite(times).any():
+        return stream
+    return stream.take(np.argsort(times, kind="stable"))
+
+
+def of_images(pixels: Stream, images: Stream) -> Stream:
+    """Pixels, those marked as not used that are of no image with a time.
+
+    Parameters
+    ----------
+    pixels
+        With ``image`` and ``stem``.
+    images
+        With ``file`` and ``stem``.
+
+    Returns
+    -------
+    Stream
+    """
+    there = np.ones(len(images), bool)
+    times = images.columns.get("time_s")
+    if times is not None and np.isfinite(times).any():
+        there = np.isfinite(times)
+    known = {str(one) for name in ("file", "stem") for one in images.columns[name][there]}
+    strange = np.array(
+        [
+            str(a) not in known and str(b) not in known
+            for a, b in zip(pixels.columns["image"], pixels.columns["stem"], strict=True)
+        ],
+        bool,
+    )
+    use, why = pixels.columns["use"].copy(), pixels.columns["why"].copy()
+    why[strange & (use == 1.0)] = "its image is not there"
+    use[strange] = 0.0
+    return Stream({**pixels.columns, "use": use, "why": why}, pixels.rows, pixels.counted_in)
+
+
+def stamped_by(images: Stream, triggers: Stream, path: Path) -> Stream:
+    """Images with the times of the records of their triggers; those without a record have none.
+
+    Parameters
+    ----------
+    images
+        With ``time_s`` or ``time_log_s``, by the camera's clock.
+    triggers
+        With ``time_s``.
+    path
+        Only for messages.
+
+    Returns
+    -------
+    Stream
+
+    Raises
+    ------
+    WildlabError
+        Where neither has times, or no image belongs to a record for certain.
+    """
+    stamps = images.columns.get("time_log_s", images.columns.get("time_s"))
+    times = triggers.columns.get("time_s")
+    if stamps is None or times is None:
+        problem = "the images or the records of their triggers have no times"
+        raise WildlabError(problem, "take out triggers", file=path, field="triggers")
+    of_record = np.where(triggers.used, times, np.nan)
+    match = match_triggers(stamps, of_record)
+    if not match.certain:
+        raise WildlabError(
+            "which image belongs to which record of a trigger is not certain",
+            "take out triggers, and give camera_offset_s in [clocks]",
+            file=path,
+            field="triggers",
+        )
+    taken = np.where(match.trigger >= 0, of_record[np.maximum(match.trigger, 0)], np.nan)
+    return _by_time(Stream({**images.columns, "time_s": taken}, images.rows, images.counted_in))

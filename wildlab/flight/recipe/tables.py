@@ -1,22 +1,29 @@
-"""Tables of a recipe beside the poses: sensors on board, frames, detections and truth."""
+"""Tables of a recipe, converted to frame n: poses, sensors on board, frames, detections and truth."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from operator import attrgetter
+from typing import Literal
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from wildlab.flight.recipe.model import Detections, FramesPart, Ground, Recipe, Truth
-from wildlab.flight.recipe.parts import Block, Satellite, Series
-from wildlab.flight.recipe.poses import (
-    LocalFrame,
-    RawPosition,
-    ned_columns,
-    read_position,
-    read_velocity,
-    velocity_columns,
+from wildlab.flight.checks.findings import NORM_TOLERANCE, POSITION, QUATERNION, VELOCITY
+from wildlab.flight.clocks import between, covariance_columns
+from wildlab.flight.recipe.model import Detections, FramesPart, Ground, Poses, Recipe, Truth
+from wildlab.flight.recipe.quantities import (
+    FORMS,
+    Attitude,
+    Block,
+    Position,
+    Quantity,
+    Satellite,
+    Series,
+    Spreads,
+    Velocity,
+    YawFromBearing,
 )
 from wildlab.flight.recipe.raw import (
     Array,
@@ -30,7 +37,338 @@ from wildlab.flight.recipe.raw import (
     times,
 )
 from wildlab.flight.units import Dimension
-from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic, wrap
+from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
+from wildlab.geometry.flodell import metres_per_degree
+from wildlab.geometry.frames import (
+    R_NED_ENU,
+    Origin,
+    enu_to_ned,
+    euler_to_matrix,
+    geodetic_to_ned,
+    matrix_to_quaternion,
+    ned_to_geodetic,
+    quaternion_to_matrix,
+    wrap,
+)
+
+#: Takes a vector from forward-left-up to forward-right-down, and back.
+FLIP = np.diag([1.0, -1.0, -1.0])
+
+#: What became of standard deviations of angles, for the flight's description.
+AS_TILT_AND_HEADING = (
+    "The tilt of nav/{} is the root mean square of the SDs of roll and pitch, the heading that of yaw."
+)
+
+#: Rows that say the same of one frame agree to this, in metres or radians.
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class RawPosition:
+    """Positions as a table has them, in radians and metres: columns as in `form`."""
+
+    form: str
+    linear: bool
+    values: Array
+
+    def rows(self, chosen: NDArray[np.intp]) -> RawPosition:
+        return RawPosition(self.form, self.linear, self.values[chosen])
+
+
+@dataclass(frozen=True)
+class LocalFrame:
+    """What takes raw positions to frame n: the origin, and the metres to take off heights."""
+
+    origin: Origin
+    correction_m: float
+    taken_off: tuple[str, ...]
+
+    def off(self, what: str) -> float:
+        return self.correction_m if what in self.taken_off else 0.0
+
+    def ned(self, position: RawPosition, what: str) -> Array:
+        """Positions in n, (N, 3); `what` they are decides whether the vertical correction is taken off."""
+        a, b, c = position.values.T
+        off = self.off(what)
+        if position.form == "ned":
+            return np.column_stack([a, b, c + off])
+        if position.form == "wgs84":
+            return geodetic_to_ned(a, b, c - off, self.origin)
+        if not position.linear:
+            return enu_to_ned(np.column_stack([a, b, c - off]))
+        north, east = metres_per_degree(self.origin[0])
+        latitude = self.origin[0] + np.radians(b / north)
+        longitude = self.origin[1] + np.radians(a / east)
+        return geodetic_to_ned(latitude, longitude, self.origin[2] + c - off, self.origin)
+
+
+def ned_columns(position: Array) -> dict[str, Array]:
+    """Positions (N, 3) in n as columns of a flight."""
+    return dict(zip(POSITION, position.T, strict=True))
+
+
+def velocity_columns(velocity: Array) -> dict[str, Array]:
+    """Velocities (N, 3) in n as columns of a flight."""
+    return dict(zip(VELOCITY, velocity.T, strict=True))
+
+
+@dataclass(frozen=True)
+class Fixes:
+    """Satellite positions: flight times (N,) and positions in n (N, 3)."""
+
+    times: Array
+    position: Array
+
+
+@dataclass(frozen=True)
+class PoseRows:
+    """Poses of one source, by time (`stamps`) or by frame (`ids`); without positions of its own, where those
+    of the receiver are to be taken."""
+
+    position: RawPosition | None
+    rotation: Array
+    velocity: Array | None
+    covariance: Array | None
+    stamps: Nanoseconds | None
+    ids: Text | None
+    note: str
+
+    def nav(self, time_s: Array, places: LocalFrame, fixes: Fixes | None) -> pd.DataFrame:
+        """The nav table, its positions in n; without those poses that `fixes` have no position for."""
+        if self.position is not None:
+            p = places.ned(self.position, "poses")
+        elif fixes is not None:
+            p = between(fixes.times, fixes.position, time_s, "gnss")
+        else:
+            raise ValueError("poses without positions")
+        q = matrix_to_quaternion(self.rotation)
+        columns: dict[str, Array | Text] = {"time_s": time_s}
+        columns |= ned_columns(p) | dict(zip(QUATERNION, q.T, strict=True))
+        if self.velocity is not None:
+            columns |= velocity_columns(self.velocity)
+        if self.ids is not None:
+            columns["frame_id"] = self.ids
+        table = pd.DataFrame(columns)
+        if self.covariance is not None:
+            table = pd.concat([table, covariance_columns(self.covariance)], axis=1)
+        return table if self.position is not None else table[np.isfinite(p[:, 0])].reset_index(drop=True)
+
+
+def read_position(table: RawTable, position: Position, part: str) -> RawPosition:
+    """The three columns of a position, in radians and metres.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing or a cell is not a number.
+    """
+    form = position.form
+    if form is None:
+        raise ValueError("a position without a form")
+    columns = []
+    for name in FORMS[form]:
+        dimension: Literal["angle", "length"] = "angle" if name in ("latitude", "longitude") else "length"
+        values = numbers(table, getattr(position, name), dimension, f"{part}.{name}")
+        limit = {"latitude": np.pi / 2, "longitude": 2 * np.pi}.get(name, np.inf)
+
+        def beyond(row: int, values: Array = values, name: str = name) -> str:
+            return f"{np.degrees(values[row]):g} deg is no {name}"
+
+        table.refuse(
+            np.abs(values) > limit,
+            beyond,
+            "check the column and its unit in the recipe",
+            getattr(position, name).column or "value",
+            f"{part}.{name}",
+        )
+        columns.append(values)
+    nowhere = (columns[0] == 0) & (columns[1] == 0)
+    # A receiver writes zeros until it knows where it is; a local position may well be zero.
+    if form == "wgs84":
+        table.refuse(
+            nowhere,
+            f"latitude and longitude are both 0, here and in {int(nowhere.sum()) - 1} other rows: no "
+            "position was known yet",
+            "take out these rows",
+            (position.latitude.column if position.latitude else None) or "value",
+            f"{part}.latitude",
+        )
+    return RawPosition(form, position.linear, np.column_stack(columns))
+
+
+def read_velocity(table: RawTable, velocity: Velocity, part: str) -> Array:
+    """North, east, down, (N, 3) m/s.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing or a cell is not a number.
+    """
+
+    def speeds(name: str) -> Array:
+        return numbers(table, getattr(velocity, name), "speed", f"{part}.{name}")
+
+    if velocity.course is not None:
+        speed, course = speeds("speed"), numbers(table, velocity.course, "angle", f"{part}.course")
+        north, east = speed * np.cos(course), speed * np.sin(course)
+    else:
+        north, east = speeds("north"), speeds("east")
+    down = speeds("down") if velocity.up is None else -speeds("up")
+    return np.column_stack([north, east, down])
+
+
+def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Text | None) -> PoseRows:
+    """One nav source. Where several rows are of one frame (`ids`), they have to say the same, and become one.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing, a cell is not a number or not a time, a quaternion is not normalised, or
+        rows of one frame differ.
+    """
+    position = None if block.position is None else read_position(table, block.position, f"{part}.position")
+    velocity = spreads = stamps = None
+    if block.velocity is not None:
+        velocity = read_velocity(table, block.velocity, f"{part}.velocity")
+    if block.spreads is not None:
+        spreads = _read_spreads(table, block.spreads, f"{part}.spreads")
+    if block.time is not None:
+        stamps = times(table, block.time, f"{part}.time", recipe.time.zone, recipe.time.epoch)
+    attitude = _read_attitude(table, block.attitude, f"{part}.attitude")
+    note = ""
+    if position is None:
+        note = f"The positions of nav/{part.removeprefix('poses.')} are linear between those of the receiver."
+    elif ids is not None:
+        frame, first = _rows_of_frames(ids)
+        for values in (position.values, attitude, velocity, spreads):
+            if values is not None:
+                _same(table, values, frame, first, ids, part)
+        if block.attitude.yaw_from_bearing is not None:
+            bearing = block.attitude.yaw_from_bearing
+            yaw, note = _yaw_from_bearing(
+                table, bearing, f"{part}.attitude.yaw_from_bearing", position, frame, first
+            )
+            attitude = np.column_stack([attitude, yaw[frame]])
+        position, attitude, ids = position.rows(first), attitude[first], ids[first]
+        velocity = None if velocity is None else velocity[first]
+        spreads = None if spreads is None else spreads[first]
+    rotation = _rotation(attitude, block.attitude)
+    covariance = None
+    if spreads is not None:
+        horizontal, vertical, tilt, heading = spreads.T
+        covariance = pose_covariance(horizontal, vertical, tilt, heading, rotation)
+    if block.spreads is not None and block.spreads.tilt is None:
+        note = f"{note} {AS_TILT_AND_HEADING.format(part.removeprefix('poses.'))}".strip()
+    return PoseRows(position, rotation, velocity, covariance, stamps, ids, note)
+
+
+def _read_attitude(table: RawTable, attitude: Attitude, part: str) -> Array:
+    """Quaternions (w, x, y, z), or roll, pitch and (where it is not recovered) yaw."""
+    if attitude.quaternion is None:
+        angles = (("roll", attitude.roll), ("pitch", attitude.pitch), ("yaw", attitude.yaw))
+        return np.column_stack(
+            [numbers(table, q, "angle", f"{part}.{name}") for name, q in angles if q is not None]
+        )
+    q = np.column_stack([plain_numbers(table, name, f"{part}.quaternion") for name in attitude.quaternion])
+    if attitude.order == "xyzw":
+        q = q[:, [3, 0, 1, 2]]
+    norm = np.linalg.norm(q, axis=1)
+    table.refuse(
+        np.abs(norm - 1) > NORM_TOLERANCE,
+        lambda row: f"the quaternion is not normalised, its length is {norm[row]:.4g}",
+        "check that these are the four parts of a rotation, and mend or take out the row",
+        ", ".join(attitude.quaternion),
+        f"{part}.quaternion",
+    )
+    return q * np.array([1, -1, -1, -1]) if attitude.inverse else q
+
+
+def _rotation(values: Array, attitude: Attitude) -> Array:
+    """``R_nb`` (N, 3, 3)."""
+    R = quaternion_to_matrix(values) if attitude.quaternion is not None else euler_to_matrix(*values.T)
+    return np.asarray(R_NED_ENU @ R @ FLIP if attitude.axes == "flu-enu" else R)
+
+
+def _read_spreads(table: RawTable, spreads: Spreads, part: str) -> Array:
+    """(N, 4) standard deviations: horizontal and vertical position, tilt and heading."""
+
+    def angle(quantity: Quantity | None) -> Array:
+        return np.zeros(0) if quantity is None else numbers(table, quantity, "angle", part)
+
+    tilt, heading = angle(spreads.tilt), angle(spreads.heading)
+    if spreads.tilt is None:
+        tilt, heading = tilt_from_roll_pitch(angle(spreads.roll), angle(spreads.pitch)), angle(spreads.yaw)
+    lengths = [numbers(table, q, "length", part) for q in (spreads.horizontal, spreads.vertical)]
+    return np.column_stack([*lengths, tilt, heading])
+
+
+def _rows_of_frames(ids: Text) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """For each row the number of its frame, and for each frame its first row."""
+    frame, _ = pd.factorize(ids)
+    _, first = np.unique(frame, return_index=True)
+    return frame, first
+
+
+def _same(
+    table: RawTable, values: Array, frame: NDArray[np.intp], first: NDArray[np.intp], ids: Text, part: str
+) -> None:
+    differs = np.abs(values - values[first][frame]).max(axis=1) > SAME
+    table.refuse(
+        differs,
+        lambda row: (
+            f"this row of frame {ids[row]!r} says something else than line {table.lines[first[frame[row]]]}"
+        ),
+        "give each frame one pose, or name more columns that tell frames apart",
+        "pose",
+        part,
+    )
+
+
+def _yaw_from_bearing(
+    table: RawTable,
+    bearing: YawFromBearing,
+    part: str,
+    position: RawPosition,
+    frame: NDArray[np.intp],
+    first: NDArray[np.intp],
+) -> tuple[Array, str]:
+    """Yaw of each frame (circular mean over its rows), and a sentence about how well the rows agree."""
+    latitude = numbers(table, bearing.latitude, "angle", f"{part}.latitude")
+    longitude = numbers(table, bearing.longitude, "angle", f"{part}.longitude")
+    beside = numbers(table, bearing.minus, "angle", f"{part}.minus")
+    north, east = np.empty(len(frame)), np.empty(len(frame))
+    for number, row in enumerate(first):
+        rows = frame == number
+        a, b, c = position.values[row].tolist()
+        origin = (a, b, c)
+        there = geodetic_to_ned(latitude[rows], longitude[rows], np.full(rows.sum(), origin[2]), origin)
+        north[rows], east[rows] = there[:, 0], there[:, 1]
+    yaw = np.arctan2(east, north) - beside
+    if bearing.past_nadir is not None:
+        slant = numbers(table, bearing.past_nadir.slant, "angle", f"{part}.past_nadir.slant")
+        minus = numbers(table, bearing.past_nadir.minus, "angle", f"{part}.past_nadir.minus")
+        yaw = yaw + np.where(slant - minus > np.pi / 2, np.pi, 0)
+    mean = np.arctan2(np.bincount(frame, np.sin(yaw)), np.bincount(frame, np.cos(yaw)))
+    off = np.degrees(np.angle(np.exp(1j * (yaw - mean[frame]))))
+    worst = int(np.argmax(np.abs(off)))
+    largest = float(np.abs(off[worst]))
+    if largest > bearing.largest_deviation_deg:
+        raise table.fail(
+            f"the yaw that this bearing gives is {largest:.3g} deg from the mean of its frame, more than "
+            f"{bearing.largest_deviation_deg:g} deg",
+            "look for a wrong sign, a wrong column, or frames that are not told apart",
+            "yaw",
+            part,
+            worst,
+        )
+    return mean, (
+        f"The yaw of {len(first)} frames is recovered from {len(frame)} recorded bearings, which agree "
+        f"with the mean of their frame to {largest:.3f} deg."
+    )
+
+
+# -- sensors, frames, detections and truth
+
 
 #: Columns of a flight's tables: name, quantity of the recipe's part, dimension.
 Columns = tuple[tuple[str, str, Dimension], ...]
