@@ -77,15 +77,15 @@ def test_what_several_steps_bring_together_is_not_guessed_and_what_meets_is_left
 def test_images_a_zone_off_say_what_to_type(hours):
     stamps = TAKEN + 3600.0 * hours
     clock = clock_of_images(images(stamps, stamps), own(), None)
-    assert f"--camera-offset {-3600.0 * hours:g} " in clock.said
+    assert f"--camera-offset {-3600.0 * hours:g} " in clock.note
     assert clock.offset_s == 0.0  # whose clock it is nobody knows: it is said, and not done
     after = clock_of_images(images(stamps, stamps), own(), -3600.0 * hours)
     right = clock_of_images(images(TAKEN, TAKEN), own(), None)
-    assert "--camera-offset" not in after.said + right.said
+    assert "--camera-offset" not in after.note + right.note
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(3600.0, True), (-1800.0, True), (2500.0, False)])
 def test_another_log_a_zone_off_says_what_to_write(seconds, said):
     boat, drone = log("boat", north=80.0, begin=seconds), log("drone", attitude=True)
-    (why,) = (one.why for one in choose_roles((boat, drone), {}) if one.found.name == "boat")
+    (why,) = (one.why for one in choose_roles((boat, drone), {}) if one.item.name == "boat")
     assert (f"offset_s = {-seconds:g}" in why) is said

@@ -164,7 +164,7 @@ def _wishes(raw: tuple[Path, ...], into: Path | None, options: dict[str, Any]) -
     from wildlab.flight.calibration_files import read_camera
     from wildlab.flight.card.importing import safe_name
     from wildlab.flight.card.proposal import Wishes
-    from wildlab.flight.recipe.parts import parse_zone
+    from wildlab.flight.recipe.quantities import parse_zone
 
     named = into if into is not None else raw[0]
     start = None
@@ -195,10 +195,10 @@ def _wishes(raw: tuple[Path, ...], into: Path | None, options: dict[str, Any]) -
 
 
 def _say(card: Card, as_json: bool) -> None:
-    from wildlab.flight.card.said import HEADINGS, rows_of, sentences_of
+    from wildlab.flight.card.description import HEADINGS, rows_of, sentences_of
 
     rows = rows_of(card.choices)
-    said = [*sentences_of(card.choices), *card.proposal.said]
+    said = [*sentences_of(card.choices), *card.proposal.notes]
     if as_json:
         files = [dict(zip(HEADINGS, row, strict=True)) for row in rows]
         print_json({"files": files, "said": [stopped(one) for one in said]})

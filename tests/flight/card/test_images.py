@@ -7,35 +7,35 @@ import pytest
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.card.found import Found
 from wildlab.flight.card.images import clock_of_images
+from wildlab.flight.card.roles import CardItem
 from wildlab.flight.readers.log import RawLog, Stream, make_stream
-from wildlab.flight.readers.parts import stamped_by
+from wildlab.flight.recipe.raw import stamped_by
 
 START = 1.7e9
 #: When images were truly taken: not evenly, as on the way from row to row.
 TAKEN = START + np.cumsum(np.random.default_rng(5).uniform(1.5, 6.0, 40))
 
 
-def images(wall: NDArray[np.float64] | None, utc: NDArray[np.float64] | None = None) -> Found:
+def images(wall: NDArray[np.float64] | None, utc: NDArray[np.float64] | None = None) -> CardItem:
     count = len(TAKEN)
     columns: dict[str, object] = {"file": [f"a{i}.jpg" for i in range(count)]}
     columns["time_log_s"] = np.full(count, np.nan) if wall is None else wall
     columns["time_s"] = np.full(count, np.nan) if utc is None else utc
-    return Found("DCIM", 1, "photos", RawLog("photos", {"photos": make_stream("photos", columns)}))
+    return CardItem("DCIM", 1, "photos", RawLog("photos", {"photos": make_stream("photos", columns)}))
 
 
 def triggers(times: NDArray[np.float64]) -> Stream:
     return make_stream("triggers", {"time_s": times, "number": np.arange(len(times))})
 
 
-def own(first: float = START - 60, last: float = START + 400) -> Found:
+def own(first: float = START - 60, last: float = START + 400) -> CardItem:
     t = np.arange(first, last)
     columns = {"time_s": t, "latitude_deg": 0 * t + 59, "longitude_deg": 0 * t + 10, "height_sea_m": 0 * t}
-    return Found("flight.bin", 1, "dataflash", RawLog("dataflash", {"gnss": make_stream("gnss", columns)}))
+    return CardItem("flight.bin", 1, "dataflash", RawLog("dataflash", {"gnss": make_stream("gnss", columns)}))
 
 
-def photos_of(found: Found) -> Stream:
+def photos_of(found: CardItem) -> Stream:
     stream = found.part("photos")
     assert stream is not None
     return stream

@@ -10,14 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.flight.card.found import Found
+from wildlab.flight.card.description import paced, sentences_of
 from wildlab.flight.card.importing import import_card, read_card
 from wildlab.flight.card.proposal import Wishes
-from wildlab.flight.card.roles import Choice
-from wildlab.flight.card.said import paced, sentences_of
+from wildlab.flight.card.roles import CardItem, Choice
 from wildlab.flight.readers.log import Clock, RawLog, make_stream
-from wildlab.flight.readers.parts import stream_of
-from wildlab.flight.recipe.parts import LogTable
+from wildlab.flight.recipe.quantities import LogTable
+from wildlab.flight.recipe.raw import log_part
 from wildlab.flight.store import Flight
 
 Shared = Callable[..., Path]
@@ -89,14 +88,14 @@ def test_how_a_clock_runs(rate, sd, said):
     """A second of a fast clock is less than one of UTC."""
     stream = make_stream("gnss", {"time_s": [1.0, 2.0]})
     clock = Clock("GPS weeks", rate, 0.0, 0.001, 0.002, 10, sd)
-    found = Found("a.bin", 1, "dataflash", RawLog("dataflash", {"gnss": stream}, clock=clock))
+    found = CardItem("a.bin", 1, "dataflash", RawLog("dataflash", {"gnss": stream}, clock=clock))
     assert any(said in one for one in sentences_of([Choice(found, "own", "why")]))
 
 
 def test_stamps_of_a_log_without_utc_count_from_what_is_stated():
     stream = make_stream("gnss", {"time_s": [np.nan, np.nan], "time_log_s": [0.5, 2.0]})
     wanted = LogTable(file="a.srt", format="dji-srt", part="gnss", offset_s=1000.0)
-    found = stream_of(RawLog("dji-srt", {"gnss": stream}), wanted, Path("a.srt"))
+    found = log_part(RawLog("dji-srt", {"gnss": stream}), wanted, Path("a.srt"))
     assert found.columns["time_s"].tolist() == [1000.5, 1002.0]
 
 

@@ -7,8 +7,7 @@ import pymap3d
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.card.found import Found
-from wildlab.flight.card.roles import choose_roles
+from wildlab.flight.card.roles import CardItem, choose_roles
 from wildlab.flight.readers.log import RawLog, make_stream
 
 START = 1.7e9
@@ -25,7 +24,7 @@ def log(
     climb: float = 0.0,
     vehicle: str = "",
     gimbal: bool = False,
-) -> Found:
+) -> CardItem:
     """A log that moves east at 1 m/s, so far north, from so many seconds on."""
     t = np.arange(seconds, dtype=float)
     lat, lon, _ = pymap3d.ned2geodetic(north + 0 * t, begin + t, 0 * t, 59.0, 10.0, 0.0)
@@ -40,9 +39,9 @@ def log(
     return holding(name, vehicle, **parts)
 
 
-def holding(name: str, vehicle: str = "", **parts: dict[str, Any]) -> Found:
+def holding(name: str, vehicle: str = "", **parts: dict[str, Any]) -> CardItem:
     streams = {part: make_stream(part, columns) for part, columns in parts.items()}
-    return Found(name, 1, "gpx", RawLog("gpx", streams, vehicle=vehicle))
+    return CardItem(name, 1, "gpx", RawLog("gpx", streams, vehicle=vehicle))
 
 
 DRONE = log("drone", attitude=True)
@@ -112,5 +111,5 @@ def test_rows_that_cannot_be_used_are_no_track():
     t = np.arange(5.0)
     columns = {"time_s": t, "latitude_deg": t, "longitude_deg": t, "height_sea_m": t}
     stream = make_stream("gnss", columns, unusable={"no fix": np.ones(5, bool)})
-    choice = choose_roles([Found("bench", 1, "gpx", RawLog("gpx", {"gnss": stream}))], {})[0]
+    choice = choose_roles([CardItem("bench", 1, "gpx", RawLog("gpx", {"gnss": stream}))], {})[0]
     assert choice.role == "nothing"

@@ -13,12 +13,21 @@ from pathlib import Path
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.flight.card.found import OTHER, Found, search, source_folder
 from wildlab.flight.card.images import one_camera
-from wildlab.flight.card.proposal import Proposal, Sources, Wishes, angles
-from wildlab.flight.card.roles import Choice, choose_roles
-from wildlab.flight.card.seen import add_frames, add_seen, add_targets
-from wildlab.flight.card.vehicle import add_poses, add_satellites, add_vehicle, uncertainty_of
+from wildlab.flight.card.proposal import (
+    Proposal,
+    Sources,
+    Wishes,
+    add_frames,
+    add_poses,
+    add_satellites,
+    add_seen,
+    add_targets,
+    add_vehicle,
+    angles,
+    uncertainty_of,
+)
+from wildlab.flight.card.roles import OTHER, CardItem, Choice, choose_roles, search, source_folder
 from wildlab.flight.files import is_safe_name, printable
 from wildlab.flight.manifest_parts import TerrainSays
 from wildlab.flight.readers.log import Stream
@@ -78,7 +87,7 @@ def read_card(
     except WildlabError as error:
         if error.file is not None:
             raise
-        seen = "; ".join(f"{one.found.shown}: {one.role} ({printable(one.why)})" for one in choices[:20])
+        seen = "; ".join(f"{one.item.shown}: {one.role} ({printable(one.why)})" for one in choices[:20])
         raise WildlabError(
             f"{error.problem}. Found: {seen}", error.fix, file=source, field=error.field
         ) from None
@@ -163,32 +172,29 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     for taken in (own, camera, receiver, triggers):
         for one in by_role.get(taken.role, ()) if taken is not None else ():
             if taken is not None and one is not taken:
-                left = (
-                    f"{one.found.shown} is left out: {taken.found.shown} has more rows, and a flight has one"
-                )
-                proposal.said.append(f"{left} of that role ({one.role}).")
+                left = f"{one.item.shown} is left out: {taken.item.shown} has more rows, and a flight has one"
+                proposal.notes.append(f"{left} of that role ({one.role}).")
     lens: str | None = None
     if images is not None:
-        found, lens, said = one_camera(images.found, images.target, wishes.camera)
-        images = replace(images, found=found)
-        proposal.said += [said] if said else []
+        found, lens, said = one_camera(images.item, images.target, wishes.camera)
+        images = replace(images, item=found)
+        proposal.notes += [said] if said else []
     placed = _placed(images)
     if own is None and camera is None and receiver is None and not placed:
         raise WildlabError(
             "nothing here says where a camera was",
-            "name the log of the flight, say with --role which file it is, or describe your own tables "
-            "in a recipe (data/recipes/README.md)",
+            "name the log of the flight (--role FILE=own), or write a recipe (data/recipes/README.md)",
         )
     streams = _streams(own, camera, receiver, images, by_role)
-    aboard = {one.found.name for one in (own, camera, receiver, images) if one is not None}
+    aboard = {one.item.name for one in (own, camera, receiver, images) if one is not None}
     sources = Sources(wishes, streams, [key for key in streams if key[0] in aboard])
-    proposal.said += sources.heights.said
-    vehicle = own.found.log.vehicle if own is not None and own.found.log is not None else ""
+    proposal.notes += sources.heights.notes
+    vehicle = own.item.log.vehicle if own is not None and own.item.log is not None else ""
     data = proposal.data
     data["description"] = f"Logged by {vehicle}." if vehicle else ""
     data["locations"] = {"sensitivity": "withheld"}
     data["platform"] = {"name": vehicle or "not stated"}
-    data["vertical"] = {"reference": sources.heights.reference, "note": " ".join(sources.heights.said)}
+    data["vertical"] = {"reference": sources.heights.reference, "note": " ".join(sources.heights.notes)}
     data["time"] = {"kind": "utc"} | ({"epoch": wishes.start} if wishes.start is not None else {})
     if own is not None:
         add_vehicle(proposal, sources, own, "vehicle", receiver is None)
@@ -204,11 +210,11 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     _uncertainty(proposal, streams)
     data["logs"] = sources.logs
     if "poses" not in data and "gnss" not in data:
-        left_out = [one for one in proposal.said if one.startswith("The images are left out")]
+        left_out = [one for one in proposal.notes if one.startswith("The images are left out")]
         because = f" ({left_out[0]})" if left_out else ""
         raise WildlabError(
             f"nothing here says where a camera was{because}",
-            "add the log of the flight, or say with --role which file it is",
+            "add the log of the flight (--role FILE=own)",
         )
     order = (
         "name",
@@ -229,14 +235,14 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
 
 def _refuse_without_zone(choices: Sequence[Choice]) -> None:
     """A log whose clock states no zone may be the vehicle's own: none without an attitude takes its place."""
-    if any(one.role == "own" and one.found.part("poses") is not None for one in choices):
+    if any(one.role == "own" and one.item.part("poses") is not None for one in choices):
         return
     for one in choices:
         if one.role == "nothing" and "without a zone" in one.why:
             raise WildlabError(
-                f"the clock of {one.found.shown} is local time, and nothing says its zone",
+                f"the clock of {one.item.shown} is local time, and nothing says its zone",
                 "state it, as --zone Europe/Oslo or --zone +02:00; or leave the file out, as "
-                f"--role {one.found.name}=nothing",
+                f"--role {one.item.name}=nothing",
                 field="--zone",
             )
 
@@ -244,21 +250,21 @@ def _refuse_without_zone(choices: Sequence[Choice]) -> None:
 def _only(by_role: Mapping[str, Sequence[Choice]], role: str) -> Choice | None:
     """The one thing of a role that only one can have; of several the one with the most rows."""
     several = by_role.get(role, ())
-    return max(several, key=lambda one: _rows(one.found), default=None)
+    return max(several, key=lambda one: _rows(one.item), default=None)
 
 
-def _rows(found: Found) -> int:
+def _rows(found: CardItem) -> int:
     return sum(int(one.used.sum()) for one in found.log.parts.values()) if found.log is not None else 0
 
 
 def _most_images(several: Sequence[Choice]) -> Choice | None:
-    usable = [one for one in several if one.found.log is not None and "photos" in one.found.log.parts]
-    return max(usable, key=lambda one: _rows(one.found), default=None)
+    usable = [one for one in several if one.item.log is not None and "photos" in one.item.log.parts]
+    return max(usable, key=lambda one: _rows(one.item), default=None)
 
 
 def _placed(images: Choice | None) -> bool:
     """Whether the images say where the camera was and how it was turned."""
-    photos = None if images is None else images.found.part("photos")
+    photos = None if images is None else images.item.part("photos")
     if photos is None or "latitude_deg" not in photos.columns or not photos.used.any():
         return False
     return angles(photos) is not None
@@ -279,9 +285,9 @@ def _streams(
     wanted += [(one, "marks") for one in by_role.get("marks", ())]
     found = {}
     for one, part in wanted:
-        stream = one.found.part(part)
+        stream = one.item.part(part)
         if stream is not None and "latitude_deg" in stream.columns and stream.used.any():
-            found[one.found.name, part] = stream
+            found[one.item.name, part] = stream
     return found
 
 
@@ -291,11 +297,9 @@ def _uncertainty(proposal: Proposal, streams: Mapping[tuple[str, str], Stream]) 
     if any("spreads" not in one for one in poses.values()):
         assumed, said = uncertainty_of(streams)
         proposal.data["uncertainty"] = assumed | proposal.data.get("uncertainty", {})
-        proposal.said.append(said)
+        proposal.notes.append(said)
     if "imu" in proposal.data:
-        proposal.said.append(
-            "No log says which inertial sensor this is: [imu] assumes one typical of autopilots."
-        )
+        proposal.notes.append("[imu] assumes an inertial sensor typical of autopilots.")
 
 
 def _mount(proposal: Proposal, camera: bool) -> None:
@@ -307,17 +311,17 @@ def _mount(proposal: Proposal, camera: bool) -> None:
         own = {"poses": "camera"} if "camera" in poses and len(poses) > 1 else {}
         proposal.data["mount"] = own | {"looks": "forward"}
         others = [name for name in poses if name != "camera"]
-        proposal.said.append(
-            f"[mount] is that of the camera's own poses (--source camera): its lens points along them. How "
-            f"it sits on {', '.join(others)} nobody states, so images are not used with these."
+        proposal.notes.append(
+            f"[mount] is that of the camera's own poses (--source camera); images are not used with "
+            f"{', '.join(others)}."
             if own
             else "The poses are those of the camera itself: its lens points along them."
         )
     elif "gimbal" not in proposal.data:
         proposal.data["mount"] = {"looks": "down"}
-        proposal.said.append(
-            "Nothing says how the camera is fixed to the airframe: it is taken to look straight down, the "
-            "top of its images forward. Change [mount] where that is wrong."
+        proposal.notes.append(
+            "The camera is taken to look straight down, the top of its images forward: change [mount] where "
+            "that is wrong."
         )
 
 

@@ -1,11 +1,16 @@
-"""Which role each thing on a card has in a flight, with the reason; whoever imports it may say otherwise."""
+"""What lies on a card, files known by their content and folders of images, and the role of each in a flight.
+
+Whoever imports it may say otherwise; nothing is written.
+"""
 
 from __future__ import annotations
 
 import math
+import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +18,216 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.card.found import Found
-from wildlab.flight.files import did_you_mean
+from wildlab.flight.files import did_you_mean, printable, read_regular
+from wildlab.flight.readers.formats import FOLDERS, FORMATS, HEAD, read_folder, read_log, recognise
+from wildlab.flight.readers.frames.image import SUFFIXES
+from wildlab.flight.readers.log import RawLog, Stream
+from wildlab.flight.recipe.raw import RAW_LIMIT
 from wildlab.flight.time_scales import hours_words, whole_hours
 from wildlab.geometry.frames import geodetic_to_ned
 
 Array = NDArray[np.float64]
+
+#: Endings of images, in small letters.
+IMAGES = frozenset(SUFFIXES)
+#: What lies on cards and is no log: not worth a sentence each.
+KNOWN_OTHERS = frozenset({".mp4", ".mov", ".lrv", ".thm", ".dng", ".lrf", ".toml", ".md", ".txt", ".parm"})
+#: Why such a file is not read.
+OTHER = "is no log by its ending"
+#: More files than any card of a day's flights has.
+MOST_FILES = 200_000
+
+
+@dataclass(frozen=True)
+class CardItem:
+    """A file or a folder of images.
+
+    Attributes
+    ----------
+    name
+        Below the source folder, with ``/``.
+    size
+        Bytes.
+    format
+        As in `FORMATS` and `FOLDERS`; empty where none is known.
+    log
+        As read, None where it could not be.
+    problem
+        Why not.
+    """
+
+    name: str
+    size: int
+    format: str = ""
+    log: RawLog | None = None
+    problem: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The name as it is told."""
+        return "the folder itself" if self.name == "." else printable(self.name)
+
+    @property
+    def called(self) -> str:
+        """The format in words."""
+        if self.format in FOLDERS:
+            return FOLDERS[self.format].called
+        return FORMATS[self.format].called if self.format else "not known"
+
+    def part(self, name: str) -> Stream | None:
+        """One part of the log, where it has one with a row that can be used; images count without a place."""
+        stream = None if self.log is None else self.log.parts.get(name)
+        return stream if stream is not None and (name == "photos" or stream.used.any()) else None
+
+
+def source_folder(paths: Sequence[Path]) -> Path:
+    """The folder that all of some files and folders lie in, or the one folder that is named.
+
+    Raises
+    ------
+    WildlabError
+        Where one of them does not exist, or they share no folder.
+    """
+    for path in paths:
+        if not path.exists():
+            raise WildlabError("there is no such file or folder", "check the name", file=path)
+    if len(paths) == 1 and paths[0].is_dir():
+        return paths[0]
+    try:
+        common = os.path.commonpath(
+            [path.resolve() if path.is_dir() else path.resolve().parent for path in paths]
+        )
+    except ValueError:
+        raise WildlabError(
+            "the files lie on different drives", "copy them into one folder", file=paths[0]
+        ) from None
+    return Path(common)
+
+
+def search(
+    paths: Sequence[Path],
+    source: Path,
+    zone: str | None = None,
+    tell: Callable[[str], None] = lambda name: None,
+) -> list[CardItem]:
+    """Everything in some files and folders that may belong to a flight.
+
+    Parameters
+    ----------
+    paths
+        Files and folders.
+    source
+        The folder that they lie in, see `source_folder`.
+    zone
+        Of wall clocks that carry none.
+    tell
+        Called with the name of each file before it is read.
+
+    Returns
+    -------
+    list of CardItem
+        In order of their names; also what no reader knows, or could not read.
+
+    Raises
+    ------
+    WildlabError
+        Where there are too many files to be a card.
+    """
+    found = []
+    for path, folder in _items(paths):
+        name = path.resolve().relative_to(source.resolve()).as_posix()
+        if folder or path.suffix.lower() not in KNOWN_OTHERS:
+            tell(name)
+        found.append(_read_folder(path, name, folder, zone) if folder else _read_file(path, name, zone))
+    return sorted(found, key=lambda one: one.name)
+
+
+def _items(paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
+    """Files, and folders of one of `FOLDERS`, each once."""
+    seen: set[Path] = set()
+    for path in paths:
+        for item, folder in _below(path) if path.is_dir() else _single(path):
+            key = item.resolve() / folder
+            if key not in seen:
+                seen.add(key)
+                yield item, folder
+            if len(seen) > MOST_FILES:
+                raise WildlabError(
+                    f"there are more than {MOST_FILES} files", "name the folder of one flight", file=path
+                )
+
+
+def _single(path: Path) -> Iterator[tuple[Path, str]]:
+    if path.suffix.lower() in IMAGES:
+        raise WildlabError("is a single image", "name the folder of the images", file=path)
+    yield path, ""
+
+
+def _below(folder: Path) -> Iterator[tuple[Path, str]]:
+    pictured: list[Path] = []
+    for here, folders, files in os.walk(folder):
+        folders[:] = sorted(one for one in folders if not one.startswith("."))
+        names = sorted(one for one in files if not one.startswith("."))
+        images = {one for one in names if Path(one).suffix.lower() in IMAGES}
+        boxes = {one for one in names if one.lower().endswith(".txt") and _is_yolo(Path(here) / one)}
+        pictured += [Path(here)] if images else []
+        if boxes:
+            yield Path(here), "clicks-yolo"
+        for name in names:
+            if name not in images | boxes:
+                yield Path(here) / name, ""
+    if pictured:  # 100MEDIA and 101MEDIA are one series of images
+        yield Path(os.path.commonpath(pictured)), "photos"
+
+
+def _is_yolo(path: Path) -> bool:
+    """Whether the first line is a class and a box in shares of the image, as YOLO writes it."""
+    try:
+        with path.open("rb") as stored:
+            words = stored.readline(HEAD).split()
+        return len(words) in (5, 6) and words[0].isdigit() and all(0 <= float(one) <= 1 for one in words[1:])
+    except (OSError, ValueError):
+        return False
+
+
+def _read_folder(folder: Path, name: str, format_: str, zone: str | None) -> CardItem:
+    size = sum(one.stat().st_size for one in folder.rglob("*") if one.is_file())
+    try:
+        log, _ = read_folder(folder, format_, zone)
+    except WildlabError as error:
+        return CardItem(name, size, format_, problem=_why(error))
+    return CardItem(name, size, format_, log)
+
+
+def _read_file(path: Path, name: str, zone: str | None) -> CardItem:
+    if path.is_symlink() and not path.resolve().is_file():
+        return CardItem(name, 0, problem="a link that leads nowhere")
+    size = path.stat().st_size
+    try:
+        with path.open("rb") as stored:
+            head = stored.read(HEAD)
+    except OSError as error:
+        return CardItem(name, size, problem=f"cannot be opened ({error.strerror})")
+    format_ = recognise(head, path.name)
+    if format_ is None:
+        known = path.suffix.lower() in KNOWN_OTHERS
+        return CardItem(name, size, problem=OTHER if known else _unknown(head))
+    try:
+        return CardItem(name, size, format_, read_log(path, read_regular(path, RAW_LIMIT), format_, zone))
+    except WildlabError as error:
+        return CardItem(name, size, format_, problem=_why(error))
+
+
+def _unknown(head: bytes) -> str:
+    return "is empty" if not head else "no reader knows this format"
+
+
+def _why(error: WildlabError) -> str:
+    """Why a file could not be read, and what to do."""
+    return f"{error.problem}; {error.fix}" if error.fix else error.problem
+
+
+# -- roles
 
 #: Role -> what it is of a flight.
 ROLES: dict[str, str] = {
@@ -45,7 +254,7 @@ SHARED_S = 1.0
 class Choice:
     """A thing on the card with its role. ``target`` is the target's name; ``why`` a clause."""
 
-    found: Found
+    item: CardItem
     role: str
     why: str
     target: str = ""
@@ -60,7 +269,7 @@ class LoggedPath(NamedTuple):
     heights: dict[str, Array]
 
 
-def choose_roles(found: Sequence[Found], stated: Mapping[str, str]) -> list[Choice]:
+def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[Choice]:
     """A role for everything that was found.
 
     Parameters
@@ -86,7 +295,7 @@ def choose_roles(found: Sequence[Found], stated: Mapping[str, str]) -> list[Choi
     for one, whole in _copies([one for one in found if one.name not in given]):
         choices[one.name + one.format] = Choice(one, "nothing", f"all that is in it is in {whole.shown} too")
     open_ = [one for one in found if one.name not in given and choices[one.name + one.format].role == ""]
-    own = next((one.found for one in choices.values() if one.role == "own"), None)
+    own = next((one.item for one in choices.values() if one.role == "own"), None)
     images = _images(found, choices)
     if own is None and open_:
         own, why = _own(open_, images)
@@ -98,7 +307,7 @@ def choose_roles(found: Sequence[Found], stated: Mapping[str, str]) -> list[Choi
     return _named([choices[one.name + one.format] for one in found])
 
 
-def _copies(found: Sequence[Found]) -> Iterator[tuple[Found, Found]]:
+def _copies(found: Sequence[CardItem]) -> Iterator[tuple[CardItem, CardItem]]:
     """Files whose every row is in another one of the same format, a copy or a part of it; and that other."""
     logs = [one for one in found if one.log is not None and one.log.parts.keys() & COPIED]
     logs.sort(key=_rows, reverse=True)
@@ -108,11 +317,11 @@ def _copies(found: Sequence[Found]) -> Iterator[tuple[Found, Found]]:
             yield one, whole
 
 
-def _rows(one: Found) -> int:
+def _rows(one: CardItem) -> int:
     return sum(len(part) for part in one.log.parts.values()) if one.log else 0
 
 
-def _within(one: Found, other: Found) -> bool:
+def _within(one: CardItem, other: CardItem) -> bool:
     if one.format != other.format or one.log is None or other.log is None:
         return False
     for name, part in one.log.parts.items():
@@ -127,7 +336,7 @@ def _within(one: Found, other: Found) -> bool:
     return True
 
 
-def _stated(found: Sequence[Found], stated: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+def _stated(found: Sequence[CardItem], stated: Mapping[str, str]) -> dict[str, tuple[str, str]]:
     names = {one.name for one in found}
     given: dict[str, tuple[str, str]] = {}
     for name, role in stated.items():
@@ -144,7 +353,7 @@ def _stated(found: Sequence[Found], stated: Mapping[str, str]) -> dict[str, tupl
     return given
 
 
-def _first(one: Found, stated: tuple[str, str] | None) -> Choice:
+def _first(one: CardItem, stated: tuple[str, str] | None) -> Choice:
     """What needs no comparison; an empty role where it does."""
     if stated is not None:
         return Choice(one, stated[0], "as you said", stated[1])
@@ -168,7 +377,7 @@ def _first(one: Found, stated: tuple[str, str] | None) -> Choice:
 PARTS_SHOWN = {"photos": "images", "marks": "points", "clicks": "pixels"}
 
 
-def _useless(one: Found) -> str:
+def _useless(one: CardItem) -> str:
     """Why a log without a usable place has no role."""
     if one.log is None or not one.log.parts:
         return "it holds nothing that a flight is made of"
@@ -177,13 +386,13 @@ def _useless(one: Found) -> str:
     return f"no row of it can be used: {common}"
 
 
-def _images(found: Sequence[Found], choices: Mapping[str, Choice]) -> Found | None:
+def _images(found: Sequence[CardItem], choices: Mapping[str, Choice]) -> CardItem | None:
     """The folder with the most images."""
     folders = [one for one in found if choices[one.name + one.format].role == "images"]
     return max(folders, key=lambda one: len(one.log.parts["photos"]) if one.log else 0, default=None)
 
 
-def _own(open_: Sequence[Found], images: Found | None) -> tuple[Found | None, str]:
+def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem | None, str]:
     """The vehicle's own log, with the reason: what turns, covers the images, triggers, flies and climbs, in
     this order, and of those that are alike the longest. None where the images have poses of their own and no
     log turns."""
@@ -218,11 +427,11 @@ _FLYING = re.compile(
 )
 
 
-def _flies(one: Found) -> bool:
+def _flies(one: CardItem) -> bool:
     return one.log is not None and bool(_FLYING.search(f"{one.format} {one.log.vehicle}"))
 
 
-def _climb(one: Found) -> float:
+def _climb(one: CardItem) -> float:
     """From the lowest to the highest place of a log, m, without the outermost hundredths."""
     for part in ("poses", "gnss"):
         stream = one.part(part)
@@ -235,12 +444,12 @@ def _climb(one: Found) -> float:
     return 0.0
 
 
-def _has_place(images: Found) -> bool:
+def _has_place(images: CardItem) -> bool:
     photos = images.part("photos")
     return photos is not None and "latitude_deg" in photos.columns and bool(photos.used.any())
 
 
-def _other(one: Found, own: Found | None, images: Found | None) -> Choice:
+def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choice:
     """A log that is not the vehicle's own."""
     if own is None:
         apart = _apart(span_of(one), None if images is None else _taken(images))
@@ -272,15 +481,14 @@ def _other(one: Found, own: Found | None, images: Found | None) -> Choice:
     )
 
 
-def _by_hours(one: Found, mine: LoggedPath, theirs: LoggedPath) -> str:
+def _by_hours(one: CardItem, mine: LoggedPath, theirs: LoggedPath) -> str:
     """That another log's clock is off by whole or half hours, and what to write; nothing where it is not."""
     by = whole_hours((theirs.times[0], theirs.times[-1]), (mine.times[0], mine.times[-1]))
     if by is None:
         return ""
     return (
-        f"; its stamps are {hours_words(by)} {'ahead' if by < 0 else 'behind'}, for with that taken off both "
-        f"were under way together: take it with --role {one.name}=target (or camera, or receiver), write "
-        f"offset_s = {by:g} in its part [logs] of the recipe, and import that"
+        f"; its stamps are {hours_words(by)} {'ahead' if by < 0 else 'behind'}: give --role "
+        f"{one.name}=target (or camera, receiver), and offset_s = {by:g} in its part [logs] of the recipe"
     )
 
 
@@ -288,7 +496,7 @@ def _by_hours(one: Found, mine: LoggedPath, theirs: LoggedPath) -> str:
 ZONES_S = 14 * 3600.0
 
 
-def _taken(images: Found) -> tuple[float, float] | None:
+def _taken(images: CardItem) -> tuple[float, float] | None:
     """When images were taken, by UTC or else by the wall clock of their camera."""
     stream = images.part("photos")
     for name in ("time_s", "time_log_s"):
@@ -305,7 +513,7 @@ def _apart(a: tuple[float, float] | None, b: tuple[float, float] | None) -> floa
     return 0.0 if a is None or b is None else max(0.0, a[0] - b[1], b[0] - a[1])
 
 
-def way_of(one: Found) -> LoggedPath | None:
+def way_of(one: CardItem) -> LoggedPath | None:
     """Where a log says that it was, rows that can be used; None where it does not say."""
     for name in ("gnss", "poses"):
         stream = one.part(name)
@@ -348,7 +556,7 @@ def _distance(mine: LoggedPath, theirs: LoggedPath) -> tuple[float, float]:
     return level, math.nan
 
 
-def span_of(one: Found, part: str | None = None) -> tuple[float, float] | None:
+def span_of(one: CardItem, part: str | None = None) -> tuple[float, float] | None:
     names = (part,) if part else ("poses", "gnss")
     for name in names:
         stream = one.part(name)
@@ -361,7 +569,7 @@ def span_of(one: Found, part: str | None = None) -> tuple[float, float] | None:
     return None
 
 
-def _duration(one: Found) -> float:
+def _duration(one: CardItem) -> float:
     span = span_of(one)
     return span[1] - span[0] if span else 0.0
 
@@ -386,7 +594,7 @@ def _named(choices: list[Choice]) -> list[Choice]:
     named = []
     for one in choices:
         if one.role == "target" and not one.target:
-            stem = re.sub(r"[^\w-]+", "-", one.found.name.rsplit("/", 1)[-1].rsplit(".", 1)[0])
+            stem = re.sub(r"[^\w-]+", "-", one.item.name.rsplit("/", 1)[-1].rsplit(".", 1)[0])
             name = base = stem.strip("-_")[:60] or "target"
             number = 2
             while name in taken:

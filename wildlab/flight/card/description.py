@@ -10,8 +10,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.flight.card.found import OTHER
-from wildlab.flight.card.roles import Choice
+from wildlab.flight.card.roles import OTHER, Choice
 from wildlab.flight.files import printable
 from wildlab.flight.readers.log import Clock, Stream
 
@@ -25,11 +24,11 @@ _REFERENCES = {"height_ellipsoid_m": "ellipsoid", "height_sea_m": "sea level", "
 
 def rows_of(choices: Sequence[Choice]) -> list[list[str]]:
     """A row for each thing that was found, under `HEADINGS`."""
-    return [_row(one) for one in choices if one.found.problem != OTHER]
+    return [_row(one) for one in choices if one.item.problem != OTHER]
 
 
 def _row(choice: Choice) -> list[str]:
-    found, role = choice.found, choice.role + (f" {choice.target}" if choice.target else "")
+    found, role = choice.item, choice.role + (f" {choice.target}" if choice.target else "")
     if found.log is None:
         return [found.shown, found.called, "", "", printable(found.problem), "", "", role]
     parts = found.log.parts
@@ -110,56 +109,47 @@ def _times(stream: Stream) -> NDArray[np.float64]:
 
 def sentences_of(choices: Sequence[Choice]) -> list[str]:
     """What of each thing is not used and why, what was lost, and what its reader noted."""
-    said = []
-    others = [one.found.shown for one in choices if one.found.problem == OTHER]
+    notes = []
+    others = [one.item.shown for one in choices if one.item.problem == OTHER]
     if others:
         more = f" and {len(others) - 3} more" if len(others) > 3 else ""
-        said.append(f"No logs by their endings, and not looked at: {', '.join(others[:3])}{more}")
+        notes.append(f"No logs by their endings, and not looked at: {', '.join(others[:3])}{more}")
     for one in choices:
-        if one.found.problem == OTHER:
+        log, name = one.item.log, one.item.shown
+        own = [f"is not used: {printable(one.why)}"] if one.role == "nothing" or log is None else []
+        if one.item.problem == OTHER:
             continue
-        name = one.found.shown
-        if one.found.log is None:
-            said.append(f"{name} is not used: {printable(one.why)}")
-            continue
-        _, _, _, _, holds, base, heights, _ = _row(one)
-        base, heights = (
-            base and f"; its time is from {base}",
-            heights and f"; its heights count from {heights}",
-        )
-        vehicle = f" ({printable(one.found.log.vehicle)})" if one.found.log.vehicle else ""
-        said.append(f"{name}{vehicle} holds {holds}{base}{heights}")
-        fixes = one.found.part("gnss")
-        if fixes is not None:
-            said += [f"{name}: {text}" for text in _quality(fixes)]
-        if one.role == "nothing":
-            said.append(f"{name} is not used: {printable(one.why)}")
-        elif one.why:
-            said.append(f"{name} is taken for {_article(one)}: {one.why}")
-        for part, stream in one.found.log.parts.items():
+        if log is not None:
+            if not own:
+                own = [f"is taken for {_ARTICLES[one.role]}{one.target and f', {one.target}'}: {one.why}"]
+            fixes = one.item.part("gnss")
+            own = [log.vehicle and f"is of {log.vehicle}", "" if fixes is None else _quality(fixes), *own]
             # An image without a place is one all the same, and its reader says what it lacks.
-            if part != "photos" and not stream.used.all():
-                said.append(f"{name}: {_unused(part, stream)}")
-        said += [f"{name}: {printable(text)}" for text in (*one.found.log.lost, *one.found.log.notes)]
-        clock = one.found.log.clock
-        # Stamps that are UTC already were brought nowhere.
-        if clock is not None and clock.pairs > 2 and (clock.rate != 1.0 or clock.spread_s > 0):
-            said.append(
-                f"{name}: its clock was brought to UTC by {clock.base} ({clock.pairs} pairs): "
-                f"{_rate(clock)}, and {1000 * clock.spread_s:.0f} ms are left over "
-                f"(largest {1000 * clock.largest_s:.0f} ms)"
-            )
-    return said
+            own += [
+                _unused(part, rows)
+                for part, rows in log.parts.items()
+                if part != "photos" and not rows.used.all()
+            ]
+            own += [*log.lost, *log.notes]
+            # Stamps that are UTC already were brought nowhere.
+            if (
+                log.clock is not None
+                and log.clock.pairs > 2
+                and (log.clock.rate != 1.0 or log.clock.spread_s > 0)
+            ):
+                own.append(_rate(log.clock))
+        notes += [f"{name}: {printable(text)}" for text in own if text]
+    return notes
 
 
 def _rate(clock: Clock) -> str:
     """How a log's clock runs, as far as its pairs of stamps can tell."""
     ppm, sd = 1e6 * (1 / clock.rate - 1), 1e6 * clock.rate_sd
+    runs = f"runs {abs(ppm):.0f} ppm {'fast' if ppm > 0 else 'slow'}"
     if clock.rate == 1.0 or (not math.isnan(sd) and abs(ppm) < TOLD * sd):
-        bound = f" to better than {TOLD * sd:.0f} ppm" if 0.5 < sd < 1e6 else ""
-        return f"that it runs fast or slow cannot be told from them{bound}"
-    spread = "" if math.isnan(sd) else f" (standard deviation {sd:.0f})"
-    return f"it runs {abs(ppm):.0f} ppm {'fast' if ppm > 0 else 'slow'}{spread}"
+        runs = "cannot be told to run fast or slow" + (f" (to {TOLD * sd:.0f} ppm)" if 0.5 < sd < 1e6 else "")
+    spread = f"{1000 * clock.spread_s:.0f} ms ({1000 * clock.largest_s:.0f} at most)"
+    return f"its clock, by {clock.pairs} pairs of {clock.base}, {runs}; residuals {spread}"
 
 
 #: A rate differs from 1 where it is so many of its standard deviations away from it.
@@ -168,34 +158,32 @@ TOLD = 2.0
 _FIXES = {2: "level", 3: "in space", 4: "differential", 5: "RTK float", 6: "RTK fixed", 7: "static", 8: "PPP"}
 
 
-def _quality(fixes: Stream) -> list[str]:
+def _quality(fixes: Stream) -> str:
     """How good the satellite positions are that can be used, by what the receiver says."""
-    said = []
-    kinds = fixes.columns.get("fix")
-    if kinds is not None and np.isfinite(kinds[fixes.used]).any():
-        known = kinds[fixes.used][np.isfinite(kinds[fixes.used])]
-        counted = Counter(_FIXES.get(int(one), f"of kind {int(one)}") for one in known)
-        said.append("fixes " + ", ".join(f"{kind} {n}" for kind, n in counted.most_common()))
-    satellites = fixes.columns.get("satellites")
-    if satellites is not None and np.isfinite(satellites[fixes.used]).any():
-        values = satellites[fixes.used]
-        low, middle, high = np.nanmin(values), np.nanmedian(values), np.nanmax(values)
-        said.append(f"satellites {low:.0f} to {high:.0f}, {middle:.0f} in the median")
-    return [", ".join(said)] if said else []
-
-
-def _article(choice: Choice) -> str:
-    words = {
-        "own": "the vehicle's own log",
-        "camera": "a log that rides on the camera",
-        "receiver": "a receiver on board",
-        "target": f"the track of a target, {choice.target}",
-        "triggers": "records of the camera's triggers",
-        "images": "the images",
-        "marks": "surveyed points",
-        "clicks": "pixels of things in the images",
+    notes = []
+    known = {
+        name: values[fixes.used] for name, values in fixes.columns.items() if name in ("fix", "satellites")
     }
-    return words[choice.role]
+    known = {name: values[np.isfinite(values)] for name, values in known.items()}
+    if len(known.get("fix", ())):
+        counted = Counter(_FIXES.get(int(one), f"of kind {int(one)}") for one in known["fix"])
+        notes.append("fixes " + ", ".join(f"{kind} {n}" for kind, n in counted.most_common()))
+    if len(known.get("satellites", ())):
+        low, middle, high = np.percentile(known["satellites"], (0, 50, 100))
+        notes.append(f"satellites {low:.0f} to {high:.0f}, median {middle:.0f}")
+    return ", ".join(notes)
+
+
+_ARTICLES = {
+    "own": "the vehicle's own log",
+    "camera": "a log that rides on the camera",
+    "receiver": "a receiver on board",
+    "target": "the track of a target",
+    "triggers": "records of the camera's triggers",
+    "images": "the images",
+    "marks": "surveyed points",
+    "clicks": "pixels of things in the images",
+}
 
 
 def _unused(part: str, stream: Stream) -> str:
