@@ -42,22 +42,9 @@ def read_wpl(text):
 
 def check_plan(plan):
     """What QGroundControl demands of a plan when it opens one: keys and kinds (its loaders' lists)."""
-    kinds = {
-        "fileType": str,
-        "groundStation": str,
-        "version": int,
-        "mission": dict,
-        "geoFence": dict,
-        "rallyPoints": dict,
-    }
-    assert all(isinstance(plan[key], kind) for key, kind in kinds.items())
     assert plan["fileType"] == "Plan" and plan["version"] == 1
     flown = plan["mission"]
     assert flown["version"] == 2 and len(flown["plannedHomePosition"]) == 3
-    assert all(
-        isinstance(flown[key], int | float)
-        for key in ("firmwareType", "vehicleType", "cruiseSpeed", "hoverSpeed")
-    )
     assert plan["geoFence"]["version"] == plan["rallyPoints"]["version"] == 2
     for number, one in enumerate(flown["items"], start=1):
         assert one["type"] == "SimpleItem" and one["autoContinue"] is True and one["doJumpId"] == number

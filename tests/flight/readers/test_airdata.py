@@ -112,14 +112,6 @@ def test_missing_columns():
     assert set(seconds["why"]) == {"", "repeated stamp"}
 
 
-def test_local_time():
-    text = table(rows()).replace("(utc)", "(local)")
-    assert set(columns_of(airdata, text)["why"]) == {"local time without a zone"}
-    columns = columns_of(airdata, text, zone="+02:00")
-    assert columns["use"].all()
-    assert columns["time_s"][0] == pytest.approx(START.timestamp() - 7200 + 0.37, abs=0.06)
-
-
 def test_text_in_columns_of_numbers_and_placeholders():
     made = rows()
     made[3]["latitude"] = "Available with any HD 360 subscription"

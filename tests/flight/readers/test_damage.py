@@ -38,7 +38,7 @@ AIRDATA = of_airdata.table(of_airdata.rows(120))
         (
             rtklib_pos,
             of_pos.WAYS["UTC"].replace(of_pos.LLH, "e-baseline(m) n-baseline(m) u-baseline(m)"),
-            "baselines",
+            "out-solformat = llh",
         ),
         (rtklib_pos, "%  GPST latitude(deg) longitude(deg) height(m)\nhello\n1,2\n", "no position; 2 lines"),
         (airdata, "time(millisecond),longitude\n1,2\n", "column 'latitude'"),

@@ -10,7 +10,7 @@ import pytest
 from pyubx2 import GET, UBXMessage, UBXReader
 
 from tests.flight.readers.tracks import Reader, check, columns_of, near
-from wildlab.flight.readers.ubx import LAYOUTS, frames
+from wildlab.flight.readers.receivers import LAYOUTS, frames
 
 ubx = Reader("ubx")
 

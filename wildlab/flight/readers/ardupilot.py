@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import fit_steady
 from wildlab.flight.readers.autopilot import (
+    FIELD,
     FIX_PLANE,
     FIX_SPACE,
     IMU,
@@ -21,8 +22,19 @@ from wildlab.flight.readers.autopilot import (
     usable,
 )
 from wildlab.flight.readers.dataflash import MessageTable, read_lines, read_records, sniff, text_sniff
-from wildlab.flight.readers.judging import in_order, placed
-from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Mask, Readings, any_of
+from wildlab.flight.readers.log import (
+    ANGLES,
+    VELOCITY,
+    WORLD,
+    Array,
+    Clock,
+    Decoded,
+    Mask,
+    Readings,
+    any_of,
+    in_order,
+    placed,
+)
 from wildlab.flight.readers.text import percent
 from wildlab.flight.schema import SPEED
 from wildlab.flight.time_scales import week_to_utc
@@ -401,20 +413,21 @@ def _from_origin(table: MessageTable, log: ArdupilotLog) -> dict[str, Array]:
 
 # -- motion
 
-#: Parts -> messages that have them, best first; a field that they need; our columns of theirs; a factor.
+#: Parts -> messages that have them, best first; fields that they need; our columns of theirs; a factor.
 SENSORS: dict[str, tuple[tuple[str, ...], str, dict[str, str], float]] = {
     # Milligauss.
     "magnetometer": (
-        ("MAG", "MAG2", "MAG3"), "MagX", {f"field_{one}_ut": f"Mag{one.upper()}" for one in "xyz"}, 0.1,
+        ("MAG", "MAG2", "MAG3"), "MagX MagY MagZ",
+        dict(zip(FIELD, ("MagX", "MagY", "MagZ"), strict=True)), 0.1,
     ),
     # Against north and the horizon, and its yaw against the airframe.
     "gimbal": (
-        ("MNT", "MNT1", "MOUNT"), "Pitch",
+        ("MNT", "MNT1", "MOUNT"), "Roll Pitch",
         dict(zip((*WORLD, "pan_deg"), ("Roll", "Pitch", "YawE", "YawB"), strict=True)), 1.0,
     ),
     # The first generation has only GPS time, of the fix before: the messages around tell more closely.
     "triggers": (
-        ("CAM", "TRIG"), "Lat",
+        ("CAM", "TRIG"), "Lat Lng",
         {
             **{"latitude_deg": "Lat", "longitude_deg": "Lng", "number": "Img"},
             **{name: f"{name[:-4].title()} {name[0].upper()}" for name in ANGLES},
@@ -427,7 +440,7 @@ SENSORS: dict[str, tuple[tuple[str, ...], str, dict[str, str], float]] = {
 def _sensor(log: ArdupilotLog, part: str) -> Readings | None:
     """A part of the first sensor of its kind, as `SENSORS` has it; None where the log has none."""
     names, needed, fields, factor = SENSORS[part]
-    table = log.first(names, needed)
+    table = log.first(names, *needed.split())
     if table is None:
         return None
     there = {ours: theirs for ours, theirs in fields.items() if any(map(table.has, theirs.split()))}
@@ -485,30 +498,23 @@ def _imu(log: ArdupilotLog) -> Readings | None:
 def _notes(
     log: ArdupilotLog, parts: dict[str, Readings], receivers: list[MessageTable], place: PlaceTrack | None
 ) -> list[str]:
-    notes, clock = [], log.clock
-    kinds = ("GPS", "ATT", "IMU", "CAM", "TRIG")
-    unstamped = [one for one in kinds if one in log.tables and own_stamps(log.tables[one]) is None]
-    if unstamped and clock is not None:
-        names = " and ".join(unstamped)
-        notes.append(f"messages {names} carry no stamps: their times are those of the messages around them")
-    if "imu" not in parts:
-        notes.append("it has no messages of an IMU: no rates of turn and no accelerations")
-    if clock is None:
-        notes.append("its messages carry no stamps")
-    elif not clock.base:
-        notes.append("no fix of a satellite receiver tells the time: its stamps are not known in UTC")
-    if "poses" in parts and place is not None:
-        known = {"sea level": "height_sea_m", "home": "height_home_m"}
-        above = " and ".join(what for what, one in known.items() if np.isfinite(place.columns[one]).any())
-        notes.append(
-            f"positions of poses are those of messages {place.name}; their heights count from {above}"
-        )
-    if len(receivers) > 1:
-        used = 1 + next(i for i, one in enumerate(receivers) if one is log.receiver)
-        notes.append(f"it has {len(receivers)} satellite receivers; receiver {used} is used")
-    if "triggers" in parts and "height_sea_m" not in parts["triggers"].columns:
-        notes.append("heights of its messages CAM are left out: it does not say what they count from")
-    return notes
+    clock, receiver = log.clock, next((i for i, one in enumerate(receivers, 1) if one is log.receiver), 0)
+    unstamped = [
+        one
+        for one in ("GPS", "ATT", "IMU", "CAM", "TRIG")
+        if clock is not None and one in log.tables and own_stamps(log.tables[one]) is None
+    ]
+    notes = {
+        f"messages {', '.join(unstamped)} have no stamps: times are those around them": unstamped,
+        "its messages have no stamps": clock is None,
+        "no satellite fix tells UTC": clock is not None and not clock.base,
+        f"positions of poses are those of messages {place and place.name}": "poses" in parts and place,
+        f"of {len(receivers)} satellite receivers number {receiver} is used": len(receivers) > 1,
+        "heights of its messages CAM do not say what they count from, and are left out": (
+            "triggers" in parts and "height_sea_m" not in parts["triggers"].columns
+        ),
+    }
+    return [text for text, holds in notes.items() if holds]
 
 
 __all__ = ["decode", "sniff", "text_decode", "text_sniff"]

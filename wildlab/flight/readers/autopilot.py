@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.clocks import between
-from wildlab.flight.readers.judging import judge
-from wildlab.flight.readers.log import WORLD, Array, Mask, Readings, any_of
+from wildlab.flight.readers.log import WORLD, Array, Mask, Readings, any_of, judge
 from wildlab.flight.readers.text import decode
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 

@@ -292,6 +292,7 @@ _COLUMNS = {
 }
 #: A gimbal that keeps its heading within this, while the aircraft turns by more than that, degrees.
 _STILL_DEG, _TURNED_DEG = 2.0, 45.0
+UTC_BASE = "UTC of the log"
 #: The counter and the clock part by more than this in a pause only, s; fewer changes of second make no fit.
 _PAUSE_S, _FEW = 1.5, 10
 
@@ -303,7 +304,7 @@ def airdata_sniff(head: bytes, name: str) -> bool:
 
 
 def airdata_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
-    """A flight record, a row for each line; `zone` is that of stamps where the file has only local ones.
+    """A flight record, a row for each line.
 
     Raises
     ------
@@ -314,9 +315,8 @@ def airdata_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     lines = decode(data).split("\n")
     header = _header(lines[0])
     names = [name for name, _ in header]
-    clock_at = [at for at, name in enumerate(names) if name.startswith("datetime")]
-    missing = [word for word in ("latitude", "longitude") if word not in names]
-    missing += [] if clock_at else ["datetime(utc)"]
+    wanted = {"latitude": "latitude", "longitude": "longitude", "datetimeutc": "datetime(utc)"}
+    missing = [shown for name, shown in wanted.items() if name not in names]
     if missing:
         problem = f"has no column {' and '.join(repr(one) for one in missing)}"
         raise WildlabError(problem, "export the flight from AirData again", file=path, field="header")
@@ -330,12 +330,15 @@ def airdata_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         place = next((names.index(name) for name in theirs if name in names), None)
         if place is not None:
             columns[ours] = numbers(row[place] for row in cells) * _unit(path, ours, header[place])
-    utc = "datetimeutc" in names
-    clocks = [row[names.index("datetimeutc") if utc else clock_at[0]] for row in cells]
+    clocks = [row[names.index("datetimeutc")] for row in cells]
+    known = {one: stamp_s(one) for one in set(clocks)}
+    whole = np.array([known[one] for one in clocks])
     notes: list[str] = []
-    times, clock, unusable = _airdata_times(clocks, utc, columns, zone, notes)
+    own = columns.get("time_log_s", np.full(len(whole), np.nan))
+    time, clock = _fraction(own, whole, notes)
+    times = {"time_s": time, "time_log_s": own if np.isfinite(own).any() else whole}
     return Decoded(
-        _parts(times, columns, np.array([at for at, _ in kept]), unusable, notes),
+        _parts(times, columns, np.array([at for at, _ in kept]), notes),
         clock=clock,
         lost=[(len(found) - len(kept), "line", f"of {len(found)} cut off")],
         notes=notes,
@@ -346,7 +349,6 @@ def _parts(
     times: dict[str, Array],
     columns: dict[str, Array],
     rows: Array,
-    unusable: dict[str, Mask],
     notes: list[str],
 ) -> dict[str, Readings]:
     def of(*names: str) -> dict[str, Array]:
@@ -361,12 +363,11 @@ def _parts(
             notes += _heading_that_stands(columns["yaw_world_deg"], columns["yaw_deg"])
     photo = np.nan_to_num(columns.get("photo", np.zeros(len(rows)))) > 0
     taken = photo & ~np.r_[False, photo[:-1]]
-    made = {name: Readings(one, rows, "line", unusable) for name, one in parts.items()}
+    made = {name: Readings(one, rows, "line") for name, one in parts.items()}
     if taken.any():
         own = {name: values[taken] for name, values in of(*PLACE, *ANGLES).items()}
         own["number"] = np.arange(1.0, taken.sum() + 1)
-        why = {reason: mask[taken] for reason, mask in unusable.items()}
-        made["triggers"] = Readings(own, rows[taken], "line", why)
+        made["triggers"] = Readings(own, rows[taken], "line")
     return made
 
 
@@ -413,27 +414,7 @@ def _cells(line: str) -> list[str]:
         return line.split(",")
 
 
-def _airdata_times(
-    clocks: list[str], utc: bool, columns: dict[str, Array], zone: str | None, notes: list[str]
-) -> tuple[dict[str, Array], Clock | None, dict[str, Mask]]:
-    """Times of the rows, how they were found, and rows that have none for a reason of its own."""
-    known = {one: stamp_s(one) for one in set(clocks)}
-    wall = np.array([known[one] for one in clocks])
-    own = columns.get("time_log_s", np.full(len(wall), np.nan))
-    local = None if utc else zone
-    whole = wall if local is None else wall_to_utc(wall, local)
-    base = "UTC of the log" if utc else NO_ZONE if zone is None else f"wall clock of zone {zone[:60]}"
-    time, clock = _fraction(own, whole, base, notes)
-    if not np.isfinite(own).any():
-        own = wall
-    if utc or zone is not None:
-        return {"time_s": time, "time_log_s": own}, clock, {}
-    notes.append("its clock is local time without a zone: state the zone")
-    times = {"time_s": np.full(len(wall), np.nan), "time_log_s": own}
-    return times, clock, {base: np.ones(len(wall), bool)}
-
-
-def _fraction(own: Array, whole: Array, base: str, notes: list[str]) -> tuple[Array, Clock | None]:
+def _fraction(own: Array, whole: Array, notes: list[str]) -> tuple[Array, Clock | None]:
     """Stamps in whole seconds made finer by a counter: where a second changes, it has just begun."""
     both = np.flatnonzero(np.isfinite(own) & np.isfinite(whole))
     if not np.isfinite(whole).any():
@@ -443,7 +424,7 @@ def _fraction(own: Array, whole: Array, base: str, notes: list[str]) -> tuple[Ar
     near = (own[after] > own[before]) & (own[after] - own[before] < 1.0)
     before, after = before[near], after[near]
     if len(after) < 3 or (whole[both] % 1 > 0).any():
-        return whole, Clock(base, pairs=len(both))
+        return whole, Clock(UTC_BASE, pairs=len(both))
     reference, middle = whole[after], (own[before] + own[after]) / 2
     # Nothing but a pause, or a wrong row, parts the two by more than the second that one of them is coarse.
     lack = (whole - own)[both]
@@ -465,10 +446,10 @@ def _fraction(own: Array, whole: Array, base: str, notes: list[str]) -> tuple[Ar
             f"{sum(stood):.1f} s together: each stretch has its own fit"
         )
     if not fits:
-        return time, Clock(base, spread_s=1 / np.sqrt(12), largest_s=0.5, pairs=len(both))
+        return time, Clock(UTC_BASE, spread_s=1 / np.sqrt(12), largest_s=0.5, pairs=len(both))
     left = np.concatenate([one.residual[one.used] for one in fits])
     fit = max(fits, key=lambda one: int(one.used.sum()))
     spread = max(one.spread_s for one in fits)
     return time, Clock(
-        base, fit.rate, fit.offset_s, spread, float(np.abs(left).max()), len(left), fit.rate_sd
+        UTC_BASE, fit.rate, fit.offset_s, spread, float(np.abs(left).max()), len(left), fit.rate_sd
     )

@@ -7,7 +7,7 @@ A reader's module has two functions::
 
 ``head`` are the first `HEAD` bytes, and the name decides only where content is not enough; the path is
 only for messages; ``zone`` is that of wall clocks without one. What is decoded is judged in one place
-(`wildlab.flight.readers.judging`). A module is imported when a file may be of its format.
+(`wildlab.flight.readers.log`). A module is imported when a file may be of its format.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.judging import judge_log
-from wildlab.flight.readers.log import RawLog
+from wildlab.flight.readers.log import RawLog, judge_log
 
 #: So many bytes are enough to tell a format.
 HEAD = 8192
@@ -47,17 +46,17 @@ FORMATS: dict[str, Format] = {
     "dataflash-text": Format("ardupilot", "ArduPilot DataFlash log as text", start="text_"),
     "ulog": Format("px4", "PX4 ULog"),
     "tlog": Format("tlog", "MAVLink telemetry log"),
-    "ubx": Format("ubx", "u-blox UBX", track=True),
+    "ubx": Format("receivers", "u-blox UBX", track=True, start="ubx_"),
     "gpx": Format("tracks", "GPX track", track=True, start="gpx_"),
     "dji-srt": Format("dji", "DJI subtitles", track=True, start="srt_"),
     "dji-mrk": Format("dji", "DJI time stamps of images", track=True, start="mrk_"),
     "airdata": Format("dji", "AirData table", track=True, start="airdata_"),
     "rtklib-pos": Format("tracks", "RTKLIB positions", track=True, start="pos_"),
-    "nmea": Format("nmea", "NMEA 0183", track=True),
+    "nmea": Format("receivers", "NMEA 0183", track=True, start="nmea_"),
     "marks-kml": Format("vector", "KML placemarks", start="kml_"),
     "marks-geojson": Format("vector", "GeoJSON points", start="geojson_"),
     "marks-csv": Format("vector", "table of surveyed points", start="table_"),
-    "clicks": Format("clicks", "clicks or boxes in images"),
+    "clicks": Format("labels", "clicks or boxes in images", start="clicks_"),
 }
 
 
@@ -99,7 +98,7 @@ def read_log(path: Path, data: bytes, format_: str, zone: str | None = None) -> 
 #: Formats of whole folders, by their names in recipes.
 FOLDERS: dict[str, Format] = {
     "photos": Format("photos", "folder of images", start="folder_"),
-    "clicks-yolo": Format("clicks", "folder of YOLO's labels", start="folder_"),
+    "clicks-yolo": Format("labels", "folder of YOLO's labels", start="folder_"),
 }
 #: So much of the beginning of each file goes into a folder's checksum: images are large and many.
 HASHED = 65536

@@ -1,12 +1,16 @@
 """What every reader of raw logs gives: parts with the same columns, units and marks, whatever the format.
 
 Stamps of the log's own clock are kept beside the UTC time that they were brought to; heights stand in the
-column of what they count from, and are not converted here; rows that cannot be used stay, and say why.
+column of what they count from, and are not converted here. A row is judged by what it says and by its
+neighbours, and nothing is dropped: rows that cannot be used stay, and say why. Rows that are used have a
+place (where the part has places), a time (if any row has one), values that can be true and stamps that
+strictly increase.
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -15,6 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.clock_fitting import ClockFit
+from wildlab.flight.readers.text import LATEST_S, plural
+from wildlab.flight.schema import DOWN, SPEED
+from wildlab.flight.time_scales import GPS_START_S
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -259,3 +266,322 @@ def make_stream(
     at = np.arange(1, count + 1) if rows is None else np.asarray(rows, np.int64)
     marks: dict[str, NDArray[Any]] = {"use": (why == "").astype(np.float64), "why": why}
     return Stream({**made, **marks}, at, counted_in)
+
+
+# -- which rows can be used, and what is said of a log
+
+
+#: A log does not run for longer than this, s: stamps so far from all others are wrong, if they are few.
+LONGEST_S, FEW = 7 * 86400.0, 5
+#: Receivers that have no place say zero and zero; so near to it nobody flies, degrees.
+NOWHERE_DEG = 1e-6
+#: Receivers that have no dilution of precision say 99, 99.9 or 99.99.
+NO_DILUTION = 99.0
+#: Places of one moment may be so far apart by their noise, m.
+NOISE_M = 30.0
+#: Parts that are judged by what they are of, not by their times.
+STILL = ("photos", "marks", "clicks")
+#: Beginning of a column -> beyond it no sensor of a flying thing measures: m/s2, rad/s, microtesla.
+SENSORS = {"f_": 1000.0, "w_": 100.0, "field_": 1000.0}
+#: Parts with angles -> beyond them none is an angle, deg.
+TURNS = {"poses": 361.0, "gimbal": 720.0}
+ONE_HEIGHT = (
+    "the receiver gives one and the same number above the ellipsoid and above sea level: only the latter is "
+    "kept, and may be the former"
+)
+_EARTH_M = 6371e3
+
+
+def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
+    """A log out of what its reader decoded.
+
+    Parameters
+    ----------
+    format_
+        As in `formats.FORMATS`.
+    found
+        What `decode` gave.
+    track
+        Whether it is the track of a receiver: heights that few rows have are left out.
+
+    Returns
+    -------
+    RawLog
+        With the parts that have rows. Columns without any value are left out, but for times and angles.
+    """
+    parts = {name: one for name, one in found.parts.items() if len(next(iter(one.columns.values())))}
+    notes = list(found.notes)
+    for name, one in parts.items():
+        columns = one.columns if name in STILL else _filled(name, one.columns)
+        notes += drop_rare_heights(columns) if track else []
+        parts[name] = one._replace(columns=columns)
+    if "gnss" in parts and _one_height(parts["gnss"].columns):
+        notes.append(ONE_HEIGHT)
+        for name in ("poses", "gnss"):
+            if name in parts:
+                parts[name].columns.pop("height_ellipsoid_m", None)
+    streams = {name: _stream(name, one) for name, one in parts.items()}
+    lost = tuple(f"{plural(count, what)} {rest}".rstrip() for count, what, rest in found.lost if count)
+    return RawLog(format_, streams, found.vehicle, found.clock, lost, tuple(dict.fromkeys(notes)))
+
+
+def _stream(name: str, one: Readings) -> Any:
+    wrong = one.unusable if name in STILL else judge(name, one.columns, one.unusable, anywhere=one.anywhere)
+    return make_stream(name, one.columns, one.rows, one.counted_in, wrong)
+
+
+def _filled(part: str, columns: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: values
+        for name, values in columns.items()
+        if name in TEXTS
+        or part in ("imu", "magnetometer")
+        or name.startswith("time")
+        or name.endswith("_deg")
+        or np.isfinite(np.asarray(values, float)).any()
+    }
+
+
+def _one_height(columns: Mapping[str, ArrayLike]) -> bool:
+    """Whether heights above the ellipsoid and above sea level are the same in all rows."""
+    if not {"height_sea_m", "height_ellipsoid_m"} <= set(columns):
+        return False
+    apart = np.asarray(columns["height_sea_m"], float) - np.asarray(columns["height_ellipsoid_m"], float)
+    known = np.isfinite(apart)
+    return bool(known.any() and (apart[known] == 0).all())
+
+
+def drop_rare_heights(columns: dict[str, Array]) -> list[str]:
+    """Takes heights out of `columns` that fewer than half of the rows have; a sentence where it did.
+
+    Rows without a height would be of no use beside rows with one, and most would be lost.
+    """
+    names = [name for name in HEIGHTS if name in columns]
+    heights = [columns[name] for name in names if name != "undulation_m"]
+    known = np.isfinite(np.array(heights, float)).any(axis=0) if heights else np.zeros(0, bool)
+    if not known.any() or known.mean() >= 0.5:
+        return []
+    for name in names:
+        del columns[name]
+    return [f"only {plural(int(known.sum()), 'row')} of {len(known)} have a height: heights are left out"]
+
+
+def placed(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> Mask:
+    """(N,) whether latitudes and longitudes (N,) are numbers, on Earth, and not both zero."""
+    latitude, longitude = np.asarray(latitude_deg, float), np.asarray(longitude_deg, float)
+    return ~any_of(_misplaced(latitude, longitude).values(), len(latitude))
+
+
+def _misplaced(latitude: Array, longitude: Array) -> dict[str, Mask]:
+    with np.errstate(invalid="ignore"):
+        return {
+            "no position": ~(np.isfinite(latitude) & np.isfinite(longitude)),
+            "impossible position": (np.abs(latitude) > 90) | (np.abs(longitude) > 360),
+            "position is a placeholder": (np.abs(latitude) < NOWHERE_DEG) & (np.abs(longitude) < NOWHERE_DEG),
+        }
+
+
+def judge(
+    part: str,
+    columns: Mapping[str, ArrayLike],
+    unusable: Mapping[str, ArrayLike] | None = None,
+    *,
+    anywhere: bool = False,
+) -> dict[str, Mask]:
+    """Why rows of a part cannot be used.
+
+    Parameters
+    ----------
+    part
+        Of `log.PARTS`.
+    columns
+        As for `make_stream`. Looked at are times in UTC, or the log's own where no row has UTC.
+    unusable
+        Reason -> (N,) bool, as the format has it; these come first.
+    anywhere
+        Whether rows without a place count, too.
+
+    Returns
+    -------
+    dict
+        Reason -> (N,) bool for `make_stream`.
+    """
+    have = {name: np.asarray(values, float) for name, values in columns.items() if name not in TEXTS}
+    time = _stamps(have)
+    utc = have.get("time_s", np.full(len(time), np.nan))
+    found = {reason: np.asarray(mask, bool) for reason, mask in (unusable or {}).items()}
+
+    def add(reason: str, *masks: Mask) -> None:
+        found[reason] = any_of([*masks, *([found[reason]] if reason in found else [])], len(time))
+
+    def named(*starts: str) -> list[Array]:
+        return [values for name, values in have.items() if name.startswith(starts)]
+
+    # Damaged values may be anything: they are marked, not warned of.
+    with np.errstate(invalid="ignore", over="ignore"):
+        where = "latitude_deg" in have and not anywhere
+        if where:
+            for reason, mask in _misplaced(have["latitude_deg"], have["longitude_deg"]).items():
+                add(reason, mask)
+            add("impossible height", *((-one < DOWN[0]) | (-one > DOWN[1]) for one in named("height_")))
+            add("impossible speed", *(np.abs(one) > SPEED[1] for one in named("v_")))
+            add("no dilution of precision", *(one >= NO_DILUTION for one in named("hdop")))
+        if part in TURNS:
+            turns = named("roll_", "pitch_", "yaw_", "pan_", "tilt_")
+            add("no attitude", *(np.isnan(one) for one in (*turns, *named("q_"))))
+            add("impossible attitude", *(np.abs(one) > TURNS[part] for one in turns))
+            if q := named("q_"):
+                add("no attitude", ~(np.abs(np.linalg.norm(q, axis=0) - 1) < 0.01))
+        for start, most in SENSORS.items():
+            if measured := named(start):
+                add("no measurement", *(~np.isfinite(one) for one in measured))
+                add("beyond any sensor", *(np.abs(one) > most for one in measured))
+                if start == "field_":
+                    add("no measurement", (np.array(measured) == 0).all(axis=0))
+        if np.isfinite(time).any():
+            add("no time", np.isnan(time))
+            add("impossible time", (utc < GPS_START_S) | (utc > LATEST_S))
+        bad = any_of(found.values(), len(time))
+        heights = named("height_")
+        if where and heights:
+            without = ~any_of([~np.isnan(one) for one in heights], len(time))
+            if not without[~bad].all():
+                add("no height", without & ~bad)
+                bad = bad | without
+    _judge_order(time, have if where else {}, bad, found)
+    return found
+
+
+def _stamps(columns: Mapping[str, ArrayLike]) -> Array:
+    """Times in UTC, or by the log's own clock where no row has UTC."""
+    stamps = [np.asarray(columns[name], float) for name in TIMES if name in columns]
+    return next((one for one in stamps if np.isfinite(one).any()), stamps[-1])
+
+
+def _judge_order(time: Array, have: Mapping[str, Array], bad: Mask, found: dict[str, Mask]) -> None:
+    good = np.flatnonzero(~bad & np.isfinite(time))
+    if not len(good):
+        return
+
+    def mark(reason: str, rows: NDArray[np.intp]) -> None:
+        found[reason] = np.zeros(len(time), bool)
+        found[reason][rows] = True
+
+    alone = _alone(time[good])
+    mark("stamp far from all others", good[alone])
+    good = good[~alone]
+    kept = in_order(time[good])
+    left, stamps = good[~kept], time[good[kept]]
+    again = np.isin(time[left], stamps)
+    mark("repeated stamp", left[again])
+    mark("stamp out of order", left[~again])
+    good = good[kept]
+    if have:
+        high = next((have[one] for one in HEIGHTS if one in have), np.zeros(len(time)))
+        place = np.radians(have["latitude_deg"]), np.radians(have["longitude_deg"]), np.nan_to_num(high)
+        mark("impossible jump", good[~_reachable(time[good], *(one[good] for one in place))])
+
+
+def _alone(time: Array) -> Mask:
+    """Stamps of which only a few are within days of each other, where there are many others."""
+    order = np.argsort(time, kind="stable")
+    group = np.cumsum(np.r_[0, np.diff(time[order]) > LONGEST_S])
+    sizes = np.bincount(group)
+    alone = np.zeros(len(time), bool)
+    alone[order] = (sizes < FEW)[group] & (sizes.max() >= 2 * FEW)
+    return alone
+
+
+def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> Mask:
+    """The most rows whose stamps strictly increase; the others repeat one, go back or leap ahead.
+
+    Parameters
+    ----------
+    stamps
+        (N,) s, in the order of the file; NaN is left out.
+    wanted
+        (N,) bool: rows that count; the others are left out, and do not make others be left out.
+
+    Returns
+    -------
+    (N,) bool
+
+    Examples
+    --------
+    >>> in_order([1.0, 2.0, 2.0, 9000.0, 3.0, 4.0, 0.5, 5.0]).tolist()
+    [True, True, False, False, True, True, False, True]
+    """
+    at = np.asarray(stamps, float)
+    usable = np.isfinite(at) if wanted is None else np.isfinite(at) & np.asarray(wanted, bool)
+    kept = np.zeros(len(at), bool)
+    rows = np.flatnonzero(usable)
+    few = _without_few(at[rows])
+    if few is not None:
+        kept[rows[few]] = True
+        return kept
+    # The longest increasing run of rows: for each length, the row with the smallest stamp that ends one. Of
+    # repeated stamps the first is kept.
+    smallest: list[float] = []
+    ending: list[int] = []
+    before: list[int] = []
+    for i, value in enumerate(at[rows].tolist()):
+        length = bisect_left(smallest, value)
+        before.append(ending[length - 1] if length else -1)
+        if length == len(smallest):
+            smallest.append(value)
+            ending.append(i)
+        elif value < smallest[length]:
+            smallest[length], ending[length] = value, i
+    i = ending[-1]
+    while i >= 0:
+        kept[rows[i]] = True
+        i = before[i]
+    return kept
+
+
+def _without_few(at: Array) -> Mask | None:
+    """(N,) what is left where one row is taken out at each step back; None where that does not mend all.
+
+    One has to go at each, so that no more can be left.
+    """
+    kept = np.ones(len(at), bool)
+    back = np.flatnonzero(np.diff(at) <= 0)
+    if not len(back):
+        return kept
+    before = np.where(back > 0, at[back - 1], -np.inf)
+    ahead = (before < at[back + 1]) & (at[back] != at[back + 1])
+    kept[np.where(ahead, back, back + 1)] = False
+    mended = (np.diff(at[kept]) > 0).all() and (np.diff(back) > 1).all()
+    return kept if mended else None
+
+
+def _reachable(time: Array, latitude: Array, longitude: Array, height: Array) -> Mask:
+    """Rows that can be reached from the longest unbroken run of rows, at a speed that the schema allows."""
+
+    def reached(i: Any, j: NDArray[Any]) -> Mask:
+        """Whether rows j can be reached from rows i, on a sphere: good to 0.5 %, which is enough."""
+        p, q = latitude[i], latitude[j]
+        turned = longitude[j] - longitude[i]
+        half = np.sin((q - p) / 2) ** 2 + np.cos(p) * np.cos(q) * np.sin(turned / 2) ** 2
+        level = 2 * _EARTH_M * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0)))
+        away = np.hypot(level, height[j] - height[i])
+        return np.asarray(away <= NOISE_M + SPEED[1] * np.abs(time[j] - time[i]))
+
+    every = np.arange(len(time))
+    starts = np.r_[0, np.flatnonzero(~reached(every[:-1], every[1:])) + 1]
+    ends = np.r_[starts[1:], len(time)]
+    longest = int(np.argmax(ends - starts))
+    kept = np.zeros(len(time), bool)
+    kept[starts[longest] : ends[longest]] = True
+    last, first = ends[longest] - 1, starts[longest]
+    for begin, end in zip(starts[longest + 1 :], ends[longest + 1 :], strict=True):
+        near = begin + np.flatnonzero(reached(last, every[begin:end]))
+        if len(near):
+            kept[near[0] : end] = True
+            last = end - 1
+    for begin, end in zip(starts[:longest][::-1], ends[:longest][::-1], strict=True):
+        near = begin + np.flatnonzero(reached(first, every[begin:end]))
+        if len(near):
+            kept[begin : near[-1] + 1] = True
+            first = begin
+    return kept

@@ -41,7 +41,7 @@ from wildlab.flight.readers.text import LATEST_S, stamp_s
 MOST_XMP = 1_000_000
 #: Name spaces by their prefixes; Pix4D's is used by Parrot, MicaSense, senseFly and others.
 _PREFIXES = {"drone-dji": "dji", "drone-parrot": "parrot", "Camera": "camera", "FLIR": "flir"}
-_PREFIXES |= {"exif": "exif", "xmp": "xmp", "tiff": "tiff"}
+_PREFIXES["tiff"] = "tiff"
 #: A property as an attribute, or as an element with text.
 _PROPERTY = re.compile(
     rf"<?\b({'|'.join(_PREFIXES)}):(\w{{1,60}})\s*(?:=\s*[\"']([^\"'<>]{{0,400}})|>([^<>]{{1,400}})<)"
@@ -64,8 +64,6 @@ class Tags:
         Of FLIR's raw thermal image, px; 0 without one.
     view_deg
         Width of the field of view as FLIR's records have it, deg; 0 where they do not say it.
-    lens
-        What FLIR's records call the lens.
     problem
         "" or a clause on what of the headers could not be read.
     """
@@ -77,7 +75,6 @@ class Tags:
     raw_width: int = 0
     raw_height: int = 0
     view_deg: float = 0.0
-    lens: str = ""
     problem: str = ""
 
 
@@ -161,7 +158,6 @@ def _records(data: bytes, found: Tags) -> None:
             record = records[CAMERA]
             (view,) = struct.unpack_from(f"{record_order(record)}f", record, 0x1B4)
             found.view_deg = float(view) if 0.1 < view < 179 else 0.0
-            found.lens = record[0x170:0x190].split(b"\0")[0].decode("ascii", "replace").strip()
     except struct.error:
         found.problem = found.problem or "its records of FLIR are cut off"
 
@@ -223,8 +219,7 @@ def place_of(tags: Tags) -> tuple[float, float, str]:
         _first(tags, "dji:GpsLongtitude", "dji:GpsLongitude", "dji:Longitude"),
     )
     sides = _angle(tags.exif, "GPSLatitude", 90.0), _angle(tags.exif, "GPSLongitude", 180.0)
-    written = [_degrees_minutes(tags.xmp.get(one, "")) for one in ("exif:GPSLatitude", "exif:GPSLongitude")]
-    ways = (one for one in (given, sides, written) if all(map(math.isfinite, one)))
+    ways = (one for one in (given, sides) if all(map(math.isfinite, one)))
     latitude, longitude = next(ways, (NAN, NAN))
     if not (math.isfinite(latitude) and math.isfinite(longitude)):
         there = "GPSLatitude" in tags.exif and "GPSLongitude" in tags.exif
@@ -250,15 +245,6 @@ def _angle(exif: dict[str, Any], name: str, most: float) -> float:
     side = text(exif.get(f"{name}Ref")).upper()[:1]
     sign = {"N": 1.0, "E": 1.0, "S": -1.0, "W": -1.0}.get(side, NAN)
     return sign * abs(size) if abs(size) <= most else NAN
-
-
-def _degrees_minutes(value: str) -> float:
-    """``53,26.856N`` or ``53,26,51N`` of XMP."""
-    found = re.fullmatch(r"(\d{1,3}),(\d{1,2}(?:\.\d{1,15})?)(?:,(\d{1,2}(?:\.\d{1,15})?))?([NSEW])", value)
-    if found is None:
-        return NAN
-    size = float(found[1]) + float(found[2]) / 60 + float(found[3] or 0) / 3600
-    return -size if found[4] in "SW" else size
 
 
 def heights_of(tags: Tags) -> tuple[float, float, float]:
@@ -382,12 +368,6 @@ def wall_of(tags: Tags) -> tuple[float, float]:
             digits = text(tags.exif.get(part))
             wall += float(f"0.{digits}") if digits.isascii() and digits.isdecimal() else 0.0
             return wall, _offset(text(tags.exif.get(zone)) or text(tags.exif.get("OffsetTime")))
-    for name in ("exif:DateTimeOriginal", "xmp:CreateDate", "xmp:ModifyDate"):
-        said = tags.xmp.get(name, "")
-        ends = re.search(r"(Z|[+-]\d\d:\d\d)$", said)
-        wall = _stamp(said[: ends.start()] if ends else said)
-        if math.isfinite(wall):
-            return wall, _offset(ends[1]) if ends else NAN
     return NAN, NAN
 
 

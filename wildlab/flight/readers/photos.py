@@ -65,8 +65,6 @@ _COLUMNS: dict[tuple[str, ...], Any] = {
     WORLD: values.camera_angles_of,
     ("sd_horizontal_m", "sd_vertical_m"): values.spreads_of,
 }
-#: Names of a lens in FLIR's records are rounded to whole mm, and small ones further.
-LENS_MM = 2.0
 #: A camera's clock that scatters more about GPS than this is not one clock, s.
 ONE_CLOCK_S = 5.0
 #: A clock that differs more from GPS than a stamp of whole seconds and a slow shutter explain, s.
@@ -153,7 +151,7 @@ def _one_folder(folder: Path, zone: str | None) -> Decoded:
         **{"focal_px": [px for _, px in focal], "focal_from": [how for how, _ in focal], "camera": cameras},
         "why": [why or ("" if up else "no height") for why, up in zip(reasons, high, strict=True)],
     }
-    columns["time_log_s"], columns["time_s"], clock, said = _times(tags, zone)
+    columns["time_log_s"], columns["time_s"], clock, notes = _times(tags, zone)
     lost += [
         (count, "image", f": {what}") for what, count in Counter(o.problem for o in tags if o.problem).items()
     ]
@@ -163,7 +161,7 @@ def _one_folder(folder: Path, zone: str | None) -> Decoded:
         vehicle=next(iter(makers)) if len(makers) == 1 else "",
         clock=clock,
         lost=lost,
-        notes=[*said, *_notes(tags, cameras, stated, columns["why"])],
+        notes=[*notes, *_notes(tags, cameras, stated, columns["why"])],
     )
 
 
@@ -196,7 +194,7 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | No
 
     Returns
     -------
-    wall, time, clock, said
+    wall, time, clock, notes
         (N,) s since 1970 by the camera's clock as if it were UTC, and in UTC, NaN where not known; how the
         one became the other, None where there are none; sentences.
 
@@ -211,7 +209,7 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | No
         if not np.isfinite(sky).any():
             return wall, sky, None, ["no image carries a time"]
         return sky, sky, Clock(BY_GPS), []
-    said: list[str] = []
+    notes: list[str] = []
     apart = (sky - wall)[np.isfinite(wall) & np.isfinite(sky)]
     middle = float(np.median(apart)) if len(apart) else np.nan
     left = np.abs(apart - middle)
@@ -221,90 +219,58 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | No
     if stated.any() and (stated.all() or not len(apart)):
         # Where one image does not state its zone, the others' is that of the same clock.
         zone_s = float(np.median(ahead[stated]))
-        time = wall - np.where(stated, ahead, zone_s)
-        clock = Clock(BY_ZONE, 1.0, -zone_s, pairs=int(stated.sum()))
+        time, clock = (
+            wall - np.where(stated, ahead, zone_s),
+            Clock(BY_ZONE, 1.0, -zone_s, pairs=int(stated.sum())),
+        )
         off = middle + zone_s
         if len(apart) and one_clock and abs(off) > OFF_S:
-            side = "behind" if off > 0 else "ahead of"
-            said.append(
-                f"the camera's clock with the zone it states is {abs(off):.0f} s {side} the GPS time in the "
-                "same images; the clock is used"
+            notes.append(
+                f"the camera's clock, which is used, is {-off:+.0f} s from the GPS time in the images"
             )
     elif len(apart):
         time = np.where(np.isfinite(wall), wall + middle, sky) if one_clock else sky
         clock = Clock(BY_GPS, 1.0, middle, spread, largest, len(apart))
         if not one_clock:
-            said.append("the camera's clock does not run along with GPS time in its images, which is used")
+            notes.append("the camera's clock does not run along with GPS time in its images, which is used")
     elif zone is not None:
         time = wall_to_utc(wall, zone)
         clock = Clock(f"local time of the zone {zone}", 1.0, float(np.nanmedian(time - wall)))
     else:
-        time = np.full(len(wall), np.nan)
-        clock = Clock(LOCAL)
-        said.append("the camera's clock is local time and no image says its zone: state it to know UTC")
+        time, clock = np.full(len(wall), np.nan), Clock(LOCAL)
+        notes.append("the camera's clock is local time and no image says its zone: state it to know UTC")
     without = int((~np.isfinite(wall) & ~np.isfinite(sky)).sum())
-    if without:
-        said.append(f"{plural(without, 'image')} without a time")
-    known = wall[np.isfinite(wall)]
-    if len(known) > 1 and (known == known.round()).all():
-        said.append("the camera's stamps are whole seconds")
-    return wall, time, clock, said
+    notes += [f"{plural(without, 'image')} without a time"] if without else []
+    return wall, time, clock, notes
 
 
 def _notes(
     tags: list[Tags], cameras: list[str], stated: list[list[tuple[str, float]]], why: list[str]
 ) -> list[str]:
     """What a user should know of a folder: cameras, sizes, tags that contradict each other, heights."""
-    said: Counter[str] = Counter()
-    for one, focal in zip(tags, stated, strict=True):
-        raw, picture = (one.raw_width, one.raw_height), (one.width, one.height)
-        if all((one.raw_width, one.width)) and raw != picture:
-            of, its = ("{} x {} px".format(*size) for size in (picture, raw))
-            said[f"the picture of {of} holds a raw thermal image of {its}, which is what is read"] += 1
+    notes: Counter[str] = Counter(one for one in why if one)
+    for focal in filter(None, stated):
+        by, used = focal[0]
         for what, px in focal[1:]:
-            by, used = focal[0]
             if abs(px / used - 1) > values.CONTRADICTS:
-                said[
-                    "tags contradict each other on the focal length: "
-                    f"{used:.0f} px ({by}, used) and {px:.0f} px ({what})"
-                ] += 1
-        if focal and focal[0][0] == values.BY_SIZE:
-            said[
-                "the tags for pixels per mm hold the size of the sensor instead: only read so are pixels "
-                "square, and it is used so"
-            ] += 1
-        lens, mm = re.search(r"FOL(\d{1,3})", one.lens), values.focal_mm_of(one)
-        if lens and abs(float(lens[1]) - mm) > max(LENS_MM, values.CONTRADICTS * mm):
-            said[
-                f"tags contradict each other on the lens: {mm:g} mm in EXIF, {float(lens[1]):g} mm in FLIR's"
-            ] += 1
-    said.update(one for one in why if one)
+                both = f"{used:.0f} px ({by}, used), {px:.0f} px ({what})"
+                notes[f"tags contradict each other on the focal length: {both}"] += 1
     rtk = [values.rtk_of(one) for one in tags]
     fixed = [one in values.RTK_FIXES for one in rtk]
-    said["heights with RTK are taken to count from the ellipsoid"] = sum(fixed)
+    notes["heights with RTK are taken to count from the ellipsoid"] = sum(fixed)
     if any(fixed):
-        lost = sum(one >= 0 for one in rtk) - sum(fixed)
-        said["RTK was lost, and heights are taken to count from sea level"] = lost
-    said[
-        "the maker's calibration of the lens (DewarpData): its focal length is used, its distortion is not"
-    ] = sum(
+        notes["RTK was lost: heights count from sea level"] = sum(one >= 0 for one in rtk) - sum(fixed)
+    notes["of the maker's calibration (DewarpData) the focal length is used, the distortion is not"] = sum(
         math.isfinite(values.dewarped_of(one)) and one.xmp.get("dji:DewarpFlag", "0") != "1" for one in tags
     )
-    plain = {
-        "DJI's absolute altitude without RTK hangs on the barometer and may be tens of metres off; the "
-        "height above take-off is the better one": any(
-            "dji:AbsoluteAltitude" in one.xmp and not ok for one, ok in zip(tags, fixed, strict=True)
-        ),
-        "angles of the name space Camera count from looking straight down, as Pix4D has them": any(
-            "camera:Pitch" in one.xmp and "dji:GimbalPitchDegree" not in one.xmp for one in tags
-        ),
-    }
-    found = Counter(one or "a camera without a name" for one in cameras)
-    several = "; ".join(f"{name} ({plural(count, 'image')})" for name, count in found.most_common(8))
+    notes["DJI's absolute altitude may be tens of metres off (barometer); above take-off is better"] = sum(
+        "dji:AbsoluteAltitude" in one.xmp and not ok for one, ok in zip(tags, fixed, strict=True)
+    )
+    several = Counter(one or "a camera without a name" for one in cameras)
+    names = "; ".join(f"{name} ({plural(count, 'image')})" for name, count in several.most_common(8))
     return [
-        *([f"there are {len(found)} cameras: {several}"] if len(found) > 1 else []),
-        *(f"{plural(count, 'image')}: {text}" for text, count in said.items() if count),
-        *(text for text, holds in plain.items() if holds),
+        *([f"there are {len(several)} cameras: {names}"] if len(several) > 1 else []),
+        *(f"{plural(count, 'image')}: {text}" for text, count in notes.items() if count),
     ]
 
 
@@ -389,10 +355,7 @@ def camera_of(log: RawLog) -> dict[str, Any] | None:
     how = Counter(str(one) for one in columns["focal_from"][known] if one).most_common(1)[0][0]
     if how == values.BY_FILM:
         film = float(np.nanmedian(columns["focal_35mm"][known]))
-        how += (
-            f" of {film:g} mm over the diagonal: rounded to within {50 / film:.0f} %, and some makers count "
-            "over the width instead"
-        )
+        how += f" of {film:g} mm over the diagonal, rounded to within {50 / film:.0f} %"
     return {
         "camera": names[0],
         "width_px": int(width),

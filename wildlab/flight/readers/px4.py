@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import ClockFit, fit_steady
@@ -38,8 +37,7 @@ from wildlab.flight.readers.autopilot import (
     heading_at,
     wrapped,
 )
-from wildlab.flight.readers.judging import placed
-from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Readings
+from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Readings, placed
 
 # -- what can be believed
 
@@ -340,8 +338,6 @@ TOPICS = frozenset(
 _EARLIEST_S, _LATEST_S = 946_684_800.0, 4_102_444_800.0
 #: A sample is at most so much older than its message, s; what is further is no time of a sample.
 _OLDEST_S = 1.0
-#: Of the sphere on which PX4 lays its local frame, m.
-PX4_EARTH_M = 6371000.0
 _GAUSS_UT = 100.0
 #: Columns -> fields of old and new firmware.
 SPREADS = {"sd_horizontal_m": "eph", "sd_vertical_m": "epv"}
@@ -440,16 +436,12 @@ def _vehicle(about: dict[str, object]) -> str:
 
 
 def _lost(sound: Sound, total: int) -> list[tuple[int, str, str]]:
-    homeless = list(sound.homeless.items())
-    lost = [
+    names = ", ".join(repr(printable(name)) for name in list(sound.homeless)[:8] if name)
+    return [
         (sound.skipped, "byte", f"of {total} in {sound.places} places are no messages"),
         (sound.rest, "byte", f"of {total} at the end: it ends within a message"),
+        (sum(sound.homeless.values()), "message", f"without a definition that can be true ({names})"),
     ]
-    for name, count in homeless[:8]:
-        whose = f"the topic {printable(name)!r}" if name else "topics that nothing introduces"
-        lost.append((count, "message", f"of {whose} without a definition that can be true"))
-    more = sum(count for _, count in homeless[8:])
-    return [*lost, (more, "message", f"of {len(homeless) - 8} more topics likewise")]
 
 
 # -- parts
@@ -481,35 +473,6 @@ def taken_s(found: Messages) -> Array:
     return np.where(true, sample, stamp)
 
 
-def from_local(
-    north_m: ArrayLike, east_m: ArrayLike, latitude_deg: ArrayLike, longitude_deg: ArrayLike
-) -> tuple[Array, Array]:
-    """Latitude and longitude of places in PX4's local frame.
-
-    PX4 lays the frame out by an azimuthal equidistant projection of a sphere; back on the same sphere it
-    gives what its filter held, where an ellipsoid would be off by up to 0.5 % of the distance.
-
-    Parameters
-    ----------
-    north_m, east_m
-        (N,) m.
-    latitude_deg, longitude_deg
-        (N,) of the frame's origin.
-
-    Returns
-    -------
-    latitude, longitude
-        (N,) deg.
-    """
-    x, y = np.asarray(north_m, float) / PX4_EARTH_M, np.asarray(east_m, float) / PX4_EARTH_M
-    lat_0, lon_0 = np.radians(latitude_deg), np.radians(longitude_deg)
-    c = np.hypot(x, y)
-    share = np.sinc(c / np.pi)  # sin(c) / c
-    lat = np.arcsin(np.clip(np.cos(c) * np.sin(lat_0) + x * share * np.cos(lat_0), -1.0, 1.0))
-    lon = lon_0 + np.arctan2(y * share, np.cos(lat_0) * np.cos(c) - x * share * np.sin(lat_0))
-    return np.degrees(lat), np.degrees(lon)
-
-
 def _parts(log: Px4Log) -> tuple[dict[str, Readings], list[str]]:
     """All parts that there are rows of, and sentences on what a user should know of them."""
     notes: list[str] = []
@@ -537,9 +500,6 @@ def _poses(log: Px4Log, notes: list[str]) -> Readings | None:
         columns = _at(place, _from_global(place), at)
         if local is not None:
             columns = _at(local, _local_motion(local), at) | columns
-    elif local is not None and local.has("ref_lat"):
-        columns = _at(local, _from_local(local) | _local_motion(local), at)
-        notes.append("positions are those of the local frame on its origin: the log has no global ones")
     else:
         columns = dict.fromkeys(("latitude_deg", "longitude_deg"), np.full(len(at), np.nan))
         notes.append(f"{len(attitude)} attitudes stand without any position on Earth")
@@ -583,20 +543,6 @@ def _position(place: Messages) -> dict[str, Array]:
         "height_sea_m": scaled(1e-3, "altitude_msl_m", "alt"),
         # Drivers that do not know it write zero.
         "height_ellipsoid_m": np.where(ellipsoid == 0, np.nan, ellipsoid),
-    }
-
-
-def _from_local(local: Messages) -> dict[str, Array]:
-    origin = local.get("ref_lat"), local.get("ref_lon")
-    latitude, longitude = from_local(local.get("x"), local.get("y"), *origin)
-    known = placed(*origin)
-    if local.has("xy_global"):
-        known &= local.get("xy_global") > 0
-    return {
-        "latitude_deg": np.where(known, latitude, np.nan),
-        "longitude_deg": np.where(known, longitude, np.nan),
-        "height_sea_m": local.get("ref_alt") - local.get("z"),
-        **local.columns(SPREADS),
     }
 
 

@@ -312,7 +312,7 @@ def _refuse_layout(data: Any, path: Path) -> None:
     if data.count != 1:
         raise WildlabError(
             f"has {data.count} bands, and a map of heights has one",
-            "give the elevation map, or the band of heights as a file of its own",
+            "give the band of heights as a file of its own",
             file=path,
         )
     kind = np.dtype(data.dtypes[0]) if data.dtypes[0] in np.sctypeDict else None
@@ -325,8 +325,7 @@ def _refuse_layout(data: Any, path: Path) -> None:
         block = rows * columns
     if max(rows, columns) > LARGEST_SIDE or block > LARGEST_BLOCK:
         raise WildlabError(
-            f"claims {columns:,} x {rows:,} cells in blocks of {block:,} bytes, and {LARGEST_BLOCK:,} are "
-            "the most that is read at once",
+            f"claims {columns:,} x {rows:,} cells in blocks of {block:,} bytes, {LARGEST_BLOCK:,} at most",
             "give a tiled GeoTIFF of the part about the flight (gdalwarp -co TILED=YES -te ...)",
             file=path,
         )

@@ -17,11 +17,13 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable
-from wildlab.flight.readers.log import Array
 from wildlab.names import from_csv_cell
+
+Array = NDArray[np.float64]
 
 #: No log is from after this, s since 1970.
 LATEST_S = datetime(2100, 1, 1, tzinfo=UTC).timestamp()
@@ -359,12 +361,6 @@ def shown(value: Any) -> str:
 MOST_XML, MOST_ELEMENTS, DEEPEST = 50_000_000, 1_000_000, 50
 
 
-class BrokenXml(WildlabError):
-    """XML that breaks off; `root` is what stands before that, None where nothing does."""
-
-    root: Element | None = None
-
-
 def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML") -> Element:
     """The root of an XML file, without entities, links or else what reaches out; name spaces stand before
     names.
@@ -380,10 +376,9 @@ def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML")
 
     Raises
     ------
-    BrokenXml
-        Where it is not XML, or breaks off.
     WildlabError
-        Where it is too large, declares a document type or entities, or is nested too deeply.
+        Where it is not XML, breaks off, is too large or nested too deeply, or declares a document type or
+        entities.
     """
 
     def fail(problem: str) -> WildlabError:
@@ -416,10 +411,5 @@ def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML")
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
-        broken = BrokenXml(f"is not {what} ({printable(str(error))[:100]})", "export it anew", file=path)
-        begun = bool(inside)
-        while inside:
-            end("")
-        broken.root = builder.close() if begun else None
-        raise broken from None
+        raise fail(f"is not {what} ({printable(str(error))[:100]})") from None
     return builder.close()

@@ -36,8 +36,18 @@ from wildlab.flight.readers.autopilot import (
     heading_at,
     wrapped,
 )
-from wildlab.flight.readers.judging import placed
-from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Mask, Readings, any_of
+from wildlab.flight.readers.log import (
+    ANGLES,
+    VELOCITY,
+    WORLD,
+    Array,
+    Clock,
+    Decoded,
+    Mask,
+    Readings,
+    any_of,
+    placed,
+)
 
 #: So many sound frames say what a file is, where its name does not.
 ENOUGH = 3
@@ -277,30 +287,28 @@ def find_boot(frames: MavlinkFrames, system: int, component: int) -> Boot | None
         late[a:b] = received[a:b] - fit.offset_s - fit.rate * own[a:b]
     main = int(np.argmax(ends - starts))
     base = "UTC of the messages SYSTEM_TIME" if from_vehicle[main] else "times of receipt"
-    notes = []
-    if said.any() and not believed:
-        far = int((np.abs(unix - told.get("received_s"))[said] >= DAY_S).sum())
-        year = int(1970 + np.median(unix[said]) // 31556952)
-        notes.append(
-            f"UTC of its messages SYSTEM_TIME is not believed: {far} of {said.sum()} are more than a day "
-            f"from their receipt (the middle one in the year {year})"
-        )
-    middle, worst = (float(np.percentile(late, share)) for share in (50, 99))
-    notes.append(
-        f"the ground station received {middle:.3f} s after the vehicle's UTC, in the middle"
-        if from_vehicle[main]
-        else "UTC is the ground station's: the vehicle's clock is fitted along the earliest receipts, the "
-        f"others are {middle:.3f} s later in the middle, 1 of 100 is more than {worst:.3f} s; what the "
-        "quickest took is not known"
-    )
-    if len(starts) > 1:
-        runs = len(starts)
-        notes.append(f"the vehicle was switched on {runs} times within it; each run has a clock of its own")
-    if falls >= MOST_RUNS:
-        notes.append(f"the vehicle's stamps fall back {falls} times: they are of several clocks")
+    middle = f"{np.median(late):.3f} s (median)"
+    notes = {
+        "UTC of its messages SYSTEM_TIME is more than a day from their receipt, and not used": (
+            said.any() and not believed
+        ),
+        f"the ground station received {middle} after the vehicle's UTC": from_vehicle[main],
+        f"UTC is the ground station's, fitted along the earliest receipts; others are {middle} later": (
+            not from_vehicle[main]
+        ),
+        f"the vehicle was switched on {len(starts)} times; each run has a clock of its own": len(starts) > 1,
+        "the vehicle's stamps are of several clocks": falls >= MOST_RUNS,
+    }
     rate, offset_s = np.array([(one.rate, one.offset_s) for one in fits]).T
     clock = Clock.fitted(base, fits[main])
-    return Boot(number[starts], rate, offset_s, np.array(behind), clock, tuple(notes))
+    return Boot(
+        number[starts],
+        rate,
+        offset_s,
+        np.array(behind),
+        clock,
+        tuple(text for text, holds in notes.items() if holds),
+    )
 
 
 class Vehicle(NamedTuple):
@@ -511,9 +519,7 @@ def _inertial(vehicle: Vehicle, notes: list[str]) -> dict[str, Readings | None]:
         if _FELT[0] < felt < _FELT[1]:
             parts["imu"] = vehicle.readings(found, stamp, dict(zip(IMU, (*force, *rate), strict=True)))
         else:
-            notes.append(
-                f"{name} is left out: it feels {felt:.3g} g in the middle, so that its units are not known"
-            )
+            notes.append(f"{name} is left out: its median is {felt:.3g} g, so its units are not known")
         if (field != 0).any():
             parts["magnetometer"] = vehicle.readings(found, stamp, dict(zip(FIELD, field, strict=True)))
         return parts
@@ -532,7 +538,7 @@ def _triggers(vehicle: Vehicle, notes: list[str]) -> Readings | None:
     columns |= {name: np.where(there, values, np.nan) for name, values in place.items()}
     made = vehicle.readings(found, "time_usec", columns)._replace(anywhere=True)
     if np.isnan(made.columns["time_log_s"]).all():
-        notes.append("times of the triggers are those of receipt: their own stamps go by no known clock")
+        notes.append("times of the triggers are those of receipt")
     return made
 
 
@@ -545,14 +551,13 @@ def _gimbal(vehicle: Vehicle, poses: Readings | None, notes: list[str]) -> Readi
     heading = heading_at(poses, made.columns["time_s"])
     if found.name == "MOUNT_STATUS":
         notes.append(
-            "the gimbal is known from MOUNT_STATUS, which has no stamps (times are those of receipt) and "
-            "does not say against what it counts: taken as pitch and roll against the horizon, yaw against "
-            "the vehicle"
+            "MOUNT_STATUS has no stamps (times are those of receipt): pitch and roll are taken against the "
+            "horizon, yaw against the vehicle"
         )
         roll, pitch, yaw = (found.get(f"pointing_{one}") / 1e2 for one in "bac")
         angles = dict(zip(WORLD, (roll, pitch, wrapped(yaw + heading)), strict=True))
     elif np.isnan(made.columns["time_log_s"]).all():
-        notes.append("times of the gimbal are those of receipt: its own stamps go by no known clock")
+        notes.append("times of the gimbal are those of receipt")
     if found.name == "GIMBAL_DEVICE_ATTITUDE_STATUS":
         angles = device_angles(found.quaternion(), found.get("flags"), heading)
     elif found.name == "MOUNT_ORIENTATION":

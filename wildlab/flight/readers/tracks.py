@@ -130,9 +130,6 @@ def _seconds(said: str) -> float:
 #: Kind of fix by the quality: none, fixed, float, by satellite, differential, single, precise, estimated.
 _QUALITY = np.array([0.0, 6.0, 5.0, 4.0, 4.0, 3.0, 8.0, 1.0])
 _SPLIT = re.compile(r"[\s,;]+")
-_CALENDAR = re.compile(r"(\d{4})/(\d{1,2})/(\d{1,2})", re.ASCII)
-#: What RTKLIB writes unless told otherwise, for a file whose header is gone.
-_USUAL = "GPST latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m) sdne(m) sdeu(m) sdun(m)"
 #: Words that only the line of the header with the names of columns has.
 _NAMED = re.compile("latitude|x-ecef|e-baseline")
 #: RTKLIB writes up to 22 columns; a header may not ask for a table of any width.
@@ -142,19 +139,7 @@ MOST_COLUMNS = 64
 def pos_sniff(head: bytes, name: str) -> bool:
     """Whether a header names columns, or rows look as RTKLIB writes them."""
     lines = text.decode(head).splitlines()
-    if any(one.startswith("%") and re.search(f"{_NAMED.pattern}|program   : RTK", one) for one in lines):
-        return True
-    rows = [_SPLIT.split(line.strip()) for line in lines[:5] if not line.startswith("%")]
-    return bool(rows) and all(_plausible(row) for row in rows[: max(len(rows) - 1, 1)])
-
-
-def _plausible(row: list[str]) -> bool:
-    """A time, a place with as many digits as RTKLIB writes, and a quality."""
-    if len(row) < 7 or not (_CALENDAR.fullmatch(row[0]) or re.fullmatch(r"\d{4}", row[0])):
-        return False
-    digits = [len(cell.partition(".")[2]) for cell in row[2:4]]
-    values = numbers(row[2:7])
-    return min(digits) >= 6 and bool(abs(values[0]) <= 90 and abs(values[1]) <= 360 and values[3] in range(8))
+    return any(one.startswith("%") and re.search(f"{_NAMED.pattern}|program   : RTK", one) for one in lines)
 
 
 def pos_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
@@ -170,8 +155,7 @@ def pos_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     comments = [line for _, line in lines if line.startswith("%")]
     cells = [(at, _SPLIT.split(line)) for at, line in lines if not line.startswith("%")]
     headers = list(dict.fromkeys(line for line in comments if _NAMED.search(line)))
-    guessed = not headers and any(_plausible(row) for _, row in cells)
-    scale, *names = _SPLIT.split((headers or [_USUAL if guessed else ""])[0].strip(" \t\r%"))[:MOST_COLUMNS]
+    scale, *names = _SPLIT.split((headers or [""])[0].strip(" \t\r%"))[:MOST_COLUMNS]
     if len(headers) > 1 or (headers and ("latitude(deg)" not in names or scale not in ("GPST", "UTC"))):
         problem = f"is a solution of the kind {' '.join([scale, *names[:2]])[:60]!r}"
         problem = "changes its columns within the file" if len(headers) > 1 else problem
@@ -181,7 +165,7 @@ def pos_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     bad = len(cells) - len(rows) if names else len(cells)
     if not rows or not names:
         problem = "has no position" + (f"; {plural(bad, 'line')} cannot be read" if bad else "")
-        raise WildlabError(problem, "write the solution of RTKLIB again", file=path)
+        raise WildlabError(problem, "write the solution of RTKLIB again, with its header", file=path)
     flat = [cell for _, _, row in rows for cell in (row + [""] * len(names))[: len(names)]]
     values: dict[str, Array] = dict(
         zip((name.partition("(")[0] for name in names), numbers(flat).reshape(len(rows), -1).T, strict=True)
@@ -211,7 +195,6 @@ def pos_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         "rows are not in order of time in the file; they were put in order": (
             (np.diff(columns["time_s"]) < 0).any()
         ),
-        "no header names the columns: taken as latitude, longitude, ellipsoidal height, at GPS time": guessed,
     }
     columns = {name: one[order] for name, one in columns.items()}
     reasons = {"no fix": columns["fix"] == 0.0, "estimated, not measured": columns["fix"] == 1.0}

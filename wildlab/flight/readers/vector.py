@@ -276,8 +276,8 @@ def parse_areas(data: bytes, path: Path) -> Areas:
         raise WildlabError("has no polygon", "draw the outline of each area as a polygon", file=path)
     if len(found) > MOST_AREAS:
         raise WildlabError(
-            f"has {len(found):,} polygons, and {MOST_AREAS} are the most that is planned with",
-            "keep those that are to be searched",
+            f"has {len(found):,} polygons, and {MOST_AREAS} are the most",
+            "keep those to be searched",
             file=path,
         )
     names = _names([one.name for one in found])
@@ -314,8 +314,7 @@ def _near(ring: Array, given: Array, what: str, file: str) -> None:
     far = np.hypot(*ring.T)
     if far.max() > FURTHEST:
         raise WildlabError(
-            f"{what} lies {far.max() / 1000:,.0f} km from the middle of all areas, and a flight is of one "
-            f"place, {FURTHEST / 1000:.0f} km about it at most",
+            f"{what} lies {far.max() / 1000:,.0f} km from the middle of all areas",
             "check signs and order of its coordinates, or plan far areas by themselves",
             file=file,
         )
@@ -436,7 +435,7 @@ def checked_ring(points: list[tuple[float, float]], what: str, file: str) -> Arr
     """
     if len(points) > MOST_POINTS + 1:
         raise WildlabError(
-            f"{what} has {len(points):,} points, and {MOST_POINTS:,} are the most that is planned with",
+            f"{what} has {len(points):,} points, and {MOST_POINTS:,} are the most",
             "simplify the outline",
             file=file,
         )
@@ -458,7 +457,7 @@ def checked_ring(points: list[tuple[float, float]], what: str, file: str) -> Arr
     if np.ptp(ring[:, 0]) > 180:
         raise WildlabError(
             f"the longitudes of {what} span {np.ptp(ring[:, 0]):.0f} degrees",
-            "split an area that crosses the antimeridian at 180 degrees, each part as a polygon of its own",
+            "split an area that crosses the antimeridian into a polygon on each side",
             file=file,
         )
     return ring
@@ -504,7 +503,7 @@ def check_shape(ring: Array, what: str, file: str) -> None:
         one, other = met
         raise WildlabError(
             f"{what} crosses itself: the side after point {one + 1} meets the side after point {other + 1}",
-            "put its points in the order in which they follow each other along the fence",
+            "put its points in their order along the fence",
             file=file,
         )
     if ring_area(ring) < LEAST_AREA:
@@ -625,11 +624,9 @@ def kml_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     }
     ground = int((~absolute & (height != 0) & np.isfinite(height)).sum())
     notes = {
-        f"{ground} of {count} heights are not used: their altitudeMode is not absolute, so that they count "
-        "from the ground, or not at all": ground > 0,
-        f"{int((~absolute).sum())} of {count} points have no height above sea level: where theirs count from "
-        "sea level, write <altitudeMode>absolute</altitudeMode> before <coordinates>; or give a table with "
-        "the columns name, latitude, longitude and height_sea": not absolute.all(),
+        f"{ground} of {count} heights are not used: their altitudeMode is not absolute": ground > 0,
+        f"{int((~absolute).sum())} of {count} points have no height above sea level: write "
+        "<altitudeMode>absolute</altitudeMode> before <coordinates>, or give a table": not absolute.all(),
     }
     lost = [(found.others, "geometry", "besides: only points are marks")]
     return _decoded(columns, range(1, count + 1), "point", lost, [said for said in notes if notes[said]])

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import printable, regular_size
+from wildlab.flight.files import regular_size
 from wildlab.flight.readers.frames.image import (
     NOTHING,
     SUFFIXES,
@@ -278,9 +278,6 @@ def open_frames(
                 if clips
                 else f"images end in one of {kinds}"
             )
-            inside = [] if clips else _folders_with_images(path)
-            if inside:
-                fix = f"name one of the folders in it: {', '.join(inside)}"
             raise WildlabError("this folder itself has no images", fix, file=path)
         return Frames(path, tuple(found), len(found), polarity, even=even)
     if not path.exists():
@@ -309,17 +306,6 @@ def filled(image: NDArray[Any], dead: NDArray[np.bool_]) -> NDArray[Any]:
     whole = image.copy()
     whole[dead] = cv2.medianBlur(image, 3)[dead]
     return whole
-
-
-def _folders_with_images(path: Path) -> list[str]:
-    """Names of the first folders in a folder that have images."""
-    folders = sorted(one for one in path.iterdir() if one.is_dir())[:50]
-    found = []
-    for one in folders:
-        # Not into a closed one.
-        if os.access(one, os.R_OK | os.X_OK) and images_in(one):
-            found.append(printable(one.name))
-    return found[:3]
 
 
 # -- flat-field corrections
