@@ -77,7 +77,7 @@ def test_what_several_steps_bring_together_is_not_guessed_and_what_meets_is_left
 def test_images_a_zone_off_say_what_to_type(hours):
     stamps = TAKEN + 3600.0 * hours
     clock = clock_of_images(images(stamps, stamps), own(), None)
-    assert f"--camera-offset {-3600.0 * hours:g} " in clock.note
+    assert f"(--camera-offset {-3600.0 * hours:g})" in clock.note
     assert clock.offset_s == 0.0  # whose clock it is nobody knows: it is said, and not done
     after = clock_of_images(images(stamps, stamps), own(), -3600.0 * hours)
     right = clock_of_images(images(TAKEN, TAKEN), own(), None)
