@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from wildlab.evaluation.runs import mean_share_interval
@@ -15,7 +18,9 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.messages.quantities import percent_between
 from wildlab.planning.coverage import Coverage
-from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, map_axes, new_figure
+from wildlab.reporting.charts.drawing import draw_way
+from wildlab.reporting.charts.forms import Values, draw_fences, rows_chart
+from wildlab.reporting.figures import BLUE, GREEN, ORANGE, VERMILLION, map_axes, new_figure
 
 #: Quantities of `means_table` that are no shares: hectares, minutes and seconds in their units.
 _SCALES = {"ground": 1e-4, "outside": 1e-4, "time": 1 / 60, "in_sight": 1.0}
@@ -31,20 +36,11 @@ def extent(land: Terrain) -> tuple[float, float, float, float]:
 
 def coverage_map(shown: Coverage, land: Terrain, fences: Sequence[Array], track: Array) -> Figure:
     """Where a plan sees the ground sharply (green), and where only blurred (orange); fences and path."""
-    fig, ax = new_figure(5.8, 4.2)
-    state = np.full(shown.looks.shape, np.nan)
-    state[(shown.blurred > 0) & ~shown.seen] = 0
-    state[shown.seen] = 1
-    colours = ListedColormap([ORANGE, GREEN])
-    ax.imshow(
-        state, origin="lower", extent=extent(land), cmap=colours, vmin=0, vmax=1, alpha=0.55,
-        interpolation="nearest",
-    )  # fmt: skip
-    ax.plot(track[:, 1], track[:, 0], color=VERMILLION, lw=0.7)
-    for fence in fences:
-        closed = np.concatenate([fence, fence[:1]])
-        ax.plot(closed[:, 1], closed[:, 0], color=INK, lw=1.4)
-    ax.grid(False)
+    state = np.where(shown.seen, 1.0, np.where(shown.blurred > 0, 0.0, np.nan))
+    fig, ax, _ = _nodes_map(
+        state, land, fences, cmap=ListedColormap([ORANGE, GREEN]), vmin=0, vmax=1, alpha=0.55
+    )
+    draw_way(ax, track, VERMILLION, width=0.7)
     map_axes(ax)
     return fig
 
@@ -53,18 +49,20 @@ def age_map(
     values: Array, inside: NDArray[np.bool_], land: Terrain, fences: Sequence[Array], label: str
 ) -> Figure:
     """A number for each node of the enclosures, north up."""
-    fig, ax = new_figure(5.8, 4.0)
-    image = ax.imshow(
-        np.where(inside, values, np.nan), origin="lower", extent=extent(land), cmap="viridis",
-        interpolation="nearest",
-    )  # fmt: skip
-    for fence in fences:
-        closed = np.concatenate([fence, fence[:1]])
-        ax.plot(closed[:, 1], closed[:, 0], color=INK, lw=1.2)
+    fig, ax, image = _nodes_map(np.where(inside, values, np.nan), land, fences, cmap="viridis")
     fig.colorbar(image, ax=ax, location="bottom", label=label, shrink=0.6, aspect=30)
-    ax.grid(False)
     map_axes(ax)
     return fig
+
+
+def _nodes_map(
+    values: Array, land: Terrain, fences: Sequence[Array], **look: Any
+) -> tuple[Figure, Axes, AxesImage]:
+    """A value for each node (R, C) of a terrain in colour, with fences."""
+    fig, ax = new_figure(5.8, 4.2)
+    image = ax.imshow(values, origin="lower", extent=extent(land), interpolation="nearest", **look)
+    draw_fences(ax, fences)
+    return fig, ax, image
 
 
 def shares_chart(runs: pd.DataFrame, names: Mapping[str, str], quantities: Mapping[str, str]) -> Figure:
@@ -77,20 +75,13 @@ def shares_chart(runs: pd.DataFrame, names: Mapping[str, str], quantities: Mappi
     names, quantities
         Words for subjects and for at most two quantities, by name.
     """
-    fig, ax = new_figure(5.8, 1.1 + 0.3 * len(names))
-    rows = np.arange(len(names))[::-1]
-    for k, (name, words) in enumerate(quantities.items()):
-        found = 100 * np.array([mean_share_interval(runs[who, name]) for who in names])
-        ends = np.where(np.isnan(found), found[:, :1], found)
-        at = rows + 0.12 * (len(quantities) - 1) * (1 - 2 * k)
-        ax.hlines(at, ends[:, 1], ends[:, 2], color=_COLOURS[k], lw=2)
-        ax.plot(ends[:, 0], at, "o", color=_COLOURS[k], label=words)
-    ax.set_yticks(rows, list(names.values()))
-    ax.set(xlabel="share (%)", xlim=(-2, 102), ylim=(-0.6, len(names) - 0.4))
-    ax.grid(visible=False, axis="y")
-    if len(quantities) > 1:
-        fig.legend(loc="outside lower center", ncols=len(quantities))
-    return fig
+    series = {}
+    for (name, words), color in zip(quantities.items(), _COLOURS, strict=False):
+        middle, *ends = 100 * np.array([mean_share_interval(runs[who, name]) for who in names]).T
+        series[words] = Values(middle, ends, color)
+    return rows_chart(
+        list(names.values()), series, "share (%)", size=(5.8, 1.1 + 0.3 * len(names)), xlim=(-2, 102)
+    )
 
 
 def means_table(runs: pd.DataFrame, names: Mapping[str, str], quantities: Sequence[str]) -> pd.DataFrame:

@@ -129,7 +129,8 @@ def finish(fig: Figure, title: str, xlabel: str = "", ylabel: str = "") -> Figur
     of a single line.
     """
     axes = fig.axes
-    axes[0].set_title(title)
+    if title:
+        axes[0].set_title(title)
     if xlabel:
         axes[-1].set_xlabel(xlabel)
     if ylabel:

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from wildlab.analysis.tracks.comparison import COLUMNS, FILTERS, table
 from wildlab.analysis.tracks.noise_model import of_targets
@@ -21,6 +20,8 @@ from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import read_settings
 from wildlab.paths import DATA
+from wildlab.reporting.charts.drawing import draw_line, draw_way, draw_white_band, finish, mark_level
+from wildlab.reporting.charts.forms import fit_map, plain_numbers
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -218,101 +219,72 @@ def mean_nees(tracks: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     for sensor, group in known.groupby("sensor", sort=False):
         left = place
         for name, rows in group.groupby("filter", sort=False):
-            spread = np.linspace(-0.22, 0.22, len(rows)) if len(rows) > 1 else np.zeros(1)
+            at = place + (np.linspace(-0.22, 0.22, len(rows)) if len(rows) > 1 else np.zeros(1))
             kept, tint = stays(rows), colour(str(name))
-            ax.plot((place + spread)[kept], rows["anees"][kept], "o", color=tint, ms=4)
-            ax.plot((place + spread)[~kept], rows["anees"][~kept], "o", mec=tint, mfc="white", ms=4)
+            ax.plot(at[kept], rows["anees"][kept], "o", color=tint, ms=4)
+            ax.plot(at[~kept], rows["anees"][~kept], "o", mec=tint, mfc="white", ms=4)
             place += 1
         ends.append(((left + place - 1) / 2, names[str(sensor)].replace(" ", "\n")))
         place += 1
-    ax.axhline(IDEAL, color="black", lw=1)
-    ax.annotate(
-        "2, ideal",
-        (1.0, IDEAL),
-        (-2, 3),
-        xycoords=("axes fraction", "data"),
-        textcoords="offset points",
-        ha="right",
-        fontsize=10,
-    )
+    mark_level(ax, IDEAL, "2, ideal")
     ax.set_yscale("log")
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    plain_numbers(ax.yaxis)
     ax.set_xticks([x for x, _ in ends], [label for _, label in ends])
     ax.grid(axis="x", visible=False)
-    ax.set_ylabel("mean NEES of a track")
     for name in ("kf", *FILTERS["position"][1:]):
         ax.plot([], [], "o", color=colour(name), ms=5, label=names[name])
     ax.plot([], [], "o", mec=GREY, mfc="white", ms=5, label="lost")
-    fig.legend(loc="outside lower center", ncols=5)
-    return fig
+    return finish(fig, "", ylabel="mean NEES of a track")
 
 
 def track_map(flight: Flight, followed: Sequence[SensorTrack], case: str, names: Mapping[str, str]) -> Figure:
     """Paths of the boats (black), of the platform (grey) and of each sensor's tracks, in local metres."""
     fig, ax = new_figure(5.8, 5.0)
-    truth, (_, nav) = flight.table("truth"), flight.pose_source()
-    ends = []
-    for name, rows in truth.groupby("target_id", sort=False):
-        ax.plot(rows["east_m"], rows["north_m"], color="black", lw=2.4, zorder=2)
-        ends.append((float(rows["east_m"].iloc[-1]), float(rows["north_m"].iloc[-1]), str(name)))
-    ax.plot(nav["east_m"], nav["north_m"], color=GREY, lw=3)
-    ends.append((float(nav["east_m"].iloc[-1]), float(nav["north_m"].iloc[-1]), "own ship"))
-    labelled = set()
+    _, nav = flight.pose_source()
+    ways = {str(name): rows for name, rows in flight.table("truth").groupby("target_id", sort=False)}
+    places = {
+        name: rows[["north_m", "east_m"]].to_numpy(float) for name, rows in (ways | {"own ship": nav}).items()
+    }
+    for name, way in places.items():
+        color, width, aside = (GREY, 3.0, (6, -14)) if name == "own ship" else ("black", 2.4, (6, 5))
+        draw_way(ax, way, color, width=width, zorder=2)
+        ax.plot(*way[-1, ::-1], "o", color=color, ms=5, zorder=4)
+        ax.annotate(name, way[-1, ::-1], aside, textcoords="offset points", fontsize=10, zorder=5)
     for one in followed:
-        label = names[one.sensor]
-        ax.plot(
-            one.estimate[:, 1],
-            one.estimate[:, 0],
-            color=SENSOR_COLOURS.get(one.sensor, GREY),
-            lw=1.3,
-            zorder=3,
-            label=None if label in labelled else label,
+        draw_way(
+            ax, one.estimate, SENSOR_COLOURS.get(one.sensor, GREY), names[one.sensor], width=1.3, zorder=3
         )
-        labelled.add(label)
-    for east, north, name in ends:
-        own = name == "own ship"
-        ax.plot(east, north, "o", color=GREY if own else "black", ms=5, zorder=4)
-        place = (6, -14) if own else (6, 5)
-        ax.annotate(name, (east, north), place, textcoords="offset points", fontsize=10, zorder=5)
-    for limit, column in ((ax.set_xlim, "east_m"), (ax.set_ylim, "north_m")):
-        values = np.concatenate([truth[column].to_numpy(), nav[column].to_numpy()])
-        limit(values.min() - MARGIN_M, values.max() + MARGIN_M)
-    ax.set_title(case.replace("-", " ").capitalize())
-    fig.legend(loc="outside lower center", ncols=4)
+    fit_map(ax, np.concatenate(list(places.values())), MARGIN_M)
     map_axes(ax)
-    return fig
+    return finish(fig, case.replace("-", " ").capitalize())
 
 
 def nees_chart(followed: Sequence[SensorTrack], names: Mapping[str, str]) -> Figure:
     """NEES of the position over time on a logarithmic axis, one line for each filter, with the 95 % band."""
     fig, ax = new_figure(5.6, 3.6)
     for one in followed:
-        ax.plot(one.times, one.nees, color=colour(one.filter), lw=1.3, label=names[one.filter])
+        draw_line(ax, one.times, one.nees, colour(one.filter), names[one.filter], width=1.3)
     log_band(ax, *chi_square_interval(2))
     values = np.concatenate([one.nees[np.isfinite(one.nees)] for one in followed])
     if len(values):
         # Down to below the band, whose name stands under it.
         ax.set_ylim(np.clip(0.5 * values.min(), 1e-3, 0.02), 2 * max(values.max(), 10.0))
-    title = f"{names[followed[0].sensor]}, {followed[0].target}"
-    ax.set(title=title, xlabel="time (s)", ylabel="NEES of the position")
-    fig.legend(loc="outside lower center", ncols=4)
-    return fig
+    return finish(
+        fig, f"{names[followed[0].sensor]}, {followed[0].target}", "time (s)", "NEES of the position"
+    )
 
 
 def innovations_chart(followed: Sequence[SensorTrack], names: Mapping[str, str]) -> Figure:
     """Autocorrelation of the innovations, north solid and east dashed, with the band of white noise."""
     fig, ax = new_figure(5.6, 3.6)
-    bound = 0.0
-    for one in followed:
-        white = innovation_whiteness(one.innovation, LAGS)
-        bound = max(bound, white.bound)
-        for values, style, axis in zip(white.autocorrelation, ("-", "--"), ("north", "east"), strict=True):
+    white = [innovation_whiteness(one.innovation, LAGS) for one in followed]
+    for one, found in zip(followed, white, strict=True):
+        for values, style, axis in zip(found.autocorrelation, ("-", "--"), ("north", "east"), strict=True):
             ax.plot(values, style, color=colour(one.filter), label=f"{names[one.filter]}, {axis}")
-    ax.axhspan(-bound, bound, color=GREY, alpha=0.18, lw=0)
-    title = f"{names[followed[0].sensor]}, {followed[0].target}"
-    ax.set(title=title, xlabel="lag (detections)", ylabel="autocorrelation")
-    fig.legend(loc="outside lower center", ncols=2)
-    return fig
+    draw_white_band(ax, max((one.bound for one in white), default=0.0))
+    return finish(
+        fig, f"{names[followed[0].sensor]}, {followed[0].target}", "lag (detections)", "autocorrelation"
+    )
 
 
 def answer(facts: Facts) -> list[str]:

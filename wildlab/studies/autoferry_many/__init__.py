@@ -15,6 +15,8 @@ from wildlab.analysis.tracks.tracker import track
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import Settings
+from wildlab.reporting.charts.drawing import finish
+from wildlab.reporting.charts.forms import Values, draw_rows
 from wildlab.reporting.figures import BLUE, ORANGE, new_figure
 from wildlab.reporting.many_tracks import rms_error
 from wildlab.reporting.report import Report
@@ -297,25 +299,24 @@ def gospa_chart(
     if not modes:
         return None
     cases = list(dict.fromkeys(rows["case"]))
-    fig, axes = new_figure(6.0, 1.5 + 0.36 * len(cases) * len(modes), rows=len(modes), sharex=True)
-    both = ((rows, "wildlab", BLUE, -0.15, "o"), (theirs, NAME, ORANGE, 0.15, "s"))
-    for ax, mode in zip(np.atleast_1d(axes), modes, strict=True):
-        for table, name, tint, shift, mark in both:
-            for place, case in enumerate(cases):
-                own = table[(table["mode"] == mode) & (table["case"] == case)]
-                ax.plot([own["gospa"].min(), own["gospa"].max()], [place + shift] * 2, color=tint, lw=1.5)
-                best = own.loc[own["rank"] == 1, "gospa"]
-                ax.plot(best, [place + shift] * len(best), mark, color=tint, ms=6, label=name)
-        ax.set_yticks(range(len(cases)), [f"{one} (tuned here)" if one == first else one for one in cases])
-        ax.set_ylim(len(cases) - 0.5, -0.5)
+    fig, axes = new_figure(
+        6.0, 1.5 + 0.36 * len(cases) * len(modes), rows=len(modes), sharex=True, squeeze=False
+    )
+    called = [f"{one} (tuned here)" if one == first else one for one in cases]
+    for ax, mode in zip(axes[:, 0], modes, strict=True):
+        series = {}
+        for table, name, tint, mark in ((rows, "wildlab", BLUE, "o"), (theirs, NAME, ORANGE, "s")):
+            own = table[table["mode"] == mode].groupby("case")["gospa"].agg(["min", "max"]).reindex(cases)
+            best = (
+                table[(table["mode"] == mode) & (table["rank"] == 1)]
+                .set_index("case")["gospa"]
+                .reindex(cases)
+            )
+            series[name] = Values(best, own.T, tint, mark)
+        draw_rows(ax, called, series, 0.3)
         ax.set_title(names[mode])
-    last = np.atleast_1d(axes)[-1]
-    last.set_xlabel("mean GOSPA (m), smaller is better")
-    last.set_xlim(left=0)
-    handles, labels = last.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    fig.legend(once.values(), once.keys(), loc="outside lower center", ncols=2)
-    return fig
+    axes[-1, 0].set_xlim(left=0)
+    return finish(fig, "", "mean GOSPA (m), smaller is better")
 
 
 def record_stone_soup(report: Report, rows: pd.DataFrame, theirs: pd.DataFrame, first: str) -> None:

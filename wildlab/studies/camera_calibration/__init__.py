@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 from wildlab.evaluation.shares import Check
 from wildlab.geometry.calibration import Mounting
 from wildlab.geometry.intrinsics import PINHOLE
+from wildlab.reporting.charts.drawing import draw_dots, finish
+from wildlab.reporting.charts.forms import Values, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, new_figure
 from wildlab.reporting.published import error_name
 from wildlab.studies.camera_calibration.calibration import (
@@ -127,31 +129,32 @@ def circle_grid(centres: Centres, calibrated: pd.DataFrame) -> Figure:
     axes[0].plot(*centres.uv.T, "+", color=VERMILLION, ms=5)
     axes[0].set(xlabel="u (px)", ylabel="v (px)", title="Centres found")
     axes[0].grid(visible=False)
-    axes[1].plot(calibrated["cx"], calibrated["cy"], "o", color=BLUE, ms=4, label="calibrations")
+    draw_dots(axes[1], calibrated["cx"], calibrated["cy"], BLUE, "calibrations", size=8, alpha=1.0)
     axes[1].plot(TAU2.cx, TAU2.cy, "x", color=INK, ms=8, mew=2, label="truth")
-    axes[1].set(xlabel="principal point, column (px)", ylabel="row (px)", title="Principal point")
+    axes[1].set(ylabel="row (px)", title="Principal point")
     axes[1].set_aspect("equal", "datalim")
-    fig.legend(*axes[1].get_legend_handles_labels(), loc="outside lower right", ncols=2)
-    return fig
+    return finish(fig, "", "principal point, column (px)")
 
 
 def mounting_causes(causes: Sequence[Cause]) -> Figure:
     """The error on the ground from the height of the flight that each cause makes, and the printed one."""
-    fig, ax = new_figure(5.6, 3.0)
-    grounds = [*(one.ground for one in causes), PRINTED_AT_HEIGHT]
-    y = np.arange(len(causes))[::-1]
-    for at, one in zip(y, causes, strict=True):
-        ax.plot(one.ground, at, "o", color=GREEN if one.name in CONSTANT else BLUE, ms=8)
-        ax.annotate(f"{one.ground:.1f} m", (one.ground, at), (0, 8), textcoords="offset points", ha="center")
+    grounds = np.array([one.ground for one in causes])
+    constant = np.isin([one.name for one in causes], CONSTANT)
+    series = {
+        name: Values(np.where(which, grounds, np.nan), color=color)
+        for name, which, color in (
+            ("new in each image", ~constant, BLUE),
+            ("the same in all", constant, GREEN),
+        )
+    }
+    least, most = min(*grounds, PRINTED_AT_HEIGHT) / 2, 2 * max(*grounds, PRINTED_AT_HEIGHT)
+    limits = {"xscale": "log", "xlim": (least, most)}
+    label = "error on the ground from 350 m (m)"
+    fig = rows_chart([one.name for one in causes], series, label, size=(5.6, 3.3), apart=0.0, **limits)
+    (ax,) = fig.axes
+    for row, value in enumerate(grounds):
+        ax.annotate(f"{value:.1f} m", (value, row), (0, 8), textcoords="offset points", ha="center")
     ax.axvline(PRINTED_AT_HEIGHT, color=INK, ls="--", lw=1)
-    ax.set_xscale("log")
-    ax.set_yticks(y, [one.name for one in causes])
-    ax.set(
-        xlabel="error on the ground from 350 m (m)",
-        xlim=(min(grounds) / 2, 2 * max(grounds)),
-        ylim=(-0.6, len(causes) - 0.3),
-    )
-    ax.grid(axis="y", visible=False)
     return fig
 
 

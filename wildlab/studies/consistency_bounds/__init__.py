@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.evaluation.consistency import chi_square_interval, share_inside, simulate_filter_runs
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED
+from wildlab.reporting.charts.drawing import finish
+from wildlab.reporting.charts.forms import Values, draw_lines
 from wildlab.reporting.figures import colour, log_band, new_figure
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
@@ -119,12 +121,13 @@ def shares_table(squares: Squares, verdicts: Mapping[str, str], names: Mapping[s
 def one_run(squares: Squares, subject: str, label: str, ylim: tuple[float, float]) -> Figure:
     """The first row of values of both filters over time, with their limits."""
     fig, ax = new_figure(5.6, 3.8)
-    for who, values in squares.values.items():
-        ax.plot(squares.times, values[subject][0], color=_COLOURS[who], marker="o", ms=3, lw=1.1, label=who)
+    lines = {
+        who: Values(of[subject][0], color=_COLOURS[who], look=".-") for who, of in squares.values.items()
+    }
+    draw_lines(ax, squares.times, lines)
     log_band(ax, *squares.limits[subject])
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
-    ax.set(xlabel="time (s)", ylabel=label, ylim=ylim)
-    return fig
+    ax.set_ylim(ylim)
+    return finish(fig, "", "time (s)", label)
 
 
 #: An overconfident filter is inside the limits less often than an honest one by more than this.

@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from wildlab.analysis.rendered import Photographer
 from wildlab.evaluation.shares import Check
+from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish, new_strips
+from wildlab.reporting.charts.forms import Values, draw_lines, draw_picture, spread_points
 from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.published import bounds_of
 from wildlab.studies.crossing_vessels import trial
@@ -154,33 +155,26 @@ def plot_tracks(flown: Flown, names: Mapping[str, str]) -> Figure:
     fig, axes = new_figure(5.9, 6.6, rows=2)
     for ax, rule in zip(axes, (DISTANCE, FEATURES), strict=True):
         bank, crossing = flown.banks[rule], flown.crossing
-        for number, boat in enumerate(BOATS):
-            north, east = crossing.truth[number].T
-            ax.plot(east, north, color=INK, lw=1.2, ls=("-", "--")[number], label=f"{boat}, true")
-        for track, first in enumerate(bank.started):
-            owner = int(crossing.boat[first])
-            new = track == int(np.flatnonzero(crossing.boat[bank.started] == owner)[0])
-            label = f"track that {BOATS[owner]} started" if new else None
-            x = bank.x[:, track]
-            ax.plot(x[:, 1], x[:, 0], color=_COLOURS[owner], lw=1.4, alpha=0.85, label=label)
+        for boat, way, style in zip(BOATS, crossing.truth, ("-", "--"), strict=True):
+            draw_way(ax, way, INK, f"{boat}, true", ls=style)
+        for track, owner in enumerate(crossing.boat[bank.started]):
+            name = f"track that {BOATS[owner]} started"
+            draw_way(ax, bank.x[:, track], _COLOURS[owner], name, width=1.4, alpha=0.85)
         ax.set_title(names[rule])
         low, high = ax.get_ylim()
         ax.set_ylim(low - FREE * (high - low), high)
-        map_axes(ax, scale_bar=ax is axes[-1])
-    axes[0].set_xlabel("")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
+        map_axes(ax, scale_bar=ax is axes[-1], east="east (m)" if ax is axes[-1] else "")
+    return finish(fig, "")
 
 
 def plot_features(looks: list[Array]) -> Figure:
     """Features of both vessels in rendered images (H figure 6.21)."""
     fig, axes = new_figure(5.9, 3.2, columns=3)
     apart = looks_of(looks)
-    rng = np.random.default_rng(0)  # to keep points apart, across
     for ax, (k, name) in zip(axes, enumerate(NAMES), strict=True):
         for number, pool in enumerate(looks):
-            across = number + rng.uniform(-0.18, 0.18, len(pool))
-            ax.plot(across, pool[:, k], "o", color=_COLOURS[number], ms=5, alpha=0.7, mew=0)
+            across = number + spread_points(len(pool), 0.18)
+            draw_dots(ax, across, pool[:, k], _COLOURS[number], size=10, alpha=0.7)
         ax.set(xlim=(-0.5, 1.5), xticks=[0, 1], xticklabels=["1", "2"], xlabel="boat", ylabel=_AXES[name])
         ax.grid(False, axis="x")
         value = apart["looks", f"separation_{name}"]
@@ -190,25 +184,21 @@ def plot_features(looks: list[Array]) -> Figure:
 
 def plot_separation(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """Wrong associations and swaps over the separation of a made-up feature."""
-    fig, (top, low) = new_figure(5.9, 4.6, rows=2, sharex=True)
-    subjects = [curve_subject(separation) for separation in SEPARATIONS]
-    middle = np.array([runs[one, "wrong"].median() for one in subjects])
-    bounds = np.array([bounds_of(runs[one, "wrong"]) for one in subjects])
-    if np.isfinite(bounds).all():
-        top.fill_between(SEPARATIONS, *bounds.T, color=BLUE, alpha=0.18, lw=0)
-    top.plot(SEPARATIONS, middle, "o-", color=BLUE)
-    share = [100 * runs[one, "swapped"].mean() for one in subjects]
-    low.plot(SEPARATIONS, share, "o-", color=BLUE, label="one made-up feature")
+    fig, (top, low) = new_strips(2, 4.6)
+    wrong = [runs[curve_subject(one), "wrong"] for one in SEPARATIONS]
+    ends = np.transpose([bounds_of(one) for one in wrong])
+    known = ends if np.isfinite(ends).all() else None
+    draw_lines(top, SEPARATIONS, {"": Values([one.median() for one in wrong], known)})
+    share = [100 * runs[curve_subject(one), "swapped"].mean() for one in SEPARATIONS]
+    draw_lines(low, SEPARATIONS, {"one made-up feature": Values(share)})
     for rule, color in ((DISTANCE, GREY), (FEATURES, VERMILLION)):
         top.axhline(runs[rule, "wrong"].median(), color=color, lw=1.3, ls="--")
         low.axhline(100 * runs[rule, "swapped"].mean(), color=color, lw=1.3, ls="--", label=names[rule])
     top.set_yscale("symlog", linthresh=1)
     # None wrong lies a little above the axis, where its line is seen.
-    top.set(ylabel="wrong", ylim=(-0.4, None))
+    top.set_ylim(-0.4, None)
     low.set(ylabel="swapped (%)", ylim=(-3, 103), xticks=SEPARATIONS)
-    low.set_xlabel("difference of the two (spreads of the feature)")
-    fig.legend(*low.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return fig
+    return finish(fig, "", "difference of the two (spreads of the feature)", "wrong")
 
 
 class Picture(NamedTuple):
@@ -258,22 +248,18 @@ def plot_frames(twin: str, flights: Sequence[Rendering]) -> Figure | None:
     if not most:
         return None
     at = next(k for k, found in enumerate(chosen) if len(found) == most)
-    pictures = [picture_of(twin, flights[at], exposure) for exposure in chosen[at]]
     fig, axes = new_figure(5.9, 3.1 if most > 1 else 4.6, columns=most, squeeze=False)
-    for ax, picture in zip(axes.flat, pictures, strict=True):
+    for ax, exposure in zip(axes.flat, chosen[at], strict=True):
+        picture = picture_of(twin, flights[at], exposure)
         (left, top), (right, bottom) = _part(picture)
-        shown = picture.counts[top:bottom, left:right]
-        low, high = np.percentile(shown, (0.5, 99.8))
-        ax.imshow(picture.counts, cmap="gray", vmin=low, vmax=high, interpolation="nearest")
-        for (x, y, width, height), boat, both in zip(
-            picture.box, picture.spotted.boat, picture.spotted.both, strict=True
-        ):
-            colour = VERMILLION if boat == NONE else GREEN if both else _COLOURS[boat]
-            box = Rectangle((x - 4, y - 4), width + 8, height + 8, fill=False, ec=colour, lw=1.8)
-            ax.add_patch(box)
-        ax.set(xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5), xticks=[], yticks=[])
-        ax.grid(False)
-        ax.set_title(f"{picture.apart:.0f} m apart")
+        low, high = np.percentile(picture.counts[top:bottom, left:right], (0.5, 99.8))
+        owners_of = zip(picture.spotted.boat, picture.spotted.both, strict=True)
+        colors = [
+            VERMILLION if boat == NONE else GREEN if both else _COLOURS[boat] for boat, both in owners_of
+        ]
+        title, box = f"{picture.apart:.0f} m apart", picture.box
+        draw_picture(ax, picture.counts, title, limits=(low, high), boxes=box, colors=colors)
+        ax.set(xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5))
     return fig
 
 

@@ -16,6 +16,8 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDABLE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
+from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
+from wildlab.reporting.charts.forms import Values, draw_lines, rows_chart
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -225,23 +227,19 @@ def plot_rates(
     Bars are twice the standard error, the published ones' with the default reading's spread between runs.
     """
     fig, ax = new_figure(5.6, 3.9)
-    at = np.arange(len(GATES))
+    at, look = np.arange(len(GATES)), {"ms": 7, "capsize": 3}
     shown = [name for name in outcomes if name != STRESS]
     for name, (marker, color, aside) in zip(shown, _MARKS, strict=False):
         rates = outcomes[name].rate
-        twice = [2 * standard_error(runs) for runs in rates]
-        look = {"fmt": marker, "color": color, "ms": 7, "capsize": 3}
-        ax.errorbar(at + aside, rates.mean(axis=1), yerr=twice, label=names[f"updated-with-{name}"], **look)
+        twice, label = [2 * standard_error(runs) for runs in rates], names[f"updated-with-{name}"]
+        ax.errorbar(at + aside, rates.mean(axis=1), twice, fmt=marker, color=color, label=label, **look)
     spread = outcomes[DEFAULT].rate.std(axis=1, ddof=1)[: len(FORMS)]
-    ax.errorbar(
-        at[: len(FORMS)], [published[form, "success_rate"] for form in FORMS],
-        yerr=2 * spread / np.sqrt(PUBLISHED_RUNS), fmt="D", mfc="white", mec=INK, ecolor=INK, ms=8, capsize=3,
-        label="published",
-    )  # fmt: skip
+    printed = [published[form, "success_rate"] for form in FORMS]
+    hollow = {"fmt": "D", "mfc": "white", "mec": INK, "ecolor": INK, "label": "published"}
+    ax.errorbar(at[: len(FORMS)], printed, 2 * spread / np.sqrt(PUBLISHED_RUNS), **hollow, **look)
     ax.set_xticks(at, [fill(names[gate], 11) for gate in GATES])
-    ax.set(xlim=(-0.5, len(GATES) - 0.5), ylabel="right associations (%)")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=1)
-    return fig
+    ax.set_xlim(-0.5, len(GATES) - 0.5)
+    return finish(fig, "", ylabel="right associations (%)")
 
 
 def plot_distributions(outcomes: Mapping[str, Outcome], names: Mapping[str, str]) -> Figure:
@@ -254,9 +252,7 @@ def plot_distributions(outcomes: Mapping[str, Outcome], names: Mapping[str, str]
             ax.plot(np.sort(runs), share, style, color=_COLOURS[form], label=label)
     ax.plot([], [], ":", color=GREY, label=names[f"updated-with-{STRESS}"])
     ax.set(xlim=(0, 100), ylim=(0, 100))
-    ax.set(xlabel="right associations in a run (%)", ylabel="runs with no more than that (%)")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
-    return fig
+    return finish(fig, "", "right associations in a run (%)", "runs with no more than that (%)")
 
 
 def plot_right_and_wrong(one: Gated, names: Mapping[str, str]) -> Figure:
@@ -267,21 +263,20 @@ def plot_right_and_wrong(one: Gated, names: Mapping[str, str]) -> Figure:
         ax.plot(np.arange(len(right)) + 1, 2 * row + right, ".", color=_COLOURS[form], ms=4)
         ax.annotate(names[form], (1, 2 * row + 0.5), fontsize=10, va="center", color=_COLOURS[form])
     ax.set_yticks(range(2 * len(FORMS)), ["wrong", "right"] * len(FORMS))
-    ax.set(xlabel="image", ylim=(-0.4, 5.5))
-    return fig
+    ax.set_ylim(-0.4, 5.5)
+    return finish(fig, "", "image")
 
 
 def plot_nis(one: Gated, form: str) -> Figure:
     """NIS of both objects of a single run by image, with the band of a consistent filter."""
     nis = one.nis[GATES.index(form), 0]
     fig, ax = new_figure(5.6, 3.4)
-    for which, (name, color) in enumerate(_OBJECTS.items()):
-        ax.plot(np.arange(len(nis)) + 1, nis[:, which], ".-", lw=0.7, ms=4, color=color, label=name)
+    lines = {
+        name: Values(nis[:, k], color=color, look=".-") for k, (name, color) in enumerate(_OBJECTS.items())
+    }
+    draw_lines(ax, np.arange(len(nis)) + 1, lines)
     log_band(ax, *chi_square_interval(2))
-    ax.set(xlabel="image", ylabel="NIS")
-    ax.set_ylim(top=30 * np.nanmax(nis))
-    ax.legend(loc="upper right", ncols=2)
-    return fig
+    return finish(fig, "", "image", "NIS")
 
 
 def plot_estimates(one: Gated, names: Mapping[str, str]) -> Figure:
@@ -295,14 +290,11 @@ def plot_estimates(one: Gated, names: Mapping[str, str]) -> Figure:
             groups.append([row])
     fig, ax = new_figure(5.0, 4.8)
     for group in groups:
-        north, east = one.estimate[group[0], 0].T
         label = "; ".join(names[FORMS[row]] for row in group)
-        ax.plot(east, north, ".-", lw=0.8, ms=3, color=_COLOURS[FORMS[group[0]]], label=label)
-    north, east = one.targets[0, 0]
-    ax.plot(east, north, "k+", ms=13, mew=2, label="main object, truth")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=1)
+        draw_way(ax, one.estimate[group[0], 0], _COLOURS[FORMS[group[0]]], label, width=0.8, marker=".", ms=3)
+    ax.plot(*one.targets[0, 0, ::-1], "k+", ms=13, mew=2, label="main object, truth")
     map_axes(ax)
-    return fig
+    return finish(fig, "")
 
 
 def plot_detections(one: Gated) -> Figure:
@@ -310,26 +302,21 @@ def plot_detections(one: Gated) -> Figure:
     fig, ax = new_figure(5.0, 4.8)
     for which, (name, color) in enumerate(_OBJECTS.items()):
         north, east = one.measured[0, :, which].T
-        ax.plot(east, north, ".", color=color, ms=5, alpha=0.7, label=name)
-    north, east = one.targets[0].T
-    ax.plot(east, north, "k+", ms=13, mew=2, label="truth")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
+        draw_dots(ax, east, north, color, name, size=5, alpha=0.7)
+    ax.plot(*one.targets[0, :, ::-1].T, "k+", ms=13, mew=2, label="truth")
     map_axes(ax)
-    return fig
+    return finish(fig, "")
 
 
 def plot_variations(
     varied: pd.DataFrame, published: Mapping[tuple[str, str], float], names: Mapping[str, str]
 ) -> Figure:
-    """Success rates of each variation of `wildlab.studies.gating.vary`; dashed: published."""
-    fig, ax = new_figure(5.9, 5.6)
-    y = np.arange(len(varied))[::-1]
-    for shift, form in zip((0.2, 0.0, -0.2), FORMS, strict=True):
-        ax.axvline(published[form, "success_rate"], color=_COLOURS[form], lw=0.8, ls=(0, (3, 3)))
-        ax.plot(varied[form], y + shift, "o", color=_COLOURS[form], ms=5, label=names[form])
-    ax.set_yticks(y, varied["variation"])
-    ax.set(xlabel="right associations (%)\ndashed: published")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
+    """Success rates of each variation of `vary`; dashed: published."""
+    series = {names[form]: Values(varied[form], color=_COLOURS[form]) for form in FORMS}
+    label = "right associations (%)\ndashed: published"
+    fig = rows_chart(list(varied["variation"]), series, label, size=(5.9, 5.6), apart=0.2)
+    for form in FORMS:
+        fig.axes[0].axvline(published[form, "success_rate"], color=_COLOURS[form], lw=0.8, ls=(0, (3, 3)))
     return fig
 
 

@@ -8,7 +8,6 @@ from time import process_time
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -17,6 +16,8 @@ from wildlab.evaluation.runs import mean_share_interval, share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT
 from wildlab.messages.quantities import percent_between
 from wildlab.planning.legs import Leg, Platform
+from wildlab.reporting.charts.drawing import draw_way, finish
+from wildlab.reporting.charts.forms import Values, draw_fences, draw_heights, fit_map, lines_chart
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -105,55 +106,41 @@ _STYLES = {INFORMATION: "-", FIXED: "--", ROWS: "-", SWING: "-", CHANCE: ":"}
 def search_map(scene: PlanningScene, found: Searched, who: str) -> Figure:
     """The path of one planner over one world, until all were found or the time was up."""
     fig, ax = new_figure(5.6, 3.9)
-    _ground(ax, scene)
+    draw_heights(ax, scene.world.terrain, 10.0, every=4)
+    draw_fences(ax, scene.world.areas)
     path = np.concatenate([scene.start.north_east[None], found.p_nc[:, :2]])
-    ax.plot(path[:, 1], path[:, 0], color=COLOURS[who], lw=1.3)
-    ax.plot(path[0, 1], path[0, 0], "s", color=INK, ms=6, label="start")
-    for animal, time in enumerate(found.found):
-        seen_at = found.at[-1] if np.isinf(time) else time
-        row = int(rows_at(np.array([seen_at]), scene.flying.interval)[0])
-        at = scene.world.animals[row, animal]
-        late = np.isinf(time)
-        ax.plot(at[1], at[0], "o", ms=6, mec=INK, mew=1.0, mfc="none" if late else VERMILLION)
-    ax.plot([], [], "o", ms=6, mec=INK, mfc=VERMILLION, label="animal, where it was found")
-    if np.isinf(found.found).any():
-        ax.plot([], [], "o", ms=6, mec=INK, mfc="none", label="not found, last position")
-    lows = np.min([area.min(axis=0) for area in scene.world.areas], axis=0) - 45
-    highs = np.max([area.max(axis=0) for area in scene.world.areas], axis=0) + 45
-    ax.set(xlim=(lows[1], highs[1]), ylim=(lows[0], highs[0]))
+    draw_way(ax, path, COLOURS[who], width=1.3)
+    ax.plot(*path[0, ::-1], "s", color=INK, ms=6, label="start")
+    late = np.isinf(found.found)
+    rows = rows_at(np.where(late, found.at[-1], found.found), scene.flying.interval).astype(int)
+    places = scene.world.animals[rows, np.arange(len(rows))]
+    for name, which, fill in (
+        ("animal, where it was found", ~late, VERMILLION), ("not found, last position", late, "none")
+    ):  # fmt: skip
+        if which.any():
+            ax.plot(*places[which, 1::-1].T, "o", ms=6, mec=INK, mew=1.0, mfc=fill, label=name)
+    fit_map(ax, np.concatenate(scene.world.areas), 45.0)
     map_axes(ax)
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
-
-
-def _ground(ax: Axes, scene: PlanningScene) -> None:
-    terrain = scene.world.terrain
-    south, north, west, east = terrain.extent
-    every = 4
-    heights = terrain.height[::every, ::every]
-    ax.contour(
-        np.linspace(west, east, heights.shape[1]), np.linspace(south, north, heights.shape[0]), heights,
-        levels=np.arange(0, 200, 10), colors="#C9D0D6", linewidths=0.7,
-    )  # fmt: skip
-    for area in scene.world.areas:
-        ring = np.concatenate([area, area[:1]])
-        ax.plot(ring[:, 1], ring[:, 0], color=INK, lw=1.2)
+    return finish(fig, "")
 
 
 def share_over_time(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """Share of the animals found over time, mean over worlds, with its 95 % interval."""
-    at = np.arange(STATIONS + 1) * BUDGET_S / STATIONS / 60
-    fig, ax = new_figure(5.6, 4.6)
+    at, lines = np.arange(STATIONS + 1) * BUDGET_S / STATIONS / 60, {}
     for who in SEARCHERS:
-        shares = np.column_stack([runs[who, f"share_{n + 1}"] for n in range(STATIONS)])
-        shares = np.concatenate([np.zeros((len(shares), 1)), shares], axis=1)
-        if len(shares) > 1:
-            low, high = np.transpose([mean_share_interval(column)[1:] for column in shares.T])
-            ax.fill_between(at, low, high, color=COLOURS[who], alpha=0.16, lw=0)
-        ax.plot(at, shares.mean(axis=0), _STYLES[who], color=COLOURS[who], label=names[who])
-    ax.set(xlabel="time (min)", ylabel="share of animals found", xlim=(0, at[-1]), ylim=(0, 1.02))
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
+        shares = np.column_stack(
+            [0 * runs[who, "share_1"], *(runs[who, f"share_{n + 1}"] for n in range(STATIONS))]
+        )
+        ends = (
+            np.transpose([mean_share_interval(column)[1:] for column in shares.T])
+            if len(shares) > 1
+            else None
+        )
+        lines[names[who]] = Values(shares.mean(axis=0), ends, COLOURS[who], _STYLES[who])
+    limits = {"xlim": (0, at[-1]), "ylim": (0, 1.02)}
+    return lines_chart(
+        at, lines, "time (min)", "share of animals found", size=(5.6, 4.6), ticks=False, **limits
+    )
 
 
 def times_of_worlds(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
@@ -165,36 +152,24 @@ def times_of_worlds(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
         x = np.concatenate([[0.0], times, [BUDGET_S / 60]])
         y = np.concatenate([[0.0], np.arange(1, len(times) + 1), [len(times)]]) / len(runs)
         ax.step(x, y, _STYLES[who], where="post", color=COLOURS[who], label=names[who])
-    ax.set(
-        xlabel="time until all are found (min)",
-        ylabel="share of worlds",
-        xlim=(0, BUDGET_S / 60),
-        ylim=(0, 1.02),
-    )
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
+    ax.set(xlim=(0, BUDGET_S / 60), ylim=(0, 1.02))
+    return finish(fig, "", "time until all are found (min)", "share of worlds")
 
 
 def tours_map(situation: Situation) -> Figure:
     """The path of the greedy high-level planner and the shortest one."""
     fig, ax = new_figure(5.6, 3.9)
-    greedy, ahead = situation.greedy, situation.ahead
-    for tour, colour, name in ((greedy, VERMILLION, "greedy"), (ahead, BLUE, "shortest")):
-        label = f"{name}, {tour.time / 60:.1f} min"
-        ax.plot(tour.path[:, 1], tour.path[:, 0], color=colour, lw=1.5, label=label)
-    ax.scatter(
-        situation.positions[:, 1],
-        situation.positions[:, 0],
-        s=8 * np.sqrt(situation.covariances[:, 0, 0]),
-        color=GREY,
-        label="known animals",
-    )
+    for tour, colour, name in (
+        (situation.greedy, VERMILLION, "greedy"), (situation.ahead, BLUE, "shortest")
+    ):  # fmt: skip
+        draw_way(ax, tour.path, colour, f"{name}, {tour.time / 60:.1f} min", width=1.5)
+    sizes = 8 * np.sqrt(situation.covariances[:, 0, 0])
+    ax.scatter(*situation.positions[:, ::-1].T, s=sizes, color=GREY, label="known animals")
     ax.plot(*situation.platform[::-1], "s", color=INK, ms=6, label="platform")
     ax.plot(*situation.way_point[::-1], "D", mfc="none", mec=INK, ms=7, label="next way point of the search")
     ax.margins(0.12)
     map_axes(ax)
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
+    return finish(fig, "")
 
 
 def planners_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:

@@ -12,7 +12,9 @@ from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from wildlab.evaluation.shares import Check
-from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, map_axes, new_figure
+from wildlab.reporting.charts.drawing import draw_line, finish, new_strips
+from wildlab.reporting.charts.forms import draw_errors, draw_marks, draw_picture
+from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, map_axes, new_figure
 from wildlab.studies.large_ship import trial
 from wildlab.studies.large_ship.trial import (
     DETECTOR,
@@ -104,58 +106,40 @@ def images(taken: Photographs) -> Figure:
     fig, axes = new_figure(5.9, 3.1, columns=2)
     for ax, row, name in zip(axes, (whole, part), ("Most in view", "Nearest to half"), strict=True):
         _, counts = taken.camera.image(int(plain.exposure[row]))
-        low, high = np.quantile(counts, [0.01, 0.99])
-        ax.imshow(counts, cmap="gray", vmin=low, vmax=high, interpolation="nearest")
+        draw_picture(ax, counts, f"{name}: {100 * plain.share[row]:.0f} %", limits=None)
         shot = taken.shots[row]
         one = shot.detections.select(shot.judged.found[1][:1])
         angle = float(np.degrees(one.orientation[0]))
-        ax.add_patch(
-            Ellipse(tuple(one.uv[0]), *one.axes[0], angle=angle, fill=False, ec=VERMILLION, lw=1.6)
-        )  # fmt: skip
-        ax.plot(*plain.uv[row], "x", color=VERMILLION, ms=8, mew=2, label="found")
-        ax.plot(*moved.uv[row], "+", color=BLUE, ms=10, mew=2, label="moved")
-        ax.plot(*plain.centre[row], "o", mfc="none", mec=ORANGE, ms=9, mew=1.6, label="true")
-        ax.set(xlim=(-reach, width + reach), ylim=(height + reach, -reach), xticks=[], yticks=[])
-        ax.set_facecolor("0.92")
-        ax.grid(False)
-        ax.set_title(f"{name}: {100 * plain.share[row]:.0f} %")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return fig
+        outline = Ellipse(tuple(one.uv[0]), *one.axes[0], angle=angle, fill=False, ec=VERMILLION, lw=1.6)
+        ax.add_patch(outline)
+        draw_marks(ax, {"found": plain.uv[row], "moved": moved.uv[row], "true": plain.centre[row]})
+        ax.set(xlim=(-reach, width + reach), ylim=(height + reach, -reach), facecolor="0.92")
+    return finish(fig, "")
 
 
 def positions(tracked: Mapping[str, Tracked], names: Mapping[str, str]) -> Figure:
     """Georeferenced positions about the ship's receiver, with and without (H figure 6.3)."""
     fig, axes = new_figure(5.9, 3.7, columns=2)
     errors = {who: -errors_of(one)[0][one.seen.seen] for who, one in tracked.items()}
-    for ax, (who, e) in zip(axes, errors.items(), strict=True):
-        ax.plot(e[:, 1], e[:, 0], "o", color=_COLOURS[who], ms=4, alpha=0.6, mew=0)
-        ax.plot(*e.mean(axis=0)[::-1], "+", color=INK, ms=12, mew=2)
-        ax.plot(0, 0, "o", mfc="none", mec=GREEN, ms=9, mew=2)
-        ax.set_title(names[who].capitalize())
     reach = 1.08 * max(float(np.abs(e).max()) for e in errors.values())
-    for ax in axes:
-        ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
-        map_axes(ax, scale_bar=False)
-    axes[1].set_ylabel("")
+    for ax, (who, e) in zip(axes, errors.items(), strict=True):
+        draw_errors(ax, e, _COLOURS[who], names[who].capitalize(), reach)
+        ax.plot(0, 0, "o", mfc="none", mec=GREEN, ms=9, mew=2)
+        map_axes(ax, scale_bar=False, north="north (m)" if ax is axes[0] else "")
     return fig
 
 
 def errors_and_speed(tracked: Mapping[str, Tracked], names: Mapping[str, str]) -> Figure:
     """Distance from the receiver and estimated speed over the joined segments (H figure 6.4)."""
-    fig, axes = new_figure(5.9, 4.6, rows=2, sharex=True)
+    fig, (far, fast) = new_strips(2, 4.6)
     for who, one in tracked.items():
-        times = one.seen.times
-        distance, speed = np.hypot(*errors_of(one)[1].T), np.hypot(*one.track.x[:, 2:4].T)
-        axes[0].plot(times, distance, color=_COLOURS[who], label=names[who])
-        axes[1].plot(times, speed, color=_COLOURS[who])
-    for ax in axes:
+        draw_line(far, one.seen.times, np.hypot(*errors_of(one)[1].T), _COLOURS[who], names[who])
+        draw_line(fast, one.seen.times, np.hypot(*one.track.x[:, 2:4].T), _COLOURS[who])
+    for ax in (far, fast):
         ax.axvline(START_S, color=INK, lw=0.8, ls=":")
         ax.set_ylim(bottom=0)
-    axes[0].set_ylabel("distance (m)")
-    axes[1].set_ylabel("speed (m/s)")
-    axes[1].set_xlabel("time, segments joined (s)")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
+    fast.set_ylabel("speed (m/s)")
+    return finish(fig, "", "time, segments joined (s)", "distance (m)")
 
 
 def answer(facts: Facts) -> list[str]:

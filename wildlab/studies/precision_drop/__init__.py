@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from wildlab.detection.colour import Colour, coloured, find_coloured
-from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, new_figure
+from wildlab.reporting.charts.forms import Values, draw_picture, lines_chart
+from wildlab.reporting.figures import GREY, INK, ORANGE, new_figure
 from wildlab.reporting.published import bounds_of, spread_key
 from wildlab.simulation.scene.coloured import ColourView
 from wildlab.studies.page import Facts
@@ -23,16 +24,13 @@ def plot_image(view: ColourView, thresholds: Colour) -> Figure:
     found = find_coloured(view.image, np.ones(view.labels.shape, bool), thresholds)
     hsv = np.asarray(cv2.cvtColor(view.image, cv2.COLOR_RGB2HSV), np.uint8)
     fig, axes = new_figure(5.8, 2.3, columns=2)
-    axes[0].imshow(view.image, interpolation="nearest")
-    axes[1].imshow(coloured(hsv, thresholds), cmap="gray", vmin=0, vmax=1, interpolation="nearest")
     height, width = view.labels.shape
     across, down = thresholds.border_px
-    for ax, title in zip(axes, ("Image", "Within the limits"), strict=True):
+    panels = {"Image": view.image, "Within the limits": coloured(hsv, thresholds)}
+    for ax, (title, picture) in zip(axes, panels.items(), strict=True):
+        draw_picture(ax, picture, title, limits=(0, 1))
         inner = (width - 1 - 2 * across, height - 1 - 2 * down)
-        frame = Rectangle((across, down), *inner, fill=False, ec=ORANGE, lw=1, ls="--")
-        ax.add_patch(frame)
-        ax.set(xticks=[], yticks=[], title=title, xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
-        ax.grid(False)
+        ax.add_patch(Rectangle((across, down), *inner, fill=False, ec=ORANGE, lw=1, ls="--"))
     axes[0].plot(*found.uv.T, "o", mfc="none", mec="white", ms=20, mew=1.6)
     return fig
 
@@ -42,20 +40,16 @@ def plot_mean(runs: pd.DataFrame) -> Figure:
     known = np.array([count for count in COUNTS if runs[MEAN, f"after_{count}"].notna().all()])
     columns = [runs[MEAN, f"after_{count}"] for count in known]
     middle = np.array([column.median() for column in columns])
-    fig, ax = new_figure(5.6, 4.2)
+    lines = {
+        "median flight": Values(middle),
+        "if errors were independent": Values(middle[0] / np.sqrt(known / known[0]), color=INK, look=":"),
+        "a single one": Values(0 * middle + runs[SINGLE, "median_error"].median(), color=GREY, look="--"),
+    }
     if len(runs) > 1:
-        low, high = np.transpose([bounds_of(column) for column in columns])
-        label = f"flights, {spread_key(len(runs))}"
-        ax.fill_between(known, low, high, color=BLUE, alpha=0.18, lw=0, label=label)
-    ax.plot(known, middle, "o-", color=BLUE, label="median flight")
-    ax.plot(known, middle[0] / np.sqrt(known / known[0]), ":", color=INK, label="if errors were independent")
-    single = float(runs[SINGLE, "median_error"].median())
-    ax.axhline(single, color=GREY, lw=1, ls="--", label="a single one")
-    ax.set(xscale="log", xlabel="detections in the mean", ylabel="error of the mean (m)", ylim=(0, None))
-    ax.set_xticks(known, [str(one) for one in known])
-    ax.minorticks_off()
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
+        band = Values(middle, np.transpose([bounds_of(column) for column in columns]))
+        lines = {f"flights, {spread_key(len(runs))}": band} | lines
+    x, y = "detections in the mean", "error of the mean (m)"
+    return lines_chart(known, lines, x, y, size=(5.6, 4.2), xscale="log", ylim=(0, None))
 
 
 def answer(facts: Facts) -> list[str]:

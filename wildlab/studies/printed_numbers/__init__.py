@@ -19,7 +19,8 @@ from wildlab.messages.quantities import number
 from wildlab.paths import DATA
 from wildlab.planning.high_level import utilities
 from wildlab.planning.information import SearchSensor, as_printed, bearing_information
-from wildlab.reporting.figures import BLUE, INK, VERMILLION, new_figure
+from wildlab.reporting.charts.forms import Values, rows_chart
+from wildlab.reporting.figures import BLUE, INK, VERMILLION
 from wildlab.reporting.published import published_values
 from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.studies.page import Facts
@@ -170,21 +171,22 @@ def pairs_table(pairs: list[Pair]) -> pd.DataFrame:
 
 def plot_ratios(pairs: list[Pair]) -> Figure:
     """How many times each number is the other, on one logarithmic axis."""
-    words = load_words()["pair"]
-    fig, ax = new_figure(5.9, 0.6 + 0.33 * len(pairs))
-    rows, ratios = np.arange(len(pairs))[::-1], [one.ratio for one in pairs]
-    widest = 1.15 * max(MARGIN, *ratios, *(1 / ratio for ratio in ratios))
+    words, ratios = load_words()["pair"], np.array([one.ratio for one in pairs])
+    topics = [words[one.key]["topic"].partition(" (")[0] for one in pairs]
+    apart = np.array([one.apart for one in pairs])
+    series = {
+        name: Values(np.where(which, ratios, np.nan), color=color)
+        for name, which, color in (("agree", ~apart, BLUE), ("differ", apart, VERMILLION))
+    }
+    widest = 1.15 * max(MARGIN, *ratios, *(1 / ratios))
+    limits = {"xscale": "log", "xlim": (1 / widest, widest)}
+    fig = rows_chart(topics, series, "ratio", size=(5.9, 1.0 + 0.33 * len(pairs)), apart=0.0, **limits)
+    (ax,) = fig.axes
     ax.axvspan(1 / MARGIN, MARGIN, color=BLUE, alpha=0.15, lw=0)
     ax.axvline(1.0, color=INK, lw=0.8)
-    ax.scatter(ratios, rows, c=[VERMILLION if one.apart else BLUE for one in pairs], s=36, zorder=3)
-    ax.set_yticks(rows, [words[one.key]["topic"].partition(" (")[0] for one in pairs])
-    ax.set_xscale("log")
-    ax.set_xlim(1 / widest, widest)
     ticks = [tick for tick in (0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0) if 1 / widest <= tick <= widest]
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     ax.minorticks_off()
-    ax.set_xlabel("ratio")
-    ax.grid(axis="y", visible=False)
     return fig
 
 

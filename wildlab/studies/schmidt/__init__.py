@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.navigation_errors import SETTLING_S
 from wildlab.evaluation.consistency import Average, average, chi_square_interval, share_inside
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import Check
+from wildlab.reporting.charts.drawing import finish, new_strips
+from wildlab.reporting.charts.forms import Values, draw_lines, plain_numbers
 from wildlab.reporting.charts.tracks import (
     error_over_time,
     speed_and_course,
@@ -23,7 +24,7 @@ from wildlab.reporting.charts.tracks import (
     track_map,
     values_over_flights,
 )
-from wildlab.reporting.figures import GREEN, GREY, INK, colour, new_figure
+from wildlab.reporting.figures import GREEN, GREY, INK, colour
 from wildlab.reporting.published import bounds_of
 from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Metric, Study
@@ -319,34 +320,35 @@ _MARKS = {"schmidt": "D", "schmidt-data-sheet": "s", "schmidt-estimated": "o"}
 def nees_over_pose_sd(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """Median NEES and the share of flights that pass, over the predicted deviation of the attitude."""
     curve, flights = curve_table(runs), len(runs)
-    fig, (upper, lower) = new_figure(5.6, 5.4, rows=2, sharex=True)
-    sd, share = curve["sd"].to_numpy(float), curve["inside"].to_numpy(float)
-    color = colour("schmidt")
+    fig, (upper, lower) = new_strips(2, 5.4, 5.6)
+    sd, share, color = curve["sd"], curve["inside"], colour("schmidt")
     upper.axhspan(*BOUNDS, color=GREEN, alpha=0.12, lw=0)
     upper.axhline(2, color=INK, lw=0.8, ls=(0, (4, 2)))
-    upper.fill_between(sd, curve["low"], curve["high"], color=color, alpha=0.25, lw=0)
-    upper.plot(sd, curve["median"], color=color, marker=".", label="published covariance, scaled")
+    line = Values(curve["median"], curve[["low", "high"]].T, color, ".-")
+    draw_lines(upper, sd, {"published covariance, scaled": line})
     upper.set_yscale("log")
-    upper.set_ylabel("mean NEES")
     limits = np.array([share_interval(round(one * flights), flights)[1:] for one in share])
-    lower.fill_between(sd, 100 * limits[:, 0], 100 * limits[:, 1], color=color, alpha=0.25, lw=0)
-    lower.plot(sd, 100 * share, color=color, marker=".")
-    lower.set_ylim(-4, 104)
-    lower.set_ylabel("in the band (%)")
+    draw_lines(lower, sd, {"": Values(100 * share, 100 * limits.T, color, ".-")})
+    lower.set(ylim=(-4, 104), ylabel="in the band (%)")
     for who in COVARIANCES:
         at = float(np.mean(list(mean_deviations(runs, ORIGINS[who][0]).values())))
         one = predicted_error(runs, who)
-        look = {"ls": "none", "marker": _MARKS[who], "mfc": "white", "mec": INK, "ms": 7, "mew": 1.5}
+        look: dict[str, Any] = {
+            "ls": "none",
+            "marker": _MARKS[who],
+            "mfc": "white",
+            "mec": INK,
+            "ms": 7,
+            "mew": 1.5,
+        }
         upper.plot(at, one.median, label=names[who], **look)
         lower.plot(at, 100 * one.inside, **look)
     for ax in (upper, lower):
         ax.axvspan(DEGREES[0], DEGREES[-1], color=GREY, alpha=0.18, lw=0)
         ax.set_xscale("log")
-        ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    upper.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    lower.set_xlabel("predicted SD of attitude, mean of roll, pitch and yaw (°)")
-    fig.legend(loc="outside lower center", ncols=2)
-    return fig
+        plain_numbers(ax.xaxis)
+    plain_numbers(upper.yaxis)
+    return finish(fig, "", "predicted SD of attitude, mean of roll, pitch and yaw (°)", "mean NEES")
 
 
 def nees_of_flights(

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 from scipy import ndimage
 
@@ -21,6 +20,7 @@ from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
 from wildlab.geometry.terrain import Terrain, intersect_terrain
+from wildlab.reporting.charts.forms import Values, fields_chart, lines_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, end_label, new_figure
 from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.studies.page import Facts
@@ -320,19 +320,8 @@ def offsets(errors: Mapping[str, float], printed: Mapping[tuple[str, str], float
 def over_image() -> Figure:
     """Contours of the error over the image, by attitude."""
     u, v, errors = errors_over_image()
-    largest = max(float(one.max()) for one in errors.values())
-    fig, axes = new_figure(5.9, 2.7, columns=3, sharey=True)
-    for ax, (attitude, error) in zip(axes, errors.items(), strict=True):
-        ax.contourf(u, v, error, levels=np.arange(25, largest + 5, 5), cmap="cividis", vmin=25, vmax=largest)
-        lines = ax.contour(u, v, error, levels=[30, 40, 50], colors="white", linewidths=0.8)
-        ax.clabel(lines, fmt="%d m", fontsize=10)
-        ax.plot(*IMAGE_CENTRE, "+", color="white", ms=9)
-        ax.set(title=attitude, xlabel="u (px)")
-        ax.set_aspect("equal")
-        ax.grid(visible=False)
-    axes[0].set_ylabel("v (px)")
-    axes[0].invert_yaxis()
-    return fig
+    levels = np.arange(25, max(float(one.max()) for one in errors.values()) + 5, 5)
+    return fields_chart(u, v, errors, levels, [30, 40, 50], "%d m", IMAGE_CENTRE, (5.9, 2.7))
 
 
 def flat_map() -> Figure:
@@ -348,20 +337,12 @@ def flat_map() -> Figure:
 
 def wrong_heights(found: list[Shift], names: Mapping[str, str]) -> Figure:
     """Distance from the true point by pitch and by what is wrong; of a camera straight down it is nothing."""
-    fig, ax = new_figure(5.6, 3.4)
-    some = [one for one in found if one.pitch < 90]
-    pitch = [one.pitch for one in some]
+    some, lines = [one for one in found if one.pitch < 90], {}
     for name, color in _WRONG.items():
-        means = [mean_interval(one.off[name]) for one in some]
-        low = [max(one.low, 1e-3) for one in means]
-        ax.fill_between(pitch, low, [one.high for one in means], color=color, alpha=0.2, lw=0)
-        ax.plot(pitch, [one.estimate for one in means], "o-", color=color, ms=4, label=names[name])
-    ax.set_yscale("log")
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.legend(loc="upper right")
-    ax.set(xlabel="camera below the horizon (degrees)", ylabel="distance from the true point (m)")
-    ax.set_xticks(pitch)
-    return fig
+        middle, low, high = np.transpose([mean_interval(one.off[name]) for one in some])
+        lines[names[name]] = Values(middle, (np.maximum(low, 1e-3), high), color)
+    x, y = "camera below the horizon (degrees)", "distance from the true point (m)"
+    return lines_chart([one.pitch for one in some], lines, x, y, yscale="log")
 
 
 #: A ratio of errors nearer to one than this is no growth.

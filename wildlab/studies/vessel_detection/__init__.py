@@ -9,7 +9,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 
 from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import find_edges, find_objects
@@ -19,6 +18,8 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
+from wildlab.reporting.charts.drawing import draw_dots, finish, name_rows
+from wildlab.reporting.charts.forms import Values, draw_picture, lines_chart, rows_chart, spread_points
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
 from wildlab.simulation.scene.bodies import KINDS
 from wildlab.simulation.scene.drawn import Draw, Drawn, draw_scene
@@ -214,20 +215,12 @@ def plot_rates(
     runs: pd.DataFrame, published: Mapping[tuple[str, str], float], names: Mapping[str, str]
 ) -> Figure:
     """Detection rates over all images with their intervals; ``published`` by subject and name."""
-    fig, ax = new_figure(5.6, 2.9)
     subjects = (SHIP, WHOLE, CUT)
-    for row, subject in enumerate(subjects):
-        found = pooled_share(runs, subject, "detection_rate")[0]
-        ax.plot([100 * found.low, 100 * found.high], [row, row], color=BLUE, lw=2)
-        ax.plot(100 * found.estimate, row, "o", color=BLUE, ms=8, label="here" if row == 0 else None)
-        printed = published.get((subject, "detection_rate"))
-        if printed is not None:
-            label = "published" if row == 0 else None
-            ax.plot(100 * printed, row, "D", mfc="none", mec=INK, ms=9, label=label)
-    ax.set_yticks(range(len(subjects)), [names[one] for one in subjects])
-    ax.set(xlabel="images in which all was found (%)", ylim=(len(subjects) - 0.5, -0.5))
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
-    return fig
+    here, *ends = 100 * np.array([pooled_share(runs, one, "detection_rate")[0] for one in subjects]).T
+    printed = [100 * published.get((one, "detection_rate"), np.nan) for one in subjects]
+    series = {"here": Values(here, ends), "published": Values(printed, color=INK, look="D")}
+    rows = [names[one] for one in subjects]
+    return rows_chart(rows, series, "images in which all was found (%)", size=(5.6, 2.9), apart=0.0)
 
 
 def plot_steps(image: Image, thresholds: FloatingThresholds) -> Figure:
@@ -239,19 +232,12 @@ def plot_steps(image: Image, thresholds: FloatingThresholds) -> Figure:
         "8 bits": steps.grey,
         "Gradient": steps.gradient,
         f"At {thresholds.gradient:g} and above": steps.steep,
-        "Found": steps.grey,
     }
-    for ax, (title, picture) in zip(axes.flat, panels.items(), strict=True):
-        ax.imshow(picture, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
-        ax.set_title(title)
-        ax.set(xticks=[], yticks=[])
-        ax.grid(False)
-    for left, top, width, height in found.box:
-        outline = Rectangle((left - 4, top - 4), width + 8, height + 8, fill=False, ec=ORANGE, lw=1.6)
-        axes.flat[3].add_patch(outline)
-    axes.flat[3].plot(*found.uv.T, "+", color=ORANGE, ms=8, mew=1.6)
-    rows, columns = image.counts.shape  # boxes and centres may reach beyond the image
-    axes.flat[3].set(xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
+    for ax, (title, picture) in zip(axes.flat, panels.items(), strict=False):
+        draw_picture(ax, picture, title)
+    last = axes.flat[3]
+    draw_picture(last, steps.grey, "Found", boxes=found.box, colors=[ORANGE] * len(found.box))
+    last.plot(*found.uv.T, "+", color=ORANGE, ms=8, mew=1.6)
     return fig
 
 
@@ -260,18 +246,20 @@ def plot_sweep(sweep: pd.DataFrame, along: str, group: str, xlabel: str, ylabel:
 
     ``label`` is what a group is called, with its value as ``{}``. A column ``scaled`` is dotted.
     """
-    fig, ax = new_figure(5.6, 3.7)
+    lines = {}
     for colour, (value, own) in zip(_COLOURS, sweep.groupby(group, sort=False), strict=False):
-        ax.plot(own[along], 100 * own["found"], "o-", color=colour, label=label.format(value))
-        for at, found, draws in zip(own[along], own["found"], own["draws"], strict=True):
-            share = share_interval(round(found * draws), int(draws))
-            ax.plot([at, at], [100 * share.low, 100 * share.high], color=colour, alpha=0.35, lw=2)
-        if "scaled" in own:
-            ax.plot(own[along], 100 * own["scaled"], ":", color=colour)
+        counts = zip(own["found"], own["draws"], strict=True)
+        ends = np.transpose([share_interval(round(share * of), int(of))[1:] for share, of in counts])
+        lines[label.format(value)] = Values(100 * own["found"], 100 * ends, colour)
+    at = np.unique(sweep[along])
+    fig = lines_chart(at, lines, xlabel, ylabel, size=(5.6, 3.7), ticks=False, ylim=(-3, 103))
     if "scaled" in sweep:
+        (ax,) = fig.axes
+        for one, (_, own) in zip(lines.values(), sweep.groupby(group, sort=False), strict=False):
+            ax.plot(own[along], 100 * own["scaled"], ":", color=one.color)
         ax.plot([], [], ":", color=INK, label="area scaled with height")
-    ax.set(xlabel=xlabel, ylabel=ylabel, ylim=(-3, 103))
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
+        fig.legends.clear()
+        finish(fig, "")
     return fig
 
 
@@ -281,11 +269,10 @@ def plot_cut_shares(objects: pd.DataFrame) -> Figure:
     cut = objects[objects["share"] < 1]
     for row, (found, colour) in enumerate(((True, BLUE), (False, VERMILLION))):
         share = 100 * cut[cut["found"].astype(bool) == found]["share"].to_numpy(float)
-        aside = np.linspace(-0.25, 0.25, len(share)) if len(share) > 1 else np.zeros(len(share))
-        ax.plot(share, row + aside, "o", color=colour, ms=5)
-    ax.set_yticks([0, 1], ["found", "missed"])
-    ax.set(xlabel="visible part of the outline (%)", ylim=(1.6, -0.6), xlim=(-2, 102))
-    return fig
+        draw_dots(ax, share, row + spread_points(len(share), 0.25), colour, size=10, alpha=0.8)
+    name_rows(ax, ["found", "missed"])
+    ax.set_xlim(-2, 102)
+    return finish(fig, "", "visible part of the outline (%)")
 
 
 def answer(facts: Facts) -> list[str]:

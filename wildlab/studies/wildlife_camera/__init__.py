@@ -16,7 +16,7 @@ from wildlab.geometry.board_views import INTRINSICS, parameters_of, project_boar
 from wildlab.geometry.camera import Camera, normalise, undistort, undistort_approximately
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera, direction_differences
-from wildlab.reporting.figures import new_figure
+from wildlab.reporting.charts.forms import fields_chart
 from wildlab.reporting.published import error_name
 from wildlab.simulation.boards import board_views
 from wildlab.studies.page import Facts
@@ -275,19 +275,11 @@ def metrics_of(
 
 def plot_inverse(inverse: Inverse, camera: Camera) -> Figure:
     """Contours of the error of the approximate inverse over the image; a cross at the principal point."""
-    fig, ax = new_figure(5.6, 4.0)
-    levels = np.linspace(0, float(inverse.error.max()), 11)
-    ax.contourf(inverse.u, inverse.v, inverse.error, levels=levels, cmap="cividis")
-    lines = ax.contour(
-        inverse.u, inverse.v, inverse.error, levels=levels[[1, 3, 6, 9]], colors="white", linewidths=0.8
+    levels, centre = np.linspace(0, float(inverse.error.max()), 11), (camera.cx, camera.cy)
+    some = levels[[1, 3, 6, 9]]
+    return fields_chart(
+        inverse.u, inverse.v, {"": inverse.error}, levels, some, "%.2g px", centre, (5.6, 4.0)
     )
-    ax.clabel(lines, fmt="%.2g px", fontsize=10)
-    ax.plot(camera.cx, camera.cy, "+", color="white", ms=9)
-    ax.set(xlabel="u (px)", ylabel="v (px)")
-    ax.set_aspect("equal")
-    ax.invert_yaxis()
-    ax.grid(visible=False)
-    return fig
 
 
 #: Focal lengths that fit a video by so many per cent are those of its pictures.

@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.detection.warm import Warm
 from wildlab.evaluation.matching import Rates, rates, shares
 from wildlab.evaluation.runs import Interval, mean_interval
 from wildlab.evaluation.shares import Check
+from wildlab.reporting.charts.drawing import finish
+from wildlab.reporting.charts.forms import Values, draw_picture, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study, name_metrics
@@ -226,33 +227,22 @@ def above(picture: Picture, thresholds: Warm) -> NDArray[np.uint8]:
     return np.where(trial.above(picture, thresholds), np.uint8(255), np.uint8(0))
 
 
-def _panel(ax: Axes, image: NDArray[Any], title: str) -> None:
-    ax.imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
-    ax.set_title(title, fontsize=10)
-    ax.set(xticks=[], yticks=[])
-    ax.grid(False)
-
-
-def _boxes(ax: Axes, picture: Picture, thresholds: Warm, frame: bool = True) -> DetectionScore:
+def _thresholded(ax: Axes, picture: Picture, thresholds: Warm) -> DetectionScore:
+    """Draw the image after a threshold, with its detections: right ones blue, others red."""
     found = find(picture, thresholds)
     judged = judge(picture, found)
     right = {row for rows in judged.rows.values() for row in rows[:1]}
-    rows, columns = picture.counts.shape
-    for row, (left, top, width, height) in enumerate(found.box):
-        colour = SKY if row in right else VERMILLION
-        ax.add_patch(Rectangle((left - 3, top - 3), width + 6, height + 6, fill=False, ec=colour, lw=1.3))
-    if frame:
-        ax.set(xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
+    colors = [SKY if row in right else VERMILLION for row in range(len(found.box))]
+    draw_picture(ax, above(picture, thresholds), boxes=found.box, colors=colors, margin=3)
     return judged
 
 
 def image_by_method(picture: Picture, names: Mapping[str, str]) -> Figure:
     """One image through each method side by side, as in F figures 7.5 to 7.11."""
-    methods = (CONSTANT, OVER_MEAN, LARGE, SUBTRACTED, ENHANCED)
     fig, axes = new_figure(5.6, 6.1, rows=3, columns=2)
-    _panel(axes.flat[0], picture.grey, "8 bits")
-    for ax, method in zip(axes.flat[1:], methods, strict=True):
-        _thresholded(ax, picture, method, names)
+    draw_picture(axes.flat[0], picture.grey, "8 bits")
+    for ax, method in zip(axes.flat[1:], (CONSTANT, OVER_MEAN, LARGE, SUBTRACTED, ENHANCED), strict=True):
+        _counted(ax, picture, method, names)
     return fig
 
 
@@ -260,9 +250,9 @@ def image_by_sun(before: Picture, after: Picture, names: Mapping[str, str]) -> F
     """A sequence over which the background changes: constant and adaptive threshold (F figures 7.5, 7.6)."""
     fig, axes = new_figure(5.6, 8.1, rows=4, columns=2)
     for column, (when, picture) in enumerate((("under clouds", before), ("sun out", after))):
-        _panel(axes[0, column], picture.grey, f"{when}, 8 bits")
+        draw_picture(axes[0, column], picture.grey, f"{when}, 8 bits")
         for row, method in enumerate((CONSTANT, ADAPTIVE, OVER_MEAN), start=1):
-            _thresholded(axes[row, column], picture, method, names)
+            _counted(axes[row, column], picture, method, names)
     return fig
 
 
@@ -273,8 +263,7 @@ def animal_by_block(picture: Picture, kind: Literal["floor", "offset"], level: f
     fig, axes = new_figure(5.6, 2.9, rows=1, columns=2)
     for ax, method in zip(axes.flat, (SMALL, LARGE), strict=True):
         thresholds = replace(METHODS[method], level=level, level_is=kind)
-        _panel(ax, above(picture, thresholds), "")
-        count = len(_boxes(ax, picture, thresholds, frame=False).rows[number])
+        count = len(_thresholded(ax, picture, thresholds).rows[number])
         ax.set_title(f"block {thresholds.block_px} px: {count} detection{'s' * (count != 1)}")
         middle, half = np.array([np.mean(u), np.mean(v)]), 0.9 * max(float(np.ptp(u)), float(np.ptp(v)), 40.0)
         ax.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] + half, middle[1] - half))
@@ -285,31 +274,21 @@ def rates_by_weather(
     runs: pd.DataFrame, what: Literal["recall", "false"], names: Mapping[str, str]
 ) -> Figure:
     """Recall, or false alarms per image, by weather and method with their intervals."""
-    methods = (CONSTANT, OVER_MEAN, SUBTRACTED, ENHANCED, BY_SIZE)
-    fig, ax = new_figure(5.6, 3.9)
-    most = 1.0
-    for k, method in enumerate(methods):
-        shift = 0.14 * (k - (len(methods) - 1) / 2)
-        for row, weather in enumerate(WEATHERS):
-            at = places([weather])
-            if what == "recall":
-                one, scale = rates_of(runs, method, at).recall, 100
-            else:
-                one, scale = false_alarms(runs, method, at), 1
-            ends = [scale * max(one.low, 0), scale * one.high]
-            ax.plot(ends, [row + shift] * 2, color=_COLOURS[method], lw=2)
-            label = names[method] if row == 0 else None
-            ax.plot(scale * one.estimate, row + shift, "o", color=_COLOURS[method], label=label)
-            most = max(most, one.estimate)
-    ax.set_yticks(range(len(WEATHERS)), [names[one] for one in WEATHERS])
-    ax.set_ylim(len(WEATHERS) - 0.5, -0.5)
-    if what == "recall":
-        ax.set(xlabel="animals found (%)", xlim=(-2, 102))
-    else:
-        ax.set_xlabel("false alarms per image")
-        ax.set_xlim(left=-0.02 * most)
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
-    return fig
+    series, most = {}, 1.0
+    for method in (CONSTANT, OVER_MEAN, SUBTRACTED, ENHANCED, BY_SIZE):
+        each = [places([weather]) for weather in WEATHERS]
+        if what == "recall":
+            found = 100 * np.array([rates_of(runs, method, at).recall for at in each])
+        else:
+            found = np.array([false_alarms(runs, method, at) for at in each])
+        middle, low, high = found.T
+        series[names[method]] = Values(middle, (np.maximum(low, 0), high), _COLOURS[method])
+        most = max(most, float(middle.max()))
+    recall, rows = what == "recall", [names[one] for one in WEATHERS]
+    label, limits = (
+        ("animals found (%)", (-2, 102)) if recall else ("false alarms per image", (-0.02 * most, None))
+    )
+    return rows_chart(rows, series, label, size=(5.6, 3.9), apart=0.14, xlim=limits)
 
 
 def f1_by_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
@@ -317,14 +296,13 @@ def f1_by_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     dark = [weather for weather in WEATHERS if weather != NOON]
     fig, ax = new_figure(5.6, 3.4)
     for k, method in enumerate((CONSTANT, SUBTRACTED, ENHANCED, BY_SIZE)):
-        found = [rates_of(runs, method, places(dark, [height])).f1 for height in VIEWS]
+        found = np.array([rates_of(runs, method, places(dark, [height])).f1 for height in VIEWS])
         x = np.arange(len(VIEWS)) + 0.08 * (k - 1.5)
-        ax.vlines(x, [one.low for one in found], [one.high for one in found], color=_COLOURS[method], lw=2)
-        ax.plot(x, [one.estimate for one in found], "o-", color=_COLOURS[method], label=names[method])
+        ax.vlines(x, found[:, 1], found[:, 2], color=_COLOURS[method], lw=2)
+        ax.plot(x, found[:, 0], "o-", color=_COLOURS[method], label=names[method])
     ax.set_xticks(range(len(VIEWS)), [f"{height} m" for height in VIEWS])
-    ax.set(ylabel="F1", ylim=(-0.02, 1.02), xlabel="height above the ground")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
-    return fig
+    ax.set_ylim(-0.02, 1.02)
+    return finish(fig, "", "height above the ground", "F1")
 
 
 def tables(runs: pd.DataFrame, names: Mapping[str, str]) -> dict[str, pd.DataFrame]:
@@ -347,13 +325,11 @@ def tables(runs: pd.DataFrame, names: Mapping[str, str]) -> dict[str, pd.DataFra
     return {"methods": pd.DataFrame(methods), "readings": pd.DataFrame(readings)}
 
 
-def _thresholded(ax: Axes, picture: Picture, method: str, names: Mapping[str, str]) -> None:
-    """The image after a method's threshold, with its detections."""
-    _panel(ax, above(picture, METHODS[method]), "")
-    found, invented, missed = _boxes(ax, picture, METHODS[method]).counts
-    ax.set_title(
-        f"{names[method]}\n{found:.0f} of {found + missed:.0f} found, {invented:.0f} false", fontsize=10
-    )
+def _counted(ax: Axes, picture: Picture, method: str, names: Mapping[str, str]) -> None:
+    """The image after a method's threshold, with its detections, and how many of them are right."""
+    found, invented, missed = _thresholded(ax, picture, METHODS[method]).counts
+    said = f"{names[method]}\n{found:.0f} of {found + missed:.0f} found, {invented:.0f} false"
+    ax.set_title(said, fontsize=10)
 
 
 def _ranged(one: Interval) -> str:

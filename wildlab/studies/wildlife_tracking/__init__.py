@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from time import process_time
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.animals.follow import FollowedAnimals, Known, follow
 from wildlab.analysis.animals.images import NONE
@@ -22,6 +19,8 @@ from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval
 from wildlab.evaluation.shares import Check, Pooled
 from wildlab.geometry.frames import Array
 from wildlab.messages.quantities import number, percent_between
+from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
+from wildlab.reporting.charts.forms import draw_fences, draw_picture, fit_map, spread_points
 from wildlab.reporting.figures import (
     BLUE,
     GREY,
@@ -297,14 +296,19 @@ def tracks_map(world: World, followed: FollowedAnimals, share: float) -> Figure:
     fig, ax = new_figure(5.9, 5.2)
     times = world.images.times
     known = _at(followed.known, times, share * world.lap)
-    seen = {one.animal for one in followed.found if one.image <= known.image}
+    places = world.images.truth[known.image]
+    seen = np.isin(np.arange(len(places)), [one.animal for one in followed.found if one.image <= known.image])
     way = world.images.poses.p_nc[: known.image + 1, :2]
     _ground(ax, world, way)
-    _animals(ax, world.images.truth[known.image], seen)
-    _tracks(ax, known)
-    _fit(ax, world, way)
-    _explain(fig)
-    return fig
+    _tracks(ax, known, np.ones(len(known.mean), bool), BLUE, "track of an animal")
+    for name, which, fill in (
+        ("animal, detected", seen, VERMILLION), ("animal, not detected yet", ~seen, "none")
+    ):  # fmt: skip
+        ax.plot(*places[which, ::-1].T, "o", ms=4.5, mec=INK, mew=0.9, mfc=fill, label=name)
+    # Whatever an ellipse reaches to.
+    fit_map(ax, np.concatenate([*world.fences, way]), 25.0)
+    map_axes(ax)
+    return finish(fig, "")
 
 
 def _at(known: list[Known], times: Array, time: float) -> Known:
@@ -312,52 +316,18 @@ def _at(known: list[Known], times: Array, time: float) -> Known:
 
 
 def _ground(ax: Axes, world: World, way: Array) -> None:
-    for fence in world.fences:
-        ring = np.concatenate([fence, fence[:1]])
-        ax.plot(ring[:, 1], ring[:, 0], color=INK, lw=1.2)
-    ax.plot(way[:, 1], way[:, 0], color=GREY, lw=1.0)
-    ax.plot(way[-1, 1], way[-1, 0], "^", color=INK, ms=7)
-    ax.grid(False)
+    draw_fences(ax, world.fences)
+    ax.plot([], [], color=INK, label="fence of an enclosure")
+    draw_way(ax, way, GREY, "path so far", width=1.0)
+    ax.plot(*way[-1, 1::-1], "^", color=INK, ms=7, label="the camera now")
 
 
-def _explain(fig: Figure, *, animals: bool = True) -> None:
-    """What lines and signs of a map are, below it."""
-    ground = [
-        Line2D([], [], color=INK, lw=1.2, label="fence of an enclosure"),
-        Line2D([], [], color=GREY, lw=1.0, label="path so far"),
-        Line2D([], [], color=INK, marker="^", ms=7, lw=0, label="the camera now"),
-    ]
-    if animals:
-        dot: dict[str, Any] = {"marker": "o", "ms": 4.5, "mec": INK, "mew": 0.9, "lw": 0}
-        ground += [
-            Line2D([], [], color=BLUE, lw=1.3, label="track of an animal"),
-            Line2D([], [], mfc=VERMILLION, label="animal, detected", **dot),
-            Line2D([], [], mfc="none", label="animal, not detected yet", **dot),
-        ]
-    else:
-        ground += [
-            Line2D([], [], color=VERMILLION, lw=2.0, label="track of the animal visited"),
-            Line2D([], [], color=BLUE, lw=1.2, label="other tracks"),
-        ]
-    fig.legend(handles=ground, loc="outside lower center", ncols=2)
-
-
-def _animals(ax: Axes, places: Array, seen: set[int]) -> None:
-    for animal, (north, east) in enumerate(places):
-        ax.plot(east, north, "o", ms=4.5, mec=INK, mew=0.9, mfc=VERMILLION if animal in seen else "none")
-
-
-def _tracks(ax: Axes, known: Known, color: str = BLUE) -> None:
-    for mean, covariance in zip(known.mean, known.covariance, strict=True):
-        ellipse(ax, mean[::-1], covariance[::-1, ::-1], HELD, color=color, lw=1.3)
-
-
-def _fit(ax: Axes, world: World, way: Array) -> None:
-    """The view to the enclosures and the way, whatever an ellipse reaches to."""
-    points = np.concatenate([*world.fences, way])
-    low, high = points.min(axis=0) - 25, points.max(axis=0) + 25
-    ax.set(xlim=(low[1], high[1]), ylim=(low[0], high[0]))
-    map_axes(ax)
+def _tracks(
+    ax: Axes, known: Known, which: NDArray[np.bool_], color: str, name: str, width: float = 1.3
+) -> None:
+    for mean, covariance in zip(known.mean[which], known.covariance[which], strict=True):
+        ellipse(ax, mean[::-1], covariance[::-1, ::-1], HELD, color=color, lw=width)
+    ax.plot([], [], color=color, lw=width, label=name)
 
 
 def visit_rows(flown: Patrolled) -> tuple[int, int] | None:
@@ -394,18 +364,14 @@ def visit_maps(world: World, flown: Patrolled) -> Figure | None:
         known = flown.known[row]
         mine = known.identity == track
         _ground(ax, world, flown.p_nc[: row + 1, :2])
-        for mean, covariance in zip(known.mean[~mine], known.covariance[~mine], strict=True):
-            ellipse(ax, mean[::-1], covariance[::-1, ::-1], HELD, color=BLUE, lw=1.2)
-        sd = np.nan
-        for mean, covariance in zip(known.mean[mine], known.covariance[mine], strict=True):
-            ellipse(ax, mean[::-1], covariance[::-1, ::-1], HELD, color=VERMILLION, lw=2.0)
-            sd = float(np.sqrt(np.trace(covariance) / 2))
+        _tracks(ax, known, mine, VERMILLION, "track of the animal visited", 2.0)
+        _tracks(ax, known, ~mine, BLUE, "other tracks")
+        own = known.covariance[mine]
+        sd = float(np.sqrt(np.trace(own[-1]) / 2)) if len(own) else np.nan
         ax.set(xlim=(middle[1] - 160, middle[1] + 160), ylim=(middle[0] - 95, middle[0] + 95))
-        map_axes(ax, scale_bar=ax is axes[-1])
-        ax.set_xlabel("east (m)" if ax is axes[-1] else "")
+        map_axes(ax, scale_bar=ax is axes[-1], east="east (m)" if ax is axes[-1] else "")
         ax.set_title(f"{what}: SD {sd:.1f} m")
-    _explain(fig, animals=False)
-    return fig
+    return finish(fig, "")
 
 
 def most_seen(followed: FollowedAnimals, out: float) -> int | None:
@@ -416,8 +382,8 @@ def most_seen(followed: FollowedAnimals, out: float) -> int | None:
 
 def deviation_over_time(runs: Runs) -> Figure | None:
     """Predicted deviation of one animal's track over time, with and without the negative update."""
-    world = runs.worlds[UAV]
-    animal = most_seen(runs.followed[UAV, NEGATIVE], 60.0)
+    world, followed = runs.worlds[UAV], runs.followed[UAV, NEGATIVE]
+    animal = most_seen(followed, 60.0)
     if animal is None:
         return None
     fig, ax = new_figure(5.9, 3.6)
@@ -426,12 +392,11 @@ def deviation_over_time(runs: Runs) -> Figure | None:
     ):  # fmt: skip
         times, sd = sd_of(world, runs.followed[UAV, name], animal)
         ax.plot(times / 60, sd, style, color=color, label=label)
-    seen = [one.image for one in runs.followed[UAV, NEGATIVE].found if one.animal == animal]
+    seen = [one.image for one in followed.found if one.animal == animal]
     ax.plot(world.images.times[seen] / 60, np.zeros(len(seen)), "|", color=INK, ms=12, label="detected")
     ax.axvline(world.lap / 60, color=GREY, lw=1.0, ls=":", label="a lap")
-    ax.set(xlabel="time (min)", ylabel="predicted SD (m)", ylim=(0, None))
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return fig
+    ax.set_ylim(0, None)
+    return finish(fig, "", "time (min)", "predicted SD (m)")
 
 
 def sd_of(world: World, followed: FollowedAnimals, animal: int) -> tuple[Array, Array]:
@@ -451,23 +416,19 @@ def sd_of(world: World, followed: FollowedAnimals, animal: int) -> tuple[Array, 
 def negative_differences(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """What the negative update changes, world by world."""
     fig, axes = new_figure(5.9, 3.8, columns=2, sharey=True)
-    rng = np.random.default_rng(0)  # to tell points apart, across
-    platforms = (GONDOLA, UAV)
+    platforms = {GONDOLA: BLUE, UAV: ORANGE}
     for ax, name, label in zip(axes, ("sd", "rmse"), ("Predicted SD", "RMS error"), strict=True):
-        for place, platform in enumerate(platforms):
+        for place, (platform, color) in enumerate(platforms.items()):
             one, other = f"{platform}-{NEGATIVE}", f"{platform}-{POSITIVE}"
             values = (runs[one, name] - runs[other, name]).dropna().to_numpy(float)
-            across = place + rng.uniform(-0.16, 0.16, len(values))
-            ax.plot(across, values, "o", ms=4, color=(BLUE, ORANGE)[place], alpha=0.55, mew=0)
+            draw_dots(ax, place + spread_points(len(values), 0.16), values, color, size=8)
             if len(values) > 1:
                 found = mean_interval(values)
                 bar = [[found.estimate - found.low], [found.high - found.estimate]]
                 ax.errorbar(place + 0.3, found.estimate, bar, fmt="D", color=INK, ms=5, capsize=4)
         ax.axhline(0, color=GREY, lw=1.0)
-        ax.set(xlim=(-0.5, 1.6), xticks=[0, 1], xticklabels=[names[one] for one in platforms])
-        ax.set_title(label)
-    axes[0].set_ylabel("with less without (m)")
-    return fig
+        ax.set(title=label, xlim=(-0.5, 1.6), xticks=[0, 1], xticklabels=[names[one] for one in platforms])
+    return finish(fig, "", ylabel="with less without (m)")
 
 
 def frame_in_weathers(runs: Renderings, names: Mapping[str, str]) -> Figure:
@@ -477,17 +438,10 @@ def frame_in_weathers(runs: Renderings, names: Mapping[str, str]) -> Figure:
     in_view = set(np.flatnonzero(runs.world.images.in_view[k]).tolist())
     for ax, (name, one) in zip(axes.flat, runs.by_weather.items(), strict=True):
         grey, found, judged = seen_again(runs.world, one, k)
-        ax.imshow(grey, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
-        for (left, top, width, height), animal in zip(found.box, judged.animal, strict=True):
-            colour = VERMILLION if animal == NONE else SKY
-            ax.add_patch(
-                Rectangle((left - 5, top - 5), width + 10, height + 10, fill=False, ec=colour, lw=1.6)
-            )
-        ax.set(xlim=(-0.5, grey.shape[1] - 0.5), ylim=(grey.shape[0] - 0.5, -0.5), xticks=[], yticks=[])
-        ax.grid(False)
-        false = int((judged.animal == NONE).sum())
+        colors = [VERMILLION if animal == NONE else SKY for animal in judged.animal]
         hits = len(in_view & set(judged.animal.tolist()))
-        ax.set_title(f"{names[name]}: {hits} of {len(in_view)} found, {false} false")
+        title = f"{names[name]}: {hits} of {len(in_view)} found, {colors.count(VERMILLION)} false"
+        draw_picture(ax, grey, title, boxes=found.box, colors=colors, margin=5)
     return fig
 
 
