@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.timing import best_of
 from wildlab.geometry.gravity import local_earth
 from wildlab.simulation import fixed_wing_trajectory, kernels, loiter_path, plain
-from wildlab.simulation.disturbances import band_limited_disturbance
+from wildlab.simulation.trajectory import band_limited_disturbance
 
 DURATION, RATE, FRACTION = 1500, 250, 100
 WIND = np.array([4.0, -3.0, 0.0])

@@ -14,7 +14,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.mount import Mount
-from wildlab.simulation.clipped_outlines import moments
+from wildlab.simulation.camera_detections import moments
 from wildlab.simulation.scene import CameraResponse, expose, render, sensor_of
 from wildlab.simulation.scene.drawn import Draw, draw_scene
 

@@ -2,12 +2,17 @@
 
 import numpy as np
 
-from wildlab.simulation.attitudes import fixed_wing_trajectory
-from wildlab.simulation.disturbances import band_limited_disturbance
-from wildlab.simulation.loiter import loiter_path
+from wildlab.simulation.courses import (
+    ControlErrors,
+    Laps,
+    filleted_course,
+    laps_path,
+    loiter_path,
+    shape_corners,
+)
 from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.trajectory import band_limited_disturbance, fixed_wing_trajectory
 from wildlab.simulation.twin_trajectory import twin_trajectory
-from wildlab.simulation.waypoint_courses import ControlErrors, Laps, filleted_course, laps_path, shape_corners
 
 WIND = np.array([4.0, -3.0, 0.0])
 LAPS_WIND = np.array([-3.2, -3.2, 0.0])  # 4.5 m/s from the north-east

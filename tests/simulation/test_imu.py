@@ -21,8 +21,8 @@ from wildlab.simulation.imu import (
     triad_data_sheets,
 )
 from wildlab.simulation.onboard_sensors import as_mounted, imu_table, mounted_imu, payload_boresight
+from wildlab.simulation.parameter_groups import Imu
 from wildlab.simulation.parameters import PARTS, TwinParameters, load_twin
-from wildlab.simulation.sensor_parameters import Imu
 from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces, turned
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate

@@ -11,9 +11,8 @@ from scipy.spatial.transform import Rotation
 from wildlab.geometry.frames import matrix_to_quaternion
 from wildlab.geometry.gravity import Earth
 from wildlab.simulation import kernels, plain
-from wildlab.simulation.disturbances import Disturbance
-from wildlab.simulation.loiter import _times_of_angles
-from wildlab.simulation.waypoint_courses import _polynomials, _smoothed
+from wildlab.simulation.courses import _polynomials, _smoothed, _times_of_angles
+from wildlab.simulation.trajectory import Disturbance
 
 COUNT = 300
 SEEDS = st.integers(0, 2**32 - 1)

@@ -10,7 +10,7 @@ import pytest
 from tests.simulation.test_twins import with_values
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
-from wildlab.simulation.land import ground_heights
+from wildlab.simulation.landscape import ground_heights
 from wildlab.simulation.parameters import TwinParameters, load_twin, twin_names
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate

@@ -17,9 +17,9 @@ from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.manifest import true_mount, twin_manifest
 from wildlab.simulation.onboard_sensors import gnss_table
+from wildlab.simulation.parameter_groups import Tolerance
 from wildlab.simulation.parameters import each_parameter, load_twin
 from wildlab.simulation.perturbed_flight import as_flown
-from wildlab.simulation.sensor_parameters import Tolerance
 from wildlab.simulation.trajectory import turned
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate

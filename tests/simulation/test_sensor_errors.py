@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from tests.simulation.motions import restless_loiter
 from tests.simulation.test_twins import with_values
 from wildlab.geometry.frames import matrix_to_rotation_vector
-from wildlab.simulation.camera_sway import camera_motion, camera_sway, recent_change
 from wildlab.simulation.error_models import (
     computer_stamps,
     gauss_markov,
@@ -16,10 +15,16 @@ from wildlab.simulation.error_models import (
     stream,
     with_attitude_error,
 )
-from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
+from wildlab.simulation.onboard_sensors import PositionErrors, antenna_motion, position_fixes
+from wildlab.simulation.parameter_groups import CameraSway
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.sensor_parameters import CameraSway
-from wildlab.simulation.trajectory import angular_rates, attitude_along
+from wildlab.simulation.trajectory import (
+    angular_rates,
+    attitude_along,
+    camera_motion,
+    camera_sway,
+    recent_change,
+)
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate
 

@@ -8,16 +8,22 @@ from scipy.spatial.transform import Rotation
 
 from tests.simulation.motions import ALTITUDE, LAPS_WIND, WIND, flown, restless_laps, restless_loiter
 from wildlab.geometry.frames import matrix_to_euler
-from wildlab.simulation.attitudes import coordinated_attitude, fixed_wing_trajectory
-from wildlab.simulation.disturbances import band_limited_disturbance
-from wildlab.simulation.loiter import loiter_path
-from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces
-from wildlab.simulation.waypoint_courses import (
+from wildlab.simulation.courses import (
     Laps,
     filleted_course,
     lap_times,
     laps_path,
+    loiter_path,
     shape_corners,
+)
+from wildlab.simulation.trajectory import (
+    Motion,
+    angular_rates,
+    attitude_along,
+    band_limited_disturbance,
+    coordinated_attitude,
+    fixed_wing_trajectory,
+    specific_forces,
 )
 
 

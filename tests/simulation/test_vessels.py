@@ -8,14 +8,13 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose
-from wildlab.simulation.camera_detections import exposure_times
-from wildlab.simulation.camera_view import Exposures
+from wildlab.simulation.camera_detections import Exposures, exposure_times
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import true_mount
+from wildlab.simulation.parameter_groups import TargetMotion
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.perturbed_flight import as_flown
 from wildlab.simulation.target_motion import target_outline, target_path, truth_table, way_along
-from wildlab.simulation.target_parameters import TargetMotion
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
 

@@ -13,7 +13,7 @@ from wildlab.simulation.scene import (
     slab,
     tree,
 )
-from wildlab.simulation.scene.drawn_land import LandDraw, draw_layout
+from wildlab.simulation.scene.drawn import LandDraw, draw_layout
 from wildlab.studies import wildlife_detection
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (

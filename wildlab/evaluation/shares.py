@@ -7,11 +7,12 @@ that few flights decide little: of twenty, even all of them leave open whether i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
@@ -147,6 +148,11 @@ class Check:
         if self.by_threshold is not None:
             return len(next(iter(self.by_threshold.values())))
         return len(self.true if self.true is not None else np.asarray(self.measured))
+
+
+def columns_of(runs: pd.DataFrame) -> Callable[[str, str], Array]:
+    """What gives (flights,) numbers by subject and name from a table with a row for each flight."""
+    return lambda subject, name: runs[subject, name].to_numpy(float)
 
 
 class Decision(NamedTuple):

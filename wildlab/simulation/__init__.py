@@ -9,15 +9,13 @@ seed and the sensor's name.
 
 Where a change belongs:
 
-- parameters: `parameters` (a twin's file) with `platform_parameters`, `sensor_parameters` and
-  `target_parameters`, whose values are `parameter_quantities`;
-- motion: `trajectory`, from `loiter`, `waypoint_courses`, `survey_courses`, `attitudes` and `disturbances`;
-  what a twin flies is in `twin_trajectory`, what it looks for in `target_motion` and `animal_motion`;
-- sensors: `imu`, `gnss`, `gimbal`, and the `error_models` that they share; what they are rather than what is
-  said of them: `as_flown`; how the camera turns against the airframe: `camera_sway`;
+- parameters: `parameters` (a twin's file) with `parameter_groups`, whose values are quantities with units;
+- motion: `trajectory`, with attitudes and disturbances, along `courses`; what a twin flies is in
+  `twin_trajectory`, what it looks for in `target_motion`, and the ground in `landscape`;
+- sensors: `imu`, receivers and gimbal in `onboard_sensors`, and the `error_models` that they share; what they
+  are rather than what is said of them: `perturbed_flight`;
 - speed: `kernels`, compiled, each with its twin in readable numpy in `plain`;
-- tables: `onboard_sensors`; `camera_detections` with `camera_view`, `animal_detections`,
-  `extended_target_detections` and `clipped_outlines`; `manifest`;
+- tables: `camera_detections`, `manifest`;
 - the whole flight: `twins`; what its camera would have seen, as images with labels: `scene`.
 """
 
@@ -27,16 +25,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from wildlab.simulation.attitudes import (
-        coordinated_attitude,
-        fixed_wing_trajectory,
-        thrust_aligned_trajectory,
-    )
+    from wildlab.simulation.courses import loiter_path
     from wildlab.simulation.error_models import gauss_markov, stream
-    from wildlab.simulation.loiter import loiter_path
     from wildlab.simulation.parameters import TwinParameters, load_twin, parameters_table, twin_names
     from wildlab.simulation.target_motion import target_path
-    from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces
+    from wildlab.simulation.trajectory import (
+        Motion,
+        angular_rates,
+        attitude_along,
+        coordinated_attitude,
+        fixed_wing_trajectory,
+        specific_forces,
+        thrust_aligned_trajectory,
+    )
     from wildlab.simulation.twins import simulate, simulate_twin
 
 _WHERE = {
@@ -44,18 +45,18 @@ _WHERE = {
     "TwinParameters": "parameters",
     "angular_rates": "trajectory",
     "attitude_along": "trajectory",
-    "fixed_wing_trajectory": "attitudes",
-    "coordinated_attitude": "attitudes",
+    "fixed_wing_trajectory": "trajectory",
+    "coordinated_attitude": "trajectory",
     "gauss_markov": "error_models",
     "load_twin": "parameters",
-    "loiter_path": "loiter",
+    "loiter_path": "courses",
     "parameters_table": "parameters",
     "simulate": "twins",
     "simulate_twin": "twins",
     "specific_forces": "trajectory",
     "stream": "error_models",
     "target_path": "target_motion",
-    "thrust_aligned_trajectory": "attitudes",
+    "thrust_aligned_trajectory": "trajectory",
     "twin_names": "parameters",
 }
 __all__ = [

@@ -18,7 +18,7 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import USUAL_GRAVITY, Earth, flat_earth
 from wildlab.simulation import kernels
 from wildlab.simulation.error_models import gauss_markov
-from wildlab.simulation.sensor_parameters import Imu
+from wildlab.simulation.parameter_groups import Imu
 from wildlab.simulation.trajectory import Trajectory
 
 #: The n of a trajectory, by itself.

@@ -8,9 +8,9 @@ from typing import Any
 
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.geometry.mount import Mount, helgesen_misalignment
-from wildlab.simulation.land import land_record
+from wildlab.simulation.landscape import land_record
+from wildlab.simulation.parameter_groups import Gnss, Imu, TwinMount
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.sensor_parameters import Gnss, Imu, TwinMount
 
 
 def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:

@@ -3,20 +3,120 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.gravity import local_earth
 from wildlab.simulation import kernels
-from wildlab.simulation.disturbances import AttitudeDisturbance, band_limited_disturbance
 from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_attitude_error
-from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
 from wildlab.simulation.imu import ideal_imu, read_imu
+from wildlab.simulation.parameter_groups import Gimbal, Gnss
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.sensor_parameters import Gnss
-from wildlab.simulation.trajectory import Motion, Trajectory, angular_rates, attitude_along
+from wildlab.simulation.trajectory import (
+    AttitudeDisturbance,
+    Motion,
+    Trajectory,
+    angular_rates,
+    attitude_along,
+    band_limited_disturbance,
+)
+
+_SHARPNESS = 0.98  # of a triangle's corners: the gimbal turns round within about a tenth of its swing
+
+
+def gimbal_angles(gimbal: Gimbal, times: Array) -> tuple[Array, Array]:
+    """True pan and tilt at times (N,) s: (N,) rad each.
+
+    Pan goes to and fro at an even pace but for the ends, where it turns round smoothly; at time 0 it passes
+    the middle. Which way that turns the camera is the mount's matter: about the vertical for one that looks
+    forward (yaw rotation), about the airframe's length for one hung by its back (roll rotation). Tilt, where
+    it moves, does alike; at ``tilt_middle`` it passes its middle on the way back.
+    """
+    t = np.asarray(times, float)
+    pan = gimbal.limit.si * _swing(t / gimbal.period.si)
+    tilt = np.full(len(t), gimbal.tilt.si)
+    if gimbal.tilt_limit is not None and gimbal.tilt_period is not None and gimbal.tilt_middle is not None:
+        tilt -= gimbal.tilt_limit.si * _swing((t - gimbal.tilt_middle.si) / gimbal.tilt_period.si)
+    return pan, tilt
+
+
+def _swing(periods: Array) -> Array:
+    """A triangle of height one with rounded corners, zero and rising at zero; (N,) periods -> (N,)."""
+    return np.asarray(np.arcsin(_SHARPNESS * np.sin(2 * math.pi * periods)) / math.asin(_SHARPNESS))
+
+
+def gimbal_table(gimbal: Gimbal, duration: float, seed: int) -> pd.DataFrame:
+    """What the gimbal says about its angles."""
+    times = np.arange(math.floor(duration * gimbal.rate.si + 1e-9) + 1) / gimbal.rate.si
+    pan, tilt = gimbal_angles(gimbal, times)
+    error = gimbal.noise.si * stream(seed, "gimbal").standard_normal((2, len(times)))
+    return pd.DataFrame({"time_s": times, "pan_rad": pan + error[0], "tilt_rad": tilt + error[1]})
+
+
+class PositionErrors(NamedTuple):
+    """How far off a receiver's positions are.
+
+    Attributes
+    ----------
+    correlated_sd
+        SDs of the time-correlated error, a first-order Gauss-Markov process, per horizontal axis and in
+        height, m: multipath, and of a single-frequency receiver the ionosphere and orbits too.
+    correlation_time
+        Its correlation time, s.
+    noise_sd
+        SDs of the white error from fix to fix, likewise, m.
+    """
+
+    correlated_sd: tuple[float, float]
+    correlation_time: float
+    noise_sd: tuple[float, float]
+
+
+def antenna_motion(motion: Motion, angular_rate: ArrayLike, arm: ArrayLike) -> tuple[Array, Array]:
+    """Position and velocity in n of an antenna that is rigidly fixed to b.
+
+    Parameters
+    ----------
+    motion
+        Of b, at N times.
+    angular_rate
+        Of b against n, in b, (N, 3) rad/s.
+    arm
+        From b to the antenna, in b, (3,) m.
+
+    Returns
+    -------
+    (N, 3) m and (N, 3) m/s.
+    """
+    r = np.asarray(arm, float)
+    around = np.cross(np.asarray(angular_rate, float), r)
+    return motion.position + motion.R_nb @ r, motion.velocity + np.einsum("nij,nj->ni", motion.R_nb, around)
+
+
+def position_fixes(
+    position: ArrayLike, step: float, errors: PositionErrors, rng: np.random.Generator
+) -> Array:
+    """Positions as a receiver gives them: with a time-correlated error, and noise from fix to fix.
+
+    Parameters
+    ----------
+    position
+        True positions of the antenna in n, (N, 3) m, ``step`` seconds apart.
+
+    Returns
+    -------
+    (N, 3) m, in n.
+    """
+    p = np.asarray(position, float)
+    correlated_sd, noise_sd = (
+        np.array([sd[0], sd[0], sd[1]]) for sd in (errors.correlated_sd, errors.noise_sd)
+    )
+    correlated = gauss_markov(len(p), step, correlated_sd, errors.correlation_time, rng)
+    return p + correlated + noise_sd * rng.standard_normal(p.shape)
 
 
 def sample_times(rate: float, duration: float) -> Array:

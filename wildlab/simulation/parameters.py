@@ -17,32 +17,35 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, did_you_mean, is_safe_name, read_toml
 from wildlab.paths import DATA
-from wildlab.simulation.parameter_quantities import Parameter
-from wildlab.simulation.platform_parameters import (
+from wildlab.simulation.parameter_groups import (
     AirframeFlight,
-    Cable,
-    Climb,
-    Land,
-    Loiter,
-    Place,
-    Route,
-    Survey,
-)
-from wildlab.simulation.sensor_parameters import (
+    Animals,
     Assumed,
     Autopilot,
     Boresight,
+    Cable,
     CameraSway,
+    Climb,
+    Enclosure,
     Gimbal,
     Gnss,
     Imu,
+    Land,
+    Loiter,
+    MarkedPair,
     OnboardClock,
+    Parameter,
+    Place,
+    Route,
+    Segments,
+    Subset,
+    Survey,
+    Target,
     Tolerance,
     TruePose,
     TwinCamera,
     TwinMount,
 )
-from wildlab.simulation.target_parameters import Animals, Enclosure, MarkedPair, Segments, Subset, Target
 
 TWINS = DATA / "twins"
 PARTS = TWINS / "parts"

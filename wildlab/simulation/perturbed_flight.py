@@ -14,9 +14,8 @@ import numpy as np
 
 from wildlab.flight.files import Strict
 from wildlab.simulation.error_models import stream
-from wildlab.simulation.parameter_quantities import Parameter
+from wildlab.simulation.parameter_groups import Gnss, Imu, Parameter, Tolerance, TwinCamera, TwinMount
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.sensor_parameters import Gnss, Imu, Tolerance, TwinCamera, TwinMount
 
 Part = TypeVar("Part", bound=Strict)
 

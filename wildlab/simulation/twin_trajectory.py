@@ -10,27 +10,33 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.simulation.attitudes import (
-    fixed_wing_trajectory,
-    thrust_aligned_trajectory,
-)
-from wildlab.simulation.disturbances import AttitudeDisturbance, Disturbance, band_limited_disturbance
-from wildlab.simulation.land import even_times, heights_along
-from wildlab.simulation.loiter import Turn, loiter_path
-from wildlab.simulation.manifest import true_mount, twin_manifest
-from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.platform_parameters import Loiter
-from wildlab.simulation.survey_courses import cable_heights, survey_course
-from wildlab.simulation.trajectory import FlightPath, Motion, Trajectory
-from wildlab.simulation.waypoint_courses import (
+from wildlab.simulation.courses import (
     ControlErrors,
     Laps,
     Shape,
+    Turn,
+    cable_heights,
     filleted_course,
     lap_times,
     laps_path,
     leg_headings,
+    loiter_path,
     shape_corners,
+    survey_course,
+)
+from wildlab.simulation.landscape import even_times, heights_along
+from wildlab.simulation.manifest import true_mount, twin_manifest
+from wildlab.simulation.parameter_groups import Loiter
+from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.trajectory import (
+    AttitudeDisturbance,
+    Disturbance,
+    FlightPath,
+    Motion,
+    Trajectory,
+    band_limited_disturbance,
+    fixed_wing_trajectory,
+    thrust_aligned_trajectory,
 )
 
 

@@ -15,15 +15,13 @@ import pandas as pd
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
-from wildlab.simulation.animal_motion import animals_truth
 from wildlab.simulation.camera_detections import exposure_times, frames_and_detections
-from wildlab.simulation.camera_sway import camera_motion
 from wildlab.simulation.error_models import stream
-from wildlab.simulation.gimbal import gimbal_table
-from wildlab.simulation.land import twin_land
+from wildlab.simulation.landscape import twin_land
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.onboard_sensors import (
     autopilot_tables,
+    gimbal_table,
     gnss_table,
     imu_table,
     nav_table,
@@ -32,8 +30,8 @@ from wildlab.simulation.onboard_sensors import (
 )
 from wildlab.simulation.parameters import TwinParameters, load_twin
 from wildlab.simulation.perturbed_flight import as_flown
-from wildlab.simulation.target_motion import truth_table
-from wildlab.simulation.trajectory import Motion, turned
+from wildlab.simulation.target_motion import animals_truth, truth_table
+from wildlab.simulation.trajectory import Motion, camera_motion, turned
 from wildlab.simulation.twin_trajectory import twin_trajectory
 
 #: Nav sources of a twin.

@@ -34,10 +34,9 @@ from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.geometry.terrain import Terrain
 from wildlab.simulation.landscape import synthetic_landscape
-from wildlab.simulation.scene.animals import ANIMALS, animal
+from wildlab.simulation.scene.bodies import ANIMALS, animal
 from wildlab.simulation.scene.ground import EVEN_LAND, Weather
-from wildlab.simulation.scene.land import LandView
-from wildlab.simulation.scene.on_terrain import land_on
+from wildlab.simulation.scene.land import LandView, land_on
 from wildlab.simulation.scene.response import IDEAL, sensor_of
 
 CAMERA = Camera(320, 240, 600.0, 600.0, 159.5, 119.5)

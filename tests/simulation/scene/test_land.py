@@ -34,7 +34,7 @@ from wildlab.simulation.scene import (
     tree,
 )
 from wildlab.simulation.scene.ground import CLOUD_BLANKET, SHADOW_DEPTH
-from wildlab.simulation.scene.on_terrain import MOST_CELLS, land_on
+from wildlab.simulation.scene.land import MOST_CELLS, land_on
 
 CAMERA = Camera(160, 128, 290.0, 292.0, 78.0, 66.0)
 SMOOTH = Cover(heating=20.0, cooling=0.0, lag=0.0, texture_sd=0.0)

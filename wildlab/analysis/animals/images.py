@@ -19,11 +19,9 @@ from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 from wildlab.geometry.viewsheds import lines_clear
-from wildlab.simulation.scene.animals import ANIMALS, animal, stone, tree
-from wildlab.simulation.scene.bodies import Body
+from wildlab.simulation.scene.bodies import ANIMALS, Body, animal, stone, tree
 from wildlab.simulation.scene.ground import Land, Weather, rolling_land
-from wildlab.simulation.scene.land import LandScene, LandView, render_land
-from wildlab.simulation.scene.on_terrain import land_on
+from wildlab.simulation.scene.land import LandScene, LandView, land_on, render_land
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose
 from wildlab.tracking.particles.clouds import Sight
 

@@ -32,20 +32,23 @@ class Values(NamedTuple):
     look: str = ""
 
 
-def draw_lines(ax: Axes, x: ArrayLike, lines: Mapping[str, Values]) -> None:
-    """Draw lines with markers and the bands of their intervals; "" leaves one out of the legend."""
+def draw_lines(ax: Axes, x: ArrayLike, lines: Mapping[str, Values], *, bars: bool = False) -> None:
+    """Draw lines with markers and the bands of their intervals, or bars; "" leaves one out of the legend."""
     for name, one in lines.items():
         if one.ends is not None:
             low, high = np.asarray(one.ends, float)
-            draw_band(ax, x, low, high, one.color, alpha=0.17)
+            if bars:
+                ax.vlines(x, low, high, color=one.color, alpha=0.35, lw=2)
+            else:
+                draw_band(ax, x, low, high, one.color, alpha=0.17)
         ax.plot(x, one.middle, one.look or "o-", color=one.color, label=name or None)
 
 
 def lines_chart(
     x: ArrayLike, lines: Mapping[str, Values], xlabel: str, ylabel: str, *, size: Size = (5.6, 3.6),
-    ticks: bool = True, **axes: Any,
+    ticks: bool = True, bars: bool = False, **axes: Any,
 ) -> Figure:  # fmt: skip
-    """Lines over a parameter, each with its band.
+    """Lines over a parameter, each with its band, or with ``bars``.
 
     Parameters
     ----------
@@ -57,7 +60,7 @@ def lines_chart(
         Of `Axes.set`: scales and limits.
     """
     fig, ax = new_figure(*size)
-    draw_lines(ax, x, lines)
+    draw_lines(ax, x, lines, bars=bars)
     ax.set(**axes)
     if axes.get("yscale") == "log":
         plain_numbers(ax.yaxis)

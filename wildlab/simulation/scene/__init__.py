@@ -1,28 +1,35 @@
 """Scenes: what a thermal camera would see of sea and land and of what is on them, with exact labels.
 
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then judged
-against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and whales,
-`sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults. On land
-`ground` has covers under the sun of a day, `on_terrain` lays them over a terrain, `animals` has what stands
-there, and `land` renders it. `coloured` is even ground and a tarpaulin as a colour camera sees them. All of
-it is chosen; nothing in it knows of a detector.
+against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and whales, and
+what stands on land; `sea` the water, `render` makes kelvin and labels, `response` the image of a camera with
+its faults. `ground` has covers under the sun of a day, and `land` lays them over a terrain and renders them.
+`coloured` is even ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it
+knows of a detector.
 
 A body's temperatures are even parts, textures and hot places; there is no heat flow, no spray, no reflection
 of the body in the water, and no weather between.
 """
 
-from wildlab.simulation.scene.animals import ANIMALS, Kind, animal, group, scatter, slab, stone, tree
 from wildlab.simulation.scene.bodies import (
+    ANIMALS,
     KINDS,
     Body,
     Hot,
+    Kind,
     Layer,
     Wake,
+    animal,
     boat,
     buoy,
+    group,
     mammal,
     person,
     rectangle,
+    scatter,
+    slab,
+    stone,
+    tree,
     vessel,
 )
 from wildlab.simulation.scene.coloured import ColourView, Ground, Tarpaulin, render_colour
@@ -36,8 +43,7 @@ from wildlab.simulation.scene.ground import (
     Weather,
     rolling_land,
 )
-from wildlab.simulation.scene.land import LandScene, LandView, ground_points, height_at, render_land
-from wildlab.simulation.scene.on_terrain import land_on
+from wildlab.simulation.scene.land import LandScene, LandView, ground_points, height_at, land_on, render_land
 from wildlab.simulation.scene.render import RenderedView, Scene, SeenBody, outline_of, render
 from wildlab.simulation.scene.response import (
     IDEAL,

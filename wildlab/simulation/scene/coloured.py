@@ -19,7 +19,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.simulation.clipped_outlines import visible_part
+from wildlab.simulation.camera_detections import visible_part
 from wildlab.simulation.scene.render import check_above, pixel_coordinates
 
 Colour = tuple[float, float, float]

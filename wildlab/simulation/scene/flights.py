@@ -12,10 +12,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.simulation.camera_detections import exposure_times
-from wildlab.simulation.camera_sway import camera_motion
-from wildlab.simulation.camera_view import Exposures
-from wildlab.simulation.clipped_outlines import visible_part
+from wildlab.simulation.camera_detections import Exposures, exposure_times, visible_part
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.perturbed_flight import as_flown
@@ -23,6 +20,7 @@ from wildlab.simulation.scene.bodies import Body, fitted_out, vessel
 from wildlab.simulation.scene.render import RenderedView, Scene, outline_of, render
 from wildlab.simulation.scene.sea import Sea
 from wildlab.simulation.target_motion import target_path
+from wildlab.simulation.trajectory import camera_motion
 from wildlab.simulation.twin_trajectory import twin_trajectory
 
 

@@ -18,7 +18,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.simulation.clipped_outlines import visible_part
+from wildlab.simulation.camera_detections import visible_part
 from wildlab.simulation.scene import kernels
 from wildlab.simulation.scene.bodies import Body
 from wildlab.simulation.scene.sea import PATCHES, RIPPLES, WAVES, Sea, tiles_at

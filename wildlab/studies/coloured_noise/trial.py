@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.tracks.sighting import CvTuning, Sighting, evaluate_track, follow_positions
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.studies.linear_vs_nonlinear.trial import (
     OBSERVER,
     Numbers,
@@ -188,8 +188,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         What `trial` gives, one row for each flight.
     """
 
-    def of(who: str, name: str) -> Array:
-        return spread[who, name].to_numpy(float)
+    of = columns_of(spread)
 
     def every(name: str, subjects: tuple[str, ...] = SUBJECTS) -> Array:
         return np.column_stack([of(who, name) for who in subjects])

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from wildlab.analysis.rendered import Photographer
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish, new_strips
 from wildlab.reporting.charts.forms import Values, draw_lines, draw_picture, spread_points
 from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
@@ -50,8 +50,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         What `trial` gives, one row for each flight.
     """
 
-    def of(subject: str, name: str) -> Array:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     def worse(subject: str) -> Array:
         """The larger share of wrong associations of the two vessels."""
@@ -73,9 +72,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         "most-correct-in-contrast": Check(
             true=(worse(FEATURES) < 0.5) & (worse(DISTANCE) >= 0.5), premise=met
         ),
-        "fewer-wrong": Check(
-            true=wrong < wrong_without, first=wrong, second=wrong_without, unit="detections"
-        ),
+        "fewer-wrong": Check.smaller(wrong, wrong_without, "detections"),
     }
 
 

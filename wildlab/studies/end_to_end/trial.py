@@ -18,7 +18,7 @@ from wildlab.analysis.rendered import Marks, Photographer, exposures_of, marks_o
 from wildlab.analysis.tracks.sighting import Sighting, sighting
 from wildlab.detection.ground import RISE
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
@@ -286,8 +286,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         What `trial` gives, one row for each flight.
     """
 
-    def of(who: str, name: str) -> Array:
-        return spread[who, name].to_numpy(float)
+    of = columns_of(spread)
 
     apart = np.max(
         [

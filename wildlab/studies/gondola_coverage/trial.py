@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.plans.flown import Executed, ExecutionErrors, execute
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
@@ -30,10 +30,9 @@ from wildlab.planning.gimbal import (
     swing_yaw,
     view_inside,
 )
+from wildlab.simulation.courses import cable_heights, filleted_course, shape_corners
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters, load_twin
-from wildlab.simulation.survey_courses import cable_heights
-from wildlab.simulation.waypoint_courses import filleted_course, shape_corners
 from wildlab.studies.uav_coverage.trial import (
     LOOKS,
     SIGMAS,
@@ -264,8 +263,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         What `trial` gives, one row for each draw.
     """
 
-    def of(subject: str, name: str) -> NDArray[np.float64]:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     adaptive, roll = "adaptive-60", "roll-60"
     outside = {name: of(name, "outside") / of(name, "ground") for name in STRATEGIES}

@@ -137,10 +137,9 @@ def share_over_time(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
             else None
         )
         lines[names[who]] = Values(shares.mean(axis=0), ends, COLOURS[who], _STYLES[who])
-    limits = {"xlim": (0, at[-1]), "ylim": (0, 1.02)}
-    return lines_chart(
-        at, lines, "time (min)", "share of animals found", size=(5.6, 4.6), ticks=False, **limits
-    )
+    fig = lines_chart(at, lines, "time (min)", "share of animals found", size=(5.6, 4.6), ticks=False)
+    fig.axes[0].set(xlim=(0, at[-1]), ylim=(0, 1.02))
+    return fig
 
 
 def times_of_worlds(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:

@@ -24,17 +24,17 @@ from wildlab.analysis.search import (
     survey,
 )
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.frames import Array
 from wildlab.planning.areas import rectangle
 from wildlab.planning.high_level import Tour, greedy_tour, shortest_tour
 from wildlab.planning.information import SearchSensor, initial_information
 from wildlab.planning.legs import Flying, Platform, look_attitude
 from wildlab.planning.planner import Horizon, InformationPlanner
-from wildlab.simulation.animal_motion import reflected
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.simulation.parameters import TwinParameters, load_twin
+from wildlab.simulation.target_motion import reflected
 
 #: The planners: by what is to be learnt, the same with its camera fixed straight down, rows with the camera
 #: straight down and from side to side, and by chance.
@@ -374,12 +374,11 @@ def check_claims(runs: pd.DataFrame, *, loads: Array) -> dict[str, Check]:
         (N,) share of one core, as the notebook has measured it on some worlds (`timing.planning_cost`).
     """
 
-    def of(subject: str, name: str) -> Array:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     def sooner(name: str, other: str, one: str = INFORMATION) -> Check:
         first, second = of(one, name), of(other, name)
-        return Check(true=first < second, first=first, second=second, unit="s")
+        return Check.smaller(first, second, "s")
 
     greedy, ahead = of(GREEDY, "tour_time"), of(AHEAD, "tour_time")
     return {

@@ -19,7 +19,7 @@ from wildlab.analysis.rendered import Photographer
 from wildlab.detection.floating import find_objects
 from wildlab.detection.flow import Features, filled_outlines, find_features, match_features
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import student_quantile
@@ -284,8 +284,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         What `trial` gives, one row for each flight.
     """
 
-    def of(subject: str, name: str) -> NDArray[np.float64]:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     whole, synchronised, still = (sizes(runs, one) for one in (LOGGED, SYNCHRONISED, STILL))
     correlation = np.minimum(of(LOGGED, "correlation_u"), of(LOGGED, "correlation_v"))
@@ -298,6 +297,6 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         "better-synchronised": Check(
             measured=synchronised / whole, first=synchronised, second=whole, unit="m/s"
         ),
-        "better-with-a-still-gimbal": Check(true=still < whole, first=still, second=whole, unit="m/s"),
+        "better-with-a-still-gimbal": Check.smaller(still, whole, "m/s"),
         "own-motion-dominates": Check(measured=sizes(runs, TRUE) / whole),
     }

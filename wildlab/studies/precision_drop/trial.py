@@ -17,14 +17,14 @@ from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.detection.colour import Colour, find_coloured
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.simulation.camera_view import marks, numbered
+from wildlab.simulation.camera_detections import marks, numbered
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.coloured import ColourView, Ground, Tarpaulin, render_colour
@@ -342,8 +342,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         What `trial` gives, one row for each flight.
     """
 
-    def of(subject: str, name: str) -> NDArray[np.float64]:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     mean, single = of(MEAN, "error"), of(SINGLE, "median_error")
     every = of(HORIZON, "alarms_without_borders")

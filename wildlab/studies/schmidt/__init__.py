@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.analysis.navigation_errors import SETTLING_S
 from wildlab.evaluation.consistency import Average, average, chi_square_interval, share_inside
 from wildlab.evaluation.runs import share_interval
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.reporting.charts.drawing import finish, new_strips
 from wildlab.reporting.charts.forms import Values, draw_lines, plain_numbers
 from wildlab.reporting.charts.tracks import (
@@ -214,8 +214,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         What `trial.summarise` gives, one row for each flight; SI and radians, angles of poses in degrees.
     """
 
-    def of(who: str, name: str) -> Array:
-        return spread[who, name].to_numpy(float)
+    of = columns_of(spread)
 
     def smaller(second: str, first: str, name: str, unit: str, premise: Flags | None) -> Check:
         """True where ``second`` has less of it than ``first``."""

@@ -11,7 +11,7 @@ from wildlab.analysis.georeference import covariances_of, georeference, observe
 from wildlab.analysis.navigate import navigate_observer
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
@@ -190,8 +190,7 @@ def check_claims(spread: pd.DataFrame, bound: float) -> dict[str, Check]:
         What the autocorrelation of white innovations stays below.
     """
 
-    def of(subject: str, name: str) -> NDArray[np.float64]:
-        return spread[subject, name].to_numpy(float)
+    of = columns_of(spread)
 
     mae, autopilot = of("observer", "mae"), of("pixhawk-autopilot", "mae")
     late, turned_ = of("without-time-synchronization", "mae"), of("without-misalignment-calibration", "mae")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.plans.flown import Executed, ExecutionErrors, Looks, execute
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
@@ -26,11 +26,11 @@ from wildlab.planning.heights import follow_terrain
 from wildlab.planning.moving import first_seen, walks
 from wildlab.planning.patterns import lawn_mowers
 from wildlab.planning.sightings import see
-from wildlab.simulation.animal_motion import enclosure_corners
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import EAST_M, NORTH_M, synthetic_landscape
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.parameters import TwinParameters, load_twin
+from wildlab.simulation.target_motion import enclosure_corners
 
 Part = TypeVar("Part")
 
@@ -258,8 +258,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         What `trial` gives, one row for each draw.
     """
 
-    def of(subject: str, name: str) -> NDArray[np.float64]:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     down, yaw, low, close, faster = (of(name, "seen") for name in (*CASES, LOW_FASTER))
     times = np.stack([of(f"rows-{one:.0f}m", "time") for one in SPACINGS])

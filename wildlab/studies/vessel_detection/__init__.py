@@ -252,7 +252,7 @@ def plot_sweep(sweep: pd.DataFrame, along: str, group: str, xlabel: str, ylabel:
         ends = np.transpose([share_interval(round(share * of), int(of))[1:] for share, of in counts])
         lines[label.format(value)] = Values(100 * own["found"], 100 * ends, colour)
     at = np.unique(sweep[along])
-    fig = lines_chart(at, lines, xlabel, ylabel, size=(5.6, 3.7), ticks=False, ylim=(-3, 103))
+    fig = lines_chart(at, lines, xlabel, ylabel, size=(5.6, 3.7), ticks=False, bars=True, ylim=(-3, 103))
     if "scaled" in sweep:
         (ax,) = fig.axes
         for one, (_, own) in zip(lines.values(), sweep.groupby(group, sort=False), strict=False):

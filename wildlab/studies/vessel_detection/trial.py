@@ -17,7 +17,7 @@ from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import FloatingObjects, find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check, Pooled
+from wildlab.evaluation.shares import Check, Pooled, columns_of
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
@@ -219,8 +219,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         What `trial` gives, one row for each flight.
     """
 
-    def of(subject: str, name: str) -> NDArray[np.float64]:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     def together(count: str, *subjects: str) -> Check:
         """Each flight's share of images with something missed or false, and that of all flights' images."""

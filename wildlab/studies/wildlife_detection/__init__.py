@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.detection.warm import Warm
 from wildlab.evaluation.matching import Rates, rates, shares
 from wildlab.evaluation.runs import Interval, mean_interval
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.reporting.charts.drawing import finish
 from wildlab.reporting.charts.forms import Values, draw_picture, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
@@ -135,8 +135,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         What `wildlab.studies.wildlife_detection.trial.trial` gives, one row for each seed.
     """
 
-    def of(subject: str, name: str) -> Array:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     cloudy = places([CLOUDY])
     changed = np.abs(of("ground", "level_after") - of("ground", "level_before")) > TOO_MUCH
@@ -184,38 +183,26 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         ),
         "small-block-splits": Check(true=pieces[SMALL] > 1, premise=np.isfinite(pieces[SMALL])),
         "large-block-whole": Check(true=pieces[LARGE] == 1, premise=np.isfinite(pieces[LARGE])),
-        "enhancement-takes-background": Check(
-            true=left[ENHANCED] > left[SUBTRACTED], first=left[ENHANCED], second=left[SUBTRACTED],
-            unit="grey levels",
+        "enhancement-takes-background": Check.larger(left[ENHANCED], left[SUBTRACTED], "grey levels"),
+        "enhancement-misses": Check.smaller(
+            recall[ENHANCED], recall[SUBTRACTED], premise=recall[SUBTRACTED] > 0
         ),
-        "enhancement-misses": Check(
-            true=recall[ENHANCED] < recall[SUBTRACTED], first=recall[ENHANCED], second=recall[SUBTRACTED],
-            premise=recall[SUBTRACTED] > 0,
-        ),
-        "combinations-best": Check(
-            true=np.minimum(good[SUBTRACTED], good[ENHANCED]) > np.maximum(good[CONSTANT], good[OVER_MEAN]),
-            first=np.minimum(good[SUBTRACTED], good[ENHANCED]),
-            second=np.maximum(good[CONSTANT], good[OVER_MEAN]),
+        "combinations-best": Check.larger(
+            np.minimum(good[SUBTRACTED], good[ENHANCED]), np.maximum(good[CONSTANT], good[OVER_MEAN])
         ),
         "subtraction-and-constant-good": Check(measured=good[BY_MEAN], above=True, reach=(0, 1)),
         "herd-biases-mean": Check(measured=of("herd", "mean_rise"), above=True),
-        "threshold-higher-than-needed": Check(
-            true=herd[BY_EMPTY] > herd[BY_MEAN], first=herd[BY_EMPTY], second=herd[BY_MEAN],
-        ),
+        "threshold-higher-than-needed": Check.larger(herd[BY_EMPTY], herd[BY_MEAN]),
         "median-rises-less": Check(
             true=np.abs(of("herd", "median_rise")) < np.abs(of("herd", "mean_rise")),
             first=of("herd", "median_rise"), second=of("herd", "mean_rise"), unit="grey levels",
         ),
-        "median-finds-more": Check(
-            true=herd[BY_MEDIAN] > herd[BY_MEAN], first=herd[BY_MEDIAN], second=herd[BY_MEAN],
-        ),
+        "median-finds-more": Check.larger(herd[BY_MEDIAN], herd[BY_MEAN]),
         "sun-breaks": Check(measured=warm[NOON], above=True),
         "night-keeps": Check(measured=warm[NIGHT]),
         "too-hot": filtered(noon[SUBTRACTED], noon[NOT_HOT]),
         "size-from-ground": filtered(gated[SUBTRACTED], gated[BY_SIZE]),
-        "block-from-distance": Check(
-            true=block[BY_BLOCK] > block[SUBTRACTED], first=block[BY_BLOCK], second=block[SUBTRACTED]
-        ),
+        "block-from-distance": Check.larger(block[BY_BLOCK], block[SUBTRACTED]),
     }  # fmt: skip
 
 

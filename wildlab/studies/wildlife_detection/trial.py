@@ -25,8 +25,8 @@ from wildlab.geometry.camera import Camera
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene.animals import ANIMALS, animal
-from wildlab.simulation.scene.drawn_land import LandDraw, Layout, draw_layout
+from wildlab.simulation.scene.bodies import ANIMALS, animal
+from wildlab.simulation.scene.drawn import LandDraw, Layout, draw_layout
 from wildlab.simulation.scene.ground import Weather
 from wildlab.simulation.scene.land import LandView, render_land
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of, to_counts

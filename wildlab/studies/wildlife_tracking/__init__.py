@@ -16,7 +16,7 @@ from wildlab.analysis.animals.follow import FollowedAnimals, Known, follow
 from wildlab.analysis.animals.images import NONE
 from wildlab.analysis.animals.revisit import Patrolled
 from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
-from wildlab.evaluation.shares import Check, Pooled
+from wildlab.evaluation.shares import Check, Pooled, columns_of
 from wildlab.geometry.frames import Array
 from wildlab.messages.quantities import number, percent_between
 from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
@@ -207,8 +207,7 @@ def check_claims(runs: pd.DataFrame, cost: Array | None = None) -> dict[str, Che
         claim on it is left out where it is None.
     """
 
-    def of(subject: str, name: str) -> Array:
-        return runs[subject, name].to_numpy(float)
+    of = columns_of(runs)
 
     def wrong(platform: str) -> Check:
         later, right = of(f"{platform}-{NEGATIVE}", "later"), of(f"{platform}-{NEGATIVE}", "right")
@@ -220,9 +219,7 @@ def check_claims(runs: pd.DataFrame, cost: Array | None = None) -> dict[str, Che
     def lower(name: str, first: str, second: str) -> Check:
         one, other = of(first, name), of(second, name)
         # A world in which there is nothing to compare says neither.
-        return Check(
-            true=one < other, first=one, second=other, unit="m", premise=np.isfinite(one) & np.isfinite(other)
-        )
+        return Check.smaller(one, other, "m", premise=np.isfinite(one) & np.isfinite(other))
 
     def known(values: Array, *, above: bool = False, most: float = np.inf) -> Check:
         return Check(measured=values, above=above, premise=np.isfinite(values), reach=(0, most))

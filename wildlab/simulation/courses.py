@@ -8,6 +8,7 @@ roll into a turn. The spline gives position, velocity and acceleration in closed
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,8 +17,10 @@ from scipy.interpolate import BSpline
 
 from wildlab.geometry.frames import Array
 from wildlab.simulation import kernels
-from wildlab.simulation.disturbances import Disturbance, no_disturbance
-from wildlab.simulation.trajectory import FlightPath, Signal
+from wildlab.simulation.parameter_groups import Cable, Enclosure
+from wildlab.simulation.plain import rate_on_circle
+from wildlab.simulation.target_motion import enclosure_axes
+from wildlab.simulation.trajectory import Disturbance, FlightPath, Signal, no_disturbance
 
 Shape = Literal["eight", "racetrack"]
 
@@ -223,3 +226,138 @@ def _smoothed(knots: Array, rough: Array, interval: float) -> BSpline:
     count = len(knots)
     support = interval * (np.arange(count + _DEGREE + 1) - (_DEGREE + 1) / 2) + knots[0]
     return BSpline(support, rough, _DEGREE, extrapolate=False)
+
+
+def rows(enclosure: Enclosure, distance: float) -> Array:
+    """Corners of a course back and forth over one enclosure, along its length (F 5.2, fig 5.1). (2 K, 2) m.
+
+    As many rows as are needed for no point within the fence to be further than half the distance from one;
+    they are evenly spaced and reach from fence to fence.
+    """
+    count = max(int(np.ceil(enclosure.width.si / distance - 1e-9)), 1)
+    aside = (np.arange(count) + 0.5) * enclosure.width.si / count - enclosure.width.si / 2
+    ends = np.tile([-0.5, 0.5, 0.5, -0.5], count)[: 2 * count] * enclosure.length.si
+    middle, along, across = enclosure_axes(enclosure)
+    return np.asarray(middle + np.outer(ends, along) + np.outer(np.repeat(aside, 2), across))
+
+
+def survey_course(enclosures: Sequence[Enclosure], distance: float) -> Array:
+    """Rows over one enclosure after the other, in their order, and back to the first corner. (M, 2) m.
+
+    Each enclosure is entered at the corner nearest to where the one before was left.
+    """
+    course: list[Array] = []
+    for enclosure in enclosures:
+        there = rows(enclosure, distance)
+        # Rows from either side, each from either end: four ways round, each with its own way out.
+        ways = [there, there[::-1], _mirrored(there), _mirrored(there)[::-1]]
+        if course:
+            ways.sort(key=lambda way: float(np.linalg.norm(way[0] - course[-1][-1])))
+        course.append(ways[0])
+    points = np.concatenate(course)
+    return np.concatenate([points, points[:1]])
+
+
+def _mirrored(corners: Array) -> Array:
+    """The same rows, each flown the other way."""
+    return np.asarray(corners.reshape(-1, 2, 2)[:, ::-1].reshape(-1, 2))
+
+
+def cable_heights(cable: Cable, lap: float, duration: float) -> Array:
+    """Times and heights over the ground, (K, 2) s and m, lowest at the start of each span of a lap (s)."""
+    count = int(np.ceil(duration / lap * cable.spans.number)) * 16 + 1
+    span = np.arange(count) / 16
+    middle, swing = (cable.highest.si + cable.lowest.si) / 2, (cable.highest.si - cable.lowest.si) / 2
+    return np.stack([span * lap / cable.spans.number, middle - swing * np.cos(2 * np.pi * span)], axis=-1)
+
+
+Turn = Literal["clockwise", "counter-clockwise"]
+
+
+def loiter_path(
+    centre: ArrayLike,
+    radius: float,
+    altitude: float,
+    airspeed: float,
+    *,
+    wind: ArrayLike = (0.0, 0.0),
+    turn: Turn = "clockwise",
+    start_angle: float = 0.0,
+    radius_error: Disturbance | None = None,
+    altitude_error: Disturbance | None = None,
+) -> FlightPath:
+    """A circle over the ground, flown at a steady airspeed through a steady wind.
+
+    The ground speed on the nominal circle solves the wind triangle exactly, so the bank and the crab angle
+    vary around the loop; the control errors then move the airframe off the circle by a few metres, and its
+    airspeed off the nominal one in the same proportion.
+
+    Parameters
+    ----------
+    centre
+        North and east of the centre, (2,) m.
+    radius, altitude
+        Metres; the altitude above the origin of n.
+    airspeed
+        m/s, above the speed of the wind.
+    wind
+        Velocity of the air over the ground, north and east, (2,) m/s.
+    turn
+        Which way round, seen from above.
+    start_angle
+        Bearing of the airframe from the centre at time 0, rad, from north towards east.
+    radius_error, altitude_error
+        Control errors, m: how far outside of the circle, and how far above the altitude, it is; None is none.
+
+    Returns
+    -------
+    Times (N,) s -> position, velocity and acceleration of b in n, (N, 3) m, m/s and m/s^2.
+
+    Raises
+    ------
+    ValueError
+        Where the wind is as fast as the airframe, or the radius is not positive.
+    """
+    c = np.asarray(centre, float)
+    w = np.asarray(wind, float)
+    if not np.hypot(*w) < airspeed or not radius > 0:
+        raise ValueError("the airspeed must exceed the wind, and the radius zero")
+    off_radius, off_altitude = radius_error or no_disturbance(), altitude_error or no_disturbance()
+    sense = 1.0 if turn == "clockwise" else -1.0
+    circle = tuple(float(part) for part in (radius, airspeed, *w, sense, start_angle))
+    times_of_angles = _times_of_angles(circle)
+
+    def path(times: Array) -> tuple[Array, Array, Array]:
+        t = np.ascontiguousarray(times, float)
+        angles = np.empty(len(t))
+        kernels.angles_on_circle(t, circle, *times_of_angles, angles)
+        p, v, a = (np.empty((len(t), 3)) for _ in range(3))
+        kernels.circle_motion(angles, circle, off_radius.with_derivatives(t), p, v, a)
+        p[:, :2] += c
+        off = off_altitude.with_derivatives(t)
+        p[:, 2], v[:, 2], a[:, 2] = -altitude - off[0], -off[1], -off[2]
+        return p, v, a
+
+    return path
+
+
+def _times_of_angles(circle: tuple[float, ...]) -> tuple[float, Array, Array]:
+    """The time to turn through an angle x, as ``mean x + Re sum_k series_k (exp(i k x) - 1)``.
+
+    The rate is periodic in the angle, so its inverse has an integral that is a Fourier series: exact to
+    rounding with a few dozen terms. An integrator of differential equations would leave an error of its own
+    in every derivative.
+
+    Returns
+    -------
+    The mean, s per rad, and the real and imaginary parts of the series, (K,) s.
+    """
+    *_, sense, start = circle
+    count = 1024
+    turned = 2 * np.pi * np.arange(count) / count  # how far around since the start, always increasing
+    spectrum = np.fft.rfft(1.0 / np.abs(rate_on_circle(start + sense * turned, circle)[0])) / count
+    mean = float(spectrum[0].real)
+    series = 2 * spectrum[1:-1] / (1j * np.arange(1, count // 2))
+    strong = np.flatnonzero(np.abs(series) > 1e-17 * mean)
+    series = series[: strong[-1] + 1] if len(strong) else series[:1]
+    return mean, np.ascontiguousarray(series.real), np.ascontiguousarray(series.imag)
