@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.timing import best_of
+from tests.navigation import reference_mekf, reference_observer
 from wildlab.geometry.frames import (
     Array,
     matrix_to_euler,
@@ -21,11 +22,11 @@ from wildlab.geometry.frames import (
     quaternion_to_matrix,
 )
 from wildlab.geometry.gravity import local_earth
-from wildlab.navigation import mekf, observer, reference_mekf, reference_observer
+from wildlab.navigation import mekf, observer
 from wildlab.navigation.aiding import Aiding, positions
 from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.noise import STIM300
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples
 from wildlab.simulation import (
     angular_rates,
     attitude_along,

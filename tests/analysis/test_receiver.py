@@ -24,7 +24,7 @@ from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight
 from wildlab.navigation.aiding import headings, positions
 from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples
 from wildlab.paths import DATA
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.navigation.logged import left_over

@@ -11,7 +11,7 @@ from wildlab.geometry.frames import matrix_to_quaternion, rotation_vector_to_mat
 from wildlab.navigation.aiding import Aiding, positions
 from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.noise import ImuNoise
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples
 from wildlab.simulation import Motion, angular_rates, coordinated_attitude, gauss_markov, specific_forces
 
 SPEED, GRAVITY = 18.0, 9.81

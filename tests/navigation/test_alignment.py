@@ -22,7 +22,7 @@ from wildlab.navigation.alignment import (
     attitude_from_directions,
     find_rest,
 )  # fmt: skip
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples
 
 
 @pytest.fixture(scope="module")

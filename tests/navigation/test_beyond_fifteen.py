@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.navigation import reference_mekf
 from tests.navigation.flights import GNSS_SD, GRAVITY, LEVERS, NOISE, begin, fixes, fly, moved, spoil
 from tests.navigation.test_mekf import (
     EARTH,
@@ -14,11 +15,10 @@ from tests.navigation.test_mekf import (
 )
 from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.geometry.gravity import flat_earth, local_earth
-from wildlab.navigation import reference_mekf
 from wildlab.navigation.aiding import positions, velocities
 from wildlab.navigation.mekf import Outages, prepare, run_mekf
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples
 from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.imu import misaligned_triad
 

@@ -8,9 +8,8 @@ import pytest
 from tests.navigation.flights import GRAVITY, LEVERS, NOISE, attitude, begin, fixes, fly, spoil
 from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
 from wildlab.geometry.gravity import flat_earth
-from wildlab.navigation.diagnostics import signs_of_trouble
-from wildlab.navigation.mekf import run_mekf
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.mekf import run_mekf, signs_of_trouble
+from wildlab.navigation.strapdown import ImuSamples
 
 EARTH = flat_earth(GRAVITY)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.navigation import reference_mekf
 from tests.navigation.flights import (
     GNSS_SD,
     GRAVITY,
@@ -20,7 +21,7 @@ from tests.navigation.flights import (
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_rotation_vector, quaternion_to_matrix
 from wildlab.geometry.gravity import flat_earth, local_earth
-from wildlab.navigation import kernels, reference_mekf
+from wildlab.navigation import kernels
 from wildlab.navigation.aiding import headings, positions, standstill, velocities
 from wildlab.navigation.mekf import (
     ACCEPTED,
@@ -33,7 +34,7 @@ from wildlab.navigation.mekf import (
     run_mekf,
 )  # fmt: skip
 from wildlab.navigation.noise import ImuNoise
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples
 
 EARTH = flat_earth(GRAVITY)
 

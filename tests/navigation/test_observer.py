@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.navigation import reference_observer
 from tests.navigation.flights import LEVERS, NOISE, attitude, begin, fixes, fly, moved, spoil
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import (
@@ -12,7 +13,6 @@ from wildlab.geometry.frames import (
     quaternion_to_matrix,
 )
 from wildlab.geometry.gravity import local_earth, normal_gravity
-from wildlab.navigation import reference_observer
 from wildlab.navigation.aiding import velocities
 from wildlab.navigation.mekf import run_mekf
 from wildlab.navigation.observer import (
@@ -24,7 +24,7 @@ from wildlab.navigation.observer import (
     prepare,
     run_observer,
 )
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples
 
 ORIGIN = (np.radians(63.6), np.radians(9.7), 40.0)
 

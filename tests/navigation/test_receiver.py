@@ -13,8 +13,7 @@ from wildlab.geometry.frames import matrix_to_rotation_vector, quaternion_to_mat
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import GaussMarkov, gather, positions, set_out, velocities
 from wildlab.navigation.mekf import run_mekf
-from wildlab.navigation.receiver import ReceiverNoise, Scale, choose, tell
-from wildlab.navigation.scoring import gaussian_log_likelihood, maximise
+from wildlab.navigation.receiver import ReceiverNoise, Scale, choose, gaussian_log_likelihood, maximise, tell
 from wildlab.simulation.error_models import gauss_markov
 
 #: What the filter is told at first, level and vertical: of positions, m, and velocities, m/s.

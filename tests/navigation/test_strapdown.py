@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
 from wildlab.geometry.gravity import EARTH_RATE, flat_earth, local_earth, normal_gravity
-from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
 from wildlab.simulation import (
     angular_rates,
     attitude_along,

@@ -13,8 +13,7 @@ from wildlab.navigation.aiding import positions, velocities
 from wildlab.navigation.mekf import InitialState, run_mekf
 from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.observer import earth_axes
-from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
 
 ORIGIN = (np.radians(59.0), np.radians(10.0), 120.0)
 

@@ -22,8 +22,7 @@ from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import PREFERRED, Flight, save_flight
 from wildlab.geometry.camera import normalise
 from wildlab.geometry.gravity import local_earth
-from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
 from wildlab.sharing.generalisation import (
     NOWHERE,
     Generalised,

@@ -23,8 +23,7 @@ from wildlab.flight.clocks import covariance_columns, frame_times
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.gravity import local_earth
-from wildlab.navigation.diagnostics import signs_of_trouble
-from wildlab.navigation.mekf import log_likelihood, pose_covariance, run_mekf
+from wildlab.navigation.mekf import log_likelihood, pose_covariance, run_mekf, signs_of_trouble
 from wildlab.navigation.observer import Gains, run_observer
 from wildlab.navigation.receiver import ReceiverNoise
 

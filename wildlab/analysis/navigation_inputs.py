@@ -20,7 +20,7 @@ from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
 from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.observer import baseline_reference, course_reference, field_reference
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.strapdown import ImuSamples
 
 Array = NDArray[np.float64]
 

@@ -20,9 +20,17 @@ from wildlab.geometry.gravity import Earth, local_earth
 from wildlab.navigation.aiding import Aiding
 from wildlab.navigation.mekf import InitialState, Navigation, run_mekf
 from wildlab.navigation.noise import AxisErrors, ImuNoise
-from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise, choose, tell
-from wildlab.navigation.scoring import gaussian_log_likelihood, maximise
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.receiver import (
+    Candidate,
+    ReceiverNoise,
+    Scale,
+    SourceNoise,
+    choose,
+    gaussian_log_likelihood,
+    maximise,
+    tell,
+)
+from wildlab.navigation.strapdown import ImuSamples
 
 Array = NDArray[np.float64]
 

@@ -25,7 +25,6 @@ from wildlab.navigation.alignment import (
     align_from_course,
     find_rest,
 )
-from wildlab.navigation.diagnostics import signs_of_trouble
 from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
 from wildlab.navigation.mekf import (
     InitialState,
@@ -35,6 +34,7 @@ from wildlab.navigation.mekf import (
     log_likelihood,
     pose_covariance,
     run_mekf,
+    signs_of_trouble,
 )
 from wildlab.navigation.noise import (
     ADIS16490,
@@ -53,8 +53,7 @@ from wildlab.navigation.observer import (
     run_observer,
 )
 from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
-from wildlab.navigation.strapdown import DeadReckoning, integrate_strapdown
-from wildlab.navigation.timeline import Gap, ImuSamples
+from wildlab.navigation.strapdown import DeadReckoning, Gap, ImuSamples, integrate_strapdown
 
 __all__ = [
     "ADIS16490",

@@ -16,7 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.navigation import kernels
 from wildlab.navigation.kernels import Integers
-from wildlab.navigation.timeline import (
+from wildlab.navigation.strapdown import (
     Gap,
     ImuSamples,
     Measurements,

@@ -15,8 +15,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, matrix_to_quaternion
 from wildlab.geometry.gravity import flat_earth
 from wildlab.navigation.mekf import InitialState
-from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import ImuSamples, checked_imu
+from wildlab.navigation.strapdown import ImuSamples, checked_imu, integrate_strapdown
 
 #: Deviations within a second, per axis, up to which an airframe stands: m/s^2 and rad/s; and the speed that
 #: a receiver at rest stays below, m/s. Two small drones show up to 0.14 and 0.03 standing in wind, and

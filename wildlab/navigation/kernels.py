@@ -1,6 +1,6 @@
 """The hot loops, compiled: strapdown steps and the MEKF.
 
-What they compute is written out again, short and slow, in `reference_mekf`; tests hold the two together. All
+What they compute is written out again, short and slow, in `tests/navigation/reference_mekf.py`. All
 compiled functions that call each other stay in this one file: the compiler's cache only looks at the file a
 function stands in, and would go on using the old version of what it calls in another one. They take more
 arguments than a function elsewhere may: scratch is made once, and an array by itself compiles faster and is
@@ -359,7 +359,7 @@ def mekf(
     lever: Array, gauss_markov: Integers, gate: Array, patience: float, states: Array, covariances: Array,
     innovations: Array, spreads: Array, nis: Array, verdicts: Integers,
 ) -> None:  # fmt: skip
-    """The whole filter over a timeline; see `reference_mekf.mekf` for the same in short."""
+    """The whole filter over a timeline; `tests/navigation/reference_mekf.py` has the same in short."""
     n = P.shape[0]
     work, R, R_start, R_mid = np.empty((3, 4)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     A, B, C, E = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))

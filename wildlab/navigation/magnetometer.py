@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, quaternion_to_matrix
 from wildlab.geometry.gravity import flat_earth
-from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import ImuSamples, checked_imu
+from wildlab.navigation.strapdown import ImuSamples, checked_imu, integrate_strapdown
 
 #: Largest standard deviation of a centre, over the radius: a heading by it is then good to some two degrees.
 SURE = 0.03

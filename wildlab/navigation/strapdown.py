@@ -1,10 +1,12 @@
-"""Dead reckoning: inertial measurements integrated to position, velocity and attitude (H 7.18-7.20).
+"""Inertial samples on one line of time, and dead reckoning by them (H 7.18-7.20).
 
 The frame is n, fixed to the ground at its origin, with the Earth's rotation and the lean of the plumb line
 where an `Earth` has them (H 5.31-5.33 in ECEF); `flat_earth` gives the equations as H 7.3 prints them.
-A step takes the mean of the measurements at its ends, and the attitude half-way. Corrections for coning and
-sculling are left out: between samples at 50 Hz and more, an airframe's rates are straight lines to well below
-what its sensors resolve, and vibration that is already averaged or aliased would not gain from them either.
+Inertial samples are instantaneous values, taken as linear in between: a step takes the mean of the values at
+its ends, and the attitude half-way. Measurements and wanted times lie where they lie, not at the nearest
+sample. Corrections for coning and sculling are left out: between samples at 50 Hz and more, an airframe's
+rates are straight lines to well below what its sensors resolve, and vibration that is already averaged or
+aliased would not gain from them either.
 """
 
 from __future__ import annotations
@@ -14,11 +16,129 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import Earth
 from wildlab.navigation import kernels
-from wildlab.navigation.timeline import Gap, ImuSamples, checked_imu, find_gaps
+from wildlab.navigation.kernels import Integers
+
+
+class ImuSamples(NamedTuple):
+    """Inertial measurements.
+
+    Attributes
+    ----------
+    times
+        (N,) s, increasing; need not be evenly spaced.
+    specific_force, angular_rate
+        In b, (N, 3), m/s^2 and rad/s. A row with NaN counts as missing.
+    """
+
+    times: Array
+    specific_force: Array
+    angular_rate: Array
+
+
+class Gap(NamedTuple):
+    """Where inertial samples are missing: the last before, the first after, s."""
+
+    start: float
+    end: float
+
+
+class Timeline(NamedTuple):
+    """Nodes of the integration: (K,) times, (K, 3) specific force and rate there.
+
+    ``gap`` (K,) is the length (s) of the gap in which the step that ends at the node lies, 0 where in none.
+    ``row_of_node`` (K,) is the output row that the node fills, or -1; there are ``rows`` of them.
+    """
+
+    times: Array
+    f: Array
+    w: Array
+    gap: Array
+    row_of_node: Integers
+    rows: int
+
+
+class Measurements(NamedTuple):
+    """Measurements in order of time: the node each belongs to, its kind, value, variance and lever arm.
+
+    ``gauss_markov`` (E,) is the first of its three Gauss-Markov error states, -1 where it has none.
+    """
+
+    node: Integers
+    kind: Integers
+    value: Array
+    variance: Array
+    lever: Array
+    gauss_markov: Integers
+
+
+def checked_imu(imu: ImuSamples) -> ImuSamples:
+    """The samples that can be used, as arrays of floats.
+
+    Raises
+    ------
+    WildlabError
+        If shapes do not fit, fewer than two samples are left, or times do not increase.
+    """
+    t, f, w = (np.asarray(part, float) for part in imu)
+    if t.ndim != 1 or f.shape != (len(t), 3) or w.shape != (len(t), 3):
+        raise WildlabError(
+            f"inertial samples have the shapes {t.shape}, {f.shape} and {w.shape}",
+            "give times (N,), specific force (N, 3) and angular rate (N, 3)",
+            field="imu",
+        )
+    whole = np.isfinite(t) & np.isfinite(f).all(axis=1) & np.isfinite(w).all(axis=1)
+    t, f, w = t[whole], f[whole], w[whole]
+    if len(t) < 2:
+        raise WildlabError(
+            f"only {len(t)} inertial samples have all their values", "give at least two", field="imu"
+        )
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if len(back):
+        raise WildlabError(
+            f"inertial samples do not go forward in time at {t[back[0] + 1]:.6f} s ({len(back)} such places)",
+            "sort them and remove repeated stamps",
+            field="imu",
+        )
+    return ImuSamples(np.ascontiguousarray(t), np.ascontiguousarray(f), np.ascontiguousarray(w))
+
+
+def find_gaps(times: ArrayLike, max_gap: float) -> list[Gap]:
+    """Intervals between samples longer than ``max_gap`` (s)."""
+    t = np.asarray(times, float)
+    return [Gap(float(t[i]), float(t[i + 1])) for i in np.flatnonzero(np.diff(t) > max_gap)]
+
+
+def lay_out(imu: ImuSamples, start: float, others: ArrayLike, wanted: ArrayLike, max_gap: float) -> Timeline:
+    """Nodes from ``start`` to the last inertial sample.
+
+    Parameters
+    ----------
+    imu
+        As :func:`checked_imu` gives it.
+    others
+        Times of measurements, s; those outside are left out.
+    wanted
+        (M,) times of the output rows; those outside are never filled.
+    max_gap
+        Intervals longer than this (s) are not integrated.
+    """
+    end = imu.times[-1]
+    wanted = np.asarray(wanted, float)
+    stamps = np.concatenate([[start], imu.times, np.asarray(others, float), wanted])
+    times = np.unique(stamps[(stamps >= start) & (stamps <= end)])
+    f, w = (np.stack([np.interp(times, imu.times, column) for column in part.T], axis=-1) for part in imu[1:])
+    interval = np.diff(imu.times)
+    middle = np.concatenate([times[:1], (times[:-1] + times[1:]) / 2])
+    length = interval[np.clip(np.searchsorted(imu.times, middle) - 1, 0, len(interval) - 1)]
+    rows = np.full(len(times), -1, np.int64)
+    inside = np.flatnonzero((wanted >= start) & (wanted <= end))
+    rows[np.searchsorted(times, wanted[inside])] = inside
+    return Timeline(times, f, w, np.where(length > max_gap, length, 0.0), rows, len(wanted))
 
 
 class DeadReckoning(NamedTuple):

@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, skew
 from wildlab.navigation.kernels import POSITION, VELOCITY
-from wildlab.navigation.observer import ObserverInputs
-from wildlab.navigation.observer_kernel import J2, MU, RADIUS, RATE
+from wildlab.navigation.observer import J2, MU, RADIUS, RATE, ObserverInputs
 
 EARTH = np.array([0.0, 0.0, RATE])
 

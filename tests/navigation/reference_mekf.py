@@ -1,4 +1,4 @@
-"""Reference implementation of the MEKF in plain numpy, which the compiled one is tested against."""
+"""The MEKF in plain numpy, which the compiled one is tested against."""
 
 from __future__ import annotations
 
