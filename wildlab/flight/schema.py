@@ -1,4 +1,4 @@
-"""What the tables of a flight are: every column's name, type, unit and meaning, in one place.
+"""What the tables of a flight are, by ``data/tables.toml``: every column's name, type, unit and meaning.
 
 Tables are Parquet files. Extra columns are carried along untouched (`wildlab check` points them out, since an
 optional column that is misspelt is an extra one).
@@ -6,14 +6,17 @@ optional column that is misspelt is an extra one).
 
 from __future__ import annotations
 
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
+from wildlab.paths import DATA
 
 DType = Literal["float", "text"]
 
@@ -31,27 +34,12 @@ DETECTION_KINDS: dict[str, tuple[str, ...]] = {
 #: Upper triangle of the 6x6 pose covariance, row by row: cov_00, cov_01, ..., cov_55.
 COVARIANCE_COLUMNS = tuple(f"cov_{i}{j}" for i in range(6) for j in range(i, 6))
 
+#: Of a second antenna on the same clock, at the same times: two of them give a heading.
+SECOND_COLUMNS = ("second_north_m", "second_east_m", "second_down_m")
+#: From b to the (first) antenna and to the second one, in b: x ahead, y right, z down.
+LEVER_COLUMNS = tuple(f"{which}lever_{axis}_m" for which in ("", "second_") for axis in "xyz")
 
 Bounds = tuple[float, float]
-
-#: Physical bounds, wide enough for all that flies or floats with a camera; beyond is a wrong unit, a wrong
-#: column or a broken row. Level distance: the local level at the origin is of no use further out, m.
-PLACE: Bounds = (-1e6, 1e6)
-#: From above the highest balloon to below the deepest place, and what the Earth falls away in `PLACE`, m.
-DOWN: Bounds = (-60e3, 100e3)
-#: Twice the speed of sound, m/s.
-SPEED: Bounds = (-700.0, 700.0)
-#: Twice as fast as small gyros measure, rad/s.
-TURN: Bounds = (-80.0, 80.0)
-#: A hundred times gravity: launches and hard landings stay below, m/s^2.
-FELT: Bounds = (-1000.0, 1000.0)
-#: What small magnetometers can measure, uT; the Earth's field is a fortieth of it.
-MAGNETIC: Bounds = (-2500.0, 2500.0)
-#: As far as radars of boats see, m.
-RANGE: Bounds = (0.0, 200e3)
-#: Twice around, rad.
-AROUND: Bounds = (-4 * np.pi, 4 * np.pi)
-ABOVE_ZERO: Bounds = (0.0, np.inf)
 
 
 @dataclass(frozen=True)
@@ -82,206 +70,42 @@ class Table:
         return tuple(column.name for column in self.columns)
 
 
-def _position(of: str, *, required: bool = True, may_be_nan: bool = False) -> tuple[Column, ...]:
-    return tuple(
-        Column(
-            f"{axis}_m",
-            "float",
-            "m",
-            f"{axis} coordinate of {of} in frame n",
-            required,
-            may_be_nan,
-            DOWN if axis == "down" else PLACE,
-        )
-        for axis in ("north", "east", "down")
-    )
+def _expanded(name: str) -> tuple[str, ...]:
+    return COVARIANCE_COLUMNS if name == "cov_ij" else (name,)
 
 
-def _velocity() -> tuple[Column, ...]:
-    return tuple(
-        Column(f"v_{axis}_m_s", "float", "m/s", f"velocity of b towards {axis}", False, True, SPEED)
-        for axis in ("north", "east", "down")
-    )
-
-
-_TIME = Column("time_s", "float", "s", "flight time: seconds since the epoch")
-_GIMBAL = tuple(
-    Column(f"{axis}_rad", "float", "rad", f"gimbal {axis}", False, True, AROUND) for axis in ("pan", "tilt")
-)
-
-#: Of a second antenna on the same clock, at the same times: two of them give a heading.
-SECOND_COLUMNS = ("second_north_m", "second_east_m", "second_down_m")
-#: From b to the (first) antenna and to the second one, in b: x ahead, y right, z down.
-LEVER_COLUMNS = (
-    *(f"lever_{axis}_m" for axis in "xyz"),
-    *(f"second_lever_{axis}_m" for axis in "xyz"),
-)
-_SECOND = tuple(
-    Column(name, "float", "m", f"{name.split('_')[1]} coordinate of a second antenna in frame n", False, True)
-    for name in SECOND_COLUMNS
-)
-
-NAV = Table(
-    "nav",
-    "pose of the platform from one source (one table per source, in nav/)",
-    (
-        _TIME,
-        *_position("b"),
-        *(
-            Column(f"q_{part}", "float", "1", f"{part} of the unit quaternion b -> n (Hamilton)")
-            for part in ("w", "x", "y", "z")
-        ),
-        *_velocity(),
-        *(
-            Column(
+def _columns(stated: Mapping[str, Mapping[str, Any]], bounds: Mapping[str, Bounds]) -> Iterator[Column]:
+    for key, one in stated.items():
+        for name in _expanded(key):
+            yield Column(
                 name,
-                "float",
-                "m, rad (products)",
-                "covariance of (north, east, down, rotation vector in b): R_true = R_logged Exp(delta)",
-                required=False,
-                may_be_nan=True,
+                "text" if "text" in one else "float",
+                one.get("unit", ""),
+                one["meaning"],
+                "optional" not in one,
+                "empty" in one,
+                bounds[one["bounds"]] if "bounds" in one else None,
             )
-            for name in COVARIANCE_COLUMNS
-        ),
-        Column("frame_id", "text", "", "the one frame this pose belongs to (no interpolation)", False),
-    ),
-    together=(("v_north_m_s", "v_east_m_s", "v_down_m_s"), COVARIANCE_COLUMNS),
-)
 
-TABLES: dict[str, Table] = {
-    table.name: table
-    for table in (
-        Table(
-            "frames",
-            "one row per image, or per look of another sensor; one that saw nothing has no detections",
-            (
-                Column("frame_id", "text", "", "name of the image"),
-                Column("time_s", "float", "s", "when it was taken, on the camera's own clock"),
-                Column("time_onboard_s", "float", "s", "when the onboard computer stamped it", False, True),
-                Column("group", "text", "", "sub-flight it belongs to", required=False),
-                Column("sensor", "text", "", "which sensor looked, where there are several", required=False),
-                *_GIMBAL,
-            ),
-            together=(("pan_rad", "tilt_rad"),),
-        ),
-        Table(
-            "gimbal",
-            "gimbal angles over time",
-            (
-                _TIME,
-                Column("pan_rad", "float", "rad", "gimbal pan", bounds=AROUND),
-                Column("tilt_rad", "float", "rad", "gimbal tilt", bounds=AROUND),
-            ),
-        ),
-        Table(
-            "imu",
-            "inertial measurements in b",
-            (
-                _TIME,
-                *(
-                    Column(f"f_{a}_m_s2", "float", "m/s^2", f"specific force along {a}", bounds=FELT)
-                    for a in "xyz"
-                ),
-                *(
-                    Column(f"w_{a}_rad_s", "float", "rad/s", f"angular rate about {a}", bounds=TURN)
-                    for a in "xyz"
-                ),
-            ),
-        ),
-        Table(
-            "magnetometer",
-            "magnetic field in b, as measured: what is magnetic on board still in it",
-            (
-                _TIME,
-                *(
-                    Column(f"field_{a}_ut", "float", "uT", f"magnetic field along {a}", bounds=MAGNETIC)
-                    for a in "xyz"
-                ),
-            ),
-        ),
-        Table(
-            "gnss",
-            "satellite positions",
-            (
-                _TIME,
-                *_position("the antenna"),
-                *_velocity(),
-                Column(
-                    "sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True, ABOVE_ZERO
-                ),
-                Column("sd_vertical_m", "float", "m", "SD of the height", False, True, ABOVE_ZERO),
-                Column(
-                    "sd_velocity_m_s",
-                    "float",
-                    "m/s",
-                    "SD of each axis of the velocity",
-                    False,
-                    True,
-                    ABOVE_ZERO,
-                ),
-                Column("satellites", "float", "", "satellites the fix is from", False, True),
-                Column("fix", "float", "", "kind of fix, as the receiver numbers them", False, True),
-                *_SECOND,
-                *(
-                    Column(name, "float", "m", f"where that antenna is in b, along {name[-3]}", False)
-                    for name in LEVER_COLUMNS
-                ),
-            ),
-            together=(
-                ("v_north_m_s", "v_east_m_s", "v_down_m_s"),
-                SECOND_COLUMNS,
-                LEVER_COLUMNS[:3],
-                LEVER_COLUMNS[3:],
-            ),
-        ),
-        Table(
-            "detections",
-            "what was seen in the frames, and other programs' answers to the same",
-            (
-                Column("detection_id", "text", "", "name of the detection; may occur once per source"),
-                Column("frame_id", "text", "", "frame it was seen in"),
-                Column("source", "text", "", "who says so"),
-                Column("kind", "text", "", " | ".join(DETECTION_KINDS)),
-                Column("u_px", "float", "px", "to the right, as the calibration counts", False, True),
-                Column("v_px", "float", "px", "downwards", False, True),
-                Column("azimuth_rad", "float", "rad", "from north towards east", False, True, AROUND),
-                Column("elevation_rad", "float", "rad", "above the horizon", False, True, AROUND),
-                Column("range_m", "float", "m", "slant range", False, True, RANGE),
-                *_position("the detection", required=False, may_be_nan=True),
-                Column("v_north_m_s", "float", "m/s", "its velocity towards north", False, True, SPEED),
-                Column("v_east_m_s", "float", "m/s", "its velocity towards east", False, True, SPEED),
-                Column("v_cov_nn", "float", "m^2/s^2", "variance of that towards north", False, True),
-                Column("v_cov_ne", "float", "m^2/s^2", "covariance of both", False, True),
-                Column("v_cov_ee", "float", "m^2/s^2", "variance of that towards east", False, True),
-                Column("target_id", "text", "", "target it is of, empty = not known", False),
-                Column(
-                    "plane_down_m", "float", "m", "down coordinate of the ground there", False, True, DOWN
-                ),
-                Column("area_px", "float", "px^2", "area of what is seen of it", False, True),
-                Column("major_px", "float", "px", "longer axis of the ellipse with its moments", False, True),
-                Column("minor_px", "float", "px", "shorter axis of that ellipse", False, True),
-                Column("angle_rad", "float", "rad", "of the longer axis, from u towards v", False, True),
-                Column("touches_border", "float", "1", "1 if the image's edge cuts it, else 0", False, True),
-            ),
-            (("v_cov_nn", "v_cov_ne", "v_cov_ee"),),
-        ),
-        Table(
-            "truth",
-            "where the targets really were",
-            (
-                Column("target_id", "text", "", "name of the target"),
-                Column(
-                    "time_s", "float", "s", "when, on the truth's own clock; NaN = never moves", True, True
-                ),
-                *_position("the target"),
-                Column(
-                    "sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True, ABOVE_ZERO
-                ),
-                Column("sd_vertical_m", "float", "m", "SD of the height", False, True, ABOVE_ZERO),
-            ),
-        ),
-    )
-}
+
+def _read_tables() -> tuple[dict[str, Bounds], dict[str, Table]]:
+    """Bounds by name, and tables."""
+    stated = tomllib.loads((DATA / "tables.toml").read_text(encoding="utf-8"))
+    bounds = {name: (low, high) for name, (low, high) in stated.pop("bounds").items()}
+    tables = {
+        name: Table(
+            name,
+            one["meaning"],
+            tuple(_columns(one["columns"], bounds)),
+            tuple(tuple(c for key in group for c in _expanded(key)) for group in one.get("together", [])),
+        )
+        for name, one in stated.items()
+    }
+    return bounds, tables
+
+
+BOUNDS, TABLES = _read_tables()
+NAV = TABLES.pop("nav")
 
 
 def extra_columns(table: Table, data: pd.DataFrame) -> list[str]:

@@ -36,7 +36,7 @@ from wildlab.flight.readers.log import (
     placed,
 )
 from wildlab.flight.readers.text import percent
-from wildlab.flight.schema import SPEED
+from wildlab.flight.schema import BOUNDS
 from wildlab.flight.time_scales import week_to_utc
 
 #: Fixes are written down by a loop that runs so often, s, at its slowest.
@@ -330,7 +330,7 @@ def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Readings:
         "a fix without height": ~(columns["fix"] >= FIX_SPACE),
         "no GPS week": np.isfinite(receiver.get("GWk", "Week")) & np.isnan(own),
         # Its parts to the north and east may each be possible.
-        "impossible speed": speed > SPEED[1],
+        "impossible speed": speed > BOUNDS["speed"][1],
     }
     return Readings(columns, receiver.rows, log.counted_in, unusable)
 

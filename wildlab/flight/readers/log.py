@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.clock_fitting import ClockFit
 from wildlab.flight.readers.text import LATEST_S, plural
-from wildlab.flight.schema import DOWN, SPEED
+from wildlab.flight.schema import BOUNDS
 from wildlab.flight.time_scales import GPS_START_S
 
 Array = NDArray[np.float64]
@@ -423,8 +423,9 @@ def judge(
         if where:
             for reason, mask in _misplaced(have["latitude_deg"], have["longitude_deg"]).items():
                 add(reason, mask)
-            add("impossible height", *((-one < DOWN[0]) | (-one > DOWN[1]) for one in named("height_")))
-            add("impossible speed", *(np.abs(one) > SPEED[1] for one in named("v_")))
+            low, high = BOUNDS["down"]
+            add("impossible height", *((-one < low) | (-one > high) for one in named("height_")))
+            add("impossible speed", *(np.abs(one) > BOUNDS["speed"][1] for one in named("v_")))
             add("no dilution of precision", *(one >= NO_DILUTION for one in named("hdop")))
         if part in TURNS:
             turns = named("roll_", "pitch_", "yaw_", "pan_", "tilt_")
@@ -565,7 +566,7 @@ def _reachable(time: Array, latitude: Array, longitude: Array, height: Array) ->
         half = np.sin((q - p) / 2) ** 2 + np.cos(p) * np.cos(q) * np.sin(turned / 2) ** 2
         level = 2 * _EARTH_M * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0)))
         away = np.hypot(level, height[j] - height[i])
-        return np.asarray(away <= NOISE_M + SPEED[1] * np.abs(time[j] - time[i]))
+        return np.asarray(away <= NOISE_M + BOUNDS["speed"][1] * np.abs(time[j] - time[i]))
 
     every = np.arange(len(time))
     starts = np.r_[0, np.flatnonzero(~reached(every[:-1], every[1:])) + 1]
