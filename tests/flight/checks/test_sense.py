@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.analysis.survey_twin import Survey, simulate
-from wildlab.flight.checks import camera, explanation, motion, sensors, tables, times
+from wildlab.flight.checks import camera, mistakes, motion, sensors, tables
 from wildlab.flight.checks.attitude import Felt, FieldStep, felt_mistakes, field_mistakes
 from wildlab.flight.checks.mistakes import attitude_mistakes, axes_words, other_axes, place_mistakes
 from wildlab.flight.checks.sightings import sightings
@@ -20,8 +20,8 @@ ORIGIN = (np.radians(63.4), np.radians(10.4), 40.0)
 Make = Callable[..., Flight]
 
 
-def _mistake(cause: str, factor: float) -> explanation.Mistake[float]:
-    return explanation.Mistake(cause, cause, cause, lambda x: x * factor, cause == "fitted")
+def _mistake(cause: str, factor: float) -> mistakes.Mistake[float]:
+    return mistakes.Mistake(cause, cause, cause, lambda x: x * factor, cause == "fitted")
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def _mistake(cause: str, factor: float) -> explanation.Mistake[float]:
 )
 def test_which_mistakes_are_named(factors, named):
     ways = [_mistake(cause, factor) for cause, factor in factors.items()]
-    found = explanation.explain(lambda x: np.full((2, 3), x), 4.0, ways)
+    found = mistakes.explain(lambda x: np.full((2, 3), x), 4.0, ways)
     assert [(one.mistake.cause, one.before) for one in found] == [(cause, 4.0) for cause in named]
 
 
@@ -50,7 +50,7 @@ def test_which_mistakes_are_named(factors, named):
     ],
 )
 def test_what_is_far_better(before, after, better):
-    assert explanation.far_better(np.full((2, 3), before), np.array([after] * 2)) == better
+    assert mistakes.far_better(np.full((2, 3), before), np.array([after] * 2)) == better
 
 
 def test_every_attitude_mistake_gives_rotations():
@@ -171,12 +171,12 @@ def test_an_origin_far_away(make_flight, north, level):
 
 def test_whole_hours_between_stamps_are_a_zone(make_flight):
     flight = make_flight()
-    assert list(times.stamps(flight)) == []
+    assert list(tables.stamps(flight)) == []
     flight.tables["frames"]["time_s"] += 7200.0
-    (found,) = times.stamps(flight)
+    (found,) = tables.stamps(flight)
     assert found.table == "frames" and "2 h late" in found.sentence
     flight.tables["frames"]["time_s"] += 400.0  # no whole quarter of an hour
-    assert list(times.stamps(flight)) == []
+    assert list(tables.stamps(flight)) == []
 
 
 def test_ground_heights_against_the_truth(make_flight):

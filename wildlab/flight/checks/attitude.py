@@ -12,19 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.explanation import (
-    Change,
-    Misfit,
-    Mistake,
-    alternate,
-    blame,
-    change_attitude,
-    change_columns,
-    crosswise,
-    explain,
-    undo_in,
-)
-from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, joined
+from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding
 from wildlab.flight.checks.inertial import (
     FORCE,
     RATE,
@@ -37,18 +25,29 @@ from wildlab.flight.checks.inertial import (
     samples,
 )
 from wildlab.flight.checks.mistakes import (
+    Change,
+    Misfit,
+    Mistake,
+    alternate,
     attitude_mistakes,
     axes_words,
+    blame,
+    change_attitude,
     change_by,
+    change_columns,
+    crosswise,
+    explain,
     mistake,
     one_row,
     other_axes,
     rows_of,
+    undo_in,
 )
 from wildlab.flight.store import Flight
 from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.gravity import USUAL_GRAVITY
+from wildlab.names import listed
 
 #: What is left between a good small sensor and a good attitude: turns (rad/s) and forces (m/s^2), and
 #: as shares of how much there was of both.
@@ -186,7 +185,7 @@ def forces(flight: Flight) -> Iterator[Finding]:
             )
         # Where the turns do not fit either, the sign of a force is none of the causes.
         elif before[0] <= UNEXPLAINED and (axes := against(given)):
-            facts["key"] = key = joined(["xyz"[axis] for axis in axes])
+            facts["key"] = key = listed(["xyz"[axis] for axis in axes])
             field = f"f_{'xyz'[axes[0]]}_m_s2"
             yield Finding("warning", "imu", field, "force-against", facts, (f"sign of force {key}",))
         elif (error := heading_error(given)) is not None:
@@ -364,7 +363,7 @@ def field(flight: Flight) -> Iterator[Finding]:
         ways = [unit for unit, factor in units.items() if 20 <= size * factor <= 80]
         inverse = [unit for unit, factor in units.items() if 20 <= size / factor <= 80]
         code = "field-unit" if ways else "field-in-ut" if inverse else "field-size"
-        facts = {"size": size, "units": joined(ways or inverse or [""], "or")}
+        facts = {"size": size, "units": listed(ways or inverse or [""], "or")}
         causes = tuple(f"magnetometer in {unit}" for unit in ways + inverse)
         yield Finding("problem", "magnetometer", FIELD[0], code, facts, causes)
         return

@@ -9,19 +9,28 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.flight.checks.attitude import field, forces, heading
-from wildlab.flight.checks.camera import ground, image, lens
-from wildlab.flight.checks.explanation import report_alone
-from wildlab.flight.checks.findings import Finding, Level, joined, say
+from wildlab.flight.checks.camera import ground, image, lens, terrain_findings
+from wildlab.flight.checks.findings import Finding, Level, say
 from wildlab.flight.checks.inertial import inertial, why_no_start
 from wildlab.flight.checks.known_points import known_points
+from wildlab.flight.checks.mistakes import report_alone
 from wildlab.flight.checks.motion import distinguish_leaps, motion, origin, positions, together
 from wildlab.flight.checks.sensors import scans, sensors, targets
-from wildlab.flight.checks.tables import bounds, duplicates, identity, order, truth_place, values
-from wildlab.flight.checks.terrain import terrain_findings
-from wildlab.flight.checks.times import gaps, overlap, stamps
+from wildlab.flight.checks.tables import (
+    bounds,
+    duplicates,
+    gaps,
+    identity,
+    order,
+    overlap,
+    stamps,
+    truth_place,
+    values,
+)
 from wildlab.flight.checksums import locations_confirmed, manifest_changed
 from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight
+from wildlab.names import listed
 
 __all__ = ["Finding", "Use", "check_flight", "find", "sense", "sense_sentences", "usable_for"]
 
@@ -209,7 +218,7 @@ def _for_tracking(flight: Flight, broken: set[str], good_nav: list[str], scored:
     elif not kinds and "detections" not in broken:
         usable, why = False, say("lacks", what=["detections"])
     elif wrong:
-        usable, why = False, say("lacks", what=[f"{joined(wrong)} without a problem"])
+        usable, why = False, say("lacks", what=[f"{listed(wrong)} without a problem"])
     elif kinds == {"pixel"} and not good_nav:
         usable, why = False, say("no-poses-for-pixels")
     else:

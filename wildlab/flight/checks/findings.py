@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from string import Formatter
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.flight.store import Flight
+from wildlab.names import listed
 from wildlab.paths import DATA
 
 Level = Literal["problem", "warning", "note"]
@@ -45,7 +46,7 @@ class Finding:
     causes
         The usual mistakes that explain it.
     corrections
-        Undo them in a flight, or give None where they cannot (`wildlab.flight.checks.explanation`).
+        Undo them in a flight, or give None where they cannot (`wildlab.flight.checks.mistakes`).
     """
 
     level: Level
@@ -92,7 +93,7 @@ _CHOICE = re.compile(r"\{(\w+)(>0)?:((?:[^{}|]|\{[^{}]*\})*)\|((?:[^{}|]|\{[^{}]
 class _Phrase(Formatter):
     def format_field(self, value: Any, format_spec: str) -> str:
         if format_spec in ("and", "or"):
-            return joined(value, format_spec)
+            return listed(value, format_spec)
         if format_spec.startswith("abs"):
             return self.format_field(abs(value), format_spec[3:])
         return number(value) if format_spec == "digits" else str(super().format_field(value, format_spec))
@@ -128,11 +129,6 @@ def number(value: float) -> str:
     if value != 0 and abs(value) < 0.095:
         return f"{value:.2g}"
     return f"{value:.0f}" if abs(value) >= 20 else f"{value:.1f}"
-
-
-def joined(parts: Sequence[str], last: str = "and") -> str:
-    """``"a, b and c"``."""
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
 def bad_rows(

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.explanation import APART, Correction, change_columns, shift_clock
 from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, Level, say
+from wildlab.flight.checks.mistakes import APART, Correction, change_columns, shift_clock
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import SECOND_COLUMNS
 from wildlab.flight.store import Flight
@@ -77,23 +78,16 @@ class Inertial:
     def _mean(self, names: Sequence[str], start: Array, end: Array) -> Array:
         if self._kept[0] != tuple(names):
             self._kept = ((), [])
-            self._kept = (tuple(names), [self._sum(name) for name in names])
+            self._kept = (
+                tuple(names),
+                [cumulative_trapezoid(self._columns[name], self.times, initial=0) for name in names],
+            )
         mean = np.empty((len(start), len(names)))
         for column, total in enumerate(self._kept[1]):
             mean[:, column] = np.interp(end, self.times, total) - np.interp(start, self.times, total)
         mean /= (end - start)[:, None]
         mean[(start < self.times[0]) | (end > self.times[-1])] = np.nan
         return mean
-
-    def _sum(self, name: str) -> Array:
-        """Integral over time of a column, from the first sample on. (N,)"""
-        value = self._columns[name]
-        total = np.empty(len(value))
-        total[0] = 0.0
-        np.add(value[1:], value[:-1], out=total[1:])
-        total[1:] *= 0.5
-        total[1:] *= np.diff(self.times)
-        return np.cumsum(total, out=total)
 
 
 @dataclass(frozen=True)

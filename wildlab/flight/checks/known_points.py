@@ -11,31 +11,29 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.special import bdtrc
 
-from wildlab.flight.checks.explanation import (
+from wildlab.flight.checks.findings import Finding, number, phrase
+from wildlab.flight.checks.mistakes import (
     ALIKE,
     FAR_BETTER,
     MOST_NAMED,
     Mistake,
     Named,
+    attitude_mistakes,
     blame,
     change_attitude,
+    change_by,
     change_place,
     explain,
+    mistake,
+    one_row,
+    place_mistakes,
     raise_by,
+    rotations_of_axes,
+    rows_of,
     shift_clock,
     shift_poses,
     state,
     undo_in,
-)
-from wildlab.flight.checks.findings import Finding, joined, number, phrase
-from wildlab.flight.checks.mistakes import (
-    attitude_mistakes,
-    change_by,
-    mistake,
-    one_row,
-    place_mistakes,
-    rotations_of_axes,
-    rows_of,
 )
 from wildlab.flight.checks.sightings import (
     Missed,
@@ -52,6 +50,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
+from wildlab.names import listed
 
 #: Without a known mistake, misses this many times what is expected and this large (deg) are still said.
 UNEXPLAINED, UNEXPLAINED_DEG = 4.0, 8.0
@@ -151,7 +150,7 @@ def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
             "plain": plain,
             "before": metres(given, plain),
             "after": metres(first.undone, plain),
-            "alike": f"; as well explained: {joined(alike, 'or')}" if alike else "",
+            "alike": f"; as well explained: {listed(alike, 'or')}" if alike else "",
         },
         [
             correct
@@ -354,7 +353,7 @@ def _weight(size: Array) -> Array:
     return np.asarray(1 / (1 + (size / (2 * max(float(np.median(size)), 1e-9))) ** 2))
 
 
-class ClockFit(NamedTuple):
+class OffsetFit(NamedTuple):
     """How well an offset of the clock is known: its standard deviation (s) from image to image, a turn of the
     camera being as free, and the multiple correlation of the two, 0 to 1."""
 
@@ -362,7 +361,7 @@ class ClockFit(NamedTuple):
     correlation: float
 
 
-def clock_fit(s: Sightings, by: float) -> ClockFit | None:
+def clock_fit(s: Sightings, by: float) -> OffsetFit | None:
     """How well an offset of the camera's clock is known beside a turn of the camera.
 
     Least squares of the misses about the offset, linear in it and in three small turns; what images share
@@ -377,7 +376,7 @@ def clock_fit(s: Sightings, by: float) -> ClockFit | None:
 
     Returns
     -------
-    ClockFit or None
+    OffsetFit or None
         None where the sightings do not determine it.
     """
     m, before, after = (missed(s.shifted(by + step)) for step in (0.0, -STEP_S, STEP_S))
@@ -397,7 +396,7 @@ def clock_fit(s: Sightings, by: float) -> ClockFit | None:
     np.add.at(score, image, np.einsum("nia,n,ni->na", J, weight, left))
     n = len(score)
     variance = float((C @ (score.T @ score) @ C)[3, 3]) * n / (n - 4)
-    return ClockFit(float(np.sqrt(variance)), float(np.sqrt(max(0.0, 1 - 1 / (A[3, 3] * C[3, 3])))))
+    return OffsetFit(float(np.sqrt(variance)), float(np.sqrt(max(0.0, 1 - 1 / (A[3, 3] * C[3, 3])))))
 
 
 def _interval(row: Any, s: Sightings, by: float) -> str:

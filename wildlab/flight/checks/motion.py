@@ -13,27 +13,32 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.integrate import cumulative_trapezoid
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.explanation import (
+from wildlab.flight.checks.findings import POSE, POSITION, VELOCITY, Finding, Level, part_of
+from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
+from wildlab.flight.checks.known_points import LONGEST_LEVER, best_of
+from wildlab.flight.checks.mistakes import (
     LEAP,
     Misfit,
     Mistake,
     alternate,
     blame,
+    change_by,
     change_columns,
     change_place,
     crosswise,
     explain,
+    mistake,
+    one_row,
+    place_mistakes,
     raise_by,
+    rows_of,
     shift_clock,
     shift_poses,
     undo_in,
 )
-from wildlab.flight.checks.findings import POSE, POSITION, VELOCITY, Finding, Level, part_of
-from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
-from wildlab.flight.checks.known_points import LONGEST_LEVER, best_of
-from wildlab.flight.checks.mistakes import change_by, mistake, one_row, place_mistakes, rows_of
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Origin, geodetic_to_ned, ned_to_geodetic
@@ -72,8 +77,7 @@ def moved(table: pd.DataFrame) -> Moved | None:
     first, last = intervals(t, STEP_S, LONGEST_S, MOST)
     if len(first) < ENOUGH:
         return None
-    total = np.zeros((len(t), 3))
-    total[1:] = np.cumsum((values[1:, 4:] + values[:-1, 4:]) / 2 * np.diff(t)[:, None], axis=0)
+    total = cumulative_trapezoid(values[:, 4:], t, axis=0, initial=0)
     length = t[last] - t[first]
     m = Moved(values[first, 1:4], values[last, 1:4], length, (total[last] - total[first]) / length[:, None])
     fast = (np.linalg.norm(m.gone, axis=1) > MOVING) | (np.linalg.norm(m.velocity, axis=1) > MOVING)

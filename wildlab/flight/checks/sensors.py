@@ -14,22 +14,27 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.explanation import (
+from wildlab.flight.checks.findings import POSITION, Finding, Level
+from wildlab.flight.checks.mistakes import (
     ALIKE,
     FAR_BETTER_ALONE,
     Misfit,
     Mistake,
     blame,
+    change_by,
     explain,
     far_better,
+    mistake,
+    one_row,
+    place_mistakes,
+    rows_of,
     undo_in,
 )
-from wildlab.flight.checks.findings import POSITION, Finding, Level, joined
-from wildlab.flight.checks.mistakes import change_by, mistake, one_row, place_mistakes, rows_of
 from wildlab.flight.clocks import frame_times, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import Settings, absent_sensors
 from wildlab.geometry.frames import Array, wrap
+from wildlab.names import listed
 
 #: A detection is of a target within this of it: so far (m) and a share of the distance, or this angle (rad).
 NEAR_M, NEAR_SHARE, NEAR_RAD = 8.0, 0.02, np.radians(2.0)
@@ -400,7 +405,7 @@ def _turned_finding(given: Scans, turn_deg: float) -> Finding:
         "then": _percent(tuple(s.turned(turn_deg) for s in given)),
         "turn": turn_deg,
         "heading": -turn_deg,
-        "names": joined([s.source for s in given]),
+        "names": listed([s.source for s in given]),
         "first": first.source,
     }
     field = "azimuth_rad" if first.azimuth is not None else "north_m"

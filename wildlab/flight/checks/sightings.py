@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.explanation import Misfit
-from wildlab.flight.checks.findings import POSE, POSITION
-from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at
+from wildlab.flight.checks.findings import POSE
+from wildlab.flight.checks.mistakes import Misfit
+from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array, Origin
@@ -199,21 +199,13 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
 
 def _points(flight: Flight, times: Array, labels: NDArray[np.object_] | None) -> Array:
     """(M, N, 3) where the targets are; with labels (1, N, 3)."""
-    offset = flight.manifest.clocks.truth_offset_s
-    found = []
-    one = np.full((1, len(times), 3), np.nan)
-    for name, track in flight.table("truth").groupby("target_id", sort=False):
-        rows = np.full(len(times), True) if labels is None else labels == name
-        if not rows.any():
-            continue
-        at, place = track["time_s"].to_numpy(float) + offset, track[list(POSITION)].to_numpy(float)
-        if np.isnan(at).all():
-            there = np.broadcast_to(place[:1], (int(rows.sum()), 3))
-        else:
-            there = between(at, place, times[rows], f"truth of {name!r}")
-        found.append(there)
-        one[0, rows] = there
-    return np.stack(found) if labels is None else one
+    truth = flight.table("truth")
+    if labels is not None:
+        truth = truth[truth["target_id"].isin(labels)]
+    names, there = truth_at(truth, times, offset_s=flight.manifest.clocks.truth_offset_s)
+    if labels is None:
+        return there
+    return there[pd.Index(names).get_indexer(pd.Index(labels)), np.arange(len(times))][None]
 
 
 def _expected(flight: Flight, P: Array | None, n: int) -> Array:
