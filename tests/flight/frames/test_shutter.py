@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from wildlab.flight.readers.frames import Frame, open_frames
-from wildlab.flight.readers.frames.opening import mark_shutter
 from wildlab.flight.readers.frames.scene import (
     MOST_DEAD,
     find_dead,
@@ -15,6 +14,7 @@ from wildlab.flight.readers.frames.scene import (
     measure_vignetting,
     without_vignetting,
 )
+from wildlab.flight.readers.frames.sequence import mark_shutter
 from wildlab.simulation.scene.response import (
     CameraResponse,
     expose,

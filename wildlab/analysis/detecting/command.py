@@ -49,7 +49,7 @@ from wildlab.files import write_csv, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import printable, read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
-from wildlab.flight.readers.frames.opening import CORRECTIONS
+from wildlab.flight.readers.frames.sequence import CORRECTIONS
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
 

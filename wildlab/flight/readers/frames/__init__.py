@@ -5,6 +5,6 @@ what cannot be used is a frame with a sentence in ``problem``: the rest goes on.
 """
 
 from wildlab.flight.readers.frames.image import Frame, Polarity, Unit, read_image
-from wildlab.flight.readers.frames.opening import Frames, open_frames
+from wildlab.flight.readers.frames.sequence import Frames, open_frames
 
 __all__ = ["Frame", "Frames", "Polarity", "Unit", "open_frames", "read_image"]
