@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -24,7 +23,7 @@ from wildlab.replay.page import page, read_viewer
 from wildlab.replay.recording import narrow_layout, save_recording
 from wildlab.replay.scene import ReplayScene, scene_of
 from wildlab.runner.evaluate import tell_source
-from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.record.provenance import flight_of_report, provenance_of_flight, read_provenance
 
 RECORDING, PAGE, ESTIMATES = "replay.rrd", "replay.html", "estimates.parquet"
 
@@ -69,7 +68,7 @@ def replay(
         Where there is no such flight, nothing to show, or no viewer.
     """
     report = None if (folder / FILE_NAME).exists() else folder
-    place = folder if report is None else flight_of(folder, reports)
+    place = folder if report is None else flight_of(folder)
     viewer = read_viewer() if html else None  # before the long part: it may be missing
     flight = load_flight(place)
     with _progress(console) as tell:
@@ -135,16 +134,13 @@ def estimates_of(flight: Flight, report: Path | None, reports: Path) -> pd.DataF
     return None
 
 
-def flight_of(report: Path, reports: Path) -> Path:
-    """The folder of the flight that a report was made from, known by the content of its files.
-
-    It is looked for where flights usually are: among those that reports keep, beside the folder of reports,
-    in ``flights`` there and here, and in the folder that one stands in.
+def flight_of(report: Path) -> Path:
+    """The folder of the flight that a report was made from (`flight_of_report`).
 
     Raises
     ------
     WildlabError
-        Where the folder is no report, says of no flight, or that flight is in none of these places.
+        Where the folder is no report, says of no flight, or that flight is not found.
     """
     if not report.is_dir():
         raise WildlabError("there is no such folder", "name a flight folder, or a report's", file=report)
@@ -155,31 +151,7 @@ def flight_of(report: Path, reports: Path) -> Path:
             "name the folder of a flight: wildlab replay flights/mine",
             file=report,
         )
-    for folder, found in flights_around(report, reports):
-        if found["files"] == theirs["files"]:
-            return folder
-    raise WildlabError(
-        f"the flight {json.dumps(str(theirs.get('name', '')))} that this report was made from is not among "
-        "the flights here, or was changed since",
-        "name its folder: wildlab replay flights/mine --into REPORT",
-        file=report,
-    )
-
-
-def flights_around(report: Path, reports: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """Flight folders where flights usually are, as seen from a report, and what provenance says of each."""
-    for place in _places(report, reports):
-        for manifest in sorted(place.glob(f"*/{FILE_NAME}")):
-            yield manifest.parent, provenance_of_flight(manifest.parent)
-
-
-def _places(report: Path, reports: Path) -> Iterator[Path]:
-    seen = set()
-    for base in (report.resolve().parent, reports.resolve(), Path.cwd()):
-        for place in (base / ".flights", base.parent / "flights", base / "flights", base, base.parent):
-            if place not in seen and place.is_dir():
-                seen.add(place)
-                yield place
+    return flight_of_report(report, theirs, "wildlab replay flights/mine --into REPORT")
 
 
 @contextmanager

@@ -20,8 +20,7 @@ from wildlab.runner.record.digests import (
     has_digests,
     misfits,
 )
-from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
-from wildlab.runner.replay import flights_around
+from wildlab.runner.record.provenance import flights_near, provenance_of_flight, read_provenance
 from wildlab.runner.seeds import SeedWork, read_seed, seed_digest
 
 
@@ -116,7 +115,8 @@ def _misfits_of_seeds(
 def _flight_of(folder: Path, theirs: Mapping[str, Any]) -> Path | None:
     """The flight with these files, or else one of the same name, which was changed."""
     changed = None
-    for there, found in flights_around(folder, folder.resolve().parent):
+    for there in flights_near(folder, theirs["name"]):
+        found = provenance_of_flight(there)
         if found["files"] == theirs["files"]:
             return there
         if found["name"] == theirs["name"]:

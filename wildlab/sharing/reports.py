@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import FILE_NAME, read_manifest
-from wildlab.paths import REPORTS, ROOT
+from wildlab.paths import REPORTS
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.processes.job import typed
 from wildlab.runner.record.digests import BEFORE_DIGESTS, has_digests, read_status
 from wildlab.runner.record.own_flights import ABOUT
-from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.record.provenance import (
+    flight_of_report,
+    flights_near,
+    provenance_of_flight,
+    read_provenance,
+    same_flight,
+)
 from wildlab.runner.track import MANY_NOTEBOOK
 from wildlab.simulation.parameters import load_twin, twin_names
 
@@ -190,7 +196,7 @@ def of_a_study(flight: dict[str, Any], reports: Path) -> bool:
         return False
     place = load_twin(twin).place
     packaged = (place.latitude.number, place.longitude.number)
-    for folder in candidates(name, [reports.resolve().parent / "flights"]):
+    for folder in flights_near(reports / name, name):
         try:
             manifest = read_manifest(folder / FILE_NAME)
         except WildlabError:
@@ -234,18 +240,7 @@ def _with_siblings(source: Source, studies: dict[str, StudyEntry]) -> tuple[Sour
     return Source(source.name, tuple(folders), True, source.flight, parameters), left_out
 
 
-def same_flight(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    """Whether two records of provenance are of one flight: all tables that both have are the same."""
-    tables = [{k: v for k, v in _files(flight).items() if k != FILE_NAME} for flight in (one, other)]
-    return bool(tables[0]) and tables[0] == tables[1]
-
-
-def _files(flight: dict[str, Any]) -> dict[str, Any]:
-    files = flight.get("files")
-    return files if isinstance(files, dict) else {}
-
-
-def flight_folder(source: Source, given: Path | None, around: Iterable[Path] = ()) -> Path:
+def flight_folder(source: Source, given: Path | None) -> Path:
     """The flight that reports were made from: the one that is given, or one that lies where flights lie.
 
     Parameters
@@ -254,8 +249,6 @@ def flight_folder(source: Source, given: Path | None, around: Iterable[Path] = (
         With what provenance says.
     given
         What the user names, if anything.
-    around
-        Folders in which flights may lie.
 
     Returns
     -------
@@ -281,26 +274,4 @@ def flight_folder(source: Source, given: Path | None, around: Iterable[Path] = (
                 field="--flight",
             )
         return given
-    for folder in candidates(source.name, around):
-        if same_flight(provenance_of_flight(folder), source.flight):
-            return folder
-    searched = ", ".join(map(str, _places(around))) or "no folder flights/ here"
-    raise WildlabError(
-        f"the flight {source.name!r} that this report was made from is in none of {searched}, and figures "
-        "are drawn again from generalised data, never masked",
-        f"say where it is: {again}",
-        file=source.folders[0],
-    )
-
-
-def _places(around: Iterable[Path]) -> list[Path]:
-    """Where flights lie: ``flights`` here, beside the reports, and in wildlab's own folder."""
-    places = [Path("flights"), *around, *([ROOT / "flights"] if ROOT is not None else [])]
-    return [place for place in dict.fromkeys(place.resolve() for place in places) if place.is_dir()]
-
-
-def candidates(name: str, around: Iterable[Path]) -> Sequence[Path]:
-    """Flight folders in ``flights`` here and beside the reports, those of the same name first."""
-    folders = [folder for place in _places(around) for folder in sorted(place.iterdir())]
-    found = [folder for folder in folders if (folder / FILE_NAME).is_file()]
-    return sorted(dict.fromkeys(found), key=lambda folder: folder.name != name)
+    return flight_of_report(source.folders[0], source.flight, again)

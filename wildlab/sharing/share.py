@@ -159,9 +159,8 @@ def share(
     for file in (target, told):
         refuse_existing(file, overwrite)
     sweep_beside(target)
-    around = [source.folders[0].resolve().parent.parent / "flights" for source in flights]
     # All are found, and the copy's name is looked through, before the first is computed, which takes minutes.
-    folders = [None if exact or not one.logged else flight_folder(one, flight, around) for one in sources]
+    folders = [None if exact or not one.logged else flight_folder(one, flight) for one in sources]
     prepared = [
         None if folder is None else _prepare(folder, source, tier, name)
         for source, name, folder in zip(sources, calls, folders, strict=True)

@@ -8,13 +8,12 @@ from typing import Any
 
 from wildlab.analysis.overviews.verdict import numbers_of
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight
 from wildlab.paths import REPORTS
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.own_flights import OwnFlight, OwnReport
 from wildlab.runner.record.digests import read_status
-from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.record.provenance import provenance_of_flight, read_provenance, tables_of
 
 
 def finished_metrics(folder: Path) -> dict[str, Any] | None:
@@ -119,11 +118,11 @@ def _earlier(ones: Sequence[OwnReport], made_from: Mapping[str, Mapping[str, Any
     what was evaluated with it and does not list them.
     """
     newest = max(ones, key=lambda one: one.finished)
-    tables = _tables(made_from[newest.folder])
+    tables = tables_of(made_from[newest.folder].get("flight"))
     old = {
         one.folder
         for one in ones
-        if one.finished < newest.finished and _differ(_tables(made_from[one.folder]), tables)
+        if one.finished < newest.finished and _differ(tables_of(made_from[one.folder].get("flight")), tables)
     }
     overview = next((one for one in ones if one.about == "overview" and one.folder not in old), None)
     parameters = made_from[overview.folder].get("parameters") if overview is not None else None
@@ -140,13 +139,6 @@ def _earlier(ones: Sequence[OwnReport], made_from: Mapping[str, Mapping[str, Any
 
 def _differ(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     return bool(one) and bool(other) and one != other
-
-
-def _tables(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """What the tables of a flight are told by; its manifest may be corrected."""
-    flight = provenance.get("flight")
-    files = flight.get("files") if isinstance(flight, dict) else None
-    return {name: one for name, one in files.items() if name != FILE_NAME} if isinstance(files, dict) else {}
 
 
 def _report(folder: Path, flight: str, provenance: dict[str, Any]) -> OwnReport:

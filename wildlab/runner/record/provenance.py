@@ -18,6 +18,7 @@ from wildlab.errors import WildlabError
 from wildlab.files import sha256
 from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.files import flight_name
+from wildlab.flight.manifest import FILE_NAME
 from wildlab.paths import LOCK, ROOT
 from wildlab.reporting.layout import ALERT
 from wildlab.reporting.text import escape
@@ -128,6 +129,62 @@ def provenance_of_flight(folder: Path) -> dict[str, Any]:
         "files": {path.relative_to(folder).as_posix(): sha256(path) for path in files},
         "sources": [str(one.get("sha256")) for one in manifest.get("sources", []) if isinstance(one, dict)],
     }
+
+
+def tables_of(flight: object) -> dict[str, Any]:
+    """The digests of a flight's tables by name, of what provenance says of it; its manifest may
+    be corrected."""
+    files = flight.get("files") if isinstance(flight, dict) else None
+    return {name: one for name, one in files.items() if name != FILE_NAME} if isinstance(files, dict) else {}
+
+
+def same_flight(one: object, other: object) -> bool:
+    """Whether two records of provenance are of one flight: its tables are the same."""
+    tables = tables_of(one)
+    return bool(tables) and tables == tables_of(other)
+
+
+def flights_near(report: Path, name: str) -> list[Path]:
+    """Folders of flights where flights usually are, those called ``name`` first.
+
+    Among those that reports keep, in ``flights`` beside the reports, here and in the checkout, beside the
+    report and here.
+    """
+    bases = (report.resolve().parent, Path.cwd(), *([ROOT] if ROOT is not None else []))
+    places = [
+        place for base in bases for place in (base / ".flights", base.parent / "flights", base / "flights")
+    ] + [place for base in bases[:2] for place in (base, base.parent)]
+    found = [one.parent for place in dict.fromkeys(places) for one in sorted(place.glob(f"*/{FILE_NAME}"))]
+    return sorted(dict.fromkeys(found), key=lambda folder: folder.name != name)
+
+
+def flight_of_report(report: Path, theirs: dict[str, Any], again: str) -> Path:
+    """The folder of the flight that a report was made from, told by its tables.
+
+    Parameters
+    ----------
+    report
+        The report's folder.
+    theirs
+        What its provenance says of the flight.
+    again
+        What to type where it is not found.
+
+    Raises
+    ------
+    WildlabError
+        Where it is in none of the places of `flights_near`.
+    """
+    name = str(theirs.get("name", ""))
+    for folder in flights_near(report, name):
+        if same_flight(provenance_of_flight(folder), theirs):
+            return folder
+    raise WildlabError(
+        f"the flight {json.dumps(name)} that this report was made from is not among the flights here, or was "
+        "changed since",
+        f"say where it is: {again}",
+        file=report,
+    )
 
 
 def changed_notice(provenance: dict[str, Any]) -> str:
