@@ -19,7 +19,7 @@ from wildlab.reporting.animation import (
     Outlines,
     ShownFlight,
     animated_flight,
-    pausable,
+    with_pause,
 )
 from wildlab.reporting.page import page
 
@@ -184,7 +184,7 @@ def opened(browser: Any, tmp_path: Path, **context: Any) -> Any:
     """The picture alone on a page, in a browser that is offline."""
     path = tmp_path / "flight.html"
     path.write_text(
-        page(title="x", body=f"<h1>x</h1>{pausable(animated_flight(shown(), alt='A flight.'))}"), "utf-8"
+        page(title="x", body=f"<h1>x</h1>{with_pause(animated_flight(shown(), alt='A flight.'))}"), "utf-8"
     )
     tab = browser.new_context(viewport={"width": 700, "height": 700}, offline=True, **context).new_page()
     tab.goto(path.as_uri())

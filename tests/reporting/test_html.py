@@ -16,7 +16,16 @@ from tests.notebooks import notebook, shown
 from wildlab.errors import WildlabError
 from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.figures import new_figure
-from wildlab.reporting.layout import ADVICE, LIMITS, METHOD, MOST, Word, arranged, with_glossary, words
+from wildlab.reporting.layout import (
+    ADVICE,
+    LIMITS,
+    METHOD,
+    MOST,
+    Word,
+    load_glossary,
+    order_report,
+    with_glossary,
+)
 from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.reporting.page import STYLE, failure_page, page
 from wildlab.reporting.report import Report, open_report
@@ -32,7 +41,6 @@ def hostile_report() -> Report:
     report.alert(HOSTILE, [HOSTILE] * 5)
     report.tiles([(HOSTILE, HOSTILE)] * 4)
     report.section(HOSTILE, HOSTILE)
-    report.subsection(HOSTILE)
     report.points([HOSTILE, "w" * 300], ordered=True)
     for width in (5.0, 9.0):
         fig, ax = new_figure(width, 3)
@@ -201,7 +209,7 @@ IMAGE = '<img alt="a" src="data:image/png;base64,AA==">'
 
 
 def in_order(*parts: str) -> str:
-    return arranged("\n".join(parts))
+    return order_report("\n".join(parts))
 
 
 def order(html: str, *words: str) -> list[str]:
@@ -242,7 +250,7 @@ def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand
     one.section("Section")
     for name in ("a", "b", "c"):
         one.figure(new_figure()[0], name=name, alt=name, caption=f"Shows {name}.", main=name == "b")
-    soup = BeautifulSoup(arranged("\n".join(one.parts)), "html.parser")
+    soup = BeautifulSoup(order_report("\n".join(one.parts)), "html.parser")
     captions = [caption.get_text() for caption in soup.find_all("figcaption")]
     assert captions == ["Figure 1. Shows b.", "Figure 2. Shows a.", "Figure 3. Shows c."]
     assert [box["aria-label"] for box in soup.find_all(role="group")] == ["Figure 1", "Figure 2", "Figure 3"]
@@ -273,7 +281,7 @@ def test_the_last_verdict_colours_the_bar(level, given):
 def test_what_is_no_report_is_left_alone():
     for names in permutations(("limits", "numbers")):
         body = "\n".join(PARTS[name] for name in names)
-        assert arranged(body) == body
+        assert order_report(body) == body
 
 
 A, B = Word("NEES", ("NEES",), "Squares."), Word("pose", ("poses", "pose"), "Where & which way.")
@@ -332,7 +340,7 @@ def test_the_words_used_most_are_kept_and_every_link_has_its_anchor(counts):
 
 
 def test_every_word_we_have_is_linked():
-    for word in words():
+    for word in load_glossary():
         assert links(with_glossary(f"<p>{word.match[0]}</p>")) == [(f"#{word.anchor}", word.match[0])]
 
 
@@ -352,4 +360,4 @@ def test_a_faulty_glossary_is_refused(tmp_path, toml, sentence):
     file = tmp_path / "glossary.toml"
     file.write_text(toml, encoding="utf-8")
     with pytest.raises(WildlabError, match=sentence):
-        words(file)
+        load_glossary(file)

@@ -14,7 +14,7 @@ from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.page import first_look_notice
-from wildlab.reporting.status import look_words
+from wildlab.reporting.status import describe_first_look
 from wildlab.runner import run as running
 from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
 from wildlab.runner.processes.job import Job
@@ -61,9 +61,9 @@ def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp
 
 
 def test_first_looks_in_words():
-    assert look_words({"seeds": (5, 200)}) == "5 of 200 flights" and look_words({}) == ""
+    assert describe_first_look({"seeds": (5, 200)}) == "5 of 200 flights" and describe_first_look({}) == ""
     # No name of a parameter reaches a reader as it is.
-    assert not [one for study in STUDIES.values() if "_" in (one := look_words(study.reductions()))]
+    assert not [one for study in STUDIES.values() if "_" in (one := describe_first_look(study.reductions()))]
     notice = first_look_notice("5 of <b>", "wildlab run a")
     assert "5 of &lt;b&gt;" in notice and "<code>wildlab run a</code>" in notice
 

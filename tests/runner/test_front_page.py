@@ -22,7 +22,7 @@ from wildlab.reporting import metrics
 from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.front_page import FILE, Glimpse, case_cards, front_page, load_front_flight
 from wildlab.reporting.published import published_rows
-from wildlab.reporting.published_tables import CALCULATIONS, counted
+from wildlab.reporting.published_tables import CALCULATIONS, count_answers
 from wildlab.reporting.status import Case, StudyStatus, standing
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.record.front_page import build_ledger
@@ -101,7 +101,7 @@ def test_counts_are_those_of_the_files(some, tmp_path):
         ours = {one["subject"]: one["value"] for one in json.loads(recorded.read_text())["metrics"]}
         near = [abs(ours[one["subject"]] - one["value"]) <= 0.05 for one in entries]
         agree, differ = agree + sum(near), differ + len(near) - sum(near)
-    counts = counted(some)
+    counts = count_answers(some)
     found = counts.groups[CALCULATIONS]
     assert (found.close["close"], found.close["not close"]) == (agree, differ) == (3, 2)
     assert sum(counts.others.values()) == found.waiting == others == 14

@@ -8,7 +8,7 @@ from tests.runner.test_ledger import PUBLISHED, a_study, published, ran
 from wildlab.evaluation.replication import SIZES
 from wildlab.reporting import metrics
 from wildlab.reporting.published import ONE_FLIGHT, load_published, quantity_kind
-from wildlab.reporting.published_tables import CALCULATIONS, FITTED, PREDICTED, counted, group_of, tally
+from wildlab.reporting.published_tables import CALCULATIONS, FITTED, PREDICTED, count_answers, group_of, tally
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.record.status import study_status
 
@@ -124,7 +124,7 @@ def test_a_number_is_counted_once_and_what_was_fitted_to_it_is_counted_apart(tmp
     # A fit that misses is a finding: it has its verdict, and the mark.
     assert [n.answers for n in one.numbers] == [("close", "outside")] * 3
     assert [n.fitted for n in one.numbers] == ["", "tuned to it", ""]
-    counts = counted([one])
+    counts = count_answers([one])
     assert (counts.of, counts.all, counts.flights) == (1, 2, 1)
     assert counts.groups[FITTED].compatible["outside"] == counts.groups[PREDICTED].compatible["outside"] == 1
     assert counts.groups[PREDICTED].chance == pytest.approx(0.1)
@@ -133,7 +133,7 @@ def test_a_number_is_counted_once_and_what_was_fitted_to_it_is_counted_apart(tmp
 def test_groups_add_up_to_all_numbers():
     """Of the real files, with nothing run."""
     statuses = [study_status(one, Path("nowhere")) for one in load_studies().values()]
-    counts = counted(statuses)
+    counts = count_answers(statuses)
     assert counts.all == sum(len(one.counted) for one in statuses) == sum(counts.others.values())
     assert {CALCULATIONS, FITTED, PREDICTED} < set(counts.groups)
     for one in (n for status in statuses for n in status.numbers):

@@ -19,7 +19,7 @@ from tests.sharing.packed import PACKED, picture, saved
 from tests.sharing.spelt import CODED, DATES, LATITUDE, LEAKS, LONGITUDE, WHEN, secrets
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.reporting.page import page
-from wildlab.sharing.allow_list import foreign
+from wildlab.sharing.allow_list import first_foreign_word
 from wildlab.sharing.document import read_part
 from wildlab.sharing.scan import scan
 
@@ -122,13 +122,13 @@ def test_a_word_that_is_not_ours_is_refused(words, tmp_path):
 def test_codes_are_of_no_form_of_ours(spelling, tmp_path):
     for latitude, longitude in ((LATITUDE, LONGITUDE), (-24.113587, 31.472936), (19.436257, -99.131264)):
         code = CODED[spelling](latitude, longitude)
-        assert foreign(f"it was {code} then"), code
+        assert first_foreign_word(f"it was {code} then"), code
     refused(tmp_path, f"<p>{code.replace('&', '&amp;').replace('<', '&lt;')}</p>")
 
 
 @pytest.mark.parametrize("way", [way for way in DATES if re.search("[-/:.T_]", way) and " " not in way])
 def test_dates_are_of_no_form_of_ours(way):
-    assert foreign(f"on {WHEN.strftime(way)} it")
+    assert first_foreign_word(f"on {WHEN.strftime(way)} it")
 
 
 def test_numbers_as_reports_write_them_are_ours():
@@ -143,9 +143,9 @@ def test_numbers_as_reports_write_them_are_ours():
         "target-1, poses-2",
         "(63 %)",
     ):
-        assert foreign(text) == "", text
+        assert first_foreign_word(text) == "", text
     for text in ("12345678", "1.2.3.4", "9/17/23", "0x3f", "1_000", "63,417", "1e999"):
-        assert foreign(text), text
+        assert first_foreign_word(text), text
 
 
 @pytest.mark.parametrize(

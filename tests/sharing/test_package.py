@@ -23,7 +23,7 @@ from wildlab.flight.store import save_flight
 from wildlab.reporting.page import page
 from wildlab.runner.record.digests import seal
 from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
-from wildlab.sharing.document import Chapter, joined, read_part
+from wildlab.sharing.document import Chapter, join_chapters, read_part
 from wildlab.sharing.package import (
     check_password,
     private_folder,
@@ -183,7 +183,7 @@ def report(folder: Path, body: str = BODY) -> Path:
 def whole(tmp_path: Path, *, exact: bool = False, times: int = 2) -> str:
     path = report(tmp_path)
     parts = tuple(read_part(path, i, exact=exact, generalised=False) for i in range(1, times + 1))
-    return joined(
+    return join_chapters(
         [Chapter("A flight, for the public", "It was <b>somewhere</b>.", ("And <i>so</i>.",), parts)], ""
     )
 

@@ -26,7 +26,7 @@ from tests.sharing.spelt import (
 )
 from wildlab.geometry.gravity import normal_gravity
 from wildlab.sharing.places import geohash, locator, plus_code
-from wildlab.sharing.scan import Finding, Secrets, Sought, not_searched, readings, scan
+from wildlab.sharing.scan import Finding, Secrets, SecretSearch, readings, scan, search_limits
 
 # Off the equator and the meridian, where a coordinate is a small number like any other.
 # A round number says nothing of a place either: 2.0 stands everywhere.
@@ -38,7 +38,7 @@ LATITUDES, LONGITUDES = (
 
 
 def found(text: str, known: Secrets) -> list[tuple[str, str]]:
-    return [(kind, written) for kind, written, _ in Sought(known).found_in(text)]
+    return [(kind, written) for kind, written, _ in SecretSearch(known).found_in(text)]
 
 
 def kinds(text: str, known: Secrets) -> set[str]:
@@ -63,7 +63,7 @@ ANYWHERE = sorted(one for one in SPELLINGS if "entities" not in one and "alone" 
 @given(latitude=LATITUDES, longitude=LONGITUDES)
 @settings(max_examples=15)
 def test_each_spelling_is_found_anywhere(latitude, longitude):
-    look = Sought(replace(secrets(latitude, longitude), moments=(), words=(), numbers=()))
+    look = SecretSearch(replace(secrets(latitude, longitude), moments=(), words=(), numbers=()))
     missed = [
         (spelling, text)
         for spelling in ANYWHERE
@@ -324,9 +324,9 @@ def test_escapes_inside_of_escapes_are_taken_away():
 
 
 def test_what_is_not_looked_for_is_said():
-    said = not_searched(replace(secrets(), words=("boat", "no", "12", "/home/kari/flights")))
+    said = search_limits(replace(secrets(), words=("boat", "no", "12", "/home/kari/flights")))
     assert any("'boat'" in one for one in said) and any("'no'" in one for one in said)
     assert not any("kari" in one for one in said)
     # A list of a thousand lines hides the one that matters; that one comes first.
-    many = not_searched(replace(secrets(), words=("boat", *(f"{n:04d}" for n in range(1046)))))
+    many = search_limits(replace(secrets(), words=("boat", *(f"{n:04d}" for n in range(1046)))))
     assert "'boat'" in many[0] and "1046" in many[1] and len(many) == 3

@@ -21,10 +21,10 @@ from wildlab.sharing.tiers import (
     Cell,
     cell_of,
     confirmed_treatment,
-    generalisation_words,
+    describe_generalisation,
+    describe_place,
     half_diagonal,
     load_tiers,
-    place_words,
     round_up,
     treatment_of,
 )
@@ -130,12 +130,12 @@ def test_at_the_edges_of_the_map_cells_have_places_on_earth():
 def test_the_terms_of_the_standard_say_what_was_done():
     """Darwin Core's. Heights above ground are shown in every copy, those above the sea in none."""
     cell = Cell(-24.9, 31.5, 0.1, 7600.0)
-    told, nothing = generalisation_words(cell, 2), generalisation_words(None, 1)
+    told, nothing = describe_generalisation(cell, 2), describe_generalisation(None, 1)
     assert told.startswith("dataGeneralizations") and nothing.startswith("informationWithheld")
     assert "coordinateUncertaintyInMeters 7600" in told and "0.1 degrees" in told
     assert all("sea level" in one and "terrain withheld" in one for one in (told, nothing))
-    assert "24.9° S, 31.5° E" in place_words(cell) and "7.6 km" in place_words(cell)
-    assert not any(one.isdigit() for one in place_words(None))
+    assert "24.9° S, 31.5° E" in describe_place(cell) and "7.6 km" in describe_place(cell)
+    assert not any(one.isdigit() for one in describe_place(None))
 
 
 @pytest.mark.parametrize(

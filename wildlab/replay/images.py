@@ -137,7 +137,7 @@ def _why_not(frame: Frame, size: tuple[int, int] | None) -> str:
 
 def jpeg_of(frame: Frame, size: tuple[int, int], most: int) -> bytes:
     """A frame as JPEG of a width and height, of as good a quality as `most` bytes allow."""
-    image = frame.image if frame.unit in ("grey", "colour") else stretched(frame.image)
+    image = frame.image if frame.unit in ("grey", "colour") else stretch_contrast(frame.image)
     if image.ndim == 3:
         image = image[..., ::-1]
     if (image.shape[1], image.shape[0]) != size:
@@ -151,7 +151,7 @@ def jpeg_of(frame: Frame, size: tuple[int, int], most: int) -> bytes:
     return packed
 
 
-def stretched(image: NDArray[Any]) -> NDArray[np.uint8]:
+def stretch_contrast(image: NDArray[Any]) -> NDArray[np.uint8]:
     """Counts or temperatures as grey levels.
 
     Parameters
@@ -166,7 +166,7 @@ def stretched(image: NDArray[Any]) -> NDArray[np.uint8]:
 
     Examples
     --------
-    >>> stretched(np.arange(1000, 1500, dtype=np.uint16).reshape(20, 25))[[0, -1], [0, -1]].tolist()
+    >>> stretch_contrast(np.arange(1000, 1500, dtype=np.uint16).reshape(20, 25))[[0, -1], [0, -1]].tolist()
     [0, 255]
     """
     numbers = image.astype(np.float32)

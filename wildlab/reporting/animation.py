@@ -94,7 +94,7 @@ class ShownFlight(NamedTuple):
     truth: Sequence[Course] = ()
 
 
-def checked(shown: ShownFlight) -> ShownFlight:
+def check_arrays(shown: ShownFlight) -> ShownFlight:
     """The same with arrays of floats whose shapes and times are in order.
 
     Raises
@@ -221,7 +221,7 @@ def animated_flight(
     """
     if not alt.strip():
         raise WildlabError("an animated flight has no alt text", "say in words what it shows", field="alt")
-    flown = _within(checked(shown))
+    flown = _within(check_arrays(shown))
     onto = _map_of(flown, probability)
     begin, end = flown.path.times[0], flown.path.times[-1]
     lasts = _seconds(flown, onto) if seconds is None else seconds
@@ -240,7 +240,7 @@ def animated_flight(
         instants, points = max(FEWEST, int(instants * 0.8)), max(40, int(points * 0.8))
 
 
-def pausable(svg: str) -> str:
+def with_pause(svg: str) -> str:
     """An animated flight with what stops it: a fold beside it, since there is no script.
 
     Parameters

@@ -31,12 +31,12 @@ from wildlab.reporting.animation import (
     Outlines,
     ShownFlight,
     animated_flight,
-    pausable,
+    with_pause,
 )
 from wildlab.reporting.own_flights import PAGE as FLIGHTS
 from wildlab.reporting.own_flights import OwnFlight, pill_of
 from wildlab.reporting.page import PILLS, TAGS, page
-from wildlab.reporting.published_tables import counted
+from wildlab.reporting.published_tables import count_answers
 from wildlab.reporting.status import FIRST_LOOK, Case, Number, StudyStatus
 from wildlab.reporting.text import read_style, render
 
@@ -315,7 +315,7 @@ def _answer(one: StudyStatus, *, alone: bool) -> Answer:
     folder = study.name if one.has_report else ""
     if not one.ran:
         return Answer(name, folder, one.state, "no")
-    found = marks.verdict_words(one)
+    found = marks.study_verdict(one)
     return Answer(name, folder, found.word, PILLS[found.level], one.first_look)
 
 
@@ -389,12 +389,12 @@ def front_page(
     code
         Which code it was put together by, as HTML.
     """
-    counts, states = counted(studies), [one.state for one in studies]
+    counts, states = count_answers(studies), [one.state for one in studies]
     alt = render("front-alt", flight=flight)
     moving = animated_flight(flight.shown, alt=alt, probability=PROBABILITY, most_bytes=MOST_MOVING)
     body = render(
         "front",
-        moving=Markup(pausable(moving)),  # noqa: S704 - HTML
+        moving=Markup(with_pause(moving)),  # noqa: S704 - HTML
         flight=flight,
         probability=PROBABILITY,
         done=states.count("done"),

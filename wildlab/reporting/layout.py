@@ -37,7 +37,7 @@ _LEVELS = {"good", "warn", "bad", "neutral"}
 _BY_CLASS = {"summary": SUMMARY, "look": ALERT, "tiles": TILES}
 
 
-def arranged(body: str) -> str:
+def order_report(body: str) -> str:
     """The parts of a report in the order of a page.
 
     Parameters
@@ -58,7 +58,7 @@ def arranged(body: str) -> str:
 
 
 def arrange_parts(soup: BeautifulSoup) -> None:
-    """Put the parts of a report in the order of a page; see `arranged`."""
+    """Put the parts of a report in the order of a page; see `order_report`."""
     if soup.header is None:
         return
     groups: dict[str, list[PageElement]] = {part: [] for part in (*ORDER, VERDICT)}
@@ -172,7 +172,7 @@ class Word(NamedTuple):
 
 
 @cache
-def words(file: Path = FILE) -> tuple[Word, ...]:
+def load_glossary(file: Path = FILE) -> tuple[Word, ...]:
     """All words of the glossary.
 
     Raises
@@ -202,7 +202,7 @@ def with_glossary(body: str, known: Sequence[Word] | None = None) -> str:
     body
         HTML.
     known
-        The words to look for; those of `words` by default.
+        The words to look for; those of `load_glossary` by default.
 
     Returns
     -------
@@ -215,7 +215,7 @@ def with_glossary(body: str, known: Sequence[Word] | None = None) -> str:
 
 def explain_words(soup: BeautifulSoup, known: Sequence[Word] | None = None) -> bool:
     """Explain the words of a page's body, see `with_glossary`; whether it uses any."""
-    known = words() if known is None else known
+    known = load_glossary() if known is None else known
     # The longest spelling first; one of small letters also begins a sentence.
     written = {spelling: word for word in known for spelling in word.match}
     begun = {one[0].upper() + one[1:]: word for one, word in written.items() if one[0].islower()}

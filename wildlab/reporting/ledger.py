@@ -17,7 +17,7 @@ from wildlab.reporting.published_tables import (
     LONGEST,
     PREDICTED,
     claims_table,
-    counted,
+    count_answers,
     flights_of,
     groups_table,
     numbers_table,
@@ -53,7 +53,7 @@ def ledger_page(studies: Iterable[StudyStatus], *, code: str = "", cases: Sequen
         longest=LONGEST,
         cases=cases,
         open_cases=[case for case in cases if case.id not in there],
-        groups=groups_table(counted(studies)),
+        groups=groups_table(count_answers(studies)),
         decided=len(decided),
         own=sum(one.own for one in decided),
         wrong=expected_wrong(len(decided)) if decided else 0.0,
@@ -83,7 +83,7 @@ def _tiles(studies: Sequence[StudyStatus]) -> list[tuple[str, str]]:
         studied += f", {states.count(state)} {words}" if state in states else ""
     tiles = [(f"{len(done)} / {len(studies)}", studied)]
     # What waits for its study is in no denominator.
-    counts = counted(studies)
+    counts = count_answers(studies)
     if counts.of:
         found = counts.groups[PREDICTED]
         words = f"{PREDICTED}, are close{_waiting(found.all - counts.of)}"

@@ -17,7 +17,7 @@ from markupsafe import Markup
 
 from wildlab.evaluation.replication import KINDS, Closeness, Compatibility
 from wildlab.reporting.page import page
-from wildlab.reporting.published_tables import PREDICTED, WIDEST, Counts, counted, groups_table, tally
+from wildlab.reporting.published_tables import PREDICTED, WIDEST, Counts, count_answers, groups_table, tally
 from wildlab.reporting.status import FIRST_LOOK, Number, Standing, StudyStatus, standing
 from wildlab.reporting.text import read_style, render
 
@@ -171,7 +171,7 @@ def legend(numbers: Iterable[Number]) -> Markup:
     )
 
 
-def verdict_words(one: StudyStatus) -> Standing:
+def study_verdict(one: StudyStatus) -> Standing:
     """What a study's numbers and claims come to, as its report says it; a first look comes to nothing yet."""
     if one.state == FIRST_LOOK:
         return Standing("first look", f"{one.first_look}: not counted yet.", "warn")
@@ -200,11 +200,11 @@ def numbers_page(studies: Sequence[StudyStatus]) -> str:
     str
         HTML; it works with no study run.
     """
-    counts, rows = counted(studies), []
+    counts, rows = count_answers(studies), []
     for one in studies:
         shown = drawable(one.counted) if one.ran else []
         if shown:
-            found, name = verdict_words(one), one.study.name.replace("-", " ")
+            found, name = study_verdict(one), one.study.name.replace("-", " ")
             alt = f"{name}: {len(shown)} numbers; {found.word}: {found.reason}"
             rows.append((one.study.name, name, plot(shown, alt=alt, width=480.0, most_levels=7), _tally(one)))
     body = render(

@@ -25,7 +25,7 @@ from wildlab.reporting.published import (
     spread_key,
 )
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus
-from wildlab.reporting.text import dim, marked, pill, render, table
+from wildlab.reporting.text import dim, mark_up, pill, render, table
 
 #: What the headline counts: predicted for a flight that nothing of ours was fitted to; then the others.
 PREDICTED = "sizes, NEES and NIS, predicted"
@@ -142,7 +142,7 @@ class Counts(NamedTuple):
         return found.all - found.unjudged - found.waiting if found else 0
 
 
-def counted(studies: Sequence[StudyStatus]) -> Counts:
+def count_answers(studies: Sequence[StudyStatus]) -> Counts:
     """Count them."""
     by_group: dict[str, list[Number]] = {group: [] for group in GROUPS}
     others: Counter[str] = Counter()
@@ -403,7 +403,7 @@ def effects_table(rows: Sequence[tuple[str, str, str, str, str]]) -> Markup:
     """
     filled = max((2 + (2 if one[4] else 1 if one[3] else 0) for one in rows), default=2)
     cells = [
-        (_with_source(text, source), pill(verdict, PILLS.get(verdict, "")), *map(marked, effects))[:filled]
+        (_with_source(text, source), pill(verdict, PILLS.get(verdict, "")), *map(mark_up, effects))[:filled]
         for text, source, verdict, *effects in rows
     ]
     heads = ("claim", "verdict", "true on", "difference")[:filled]
@@ -430,8 +430,8 @@ def _report_row(
     quantity = words_of(quantities, one.name) + (f" ({unit})" if unit else "")
     near, inside = one.answers
     return (
-        marked(words_of(subjects, one.subject)),
-        marked(quantity + (", size" if one.by_size else "")),
+        mark_up(words_of(subjects, one.subject)),
+        mark_up(quantity + (", size" if one.by_size else "")),
         number(one.published, one.digits),
         number(one.here, one.digits + 1),
         strip(one),

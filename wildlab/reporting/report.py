@@ -33,7 +33,7 @@ from wildlab.errors import WildlabError
 from wildlab.messages.catalogue import Message, PageTexts, fill
 from wildlab.messages.quantities import known
 from wildlab.reporting import metrics as schema
-from wildlab.reporting.animation import PAUSE_STYLE, ShownFlight, animated_flight, pausable
+from wildlab.reporting.animation import PAUSE_STYLE, ShownFlight, animated_flight, with_pause
 from wildlab.reporting.figures import figure_html, png_bytes, save_figure
 from wildlab.reporting.layout import ALERT, LIMITS, METHOD, VERDICT
 from wildlab.reporting.page import PILLS, TAGS
@@ -186,11 +186,6 @@ class Report:
         intro = known(intro)
         self._show(heading, f"<p>{inline(intro)}</p>" if intro else "")
 
-    def subsection(self, title: str, intro: str = "") -> None:
-        """``<h3>`` and, if given, a paragraph."""
-        intro = known(intro)
-        self._show(f"<h3>{inline(title)}</h3>", f"<p>{inline(intro)}</p>" if intro else "")
-
     def text(self, paragraphs: str) -> None:
         """Paragraphs, split at blank lines, with ``$latex$`` set as maths. Not for text out of data."""
         self._show(prose(known(paragraphs)))
@@ -247,7 +242,7 @@ class Report:
         fold, intro
             The one-line summary behind which it is folded away, and what stands above it.
         """
-        drawn = pausable(animated_flight(shown, alt=alt, most_bytes=most_bytes))
+        drawn = with_pause(animated_flight(shown, alt=alt, most_bytes=most_bytes))
         html = f"<style>{PAUSE_STYLE}</style><figure>{drawn}</figure>"
         if fold:
             html = f"<details><summary>{inline(fold)}</summary><p>{inline(known(intro))}</p>{html}</details>"

@@ -277,7 +277,7 @@ LOOK_WORDS = {
 }
 
 
-def look_words(first_look: Any) -> str:
+def describe_first_look(first_look: Any) -> str:
     """What is shown of what: "5 of 200 flights"; nothing for a full report, or what is none of ours."""
     try:
         parts = [

@@ -135,12 +135,12 @@ def _templates() -> Environment:
         # Names of strangers turn no text around.
         finalize=lambda value: value if hasattr(value, "__html__") else visible(value),
     )
-    found.filters["inline"] = marked
+    found.filters["inline"] = mark_up
     found.filters |= {"percent": percent, "duration": duration}
     return found
 
 
-def marked(text: object) -> Markup:
+def mark_up(text: object) -> Markup:
     """Text with its marks, as HTML; what is HTML stays as it is."""
     return text if isinstance(text, Markup) else Markup(inline(text))  # noqa: S704 - escaped there
 
@@ -289,4 +289,4 @@ def _cell(value: object) -> Markup | str:
         return "yes" if value else "no"
     if value is None or (isinstance(value, float) and value != value) or value is pd.NaT or value is pd.NA:
         return NOTHING
-    return marked(known(str(value))) or (NOTHING if str(value) else "")
+    return mark_up(known(str(value))) or (NOTHING if str(value) else "")

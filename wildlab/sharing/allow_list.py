@@ -96,7 +96,7 @@ def own_phrases() -> str:
 
 
 @cache
-def own_words() -> frozenset[str]:
+def own_vocabulary() -> frozenset[str]:
     """The different ones among them."""
     return frozenset(own_phrases().split())
 
@@ -106,18 +106,17 @@ def _own_tokens() -> frozenset[str]:
     """The same, runs of letters alone, names with _, and whatever short thing has a digit: ``H 7.2.2``."""
     text = own_text()
     chunks = {chunk.strip(_AROUND) for chunk in _CHUNK.findall(text) if len(chunk) < 20}
-    return own_words() | set(_LETTERS.findall(text)) | set(re.findall(r"\w+", text)) | chunks
+    return own_vocabulary() | set(_LETTERS.findall(text)) | set(re.findall(r"\w+", text)) | chunks
 
 
-def foreign(text: str) -> str:
+def first_foreign_word(text: str) -> str:
     """The first word or number in a text that no report of wildlab has; nothing where all are its own.
 
     Examples
     --------
-    >>> foreign("The mean error is 6.4 m (5.9 to 7.0), of target-2."), foreign("seen near Skukuza")
-    ('', 'skukuza')
-    >>> foreign("9/17/23"), foreign("u4pruydqqvj"), foreign("1694960631")
-    ('9/17/23', 'u4pruydqqvj', '1694960631')
+    >>> texts = ("The mean error is 6.4 m, of target-2.", "seen near Skukuza", "9/17/23", "1694960631")
+    >>> [first_foreign_word(text) for text in texts]
+    ['', 'skukuza', '9/17/23', '1694960631']
     """
     coded = _CODED.search(text)
     if coded:
@@ -211,7 +210,7 @@ class Writer:
         raise self._refusal(tag, f"has {name}={text[:60]!r}")
 
     def _words(self, text: str, tag: Tag) -> None:
-        found = next(iter(_CODED.findall(text)), "") if self.exact else foreign(text)
+        found = next(iter(_CODED.findall(text)), "") if self.exact else first_foreign_word(text)
         if found:
             raise self._refusal(tag, f"says {found[:60]!r}, which is no word or number of a report")
 

@@ -158,7 +158,7 @@ def _tie(link: Tag) -> None:
         link.decompose()
 
 
-def joined(chapters: Sequence[Chapter], heading: str) -> str:
+def join_chapters(chapters: Sequence[Chapter], heading: str) -> str:
     """One page with all chapters, and a list of their reports first where there is more than one.
 
     Parameters

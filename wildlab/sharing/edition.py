@@ -29,7 +29,7 @@ from wildlab.messages.catalogue import (
 )
 from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.page import POLICY
-from wildlab.reporting.text import escape, marked, read_style, render
+from wildlab.reporting.text import escape, mark_up, read_style, render
 from wildlab.sharing.edition_story import MEDIAN_DISTANCE, STEP_M, Facts, tell
 
 Array = NDArray[np.float64]
@@ -368,7 +368,7 @@ def edition_html(
     story = tell(facts)
 
     def shown(one: Value) -> Markup:
-        return marked(say(words, one))
+        return mark_up(say(words, one))
 
     drawn = picture_html(picture, facts, words)
     # What a step is taken as stands where steps are.

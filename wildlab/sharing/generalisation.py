@@ -34,11 +34,11 @@ from wildlab.sharing.names import (
     Names,
     learn_names,
     neutral_hulls,
-    renamed,
+    rename_identifiers,
     scale_pixels,
     whole_quarters,
 )
-from wildlab.sharing.sender_list import Removed, removed_from
+from wildlab.sharing.sender_list import Removal, list_removals
 from wildlab.sharing.tiers import Cell, Treatment, cell_of
 
 _FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
@@ -191,7 +191,7 @@ class Generalised:
     cell: Cell | None
     when: str
     names: Names
-    removed: tuple[Removed, ...]
+    removed: tuple[Removal, ...]
     clocks: dict[str, float] = field(default_factory=dict)
     pixels: float = 1.0
 
@@ -229,14 +229,14 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
     folded = {key: value - clocks[key] for key, value in manifest.clocks.model_dump().items()}
     start = first_stamp(flight)
     nav = {
-        names.of("poses", source): _moved(renamed(table, names, "nav"), shift, start)
+        names.of("poses", source): _moved(rename_identifiers(table, names, "nav"), shift, start)
         for source, table in flight.nav.items()
     }
     best = _poses(flight)
     camera, pixels = rounded_camera(manifest.camera)
     tables: dict[str, pd.DataFrame] = {}
     for key, table in flight.tables.items():
-        table = renamed(table, names, key)
+        table = rename_identifiers(table, names, key)
         if key == "imu":
             here = local_earth(*manifest.origin_tuple()[::2])
             table = moved_imu(table, best, shift, here, local_earth(math.radians(there[0]), 0.0))
@@ -271,7 +271,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
         )
     made = Flight(make_manifest(data), nav, tables, None, terrain)
     at = "withheld" if cell is None else f"{cell.latitude_deg:g}, {cell.longitude_deg:g}, a cell's middle"
-    removed = tuple(removed_from(true, made, names, start, when, at))
+    removed = tuple(list_removals(true, made, names, start, when, at))
     return Generalised(made, cell, when, names, removed, zones, pixels)
 
 

@@ -97,7 +97,7 @@ def learn_names(
     return names
 
 
-def renamed(table: pd.DataFrame, names: Names, schema: str) -> pd.DataFrame:
+def rename_identifiers(table: pd.DataFrame, names: Names, schema: str) -> pd.DataFrame:
     """A table with neutral names, and without columns that the schema does not know: they may hold anything.
 
     Parameters

@@ -30,7 +30,7 @@ from wildlab.sharing.sender_list import Agreement, compare
 _TOLD = ("filters", "targets", "sensors", "settings", "tuned", "smooth")
 
 
-class Redrawn(NamedTuple):
+class RecomputedReports(NamedTuple):
     """A generalised flight and its reports.
 
     Attributes
@@ -57,7 +57,7 @@ class Redrawn(NamedTuple):
     missing: tuple[str, ...]
 
 
-def redraw(
+def recompute_reports(
     flight: Flight,
     made: Generalised,
     source: Source,
@@ -65,7 +65,7 @@ def redraw(
     *,
     notebooks: Path = NOTEBOOKS,
     console: Console | None = None,
-) -> Redrawn:
+) -> RecomputedReports:
     """Make the reports of a flight again from its generalised copy.
 
     Parameters
@@ -137,7 +137,7 @@ def redraw(
     (own,) = own_flights(reports, ())
     numbered = [one for one in pairs if one.name == f"{source.name}{MANY}"]
     agreement = compare(pairs, made.names, numbered)
-    return Redrawn(made, folders, own, agreement, tuple(notes), missing)
+    return RecomputedReports(made, folders, own, agreement, tuple(notes), missing)
 
 
 def _many(

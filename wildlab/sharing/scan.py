@@ -36,7 +36,7 @@ from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import EARTH_RATE, normal_gravity
 from wildlab.paths import ROOT
-from wildlab.sharing.allow_list import own_phrases, own_words
+from wildlab.sharing.allow_list import own_phrases, own_vocabulary
 from wildlab.sharing.generalisation import Generalised, first_stamp, new_origin
 from wildlab.sharing.names import names_in
 from wildlab.sharing.numbers import Dates, Hit, Numbers, numbers_of
@@ -140,7 +140,7 @@ class Finding:
         return f"{self.file}: {self.kind}: {self.written}"
 
 
-def scan(files: Mapping[str, str], secrets: Secrets | Sought) -> list[Finding]:
+def scan(files: Mapping[str, str], secrets: Secrets | SecretSearch) -> list[Finding]:
     """What must not be in texts and their names, and is.
 
     Parameters
@@ -161,7 +161,7 @@ def scan(files: Mapping[str, str], secrets: Secrets | Sought) -> list[Finding]:
     >>> print(scan({"page.html": "<p>60&deg; 7' 24.3&quot; N, 10&deg; 15' 0.8&quot; E</p>"}, known)[0])
     page.html: place: latitude and longitude, degrees, minutes and seconds
     """
-    sought = secrets if isinstance(secrets, Sought) else Sought(secrets)
+    sought = secrets if isinstance(secrets, SecretSearch) else SecretSearch(secrets)
     findings: list[Finding] = []
     for name, content in files.items():
         for where, text in ((f"the name of the file {name}", name), (name, content)):
@@ -177,7 +177,7 @@ def scan(files: Mapping[str, str], secrets: Secrets | Sought) -> list[Finding]:
     return findings
 
 
-class Sought:
+class SecretSearch:
     """What is looked for, prepared once for all texts."""
 
     def __init__(self, secrets: Secrets) -> None:
@@ -248,7 +248,7 @@ def readings(text: str) -> list[str]:
     return list(dict.fromkeys([*found, *bare, *tables]))
 
 
-def not_searched(secrets: Secrets) -> list[str]:
+def search_limits(secrets: Secrets) -> list[str]:
     """What of the secrets is not looked for, and why: sentences for the sender."""
     said = phrases_of(secrets.words)[1]
     return [*said, "What is drawn is not read: the pixels of pictures, and letters drawn as outlines."]
@@ -285,7 +285,7 @@ def phrases_of(words: Iterable[str]) -> tuple[list[tuple[str, ...]], list[str]]:
                 elif one == piece and phrase:
                     skipped.setdefault(reason, {})[one] = None
             telling = [part for part in parts_of(stem) if len(part) >= LONG and not part.isdigit()]
-            wanted.update({(part,): None for part in telling if part not in own_words()})
+            wanted.update({(part,): None for part in telling if part not in own_vocabulary()})
     rare = sorted(skipped.items(), key=lambda one: len(one[1]))
     said = []
     for reason, ones in rare:
@@ -301,7 +301,7 @@ def _useless(phrase: tuple[str, ...]) -> str:
         return f"it has fewer than {SHORTEST} letters, and stands everywhere"
     if joined.isdigit() and len(joined) < 6:
         return "it is a short number, and stands everywhere"
-    if all(part in own_words() for part in phrase) and f" {' '.join(phrase)} " in own_phrases():
+    if all(part in own_vocabulary() for part in phrase) and f" {' '.join(phrase)} " in own_phrases():
         return "wildlab's own reports use it"
     return ""
 

@@ -24,7 +24,7 @@ REMAINS = tuple(text for key, text in load_texts("sharing").answers.items() if k
 
 
 @dataclass(frozen=True)
-class Removed:
+class Removal:
     """One thing that the copy does not have: what it was, and what stands in its place. For the sender."""
 
     what: str
@@ -32,9 +32,9 @@ class Removed:
     now: str
 
 
-def removed_from(
+def list_removals(
     flight: Flight, made: Flight, names: Names, start: float, when: str, place: str
-) -> Iterator[Removed]:
+) -> Iterator[Removal]:
     """What is gone of the manifest and the tables, as the sender knows it.
 
     Parameters
@@ -50,12 +50,12 @@ def removed_from(
     """
     was, now = flight.manifest, made.manifest
     o = was.origin
-    yield Removed("origin", f"{o.latitude_deg}, {o.longitude_deg}, {o.height_m} m", place)
-    yield Removed("heights", "above the ellipsoid, by the origin", "above the flight's own ground")
+    yield Removal("origin", f"{o.latitude_deg}, {o.longitude_deg}, {o.height_m} m", place)
+    yield Removal("heights", "above the ellipsoid, by the origin", "above the flight's own ground")
     if was.time.epoch is not None:
         true = datetime.fromtimestamp(was.time.epoch.timestamp() + start, UTC)
-        yield Removed("date and time", f"{true:%Y-%m-%d %H:%M:%S} UTC", f"{when}, time from the first sample")
-    yield Removed("flight", was.name, now.name)
+        yield Removal("date and time", f"{true:%Y-%m-%d %H:%M:%S} UTC", f"{when}, time from the first sample")
+    yield Removal("flight", was.name, now.name)
     for what, one, other in (
         ("description", was.description, ""),
         ("platform", was.platform.name, now.platform.name),
@@ -70,33 +70,33 @@ def removed_from(
         ("reference of the map", was.terrain.crs if was.terrain else "", "n"),
     ):
         if one and one != other:
-            yield Removed(what, one, other or "left out")
+            yield Removal(what, one, other or "left out")
     if was.vertical.correction_m or was.vertical.reference != "ellipsoid":
         v = was.vertical
-        yield Removed("vertical reference", f"{v.reference}, {v.correction_m} m taken off", "left out")
+        yield Removal("vertical reference", f"{v.reference}, {v.correction_m} m taken off", "left out")
     if was.magnetometer.declination_deg is not None:
-        yield Removed("declination", f"{was.magnetometer.declination_deg} deg", "that of no place")
+        yield Removal("declination", f"{was.magnetometer.declination_deg} deg", "that of no place")
     for key, value in was.clocks.model_dump().items():
         kept = getattr(now.clocks, key)
         if value != kept:
-            yield Removed(key.removesuffix("_s").replace("_", " "), f"{value} s", f"{kept:g} s")
+            yield Removal(key.removesuffix("_s").replace("_", " "), f"{value} s", f"{kept:g} s")
     for name, part in was.sensors.items():
         kept = now.sensors[names.of("sensor", name)].clock_offset_s
         if part.clock_offset_s != kept:
-            yield Removed(f"clock offset of {name}", f"{part.clock_offset_s} s", f"{kept:g} s")
+            yield Removal(f"clock offset of {name}", f"{part.clock_offset_s} s", f"{kept:g} s")
     for one in hulls_of(was.targets):
-        yield Removed("kind of target", one, "a letter")
+        yield Removal("kind of target", one, "a letter")
     for source in was.sources:
-        yield Removed("raw file", f"{source.file} ({source.sha256[:8]})", "left out")
+        yield Removal("raw file", f"{source.file} ({source.sha256[:8]})", "left out")
     for key in sorted({*flight.tables} - {*made.tables}):
-        yield Removed("table", key, "left out: what the field there did to it cannot be told")
+        yield Removal("table", key, "left out: what the field there did to it cannot be told")
     tables = {**{f"nav/{name}": nav for name, nav in flight.nav.items()}, **flight.tables}
     for name, table in tables.items():
         copied = _copied(made, name, flight)
         for column in [] if copied is None else [one for one in table if one not in copied]:
-            yield Removed("column", f"{name}: {column}", "left out")
+            yield Removal("column", f"{name}: {column}", "left out")
     if flight.folder is not None:
-        yield Removed("folder", str(flight.folder.resolve()), "left out")
+        yield Removal("folder", str(flight.folder.resolve()), "left out")
     yield from _renames(names)
 
 
@@ -111,17 +111,17 @@ def _copied(made: Flight, name: str, flight: Flight) -> pd.DataFrame | None:
     return list(made.nav.values())[list(flight.nav).index(name.removeprefix("nav/"))]
 
 
-def _renames(names: Names) -> Iterator[Removed]:
+def _renames(names: Names) -> Iterator[Removal]:
     for kind, known in sorted(names.by_kind.items()):
         for true, neutral in known.items():
             if kind not in ("frame", "detection"):
-                yield Removed(kind, true, neutral)
+                yield Removal(kind, true, neutral)
         if kind in ("frame", "detection") and known:
             (a, first), *_, (b, last) = (*known.items(), *known.items())
-            yield Removed(f"{len(known)} names of {kind}s", f"{a} to {b}", f"{first} to {last}")
+            yield Removal(f"{len(known)} names of {kind}s", f"{a} to {b}", f"{first} to {last}")
 
 
-def removed_lines(removed: Sequence[Removed]) -> list[str]:
+def removal_lines(removed: Sequence[Removal]) -> list[str]:
     """One line for each thing: what, what it was, and what stands in its place."""
     return [
         f"{one.what}: {one.was!r} -> {one.now}" if one.was else f"{one.what}: {one.now}" for one in removed
@@ -282,7 +282,7 @@ def share_apart(one: float, other: float) -> float:
     return 0.0 if apart <= NOTHING else apart / max(abs(one), abs(other))
 
 
-def agreement_words(found: Agreement) -> str:
+def describe_agreement(found: Agreement) -> str:
     """For the page: what it says of its own numbers; nothing where nothing was compared."""
     if not found.compared:
         return ""

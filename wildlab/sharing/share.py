@@ -17,8 +17,8 @@ from wildlab.flight.store import Flight, load_flight
 from wildlab.messages.catalogue import Day, Language, load_language
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import load_studies
-from wildlab.sharing.allow_list import foreign
-from wildlab.sharing.document import Chapter, joined, read_part
+from wildlab.sharing.allow_list import first_foreign_word
+from wildlab.sharing.document import Chapter, join_chapters, read_part
 from wildlab.sharing.edition import Place, edition_html, map_of
 from wildlab.sharing.edition_story import facts_of
 from wildlab.sharing.generalisation import Generalised, generalise
@@ -31,17 +31,25 @@ from wildlab.sharing.package import (
     sweep_beside,
     zip_bytes,
 )
-from wildlab.sharing.recomputation import Redrawn, redraw
+from wildlab.sharing.recomputation import RecomputedReports, recompute_reports
 from wildlab.sharing.reports import Source, flight_folder, sources_of
-from wildlab.sharing.scan import Secrets, Sought, all_of, flight_secrets, machine_secrets, not_searched, scan
-from wildlab.sharing.sender_list import agreement_words, removed_lines, sender_list
+from wildlab.sharing.scan import (
+    Secrets,
+    SecretSearch,
+    all_of,
+    flight_secrets,
+    machine_secrets,
+    scan,
+    search_limits,
+)
+from wildlab.sharing.sender_list import describe_agreement, removal_lines, sender_list
 from wildlab.sharing.tiers import (
     Tier,
     Treatment,
     confirmed_treatment,
-    generalisation_words,
+    describe_generalisation,
+    describe_place,
     load_tiers,
-    place_words,
 )
 
 #: Of what the scan found, so many are named.
@@ -166,7 +174,7 @@ def share(
         for source, name, folder in zip(sources, calls, folders, strict=True)
     ]
     secrets = all_of([machine_secrets(), *(one.secrets for one in prepared if one is not None)])
-    sought = Sought(secrets)
+    sought = SecretSearch(secrets)
     _refuse_leaks({target.name: ""}, target, sought)
     documents: list[_Document] = []
     for source, name, one in zip(sources, calls, prepared, strict=True):
@@ -177,7 +185,7 @@ def share(
             documents.append(_copied(source, tier, name, first))
     pages = _pages(documents, target, zipped, len(flights))
     _refuse_leaks(pages, target, sought)
-    notes = [*left_out, *not_searched(secrets), *([] if password is None else [OPENED_WITH])]
+    notes = [*left_out, *search_limits(secrets), *([] if password is None else [OPENED_WITH])]
     lines = sender_list(
         target.name, [document.told for document in documents], notes, generalised=any(folders)
     )
@@ -212,14 +220,14 @@ def _target(name: str, tier: Tier, out: Path | None, zipped: bool) -> Path:
 def _pages(documents: Sequence[_Document], target: Path, zipped: bool, flights: int) -> dict[str, str]:
     """The pages by name: one of all, or one of each."""
     if zipped:
-        reports = {f"{one.name}.html": joined([one.chapter], one.chapter.heading) for one in documents}
+        reports = {f"{one.name}.html": join_chapters([one.chapter], one.chapter.heading) for one in documents}
         return reports | {f"{one.name}-one-sheet.html": one.edition for one in documents if one.edition}
     if documents[0].edition:
         return {target.name: documents[0].edition}
     studies = len(documents) - flights
     counts = [(flights, "flight", "flights"), (studies, "study", "studies")]
     said = " and ".join(f"{n} {one if n == 1 else many}" for n, one, many in counts if n)
-    return {target.name: joined([one.chapter for one in documents], f"Reports on {said}")}
+    return {target.name: join_chapters([one.chapter for one in documents], f"Reports on {said}")}
 
 
 def _prepare(folder: Path, source: Source, tier: Tier, name: str) -> _Prepared:
@@ -241,7 +249,7 @@ def _generalised(
     """A flight's reports, drawn again."""
     made, treatment, name = one.made, one.treatment, one.made.flight.name
     with private_folder() as work:
-        drawn = redraw(one.flight, made, source, work, notebooks=notebooks, console=console)
+        drawn = recompute_reports(one.flight, made, source, work, notebooks=notebooks, console=console)
         parts = [
             read_part(folder / "report.html", number, exact=False, generalised=True)
             for number, folder in enumerate(drawn.folders.values(), first)
@@ -253,12 +261,12 @@ def _generalised(
         "Names of the flight, of targets, files and sensors are replaced by neutral ones, focal lengths are "
         "rounded, and photographs are left out.",
         "Every figure and every number was computed again from generalised data. "
-        + agreement_words(drawn.agreement),
-        generalisation_words(made.cell, treatment.category),
+        + describe_agreement(drawn.agreement),
+        describe_generalisation(made.cell, treatment.category),
     ]
     heading = f"{'A flight' if name == 'flight' else name.replace('-', ' ').capitalize()}, {_WORDS[tier]}"
     otherwise = drawn.agreement.otherwise
-    named = next(filter(None, map(foreign, otherwise)), "")
+    named = next(filter(None, map(first_foreign_word, otherwise)), "")
     if named:
         raise RunFailed(
             f"there is no copy, since it differs from your reports, and cannot say how without {named!r}",
@@ -271,13 +279,13 @@ def _generalised(
             "share the reports without --edition: they say at their top where they differ",
             file=source.folders[0],
         )
-    lead = " ".join([*([BEWARE, *otherwise] if otherwise else []), place_words(made.cell) + when])
+    lead = " ".join([*([BEWARE, *otherwise] if otherwise else []), describe_place(made.cell) + when])
     chapter = Chapter(heading, lead, tuple(line.strip() for line in about), tuple(parts))
     sheet = "" if words is None else _sheet(drawn, name, treatment, words)
     return _Document(name, chapter, (f"Flight {source.name}", tuple(_told(drawn, treatment))), sheet)
 
 
-def _sheet(drawn: Redrawn, name: str, treatment: Treatment, words: Language) -> str:
+def _sheet(drawn: RecomputedReports, name: str, treatment: Treatment, words: Language) -> str:
     """The flight on one sheet, from its generalised copy alone."""
     made = drawn.made
     place = Place()
@@ -303,7 +311,7 @@ def _language(edition: str | Path | None, sources: Sequence[Source], exact: bool
     return load_language(edition)
 
 
-def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:
+def _told(drawn: RecomputedReports, treatment: Treatment) -> Iterator[str]:
     how = "as flight.toml states" if treatment.stated else "assumed: flight.toml states no category"
     how = how if treatment.unconfirmed is None else "the more careful one"
     yield f"category {treatment.category} of GBIF's guide ({how}), dates to the {treatment.date}"
@@ -312,7 +320,7 @@ def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:
             f"flight.toml states category {treatment.unconfirmed}, and it was not confirmed: the more "
             "careful one counts. If it is meant: wildlab check --accept"
         )
-    yield from removed_lines(drawn.made.removed)
+    yield from removal_lines(drawn.made.removed)
     a = drawn.agreement
     if a.compared:
         yield f"{a.same} of {a.compared} numbers are those of your report, to 0.1 % or better"
@@ -337,7 +345,7 @@ def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
     return _Document(name, Chapter(f"{name}, {_WORDS[tier]}", about, (), tuple(parts)), (heading, (removed,)))
 
 
-def _refuse_leaks(pages: Mapping[str, str], target: Path, sought: Sought) -> None:
+def _refuse_leaks(pages: Mapping[str, str], target: Path, sought: SecretSearch) -> None:
     """Look through all that is to be sent, and refuse it where something must not be in it.
 
     Raises

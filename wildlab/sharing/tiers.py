@@ -231,13 +231,13 @@ def cell_of(latitude_deg: float, longitude_deg: float, size_deg: float, reach_m:
     sides = [*(side for side in SIDES if side < size_deg), size_deg]
     lat, lon = latitude_deg, (longitude_deg + 180) % 360 - 180
     for side in sides:
-        lat, lon = rounded(lat, side), rounded(lon, side)
+        lat, lon = round_to_step(lat, side), round_to_step(lon, side)
     lat, lon = max(-90.0, min(90.0, lat)), -180.0 if lon >= 180.0 else lon
     # What was rounded more than once may be farther off by half of each of the finer sides.
     return Cell(lat, lon, size_deg, round_up(half_diagonal(lat, sum(sides)) + reach_m))
 
 
-def rounded(value: float, step: float) -> float:
+def round_to_step(value: float, step: float) -> float:
     """To the nearest multiple of a step, halves up."""
     return round(math.floor(value / step + 0.5) * step, _DIGITS) + 0.0
 
@@ -258,7 +258,7 @@ def round_up(metres: float) -> float:
     return round(math.ceil(metres / step - 1e-9) * step, _DIGITS)
 
 
-def place_words(cell: Cell | None) -> str:
+def describe_place(cell: Cell | None) -> str:
     """Where it was, in words; without a cell, that it is not told."""
     texts = load_texts("sharing").answers
     if cell is None:
@@ -267,12 +267,12 @@ def place_words(cell: Cell | None) -> str:
         "latitude": _side(cell.latitude_deg, "N", "S"),
         "longitude": _side(cell.longitude_deg, "E", "W"),
         "size": f"{cell.size_deg:g}",
-        "uncertainty": distance_words(cell.uncertainty_m),
+        "uncertainty": format_distance(cell.uncertainty_m),
     }
     return fill(texts["cell"], {}, values)
 
 
-def generalisation_words(cell: Cell | None, category: int) -> str:
+def describe_generalisation(cell: Cell | None, category: int) -> str:
     """The text for Darwin Core's ``dataGeneralizations`` (or ``informationWithheld``)."""
     texts, values = load_texts("sharing").answers, {"category": str(category)}
     if cell is None:
@@ -281,7 +281,7 @@ def generalisation_words(cell: Cell | None, category: int) -> str:
     return fill(texts["data-generalizations"], {}, values)
 
 
-def distance_words(metres: float) -> str:
+def format_distance(metres: float) -> str:
     """``"6.3 km"``, ``"130 m"``: two digits as they are."""
     return f"{metres / 1e3:g} km" if metres >= 1e3 else f"{metres:g} m"
 

@@ -28,7 +28,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames.image import MOST_BYTES, decode
 from wildlab.paths import DATA
-from wildlab.replay.images import stretched
+from wildlab.replay.images import stretch_contrast
 from wildlab.runner.annotation.session import Session, check_points
 
 #: Bytes that a page may send at once, and how long it may take for it, s.
@@ -332,7 +332,7 @@ def picture_of(path: Path) -> Picture | str:
         return f"This image cannot be shown: {found}."
     image, unit, _ = found
     if unit not in ("grey", "colour"):
-        image = stretched(image)
+        image = stretch_contrast(image)
     if image.ndim == 3:
         image = np.ascontiguousarray(image[..., ::-1])
     if image.ndim == 3 and image.shape[0] * image.shape[1] > MOST_EXACT:

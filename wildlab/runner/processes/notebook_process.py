@@ -91,7 +91,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.files import write_atomic, write_json
     from wildlab.reporting import metrics, notebook_pages
     from wildlab.reporting.page import first_look_notice
-    from wildlab.reporting.status import look_words
+    from wildlab.reporting.status import describe_first_look
     from wildlab.runner.catalogue import OTHERS
     from wildlab.runner.record import provenance
 
@@ -138,7 +138,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
         origin["seeds"] = job.seeds.provenance()
     origin["seconds"] = round(time.monotonic() - started, 1)
     write_json(folder / "provenance.json", origin)
-    look = look_words(job.first_look)
+    look = describe_first_look(job.first_look)
     notice = first_look_notice(look, job.again) if look else ""
     page = notebook_pages.report_page(
         cleaned,

@@ -11,7 +11,7 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.published import FOLDER, compared_number, load_claims, published_rows
-from wildlab.reporting.status import FIRST_LOOK, Claim, Number, StudyStatus, look_words
+from wildlab.reporting.status import FIRST_LOOK, Claim, Number, StudyStatus, describe_first_look
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.record.digests import BEFORE_DIGESTS, STATUS, has_digests, read_status
 
@@ -26,7 +26,7 @@ def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> 
     state = str(status["state"])
     metrics: dict[str, Any] | None = None
     reason = str(status.get("reason", ""))
-    look = look_words(status.get("first_look"))
+    look = describe_first_look(status.get("first_look"))
     if state == "done":
         try:
             metrics = read_metrics(folder / "metrics.json")
