@@ -24,9 +24,12 @@ Size = tuple[float, float]
 
 
 class Values(NamedTuple):
-    """A line or a row of dots: (N,) values, (2, N) ends of intervals if any, colour, marker or style."""
+    """A line or a row of dots: (N,) values, (2, N) ends of intervals if any, colour, marker or style.
 
-    middle: ArrayLike
+    Without values a line is its band alone.
+    """
+
+    middle: ArrayLike | None
     ends: ArrayLike | None = None
     color: str = BLUE
     look: str = ""
@@ -40,8 +43,9 @@ def draw_lines(ax: Axes, x: ArrayLike, lines: Mapping[str, Values], *, bars: boo
             if bars:
                 ax.vlines(x, low, high, color=one.color, alpha=0.35, lw=2)
             else:
-                draw_band(ax, x, low, high, one.color, alpha=0.17)
-        ax.plot(x, one.middle, one.look or "o-", color=one.color, label=name or None)
+                draw_band(ax, x, low, high, one.color, name if one.middle is None else "", alpha=0.17)
+        if one.middle is not None:
+            ax.plot(x, one.middle, one.look or "o-", color=one.color, label=name or None)
 
 
 def lines_chart(
@@ -90,8 +94,9 @@ def draw_rows(ax: Axes, rows: Sequence[str], series: Mapping[str, Values], apart
         at = np.arange(len(rows)) + apart * (k - (len(series) - 1) / 2)
         if one.ends is not None:
             ax.hlines(at, *np.asarray(one.ends, float), color=one.color, lw=2)
-        look: dict[str, Any] = {"mfc": "white", "mew": 1.6} if one.look == "D" else {}
-        ax.plot(one.middle, at, one.look or "o", color=one.color, ms=7, ls="none", label=name or None, **look)
+        look: dict[str, Any] = {"mfc": "white", "mew": 1.6, "ms": 7} if one.look == "D" else {"ms": 5}
+        dots = np.asarray(one.middle, float)
+        ax.plot(dots, at, one.look or "o", color=one.color, ls="none", label=name or None, **look)
     name_rows(ax, rows)
 
 

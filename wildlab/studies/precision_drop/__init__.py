@@ -46,7 +46,7 @@ def plot_mean(runs: pd.DataFrame) -> Figure:
         "a single one": Values(0 * middle + runs[SINGLE, "median_error"].median(), color=GREY, look="--"),
     }
     if len(runs) > 1:
-        band = Values(middle, np.transpose([bounds_of(column) for column in columns]))
+        band = Values(None, np.transpose([bounds_of(column) for column in columns]))
         lines = {f"flights, {spread_key(len(runs))}": band} | lines
     x, y = "detections in the mean", "error of the mean (m)"
     return lines_chart(known, lines, x, y, size=(5.6, 4.2), xscale="log", ylim=(0, None))
