@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 
 from benchmarks.timing import best_of
-from wildlab.detection import Contrast, Warm, find_by_contrast, find_warm
+from wildlab.detection.contrast import Contrast, find_by_contrast
+from wildlab.detection.warm import Warm, find_warm
 
 
 def make_image(animals: int = 20) -> np.ndarray:

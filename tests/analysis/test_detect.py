@@ -25,8 +25,8 @@ from wildlab.analysis.detecting.methods import (
 )
 from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast
+from wildlab.detection.floating import FloatingThresholds
 from wildlab.detection.shape import Shape, fit_shape
-from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import Interval
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels

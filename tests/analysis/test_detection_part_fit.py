@@ -13,8 +13,8 @@ from wildlab.analysis.detecting.fit import (
     with_part,
 )
 from wildlab.detection.contrast import Contrast
+from wildlab.detection.floating import FloatingThresholds
 from wildlab.detection.shape import Shape
-from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.flight.readers.frames import Frame
 
 

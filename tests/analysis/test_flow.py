@@ -15,7 +15,7 @@ from wildlab.analysis.flow import (
     pair_velocities,
 )
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
-from wildlab.detection.flow import FlowThresholds, Matches
+from wildlab.detection.flow import Matches
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.parameters import load_twin
@@ -124,9 +124,7 @@ def test_the_interval_is_the_cameras_pace_or_what_the_stamps_say(flight, seen):
 def test_no_row_is_left_out_and_each_says_whether_it_would_pass(flight, seen):
     pairs = pairs_of(seen)
     pairs[2] = pairs[2]._replace(matches=Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.nan))
-    table = pair_velocities(
-        flight, pairs, Reading("autopilot"), FlowThresholds(largest_gimbal_rate=0.05, largest_speed=5.0)
-    )
+    table = pair_velocities(flight, pairs, Reading("autopilot"), largest_gimbal_rate=0.05, largest_speed=5.0)
     assert len(table) == len(pairs)
     assert np.isnan(speeds(table)[2]).all() and not table["likely_speed"][2]
     assert np.array_equal(table["slow_gimbal"], table["gimbal_rate_rad_s"] <= 0.05)

@@ -11,8 +11,7 @@ import pytest
 from tests.detection.ellipses import inside as inside_ellipse
 from tests.refused import refused
 from wildlab.detection.contrast import Contrast, find_by_contrast
-from wildlab.detection.detections import Detections, describe, join, no_detections
-from wildlab.detection.near import merge_near, remove_near
+from wildlab.detection.detections import Detections, describe, join, no_detections, remove_near
 from wildlab.detection.warm import (
     Warm,
     block_from_distance,
@@ -175,7 +174,7 @@ def at(uv: list[list[float]], score: list[float]) -> Detections:
     return describe(labels, 1.0 * (labels > 0), EVERYWHERE, score=score)
 
 
-def test_of_those_too_near_the_surest_stays_or_all_become_one():
+def test_of_those_too_near_the_surest_stays():
     found = at([[20, 20], [28, 20], [36, 20], [100, 20]], [1.0, 3.0, 2.0, 0.5])
     left = remove_near(found, 10)
     assert left.uv[:, 0].tolist() == [28, 100] and left.score.tolist() == [3.0, 0.5]
@@ -183,14 +182,6 @@ def test_of_those_too_near_the_surest_stays_or_all_become_one():
     # What was removed removes nothing.
     chain = at([[20, 20], [28, 20], [36, 20]], [3.0, 2.0, 1.0])
     assert remove_near(chain, 10).uv[:, 0].tolist() == [20, 36]
-    merged = merge_near(found, 10)
-    assert np.allclose(sorted(merged.uv[:, 0]), [28, 100]) and merged.area.max() == 27
-    row = int(np.argmax(merged.area))
-    assert merged.box[row].tolist() == [18.5, 18.5, 19, 3] and merged.orientation[row] == pytest.approx(0)
-    whole = np.zeros((160, 200), np.int32)
-    for u in (20, 28, 36):
-        whole[19:22, u - 1 : u + 2] = 1
-    assert np.allclose(merged.axes[row], describe(whole, whole, EVERYWHERE).axes[0])
 
 
 @pytest.mark.parametrize("find", [warm, by_contrast])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.detection.ellipses import inside
-from wildlab.detection.features import boundary_spread, shape_of
+from wildlab.detection.centres import boundary_spread, shape_of
 
 
 def drawn_ellipse(centre, axes, angle):

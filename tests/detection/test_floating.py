@@ -7,13 +7,13 @@ from scipy import ndimage
 from tests.refused import refused
 from wildlab.detection.centres import cut_sides
 from wildlab.detection.floating import (
+    FloatingThresholds,
     detect_floating,
     find_edges,
     find_objects,
     nested_in_boxes,
     to_grey,
 )
-from wildlab.detection.thresholds import FloatingThresholds
 
 
 def sea(height=90, width=120, noise=0.0, seed=0):

@@ -1,24 +1,18 @@
-"""Polygons: what is refused, what lies inside, ways that stay inside."""
+"""Polygons: what is refused, and what lies inside."""
 
 import numpy as np
 import pytest
 
-from tests.planning.ground import length
 from wildlab.errors import WildlabError
 from wildlab.planning.areas import (
     area_of,
     check_area,
     contains,
-    distance_to_border,
     is_convex,
     rectangle,
-    stays_inside,
-    way_inside,
 )
 
 SQUARE = [[0.0, 0.0], [0.0, 10.0], [10.0, 10.0], [10.0, 0.0]]
-#: A U open to the north: two arms and a bridge.
-U_SHAPE = [[0, 0], [100, 0], [100, 30], [30, 30], [30, 70], [100, 70], [100, 100], [0, 100]]
 
 
 @pytest.mark.parametrize(
@@ -69,23 +63,3 @@ def test_a_rectangle_has_its_sides_and_its_course():
     assert area_of(corners) == pytest.approx(200.0)
     along = np.array([np.cos(0.3), np.sin(0.3)])
     assert np.ptp(corners @ along) == pytest.approx(20.0)
-
-
-def test_distance_to_the_border():
-    assert np.allclose(distance_to_border(SQUARE, [[5, 5], [5, 12], [-3, -4]]), [5, 2, 5])
-
-
-def test_a_way_along_the_border_is_inside_and_one_across_the_gap_is_not():
-    fence = check_area(U_SHAPE)
-    assert not is_convex(fence) and is_convex(check_area(SQUARE))
-    assert stays_inside(fence, [0, 0], [0, 100])
-    assert stays_inside(fence, [30, 30], [30, 70])
-    assert stays_inside(fence, [10, 10], [10, 90])
-    assert not stays_inside(fence, [90, 15], [90, 85])
-    assert not stays_inside(fence, [100, 30], [100, 70])
-
-
-def test_the_way_inside_goes_round_the_two_corners_of_the_gap():
-    way = way_inside(check_area(U_SHAPE), [90, 15], [90, 85])
-    assert np.allclose(way, [[90, 15], [30, 30], [30, 70], [90, 85]])
-    assert length(way) == pytest.approx(40 + 2 * np.hypot(60, 15))

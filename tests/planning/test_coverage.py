@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.refused import refused
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -17,9 +16,16 @@ from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import visible_nodes
 from wildlab.planning.areas import area_of, check_area, contains, rectangle
-from wildlab.planning.coverage import cover, nodes_in, share_seen
-from wildlab.planning.moving import first_seen, walks
-from wildlab.planning.sightings import Sightings, see
+from wildlab.planning.coverage import (
+    Coverage,
+    Sightings,
+    first_seen,
+    from_sightings,
+    nodes_in,
+    see,
+    share_seen,
+    walks,
+)
 from wildlab.simulation.landscape import synthetic_landscape
 
 CAMERA = Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6, 0.0, (0.446, 0.0, 0.0, 0.0, 0.0))
@@ -59,6 +65,12 @@ def test_many_images_show_what_each_shows_alone(holes):
     assert some > 2000
 
 
+def cover(terrain: Terrain, poses: CameraPoses, times: NDArray[np.float64], sharp=None, **more) -> Coverage:
+    """What images show of a terrain up to 100 m."""
+    clear = np.ones(len(times), bool) if sharp is None else sharp
+    return from_sightings(see(terrain, poses, 100.0), terrain, times, clear, **more)
+
+
 def flat_flight(times: NDArray[np.float64]) -> tuple[Terrain, CameraPoses]:
     """1 m/s north at 10 m over a plane: a square of 20 m is in view."""
     flat = Terrain(np.zeros((201, 101), np.float32), north=-50.0, east=-50.0, step=1.0)
@@ -69,7 +81,7 @@ def flat_flight(times: NDArray[np.float64]) -> tuple[Terrain, CameraPoses]:
 def test_times_and_gaps_are_those_of_a_square_that_moves():
     times = np.arange(0.0, 61.0)
     flat, poses = flat_flight(times)
-    shown = cover(flat, poses, times, furthest=100.0)
+    shown = cover(flat, poses, times)
     north = flat.north + np.arange(201)
     column = 50  # below the way
     seen = [times[np.abs(n - times) <= 10] for n in north]
@@ -87,11 +99,11 @@ def test_times_and_gaps_are_those_of_a_square_that_moves():
 def test_probability_is_that_of_independent_looks():
     times = np.arange(0.0, 5.0)
     flat, poses = flat_flight(times)
-    shown = cover(flat, poses, times, furthest=100.0, range_scale=12.0)
+    shown = cover(flat, poses, times, range_scale=12.0)
     n, e = 3.0, 4.0
     each = np.exp(-((n - times) ** 2 + e**2 + 10.0**2) / 12.0**2)
     assert shown.detected[53, 54] == pytest.approx(1 - np.prod(1 - each))
-    perfect = cover(flat, poses, times, furthest=100.0)
+    perfect = cover(flat, poses, times)
     assert np.array_equal(perfect.detected, (perfect.looks > 0).astype(float))
 
 
@@ -99,8 +111,8 @@ def test_a_blurred_image_is_not_counted_and_told():
     times = np.arange(0.0, 61.0)
     flat, poses = flat_flight(times)
     sharp = times < 30
-    shown = cover(flat, poses, times, furthest=100.0, sharp=sharp)
-    half = cover(flat, poses.take(sharp), times[sharp], furthest=100.0)
+    shown = cover(flat, poses, times, sharp=sharp)
+    half = cover(flat, poses.take(sharp), times[sharp])
     assert np.array_equal(shown.looks, half.looks)
     where = np.zeros(flat.height.shape, bool)
     where[:, 45:56] = True
@@ -120,25 +132,12 @@ def test_a_border_is_a_smaller_image():
     one = every.take(every.edge >= 100.0)
     assert np.array_equal(one.node, other.node) and np.array_equal(one.image, other.image)
     assert 0 < len(one.node) < len(every.node) and (every.edge >= 0).all()
-    times = np.arange(40.0)
-    shown = cover(terrain, poses, times, furthest=150.0, border=100.0)
-    assert shown.looks.sum() == len(one.node)
 
 
-def test_trees_hide_the_ground_behind_and_below_them():
-    flat = Terrain(np.zeros((101, 101), np.float32), north=-50.0, east=-50.0, step=1.0)
-    raised = flat.height.copy()
-    raised[60:63, :] = 8.0
-    trees = Terrain(raised, north=-50.0, east=-50.0, step=1.0)
-    pose = CameraPoses(WIDE, Mount("down"), np.array([[0.0, 0.0, -20.0]]), np.eye(3))
-    bare = cover(flat, pose, [0.0], furthest=200.0).seen
-    hidden = cover(flat, pose, [0.0], furthest=200.0, surface=trees).seen
-    north = flat.north + np.arange(101)
-    column = 50
-    lost = north[bare[:, column] & ~hidden[:, column]]
-    # The flanks rise from 9 m; the last tree at 12 m of 8 m hides up to 12 x 20 / 12 = 20 m.
-    assert lost.min() == 10.0 and lost.max() in (19.0, 20.0)
-    assert hidden[:60, column].sum() == bare[:60, column].sum()
+@pytest.mark.parametrize("furthest", [np.inf, 0.0])
+def test_a_furthest_distance_without_end_is_refused(furthest):
+    with refused(f"{furthest} m"):
+        see(*flat_flight(np.array([0.0, 1.0])), furthest)
 
 
 def test_nodes_of_areas_have_their_area():
@@ -147,25 +146,6 @@ def test_nodes_of_areas_have_their_area():
     owner = nodes_in(flat, fences)
     for k, fence in enumerate(fences):
         assert (owner == k).sum() * 0.25 == pytest.approx(area_of(fence), rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("change", "problem"),
-    [
-        ({"furthest": np.inf}, "inf m"),
-        ({"furthest": 0.0}, "0.0 m"),
-        ({"times": [0.0]}, "2 poses"),
-        ({"times": [1.0, 0.0]}, "order"),
-        ({"sharp": [True]}, "sharpness"),
-    ],
-)
-def test_wrong_use_is_refused(change, problem):
-    flat, poses = flat_flight(np.array([0.0, 1.0]))
-    given = {"times": [0.0, 1.0], "furthest": 100.0} | change
-    times = given.pop("times")
-    with pytest.raises(WildlabError) as caught:
-        cover(flat, poses, times, **given)  # type: ignore[arg-type]
-    assert problem in caught.value.problem
 
 
 # -- animals that walk within a fence, and when images show them first

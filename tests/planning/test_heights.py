@@ -7,7 +7,7 @@ import pytest
 
 from tests.refused import refused
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.heights import follow_terrain
+from wildlab.planning.courses import follow_terrain
 
 
 def rough(seed: int = 1) -> Terrain:

@@ -1,4 +1,4 @@
-"""The high-level planner: both objectives, the rules by which animals are lost, and what greed costs."""
+"""The high-level planner: the objective, the rules by which animals are lost, and what greed costs."""
 
 import numpy as np
 import pytest
@@ -9,25 +9,15 @@ from tests.refused import refused
 from wildlab.planning.high_level import (
     SEARCH,
     all_positioned,
-    best_by_measure,
     best_goal,
     greedy_tour,
-    known_measure,
     lost_by_covariance,
     lost_by_search,
     shortest_tour,
     utilities,
 )
 
-MEASURE = {"alpha": 0.01, "speed": 5.0, "walk": 0.25, "horizon": 60.0}
 GREEDY = {"alpha": 1.0, "c": 400.0, "speed": 5.0, "walk": 0.25}
-
-
-def test_the_measure_counts_animals_and_then_how_well_they_are_known():
-    P = [np.eye(2), 50 * np.eye(2)]
-    assert known_measure(P, 1e-9) == pytest.approx(2)
-    assert known_measure(P, 0.5) == pytest.approx(np.exp(-1) + np.exp(-50))
-    assert known_measure(np.zeros((0, 2, 2)), 0.5) == 0
 
 
 def test_utilities_are_reward_over_distance():
@@ -45,26 +35,6 @@ def test_the_greatest_utility_is_the_goal():
     assert best_goal(at, P, [0, 45], [0, 10], alpha=1, c=1) == 0
     with refused("no goal"):
         best_goal(np.zeros((0, 2)), np.zeros((0, 2, 2)), [0, 0], None, alpha=1, c=1)
-
-
-def test_the_measure_sends_back_for_what_is_known_badly_and_on_where_much_can_be_found():
-    at, bad = [[0.0, 50.0]], [200 * np.eye(2)]
-    assert best_by_measure(at, bad, [0, 0], finds=0.0, **MEASURE) == 0
-    assert best_by_measure(at, bad, [0, 0], finds=1.0, **MEASURE) == SEARCH
-    well = [np.eye(2)]
-    assert best_by_measure(at, well, [0, 0], finds=0.02, **MEASURE) == SEARCH
-    assert best_by_measure([[0.0, 400.0]], bad, [0, 0], finds=0.0, **MEASURE) == SEARCH  # not in time
-    two = [20 * np.eye(2), *bad]
-    assert best_by_measure([*at, *at], two, [0, 0], finds=0.0, **MEASURE) == 1
-
-
-@pytest.mark.parametrize("alpha", [0.001, 0.05, 1.0])
-def test_going_back_gains_only_where_an_animal_is_known_worse_than_a_look_would_make_it(alpha):
-    """Animals that stand still: one as well known as one just seen, a little worse, a little better."""
-    given = {"alpha": alpha, "speed": 5.0, "walk": 0.0, "horizon": 60.0, "found_variance": 2.0}
-    for variance, goal in ((2.0, SEARCH), (2.1, 0), (1.9, SEARCH)):
-        known = [variance * np.eye(2)]
-        assert best_by_measure([[0.0, 50.0]], known, [0, 0], finds=1e-6, **given) == goal
 
 
 def test_an_enclosure_is_done_when_all_are_known_at_once():

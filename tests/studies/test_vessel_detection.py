@@ -5,8 +5,7 @@ import pandas as pd
 import pytest
 
 from wildlab.analysis.rendered import judge
-from wildlab.detection.floating import FloatingObjects, find_objects
-from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera

@@ -16,7 +16,7 @@ from wildlab.analysis.evaluate import blocks_of
 from wildlab.analysis.flow import Reading, camera_poses_at
 from wildlab.analysis.georeference import georeference, observe, truth_of
 from wildlab.analysis.repeats import compare_sightings, judge_repeats
-from wildlab.detection.image_motion import as_grey, image_motion
+from wildlab.detection.flow import as_grey, image_motion
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.readers.frames import Frame

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
-from wildlab.detection.flow import FlowThresholds, Matches, likely_speed, slow_gimbal
+from wildlab.detection.flow import LARGEST_GIMBAL_RATE, LARGEST_SPEED, Matches, likely_speed, slow_gimbal
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import between, frame_times, poses_at
 from wildlab.flight.store import Flight
@@ -68,7 +68,8 @@ def pair_velocities(
     flight: Flight,
     pairs: Sequence[FramePair],
     reading: Reading | None = None,
-    thresholds: FlowThresholds | None = None,
+    largest_gimbal_rate: float = LARGEST_GIMBAL_RATE,
+    largest_speed: float = LARGEST_SPEED,
 ) -> pd.DataFrame:
     """Velocities of a target from pairs of images that follow each other, H (5.30).
 
@@ -80,8 +81,8 @@ def pair_velocities(
         Each of two frames, the second one the next that was taken.
     reading
         None takes the only nav source, and the manifest.
-    thresholds
-        For ``slow_gimbal`` and ``likely_speed``; no row is left out.
+    largest_gimbal_rate, largest_speed
+        For ``slow_gimbal`` (rad/s) and ``likely_speed`` (m/s); no row is left out.
 
     Returns
     -------
@@ -97,7 +98,7 @@ def pair_velocities(
     WildlabError
         Where the flight has no frames or poses, a row is none of its frames, or ``times`` has another length.
     """
-    given, limits = reading or Reading(), thresholds or FlowThresholds()
+    given = reading or Reading()
     stamps = frame_times(flight) if given.times is None else np.asarray(given.times, float)
     if len(stamps) != len(flight.table("frames")):
         raise WildlabError(
@@ -128,8 +129,8 @@ def pair_velocities(
     speeds = table[["v_north_m_s", "v_east_m_s"]].to_numpy(float)
     return table.drop(columns=["pan_rate", "tilt_rate"]).assign(
         gimbal_rate_rad_s=np.hypot(*rates.T),
-        slow_gimbal=slow_gimbal(rates, limits),
-        likely_speed=likely_speed(speeds, limits),
+        slow_gimbal=slow_gimbal(rates, largest_gimbal_rate),
+        likely_speed=likely_speed(speeds, largest_speed),
     )
 
 

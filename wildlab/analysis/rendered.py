@@ -15,10 +15,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.detection.border import adjust_at_border
+from wildlab.detection.centres import adjust_at_border
 from wildlab.detection.detections import Detections, no_detections
-from wildlab.detection.floating import FloatingObjects, find_objects
-from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array

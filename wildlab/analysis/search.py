@@ -19,7 +19,6 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
-from wildlab.planning.followers import PatternPlanner, RandomWalk
 from wildlab.planning.high_level import (
     SEARCH,
     all_positioned,
@@ -28,7 +27,7 @@ from wildlab.planning.high_level import (
     lost_by_search,
 )
 from wildlab.planning.information import SearchSensor, detection_probability, in_field_of_view
-from wildlab.planning.legs import Flying, Leg, Platform
+from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk
 from wildlab.planning.patterns import Pattern, lawn_mower
 from wildlab.planning.planner import InformationPlanner
 

@@ -6,42 +6,17 @@ are frozen dataclasses with defaults. F is A. Flodell and C. Christensson, Wildl
 and Thermal Imagery, master's thesis, Linköping University 2016; H is H. H. Helgesen, Detection and Tracking
 of Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 
-- `wildlab.detection.contrast`, `warm`: warm things by local contrast, and animals as F finds them.
-- `wildlab.detection.floating`: whatever floats on a homogeneous sea, by its edges (H 4.3); `border`: what the
-  border of the image cuts (H 4.7); `features`: shape of a region by its moments (H 4.5, 4.6).
+- `wildlab.detection.contrast`, `warm`: warm things by local contrast, and animals as F finds them; `shape`:
+  which of them are animals.
+- `wildlab.detection.floating`: whatever floats on a homogeneous sea, by its edges (H 4.3); `centres`: where
+  the centre of a region is, also of one that the border of the image cuts (H 4.5 to 4.7).
 - `wildlab.detection.colour`: something of one colour in a colour image (H 4.4.2); `boards`: what calibrates;
   `flow`: the same features in two images (H 5.4).
 
 >>> import numpy as np
->>> from wildlab.detection import find_by_contrast
+>>> from wildlab.detection.contrast import find_by_contrast
 >>> image = np.random.default_rng(1).normal(100, 2, (120, 160))
 >>> image[60:66, 40:50] += 40
 >>> print(len(find_by_contrast(image, np.ones((120, 160), bool))))
 1
 """
-
-from wildlab.detection.contrast import Contrast, find_by_contrast
-from wildlab.detection.detections import Detections, describe, join, no_detections
-from wildlab.detection.near import merge_near, remove_near
-from wildlab.detection.shape import Shape, find_by_shape, fit_shape, log_odds
-from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance, to_grey
-
-__all__ = [
-    "Contrast",
-    "Detections",
-    "Shape",
-    "Warm",
-    "block_from_distance",
-    "describe",
-    "find_by_contrast",
-    "find_by_shape",
-    "find_warm",
-    "fit_shape",
-    "gate_from_distance",
-    "join",
-    "log_odds",
-    "merge_near",
-    "no_detections",
-    "remove_near",
-    "to_grey",
-]

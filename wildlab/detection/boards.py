@@ -72,15 +72,13 @@ class BoardImage(NamedTuple):
     inverted: bool
 
 
-def grey8(image: ArrayLike, valid: ArrayLike | None = None) -> Grey:
+def grey8(image: ArrayLike) -> Grey:
     """An image of any kind as 8 bit grey, stretched between its darkest and lightest half percent.
 
     Parameters
     ----------
     image
         (H, W), or (H, W, 3) red, green and blue; counts, kelvin or grey.
-    valid
-        (H, W) bool, which pixels count; left out, all that are finite.
 
     Returns
     -------
@@ -96,7 +94,7 @@ def grey8(image: ArrayLike, valid: ArrayLike | None = None) -> Grey:
     if values.ndim == 3:
         values = values[..., :3].astype(np.float32) @ np.array([0.299, 0.587, 0.114], np.float32)
     values = values.astype(np.float32)
-    counts = np.isfinite(values) if valid is None else np.isfinite(values) & np.asarray(valid, bool)
+    counts = np.isfinite(values)
     if not counts.any():
         return np.zeros(values.shape, np.uint8)
     low, high = np.percentile(values[counts], STRETCHED)

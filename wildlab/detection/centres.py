@@ -1,18 +1,66 @@
-"""How far a found centre may be from the true one: from shape, blur, and the border of the image."""
+"""Where the centre of a found region is and how far off it may be: moments (H 4.5, 4.6), blur, the image's
+border.
+
+Pixels are squares about their centres, and the centre of the upper left one is (0, 0), as in OpenCV. The
+moments of a region are those of the squares, so that a rectangle of w by h pixels has exactly the moments of
+the rectangle.
+
+A blob of which a part is hidden beyond the border of the image has its centre too far inside. Where the
+length of the object is known, H (4.7) moves it along the blob's major axis, towards the border, by ``L/2 - (a
+- i)``: half the length of the object, less what the blob has behind its centre. With ``i`` from the centre to
+the border, that is ``a - i`` only if ``a`` is the full major axis.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from wildlab.detection.features import axes_of
-from wildlab.detection.thresholds import FILLED, CentreErrors
+from wildlab.detection.detections import Detections
+from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 
+#: Share of its ellipse that a blob fills below which it is not a filled one.
+FILLED = 0.9
 #: Rows and columns at the border in which the contour of something cut may end.
 AT_BORDER = 2
+
+
+@dataclass(frozen=True)
+class CentreErrors:
+    """How far a found centre may be from the true one: what `wildlab.detection.floating` states.
+
+    The true centre is that of the object's whole outline in the image. The numbers were set on scenes of
+    `wildlab.simulation.scene.drawn` with seeds that no test and no study uses: 1000 to 1499, 3000 to 3299.
+
+    Attributes
+    ----------
+    floor
+        Standard deviation that nothing falls below, px.
+    edge
+        Of where a piece of the contour lies, as a share of the blur.
+    shape
+        Share of the object's own spread by which parts that look different (houses, engines, wakes) move the
+        centre.
+    broken
+        Share of the major axis by which the centre moves where the contour is not closed, and the blob is a
+        line in place of an area.
+    cut
+        Share of the major axis by which the border of the image moves it, for the hidden part.
+    adjusted
+        Share of the major axis that is left of that once the centre was moved by H (4.7).
+    """
+
+    floor: float = 0.2
+    edge: float = 0.1
+    shape: float = 0.01
+    broken: float = 0.2
+    cut: float = 0.28
+    adjusted: float = 0.1
 
 
 def cut_sides(box: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -59,7 +107,7 @@ def centre_covariance(
     area
         px^2.
     region, boundary
-        (2, 2) each: `Shape.covariance`, and what `wildlab.detection.features.boundary_spread` gives.
+        (2, 2) each: `Shape.covariance`, and what `wildlab.detection.centres.boundary_spread` gives.
     cut
         (4,) from :func:`cut_sides`.
     smoothing_sd
@@ -102,3 +150,234 @@ def hidden_part(region: Array, cut: NDArray[np.bool_], errors: CentreErrors) -> 
     # Along its own axes, and across the border: a ship of which a corner shows lies any way.
     major = float(axes_of(region)[0][0])
     return np.asarray(errors.cut**2 * (16 * region + 0.25 * major**2 * across))
+
+
+#: Variance of a point within a pixel, px^2, along either side.
+WITHIN_PIXEL = 1 / 12
+
+
+class Shape(NamedTuple):
+    """A region's shape.
+
+    Attributes
+    ----------
+    area
+        px^2.
+    centre
+        (2,) u and v, px.
+    covariance
+        (2, 2) of the points of the region, H (4.6) divided by the area, px^2.
+    axes
+        (2,) full lengths of the ellipse with that covariance, px.
+    orientation
+        Of the major axis, from u towards v, within a quarter turn of u, rad.
+    hu
+        (7,) invariants under translation, rotation and scale.
+    """
+
+    area: float
+    centre: Array
+    covariance: Array
+    axes: Array
+    orientation: float
+    hu: Array
+
+
+def axes_of(covariance: Array) -> tuple[Array, float]:
+    """Full axes (2,) and orientation of the ellipse whose points have that covariance (2, 2).
+
+    Eigenvectors of H (4.6). The points of an ellipse with full axis ``a`` have the variance ``a^2 / 16``.
+
+    Examples
+    --------
+    >>> axes, angle = axes_of(np.diag([1.0, 4.0]))
+    >>> axes.tolist(), round(angle, 4)
+    ([8.0, 4.0], 1.5708)
+    """
+    a, b, c = covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    middle, half = (a + c) / 2, float(np.hypot((a - c) / 2, b))
+    sizes = np.array([middle + half, max(middle - half, 0.0)])
+    angle = 0.5 * float(np.arctan2(2 * b, a - c))
+    return 4 * np.sqrt(sizes), angle
+
+
+def shape_of(mask: NDArray[Any], left: int = 0, top: int = 0) -> Shape:
+    """The shape of a region.
+
+    Parameters
+    ----------
+    mask
+        (H, W), nonzero inside; a part of an image.
+    left, top
+        Where in the image that part begins, px.
+
+    Returns
+    -------
+    Shape
+    """
+    found = cv2.moments(np.ascontiguousarray(mask, np.uint8), binaryImage=True)
+    area = found["m00"]
+    centre = np.array([found["m10"], found["m01"]]) / area
+    second = np.array([[found["mu20"], found["mu11"]], [found["mu11"], found["mu02"]]]) / area
+    covariance = second + WITHIN_PIXEL * np.eye(2)
+    axes, orientation = axes_of(covariance)
+    hu = np.asarray(cv2.HuMoments(found), float).ravel()
+    return Shape(area, centre + np.array([left, top]), covariance, axes, orientation, hu)
+
+
+def boundary_spread(outline: NDArray[Any], centre: Array) -> Array:
+    """Integral of ``(r - c)(r - c)^T`` along a region's outer boundary, px^3.
+
+    Where each piece of the boundary lies a bit further out or in, independently, the centre moves by the
+    integral of ``(r - c) dn ds`` over the area: its covariance is this, times the variance of ``dn`` and the
+    length over which it stays the same, divided by the squared area.
+
+    Parameters
+    ----------
+    outline
+        (K, 1, 2) or (K, 2) centres of the boundary's pixels in order, as of OpenCV's ``findContours``.
+    centre
+        (2,) of the region, px.
+
+    Returns
+    -------
+    (2, 2).
+    """
+    points = np.asarray(outline, float).reshape(-1, 2)
+    steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    # Through the pixels' centres a contour is half a pixel short on each side.
+    away = points - centre
+    distance = np.linalg.norm(away, axis=1, keepdims=True)
+    away = away * (1 + 0.5 / np.maximum(distance, 0.5))
+    lengths = np.maximum((steps + np.roll(steps, 1)) / 2, 1.0)
+    return np.asarray((away * lengths[:, None]).T @ away)
+
+
+#: By how much the major axis must exceed the minor one for a direction, which H 4.3, 6.4.1 ask and not print.
+AXIS_RATIO = 1.5
+#: Of the major axis: further from the centre the border is not what cuts the blob.
+REACH = 0.75
+
+
+def adjust_at_border(
+    detections: Detections,
+    shape: tuple[int, int],
+    length: ArrayLike,
+    length_sd: float = 0.0,
+) -> Detections:
+    """Move the centres of what the border of the image cuts, H (4.7), where the length is known.
+
+    Only filled blobs whose major axis differs from the minor one by `AXIS_RATIO`, and meets the border
+    where it cuts the blob, are moved; never those that two opposite borders cut, of which the hidden parts
+    are unknown. The centre may come to lie outside of the image.
+
+    Parameters
+    ----------
+    detections
+        Of one image.
+    shape
+        Rows and columns of the image.
+    length
+        Of the whole object, px, one or (N,); NaN where it is not known.
+    length_sd
+        Standard deviation of that, px.
+
+    Returns
+    -------
+    Detections
+        With moved centres, and their covariances without what the hidden part added.
+
+    Raises
+    ------
+    WildlabError
+        Where a length is not above zero.
+    """
+    lengths = np.broadcast_to(np.asarray(length, float), len(detections))
+    if (lengths <= 0).any():
+        raise WildlabError(f"a length of {lengths.min()} px", "give one above zero", field="length")
+    given = CentreErrors()
+    moves = border_moves(detections, shape, lengths)
+    uv, covariance = detections.uv.copy(), detections.covariance.copy()
+    moved = np.isfinite(moves).all(axis=1)
+    uv[moved] += moves[moved]
+    for row in np.flatnonzero(moved):
+        along = direction(detections.orientation[row])
+        region = ellipse_covariance(detections.axes[row], detections.orientation[row])
+        # The hidden part is known but for the length; how far the blob reaches behind its centre is not read
+        # off the image but from its second moments, which for other shapes than an ellipse are some way off.
+        without = covariance[row] - hidden_part(region, cut_sides(detections.box[row], shape), given)
+        left = (4 * given.adjusted) ** 2 * region + (length_sd / 2) ** 2 * np.outer(along, along)
+        covariance[row] = without + left
+    return replace(detections, uv=uv, covariance=covariance)
+
+
+def border_moves(detections: Detections, shape: tuple[int, int], lengths: Array) -> Array:
+    """By how much each centre is moved, H (4.7).
+
+    Parameters
+    ----------
+    detections, shape
+        As for :func:`adjust_at_border`.
+    lengths
+        (N,) px.
+
+    Returns
+    -------
+    (N, 2) px, NaN where a centre stays.
+    """
+    rows, columns = shape
+    moves = np.full((len(detections), 2), np.nan)
+    # Of a broken contour only a line was found, and its axis says little.
+    filled = detections.area >= FILLED * np.pi / 4 * detections.axes.prod(axis=1)
+    for row, box in enumerate(detections.box):
+        sides = cut_sides(box, shape)
+        major, minor = detections.axes[row]
+        opposite = (sides[0] and sides[2]) or (sides[1] and sides[3])
+        if (
+            not sides.any()
+            or opposite
+            or not filled[row]
+            or major < AXIS_RATIO * minor
+            or not np.isfinite(lengths[row])
+        ):
+            continue
+        along = direction(detections.orientation[row])
+        near = to_border(detections.uv[row], along, columns, rows)
+        if abs(near) > REACH * major:
+            continue
+        moves[row] = np.sign(near) * (lengths[row] / 2 - (major - abs(near))) * along
+    return moves
+
+
+def ellipse_covariance(axes: Array, angle: float) -> Array:
+    """Covariance (2, 2) of the points of an ellipse with full axes (2,), the major one at that angle."""
+    along = direction(angle)
+    across = np.array([-along[1], along[0]])
+    return np.asarray(
+        (axes[0] / 4) ** 2 * np.outer(along, along) + (axes[1] / 4) ** 2 * np.outer(across, across)
+    )
+
+
+def direction(angle: float) -> Array:
+    """Unit vector (2,) at an angle from u towards v."""
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def to_border(centre: Array, along: Array, width: float, height: float) -> float:
+    """How far along a direction, or against it (negative), the nearer border of the image is from a centre.
+
+    The image reaches half a pixel beyond the centres of its first and last pixels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> to_border(np.array([9.5, 50.0]), np.array([1.0, 0.0]), 100, 100)
+    -10.0
+    """
+    distances = []
+    for at, step, size in zip(centre, along, (width, height), strict=True):
+        if abs(step) > 1e-12:
+            distances += [(-0.5 - at) / step, (size - 0.5 - at) / step]
+    forward = min(value for value in distances if value >= 0)
+    backward = max(value for value in distances if value <= 0)
+    return float(forward if forward < -backward else backward)

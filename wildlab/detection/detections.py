@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -271,3 +272,36 @@ def join(parts: Sequence[Detections]) -> Detections:
         return no_detections()
     names = [one.name for one in fields(Detections)]
     return Detections(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def remove_near(found: Detections, apart_px: float) -> Detections:
+    """Of detections that are too near one another only the one with the largest score stays (F 3.2.6).
+
+    Parameters
+    ----------
+    found
+        Of one image.
+    apart_px
+        How far centroids are apart at least; 0 removes nothing.
+
+    Returns
+    -------
+    Detections
+        In the order of the score, largest first.
+
+    Notes
+    -----
+    F removes detections too near to each other and takes them for one target; which of them stays is not
+    said. Here it is the surest.
+    """
+    order = np.argsort(-found.score, kind="stable")
+    found = found.select(order)
+    if apart_px <= 0 or len(found) < 2:
+        return found
+    keep = np.ones(len(found), bool)
+    pairs = cKDTree(found.uv).query_pairs(np.nextafter(apart_px, 0), output_type="ndarray")
+    # The surer comes first in each pair; it removes others only where it was not removed itself.
+    for row, other in pairs[np.lexsort(pairs.T[::-1])]:
+        if keep[row]:
+            keep[other] = False
+    return found.select(keep)

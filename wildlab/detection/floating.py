@@ -6,21 +6,27 @@
 4. Connect, and remove what is too small or too large.
 5. Remove what lies in the box of something larger.
 6. Fill.
-7. At the border of the image, move the centre where the size is known (4.7): `wildlab.detection.border`.
+7. At the border of the image, move the centre where the size is known (4.7): `wildlab.detection.centres`.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.detection.centres import AT_BORDER, centre_covariance, cut_sides
+from wildlab.detection.centres import (
+    AT_BORDER,
+    CentreErrors,
+    boundary_spread,
+    centre_covariance,
+    cut_sides,
+    shape_of,
+)
 from wildlab.detection.detections import Detections
-from wildlab.detection.features import boundary_spread, shape_of
-from wildlab.detection.thresholds import CentreErrors, FloatingThresholds
 from wildlab.errors import WildlabError
 
 #: Of how many pixels along each side one is looked at to find an image's range.
@@ -63,7 +69,6 @@ def detect_floating(
     image: NDArray[Any],
     valid: NDArray[np.bool_] | None = None,
     thresholds: FloatingThresholds | None = None,
-    errors: CentreErrors | None = None,
 ) -> Detections:
     """Floating objects of one image, H 4.3; `find_objects` gives their pixels as well.
 
@@ -75,14 +80,12 @@ def detect_floating(
         (H, W): which pixels show anything; None is all of them. NaN shows nothing.
     thresholds
         Those of H 4.4.1 by default.
-    errors
-        What the covariances of the centres are made of.
 
     Returns
     -------
     Detections
         By area, the largest first. The centre of what the border cuts is that of the visible part, and its
-        covariance says so; `wildlab.detection.border.adjust_at_border` moves it.
+        covariance says so; `wildlab.detection.centres.adjust_at_border` moves it.
 
     Raises
     ------
@@ -97,20 +100,19 @@ def detect_floating(
     >>> detect_floating(sea).uv.round(1)
     array([[45. , 29.5]])
     """
-    return find_objects(image, valid, thresholds, errors).detections
+    return find_objects(image, valid, thresholds).detections
 
 
 def find_objects(
     image: NDArray[Any],
     valid: NDArray[np.bool_] | None = None,
     thresholds: FloatingThresholds | None = None,
-    errors: CentreErrors | None = None,
 ) -> FloatingObjects:
     """As :func:`detect_floating`, with the pixels of each object.
 
     Parameters
     ----------
-    image, valid, thresholds, errors
+    image, valid, thresholds
         As there.
 
     Returns
@@ -133,9 +135,7 @@ def find_objects(
     labels = np.zeros(filled.shape, np.int32)
     for number, found in enumerate(objects, start=1):
         labels[found.here][found.mask > 0] = number
-    return FloatingObjects(
-        _described(np.asarray(image), steps, edges, objects, given, errors or CentreErrors()), labels
-    )
+    return FloatingObjects(_described(np.asarray(image), steps, edges, objects, given), labels)
 
 
 class _Region(NamedTuple):
@@ -350,7 +350,6 @@ def _described(
     edges: NDArray[np.uint8],
     objects: list[_Region],
     thresholds: FloatingThresholds,
-    errors: CentreErrors,
 ) -> Detections:
     """Features of the objects, in their order."""
     n = len(objects)
@@ -369,7 +368,148 @@ def _described(
             boundary_spread(outline, shape.centre),
             cut_sides(np.array(box), image.shape),
             thresholds.smoothing_sd,
-            errors,
+            CentreErrors(),
         )
     box_table = np.array([found.box for found in objects], float).reshape(-1, 4)
     return Detections(uv, covariance, area, intensity, box_table, axes, orientation, hu, score)
+
+
+#: What H prints of the detector's numbers, and where.
+PUBLISHED = {
+    "gradient": "H 4.4.1: 230 of 255",
+    "smallest_area": "H 4.4.1: 50 pixels",
+}
+#: What H leaves open, and why it is as it is here.
+CHOSEN = {
+    "smoothing_size": "n of (4.1) is not printed; five pixels keep what is ten pixels wide",
+    "smoothing_sd": "sigma_g of (4.1) is not printed; OpenCV's for a kernel of five pixels",
+    "scaling": "how 14 bits become 8 is not printed; a fixed range shows an object alike beside any other",
+    "stretched_share": "one pixel in a hundred may saturate at the dark end, as cameras do",
+    "smallest_range_k": "an even sea must not become black and white; 50 mK of noise are three levels",
+    "counts_per_kelvin": "the Tau 2's in its high gain; matters for images in counts only",
+    "gradient_gain": "(4.3) has no factor before it",
+    "clipping": "a gradient beyond 255 is 255; that an image's largest becomes 255 is the other reading",
+    "largest_area": "H 4.3 removes blobs that are too large, and prints no limit",
+    "area_of": "H removes small blobs before it fills them: what counts is the blob of steep pixels",
+    "nested": "H 4.3 compares the boxes",
+    "close_at_border": "what the border of the image cuts has an open contour, and figure 4.8 has it filled",
+    "warm": "H 4.1: vessels are warmer than the sea",
+}
+
+
+@dataclass(frozen=True)
+class FloatingThresholds:
+    """Thresholds of the seven steps of H 4.3; `PUBLISHED` and `CHOSEN` say which are whose.
+
+    Attributes
+    ----------
+    gradient
+        T_g of (4.4), of 255.
+    smallest_area, largest_area
+        Of a blob, px^2; None is no limit.
+    smoothing_size, smoothing_sd
+        Of the Gaussian kernel (4.1), px; the size is odd.
+    scaling
+        How 14 bits become 8: ``"fixed"``, 256 grey levels over ``smallest_range_k``, from the
+        ``stretched_share`` of an image's darkest pixels on; ``"stretched"``, from there to that share of its
+        brightest, over ``smallest_range_k`` at least; ``"counts"``, not at all: only the gradient of counts
+        has 8 bits. Grey levels stay as they are.
+    gradient_gain
+        Factor before (4.3).
+    clipping
+        What lies beyond 255 in the gradient image: ``"saturated"``, or the image divided by its largest
+        gradient (``"normalised"``).
+    area_of
+        What the limits are for: the blob of steep pixels (``"edges"``, a ring if the inside is even), or the
+        blob once it is filled (``"filled"``).
+    nested
+        What is removed as a part of something larger: a blob whose box is inside another's (``"boxes"``), or
+        only one that is inside another's contour (``"contours"``).
+    close_at_border
+        Whether what lies between an open contour and the border of the image is filled.
+    warm
+        Whether objects are brighter than the sea; needed for that filling only.
+    """
+
+    gradient: float = 230.0
+    smallest_area: float = 50.0
+    largest_area: float | None = None
+    smoothing_size: int = 5
+    smoothing_sd: float = 1.1
+    scaling: Literal["fixed", "stretched", "counts"] = "fixed"
+    stretched_share: float = 0.01
+    smallest_range_k: float = 4.0
+    counts_per_kelvin: float = 25.0
+    gradient_gain: float = 1.0
+    clipping: Literal["saturated", "normalised"] = "saturated"
+    area_of: Literal["edges", "filled"] = "edges"
+    nested: Literal["boxes", "contours"] = "boxes"
+    close_at_border: bool = True
+    warm: bool = True
+
+    def __post_init__(self) -> None:
+        limits: tuple[tuple[str, bool, str], ...] = (
+            ("gradient", 0 < self.gradient <= 255, "give one above 0, up to 255"),
+            ("smallest_area", self.smallest_area > 0, "give an area above 0, in pixels"),
+            (
+                "largest_area",
+                self.largest_area is None or self.largest_area >= self.smallest_area,
+                "give one that is no smaller than smallest_area, or None",
+            ),
+            (
+                "smoothing_size",
+                self.smoothing_size > 0 and self.smoothing_size % 2 == 1,
+                "give an odd number of pixels",
+            ),
+            ("smoothing_sd", self.smoothing_sd > 0, "give one above 0, in pixels"),
+            ("stretched_share", 0 <= self.stretched_share < 0.5, "give a share from 0 to below 0.5"),
+            ("smallest_range_k", self.smallest_range_k > 0, "give a range above 0, in kelvin"),
+            ("counts_per_kelvin", self.counts_per_kelvin > 0, "give a number above 0"),
+            ("gradient_gain", self.gradient_gain > 0, "give a factor above 0"),
+            (
+                "scaling",
+                self.scaling in ("fixed", "stretched", "counts"),
+                "use 'fixed', 'stretched' or 'counts'",
+            ),
+            ("clipping", self.clipping in ("saturated", "normalised"), "use 'saturated' or 'normalised'"),
+            ("area_of", self.area_of in ("edges", "filled"), "use 'edges' or 'filled'"),
+            ("nested", self.nested in ("boxes", "contours"), "use 'boxes' or 'contours'"),
+        )
+        for field, fine, fix in limits:
+            if not fine:
+                raise WildlabError(f"{field} is {getattr(self, field)!r}", fix, field=field)
+
+    def at_height(self, height: float, reference: float) -> FloatingThresholds:
+        """The same for another height, H 4.4.1: areas scaled by how large things look.
+
+        A filled area goes with the squared scale of the image; a contour, which is as wide as the blur at
+        every height, goes with the scale itself.
+
+        Parameters
+        ----------
+        height
+            Of the camera above the sea, m.
+        reference
+            Height for which these thresholds are, m.
+
+        Returns
+        -------
+        FloatingThresholds
+
+        Raises
+        ------
+        WildlabError
+            Where a height is not above zero.
+
+        Examples
+        --------
+        >>> FloatingThresholds(area_of="filled").at_height(200.0, 100.0).smallest_area
+        12.5
+        """
+        if not (height > 0 and reference > 0 and np.isfinite(height) and np.isfinite(reference)):
+            raise WildlabError(
+                f"heights of {height} and {reference} m", "give both above zero, in metres", field="height"
+            )
+        factor = (reference / height) ** (2 if self.area_of == "filled" else 1)
+        largest = None if self.largest_area is None else self.largest_area * factor
+        return replace(self, smallest_area=self.smallest_area * factor, largest_area=largest)

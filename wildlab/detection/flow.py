@@ -1,7 +1,9 @@
-"""Features of one thing in two images, and how far each has moved: H 4.2, 5.4.
+"""Features that two images share, and how far they moved: within one thing (H 4.2, 5.4), or of the whole
+scene.
 
-SIFT features within the filled vessel alone (H 4.3 says that this solves what features elsewhere spoil),
-paired by a FLANN nearest-neighbour search. What H does not print is chosen: see `FlowThresholds`.
+Of a vessel, SIFT features within its filled outline alone (H 4.3 says that this solves what features
+elsewhere spoil), paired by a FLANN nearest-neighbour search. Of the scene, corners followed by Lucas and
+Kanade's flow. What H does not print is chosen.
 """
 
 from __future__ import annotations
@@ -14,66 +16,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera, normalise
+from wildlab.geometry.frames import Array
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: Pixels around a mask that are looked at too: features are described by what is around them.
 _MARGIN = 24
 
 
-@dataclass(frozen=True)
-class FlowThresholds:
-    """What counts as a feature, as the same feature, and as a usable pair of images. All chosen.
-
-    Attributes
-    ----------
-    contrast
-        Of SIFT: how much a feature stands out, of the grey levels' range. Half of OpenCV's 0.04, for images
-        with few levels.
-    ratio
-        A match is kept if the nearest descriptor is nearer than that share of the second nearest: Lowe (2004)
-        has 0.8.
-    agreement
-        How far, px, a feature may lie from where the motion of the whole (shift, turn and scale) has it.
-    largest_turn
-        Of that motion, how far it may turn (rad) and scale (share) from one image to the next: any two pairs
-        make some motion, but a camera seldom turns by more than 60 deg/s.
-    fewest
-        Features that must be left; with more than two the scatter about a motion of four numbers is known,
-        and of few that fit each other some do so by chance.
-    largest_gimbal_rate
-        Pairs of images between which the gimbal turned faster than that are dropped, rad/s (H 5.6.3 proposes
-        such a limit and does not apply it).
-    largest_speed
-        Velocities above it are dropped, m/s: 25 m/s are 49 kn (H 5.6.3, as before).
-    smallest_sd
-        Standard deviation of a displacement, px, where the scatter of features says less.
-    """
-
-    contrast: float = 0.02
-    ratio: float = 0.8
-    agreement: float = 2.0
-    largest_turn: float = 0.15
-    fewest: int = 4
-    largest_gimbal_rate: float = float(np.radians(3.0))
-    largest_speed: float = 25.0
-    smallest_sd: float = 0.1
-
-    def __post_init__(self) -> None:
-        limits = (
-            ("contrast", self.contrast > 0, "give a share above 0"),
-            ("ratio", 0 < self.ratio <= 1, "give a share from above 0 to 1"),
-            ("agreement", self.agreement > 0, "give one above 0, in pixels"),
-            ("largest_turn", self.largest_turn > 0, "give an angle above 0, in rad"),
-            ("fewest", self.fewest >= 3, "give at least 3 features"),
-            ("largest_gimbal_rate", self.largest_gimbal_rate > 0, "give one above 0, in rad/s"),
-            ("largest_speed", self.largest_speed > 0, "give one above 0, in m/s"),
-            ("smallest_sd", self.smallest_sd > 0, "give one above 0, in pixels"),
-        )
-        for field, fine, fix in limits:
-            if not fine:
-                raise WildlabError(f"{field} is {getattr(self, field)!r}", fix, field=field)
+#: Of SIFT: how much a feature stands out, of the grey levels' range. Half of OpenCV's 0.04, for images with
+#: few levels. This and what follows is chosen.
+CONTRAST = 0.02
+#: A match is kept if the nearest descriptor is nearer than that share of the second nearest: Lowe (2004) has
+#: 0.8.
+RATIO = 0.8
+#: How far, px, a feature may lie from where the motion of the whole (shift, turn and scale) has it.
+AGREEMENT = 2.0
+#: Of that motion, how far it may turn (rad) and scale (share) from one image to the next: any two pairs make
+#: some motion, but a camera seldom turns by more than 60 deg/s.
+LARGEST_TURN = 0.15
+#: Features that must be left; with more than two the scatter about a motion of four numbers is known, and of
+#: few that fit each other some do so by chance.
+FEWEST = 4
+#: Pairs of images between which the gimbal turned faster (rad/s), and velocities above it (m/s; 25 m/s are 49
+#: kn), are dropped: H 5.6.3 proposes such limits and does not apply them.
+LARGEST_GIMBAL_RATE, LARGEST_SPEED = float(np.radians(3.0)), 25.0
+#: Standard deviation of a displacement, px, where the scatter of features says less.
+SMALLEST_SD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +78,7 @@ class Features:
         return len(self.uv)
 
 
-def find_features(image: NDArray[Any], inside: Mask, thresholds: FlowThresholds | None = None) -> Features:
+def find_features(image: NDArray[Any], inside: Mask) -> Features:
     """SIFT features of one thing in one image.
 
     Parameters
@@ -117,8 +87,6 @@ def find_features(image: NDArray[Any], inside: Mask, thresholds: FlowThresholds 
         (H, W) grey levels, counts or kelvin. They become 256 levels over the range of what is inside.
     inside
         (H, W) where the thing is: the filled object of a detector.
-    thresholds
-        None takes the default ones.
 
     Returns
     -------
@@ -130,7 +98,6 @@ def find_features(image: NDArray[Any], inside: Mask, thresholds: FlowThresholds 
     WildlabError
         Where the image is no grey image, or the mask has another size.
     """
-    given = thresholds or FlowThresholds()
     seen, mask = np.asarray(image), np.asarray(inside, bool)
     if seen.ndim != 2 or seen.dtype.kind not in "uif":
         raise WildlabError(
@@ -150,8 +117,8 @@ def find_features(image: NDArray[Any], inside: Mask, thresholds: FlowThresholds 
         return none
     top, left = max(int(rows[0]) - _MARGIN, 0), max(int(columns[0]) - _MARGIN, 0)
     here = slice(top, int(rows[-1]) + _MARGIN + 1), slice(left, int(columns[-1]) + _MARGIN + 1)
-    sift = cv2.SIFT.create(contrastThreshold=given.contrast)
-    points, descriptors = sift.detectAndCompute(_grey(seen[here], mask[here]), mask[here].astype(np.uint8))
+    sift = cv2.SIFT.create(contrastThreshold=CONTRAST)
+    points, descriptors = sift.detectAndCompute(as_grey(seen[here], mask[here]), mask[here].astype(np.uint8))
     if not points:
         return none
     uv = np.array([point.pt for point in points], float)
@@ -160,31 +127,28 @@ def find_features(image: NDArray[Any], inside: Mask, thresholds: FlowThresholds 
     return Features(uv[once] + [left, top], np.asarray(descriptors, np.float32)[once])
 
 
-def match_features(first: Features, second: Features, thresholds: FlowThresholds | None = None) -> Matches:
+def match_features(first: Features, second: Features) -> Matches:
     """The same features in two images.
 
     Parameters
     ----------
     first, second
         From `find_features`.
-    thresholds
-        None takes the default ones.
 
     Returns
     -------
     Matches
-        None at all where fewer than ``fewest`` are left.
+        None at all where fewer than `FEWEST` are left.
 
     Notes
     -----
     The search among the descriptors visits every leaf of the tree: the same pairs as by comparing all with
     all, and the same each time.
     """
-    given = thresholds or FlowThresholds()
-    if min(len(first), len(second)) < given.fewest:
+    if min(len(first), len(second)) < FEWEST:
         return _none()
-    here, there = nearest_by_ratio(first.descriptors, second.descriptors, given.ratio)
-    return agreeing(first.uv[here], second.uv[there], given)
+    here, there = nearest_by_ratio(first.descriptors, second.descriptors, RATIO)
+    return agreeing(first.uv[here], second.uv[there])
 
 
 def filled_outlines(labels: NDArray[np.integer]) -> Mask:
@@ -243,15 +207,20 @@ def nearest_by_ratio(
     return np.array([best[row][1] for row in there], np.intp), np.array(there, np.intp)
 
 
-def agreeing(first: ArrayLike, second: ArrayLike, thresholds: FlowThresholds) -> Matches:
+def agreeing(
+    first: ArrayLike,
+    second: ArrayLike,
+    largest_turn: float = LARGEST_TURN,
+    smallest_sd: float = SMALLEST_SD,
+) -> Matches:
     """Those of some matches that moved with most of the others, by shift, turn and scale.
 
     Parameters
     ----------
     first, second
         (N, 2) px in either image.
-    thresholds
-        With ``agreement``, ``fewest`` and ``smallest_sd``.
+    largest_turn, smallest_sd
+        In place of `LARGEST_TURN` and `SMALLEST_SD`.
 
     Returns
     -------
@@ -259,22 +228,22 @@ def agreeing(first: ArrayLike, second: ArrayLike, thresholds: FlowThresholds) ->
         Without rows where too few agree.
     """
     here, there = np.asarray(first, float), np.asarray(second, float)
-    if len(here) < thresholds.fewest:
+    if len(here) < FEWEST:
         return _none()
     motion, kept = cv2.estimateAffinePartial2D(
-        here, there, method=cv2.RANSAC, ransacReprojThreshold=thresholds.agreement, maxIters=500
+        here, there, method=cv2.RANSAC, ransacReprojThreshold=AGREEMENT, maxIters=500
     )
     rows = np.zeros(len(here), bool) if kept is None else np.asarray(kept).ravel() > 0
-    if motion is None or rows.sum() < thresholds.fewest:
+    if motion is None or rows.sum() < FEWEST:
         return _none()
     along, across = float(motion[0, 0]), float(motion[1, 0])
     turned, scaled = np.arctan2(across, along), np.hypot(along, across) - 1
-    if max(abs(turned), abs(scaled)) > thresholds.largest_turn:
+    if max(abs(turned), abs(scaled)) > largest_turn:
         return _none()
     here, there = here[rows], there[rows]
     left = there - moved_together(here, there)
     sd = float(np.sqrt((left**2).sum() / (left.size - 4)))
-    return Matches(here, there, max(sd, thresholds.smallest_sd))
+    return Matches(here, there, max(sd, smallest_sd))
 
 
 def moved_together(first: Array, second: Array) -> Array:
@@ -285,39 +254,119 @@ def moved_together(first: Array, second: Array) -> Array:
     return np.asarray(centre_second + np.stack([turned.real, turned.imag], axis=1))
 
 
-def slow_gimbal(gimbal_rates: ArrayLike, thresholds: FlowThresholds) -> Mask:
+def slow_gimbal(gimbal_rates: ArrayLike, largest: float = LARGEST_GIMBAL_RATE) -> Mask:
     """Pairs of images between which the gimbal hardly moved: (N, 2) rad/s of pan and tilt -> (N,).
 
     Examples
     --------
-    >>> slow_gimbal([[0.0, 0.01], [0.0, -0.2]], FlowThresholds()).tolist()
+    >>> slow_gimbal([[0.0, 0.01], [0.0, -0.2]]).tolist()
     [True, False]
     """
     rates = np.asarray(gimbal_rates, float)
-    return np.asarray(np.hypot(rates[..., 0], rates[..., 1]) <= thresholds.largest_gimbal_rate)
+    return np.asarray(np.hypot(rates[..., 0], rates[..., 1]) <= largest)
 
 
-def likely_speed(velocities: ArrayLike, thresholds: FlowThresholds) -> Mask:
+def likely_speed(velocities: ArrayLike, largest: float = LARGEST_SPEED) -> Mask:
     """Velocities (N, 2) m/s that a vessel can have; NaN is none.
 
     Examples
     --------
-    >>> likely_speed([[3.0, 4.0], [40.0, 0.0]], FlowThresholds()).tolist()
+    >>> likely_speed([[3.0, 4.0], [40.0, 0.0]]).tolist()
     [True, False]
     """
     v = np.asarray(velocities, float)
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.hypot(v[..., 0], v[..., 1]) <= thresholds.largest_speed)
+        return np.asarray(np.hypot(v[..., 0], v[..., 1]) <= largest)
 
 
 def _none() -> Matches:
     return Matches(np.zeros((0, 2)), np.zeros((0, 2)), float("nan"))
 
 
-def _grey(image: NDArray[Any], inside: Mask) -> NDArray[np.uint8]:
-    """In 256 levels, over the range of what is inside."""
-    values = image.astype(np.float32)
-    shown = values[inside & np.isfinite(values)]
+Grey = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
+
+#: Features that are followed at most, and that have to agree on one motion at least.
+MOST, FEWEST = 400, 12
+#: How far (px) a feature may be from where it began when it is followed back, and from the common motion.
+BACK_PX, AGREEMENT_PX = 0.7, 1.5
+#: Share of the followed features that has to agree.
+AGREE = 0.4
+#: Window and levels of the pyramid: displacements up to about a sixth of 640 px are followed.
+WINDOW, LEVELS = 21, 4
+
+
+def as_grey(image: NDArray[Any], valid: Mask) -> Grey:
+    """An image (H, W) or (H, W, 3) in 256 levels over the range of what can be seen.
+
+    Parameters
+    ----------
+    image
+        Grey levels, counts, kelvin, or red-green-blue.
+    valid
+        (H, W) where there is a scene.
+
+    Returns
+    -------
+    (H, W) uint8
+    """
+    values = np.asarray(image, np.float32)
+    values = values.mean(axis=2) if values.ndim == 3 else values
+    shown = values[valid & np.isfinite(values)]
     low, high = np.quantile(shown, [0.01, 0.99]) if len(shown) else (0.0, 1.0)
-    grey = (np.nan_to_num(values, nan=float(low)) - low) * (255.0 / max(high - low, 1e-6))
+    grey = (np.nan_to_num(values, nan=float(low)) - low) * (255.0 / max(float(high - low), 1e-6))
     return np.ascontiguousarray(np.clip(np.rint(grey), 0, 255).astype(np.uint8))
+
+
+def image_motion(first: Grey, second: Grey, camera: Camera, valid: Mask | None = None) -> Array:
+    """How the scene moved from one image to the next: a shift at the principal point, and a turn.
+
+    Parameters
+    ----------
+    first, second
+        (H, W) grey images of one size, from `as_grey`.
+    camera
+        Its lens: the motion is fitted to directions, not to pixels.
+    valid
+        (H, W) where features are looked for; everywhere, if not given.
+
+    Returns
+    -------
+    (3,)
+        Tangents along the columns and the rows, and the turn from the columns' to the rows' axis (rad); NaN
+        where too few features agree.
+    """
+    lost = np.full(3, np.nan)
+    mask = None if valid is None else np.asarray(valid, np.uint8)
+    points = cv2.goodFeaturesToTrack(first, MOST, 0.01, 8, mask=mask)
+    if points is None or len(points) < FEWEST:
+        return lost
+    there, found = _follow(first, second, np.asarray(points, np.float32))
+    back, found_back = _follow(second, first, there)
+    here, after = np.asarray(points, np.float32)[:, 0], there[:, 0]
+    good = found & found_back & (np.linalg.norm(back[:, 0] - here, axis=1) < BACK_PX)
+    if good.sum() < FEWEST:
+        return lost
+    _, kept = cv2.estimateAffinePartial2D(
+        here[good], after[good], method=cv2.RANSAC, ransacReprojThreshold=AGREEMENT_PX, maxIters=500
+    )
+    rows = np.zeros(int(good.sum()), bool) if kept is None else np.asarray(kept).ravel() > 0
+    if rows.sum() < max(FEWEST, AGREE * len(rows)):
+        return lost
+    a = normalise(camera, here[good][rows].astype(float)) @ [1, 1j]
+    b = normalise(camera, after[good][rows].astype(float)) @ [1, 1j]
+    known = np.isfinite(a) & np.isfinite(b)
+    if known.sum() < FEWEST:
+        return lost
+    # Shift, turn and scale by least squares, as numbers of the complex plane.
+    A = np.stack([np.ones(int(known.sum()), complex), a[known]], axis=1)
+    shift, turn = np.linalg.lstsq(A, b[known], rcond=None)[0]
+    return np.array([shift.real, shift.imag, np.angle(turn)])
+
+
+def _follow(first: Grey, second: Grey, points: NDArray[np.float32]) -> tuple[NDArray[np.float32], Mask]:
+    """Where points (N, 1, 2) of one image are in the other, and which were found."""
+    there, found, _ = cv2.calcOpticalFlowPyrLK(
+        first, second, points, np.empty_like(points), winSize=(WINDOW, WINDOW), maxLevel=LEVELS
+    )
+    return np.asarray(there, np.float32), np.asarray(found)[:, 0] == 1

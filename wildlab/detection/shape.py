@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
-from wildlab.detection.background import Mask
-from wildlab.detection.contrast import FEATURES, Contrast, Proposals, propose
-from wildlab.detection.detections import Array, Detections
-from wildlab.detection.near import remove_near
+from wildlab.detection.contrast import FEATURES, Contrast, Mask, Proposals, propose
+from wildlab.detection.detections import Array, Detections, remove_near
 from wildlab.errors import WildlabError
 
 #: What lets through nearly all that is warm: the regression decides.
@@ -57,9 +55,7 @@ class Shape:
     apart_px: float = 10.0
 
 
-def fit_shape(
-    features: ArrayLike, wanted: ArrayLike, regions: Contrast, least: float = 0.0, apart_px: float = 10.0
-) -> Shape:
+def fit_shape(features: ArrayLike, wanted: ArrayLike, regions: Contrast) -> Shape:
     """Learn which regions are what was labelled.
 
     Parameters
@@ -70,8 +66,6 @@ def fit_shape(
         (N,) bool: which regions belong to a label.
     regions
         What the regions come from.
-    least, apart_px
-        As `Shape` has them.
 
     Returns
     -------
@@ -106,7 +100,7 @@ def fit_shape(
 
     w = minimize(loss, np.zeros(Z.shape[1] + 1), jac=True, method="L-BFGS-B").x
     plain = [tuple(float(one) for one in part) for part in (mean, scale, w[1:])]
-    return Shape(regions, plain[0], plain[1], plain[2], float(w[0]), least, apart_px)
+    return Shape(regions, plain[0], plain[1], plain[2], float(w[0]))
 
 
 def log_odds(learnt: Shape, features: ArrayLike) -> Array:

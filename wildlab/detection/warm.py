@@ -9,9 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.detection.background import Mask, fill_invalid
-from wildlab.detection.detections import PART, Detections, describe, no_detections
-from wildlab.detection.near import merge_near, remove_near
+from wildlab.detection.contrast import Mask, fill_invalid
+from wildlab.detection.detections import PART, Detections, describe, no_detections, remove_near
 from wildlab.errors import WildlabError
 
 Grey = NDArray[np.uint8]
@@ -41,9 +40,7 @@ class Warm:
     smallest_px, largest_px
         Limits of the area inside a contour, px^2; `gate_from_distance` gives them.
     apart_px
-        Of detections nearer than this one stays (`wildlab.detection.near`); 0 for all.
-    merge
-        Whether those are merged in place of that.
+        Of detections nearer than this one stays (`wildlab.detection.detections`); 0 for all.
     hottest
         What the mean of a detection is at most, in the unit of the image (F 8.4).
     window
@@ -63,7 +60,6 @@ class Warm:
     smallest_px: float = 12.0
     largest_px: float = 1500.0
     apart_px: float = 10.0
-    merge: bool = False
     hottest: float = float("inf")
     window: tuple[float, float] | None = None
     warm_is_bright: bool = True
@@ -274,7 +270,7 @@ def find_warm(image: NDArray[Any], valid: Mask, thresholds: Warm | None = None) 
     noise = _noise(grey, valid)
     found = describe(labels, measured, valid, contrast=grey, noise=noise, part=t.part, score=excess)
     found = found.select(found.intensity <= t.hottest)
-    return merge_near(found, t.apart_px) if t.merge else remove_near(found, t.apart_px)
+    return remove_near(found, t.apart_px)
 
 
 def grey_above(grey: Grey, t: Warm) -> Grey:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse.csgraph import shortest_path
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
@@ -226,127 +224,6 @@ def rectangle(north: float, east: float, length: float, width: float, course: fl
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
     corners = np.array([north, east]) + length * signs[:, :1] * along + width * signs[:, 1:] * across
     return check_area(corners, "rectangle")
-
-
-def stays_inside(corners: ArrayLike, start: ArrayLike, end: ArrayLike) -> bool:
-    """Whether a straight way stays within a polygon; its border belongs to it.
-
-    Parameters
-    ----------
-    corners
-        (K, 2) metres.
-    start, end
-        (2,) metres.
-
-    Returns
-    -------
-    bool
-    """
-    fence, a, b = np.asarray(corners, float), np.asarray(start, float), np.asarray(end, float)
-    along = b - a
-    length = float(np.linalg.norm(along))
-    edges = np.roll(fence, -1, axis=0) - fence
-    cross = along[0] * edges[:, 1] - along[1] * edges[:, 0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        to = fence - a
-        t = (to[:, 0] * edges[:, 1] - to[:, 1] * edges[:, 0]) / cross
-    # Corners of the fence cut the way as well: an edge along the way crosses it nowhere.
-    s = (to @ along) / max(length**2, 1e-300)
-    cuts = np.concatenate([t[np.isfinite(t)], s])
-    cuts = np.unique(np.concatenate([[0.0, 1.0], cuts[(cuts > 0) & (cuts < 1)]]))
-    middles = a + ((cuts[:-1] + cuts[1:]) / 2)[:, None] * along
-    pieces = np.diff(cuts) * length > 10 * SAME
-    near = distance_to_border(fence, middles) <= 10 * SAME
-    return bool((contains(fence, middles) | near | ~pieces).all())
-
-
-def distance_to_border(corners: ArrayLike, points: ArrayLike) -> Array:
-    """How far points are from the border of a polygon, inside or outside.
-
-    Parameters
-    ----------
-    corners
-        (K, 2) metres.
-    points
-        (N, 2) metres.
-
-    Returns
-    -------
-    (N,) metres.
-    """
-    fence = np.asarray(corners, float)
-    asked = np.atleast_2d(np.asarray(points, float))
-    following = np.roll(fence, -1, axis=0)
-    if len(fence) * len(asked) <= TOGETHER:
-        edges, to = following - fence, asked[:, None] - fence
-        part = np.einsum("nki,ki->nk", to, edges) / np.maximum(np.einsum("ki,ki->k", edges, edges), 1e-300)
-        off = to - np.clip(part, 0, 1)[..., None] * edges
-        return np.asarray(np.sqrt(np.einsum("nki,nki->nk", off, off)).min(axis=1))
-    nearest = np.full(len(asked), np.inf)
-    for a, b in zip(fence, following, strict=True):
-        edge = b - a
-        t = np.clip((asked - a) @ edge / max(edge @ edge, 1e-300), 0, 1)
-        nearest = np.minimum(nearest, np.linalg.norm(asked - a - t[:, None] * edge, axis=1))
-    return nearest
-
-
-def way_inside(corners: ArrayLike, start: ArrayLike, end: ArrayLike) -> Array:
-    """Shortest way between two points that stays within a polygon, by way of its corners.
-
-    Parameters
-    ----------
-    corners
-        (K, 2) metres, checked.
-    start, end
-        (2,) metres. Where one of them lies outside, the way is straight.
-
-    Returns
-    -------
-    (M, 2) metres, from start to end.
-    """
-    fence, a, b = np.asarray(corners, float), np.asarray(start, float), np.asarray(end, float)
-    ends = np.stack([a, b])
-    held = contains(fence, ends) | (distance_to_border(fence, ends) <= 10 * SAME)
-    if not held.all() or stays_inside(fence, a, b):
-        return ends
-    corners_in, lengths, before = _ways_between_corners(fence.tobytes())
-    far = [
-        np.array(
-            [np.linalg.norm(end - one) if stays_inside(fence, end, one) else np.inf for one in corners_in]
-        )
-        for end in ends
-    ]
-    if not len(corners_in):
-        return ends  # rounding alone: in a convex area the straight way is inside
-    total = far[0][:, None] + lengths + far[1]
-    first, last = np.unravel_index(int(total.argmin()), total.shape)
-    if not np.isfinite(total[first, last]):
-        return ends  # rounding alone: a checked polygon is connected
-    path = [int(last)]
-    while path[-1] != first:
-        path.append(int(before[first, path[-1]]))
-    return np.concatenate([ends[:1], corners_in[path[::-1]], ends[1:]])
-
-
-@lru_cache(maxsize=16)
-def _ways_between_corners(data: bytes) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Corners that stick into an area, at which alone shortest ways bend, and the ways between all of them.
-
-    (M, 2) metres, their lengths (M, M), and from each row's corner the corner before each column's.
-    """
-    fence = np.frombuffer(data).reshape(-1, 2)
-    after = np.roll(fence, -1, axis=0) - fence
-    into = np.roll(after, 1, axis=0)
-    nodes = fence[into[:, 0] * after[:, 1] - into[:, 1] * after[:, 0] < 0]
-    direct = np.full((len(nodes), len(nodes)), np.inf)
-    for i in range(len(nodes)):
-        for j in range(i):
-            if stays_inside(fence, nodes[i], nodes[j]):
-                direct[i, j] = direct[j, i] = np.linalg.norm(nodes[i] - nodes[j])
-    if not len(nodes):
-        return nodes, direct, np.zeros((0, 0), np.intp)
-    lengths, before = shortest_path(direct, method="D", return_predecessors=True)
-    return nodes, np.asarray(lengths), np.asarray(before, np.intp)
 
 
 def _signed_area(points: Array) -> float:

@@ -1,7 +1,9 @@
-"""What a plan will have seen: how often, when last, how surely, and what was seen only blurred.
+"""What images show of a terrain: which nodes, how often, when last and how surely; and animals that walk
+meanwhile.
 
-A node of the terrain counts as seen where an image shows it with nothing before it, and sharply: an image is
-blurred where the camera turns and moves by more than a stated number of pixels while it is exposed.
+A node counts as seen where an image shows it with nothing before it, and sharply: an image is blurred where
+the camera turns and moves by more than a stated number of pixels while it is exposed. All images are looked
+at at once (`wildlab.geometry.visibility.visible_nodes` does the same for one), and lines of sight are exact.
 """
 
 from __future__ import annotations
@@ -10,13 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.areas import contains
-from wildlab.planning.sightings import Sightings, see
+from wildlab.geometry.visibility import image_border, lines_clear, widest_view
+from wildlab.planning.areas import check_area, contains, inside_of
 
 
 class Coverage(NamedTuple):
@@ -86,76 +90,6 @@ class Share(NamedTuple):
     area: float
 
 
-def cover(
-    terrain: Terrain,
-    poses: CameraPoses,
-    times: ArrayLike,
-    *,
-    furthest: float,
-    sharp: ArrayLike | None = None,
-    range_scale: float = np.inf,
-    border: float = 0.0,
-    surface: Terrain | None = None,
-) -> Coverage:
-    """What images show of a terrain, over all of them.
-
-    Parameters
-    ----------
-    terrain
-        In the same n.
-    poses
-        Of the images, N rows.
-    times
-        (N,) s, ascending.
-    furthest
-        Distance up to which anything is looked for, metres.
-    sharp
-        (N,) bool, from `wildlab.planning.gimbal.blur`; None takes all images for sharp.
-    range_scale
-        ``r`` of (5.9), metres: at that distance one look detects with 1/e. Infinite is a perfect sensor.
-    border
-        How far inside the image a node must be, pixels: the margin of a plan against errors of the pose.
-    surface
-        What hides, as for `see`.
-
-    Returns
-    -------
-    Coverage
-
-    Raises
-    ------
-    WildlabError
-        As `see`; where times are not ascending, or not one for each pose.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from wildlab.geometry import Camera, CameraPoses, Mount, Terrain
-    >>> camera = Camera(100, 100, 100.0, 100.0, 50.0, 50.0)
-    >>> flat = Terrain(np.zeros((101, 101), np.float32), north=-100.0, east=-100.0, step=2.0)
-    >>> poses = CameraPoses(camera, Mount("down"), np.array([[0, 0, -20], [10, 0, -20.0]]), np.eye(3))
-    >>> shown = cover(flat, poses, [0.0, 5.0], furthest=100.0)
-    >>> print(np.bincount(shown.looks.ravel())[1:])
-    [110  66]
-    """
-    t = np.asarray(times, float)
-    count = poses.rows[0] if len(poses.rows) == 1 else -1
-    if t.shape != (count,) or not (np.diff(t) >= 0).all():
-        raise WildlabError(
-            f"times of the shape {t.shape} for {count} poses, or not in order",
-            "give one ascending time for each pose",
-            field="times",
-        )
-    clear = np.ones(len(t), bool) if sharp is None else np.asarray(sharp, bool)
-    if clear.shape != t.shape:
-        raise WildlabError(
-            f"{clear.size} marks of sharpness for {len(t)} images", "give one each", field="sharp"
-        )
-    found = see(terrain, poses, furthest, surface=surface)
-    found = found.take(found.edge >= border) if border > 0 else found
-    return from_sightings(found, terrain, t, clear, range_scale)
-
-
 def from_sightings(
     found: Sightings, terrain: Terrain, times: Array, sharp: NDArray[np.bool_], range_scale: float = np.inf
 ) -> Coverage:
@@ -172,7 +106,7 @@ def from_sightings(
     sharp
         (N,) bool.
     range_scale
-        As for `cover`.
+        ``r`` of (5.9), metres: at that distance one look detects with 1/e. Infinite is a perfect sensor.
 
     Returns
     -------
@@ -240,7 +174,7 @@ def share_seen(shown: Coverage, where: NDArray[np.bool_]) -> Share:
     Parameters
     ----------
     shown
-        From `cover`.
+        From `from_sightings`.
     where
         (R, C) bool: the nodes, as by `nodes_in`.
 
@@ -260,3 +194,275 @@ def share_seen(shown: Coverage, where: NDArray[np.bool_]) -> Share:
         float(shown.detected[where].mean()),
         count * shown.step**2,
     )
+
+
+#: Lines of sight that are looked at together; what they take is some tens of megabytes.
+_TOGETHER = 250_000
+#: Border rays that sink by less than this share of their length meet no ground worth the name.
+_FLAT = 1e-3
+
+
+class Sightings(NamedTuple):
+    """Nodes that images show: one row for each node of each image, images in order.
+
+    Attributes
+    ----------
+    image
+        (S,) which pose.
+    node
+        (S,) which node, counted row by row of the terrain.
+    distance
+        (S,) from the camera to the node, metres.
+    edge
+        (S,) how far it is from the nearest edge of the image, pixels.
+    """
+
+    image: NDArray[np.intp]
+    node: NDArray[np.intp]
+    distance: Array
+    edge: Array
+
+    def take(self, which: NDArray[np.bool_]) -> Sightings:
+        """Some of them, by (S,) bool."""
+        return Sightings(self.image[which], self.node[which], self.distance[which], self.edge[which])
+
+
+def see(
+    terrain: Terrain,
+    poses: CameraPoses,
+    furthest: float,
+    *,
+    hidden: bool = True,
+) -> Sightings:
+    """All nodes that images show.
+
+    Parameters
+    ----------
+    terrain
+        In the same n.
+    poses
+        Of the images, N rows.
+    furthest
+        Distance up to which anything is looked for, metres.
+    hidden
+        Whether the ground hides anything; else all that is in the image is seen.
+
+    Returns
+    -------
+    Sightings
+
+    Raises
+    ------
+    WildlabError
+        Where the furthest distance is not above zero and finite, or poses are not one row of instants.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from wildlab.geometry import Camera, CameraPoses, Mount, Terrain
+    >>> camera = Camera(100, 100, 100.0, 100.0, 50.0, 50.0)
+    >>> flat = Terrain(np.zeros((101, 101), np.float32), north=-100.0, east=-100.0, step=2.0)
+    >>> poses = CameraPoses(camera, Mount("down"), np.array([[0, 0, -20], [30, 0, -20.0]]), np.eye(3))
+    >>> print(np.bincount(see(flat, poses, 100.0).image))
+    [121 121]
+    """
+    if not (np.isfinite(furthest) and furthest > 0):
+        raise WildlabError(
+            f"a furthest distance of {furthest} m",
+            "say up to which distance anything is to be found, in metres above zero",
+            field="furthest",
+        )
+    if len(poses.rows) != 1:
+        raise WildlabError(f"poses with the rows {poses.rows}", "give one row of instants", field="poses")
+    p, R = np.asarray(poses.p_nc, float), np.asarray(poses.R_nc, float)
+    first, count = _blocks(terrain, poses.camera, p, R, furthest)
+    # Compiled functions are imported where they are called: a compiler takes its time to be imported.
+    from wildlab.geometry.compilation import announced
+    from wildlab.planning.view_kernels import in_images
+
+    camera = poses.camera
+    lens = np.array(
+        [
+            *(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.skew),
+            *(*camera.distortion, widest_view(camera) * (1 + 1e-9)),
+        ],
+        float,
+    )
+    grid = np.array([terrain.north, terrain.east, terrain.step])
+    with announced("the view over terrain"):
+        image, node, distance, edge, points = in_images(
+            terrain.height, grid, lens, first, count, p.copy(), R.copy(), furthest
+        )
+    found = Sightings(image, node, distance, edge)
+    if not hidden or not len(node):
+        return found
+    clear = [
+        lines_clear(terrain, points[begin : begin + _TOGETHER], p[image[begin : begin + _TOGETHER]])
+        for begin in range(0, len(node), _TOGETHER)
+    ]
+    return found.take(np.concatenate(clear))
+
+
+def _blocks(
+    terrain: Terrain, camera: Camera, p: Array, R: Array, furthest: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First row and column, and how many of each, of nodes that an image may show. (N, 2) each.
+
+    What it shows lies within the hull of where its border's rays come to the lowest and to the highest
+    ground within the furthest distance; and within that distance, where a ray does not sink.
+    """
+    directions = normalise(camera, image_border(camera))
+    directions = directions[np.isfinite(directions).all(axis=1)]
+    # A little more than the border: between two rays a distorted border bulges.
+    rays = np.concatenate([1.02 * directions, np.ones((len(directions), 1))], axis=1)
+    rays = np.einsum("nij,kj->nki", R, rays)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    sinks = (rays[..., 2] > _FLAT).all(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = rays[..., :2] / rays[..., 2:]
+    window = np.full(len(p), furthest)
+    # The ground about a camera bounds how far it sees, and so which ground about it there is to look at.
+    for _ in range(2):
+        low, high = _bounds(terrain, p, window)
+        reach = np.stack([p[:, :2] - furthest, p[:, :2] + furthest])
+        drops = [np.maximum(-p[:, 2] - level, 0.0)[:, None, None] for level in (high, low)]
+        with np.errstate(invalid="ignore"):
+            ends = np.concatenate([p[:, None, :2] + drop * slopes for drop in drops], axis=1)
+        reach[0, sinks] = np.maximum(reach[0, sinks], ends[sinks].min(axis=1))
+        reach[1, sinks] = np.minimum(reach[1, sinks], ends[sinks].max(axis=1))
+        furthest_corner = np.abs(reach - p[:, :2]).max(axis=(0, 2))
+        # A few sizes of window are enough.
+        with np.errstate(divide="ignore"):
+            window = np.minimum(furthest, furthest * 2.0 ** np.ceil(np.log2(furthest_corner / furthest)))
+    corner = np.array([terrain.north, terrain.east])
+    shape = np.array(terrain.height.shape)
+    reach = np.nan_to_num(reach, nan=-1e9)
+    first = np.clip(np.floor((reach[0] - corner) / terrain.step), 0, shape).astype(np.intp)
+    last = np.clip(np.ceil((reach[1] - corner) / terrain.step) + 1, 0, shape).astype(np.intp)
+    count = np.maximum(last - first, 0)
+    # A block without rows has no nodes, whatever its columns say.
+    count[(count == 0).any(axis=1)] = 0
+    return first, count
+
+
+def _bounds(terrain: Terrain, p: Array, window: Array) -> tuple[Array, Array]:
+    """Lowest and highest ground within so many metres, (N,), of each camera, metres. (N,) each."""
+    rows, columns = terrain.height.shape
+    known = np.isfinite(terrain.height)
+    at = (p[:, :2] - (terrain.north, terrain.east)) / terrain.step
+    outside = ~((at >= 0) & (at <= (rows - 1, columns - 1))).all(axis=1)
+    i, j = np.clip(np.nan_to_num(np.rint(at)), 0, (rows - 1, columns - 1)).astype(np.intp).T
+    low, high = np.full(len(p), np.inf), np.full(len(p), -np.inf)
+    for one in np.unique(window[~outside]):
+        half = int(np.ceil(one / terrain.step)) + 1
+        size = (min(2 * half + 1, 2 * rows + 1), min(2 * half + 1, 2 * columns + 1))
+        which = (window == one) & ~outside
+        for bound, limit, of in ((low, np.inf, minimum_filter), (high, -np.inf, maximum_filter)):
+            bound[which] = of(np.where(known, terrain.height, limit), size, mode="nearest")[
+                i[which], j[which]
+            ]
+    # Cameras off the map see what no window about a node bounds.
+    least, most = float(terrain.height[known].min()), float(terrain.height[known].max())
+    return np.where(np.isfinite(low), low, least), np.where(np.isfinite(high), high, most)
+
+
+def walks(
+    fence: ArrayLike,
+    times: ArrayLike,
+    count: int,
+    speed_sd: float,
+    step: float,
+    rng: np.random.Generator,
+) -> Array:
+    """Random walks within an area, F (4.5) with the noise of (4.8): a new velocity every step.
+
+    Parameters
+    ----------
+    fence
+        (K, 2) metres. An animal whose step would lead out of it stays where it is.
+    times
+        (N,) s from 0, ascending.
+    count
+        Of animals; each starts anywhere in the area with equal chance.
+    speed_sd
+        Standard deviation of each component of the velocity, m/s.
+    step
+        How long an animal keeps to a velocity, s.
+    rng
+        Random numbers.
+
+    Returns
+    -------
+    (count, N, 2) metres, linear between steps.
+
+    Raises
+    ------
+    WildlabError
+        As `check_area`; where the spread of speeds is below zero or the step not above it.
+    """
+    if not (speed_sd >= 0 and step > 0):
+        raise WildlabError(
+            f"speeds of {speed_sd} m/s that last {step} s",
+            "give zero or more, and more than zero",
+            field="step",
+        )
+    corners = check_area(fence, "fence")
+    t = np.asarray(times, float)
+    here = _anywhere(corners, count, rng)
+    steps = int(np.ceil(float(t.max(initial=0.0)) / step)) + 1
+    way = np.empty((steps + 1, count, 2))
+    way[0] = here
+    within = inside_of(corners)
+    for k in range(steps):
+        there = here + step * speed_sd * rng.standard_normal((count, 2))
+        here = np.where(within(there)[:, None], there, here)
+        way[k + 1] = here
+    at = t / step
+    before = np.minimum(at.astype(np.intp), steps - 1)
+    part = (at - before)[:, None, None]
+    return np.asarray(np.swapaxes(way[before] * (1 - part) + way[before + 1] * part, 0, 1))
+
+
+def first_seen(
+    found: Sightings, terrain: Terrain, times: ArrayLike, sharp: NDArray[np.bool_], ways: ArrayLike
+) -> Array:
+    """When each animal was first in a sharp image that shows the node nearest to it.
+
+    Parameters
+    ----------
+    found
+        Sightings of nodes, from `see`.
+    terrain
+        Of which they tell; its step is how precisely "in the image" is known.
+    times
+        (N,) s of the images.
+    sharp
+        (N,) bool.
+    ways
+        (A, N, 2) where the animals are at these times, metres, from `walks`.
+
+    Returns
+    -------
+    (A,) s; NaN of those that were never seen.
+    """
+    t, where = np.asarray(times, float), np.asarray(ways, float)
+    rows, columns = terrain.height.shape
+    i = np.rint((where[..., 0] - terrain.north) / terrain.step).astype(np.int64)
+    j = np.rint((where[..., 1] - terrain.east) / terrain.step).astype(np.int64)
+    on = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
+    size = np.int64(rows * columns)
+    # Image and node as one number: those that are shown are few beside all there could be.
+    shown = np.sort(found.image.astype(np.int64) * size + found.node)
+    asked = np.where(on, np.arange(len(t)) * size + i * columns + j, -1)
+    place = np.minimum(np.searchsorted(shown, asked), max(len(shown) - 1, 0))
+    hit = (shown[place] == asked) & sharp if len(shown) else np.zeros(asked.shape, bool)
+    return np.where(hit.any(axis=1), t[hit.argmax(axis=1)], np.nan)
+
+
+def _anywhere(corners: Array, count: int, rng: np.random.Generator) -> Array:
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    found = np.zeros((0, 2))
+    while len(found) < count:
+        tried = rng.uniform(low, high, (2 * count + 10, 2))
+        found = np.concatenate([found, tried[contains(corners, tried)]])
+    return found[:count]

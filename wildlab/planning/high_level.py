@@ -1,7 +1,7 @@
 """Search on, or go back to an animal that is known: the high-level planner of F 5.3.1.
 
 It takes estimates as they are: positions (m, 2) north and east, m, and covariances (m, 2, 2), m^2, of the
-animals that are known. Both objectives of the thesis are here, the rule by which an enclosure is done, and
+animals that are known. The objective (5.2) is here, the rule by which an enclosure is done, and
 both rules by which an animal that was known is lost.
 """
 
@@ -16,31 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 
-#: What `best_goal` and `best_by_measure` give where the search for new animals is worth more: F's m + 1.
+#: What `best_goal` gives where the search for new animals is worth more: F's m + 1.
 SEARCH = -1
-
-
-def known_measure(covariances: ArrayLike, alpha: float) -> float:
-    """How much is known of all animals together, V of F (5.1).
-
-    Parameters
-    ----------
-    covariances
-        (m, 2, 2) m^2.
-    alpha
-        1/m^2. Near 0 only the number of known animals counts; at 0.5 one that is known badly hardly does.
-
-    Returns
-    -------
-    From 0 to m.
-
-    Examples
-    --------
-    >>> round(known_measure([np.eye(2), 100 * np.eye(2)], 0.5), 3)
-    0.368
-    """
-    P = np.asarray(covariances, float).reshape(-1, 2, 2)
-    return float(np.exp(-alpha * np.trace(P, axis1=1, axis2=2)).sum())
 
 
 def utilities(
@@ -118,69 +95,6 @@ def best_goal(
         raise WildlabError("there is no goal left", "end the search when all is done (all_positioned)")
     k = int(np.argmax(worth))
     return SEARCH if k == len(worth) - 1 else k
-
-
-def best_by_measure(
-    positions: ArrayLike,
-    covariances: ArrayLike,
-    platform: ArrayLike,
-    *,
-    alpha: float,
-    speed: float,
-    walk: float,
-    horizon: float,
-    finds: float,
-    found_variance: float = 1.0,
-) -> int:
-    """Which animal to go back to, or `SEARCH`, by what V of F (5.1) will be after a while.
-
-    F does not say how V decides. Here each choice is carried on over the same time: going back makes one
-    animal known well when the platform arrives, and only the rest of the time is left for new ones.
-
-    Parameters
-    ----------
-    positions, covariances
-        Of the animals that are known, (m, 2) m and (m, 2, 2) m^2.
-    platform
-        (2,) m.
-    alpha
-        As for `known_measure`, 1/m^2.
-    speed
-        Of the platform, m/s.
-    walk
-        By how much a variance grows, each way, m^2/s.
-    horizon
-        How long choices are carried on, s.
-    finds
-        New animals that the search is expected to find, 1/s.
-    found_variance
-        Of an animal that was just seen, each way, m^2.
-
-    Returns
-    -------
-    int
-    """
-    at = np.asarray(positions, float).reshape(-1, 2)
-    P = np.asarray(covariances, float).reshape(-1, 2, 2)
-    later = P + walk * horizon * np.eye(2)
-    base = np.exp(-alpha * np.trace(later, axis1=1, axis2=2))
-
-    def just_found(ago: ArrayLike) -> Array:
-        return np.exp(-2 * alpha * (found_variance + walk * np.asarray(ago, float)))
-
-    # New animals come evenly: each has grown old since it was found.
-    ages = np.linspace(0.0, horizon, 33)
-    values = np.append(np.zeros(len(at)), finds * horizon * just_found(ages).mean())
-    away = np.hypot(*(at - np.asarray(platform, float)).T) / speed
-    for j, time in enumerate(away):
-        if time > horizon:
-            values[j] = -np.inf
-            continue
-        rest = horizon - time
-        searched = finds * rest * just_found(np.linspace(0.0, rest, 33)).mean()
-        values[j] = just_found(rest) - base[j] + searched
-    k = int(np.argmax(values))
-    return SEARCH if k == len(at) else k
 
 
 def all_positioned(known: ArrayLike, live: ArrayLike) -> NDArray[np.bool_]:

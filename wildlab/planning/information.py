@@ -2,7 +2,8 @@
 
 Where an animal stands that is at a grid point is known with the covariance P (3, 3), and Y is its inverse. An
 image that shows the point adds what two angles tell (5.4), less where an animal may be missed (5.10), and
-with time it wears off (5.5). What is left to be known is the sum of all tr(Y^-1), (5.6).
+with time it wears off (5.5); `information_kernels` has both. What is left to be known is the sum of all
+tr(Y^-1), (5.6).
 
 F writes this in east-north-up; here it is n, north-east-down. The print contradicts itself in places:
 `as_printed` has its letter, and the study ``printed-numbers`` shows where it differs.
@@ -78,33 +79,8 @@ def sensor_of(camera: Camera, *, sd: float, reach: float, nearest: float = 1.0) 
     return SearchSensor(*half, sd=sd, reach=reach, nearest=nearest)
 
 
-def azimuth_elevation(points: ArrayLike, p_nc: ArrayLike) -> Array:
-    """Both angles at which a camera sees points, F (5.7), without noise.
-
-    Parameters
-    ----------
-    points
-        (N, 3) in n, m.
-    p_nc
-        Of the camera, (3,) or (N, 3), m.
-
-    Returns
-    -------
-    (N, 2) azimuth from north, clockwise, and elevation above the horizontal plane, rad. F counts its azimuth
-    from east, anticlockwise, which changes its sign and its zero and nothing of what it tells.
-
-    Examples
-    --------
-    >>> print(np.degrees(azimuth_elevation([[0.0, 50.0, 0.0]], [0.0, 0.0, -50.0])))
-    [[ 90. -45.]]
-    """
-    d = np.asarray(points, float) - np.asarray(p_nc, float)
-    azimuth = np.arctan2(d[..., 1], d[..., 0])
-    return np.stack([azimuth, np.arctan2(-d[..., 2], np.hypot(d[..., 0], d[..., 1]))], axis=-1)
-
-
 def bearing_jacobian(points: ArrayLike, p_nc: ArrayLike, nearest: float = 0.0) -> Array:
-    """How both angles of `azimuth_elevation` change with the point.
+    """How azimuth and elevation, F (5.7), change with the point: (north, clockwise) and above the horizon.
 
     With ``rho`` the horizontal distance and ``r`` the distance, the azimuth turns by 1 / rho a metre across
     the view, and the elevation by 1 / r a metre across it. As rho = r cos(theta), the azimuth brings the
@@ -234,7 +210,6 @@ def detection_probability(
     p_nc: ArrayLike,
     R_nc: ArrayLike,
     sensor: SearchSensor,
-    clear: NDArray[np.bool_] | None = None,
 ) -> Array:
     """With which probability an animal at a point is found in one image, F (5.8) with (5.9).
 
@@ -247,13 +222,11 @@ def detection_probability(
     R_nc
         (3, 3), takes a vector from c to n.
     sensor
-        Field of view and reach.
-    clear
-        (N,) whether nothing hides the point, as `wildlab.geometry.lines_clear` says; None: nothing does.
+        Field of view and reach; what hides the point is not asked.
 
     Returns
     -------
-    (N,) from 0 to 1; 0 outside of the field of view and where the point is hidden.
+    (N,) from 0 to 1; 0 outside of the field of view.
 
     Examples
     --------
@@ -265,8 +238,6 @@ def detection_probability(
     """
     away = np.asarray(points, float) - np.asarray(p_nc, float)
     seen = in_field_of_view(points, p_nc, R_nc, sensor)
-    if clear is not None:
-        seen = seen & clear
     return np.where(seen, np.exp(-(away**2).sum(axis=-1) / sensor.reach**2), 0.0)
 
 
@@ -301,74 +272,6 @@ def initial_information(count: int, sd: ArrayLike) -> Array:
     return np.tile(np.diag(1 / each**2), (count, 1, 1))
 
 
-def add_image(
-    Y: ArrayLike, points: ArrayLike, p_nc: ArrayLike, probability: ArrayLike, sensor: SearchSensor
-) -> Array:
-    """The grid after one more image, F (5.10).
-
-    Parameters
-    ----------
-    Y
-        (N, 3, 3) before it, 1/m^2.
-    points
-        (N, 3) in n, m.
-    p_nc
-        Of the camera, (3,), m.
-    probability
-        (N,) of detection, as `detection_probability` has it.
-    sensor
-        How sharp its angles are.
-
-    Returns
-    -------
-    (N, 3, 3) 1/m^2.
-    """
-    told = bearing_information(points, p_nc, sensor)
-    return np.asarray(np.asarray(Y, float) + np.asarray(probability, float)[:, None, None] * told)
-
-
-def grow_old(Y: ArrayLike, Q: ArrayLike) -> Array:
-    """The grid after a while in which nothing was seen, F (5.5), for a random walk on the ground.
-
-    F prints F_t = G_t = I (2 x 2) beside matrices of 3 x 3. An animal walks over the ground and does not
-    leave it, so here F_t = I (3 x 3), and G_t (3 x 2) takes the walk to north and east; what is known of the
-    height stays. The print inverts Y, which has no inverse where nothing was seen yet; written as
-    Y - Y G (I + Q G'YG)^-1 Q G'Y it needs none, and gives the same wherever there is one.
-
-    Parameters
-    ----------
-    Y
-        (N, 3, 3) before, 1/m^2; may be singular.
-    Q
-        Covariance of the walk meanwhile, north and east: (2, 2), or a variance for both, m^2.
-
-    Returns
-    -------
-    (N, 3, 3) 1/m^2, never more than before.
-
-    Raises
-    ------
-    WildlabError
-        Where Q is not a covariance.
-
-    Examples
-    --------
-    >>> print(np.diag(grow_old(np.eye(3)[None], 3.0)[0]))
-    [0.25 0.25 1.  ]
-    """
-    walk = np.asarray(Q, float)
-    walk = walk * np.eye(2) if walk.ndim == 0 else walk
-    known = walk.shape == (2, 2) and bool(np.isfinite(walk).all())
-    if not known or np.linalg.eigvalsh((walk + walk.T) / 2)[0] < 0:
-        raise WildlabError(
-            f"a walk of {np.asarray(Q).tolist()}", "give a covariance (2, 2) in m^2", field="Q"
-        )
-    before = np.asarray(Y, float)
-    lost = np.linalg.solve(np.eye(2) + walk @ before[..., :2, :2], walk @ before[..., :2, :])
-    after = before - before[..., :, :2] @ lost
-    return np.asarray((after + np.swapaxes(after, -1, -2)) / 2)
-
-
 def trace_of_inverse(Y: ArrayLike) -> Array:
     """tr(Y^-1) of each matrix, in closed form by its factors L D L'.
 
@@ -397,22 +300,3 @@ def trace_of_inverse(Y: ArrayLike) -> Array:
         d3 = Y[..., 2, 2] - c * l3 - m * rest
         total = 1 / a + (l2**2 + 1) / d2 + ((l2 * m - l3) ** 2 + m**2 + 1) / d3
     return np.where((a > 0) & (d2 > 0) & (d3 > 0), total, np.inf)
-
-
-def left_to_know(Y: ArrayLike, weights: ArrayLike = 1.0) -> float:
-    """The objective of F (5.6): the sum of tr(Y^-1) over all grid points.
-
-    Parameters
-    ----------
-    Y
-        (N, 3, 3) 1/m^2.
-    weights
-        (N,), how much each point counts: 0 where an enclosure is done. F has 1.
-
-    Returns
-    -------
-    m^2; the lower, the more is known.
-    """
-    given = np.broadcast_to(np.asarray(weights, float), np.shape(Y)[:-2])
-    counts = given > 0
-    return float(given[counts] @ trace_of_inverse(np.asarray(Y, float)[counts]))

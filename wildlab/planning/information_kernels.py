@@ -1,7 +1,7 @@
 """What candidate steps would tell of a grid, compiled: the planner asks it hundreds of times a decision.
 
-The sums are those of `wildlab.planning.information`, written out; tests hold the two together. All of it
-stands in one file, for the compiler's cache looks at one file only.
+The sums are those of F (5.4)-(5.10), written out; tests hold them against plain matrices. All of it stands in
+one file, for the compiler's cache looks at one file only.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ def worth_beyond(left: Array, middles: Array, parents: Array, ends: Array, lengt
 
 @compiled
 def grow_old_all(Y: Array, left: Array, q: float) -> None:
-    """F (5.5) in place, for a walk with the variance ``q`` both ways; as `information.grow_old` has it.
+    """F (5.5) in place, for a walk with the variance ``q`` both ways; and nothing for its height.
 
     With A the 2 x 2 block of Y for the ground and n the column beside it, A becomes (I + qA)^-1 A and n
     (I + qA)^-1 n, written out so that nothing is subtracted from what is nearly the same.

@@ -3,15 +3,14 @@
 F flies rows over one enclosure after the other and leaves the order of the enclosures and the direction of
 the rows to the user; here both may be chosen, or follow from the length of the way. F's sentence that such
 rows cover any convex area takes no heed of how rows end: a row that ends at the fence leaves the tips of a
-slanted fence unseen, so rows here reach as far as the area does anywhere within half a row distance
-(``ends="cover"``).
+slanted fence unseen, so rows here reach as far as the area does anywhere within half a row distance.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,10 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
-from wildlab.planning.areas import check_area, edge_directions, way_inside
-from wildlab.planning.visits import AreaWay, visit_order
+from wildlab.planning.areas import check_area, edge_directions
 
-Ends = Literal["cover", "inside"]
 #: More rows than this over one area are a slip of a unit.
 MOST_ROWS = 5000
 
@@ -146,7 +143,6 @@ def lawn_mower(
     distance: float,
     *,
     direction: float | None = None,
-    ends: Ends = "cover",
     turn: float = 0.0,
     start: ArrayLike | None = None,
 ) -> Pattern:
@@ -165,10 +161,6 @@ def lawn_mower(
     direction
         Of the rows, from north to the east, radians; None takes the one, of those along the fence's edges,
         that needs the shortest rows, counting ``turn`` for each.
-    ends
-        ``"cover"``: rows reach as far as the area does within half a row distance, so that all of it is
-        within that; they leave a slanted fence behind. ``"inside"``: rows end at the fence, and the way
-        between them stays inside.
     turn
         What a turn costs, as metres of way: speed times the time of a turn.
     start
@@ -194,7 +186,7 @@ def lawn_mower(
     """
     return lawn_mowers(
         [corners], distance, directions=None if direction is None else [direction],
-        ends=ends, turn=turn, start=start,
+        turn=turn, start=start,
     )  # fmt: skip
 
 
@@ -203,11 +195,9 @@ def lawn_mowers(
     distance: float | Sequence[float],
     *,
     directions: Sequence[float | None] | None = None,
-    ends: Ends = "cover",
     turn: float = 0.0,
     start: ArrayLike | None = None,
     back: bool = False,
-    order: Sequence[int] | None = None,
 ) -> Pattern:
     """Rows over several areas, one after the other, in the order of the shortest way (F 5.2, figure 5.2).
 
@@ -219,14 +209,12 @@ def lawn_mowers(
         Between rows, for all or for each, metres.
     directions
         Of the rows of each area, radians, None where it is to be chosen as in `lawn_mower`.
-    ends, turn
+    turn
         As for `lawn_mower`.
     start
         (2,) where the way begins; None leaves that open.
     back
         Whether the way leads back to where it began, which then counts for the order.
-    order
-        Of the areas, counted from 0; None takes the shortest.
 
     Returns
     -------
@@ -252,18 +240,12 @@ def lawn_mowers(
     for given, what in ((len(apart), "distance"), (len(wanted), "directions")):
         if given != len(areas):
             raise WildlabError(f"{given} values for {len(areas)} areas", "give one for each", field=what)
-    if order is not None and sorted(order) != list(range(len(areas))):
-        raise WildlabError(
-            f"an order of {list(order)} for {len(areas)} areas",
-            f"name each of 0 to {len(areas) - 1} once",
-            field="order",
-        )
     fences = [check_area(one, f"area {k + 1}") for k, one in enumerate(areas)]
     inner = [
-        _block_ways(fence, float(d), angle, ends, turn)
+        _block_ways(fence, float(d), angle, turn)
         for fence, d, angle in zip(fences, apart, wanted, strict=True)
     ]
-    chosen = visit_order([ways for ways, _ in inner], start=start, back=back, order=order)
+    chosen = visit_order([ways for ways, _ in inner], start=start, back=back)
     rows, area, way = [], [], []
     for k, which in chosen:
         one = inner[k][0][which]
@@ -281,9 +263,7 @@ def lawn_mowers(
     )
 
 
-def rows_over(
-    corners: ArrayLike, distance: float, direction: float, ends: Ends = "cover"
-) -> tuple[list[list[Array]], float]:
+def rows_over(corners: ArrayLike, distance: float, direction: float) -> tuple[list[list[Array]], float]:
     """Pieces of rows over an area, row by row from left to right of their direction.
 
     Parameters
@@ -294,8 +274,6 @@ def rows_over(
         Between rows at most, metres.
     direction
         Of the rows, from north to the east, radians.
-    ends
-        As for `lawn_mower`.
 
     Returns
     -------
@@ -324,30 +302,27 @@ def rows_over(
     rows = []
     for k in range(count):
         bottom, middle, top = (low + (k + part) * step for part in (0.0, 0.5, 1.0))
-        spans = _spans(turned, bottom, top) if ends == "cover" else _chords(turned, middle)
-        rows.append([np.outer(span, along) + middle * across for span in spans])
+        rows.append([np.outer(span, along) + middle * across for span in _spans(turned, bottom, top)])
     return rows, step
 
 
 def _block_ways(
-    fence: Array, distance: float, direction: float | None, ends: Ends, turn: float
+    fence: Array, distance: float, direction: float | None, turn: float
 ) -> tuple[list[AreaWay], float]:
     """Ways over one area, each with its own entrance and exit, and the distance between its rows."""
-    angle = _best_direction(fence, distance, ends, turn) if direction is None else float(direction)
-    rows, step = rows_over(fence, distance, angle, ends)
-    blocks = _blocks(rows, angle)
-    if len(blocks) == 1:
-        return [_way(way, fence, ends) for way in _four_ways(blocks[0])], step
+    angle = _best_direction(fence, distance, turn) if direction is None else float(direction)
+    rows, step = rows_over(fence, distance, angle)
+    each = [[_way(way) for way in _four_ways(block)] for block in _blocks(rows, angle)]
+    if len(each) == 1:
+        return each[0], step
     # Blocks within a concave area, in the shortest order; the whole may be flown either way round.
-    each = [[_way(way, fence, ends) for way in _four_ways(block)] for block in blocks]
-    chosen = visit_order(each, fence=fence if ends == "inside" else None)
-    flown = np.concatenate([each[k][which].rows for k, which in chosen])
-    return [_way(flown, fence, ends), _way(flown[::-1, ::-1], fence, ends)], step
+    flown = np.concatenate([each[k][which].rows for k, which in visit_order(each)])
+    return [_way(flown), _way(flown[::-1, ::-1])], step
 
 
-def _best_direction(fence: Array, distance: float, ends: Ends, turn: float) -> float:
+def _best_direction(fence: Array, distance: float, turn: float) -> float:
     def cost(angle: float) -> float:
-        pieces = [piece for row in rows_over(fence, distance, angle, ends)[0] for piece in row]
+        pieces = [piece for row in rows_over(fence, distance, angle)[0] for piece in row]
         lengths = sum(float(np.linalg.norm(piece[1] - piece[0])) for piece in pieces)
         return lengths + len(pieces) * (turn + distance)
 
@@ -388,23 +363,8 @@ def _four_ways(block: Array) -> list[Array]:
     return ways
 
 
-def _way(rows: Array, fence: Array, ends: Ends) -> AreaWay:
-    """The way through rows, round the corners of the fence where it has to stay inside."""
-    points = [rows[0, 0]]
-    for k, row in enumerate(rows):
-        if k:
-            points += list(way_inside(fence, points[-1], row[0])[1:] if ends == "inside" else row[:1])
-        points.append(row[1])
-    return AreaWay(rows, np.array(points))
-
-
-def _chords(turned: Array, at: float) -> list[Array]:
-    """Where the line across = ``at`` lies in a polygon of along and across: (2,) each."""
-    following = np.roll(turned, -1, axis=0)
-    spans = (turned[:, 1] > at) != (following[:, 1] > at)
-    a, b = turned[spans], following[spans]
-    x = np.sort(a[:, 0] + (at - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))
-    return [np.array(pair) for pair in x.reshape(-1, 2) if pair[1] - pair[0] > 0]
+def _way(rows: Array) -> AreaWay:
+    return AreaWay(rows, rows.reshape(-1, 2))
 
 
 def _spans(turned: Array, bottom: float, top: float) -> list[Array]:
@@ -434,3 +394,165 @@ def _spans(turned: Array, bottom: float, top: float) -> list[Array]:
         else:
             united.append([left, right])
     return [np.array(one) for one in united]
+
+
+#: Up to how many areas every order is looked at.
+EXACT = 9
+
+
+class AreaWay(NamedTuple):
+    """One way over an area.
+
+    Attributes
+    ----------
+    rows
+        (R, 2, 2) metres, in the order flown.
+    points
+        (M, 2) metres, all way points; the first is its entrance, the last its exit.
+    """
+
+    rows: Array
+    points: Array
+
+
+def visit_order(
+    ways: Sequence[Sequence[AreaWay]],
+    *,
+    start: ArrayLike | None = None,
+    back: bool = False,
+) -> list[tuple[int, int]]:
+    """The order of areas, and how each is entered, that makes the whole way shortest.
+
+    Every order is looked at for up to `EXACT` areas (dynamic programming over the set of those visited). Of
+    more, a way that goes to the nearest next is improved by turning parts of it round and by moving areas to
+    other places (2-opt, or-opt) until none of that helps: such a way is short, not surely the shortest.
+
+    Parameters
+    ----------
+    ways
+        Of each area the ways over it.
+    start
+        (2,) where one begins, metres; None begins at any entrance.
+    back
+        Whether one returns to the start.
+
+    Returns
+    -------
+    Of each visit the number of the area and of its way.
+
+    Raises
+    ------
+    WildlabError
+        Where an area has no way.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from wildlab.planning.patterns import AreaWay, visit_order
+    >>> there = [[AreaWay(np.zeros((0, 2, 2)), np.array([[x, 0.0], [x, 1.0]]))] for x in (5.0, 1.0, 3.0)]
+    >>> visit_order(there, start=[0.0, 0.0])
+    [(1, 0), (2, 0), (0, 0)]
+    """
+    if any(not len(one) for one in ways):
+        raise WildlabError("an area has no way over it", "give one at least for each", field="ways")
+    costs = _Costs(ways, start, back)
+    if len(ways) <= EXACT:
+        return costs.exact()
+    return costs.improved()
+
+
+class _Costs:
+    """Lengths between all ways, and orders by them."""
+
+    def __init__(self, ways: Sequence[Sequence[AreaWay]], start: ArrayLike | None, back: bool) -> None:
+        flat = [(k, w) for k, each in enumerate(ways) for w in range(len(each))]
+        self.flat = flat
+        self.of = [[i for i, (k, _) in enumerate(flat) if k == one] for one in range(len(ways))]
+        entrance = np.array([ways[k][w].points[0] for k, w in flat])
+        leave = np.array([ways[k][w].points[-1] for k, w in flat])
+        apart = np.linalg.norm(leave[:, None] - entrance[None], axis=-1)
+        # What lies within a way counts as well: ways round corners differ.
+        self.inner = np.array(
+            [np.linalg.norm(np.diff(ways[k][w].points, axis=0), axis=1).sum() for k, w in flat]
+        )
+        self.apart = apart
+        at = None if start is None else np.asarray(start, float)
+        self.first = np.zeros(len(flat)) if at is None else np.linalg.norm(entrance - at, axis=-1)
+        self.home = np.zeros(len(flat)) if at is None or not back else np.linalg.norm(leave - at, axis=-1)
+
+    def best_ways(self, order: list[int]) -> tuple[float, list[tuple[int, int]]]:
+        """The best ways in a given order, and their length."""
+        begin = self.of[order[0]]
+        length = self.first[begin] + self.inner[begin]
+        paths = [[one] for one in begin]
+        for k in order[1:]:
+            options = self.of[k]
+            total = length[:, None] + self.apart[np.ix_([p[-1] for p in paths], options)]
+            pick = total.argmin(axis=0)
+            length = total[pick, np.arange(len(options))] + self.inner[options]
+            paths = [[*paths[pick[i]], one] for i, one in enumerate(options)]
+        length = length + self.home[[p[-1] for p in paths]]
+        best = int(length.argmin())
+        return float(length[best]), [self.flat[one] for one in paths[best]]
+
+    def exact(self) -> list[tuple[int, int]]:
+        """Held and Karp's dynamic programme over sets of areas; ways with the areas."""
+        count, size = len(self.of), len(self.flat)
+        owner = np.array([k for k, _ in self.flat])
+        length = np.full((1 << count, size), np.inf)
+        before = np.full((1 << count, size), -1, int)
+        length[1 << owner, np.arange(size)] = self.first + self.inner
+        for mask in range(1, 1 << count):
+            here = np.flatnonzero(np.isfinite(length[mask]))
+            there = np.flatnonzero((mask >> owner) & 1 == 0)
+            if not len(here) or not len(there):
+                continue
+            total = length[mask, here][:, None] + self.apart[np.ix_(here, there)] + self.inner[there]
+            pick = total.argmin(axis=0)
+            value = total[pick, np.arange(len(there))]
+            masks = mask | (1 << owner[there])
+            better = value < length[masks, there]
+            length[masks[better], there[better]] = value[better]
+            before[masks[better], there[better]] = here[pick[better]]
+        mask = (1 << count) - 1
+        path = [int((length[mask] + self.home).argmin())]
+        while before[mask, path[-1]] >= 0:
+            mask, step = mask ^ (1 << owner[path[-1]]), before[mask, path[-1]]
+            path.append(int(step))
+        return [self.flat[one] for one in path[::-1]]
+
+    def improved(self) -> list[tuple[int, int]]:
+        """Nearest next, then parts turned round or moved until nothing helps."""
+        order = self._nearest_next()
+        length, chosen = self.best_ways(order)
+        again = True
+        while again:
+            again = False
+            for changed in _changed(order):
+                shorter, ways = self.best_ways(changed)
+                if shorter < length - 1e-9:
+                    order, length, chosen, again = changed, shorter, ways, True
+                    break
+        return chosen
+
+    def _nearest_next(self) -> list[int]:
+        here = int(self.first.argmin())
+        order = [self.flat[here][0]]
+        while len(order) < len(self.of):
+            left = [one for k, options in enumerate(self.of) if k not in order for one in options]
+            here = left[int(self.apart[here, left].argmin())]
+            order.append(self.flat[here][0])
+        return order
+
+
+def _changed(order: list[int]) -> list[list[int]]:
+    """Orders that differ by one part turned round or by one area moved."""
+    count = len(order)
+    turned = [
+        order[:i] + order[i:j][::-1] + order[j:] for i in range(count - 1) for j in range(i + 2, count + 1)
+    ]
+    moved = []
+    for i in range(count):
+        rest = order[:i] + order[i + 1 :]
+        moved += [[*rest[:j], order[i], *rest[j:]] for j in range(count) if j != i]
+    return turned + moved

@@ -142,11 +142,6 @@ class InformationPlanner:
         self._middles = np.stack(sums, axis=-1) / each[:, None]
         self._half = np.array([sensor.half_width, sensor.half_height])
 
-    @property
-    def left_to_know(self) -> float:
-        """The objective of F (5.6) as it stands, over points that count, m^2."""
-        return float(self.weights @ self.left)
-
     def add(self, leg: Leg, clear: NDArray[np.bool_] | None = None) -> None:
         """Add what the images of a leg tell, F (5.10).
 

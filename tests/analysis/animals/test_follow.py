@@ -23,9 +23,9 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.planning.areas import inside_of, rectangle
+from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import look_down
 from wildlab.planning.high_level import SEARCH
-from wildlab.planning.moving import walks
 from wildlab.tracking.particles import ImageLook, Rules, walk_of
 from wildlab.tracking.particles.clouds import Inside
 from wildlab.tracking.particles.steps import Moves

@@ -16,8 +16,8 @@ from wildlab.analysis.detecting.judged import ELLIPSE
 from wildlab.analysis.detecting.methods import METHODS
 from wildlab.detection.contrast import Contrast, Proposals, propose
 from wildlab.detection.detections import Detections
+from wildlab.detection.floating import FloatingThresholds
 from wildlab.detection.shape import PERMISSIVE, Shape, choose, fit_shape
-from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.detection.warm import Warm, to_grey
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates

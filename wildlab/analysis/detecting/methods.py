@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 from wildlab.detection.colour import Colour, find_coloured
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections
-from wildlab.detection.floating import detect_floating
+from wildlab.detection.floating import FloatingThresholds, detect_floating
 from wildlab.detection.shape import Shape, find_by_shape
-from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance
 from wildlab.errors import WildlabError
 from wildlab.files import write_json

@@ -24,6 +24,7 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
+from wildlab.planning.coverage import see
 from wildlab.planning.gimbal import (
     GimbalAngles,
     adapt_roll,
@@ -34,7 +35,6 @@ from wildlab.planning.gimbal import (
     swing_yaw,
     view_inside,
 )
-from wildlab.planning.sightings import see
 
 #: Share of an image's shorter side that its edge is: what lies in it is not counted.
 EDGE = 0.05

@@ -12,9 +12,8 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, rotation_vector_to_matrix
 from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
-from wildlab.planning.coverage import Coverage, from_sightings
+from wildlab.planning.coverage import Coverage, Sightings, from_sightings, see
 from wildlab.planning.gimbal import blur
-from wildlab.planning.sightings import Sightings, see
 from wildlab.simulation.error_models import gauss_markov
 
 

@@ -19,13 +19,11 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.courses import Course, fly
-from wildlab.planning.coverage import nodes_in, share_seen
+from wildlab.planning.courses import Course, fly, follow_terrain
+from wildlab.planning.coverage import first_seen, nodes_in, see, share_seen, walks
 from wildlab.planning.gimbal import camera_on_course, look_down, swing_yaw
-from wildlab.planning.heights import follow_terrain
-from wildlab.planning.moving import first_seen, walks
 from wildlab.planning.patterns import lawn_mowers
-from wildlab.planning.sightings import see
+from wildlab.simulation.animal_motion import enclosure_corners
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import EAST_M, NORTH_M, synthetic_landscape
 from wildlab.simulation.manifest import twin_manifest

@@ -14,8 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.rendered import judge
-from wildlab.detection.floating import FloatingObjects, find_objects
-from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, Pooled, columns_of
 from wildlab.geometry.covariances import inside_ellipse

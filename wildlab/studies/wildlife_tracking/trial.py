@@ -31,10 +31,9 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.areas import check_area, inside_of
-from wildlab.planning.courses import fly
+from wildlab.planning.courses import fly, follow_terrain
+from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course, swing_roll
-from wildlab.planning.heights import follow_terrain
-from wildlab.planning.moving import walks
 from wildlab.planning.patterns import Pattern, lawn_mowers
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters, load_twin
