@@ -16,7 +16,6 @@ LAZY = (
     "wildlab.flight.checks",
     "wildlab.flight.recipe",
     "wildlab.geometry",
-    "wildlab.analysis",
     "wildlab.reporting",
 )
 #: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
@@ -27,15 +26,13 @@ DOCUMENTED = (
         "wildlab.tracking",
         "wildlab.tracking.many",
         "wildlab.tracking.particles",
-        "wildlab.detection",
-        "wildlab.planning",
     ),
 )
 #: Rooms whose examples are run.
 WITH_EXAMPLES = (
     *DOCUMENTED,
-    "wildlab.api",
-    "wildlab.sharing",
+    *("wildlab.analysis", "wildlab.detection", "wildlab.planning"),
+    *("wildlab.api", "wildlab.sharing"),
 )
 
 

@@ -130,5 +130,5 @@ def score(
 ) -> pd.DataFrame:
     """The errors of a flight's detections, as observed by its log or otherwise."""
     seen = observations or observe(flight)
-    errors = pose_errors(flight, seen, deviations)
-    return score_points(flight, georeference(flight, seen, np.random.default_rng(seed), errors))
+    errors = pose_errors(seen, deviations)
+    return score_points(flight, georeference(seen, np.random.default_rng(seed), errors))

@@ -124,5 +124,5 @@ def test_ellipses_through_import_and_georeference(tmp_path, kind, pitch_deg):
     share = (np.einsum("ni,nij,nj->n", off, np.linalg.inv(C), off) <= -2 * np.log(0.1)).mean()
     assert len(off) == PHOTOS and 0.87 <= share <= 0.93
     flight = load_flight(flight_folder)
-    used = used_deviations(flight, observe(flight))
+    used = used_deviations(observe(flight))
     assert np.allclose([used["tilt_deg"], used["heading_deg"]], TRUE[kind][2:])

@@ -12,12 +12,12 @@ from tests.analysis.conftest import build, changed, score
 from tests.analysis.survey_twin import CAMERA, Survey, simulate
 from tests.refused import refused
 from tests.sound_flights import simulate_sound_flight
+from wildlab.analysis.accuracy import compare_sightings, judge_repeats
 from wildlab.analysis.camera_clock import by_points_in_words
 from wildlab.analysis.diagnose import diagnose, find_implausible
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, observe
 from wildlab.analysis.learn import learn_from
-from wildlab.analysis.repeats import compare_sightings, judge_repeats
 from wildlab.evaluation.outliers import find_outliers
 from wildlab.geometry.corrections import BOUNDS, Calibration
 
@@ -30,7 +30,7 @@ WRONG = {
 
 
 def diagnosed(flight):
-    return diagnose(flight, observe(flight), score(flight))
+    return diagnose(observe(flight), score(flight))
 
 
 @pytest.mark.slow
@@ -40,7 +40,7 @@ def test_a_sound_flight_whose_poses_wander_has_no_certain_cause(kind):
     flight = simulate_sound_flight(kind, 1)
     source = "camera" if "camera" in flight.nav else None
     observations = observe(flight, source)
-    found = diagnose(flight, observations, score(flight, observations), source)
+    found = diagnose(observations, score(flight, observations))
     assert not found.counts, found.winner.name
     assert found.noise.share > 0.5
 
@@ -250,7 +250,7 @@ def test_sound_flights_have_no_outliers(views):
 
 def judged(flight):
     full = flight.tables.pop("truth")
-    found = judge_repeats(flight, observe(flight), np.random.default_rng(0))
+    found = judge_repeats(observe(flight), np.random.default_rng(0))
     flight.tables["truth"] = full
     return found
 
@@ -275,7 +275,7 @@ def unknown(clock_s):
     flight = simulate(Survey(images=24, clock_s=clock_s))
     del flight.tables["truth"]
     seen = observe(flight)
-    return flight, seen, judge_repeats(flight, seen, np.random.default_rng(0))
+    return flight, seen, judge_repeats(seen, np.random.default_rng(0))
 
 
 @pytest.mark.slow
@@ -295,7 +295,7 @@ def test_a_clock_shows_without_a_known_place():
 @pytest.mark.slow
 def test_calibration_and_clock_have_what_sightings_say(monkeypatch):
     flight, seen, found = unknown(0.3)
-    learnt = learn_from(flight, seen, found.diagnosis, np.random.default_rng(0))
+    learnt = learn_from(seen, found.diagnosis, np.random.default_rng(0))
     assert [one.name for one in learnt.parameter] == ["clock"]
     assert learnt.parameter[0].low <= 0.3 <= learnt.parameter[0].high
     monkeypatch.setattr("wildlab.analysis.camera_clock.judge_repeats", lambda *_: found)

@@ -6,7 +6,7 @@ import pytest
 
 from tests.analysis.conftest import changed, score
 from tests.refused import refused
-from wildlab.analysis.calibrate import calibrate_flight
+from wildlab.analysis.accuracy import calibrate_flight
 from wildlab.analysis.evaluate import (
     blocks_of,
     errors_of,
@@ -71,10 +71,10 @@ def test_ellipses_from_estimated_noise_hold_what_they_say(make_flight):
     table = score(flight)
     observations = observe(flight)
     assert table["inside_90"].mean() > 0.97
-    after = evaluate_with_estimated_noise(flight, observations, table, np.random.default_rng(1))
+    after = evaluate_with_estimated_noise(observations, table, np.random.default_rng(1))
     assert len(after) == len(table)
     assert 0.84 < after["inside_90"].mean() < 0.95
-    assert estimate_noise(flight, observations, table).sd["tilt"] == pytest.approx(np.radians(0.3), rel=0.35)
+    assert estimate_noise(observations, table).sd["tilt"] == pytest.approx(np.radians(0.3), rel=0.35)
 
 
 def test_a_log_s_own_covariance_is_used_and_can_be_overridden(make_flight):
@@ -83,8 +83,8 @@ def test_a_log_s_own_covariance_is_used_and_can_be_overridden(make_flight):
     nav = flight.nav["logged"]
     flight.nav["logged"] = nav.join(covariance_columns(np.tile(own, (len(nav), 1, 1))))
     observations = observe(flight)
-    assert np.allclose(pose_errors(flight, observations).pose, own)
-    overridden = pose_errors(flight, observations, {"tilt_deg": 2.0, "heading_deg": 4.0}).pose
+    assert np.allclose(pose_errors(observations).pose, own)
+    overridden = pose_errors(observations, {"tilt_deg": 2.0, "heading_deg": 4.0}).pose
     R = observations.poses.R_nb
     assert np.allclose(
         R @ overridden[:, 3:, 3:] @ np.swapaxes(R, 1, 2), np.diag(np.radians([2.0, 2.0, 4.0]) ** 2)

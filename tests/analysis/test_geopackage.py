@@ -52,7 +52,7 @@ def rows_of(base: sqlite3.Connection, query: str) -> list[Any]:
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Flight, Any, Path]:
     flight = simulate_twin("large-ship", 1)
     seen = observe(flight, "autopilot")
-    points = georeference(flight, seen, np.random.default_rng(1))
+    points = georeference(seen, np.random.default_rng(1))
     points.loc[3, ["north_m", "east_m", "down_m"]] = np.nan
     path = tmp_path_factory.mktemp("map") / "points.gpkg"
     write_points(flight, points, path, "autopilot")

@@ -73,7 +73,7 @@ def flown(noise: float = 0.0, per_image: int = 6) -> Flight:
 def test_with_exact_poses_points_are_the_marks():
     flight = flown()
     seen = observe(flight)
-    points = georeference(flight, seen, np.random.default_rng(0))
+    points = georeference(seen, np.random.default_rng(0))
     marks = flight.table("truth")[["north_m", "east_m", "down_m"]].to_numpy()
     np.testing.assert_allclose(points[["north_m", "east_m", "down_m"]].to_numpy(), marks, atol=1e-6)
     assert pixels_to_terrain(seen.poses, seen.uv, seen.terrain).counts() == {"met the ground": len(points)}
@@ -81,7 +81,7 @@ def test_with_exact_poses_points_are_the_marks():
     assert shift_from_level(seen, points).largest < 1e-6
     unknown = replace(seen, level=np.full(len(points), np.nan))
     shift = shift_from_level(unknown, points)
-    level = georeference(flight, on_level(unknown), np.random.default_rng(0))
+    level = georeference(on_level(unknown), np.random.default_rng(0))
     off = np.hypot(level["north_m"] - points["north_m"], level["east_m"] - points["east_m"])
     assert shift == (int(off.notna().sum()), float(off.median()), float(off.max()))
     assert shift.median > 3.0
@@ -103,7 +103,7 @@ def test_the_map_decides_how_good_its_heights_are():
     for sd in (np.nan, 0.3, 6.0):
         flight = flown()
         flight.terrain = replace(hills(), sd=sd)
-        points = georeference(flight, observe(flight), np.random.default_rng(0))
+        points = georeference(observe(flight), np.random.default_rng(0))
         sizes.append(float((points["cov_nn"] + points["cov_ee"]).median()))
     assert sizes[0] == sizes[1]  # 0.3 m is what the manifest assumes where the map is silent
     assert sizes[2] > 3 * sizes[1]
@@ -116,7 +116,7 @@ def test_rays_that_meet_no_ground_are_counted():
     nav.loc[[0, 2, 3, 4], "down_m"] = 500.0
     nav.loc[1, "east_m"] = 4000.0
     seen = observe(flight)
-    points = georeference(flight, seen, np.random.default_rng(0))
+    points = georeference(seen, np.random.default_rng(0))
     counts = pixels_to_terrain(seen.poses, seen.uv, seen.terrain).counts()
     lost = points["north_m"].isna()
     assert len(counts) == 4  # of each fate some
@@ -148,8 +148,8 @@ def test_heights_left_in_raise_terrain_that_counts_alike():
         vertical = {"reference": "x", "correction_m": 20.0}
         flight = changed(flown(), {"terrain": record | {"heights": heights}, "vertical": vertical})
         seen = observe(flight)
-        raised = heights_left_in(flight, seen)
-        before, after = (georeference(flight, o, np.random.default_rng(0)) for o in (seen, raised))
+        raised = heights_left_in(seen)
+        before, after = (georeference(o, np.random.default_rng(0)) for o in (seen, raised))
         moved[heights] = np.nanmedian(np.abs(after["north_m"] - before["north_m"]))
     assert moved["flight"] < 1e-3 < 1.0 < moved["ellipsoid"]
 

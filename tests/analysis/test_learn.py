@@ -55,17 +55,17 @@ def only(name, value, half, unit):
 
 def test_a_corrected_flight_says_what_the_applied_calibration_says():
     flight = named(tuesday(seed=5), "wednesday")
-    applied = apply_learnt(flight, None, observe(flight), learnt())
+    applied = apply_learnt(observe(flight), learnt())
     corrected = corrected_flight(flight, None, learnt())
     rng = np.random.default_rng(0)
     np.testing.assert_allclose(
-        georeference(corrected, observe(corrected), rng)[["north_m", "east_m"]],
-        georeference(flight, applied.observations, rng)[["north_m", "east_m"]],
+        georeference(observe(corrected), rng)[["north_m", "east_m"]],
+        georeference(applied.observations, rng)[["north_m", "east_m"]],
         atol=1e-6,
     )
     # So it does of the lens.
     of_lens = only("radial", 0.1, 0.01, "1")
-    camera = apply_learnt(flight, None, observe(flight), of_lens).observations.poses.camera
+    camera = apply_learnt(observe(flight), of_lens).observations.poses.camera
     assert camera == observe(corrected_flight(flight, None, of_lens)).poses.camera
     assert camera.distortion == (0.1, 0.0, 0.0, 0.0, 0.0)
     # What the calibration takes off is no contradiction any more.
@@ -85,13 +85,13 @@ def test_only_another_height_than_that_of_the_calibration_is_said():
         for low, high in ((factor * height.min(), 1e3), (1.0, height.max() / factor)):
             near = learnt().conditions.model_copy(update={"height_m": (low, high)})
             other = learnt().model_copy(update={"conditions": near})
-            assert ("another height" in apply_learnt(flight, None, logged, other).sentence) == other_height
+            assert ("another height" in apply_learnt(logged, other).sentence) == other_height
 
 
 def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
     flight = named(tuesday(seed=5), "wednesday")
     logged = observe(flight)
-    applied = apply_learnt(flight, None, logged, learnt())
+    applied = apply_learnt(logged, learnt())
     after = score(flight, applied.observations, applied.deviations)
     well = simulate(Survey(seed=5))
     untouched = score(well)
@@ -104,9 +104,9 @@ def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
 def test_on_the_very_flight_it_was_learnt_on_that_is_said():
     # By its clicks and poses, whatever its name is.
     renamed = named(tuesday(), "friday")
-    assert "this very flight" in apply_learnt(renamed, None, observe(renamed), learnt()).sentence
+    assert "this very flight" in apply_learnt(observe(renamed), learnt()).sentence
     other = named(tuesday(seed=5), "tuesday")
-    assert "this very flight" not in apply_learnt(other, None, observe(other), learnt()).sentence
+    assert "this very flight" not in apply_learnt(observe(other), learnt()).sentence
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_on_the_very_flight_it_was_learnt_on_that_is_said():
 def test_another_camera_or_mount_is_refused(change, words):
     flight = changed(tuesday(images=8), change)
     with refused(words):
-        apply_learnt(flight, None, observe(flight), learnt())
+        apply_learnt(observe(flight), learnt())
 
 
 @pytest.mark.slow
@@ -132,9 +132,9 @@ def test_what_was_applied_is_not_found_again():
     flight.nav["logged"]["east_m"] += 6.0
     own = learn_flight(flight, np.random.default_rng(0))[0]
     assert {"east", "clock", "tilt"} <= {one.name for one in own.parameter}
-    applied = apply_learnt(flight, None, observe(flight), own)
+    applied = apply_learnt(observe(flight), own)
     scored = score(flight, applied.observations)
-    again = diagnose(flight, applied.observations, scored)
+    again = diagnose(applied.observations, scored)
     assert not again.counts
     clock = next(model for model in again.models if model.causes == ("clock",))
     assert abs(clock.fit.values[0]) < 0.02
@@ -149,7 +149,7 @@ def test_where_nothing_gains_for_certain_the_noise_alone_is_kept():
     assert 0.4 < found.noise.tilt_deg < 1.1
     assert parse_learnt(learnt_toml(found)) == found
     flight = named(tuesday(seed=5), "wednesday")
-    applied = apply_learnt(flight, None, observe(flight), found)
+    applied = apply_learnt(observe(flight), found)
     assert np.allclose(applied.observations.poses.p_nb, observe(flight).poses.p_nb)
 
 

@@ -61,7 +61,7 @@ def test_poses_at_the_frames_are_one_more_source_of_the_flight(flight, tmp_path)
     assert set(nav["time_s"]) <= set(flight.frames["time_s"])
     save_flight(Flight(flight.manifest, {**flight.nav, "observer": nav}, flight.tables), tmp_path / "flight")
     again = load_flight(tmp_path / "flight")
-    scored = score_points(again, georeference(again, observe(again, "observer"), np.random.default_rng(0)))
+    scored = score_points(again, georeference(observe(again, "observer"), np.random.default_rng(0)))
     assert scored["error_m"].notna().all()
     assert scored["error_m"].mean() < 20.0
 

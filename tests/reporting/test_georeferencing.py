@@ -77,7 +77,7 @@ def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():
 @pytest.fixture(scope="module")
 def made() -> tuple[Flight, Any]:
     flight = simulate_twin("large-ship", 1)
-    points = georeference(flight, observe(flight, "autopilot"), np.random.default_rng(1))
+    points = georeference(observe(flight, "autopilot"), np.random.default_rng(1))
     points.loc[3, ["north_m", "east_m", "down_m"]] = np.nan
     return flight, points
 

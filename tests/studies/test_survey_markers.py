@@ -7,7 +7,7 @@ and 17.26 m published for all four.
 import numpy as np
 import pytest
 
-from wildlab.analysis.calibrate import calibrate_flight
+from wildlab.analysis.accuracy import calibrate_flight
 from wildlab.analysis.diagnose import diagnose
 from wildlab.analysis.evaluate import errors_of, recorded_answers, score_points
 from wildlab.analysis.georeference import georeference, heights_left_in, observe
@@ -37,7 +37,7 @@ def flights(tmp_path_factory, shared_data):
 
 def errors(flight, observations=None):
     observations = observations or observe(flight)
-    return score_points(flight, georeference(flight, observations, np.random.default_rng(0)))
+    return score_points(flight, georeference(observations, np.random.default_rng(0)))
 
 
 def test_labelled_clicks_of_one_flight(flights):
@@ -52,7 +52,7 @@ def test_labelled_clicks_of_one_flight(flights):
 
 def test_without_the_vertical_correction_it_would_be_useless(flights):
     flight = flights["openathena-f1"]
-    assert errors(flight, heights_left_in(flight, observe(flight)))["error_m"].mean() > 40.0
+    assert errors(flight, heights_left_in(observe(flight)))["error_m"].mean() > 40.0
 
 
 def test_all_clicks_against_the_nearest_marker(flights):
@@ -74,7 +74,7 @@ def test_one_flight_as_plain_tables_is_the_same_flight_as_published(flights):
     for name, flight in flights.items():
         o = observe(flight)
         rows = (o.table["target_id"] == "").to_numpy()
-        points = georeference(flight, o, np.random.default_rng(0))[["north_m", "east_m", "down_m"]].to_numpy()
+        points = georeference(o, np.random.default_rng(0))[["north_m", "east_m", "down_m"]].to_numpy()
         on_earth[name] = ned_to_geodetic(points[rows], flight.manifest.origin_tuple())[:, :2] * 6.37e6
         pixels[name] = o.uv[rows]
     far = np.linalg.norm(pixels["openathena-f1"][:, None] - pixels["openathena"][None], axis=2)
@@ -86,7 +86,7 @@ def test_one_flight_as_plain_tables_is_the_same_flight_as_published(flights):
 def test_estimated_noise_makes_the_ellipses_honest(flights):
     flight = flights["openathena-f1"]
     scored = errors(flight)
-    after = evaluate_with_estimated_noise(flight, observe(flight), scored, np.random.default_rng(3))
+    after = evaluate_with_estimated_noise(observe(flight), scored, np.random.default_rng(3))
     assert 0.82 <= after["inside_90"].mean() <= 0.97
 
 
@@ -107,7 +107,7 @@ def diagnosed(flight, tilt_deg=0.0, down_m=0.0):
     flight.nav["logged"] = nav
     try:
         observations = observe(flight)
-        return diagnose(flight, observations, errors(flight, observations))
+        return diagnose(observations, errors(flight, observations))
     finally:
         flight.nav["logged"] = logged
 

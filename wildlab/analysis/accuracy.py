@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from wildlab.analysis.evaluate import (
     axes_of,
     blocks_of,
     errors_of,
+    fit_flight,
     look_at_nearest_rule,
     score_points,
 )
@@ -22,11 +24,14 @@ from wildlab.analysis.georeference import (
     calibrated,
     covariances_of,
     georeference,
+    observe,
     pose_errors,
 )
 from wildlab.analysis.pose_noise import estimate_noise, evaluate_with_estimated_noise, used_deviations
+from wildlab.errors import WildlabError
 from wildlab.evaluation.axes import AlongAxis, split_along
 from wildlab.evaluation.blocks import Halves, Labels, compare_halves
+from wildlab.evaluation.causes import mean_of_others
 from wildlab.evaluation.ellipses import EllipseVerdict, judge_ellipses
 from wildlab.evaluation.errors import (
     ErrorSummary,
@@ -36,8 +41,9 @@ from wildlab.evaluation.errors import (
     summarise,
 )
 from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.evaluation.sightings import Averaged, try_averaging
+from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
 from wildlab.flight.store import Flight
+from wildlab.geometry.calibration import BORESIGHT, Calibration, split_images
 
 Array = NDArray[np.float64]
 
@@ -105,24 +111,18 @@ class Accuracy:
 
 
 def judge_accuracy(
-    flight: Flight,
     observations: Observations,
     rng: np.random.Generator,
-    source: str | None = None,
     deviations: dict[str, float] | None = None,
 ) -> Accuracy:
     """Place a flight's detections, hold them against the truth, and look for the cause of their errors.
 
     Parameters
     ----------
-    flight
-        With truth.
     observations
-        From `observe`, with a calibration applied or not.
+        From `observe` of a flight with truth, with a calibration applied or not.
     rng
         Draws halves, blocks, and samples of flat rays.
-    source
-        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     deviations
         Standard deviations in place of those that log and manifest state.
 
@@ -135,14 +135,15 @@ def judge_accuracy(
     WildlabError
         Where the flight has no truth, or no detection can be compared with it.
     """
-    errors_stated = pose_errors(flight, observations, deviations)
-    points = georeference(flight, observations, rng, errors_stated)
+    flight = observations.flight
+    errors_stated = pose_errors(observations, deviations)
+    points = georeference(observations, rng, errors_stated)
     scored = score_points(flight, points)
     errors, blocks = errors_of(scored), blocks_of(flight, scored)
     summary = summarise(errors)
     located = np.isfinite(scored["error_m"]) & np.isfinite(scored["cov_nn"])
     enough = scored.loc[located, "frame_id"].nunique() >= FEWEST_IMAGES
-    diagnosis = diagnose(flight, observations, scored, source) if enough else None
+    diagnosis = diagnose(observations, scored) if enough else None
     intervals = {}
     if enough:
         figures = {
@@ -159,13 +160,13 @@ def judge_accuracy(
     if diagnosis is not None:
         left, of = left[diagnosis.inliers], of[diagnosis.inliers]
     averaged = try_averaging(left, of["truth_id"], of["frame_id"], rng) if enough else None
-    noise, learnt = _learn_noise(flight, observations, diagnosis, rng, source)
+    noise, learnt = _learn_noise(observations, diagnosis, rng)
     nearest = look_at_nearest_rule(flight, scored) if flight.manifest.scoring.rule == "nearest" else None
     unambiguous = None
     if nearest is not None and nearest.ambiguous.any():
         clear = scored[~nearest.ambiguous & located]
         if clear["frame_id"].nunique() >= FEWEST_IMAGES:
-            unambiguous = diagnose(flight, observations, clear, source)
+            unambiguous = diagnose(observations, clear)
     return Accuracy(
         observations=observations,
         points=points,
@@ -174,9 +175,9 @@ def judge_accuracy(
         summary=summary,
         intervals=intervals,
         lost=int((~np.isfinite(scored["error_m"])).sum()),
-        assumed=used_deviations(flight, observations, deviations),
+        assumed=used_deviations(observations, deviations),
         ellipses=judge_ellipses(errors, covariances_of(scored), blocks, rng),
-        axes=split_along(errors, axes_of(flight, observations, scored, source), blocks),
+        axes=split_along(errors, axes_of(observations, scored), blocks),
         halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
         remaining=scatter_by_image(left, of["frame_id"]),
@@ -189,11 +190,7 @@ def judge_accuracy(
 
 
 def _learn_noise(
-    flight: Flight,
-    observations: Observations,
-    diagnosis: Diagnosis | None,
-    rng: np.random.Generator,
-    source: str | None,
+    observations: Observations, diagnosis: Diagnosis | None, rng: np.random.Generator
 ) -> tuple[PoseNoise | None, float]:
     """Noise of the poses once a constant error is taken off, and how honest ellipses from it are."""
     if diagnosis is None:
@@ -203,20 +200,14 @@ def _learn_noise(
     if known["frame_id"].nunique() < FEWEST_IMAGES:
         return None, float("nan")
     inside = [
-        evaluate_with_estimated_noise(flight, observations, known, rng, source, names)["inside_90"].mean()
+        evaluate_with_estimated_noise(observations, known, rng, names)["inside_90"].mean()
         for _ in range(HALVINGS)
     ]
-    noise = noise_without(flight, observations, diagnosis, rng, source)
+    noise = noise_without(observations, diagnosis, rng)
     return noise, float(np.mean(inside))
 
 
-def noise_without(
-    flight: Flight,
-    observations: Observations,
-    diagnosis: Diagnosis,
-    rng: np.random.Generator,
-    source: str | None = None,
-) -> PoseNoise:
+def noise_without(observations: Observations, diagnosis: Diagnosis, rng: np.random.Generator) -> PoseNoise:
     """Noise of the poses with the winner's constants taken off, and without what is far out.
 
     Whether the winner is certain does not matter: what stays the same in all images is no noise, whichever
@@ -224,7 +215,7 @@ def noise_without(
 
     Parameters
     ----------
-    flight, observations, rng, source
+    observations, rng
         As for `judge_accuracy`.
     diagnosis
         Of these observations.
@@ -236,7 +227,205 @@ def noise_without(
     known = diagnosis.scored[diagnosis.inliers].reset_index(drop=True)
     placed = observations
     if diagnosis.winner.causes:
-        placed = calibrated(flight, source, observations, diagnosis.calibration)
-        rows = placed.table["detection_id"].isin(known["detection_id"]).to_numpy()
-        known = score_points(flight, georeference(flight, placed.take(rows), rng))
-    return estimate_noise(flight, placed, known)
+        placed = calibrated(observations, diagnosis.calibration)
+        known = score_points(placed.flight, georeference(placed.of(known), rng))
+    return estimate_noise(placed, known)
+
+
+Array = NDArray[np.float64]
+
+
+class Calibrated(NamedTuple):
+    """A calibration from all images, and the errors on images that a calibration has not seen.
+
+    Attributes
+    ----------
+    calibration
+        From all images: what to write into the manifest.
+    scored
+        Every point placed by a calibration from the other half of the images (the first split).
+    mean_errors
+        Mean error of each split, metres.
+    """
+
+    calibration: Calibration
+    scored: pd.DataFrame
+    mean_errors: Array
+
+
+def calibrate_flight(
+    flight: Flight,
+    rng: np.random.Generator,
+    source: str | None = None,
+    estimate: tuple[str, ...] = BORESIGHT,
+    splits: int = 20,
+) -> Calibrated:
+    """Calibrate on a flight's known points, and judge each half of its images by the other half.
+
+    Draws (images, or minutes of them: see :func:`~wildlab.analysis.evaluate.blocks_of`) are halved at random,
+    ``splits`` times over; a calibration from one half places the points of the other. A clock offset is
+    asked for only where the flight has times.
+
+    Parameters
+    ----------
+    flight
+        With pixel detections, poses and truth.
+    rng
+        Draws the halves, and samples of flat rays.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+    estimate
+        What to estimate: see `wildlab.geometry.calibration.calibrate`.
+    splits
+        How many times the images are halved.
+
+    Returns
+    -------
+    Calibrated
+
+    Raises
+    ------
+    WildlabError
+        Where fewer than four images show a known point.
+    """
+    if flight.manifest.time.kind == "sequence":
+        estimate = tuple(name for name in estimate if name != "clock")
+    observations = observe(flight, source)
+    plain = score_points(flight, georeference(observations, rng))
+    plain = plain[np.isfinite(plain["error_m"]) & np.isfinite(plain["cov_nn"])]
+    if plain["frame_id"].nunique() < 4:
+        raise WildlabError(
+            "fewer than four images show a known point, too few to calibrate on half of them",
+            "label more detections, or add truth",
+            file=flight.folder,
+            field="detections",
+        )
+    draws = blocks_of(flight, plain)
+    rounds = []
+    for _ in range(splits):
+        half = split_images(draws, rng)
+        parts = [
+            _evaluate_unseen(
+                observations,
+                fit_flight(observations, plain[seen], estimate),
+                plain[~seen],
+                rng,
+            )
+            for seen in (half, ~half)
+        ]
+        rounds.append(pd.concat(parts, ignore_index=True))
+    return Calibrated(
+        fit_flight(observations, plain, estimate),
+        rounds[0],
+        np.array([r["error_m"].mean() for r in rounds]),
+    )
+
+
+def _evaluate_unseen(
+    observations: Observations, calibration: Calibration, unseen: pd.DataFrame, rng: np.random.Generator
+) -> pd.DataFrame:
+    """Errors of the unseen points with a calibration applied."""
+    placed = calibrated(observations.of(unseen), calibration)
+    return score_points(placed.flight, georeference(placed, rng, pose_errors(placed)))
+
+
+class Repeats(NamedTuple):
+    """Sightings of the same things.
+
+    Attributes
+    ----------
+    points
+        On the ground, one row a detection; lost points are NaN.
+    lost
+        How many.
+    spread
+        Of the sightings of things that were seen in two images or more; None where there are none.
+    things
+        Names of the things, most seen first, with their sightings, images and spread (m per axis).
+    diagnosis
+        Which constant error makes sightings of the same thing lie apart; None where fewer than six images
+        show a thing that another image shows too.
+    """
+
+    points: pd.DataFrame
+    lost: int
+    spread: Spread | None
+    things: pd.DataFrame
+    diagnosis: Diagnosis | None = None
+
+
+def compare_sightings(points: pd.DataFrame) -> pd.DataFrame:
+    """Distance of each sighting to the mean of those of the same thing in other images.
+
+    Parameters
+    ----------
+    points
+        From `wildlab.analysis.georeference.georeference`.
+
+    Returns
+    -------
+    DataFrame
+        The points that name a thing, with ``truth_id`` (its name), ``error_north_m``, ``error_east_m`` and
+        ``error_m``, as from `wildlab.analysis.evaluate.score_points`; NaN where no other image shows it.
+    """
+    named = points[points["target_id"].astype(str) != ""].reset_index(drop=True)
+    xy, things = named[["north_m", "east_m"]].to_numpy(float), named["target_id"].to_numpy(str)
+    images, error = named["frame_id"].to_numpy(str), np.full((len(named), 2), np.nan)
+    for image in np.unique(images):
+        own = images == image
+        error[own] = (xy - mean_of_others(xy, things, ~own))[own]
+    return named.assign(
+        truth_id=things, error_north_m=error[:, 0], error_east_m=error[:, 1], error_m=np.hypot(*error.T)
+    )
+
+
+def judge_repeats(observations: Observations, rng: np.random.Generator) -> Repeats:
+    """Place a flight's detections and compare the sightings of each thing with each other.
+
+    Parameters
+    ----------
+    observations
+        From `observe`, of a flight whose detections name their targets; truth is not looked at.
+    rng
+        Draws samples of flat rays.
+
+    Returns
+    -------
+    Repeats
+
+    Raises
+    ------
+    WildlabError
+        Where no detection names a target.
+    """
+    points = georeference(observations, rng)
+    named = points["target_id"].astype(str).to_numpy()
+    if not (named != "").any():
+        raise WildlabError(
+            "no detection names what it is of, so that sightings cannot be compared with each other",
+            "name the targets in the detections' target_id, or add truth",
+            file=observations.flight.folder,
+            field="detections.target_id",
+        )
+    xy, images = points[["north_m", "east_m"]].to_numpy(float), points["frame_id"].to_numpy(str)
+    spread = spread_of_sightings(xy, named, images, covariances_of(points))
+    rows = []
+    for name in np.unique(named[named != ""]):
+        own = (named == name) & np.isfinite(xy).all(axis=1)
+        one = spread_of_sightings(xy[own], named[own], images[own])
+        rows.append(
+            {
+                "thing": name,
+                "sightings": int(own.sum()),
+                "images": len(np.unique(images[own])),
+                "sd": one.sd if one is not None else np.nan,
+            }
+        )
+    things = (
+        pd.DataFrame(rows).sort_values("sightings", ascending=False, kind="stable").reset_index(drop=True)
+    )
+    compared = compare_sightings(points)
+    located = np.isfinite(compared["error_m"]) & np.isfinite(compared["cov_nn"])
+    enough = compared.loc[located, "frame_id"].nunique() >= FEWEST_IMAGES
+    diagnosis = diagnose(observations, compared, places_known=False) if enough else None
+    return Repeats(points, int(np.isnan(xy[:, 0]).sum()), spread, things, diagnosis)

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.accuracy import compare_sightings, judge_repeats
 from wildlab.analysis.diagnose import nonzero
 from wildlab.analysis.evaluate import blocks_of
 from wildlab.analysis.flow import Reading, camera_poses_at
 from wildlab.analysis.georeference import georeference, observe, truth_of
-from wildlab.analysis.repeats import compare_sightings, judge_repeats
 from wildlab.detection.flow import as_grey, image_motion
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
@@ -314,7 +314,7 @@ def _by_sightings(flight: Flight, source: str | None) -> CameraClock:
     It is certain where the search for a constant error finds it so: see `wildlab.analysis.diagnose`.
     """
     observations, rng = observe(flight, source), np.random.default_rng(0)
-    diagnosis = judge_repeats(flight, observations, rng, source).diagnosis
+    diagnosis = judge_repeats(observations, rng).diagnosis
     if diagnosis is None:
         raise WildlabError(
             "fewer than six images show a thing that another image shows too",
@@ -347,9 +347,7 @@ def _by_sightings(flight: Flight, source: str | None) -> CameraClock:
     }
     tried = offset + np.arange(-1.0, 1.01, 0.1)
     apart = [
-        compare_sightings(georeference(flight, observe(flight, source, clock_shift=float(one)), rng))[
-            "error_m"
-        ]
+        compare_sightings(georeference(observe(flight, source, clock_shift=float(one)), rng))["error_m"]
         for one in tried
     ]
     curve = pd.DataFrame({"offset_s": tried + stated, "cost": [one.mean() for one in apart]})

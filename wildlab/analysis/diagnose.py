@@ -353,25 +353,15 @@ FAR_START = 0.4
 LEAST = (0.01, 0.01, 1e-4, 1e-4, 0.05)
 
 
-def diagnose(
-    flight: Flight,
-    observations: Observations,
-    scored: pd.DataFrame,
-    source: str | None = None,
-    places_known: bool = True,
-) -> Diagnosis:
+def diagnose(observations: Observations, scored: pd.DataFrame, places_known: bool = True) -> Diagnosis:
     """Find what is constantly wrong with the poses, the camera or its clock.
 
     Parameters
     ----------
-    flight
-        The flight.
     observations
         From `observe`, or with a calibration applied.
     scored
-        From `score_points`, or `wildlab.analysis.repeats.compare_sightings`, of these observations.
-    source
-        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+        From `score_points`, or `wildlab.analysis.accuracy.compare_sightings`, of these observations.
     places_known
         Whether the places that the points are of are known (truth). Otherwise only their names are used.
 
@@ -390,16 +380,16 @@ def diagnose(
         raise WildlabError(
             f"the error of a point is known in {images} images, too few to find a cause",
             f"mark known points in at least {FEWEST_IMAGES} images",
-            file=flight.folder,
+            file=observations.flight.folder,
             field="detections",
         )
     if places_known:
-        chosen, known = known_points(flight, observations, scored)
+        chosen, known = known_points(observations, scored)
     else:
-        chosen = observations.take(observations.table["detection_id"].isin(scored["detection_id"]).to_numpy())
+        chosen = observations.of(scored)
         known = np.column_stack([np.zeros((len(chosen.uv), 2)), chosen.plane_down])
     scored = scored.set_index("detection_id").loc[chosen.table["detection_id"]].reset_index()
-    search = _Search(flight, chosen, known, scored, source, places_known)
+    search = _Search(chosen, known, scored, places_known)
     largest = search.fit_robustly(np.ones(len(scored), bool))
     outliers, inliers = search.far_out(largest)
     if count_images(scored, inliers) < FEWEST_IMAGES:
@@ -419,23 +409,16 @@ def diagnose(
 class _Search:
     """What is shared by the searches of one flight: N points, their poses, and how they are placed."""
 
-    def __init__(
-        self,
-        flight: Flight,
-        chosen: Observations,
-        known: Array,
-        scored: pd.DataFrame,
-        source: str | None,
-        places_known: bool,
-    ) -> None:
+    def __init__(self, chosen: Observations, known: Array, scored: pd.DataFrame, places_known: bool) -> None:
+        flight = chosen.flight
         self.scored, self.chosen, self.known, self.places_known = scored, chosen, known, places_known
         self.names_of = scored["truth_id"].to_numpy(str)
         self.things = None if places_known else self.names_of
         sd = _survey_error(flight, self.names_of) if places_known else np.inf
         self.places = KnownPlaces(self.names_of, sd) if sd > 0 else None
         self.blocks, self.ellipses = blocks_of(flight, scored), covariances_of(scored)
-        self.poses_at = _poses(flight, source, chosen, self.names_of)
-        timed = flight.manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
+        self.poses_at = _poses(chosen, self.names_of)
+        timed = flight.manifest.time.kind == "utc" and "frame_id" not in flight.nav[chosen.source]
         self.causes = [cause for cause in CAUSES if timed or cause != "clock"]
         if not places_known:
             self.causes.remove("position")  # moves all sightings alike
@@ -443,8 +426,8 @@ class _Search:
         frames = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(scored["frame_id"]))
         order = scored["time_s"].to_numpy(float) if seconds else frames.astype(float)
         self.lasts = LASTS_S if seconds else LASTS_IMAGES
-        self.flight, self.order = flight, order
-        self.assumed = _pose_points(flight, chosen, order)[1]
+        self.order = order
+        self.assumed = _pose_points(chosen, order)[1]
         self.logged = self.place((), np.zeros(0))
         self._robust: tuple[Mask, Fit] | None = None
         images = np.unique(order, return_inverse=True)[1]
@@ -503,11 +486,11 @@ class _Search:
         values = start * np.array([PARAMETERS[name] for name in names])
         off = Calibration(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
         corrected = replace(self.chosen, poses=calibrated_poses(off, self.poses_at))
-        points = _pose_points(self.flight, corrected, self.order)[0].take(used)
+        points = _pose_points(corrected, self.order)[0].take(used)
         # A ray that this tips over the horizon has the derivatives that it was logged with.
         over = ~np.isfinite(points.derivatives).all(axis=(1, 2))
         if over.any():
-            logged = _pose_points(self.flight, self.chosen, self.order)[0].take(used)
+            logged = _pose_points(self.chosen, self.order)[0].take(used)
             points = PosePoints(
                 *(
                     np.where(over.reshape(-1, *[1] * (a.ndim - 1)), b, a)
@@ -617,9 +600,9 @@ class _Search:
         )
 
 
-def _pose_points(flight: Flight, chosen: Observations, order: Array) -> tuple[PosePoints, dict[str, float]]:
+def _pose_points(chosen: Observations, order: Array) -> tuple[PosePoints, dict[str, float]]:
     """Points as their covariance depends on them, and the standard deviations that log or manifest state."""
-    J, stated = ground_jacobians(chosen.poses, chosen.uv, chosen.plane_down), pose_errors(flight, chosen)
+    J, stated = ground_jacobians(chosen.poses, chosen.uv, chosen.plane_down), pose_errors(chosen)
     R = np.broadcast_to(chosen.poses.R_nb, (len(order), 3, 3))
     in_n = J.pose.copy()
     in_n[..., 3:] = J.pose[..., 3:] @ np.swapaxes(R, 1, 2)
@@ -662,16 +645,14 @@ def _deviance(r: Array, covariance: Covariance) -> float:
     return float(covariance.weigh(r[..., None])[0][0, 0])
 
 
-def _poses(
-    flight: Flight, source: str | None, chosen: Observations, targets: NDArray[np.str_]
-) -> Callable[[float], CameraPoses]:
+def _poses(chosen: Observations, targets: NDArray[np.str_]) -> Callable[[float], CameraPoses]:
     """Poses at shifted stamps, as seen from each point's target, which moves on at its speed at the time.
 
     Those as they are, and the last few, are not interpolated again. What a calibration has added to the
     position stays added.
     """
-    named = chosen.table.assign(target_id=targets)
-    shifted = shifting_poses(flight, source, chosen)
+    flight, named = chosen.flight, chosen.table.assign(target_id=targets)
+    shifted = shifting_poses(chosen)
 
     @lru_cache(maxsize=_SHIFTS)
     def at(shift: float) -> CameraPoses:

@@ -8,13 +8,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.georeference import Observations, covariances_of, truth_of
+from wildlab.analysis.georeference import Observations, covariances_of, shifting_poses, truth_of
 from wildlab.errors import WildlabError
 from wildlab.evaluation.ambiguity import ambiguous, largest_visible
 from wildlab.evaluation.blocks import time_blocks
 from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.covariances import inside_ellipse
+from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.frames import Array
 from wildlab.geometry.robust import student_scale
 
@@ -49,7 +50,7 @@ def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
     >>> from wildlab.analysis.georeference import georeference, observe
     >>> from wildlab.simulation.twins import simulate_twin
     >>> flight = simulate_twin("large-ship", 1)
-    >>> points = georeference(flight, observe(flight, "truth"), np.random.default_rng(0))
+    >>> points = georeference(observe(flight, "truth"), np.random.default_rng(0))
     >>> bool(score_points(flight, points)["error_m"].median() < 20)
     True
     """
@@ -189,17 +190,35 @@ def blocks_of(flight: Flight, table: pd.DataFrame) -> NDArray[np.intp]:
     return time_blocks(place, seconds=False)
 
 
-def known_points(
-    flight: Flight, observations: Observations, scored: pd.DataFrame
-) -> tuple[Observations, Array]:
+def known_points(observations: Observations, scored: pd.DataFrame) -> tuple[Observations, Array]:
     """The observations that were scored, and the points (N, 3) they should have met.
 
     North and east are those of the truth, down is the ground that the ray was cut with.
     """
-    chosen = observations.take(observations.table["detection_id"].isin(scored["detection_id"]).to_numpy())
+    chosen = observations.of(scored)
     names = scored.set_index("detection_id").loc[chosen.table["detection_id"], "truth_id"].to_numpy()
-    where = truth_of(flight, chosen.table.assign(target_id=names))
+    where = truth_of(chosen.flight, chosen.table.assign(target_id=names))
     return chosen, np.column_stack([where[:, :2], chosen.plane_down])
+
+
+def fit_flight(
+    observations: Observations,
+    scored: pd.DataFrame,
+    estimate: tuple[str, ...] = BORESIGHT,
+) -> Calibration:
+    """Calibrate on the points of a scored table, weighted with their ground covariances."""
+    observations, known = known_points(observations, scored)
+    ids = observations.table["detection_id"]
+    weights = covariances_of(scored.set_index("detection_id").loc[ids].reset_index())
+    return calibrate(
+        shifting_poses(observations),
+        observations.uv,
+        known,
+        observations.table["frame_id"].to_numpy(),
+        estimate,
+        weights,
+        blocks_of(observations.flight, observations.table),
+    )
 
 
 #: A camera or a track slower than this has no direction (m/s), and a view nearer to straight down than this
@@ -208,21 +227,15 @@ SLOWEST_M_S = 1.0
 STEEPEST = 0.05
 
 
-def axes_of(
-    flight: Flight, observations: Observations, scored: pd.DataFrame, source: str | None = None
-) -> dict[str, Array]:
+def axes_of(observations: Observations, scored: pd.DataFrame) -> dict[str, Array]:
     """Unit vectors (N, 2), north-east, of the axes that a scored table's errors are split along.
 
     Parameters
     ----------
-    flight
-        The flight.
     observations
         Those that the table was made from.
     scored
         From `score_points`, N rows.
-    source
-        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Returns
     -------
@@ -243,7 +256,8 @@ def axes_of(
         "away from the camera": away,
         "to the right of the line of sight": _right(away),
     }
-    nav = flight.pose_source(source)[1]
+    flight = observations.flight
+    nav = flight.nav[observations.source]
     if flight.manifest.time.kind == "utc" and "frame_id" not in nav:
         times = scored["time_s"].to_numpy(float)
         after, before = (poses_at(nav, times + shift)[0][:, :2] for shift in (0.5, -0.5))

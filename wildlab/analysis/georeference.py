@@ -41,6 +41,8 @@ class Observations:
 
     Attributes
     ----------
+    flight, source
+        Whose they are, and the name of the ``nav`` table that the poses come from.
     table
         ``detection_id``, ``frame_id``, ``group``, ``target_id``, ``time_s`` (flight time).
     uv
@@ -57,6 +59,8 @@ class Observations:
         Over terrain, what `plane_down` would be without it, (N,).
     """
 
+    flight: Flight
+    source: str
     table: pd.DataFrame
     uv: Array
     poses: CameraPoses
@@ -66,14 +70,18 @@ class Observations:
 
     def take(self, rows: NDArray[np.bool_]) -> Observations:
         """The observations of some rows."""
-        return Observations(
-            self.table[rows].reset_index(drop=True),
-            self.uv[rows],
-            self.poses.take(rows),
-            self.plane_down[rows],
-            self.terrain,
-            None if self.level is None else self.level[rows],
+        return replace(
+            self,
+            table=self.table[rows].reset_index(drop=True),
+            uv=self.uv[rows],
+            poses=self.poses.take(rows),
+            plane_down=self.plane_down[rows],
+            level=None if self.level is None else self.level[rows],
         )
+
+    def of(self, scored: pd.DataFrame) -> Observations:
+        """The observations of a scored table."""
+        return self.take(self.table["detection_id"].isin(scored["detection_id"]).to_numpy())
 
 
 def observe(
@@ -130,10 +138,11 @@ def observe(
             file=flight.folder,
             field="detections",
         )
+    name, nav = flight.pose_source(source)
     at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
     own_clock = frames[stamps].to_numpy(float) - frames["time_s"].to_numpy(float)
     times = (frame_times(flight) + own_clock + clock_shift)[at]
-    p_nb, R_nb, covariance = poses_at(flight.pose_source(source)[1], times, pixels["frame_id"])
+    p_nb, R_nb, covariance = poses_at(nav, times, pixels["frame_id"])
     pan, tilt = (angle[at] for angle in gimbal_angles(flight))
     lost = at < 0
     p_nb[lost], R_nb[lost] = np.nan, np.nan
@@ -147,9 +156,11 @@ def observe(
         }
     )
     manifest = flight.manifest
-    mount = manifest.geometry_mount(flight.pose_source(source)[0])
+    mount = manifest.geometry_mount(name)
     level = _ground_heights(flight, table, pixels)
     seen = Observations(
+        flight,
+        name,
         table,
         pixels[["u_px", "v_px"]].to_numpy(float),
         CameraPoses(manifest.geometry_camera(), mount, p_nb, R_nb, pan, tilt, covariance),
@@ -168,13 +179,13 @@ def _grounded(observations: Observations) -> Observations:
     return replace(o, plane_down=pixels_to_terrain(o.poses, o.uv, o.terrain).points[:, 2])
 
 
-def shifting_poses(flight: Flight, source: str | None, observations: Observations) -> PosesAt:
+def shifting_poses(observations: Observations) -> PosesAt:
     """From seconds to the poses of observations whose camera stamps are so much later; the last few are kept.
 
     A moving gimbal keeps the angles it had at the unshifted stamps, and the poses their covariance.
     """
     times = observations.table["time_s"].to_numpy(float)
-    find = pose_finder(flight.pose_source(source)[1], observations.table["frame_id"])
+    find = pose_finder(observations.flight.nav[observations.source], observations.table["frame_id"])
 
     @lru_cache(maxsize=4)
     def at(shift: float) -> CameraPoses:
@@ -184,13 +195,14 @@ def shifting_poses(flight: Flight, source: str | None, observations: Observation
     return at
 
 
-def heights_left_in(flight: Flight, observations: Observations) -> Observations:
+def heights_left_in(observations: Observations) -> Observations:
     """The observations as they would be had the vertical correction not been taken off on import.
 
     The ground of a labelled target comes from its survey and stays; any other came from the same source as
     the heights of the aircraft, and rises with them. So does terrain whose heights count from what the
     flight's do; any other stays.
     """
+    flight = observations.flight
     raised = flight.manifest.vertical.correction_m
     poses = observations.poses
     poses = replace(poses, p_nb=poses.p_nb - np.array([0.0, 0.0, raised]))
@@ -205,18 +217,14 @@ def heights_left_in(flight: Flight, observations: Observations) -> Observations:
     )
 
 
-def calibrated(
-    flight: Flight, source: str | None, observations: Observations, calibration: Calibration
-) -> Observations:
+def calibrated(observations: Observations, calibration: Calibration) -> Observations:
     """The observations with an estimated calibration applied to mount, camera, pose and times."""
-    poses = calibrated_poses(calibration, shifting_poses(flight, source, observations))
+    poses = calibrated_poses(calibration, shifting_poses(observations))
     times = observations.table["time_s"] + calibration.value("clock")
     return _grounded(replace(observations, table=observations.table.assign(time_s=times), poses=poses))
 
 
-def pose_errors(
-    flight: Flight, observations: Observations, assumed: dict[str, float] | None = None
-) -> PoseErrors:
+def pose_errors(observations: Observations, assumed: dict[str, float] | None = None) -> PoseErrors:
     """Covariances of what the ground points are computed from.
 
     The pose's covariance is the log's where it has one; all else comes from ``assumed``, then the manifest's
@@ -225,8 +233,6 @@ def pose_errors(
 
     Parameters
     ----------
-    flight
-        The flight.
     observations
         From `observe`.
     assumed
@@ -239,7 +245,7 @@ def pose_errors(
     """
     ground = observations.terrain
     of_map = {} if ground is None or np.isnan(ground.sd) else {"plane_height_m": ground.sd}
-    sd = assumed_deviations(flight) | of_map | (assumed or {})
+    sd = assumed_deviations(observations.flight) | of_map | (assumed or {})
     pose = observations.poses.covariance
     if pose is None or assumed is not None:
         pose = assumed_pose_covariance(observations.poses.R_nb, sd)
@@ -275,10 +281,7 @@ def assumed_deviations(flight: Flight) -> dict[str, float]:
 
 
 def georeference(
-    flight: Flight,
-    observations: Observations,
-    rng: np.random.Generator,
-    errors: PoseErrors | None = None,
+    observations: Observations, rng: np.random.Generator, errors: PoseErrors | None = None
 ) -> pd.DataFrame:
     """Ground points of a flight's pixel detections, one row each, NaN where the ray misses the ground.
 
@@ -291,7 +294,7 @@ def georeference(
     """
     o = observations
     if errors is None:
-        errors = pose_errors(flight, o)
+        errors = pose_errors(o)
     met = None
     if o.terrain is not None:
         met = pixels_to_terrain(o.poses, o.uv, o.terrain)

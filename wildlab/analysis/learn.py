@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.analysis.accuracy import noise_without
+from wildlab.analysis.accuracy import compare_sightings, noise_without
 from wildlab.analysis.diagnose import Diagnosis, diagnose
 from wildlab.analysis.evaluate import score_points
 from wildlab.analysis.georeference import Observations, calibrated, georeference, observe
 from wildlab.analysis.pose_noise import as_deviations
-from wildlab.analysis.repeats import compare_sightings
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import (
     UNITS,
@@ -66,43 +65,34 @@ def learn_flight(
         clear.
     """
     observations = observe(flight, source)
-    points = georeference(flight, observations, rng)
+    points = georeference(observations, rng)
     known = flight.truth is not None
     scored = score_points(flight, points) if known else compare_sightings(points)
-    diagnosis = diagnose(flight, observations, scored, source, places_known=known)
-    return learn_from(flight, observations, diagnosis, rng, source), diagnosis
+    diagnosis = diagnose(observations, scored, places_known=known)
+    return learn_from(observations, diagnosis, rng), diagnosis
 
 
-def learn_from(
-    flight: Flight,
-    observations: Observations,
-    diagnosis: Diagnosis,
-    rng: np.random.Generator,
-    source: str | None = None,
-) -> Learnt:
+def learn_from(observations: Observations, diagnosis: Diagnosis, rng: np.random.Generator) -> Learnt:
     """What a diagnosis teaches: corrections only where they gained something for certain.
 
     Parameters
     ----------
-    flight, observations
-        The flight, as `diagnose` had it.
+    observations
+        As `diagnose` had them.
     diagnosis
         Of it.
     rng
         Draws samples of flat rays.
-    source
-        Name of the ``nav`` table.
 
     Returns
     -------
     Learnt
     """
-    name, _ = flight.pose_source(source)
+    flight, name = observations.flight, observations.source
     camera = flight.manifest.camera
     if camera is None:
         raise WildlabError(f"the flight {flight.name} has no camera", "there is nothing to calibrate")
-    rows = observations.table["detection_id"].isin(diagnosis.scored["detection_id"]).to_numpy()
-    used = observations.take(rows)
+    used = observations.of(diagnosis.scored)
     depression = np.degrees(np.arcsin(np.clip(used.poses.R_nc[:, 2, 2], -1, 1)))
     height = used.plane_down - used.poses.p_nc[:, 2]
     calibration, gain = diagnosis.calibration, diagnosis.winner.gain
@@ -119,7 +109,7 @@ def learn_from(
         scales.append(scale)
     covariance = calibration.covariance * np.outer(scales, scales) if scales else np.zeros((0, 0))
     learnt = diagnosis.noise if diagnosis.noise is not None and not diagnosis.places_known else None
-    noise = as_deviations(learnt or noise_without(flight, observations, diagnosis, rng, source))
+    noise = as_deviations(learnt or noise_without(observations, diagnosis, rng))
     return Learnt(
         learnt_on=LearntOn(
             flight=flight.name,
@@ -173,17 +163,13 @@ class Applied(NamedTuple):
     sentence: str
 
 
-def apply_learnt(flight: Flight, source: str | None, observations: Observations, learnt: Learnt) -> Applied:
+def apply_learnt(observations: Observations, learnt: Learnt) -> Applied:
     """Apply what was learnt on another flight.
 
     Parameters
     ----------
-    flight
-        The flight that is judged.
-    source
-        Name of its ``nav`` table.
     observations
-        As logged.
+        As logged, of the flight that is judged.
     learnt
         From `wildlab.flight.calibration_files.read_learnt`.
 
@@ -196,10 +182,10 @@ def apply_learnt(flight: Flight, source: str | None, observations: Observations,
     WildlabError
         Where it was learnt with another camera or another mount.
     """
-    refuse_other_camera(flight.manifest, learnt)
-    placed = calibrated(flight, source, observations, _calibration(learnt))
+    refuse_other_camera(observations.flight.manifest, learnt)
+    placed = calibrated(observations, _calibration(learnt))
     deviations = {name: float(value) for name, value in learnt.noise.model_dump().items()}
-    return Applied(placed, deviations, _sentence(flight, observations, learnt))
+    return Applied(placed, deviations, _sentence(observations, learnt))
 
 
 def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flight:
@@ -263,7 +249,7 @@ def _calibration(learnt: Learnt) -> Calibration:
     )
 
 
-def _sentence(flight: Flight, observations: Observations, learnt: Learnt) -> str:
+def _sentence(observations: Observations, learnt: Learnt) -> str:
     on = learnt.learnt_on
     if fingerprint(observations) == on.fingerprint:
         return (
@@ -279,7 +265,7 @@ def _sentence(flight: Flight, observations: Observations, learnt: Learnt) -> str
         f"Applied: a calibration learnt on the flight {on.flight} ({on.images} images, {on.points} points), "
         f"with {what} and its standard deviations of the poses."
     )
-    if on.flight == flight.name:
+    if on.flight == observations.flight.name:
         said += " It has the name of this flight, and other clicks or poses."
     depression = np.degrees(np.arcsin(np.clip(observations.poses.R_nc[:, 2, 2], -1, 1)))
     low, high = learnt.conditions.depression_deg

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.calibrate import fit_flight
-from wildlab.analysis.evaluate import blocks_of, errors_of, known_points, score_points
+from wildlab.analysis.evaluate import blocks_of, errors_of, fit_flight, known_points, score_points
 from wildlab.analysis.georeference import (
     Observations,
     assumed_deviations,
@@ -341,7 +340,7 @@ APART_S = 1.0
 FAR_OUT = 0.05
 
 
-def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFrame) -> PoseNoise:
+def estimate_noise(observations: Observations, scored: pd.DataFrame) -> PoseNoise:
     """Standard deviations of the poses behind the errors of known points.
 
     See `wildlab.evaluation.pose_noise`. The prior lies about what was assumed for the ellipses: what the log
@@ -349,10 +348,9 @@ def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFr
 
     Parameters
     ----------
-    flight
-        What it states of pixel and ground is assumed.
     observations
-        From `observe`, with a calibration applied where there is one.
+        From `observe`, with a calibration applied where there is one. What their flight states of pixel and
+        ground is assumed.
     scored
         From `score_points`, of these observations.
 
@@ -365,12 +363,12 @@ def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFr
     ValueError
         Where fewer than three images have a usable point.
     """
-    o, _ = known_points(flight, observations, scored)
+    o, _ = known_points(observations, scored)
     errors = errors_of(scored.set_index("detection_id").loc[o.table["detection_id"]])
     J = ground_jacobians(o.poses, o.uv, o.plane_down)
     derivatives = J.pose.copy()
     derivatives[:, :, 3:] = J.pose[:, :, 3:] @ level_axes(o.poses.R_nb)
-    sd = used_deviations(flight, o)
+    sd = used_deviations(o)
     plane = sd["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
     assumed = {
         "position_horizontal": sd["position_horizontal_m"],
@@ -383,15 +381,11 @@ def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFr
     return estimate_pose_noise(errors, derivatives, J.pixel, plane, images, assumed, FAR_OUT)
 
 
-def used_deviations(
-    flight: Flight, observations: Observations, assumed: dict[str, float] | None = None
-) -> dict[str, float]:
+def used_deviations(observations: Observations, assumed: dict[str, float] | None = None) -> dict[str, float]:
     """The standard deviations that the ellipses of observations really come from.
 
     Parameters
     ----------
-    flight
-        The flight.
     observations
         From `observe`.
     assumed
@@ -403,7 +397,7 @@ def used_deviations(
         By the names of ``USUAL``: those of the poses are the log's own where it has a covariance (root of the
         mean variance), otherwise the manifest's or the usual ones.
     """
-    sd = assumed_deviations(flight) | (assumed or {})
+    sd = assumed_deviations(observations.flight) | (assumed or {})
     covariance = observations.poses.covariance
     if covariance is None or assumed is not None or not np.isfinite(covariance).any():
         return sd
@@ -485,23 +479,19 @@ def as_deviations(noise: PoseNoise | WanderNoise) -> dict[str, float]:
 
 
 def evaluate_with_estimated_noise(
-    flight: Flight,
     observations: Observations,
     scored: pd.DataFrame,
     rng: np.random.Generator,
-    source: str | None = None,
     names: tuple[str, ...] = (),
 ) -> pd.DataFrame:
     """Points scored again with ellipses from pose noise estimated on the other half of the images.
 
     Parameters
     ----------
-    flight, observations, scored
+    observations, scored
         As for `estimate_noise`.
     rng
         Draws the halves, of whole blocks in time order.
-    source
-        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     names
         Parameters that are taken off first: estimated on the other half, too.
 
@@ -510,23 +500,15 @@ def evaluate_with_estimated_noise(
     DataFrame
         As from `score_points`.
     """
+    flight = observations.flight
     half = split_images(blocks_of(flight, scored), rng)
     parts = []
     for seen in (half, ~half):
         placed = observations
         if names:
-            placed = calibrated(
-                flight, source, observations, fit_flight(flight, observations, scored[seen], source, names)
-            )
-        learnt = score_points(flight, georeference(flight, _of(placed, scored[seen]), rng))
-        deviations = as_deviations(estimate_noise(flight, placed, learnt))
-        unseen = _of(placed, scored[~seen])
-        parts.append(
-            score_points(flight, georeference(flight, unseen, rng, pose_errors(flight, unseen, deviations)))
-        )
+            placed = calibrated(observations, fit_flight(observations, scored[seen], names))
+        learnt = score_points(flight, georeference(placed.of(scored[seen]), rng))
+        deviations = as_deviations(estimate_noise(placed, learnt))
+        unseen = placed.of(scored[~seen])
+        parts.append(score_points(flight, georeference(unseen, rng, pose_errors(unseen, deviations))))
     return pd.concat(parts, ignore_index=True)
-
-
-def _of(observations: Observations, scored: pd.DataFrame) -> Observations:
-    """The observations of a scored table."""
-    return observations.take(observations.table["detection_id"].isin(scored["detection_id"]).to_numpy())

@@ -82,7 +82,7 @@ def georeference(flight: Flight, source: str | None = None, seed: int = 0) -> Po
     [False, False]
     """
     name, _ = flight.pose_source(source)
-    return Points(flight, name, to_ground(flight, observe(flight, name), np.random.default_rng(seed)))
+    return Points(flight, name, to_ground(observe(flight, name), np.random.default_rng(seed)))
 
 
 @dataclass(frozen=True, repr=False)

@@ -350,7 +350,7 @@ def _places(flight: Flight, found: TrackingResult, one: SensorTrack, source: str
         return np.where((one.detection != "")[:, None], chosen, np.nan)
     # With a clock that is corrected the poses of other times count.
     if scans.kind == "pixel" and not found.beliefs[one.sensor].offset_s:
-        points = georeference(flight, observe(flight, source), np.random.default_rng(0))
+        points = georeference(observe(flight, source), np.random.default_rng(0))
         places = points.set_index("detection_id")[["north_m", "east_m"]]
         return places.reindex(one.detection).to_numpy(float)
     return nothing

@@ -51,7 +51,7 @@ def georeference(flight: Path, into: Path, overwrite: bool, source: str | None, 
     name, _ = data.pose_source(source)
     tell_source(data, source, terminal_console())
     observations = observe(data, name)
-    points = to_ground(data, observations, np.random.default_rng(seed))
+    points = to_ground(observations, np.random.default_rng(seed))
     write_points(data, points, into, name)
     for line in ground_sentences(observations, points):
         click.echo(stopped(line))

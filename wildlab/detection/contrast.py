@@ -52,7 +52,8 @@ class Contrast:
     warm_is_bright
         False for black-hot images.
     part
-        How far the middle of an animal is from that of what is warm of it (`wildlab.detection.describe`).
+        How far the middle of an animal is from that of what is warm of it
+        (`wildlab.detection.detections.describe`).
     """
 
     window_px: int = 61

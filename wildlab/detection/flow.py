@@ -287,7 +287,7 @@ Grey = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
 #: Features that are followed at most, and that have to agree on one motion at least.
-MOST, FEWEST = 400, 12
+MOST_CORNERS, FEWEST_CORNERS = 400, 12
 #: How far (px) a feature may be from where it began when it is followed back, and from the common motion.
 BACK_PX, AGREEMENT_PX = 0.7, 1.5
 #: Share of the followed features that has to agree.
@@ -338,25 +338,25 @@ def image_motion(first: Grey, second: Grey, camera: Camera, valid: Mask | None =
     """
     lost = np.full(3, np.nan)
     mask = None if valid is None else np.asarray(valid, np.uint8)
-    points = cv2.goodFeaturesToTrack(first, MOST, 0.01, 8, mask=mask)
-    if points is None or len(points) < FEWEST:
+    points = cv2.goodFeaturesToTrack(first, MOST_CORNERS, 0.01, 8, mask=mask)
+    if points is None or len(points) < FEWEST_CORNERS:
         return lost
     there, found = _follow(first, second, np.asarray(points, np.float32))
     back, found_back = _follow(second, first, there)
     here, after = np.asarray(points, np.float32)[:, 0], there[:, 0]
     good = found & found_back & (np.linalg.norm(back[:, 0] - here, axis=1) < BACK_PX)
-    if good.sum() < FEWEST:
+    if good.sum() < FEWEST_CORNERS:
         return lost
     _, kept = cv2.estimateAffinePartial2D(
         here[good], after[good], method=cv2.RANSAC, ransacReprojThreshold=AGREEMENT_PX, maxIters=500
     )
     rows = np.zeros(int(good.sum()), bool) if kept is None else np.asarray(kept).ravel() > 0
-    if rows.sum() < max(FEWEST, AGREE * len(rows)):
+    if rows.sum() < max(FEWEST_CORNERS, AGREE * len(rows)):
         return lost
     a = normalise(camera, here[good][rows].astype(float)) @ [1, 1j]
     b = normalise(camera, after[good][rows].astype(float)) @ [1, 1j]
     known = np.isfinite(a) & np.isfinite(b)
-    if known.sum() < FEWEST:
+    if known.sum() < FEWEST_CORNERS:
         return lost
     # Shift, turn and scale by least squares, as numbers of the complex plane.
     A = np.stack([np.ones(int(known.sum()), complex), a[known]], axis=1)

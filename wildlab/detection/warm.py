@@ -49,7 +49,8 @@ class Warm:
     warm_is_bright
         False for black-hot images.
     part
-        How far the middle of an animal is from that of what is warm of it (`wildlab.detection.describe`).
+        How far the middle of an animal is from that of what is warm of it
+        (`wildlab.detection.detections.describe`).
     """
 
     background: Literal["none", "enhance", "mean", "median"] = "median"

@@ -6,12 +6,12 @@ C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, master's
 2016.
 
 - `wildlab.planning.areas`: polygons, checked; what lies in them.
-- `wildlab.planning.patterns`: lawn-mower patterns over one area and over several, in the order of the shortest
-  way (F 5.2).
+- `wildlab.planning.patterns`: lawn-mower patterns over one area and over several, in the order of the
+  shortest way (F 5.2).
 - `wildlab.planning.courses`: the way that is flown through a pattern, with turns, wind, heights and times.
 - `wildlab.planning.gimbal`: strategies of a gimbal and how they blur images (F 5.4).
-- `wildlab.planning.coverage`: what images show of a terrain, how often, when last and how surely (F 5.8, 5.9);
-  animals that walk meanwhile.
+- `wildlab.planning.coverage`: what images show of a terrain, how often, when last and how surely (F 5.8,
+  5.9); animals that walk meanwhile.
 - `wildlab.planning.information`: what is known of each point of a grid, and what an image adds (F 5.3.2).
 - `wildlab.planning.planner`: where to fly and look next, by what is to be learnt; `legs`: what platform and
   gimbal can do, and flights along way points or by chance.

@@ -587,7 +587,7 @@ def _other_summaries(
     )
     # The height of the geoid tells of a place.
     if manifest.vertical.correction_m and shown and apart:
-        raised = georeference(flight, heights_left_in(flight, found.observations), np.random.default_rng(0))
+        raised = georeference(heights_left_in(found.observations), np.random.default_rng(0))
         rows[texts.subjects["uncorrected-heights"]] = summarise(errors_of(score_points(flight, raised)))
     return rows
 

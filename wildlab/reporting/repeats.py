@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from wildlab.analysis.accuracy import Repeats
 from wildlab.analysis.overviews.verdict import (
     FEW_POINTS,
     MANY_LOST,
@@ -13,7 +14,6 @@ from wildlab.analysis.overviews.verdict import (
     Verdict,
     verdict_of,
 )
-from wildlab.analysis.repeats import Repeats
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import significant

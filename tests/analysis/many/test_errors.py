@@ -113,19 +113,19 @@ def taken(flight: Flight, observed: Observations, lasting_s: float = np.inf) -> 
 
 def test_an_error_stays_itself_along_the_flight():
     """From one look to the next as the Schmidt filter carries it; and a roll moves places as rays say."""
-    flight, observed = _pixels()
+    _, observed = _pixels()
     rows = np.flatnonzero(np.isfinite(observed.poses.p_nb).all(axis=1))[:300]
     some = np.zeros(len(observed.uv), bool)
     some[rows] = True
     observed = observed.take(some)
-    errors = pose_errors(flight, observed)
+    errors = pose_errors(observed)
     roots = _pose_roots(observed, errors)
     assert np.allclose(roots @ np.swapaxes(roots, 1, 2), errors.pose, atol=1e-12)
     order = np.argsort(observed.table["time_s"].to_numpy(float), kind="stable")
     for a, b in zip(order[:-1:20], order[1::20], strict=False):
         phi = transition_of_pose(errors.pose[a], errors.pose[b], "bias")
         assert np.allclose(phi @ roots[a], roots[b], atol=1e-9)
-    points = georeference(flight, observed, np.random.default_rng(0))
+    points = georeference(observed, np.random.default_rng(0))
     linear = points["ellipse"].to_numpy(str) == "linear"
     of_pose = OfPose(roots, OF_COVARIANCE)
     _, shared, _ = of_pixels(observed, errors, of_pose, covariances_of(points), np.inf)
@@ -137,7 +137,7 @@ def test_an_error_stays_itself_along_the_flight():
             p_nb=observed.poses.p_nb + small * roots[:, :3, i],
             R_nb=observed.poses.R_nb @ turn,
         )
-        moved = georeference(flight, replace(observed, poses=poses), np.random.default_rng(0))
+        moved = georeference(replace(observed, poses=poses), np.random.default_rng(0))
         by_hand = (moved[["north_m", "east_m"]] - points[["north_m", "east_m"]]).to_numpy(float) / small
         assert np.allclose(shared[linear][..., i], -by_hand[linear], rtol=0.02, atol=0.02)
 
@@ -174,7 +174,7 @@ def test_what_is_considered_of_a_camera_is_in_its_pose():
     text = "[sensors.manual.noise]\npixel_px = 7.0\n[sensors.manual.considered.heading]\nsd_deg = 9.0\n"
     text += "[sensors.manual.considered.platform_east]\nsd_m = 4.0\n"
     belief = believed(flight, text, *MANUAL)[1]
-    usual, told = pose_errors(flight, observed), told_errors(flight, observed, belief)
+    usual, told = pose_errors(observed), told_errors(flight, observed, belief)
     assert np.allclose(told.pixel, 49.0 * np.eye(2))
     assert np.allclose(told.pose[:, 1, 1], 16.0) and np.allclose(told.pose[:, 0, 0], usual.pose[:, 0, 0])
     level = np.abs(observed.poses.R_nb[:, 2, 2]) > 0.999
@@ -203,9 +203,9 @@ def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it():
 
 
 def test_mount_and_ground_are_in_what_is_shared_and_stay():
-    flight, observed = _pixels()
-    errors = pose_errors(flight, observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
-    points = georeference(flight, observed, np.random.default_rng(0), errors)
+    _, observed = _pixels()
+    errors = pose_errors(observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
+    points = georeference(observed, np.random.default_rng(0), errors)
     linear = points["ellipse"].to_numpy(str) == "linear"
     of_pose = OfPose(_pose_roots(observed, errors), OF_COVARIANCE)
     R, shared, found = of_pixels(observed, errors, of_pose, np.full((len(observed.uv), 2, 2), np.nan), 7.0)
@@ -221,7 +221,7 @@ def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one():
     own[::3] = np.nan
     known = replace(observed, poses=replace(observed.poses, covariance=own))
     belief = believed(flight, "", *MANUAL)[1]
-    told, usual = told_errors(flight, known, belief._replace(considered=())), pose_errors(flight, observed)
+    told, usual = told_errors(flight, known, belief._replace(considered=())), pose_errors(observed)
     assert np.allclose(told.pose[::3], usual.pose[::3]) and np.allclose(told.pose[1::3], own[1::3])
 
 
@@ -270,7 +270,7 @@ def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places():
     _, shared, errors = of_pixels(observed, told, of_pose, nothing, 30.0)
     assert errors.names[:6] == POSE and set(errors.lasting_s[:6]) == {30.0}
     sd = flight.manifest.uncertainty
-    points = georeference(flight, observed, np.random.default_rng(0), told)
+    points = georeference(observed, np.random.default_rng(0), told)
     away = points[["north_m", "east_m"]].to_numpy(float) - observed.poses.p_nb[:, :2]
     known = np.isfinite(shared).all(axis=(1, 2))
     assert known.sum() > 100

@@ -93,7 +93,7 @@ def test_pixels_are_where_georeferencing_puts_them():
     flight = simulate_twin("large-ship", 1)
     scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
     found = places(flight, "", scans.sensor, "autopilot")
-    points = georeference(flight, observe(flight, "autopilot"), np.random.default_rng(0))
+    points = georeference(observe(flight, "autopilot"), np.random.default_rng(0))
     points = points.set_index("detection_id")
     rows = np.flatnonzero(np.isfinite(scans.platform).all(axis=1))
     for scan, row in list(zip(found.scans, rows, strict=True))[::50]:

@@ -87,7 +87,7 @@ def told_errors(flight: Flight, observed: Observations, beliefs: NoiseModel) -> 
     That is `pose_errors` with the noise of pixels that the sensor is believed to have. Errors of the pose
     that are considered come on top of a covariance that poses have, and take the place of what is assumed.
     """
-    errors = pose_errors(flight, observed)._replace(pixel=np.diag(beliefs.noise[:2] ** 2))
+    errors = pose_errors(observed)._replace(pixel=np.diag(beliefs.noise[:2] ** 2))
     if observed.poses.covariance is None:
         roots = stated_roots(observed.poses.R_nb, stated_deviations(flight, beliefs))
         return errors._replace(pose=roots @ np.swapaxes(roots, 1, 2))
@@ -509,7 +509,7 @@ def _of_pixels(
     """Rays where they meet the ground, what each is wrong by alone, and what the poses do to all."""
     observed = observe(flight, source, clock_shift=beliefs.offset_s)
     told = told_errors(flight, observed, beliefs)
-    points = georeference(flight, observed, np.random.default_rng(0), told)
+    points = georeference(observed, np.random.default_rng(0), told)
     of_pose = of_poses(flight, observed, told, beliefs, lasting_s)
     own, shared, errors = of_pixels(observed, told, of_pose, covariances_of(points), lasting_s)
     ids = pd.Index(points["detection_id"])

@@ -205,7 +205,7 @@ def _inside_as_flown(pair: FlightPair, source: str) -> NDArray[np.bool_]:
     """(K,) whether the ellipses with the flight's own poses and their reported errors hold the receiver."""
     flight = pair.flights[RENDERED]
     seen = observe(flight, source)
-    errors = pose_errors(flight, seen)._replace(pixel=pair.marks.covariance[pair.marks.found])
+    errors = pose_errors(seen)._replace(pixel=pair.marks.covariance[pair.marks.found])
     found = ground_covariance(seen.poses, seen.uv, seen.plane_down, errors, np.random.default_rng(0))
     own = pair.seen[RENDERED]
     off = (own.truth[:, :2] - own.positions)[own.seen]

@@ -252,7 +252,7 @@ def ground_inside(taken: Photographs, one: Tracked) -> NDArray[np.bool_]:
     """
     target = str(taken.flight.table("detections")["target_id"].iloc[0])
     seen = observe(with_detections(taken.flight, one.marks, target), SOURCE)
-    errors = pose_errors(taken.flight, seen)._replace(pixel=one.marks.covariance[one.marks.found])
+    errors = pose_errors(seen)._replace(pixel=one.marks.covariance[one.marks.found])
     found = ground_covariance(seen.poses, seen.uv, seen.plane_down, errors, np.random.default_rng(0))
     off = errors_of(one)[0][one.marks.found]
     return np.asarray(inside_ellipse(off, found.covariance, 0.9))

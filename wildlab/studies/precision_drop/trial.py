@@ -322,7 +322,7 @@ def flown(
             f"on the flight of seed {seed} nothing was found", "look at the twin and its images", file=twin
         )
     flight = with_detections(simulate_twin(twin, seed), drop)
-    points = georeference(flight, observe(flight, "autopilot"), np.random.default_rng(seed))
+    points = georeference(observe(flight, "autopilot"), np.random.default_rng(seed))
     errors = errors_of(score_points(flight, points))
     camera = scene.poses.camera
     numbers = numbers_of(drop, errors, camera, parameters.flight.altitude.si)

@@ -98,9 +98,7 @@ def evaluate_sources(flight: Flight, rng: np.random.Generator) -> dict[str, pd.D
     detections = flight.table("detections")
     sea = detections.loc[detections["kind"] == "pixel", "plane_down_m"].to_numpy(float)
     return {
-        column: score_points(
-            flight, georeference(flight, replace(observe(flight, source), plane_down=sea), rng)
-        )
+        column: score_points(flight, georeference(replace(observe(flight, source), plane_down=sea), rng))
         for column, source in COLUMNS.items()
     }
 
@@ -215,9 +213,7 @@ def first_case(seed: int, twin: str) -> float:
     flight = simulate_twin(twin, seed)
     navigate_vessel(flight)
     rng = np.random.default_rng(seed)
-    return summarise(
-        errors_of(score_points(flight, georeference(flight, observe(flight, "observer"), rng)))
-    ).mean
+    return summarise(errors_of(score_points(flight, georeference(observe(flight, "observer"), rng)))).mean
 
 
 def trial(seed: int, *, twin: str, first: str) -> dict[tuple[str, str], float]:

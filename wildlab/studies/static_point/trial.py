@@ -100,7 +100,7 @@ def evaluate_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.D
             field="nav",
         )
     return {
-        column: score_points(flight, georeference(flight, observe(flight, source, stamps), rng))
+        column: score_points(flight, georeference(observe(flight, source, stamps), rng))
         for column, (source, stamps) in COLUMNS.items()
         if source in flight.nav and stamps in frames
     }
