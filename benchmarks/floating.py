@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 
 from benchmarks.timing import best_of
-from wildlab.detection.floating import find_edges, find_objects
-from wildlab.detection.floating import FloatingThresholds
+from wildlab.detection.floating import FloatingThresholds, find_edges, find_objects
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix

@@ -142,7 +142,7 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
         folder = Path(temporary)
         write_tables(folder)
         flight = str(folder / "flight")
-        import_s, import_gb = run_command("import", str(folder / "recipe.toml"), "--into", flight)
+        import_s, import_gb = run_command("import", str(folder / "recipe.toml"), "--out", flight)
         check_s, check_gb = run_command("check", flight)
     return f"{HOURS:g} hours at {RATE} Hz, from CSV", [
         (f"import, {import_gb:.2f} GB", import_s, import_gb / IMPORTED_GB, f"<= {IMPORTED_GB:g} GB"),

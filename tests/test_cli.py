@@ -90,7 +90,7 @@ def test_list_as_a_table_and_as_json(capsys, tmp_path):
         (["run", "--timeout", "0", "--all"], "--timeout"),
         (["run", "--seed", "-1", "--all"], "--seed"),
         (["check"], "FLIGHT"),
-        (["simulate", "static-antenna"], "--into"),
+        (["simulate", "static-antenna"], "--out"),
     ],
 )
 def test_wrong_use_has_exit_code_2(capsys, arguments, about):

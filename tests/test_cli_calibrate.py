@@ -32,10 +32,10 @@ def folder(tmp_path_factory):
 
 
 def test_what_is_learnt_is_written_and_of_one_camera_alone(folder, tmp_path):
-    succeed("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+    succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
     kept = read_learnt(tmp_path / "c.toml")
     assert {"tilt"} <= {one.name for one in kept.parameter}
-    assert "--overwrite" in refuse("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+    assert "--overwrite" in refuse("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
     assert read_learnt(tmp_path / "c.toml") == kept
     assert "fx_px" in refuse(
         "evaluate", folder / "other", "--calibration", tmp_path / "c.toml", "--out", tmp_path / "reports"
@@ -59,7 +59,7 @@ def test_causes_that_are_inseparable_are_named(folder, tmp_path, monkeypatch):
     rival = SimpleNamespace(causes=("boresight",), gain=SimpleNamespace(with_=2.1, counts=True))
     for rivals in ((rival,), ()):
         learn(monkeypatch, winner=winner, rivals=rivals, models=[winner, *rivals])
-        out = succeed("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+        out = succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
         assert ("boresight" in out) == bool(rivals)
 
 
@@ -69,7 +69,7 @@ def test_nothing_is_not_said_to_gain_nothing_where_something_does(folder, tmp_pa
     model = SimpleNamespace(causes=("height",), gain=SimpleNamespace(counts=low > 0))
     nothing = SimpleNamespace(causes=(), gain=SimpleNamespace(gain=Interval(0.0, 0.0, 0.0)))
     learn(monkeypatch, models=[model], winner=nothing, rivals=())
-    out = succeed("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+    out = succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
     assert ("for certain" in out) == (low < 0)
 
 
@@ -78,12 +78,12 @@ def test_logs_that_contradict_each_other_teach_nothing(folder, tmp_path):
     nav = flight.nav["logged"]
     nav["down_m"] *= 3.28084
     save_flight(flight, tmp_path / "feet")
-    assert "contradict" in refuse("calibrate", tmp_path / "feet", "--into", tmp_path / "c.toml")
+    assert "contradict" in refuse("calibrate", tmp_path / "feet", "--out", tmp_path / "c.toml")
     assert not (tmp_path / "c.toml").exists()
 
 
 def test_too_few_images_and_files_that_are_not_there_are_sentences(folder, tmp_path):
-    assert "5 images" in refuse("calibrate", folder / "short", "--into", tmp_path / "c.toml")
+    assert "5 images" in refuse("calibrate", folder / "short", "--out", tmp_path / "c.toml")
     assert not (tmp_path / "c.toml").exists()
     assert "no such file" in refuse("evaluate", folder / "tilted", "--calibration", tmp_path / "none.toml")
 
@@ -100,23 +100,21 @@ def example_recipe(into):
 
 @pytest.mark.slow
 def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(folder, tmp_path, monkeypatch):
-    succeed("calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+    succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
     recipe = example_recipe(tmp_path)
     assert "another camera" in refuse(
-        "import", recipe, "--into", tmp_path / "f", "--calibration", tmp_path / "c.toml"
+        "import", recipe, "--out", tmp_path / "f", "--calibration", tmp_path / "c.toml"
     )
     assert not (tmp_path / "f").exists()
-    succeed("import", recipe, "--into", tmp_path / "f")
+    succeed("import", recipe, "--out", tmp_path / "f")
     flight, learnt = load_flight(tmp_path / "f"), read_learnt(tmp_path / "c.toml")
     # The same learnt values, of this flight's own camera.
     mine = learnt.model_copy(update={"camera": flight.manifest.camera, "mount": flight.manifest.mount})
     write_learnt(mine, tmp_path / "mine.toml")
-    succeed(
-        "import", recipe, "--into", tmp_path / "f", "--calibration", tmp_path / "mine.toml", "--overwrite"
-    )
+    succeed("import", recipe, "--out", tmp_path / "f", "--calibration", tmp_path / "mine.toml", "--overwrite")
     kept = load_flight(tmp_path / "f")
     assert kept.calibration is not None and read_learnt(kept.calibration) == mine
-    succeed("import", recipe, "--into", tmp_path / "f", "--overwrite")
+    succeed("import", recipe, "--out", tmp_path / "f", "--overwrite")
     assert load_flight(tmp_path / "f").calibration is None
 
     jobs = []

@@ -43,14 +43,14 @@ def copy(boards, tmp_path):
 
 @pytest.mark.slow
 def test_the_camera_comes_out_and_is_written(boards, tmp_path):
-    succeed("camera", boards, "--into", tmp_path / "camera.toml", "--name", "Tau2", *PRINTED)
+    succeed("camera", boards, "--out", tmp_path / "camera.toml", "--name", "Tau2", *PRINTED)
     kept = read_camera(tmp_path / "camera.toml")
     assert kept.evidence.views >= 8
     assert kept.camera.name == "Tau2" and kept.board.spacing_m == 0.03
     assert kept.evidence.lens == "k1" and kept.evidence.rms_px < 0.2
     before = (tmp_path / "camera.toml").read_bytes()
     assert "--overwrite" in refuse(
-        "camera", boards, "--into", tmp_path / "camera.toml", "--lens", "none", *PRINTED
+        "camera", boards, "--out", tmp_path / "camera.toml", "--lens", "none", *PRINTED
     )
     assert (tmp_path / "camera.toml").read_bytes() == before
     truth = {"fx": 420.0, "fy": 424.0, "cx": 156.0, "cy": 131.0, "k1": -0.15}
@@ -134,7 +134,7 @@ def test_hostile_images_are_left_out_and_the_rest_goes_on(copy):
 def test_wrong_use_is_refused(tmp_path, boards, arguments, said):
     (tmp_path / "empty").mkdir()
     arguments = [one.format(tmp_path / "empty", boards=boards) for one in arguments.split()]
-    assert said in refuse("camera", *arguments, "--into", tmp_path / "camera.toml")
+    assert said in refuse("camera", *arguments, "--out", tmp_path / "camera.toml")
     assert not (tmp_path / "camera.toml").exists()
 
 
@@ -143,7 +143,7 @@ def test_opencv_s_own_images(shared_data, tmp_path):
     """Half a minute. The published estimate has an error of .3926 px and fx = fy = 535.9."""
     images = shared_data("calibration", "opencv_left")
     printed = ("--board", "9x6", "--square", "25mm", "--lens", "full")
-    succeed("camera", images, "--into", tmp_path / "left.toml", *printed)
+    succeed("camera", images, "--out", tmp_path / "left.toml", *printed)
     kept = read_camera(tmp_path / "left.toml")
     assert kept.evidence.views == 13 and kept.evidence.rms_px <= 0.393
     fx = next(one for one in kept.parameter if one.name == "fx")
@@ -154,7 +154,7 @@ def test_opencv_s_own_images(shared_data, tmp_path):
 def test_a_thermal_board_light_on_dark(shared_data, tmp_path):
     """Every other of 43 images without a licence. Some show half a board, or shadows across it."""
     files = sorted(shared_data("calibration", "thermal_chessboard").glob("*.png"))[::2]
-    succeed("camera", *files, "--into", tmp_path / "c.toml", "--board", "8x7", "--square", "50mm")
+    succeed("camera", *files, "--out", tmp_path / "c.toml", "--board", "8x7", "--square", "50mm")
     kept = read_camera(tmp_path / "c.toml")
     assert kept.evidence.images == 22 and kept.evidence.views >= 11
     assert kept.evidence.rms_px < 0.6

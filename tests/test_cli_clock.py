@@ -51,8 +51,8 @@ def test_known_points_tell_it_where_motion_does_not(
 
         return told
 
-    monkeypatch.setattr(camera_clock, "by_motion_in_words", estimate(motion, "no pairs"))
-    monkeypatch.setattr(camera_clock, "by_points_in_words", estimate(points, "no points"))
+    monkeypatch.setattr(camera_clock, "clock_from_motion", estimate(motion, "no pairs"))
+    monkeypatch.setattr(camera_clock, "clock_from_points", estimate(points, "no points"))
     call = ["clock", str(tmp_path / "flight"), "--images", str(tmp_path / "images"), "--json"]
     ran = CliRunner().invoke(wildlab, call)
     if motion is None and points is None:

@@ -64,7 +64,7 @@ def reports(tmp_path: Path) -> Path:
 
 def test_the_page_and_the_table_have_every_flight(reports):
     folders = [reports / f"{name}-overview" for name in ("monday", "tuesday", "friday")]
-    out = succeed("compare", *folders, "--out", reports)
+    out = succeed("compare", *folders, "--reports", reports)
     assert out.strip().endswith("comparison/report.html")
     page = (reports / "comparison" / "report.html").read_text(encoding="utf-8")
     assert "<script" not in page and not re.search("https?:", page)
@@ -101,7 +101,7 @@ def test_a_crash_is_not_sound_and_the_attitude_is_that_of_the_page(tmp_path):
 
 def test_into_another_folder_has_no_links_that_lead_nowhere(reports, tmp_path):
     folders = [reports / "monday", reports / "tuesday-overview"]
-    out = succeed("compare", *folders, "--out", reports, "--into", tmp_path / "a" / "b")
+    out = succeed("compare", *folders, "--reports", reports, "--out", tmp_path / "a" / "b")
     assert out.strip().endswith("a/b/report.html")
     soup = BeautifulSoup((tmp_path / "a" / "b" / "report.html").read_text(encoding="utf-8"), "html.parser")
     links = [str(link["href"]) for link in soup.find_all("a")]
@@ -118,7 +118,7 @@ def test_into_another_folder_has_no_links_that_lead_nowhere(reports, tmp_path):
     ],
 )
 def test_what_cannot_be_compared_is_refused(reports, named, said):
-    err = refuse("compare", *(reports / name for name in named), "--out", reports)
+    err = refuse("compare", *(reports / name for name in named), "--reports", reports)
     assert said in err.lower()
     assert not (reports / "comparison").exists()
 
@@ -128,7 +128,7 @@ def test_names_out_of_logs_are_only_text(reports):
         json.dumps({"flight": {"name": "<b>x", "kind": "<i>"}, "parameters": {"lacking": ["<script>"]}})
     )
     build_ledger(reports, {})
-    succeed("compare", reports / "monday-overview", reports / "tuesday-overview", "--out", reports)
+    succeed("compare", reports / "monday-overview", reports / "tuesday-overview", "--reports", reports)
     for page in (reports / "flights.html", reports / "comparison" / "report.html"):
         text = page.read_text(encoding="utf-8")
         assert "&lt;b&gt;x" in text and "<b>x" not in text and "<script" not in text and "<i>" not in text
@@ -168,8 +168,8 @@ def test_a_flight_without_reports_is_evaluated_first(reports, tmp_path):
     for name in ("detections", "truth", "frames"):
         flight.tables.pop(name, None)
     save_flight(flight, tmp_path / "flight")
-    succeed("compare", tmp_path / "flight", reports / "monday", "--out", reports)
+    succeed("compare", tmp_path / "flight", reports / "monday", "--reports", reports)
     made = (reports / "flight-overview" / "status.json").stat().st_mtime_ns
     assert "georeferencing" in (reports / "comparison" / "report.html").read_text(encoding="utf-8")
-    succeed("compare", tmp_path / "flight", reports / "monday", "--out", reports)
+    succeed("compare", tmp_path / "flight", reports / "monday", "--reports", reports)
     assert (reports / "flight-overview" / "status.json").stat().st_mtime_ns == made

@@ -33,7 +33,7 @@ def test_a_folder_with_bad_images_leaves_tables_and_pictures(capsys, tmp_path):
     path = folder(tmp_path / "in")
     (path / "cut.png").write_bytes((path / "000.png").read_bytes()[:200])
     os.mkfifo(path / "pipe.jpg")
-    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv")
+    code, out, err = call(capsys, "detect", path, "--out", tmp_path / "out", "--labels", path / "labels.csv")
     assert code == 0, err
     assert "F1 1.00" in out and "cut.png" in err and "pipe.jpg" in err
     assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 6
@@ -45,12 +45,12 @@ def test_a_folder_with_bad_images_leaves_tables_and_pictures(capsys, tmp_path):
 
 def test_results_go_neither_among_the_images_nor_over_those_of_others(tmp_path):
     path, other = folder(tmp_path / "in"), folder(tmp_path / "other")
-    assert "among" in refuse("detect", path, "--into", path)
+    assert "among" in refuse("detect", path, "--out", path)
     assert not (path / "detections.csv").exists()
-    succeed("detect", path, "--into", tmp_path / "out")
+    succeed("detect", path, "--out", tmp_path / "out")
     before = (tmp_path / "out" / "detections.csv").read_bytes()
     assert str(tmp_path) not in (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
-    assert "another folder" in refuse("detect", other, "--into", tmp_path / "out")
+    assert "another folder" in refuse("detect", other, "--out", tmp_path / "out")
     assert (tmp_path / "out" / "detections.csv").read_bytes() == before
 
 
@@ -63,7 +63,7 @@ def test_what_was_missed_and_invented_is_on_sheets(tmp_path):
     path = folder(tmp_path / "in")
     cv2.imwrite(str(path / "000.png"), picture([(30, 60), (100, 70)], 0))
     out = succeed(
-        "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv", "--json", "--overlays", 2
+        "detect", path, "--out", tmp_path / "out", "--labels", path / "labels.csv", "--json", "--overlays", 2
     )
     result = json.loads(out)
     assert result["pictures"] == {"overlays": 2, "found": 11, "missed": 1, "invented": 1}
@@ -72,7 +72,7 @@ def test_what_was_missed_and_invented_is_on_sheets(tmp_path):
 
 
 def test_lengths_come_from_the_distance(tmp_path):
-    path, into = folder(tmp_path / "in"), ("--into", tmp_path / "out")
+    path, into = folder(tmp_path / "in"), ("--out", tmp_path / "out")
     thresholds = {}
     for distance in (50, 100):
         succeed("detect", path, *into, "--distance", distance, "--focal", 1000)
@@ -88,11 +88,11 @@ def test_lengths_come_from_the_distance(tmp_path):
 def test_a_flight_gives_its_images_and_their_times(tmp_path):
     twin = simulate_twin("large-ship", 1)
     save_flight(twin, tmp_path / "flight")
-    assert "'images'" in refuse("detect", tmp_path / "flight", "--into", tmp_path / "out")
+    assert "'images'" in refuse("detect", tmp_path / "flight", "--out", tmp_path / "out")
     (tmp_path / "flight" / "images").mkdir()
     name = str(twin.frames["frame_id"].iloc[3])
     cv2.imwrite(str(tmp_path / "flight" / "images" / f"{name}.png"), picture([(30, 60)], 0))
-    succeed("detect", tmp_path / "flight", "--into", tmp_path / "out")
+    succeed("detect", tmp_path / "flight", "--out", tmp_path / "out")
     frame = pd.read_csv(tmp_path / "out" / "frames.csv").iloc[0]
     assert str(frame["frame_id"]) == name
     time = frame["time_s"]
@@ -100,7 +100,7 @@ def test_a_flight_gives_its_images_and_their_times(tmp_path):
 
 
 def test_wrong_use_is_refused(tmp_path):
-    path, into = folder(tmp_path / "in"), ("--into", tmp_path / "out")
+    path, into = folder(tmp_path / "in"), ("--out", tmp_path / "out")
     labels = path / "labels.csv"
     assert "no such file" in refuse("detect", tmp_path / "none", *into)
     assert "--thresholds" in refuse("detect", path, *into, "--fit", labels, "--thresholds", labels)
@@ -116,7 +116,7 @@ def test_a_turn_that_viewers_make_is_not_made(tmp_path):
         exif = Image.Exif()
         exif[0x0112] = 6
         Image.fromarray(seen).save(path / f"{number}.jpg", exif=exif, quality=98)
-    succeed("detect", path, "--into", tmp_path / "out")
+    succeed("detect", path, "--out", tmp_path / "out")
     assert pd.read_csv(tmp_path / "out" / "frames.csv")["width_px"].tolist() == [128, 128]
 
 
@@ -158,14 +158,14 @@ def hostile(path):
 
 def test_whatever_lies_in_the_folder_is_counted(capsys, tmp_path):
     path, names = hostile(tmp_path / "in")
-    out = succeed("detect", path, "--into", tmp_path / "out", "--json")
+    out = succeed("detect", path, "--out", tmp_path / "out", "--json")
     result = json.loads(out)
     assert result["frames"] == {"all": 3 + len(names), "usable": 3, "kept": 0}
     assert set(dict(result["problems"])) == names
     assert set(pd.read_csv(tmp_path / "out" / "frames.csv")["frame_id"]) >= {"ünï – 鹿.png", "new\nline.png"}
     assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 3
     # In a terminal ten are told, with no sign in them that it would obey, and the others are counted.
-    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out")
+    code, _, err = call(capsys, "detect", path, "--out", tmp_path / "out")
     lines = err.splitlines()
     assert code == 0 and len(lines) == 11 and "\x1b" not in err and f"{len(names) - 10} more" in lines[-1]
 
@@ -175,7 +175,7 @@ def test_names_that_become_one_file_name_keep_a_picture_each(tmp_path):
     for name in ("鹿.png", "猫.png", "000.jpg"):
         cv2.imwrite(str(path / "x.png"), picture([(40, 40)], len(name)))
         (path / "x.png").rename(path / name)
-    succeed("detect", path, "--into", tmp_path / "out")
+    succeed("detect", path, "--out", tmp_path / "out")
     found = sorted(one.name for one in (tmp_path / "out" / "overlays").glob("*.jpg"))
     assert found == ["000-2.jpg", "000.jpg", "001.jpg", "_-2.jpg", "_.jpg"]
 
@@ -185,7 +185,7 @@ def test_control_c_in_the_middle_loses_nothing_that_was_finished(tmp_path):
     path = folder(tmp_path / "in", 150)
 
     def command(into):
-        arguments = ["detect", str(path), "--into", str(tmp_path / into), "--overlays", "0"]
+        arguments = ["detect", str(path), "--out", str(tmp_path / into), "--overlays", "0"]
         return [sys.executable, "-m", "wildlab.cli", *arguments]
 
     # Where the tests run in the background of a shell, the interrupt is ignored by all that they start.
@@ -225,8 +225,8 @@ def test_what_the_camera_does_is_seen(capsys, tmp_path):
         image = image + rng.normal(0, 1.5, image.shape)
         image[20, 30] = 0
         cv2.imwrite(str(path / f"{number:02d}.png"), image.astype(np.uint16))
-    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--even")
+    code, out, err = call(capsys, "detect", path, "--out", tmp_path / "out", "--even")
     assert code == 0 and "05.png" in err and "11 frames of 12" in out
     assert "1 pixel" in out and "darker" in out
-    out = succeed("detect", path / "00.png", "--into", tmp_path / "one", "--even")
+    out = succeed("detect", path / "00.png", "--out", tmp_path / "one", "--even")
     assert "darker" not in out

@@ -26,7 +26,7 @@ def area(tmp_path):
 
 def test_a_plan_leaves_files_and_a_page_that_tells_no_place(area, tmp_path):
     into = tmp_path / "out"
-    out = succeed(area, *SHEET, "--height", 60, "--battery", 9, "--into", into)
+    out = succeed(area, *SHEET, "--height", 60, "--battery", 9, "--out", into)
     names = sorted(one.name for one in into.iterdir())
     flights = [one for one in names if one.endswith(".waypoints")]
     assert names == sorted(["plan.geojson", "plan.kml", "report.html", "result.json", *flights,
@@ -47,14 +47,14 @@ def test_a_plan_leaves_files_and_a_page_that_tells_no_place(area, tmp_path):
         assert "58.6" not in text and "16.4" not in text and str(tmp_path) not in text.replace(str(into), "")
     assert "Wolf" not in page + out + (into / "result.json").read_text() and "withheld" in page
     assert "area 1" in page and "Wolf" in (into / "plan.kml").read_text()
-    code, _, err = call(area, *SHEET, "--height", 60, "--names", "--into", tmp_path / "named")
+    code, _, err = call(area, *SHEET, "--height", 60, "--names", "--out", tmp_path / "named")
     named = (tmp_path / "named" / "report.html").read_text()
     assert code == 0 and "Wolf &lt;script&gt;" in named and "withheld" in named
     assert all(one in err for one in flights)
 
 
 def test_the_page_tells_the_place_where_it_may(area, tmp_path):
-    code, _, err = call(area, *SHEET, "--into", tmp_path / "out", "--exact")
+    code, _, err = call(area, *SHEET, "--out", tmp_path / "out", "--exact")
     assert "Wolf &lt;script&gt;" in (tmp_path / "out" / "report.html").read_text()
     assert code == 0 and "report.html" in err
     assert "58.66" in (tmp_path / "out" / "report.html").read_text()
@@ -62,17 +62,17 @@ def test_the_page_tells_the_place_where_it_may(area, tmp_path):
 
 def test_a_folder_is_replaced_only_when_asked(area, tmp_path):
     into = tmp_path / "out"
-    succeed(area, *SHEET, "--battery", 5, "--height", 40, "--into", into)
+    succeed(area, *SHEET, "--battery", 5, "--height", 40, "--out", into)
     before = len(list(into.glob("*.plan")))
-    refuse(area, *SHEET, "--into", into)
+    refuse(area, *SHEET, "--out", into)
     assert len(list(into.glob("*.plan"))) == before > 1
     (into / "mine.txt").write_text("kept")
-    succeed(area, *SHEET, "--into", into, "--overwrite")
+    succeed(area, *SHEET, "--out", into, "--overwrite")
     assert len(list(into.glob("*.plan"))) == 1 and (into / "mine.txt").read_text() == "kept"
     other = tmp_path / "other"
     other.mkdir()
     (other / "photo.jpg").write_text("x")
-    assert "photo.jpg" in refuse(area, *SHEET, "--into", other, "--overwrite")
+    assert "photo.jpg" in refuse(area, *SHEET, "--out", other, "--overwrite")
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_folder_is_replaced_only_when_asked(area, tmp_path):
     ],
 )
 def test_wrong_use_leaves_nothing(area, tmp_path, given, said):
-    assert said.lower() in refuse(area, *given, "--into", tmp_path / "out").lower()
+    assert said.lower() in refuse(area, *given, "--out", tmp_path / "out").lower()
     assert not (tmp_path / "out").exists()
 
 
@@ -110,7 +110,7 @@ def test_a_calibrated_camera_is_taken(area, tmp_path):
     )
     write_camera(content, tmp_path / "camera.toml")
     out = succeed(
-        area, "--camera", tmp_path / "camera.toml", "--height", 60, "--into", tmp_path / "o", "--json"
+        area, "--camera", tmp_path / "camera.toml", "--height", 60, "--out", tmp_path / "o", "--json"
     )
     assert json.loads(out)["strip_m"] == pytest.approx(60 * 639 / 800, abs=0.01)
 
@@ -146,7 +146,7 @@ def over_map(tmp_path_factory):
 def test_heights_follow_a_map(over_map, tmp_path):
     _, area, dem, _, _ = over_map
     into = tmp_path / "out"
-    succeed(area, *SHEET, "--terrain", dem, "--height", 60, "--direction", 90, "--into", into)
+    succeed(area, *SHEET, "--terrain", dem, "--height", 60, "--direction", 90, "--out", into)
     rows = read_wpl((into / "sortie-1.waypoints").read_text())
     points = rows[rows[:, 3] == 16][1:]
     # Over the ridge and back down, row after row: 60 m above the ground, counted from the take-off's.
@@ -162,7 +162,7 @@ def test_heights_follow_a_map(over_map, tmp_path):
 
 def test_maps_that_do_not_fit_are_refused(over_map, tmp_path):
     folder, area, dem, heights, corner = over_map
-    into = ("--into", tmp_path / "out")
+    into = ("--out", tmp_path / "out")
 
     def refused(path, area=area):
         return refuse(area, *SHEET, "--height", 60, "--terrain", path, *into)
@@ -183,22 +183,22 @@ def test_maps_that_do_not_fit_are_refused(over_map, tmp_path):
 
 def test_trees_and_rules_forbid(over_map, tmp_path):
     _, area, dem, _, _ = over_map
-    assert "30 m" in refuse(area, *SHEET, "--height", 25, "--trees", 20, "--into", tmp_path / "a")
-    assert "below 30 m" in refuse(area, *SHEET, "--pixels", 60, "--trees", 20, "--into", tmp_path / "a")
+    assert "30 m" in refuse(area, *SHEET, "--height", 25, "--trees", 20, "--out", tmp_path / "a")
+    assert "below 30 m" in refuse(area, *SHEET, "--pixels", 60, "--trees", 20, "--out", tmp_path / "a")
     # An aircraft that cannot slow down begins to climb before the ridge, and is too high above the valley.
     given = ("--terrain", dem, "--height", 110, "--direction", 90, "--climb", 1, "--turn-radius", 30)
-    err = refuse(area, *SHEET, *given, "--into", tmp_path / "b")
+    err = refuse(area, *SHEET, *given, "--out", tmp_path / "b")
     assert re.search(r"--max-height: sortie 1 is 1[2-9]\d m above the ground \d+ m", err)
     assert not (tmp_path / "b").exists()
     lower = int(re.search(r"plan (\d+) m above the ground or lower", err, re.IGNORECASE).group(1))
     given = [lower - 1 if one == 110 else one for one in given]
-    succeed(area, *SHEET, *given, "--into", tmp_path / "b")
+    succeed(area, *SHEET, *given, "--out", tmp_path / "b")
 
 
 @pytest.mark.slow
 def test_a_take_off_point_of_unknown_height_is_refused(over_map, tmp_path):
     folder, area, dem, heights, corner = over_map
-    given = ("--height", 60, "--into", tmp_path / "out")
+    given = ("--height", 60, "--out", tmp_path / "out")
     outside = ("--home", f"{LAT + 0.012},{LON}")
     assert "--above ground" in refuse(area, *SHEET, "--terrain", dem, *given, *outside)
     assert not (tmp_path / "out").exists()
@@ -212,7 +212,7 @@ def test_a_take_off_point_of_unknown_height_is_refused(over_map, tmp_path):
         60,
         "--home",
         f"{LAT + 0.005},{LON}",
-        "--into",
+        "--out",
         tmp_path / "known",
     )
     holed = heights.copy()
@@ -228,14 +228,14 @@ def test_a_take_off_point_of_unknown_height_is_refused(over_map, tmp_path):
         60,
         "--home",
         f"{LAT + 0.005},{LON}",
-        "--into",
+        "--out",
         tmp_path / "hole",
     )
 
 
 def test_a_flight_of_too_many_way_points_leaves_the_plan_that_is_there(area, tmp_path):
     into = tmp_path / "out"
-    succeed(area, *SHEET, "--height", 60, "--into", into)
+    succeed(area, *SHEET, "--height", 60, "--out", into)
     before = {one.name: one.read_bytes() for one in into.iterdir()}
-    assert "700" in refuse(area, *SHEET, "--height", 3, "--overlap", 0.9, "--into", into, "--overwrite")
+    assert "700" in refuse(area, *SHEET, "--height", 3, "--overlap", 0.9, "--out", into, "--overwrite")
     assert {one.name: one.read_bytes() for one in into.iterdir()} == before

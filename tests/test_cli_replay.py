@@ -35,7 +35,7 @@ def report_of(flight: Path, place: Path) -> Path:
 
 
 def test_a_flight_is_written(flight, tmp_path):
-    out = succeed("replay", flight, "--into", tmp_path / "out", *POSES)
+    out = succeed("replay", flight, "--out", tmp_path / "out", *POSES)
     assert out.strip() == str(tmp_path / "out" / "replay.rrd")
     assert [one.name for one in (tmp_path / "out").iterdir()] == ["replay.rrd"]
     assert not (flight / "replay.rrd").exists()
@@ -58,6 +58,6 @@ def test_what_is_refused(flight, tmp_path):
     assert "no such folder" in refuse("replay", tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
     assert "neither a flight" in refuse("replay", tmp_path / "empty")
-    assert "no part" in refuse("replay", flight, "--into", flight, *POSES)
-    assert "nav source 'x'" in refuse("replay", flight, "--source", "x", "--into", tmp_path / "a")
+    assert "no part" in refuse("replay", flight, "--out", flight, *POSES)
+    assert "nav source 'x'" in refuse("replay", flight, "--source", "x", "--out", tmp_path / "a")
     assert not (tmp_path / "a").exists()

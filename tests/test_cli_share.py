@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from wildlab.cli import main, wildlab
-from wildlab.commands.share import VARIABLE
+from wildlab.commands.sharing import VARIABLE
 from wildlab.sharing import share as sharing
 
 

@@ -42,12 +42,12 @@ def surveyed(tmp_path: Path) -> tuple[Path, Path]:
 
 def test_a_map_is_laid_under_a_flight_and_its_points_lie_on_it(surveyed, tmp_path):
     folder, dem = surveyed
-    succeed("georeference", folder, "--into", tmp_path / "level.csv")
+    succeed("georeference", folder, "--out", tmp_path / "level.csv")
     succeed("terrain", folder, dem, "--heights", "ellipsoid", "--sd", "0.3")
     flight = load_flight(folder)
     assert flight.terrain is not None and flight.manifest.terrain is not None
     assert flight.manifest.terrain.crs == "EPSG:25833"
-    out = succeed("georeference", folder, "--into", tmp_path / "slope.csv")
+    out = succeed("georeference", folder, "--out", tmp_path / "slope.csv")
     level, slope = pd.read_csv(tmp_path / "level.csv"), pd.read_csv(tmp_path / "slope.csv")
     shift = np.hypot(slope["north_m"] - level["north_m"], slope["east_m"] - level["east_m"])
     assert f"{shift.median():.2f} m" in out and f"{shift.max():.2f} m" in out
@@ -59,8 +59,8 @@ def test_a_map_is_laid_under_a_flight_and_its_points_lie_on_it(surveyed, tmp_pat
 
 def test_a_geojson_has_the_places(surveyed, tmp_path):
     folder, _ = surveyed
-    succeed("georeference", folder, "--into", tmp_path / "p.csv")
-    succeed("georeference", folder, "--into", tmp_path / "p.geojson")
+    succeed("georeference", folder, "--out", tmp_path / "p.csv")
+    succeed("georeference", folder, "--out", tmp_path / "p.geojson")
     points = pd.read_csv(tmp_path / "p.csv")
     found = json.loads((tmp_path / "p.geojson").read_text())["features"]
     origin = load_flight(folder).manifest.origin_tuple()
@@ -69,8 +69,8 @@ def test_a_geojson_has_the_places(surveyed, tmp_path):
     np.testing.assert_allclose(places[:, 0], np.degrees(llh[:, 1]), atol=2e-8)
     np.testing.assert_allclose(places[:, 1], np.degrees(llh[:, 0]), atol=2e-8)
     assert [one["properties"]["detection_id"] for one in found] == list(points["detection_id"])
-    assert "--overwrite" in refuse("georeference", folder, "--into", tmp_path / "p.csv")
-    assert ".geojson" in refuse("georeference", folder, "--into", tmp_path / "p.shp")
+    assert "--overwrite" in refuse("georeference", folder, "--out", tmp_path / "p.csv")
+    assert ".geojson" in refuse("georeference", folder, "--out", tmp_path / "p.shp")
 
 
 def test_wrong_use_leaves_the_flight_as_it_is(surveyed, tmp_path):

@@ -27,7 +27,7 @@ def numbers(report: Path) -> dict[tuple[str, str], float]:
 @pytest.mark.slow
 def test_a_heading_that_is_off_is_seen_through_by_the_command_line_alone(tmp_path):
     flight = kept(tmp_path, seed=1, heading_off_deg=2.0, heading_sd_deg=2.0)
-    succeed("track", flight, "--into", tmp_path / "out", "--smooth")
+    succeed("track", flight, "--out", tmp_path / "out", "--smooth")
     found = numbers(tmp_path / "out")
     assert found["nees", "radar/boat/ekf"] > 20 > 5 > found["nees", "radar/boat/schmidt"]
     page = (tmp_path / "out" / "report.html").read_text()
@@ -43,7 +43,7 @@ def test_a_heading_that_is_off_is_seen_through_by_the_command_line_alone(tmp_pat
 def test_tuned_on_one_flight_and_judged_on_another(tmp_path):
     one = kept(tmp_path, seed=1, name="monday", truth=False)
     other = kept(tmp_path, seed=2, name="tuesday", truth=False)
-    succeed("track", other, "--tune", one, "--into", tmp_path / "out")
+    succeed("track", other, "--tune", one, "--out", tmp_path / "out")
     assert ("nis", "radar/boat/ekf") in numbers(tmp_path / "out")
     assert not any(name == "nees" for name, _ in numbers(tmp_path / "out"))
 
@@ -76,7 +76,7 @@ def test_a_flight_without_detections_is_refused(tmp_path):
 @pytest.mark.slow
 def test_all_targets_at_once_without_a_name(tmp_path):
     flight = kept(tmp_path, kind="position", clutter=2, labelled=False)
-    succeed("track", flight, "--many", "--into", tmp_path / "out")
+    succeed("track", flight, "--many", "--out", tmp_path / "out")
     assert numbers(tmp_path / "out")["tracked", "target-1"] > 0.9
     assert (pd.read_parquet(tmp_path / "out" / "estimates.parquet")["track"] >= 0).all()
 

@@ -94,10 +94,10 @@ def test_the_front_pages_own_commands_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     out = str(tmp_path / "reports")
     for line in (
-        "simulate large-ship --into flights/trial",
+        "simulate large-ship --out flights/trial",
         f"evaluate flights/trial --out {out}",
-        f"track flights/trial --into {out}/trial-tracking",
-        f"replay flights/trial --into {out}/trial-replay",
+        f"track flights/trial --out {out}/trial-tracking",
+        f"replay flights/trial --out {out}/trial-replay",
         f"share {out}/trial",
     ):
         with pytest.raises(SystemExit) as ended:

@@ -154,7 +154,7 @@ def test_commands_work_from_any_folder(installed):
     assert "WRONG" not in told and "make " not in told
     assert str(installed.packages / "wildlab" / "resources") in told
 
-    assert installed.wildlab("simulate", "static-antenna", "--into", "flights/antenna") == "flights/antenna\n"
+    assert installed.wildlab("simulate", "static-antenna", "--out", "flights/antenna") == "flights/antenna\n"
     assert "georeferencing accuracy: yes" in installed.wildlab("check", "flights/antenna")
     assert installed.wildlab("run", "sensitivity") == "reports/index.html\n"
 

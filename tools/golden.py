@@ -64,29 +64,29 @@ def steps() -> Iterator[Step]:
     for name, raw in PUBLIC.items():
         recipe = f"data/recipes/{name}.toml"
         yield Step(
-            f"imported-{name}", ["import", recipe, "--source", f"{{data}}/{raw}", "--into", _flight(name)]
+            f"imported-{name}", ["import", recipe, "--source", f"{{data}}/{raw}", "--out", _flight(name)]
         )
     for name in SIMULATED:
-        yield Step(f"imported-{name}", ["simulate", name, "--seed", "3", "--into", _flight(name)])
+        yield Step(f"imported-{name}", ["simulate", name, "--seed", "3", "--out", _flight(name)])
     for name in (*PUBLIC, *SIMULATED):
         yield Step(f"checked-{name}", ["check", "--json", _flight(name)])
         yield Step(f"evaluated-{name}", ["evaluate", _flight(name), "--out", _out("evaluated", name)])
         yield Step(
-            f"placed-{name}", ["georeference", _flight(name), "--into", _out("placed", name) + "/points.csv"]
+            f"placed-{name}", ["georeference", _flight(name), "--out", _out("placed", name) + "/points.csv"]
         )
         more = FERRY if name.startswith("autoferry") else []
         yield Step(
-            f"tracked-{name}", ["track", _flight(name), "--into", _out("tracked", name) + "/report", *more]
+            f"tracked-{name}", ["track", _flight(name), "--out", _out("tracked", name) + "/report", *more]
         )
-        many = ["track", "--many", _flight(name), "--into", _out("many", name) + "/report", *more]
+        many = ["track", "--many", _flight(name), "--out", _out("many", name) + "/report", *more]
         yield Step(f"many-{name}", many)
         report = _out("evaluated", name) + f"/{name}"
         copy = ["share", report, "--flight", _flight(name), "--out", _out("shared", name) + "/copy.html"]
         yield Step(f"shared-{name}", copy)
     sight = ["--image", "640x512", "--view", "32", "--height", "60"]
-    yield Step("planned", ["plan", "{work}/fence.geojson", *sight, "--into", _out("planned")])
+    yield Step("planned", ["plan", "{work}/fence.geojson", *sight, "--out", _out("planned")])
     warm = ["detect", "{data}/imagery/bambi_gatter/thermal", "--method", "warm"]
-    yield Step("detected", [*warm, "--into", _out("detected")])
+    yield Step("detected", [*warm, "--out", _out("detected")])
     yield Step("studies", ["run", "--all", "--seeds", "3", "--jobs", "2", "--out", _out("studies")])
 
 

@@ -12,32 +12,17 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import click
 
 from wildlab import __version__
-from wildlab.commands import studies
-from wildlab.commands.calibrate import calibrate
-from wildlab.commands.camera import camera
-from wildlab.commands.click import click_
-from wildlab.commands.clock import clock
-from wildlab.commands.compare import compare
+from wildlab.commands import calibration, evaluation, flights, shared, sharing, studies
 from wildlab.commands.detect import detect
-from wildlab.commands.georeference import georeference
-from wildlab.commands.import_ import import_
 from wildlab.commands.plan import plan
-from wildlab.commands.replay import replay
-from wildlab.commands.share import share
 from wildlab.commands.shared import FOLDER
-from wildlab.commands.terrain import terrain
-from wildlab.commands.track import track
-from wildlab.commands.verify import verify
 from wildlab.errors import WildlabError, system_error
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
-
-if TYPE_CHECKING:
-    pass
 
 
 class Commands(click.Group):
@@ -60,7 +45,15 @@ class Commands(click.Group):
             raise click.UsageError(f"{error.message} Did you mean {near[0]!r}?", ctx) from error
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+def _today(name: str) -> str:
+    """What an option is called; ``--into`` was its name for whatever is written."""
+    return "out" if name == "into" else name
+
+
+SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100, "token_normalize_func": _today}
+
+
+@click.group(cls=Commands, context_settings=SETTINGS)
 @click.version_option(__version__, prog_name="wildlab")
 def wildlab() -> None:
     """Analyse UAV surveillance flights, and regenerate the figures of the two theses.
@@ -77,33 +70,33 @@ for _command in (
     studies.list_,
     studies.run,
     studies.vary,
-    studies.evaluate,
-    compare,
-    import_,
-    click_,
-    georeference,
-    track,
-    replay,
-    camera,
+    evaluation.evaluate,
+    evaluation.compare,
+    flights.import_,
+    flights.click_,
+    evaluation.georeference,
+    evaluation.track,
+    evaluation.replay,
+    calibration.camera,
     detect,
-    calibrate,
-    clock,
-    terrain,
+    calibration.calibrate,
+    calibration.clock,
+    flights.terrain,
     plan,
-    share,
-    verify,
+    sharing.share,
+    sharing.verify,
 ):
     wildlab.add_command(_command)
 
 
-@wildlab.command(short_help="Is a flight usable, and for what?")
+@wildlab.command()
 @click.argument("flight", type=FOLDER)
-@click.option("--json", "as_json", is_flag=True, help="As JSON.")
-@click.option(
-    "--accept", is_flag=True, help="First write the checksums anew: its files were changed on purpose."
-)
+@shared.as_json
+@click.option("--accept", is_flag=True, help="Its files were changed on purpose: new checksums first.")
 def check(flight: Path, as_json: bool, accept: bool) -> None:
-    """Is a flight usable, and for what? Exits with 2 where there is a problem.
+    """Say whether FLIGHT is usable, and for what.
+
+    Exits with 2 where there is a problem.
 
     \b
     Examples:
@@ -142,13 +135,14 @@ def check(flight: Path, as_json: bool, accept: bool) -> None:
         sys.exit(2)
 
 
-@wildlab.command(short_help="Get a public data set, or list what there is.")
+@wildlab.command()
 @click.argument("dataset", required=False)
-@click.option("--json", "as_json", is_flag=True, help="Without DATASET: the list as JSON.")
+@shared.as_json
 def fetch(dataset: str | None, as_json: bool) -> None:
-    """Get a public data set, checked by its SHA-256; without DATASET, list what there is.
+    """Get a public data set, or list them.
 
-    WILDLAB_DATA_MIRROR=FOLDER takes the files from a folder in place of the network.
+    It is checked by its SHA-256. WILDLAB_DATA_MIRROR=FOLDER takes the files from a folder in place of the
+    network.
 
     \b
     Example:
@@ -172,27 +166,29 @@ def fetch(dataset: str | None, as_json: bool) -> None:
 
 @wildlab.command()
 @click.argument("twin")
-@click.option("--into", type=FOLDER, required=True, help="Folder of the flight to make.")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=1, show_default=True)
-@click.option("--overwrite", is_flag=True, help="Replace the flight that is there.")
-def simulate(twin: str, into: Path, seed: int, overwrite: bool) -> None:
+@shared.out(FOLDER, "Folder of the flight to make.", required=True)
+@shared.seed
+@shared.overwrite
+def simulate(twin: str, out: Path, seed: int, overwrite: bool) -> None:
     """Simulate a twin as a flight folder. TWIN is one that comes with wildlab, or a parameter file.
 
     \b
     Example:
-      wildlab simulate static-antenna --into flights/antenna --seed 7
+      wildlab simulate static-antenna --out flights/antenna --seed 7
     """
     from wildlab.flight.store import save_flight
     from wildlab.simulation.twins import simulate_twin
 
-    save_flight(simulate_twin(twin, seed), into, overwrite=overwrite)
-    click.echo(shown(into))
+    save_flight(simulate_twin(twin, seed), out, overwrite=overwrite)
+    click.echo(shown(out))
 
 
 @wildlab.command()
-@click.option("--json", "as_json", is_flag=True, help="As JSON.")
+@shared.as_json
 def doctor(as_json: bool) -> None:
-    """What is wrong with this installation, and the fix. Exits with 2 where something is.
+    """Say what is wrong with this installation, and the fix.
+
+    Exits with 2 where something is.
 
     \b
     Example:

@@ -14,9 +14,9 @@ from click.testing import CliRunner, Result
 from tests.analysis.conftest import changed
 from tests.refused import refused
 from wildlab.analysis.camera_clock import (
-    by_motion_in_words,
     camera_clock_by_motion,
     camera_clock_by_points,
+    clock_from_motion,
     image_motions,
 )
 from wildlab.cli import wildlab
@@ -107,7 +107,7 @@ def over_land(flight: Flight, first: int, count: int) -> Iterator[Frame]:
 
 @pytest.mark.slow
 def test_from_the_motion_of_images(antenna):
-    found = by_motion_in_words(late(antenna, 1.3), over_land(antenna, 3000, 160), "autopilot")
+    found = clock_from_motion(late(antenna, 1.3), over_land(antenna, 3000, 160), "autopilot")
     assert found.numbers["certain"], found.sentence
     assert found.numbers["offset_s"] == pytest.approx(1.3, abs=0.030)
     assert found.numbers["gain"] == pytest.approx(1.0, abs=0.3)
@@ -136,10 +136,10 @@ def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna):
             grey = np.clip(pattern + rng.normal(0, 2, pattern.shape), 0, 255).astype(np.uint8)
             yield Frame(f"{name}.png", None, grey, "grey", "unknown", np.ones(grey.shape, bool))
 
-    found = by_motion_in_words(antenna, frames(), "autopilot")
+    found = clock_from_motion(antenna, frames(), "autopilot")
     assert not found.numbers["certain"]
     with refused("0 of 0"):
-        by_motion_in_words(antenna, iter(()), "autopilot")
+        clock_from_motion(antenna, iter(()), "autopilot")
 
 
 @pytest.mark.slow

@@ -112,8 +112,8 @@ def test_ellipses_through_import_and_georeference(tmp_path, kind, pitch_deg):
     marks = write_survey(tmp_path, kind, pitch_deg)
     recipe, flight_folder, points_file = (tmp_path / name for name in ("recipe.toml", "flight", "points.csv"))
     for call in (
-        ["import", recipe, "--into", flight_folder],
-        ["georeference", flight_folder, "--into", points_file],
+        ["import", recipe, "--out", flight_folder],
+        ["georeference", flight_folder, "--out", points_file],
     ):
         ran = CliRunner().invoke(wildlab, list(map(str, call)))
         assert ran.exit_code == 0, ran.output

@@ -43,7 +43,7 @@ def test_a_batch_is_judged_beside_ours(capsys, tmp_path):
     path = folder(tmp_path / "in")
     md = batch(tmp_path / "md.json", 7)
     code, out, err = call(
-        capsys, "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv", "--also",
+        capsys, "detect", path, "--out", tmp_path / "out", "--labels", path / "labels.csv", "--also",
         f"md={md}", "--also-class", "animal", "--json",
     )  # fmt: skip
     assert code == 0, err
@@ -70,10 +70,10 @@ def test_a_batch_is_judged_beside_ours(capsys, tmp_path):
 
 def test_our_own_table_as_another_detector_is_ours(capsys, tmp_path):
     path = folder(tmp_path / "in")
-    assert call(capsys, "detect", path, "--into", tmp_path / "one")[0] == 0
+    assert call(capsys, "detect", path, "--out", tmp_path / "one")[0] == 0
     (tmp_path / "l.csv").write_text((path / "labels.csv").read_text().replace(",5,5,", ",3,2,"))
     code, out, err = call(
-        capsys, "detect", path, "--into", tmp_path / "two", "--labels", tmp_path / "l.csv", "--also",
+        capsys, "detect", path, "--out", tmp_path / "two", "--labels", tmp_path / "l.csv", "--also",
         tmp_path / "one" / "detections.csv", "--json",
     )  # fmt: skip
     assert code == 0, err
@@ -98,7 +98,7 @@ def test_labels_in_shares_of_the_image_judge_alike(capsys, tmp_path):
     judged = []
     for labels in (path / "labels.csv", tmp_path / "yolo"):
         code, out, err = call(
-            capsys, "detect", path, "--into", tmp_path / "out", "--labels", labels, "--json"
+            capsys, "detect", path, "--out", tmp_path / "out", "--labels", labels, "--json"
         )  # fmt: skip
         assert code == 0, err
         judged.append(json.loads(out)["judged"])
@@ -166,5 +166,5 @@ def test_a_name_before_a_file(tmp_path):
 def test_wrong_use_is_refused(capsys, tmp_path, monkeypatch, more, words):
     path = folder(tmp_path / "in")
     monkeypatch.chdir(path)
-    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "o", *more)
+    code, _, err = call(capsys, "detect", path, "--out", tmp_path / "o", *more)
     assert code == 2 and words in err

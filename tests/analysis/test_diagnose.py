@@ -13,7 +13,7 @@ from tests.analysis.survey_twin import CAMERA, Survey, simulate
 from tests.refused import refused
 from tests.sound_flights import simulate_sound_flight
 from wildlab.analysis.accuracy import compare_sightings, judge_repeats
-from wildlab.analysis.camera_clock import by_points_in_words
+from wildlab.analysis.camera_clock import clock_from_points
 from wildlab.analysis.diagnose import diagnose, find_implausible
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, observe
@@ -299,11 +299,11 @@ def test_calibration_and_clock_have_what_sightings_say(monkeypatch):
     assert [one.name for one in learnt.parameter] == ["clock"]
     assert learnt.parameter[0].low <= 0.3 <= learnt.parameter[0].high
     monkeypatch.setattr("wildlab.analysis.camera_clock.judge_repeats", lambda *_: found)
-    clock = by_points_in_words(flight)
+    clock = clock_from_points(flight)
     assert clock.numbers["certain"] and clock.numbers["offset_s"] == pytest.approx(0.3, abs=0.03)
     assert clock.curve["offset_s"][clock.curve["cost"].argmin()] == pytest.approx(0.3, abs=0.15)
     monkeypatch.setattr("wildlab.analysis.camera_clock.judge_repeats", lambda *_: unknown(0.0)[2])
-    assert not by_points_in_words(unknown(0.0)[0]).numbers["certain"]
+    assert not clock_from_points(unknown(0.0)[0]).numbers["certain"]
 
 
 def test_a_sighting_is_held_against_those_of_other_images():

@@ -14,10 +14,10 @@ from tests.refused import refused
 from wildlab.analysis.plans.command import missions
 from wildlab.analysis.plans.coverage import cover
 from wildlab.analysis.plans.plan import make_plan, nearest_ground, refuse_near
+from wildlab.analysis.plans.request import LIMITS, PlanRequest, look
 from wildlab.analysis.plans.said import plan_result
 from wildlab.analysis.plans.sorties import TOLERANCE, fly_rows, follow
-from wildlab.analysis.plans.wanted import LIMITS, Wanted, look
-from wildlab.flight.writers import CHANGE_SPEED, mission_items
+from wildlab.flight.writers.mission import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
 
@@ -36,7 +36,7 @@ def field(tmp_path_factory):
 
 
 def plan(area, **given):
-    return make_plan(Wanted(area, CAMERA, **{"names": True} | given))
+    return make_plan(PlanRequest(area, CAMERA, **{"names": True} | given))
 
 
 def result_of(made):
@@ -245,7 +245,7 @@ def test_climbing_that_is_too_steep_takes_longer_and_is_said(field):
     cliff = np.zeros((200, 200), np.float32)
     cliff[100:] = 90.0
     terrain = Terrain(cliff, north=-1000.0, east=-1000.0, step=10.0)
-    wanted = Wanted(field, CAMERA, height_m=60.0, direction_deg=0.0, climb_m_s=2.0)
+    wanted = PlanRequest(field, CAMERA, height_m=60.0, direction_deg=0.0, climb_m_s=2.0)
     flat, steep = make_plan(wanted), make_plan(wanted, terrain)
     wing = make_plan(replace(wanted, turn_radius_m=30.0, max_height_m=500.0), terrain)
     assert wing.sorties[0].steepest == pytest.approx(2.0, rel=0.01) and not result_of(wing)["warnings"]
@@ -282,19 +282,19 @@ def test_the_nearest_ground_of_a_slope_is_that_of_a_plane():
 
 def test_a_way_that_comes_too_near_is_refused(field):
     terrain = wall(90.0)
-    made = make_plan(Wanted(field, CAMERA, height_m=60.0), terrain)
+    made = make_plan(PlanRequest(field, CAMERA, height_m=60.0), terrain)
     assert made.nearest > 5.0
     one = made.sorties[0]
     low = one._replace(way=one.way._replace(height=np.minimum(one.way.height, 92.0)))
     with refused(r"within [0-4]\.\d m"):
         refuse_near([low], terrain, made.wanted, 60.0)
     with refused(r"1\d\d m above"):
-        make_plan(Wanted(field, CAMERA, height_m=60.0), wall(150.0))
+        make_plan(PlanRequest(field, CAMERA, height_m=60.0), wall(150.0))
 
 
 def test_heights_above_take_off_are_differences_of_ground(field):
     terrain = hills()
-    wanted = Wanted(field, CAMERA, height_m=60.0)
+    wanted = PlanRequest(field, CAMERA, height_m=60.0)
     made = make_plan(wanted, terrain)
     flight = missions(made)[0]
     way = made.sorties[0].way
@@ -312,7 +312,7 @@ def test_heights_above_take_off_are_differences_of_ground(field):
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1e9])
 def test_absurd_numbers_are_refused_by_name(name, value):
     with refused(field=LIMITS[name][0]):
-        Wanted(Path("x"), CAMERA, **{name: value})
+        PlanRequest(Path("x"), CAMERA, **{name: value})
 
 
 @pytest.mark.parametrize(
@@ -327,12 +327,12 @@ def test_absurd_numbers_are_refused_by_name(name, value):
 )
 def test_wishes_that_contradict_are_refused(given, words):
     with refused(words):
-        Wanted(Path("x"), CAMERA, **given)
+        PlanRequest(Path("x"), CAMERA, **given)
 
 
 def test_a_wind_blows_from_where_it_is_said_to_and_changes_the_speed_of_a_wing():
     given = {"wind_m_s": 5.0, "wind_from_deg": 270.0}
-    copter, wing = (Wanted(Path("x"), CAMERA, turn_radius_m=turn, **given) for turn in (0.0, 30.0))
+    copter, wing = (PlanRequest(Path("x"), CAMERA, turn_radius_m=turn, **given) for turn in (0.0, 30.0))
     assert np.allclose(copter.wind, [0, 5])
     assert (copter.slowest_m_s, copter.fastest_m_s) == (10.0, 10.0)
     assert (wing.slowest_m_s, wing.fastest_m_s) == (5.0, 15.0)

@@ -12,8 +12,8 @@ from tests.analysis.test_plan import CAMERA, hills, plan
 from tests.flight.test_area import collection, feature, polygon
 from wildlab.analysis.plans.coverage import Covered, cover, gimbal_rate, images_of
 from wildlab.analysis.plans.plan import make_plan
+from wildlab.analysis.plans.request import FURTHEST, PlanRequest, simplified
 from wildlab.analysis.plans.said import animals_in, plan_result
-from wildlab.analysis.plans.wanted import FURTHEST, Wanted, simplified
 from wildlab.geometry.camera import normalise, project
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
@@ -28,7 +28,7 @@ def field(tmp_path_factory):
 
 
 def over(area, terrain, **given):
-    return make_plan(Wanted(area, CAMERA, **given), terrain)
+    return make_plan(PlanRequest(area, CAMERA, **given), terrain)
 
 
 def test_with_overlap_all_of_a_flat_field_is_seen_and_its_hole_is_not_asked(field):

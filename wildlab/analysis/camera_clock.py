@@ -289,7 +289,7 @@ class CameraClock(NamedTuple):
     sentence: str
 
 
-def by_points_in_words(flight: Flight, source: str | None = None) -> CameraClock:
+def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
     """`camera_clock_by_points` with its words; without truth, from things that several images show.
 
     Raises
@@ -363,7 +363,7 @@ def _by_sightings(flight: Flight, source: str | None) -> CameraClock:
     return CameraClock(numbers, curve, sentence)
 
 
-def by_motion_in_words(
+def clock_from_motion(
     flight: Flight,
     frames: Iterable[Frame],
     source: str | None = None,

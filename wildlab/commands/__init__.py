@@ -1,1 +1,1 @@
-"""Commands of the command line that are about studies, and what all commands share."""
+"""Commands of the command line, a file for each job, and the options that they share."""

@@ -2,210 +2,129 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from wildlab.commands.shared import FILE, FOLDER, terminal_console
-from wildlab.commands.terrain import says_of, terrain_options
+from wildlab.commands import shared
+from wildlab.commands.shared import FILE, FOLDER, Pair, terminal_console, terrain_of, terrain_options
 from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, shown
 
 if TYPE_CHECKING:
-    from wildlab.analysis.plans.wanted import Gimbal
     from wildlab.geometry.camera import Camera
 
+#: Numbers that may be given: option, field of `PlanRequest`, what it is without, and what it says.
+_NUMBERS: tuple[tuple[str, str, float | None, str], ...] = (
+    ("--trees", "trees_m", 0.0, "Height of the tallest trees, m."),
+    ("--height", "height_m", None, "Above the ground, m.  [default: by --animal and --pixels]"),
+    ("--animal", "animal_m", 1.5, "Length of what is looked for, m."),
+    ("--pixels", "pixels", 10.0, "Across how many it shall be."),
+    ("--speed", "speed_m_s", 10.0, "Over ground, m/s; with --turn-radius through air."),
+    ("--max-airspeed", "max_air_m_s", None, "Of a multicopter, m/s."),
+    ("--overlap", "overlap", 0.2, "Share of neighbouring rows."),
+    ("--tilt", "tilt_deg", 90.0, "Camera below the horizon, deg."),
+    ("--swing", "swing_deg", 0.0, "Of the gimbal to either side, deg."),
+    ("--rate", "rate_deg_s", None, "Of its swing, deg/s.  [default: as slow as may be]"),
+    ("--exposure", "exposure_ms", 10.0, "Of an image, ms."),
+    ("--direction", "direction_deg", None, "Of the rows, deg from north.  [default: the quickest]"),
+    ("--wind", "wind_m_s", 0.0, "Its speed, m/s."),
+    ("--wind-from", "wind_from_deg", None, "Deg from north."),
+    ("--turn-radius", "turn_radius_m", 0.0, "Of an aircraft that cannot stop, m."),
+    ("--turn-time", "turn_s", 3.0, "Of one that can, s."),
+    ("--climb", "climb_m_s", 3.0, "Climbing or sinking, m/s."),
+    ("--battery", "battery_min", None, "Minutes: longer plans become several flights."),
+    ("--reserve", "reserve", 0.2, "Share left at landing."),
+    ("--max-height", "max_height_m", 120.0, "Above the ground by the rules, m."),
+    ("--animals", "animals", None, "In each area that does not say itself."),
+    ("--density", "density_km2", None, "Or so many on a square kilometre."),
+    ("--detection", "detection", 1.0, "Share of animals in view that are found."),
+    ("--photo-every", "photo_m", 0.0, "Trigger the camera each so many metres."),
+)
 
-class TwoNumbers(click.ParamType[tuple[float, float]]):
-    """Two numbers with something between them: 640x512, or 58.66,16.46."""
 
-    name = "A,B"
-
-    def __init__(self, between: str, example: str) -> None:
-        self.between, self.example = between, example
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        parts = re.split(rf"\s*[{self.between}]\s*", str(value).strip())
-        try:
-            one, other = (float(part) for part in parts)
-        except ValueError:
-            self.fail(f"{value!r} is not two numbers: write {self.example}.")
-        return one, other
+def _numbers(command: Callable[..., Any]) -> Callable[..., Any]:
+    for option, field, value, text in reversed(_NUMBERS):
+        shows = bool(value)
+        command = click.option(option, field, type=float, default=value, show_default=shows, help=text)(
+            command
+        )
+    return command
 
 
-@click.command(short_help="Plan a search flight: way points, times, and what speaks against it.")
+@click.command()
 @click.argument("area", type=FILE)
+@shared.out(FOLDER, "Folder for way points, maps and the page.", required=True)
 @click.option("--camera", type=FILE, help="What `wildlab camera` wrote.")
-@click.option(
-    "--image", type=TwoNumbers("xX×", "640x512"), help="Without --camera: columns x rows of the image."
-)
+@click.option("--image", type=Pair("CxR", "xX×", "640x512"), help="Without it: columns x rows.")
 @click.option("--focal", type=float, help="With --image: focal length, px.")
-@click.option("--view", type=float, help="With --image, in place of --focal: field of view across, deg.")
-@click.option("--terrain", type=FILE, help="Map of heights (GeoTIFF): heights follow it, and it hides.")
+@click.option("--view", type=float, help="Or field of view across, deg.")
+@click.option("--terrain", type=FILE, help="Map of heights: they follow it, and it hides.")
 @terrain_options("--terrain-", "crs", "unit", "nodata", "cell", "corner")
-@click.option("--trees", type=float, default=0.0, help="Height of the tallest trees, m: fly above them.")
-@click.option("--into", type=FOLDER, required=True, help="Folder for way points, maps and the page.")
-@click.option("--height", type=float, help="Above the ground, m.  [default: from --animal and --pixels]")
-@click.option("--animal", type=float, default=1.5, show_default=True, help="Length of what is looked for, m.")
-@click.option("--pixels", type=float, default=10.0, show_default=True, help="Across how many it shall be.")
-@click.option(
-    "--speed",
-    type=float,
-    default=10.0,
-    show_default=True,
-    help="Over ground; with --turn-radius through air, m/s.",
-)
-@click.option("--max-airspeed", type=float, help="What a multicopter can do through the air, m/s.")
-@click.option("--overlap", type=float, default=0.2, show_default=True, help="Of neighbouring rows, a share.")
-@click.option(
-    "--tilt", type=float, default=90.0, show_default=True, help="Camera below the horizon, deg; 90 is down."
-)
+@_numbers
 @click.option(
     "--gimbal",
     type=click.Choice(["fixed", "yaw", "roll", "adaptive"]),
     default="fixed",
     show_default=True,
-    help="How the camera swings to either side; adaptive keeps to the areas (F 5.4).",
+    help="How the camera swings; adaptive keeps to the areas (F 5.4).",
 )
-@click.option("--swing", type=float, default=0.0, help="How far to either side, deg.")
-@click.option("--rate", type=float, help="How fast, deg/s.  [default: no faster than leaves nothing out]")
-@click.option("--exposure", type=float, default=10.0, show_default=True, help="Of an image, ms.")
-@click.option(
-    "--direction", type=float, help="Of the rows, deg clockwise from north.  [default: quickest edge]"
-)
-@click.option("--wind", type=float, default=0.0, help="Its speed, m/s.")
-@click.option("--wind-from", type=float, help="From where, deg clockwise from north.")
-@click.option(
-    "--turn-radius", type=float, default=0.0, help="Of an aircraft that cannot stop, m.  [default: it can]"
-)
-@click.option("--turn-time", type=float, default=3.0, show_default=True, help="Of one that stops to turn, s.")
-@click.option("--climb", type=float, default=3.0, show_default=True, help="Climbing or sinking at most, m/s.")
-@click.option(
-    "--battery", type=float, help="How long it lasts, minutes: longer plans become several flights."
-)
-@click.option("--reserve", type=float, default=0.2, show_default=True, help="Share left at landing.")
-@click.option(
-    "--max-height", type=float, default=120.0, show_default=True, help="Above the ground by the rules, m."
-)
-@click.option(
-    "--home", type=TwoNumbers(",; ", "58.66,16.46"), help="Take-off: latitude,longitude.  [default: row 1]"
-)
-@click.option("--animals", type=float, help="How many live in each area that does not say itself.")
-@click.option("--density", type=float, help="Or how many on a square kilometre.")
-@click.option(
-    "--detection", type=float, default=1.0, show_default=True, help="Share of animals in view that are found."
-)
-@click.option("--photo-every", type=float, default=0.0, help="Trigger the camera each so many metres.")
+@click.option("--home", type=Pair("LAT,LON", ",; ", "58.66,16.46"), help="Take-off.  [default: row 1]")
 @click.option(
     "--above",
+    "heights",
     type=click.Choice(["take-off", "ground"]),
     default="take-off",
     show_default=True,
-    help="Above what the autopilot keeps its heights; ground needs its own map.",
+    help="What heights count from; ground needs the autopilot's own map.",
 )
 @click.option("--names", is_flag=True, help="Let the page tell the names of areas and of the map.")
 @click.option("--exact", is_flag=True, help="Let the page tell where on the Earth this is.")
-@click.option("--overwrite", is_flag=True, help="Replace the plan that is there.")
-@click.option("--json", "as_json", is_flag=True, help="What came out, as JSON.")
+@shared.overwrite
+@shared.as_json
 def plan(
     area: Path,
+    out: Path,
     camera: Path | None,
     image: tuple[float, float] | None,
     focal: float | None,
     view: float | None,
     terrain: Path | None,
-    trees: float,
-    into: Path,
-    height: float | None,
-    animal: float,
-    pixels: float,
-    speed: float,
-    max_airspeed: float | None,
-    overlap: float,
-    tilt: float,
-    gimbal: Gimbal,
-    swing: float,
-    rate: float | None,
-    exposure: float,
-    direction: float | None,
-    wind: float,
-    wind_from: float | None,
-    turn_radius: float,
-    turn_time: float,
-    climb: float,
-    battery: float | None,
-    reserve: float,
-    max_height: float,
-    animals: float | None,
-    density: float | None,
-    detection: float,
-    home: tuple[float, float] | None,
-    photo_every: float,
-    above: Literal["take-off", "ground"],
     names: bool,
     exact: bool,
     overwrite: bool,
     as_json: bool,
-    **stated: Any,
+    **asked: Any,
 ) -> None:
-    """Plan a flight that searches AREA, a GeoJSON or KML file of polygons, in rows.
+    """Plan a search flight over AREA, in rows.
 
-    Leaves for each flight a .waypoints (Mission Planner) and a .plan (QGroundControl), for all of them
-    plan.geojson and plan.kml, and report.html. All but the page hold exact positions: keep them to the pilot.
+    AREA is a GeoJSON or KML file of polygons. Leaves for each flight a .waypoints (Mission Planner) and a
+    .plan (QGroundControl), for all of them plan.geojson and plan.kml, and report.html. All but the page hold
+    exact positions: keep them to the pilot.
 
     \b
     Examples:
-      wildlab plan fence.geojson --camera camera.toml --into flight
-      wildlab plan fence.geojson --image 640x512 --view 32 --height 60 --battery 25 --into flight
-      wildlab plan fence.geojson --camera camera.toml --terrain dem.tif --animals 5 --into flight
-      wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --into flight
+      wildlab plan fence.geojson --camera camera.toml --out flight
+      wildlab plan fence.geojson --image 640x512 --view 32 --height 60 --battery 25 --out flight
+      wildlab plan fence.geojson --camera camera.toml --terrain dem.tif --animals 5 --out flight
+      wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --out flight
     """
     from wildlab.analysis.plans.command import PAGE, plan_flight
-    from wildlab.analysis.plans.wanted import Wanted
+    from wildlab.analysis.plans.request import PlanRequest
     from wildlab.files import write_atomic
 
-    wanted = Wanted(
-        area,
-        lens(camera, image, focal, view),
-        says_of(terrain, stated, "--terrain-"),
-        trees,
-        height_m=height,
-        animal_m=animal,
-        pixels=pixels,
-        speed_m_s=speed,
-        max_air_m_s=max_airspeed,
-        overlap=overlap,
-        tilt_deg=tilt,
-        gimbal=gimbal,
-        swing_deg=swing,
-        rate_deg_s=rate,
-        exposure_s=exposure / 1000,
-        wind_m_s=wind,
-        wind_from_deg=wind_from,
-        turn_radius_m=turn_radius,
-        turn_s=turn_time,
-        climb_m_s=climb,
-        battery_min=battery,
-        reserve=reserve,
-        max_height_m=max_height,
-        direction_deg=direction,
-        home=home,
-        animals=animals,
-        density_km2=density,
-        detection=detection,
-        heights=above,
-        photo_m=photo_every,
-        names=names or exact,
-    )
-    made, covered, result = plan_flight(wanted, into, terminal_console(), overwrite=overwrite)
+    stated = {name: asked.pop(name) for name in list(asked) if name.startswith("terrain_")}
+    exposure_s = asked.pop("exposure_ms") / 1000
+    says = terrain_of(terrain, stated, "--terrain-")
+    of = lens(camera, image, focal, view)
+    request = PlanRequest(area, of, says, exposure_s=exposure_s, names=names or exact, **asked)
+    made, covered, result = plan_flight(request, out, terminal_console(), overwrite=overwrite)
     # What makes pages takes seconds to be imported: what is wrong has been said by now.
     from wildlab.reporting.plan import plan_page
 
-    write_atomic(into / PAGE, plan_page(made, covered, result, exact=exact))
+    write_atomic(out / PAGE, plan_page(made, covered, result, exact=exact))
     if as_json:
         print_json(result)
         return
@@ -218,7 +137,7 @@ def plan(
     if not exact:
         told = "metres, and the names that you let it tell" if names else "metres only"
         click.echo(f"{PAGE} has {told}, and no position.", err=True)
-    click.echo(shown(into / PAGE))
+    click.echo(shown(out / PAGE))
 
 
 def lens(
@@ -252,19 +171,11 @@ def lens(
     if camera is not None:
         if image is not None or focal is not None or view is not None:
             raise WildlabError(
-                "the camera is described twice", "give --camera alone, or --image with --focal or --view"
+                "the camera is described twice", "give --camera, or --image and a focal length"
             )
-        found = read_camera(camera).camera
-        return Camera(
-            found.width_px,
-            found.height_px,
-            found.fx_px,
-            found.fy_px,
-            found.cx_px,
-            found.cy_px,
-            found.skew_px,
-            (found.k1, found.k2, found.p1, found.p2, found.k3),
-        )
+        c = read_camera(camera).camera
+        bends = (c.k1, c.k2, c.p1, c.p2, c.k3)
+        return Camera(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.skew_px, bends)
     if image is None or (focal is None) == (view is None):
         raise WildlabError(
             "nothing says what the camera sees",
@@ -272,17 +183,14 @@ def lens(
         )
     columns, rows = image
     if not (2 <= columns <= 100_000 and 2 <= rows <= 100_000 and columns % 1 == 0 and rows % 1 == 0):
-        raise WildlabError(
-            f"an image of {columns:g} x {rows:g} pixels", "give whole numbers, as 640x512", field="--image"
-        )
+        problem = f"an image of {columns:g} x {rows:g} pixels"
+        raise WildlabError(problem, "give whole numbers, as 640x512", field="--image")
+    length = math.nan if focal is None else focal
     if view is not None:
         if not 1 <= view <= 170:
-            raise WildlabError(
-                f"a field of view of {view:g} degrees", "give one from 1 to 170", field="--view"
-            )
+            problem = f"a field of view of {view:g} degrees"
+            raise WildlabError(problem, "give one from 1 to 170", field="--view")
         length = columns / 2 / math.tan(math.radians(view) / 2)
-    else:
-        length = math.nan if focal is None else focal
     if not 1 <= length <= 1e6:
         raise WildlabError(f"a focal length of {length:g} px", "give pixels above 1", field="--focal")
     return Camera(int(columns), int(rows), length, length, columns / 2, rows / 2)

@@ -1,18 +1,42 @@
-"""What commands share: kinds of paths, where reports go, where progress is shown."""
+"""What commands share: kinds of values, options that many have, options of an elevation map, where progress
+is shown."""
 
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+from wildlab.errors import WildlabError
+from wildlab.paths import REPORTS
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from wildlab.flight.terrain_model import TerrainSays
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
 FOLDER = click.Path(path_type=Path, file_okay=False)
 FILE = click.Path(path_type=Path, dir_okay=False)
+ANY = click.Path(path_type=Path)
+
+source = click.option("--source", help="Which poses, of several (nav/NAME.parquet).")
+seed = click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=1, show_default=True)
+overwrite = click.option("--overwrite", is_flag=True, help="Replace what is there.")
+as_json = click.option("--json", "as_json", is_flag=True, help="As JSON.")
+reports = click.option(
+    "--out", "reports", type=FOLDER, default=REPORTS, help="Where reports are, and go.  [default: reports]"
+)
+
+
+def out(kind: click.ParamType[Path], text: str, **more: Any) -> Callable[[Command], Command]:
+    """The option for the file or folder that is written."""
+    return click.option("--out", type=kind, help=text, **more)
 
 
 class Minutes(click.ParamType[float]):
@@ -32,12 +56,35 @@ class Minutes(click.ParamType[float]):
 
 #: A year.
 MOST_MINUTES = 525_600
+timeout = click.option("--timeout", type=Minutes(), help="Minutes for a notebook or a seed.  [default: 30]")
 
 
-def reports_folder(out: Path | None) -> Path:
-    from wildlab.paths import REPORTS
+class Pair(click.ParamType[tuple[float, float]]):
+    """Two numbers with something between them: 640x512, or 58.66,16.46."""
 
-    return REPORTS if out is None else out
+    def __init__(self, name: str, between: str, example: str) -> None:
+        self.name, self.between, self.example = name, between, example
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        try:
+            one, other = (float(part) for part in re.split(rf"\s*[{self.between}]\s*", str(value).strip()))
+        except ValueError:
+            self.fail(f"{value!r} is not two numbers: write {self.example}.")
+        return one, other
+
+
+def refuse_existing(file: Path | None, overwrite: bool) -> None:
+    """Refuse to write over a file unasked.
+
+    Raises
+    ------
+    WildlabError
+        Where it is there already.
+    """
+    if file is not None and file.exists() and not overwrite:
+        raise WildlabError("this file is there already", "name another, or add --overwrite", file=file)
 
 
 def terminal_console() -> Console:
@@ -45,3 +92,64 @@ def terminal_console() -> Console:
 
     # Progress goes to standard error: standard output is the path of the result.
     return Console(stderr=True)
+
+
+#: By the keys of `TerrainSays`: kind, and what it says.
+_OPTIONS: dict[str, tuple[Any, str]] = {
+    "heights": (str, "What its heights count from: ellipsoid, flight, or the geoid's height in m."),
+    "crs": (str, "Of a map that states none: EPSG:32633."),
+    "unit": (click.Choice(["m", "ft", "us-ft"]), "Of its heights.  [default: m]"),
+    "nodata": (float, "Value of a hole that the map does not declare."),
+    "sd": (float, "Standard deviation of its heights, m."),
+    "step": (float, "Of the grid that is kept, m.  [default: the map's]"),
+    "margin": (float, "How far beyond the flight, m.  [default: by height]"),
+    "cell": (float, "Of a PNG: side of a pixel, m."),
+    "corner": ((float, float), "Of a PNG: easting and northing, upper left."),
+}
+_METRES = {"sd": "sd_m", "step": "step_m", "margin": "margin_m", "cell": "cell_m"}
+
+
+def terrain_options(prefix: str, *names: str) -> Callable[[Command], Command]:
+    """Options for what a map does not say of itself, each with a prefix: those named, or all."""
+
+    def decorate(command: Command) -> Command:
+        for name, (kind, text) in reversed(_OPTIONS.items()):
+            if not names or name in names:
+                command = click.option(f"{prefix}{name}", f"terrain_{name}", type=kind, help=text)(command)
+        return command
+
+    return decorate
+
+
+def terrain_of(map_: Path | None, stated: Mapping[str, Any], prefix: str) -> TerrainSays | None:
+    """What the options say of a map; None without a map.
+
+    Raises
+    ------
+    WildlabError
+        Where an option is there without a map, or its value is wrong.
+    """
+    from wildlab.flight.files import check_model
+    from wildlab.flight.terrain_model import TerrainSays
+
+    given = {name.removeprefix("terrain_"): one for name, one in stated.items() if one is not None}
+    if map_ is None:
+        if given:
+            raise WildlabError("no map is named", "add --terrain", field=prefix + next(iter(given)))
+        return None
+    heights = given.get("heights")
+    if heights is not None and heights not in ("ellipsoid", "flight"):
+        try:
+            given["heights"] = float(heights)
+        except ValueError:
+            raise WildlabError(
+                f"{heights!r} is nothing that heights count from",
+                "give ellipsoid, flight, or how many metres the geoid is above the ellipsoid there",
+                field=f"{prefix}heights",
+            ) from None
+    data = {_METRES.get(name, name): value for name, value in given.items()}
+    try:
+        return check_model(TerrainSays, {"file": str(map_), **data}, None)
+    except WildlabError as error:
+        field = prefix + (error.field or "").removesuffix("_m")
+        raise WildlabError(error.problem, error.fix, field=field) from None

@@ -1,4 +1,4 @@
-"""Commands on studies: list, run, vary; and evaluate, which judges a flight by the same notebooks."""
+"""Commands on studies: list, run, vary."""
 
 from __future__ import annotations
 
@@ -8,16 +8,21 @@ from pathlib import Path
 
 import click
 
-from wildlab.commands.shared import FILE, FOLDER, Minutes, reports_folder, terminal_console
+from wildlab.commands import shared
+from wildlab.commands.shared import FOLDER, terminal_console
 from wildlab.terminal import count, print_json, print_table, shown
 
+jobs = click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 
-@click.command("list", short_help="The studies, and where each stands.")
-@click.option("--out", type=FOLDER, help="Where the reports are.  [default: reports]")
-@click.option("--json", "as_json", is_flag=True, help="As JSON, with every published number and ours.")
-@click.option("--rule", is_flag=True, help="How often each answer is right, by simulation of the rule.")
-def list_(out: Path | None, as_json: bool, rule: bool) -> None:
-    """The studies, and where each stands: published numbers that are close, and within 90 % of our flights.
+
+@click.command("list")
+@shared.reports
+@shared.as_json
+@click.option("--rule", is_flag=True, help="How often each answer is right, by simulation.")
+def list_(reports: Path, as_json: bool, rule: bool) -> None:
+    """The studies, and where each stands.
+
+    How many of its published numbers are close, and within 90 % of our flights.
 
     \b
     Example:
@@ -39,7 +44,7 @@ def list_(out: Path | None, as_json: bool, rule: bool) -> None:
         rows = [[kind, *(f"{value:.2f}" for value in row)] for kind, *row in table.itertuples(index=False)]
         print_table(["kind", "our errors, times", *table.columns[2:]], rows)
         return
-    statuses = [study_status(study, reports_folder(out)) for study in load_studies().values()]
+    statuses = [study_status(study, reports) for study in load_studies().values()]
     if as_json:
         print_json([as_plain(one) for one in statuses])
         return
@@ -75,40 +80,30 @@ def list_(out: Path | None, as_json: bool, rule: bool) -> None:
         click.echo(f"  {one.study.name}: {one.reason}", err=True)
 
 
-@click.command(short_help="Run studies; each leaves a report.")
+@click.command()
 @click.argument("studies", nargs=-1, metavar="STUDY...")
 @click.option(
     "--all",
     "everything",
     is_flag=True,
-    help="All studies but those kept apart; those whose data are not here are skipped.",
+    help="All studies whose data are here.",
 )
-@click.option("--first-look", is_flag=True, help="A few flights of each study, and say so; no full numbers.")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed in place of the study's own.")
+@click.option("--first-look", is_flag=True, help="A few flights of each study.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="In place of the study's own.")
 @click.option(
     "--seeds",
     type=click.IntRange(1, 1_000_000),
-    help="Over how many simulated flights, in place of the study's own.",
+    help="Over how many simulated flights.",
 )
-@click.option("--flight", type=FOLDER, help="A flight folder in place of the study's own (one study only).")
-@click.option(
-    "--jobs",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="How many processes at a time, for notebooks and seeds together.",
-)
+@click.option("--flight", type=FOLDER, help="In place of the study's own (one study).")
+@jobs
 @click.option(
     "--scheduler",
     metavar="tcp://HOST:PORT",
-    help="Compute the seeds on a dask.distributed cluster; notebooks run here.",
+    help="Seeds on a dask.distributed cluster.",
 )
-@click.option(
-    "--timeout",
-    type=Minutes(),
-    help="Minutes a notebook may take, and each seed.  [default: 30]",
-)
-@click.option("--out", type=FOLDER, help="Where reports go.  [default: reports]")
+@shared.timeout
+@shared.reports
 def run(
     studies: tuple[str, ...],
     everything: bool,
@@ -119,13 +114,14 @@ def run(
     jobs: int,
     scheduler: str | None,
     timeout: float | None,
-    out: Path | None,
+    reports: Path,
 ) -> None:
-    """Run studies; each leaves a report, and the ledger shows them all.
+    """Run studies; each leaves a report.
 
-    --all goes over them twice: first every report from few flights, then the full numbers in their place.
-    A study that is named runs once, in full; the name of a case (schmidt) stands for all its studies.
-    --seeds N is one pass over N flights.
+    The ledger shows them all. Studies kept apart, and those whose data are not here, are not in --all. It
+    goes over them twice: first every report from few flights, then the full numbers in their place. A study
+    that is named runs once, in full; the name of a case (schmidt) stands for all its studies. --seeds N is
+    one pass over N flights.
 
     What was computed for a seed is kept: a run that was broken off goes on where it stopped, and more
     seeds cost only those that are new. The numbers are the same for any --jobs.
@@ -152,35 +148,33 @@ def run(
         seed=seed,
         seeds=seeds,
         flight=flight,
-        reports=reports_folder(out),
+        reports=reports,
         parallel=jobs,
         scheduler=scheduler,
         timeout_s=None if timeout is None else timeout * 60,
         console=terminal_console(),
     )
-    click.echo(shown(reports_folder(out) / "index.html"))
+    click.echo(shown(reports / "index.html"))
     failed = [outcome.name for outcome in outcomes if outcome.state == "failed"]
     if failed:
         click.echo(f"{len(failed)} of {len(outcomes)} failed: {', '.join(failed)}.", err=True)
         sys.exit(1)
 
 
-@click.command(short_help="Which verdicts hang on what was chosen for a twin?")
+@click.command()
 @click.argument("study")
 @click.option(
     "--by",
     default="0.5,0.8,1.25,2",
     show_default=True,
     metavar="FACTORS",
-    help="By what the parameters are multiplied.",
+    help="To multiply parameters by.",
 )
-@click.option(
-    "--seeds", type=click.IntRange(3, 10_000), default=20, show_default=True, help="Over how many flights."
-)
-@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="How many processes.")
-@click.option("--out", type=FOLDER, help="Where reports are.  [default: reports]")
-def vary(study: str, by: str, seeds: int, jobs: int, out: Path | None) -> None:
-    """Which verdicts of a STUDY hang on what was chosen for its twin?
+@click.option("--seeds", type=click.IntRange(3, 10_000), default=20, show_default=True, help="Flights.")
+@jobs
+@shared.reports
+def vary(study: str, by: str, seeds: int, jobs: int, reports: Path) -> None:
+    """Show which verdicts of a STUDY hang on choices for its twin.
 
     Each group of chosen parameters is multiplied, the filters' tuning left alone; the table names the
     verdicts that turn. A moved flight shows its target in as many images as it does, at most in as many as
@@ -202,7 +196,7 @@ def vary(study: str, by: str, seeds: int, jobs: int, out: Path | None) -> None:
         study,
         factors=factors,
         seeds=seeds,
-        reports=reports_folder(out),
+        reports=reports,
         parallel=jobs,
         tell=lambda line: console.print(line, highlight=False, soft_wrap=True),
     )
@@ -211,51 +205,3 @@ def vary(study: str, by: str, seeds: int, jobs: int, out: Path | None) -> None:
         share = "-" if math.isnan(turned) else f"{turned:.0f} of {of}"
         rows.append([str(group), f"{factor:g}", share, str(which)])
     print_table(["chosen parameters", "times", "turned", "which"], rows)
-
-
-@click.command(short_help="What is a flight worth? One report for all that its data allow.")
-@click.argument("flight", type=FOLDER)
-@click.option("--source", help="Which poses to judge, where the flight has several (its nav/NAME.parquet).")
-@click.option(
-    "--calibration", type=FILE, help="Apply first what `wildlab calibrate` learnt on another flight."
-)
-@click.option("--out", type=FOLDER, help="Where the report goes.  [default: reports]")
-@click.option("--timeout", type=Minutes(), help="Minutes it may take.  [default: 30]")
-def evaluate(
-    flight: Path, source: str | None, calibration: Path | None, out: Path | None, timeout: float | None
-) -> None:
-    """What is a flight worth? FLIGHT is a folder made by `wildlab import` or `wildlab simulate`.
-
-    First an overview, whatever the flight lacks: where it flew and what is wrong on the way, what was
-    recorded and where it pauses, what the images showed, and the three things most worth fixing, each with
-    its measured gain. Then a report on the accuracy of its georeferencing, and one on its navigation, as far
-    as the data go.
-    All flights evaluated are listed in reports/flights.html.
-
-    \b
-    Examples:
-      wildlab evaluate flights/tuesday
-      wildlab evaluate flights/antenna --source autopilot
-      wildlab evaluate flights/wednesday --calibration calibration.toml
-    """
-    from wildlab.runner.evaluate import evaluate_flight, left_from_before
-
-    reports = reports_folder(out)
-    outcomes = evaluate_flight(
-        flight,
-        source=source,
-        calibration=calibration,
-        reports=reports,
-        timeout_s=None if timeout is None else timeout * 60,
-        console=terminal_console(),
-    )
-    for outcome in outcomes:
-        if outcome.folder is not None:
-            click.echo(shown(outcome.folder / "report.html"))
-    for folder in left_from_before(flight, reports):
-        click.echo(
-            f"{shown(folder)} is of an earlier evaluation, and was not made again: flights.html says so.",
-            err=True,
-        )
-    if any(outcome.state == "failed" for outcome in outcomes):
-        sys.exit(1)

@@ -139,7 +139,7 @@ def refuse_study_name(flight: Flight, name: str, studies: Collection[str]) -> No
     if name in studies:
         raise WildlabError(
             f"the flight is named {flight.name!r} like a study, whose report it would replace",
-            "rename the flight's folder, or name another folder for the report (--out, --into)",
+            "rename the flight's folder, or name another folder for the report (--out, --out)",
         )
 
 

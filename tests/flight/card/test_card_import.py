@@ -68,7 +68,7 @@ def test_the_recipe_beside_a_flight_makes_it_again(card, tmp_path):
 def test_a_track_beside_the_images_is_a_target_once(card, tmp_path):
     for name, seconds in (("fox <b>.gpx", 40), ("fox <b>2.gpx", 40), ("fox cut.gpx", 25)):
         (card / name).write_text(fox(seconds))
-    assert call(card, "--into", tmp_path / "flight", "--zone", "UTC", "--geoid", 0).exit_code == 0
+    assert call(card, "--out", tmp_path / "flight", "--zone", "UTC", "--geoid", 0).exit_code == 0
     flight = load_flight(tmp_path / "flight")
     tracks = flight.truth[flight.truth["time_s"].notna()]
     assert set(tracks["target_id"]) == {"fox-b"}
@@ -104,7 +104,7 @@ def test_the_zone_of_a_wall_clock_by_the_flight(card, tmp_path):
 
 
 def test_overwriting_takes_a_word(card, tmp_path):
-    arguments = (card, "--into", tmp_path / "flight", "--zone", "UTC")
+    arguments = (card, "--out", tmp_path / "flight", "--zone", "UTC")
     assert call(*arguments).exit_code == 0
     recipe = recipe_beside(tmp_path / "flight").read_text(encoding="utf-8")
     assert isinstance(call(*arguments).exception, WildlabError)
@@ -149,7 +149,7 @@ def test_what_is_stated_wrongly(card, option, value, said):
 
 @pytest.mark.parametrize(
     "arguments",
-    ["card", "card --into x --json", "card --into x --source y", "r.toml --into x --zone UTC"],
+    ["card", "card --out x --json", "card --out x --source y", "r.toml --out x --zone UTC"],
 )
 def test_options_that_do_not_go_together(arguments):
     assert call(*arguments.split()).exit_code == 2

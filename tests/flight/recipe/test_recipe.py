@@ -406,7 +406,7 @@ def test_the_option_takes_the_place_of_the_recipe(raw, capsys):
     write_map(raw.folder / "raw" / "dem.tif", 1.5)
     raw.set("terrain", {"file": "dem.tif", "heights": 39.5})
     other = write_map(raw.folder / "other.tif", 3.0)
-    command = ("import", raw.write(), "--source", raw.folder / "raw", "--into", raw.into)
+    command = ("import", raw.write(), "--source", raw.folder / "raw", "--out", raw.into)
     code, _, err = call(capsys, *command, "--terrain-heights", "0")
     assert code == 2 and "--terrain-heights" in err
     code, _, err = call(capsys, *command, "--terrain", other, "--terrain-heights", "ellipsoid")

@@ -164,12 +164,12 @@ MOST_BYTES = 50_000_000
 
 
 @dataclass(frozen=True)
-class Wanted:
+class DetectRequest:
     """What was asked for.
 
     Attributes
     ----------
-    images, into
+    images, out
         Where frames are, and where what comes out goes.
     method
         One of `wildlab.analysis.detecting.methods.METHODS`.
@@ -197,7 +197,7 @@ class Wanted:
     """
 
     images: Path
-    into: Path
+    out: Path
     method: str = "contrast"
     labels: Path | None = None
     fit: Path | None = None
@@ -214,12 +214,12 @@ class Wanted:
     even: bool = False
 
 
-def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
+def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
     """Detect in images, and write tables and pictures.
 
     Parameters
     ----------
-    wanted
+    request
         What was asked for.
     console
         Where progress is shown.
@@ -234,98 +234,100 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
     WildlabError
         Where images, labels or thresholds cannot be used.
     """
-    if wanted.fit and wanted.thresholds:
+    if request.fit and request.thresholds:
         raise WildlabError("thresholds are both named and to be fitted", "leave --fit or --thresholds out")
-    if wanted.method == "shape" and not (wanted.fit or wanted.thresholds):
+    if request.method == "shape" and not (request.fit or request.thresholds):
         raise WildlabError(
             "a classifier of shapes has to be learnt first",
             "give --fit with labels, or --thresholds of such a run",
         )
-    if (wanted.classes or wanted.group) and not (wanted.labels or wanted.fit):
+    if (request.classes or request.group) and not (request.labels or request.fit):
         raise WildlabError(
             "there are no labels whose classes or groups are meant", "give --labels or --fit, or leave it out"
         )
-    if wanted.also and not wanted.labels:
+    if request.also and not request.labels:
         raise WildlabError(
             "another detector can be judged by labels only", "give --labels, or leave --also out"
         )
-    if wanted.also_classes and not wanted.also:
+    if request.also_classes and not request.also:
         raise WildlabError("there is no other detector whose classes these are", "give its file with --also")
-    if (wanted.distance_m is None) is not (wanted.focal_px is None):
+    if (request.distance_m is None) is not (request.focal_px is None):
         raise WildlabError(
             "the distance to the ground and the focal length are of use together", "give both, or neither"
         )
-    _refuse_folder(wanted)
-    frames = _open(wanted)
-    labels = _labels(wanted.labels, wanted)
-    to_fit = _labels(wanted.fit, wanted)
-    others = [] if labels is None else read_others(wanted.also, labels, wanted.classes, wanted.also_classes)
-    thresholds = METHODS[wanted.method].thresholds()
-    if wanted.distance_m is not None and wanted.focal_px is not None:
-        if wanted.fit or wanted.thresholds:
+    _refuse_folder(request)
+    frames = _open(request)
+    labels = _labels(request.labels, request)
+    to_fit = _labels(request.fit, request)
+    others = (
+        [] if labels is None else read_others(request.also, labels, request.classes, request.also_classes)
+    )
+    thresholds = METHODS[request.method].thresholds()
+    if request.distance_m is not None and request.focal_px is not None:
+        if request.fit or request.thresholds:
             raise WildlabError(
                 "lengths come from a distance and from a fit", "leave --distance or the other out"
             )
         thresholds = for_distance(
-            wanted.method, thresholds, wanted.distance_m, wanted.focal_px, wanted.animal_m
+            request.method, thresholds, request.distance_m, request.focal_px, request.animal_m
         )
-    if wanted.thresholds:
-        thresholds = read_thresholds(wanted.thresholds, wanted.method)
-    wanted.into.mkdir(parents=True, exist_ok=True)
+    if request.thresholds:
+        thresholds = read_thresholds(request.thresholds, request.method)
+    request.out.mkdir(parents=True, exist_ok=True)
     fitted, part = None, None
     if to_fit is not None:
         with _progress(console, "choosing thresholds", None) as tell:
             samples = samples_of(frames, to_fit)
-            by_shape = wanted.method == "shape"
+            by_shape = request.method == "shape"
             fitted = (
                 fit_shapes(samples, tell=tell)
                 if by_shape
-                else fit_thresholds(wanted.method, samples, tell=tell)
+                else fit_thresholds(request.method, samples, tell=tell)
             )
         thresholds = fitted.thresholds
-        part = fit_part(wanted.method, samples, thresholds)
+        part = fit_part(request.method, samples, thresholds)
         if part is not None and np.isfinite(part.part):
             thresholds = with_part(thresholds, part.part)
-    write_thresholds(wanted.into / "thresholds.json", wanted.method, thresholds)
+    write_thresholds(request.out / "thresholds.json", request.method, thresholds)
     with _progress(console, "detecting", frames.count) as tell:
         detected = run_detection(
-            frames, wanted.into, wanted.method, thresholds, lambda done: tell(done, None)
+            frames, request.out, request.method, thresholds, lambda done: tell(done, None)
         )
     judged = judge_detections(detected.detections, detected.frames, labels) if labels is not None else None
     things = _as_found(detected.detections) if judged is None else judged.things
     names = [str(one) for one in detected.frames["frame_id"]]
     with _progress(console, "drawing", None) as tell:
         pictures = write_pictures(
-            frames, names, things, wanted.into, wanted.overlays, lambda done: tell(done, None)
+            frames, names, things, request.out, request.overlays, lambda done: tell(done, None)
         )
-    result = _result(wanted, thresholds, detected, judged, fitted, part, pictures, labels)
+    result = _result(request, thresholds, detected, judged, fitted, part, pictures, labels)
     usable = result["frames"]["usable"]
-    chosen = bool(wanted.fit or wanted.thresholds or wanted.distance_m is not None)
+    chosen = bool(request.fit or request.thresholds or request.distance_m is not None)
     result["notes"] = [
         *frames_said(frames, detected),
-        *too_few_or_many(wanted.method, wanted.polarity, len(detected.detections), usable, chosen=chosen),
+        *too_few_or_many(request.method, request.polarity, len(detected.detections), usable, chosen=chosen),
     ]
     result["sentences"] = [*result["notes"], *result["sentences"]]
     if others and labels is not None:
-        ours = f"wildlab {wanted.method}"
+        ours = f"wildlab {request.method}"
         compared = compare_detectors(ours, detected.detections, others, detected.frames, labels)
         result["compared"] = [one.as_plain() for one in compared]
         result["sentences"] += [line for one in compared for line in compared_sentences(one, compared[0])]
-        write_csv(wanted.into / "compared.csv", curve_table(compared))
-    write_json(wanted.into / "result.json", result)
+        write_csv(request.out / "compared.csv", curve_table(compared))
+    write_json(request.out / "result.json", result)
     return result
 
 
-def _refuse_folder(wanted: Wanted) -> None:
+def _refuse_folder(request: DetectRequest) -> None:
     """Results neither among the images, where the next run would read them, nor over another folder's."""
-    images = wanted.images.resolve()
-    if wanted.into.resolve() in (images, images / "images"):
+    images = request.images.resolve()
+    if request.out.resolve() in (images, images / "images"):
         raise WildlabError(
             "the results would lie among the images, and count as images the next time",
-            "name another folder with --into",
-            file=wanted.into,
+            "name another folder with --out",
+            file=request.out,
         )
-    earlier = wanted.into / "result.json"
+    earlier = request.out / "result.json"
     try:
         given = json.loads(read_regular(earlier, MOST_BYTES))
         before = given.get("of") if isinstance(given, dict) else None
@@ -334,8 +336,8 @@ def _refuse_folder(wanted: Wanted) -> None:
     if isinstance(before, str) and before != _place(images):
         raise WildlabError(
             f"the folder holds what was found in another folder, {printable(str(given.get('images')))}",
-            "name another folder with --into, or remove this one",
-            file=wanted.into,
+            "name another folder with --out, or remove this one",
+            file=request.out,
         )
 
 
@@ -344,19 +346,19 @@ def _place(images: Path) -> str:
     return sha256(str(images.resolve()).encode("utf-8", "surrogateescape")).hexdigest()[:16]
 
 
-def _open(wanted: Wanted) -> Frames:
+def _open(request: DetectRequest) -> Frames:
     """Frames; with flight times where they are those of a flight folder, whose images lie in ``images``."""
-    if not (wanted.images / "flight.toml").is_file():
-        return open_frames(wanted.images, polarity=wanted.polarity, even=wanted.even)
-    inside = wanted.images / "images"
+    if not (request.images / "flight.toml").is_file():
+        return open_frames(request.images, polarity=request.polarity, even=request.even)
+    inside = request.images / "images"
     if not inside.is_dir():
         raise WildlabError(
             "this flight has no folder 'images'",
             "put its images there, or name their own folder",
             file=inside,
         )
-    flight = load_flight(wanted.images)
-    frames = open_frames(inside, polarity=wanted.polarity, even=wanted.even)
+    flight = load_flight(request.images)
+    frames = open_frames(inside, polarity=request.polarity, even=request.even)
     if flight.frames is None:
         return frames
     known = dict(zip(flight.frames["frame_id"].astype(str), frame_times(flight), strict=True))
@@ -394,8 +396,8 @@ def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
     return found
 
 
-def _labels(path: Path | None, wanted: Wanted) -> Labels | None:
-    return None if path is None else read_labels(path, classes=wanted.classes, group=wanted.group)
+def _labels(path: Path | None, request: DetectRequest) -> Labels | None:
+    return None if path is None else read_labels(path, classes=request.classes, group=request.group)
 
 
 def _as_found(detections: pd.DataFrame) -> pd.DataFrame:
@@ -404,7 +406,7 @@ def _as_found(detections: pd.DataFrame) -> pd.DataFrame:
 
 
 def _result(
-    wanted: Wanted,
+    request: DetectRequest,
     thresholds: Any,
     detected: Detected,
     judged: DetectorScore | None,
@@ -415,9 +417,9 @@ def _result(
 ) -> dict[str, Any]:
     problems = detected.frames[detected.frames["problem"].fillna("") != ""]
     result: dict[str, Any] = {
-        "method": wanted.method,
-        "images": wanted.images.resolve().name,
-        "of": _place(wanted.images),
+        "method": request.method,
+        "images": request.images.resolve().name,
+        "of": _place(request.images),
         "frames": {
             "all": len(detected.frames),
             "usable": len(detected.frames) - len(problems),
@@ -444,14 +446,14 @@ def _result(
             f"On frames that thresholds were not chosen from: {rates_sentence(result['fit']['held_out'])}"
         )
         say.append(f"Where they were chosen: {rates_sentence(result['fit']['where_chosen'])}")
-        without = "Without a classifier" if wanted.method == "shape" else "With the defaults"
+        without = "Without a classifier" if request.method == "shape" else "With the defaults"
         say.append(f"{without}: {rates_sentence(result['fit']['defaults'])}")
         if part is not None:
             result["fit"]["ellipses"] = part.as_plain()
             say.append(part_sentence(part, PART))
     if judged is not None and labels is not None:
         result["judged"] = judged.as_plain()
-        chosen_here = fitted is not None and wanted.labels == wanted.fit
+        chosen_here = fitted is not None and request.labels == request.fit
         result["chosen_here"] = chosen_here
         where = (
             "Beside the labels that the thresholds were chosen by (too good)"
@@ -464,7 +466,7 @@ def _result(
             say.append(ellipse_sentence(result["judged"]["ellipse_coverage_90"]))
         say += labels_sentences(labels)
         kinds = labels.marked.known_kinds
-        if len(kinds) > 1 and not wanted.classes:
+        if len(kinds) > 1 and not request.classes:
             some = ", ".join(printable(one) for one in kinds[:5])
             say.append(f"Labels of {len(kinds)} classes count alike ({some}); --class chooses.")
         if judged.without_labels or judged.unusable or judged.absent:

@@ -11,8 +11,8 @@ from rich.console import Console
 
 from wildlab.analysis.plans.coverage import Covered, cover
 from wildlab.analysis.plans.plan import Plan, make_plan, on_earth, rings_on_earth
+from wildlab.analysis.plans.request import PlanRequest
 from wildlab.analysis.plans.said import plan_result
-from wildlab.analysis.plans.wanted import Wanted
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.flight.writers import Mission, plan_geojson, plan_kml, qgc_plan, waypoints_text
@@ -113,7 +113,7 @@ def refuse_folder(into: Path, overwrite: bool) -> None:
     if RESULT not in held or not any(one.endswith(".waypoints") for one in held):
         raise WildlabError(
             f"the folder holds other things ({', '.join(held[:3])}{', ...' if len(held) > 3 else ''})",
-            "name a folder of its own with --into",
+            "name a folder of its own with --out",
             file=into,
         )
     if not overwrite:
@@ -135,7 +135,7 @@ def origin_text(plan: Plan) -> str:
 
 
 def plan_flight(
-    wanted: Wanted, into: Path, console: Console, *, overwrite: bool = False
+    wanted: PlanRequest, into: Path, console: Console, *, overwrite: bool = False
 ) -> tuple[Plan, list[Covered], dict[str, Any]]:
     """Plan, and write what a pilot takes along.
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.analysis.plans.plan import Plan
+from wildlab.analysis.plans.request import FURTHEST, simplified
 from wildlab.analysis.plans.sorties import Sortie
-from wildlab.analysis.plans.wanted import FURTHEST, simplified
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array

@@ -10,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from wildlab.analysis.plans.sorties import HeightProfile, Sortie, clear_of, split_rows
-from wildlab.analysis.plans.wanted import (
+from wildlab.analysis.plans.request import (
     CLEARANCE,
     FURTHEST,
     GroundView,
-    Wanted,
+    PlanRequest,
     directions,
     look,
     simplified,
     sizes_alone,
 )
+from wildlab.analysis.plans.sorties import HeightProfile, Sortie, clear_of, split_rows
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest_parts import TerrainSays
 from wildlab.flight.readers.vector import Area, Areas, read_areas
@@ -38,7 +38,7 @@ APART, MOST_PLACES = 2.0, 20_000
 DIRECTIONS, GROWING, CLOSELY = 24, 1.15, 20
 
 
-def refuse_take_off(home: Array, terrain: Terrain | None, wanted: Wanted) -> None:
+def refuse_take_off(home: Array, terrain: Terrain | None, wanted: PlanRequest) -> None:
     """Refuse heights above a take-off point of which the map does not know the height.
 
     Parameters
@@ -68,7 +68,7 @@ def refuse_take_off(home: Array, terrain: Terrain | None, wanted: Wanted) -> Non
     )
 
 
-def refuse_heights(sorties: Sequence[Sortie], home: Array, wanted: Wanted, above: float) -> None:
+def refuse_heights(sorties: Sequence[Sortie], home: Array, wanted: PlanRequest, above: float) -> None:
     """Refuse ways above what the rules allow.
 
     Parameters
@@ -115,7 +115,9 @@ def _side(metres: float, ahead: str, behind: str) -> str:
     return f"{abs(metres):.0f} m {ahead if metres >= 0 else behind}"
 
 
-def refuse_near(sorties: Sequence[Sortie], terrain: Terrain | None, wanted: Wanted, above: float) -> float:
+def refuse_near(
+    sorties: Sequence[Sortie], terrain: Terrain | None, wanted: PlanRequest, above: float
+) -> float:
     """Refuse ways that come too near to the ground on any side, and say how near they come.
 
     Parameters
@@ -245,7 +247,7 @@ class Plan:
         Where the terrain comes from; None where it was given, or there is none.
     """
 
-    wanted: Wanted
+    wanted: PlanRequest
     areas: Areas
     terrain: Terrain | None
     view: GroundView
@@ -290,7 +292,7 @@ class Plan:
         return seconds
 
 
-def make_plan(wanted: Wanted, terrain: Terrain | None = None) -> Plan:
+def make_plan(wanted: PlanRequest, terrain: Terrain | None = None) -> Plan:
     """Plan a flight.
 
     Parameters
@@ -342,7 +344,7 @@ def make_plan(wanted: Wanted, terrain: Terrain | None = None) -> Plan:
     return Plan(wanted, areas, terrain, view, height, strip, pattern, home, sorties, nearest, cut)
 
 
-def _height(wanted: Wanted, view: GroundView) -> float:
+def _height(wanted: PlanRequest, view: GroundView) -> float:
     """The height that was asked for, or the one from which the animal has the pixels it shall have."""
     most, least = wanted.max_height_m, wanted.trees_m + CLEARANCE if wanted.trees_m > 0 else 0.0
     if wanted.height_m is not None:
@@ -372,7 +374,9 @@ def _height(wanted: Wanted, view: GroundView) -> float:
     return float(math.floor(min(sharp, max(most - BELOW_RULE, min(most, least)))))
 
 
-def _cut_out(says: TerrainSays, wanted: Wanted, areas: Areas, home: Array | None, beyond: float) -> CutOut:
+def _cut_out(
+    says: TerrainSays, wanted: PlanRequest, areas: Areas, home: Array | None, beyond: float
+) -> CutOut:
     """The map under the areas and as far about them as a flight comes or looks."""
     points = np.concatenate([area.outline for area in areas.areas])
     if home is not None:
@@ -414,7 +418,7 @@ def _home(home: tuple[float, float], areas: Areas) -> Array:
     return here
 
 
-def _turn_length(wanted: Wanted) -> float:
+def _turn_length(wanted: PlanRequest) -> float:
     """What a turn costs, as metres of way: half a circle, or the time that one stands."""
     return math.pi * wanted.turn_radius_m if wanted.turn_radius_m > 0 else wanted.speed_m_s * wanted.turn_s
 

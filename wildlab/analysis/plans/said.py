@@ -12,8 +12,8 @@ import numpy as np
 
 from wildlab.analysis.plans.coverage import EDGE, SHARP, Covered, gimbal_rate, images_of
 from wildlab.analysis.plans.plan import Plan
+from wildlab.analysis.plans.request import FURTHEST
 from wildlab.analysis.plans.sorties import Sortie, fly_rows
-from wildlab.analysis.plans.wanted import FURTHEST
 from wildlab.flight.files import printable
 from wildlab.flight.readers.vector import Area
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.analysis.plans.wanted import Wanted
+from wildlab.analysis.plans.request import PlanRequest
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
@@ -254,7 +254,7 @@ class Sortie(NamedTuple):
 
 
 def split_rows(
-    pattern: Pattern, home: Array, wanted: Wanted, terrain: Terrain | None, above: float
+    pattern: Pattern, home: Array, wanted: PlanRequest, terrain: Terrain | None, above: float
 ) -> tuple[Sortie, ...]:
     """Rows in their order, as few flights as the battery allows.
 
@@ -318,7 +318,7 @@ def fly_rows(
     rows: Sequence[int],
     pattern: Pattern,
     home: Array,
-    wanted: Wanted,
+    wanted: PlanRequest,
     terrain: Terrain | None,
     above: float,
 ) -> Sortie:
@@ -390,7 +390,7 @@ def _corners(course: Course, radius: float) -> NDArray[np.intp]:
 
 
 def _times(
-    course: Course, corners: NDArray[np.intp], way: HeightProfile, wanted: Wanted
+    course: Course, corners: NDArray[np.intp], way: HeightProfile, wanted: PlanRequest
 ) -> tuple[float, float]:
     """Seconds with climbing, and the greatest vertical speed that the way would need."""
     at = np.flatnonzero(way.corner >= 0)

@@ -78,7 +78,7 @@ class Proposal:
     def text(self, choices: Sequence[Choice]) -> str:
         """The recipe as TOML, with what it rests on in front."""
         lines = [
-            "# Written by wildlab import. To change it: wildlab import THIS --source FOLDER --into FLIGHT"
+            "# Written by wildlab import. To change it: wildlab import THIS --source FOLDER --out FLIGHT"
         ]
         for one in choices:
             if one.item.problem == OTHER:

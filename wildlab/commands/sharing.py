@@ -1,42 +1,35 @@
-"""A copy of reports that is safe to send."""
+"""A copy of reports that is safe to send, and whether a report is as it was written."""
 
 from __future__ import annotations
 
 import getpass
 import os
+import sys
 import warnings
 from pathlib import Path
 
 import click
 
-from wildlab.commands.shared import FILE, FOLDER, terminal_console
+from wildlab.commands import shared
+from wildlab.commands.shared import ANY, FILE, FOLDER, terminal_console
 from wildlab.errors import WildlabError
-from wildlab.terminal import shown
+from wildlab.terminal import count, print_json, sentence, shown
 
 #: Where a password may stand that nobody types: never on the command line, which others can see.
 VARIABLE = "WILDLAB_SHARE_PASSWORD"
 
 
-@click.command(short_help="A copy of reports that is safe to send.")
-@click.argument("report", type=click.Path(path_type=Path))
+@click.command()
+@click.argument("report", type=ANY)
 @click.option(
-    "--for",
-    "tier",
-    type=click.Choice(["public", "partner", "team"]),
-    default="public",
-    show_default=True,
-    help="Who gets it.",
+    "--for", "tier", type=click.Choice(["public", "partner", "team"]), default="public", show_default=True
 )
 @click.option("--flight", type=FOLDER, help="The flight's folder.  [default: found in flights/]")
-@click.option("--out", type=FILE, help="The file to make.  [default: flight-public.html, here]")
-@click.option("--zip", "zipped", is_flag=True, help="A zip with a page for each flight and study.")
-@click.option(
-    "--encrypt",
-    is_flag=True,
-    help=f"A zip with a password: asked for, or in {VARIABLE}.",
-)
-@click.option("--edition", help="On one sheet in plain words: en, nb, sv, or a file of texts.")
-@click.option("--overwrite", is_flag=True, help="Replace the copy that is there.")
+@shared.out(FILE, "The file to make.  [default: flight-public.html, here]")
+@click.option("--zip", "zipped", is_flag=True, help="A zip with a page for each report.")
+@click.option("--encrypt", is_flag=True, help=f"A zip with a password: asked for, or in {VARIABLE}.")
+@click.option("--edition", help="One sheet in plain words: en, nb, sv, or a file of texts.")
+@shared.overwrite
 def share(
     report: Path,
     tier: str,
@@ -47,9 +40,10 @@ def share(
     edition: str | None,
     overwrite: bool,
 ) -> None:
-    """Make one file of REPORT that can be mailed: a report, a folder of reports, or a flight with reports.
+    """Make a copy of REPORT that is safe to send.
 
-    All reports on a flight go together: those of `wildlab evaluate`, and that of `wildlab track --many`.
+    REPORT is a report, a folder of reports, or a flight with reports. All reports on a flight go together:
+    those of `wildlab evaluate`, and that of `wildlab track --many`.
 
     For the public the place is withheld or is a cell of the flight's category (locations.category in
     flight.toml), dates are months, names are neutral, pictures are left out. For partners it may be what
@@ -71,16 +65,13 @@ def share(
     """
     from wildlab.sharing.share import share as make
 
-    password = None
-    if encrypt:
-        password = os.environ.get(VARIABLE) or _asked()
     made = make(
         report,
         tier,  # type: ignore[arg-type]  # click has checked it
         flight=flight,
         out=out,
         zipped=zipped,
-        password=password,
+        password=(os.environ.get(VARIABLE) or _asked()) if encrypt else None,
         edition=edition,
         overwrite=overwrite,
         console=terminal_console(),
@@ -112,3 +103,38 @@ def _asked() -> str:
                 field="--encrypt",
             ) from None
     return typed
+
+
+@click.command()
+@click.argument("report", type=FOLDER)
+@click.option("--flight", type=FOLDER, help="The flight, where it is not found.")
+@click.option("--raw", type=FOLDER, help="The folder that it was imported from.")
+@shared.as_json
+def verify(report: Path, flight: Path | None, raw: Path | None, as_json: bool) -> None:
+    """Check that a REPORT is as it was written.
+
+    Computes all digests again: of its files, kept seeds, flight and raw files. Says what does not fit, and
+    what to do. Exits with 1 where something does not fit.
+
+    \b
+    Examples:
+      wildlab verify reports/tuesday-overview
+      wildlab verify reports/tuesday-overview --raw card/DCIM
+    """
+    from wildlab.runner.verification import verify_report
+
+    found = verify_report(report, flight, raw)
+    if as_json:
+        names = ("file", "field", "problem", "fix")
+        misfits = [{name: getattr(one, name) for name in names} for one in found.misfits]
+        checked = {"checked": list(found.checked), "not_checked": list(found.unchecked)}
+        print_json({"fits": not misfits, "misfits": misfits} | checked)
+    else:
+        for one in found.misfits:
+            click.echo(str(one))
+        click.echo(sentence(f"checked: {', '.join(found.checked) or 'nothing'}"))
+        for what in found.unchecked:
+            click.echo(sentence(f"not checked: {what}"))
+        click.echo(sentence(f"{count(len(found.misfits), 'misfit')}"))
+    if found.misfits:
+        sys.exit(1)

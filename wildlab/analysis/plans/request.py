@@ -173,7 +173,7 @@ def look(camera: Camera, tilt_deg: float, gimbal: str = "fixed", swing_deg: floa
     tilt_deg
         Below the horizon; 90 is straight down.
     gimbal, swing_deg
-        As for `wildlab.analysis.plans.wanted.Wanted`.
+        As for `wildlab.analysis.plans.request.PlanRequest`.
 
     Returns
     -------
@@ -283,7 +283,7 @@ LIMITS: dict[str, tuple[str, float, float, str]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
+class PlanRequest:
     """What was asked for.
 
     Attributes
@@ -460,7 +460,7 @@ class Wanted:
 MOST_TRIED = 12
 
 
-def directions(outlines: Sequence[Array], distance: float, wanted: Wanted) -> list[float] | None:
+def directions(outlines: Sequence[Array], distance: float, wanted: PlanRequest) -> list[float] | None:
     """Of the rows over each area.
 
     Parameters

@@ -1,0 +1,308 @@
+"""A camera from images of a board, the offset of its clock, and what is constantly wrong with its poses."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from wildlab.commands import shared
+from wildlab.commands.shared import ANY, FILE, FOLDER, refuse_existing
+from wildlab.errors import WildlabError
+from wildlab.terminal import print_json, print_table, shown, stopped
+
+if TYPE_CHECKING:
+    from wildlab.analysis.camera_clock import CameraClock
+    from wildlab.flight.store import Flight
+
+LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+
+
+class Length(click.ParamType[float]):
+    """A length with its unit: 25mm; metres come out."""
+
+    name = "LENGTH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        found = re.fullmatch(r"(\d+(?:\.\d+)?|\.\d+)\s*(mm|cm|m)", str(value))
+        if found is None or not 0 < float(found[1]) * LENGTHS[found[2]] <= 100:
+            self.fail(f"{value!r} is no length above zero with its unit: write 25mm, 2.5cm or 0.025m.")
+        return float(found[1]) * LENGTHS[found[2]]
+
+
+class Grid(click.ParamType[tuple[int, int]]):
+    """Columns and rows: 9x6."""
+
+    name = "CxR"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        found = re.fullmatch(r"(\d{1,3})\s*[x×X]\s*(\d{1,3})", str(value))
+        if found is None:
+            self.fail(f"{value!r} is no number of columns and rows: write 9x6.")
+        return int(found[1]), int(found[2])
+
+
+@click.command()
+@click.argument("images", nargs=-1, required=True, type=ANY)
+@click.option("--board", type=Grid(), help="A chessboard's inner corners: 9x6.")
+@click.option("--circles", type=Grid(), help="A grid of circles: 7x7.")
+@click.option("--staggered", is_flag=True, help="Every other row is moved by half a step (4x11).")
+@click.option("--square", type=Length(), required=True, help="From corner to corner, or circle to circle.")
+@shared.out(FILE, "The file to write: camera.toml.")
+@shared.overwrite
+@click.option("--name", default="camera", show_default=True)
+@click.option(
+    "--lens",
+    type=click.Choice(["auto", "none", "k1", "k1-k2", "k1-k2-k3", "tangential", "full"]),
+    default="auto",
+    show_default=True,
+    help="How it bends; auto: the simplest that fits as well.",
+)
+@click.option("--square-pixels", is_flag=True, help="One focal length for both sides.")
+@click.option("--without", multiple=True, metavar="NAME", help="An image to leave out.")
+@shared.as_json
+def camera(
+    images: tuple[Path, ...],
+    board: tuple[int, int] | None,
+    circles: tuple[int, int] | None,
+    staggered: bool,
+    square: float,
+    out: Path | None,
+    overwrite: bool,
+    name: str,
+    lens: str,
+    square_pixels: bool,
+    without: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Calibrate a camera from IMAGES of a flat board.
+
+    Files, or folders of them. Thermal and colour images, dark on light or light on dark. Focal lengths,
+    principal point and distortion come with intervals, from how far they move when a view is left out. Take
+    20 views or more, from all sides. Staggered circles are half a --square apart. --lens auto takes the
+    simplest model that is no worse than the best on views held out.
+
+    \b
+    Examples:
+      wildlab camera boards/ --board 9x6 --square 25mm --out camera.toml
+      wildlab camera warm/*.png --circles 7x7 --square 30mm --out camera.toml
+    Then, in a recipe: camera = "camera.toml"
+    """
+    if (board is None) == (circles is None):
+        raise click.UsageError("Give either --board or --circles.")
+    if staggered and circles is None:
+        raise click.UsageError("--staggered is for --circles.")
+    refuse_existing(out, overwrite)
+    from rich.progress import track
+
+    from wildlab.analysis.camera import calibrate_images, camera_file, sentences
+    from wildlab.detection.boards import Board
+    from wildlab.flight.camera_file import write_camera
+    from wildlab.flight.readers.frames.image import still_files
+
+    columns, rows = board or circles or (0, 0)
+    pattern = "chessboard" if board else "staggered circles" if staggered else "circles"
+    console = shared.terminal_console()
+    found = calibrate_images(
+        still_files(list(images)),
+        Board(pattern, columns, rows, square),  # type: ignore[arg-type]
+        lens,
+        square_pixels,
+        without,
+        lambda paths: track(paths, "looking for boards", console=console, transient=True),
+    )
+    content = camera_file(found, name)
+    if out is not None:
+        write_camera(content, out)
+    left = [one for one in found.images if one.problem]
+    if as_json:
+        unused = [{"name": one.name, "why": one.problem} for one in left]
+        more = {"left_out": unused, "odd": list(found.odd), "sentences": sentences(found)}
+        print_json({**content.model_dump(mode="json"), **more})
+        return
+    for one in left:
+        click.echo(f"{one.name}: {stopped(one.problem)}", err=True)
+    for line in sentences(found):
+        click.echo(line)
+    rows_shown = [
+        [p.name, *_interval(p.value, p.low, p.high), "px" if p.name[0] in "fcs" else ""]
+        for p in content.parameter
+    ]
+    print_table(["", "estimate", "95 % interval", "unit"], rows_shown)
+    if out is not None:
+        click.echo(shown(out))
+
+
+def _interval(*values: float) -> tuple[str, str]:
+    value, low, high = (f"{one:.1f}" if abs(one) >= 10 else f"{one:.4f}" for one in values)
+    return value, f"{low} to {high}"
+
+
+@click.command()
+@click.argument("flight", type=FOLDER)
+@click.option("--images", type=click.Path(exists=True, path_type=Path), help="Its images: folder or video.")
+@click.option("--offset", type=float, help="Seconds, in place of an estimate.")
+@click.option("--set", "set_", is_flag=True, help="Write the offset into the flight.")
+@shared.source
+@click.option("--curve", type=FILE, help="CSV file: how well each offset fits.")
+@shared.as_json
+def clock(
+    flight: Path,
+    images: Path | None,
+    offset: float | None,
+    set_: bool,
+    source: str | None,
+    curve: Path | None,
+    as_json: bool,
+) -> None:
+    """Estimate or set the offset of the camera's clock.
+
+    It is what has to be added to the stamps of FLIGHT's images. With --images, from the motion of the images
+    against the turning that the log has; without, or where that does not tell it, from known points that were
+    seen. --offset takes a number that is known otherwise (F 6.3.3). An offset that does not stand out is said
+    to be uncertain, and --set refuses it.
+
+    \b
+    Examples:
+      wildlab clock flights/tuesday
+      wildlab clock flights/tuesday --images card/DCIM --curve curve.csv --set
+      wildlab clock flights/tuesday --offset 0.42 --set
+    """
+    from wildlab.files import write_csv
+    from wildlab.flight.store import load_flight
+
+    loaded = load_flight(flight)
+    if offset is not None:
+        if images is not None or curve is not None:
+            raise WildlabError(
+                "an offset is stated and an estimate asked for", "leave one out", field="--offset"
+            )
+        said = {"offset_s": offset, "certain": True, "method": "stated"}
+    else:
+        found = _estimate(loaded, images, source)
+        if curve is not None:
+            write_csv(curve, found.curve)
+        said = {**found.numbers, "sentence": found.sentence}
+    if as_json:
+        print_json(said)
+    else:
+        click.echo(said.get("sentence", f"The stamps of the images get {said['offset_s']:+.3f} s."))
+    if not set_:
+        return
+    if not said["certain"]:
+        raise WildlabError(
+            "the offset is not certain, so it is not set",
+            "state it yourself with --offset if you know it",
+            file=flight,
+            field="clocks.camera_offset_s",
+        )
+    from dataclasses import replace
+
+    from wildlab.flight.manifest import replace_in_manifest
+    from wildlab.flight.store import save_flight
+
+    change = {"clocks": {"camera_offset_s": round(float(str(said["offset_s"])), 4)}}
+    changed = replace(loaded, manifest=replace_in_manifest(loaded.manifest, change))
+    save_flight(changed, flight, overwrite=True)
+    click.echo(f'Next: wildlab check "{shown(flight)}"', err=True)
+
+
+def _estimate(flight: Flight, images: Path | None, source: str | None) -> CameraClock:
+    from wildlab.analysis.camera_clock import clock_from_motion, clock_from_points
+
+    if images is None:
+        return clock_from_points(flight, source)
+    from wildlab.flight.readers.frames import open_frames
+
+    ids = [] if flight.frames is None else [str(one) for one in flight.frames["frame_id"]]
+    refused: WildlabError | None = None
+    try:
+        found = clock_from_motion(flight, open_frames(images, ids=ids), source)
+        if found.numbers["certain"]:
+            return found
+        why = found.sentence
+    except WildlabError as error:
+        refused, why = error, f"The motion of the images does not show it: {error.problem}."
+    try:
+        other = clock_from_points(flight, source)
+    except WildlabError:
+        other = None
+    if other is None or (refused is None and not other.numbers["certain"]):
+        if refused is not None:
+            raise refused
+        return found
+    return other._replace(sentence=f"{why} So known points are used: {other.sentence}")
+
+
+@click.command()
+@click.argument("flight", type=FOLDER)
+@shared.out(FILE, "The file to write: calibration.toml.", required=True)
+@shared.overwrite
+@shared.source
+@shared.seed
+@shared.as_json
+def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed: int, as_json: bool) -> None:
+    """Learn on FLIGHT what the next one is corrected by.
+
+    On its known points: what is constantly wrong with position, boresight, clock or lens. Without truth,
+    things that several images show serve as well. Only what gained something for certain on images that it
+    was not estimated from, and nothing else explains as well, is written down, with its covariance; how noisy
+    the poses were always is. Judge it on another flight. A flight whose logs contradict each other teaches
+    nothing.
+
+    \b
+    Examples:
+      wildlab calibrate flights/tuesday --out calibration.toml
+      wildlab evaluate flights/wednesday --calibration calibration.toml
+    """
+    import numpy as np
+
+    from wildlab.analysis.learn import learn_flight
+    from wildlab.flight.checks.check import sense_sentences
+    from wildlab.flight.learnt import write_learnt
+    from wildlab.flight.store import load_flight
+    from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
+
+    refuse_existing(out, overwrite)
+    loaded = load_flight(flight)
+    if problems := [one for one in sense_sentences(loaded) if one.startswith("problem")]:
+        raise WildlabError(
+            f"its logs contradict each other ({len(problems)} problem{'s' * (len(problems) > 1)})",
+            "mend that first: wildlab check says what it is",
+            file=flight,
+        )
+    learnt, diagnosis = learn_flight(loaded, np.random.default_rng(seed), source)
+    write_learnt(learnt, out)
+    if as_json:
+        print_json(learnt.model_dump())
+        return
+    gain, winner = learnt.gain, diagnosis.winner
+    possible = winner.gain.gain
+    if gain is not None:
+        click.echo(
+            f"{winner.name}: mean error {gain.without_m:.2f} m as logged, {gain.with_m:.2f} m on images held "
+            f"out (gain {gain.low_m:.2f} to {gain.high_m:.2f} m)."
+        )
+        rows = [
+            [one.name, f"{one.value:+.3f}", f"{one.low:+.3f} to {one.high:+.3f}", one.unit]
+            for one in learnt.parameter
+        ]
+        print_table(["to be added to", "estimate", "95 % interval", "unit"], rows)
+    elif winner.causes and np.isfinite(possible.low):
+        click.echo(
+            f"Possible, not certain: {words_of_causes(winner.causes)}, gain {possible.low:.2f} to "
+            f"{possible.high:.2f} m on images held out. The file holds the noise of the poses alone."
+        )
+    else:
+        click.echo(
+            f"No constant error is certain ({len(diagnosis.models)} models tried): the file holds the noise "
+            "of the poses alone."
+        )
+    if gain is None and (others := simplest_rivals(diagnosis)):
+        one, other = words_of_causes(winner.causes), words_of_causes(others[0])
+        click.echo(f"These images do not separate {one} from {other}.")
+    click.echo(shown(out))
