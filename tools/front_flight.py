@@ -20,7 +20,7 @@ from wildlab.analysis.georeference import (
     georeference,
     observe,
 )
-from wildlab.analysis.overviews.image_coverage import cover_images
+from wildlab.analysis.image_coverage import cover_images
 from wildlab.analysis.tracks.sighting import CvTuning, follow_schmidt, sighting
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic

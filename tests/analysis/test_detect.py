@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -13,16 +14,16 @@ from tests.analysis.test_detection_part_fit import sample
 from tests.refused import refused
 from wildlab.analysis.detecting import detect as subject
 from wildlab.analysis.detecting.command import samples_of
-from wildlab.analysis.detecting.detect import detect_frame, run_detection
-from wildlab.analysis.detecting.fit import fit_shapes, fit_thresholds
-from wildlab.analysis.detecting.judged import judge_detections
-from wildlab.analysis.detecting.methods import (
+from wildlab.analysis.detecting.detect import (
     METHODS,
+    detect_frame,
     for_distance,
     read_thresholds,
-    thresholds_from,
+    run_detection,
     write_thresholds,
 )
+from wildlab.analysis.detecting.fit import fit_shapes, fit_thresholds
+from wildlab.analysis.detecting.scores import judge_detections
 from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast
 from wildlab.detection.floating import FloatingThresholds
@@ -162,17 +163,20 @@ def test_thresholds_come_back_from_their_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("kind", "given", "words"),
+    ("method", "given", "word"),
     [
-        (Contrast, {"peek": 3}, "'peek'"),
-        (Contrast, {"peak": "high"}, r"9\.0"),
-        (FloatingThresholds, {"largest_area": "big"}, "'big'"),
-        (FloatingThresholds, {"largest_area": (1.0, 2.0)}, "do not fit"),
+        ("contrast", {"peek": 3}, "'peek'"),
+        ("contrast", {"peak": "high"}, "'peak'"),
+        ("contrast", {"peak": True}, "'peak'"),
+        ("floating", {"largest_area": "big"}, "'largest_area'"),
+        ("shape", {"regions": {"peek": 3}}, "'peek'"),
+        ("colour", {"hue": 3}, "'hue'"),
     ],
 )
-def test_thresholds_that_there_are_not_are_refused(kind, given, words):
-    with refused(words):
-        thresholds_from(kind, given)
+def test_thresholds_that_there_are_not_are_refused(tmp_path, method, given, word):
+    (tmp_path / "t.json").write_text(json.dumps({"method": method, "thresholds": given}))
+    with refused(word):
+        read_thresholds(tmp_path / "t.json", method)
 
 
 def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path):

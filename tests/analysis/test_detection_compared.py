@@ -12,7 +12,7 @@ import pytest
 from tests.analysis.test_detect import folder
 from tests.refused import refused
 from tests.test_cli_detect import call
-from wildlab.analysis.detecting.judged import compare_detectors, named_file, read_others
+from wildlab.analysis.detecting.scores import compare_detectors, named_file, read_others
 from wildlab.flight.readers.labels import read_labels
 
 #: Of the frames of `folder`.

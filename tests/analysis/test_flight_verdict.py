@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.analysis.conftest import build, receiver
-from wildlab.analysis.overviews.overview import Overview, look_over
-from wildlab.analysis.overviews.verdict import (
+from wildlab.analysis.overview import Overview, look_over
+from wildlab.analysis.verdict import (
     PARTS,
     VERDICT_LEVEL,
     Evidence,

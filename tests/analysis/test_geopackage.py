@@ -15,9 +15,8 @@ import pandas as pd
 import pytest
 
 from tests.refused import refused
-from wildlab.analysis.geopackage import Layer, write_geopackage
 from wildlab.analysis.georeference import covariances_of, georeference, observe
-from wildlab.analysis.ground import CORNERS, write_points
+from wildlab.analysis.ground import CORNERS, Layer, write_geopackage, write_points
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
 from wildlab.simulation.twins import simulate_twin
@@ -92,7 +91,7 @@ def test_the_file_is_what_the_standard_asks_for(made):
 def test_pyproj_reads_its_reference_system():
     from pyproj import CRS
 
-    from wildlab.analysis.geopackage import _DEFINITION
+    from wildlab.analysis.ground import _DEFINITION
 
     assert CRS.from_wkt(_DEFINITION).to_epsg() == 4326
 

@@ -18,9 +18,11 @@ from tests.analysis.conftest import build, changed, receiver, without_poses
 from tests.analysis.robots import KNOWN, robot_flight
 from tests.planning.ground import FLAT
 from tests.refused import refused
-from wildlab.analysis.overviews.image_coverage import Recovered, cover_images, ground_height
-from wildlab.analysis.overviews.overview import TROUBLES, look_over
-from wildlab.analysis.overviews.verdict import (
+from wildlab.analysis.image_coverage import Recovered, cover_images, ground_height
+from wildlab.analysis.overview import TROUBLES, look_over
+from wildlab.analysis.tracks.judged import judged as judged_tracks
+from wildlab.analysis.tracks.tracker import track
+from wildlab.analysis.verdict import (
     Evidence,
     Verdict,
     gains_of,
@@ -29,8 +31,6 @@ from wildlab.analysis.overviews.verdict import (
     possible_gain,
     verdict_of,
 )
-from wildlab.analysis.tracks.judged import judged as judged_tracks
-from wildlab.analysis.tracks.tracker import track
 from wildlab.evaluation.streams import pace_of, runs_of
 from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
 from wildlab.flight.store import Flight

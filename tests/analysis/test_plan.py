@@ -15,11 +15,12 @@ from wildlab.analysis.plans.command import missions
 from wildlab.analysis.plans.coverage import cover
 from wildlab.analysis.plans.plan import make_plan, nearest_ground, refuse_near
 from wildlab.analysis.plans.request import LIMITS, PlanRequest, look
-from wildlab.analysis.plans.said import plan_result
+from wildlab.analysis.plans.result import plan_result
 from wildlab.analysis.plans.sorties import TOLERANCE, fly_rows, follow
 from wildlab.flight.writers.mission import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
+from wildlab.reporting.plan import with_words
 
 CAMERA = Camera(640, 512, 800.0, 800.0, 319.5, 255.5)
 #: 200 m east and 400 m north.
@@ -67,17 +68,36 @@ def test_a_camera_that_cannot_see_the_ground_is_told_where_it_looks():
 
 
 @pytest.mark.parametrize(
-    ("given", "fragment"),
+    ("given", "facts"),
     [
-        ({"pixels": 25.0}, "20.0 pixels"),  # 800 * 1.5 / 60
-        ({"wind_m_s": 6.0, "wind_from_deg": 0.0}, "16 m/s"),
-        ({"wind_m_s": 6.0, "wind_from_deg": 0.0, "max_air_m_s": 16.0}, None),
-        ({}, None),
+        (
+            {"pixels": 25.0},
+            {"fewer-pixels": {"animal": "1.5", "pixels": "20.0", "wanted": "25"}},
+        ),  # 800 * 1.5 / 60
+        ({"animal_m": 0.3}, {"few-pixels": {"animal": "0.3", "pixels": "4.0", "wanted": "10"}}),
+        ({"wind_m_s": 6.0, "wind_from_deg": 0.0}, {"airspeed": {"air": "16", "speed": "10"}}),
+        ({"wind_m_s": 6.0, "wind_from_deg": 0.0, "max_air_m_s": 16.0}, {}),
+        ({}, {}),
     ],
 )
-def test_plans_warn_of_few_pixels_and_of_a_head_wind(field, given, fragment):
-    found = result_of(plan(field, height_m=60.0, direction_deg=0.0, **given))["warnings"]
-    assert any(fragment in one for one in found) if fragment else not found
+def test_plans_warn_of_few_pixels_and_of_a_head_wind(field, given, facts):
+    assert dict(result_of(plan(field, height_m=60.0, direction_deg=0.0, **given))["warnings"]) == facts
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"battery_min": 30.0, "animals": 3.0, "photo_m": 5.0, "names": True},
+        {"turn_radius_m": 40.0, "wind_m_s": 4.0, "wind_from_deg": 90.0, "heights": "ground"},
+        {"gimbal": "adaptive", "swing_deg": 20.0, "tilt_deg": 70.0, "trees_m": 5.0},
+        {"exposure_s": 0.4, "gimbal": "roll", "swing_deg": 30.0, "home": (58.66, 16.46)},
+    ],
+)
+def test_every_fact_has_its_words(field, given):
+    facts = result_of(plan(field, height_m=60.0, **given))
+    said = with_words(facts)
+    for name in ("assumed", "warnings", "sentences"):
+        assert len(said[name]) == len(facts[name]) and not any("{" in one for one in said[name])
 
 
 def test_the_height_follows_from_the_animal_and_the_rule(field):
@@ -190,7 +210,7 @@ def test_what_lies_in_two_areas_counts_once(tmp_path):
     assert sum(made.alone.values()) == pytest.approx(14e4, rel=0.01)
     said = result_of(made)
     assert said["animals"] == pytest.approx(14, rel=0.01)
-    assert any("2.0 ha" in one for one in said["warnings"])
+    assert dict(said["warnings"]) == {"overlap": {"size": "2.0 ha"}}
 
 
 def test_where_one_takes_off(field):

@@ -16,8 +16,15 @@ from wildlab.analysis.navigation_errors import (
     numbers_of,
     study_navigation,
 )
-from wildlab.analysis.navigation_inputs import imu_noise, inputs_of
-from wildlab.analysis.receiver import place_receiver, receiver_noise, thinned, told, without_gross
+from wildlab.analysis.navigation_inputs import (
+    imu_noise,
+    inputs_of,
+    place_receiver,
+    receiver_noise,
+    thinned,
+    told,
+    without_gross,
+)
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from tests.replay.recordings import Logged, read_recording
-from wildlab.analysis.overviews.image_coverage import ground_height
+from wildlab.analysis.image_coverage import ground_height
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles
 from wildlab.flight.manifest import replace_in_manifest

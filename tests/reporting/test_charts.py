@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from tests.figure_text import overlapping
-from wildlab.analysis.overviews.overview import Path
+from wildlab.analysis.overview import Path
 from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from wildlab.analysis.diagnose import Diagnosis
-from wildlab.analysis.overviews.verdict import (
+from wildlab.analysis.verdict import (
     CAUSES,
     WORTH,
     Evidence,

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wildlab.analysis.overviews.overview import Alarm, Issue
-from wildlab.analysis.overviews.verdict import Gain, Verdict
-from wildlab.messages.catalogue import load_texts
+from wildlab.analysis.overview import Alarm, Issue
+from wildlab.analysis.verdict import Gain, Verdict
+from wildlab.messages.page_texts import load_texts
 from wildlab.reporting import overview as page
 from wildlab.reporting.overview import Judged
 
 TEXTS = load_texts("overview").answers
-#: What may be lost: the keys of `wildlab.analysis.overviews.image_coverage.lost_data`.
+#: What may be lost: the keys of `wildlab.analysis.image_coverage.lost_data`.
 LOST = (
     "images_without_pose",
     "images_without_gimbal",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.analysis.navigation_errors import NavigationErrors
-from wildlab.analysis.receiver import Placement, Receiver
+from wildlab.analysis.navigation_inputs import Placement, Receiver
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise
 from wildlab.studies.navigation import logged as noise
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.analysis.animals.follow import FollowedAnimals, Found, Known
 from wildlab.analysis.animals.images import NONE, Framed, Images
+from wildlab.analysis.animals.tracking import FollowedAnimals, Found, Known
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses

@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.animals.follow import Found, Known
-from wildlab.analysis.animals.revisit import (
+from wildlab.analysis.animals.tracking import (
+    Found,
+    Known,
     Patrolled,
     found_on_visits,
     next_lap,

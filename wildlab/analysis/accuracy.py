@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
 from wildlab.analysis.evaluate import (
@@ -44,8 +43,7 @@ from wildlab.evaluation.pose_noise import PoseNoise
 from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration, split_images
-
-Array = NDArray[np.float64]
+from wildlab.geometry.frames import Array
 
 #: How many times the images are halved to see what ellipses from learnt noise are worth.
 HALVINGS = 5
@@ -230,9 +228,6 @@ def noise_without(observations: Observations, diagnosis: Diagnosis, rng: np.rand
         placed = calibrated(observations, diagnosis.calibration)
         known = score_points(placed.flight, georeference(placed.of(known), rng))
     return estimate_noise(placed, known)
-
-
-Array = NDArray[np.float64]
 
 
 class Calibrated(NamedTuple):

@@ -19,7 +19,8 @@ from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.frames.image import file_name, read_image
 from wildlab.geometry.board_views import parameters_of
-from wildlab.geometry.frames import Array
+from wildlab.geometry.directions import direction_sd
+from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.intrinsics import (
     FEWEST,
     LENSES,
@@ -252,7 +253,7 @@ def _most_odd(views: int) -> int:
     return min(int(ODD * views), views - FEWEST)
 
 
-def odd_views(errors: Array) -> NDArray[np.bool_]:
+def odd_views(errors: Array) -> Mask:
     """Which views disagree with the rest, by their held-out errors.
 
     Parameters
@@ -273,7 +274,7 @@ def odd_views(errors: Array) -> NDArray[np.bool_]:
     return np.asarray(odd)
 
 
-def coverage(uv: Array, width: int, height: int) -> NDArray[np.bool_]:
+def coverage(uv: Array, width: int, height: int) -> Mask:
     """Which cells of a raster of 8 x 6 over the image hold a point of a board: (6, 8) bool.
 
     Parameters

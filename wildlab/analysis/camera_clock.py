@@ -30,9 +30,9 @@ from wildlab.geometry.camera_clock import (
     clock_by_points,
 )
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import matrix_to_rotation_vector
-
-Array = NDArray[np.float64]
+from wildlab.geometry.clock_by_motion import FEWEST, ClockByMotion, clock_by_motion
+from wildlab.geometry.clock_by_points import ClockByPoints, clock_by_points
+from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_rotation_vector
 
 #: Images further apart in time (s) are not compared: between them the camera may have turned to and fro.
 LONGEST_PAIR_S = 1.0
@@ -147,7 +147,7 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
 
 def image_motions(
     frames: Iterable[Frame], flight: Flight, camera: Camera, progress: Callable[[], None] | None = None
-) -> tuple[NDArray[np.intp], Array]:
+) -> tuple[Indices, Array]:
     """How the scene moved from each image of a flight to the next that follows it closely.
 
     Parameters
@@ -173,7 +173,7 @@ def image_motions(
     stamps = flight.table("frames")["time_s"].to_numpy(float)
     pairs: list[tuple[int, int]] = []
     motion: list[Array] = []
-    before: tuple[int, NDArray[np.uint8], NDArray[np.bool_]] | None = None
+    before: tuple[int, NDArray[np.uint8], Mask] | None = None
     for frame in frames:
         row = rows.get(frame.name, rows.get(Path(frame.name).stem))
         if progress is not None:
@@ -192,7 +192,7 @@ def image_motions(
 
 
 def camera_clock_by_motion(
-    flight: Flight, pairs: NDArray[np.intp], motion: Array, source: str | None = None
+    flight: Flight, pairs: Indices, motion: Array, source: str | None = None
 ) -> ClockByMotion:
     """What to add to the stamps of the images so that they moved as the log says that the camera turned.
 

@@ -71,11 +71,9 @@ from wildlab.geometry.calibration import (
     undetermined_parameter,
 )
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.robust import student_scale, student_weights
 from wildlab.geometry.uncertainty import ground_jacobians
-
-Mask = NDArray[np.bool_]
 
 #: What may be constantly wrong, each with its parameters. Each of `_LENS` holds the one before.
 CAUSES: dict[str, tuple[str, ...]] = {

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.analysis.georeference import Observations, covariances_of, shifting_poses, truth_of
 from wildlab.errors import WildlabError
@@ -16,7 +15,7 @@ from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate
 from wildlab.geometry.ellipses import inside_ellipse
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.robust import student_scale
 
 
@@ -169,7 +168,7 @@ def unlabelled_programs(flight: Flight) -> list[str]:
     return [str(program) for program, some in known.items() if not some]
 
 
-def blocks_of(flight: Flight, table: pd.DataFrame) -> NDArray[np.intp]:
+def blocks_of(flight: Flight, table: pd.DataFrame) -> Indices:
     """Which block in time order (N,) each point belongs to: see `wildlab.evaluation.blocks.time_blocks`.
 
     Parameters
@@ -291,7 +290,7 @@ class NearestRule(NamedTuple):
         Standard deviation of an error along either axis that this was judged with.
     """
 
-    ambiguous: NDArray[np.bool_]
+    ambiguous: Mask
     visible_m: float
     sd_m: float
 

@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.detection.flow import LARGEST_GIMBAL_RATE, LARGEST_SPEED, Matches, likely_speed, slow_gimbal
@@ -19,9 +18,8 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.flow import camera_flow, flow_between, motion_between
 from wildlab.geometry.flow_uncertainty import FlowErrors, mean_velocity
+from wildlab.geometry.frames import Array
 from wildlab.geometry.mount import Mount
-
-Array = NDArray[np.float64]
 
 #: What is known of an autopilot's velocity (m/s per axis), of angular rates from two of its attitudes or of
 #: a gimbal's angles (deg/s), where nothing states it: a tenth of a degree, twice in an eighth of a second.

@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times, gimbal_angles, pose_finder, poses_at, truth_at
@@ -15,12 +14,11 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import pose_covariance
 from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.georeference import RAY_STATUS, georeference_pixels
+from wildlab.geometry.frames import Array, Mask
+from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
 from wildlab.geometry.terrain_uncertainty import terrain_covariance
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
-
-Array = NDArray[np.float64]
 
 #: Standard deviations assumed where neither the log nor the manifest states one; those of the attitude as in
 #: `wildlab.geometry.attitude_uncertainty`.
@@ -68,7 +66,7 @@ class Observations:
     terrain: Terrain | None = None
     level: Array | None = None
 
-    def take(self, rows: NDArray[np.bool_]) -> Observations:
+    def take(self, rows: Mask) -> Observations:
         """The observations of some rows."""
         return replace(
             self,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.analysis.navigation_inputs import (
     POSITION,
@@ -17,17 +17,17 @@ from wildlab.analysis.navigation_inputs import (
     imu_noise,
     inputs_of,
     second_vector,
+    told,
+    without_gross,
 )
-from wildlab.analysis.receiver import told, without_gross
 from wildlab.flight.clocks import covariance_columns, frame_times
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.mekf import log_likelihood, pose_covariance, run_mekf, signs_of_trouble
 from wildlab.navigation.observer import Gains, run_observer
 from wildlab.navigation.receiver import ReceiverNoise
-
-Array = NDArray[np.float64]
 
 BIASES = ["accelerometer_x_m_s2", "accelerometer_y_m_s2", "accelerometer_z_m_s2"] + [
     f"gyro_{axis}_rad_s" for axis in "xyz"

@@ -25,8 +25,7 @@ from wildlab.analysis.navigate import (
     navigate_mekf,
     navigate_observer,
 )
-from wildlab.analysis.navigation_inputs import VELOCITY
-from wildlab.analysis.receiver import Receiver, receiver_noise
+from wildlab.analysis.navigation_inputs import VELOCITY, Receiver, receiver_noise
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import Average, average, chi_square_interval, nees, share_inside
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound

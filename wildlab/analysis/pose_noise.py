@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.analysis.evaluate import blocks_of, errors_of, fit_flight, known_points, score_points
 from wildlab.analysis.georeference import (
@@ -29,7 +29,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import level_axes, tilt_and_heading
 from wildlab.geometry.calibration import split_images
 from wildlab.geometry.camera import normalise
-from wildlab.geometry.frames import Array, matrix_to_euler, wrap
+from wildlab.geometry.frames import Array, Indices, matrix_to_euler, wrap
 from wildlab.geometry.uncertainty import ground_jacobians
 from wildlab.tracking.filters import thin
 from wildlab.tracking.records import Track
@@ -43,7 +43,7 @@ _POSE = [0, 1, 2, 6, 7, 8]
 NAMES = (*PLACES, *AXES)
 
 
-def pauses(seen: Sighting) -> list[NDArray[np.intp]]:
+def pauses(seen: Sighting) -> list[Indices]:
     """Rows of the frames of each pause, from the first to the last without a detection.
 
     Parameters

@@ -20,7 +20,7 @@ from wildlab.detection.detections import Detections, no_detections
 from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight, VesselLook, Window, corner_of
@@ -193,7 +193,7 @@ def _found_from(found: Detections, corner: Array) -> Detections:
     return replace(found, uv=found.uv + corner, box=box)
 
 
-def exposures_of(frames: pd.DataFrame) -> NDArray[np.intp]:
+def exposures_of(frames: pd.DataFrame) -> Indices:
     """Numbers of the exposures, (N,), that the frames of a twin are.
 
     Parameters
@@ -232,17 +232,17 @@ class Marks(NamedTuple):
         (K,) how many detections are the target's, and how many are of nothing.
     """
 
-    exposure: NDArray[np.intp]
+    exposure: Indices
     uv: Array
     covariance: Array
     centre: Array
     share: Array
-    moved: NDArray[np.bool_]
-    pieces: NDArray[np.intp]
-    false: NDArray[np.intp]
+    moved: Mask
+    pieces: Indices
+    false: Indices
 
     @property
-    def found(self) -> NDArray[np.bool_]:
+    def found(self) -> Mask:
         """(K,) whether the target was detected."""
         return np.asarray(np.isfinite(self.uv).all(axis=1))
 

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
@@ -82,8 +81,8 @@ class Surveyed(NamedTuple):
 
     positioned: float
     p_nc: Array
-    goal: NDArray[np.intp]
-    known: NDArray[np.intp]
+    goal: Indices
+    known: Indices
     lost_by_covariance: int
     lost_by_search: int
     error: Array
@@ -110,7 +109,7 @@ class _Filters:
         """(A, 2, 2) m^2."""
         return np.asarray(self.p[:, None, None] * np.eye(2))
 
-    def see(self, animals: NDArray[np.intp], positions: Array) -> None:
+    def see(self, animals: Indices, positions: Array) -> None:
         """Positions (K, 2) of animals that an image shows."""
         R = self.rules.position_sd**2
         gain = np.where(self.live[animals], self.p[animals] / (self.p[animals] + R), 1.0)
@@ -198,8 +197,8 @@ def survey(
 
 
 def _next(
-    rows: SearchInRows, platform: Platform, filters: _Filters, wanted: NDArray[np.bool_],
-    open_areas: NDArray[np.bool_],
+    rows: SearchInRows, platform: Platform, filters: _Filters, wanted: Mask,
+    open_areas: Mask,
 ) -> tuple[Leg, int]:  # fmt: skip
     """The next leg and its goal; ``wanted`` (A,) are animals of areas that are not done."""
     rules = filters.rules
@@ -247,7 +246,7 @@ class World(NamedTuple):
     terrain: Terrain
     areas: tuple[Array, ...]
     animals: Array
-    area_of: NDArray[np.intp]
+    area_of: Indices
     chance: Array
 
 
@@ -275,7 +274,7 @@ class Searched(NamedTuple):
     found: Array
     p_nc: Array
     at: Array
-    counts: NDArray[np.bool_]
+    counts: Mask
     covered: Array
     asked: int
     decisions: int
@@ -284,7 +283,7 @@ class Searched(NamedTuple):
 class Searcher(Protocol):
     """A planner, as the loop asks it."""
 
-    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+    def next_leg(self, platform: Platform, open_areas: Mask) -> tuple[Leg, int]:
         """The next leg, and how many candidate steps were weighed.
 
         Parameters
@@ -356,12 +355,12 @@ def search(
     )  # fmt: skip
 
 
-def rows_at(times: Array, interval: float) -> NDArray[np.intp]:
+def rows_at(times: Array, interval: float) -> Indices:
     """(L,) rows of a world that hold at times (L,) s: the last begun; turns put images between rows."""
     return np.floor(np.asarray(times) / interval + 1e-9).astype(np.intp) - 1
 
 
-def found_in(world: World, leg: Leg, rows: NDArray[np.intp], sensor: SearchSensor) -> NDArray[np.bool_]:
+def found_in(world: World, leg: Leg, rows: Indices, sensor: SearchSensor) -> Mask:
     """(L, A) which animals the images of a leg find; ``rows`` (L,) are its images in the world's count."""
     hit = np.zeros((len(rows), world.chance.shape[1]), bool)
     for image, row in enumerate(rows):
@@ -378,8 +377,8 @@ def found_in(world: World, leg: Leg, rows: NDArray[np.intp], sensor: SearchSenso
 
 
 def shown_points(
-    terrain: Terrain, points: Array, leg: Leg, image: int, sensor: SearchSensor, asked: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+    terrain: Terrain, points: Array, leg: Leg, image: int, sensor: SearchSensor, asked: Mask
+) -> Mask:
     """(N,) which of the points that are asked for an image shows, and nothing hides."""
     p, R = leg.p_nc[image], leg.R_nc[min(image, len(leg.R_nc) - 1)]
     inside = np.flatnonzero(asked & in_field_of_view(points, p, R, sensor))
@@ -403,10 +402,10 @@ class SearchByInformation:
         off.
     """
 
-    def __init__(self, planner: InformationPlanner, area_of: NDArray[np.intp], walk: float) -> None:
+    def __init__(self, planner: InformationPlanner, area_of: Indices, walk: float) -> None:
         self.planner, self.area_of, self.walk = planner, area_of, walk
 
-    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+    def next_leg(self, platform: Platform, open_areas: Mask) -> tuple[Leg, int]:
         """As `Searcher` has it."""
         self.planner.weights[:] = open_areas[self.area_of]
         chosen = self.planner.choose(platform)
@@ -449,16 +448,16 @@ class SearchInRows:
         self._now: PatternPlanner | None = None
         self._area = -1
 
-    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+    def next_leg(self, platform: Platform, open_areas: Mask) -> tuple[Leg, int]:
         """As `Searcher` has it."""
         return self._rows(platform, open_areas).choose(platform), 0
 
-    def way_point(self, platform: Platform, open_areas: NDArray[np.bool_]) -> Array:
+    def way_point(self, platform: Platform, open_areas: Mask) -> Array:
         """(2,) m, the first that was not visited: where the search would go on."""
         rows = self._rows(platform, open_areas)
         return np.asarray(rows.way_points[rows.visited])
 
-    def _rows(self, platform: Platform, open_areas: NDArray[np.bool_]) -> PatternPlanner:
+    def _rows(self, platform: Platform, open_areas: Mask) -> PatternPlanner:
         """What is left of the rows that are being flown, or the rows over the next area."""
         if self._now is None or self._now.done or not open_areas[self._area]:
             self._queue = [one for one in self._queue if open_areas[one]]
@@ -495,7 +494,7 @@ class SearchByChance:
         self.areas = world.areas
         self._walk = RandomWalk(list(world.areas), world.terrain, flying, rng)
 
-    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+    def next_leg(self, platform: Platform, open_areas: Mask) -> tuple[Leg, int]:
         """As `Searcher` has it."""
         self._walk.areas = [area for area, still in zip(self.areas, open_areas, strict=True) if still]
         return self._walk.choose(platform), 0
@@ -504,7 +503,7 @@ class SearchByChance:
         """As `Searcher` has it; chance does not ask what was seen."""
 
 
-def grid_over(areas: Sequence[Array], terrain: Terrain, step: float) -> tuple[Array, NDArray[np.intp]]:
+def grid_over(areas: Sequence[Array], terrain: Terrain, step: float) -> tuple[Array, Indices]:
     """Points inside areas, one for each cell of a grid.
 
     Parameters

@@ -111,9 +111,9 @@ def plan(
       wildlab plan fence.geojson --camera camera.toml --terrain dem.tif --animals 5 --out flight
       wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --out flight
     """
-    from wildlab.analysis.plans.command import PAGE, plan_flight
+    from wildlab.analysis.plans.command import PAGE, RESULT, plan_flight
     from wildlab.analysis.plans.request import PlanRequest
-    from wildlab.files import write_atomic
+    from wildlab.files import write_atomic, write_json
 
     stated = {name: asked.pop(name) for name in list(asked) if name.startswith("terrain_")}
     exposure_s = asked.pop("exposure_ms") / 1000
@@ -122,7 +122,10 @@ def plan(
     request = PlanRequest(area, of, says, exposure_s=exposure_s, names=names or exact, **asked)
     made, covered, result = plan_flight(request, out, terminal_console(), overwrite=overwrite)
     # What makes pages takes seconds to be imported: what is wrong has been said by now.
-    from wildlab.reporting.plan import plan_page
+    from wildlab.reporting.plan import plan_page, with_words
+
+    result = with_words(result)
+    write_json(out / RESULT, result)
 
     write_atomic(out / PAGE, plan_page(made, covered, result, exact=exact))
     if as_json:

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.detection.detections import Detections
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Mask
 
 #: Share of its ellipse that a blob fills below which it is not a filled one.
 FILLED = 0.9
@@ -63,7 +63,7 @@ class CentreErrors:
     adjusted: float = 0.1
 
 
-def cut_sides(box: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def cut_sides(box: NDArray[Any], shape: tuple[int, ...]) -> Mask:
     """Which borders of an image of that shape (rows, columns) a box touches: left, top, right, bottom.
 
     Parameters
@@ -92,7 +92,7 @@ def centre_covariance(
     area: float,
     region: Array,
     boundary: Array,
-    cut: NDArray[np.bool_],
+    cut: Mask,
     smoothing_sd: float,
     errors: CentreErrors,
 ) -> Array:
@@ -128,7 +128,7 @@ def centre_covariance(
     return np.asarray(contour + errors.shape**2 * region + even + hidden_part(region, cut, errors))
 
 
-def hidden_part(region: Array, cut: NDArray[np.bool_], errors: CentreErrors) -> Array:
+def hidden_part(region: Array, cut: Mask, errors: CentreErrors) -> Array:
     """What the border of the image adds to the covariance of a centre (2, 2), px^2; zero for what is whole.
 
     Parameters

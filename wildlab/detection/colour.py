@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.detection.detections import Detections, Mask, describe, no_detections
+from wildlab.detection.detections import Detections, describe, no_detections
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array, Mask
 
 #: Regions that are described at most, the largest first: an image full of them shows nothing that is wanted.
 MOST_REGIONS = 1000
@@ -138,7 +139,7 @@ def coloured(hsv: NDArray[np.uint8], t: Colour) -> Mask:
     return np.asarray(good)
 
 
-def _regions(wanted: NDArray[np.uint8], t: Colour) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+def _regions(wanted: NDArray[np.uint8], t: Colour) -> tuple[NDArray[np.int32], Array]:
     """Labels (H, W) of what lies inside outer contours of sufficient area, the largest first, and areas."""
     outlines, _ = cv2.findContours(wanted, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     areas = []

@@ -15,8 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.detection.detections import PART, Array, Detections, describe, no_detections
+from wildlab.detection.detections import PART, Detections, describe, no_detections
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array, Mask
 
 #: The most regions of one image that are looked at further: an image of noise has tens of thousands.
 MOST_REGIONS = 5000
@@ -302,8 +303,6 @@ def _features(
 
 
 Image = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-
 #: What a standard deviation is to the median absolute deviation, for normal noise.
 MAD = 1.4826
 #: Standard deviation of what rounding to whole numbers takes away.

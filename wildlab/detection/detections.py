@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from wildlab.geometry.frames import Array, Indices, Mask
 
 #: Standard deviation of the middle of an animal about that of what is warm of it, over the length of the
 #: latter: legs and heads are cold or hidden. From how far labels of people and deer lie from detections
@@ -204,7 +203,7 @@ def describe(
     )
 
 
-def _outline(labels: NDArray[np.int32], rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Mask:
+def _outline(labels: NDArray[np.int32], rows: Indices, columns: Indices) -> Mask:
     """(P,) which pixels have a neighbour that does not belong to their region, or lie at the border."""
     height, width = labels.shape
     own = labels[rows, columns]
@@ -215,7 +214,7 @@ def _outline(labels: NDArray[np.int32], rows: NDArray[np.intp], columns: NDArray
     return np.asarray(found)
 
 
-def _beside(valid: Mask, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Mask:
+def _beside(valid: Mask, rows: Indices, columns: Indices) -> Mask:
     """(P, 2) which pixels lie beside a border to the left or right, and above or below: within 2 px."""
     height, width = valid.shape
     found = np.stack([(columns < 2) | (columns >= width - 2), (rows < 2) | (rows >= height - 2)], axis=1)
@@ -226,7 +225,7 @@ def _beside(valid: Mask, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> M
     return found
 
 
-def _hu(starts: NDArray[np.intp], apart: Array, area: Array) -> Array:
+def _hu(starts: Indices, apart: Array, area: Array) -> Array:
     """Hu's moments (N, 7), from central moments normalised by the area."""
     x, y = apart.T
 

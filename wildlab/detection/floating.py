@@ -28,6 +28,7 @@ from wildlab.detection.centres import (
 )
 from wildlab.detection.detections import Detections
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Mask
 
 #: Of how many pixels along each side one is looked at to find an image's range.
 SPARSE = 8
@@ -67,7 +68,7 @@ class FloatingObjects(NamedTuple):
 
 def detect_floating(
     image: NDArray[Any],
-    valid: NDArray[np.bool_] | None = None,
+    valid: Mask | None = None,
     thresholds: FloatingThresholds | None = None,
 ) -> Detections:
     """Floating objects of one image, H 4.3; `find_objects` gives their pixels as well.
@@ -105,7 +106,7 @@ def detect_floating(
 
 def find_objects(
     image: NDArray[Any],
-    valid: NDArray[np.bool_] | None = None,
+    valid: Mask | None = None,
     thresholds: FloatingThresholds | None = None,
 ) -> FloatingObjects:
     """As :func:`detect_floating`, with the pixels of each object.
@@ -155,9 +156,7 @@ def _within(outline: Any) -> _Region:
     return _Region((left, top, width, height), here, mask, outline)
 
 
-def to_grey(
-    image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds: FloatingThresholds
-) -> NDArray[Any]:
+def to_grey(image: NDArray[Any], valid: Mask | None, thresholds: FloatingThresholds) -> NDArray[Any]:
     """An image in 256 grey levels, or in counts, (H, W); see ``scaling`` of `FloatingThresholds`.
 
     Parameters
@@ -193,7 +192,7 @@ def to_grey(
     return np.asarray(cv2.addWeighted(plain, gain, plain, 0.0, -low * gain, dtype=cv2.CV_8U))
 
 
-def find_edges(image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds: FloatingThresholds) -> Steps:
+def find_edges(image: NDArray[Any], valid: Mask | None, thresholds: FloatingThresholds) -> Steps:
     """Steps 1 to 3, H (4.1) to (4.4).
 
     Parameters
@@ -246,7 +245,7 @@ def find_edges(image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds:
     return Steps(grey, smoothed, gradient, np.asarray(steep, np.uint8))
 
 
-def nested_in_boxes(boxes: NDArray[Any]) -> NDArray[np.bool_]:
+def nested_in_boxes(boxes: NDArray[Any]) -> Mask:
     """Which boxes (N, 4), left, top, width, height, lie completely in a larger one, H 4.3.
 
     Parameters

@@ -17,9 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.frames import Array
-
-Mask = NDArray[np.bool_]
+from wildlab.geometry.frames import Array, Indices, Mask
 
 #: Pixels around a mask that are looked at too: features are described by what is around them.
 _MARGIN = 24
@@ -180,7 +178,7 @@ def filled_outlines(labels: NDArray[np.integer]) -> Mask:
 
 def nearest_by_ratio(
     first: NDArray[np.float32], second: NDArray[np.float32], ratio: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+) -> tuple[Indices, Indices]:
     """Rows of two sets of descriptors that belong together: nearest by far, and each taken once.
 
     Parameters
@@ -284,8 +282,6 @@ def _none() -> Matches:
 
 
 Grey = NDArray[np.uint8]
-Mask = NDArray[np.bool_]
-
 #: Features that are followed at most, and that have to agree on one motion at least.
 MOST_CORNERS, FEWEST_CORNERS = 400, 12
 #: How far (px) a feature may be from where it began when it is followed back, and from the common motion.

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
-from wildlab.detection.contrast import FEATURES, Contrast, Mask, Proposals, propose
-from wildlab.detection.detections import Array, Detections, remove_near
+from wildlab.detection.contrast import FEATURES, Contrast, Proposals, propose
+from wildlab.detection.detections import Detections, remove_near
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array, Mask
 
 #: What lets through nearly all that is warm: the regression decides.
 PERMISSIVE = Contrast(

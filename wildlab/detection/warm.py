@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.detection.contrast import Mask, fill_invalid
+from wildlab.detection.contrast import fill_invalid
 from wildlab.detection.detections import PART, Detections, describe, no_detections, remove_near
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array, Mask
 
 Grey = NDArray[np.uint8]
 #: The most contours of one image that are looked at further.
@@ -297,7 +298,7 @@ def grey_above(grey: Grey, t: Warm) -> Grey:
     return ((grey > mean) & (grey > t.level)).astype(np.uint8)
 
 
-def _contours(above: Grey, grey: Grey, t: Warm) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+def _contours(above: Grey, grey: Grey, t: Warm) -> tuple[NDArray[np.int32], Array]:
     """Labels (H, W) of what lies inside outer contours of sufficient size, and their largest excess."""
     outlines, _ = cv2.findContours(above, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     labels = np.zeros(above.shape, np.int32)

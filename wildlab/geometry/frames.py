@@ -14,7 +14,10 @@ import pymap3d
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+#: Numbers, truth values, and rows or counts: of any shape.
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 Origin = tuple[float, float, float]
 
 #: Exchanges north-east-down and east-north-up; its own inverse (F 2.4).

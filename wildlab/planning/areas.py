@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Mask
 
 #: Corners nearer to one another than this are one corner, metres; and what counts as on a border.
 SAME = 1e-6
@@ -120,7 +120,7 @@ def is_convex(corners: ArrayLike) -> bool:
     return bool((turns >= -1e-9 * lengths).all())
 
 
-def contains(corners: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
+def contains(corners: ArrayLike, points: ArrayLike) -> Mask:
     """Which points lie in a polygon, by counting the edges that a line to the north crosses.
 
     Parameters
@@ -157,7 +157,7 @@ def contains(corners: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
     return inside
 
 
-def inside_of(corners: ArrayLike) -> Callable[[Array], NDArray[np.bool_]]:
+def inside_of(corners: ArrayLike) -> Callable[[Array], Mask]:
     """Whether points (..., 2) lie in an area, for areas that are asked often.
 
     A convex one is asked by its sides, which is many times faster than `contains`.
@@ -255,7 +255,7 @@ def _crossing_edges(points: Array) -> tuple[int, int] | None:
     return None
 
 
-def _meet(a: Array, along: Array, b: Array, edges: Array) -> NDArray[np.bool_]:
+def _meet(a: Array, along: Array, b: Array, edges: Array) -> Mask:
     """Which closed segments, from b (N, 2) along edges (N, 2), have a point in common with one."""
     length, lengths = np.asarray(np.linalg.norm(along)), np.linalg.norm(edges, axis=1)
 
@@ -267,7 +267,7 @@ def _meet(a: Array, along: Array, b: Array, edges: Array) -> NDArray[np.bool_]:
     near, far = sides(edges, a - b, lengths), sides(edges, a + along - b, lengths)
     meet = (start * end < 0) & (near * far < 0)
 
-    def within(points: Array, origins: Array, spans: Array) -> NDArray[np.bool_]:
+    def within(points: Array, origins: Array, spans: Array) -> Mask:
         low, high = np.minimum(origins, origins + spans), np.maximum(origins, origins + spans)
         return np.asarray(((points >= low - SAME) & (points <= high + SAME)).all(axis=-1))
 

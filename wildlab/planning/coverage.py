@@ -11,13 +11,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.visibility import image_border, lines_clear, widest_view
 from wildlab.planning.areas import check_area, contains, inside_of
@@ -47,8 +47,8 @@ class Coverage(NamedTuple):
         Between nodes, metres.
     """
 
-    looks: NDArray[np.intp]
-    blurred: NDArray[np.intp]
+    looks: Indices
+    blurred: Indices
     last: Array
     longest_gap: Array
     detected: Array
@@ -56,7 +56,7 @@ class Coverage(NamedTuple):
     step: float
 
     @property
-    def seen(self) -> NDArray[np.bool_]:
+    def seen(self) -> Mask:
         """(R, C) bool: seen sharply at least once."""
         return np.asarray(self.looks > 0)
 
@@ -91,7 +91,7 @@ class Share(NamedTuple):
 
 
 def from_sightings(
-    found: Sightings, terrain: Terrain, times: Array, sharp: NDArray[np.bool_], range_scale: float = np.inf
+    found: Sightings, terrain: Terrain, times: Array, sharp: Mask, range_scale: float = np.inf
 ) -> Coverage:
     """Coverage by sightings that are known already.
 
@@ -144,7 +144,7 @@ def from_sightings(
     )
 
 
-def nodes_in(terrain: Terrain, fences: list[Array]) -> NDArray[np.intp]:
+def nodes_in(terrain: Terrain, fences: list[Array]) -> Indices:
     """Which area each node of a terrain lies in.
 
     Parameters
@@ -168,7 +168,7 @@ def nodes_in(terrain: Terrain, fences: list[Array]) -> NDArray[np.intp]:
     return owner.reshape(rows, columns)
 
 
-def share_seen(shown: Coverage, where: NDArray[np.bool_]) -> Share:
+def share_seen(shown: Coverage, where: Mask) -> Share:
     """How much of some nodes was seen.
 
     Parameters
@@ -217,12 +217,12 @@ class Sightings(NamedTuple):
         (S,) how far it is from the nearest edge of the image, pixels.
     """
 
-    image: NDArray[np.intp]
-    node: NDArray[np.intp]
+    image: Indices
+    node: Indices
     distance: Array
     edge: Array
 
-    def take(self, which: NDArray[np.bool_]) -> Sightings:
+    def take(self, which: Mask) -> Sightings:
         """Some of them, by (S,) bool."""
         return Sightings(self.image[which], self.node[which], self.distance[which], self.edge[which])
 
@@ -303,9 +303,7 @@ def see(
     return found.take(np.concatenate(clear))
 
 
-def _blocks(
-    terrain: Terrain, camera: Camera, p: Array, R: Array, furthest: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _blocks(terrain: Terrain, camera: Camera, p: Array, R: Array, furthest: float) -> tuple[Indices, Indices]:
     """First row and column, and how many of each, of nodes that an image may show. (N, 2) each.
 
     What it shows lies within the hull of where its border's rays come to the lowest and to the highest
@@ -423,9 +421,7 @@ def walks(
     return np.asarray(np.swapaxes(way[before] * (1 - part) + way[before + 1] * part, 0, 1))
 
 
-def first_seen(
-    found: Sightings, terrain: Terrain, times: ArrayLike, sharp: NDArray[np.bool_], ways: ArrayLike
-) -> Array:
+def first_seen(found: Sightings, terrain: Terrain, times: ArrayLike, sharp: Mask, ways: ArrayLike) -> Array:
     """When each animal was first in a sharp image that shows the node nearest to it.
 
     Parameters

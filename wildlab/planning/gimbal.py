@@ -23,12 +23,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_rotation_vector
+from wildlab.geometry.frames import Array, Mask, euler_to_matrix, matrix_to_rotation_vector
 from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.mount import R_MC_FORWARD
 from wildlab.geometry.terrain import Terrain, intersect_terrain
@@ -269,7 +269,7 @@ def view_inside(
     pitch: float,
     fences: Sequence[ArrayLike],
     terrain: Terrain,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Whether the whole field of view would lie within the areas, for each place and each roll.
 
     Parameters
@@ -309,7 +309,7 @@ def view_inside(
 
 def adapt_roll(
     times: ArrayLike,
-    inside: NDArray[np.bool_],
+    inside: Mask,
     rolls: ArrayLike,
     limits: tuple[float, float],
     rate: float,

@@ -11,10 +11,10 @@ from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Mask
 
 #: What `best_goal` gives where the search for new animals is worth more: F's m + 1.
 SEARCH = -1
@@ -97,7 +97,7 @@ def best_goal(
     return SEARCH if k == len(worth) - 1 else k
 
 
-def all_positioned(known: ArrayLike, live: ArrayLike) -> NDArray[np.bool_]:
+def all_positioned(known: ArrayLike, live: ArrayLike) -> Mask:
     """Which enclosures are done: as many animals are known at once as live there, F 5.3.
 
     Parameters
@@ -114,7 +114,7 @@ def all_positioned(known: ArrayLike, live: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(np.asarray(known) >= np.asarray(live))
 
 
-def lost_by_covariance(covariances: ArrayLike, limit: float) -> NDArray[np.bool_]:
+def lost_by_covariance(covariances: ArrayLike, limit: float) -> Mask:
     """Which animals are lost because too little is known of them, F 5.3: Tr(P) beyond a limit.
 
     Parameters
@@ -132,7 +132,7 @@ def lost_by_covariance(covariances: ArrayLike, limit: float) -> NDArray[np.bool_
     return np.asarray(np.trace(P, axis1=1, axis2=2) > limit)
 
 
-def lost_by_search(missed: ArrayLike, doubt: float) -> NDArray[np.bool_]:
+def lost_by_search(missed: ArrayLike, doubt: float) -> Mask:
     """Which animals are lost because they were not where they should be, F 5.3.4.
 
     Parameters

@@ -14,11 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import Array, ned_to_enu
+from wildlab.geometry.frames import Array, Mask, ned_to_enu
 
 
 @dataclass(frozen=True)
@@ -180,9 +180,7 @@ def as_printed(points: ArrayLike, p_nc: ArrayLike, sd: float) -> Array:
     return np.asarray(Y * q[..., None, None])
 
 
-def in_field_of_view(
-    points: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike, sensor: SearchSensor
-) -> NDArray[np.bool_]:
+def in_field_of_view(points: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike, sensor: SearchSensor) -> Mask:
     """Which points lie in the field of view, F (2.22)-(2.23); what hides them is not asked.
 
     Parameters

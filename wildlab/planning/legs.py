@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.frames import Array, Mask, euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.areas import contains
@@ -107,7 +107,7 @@ class Flying:
         each = np.cumsum(np.asarray(waits, float), axis=-1)
         return np.asarray(each + self.interval * np.arange(1, self.images + 1))
 
-    def ready(self, turned: ArrayLike, waits: ArrayLike = 0.0) -> NDArray[np.bool_]:
+    def ready(self, turned: ArrayLike, waits: ArrayLike = 0.0) -> Mask:
         """Which images of a step count where the camera has to turn first.
 
         Parameters
@@ -163,7 +163,7 @@ class Leg(NamedTuple):
 
     p_nc: Array
     R_nc: Array
-    counts: NDArray[np.bool_]
+    counts: Mask
     heading: float
     at: Array
 

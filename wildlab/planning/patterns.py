@@ -13,11 +13,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices
 from wildlab.planning.areas import check_area, edge_directions
 
 #: More rows than this over one area are a slip of a unit.
@@ -56,7 +56,7 @@ class Pattern(NamedTuple):
     """
 
     rows: Array
-    area: NDArray[np.intp]
+    area: Indices
     waypoints: Array
     directions: Array
     distance: Array

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.information import SearchSensor, trace_of_inverse
@@ -142,7 +142,7 @@ class InformationPlanner:
         self._middles = np.stack(sums, axis=-1) / each[:, None]
         self._half = np.array([sensor.half_width, sensor.half_height])
 
-    def add(self, leg: Leg, clear: NDArray[np.bool_] | None = None) -> None:
+    def add(self, leg: Leg, clear: Mask | None = None) -> None:
         """Add what the images of a leg tell, F (5.10).
 
         Parameters
@@ -253,7 +253,7 @@ class InformationPlanner:
         sums = np.bincount(whole.ravel(), (left * self.weights).ravel(), len(left) * count)
         return np.asarray(sums.reshape(-1, count), float)
 
-    def _headings(self, states: list[Platform], blocks: Array) -> tuple[NDArray[np.intp], Array]:
+    def _headings(self, states: list[Platform], blocks: Array) -> tuple[Indices, Array]:
         """Candidates (K,): which state each begins in, and its heading."""
         each = np.array([one.heading for one in states])[:, None] + np.array(self.horizon.turns)
         away = self._middles - np.stack([one.north_east for one in states])[:, None]
@@ -263,7 +263,7 @@ class InformationPlanner:
         parents = np.repeat(np.arange(len(states)), headings.shape[1])
         return parents, headings.ravel()
 
-    def _positions(self, states: list[Platform], parents: NDArray[np.intp], headings: Array) -> Array:
+    def _positions(self, states: list[Platform], parents: Indices, headings: Array) -> Array:
         """(K, L, 3) where images are taken."""
         starts = np.stack([one.north_east for one in states])[parents]
         return leg_positions(self.terrain, self.flying, starts, headings)
@@ -277,11 +277,11 @@ class InformationPlanner:
         depth = np.nan_to_num(float(self.points[:, 2].max()) - cams[..., 2])
         return np.asarray(sideways_limit(R, 1.0, self.sensor).max(axis=1)[:, None] * depth)
 
-    def _clear(self, cams: Array, reach: Array) -> NDArray[np.bool_]:
+    def _clear(self, cams: Array, reach: Array) -> Mask:
         """As `_lines`, or (0, 0, 0) where candidates take all lines of sight for clear."""
         return self._lines(cams, reach) if self.hides else np.zeros((0, 0, 0), bool)
 
-    def _lines(self, cams: Array, reach: Array) -> NDArray[np.bool_]:
+    def _lines(self, cams: Array, reach: Array) -> Mask:
         """(K, L, N) whether nothing hides a point that counts and lies within reach (K, L)."""
         away = np.linalg.norm(self.points[:, :2] - cams[:, :, None, :2], axis=-1)
         k, image, i = np.nonzero((away <= reach[..., None]) & (self.weights > 0))

@@ -9,10 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.overviews.verdict import Verdict
 from wildlab.analysis.tracks.judged import LEADING
-from wildlab.messages.catalogue import Message, fill, load_texts
-from wildlab.messages.quantities import NOTHING, area, duration, metres, number, percent, way_length
+from wildlab.analysis.verdict import Verdict
 from wildlab.names import listed
 from wildlab.paths import DATA
 from wildlab.reporting.charts.drawing import dots_chart

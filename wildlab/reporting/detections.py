@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.detecting.judged import ELLIPSE, rate_words
-from wildlab.messages.catalogue import Message, load_texts
-from wildlab.messages.quantities import NOTHING, percent_of
+from wildlab.analysis.detecting.scores import ELLIPSE, rate_words
+from wildlab.messages.message import Message
+from wildlab.messages.page_texts import load_texts, percent_of
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
 from wildlab.reporting.layout import ADVICE
@@ -188,7 +188,7 @@ def detections_page(
     thresholds
         By name, as plain values.
     curves
-        Of detectors that are compared, as of `wildlab.analysis.detecting.judged.curve_table`; None where
+        Of detectors that are compared, as of `wildlab.analysis.detecting.scores.curve_table`; None where
         there is only ours.
 
     Returns

@@ -17,7 +17,7 @@ from wildlab.analysis.accuracy import Accuracy
 from wildlab.analysis.diagnose import CAUSES, Diagnosis
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import georeference, heights_left_in
-from wildlab.analysis.overviews.verdict import (
+from wildlab.analysis.verdict import (
     FEW_POINTS,
     MANY_LOST,
     VERDICT_LEVEL,

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.overviews.overview import (
+from wildlab.analysis.overview import (
     APART_M,
     APART_SD,
     APART_SHARE,
@@ -26,7 +26,7 @@ from wildlab.analysis.overviews.overview import (
     length_of_way,
     troubled_for,
 )
-from wildlab.analysis.overviews.verdict import (
+from wildlab.analysis.verdict import (
     LISTED,
     MOST,
     WORTH,
@@ -435,9 +435,9 @@ def show_overview(
     report
         Is added to.
     overview
-        From `wildlab.analysis.overviews.overview.look_over`.
+        From `wildlab.analysis.overview.look_over`.
     gains, numbers
-        From `wildlab.analysis.overviews.verdict`, and the numbers of the other reports behind them.
+        From `wildlab.analysis.verdict`, and the numbers of the other reports behind them.
     amiss
         What does not fit together: `wildlab.flight.checks.check.sense_sentences`.
     lacking

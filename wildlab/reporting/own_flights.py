@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
-from wildlab.analysis.overviews.verdict import Verdict, evidence_of, verdict_of
+from wildlab.analysis.verdict import Verdict, evidence_of, verdict_of
 from wildlab.reporting.page import PILLS, TAGS, page
 from wildlab.reporting.text import render
 

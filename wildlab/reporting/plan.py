@@ -15,12 +15,11 @@ from matplotlib.path import Path as Outline
 from wildlab.analysis.plans.command import origin_text
 from wildlab.analysis.plans.coverage import Covered
 from wildlab.analysis.plans.plan import Plan
-from wildlab.analysis.plans.said import count, head_count, hectares, minutes, percent
-from wildlab.flight.readers.vector import Area
+from wildlab.analysis.plans.result import count, head_count, hectares, minutes, percent
+from wildlab.flight.readers.area import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.messages.catalogue import Message, load_texts
-from wildlab.messages.quantities import NOTHING
+from wildlab.messages.page_texts import fill, load_texts
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.notebook_pages import finished_page
@@ -36,6 +35,26 @@ PLACES = 800
 NAMED = 6
 
 
+def with_words(result: Mapping[str, Any]) -> dict[str, Any]:
+    """The result of a plan with the sentences of the catalogue in place of its facts.
+
+    Parameters
+    ----------
+    result
+        From `wildlab.analysis.plans.result.plan_result`.
+
+    Returns
+    -------
+    dict
+    """
+    texts = load_texts("plan").answers
+    said = {
+        name: [fill(texts[key], {}, values) for key, values in result[name]]
+        for name in ("assumed", "warnings", "sentences")
+    }
+    return {**result, **said}
+
+
 def plan_page(
     plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any], *, exact: bool = False
 ) -> str:
@@ -48,7 +67,7 @@ def plan_page(
     covered
         Of each area, from `wildlab.analysis.plans.coverage.cover`.
     result
-        From `wildlab.analysis.plans.said.plan_result`.
+        From `with_words`.
     exact
         Whether it may tell where on the Earth this is.
 

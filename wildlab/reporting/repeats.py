@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from wildlab.analysis.accuracy import Repeats
-from wildlab.analysis.overviews.verdict import (
+from wildlab.analysis.verdict import (
     FEW_POINTS,
     MANY_LOST,
     VERDICT_LEVEL,

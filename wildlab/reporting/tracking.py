@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.overviews.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
 from wildlab.analysis.tracks.judged import (
     CAUTIOUS,
     CONSISTENT,
@@ -28,6 +27,7 @@ from wildlab.analysis.tracks.judged import (
 from wildlab.analysis.tracks.noise_model import ROUGH, ToldValue, Tuned
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.analysis.tracks.tracks import TOGETHER
+from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant

@@ -11,8 +11,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from wildlab.analysis.georeference import observe
-from wildlab.analysis.overviews.overview import look_over
-from wildlab.analysis.overviews.verdict import Verdict
+from wildlab.analysis.overview import look_over
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels

@@ -6,18 +6,21 @@ import numpy as np
 import pytest
 
 from tests.planning.ground import FLAT
-from wildlab.analysis.animals.follow import (
+from wildlab.analysis.animals.images import NONE, Detector, Images, footprint_circles, sight_from, take_images
+from wildlab.analysis.animals.tracking import (
     STATION_S,
+    Aircraft,
     Kalman,
     Ledger,
     Particles,
+    Patrolled,
+    Visits,
     blind,
     follow,
     next_look,
+    patrol,
 )
-from wildlab.analysis.animals.images import NONE, Detector, Images, footprint_circles, sight_from, take_images
-from wildlab.analysis.animals.revisit import Aircraft, Patrolled, Visits, patrol
-from wildlab.analysis.plans.flown import ExecutionErrors
+from wildlab.analysis.plans.execution import ExecutionErrors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix

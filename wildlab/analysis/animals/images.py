@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.plans.flown import ExecutionErrors
+from wildlab.analysis.plans.execution import ExecutionErrors
 from wildlab.detection.detections import Detections
 from wildlab.geometry.camera import Camera, in_image, normalise
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
@@ -79,12 +79,12 @@ class Images(NamedTuple):
     poses: CameraPoses
     z: Array
     R: Array
-    image: NDArray[np.intp]
-    animal: NDArray[np.intp]
+    image: Indices
+    animal: Indices
     truth: Array
-    in_view: NDArray[np.bool_]
+    in_view: Mask
 
-    def taken(self, image: int) -> tuple[Array, Array, NDArray[np.intp]]:
+    def taken(self, image: int) -> tuple[Array, Array, Indices]:
         """Detections, covariances and animals of one image."""
         rows = slice(*np.searchsorted(self.image, [image, image + 1]))
         return self.z[rows], self.R[rows], self.animal[rows]
@@ -128,7 +128,7 @@ def pose_errors(errors: ExecutionErrors, sd: float, R_nc: Array, headings: Array
 
 def shown(
     terrain: Terrain, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, places: ArrayLike, detector: Detector
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Which places an image shows: inside its border, not too far, and with nothing in between.
 
     Parameters
@@ -378,7 +378,7 @@ class Frame(NamedTuple):
 
     counts: NDArray[np.uint16]
     view: LandView
-    animal: NDArray[np.intp]
+    animal: Indices
 
 
 class Framed(NamedTuple):
@@ -396,7 +396,7 @@ class Framed(NamedTuple):
 
     images: Images
     uv: Array
-    standing: NDArray[np.bool_]
+    standing: Mask
 
 
 def furnish(
@@ -494,8 +494,8 @@ def _half_height(body: Body) -> float:
 class FrameMatch(NamedTuple):
     """Of D detections of a frame: whose each is, `NONE` for no animal's; and if anything stands there."""
 
-    animal: NDArray[np.intp]
-    standing: NDArray[np.bool_]
+    animal: Indices
+    standing: Mask
 
 
 def judge(frame: Frame, found: Detections) -> FrameMatch:
@@ -563,7 +563,7 @@ def take_frames(
     -------
     Framed
     """
-    uv, image, judged = list[Array](), list[NDArray[np.intp]](), list[FrameMatch]()
+    uv, image, judged = list[Array](), list[Indices](), list[FrameMatch]()
     for k in range(len(images.times)):
         shot = frame(k)
         found = find(shot.counts, ground_distance(terrain, images.poses.take(np.array([k]))))

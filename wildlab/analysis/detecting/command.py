@@ -17,7 +17,14 @@ import pandas as pd
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from wildlab.analysis.detecting.detect import Detected, run_detection
+from wildlab.analysis.detecting.detect import (
+    METHODS,
+    Detected,
+    for_distance,
+    read_thresholds,
+    run_detection,
+    write_thresholds,
+)
 from wildlab.analysis.detecting.fit import (
     MOST_FRAMES,
     Fitted,
@@ -29,7 +36,8 @@ from wildlab.analysis.detecting.fit import (
     part_sentence,
     with_part,
 )
-from wildlab.analysis.detecting.judged import (
+from wildlab.analysis.detecting.pictures import write_pictures
+from wildlab.analysis.detecting.scores import (
     DetectorScore,
     compare_detectors,
     compared_sentences,
@@ -41,8 +49,6 @@ from wildlab.analysis.detecting.judged import (
     rates_sentence,
     read_others,
 )
-from wildlab.analysis.detecting.methods import METHODS, for_distance, read_thresholds, write_thresholds
-from wildlab.analysis.detecting.pictures import write_pictures
 from wildlab.detection.detections import PART
 from wildlab.errors import WildlabError
 from wildlab.files import write_csv, write_json
@@ -172,7 +178,7 @@ class DetectRequest:
     images, out
         Where frames are, and where what comes out goes.
     method
-        One of `wildlab.analysis.detecting.methods.METHODS`.
+        One of `wildlab.analysis.detecting.detect.METHODS`.
     labels
         By which the detections are judged.
     fit

@@ -11,22 +11,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.detecting.detect import detect_frame
-from wildlab.analysis.detecting.judged import ELLIPSE
-from wildlab.analysis.detecting.methods import METHODS
+from wildlab.analysis.detecting.detect import METHODS, detect_frame
+from wildlab.analysis.detecting.scores import ELLIPSE
 from wildlab.detection.contrast import Contrast, Proposals, propose
 from wildlab.detection.detections import Detections
 from wildlab.detection.floating import FloatingThresholds
 from wildlab.detection.shape import PERMISSIVE, Shape, choose, fit_shape
 from wildlab.detection.warm import Warm, to_grey
 from wildlab.errors import WildlabError
-from wildlab.evaluation.matching import Rates, Rule, match, rates
+from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.flight.readers.frames import Frame
-from wildlab.geometry.covariances import inside_ellipse
-from wildlab.geometry.frames import Array
-
-Counts = NDArray[np.intp]
+from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.frames import Array, Indices, Mask
 
 #: What is tried: where regions come from and end, how far detections are apart, how sure they are at least.
 REGIONS = tuple(
@@ -41,21 +38,17 @@ class _Seen:
     """Regions of one frame, which of them belong to a label, and which are judged at all."""
 
     proposals: Proposals
-    wanted: NDArray[np.bool_]
-    judged: NDArray[np.bool_]
+    wanted: Mask
+    judged: Mask
 
 
-def fit_shapes(
-    samples: Sequence[Sample], *, rule: Rule | None = None, tell: Callable[[int, int], None] | None = None
-) -> Fitted:
+def fit_shapes(samples: Sequence[Sample], *, tell: Callable[[int, int], None] | None = None) -> Fitted:
     """Learn a classifier of shapes, and judge each frame with one that did not see its group.
 
     Parameters
     ----------
     samples
         Labelled frames of three groups or more: thresholds are chosen inside those that it learns from.
-    rule
-        When a detection and a label belong together.
     tell
         Called with how many steps are done, and of how many.
 
@@ -73,22 +66,22 @@ def fit_shapes(
     names = list(dict.fromkeys(groups.tolist()))
     seen: list[list[_Seen]] = []
     for at, sample in enumerate(samples):
-        seen.append([_look(sample, number, rule) for number in range(len(REGIONS))])
+        seen.append([_look(sample, number) for number in range(len(REGIONS))])
         if tell:
             tell(at + 1, len(samples) + len(names) + 1)
     held_out = np.zeros((len(samples), 3), np.intp)
     chosen: dict[str, Shape] = {}
     for at, name in enumerate(names):
-        learnt = _learn(seen, samples, groups, np.flatnonzero(groups != name), rule)
+        learnt = _learn(seen, samples, groups, np.flatnonzero(groups != name))
         chosen[name] = learnt
         for row in np.flatnonzero(groups == name).tolist():
-            held_out[row] = _count(choose(_of(seen[row], learnt), learnt), samples[row], rule)
+            held_out[row] = _count(choose(_of(seen[row], learnt), learnt), samples[row])
         if tell:
             tell(len(samples) + at + 1, len(samples) + len(names) + 1)
     everywhere = range(len(samples))
-    final = _learn(seen, samples, groups, np.arange(len(samples)), rule)
-    inside = [_count(choose(_of(seen[row], final), final), samples[row], rule) for row in everywhere]
-    raw = [_count(seen[row][-1].proposals.detections, samples[row], rule) for row in everywhere]
+    final = _learn(seen, samples, groups, np.arange(len(samples)))
+    inside = [_count(choose(_of(seen[row], final), final), samples[row]) for row in everywhere]
+    raw = [_count(seen[row][-1].proposals.detections, samples[row]) for row in everywhere]
     if tell:
         tell(len(samples) + len(names) + 1, len(samples) + len(names) + 1)
     labels = groups.tolist()
@@ -97,12 +90,12 @@ def fit_shapes(
     return Fitted(final, out, at_home, plain, held_out, chosen, tried)
 
 
-def _look(sample: Sample, number: int, rule: Rule | None) -> _Seen:
+def _look(sample: Sample, number: int) -> _Seen:
     frame = sample.frame
     regions = replace(REGIONS[number], warm_is_bright=frame.polarity != "black-hot")
     image = frame.image if frame.image.ndim == 2 else to_grey(frame.image)
     proposals = propose(image, frame.valid, regions)
-    found = match(_boxes(proposals.detections), sample.boxes, rule, sample.ignore)
+    found = match(_boxes(proposals.detections), sample.boxes, ignore=sample.ignore)
     wanted = np.zeros(len(proposals.detections), bool)
     wanted[found.pairs[:, 0]] = True
     judged = np.ones(len(wanted), bool)
@@ -119,8 +112,7 @@ def _learn(
     seen: Sequence[Sequence[_Seen]],
     samples: Sequence[Sample],
     groups: NDArray[np.str_],
-    rows: NDArray[np.intp],
-    rule: Rule | None,
+    rows: Indices,
 ) -> Shape:
     """The classifier of some frames; how sure and how far apart by leaving out group after group."""
     best: tuple[float, Shape] | None = None
@@ -132,7 +124,7 @@ def _learn(
             if learnt is None:
                 continue
             for row in rows[groups[rows] == name].tolist():
-                counts += _counts_of(seen[row][number].proposals, learnt, samples[row], rule)
+                counts += _counts_of(seen[row][number].proposals, learnt, samples[row])
         found, invented, missed = np.moveaxis(counts, -1, 0).astype(float)
         f1 = 2 * found / np.maximum(2 * found + invented + missed, 1)
         a, b = np.unravel_index(int(np.argmax(f1)), f1.shape)
@@ -148,7 +140,7 @@ def _nothing() -> Shape:
     return Shape(REGIONS[0], (0.0,) * columns, (1.0,) * columns, (0.0,) * columns, -100.0)
 
 
-def _fit(seen: Sequence[Sequence[_Seen]], number: int, rows: NDArray[np.intp]) -> Shape | None:
+def _fit(seen: Sequence[Sequence[_Seen]], number: int, rows: Indices) -> Shape | None:
     some = [seen[row][number] for row in rows.tolist()]
     wanted = np.concatenate([one.wanted[one.judged] for one in some]) if some else np.zeros(0, bool)
     if not 0 < wanted.sum() < len(wanted):
@@ -157,22 +149,22 @@ def _fit(seen: Sequence[Sequence[_Seen]], number: int, rows: NDArray[np.intp]) -
     return fit_shape(features, wanted, REGIONS[number])
 
 
-def _counts_of(proposals: Proposals, learnt: Shape, sample: Sample, rule: Rule | None) -> Counts:
+def _counts_of(proposals: Proposals, learnt: Shape, sample: Sample) -> Indices:
     """(A, L, 3) found, invented and missed for every distance and every sureness."""
     result = np.zeros((len(APART), len(LEAST), 3), np.intp)
     for a, apart in enumerate(APART):
         # The surest of those that are near each other is the same for every limit below it.
         kept = choose(proposals, replace(learnt, least=LEAST[0], apart_px=apart))
         for b, least in enumerate(LEAST):
-            result[a, b] = _count(kept.select(kept.score >= least), sample, rule)
+            result[a, b] = _count(kept.select(kept.score >= least), sample)
     return result
 
 
-def _count(found: Detections, sample: Sample, rule: Rule | None) -> Counts:
-    return match(_boxes(found), sample.boxes, rule, sample.ignore).counts
+def _count(found: Detections, sample: Sample) -> Indices:
+    return match(_boxes(found), sample.boxes, ignore=sample.ignore).counts
 
 
-def _boxes(found: Detections) -> NDArray[np.float64]:
+def _boxes(found: Detections) -> Array:
     return np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
 
 
@@ -193,7 +185,7 @@ class Found(NamedTuple):
     covariance: Array
     major: Array
 
-    def inside(self, part: float) -> NDArray[np.bool_]:
+    def inside(self, part: float) -> Mask:
         """(N,) bool: whether the 90 % ellipses with that part hold the labels."""
         wider = (part * self.major)[:, None, None] ** 2 * np.eye(2)
         return inside_ellipse(self.off, self.covariance + wider, ELLIPSE)
@@ -246,7 +238,7 @@ def part_of(needed: ArrayLike) -> float:
     return float(ordered[at - 1]) if at <= len(ordered) else float("nan")
 
 
-def found_labels(method: str, samples: Sequence[Sample], thresholds: Any, rule: Rule | None = None) -> Found:
+def found_labels(method: str, samples: Sequence[Sample], thresholds: Any) -> Found:
     """Labels that a method finds, with its ellipses as they are without any part.
 
     Parameters
@@ -255,8 +247,6 @@ def found_labels(method: str, samples: Sequence[Sample], thresholds: Any, rule: 
         Of those that have a part.
     samples
         Labelled frames.
-    rule
-        When a detection and a label belong together.
 
     Returns
     -------
@@ -267,7 +257,7 @@ def found_labels(method: str, samples: Sequence[Sample], thresholds: Any, rule: 
     for sample in samples:
         found = detect_frame(sample.frame, method, bare)
         boxes = np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
-        pairs = match(boxes, sample.boxes, rule, sample.ignore).pairs
+        pairs = match(boxes, sample.boxes, ignore=sample.ignore).pairs
         if len(pairs):
             own, label = pairs.T
             middle = sample.boxes[label, :2] + sample.boxes[label, 2:] / 2
@@ -324,7 +314,6 @@ def fit_part(
     method: str,
     samples: Sequence[Sample],
     thresholds: Any,
-    rule: Rule | None = None,
 ) -> PartFit | None:
     """The part of ellipses from labelled frames, judged on groups that it was not chosen from.
 
@@ -334,8 +323,6 @@ def fit_part(
         What finds them.
     samples
         Labelled frames of two groups or more.
-    rule
-        When a detection and a label belong together.
 
     Returns
     -------
@@ -343,10 +330,10 @@ def fit_part(
     """
     if part_in(thresholds) is None:
         return None
-    found = [found_labels(method, [one], thresholds, rule) for one in samples]
+    found = [found_labels(method, [one], thresholds) for one in samples]
     needed = [parts_needed(one) for one in found]
     groups = [one.group for one in samples]
-    inside: list[NDArray[np.bool_]] = []
+    inside: list[Mask] = []
     for name in dict.fromkeys(groups):
         part = part_of(np.concatenate([n for n, group in zip(needed, groups, strict=True) if group != name]))
         if np.isfinite(part):
@@ -474,7 +461,7 @@ class Fitted:
     held_out: Rates
     inside: Rates
     defaults: Rates
-    counts: NDArray[np.intp]
+    counts: Indices
     chosen: dict[str, Any]
     tried: int
 
@@ -485,7 +472,7 @@ def candidates(method: str, count: int = TRIED, seed: int = 1) -> list[Any]:
     Parameters
     ----------
     method
-        One of `wildlab.analysis.detecting.methods.METHODS`.
+        One of `wildlab.analysis.detecting.detect.METHODS`.
     count
         How many at most.
     seed
@@ -522,7 +509,6 @@ def fit_thresholds(
     samples: Sequence[Sample],
     *,
     tried: Sequence[Contrast | Warm | FloatingThresholds] | None = None,
-    rule: Rule | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> Fitted:
     """Choose thresholds by F1 over labelled frames, and judge each frame without its own group.
@@ -535,8 +521,6 @@ def fit_thresholds(
         Labelled frames, of two groups or more.
     tried
         Sets of thresholds; None takes `candidates`. The first are the defaults.
-    rule
-        When a detection and a label belong together.
     tell
         Called with how many frames are done, and of how many.
 
@@ -557,7 +541,7 @@ def fit_thresholds(
         for row, thresholds in enumerate(sets):
             found = detect_frame(sample.frame, method, thresholds)
             boxes = np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
-            counts[row, at] = match(boxes, sample.boxes, rule, sample.ignore).counts
+            counts[row, at] = match(boxes, sample.boxes, ignore=sample.ignore).counts
         if tell:
             tell(at + 1, len(samples))
     held_out = np.zeros((len(samples), 3), np.intp)
@@ -610,7 +594,7 @@ def checked_groups(samples: Sequence[Sample], fewest: int) -> NDArray[np.str_]:
     return groups
 
 
-def _best(counts: NDArray[np.intp]) -> int:
+def _best(counts: Indices) -> int:
     """Which of (C, F, 3) has the largest F1 over its frames; of equal ones the first."""
     found, invented, missed = counts.sum(axis=1).T.astype(float)
     return int(np.argmax(2 * found / np.maximum(2 * found + invented + missed, 1)))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wildlab.detection.warm import to_grey
 from wildlab.files import write_atomic
 from wildlab.flight.readers.frames import Frame, Frames
+from wildlab.geometry.frames import Array
 
 Picture = NDArray[np.uint8]
 
@@ -88,7 +89,7 @@ def contact_sheet(tiles: list[tuple[Picture, str, str]], columns: int = IN_A_ROW
     return sheet
 
 
-def cut_tile(frame: Frame, box: NDArray[np.float64], colour: tuple[int, int, int]) -> Picture:
+def cut_tile(frame: Frame, box: Array, colour: tuple[int, int, int]) -> Picture:
     """The surroundings of a box, enlarged.
 
     Parameters
@@ -134,7 +135,7 @@ def write_pictures(
         Of all frames, in order.
     things
         ``frame_id``, ``verdict``, the box and ``score``; from
-        `wildlab.analysis.detecting.judged.DetectorScore`, or all ``detected``.
+        `wildlab.analysis.detecting.scores.DetectorScore`, or all ``detected``.
     into
         Folder: ``overlays/NAME.jpg``, ``missed.jpg``, ``invented.jpg``, and ``found.jpg``, or
         ``detected.jpg`` where nothing is judged.

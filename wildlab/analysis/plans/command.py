@@ -12,7 +12,7 @@ from rich.console import Console
 from wildlab.analysis.plans.coverage import Covered, cover
 from wildlab.analysis.plans.plan import Plan, make_plan, on_earth, rings_on_earth
 from wildlab.analysis.plans.request import PlanRequest
-from wildlab.analysis.plans.said import plan_result
+from wildlab.analysis.plans.result import plan_result
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.flight.writers import Mission, plan_geojson, plan_kml, qgc_plan, waypoints_text
@@ -155,7 +155,7 @@ def plan_flight(
     plan, covered
         For its page.
     result
-        For JSON, also in ``result.json``: numbers, sentences, and ``places``, the files that hold positions.
+        For JSON, also in ``result.json``: numbers, facts, and ``places``, the files that hold positions.
 
     Raises
     ------

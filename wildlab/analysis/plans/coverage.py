@@ -13,14 +13,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.analysis.plans.plan import Plan
 from wildlab.analysis.plans.request import FURTHEST, simplified
 from wildlab.analysis.plans.sorties import Sortie
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
@@ -74,12 +73,12 @@ class Covered(NamedTuple):
     north: float
     east: float
     step: float
-    inside: NDArray[np.bool_]
-    looks: NDArray[np.intp]
-    hidden: NDArray[np.bool_]
-    blurred: NDArray[np.bool_]
+    inside: Mask
+    looks: Indices
+    hidden: Mask
+    blurred: Mask
 
-    def share(self, which: NDArray[np.bool_]) -> float:
+    def share(self, which: Mask) -> float:
         """Of the area's nodes, those that ``which`` (R, C) marks."""
         return float(which[self.inside].mean())
 
@@ -120,7 +119,7 @@ class Images(NamedTuple):
     """Poses of the images of a flight, and which of them are sharp."""
 
     poses: CameraPoses
-    sharp: NDArray[np.bool_]
+    sharp: Mask
 
 
 def images_of(plan: Plan, sortie: Sortie) -> Images:
@@ -171,7 +170,7 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     return Images(poses.take(rows), (blurred <= most)[rows])
 
 
-def _instants(times: Array, row_of: NDArray[np.intp], step: float) -> Array:
+def _instants(times: Array, row_of: Indices, step: float) -> Array:
     """When images are taken: every ``step`` seconds, and at both ends of each row."""
     begins = np.flatnonzero(row_of[:-1] >= 0)
     # Just before a row ends: at its end, the next piece begins.
@@ -241,7 +240,7 @@ def _flat(fences: list[Array], height: float) -> Terrain:
 
 def _nodes(
     outline: Array, holes: tuple[Array, ...], terrain: Terrain | None, step: float
-) -> tuple[Terrain, NDArray[np.bool_]]:
+) -> tuple[Terrain, Mask]:
     """A grid over an area, its heights those of the ground, and which nodes lie in the area."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     # Nodes stand for the cells about them: none on the border itself.
@@ -273,7 +272,7 @@ def _within_edge(camera: Camera) -> Camera:
     )
 
 
-def _covered(plan: Plan, nodes: Terrain, inside: NDArray[np.bool_], images: list[Images]) -> Covered:
+def _covered(plan: Plan, nodes: Terrain, inside: Mask, images: list[Images]) -> Covered:
     shape, size = nodes.height.shape, nodes.height.size
     looks, shown, soft = (np.zeros(size, np.intp) for _ in range(3))
     wanted = np.flatnonzero(inside.ravel())

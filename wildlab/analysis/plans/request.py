@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest_parts import TerrainSays
 from wildlab.flight.readers.vector import Area, crossing, ring_area
 from wildlab.flight.writers import Heights, Vehicle
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.georeference import intersect_plane, pixel_rays
 from wildlab.planning.areas import contains, edge_directions
 from wildlab.planning.courses import fly
@@ -109,7 +108,7 @@ def sizes_alone(areas: Sequence[Area]) -> dict[str, float]:
     return found
 
 
-def _within(area: Area, points: Array) -> NDArray[np.bool_]:
+def _within(area: Area, points: Array) -> Mask:
     """Which points (N, 2) lie in an area, and not in its holes."""
     inside = np.asarray(contains(area.outline, points))
     for hole in area.holes:

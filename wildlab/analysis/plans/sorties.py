@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.analysis.plans.request import PlanRequest
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.courses import Course, fly
 from wildlab.planning.patterns import Pattern
@@ -55,7 +54,7 @@ class HeightProfile(NamedTuple):
     points: Array
     ground: Array
     height: Array
-    corner: NDArray[np.intp]
+    corner: Indices
     least: float
     most: float
     highest: Array
@@ -165,7 +164,7 @@ def _clear(places: Array, terrain: Terrain, distance: float) -> Array:
     return found
 
 
-def _places(way: Array, spacing: float) -> tuple[Array, NDArray[np.intp], Array]:
+def _places(way: Array, spacing: float) -> tuple[Array, Indices, Array]:
     """Places along a way, which corner of it each is, and how far along it."""
     steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
     spacing = max(spacing, float(steps.sum()) / MOST_PLACES)
@@ -180,9 +179,7 @@ def _places(way: Array, spacing: float) -> tuple[Array, NDArray[np.intp], Array]
     return places, np.array(corner), along
 
 
-def _thinned(
-    along: Array, low: Array, wanted: Array, high: Array, kept: NDArray[np.bool_]
-) -> NDArray[np.intp]:
+def _thinned(along: Array, low: Array, wanted: Array, high: Array, kept: Mask) -> Indices:
     """Places between which a straight line stays between low and high, each at the height wanted there.
 
     From a place kept, the slopes that clear all places so far make a wedge; the last place that a line
@@ -245,9 +242,9 @@ class Sortie(NamedTuple):
     """
 
     name: str
-    rows: NDArray[np.intp]
+    rows: Indices
     course: Course
-    row_of: NDArray[np.intp]
+    row_of: Indices
     way: HeightProfile
     duration: float
     steepest: float
@@ -365,7 +362,7 @@ def fly_rows(
     return Sortie(name, chosen, course, _row_of(course, flown, of), way, duration, steepest)
 
 
-def _corners(course: Course, radius: float) -> NDArray[np.intp]:
+def _corners(course: Course, radius: float) -> Indices:
     """Points of a course that a way needs: without stops on the spot, and arcs as some of their points."""
     points = course.points
     moved = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])
@@ -389,9 +386,7 @@ def _corners(course: Course, radius: float) -> NDArray[np.intp]:
     return np.asarray(kept[np.array(chosen)])
 
 
-def _times(
-    course: Course, corners: NDArray[np.intp], way: HeightProfile, wanted: PlanRequest
-) -> tuple[float, float]:
+def _times(course: Course, corners: Indices, way: HeightProfile, wanted: PlanRequest) -> tuple[float, float]:
     """Seconds with climbing, and the greatest vertical speed that the way would need."""
     at = np.flatnonzero(way.corner >= 0)
     arrival = course.times[corners[way.corner[at]]]
@@ -411,7 +406,7 @@ def _times(
     return total + float(up + down) / wanted.climb_m_s, steepest
 
 
-def _row_of(course: Course, flown: Array, of: list[int]) -> NDArray[np.intp]:
+def _row_of(course: Course, flown: Array, of: list[int]) -> Indices:
     """Which row each piece of a course is: rows come whole, and in their order."""
     found = np.full(len(course.points), -1, np.intp)
     begin = 0

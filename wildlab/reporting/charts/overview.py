@@ -10,8 +10,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from wildlab.analysis.overviews.image_coverage import Coverage
-from wildlab.analysis.overviews.overview import TROUBLES, Issue, Path
+from wildlab.analysis.image_coverage import Coverage
+from wildlab.analysis.overview import TROUBLES, Issue, Path
 from wildlab.evaluation.streams import Pace
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
 from wildlab.names import figure_name

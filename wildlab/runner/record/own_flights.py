@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from wildlab.analysis.overviews.verdict import numbers_of
+from wildlab.analysis.verdict import numbers_of
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.paths import REPORTS

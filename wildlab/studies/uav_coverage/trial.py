@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.plans.flown import Executed, ExecutionErrors, Looks, execute
+from wildlab.analysis.plans.execution import Executed, ExecutionErrors, Looks, execute
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.camera import Camera

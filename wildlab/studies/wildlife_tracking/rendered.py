@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.analysis.animals.follow import FollowedAnimals, follow
 from wildlab.analysis.animals.images import (
     NONE,
     Frame,
@@ -28,7 +27,7 @@ from wildlab.analysis.animals.images import (
     render_frame,
     take_frames,
 )
-from wildlab.analysis.animals.revisit import out_of_sight, sight_numbers
+from wildlab.analysis.animals.tracking import FollowedAnimals, follow, out_of_sight, sight_numbers
 from wildlab.detection.detections import Detections
 from wildlab.detection.warm import find_warm, gate_from_distance, to_grey
 from wildlab.errors import WildlabError

@@ -13,12 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.analysis.animals.follow import FollowedAnimals, Follower, Kalman, Particles, follow
 from wildlab.analysis.animals.images import Detector, Images, take_images
-from wildlab.analysis.animals.revisit import (
+from wildlab.analysis.animals.tracking import (
     Aircraft,
+    FollowedAnimals,
+    Follower,
+    Kalman,
+    Particles,
     Patrolled,
     Visits,
+    follow,
     found_on_visits,
     next_lap,
     out_of_sight,
@@ -26,7 +30,7 @@ from wildlab.analysis.animals.revisit import (
     sight_numbers,
     turns,
 )
-from wildlab.analysis.plans.flown import ExecutionErrors, with_errors
+from wildlab.analysis.plans.execution import ExecutionErrors, with_errors
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain

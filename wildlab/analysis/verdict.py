@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from wildlab.analysis.overviews.image_coverage import Recovered
-from wildlab.analysis.overviews.overview import Overview
+from wildlab.analysis.image_coverage import Recovered
+from wildlab.analysis.overview import Overview
 from wildlab.evaluation.ellipses import is_overconfident
 from wildlab.evaluation.runs import Interval
 
@@ -129,7 +129,7 @@ def parts_of(numbers: Numbers) -> dict[str, Verdict]:
     Parameters
     ----------
     numbers
-        From `wildlab.analysis.overviews.verdict.numbers_of`.
+        From `wildlab.analysis.verdict.numbers_of`.
 
     Returns
     -------
@@ -188,7 +188,7 @@ class Gain(NamedTuple):
     Attributes
     ----------
     key
-        ``cause``, ``far_out``, or what is lost: `wildlab.analysis.overviews.image_coverage.Recovered`.
+        ``cause``, ``far_out``, or what is lost: `wildlab.analysis.image_coverage.Recovered`.
     causes
         Of a constant error, which; else empty.
     value, low, high, unit
@@ -394,7 +394,7 @@ def doubted(numbers: Numbers) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Of `wildlab.analysis.overviews.verdict.PARTS`.
+        Of `wildlab.analysis.verdict.PARTS`.
     """
     told = possible_gain(numbers) is not None
     return tuple(

@@ -14,7 +14,7 @@ from wildlab.evaluation.streams import Pace
 from wildlab.flight.clocks import between, frame_poses, frame_times, gimbal_angles
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.georeference import georeference_pixels, pixel_rays
 from wildlab.geometry.terrain import pixels_to_terrain
 
@@ -47,8 +47,8 @@ class Coverage(NamedTuple):
     """
 
     images: int
-    posed: NDArray[np.bool_]
-    flat: NDArray[np.bool_]
+    posed: Mask
+    flat: Mask
     outlines: Array
     counts: NDArray[np.int32]
     north: float
@@ -57,7 +57,7 @@ class Coverage(NamedTuple):
     ground: str
 
     @property
-    def placed(self) -> NDArray[np.bool_]:
+    def placed(self) -> Mask:
         """(N,) bool: the images with a footprint."""
         return np.asarray(np.isfinite(self.outlines).all(axis=(1, 2)))
 
@@ -168,9 +168,7 @@ def _border(width: int, height: int) -> Array:
     return np.concatenate([np.stack(side, axis=1) for side in sides])
 
 
-def _counted(
-    images: int, posed: NDArray[np.bool_], flat: NDArray[np.bool_], outlines: Array, ground: str
-) -> Coverage:
+def _counted(images: int, posed: Mask, flat: Mask, outlines: Array, ground: str) -> Coverage:
     known = outlines[np.isfinite(outlines).all(axis=(1, 2))]
     if not len(known):
         return Coverage(images, posed, flat, outlines, np.zeros((1, 1), np.int32), 0.0, 0.0, 1.0, ground)
@@ -232,7 +230,7 @@ def detections_of(flight: Flight, source: str | None) -> tuple[int, int, int]:
     return len(detections), images, int(placed.sum())
 
 
-def _placed(flight: Flight, source: str | None) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _placed(flight: Flight, source: str | None) -> tuple[Mask, Mask]:
     """Of the pixel detections, which have a place on the ground, and which a pose; nothing without poses."""
     none = np.zeros(0, bool)
     if source is None or flight.manifest.camera is None:
@@ -299,7 +297,7 @@ def _unrecorded(flight: Flight, source: str | None, streams: dict[str, Pace]) ->
     return found
 
 
-def _why_unposed(flight: Flight, source: str, unposed: NDArray[np.bool_]) -> str:
+def _why_unposed(flight: Flight, source: str, unposed: Mask) -> str:
     nav, times = flight.nav[source], frame_times(flight)[unposed]
     if "frame_id" in nav:
         return "no pose bears their name"

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.matching import Rates, Rule, match, rates
+from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.score_curve import Curve, ScoredFrame, curve_along_score, difference_of_f1
 from wildlab.flight.files import printable
 from wildlab.flight.readers.labels import Labels, choose_classes, read_labels
-from wildlab.geometry.covariances import inside_ellipse
+from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.frames import Array, Indices, Mask
 
 #: Probability of the ellipses that are held against labels.
 ELLIPSE = 0.9
@@ -191,9 +191,7 @@ def labels_sentences(labels: Labels) -> list[str]:
     return found
 
 
-def judge_detections(
-    detections: pd.DataFrame, frames: pd.DataFrame, labels: Labels, rule: Rule | None = None
-) -> DetectorScore:
+def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Labels) -> DetectorScore:
     """Hold the detections of a run against labels.
 
     Parameters
@@ -202,8 +200,6 @@ def judge_detections(
         As `wildlab.analysis.detecting.detect.Detected` has them.
     labels
         Of the same frames.
-    rule
-        When a detection and a label belong together.
 
     Returns
     -------
@@ -215,11 +211,11 @@ def judge_detections(
         Where no frame of the run is labelled.
     """
     by_frame = dict(tuple(detections.groupby("frame_id", sort=False))) if len(detections) else {}
-    counts: list[NDArray[np.intp]] = []
+    counts: list[Indices] = []
     groups: list[str] = []
     rows: list[tuple[Any, ...]] = []
     named = set()
-    inside: list[NDArray[np.bool_]] = []
+    inside: list[Mask] = []
     unusable = outside = 0
     columns = (frames[one] for one in ("frame_id", "width_px", "height_px"))
     for frame, width, height, problem in zip(*columns, frames["problem"].fillna(""), strict=True):
@@ -236,7 +232,7 @@ def judge_detections(
         if width and height:
             beyond = (true[:, :2] >= [width, height]) | (true[:, :2] + true[:, 2:] < 0)
             outside += int(beyond.any(axis=1).sum())
-        found = match(centred, true, rule, ignore)
+        found = match(centred, true, ignore=ignore)
         if own is not None and set(_COVARIANCE) <= set(own.columns) and len(found.pairs):
             covariance = own[_COVARIANCE].to_numpy(float)[found.pairs[:, 0]].reshape(-1, 2, 2)
             middle = true[:, :2] + true[:, 2:] / 2
@@ -261,14 +257,14 @@ def judge_detections(
     )  # fmt: skip
 
 
-def _share(inside: list[NDArray[np.bool_]]) -> Interval | None:
+def _share(inside: list[Mask]) -> Interval | None:
     all_of = np.concatenate([np.zeros(0, bool), *inside])
     return share_interval(int(all_of.sum()), len(all_of)) if len(all_of) else None
 
 
 def boxes_by_frame(
     detections: pd.DataFrame,
-) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+) -> dict[str, tuple[Array, Array]]:
     """Boxes about the centroids, and scores, by the name of the frame.
 
     Parameters
@@ -289,7 +285,7 @@ def boxes_by_frame(
     }
 
 
-def _about(own: pd.DataFrame, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _about(own: pd.DataFrame, boxes: Array) -> Array:
     """Boxes of the same sizes about the centroids: it is these that are the detections."""
     uv = own[["u_px", "v_px"]].to_numpy(float)
     return np.concatenate([uv - boxes[:, 2:] / 2, boxes[:, 2:]], axis=1)
@@ -451,7 +447,6 @@ def compare_detectors(
     others: Sequence[Other],
     frames: pd.DataFrame,
     labels: Labels,
-    rule: Rule | None = None,
 ) -> list[Compared]:
     """Our detections and those of others, each against the same labels.
 
@@ -465,8 +460,6 @@ def compare_detectors(
         From `read_others`.
     labels
         The truth. All frames that it names and the run has are judged, for everyone.
-    rule
-        When a detection and a label belong together.
 
     Returns
     -------
@@ -497,11 +490,11 @@ def compare_detectors(
     first = None
     for called, found, told in sets:
         scored = [ScoredFrame(a[0], a[1], b[0], b[1]) for a, b in zip(found, truth, strict=True)]
-        counts = np.array([match(one.boxes, one.labels, rule, one.ignore).counts for one in scored])
+        counts = np.array([match(one.boxes, one.labels, ignore=one.ignore).counts for one in scored])
         first = counts if first is None else first
         scores = np.concatenate([np.zeros(0), *(one.scores for one in scored)])
         complete = bool(np.isfinite(scores).all())
-        curve = curve_along_score(scored, groups, rule) if complete else None
+        curve = curve_along_score(scored, groups) if complete else None
         lowest = float(scores.min()) if complete and len(scores) else float("nan")
         beyond = difference_of_f1(counts, first, groups)
         result.append(Compared(called, rates(counts, groups), curve, lowest, beyond, told))

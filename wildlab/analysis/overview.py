@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab.analysis.overviews.image_coverage import (
+from wildlab.analysis.image_coverage import (
     POSITION,
     Coverage,
     Recovered,

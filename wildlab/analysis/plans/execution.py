@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, rotation_vector_to_matrix
+from wildlab.geometry.frames import Array, Mask, rotation_vector_to_matrix
 from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.planning.coverage import Coverage, Sightings, from_sightings, see
@@ -82,7 +82,7 @@ class Planned(NamedTuple):
 
     coverage: Coverage
     found: Sightings
-    sharp: NDArray[np.bool_]
+    sharp: Mask
     distance: Array
 
 
@@ -105,9 +105,9 @@ class Executed(NamedTuple):
 
     planned: Coverage
     flown: Coverage
-    sure: NDArray[np.bool_]
+    sure: Mask
     found: Sightings
-    sharp: NDArray[np.bool_]
+    sharp: Mask
     margin_px: float
 
     @property

@@ -1,0 +1,686 @@
+"""Tracks of animals through the images of a way, the loop closed where tracks say where to fly, and what came
+of it.
+
+Between two images that can tell a track anything there may be hundreds that cannot: they look elsewhere and
+detect nothing. These are left out, which changes nothing of the tracks but how finely their walk is cut.
+
+F 5.3: rows are flown to find new animals, and broken off where one that is known is worth a visit by (5.2)
+and (5.3); it is then found again, or lost by the images that should have shown it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.analysis.animals.images import (
+    Detector,
+    Images,
+    footprint_circles,
+    put_on_ground,
+    shown,
+    sight_from,
+)
+from wildlab.analysis.plans.execution import ExecutionErrors, displaced, drawn_errors
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array, Indices, Mask
+from wildlab.geometry.quantiles import chi2_quantile
+from wildlab.geometry.terrain import Terrain
+from wildlab.planning.gimbal import GimbalAngles, camera_on_course
+from wildlab.planning.high_level import SEARCH, all_positioned, best_goal
+from wildlab.tracking.kalman import update
+from wildlab.tracking.motion import Motion
+from wildlab.tracking.particles import ImageLook, Rules, mahalanobis_squared, moments, nearest_animal, no_herd
+from wildlab.tracking.particles.clouds import Cloud, Inside, move, stay_inside
+from wildlab.tracking.particles.steps import step_nearest
+
+#: A walk within a fence is cut into steps no longer than this, s; and tracks are looked at as often.
+STATION_S = 20.0
+#: How far a walk is taken to lead an animal out of its cloud, in standard deviations.
+STRAYS = 4.0
+
+
+class Known(NamedTuple):
+    """What is known of all tracks at a time.
+
+    Attributes
+    ----------
+    image
+        Number of the image.
+    identity
+        (K,) numbers of the tracks.
+    mean, covariance
+        (K, 2) m and (K, 2, 2) m^2.
+    """
+
+    image: int
+    identity: NDArray[np.int64]
+    mean: Array
+    covariance: Array
+
+
+class Found(NamedTuple):
+    """One detection that was given to a track.
+
+    Attributes
+    ----------
+    image, animal
+        Where, and whose it is; -1 where it is of no animal.
+    track
+        That it was given to, or that it started.
+    started
+        Whether it started it.
+    before, after
+        Trace of that track's covariance before the image and after it, m^2; NaN before its start.
+    after_last
+        The same after its detection before, m^2.
+    own_before
+        Trace, before the image, of the track that had this animal's detection before, m^2; NaN for none.
+    own
+        Number of that track, 0 for none.
+    away
+        How long the animal had not been detected, s; infinite for the first time, and for none.
+    """
+
+    image: int
+    animal: int
+    track: int
+    started: bool
+    before: float
+    after: float
+    after_last: float
+    own_before: float
+    own: int
+    away: float
+
+
+class FollowedAnimals(NamedTuple):
+    """A way with its tracks.
+
+    Attributes
+    ----------
+    known
+        At every station.
+    found
+        Every detection.
+    steps
+        How many images were looked at.
+    tracks
+        How many tracks were started.
+    """
+
+    known: list[Known]
+    found: list[Found]
+    steps: int
+    tracks: int
+
+
+class Follower(Protocol):
+    """Tracks that go on image by image."""
+
+    def step(self, look: ImageLook) -> NDArray[np.int64]:
+        """One image; (M,) the track that each detection was given."""
+
+    def known(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """Numbers (K,), means (K, 2) m and covariances (K, 2, 2) m^2."""
+
+    def reach(self) -> Array:
+        """(K,) how far off its mean an animal may be for an image without detections to tell, m."""
+
+
+class Particles:
+    """Tracks by F's particle filter, each kept inside the fence that it began in."""
+
+    def __init__(
+        self, motion: Motion, fences: list[Inside], rng: np.random.Generator, rules: Callable[..., Rules]
+    ) -> None:
+        self._motion, self._fences, self._rng = motion, fences, rng
+        self._home = np.zeros(0, np.intp)
+        self.rules = rules(self._moves)
+        self.herd = no_herd(self.rules)
+        self._moments = moments(self.herd.cloud)
+
+    def _moves(self, cloud: Cloud, seen: Mask, dt: float, rng: np.random.Generator) -> Cloud:
+        steps = max(int(np.ceil(dt / STATION_S - 1e-9)), 1)
+        for _ in range(steps):
+            cloud = stay_inside(cloud, move(cloud, self._motion, dt / steps, rng), self._inside)
+        return cloud
+
+    def _inside(self, places: Array) -> Mask:
+        """(K, N) whether places (K, N, 2) are inside the fence that each track began in."""
+        inside = np.ones(places.shape[:-1], bool)
+        for number, fence in enumerate(self._fences):
+            mine = self._home == number
+            if mine.any():
+                inside[mine] = fence(places[mine])
+        return inside
+
+    def step(self, look: ImageLook) -> NDArray[np.int64]:
+        """As `Follower` has it."""
+        self.herd, names = step_nearest(self.herd, look, self.rules, self._rng)
+        self._moments = moments(self.herd.cloud)
+        new = self.herd.cloud.x[len(self._home) :, :, :2]
+        # Where most of a new cloud lies; outside all fences none keeps it.
+        shares = np.array([fence(new).mean(axis=1) for fence in self._fences]).reshape(len(self._fences), -1)
+        if len(new):
+            home = np.where(shares.max(axis=0) > 0, shares.argmax(axis=0), -1)
+            self._home = np.append(self._home, home.astype(np.intp))
+        return names
+
+    @property
+    def home(self) -> Indices:
+        """(K,) which fence each track began in, -1 for none."""
+        return self._home
+
+    def seen_now(self, track: int) -> bool:
+        """Whether the latest image had a detection of a track, by its number."""
+        mine = self.herd.identity == track
+        return bool((self.herd.seen_at[mine] == self.herd.time).any())
+
+    def give_up(self, track: int) -> None:
+        """Take a track, by its number, for lost: it was looked for and not found (F 5.3.4)."""
+        lost = self.herd.lost | (self.herd.identity == track)
+        self.herd = self.herd._replace(lost=lost)
+
+    def known(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """As `Follower` has it."""
+        mean, covariance = self._moments
+        return self.herd.identity, mean[:, :2], covariance[:, :2, :2]
+
+    def reach(self) -> Array:
+        """As `Follower` has it."""
+        if not self.rules.negative or not len(self.herd.identity):
+            return np.full(len(self.herd.identity), -np.inf)
+        off = self.herd.cloud.x[..., :2] - self._moments[0][:, None, :2]
+        return np.asarray(np.sqrt((off**2).sum(axis=-1).max(axis=1)))
+
+
+class Kalman:
+    """The same rule of association with a Kalman filter for each track, which no image without detections and
+    no fence can tell anything: the ellipse that F 8.3 holds the particle filter against."""
+
+    def __init__(self, motion: Motion, gate_probability: float) -> None:
+        self._motion, self._gate = motion, gate_probability
+        self._time = np.nan
+        self._mean, self._P = np.zeros((0, 2)), np.zeros((0, 2, 2))
+
+    def step(self, look: ImageLook) -> NDArray[np.int64]:
+        """As `Follower` has it."""
+        if len(self._mean):
+            F, Q = self._motion(look.time - self._time)
+            self._mean, self._P = self._mean @ F.T, F @ self._P @ F.T + Q
+        self._time = look.time
+        usable = np.isfinite(look.z).all(axis=1) & np.isfinite(look.R).all(axis=(1, 2))
+        z, R = look.z[usable], look.R[usable]
+        names = np.zeros(len(look.z), np.int64)
+        if not len(z):
+            return names
+        taken = nearest_animal(mahalanobis_squared(self._mean, self._P, z, R), self._gate)
+        for j in np.flatnonzero(taken >= 0):
+            a = taken[j]
+            after = update(self._mean[a], self._P[a], z[j], np.eye(2), R[j])
+            self._mean[a], self._P[a] = after.x, after.P
+        new = np.flatnonzero(taken < 0)
+        taken[new] = len(self._mean) + np.arange(len(new))
+        self._mean, self._P = np.concatenate([self._mean, z[new]]), np.concatenate([self._P, R[new]])
+        names[usable] = taken + 1
+        return names
+
+    def known(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """As `Follower` has it."""
+        return np.arange(len(self._mean)) + 1, self._mean.copy(), self._P.copy()
+
+    def reach(self) -> Array:
+        """As `Follower` has it."""
+        return np.full(len(self._mean), -np.inf)
+
+
+class Ledger:
+    """Which detections went where: what `FollowedAnimals` is made of, kept while the tracks go on."""
+
+    def __init__(self, animals: int) -> None:
+        self.found: list[Found] = []
+        self._seen_at = np.full(animals, -np.inf)
+        self._own = np.zeros(animals, np.int64)
+        self._after_last: dict[int, float] = {}
+
+    def enter(
+        self,
+        image: int,
+        time: float,
+        animals: Indices,
+        names: NDArray[np.int64],
+        before: dict[int, float],
+        after: dict[int, float],
+    ) -> None:
+        """The detections of one image; traces of all tracks before and after it, by their number."""
+        own = np.append(self._own, 0)  # the last row is that of no animal
+        for animal, name in zip(animals.tolist(), names.tolist(), strict=True):
+            if not name:
+                continue
+            away = time - float(self._seen_at[animal]) if animal >= 0 else np.inf
+            self.found.append(
+                Found(
+                    image, animal, name, name not in before, before.get(name, np.nan), after[name],
+                    self._after_last.get(name, np.nan), before.get(int(own[animal]), np.nan),
+                    int(own[animal]), away,
+                )
+            )  # fmt: skip
+            if animal >= 0:
+                self._own[animal], self._seen_at[animal] = name, time
+        for name in set(names.tolist()) - {0}:
+            self._after_last[name] = after[name]
+
+
+def traces_of(follower: Follower) -> dict[int, float]:
+    """Trace of each track's covariance, m^2, by its number."""
+    identity, _, covariance = follower.known()
+    return dict(zip(identity.tolist(), np.trace(covariance, axis1=1, axis2=2).tolist(), strict=True))
+
+
+def follow(
+    images: Images, terrain: Terrain, detector: Detector, follower: Follower, motion: Motion
+) -> FollowedAnimals:
+    """Take a follower through all images that can tell its tracks anything.
+
+    Parameters
+    ----------
+    images
+        Of one way.
+    terrain
+        The ground.
+    detector
+        What the tracks take the camera for.
+    follower
+        With its tracks; they are carried on.
+    motion
+        How fast an animal can leave its cloud.
+
+    Returns
+    -------
+    Followed
+    """
+    times = images.times
+    T = len(times)
+    middle, radius = footprint_circles(terrain, images.poses)
+    station = np.unique(np.searchsorted(times, np.arange(times[0], times[-1] + STATION_S, STATION_S)))
+    stations = np.zeros(T, bool)
+    stations[np.minimum(station, T - 1)] = True
+    stations[-1] = True
+    detected = np.zeros(T, bool)
+    detected[images.image] = True
+    ledger, known = Ledger(images.truth.shape[1]), list[Known]()
+    steps, k, tells = 0, 0, True
+
+    def look(k: int) -> ImageLook:
+        z, R, _ = images.taken(k)
+        p, circle = images.poses, (middle[k], float(radius[k]))
+        sight = sight_from(terrain, p.camera, p.p_nc[k], p.R_nc[k], circle, detector)
+        return ImageLook(float(times[k]), z, R, sight)
+
+    while k < T:
+        steps += 1
+        time = float(times[k])
+        if detected[k]:
+            # First on to the image alone: a trace before it is one at its time.
+            follower.step(blind(time))
+            before = traces_of(follower)
+            names = follower.step(look(k))
+            ledger.enter(k, time, images.taken(k)[2], names, before, traces_of(follower))
+        else:
+            follower.step(look(k) if tells else blind(time))
+        if stations[k]:
+            known.append(Known(k, *follower.known()))
+        k, tells = next_look(follower, k, times, middle, radius, detected | stations, motion)
+    tracks = max((one.track for one in ledger.found), default=0)
+    return FollowedAnimals(known, ledger.found, steps, tracks)
+
+
+def blind(time: float) -> ImageLook:
+    """An image that shows nothing of the ground."""
+    return ImageLook(time, np.zeros((0, 2)), np.zeros((0, 2, 2)), lambda places: np.zeros(places.shape[:-1]))
+
+
+def next_look(
+    follower: Follower, k: int, times: Array, middle: Array, radius: Array, wanted: Mask,
+    motion: Motion,
+) -> tuple[int, bool]:  # fmt: skip
+    """The next image to be looked at, and whether what it does not show can tell a track anything."""
+    ahead = np.flatnonzero(wanted[k + 1 :])
+    last = k + 1 + int(ahead[0]) if len(ahead) else len(times)
+    rows = np.arange(k + 1, min(last + 1, len(times)))
+    _, mean, _ = follower.known()
+    reach = follower.reach()
+    able = np.isfinite(reach)
+    if len(rows) and able.any():
+        spread = float(np.sqrt(motion(float(times[rows[-1]] - times[k]))[1][0, 0]))
+        away = np.linalg.norm(middle[rows, None] - mean[None, able], axis=-1)
+        near = (away < radius[rows, None] + reach[able] + STRAYS * spread).any(axis=1)
+        if near.any():
+            return int(rows[near.argmax()]), True
+    return last, False
+
+
+class Aircraft(NamedTuple):
+    """What flies, and what it carries.
+
+    Attributes
+    ----------
+    camera
+        Intrinsic parameters.
+    gimbal
+        Where the camera looks at times, s: the same along rows and on a visit.
+    height, speed
+        Above the ground, m, and m/s.
+    errors
+        How far off its pose it is.
+    detector
+        What becomes of an animal in an image.
+    """
+
+    camera: Camera
+    gimbal: Callable[[Array], GimbalAngles]
+    height: float
+    speed: float
+    errors: ExecutionErrors
+    detector: Detector
+
+
+class Visits(NamedTuple):
+    """By what the high-level planner goes; F prints none of it.
+
+    Attributes
+    ----------
+    alpha, c
+        Of F (5.2).
+    worth_m2
+        Trace of a covariance from which on an animal is worth a visit, m^2; infinite for rows alone.
+    patience
+        How long the camera scans about a place before the animal is given up, s.
+    """
+
+    alpha: float
+    c: float
+    worth_m2: float
+    patience: float
+
+
+class Patrolled(NamedTuple):
+    """A flight that was steered by its tracks.
+
+    Attributes
+    ----------
+    times
+        (T,) s of its images.
+    p_nc
+        (T, 3) m.
+    goal
+        (T,) number of the track flown to, or `SEARCH`.
+    known
+        After every image.
+    found
+        Every detection.
+    given_up
+        Numbers of the tracks that were looked for and not found, one for each time.
+    done
+        (E,) s when each enclosure had as many tracks at once as animals live there; infinite for never.
+    """
+
+    times: Array
+    p_nc: Array
+    goal: NDArray[np.int64]
+    known: list[Known]
+    found: list[Found]
+    given_up: list[int]
+    done: Array
+
+
+def patrol(
+    terrain: Terrain,
+    aircraft: Aircraft,
+    way_points: Array,
+    area_of: Indices,
+    lives: Indices,
+    times: Array,
+    truth: Array,
+    follower: Particles,
+    visits: Visits,
+    rng: np.random.Generator,
+) -> Patrolled:
+    """Fly rows and visits until the rows are flown or the time is up.
+
+    Parameters
+    ----------
+    terrain
+        The ground.
+    aircraft
+        What flies.
+    way_points, area_of
+        (M, 2) m of the search, and (M,) in which enclosure each is. Those of an enclosure that is done are
+        left out (F 5.3).
+    lives
+        (E,) animals that live in each enclosure, which F takes as known.
+    times
+        (T,) s, evenly spaced, of all images that there is time for.
+    truth
+        (T, A, 2) m.
+    follower
+        Tracks; they are carried on, and know the same enclosures by the same numbers.
+    visits
+        Of the high-level planner.
+    rng
+        Random numbers of the errors and of the images.
+
+    Returns
+    -------
+    Patrolled
+    """
+    step = float(times[1] - times[0])
+    off, turn = drawn_errors(len(times), aircraft.errors, step, rng)
+    here, heading, reached = way_points[0].astype(float), 0.0, 0
+    ledger, known, goals, path = Ledger(truth.shape[1]), list[Known](), list[int](), list[Array]()
+    given_up, done = list[int](), np.full(len(lives), np.inf)
+    sought, arrived, scanned = SEARCH, False, 0.0
+    for k, time in enumerate(times.tolist()):
+        identity, mean, P = follower.known()
+        here_live, home = ~follower.herd.lost, follower.home
+        counts = np.bincount(home[here_live & (home >= 0)], minlength=len(lives))[: len(lives)]
+        done[np.isinf(done) & all_positioned(counts, lives)] = time
+        while reached < len(way_points) and np.isfinite(done[area_of[reached]]):
+            reached += 1
+        if reached == len(way_points):
+            break
+        wanted = here_live & (np.trace(P, axis1=1, axis2=2) >= visits.worth_m2) & (home >= 0)
+        wanted &= np.isinf(done)[home]
+        rows = np.flatnonzero(wanted)
+        chosen = best_goal(
+            mean[rows], P[rows], here, way_points[reached], alpha=visits.alpha, c=visits.c
+        )  # fmt: skip
+        goal = SEARCH if chosen == SEARCH else int(identity[rows[chosen]])
+        aim = way_points[reached] if goal == SEARCH else mean[rows[chosen]]
+        away, reach = float(np.hypot(*(aim - here))), aircraft.speed * step
+        heading = float(np.arctan2(*(aim - here)[::-1])) if away > 0 else heading
+        here = aim.astype(float) if away <= reach else here + (aim - here) * (reach / away)
+        if goal == SEARCH:
+            reached += away <= reach
+        # From where the animal should be the camera scans; one that this does not find is given up.
+        if goal != sought:
+            sought, arrived, scanned = goal, False, 0.0
+        arrived |= goal != SEARCH and away <= reach
+        scanned += step if arrived else 0.0
+        told = _pose(terrain, aircraft, here, heading, times[k : k + 1])
+        true = displaced(told, [heading], off[k : k + 1], turn[k : k + 1])
+        _see(terrain, aircraft, told, true, heading, truth[k], time, follower, ledger, k, rng)
+        if scanned > visits.patience and not follower.seen_now(goal):
+            follower.give_up(goal)
+            given_up.append(goal)
+        known.append(Known(k, *follower.known()))
+        goals.append(goal)
+        path.append(told.p_nc[0])
+    flown = len(goals)
+    return Patrolled(
+        times[:flown], np.array(path).reshape(-1, 3), np.array(goals, np.int64), known, ledger.found,
+        given_up, done,
+    )  # fmt: skip
+
+
+def _pose(terrain: Terrain, aircraft: Aircraft, here: Array, heading: float, time: Array) -> CameraPoses:
+    up = float(np.nan_to_num(terrain.heights_at(here[None]))[0]) + aircraft.height
+    p = np.array([[here[0], here[1], -up]])
+    return camera_on_course(aircraft.camera, p, [heading], aircraft.gimbal(time))
+
+
+def _see(
+    terrain: Terrain, aircraft: Aircraft, told: CameraPoses, true: CameraPoses, heading: float,
+    truth: Array, time: float, follower: Particles, ledger: Ledger, k: int, rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """One image for the tracks."""
+    detector = aircraft.detector
+    in_view = shown(terrain, true.camera, true.p_nc[0], true.R_nc[0], truth, detector)
+    seen = np.flatnonzero(in_view & (rng.random(len(truth)) < detector.detected))
+    z, R = np.zeros((0, 2)), np.zeros((0, 2, 2))
+    if len(seen):
+        rows = np.zeros(len(seen), np.intp)
+        z, R = put_on_ground(
+            terrain,
+            told.take(rows),
+            true.take(rows),
+            np.full(len(seen), heading),
+            truth[seen],
+            aircraft.errors,
+            detector,
+            rng,
+        )
+    follower.step(blind(time))
+    before = traces_of(follower)
+    middle, radius = footprint_circles(terrain, told)
+    sight = sight_from(
+        terrain, told.camera, told.p_nc[0], told.R_nc[0], (middle[0], float(radius[0])), detector
+    )
+    names = follower.step(ImageLook(time, z, R, sight))
+    ledger.enter(k, time, seen, names, before, traces_of(follower))
+
+
+#: An animal is out of sight once it has not been detected for so long, s. Chosen.
+OUT_OF_SIGHT = 30.0
+
+
+class OutOfSight(NamedTuple):
+    """Animals with a track at a time when they were not detected for a while; N of them, at all stations.
+
+    Attributes
+    ----------
+    off
+        (N, 2) m, the track's mean from the animal.
+    covariance
+        (N, 2, 2) m^2, the track's.
+    own
+        (N,) bool: whether the track had not been given another animal's detection by then.
+    """
+
+    off: Array
+    covariance: Array
+    own: Mask
+
+    @property
+    def nees(self) -> Array:
+        """(N,) squared distances in units of the covariance; 2 on average where it is right."""
+        solved = np.linalg.solve(self.covariance, self.off[..., None])[..., 0]
+        return np.asarray(np.einsum("ni,ni->n", self.off, solved))
+
+
+def out_of_sight(
+    known: list[Known], found: list[Found], times: Array, truth: Array, until: ArrayLike = np.inf
+) -> OutOfSight:
+    """Where tracks are and animals are, once these were not detected for `OUT_OF_SIGHT`.
+
+    An animal's track is the one that its latest detection was given to.
+
+    Parameters
+    ----------
+    known, found
+        Of the tracks.
+    times, truth
+        (T,) s and (T, A, 2) m.
+    until
+        (A,) s up to when an animal counts, or one time for all.
+
+    Returns
+    -------
+    OutOfSight
+    """
+    animals = truth.shape[1]
+    counts = np.broadcast_to(np.asarray(until, float), animals)
+    own, seen_at = np.zeros(animals, np.int64), np.full(animals, np.inf)
+    off, covariance, pure, row = list[Array](), list[Array](), list[bool](), 0
+    first, mixed = dict[int, int](), set[int]()
+    for one in known:
+        while row < len(found) and found[row].image <= one.image:
+            if first.setdefault(found[row].track, found[row].animal) != found[row].animal:
+                mixed.add(found[row].track)
+            if found[row].animal >= 0:
+                own[found[row].animal], seen_at[found[row].animal] = found[row].track, times[found[row].image]
+            row += 1
+        at = {int(name): k for k, name in enumerate(one.identity)}
+        time = times[one.image]
+        for animal in np.flatnonzero((time - seen_at > OUT_OF_SIGHT) & (time <= counts)):
+            k = at.get(int(own[animal]))
+            if k is not None:
+                off.append(one.mean[k] - truth[one.image, animal])
+                covariance.append(one.covariance[k])
+                pure.append(int(own[animal]) not in mixed)
+    return OutOfSight(
+        np.array(off).reshape(-1, 2), np.array(covariance).reshape(-1, 2, 2), np.array(pure, bool)
+    )  # fmt: skip
+
+
+def sight_numbers(away: OutOfSight) -> dict[str, float]:
+    """How well animals out of sight are known, by name; NaN where there was none.
+
+    ``rmse`` and ``sd`` in m (`sd` for one axis), ``anees``, ``beyond``: the share outside the ellipse that
+    should hold 95 %; the same of tracks of one animal alone, ``own``, and the share of these.
+    """
+    names = ("rmse", "sd", "anees", "beyond", "rmse_own", "anees_own", "own_share")
+    if not len(away.off):
+        return dict.fromkeys(names, np.nan)
+    squares, mine, nees = (away.off**2).sum(axis=1), away.own, away.nees
+    trace = np.trace(away.covariance, axis1=1, axis2=2)
+    return {
+        "rmse": float(np.sqrt(squares.mean())),
+        "sd": float(np.sqrt(trace.mean() / 2)),
+        "anees": float(nees.mean()),
+        "beyond": float((nees > chi2_quantile(0.95, 2)).mean()),
+        "rmse_own": float(np.sqrt(squares[mine].mean())) if mine.any() else np.nan,
+        "anees_own": float(nees[mine].mean()) if mine.any() else np.nan,
+        "own_share": float(mine.mean()),
+    }
+
+
+def next_lap(found: list[Found], times: Array, lap: float) -> list[Found]:
+    """Of each animal that was detected in the first lap, its first detection in the second."""
+    seen: set[int] = set()
+    back: dict[int, Found] = {}
+    for one in found:
+        if times[one.image] < lap:
+            seen.add(one.animal)
+        elif one.animal in seen:
+            back.setdefault(one.animal, one)
+    return [one for animal, one in sorted(back.items()) if animal >= 0]
+
+
+def found_on_visits(flown: Patrolled) -> list[Found]:
+    """Detections that gave an animal's track back to it while that track was flown to."""
+    return [
+        one for one in flown.found
+        if flown.goal[one.image] == one.track == one.own and OUT_OF_SIGHT < one.away < np.inf
+    ]  # fmt: skip
+
+
+def turns(flown: Patrolled) -> int:
+    """How often a search turned to a track, from its rows or from another track."""
+    goal = np.append(SEARCH, flown.goal)
+    return int(((goal[1:] != goal[:-1]) & (goal[1:] != SEARCH)).sum())

@@ -1,0 +1,320 @@
+"""What came out of a plan: numbers, and facts on what it rests on, what speaks against it, and what would
+help.
+
+A fact is a key of ``data/messages/en/plan.toml`` and the numbers that its text takes, as they are shown.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wildlab.analysis.plans.coverage import EDGE, SHARP, Covered, gimbal_rate
+from wildlab.analysis.plans.plan import Plan
+from wildlab.analysis.plans.request import FURTHEST
+from wildlab.analysis.plans.sorties import Sortie
+from wildlab.flight.files import printable
+from wildlab.flight.readers.area import Area
+
+#: A key, and texts for its placeholders.
+Fact = tuple[str, dict[str, str]]
+#: Pixels along an animal below which F 3.2's chain and people alike miss many.
+FEW_PIXELS = 5.0
+#: Share of the ground seen below which that is said before all else, and below which hardly anything is.
+LITTLE, HARDLY = 0.5, 0.1
+#: Share of an area that may be missed before it is told of.
+UNSEEN = 0.02
+
+
+def plan_result(plan: Plan, covered: Sequence[Covered]) -> dict[str, Any]:
+    """A plan as plain values for JSON; metres of n, and no position on the Earth.
+
+    Parameters
+    ----------
+    plan
+        From `wildlab.analysis.plans.plan.make_plan`.
+    covered
+        Of each area, from `wildlab.analysis.plans.coverage.cover`.
+
+    Returns
+    -------
+    dict
+        Numbers; ``assumed``, ``warnings`` and ``sentences`` are facts, `wildlab.reporting.plan` has their
+        words.
+    """
+    wanted, view = plan.wanted, plan.view
+    seconds = plan.area_seconds()
+    living = [animals_in(plan, area) for area in plan.areas.areas]
+    found = [n * one.seen * wanted.detection for n, one in zip(living, covered, strict=True)]
+    return {
+        "height_m": plan.height,
+        "strip_m": round(plan.strip, 2),
+        "animal_pixels": round(view.pixels(wanted.camera, wanted.animal_m, plan.height), 2),
+        "duration_s": round(plan.duration, 1),
+        "nearest_ground_m": round(plan.nearest, 1),
+        "furthest_m": round(_furthest(plan), 1),
+        "seen": round(seen_share(plan, covered), 4),
+        "animals": _number(sum(living)),
+        "expected_finds": _number(sum(found)),
+        "areas": [
+            {
+                "name": plan.names[k],
+                "seen": round(covered[k].seen, 4),
+                "hidden": round(covered[k].share(covered[k].hidden), 4),
+                "blurred": round(covered[k].share(covered[k].blurred), 4),
+                "animals": _number(living[k]),
+                "expected_finds": _number(found[k]),
+                "size_m2": round(area.size, 1),
+                "rows": int((plan.pattern.area == k).sum()),
+                "row_distance_m": round(float(plan.pattern.distance[k]), 2),
+                "seconds": round(float(seconds[k]), 1),
+            }
+            for k, area in enumerate(plan.areas.areas)
+        ],
+        "sorties": [_sortie(plan, one) for one in plan.sorties],
+        "assumed": assumed(plan),
+        "warnings": [*warnings(plan), *unseen(plan, covered)],
+        "sentences": summary(plan, seen_share(plan, covered), sum(living), sum(found)),
+    }
+
+
+def _sortie(plan: Plan, one: Sortie) -> dict[str, Any]:
+    names = [plan.names[k] for k in dict.fromkeys(plan.pattern.area[one.rows].tolist())]
+    battery = plan.wanted.battery_min
+    return {
+        "name": one.name,
+        "areas": names,
+        "rows": len(one.rows),
+        "way_points": len(one.way.points),
+        "length_m": round(one.course.length, 1),
+        "duration_s": round(one.duration, 1),
+        "of_battery": None if battery is None else round(one.duration / (60 * battery), 4),
+        "least_above_ground_m": round(one.way.least, 2),
+        "most_above_ground_m": round(one.way.most, 2),
+        "steepest_m_s": round(one.steepest, 2),
+    }
+
+
+def fact(key: str, **values: float | str) -> Fact:
+    """A fact; numbers as ``:g`` writes them.
+
+    Examples
+    --------
+    >>> fact("climb", speed=3.0)
+    ('climb', {'speed': '3'})
+    """
+    return key, {name: one if isinstance(one, str) else f"{one:g}" for name, one in values.items()}
+
+
+def summary(plan: Plan, seen: float, living: float, finds: float) -> list[Fact]:
+    """What a pilot wants to know first."""
+    wanted, n, rows, areas = plan.wanted, len(plan.sorties), len(plan.pattern.rows), plan.areas.areas
+    where = plan.names[0] if len(areas) == 1 else f"{len(areas)} areas"
+    least, most = f"{plan.pattern.distance.min():.0f}", f"{plan.pattern.distance.max():.0f}"
+    apart = f" {least if least == most else f'{least} to {most}'} m apart" if rows > len(areas) else ""
+    pixels = plan.view.pixels(wanted.camera, wanted.animal_m, plan.height)
+    found = []
+    if seen < LITTLE:
+        found.append(fact("hardly-anything" if seen < HARDLY else "less-than-half", seen=percent(seen)))
+    return [
+        *found,
+        fact(
+            "one-flight" if n == 1 else "flights",
+            where=where,
+            size=hectares(sum(plan.alone.values())),
+            n=n,
+            time=minutes(plan.duration),
+            rows=count(rows, "row"),
+            apart=apart,
+        ),
+        fact(
+            "strip",
+            height=f"{plan.height:.0f}",
+            strip=f"{plan.strip:.0f}",
+            animal=wanted.animal_m,
+            pixels=f"{pixels:.0f}",
+        ),
+        fact("seen", seen=percent(seen)),
+        *([] if math.isnan(finds) else [fact("finds", living=head_count(living), finds=head_count(finds))]),
+    ]
+
+
+def seen_share(plan: Plan, covered: Sequence[Covered]) -> float:
+    """Share of all areas together that is seen; what lies in several of them counts once."""
+    sizes = list(plan.alone.values())
+    return sum(size * one.seen for size, one in zip(sizes, covered, strict=True)) / sum(sizes)
+
+
+def animals_in(plan: Plan, area: Area) -> float:
+    """How many animals live in an area: what its file says, else what was asked for; NaN if nobody said."""
+    wanted = plan.wanted
+    if not math.isnan(area.animals):
+        return area.animals
+    if wanted.animals is not None:
+        return wanted.animals
+    return math.nan if wanted.density_km2 is None else wanted.density_km2 * plan.alone[area.name] / 1e6
+
+
+def unseen(plan: Plan, covered: Sequence[Covered]) -> list[Fact]:
+    """Where more than `UNSEEN` of an area is not seen, why, and what helps; a fact for each area."""
+    wanted, found = plan.wanted, []
+    # By itself a swing is as slow as it may be without leaving ground out.
+    swing = "fixed" if wanted.gimbal == "fixed" else "own" if wanted.rate_deg_s is None else "stated"
+    for k, one in enumerate(covered):
+        missed, hidden, blurred = 1 - one.seen, one.share(one.hidden), one.share(one.blurred)
+        if missed <= UNSEEN:
+            continue
+        causes = {
+            "hidden": hidden,
+            f"blurred-{swing}": blurred,
+            "photos" if wanted.photo_m > 0 else "overlap": missed - hidden - blurred,
+        }
+        parts = {
+            name: percent(share)
+            for name, share in zip(("hidden", "blurred", "nowhere"), causes.values(), strict=True)
+        }
+        worst = max(causes, key=lambda name: causes[name])
+        found.append(fact(f"unseen-{worst}", missed=percent(missed), area=plan.names[k], **parts))
+    return found
+
+
+def assumed(plan: Plan) -> list[Fact]:
+    """What the plan rests on."""
+    wanted, found = plan.wanted, list[Fact]()
+    if plan.cut is not None and wanted.terrain is not None:
+        name = printable(Path(wanted.terrain.file).name) if wanted.names else "the map that was given"
+        step, rms = f"{plan.cut.terrain.step:.3g}", f"{plan.cut.rms:.2g}"
+        found.append(fact("ground-map", name=name, step=step, rms=rms))
+    elif plan.terrain is None:
+        found.append(fact("ground-flat"))
+    if wanted.home is None:
+        found.append(fact("home"))
+    found.append(fact("above-take-off" if wanted.heights == "take-off" else "above-ground"))
+    if plan.terrain is not None:
+        found += [
+            fact("nearest-trees" if wanted.trees_m > 0 else "nearest", nearest=f"{plan.nearest:.0f}"),
+            fact("take-off-height"),
+        ]
+    if plan.terrain is not None and not np.isfinite(plan.terrain.heights_at(plan.home[None])).all():
+        found.append(fact("return-unknown"))
+    else:
+        highest = max(float((one.way.height - one.way.ground[0]).max()) for one in plan.sorties)
+        found.append(fact("return", height=str(math.ceil(highest - 1e-6))))
+    wind = {"wind": wanted.wind_m_s, "from": f"{wanted.wind_from_deg or 0.0:.0f}"}
+    found.append(
+        fact(
+            f"speed-{wanted.vehicle}-{'wind' if wanted.wind_m_s > 0 else 'calm'}",
+            speed=wanted.speed_m_s,
+            slowest=wanted.slowest_m_s,
+            fastest=wanted.fastest_m_s,
+            air=wanted.air_m_s,
+            **wind,
+        )
+    )
+    found.append(
+        fact("turn-radius", radius=wanted.turn_radius_m)
+        if wanted.turn_radius_m > 0
+        else fact("turn-stop", time=wanted.turn_s)
+    )
+    found.append(fact("climb", speed=wanted.climb_m_s))
+    if wanted.trees_m > 0:
+        found.append(fact("trees", height=wanted.trees_m))
+    found.append(fact("looks-down" if wanted.tilt_deg == 90 else "looks-ahead", tilt=wanted.tilt_deg))
+    found.append(fact("photos", apart=wanted.photo_m) if wanted.photo_m > 0 else fact("films"))
+    if wanted.gimbal != "fixed":
+        rate = f"{math.degrees(gimbal_rate(plan)):.0f}"
+        found.append(fact(f"swing-{wanted.gimbal}", swing=wanted.swing_deg, rate=rate))
+    found.append(
+        fact(
+            "counts",
+            edge=f"{100 * EDGE:.0f}",
+            furthest=FURTHEST,
+            exposure=1000 * wanted.exposure_s,
+            sharp=f"{100 * SHARP:.0f}",
+            animal=wanted.animal_m,
+        )
+    )
+    if not math.isnan(sum(animals_in(plan, area) for area in plan.areas.areas)):
+        found.append(fact("detection", share=percent(wanted.detection)))
+    if wanted.battery_min is None:
+        found.append(fact("battery-unknown"))
+    else:
+        found.append(fact("battery", time=wanted.battery_min, reserve=f"{100 * wanted.reserve:.0f}"))
+    found.append(fact("rules", height=wanted.max_height_m))
+    return found
+
+
+def warnings(plan: Plan) -> list[Fact]:
+    """What speaks against flying it as it is."""
+    wanted, found = plan.wanted, list[Fact]()
+    steepest = max(one.steepest for one in plan.sorties)
+    # A hundredth is rounding: what cannot slow down is planned to climb at all that it can do.
+    if steepest > 1.01 * wanted.climb_m_s:
+        found.append(
+            fact(
+                f"steep-{wanted.vehicle}",
+                speed=wanted.speed_m_s,
+                steepest=f"{steepest:.1f}",
+                climb=wanted.climb_m_s,
+            )
+        )
+    if wanted.vehicle == "multicopter" and wanted.wind_m_s > 0 and wanted.max_air_m_s is None:
+        found.append(fact("airspeed", air=wanted.air_m_s, speed=wanted.speed_m_s))
+    unknown = sum(one.way.unknown for one in plan.sorties)
+    if unknown > 0:
+        found.append(fact("unknown-ground", way=f"{unknown:.0f}"))
+    pixels = plan.view.pixels(wanted.camera, wanted.animal_m, plan.height)
+    if pixels < max(FEW_PIXELS, 0.99 * wanted.pixels):
+        key = "few-pixels" if pixels < FEW_PIXELS else "fewer-pixels"
+        found.append(fact(key, animal=wanted.animal_m, pixels=f"{pixels:.1f}", wanted=wanted.pixels))
+    alone = sum(plan.alone.values())
+    twice = sum(area.size for area in plan.areas.areas) - alone
+    if twice > 1e-3 * alone:
+        told = wanted.animals is not None or any(not math.isnan(one.animals) for one in plan.areas.areas)
+        found.append(fact("overlap-animals" if told else "overlap", size=hectares(twice)))
+    if any(len(area.holes) for area in plan.areas.areas):
+        found.append(fact("holes"))
+    return found
+
+
+def _furthest(plan: Plan) -> float:
+    return max(float(np.hypot(*(one.way.points - plan.home).T).max()) for one in plan.sorties)
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else round(value, 3)
+
+
+def minutes(seconds: float) -> str:
+    """ "12 min", "1 h 05 min": rounded up, as whoever waits counts."""
+    whole = math.ceil(seconds / 60 - 1e-9)
+    return f"{whole} min" if whole < 60 else f"{whole // 60} h {whole % 60:02d} min"
+
+
+def percent(share: float) -> str:
+    """A share as a person says it; nearly all is not all."""
+    if 0 < share < 0.01 or 0.99 < share < 1:
+        near = "< 0.1 %" if share < 0.5 else "> 99.9 %"
+        return f"{100 * share:.1f} %" if 0.0005 < share < 0.9995 else near
+    return f"{100 * share:.0f} %"
+
+
+def head_count(value: float) -> str:
+    """A number of animals that may be expected: three figures, and never half an animal of hundreds."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def hectares(size: float) -> str:
+    """A size in m2 as a person says it."""
+    if size < 1e4:
+        return f"{size:,.0f} m²"
+    return f"{size / 1e4:.1f} ha" if size < 1e6 else f"{size / 1e6:.1f} km²"
+
+
+def count(n: int, word: str) -> str:
+    """ "1 row", "2 rows"."""
+    return f"{n} {word}{'' if n == 1 else 's'}"
