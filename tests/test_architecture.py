@@ -44,7 +44,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "sharing": BELOW_ANALYSIS | {"analysis", "messages", "reporting", "studies", "runner"},
     # What `import wildlab` offers; nothing of wildlab imports it.
     "api": BELOW_ANALYSIS | {"analysis", "reporting", "replay"},
-    "commands": BELOW_ANALYSIS | {"analysis", "reporting", "studies", "runner", "sharing", "terminal"},
+    "commands": BELOW_ANALYSIS
+    | {"analysis", "messages", "reporting", "studies", "runner", "sharing", "terminal"},
     "cli": BELOW_ANALYSIS | {"analysis", "reporting", "studies", "runner", "commands", "doctor", "terminal"},
     "__main__": {"cli"},
     "summary_table": set(),

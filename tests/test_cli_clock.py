@@ -19,7 +19,8 @@ from wildlab.flight.store import save_flight
 
 
 def clock(sentence: str, certain: bool) -> CameraClock:
-    return CameraClock({"certain": certain, "method": sentence}, pd.DataFrame(), f"{sentence} say so.")
+    facts = (("detect-note", {"note": f"{sentence} say so"}),)
+    return CameraClock({"certain": certain, "method": sentence}, pd.DataFrame(), facts)
 
 
 @pytest.mark.parametrize(

@@ -108,7 +108,7 @@ def over_land(flight: Flight, first: int, count: int) -> Iterator[Frame]:
 @pytest.mark.slow
 def test_from_the_motion_of_images(antenna):
     found = clock_from_motion(late(antenna, 1.3), over_land(antenna, 3000, 160), "autopilot")
-    assert found.numbers["certain"], found.sentence
+    assert found.numbers["certain"], found.facts
     assert found.numbers["offset_s"] == pytest.approx(1.3, abs=0.030)
     assert found.numbers["gain"] == pytest.approx(1.0, abs=0.3)
     at = found.curve["correlation"].idxmax()

@@ -34,7 +34,7 @@ def run(detections=10, usable=5, **more):
         "detections": detections,
         "problems": [],
         "pictures": {"overlays": 1},
-        "sentences": [],
+        "facts": [],
     }
     return result | more
 

@@ -1,6 +1,4 @@
-"""A camera out of images of a board: boards found, lens chosen, camera estimated, views compared, and told
-in words.
-"""
+"""A camera out of images of a board: boards found, lens chosen, camera estimated, views compared."""
 
 from __future__ import annotations
 
@@ -13,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.analysis import Fact, fact
 from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_board, grey8
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
@@ -393,7 +392,7 @@ def _refuse_few(images: list[BoardImage], n: int, board: Board) -> None:
     )
 
 
-#: A mean gap between boards that is larger than this share of the raster leaves the lens to guesswork.
+#: A raster that boards cover less than this share of leaves the lens to guesswork.
 COVERED = 0.8
 #: Fewer views than this give wide intervals.
 PLENTY = 15
@@ -410,52 +409,40 @@ WORDS = {
 }  # fmt: skip
 
 
-def boards_sentence(found: CameraCalibration) -> str:
+def _boards(found: CameraCalibration) -> Fact:
     """How many boards, and how many of them only once the image was inverted."""
     views, inverted = len(found.views), sum(one.inverted for one in found.views)
-    said = f"The board is in {views} of {len(found.images)} images"
-    if inverted:
-        said += f", in {'all' if inverted == views else inverted} of them light on dark"
-    return f"{said}."
+    key = "camera-boards" if not inverted else "camera-inverted" if inverted == views else "camera-mixed"
+    return fact(key, views=views, images=len(found.images), inverted=inverted)
 
 
-def fit_sentence(found: CameraCalibration) -> str:
+def _fit(found: CameraCalibration) -> Fact:
     """How well it fits, by which lens, and why that one."""
-    rms, lens = found.found.rms, found.choice.lens
-    said = f"Projected and seen points are {rms:.3f} px apart (root mean square)"
+    rms, lens, tried = f"{found.found.rms:.3f}", found.choice.lens, found.choice.held_out
     model = "a lens that does not bend" if lens == "none" else f'the lens model "{lens}"'
-    tried = found.choice.held_out
     if not tried:
-        return f"{said}, with {model}."
+        return fact("camera-fit", rms=rms, model=model)
     best = min(tried, key=lambda name: tried[name])
-    compared = (
-        f"on views held out it is off by {tried[lens]:.3f} px"
-        if best == lens
-        else f'on views held out it is off by {tried[lens]:.3f} px, and the best, "{best}", by '
-        f"{tried[best]:.3f} px, which is no certain gain"
-    )
-    return f"{said}, with {model}: {compared}."
+    key = "camera-fit-best" if best == lens else "camera-fit-simpler"
+    return fact(key, rms=rms, model=model, own=f"{tried[lens]:.3f}", best=best, other=f"{tried[best]:.3f}")
 
 
-def coverage_sentence(found: CameraCalibration) -> str:
+def _covered(found: CameraCalibration) -> Fact:
     """How much of the image the boards cover, and where they do not."""
     held = coverage(found.uv, found.width, found.height)
-    share = held.mean()
-    said = f"The boards cover {100 * share:.0f} % of the image"
     rows, columns = held.shape
-    halves = {
-        "upper left": held[: rows // 2, : columns // 2],
-        "upper right": held[: rows // 2, columns // 2 :],
-        "lower left": held[rows // 2 :, : columns // 2],
-        "lower right": held[rows // 2 :, columns // 2 :],
+    sides = {"upper": slice(None, rows // 2), "lower": slice(rows // 2, None)}
+    shares = {
+        f"{name} {side}": held[part, half].mean()
+        for name, part in sides.items()
+        for side, half in (("left", slice(None, columns // 2)), ("right", slice(columns // 2, None)))
     }
-    worst = min(halves, key=lambda name: halves[name].mean())
-    if share >= COVERED:
-        return f"{said}."
-    return f"{said}, least at its {worst} ({100 * halves[worst].mean():.0f} %): hold the board there, too."
+    worst = min(shares, key=lambda name: shares[name])
+    key = "camera-covered" if held.mean() >= COVERED else "camera-uncovered"
+    return fact(key, share=f"{100 * held.mean():.0f}", worst=worst, least=f"{100 * shares[worst]:.0f}")
 
 
-def corner_sentence(found: CameraCalibration) -> str:
+def _directions(found: CameraCalibration) -> Fact:
     """How well directions are known in the middle and at the worst corner."""
     w, h = found.width, found.height
     places = {
@@ -464,18 +451,11 @@ def corner_sentence(found: CameraCalibration) -> str:
         "the lower right corner": (w - 1.0, h - 1.0),
     }  # fmt: skip
     sd = dict(zip(places, direction_sd(found.found, np.array(list(places.values()))), strict=True))
-    blind = [name for name, one in sd.items() if not np.isfinite(one)]
-    if blind:
-        return f"The lens model does not reach {' and '.join(blind)}: it folds back before."
+    if blind := [name for name, one in sd.items() if not np.isfinite(one)]:
+        return fact("camera-folds", places=" and ".join(blind))
     worst = max(sd, key=lambda name: sd[name])
-    said = (
-        "Apart from a turn of the whole camera, where a direction is seen is known to "
-        f"{sd['the middle']:.1f} px in the middle"
-    )
-    if worst == "the middle":
-        return f"{said} of the image (one standard deviation), and no worse at the corners."
-    advice = ": more views there will help" if sd[worst] > ROUGH_PX else ""
-    return f"{said} of the image and to {sd[worst]:.1f} px at {worst} (one standard deviation){advice}."
+    kind = "even" if worst == "the middle" else "rough" if sd[worst] > ROUGH_PX else "corner"
+    return fact(f"camera-{kind}", middle=f"{sd['the middle']:.1f}", worst=f"{sd[worst]:.1f}", place=worst)
 
 
 def tilts_deg(found: Intrinsics) -> Array:
@@ -491,73 +471,49 @@ def rim_px(found: Intrinsics) -> float:
     return float(share * np.hypot(found.camera.width, found.camera.height) / 2)
 
 
-def confusion_sentences(found: CameraCalibration) -> list[str]:
+def _confused(found: CameraCalibration) -> list[Fact]:
     """Which parameters the views cannot tell apart, and what would help."""
-    said = []
+    tilt, facts = f"{tilts_deg(found.found).max():.0f}", []
     for group in confused(found.found):
         names = listed([WORDS.get(one, one) for one in group])
-        what = f"The views cannot tell {names} apart"
-        if len(group) == 1:
-            what = f"The views hardly tell {names}"
+        kind = "edges"
         if set(group) <= {"k1", "k2", "k3"}:
-            lens = "k1" if "k3" not in group else "k1-k2"
-            said.append(f"{what}: together they say how the lens bends, and --lens {lens} does with fewer.")
+            kind = "lens"
         elif set(group) & {"f", "fx", "fy"}:
             # Two focal lengths change together wherever the board stands; it matters where both are vague.
             if rim_px(found.found) < MATTERS_PX:
                 continue
-            said.append(
-                f"{what}: tilt the board more, it is {tilts_deg(found.found).max():.0f} degrees at most."
-            )
-        else:
-            said.append(f"{what}: turn the board by 90 degrees between views, and hold it at the edges.")
-    flat = tilts_deg(found.found).max()
-    if flat < FLAT_DEG:
-        said.append(
-            f"The board is tilted by {flat:.0f} degrees at most, which hardly tells focal length from "
-            "distance."
-        )
-    return said
+            kind = "tilt"
+        lens = "k1" if "k3" not in group else "k1-k2"
+        facts.append(fact(f"camera-confused-{kind}", names=names, tilt=tilt, lens=lens))
+    if tilts_deg(found.found).max() < FLAT_DEG:
+        facts.append(fact("camera-flat", tilt=tilt))
+    return facts
 
 
-def odd_sentences(found: CameraCalibration) -> list[str]:
+def _odd(found: CameraCalibration) -> list[Fact]:
     """Views that disagree with the rest, and what becomes of the estimate without them."""
     rest = found.without_odd
     if rest is None:
         return []
-    names = [one.name for one in found.views]
-    rms = [found.held_out[names.index(name)] for name in found.odd]
-    usual = float(np.median([e for n, e in zip(names, found.held_out, strict=True) if n not in found.odd]))
-    which = listed([f"{name} ({error:.2f} px)" for name, error in zip(found.odd, rms, strict=True)])
+    errors = dict(zip((one.name for one in found.views), found.held_out, strict=True))
+    usual = float(np.median([error for name, error in errors.items() if name not in found.odd]))
+    which = listed([f"{name} ({errors[name]:.2f} px)" for name in found.odd])
     moved = ", ".join(
         f"{name} {found.found.value(name):.1f} -> {rest.value(name):.1f}"
         for name in found.found.names
         if name in WORDS
     )
     option = " ".join(f"--without {name}" for name in found.odd)
-    said = (
-        f"{which} {'disagrees' if len(rms) == 1 else 'disagree'} with the other views, which are typically "
-        f"{usual:.2f} px off under the camera that the rest give"
-    )
-    return [f"{said}. Without: {rest.rms:.3f} px, {moved} ({option})."]
-
-
-def number_sentence(found: CameraCalibration) -> list[str]:
-    """That there are few views, where there are."""
-    n = len(found.views)
-    if n >= PLENTY:
-        return []
-    return [f"{n} views make wide intervals: {PLENTY} to 30 from different sides are better."]
-
-
-def sentences(found: CameraCalibration) -> list[str]:
-    """All that is said of a calibration, in order."""
     return [
-        boards_sentence(found),
-        fit_sentence(found),
-        coverage_sentence(found),
-        corner_sentence(found),
-        *confusion_sentences(found),
-        *odd_sentences(found),
-        *number_sentence(found),
+        fact(
+            "camera-odd", which=which, usual=f"{usual:.2f}", rms=f"{rest.rms:.3f}", moved=moved, option=option
+        )
     ]
+
+
+def facts_of(found: CameraCalibration) -> list[Fact]:
+    """All that is said of a calibration, in order; its words are in ``data/messages/en/terminal.toml``."""
+    few = [fact("camera-few", views=len(found.views), plenty=PLENTY)] if len(found.views) < PLENTY else []
+    first = [_boards(found), _fit(found), _covered(found), _directions(found)]
+    return [*first, *_confused(found), *_odd(found), *few]

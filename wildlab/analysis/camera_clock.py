@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis import Fact, fact
 from wildlab.analysis.accuracy import compare_sightings, judge_repeats
 from wildlab.analysis.diagnose import nonzero
 from wildlab.analysis.evaluate import blocks_of
@@ -271,7 +272,7 @@ def camera_rotation(flight: Flight) -> Array:
 
 
 class CameraClock(NamedTuple):
-    """An estimate in numbers and in words.
+    """An estimate of what to add to the stamps of the images.
 
     Attributes
     ----------
@@ -280,17 +281,17 @@ class CameraClock(NamedTuple):
         ``rival_s`` and what the estimate rests on.
     curve
         ``offset_s``, and ``cost`` or ``correlation``.
-    sentence
-        The same in words.
+    facts
+        What is said of it; the words are in ``data/messages/en/terminal.toml``.
     """
 
     numbers: dict[str, object]
     curve: pd.DataFrame
-    sentence: str
+    facts: tuple[Fact, ...]
 
 
 def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
-    """`camera_clock_by_points` with its words; without truth, from things that several images show.
+    """`camera_clock_by_points` with its facts; without truth, from things that several images show.
 
     Raises
     ------
@@ -303,9 +304,8 @@ def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
     found = camera_clock_by_points(flight, source)
     rests = {"points": found.points, "images": found.images, "blocks": found.draws}
     numbers = {**_numbers(found, "known points"), **rests}
-    by = f"{found.points} sightings of known points in {found.images} images"
     curve = pd.DataFrame({"offset_s": found.offsets, "cost": found.cost})
-    return CameraClock(numbers, curve, _sentence(found, by))
+    return CameraClock(numbers, curve, _facts("points", numbers))
 
 
 def _by_sightings(flight: Flight, source: str | None) -> CameraClock:
@@ -351,16 +351,7 @@ def _by_sightings(flight: Flight, source: str | None) -> CameraClock:
         for one in tried
     ]
     curve = pd.DataFrame({"offset_s": tried + stated, "cost": [one.mean() for one in apart]})
-    by = f"{len(diagnosis.scored)} sightings of things whose places are not known"
-    if certain:
-        sentence = (
-            f"The stamps of the images get {offset + stated:+.3f} s (SD {numbers['sd_s']:.3f} s), by {by}."
-        )
-    else:
-        sentence = (
-            f"The offset of the camera's clock cannot be told by {by}: {offset + stated:+.3f} s fits best."
-        )
-    return CameraClock(numbers, curve, sentence)
+    return CameraClock(numbers, curve, _facts("things", numbers | {"points": len(diagnosis.scored)}))
 
 
 def clock_from_motion(
@@ -369,7 +360,7 @@ def clock_from_motion(
     source: str | None = None,
     progress: Callable[[], None] | None = None,
 ) -> CameraClock:
-    """`camera_clock_by_motion` of images, with its words.
+    """`camera_clock_by_motion` of images, with its facts.
 
     Raises
     ------
@@ -381,10 +372,8 @@ def clock_from_motion(
     found = camera_clock_by_motion(flight, pairs, motion, source)
     rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
     numbers = {**_numbers(found, "image motion"), **rests, "gain": found.gain}
-    by = f"the motion between {found.pairs} pairs of images (correlation {found.peak:.2f}"
-    by += f", next best {found.rival_correlation:.2f}, gain {found.gain:.2f})"
     curve = pd.DataFrame({"offset_s": found.offsets, "correlation": found.correlation})
-    return CameraClock(numbers, curve, _sentence(found, by))
+    return CameraClock(numbers, curve, _facts("motion", numbers))
 
 
 def _numbers(found: ClockByPoints | ClockByMotion, method: str) -> dict[str, object]:
@@ -397,10 +386,14 @@ def _numbers(found: ClockByPoints | ClockByMotion, method: str) -> dict[str, obj
     }
 
 
-def _sentence(found: ClockByPoints | ClockByMotion, by: str) -> str:
-    if found.certain:
-        return f"The stamps of the images get {found.offset_s:+.3f} s (SD {found.sd_s:.3f} s), by {by}."
-    return (
-        f"The offset of the camera's clock cannot be told by {by}: {found.offset_s:+.3f} s fits best, and "
-        f"does not stand out against others, as {found.rival_s:+.2f} s."
-    )
+def _facts(way: str, numbers: dict[str, object]) -> tuple[Fact, ...]:
+    shown = {
+        name: f"{one:+.3f}"
+        if name in ("offset_s", "rival_s")
+        else f"{one:.2f}"
+        if isinstance(one, float)
+        else str(one)
+        for name, one in numbers.items()
+    }
+    sd = f"{numbers['sd_s']:.3f}"
+    return (fact(f"clock-{way}-{'certain' if numbers['certain'] else 'open'}", **shown | {"sd_s": sd}),)

@@ -23,6 +23,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from wildlab.analysis import Fact, fact
 from wildlab.analysis.georeference import Observations, covariances_of
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv
@@ -86,8 +87,8 @@ def shift_from_level(observations: Observations, points: pd.DataFrame) -> Shift:
     return Shift(len(off), float(np.median(off)), float(off.max()))
 
 
-def ground_sentences(observations: Observations, points: pd.DataFrame) -> list[str]:
-    """What the points lie on, what became of the rays, and what a plane would have given; without full stops.
+def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]:
+    """What the points lie on, what became of the rays, and what a plane would have given.
 
     Parameters
     ----------
@@ -96,35 +97,26 @@ def ground_sentences(observations: Observations, points: pd.DataFrame) -> list[s
 
     Returns
     -------
-    list of str
+    list of Fact
+        Of ``data/messages/en/terminal.toml``.
     """
-    placed = int(points["north_m"].notna().sum())
-    kinds = points["ellipse"].value_counts()
+    placed, of = int(points["north_m"].notna().sum()), len(points)
     if observations.terrain is None:
-        return [
-            f"{placed} of {len(points)} points lie on level ground, at the height of each target: "
-            "there is no terrain"
-        ]
+        return [fact("ground-level", placed=placed, of=of)]
     became = "; ".join(f"{n} {words}" for words, n in points["ray"].value_counts().items())
-    said = [f"Of {len(points)} rays, over terrain: {became or 'none'}"]
+    found = [fact("ground-terrain", of=of, became=became or "none")]
     shift = shift_from_level(observations, points)
     if shift.n:
-        whose = "as high as is stated of each target, else as the ground under the camera"
-        said.append(
-            f"Level ground ({whose}) would have put {shift.n} of them {shift.median:.2f} m elsewhere in the "
-            f"median, {shift.largest:.2f} m at most"
-        )
-    sampled, split = int(kinds.get("sampled", 0)), int(kinds.get("split", 0))
+        median, largest = f"{shift.median:.2f}", f"{shift.largest:.2f}"
+        found.append(fact("ground-shift", n=shift.n, median=median, largest=largest))
+    kinds = points["ellipse"].value_counts()
+    sampled, split, unbounded = (int(kinds.get(name, 0)) for name in ("sampled", "split", "unbounded"))
     if sampled + split:
-        said.append(
-            f"{sampled + split} of {placed} ellipses were sampled: the ground is bent there, or the ray flat"
-            + (f"; {split} of these over a ridge, with a near and a far group" if split else "")
-        )
-    if unbounded := int(kinds.get("unbounded", 0)):
-        said.append(
-            f"{unbounded} of {placed} points have no ellipse: more than 5 % of their samples meet no ground"
-        )
-    return said
+        key = "ground-split" if split else "ground-sampled"
+        found.append(fact(key, sampled=sampled + split, split=split, placed=placed))
+    if unbounded:
+        found.append(fact("ground-unbounded", unbounded=unbounded, placed=placed))
+    return found
 
 
 #: What is written, by the end of the name.

@@ -99,10 +99,11 @@ def camera(
     refuse_existing(out, overwrite)
     from rich.progress import track
 
-    from wildlab.analysis.camera import calibrate_images, camera_file, sentences
+    from wildlab.analysis.camera import calibrate_images, camera_file, facts_of
     from wildlab.detection.boards import Board
     from wildlab.flight.camera_file import write_camera
     from wildlab.flight.readers.frames.image import still_files
+    from wildlab.messages.page_texts import words
 
     columns, rows = board or circles or (0, 0)
     pattern = "chessboard" if board else "staggered circles" if staggered else "circles"
@@ -118,15 +119,15 @@ def camera(
     content = camera_file(found, name)
     if out is not None:
         write_camera(content, out)
-    left = [one for one in found.images if one.problem]
+    left, said = [one for one in found.images if one.problem], words("terminal", facts_of(found))
     if as_json:
         unused = [{"name": one.name, "why": one.problem} for one in left]
-        more = {"left_out": unused, "odd": list(found.odd), "sentences": sentences(found)}
+        more = {"left_out": unused, "odd": list(found.odd), "sentences": said}
         print_json({**content.model_dump(mode="json"), **more})
         return
     for one in left:
         click.echo(f"{one.name}: {stopped(one.problem)}", err=True)
-    for line in sentences(found):
+    for line in said:
         click.echo(line)
     rows_shown = [
         [p.name, *_interval(p.value, p.low, p.high), "px" if p.name[0] in "fcs" else ""]
@@ -172,8 +173,10 @@ def clock(
       wildlab clock flights/tuesday --images card/DCIM --curve curve.csv --set
       wildlab clock flights/tuesday --offset 0.42 --set
     """
+    from wildlab.analysis import Fact, fact
     from wildlab.files import write_csv
     from wildlab.flight.store import load_flight
+    from wildlab.messages.page_texts import words
 
     loaded = load_flight(flight)
     if offset is not None:
@@ -181,16 +184,18 @@ def clock(
             raise WildlabError(
                 "an offset is stated and an estimate asked for", "leave one out", field="--offset"
             )
-        said = {"offset_s": offset, "certain": True, "method": "stated"}
+        said: dict[str, object] = {"offset_s": offset, "certain": True, "method": "stated"}
+        facts: tuple[Fact, ...] = (fact("clock-stated", offset_s=f"{offset:+.3f}"),)
     else:
         found = _estimate(loaded, images, source)
         if curve is not None:
             write_csv(curve, found.curve)
-        said = {**found.numbers, "sentence": found.sentence}
+        said, facts = found.numbers, found.facts
+    sentence = " ".join(words("terminal", facts))
     if as_json:
-        print_json(said)
+        print_json({**said, "sentence": sentence})
     else:
-        click.echo(said.get("sentence", f"The stamps of the images get {said['offset_s']:+.3f} s."))
+        click.echo(sentence)
     if not set_:
         return
     if not said["certain"]:
@@ -212,6 +217,7 @@ def clock(
 
 
 def _estimate(flight: Flight, images: Path | None, source: str | None) -> CameraClock:
+    from wildlab.analysis import fact
     from wildlab.analysis.camera_clock import clock_from_motion, clock_from_points
 
     if images is None:
@@ -224,9 +230,9 @@ def _estimate(flight: Flight, images: Path | None, source: str | None) -> Camera
         found = clock_from_motion(flight, open_frames(images, ids=ids), source)
         if found.numbers["certain"]:
             return found
-        why = found.sentence
+        why = found.facts
     except WildlabError as error:
-        refused, why = error, f"The motion of the images does not show it: {error.problem}."
+        refused, why = error, (fact("clock-motion-refused", problem=error.problem),)
     try:
         other = clock_from_points(flight, source)
     except WildlabError:
@@ -235,7 +241,7 @@ def _estimate(flight: Flight, images: Path | None, source: str | None) -> Camera
         if refused is not None:
             raise refused
         return found
-    return other._replace(sentence=f"{why} So known points are used: {other.sentence}")
+    return other._replace(facts=(*why, fact("clock-so"), *other.facts))
 
 
 @click.command()

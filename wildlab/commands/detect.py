@@ -64,6 +64,7 @@ def detect(as_json: bool, **asked: Any) -> None:
     """
     from wildlab.analysis.detecting.command import DetectRequest, detect_images
     from wildlab.flight.files import printable
+    from wildlab.messages.page_texts import words
 
     request = DetectRequest(**asked)
     result = detect_images(request, terminal_console())
@@ -80,7 +81,7 @@ def detect(as_json: bool, **asked: Any) -> None:
     if len(problems) > SHOWN:
         more = count(len(problems) - SHOWN, "more frame")
         click.echo(f"{more} cannot be used: see frames.csv.", err=True)
-    for line in result["sentences"]:
+    for line in words("terminal", result["facts"]):
         click.echo(line)
     click.echo(shown(request.out / "report.html"))
 

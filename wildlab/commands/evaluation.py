@@ -105,8 +105,9 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
 
     from wildlab.analysis.georeference import georeference as to_ground
     from wildlab.analysis.georeference import observe
-    from wildlab.analysis.ground import SUFFIXES, ground_sentences, write_points
+    from wildlab.analysis.ground import SUFFIXES, ground_facts, write_points
     from wildlab.flight.store import load_flight
+    from wildlab.messages.page_texts import words
     from wildlab.runner.evaluate import tell_source
 
     if out.suffix not in SUFFIXES:
@@ -117,8 +118,8 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
     tell_source(data, source, terminal_console())
     points = to_ground(observations, np.random.default_rng(seed))
     write_points(data, points, out, observations.source)
-    for line in ground_sentences(observations, points):
-        click.echo(stopped(line))
+    for line in words("terminal", ground_facts(observations, points)):
+        click.echo(line)
     click.echo(shown(out))
 
 

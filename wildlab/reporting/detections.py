@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from wildlab.analysis.detecting.scores import ELLIPSE, rate_words
 from wildlab.messages.message import Message
-from wildlab.messages.page_texts import load_texts, percent_of
+from wildlab.messages.page_texts import load_texts, percent_of, words
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
 from wildlab.reporting.layout import ADVICE
@@ -246,7 +246,11 @@ def _show_compared(wording: Wording, compared: Sequence[Mapping[str, Any]], curv
     wording.table("compared", compared_table(compared))
     if len(curves):
         wording.figure("curves", precision_over_recall([one["name"] for one in compared], curves))
-    if notes := [f"{one['name']}: {line}" for one in compared for line in one["told"]]:
+    if notes := [
+        line
+        for one in compared
+        for line in words("terminal", [(key, values | {"name": one["name"]}) for key, values in one["told"]])
+    ]:
         wording.report.points(notes)
 
 
@@ -288,7 +292,7 @@ def _show_overlays(
 
 def _show_details(wording: Wording, result: Mapping[str, Any], thresholds: Mapping[str, Any]) -> None:
     names, report, judged = wording.texts.subjects, wording.report, result.get("judged")
-    said = [str(one) for one in result.get("notes", ())]
+    said = words("terminal", result.get("notes", ()))
     if judged and (aside := result["detections"] - judged["found"] - judged["invented"]) > 0:
         said += wording.messages([Message("aside", {"aside": str(aside), "of": str(result["detections"])})])
     part = thresholds.get("part")

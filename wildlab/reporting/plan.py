@@ -19,7 +19,7 @@ from wildlab.analysis.plans.result import count, head_count, hectares, minutes, 
 from wildlab.flight.readers.area import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.messages.page_texts import fill, load_texts
+from wildlab.messages.page_texts import words
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.notebook_pages import finished_page
@@ -47,11 +47,7 @@ def with_words(result: Mapping[str, Any]) -> dict[str, Any]:
     -------
     dict
     """
-    texts = load_texts("plan").answers
-    said = {
-        name: [fill(texts[key], {}, values) for key, values in result[name]]
-        for name in ("assumed", "warnings", "sentences")
-    }
+    said = {name: words("plan", result[name]) for name in ("assumed", "warnings", "sentences")}
     return {**result, **said}
 
 

@@ -17,6 +17,7 @@ import pandas as pd
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from wildlab.analysis import Fact, fact
 from wildlab.analysis.detecting.detect import (
     METHODS,
     Detected,
@@ -33,24 +34,24 @@ from wildlab.analysis.detecting.fit import (
     fit_part,
     fit_shapes,
     fit_thresholds,
-    part_sentence,
     with_part,
 )
 from wildlab.analysis.detecting.pictures import write_pictures
 from wildlab.analysis.detecting.scores import (
+    ELLIPSE,
     DetectorScore,
     compare_detectors,
-    compared_sentences,
     curve_table,
-    ellipse_sentence,
+    facts_of,
     judge_detections,
-    labels_sentences,
+    left_out,
     plain_rates,
-    rates_sentence,
+    rates_fact,
     read_others,
 )
 from wildlab.detection.detections import PART
 from wildlab.errors import WildlabError
+from wildlab.evaluation.runs import Interval
 from wildlab.files import write_csv, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import printable, read_regular
@@ -61,108 +62,6 @@ from wildlab.flight.store import load_flight
 
 #: Detections an image from which on defaults are said to fit badly: more than anyone looks through.
 MANY = 10
-
-
-def not_judged(judged: DetectorScore) -> list[str]:
-    """Sentences on frames and labels that say nothing, or count as missed for a reason of their own.
-
-    Parameters
-    ----------
-    judged
-        A run beside its labels.
-
-    Returns
-    -------
-    list of str
-    """
-    said = []
-    if judged.without_labels:
-        said.append(f"{judged.without_labels} of the frames are not judged: the labels do not name them.")
-    if judged.outside:
-        said.append(
-            f"{judged.outside} labels lie wholly outside their image and count as missed: are they of these "
-            "images, at this size?"
-        )
-    if judged.unusable:
-        said.append(f"{judged.unusable} labelled frames could not be used; what is labelled there is missed.")
-    if judged.absent:
-        first = ", ".join(printable(one) for one in judged.absent[:3])
-        more = len(judged.absent) - 3
-        said.append(
-            f"{len(judged.absent)} labelled frames are not here and count nowhere: {first}"
-            + (f" and {more} more." if more > 0 else ".")
-        )
-    return said
-
-
-def too_few_or_many(method: str, polarity: Polarity, found: int, usable: int, *, chosen: bool) -> list[str]:
-    """What may be wrong where nothing is found, or more than can be looked through.
-
-    Parameters
-    ----------
-    method, polarity
-        As they were asked for.
-    found, usable
-        Detections, and frames that could be used.
-    chosen
-        Whether thresholds were chosen for these images.
-
-    Returns
-    -------
-    list of str
-
-    Examples
-    --------
-    >>> too_few_or_many("warm", "unknown", 900, 30, chosen=True)
-    []
-    """
-    if not usable:
-        return []
-    if not found and method != "colour" and polarity != "black-hot":
-        return ["Nothing stands out as warm. Where what is warm looks dark, say --polarity black-hot."]
-    if found > MANY * usable and not chosen:
-        return [
-            f"That is {found / usable:.0f} an image: the defaults fit no camera in particular. Sizes follow "
-            "from --distance and --focal, and --fit chooses thresholds from labels."
-        ]
-    return []
-
-
-def frames_said(frames: Frames, detected: Detected) -> list[str]:
-    """Sentences on what was found of the camera itself: its shutter, its pixels, its corners.
-
-    Parameters
-    ----------
-    frames
-        That were looked at.
-    detected
-        What came out of them.
-
-    Returns
-    -------
-    list of str
-        None of them where there is nothing to be said.
-    """
-    kept = frames.kept
-    said = [f"{note[0].upper()}{note[1:]}." for note in kept.notes]
-    problems = detected.frames["problem"].fillna("").astype(str)
-    corrections = problems.str.contains("|".join(CORRECTIONS)).sum()
-    if corrections:
-        said.append(f"Taken during a flat-field correction: {corrections} of {len(problems)} frames.")
-    if kept.dead is not None and kept.dead.any():
-        number = int(kept.dead.sum())
-        word = "1 pixel does not" if number == 1 else f"{number} pixels do not"
-        said.append(f"{word} see the scene and {'is' if number == 1 else 'are'} masked.")
-    if frames.even and kept.vignetting is None:
-        said.append("No fall of brightness towards the corners could be measured, and none is taken off.")
-    elif kept.vignetting is not None:
-        corner, sd = kept.vignetting.corner, kept.vignetting.sd
-        word = "darker" if corner < 0 else "brighter"
-        said.append(
-            f"The corners are {abs(corner):.3g} (standard deviation {sd:.2g}) {word} than the middle, by "
-            f"{kept.vignetting.images} frames; that is taken off."
-        )
-    return said
 
 
 #: Bytes of an earlier run's result.json at most.
@@ -233,7 +132,8 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
     Returns
     -------
     dict
-        For JSON: numbers, problems of frames, and sentences to be printed.
+        For JSON: numbers, problems of frames, and facts, whose words are in
+        ``data/messages/en/terminal.toml``.
 
     Raises
     ------
@@ -310,15 +210,15 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
     usable = result["frames"]["usable"]
     chosen = bool(request.fit or request.thresholds or request.distance_m is not None)
     result["notes"] = [
-        *frames_said(frames, detected),
+        *facts_of_frames(frames, detected),
         *too_few_or_many(request.method, request.polarity, len(detected.detections), usable, chosen=chosen),
     ]
-    result["sentences"] = [*result["notes"], *result["sentences"]]
+    result["facts"] = [*result["notes"], *result["facts"]]
     if others and labels is not None:
         ours = f"wildlab {request.method}"
         compared = compare_detectors(ours, detected.detections, others, detected.frames, labels)
         result["compared"] = [one.as_plain() for one in compared]
-        result["sentences"] += [line for one in compared for line in compared_sentences(one, compared[0])]
+        result["facts"] += [line for one in compared for line in facts_of(one, compared[0])]
         write_csv(request.out / "compared.csv", curve_table(compared))
     write_json(request.out / "result.json", result)
     return result
@@ -436,11 +336,11 @@ def _result(
             [str(a), str(b)] for a, b in zip(problems["frame_id"], problems["problem"], strict=True)
         ],
         "pictures": pictures,
-        "sentences": [],
+        "facts": [],
     }
-    say = result["sentences"]
+    said: list[Fact] = result["facts"]
     if detected.kept:
-        say.append(f"{detected.kept} frames are kept from an earlier run with the same settings.")
+        said.append(fact("detect-kept", kept=detected.kept))
     if fitted is not None:
         result["fit"] = {
             "sets_tried": fitted.tried,
@@ -448,36 +348,107 @@ def _result(
             "where_chosen": plain_rates(fitted.inside),
             "defaults": plain_rates(fitted.defaults),
         }
-        say.append(
-            f"On frames that thresholds were not chosen from: {rates_sentence(result['fit']['held_out'])}"
-        )
-        say.append(f"Where they were chosen: {rates_sentence(result['fit']['where_chosen'])}")
-        without = "Without a classifier" if request.method == "shape" else "With the defaults"
-        say.append(f"{without}: {rates_sentence(result['fit']['defaults'])}")
+        without = "unlearnt" if request.method == "shape" else "defaults"
+        for key, name in (("held-out", "held_out"), ("where-chosen", "where_chosen"), (without, "defaults")):
+            said.append(rates_fact(f"detect-{key}", result["fit"][name]))
         if part is not None:
             result["fit"]["ellipses"] = part.as_plain()
-            say.append(part_sentence(part, PART))
+            said.append(part_fact(part))
     if judged is not None and labels is not None:
         result["judged"] = judged.as_plain()
         chosen_here = fitted is not None and request.labels == request.fit
         result["chosen_here"] = chosen_here
-        where = (
-            "Beside the labels that the thresholds were chosen by (too good)"
-            if chosen_here
-            else "Beside the labels"
-        )
-        say.append(f"{where}: {rates_sentence(result['judged'])}")
+        key = "detect-labels-too-good" if chosen_here else "detect-labels"
+        said.append(rates_fact(key, result["judged"]))
         by_these = chosen_here and part is not None and np.isfinite(part.part)
-        if "ellipse_coverage_90" in result["judged"] and not by_these:
-            say.append(ellipse_sentence(result["judged"]["ellipse_coverage_90"]))
-        say += labels_sentences(labels)
+        if judged.ellipse is not None and not by_these:
+            share = judged.ellipse
+            word = "small" if share.high < ELLIPSE else "large" if share.low > ELLIPSE else "right"
+            said.append(fact(f"detect-ellipses-{word}", **_percent(share)))
+        said += left_out(labels)
+        scores = np.concatenate([np.zeros(0), *labels.scores.values()])
+        if np.isfinite(scores).any():
+            low, high = np.nanmin(scores), np.nanmax(scores)
+            said.append(fact("detect-scored", low=f"{low:.2g}", high=f"{high:.2g}"))
         kinds = labels.marked.known_kinds
         if len(kinds) > 1 and not request.classes:
             some = ", ".join(printable(one) for one in kinds[:5])
-            say.append(f"Labels of {len(kinds)} classes count alike ({some}); --class chooses.")
-        if judged.without_labels or judged.unusable or judged.absent:
-            say += not_judged(judged)
+            said.append(fact("detect-classes", n=len(kinds), some=some))
+        said += not_judged(judged)
     return result
+
+
+def _percent(share: Interval) -> dict[str, str]:
+    return {name: f"{100 * one:.0f}" for name, one in zip(("share", "low", "high"), share, strict=True)}
+
+
+def part_fact(fit: PartFit) -> Fact:
+    """What part of the length was chosen for ellipses, from how many labels, and what it holds of others."""
+    if not np.isfinite(fit.part):
+        return fact("detect-part-default", part=f"{100 * PART:.3g}", labels=fit.labels)
+    part = f"{100 * fit.part:.2g}"
+    if fit.held_out is None:
+        return fact("detect-part-untried", part=part, labels=fit.labels)
+    return fact("detect-part", part=part, labels=fit.labels, **_percent(fit.held_out))
+
+
+def not_judged(judged: DetectorScore) -> list[Fact]:
+    """Frames and labels that say nothing, or count as missed for a reason of their own."""
+    counts = {
+        "without-labels": judged.without_labels, "outside": judged.outside, "unusable": judged.unusable,
+    }  # fmt: skip
+    found = [fact(f"detect-{key}", n=n) for key, n in counts.items() if n]
+    if judged.absent:
+        first = ", ".join(printable(one) for one in judged.absent[:3])
+        found.append(fact("detect-absent", n=len(judged.absent), first=first))
+    return found
+
+
+def too_few_or_many(method: str, polarity: Polarity, found: int, usable: int, *, chosen: bool) -> list[Fact]:
+    """What may be wrong where nothing is found, or more than can be looked through.
+
+    Parameters
+    ----------
+    method, polarity
+        As they were asked for.
+    found, usable
+        Detections, and frames that could be used.
+    chosen
+        Whether thresholds were chosen for these images.
+
+    Returns
+    -------
+    list of Fact
+
+    Examples
+    --------
+    >>> too_few_or_many("warm", "unknown", 900, 30, chosen=True)
+    []
+    """
+    if usable and not found and method != "colour" and polarity != "black-hot":
+        return [fact("detect-nothing")]
+    if usable and found > MANY * usable and not chosen:
+        return [fact("detect-many", each=f"{found / usable:.0f}")]
+    return []
+
+
+def facts_of_frames(frames: Frames, detected: Detected) -> list[Fact]:
+    """What was found of the camera itself: its shutter, its pixels, its corners."""
+    kept = frames.kept
+    found = [fact("detect-note", note=f"{note[0].upper()}{note[1:]}") for note in kept.notes]
+    problems = detected.frames["problem"].fillna("").astype(str)
+    corrections = int(problems.str.contains("|".join(CORRECTIONS)).sum())
+    if corrections:
+        found.append(fact("detect-corrections", n=corrections, of=len(problems)))
+    if kept.dead is not None and kept.dead.any():
+        found.append(fact("detect-dead", n=int(kept.dead.sum())))
+    if kept.vignetting is not None:
+        v = kept.vignetting
+        key = "detect-corners-darker" if v.corner < 0 else "detect-corners-brighter"
+        found.append(fact(key, corner=f"{abs(v.corner):.3g}", sd=f"{v.sd:.2g}", images=v.images))
+    elif frames.even:
+        found.append(fact("detect-corners-unknown"))
+    return found
 
 
 @contextmanager

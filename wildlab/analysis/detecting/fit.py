@@ -344,38 +344,6 @@ def fit_part(
     return PartFit(part_of(every), len(every), share)
 
 
-def part_sentence(fit: PartFit, default: float) -> str:
-    """What was chosen, from how many labels, and what it holds of others.
-
-    Parameters
-    ----------
-    fit
-        Of a run.
-    default
-        What holds where nothing could be chosen.
-
-    Returns
-    -------
-    str
-    """
-    if not np.isfinite(fit.part):
-        return (
-            f"Ellipses keep the default part of {100 * default:.3g} % of the length: {fit.labels} labels "
-            "were found, and nine are the fewest that one can be chosen from."
-        )
-    start = (
-        f"So that 90 % ellipses hold the labels' middles, {100 * fit.part:.2g} % of the length is taken for "
-        f"what is not seen ({fit.labels} labels were found)"
-    )
-    if fit.held_out is None:
-        return f"{start}; what it holds of others is not known."
-    share = fit.held_out
-    return (
-        f"{start}; of labels that it was not chosen from they hold {100 * share.estimate:.0f} % "
-        f"({100 * share.low:.0f} to {100 * share.high:.0f})."
-    )
-
-
 #: What is tried of each threshold. Lengths in px and levels go up by about a half, as what they gain does.
 GRIDS: dict[str, dict[str, tuple[Any, ...]]] = {
     "contrast": {

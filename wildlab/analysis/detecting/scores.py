@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis import Fact, fact
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.evaluation.runs import Interval, share_interval
@@ -78,31 +79,6 @@ class DetectorScore:
         return found | {"frames_unusable": self.unusable, "labelled_frames_absent": len(self.absent)}
 
 
-def ellipse_sentence(share: Mapping[str, float]) -> str:
-    """Whether the stated ellipses of pixels can be believed.
-
-    Parameters
-    ----------
-    share
-        ``estimate``, ``low`` and ``high`` of what they hold.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> ellipse_sentence({"estimate": 0.6, "low": 0.5, "high": 0.7})
-    'The stated 90 % ellipses hold the middle of 60 % (50 to 70) of the labels found: they are too small.'
-    """
-    word = (
-        "they are too small" if share["high"] < ELLIPSE else "they are too large" if share["low"] > ELLIPSE
-        else "90 % is within that"
-    )  # fmt: skip
-    span = f"{100 * share['estimate']:.0f} % ({100 * share['low']:.0f} to {100 * share['high']:.0f})"
-    return f"The stated 90 % ellipses hold the middle of {span} of the labels found: {word}."
-
-
 def plain_rates(given: Rates) -> dict[str, Any]:
     """Rates for JSON, None in place of NaN.
 
@@ -148,47 +124,17 @@ def rate_words(one: Mapping[str, float | None] | None, sign: str = "") -> str:
     return f"{one['estimate']:{sign}.2f}{span}"
 
 
-def rates_sentence(rates: dict[str, Any]) -> str:
-    """Rates as a line that is printed.
-
-    Parameters
-    ----------
-    rates
-        From `plain_rates`.
-
-    Returns
-    -------
-    str
-    """
-
-    def shown(name: str) -> str:
-        return f"{name} {rate_words(rates[name]) or 'not defined'}"
-
-    counts = f"{rates['found']} found, {rates['invented']} invented, {rates['missed']} missed"
-    return f"{shown('f1')}, {shown('precision')}, {shown('recall')}; {counts}.".replace("f1", "F1")
+def left_out(labels: Labels) -> list[Fact]:
+    """What of a file of labels is not used."""
+    parts = [f"{count} x {reason}" for reason, count in labels.marked.left_out.items()]
+    return [fact("detect-left-out", parts="; ".join(parts))] if parts else []
 
 
-def labels_sentences(labels: Labels) -> list[str]:
-    """What of a file of labels is not used, and what it says that truth does not have.
-
-    Parameters
-    ----------
-    labels
-        The truth.
-
-    Returns
-    -------
-    list of str
-    """
-    said = [f"{count} x {reason}" for reason, count in labels.marked.left_out.items()]
-    found = [f"Left out of the labels: {'; '.join(said)}."] if said else []
-    scores = np.concatenate([np.zeros(0), *labels.scores.values()])
-    scores = scores[np.isfinite(scores)]
-    if len(scores):
-        found.append(
-            f"The labels have scores ({scores.min():.2g} to {scores.max():.2g}), and all are taken for true."
-        )
-    return found
+def rates_fact(key: str, given: Mapping[str, Any], **more: str) -> Fact:
+    """Rates from `plain_rates`, as a fact."""
+    shown = {name: rate_words(given[name]) or "not defined" for name in ("f1", "precision", "recall")}
+    counts = {name: str(given[name]) for name in ("found", "invented", "missed")}
+    return fact(key, **shown, **counts, **more)
 
 
 def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Labels) -> DetectorScore:
@@ -307,13 +253,13 @@ class Other:
     classes
         Which of its classes are taken.
     told
-        Sentences on what was made of its file.
+        Facts on what was made of its file.
     """
 
     name: str
     boxes: Labels
     classes: tuple[str, ...]
-    told: tuple[str, ...]
+    told: tuple[Fact, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,7 +279,7 @@ class Compared:
     beyond
         F1 of this detector minus that of the first one, with an interval over the same draws.
     told
-        Sentences on what is not judged.
+        Facts on what is not judged.
     """
 
     name: str
@@ -341,7 +287,7 @@ class Compared:
     curve: Curve | None
     lowest: float
     beyond: Interval
-    told: tuple[str, ...]
+    told: tuple[Fact, ...]
 
     def as_plain(self) -> dict[str, Any]:
         """Numbers for JSON, None in place of NaN.
@@ -431,11 +377,10 @@ def read_others(
         if own and not taken:
             there = ", ".join(printable(one) for one in known[:20]) or "none"
             raise WildlabError(f"has none of the classes {', '.join(own)}", f"there are {there}", file=path)
-        told = [f"{count} x {reason}" for reason, count in every.marked.left_out.items()]
-        told = [f"Left out: {'; '.join(told)}."] if told else []
+        told = left_out(every)
         if classes and not taken and known:
             some = ", ".join(printable(one) for one in known[:8])
-            told.append(f"All its classes are taken ({some}): none is called {', '.join(classes)}.")
+            told.append(fact("detect-all-classes", some=some, classes=", ".join(classes)))
         boxes = choose_classes(every.marked, path, taken) if taken else every
         found.append(Other(printable(name), boxes, taken, tuple(told)))
     return found
@@ -480,7 +425,7 @@ def compare_detectors(
     groups = [labels.group[known] for _, known, _, _ in judged]
     ours = boxes_by_frame(detections)
     empty = (NOTHING, np.zeros(0))
-    sets: list[tuple[str, list[Any], tuple[str, ...]]] = [
+    sets: list[tuple[str, list[Any], tuple[Fact, ...]]] = [
         (name, [ours.get(frame, empty) for frame, _, _, _ in judged], ())
     ]
     for other in others:
@@ -503,7 +448,7 @@ def compare_detectors(
 
 def _of_other(
     other: Other, judged: list[tuple[str, str, int, int]], relative: bool
-) -> tuple[list[tuple[Any, Any]], tuple[str, ...]]:
+) -> tuple[list[tuple[Any, Any]], tuple[Fact, ...]]:
     """Boxes and scores of each judged frame, and what is to be told of the others."""
     boxes, seen = [], set()
     without, sizeless = 0, 0
@@ -520,17 +465,14 @@ def _of_other(
             sizeless += len(own)
             own, scores = NOTHING, np.zeros(0)
         boxes.append((own, scores))
-    told = []
+    told = list[Fact]()
     beside = {name: len(own) for name, own in other.boxes.boxes.items() if name not in seen}
     if beside:
-        told.append(
-            f"Not judged: {sum(beside.values())} boxes on {len(beside)} images that are not among the "
-            f"{len(judged)} judged."
-        )
+        told.append(fact("detect-beside", boxes=sum(beside.values()), images=len(beside), judged=len(judged)))
     if without:
-        told.append(f"It says nothing of {without} of the {len(judged)} judged frames: nothing found there.")
+        told.append(fact("detect-silent", without=without, judged=len(judged)))
     if sizeless:
-        told.append(f"Not judged: {sizeless} boxes on images that could not be read.")
+        told.append(fact("detect-sizeless", boxes=sizeless))
     return boxes, tuple(told)
 
 
@@ -558,25 +500,13 @@ def curve_table(compared: Sequence[Compared]) -> pd.DataFrame:
     return table.astype({"found": int, "invented": int, "missed": int})
 
 
-def compared_sentences(one: Compared, first: Compared) -> list[str]:
-    """What came out for a detector, as lines that are printed.
-
-    Parameters
-    ----------
-    one
-        The detector.
-    first
-        Ours, whose rates are printed already.
-
-    Returns
-    -------
-    list of str
-    """
+def facts_of(one: Compared, first: Compared) -> list[Fact]:
+    """What came out for a detector beside ours, which is the first, whose rates are said already."""
     plain = one.as_plain()
     area, beyond = plain["average_precision"], plain["f1_beyond_ours"]
-    lines = [] if one is first else [f"{one.name}, all its boxes: {rates_sentence(plain)}"]
+    found = [] if one is first else [rates_fact("detect-other", plain, name=one.name)]
     if area is not None and area["estimate"] is not None and plain["lowest_score"] is not None:
-        lines.append(f"{one.name}, along the score: average precision {rate_words(area)}.")
+        found.append(fact("detect-average-precision", name=one.name, area=rate_words(area)))
     if one is not first and beyond["estimate"] is not None:
-        lines.append(f"{one.name}, F1 minus that of {first.name}: {rate_words(beyond, '+')}.")
-    return lines + [f"{one.name}: {line}" for line in one.told]
+        found.append(fact("detect-beyond", name=one.name, first=first.name, beyond=rate_words(beyond, "+")))
+    return found + [(key, values | {"name": one.name}) for key, values in one.told]

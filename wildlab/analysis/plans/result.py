@@ -1,7 +1,7 @@
 """What came out of a plan: numbers, and facts on what it rests on, what speaks against it, and what would
 help.
 
-A fact is a key of ``data/messages/en/plan.toml`` and the numbers that its text takes, as they are shown.
+The words of its facts are in ``data/messages/en/plan.toml``.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from wildlab.analysis import Fact, fact
 from wildlab.analysis.plans.coverage import EDGE, SHARP, Covered, gimbal_rate
 from wildlab.analysis.plans.plan import Plan
 from wildlab.analysis.plans.request import FURTHEST
@@ -20,8 +21,6 @@ from wildlab.analysis.plans.sorties import Sortie
 from wildlab.flight.files import printable
 from wildlab.flight.readers.area import Area
 
-#: A key, and texts for its placeholders.
-Fact = tuple[str, dict[str, str]]
 #: Pixels along an animal below which F 3.2's chain and people alike miss many.
 FEW_PIXELS = 5.0
 #: Share of the ground seen below which that is said before all else, and below which hardly anything is.
@@ -97,17 +96,6 @@ def _sortie(plan: Plan, one: Sortie) -> dict[str, Any]:
         "most_above_ground_m": round(one.way.most, 2),
         "steepest_m_s": round(one.steepest, 2),
     }
-
-
-def fact(key: str, **values: float | str) -> Fact:
-    """A fact; numbers as ``:g`` writes them.
-
-    Examples
-    --------
-    >>> fact("climb", speed=3.0)
-    ('climb', {'speed': '3'})
-    """
-    return key, {name: one if isinstance(one, str) else f"{one:g}" for name, one in values.items()}
 
 
 def summary(plan: Plan, seen: float, living: float, finds: float) -> list[Fact]:
