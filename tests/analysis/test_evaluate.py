@@ -1,5 +1,7 @@
 """From a flight to errors: what is put in comes out, by both scoring rules, with moving targets too."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,6 +12,7 @@ from wildlab.analysis.accuracy import calibrate_flight
 from wildlab.analysis.evaluate import (
     blocks_of,
     errors_of,
+    on_one_heading,
     recorded_answers,
     unlabelled_programs,
 )
@@ -17,6 +20,7 @@ from wildlab.analysis.georeference import observe, pose_errors
 from wildlab.analysis.pose_noise import estimate_noise, evaluate_with_estimated_noise
 from wildlab.flight.clocks import covariance_columns
 from wildlab.geometry.frames import (
+    euler_to_matrix,
     matrix_to_quaternion,
     quaternion_to_matrix,
     rotation_vector_to_matrix,
@@ -153,3 +157,12 @@ def test_errors_that_wander_widen_what_is_stated(make_flight):
     found = calibrate_flight(flight, rng, splits=1).calibration
     # Seven draws of one degree each: about 0.4 deg, where 420 images would claim 0.05.
     assert 0.2 < np.degrees(found.sd("roll")) < 0.8
+
+
+def test_a_line_flown_there_and_back_is_not_one_heading():
+    seen = observe(make_flight())
+    yaw = np.radians(30.0) + np.linspace(-0.2, 0.2, len(seen.uv))
+    there = replace(seen, poses=replace(seen.poses, R_nb=euler_to_matrix(0.1, 0.0, yaw)))
+    assert on_one_heading(there)
+    yaw[::2] += np.pi
+    assert not on_one_heading(replace(seen, poses=replace(seen.poses, R_nb=euler_to_matrix(0.1, 0.0, yaw))))

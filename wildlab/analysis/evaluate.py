@@ -15,7 +15,7 @@ from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate
 from wildlab.geometry.ellipses import inside_ellipse
-from wildlab.geometry.frames import Array, Indices, Mask
+from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_euler, wrap
 from wildlab.geometry.robust import student_scale
 
 
@@ -275,6 +275,29 @@ def _unit(vectors: Array, least: Array) -> Array:
 def _right(axis: Array) -> Array:
     """A quarter turn clockwise, seen from above (north, east)."""
     return np.column_stack([-axis[:, 1], axis[:, 0]])
+
+
+#: How far headings may lie from their mean, rad, for a flight on one heading: a turned camera and a shifted
+#: position then move all points alike.
+ONE_HEADING = np.radians(45.0)
+
+
+def on_one_heading(observations: Observations) -> bool:
+    """Whether all images were taken on one heading.
+
+    Parameters
+    ----------
+    observations
+        From `wildlab.analysis.georeference.observe`.
+
+    Returns
+    -------
+    bool
+    """
+    R = observations.poses.R_nb[np.isfinite(observations.poses.R_nb).all(axis=(1, 2))]
+    yaw = matrix_to_euler(R)[:, 2]
+    mean = np.angle(np.exp(1j * yaw).mean()) if len(yaw) else 0.0
+    return bool(len(yaw)) and bool(np.abs(wrap(yaw - mean)).max() <= ONE_HEADING)
 
 
 class NearestRule(NamedTuple):

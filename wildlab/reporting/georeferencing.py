@@ -15,7 +15,7 @@ import pandas as pd
 
 from wildlab.analysis.accuracy import Accuracy
 from wildlab.analysis.diagnose import CAUSES, Diagnosis
-from wildlab.analysis.evaluate import errors_of, score_points
+from wildlab.analysis.evaluate import errors_of, on_one_heading, score_points
 from wildlab.analysis.georeference import georeference, heights_left_in
 from wildlab.analysis.verdict import (
     FEW_POINTS,
@@ -356,6 +356,16 @@ def advice(found: Accuracy, *, calibrated_elsewhere: bool, problems: int = 0) ->
     return said[:MOST_ADVICE]
 
 
+def one_heading_hides(found: Accuracy) -> bool:
+    """Whether a tilted camera and a shifted position are not separated because all images have one
+    heading."""
+    d = found.diagnosis
+    if d is None or d.counts:
+        return False
+    causes = {*d.winner.causes, *d.inseparable}
+    return bool(causes & {"boresight", "position"}) and on_one_heading(found.observations)
+
+
 def limits(
     flight: Flight, found: Accuracy, truth: TruthKinds, programs: Sequence[str], source: str | None
 ) -> list[Message]:
@@ -366,6 +376,7 @@ def limits(
     timed = manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
     nearest = found.nearest
     conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
+        ("limit-heading", one_heading_hides(found), {}),
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": str(found.lost)}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),

@@ -187,7 +187,7 @@ def reason(found: Judged, counts: Mapping[str, int]) -> Message:
     if found.doubts:
         return Message("reason-doubts", {"reports": listed(list(found.doubts))})
     if counts["troubled"]:
-        return Message("reason-troubled", {"count": str(counts["troubled"])})
+        return Message("reason-troubled", {"what": listed(troubles_of(overview, found.possible))})
     if found.verdict == Verdict.UNJUDGED:
         return Message("reason-unjudged")
     return Message("reason-sound", {"count": str(found.judged)})
@@ -206,6 +206,14 @@ def limits(overview: Overview, lacking: Sequence[str]) -> list[Message]:
 # -- what is recorded
 
 
+def troubles_of(overview: Overview, possible: Gain | None) -> list[str]:
+    """What is wrong on a flight with a gain that is not known, by name."""
+    long = troubled_for(overview, WORTH)
+    paused = [one for one in overview.troubles if one.what == "no poses" and one not in long]
+    uncertain = [] if possible is None else ["a constant error that is not certain"]
+    return [*(one.what for one in (*long, *paused)), *uncertain]
+
+
 def counts_of(
     overview: Overview,
     gains: Sequence[Gain],
@@ -214,12 +222,10 @@ def counts_of(
     possible: Gain | None,
 ) -> dict[str, int]:
     """What is counted on the flight beside the verdicts of its reports, and recorded."""
-    long = troubled_for(overview, WORTH)
-    paused = [one for one in overview.troubles if one.what == "no poses" and one not in long]
     return {
         "problems": problems,
         "worth": sum(gain.share >= WORTH for gain in gains),
-        "troubled": len(long) + len(paused) + (possible is not None),
+        "troubled": len(troubles_of(overview, possible)),
         "judged": judged,
         "broken": sum(one.broken for one in overview.alarms),
         "alarmed": sum(not one.broken for one in overview.alarms),
