@@ -48,7 +48,7 @@ def learn(monkeypatch, **found):
     """Have the command find this, and write nothing."""
     learnt = SimpleNamespace(gain=None, parameter=())
     both = learnt, SimpleNamespace(**found)
-    monkeypatch.setattr("wildlab.analysis.learn.learn_flight", lambda *_: both)
+    monkeypatch.setattr("wildlab.analysis.accuracy.learn_flight", lambda *_: both)
     monkeypatch.setattr("wildlab.flight.calibration_files.write_learnt", lambda *_: None)
 
 
@@ -61,16 +61,6 @@ def test_causes_that_are_inseparable_are_named(folder, tmp_path, monkeypatch):
         learn(monkeypatch, winner=winner, rivals=rivals, models=[winner, *rivals])
         out = succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
         assert ("boresight" in out) == bool(rivals)
-
-
-@pytest.mark.parametrize("low", [0.1, -0.1])
-def test_nothing_is_not_said_to_gain_nothing_where_something_does(folder, tmp_path, monkeypatch, low):
-    """Nothing may be as likely as the best while some model gains for certain."""
-    model = SimpleNamespace(causes=("height",), gain=SimpleNamespace(counts=low > 0))
-    nothing = SimpleNamespace(causes=(), gain=SimpleNamespace(gain=Interval(0.0, 0.0, 0.0)))
-    learn(monkeypatch, models=[model], winner=nothing, rivals=())
-    out = succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
-    assert ("for certain" in out) == (low < 0)
 
 
 def test_logs_that_contradict_each_other_teach_nothing(folder, tmp_path):

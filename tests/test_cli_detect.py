@@ -227,6 +227,6 @@ def test_what_the_camera_does_is_seen(capsys, tmp_path):
         cv2.imwrite(str(path / f"{number:02d}.png"), image.astype(np.uint16))
     code, out, err = call(capsys, "detect", path, "--out", tmp_path / "out", "--even")
     assert code == 0 and "05.png" in err and "11 frames of 12" in out
-    assert "1 pixel" in out and "darker" in out
+    assert "masked: 1" in out and "darker" in out
     out = succeed("detect", path / "00.png", "--out", tmp_path / "one", "--even")
     assert "darker" not in out

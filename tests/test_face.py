@@ -18,8 +18,8 @@ from scipy.stats import chi2
 import wildlab
 from tests.rooms import LAZY
 from wildlab import paths
-from wildlab.analysis.navigate import PUBLISHED_LIKE
-from wildlab.analysis.navigation_errors import (
+from wildlab.analysis.navigate import (
+    PUBLISHED_LIKE,
     NavigationErrors,
     Series,
     mean_of_runs,

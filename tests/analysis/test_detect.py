@@ -25,9 +25,8 @@ from wildlab.analysis.detecting.detect import (
 from wildlab.analysis.detecting.fit import fit_shapes, fit_thresholds
 from wildlab.analysis.detecting.scores import judge_detections
 from wildlab.detection.colour import Colour
-from wildlab.detection.contrast import Contrast
+from wildlab.detection.contrast import Contrast, Shape, fit_shape
 from wildlab.detection.floating import FloatingThresholds
-from wildlab.detection.shape import Shape, fit_shape
 from wildlab.evaluation.runs import Interval
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels

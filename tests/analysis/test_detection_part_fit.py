@@ -12,9 +12,8 @@ from wildlab.analysis.detecting.fit import (
     parts_needed,
     with_part,
 )
-from wildlab.detection.contrast import Contrast
+from wildlab.detection.contrast import Contrast, Shape
 from wildlab.detection.floating import FloatingThresholds
-from wildlab.detection.shape import Shape
 from wildlab.flight.readers.frames import Frame
 
 

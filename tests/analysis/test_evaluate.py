@@ -159,7 +159,7 @@ def test_errors_that_wander_widen_what_is_stated(make_flight):
     assert 0.2 < np.degrees(found.sd("roll")) < 0.8
 
 
-def test_a_line_flown_there_and_back_is_not_one_heading():
+def test_a_line_flown_there_and_back_is_not_one_heading(make_flight):
     seen = observe(make_flight())
     yaw = np.radians(30.0) + np.linspace(-0.2, 0.2, len(seen.uv))
     there = replace(seen, poses=replace(seen.poses, R_nb=euler_to_matrix(0.1, 0.0, yaw)))

@@ -7,6 +7,7 @@ import json
 import math
 import sqlite3
 import struct
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -88,12 +89,12 @@ def test_the_file_is_what_the_standard_asks_for(made):
                 assert envelope == pytest.approx([left, right, low, high])
 
 
-def test_pyproj_reads_its_reference_system():
+def test_pyproj_reads_its_reference_system(made):
     from pyproj import CRS
 
-    from wildlab.analysis.ground import _DEFINITION
-
-    assert CRS.from_wkt(_DEFINITION).to_epsg() == 4326
+    with closing(sqlite3.connect(made[2])) as base:
+        [(definition,)] = base.execute("SELECT definition FROM gpkg_spatial_ref_sys WHERE srs_id = 4326")
+    assert CRS.from_wkt(definition).to_epsg() == 4326
 
 
 def test_points_lie_where_they_are_and_say_what_they_come_from(made):

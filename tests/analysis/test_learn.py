@@ -8,9 +8,9 @@ import pytest
 from tests.analysis.conftest import changed, score
 from tests.analysis.survey_twin import Survey, simulate
 from tests.refused import refused
+from wildlab.analysis.accuracy import apply_learnt, corrected_flight, learn_flight
 from wildlab.analysis.diagnose import diagnose
 from wildlab.analysis.georeference import georeference, observe
-from wildlab.analysis.learn import apply_learnt, corrected_flight, learn_flight
 from wildlab.flight.calibration_files import (
     LearntParameter,
     learnt_toml,
@@ -85,7 +85,7 @@ def test_only_another_height_than_that_of_the_calibration_is_said():
         for low, high in ((factor * height.min(), 1e3), (1.0, height.max() / factor)):
             near = learnt().conditions.model_copy(update={"height_m": (low, high)})
             other = learnt().model_copy(update={"conditions": near})
-            assert ("another height" in apply_learnt(logged, other).sentence) == other_height
+            assert ("applied-height" in dict(apply_learnt(logged, other).facts)) == other_height
 
 
 def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
@@ -98,15 +98,15 @@ def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
     assert score(flight, logged)["error_m"].mean() > 10.0
     assert after["error_m"].mean() <= 1.1 * untouched["error_m"].mean()
     assert 0.83 < after["inside_90"].mean() < 0.97
-    assert "this very flight" not in applied.sentence
+    assert "applied-here" not in dict(applied.facts)
 
 
 def test_on_the_very_flight_it_was_learnt_on_that_is_said():
     # By its clicks and poses, whatever its name is.
     renamed = named(tuesday(), "friday")
-    assert "this very flight" in apply_learnt(observe(renamed), learnt()).sentence
+    assert "applied-here" in dict(apply_learnt(observe(renamed), learnt()).facts)
     other = named(tuesday(seed=5), "tuesday")
-    assert "this very flight" not in apply_learnt(observe(other), learnt()).sentence
+    assert "applied-here" not in dict(apply_learnt(observe(other), learnt()).facts)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wildlab.analysis.navigate import Navigated, likelihoods_of_latency, navigate_mekf
-from wildlab.analysis.navigation_errors import corrections, navigate_all
+from wildlab.analysis.navigate import (
+    Navigated,
+    corrections,
+    likelihoods_of_latency,
+    navigate_all,
+    navigate_mekf,
+)
 from wildlab.flight.clocks import covariances, poses_at
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight

@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.analysis.navigate import navigate_mekf
-from wildlab.analysis.navigation_errors import errors_against
+from wildlab.analysis.navigate import errors_against, navigate_mekf
 from wildlab.flight.store import Flight
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import twin_manifest

@@ -9,11 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from tests.analysis.conftest import first_seconds
 from tests.refused import refused
-from wildlab.analysis.navigate import PUBLISHED_LIKE, navigate_mekf
-from wildlab.analysis.navigation_errors import (
+from wildlab.analysis.navigate import (
     AXES,
+    PUBLISHED_LIKE,
     comparison_times,
     errors_against,
+    navigate_mekf,
     normalised_innovations,
     numbers_of,
     reference_of,

@@ -9,10 +9,10 @@ import pytest
 
 from tests.analysis.conftest import changed, first_seconds
 from tests.refused import refused
-from wildlab.analysis.navigate import navigate_mekf
-from wildlab.analysis.navigation_errors import (
+from wildlab.analysis.navigate import (
     REFERENCES,
     flown_part,
+    navigate_mekf,
     numbers_of,
     study_navigation,
 )

@@ -21,9 +21,9 @@ from wildlab.analysis.search import (
     survey,
 )
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.high_level import SEARCH
 from wildlab.planning.information import SearchSensor
 from wildlab.planning.legs import Flying, Leg, Platform, look_attitude
+from wildlab.planning.planner import SEARCH
 
 SENSOR = SearchSensor(0.3, 0.2, sd=0.2, reach=100.0, nearest=5.0)
 FLYING = Flying(5.0, 50.0)

@@ -8,8 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.refused import refused
-from wildlab.analysis.navigate import PUBLISHED_LIKE, navigate_mekf
-from wildlab.analysis.navigation_errors import NavigationErrors, errors_against
+from wildlab.analysis.navigate import PUBLISHED_LIKE, NavigationErrors, errors_against, navigate_mekf
 from wildlab.analysis.pose_noise import (
     PAUSE_S,
     TURNING,

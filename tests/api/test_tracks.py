@@ -12,8 +12,7 @@ import pytest
 import wildlab
 from tests.analysis.robots import KNOWN, joined, robot_flight
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
-from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated
-from wildlab.analysis.navigation_errors import Series, comparison_times, mean_of_runs
+from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated, Series, comparison_times, mean_of_runs
 from wildlab.analysis.tracks import tracker
 from wildlab.analysis.tracks.judged import STATE, estimates_table, judged
 from wildlab.analysis.tracks.sighting import (

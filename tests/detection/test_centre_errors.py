@@ -13,8 +13,8 @@ from wildlab.detection.centres import (
 )
 from wildlab.detection.floating import find_objects
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.ellipses import inside_ellipse
-from wildlab.simulation.clipped_outlines import moments
+from wildlab.geometry.covariances import inside_ellipse
+from wildlab.simulation.camera_detections import moments
 from wildlab.simulation.scene import CameraResponse, expose, render, sensor_of
 from wildlab.simulation.scene.drawn import Draw, draw_scene
 

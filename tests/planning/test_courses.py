@@ -81,7 +81,7 @@ def test_what_cannot_stop_flies_every_row_and_turns_between_no_tighter_than_it_c
 @pytest.mark.parametrize(
     ("points", "arguments", "problem"),
     [
-        (2, {"speed": 0.0}, "speed of 0"),
+        (2, {"speed": 0.0}, "speed: 0.0"),
         (2, {"speed": 5.0, "wind": [4.0, 3.0]}, "wind of 5"),
         (2, {"speed": 5.0, "turn_radius": -1.0}, "-1.0"),
         (2, {"speed": 5.0, "turn_time": -1.0}, "-1.0"),

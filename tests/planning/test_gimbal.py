@@ -124,9 +124,9 @@ def test_the_rate_brings_the_swing_round_while_the_image_passes():
     ("call", "problem"),
     [
         (lambda: swing([0.0], -1.0, 1.0), "-1.0 rad"),
-        (lambda: swing([0.0], 1.0, 0.0), "0.0 rad/s"),
+        (lambda: swing([0.0], 1.0, 0.0), "rate"),
         (lambda: adapt_roll([0.0], np.ones((1, 1), bool), [0.0], (1.0, 0.5), 1.0), "limits"),
-        (lambda: adapt_roll([0.0], np.ones((1, 1), bool), [0.0], (0.5, 1.0), 0.0), "rate of 0.0"),
+        (lambda: adapt_roll([0.0], np.ones((1, 1), bool), [0.0], (0.5, 1.0), 0.0), "rate"),
         (lambda: swing_rate(0.5, 0.0, 1.0), "0.0"),
         (lambda: swing_rate(0.5, 1.0, 1.0, 1.0), "overlap"),
         (lambda: blur(CAMERA, ALONE, [0.0], 1, 1), "1 instant"),
@@ -135,4 +135,4 @@ def test_the_rate_brings_the_swing_round_while_the_image_passes():
 def test_wrong_use_is_refused(call, problem):
     with pytest.raises(WildlabError) as caught:
         call()  # type: ignore[operator]
-    assert problem in caught.value.problem
+    assert problem in str(caught.value)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.refused import refused
-from wildlab.planning.high_level import (
+from wildlab.planning.planner import (
     SEARCH,
     all_positioned,
     best_goal,

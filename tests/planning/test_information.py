@@ -135,7 +135,7 @@ def test_the_trace_of_the_inverse_keeps_its_digits_where_directions_differ_a_lot
 @pytest.mark.parametrize("name", ["half_width", "half_height", "sd", "reach", "nearest"])
 def test_a_sensor_without_size_is_refused(name):
     good = {"half_width": 0.3, "half_height": 0.2, "sd": 0.02, "reach": 100.0, "nearest": 1.0}
-    with refused(f"{name} is 0.0"):
+    with refused("above zero", field=name):
         SearchSensor(**(good | {name: 0.0}))
 
 

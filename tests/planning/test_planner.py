@@ -17,7 +17,7 @@ from wildlab.planning.information import (
     initial_information,
     trace_of_inverse,
 )
-from wildlab.planning.information_kernels import gains_of_steps, worth_beyond
+from wildlab.planning.kernels import gains_of_steps, worth_beyond
 from wildlab.planning.legs import (
     Flying,
     Leg,

@@ -155,9 +155,11 @@ def limits_with(offset=0.0, kind="logged", truth=EXACT, certain=False, halves=Fa
         vertical=SimpleNamespace(correction_m=0.0),
     )  # fmt: skip
     flight = SimpleNamespace(manifest=manifest, pose_source=lambda _: ("nav", []))
+    winner = SimpleNamespace(causes=())
     found = SimpleNamespace(
-        diagnosis=SimpleNamespace(counts=certain), nearest=None, lost=lost, scored=range(100),
-        halves=SimpleNamespace(disagree=halves),
+        diagnosis=SimpleNamespace(counts=certain, winner=winner, inseparable=(), extended=False),
+        nearest=None,
+        lost=lost, scored=range(100), halves=SimpleNamespace(disagree=halves),
     )  # fmt: skip
     return {one.key: dict(one.values) for one in georeferencing.limits(flight, found, truth, [], None)}
 

@@ -12,7 +12,7 @@ import pytest
 
 from wildlab.analysis.overview import Alarm, Issue
 from wildlab.analysis.verdict import Gain, Verdict
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import overview as page
 from wildlab.reporting.overview import Judged
 

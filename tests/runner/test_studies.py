@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from tests.page_words import MOST_IN_ANSWER, MOST_WORDS, words_in_sight
-from wildlab.analysis.navigation_errors import TUNINGS
+from wildlab.analysis.navigate import TUNINGS
 from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import white_bound
 from wildlab.flight.recipe.importing import import_flight

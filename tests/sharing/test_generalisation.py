@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.sharing.canary import EPOCH, HASH, HERE, START, canary, place, velocity
 from wildlab.analysis.georeference import observe
-from wildlab.analysis.navigation_errors import REFERENCES, reference_of
+from wildlab.analysis.navigate import REFERENCES, reference_of
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import PREFERRED, Flight, save_flight

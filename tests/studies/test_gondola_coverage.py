@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.plans.execution import as_planned
+from wildlab.analysis.plans.coverage import as_planned
 from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.parameters import load_twin

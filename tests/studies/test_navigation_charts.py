@@ -13,7 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.flight.conftest import make_flight  # noqa: F401 - a fixture
-from wildlab.analysis.navigation_errors import Studied
+from wildlab.analysis.navigate import Studied
 from wildlab.flight.store import Flight
 from wildlab.reporting.charts.navigation import mark_period, speed_chart
 from wildlab.studies import navigation

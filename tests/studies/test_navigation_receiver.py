@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.analysis.navigation_errors import NavigationErrors
+from wildlab.analysis.navigate import NavigationErrors
 from wildlab.analysis.navigation_inputs import Placement, Receiver
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise
 from wildlab.studies.navigation import logged as noise

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from wildlab.analysis.verdict import Verdict
-from wildlab.messages.page_texts import load_texts
+from wildlab.messages.catalogue import load_texts
 from wildlab.studies.navigation import attitude_of, level_of, verdict_of_attitude
 
 #: Errors of 1.3 degrees, all axes together, where 2.6 are predicted.

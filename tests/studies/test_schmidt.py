@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wildlab.analysis.navigation_errors import SETTLING_S, errors_against
+from wildlab.analysis.navigate import SETTLING_S, errors_against
 from wildlab.analysis.pose_noise import covariance_of, pauses
 from wildlab.analysis.tracks.sighting import Sighting, follow_schmidt
 from wildlab.errors import WildlabError

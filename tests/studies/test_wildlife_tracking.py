@@ -18,7 +18,7 @@ from wildlab.analysis.animals.tracking import (
 )
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
-from wildlab.planning.high_level import SEARCH
+from wildlab.planning.planner import SEARCH
 from wildlab.studies.wildlife_tracking import check_claims
 from wildlab.studies.wildlife_tracking.trial import (
     FILTERS,

@@ -18,7 +18,6 @@ from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.frames.image import file_name, read_image
 from wildlab.geometry.board_views import parameters_of
-from wildlab.geometry.directions import direction_sd
 from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.intrinsics import (
     FEWEST,
@@ -445,11 +444,11 @@ def _covered(found: CameraCalibration) -> Fact:
 def _directions(found: CameraCalibration) -> Fact:
     """How well directions are known in the middle and at the worst corner."""
     w, h = found.width, found.height
-    places = {
-        "the middle": (w / 2, h / 2), "the upper left corner": (0.0, 0.0),
-        "the upper right corner": (w - 1.0, 0.0), "the lower left corner": (0.0, h - 1.0),
-        "the lower right corner": (w - 1.0, h - 1.0),
-    }  # fmt: skip
+    places = {"the middle": (w / 2, h / 2)} | {
+        f"the {row} {column} corner": (u, v)
+        for row, v in (("upper", 0.0), ("lower", h - 1.0))
+        for column, u in (("left", 0.0), ("right", w - 1.0))
+    }
     sd = dict(zip(places, direction_sd(found.found, np.array(list(places.values()))), strict=True))
     if blind := [name for name, one in sd.items() if not np.isfinite(one)]:
         return fact("camera-folds", places=" and ".join(blind))

@@ -31,8 +31,6 @@ from wildlab.geometry.camera_clock import (
     clock_by_points,
 )
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.clock_by_motion import FEWEST, ClockByMotion, clock_by_motion
-from wildlab.geometry.clock_by_points import ClockByPoints, clock_by_points
 from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_rotation_vector
 
 #: Images further apart in time (s) are not compared: between them the camera may have turned to and fro.

@@ -14,7 +14,7 @@ from wildlab.evaluation.blocks import time_blocks
 from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_euler, wrap
 from wildlab.geometry.robust import student_scale
 

@@ -15,7 +15,7 @@ from wildlab.geometry.attitude_uncertainty import pose_covariance
 from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Mask
-from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.georeference import RAY_STATUS, georeference_pixels
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
 from wildlab.geometry.terrain_uncertainty import terrain_covariance
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance

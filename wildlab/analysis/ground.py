@@ -32,6 +32,7 @@ from wildlab.geometry.covariances import ellipse_axes
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.terrain import Terrain
+from wildlab.paths import DATA
 
 
 class Shift(NamedTuple):
@@ -289,53 +290,11 @@ def _geojson(flight: Flight, table: pd.DataFrame) -> dict[str, object]:
     return {"type": "FeatureCollection", "features": features}
 
 
-#: "GPKG", and the version 1.3.0.
-APPLICATION_ID, USER_VERSION = 0x47504B47, 10300
+#: What every GeoPackage holds.
+SCHEMA = DATA / "geopackage.sql"
 WGS84 = 4326
 #: Well-known binary of points with z, and of polygons without.
 POINT_Z, POLYGON = 1001, 3
-
-_DEFINITION = (
-    'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],'
-    'AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],UNIT["degree",'
-    '0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]'
-)
-_SCHEMA = """
-CREATE TABLE gpkg_spatial_ref_sys (
-  srs_name TEXT NOT NULL, srs_id INTEGER NOT NULL PRIMARY KEY, organization TEXT NOT NULL,
-  organization_coordsys_id INTEGER NOT NULL, definition TEXT NOT NULL, description TEXT);
-CREATE TABLE gpkg_contents (
-  table_name TEXT NOT NULL PRIMARY KEY, data_type TEXT NOT NULL, identifier TEXT UNIQUE,
-  description TEXT DEFAULT '', last_change DATETIME NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now')),
-  min_x DOUBLE, min_y DOUBLE, max_x DOUBLE, max_y DOUBLE, srs_id INTEGER,
-  CONSTRAINT fk_gc_r_srs_id FOREIGN KEY (srs_id) REFERENCES gpkg_spatial_ref_sys(srs_id));
-CREATE TABLE gpkg_geometry_columns (
-  table_name TEXT NOT NULL, column_name TEXT NOT NULL, geometry_type_name TEXT NOT NULL,
-  srs_id INTEGER NOT NULL, z TINYINT NOT NULL, m TINYINT NOT NULL,
-  CONSTRAINT pk_geom_cols PRIMARY KEY (table_name, column_name),
-  CONSTRAINT uk_gc_table_name UNIQUE (table_name),
-  CONSTRAINT fk_gc_tn FOREIGN KEY (table_name) REFERENCES gpkg_contents(table_name),
-  CONSTRAINT fk_gc_srs FOREIGN KEY (srs_id) REFERENCES gpkg_spatial_ref_sys (srs_id));
-"""
-_SYSTEMS = (
-    (
-        "Undefined cartesian SRS",
-        -1,
-        "NONE",
-        -1,
-        "undefined",
-        "undefined cartesian coordinate reference system",
-    ),
-    (
-        "Undefined geographic SRS",
-        0,
-        "NONE",
-        0,
-        "undefined",
-        "undefined geographic coordinate reference system",
-    ),
-    ("WGS 84 geodetic", WGS84, "EPSG", WGS84, _DEFINITION, "longitude and latitude in degrees on WGS 84"),
-)
 
 
 class Layer(NamedTuple):
@@ -402,10 +361,7 @@ def write_geopackage(path: Path, layers: Sequence[Layer]) -> None:
 
 
 def _fill(base: sqlite3.Connection, layers: Sequence[Layer]) -> None:
-    base.executescript(_SCHEMA)
-    base.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-    base.execute(f"PRAGMA user_version = {USER_VERSION}")
-    base.executemany("INSERT INTO gpkg_spatial_ref_sys VALUES (?, ?, ?, ?, ?, ?)", _SYSTEMS)
+    base.executescript(SCHEMA.read_text(encoding="utf-8"))
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S.000Z")
     for layer in layers:
         columns = "".join(f", {_quoted(name)} {kind}" for name, (kind, _) in layer.columns.items())

@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from wildlab.analysis.navigation_inputs import (
     POSITION,
     VELOCITY,
+    Receiver,
     axis_errors,
+    filter_of,
     heading_from,
     headings_of,
     imu_noise,
     inputs_of,
+    receiver_noise,
     second_vector,
     told,
     without_gross,
 )
-from wildlab.flight.clocks import covariance_columns, frame_times
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import Average, average, chi_square_interval, nees, share_inside
+from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound
+from wildlab.flight.checks.inertial import FLYING
+from wildlab.flight.clocks import covariance_columns, covariances, frame_times, gnss_times, poses_at
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
-from wildlab.geometry.gravity import local_earth
-from wildlab.navigation.mekf import log_likelihood, pose_covariance, run_mekf, signs_of_trouble
+from wildlab.navigation.mekf import log_likelihood, pose_covariance, signs_of_trouble
 from wildlab.navigation.observer import Gains, run_observer
 from wildlab.navigation.receiver import ReceiverNoise
 
@@ -163,17 +172,9 @@ def navigate_mekf(
         given = given._replace(aiding=told(without_gross(flight, given), receiver))
     if magnetometer:
         given.aiding["heading"] = headings_of(flight)
-    latitude, _, height = flight.manifest.origin_tuple()
-    found = run_mekf(
-        given.imu,
-        given.start,
-        noise,
-        local_earth(latitude, height),
-        list(given.aiding.values()),
-        _wanted(flight, times),
-        axes=axes,
-        gate_probability=GATE if receiver is None else 1.0,
-    )
+    filtered = filter_of(flight, given)._replace(noise=noise, axes=axes)
+    gate = GATE if receiver is None else 1.0
+    found = filtered.run(given.aiding, _wanted(flight, times), gate)
     nav = _nav_table(found.times, found.position, found.velocity, found.quaternion)
     nav = nav.join(covariance_columns(pose_covariance(found.covariance)))
     bias = np.hstack([found.accelerometer_bias, found.gyro_bias])
@@ -254,15 +255,11 @@ def likelihoods_of_latency(flight: Flight, latencies: ArrayLike) -> Array:
     WildlabError
         As `navigate_mekf`.
     """
-    noise, axes = imu_noise(flight), axis_errors(flight)
-    latitude, _, height = flight.manifest.origin_tuple()
-    found = []
+    noise, found = imu_noise(flight), []
     for latency in np.atleast_1d(np.asarray(latencies, float)):
         late = replace_in_manifest(flight.manifest, {"gnss": {"latency_s": float(latency)}})
-        given = inputs_of(Flight(late, flight.nav, flight.tables, flight.folder, flight.terrain), noise=noise)
-        end = given.imu.times[-1:]
-        earth = local_earth(latitude, height)
-        run = run_mekf(given.imu, given.start, noise, earth, list(given.aiding.values()), end, axes=axes)
+        given = inputs_of(replace(flight, manifest=late), noise=noise)
+        run = filter_of(flight, given).run(given.aiding, given.imu.times[-1:], 0.9999)
         with np.errstate(invalid="ignore"):  # under some, the filter is lost altogether
             likelihood = log_likelihood(run.innovations)
         found.append(likelihood if np.isfinite(likelihood) else -np.inf)
@@ -289,3 +286,439 @@ def _known(found: Navigated) -> Navigated:
         biases=found.biases[rows].reset_index(drop=True),
         velocity_covariance=None if P is None else P[rows],
     )
+
+
+#: What a flight's navigation may be compared with, best first. Only the first is the truth.
+REFERENCES = ("truth-payload", "onboard", "autopilot")
+#: Poses a second that are compared: errors of attitude and position wander over seconds.
+RATE_HZ = 5.0
+#: Until the filters have forgotten their start, s.
+SETTLING_S = 60.0
+#: What calibrated accelerometers are off by at switching on, m/s^2: it leans an attitude by half a degree.
+CALIBRATED = 0.1
+AXES = ("roll", "pitch", "yaw")
+PLACES = ("north", "east", "down")
+#: Blocks of an error: columns of `NavigationErrors.error`, and what they are called.
+BLOCKS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6, 9)}
+#: The filter with the tunings that are compared with print, by the subject of their numbers.
+TUNINGS = {
+    "mekf-published-like": PUBLISHED_LIKE,
+    "mekf-published-like-turning": PUBLISHED_LIKE_TURNING,
+    "mekf-published-like-long": PUBLISHED_LIKE_LONG,
+}
+
+
+class NavigationErrors(NamedTuple):
+    """Errors (K, 9) at K times: position (m) and velocity (m/s) in n, attitude (rad) in b; see the module.
+
+    ``sd`` (K, 9) is what the estimate states of them and ``nees`` has (K,) for each block, not divided by its
+    three degrees of freedom; both NaN where nothing is stated.
+    """
+
+    times: Array
+    error: Array
+    sd: Array
+    nees: dict[str, Array]
+
+
+class Studied(NamedTuple):
+    """A flight, navigated and scored at certain times (K,) against one of its nav sources.
+
+    ``receiver`` is how the receiver of a logged flight errs, or None where ``refusal`` says why not. What is
+    judged first is ``mekf``, with what is stated of the sensors: ``mekf-receiver``, where there is one, has a
+    noise that was found on the flight itself.
+    """
+
+    flight: Flight
+    reference: str
+    times: Array
+    found: dict[str, Navigated]
+    scored: dict[str, NavigationErrors]
+    receiver: Receiver | None = None
+    refusal: str = ""
+
+
+def reference_of(flight: Flight) -> str:
+    """The nav source to compare with, by `REFERENCES`.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has none of them.
+    """
+    for name in REFERENCES:
+        if name in flight.nav:
+            return name
+    raise WildlabError(
+        "the flight has no pose to compare with",
+        f"give it a nav table named {' or '.join(REFERENCES)}",
+        file=flight.folder,
+        field="nav",
+    )
+
+
+def comparison_times(flight: Flight, reference: str) -> Array:
+    """Stamps (K,) of the reference, thinned to `RATE_HZ`, within the inertial samples."""
+    stamps = flight.nav[reference]["time_s"].to_numpy(float)
+    felt = flight.table("imu")["time_s"].to_numpy(float)
+    every = max(1, round(1 / (RATE_HZ * float(np.median(np.diff(stamps))))))
+    return np.asarray(stamps[(stamps >= felt[0]) & (stamps <= felt[-1])][::every])
+
+
+def flown_part(flight: Flight, times: ArrayLike) -> tuple[str, float, float]:
+    """The part of a flight to judge where nobody names one: what to call it, and from when to when, s.
+
+    In the air, where the receiver's speeds tell; else from a minute after the first of ``times`` on.
+    """
+    t, gnss = np.asarray(times, float), flight.table("gnss")
+    if set(VELOCITY) <= set(gnss.columns):
+        speed = np.hypot(*gnss[["v_north_m_s", "v_east_m_s"]].to_numpy(float).T)
+        fast = gnss_times(flight)[speed >= FLYING]
+        if len(fast):
+            return "in the air", float(max(fast[0], t[0])), float(min(fast[-1], t[-1]))
+    return "after the first minute", float(t[0]) + SETTLING_S, float(t[-1])
+
+
+def errors_against(
+    reference: pd.DataFrame,
+    nav: pd.DataFrame,
+    times: ArrayLike,
+    velocity_covariance: Array | None = None,
+) -> NavigationErrors:
+    """Errors of one nav table against another at given times (K,).
+
+    Parameters
+    ----------
+    reference
+        A nav table; without velocities, there are no errors of velocity.
+    nav
+        The estimate.
+    times
+        (K,) s.
+    velocity_covariance
+        (M, 3, 3) of its rows, which tables of poses have no place for.
+
+    Returns
+    -------
+    Errors
+        Reference minus estimate.
+    """
+    t = np.asarray(times, float)
+    p_true, R_true, _ = poses_at(reference, t)
+    p, R, _ = poses_at(nav, t)
+    error = np.full((len(t), 9), np.nan)
+    known = np.isfinite(p[:, 0]) & np.isfinite(p_true[:, 0])
+    error[:, :3] = p_true - p
+    error[:, 3:6] = _velocities(reference, t) - _velocities(nav, t)
+    turn = Rotation.from_matrix(np.swapaxes(R[known], 1, 2) @ R_true[known])
+    error[known, 6:] = 4 * turn.as_mrp()
+    P = np.full((len(t), 9, 9), np.nan)
+    poses = covariances(nav)
+    rows = np.clip(np.searchsorted(nav["time_s"], t), 0, len(nav) - 1)
+    at = np.abs(nav["time_s"].to_numpy(float)[rows] - t) < 1e-6  # a covariance is not interpolated
+    if poses is not None:
+        pose = np.ix_([0, 1, 2, 6, 7, 8], [0, 1, 2, 6, 7, 8])
+        for k in np.flatnonzero(at & known):
+            P[k][pose] = poses[rows[k]]
+    if velocity_covariance is not None:
+        P[at, 3:6, 3:6] = velocity_covariance[rows[at]]
+    blocks = {name: nees(error[:, part], P[:, part, part]) for name, part in BLOCKS.items()}
+    return NavigationErrors(t, error, np.sqrt(np.diagonal(P, axis1=1, axis2=2)), blocks)
+
+
+def _velocities(nav: pd.DataFrame, times: Array) -> Array:
+    if not set(VELOCITY) <= set(nav):
+        return np.full((len(times), 3), np.nan)
+    stamps = nav["time_s"].to_numpy(float)
+    return np.stack(
+        [np.interp(times, stamps, nav[name], left=np.nan, right=np.nan) for name in VELOCITY], axis=-1
+    )
+
+
+def summarise(errors: NavigationErrors, begin: float = -np.inf, end: float = np.inf) -> dict[str, float]:
+    """Numbers of a part of a flight, by the names under which they are recorded.
+
+    ``rms_...`` and ``mean_sd_...`` of position (m) and attitude (degrees) about each axis, ``rms_velocity``
+    (m/s, of all three), ``nees_...`` of each block (ideally 3).
+    """
+    part = (errors.times >= begin) & (errors.times < end)
+    e, sd = errors.error[part], errors.sd[part]
+    result: dict[str, float] = {}
+    for prefix, values in (("rms", _rms(e)), ("mean_sd", _mean(sd))):
+        result |= {f"{prefix}_{name}": float(values[i]) for i, name in enumerate(PLACES)}
+        result |= {f"{prefix}_{name}": float(np.degrees(values[6 + i])) for i, name in enumerate(AXES)}
+    result["rms_velocity"] = float(np.sqrt((_rms(e)[3:6] ** 2).sum()))
+    result |= {f"nees_{name}": float(_mean(values[part])) for name, values in errors.nees.items()}
+    return result
+
+
+def _mean(values: Array) -> Array:
+    known = np.isfinite(values)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    count = known.sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _rms(values: Array) -> Array:
+    return np.sqrt(_mean(values**2))
+
+
+def summarise_innovations(found: Navigated, begin: float = -np.inf, end: float = np.inf) -> pd.DataFrame:
+    """NIS and whiteness of each source's innovations between two times (s), one row for each source.
+
+    Columns: ``source``, ``n``, ``nis`` (mean, ideally ``dof``), ``dof``, ``inside`` (share within the 95 %
+    interval of one), ``left_out`` (share), ``lag1`` (largest autocorrelation of an element of the innovation,
+    in units of what the filter expects of it, at lag 1) and ``bound`` (what white noise stays below).
+    """
+    rows = []
+    stamps = found.innovations["time_s"]
+    inside = found.innovations[(stamps >= begin) & (stamps < end)]
+    for source, part in inside.groupby("source", sort=False):
+        dof = int(part["dof"].iloc[0])
+        whitened = normalised_innovations(part, dof)
+        rows.append(
+            {
+                "source": source,
+                "n": len(part),
+                "nis": float(part["nis"].mean()),
+                "dof": dof,
+                "inside": share_inside(part["nis"], chi_square_interval(dof)),
+                "left_out": float((part["verdict"] == 0).mean()),
+                "lag1": max((float(autocorrelation(column, 1)[1]) for column in whitened.T), key=abs),
+                "bound": white_bound(len(part)),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def normalised_innovations(innovations: pd.DataFrame, dof: int = 3) -> Array:
+    """Elements (N, dof) of one source's innovations in units of the deviations that the filter expects."""
+    names = ["first", "second", "third"][:dof]
+    expected = innovations[[f"sd_{name}" for name in names]].to_numpy(float)
+    return np.asarray(innovations[names].to_numpy(float) / expected)
+
+
+def calibrated(flight: Flight) -> bool:
+    """Whether the flight's manifest says that its accelerometers are off by no more than `CALIBRATED`."""
+    stated = flight.manifest.imu.accelerometer_turn_on_m_s2
+    return stated is not None and stated <= CALIBRATED
+
+
+def navigate_all(flight: Flight, times: ArrayLike) -> dict[str, Navigated]:
+    """Every estimate that is compared, by its subject: the filter by what is stated, and the observer; with
+    two antennas also the filter with the tunings of `TUNINGS`.
+
+    The observer of H is for calibrated accelerometers. Where these are not (see `calibrated`), their
+    calibration is the bias that the filter found, the median over the flight.
+    """
+    filtered, off = navigate_mekf(flight, times), np.zeros(3)
+    if not calibrated(flight):
+        off = filtered.biases[BIASES[:3]].median().to_numpy(float)
+    found = {"mekf": filtered, "observer": navigate_observer(flight, times, accelerometer_bias=off)}
+    if "second_north_m" in flight.table("gnss"):
+        found |= {name: navigate_mekf(flight, times, tuning=tuning) for name, tuning in TUNINGS.items()}
+    return found
+
+
+def evaluate_all(
+    flight: Flight, found: Mapping[str, Navigated], times: ArrayLike, reference: str
+) -> dict[str, NavigationErrors]:
+    """Errors of each estimate against the reference, and on a twin those of its autopilot.
+
+    The autopilot is scored by the airframe it sits on, not by the payload with the IMU and the antennas.
+    """
+    table = flight.nav[reference]
+    scored = {
+        name: errors_against(table, one.nav, times, one.velocity_covariance) for name, one in found.items()
+    }
+    if "truth" in flight.nav and "autopilot" in flight.nav:
+        scored["autopilot"] = errors_against(flight.nav["truth"], flight.nav["autopilot"], times)
+    return scored
+
+
+def study_navigation(flight: Flight) -> Studied:
+    """A flight navigated in every way that is compared, and scored by the best reference it has.
+
+    Of a logged flight, whose receiver nobody knows, that one's noise is found as well; a twin states its own.
+
+    Raises
+    ------
+    WildlabError
+        Where it has no reference, or lacks what navigation needs.
+    """
+    reference = reference_of(flight)
+    times = comparison_times(flight, reference)
+    found, receiver, refusal = navigate_all(flight, times), None, ""
+    if flight.manifest.kind == "logged":
+        try:
+            receiver = receiver_noise(flight)
+        except WildlabError as refused:
+            refusal = refused.problem
+        if receiver is not None and receiver.noise is not None:
+            found["mekf-receiver"] = navigate_mekf(flight, times, receiver=receiver.noise)
+    scored = evaluate_all(flight, found, times, reference)
+    return Studied(flight, reference, times, found, scored, receiver, refusal)
+
+
+def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tuple[str, str], float]:
+    """What is compared over flights, by (subject, name): `summarise`; of the filter ``nis_<source>``, and of
+    logged flights ``lag1_<source>``; on twins of the tuned filters how often they have the autopilot within
+    their bounds (`shares_within`).
+
+    There is no NEES without a truth, and no error of position where the reference has no velocity: its
+    positions are then those of the receiver, which the estimate is made from.
+    """
+    table = studied.flight.nav[studied.reference]
+    hidden = [] if studied.reference == REFERENCES[0] else ["nees"]
+    hidden += [] if set(VELOCITY) <= set(table) else [f"rms_{place}" for place in PLACES]
+    numbers = {
+        (subject, name): value
+        for subject, errors in studied.scored.items()
+        for name, value in summarise(errors, begin, end).items()
+        if np.isfinite(value) and not name.startswith(tuple(hidden))
+    }
+    for subject in ("mekf", "mekf-receiver"):
+        if subject not in studied.found:
+            continue
+        for row in summarise_innovations(studied.found[subject], begin, end).to_dict(orient="records"):
+            source = row["source"].replace(" ", "_")
+            numbers[subject, f"nis_{source}"] = row["nis"]
+            if studied.flight.manifest.kind == "logged":
+                numbers[subject, f"lag1_{source}"] = row["lag1"]
+    if "autopilot" in studied.scored:
+        for subject in [name for name in TUNINGS if name in studied.found]:
+            shares = shares_within(against_autopilot(studied, subject), begin)
+            numbers |= {(subject, name): value for name, value in shares.items()}
+    return numbers
+
+
+def shares_within(errors: NavigationErrors, begin: float = -np.inf) -> dict[str, float]:
+    """Share of the errors within two of the stated standard deviations, of ``roll``, ``pitch``, ``yaw`` and
+    ``velocity`` (all three axes), from a time on."""
+    late = errors.times >= begin
+    e, two = errors.error[late], 2 * errors.sd[late]
+    known = np.isfinite(e) & np.isfinite(two)
+    inside = np.where(known, np.abs(e) <= two, np.nan)
+    shares = {f"inside_{name}": float(_mean(inside[:, 6 + i])) for i, name in enumerate(AXES)}
+    return shares | {"inside_velocity": float(_mean(inside[:, 3:6].ravel()))}
+
+
+def against_autopilot(studied: Studied, subject: str) -> NavigationErrors:
+    """Differences of an estimate from the autopilot, as H 7.5 has them: neither of the two is the truth."""
+    one = studied.found[subject]
+    return errors_against(studied.flight.nav["autopilot"], one.nav, studied.times, one.velocity_covariance)
+
+
+def corrections(flight: Flight, found: Navigated) -> Array:
+    """What turned the estimate from one row to the next besides the gyros, rad, (M - 1,).
+
+    Zero but for what measurements correct. Meant for estimates at all inertial samples: across the vertical,
+    where Euler angles jump, this does not.
+    """
+    imu, times = flight.table("imu"), found.nav["time_s"].to_numpy(float)
+    rows = np.searchsorted(imu["time_s"].to_numpy(float), times)
+    rate = imu[[f"w_{axis}_rad_s" for axis in "xyz"]].to_numpy(float)[rows]
+    bias = found.biases[[f"gyro_{axis}_rad_s" for axis in "xyz"]].to_numpy(float)
+    felt = (rate[1:] + rate[:-1]) / 2 - bias[1:]
+    attitude = Rotation.from_quat(found.nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float), scalar_first=True)
+    turned = (attitude[:-1].inv() * attitude[1:]).as_rotvec()
+    return np.asarray(np.linalg.norm(turned - felt * np.diff(times)[:, None], axis=1))
+
+
+def unit_of(name: str) -> str:
+    """The unit of one of those numbers."""
+    if name.startswith(("nees", "nis", "lag1", "inside")):
+        return "1"
+    return "deg" if name.endswith(AXES) else "m/s" if name.endswith("velocity") else "m"
+
+
+class Series(NamedTuple):
+    """NEES or NIS (N,) of one run over its times (N,), s, with ``dof`` degrees of freedom; NaN: none.
+
+    ``worth``: at most so many independent values, where the errors themselves say so: one that lasts is one,
+    however much its square wavers.
+    """
+
+    name: str
+    dof: float
+    times: Array
+    values: Array
+    worth: float = np.inf
+
+
+def worth(values: ArrayLike) -> float:
+    """How many independent values those of one run (N,) are worth for their mean; NaN are left out.
+
+    Parameters
+    ----------
+    values
+        (N,) in the order of time.
+
+    Returns
+    -------
+    float
+        From 1 to N, or 0 where there is none.
+
+    Examples
+    --------
+    >>> worth([2.0, 1.0, float("nan")])
+    2.0
+    """
+    array = np.asarray(values, float)
+    known = array[np.isfinite(array)]
+    if len(known) < 4 or np.ptp(known) == 0:
+        return float(len(known))
+    return float(np.clip(effective_sample_size(known, len(known) - 1), 1.0, len(known)))
+
+
+def mean_of_runs(runs: Sequence[Series]) -> Average:
+    """Mean of the same quantity over independent runs, and the 95 % interval of a consistent filter's.
+
+    Parameters
+    ----------
+    runs
+        One series for each run; degrees of freedom that differ are averaged over the values.
+
+    Returns
+    -------
+    Average
+        ``worth`` is the sum of what each run is worth.
+
+    Examples
+    --------
+    >>> run = Series("NEES", 2, np.arange(3.0), np.array([1.0, 2.0, 3.0]))
+    >>> mean = mean_of_runs([run, run])
+    >>> mean.mean, mean.n, mean.worth, mean.inside
+    (2.0, 6, 6.0, True)
+    """
+    values = np.concatenate([np.asarray(run.values, float) for run in runs])
+    known = np.array([np.isfinite(run.values).sum() for run in runs])
+    dof = float(np.average([run.dof for run in runs], weights=known)) if known.any() else runs[0].dof
+    return average(values, dof, sum(min(worth(run.values), run.worth) for run in runs))
+
+
+def navigation_series(errors: NavigationErrors, begin: float = -np.inf, end: float = np.inf) -> list[Series]:
+    """NEES of position, velocity and attitude, three degrees of freedom each, of a part of a flight.
+
+    Parameters
+    ----------
+    errors
+        Against a reference that is the truth: else it is the difference of two estimates that is scored.
+    begin, end
+        s.
+
+    Returns
+    -------
+    list of Series
+        Those blocks that have values.
+
+    Examples
+    --------
+    >>> nothing = np.full((2, 9), np.nan)
+    >>> blocks = {"position": np.array([3.0, 2.0]), "velocity": nothing[:, 0], "attitude": nothing[:, 0]}
+    >>> [s.name for s in navigation_series(NavigationErrors(np.arange(2.0), nothing, nothing, blocks))]
+    ['NEES position']
+    """
+    part = (errors.times >= begin) & (errors.times < end)
+    all_blocks = [Series(f"NEES {name}", 3, errors.times[part], errors.nees[name][part]) for name in BLOCKS]
+    return [one for one in all_blocks if np.isfinite(one.values).any()]

@@ -27,9 +27,17 @@ from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
 from wildlab.navigation.mekf import InitialState, Navigation, run_mekf
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.observer import baseline_reference, course_reference, field_reference
-from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise, choose, tell
-from wildlab.navigation.scoring import gaussian_log_likelihood, maximise
-from wildlab.navigation.timeline import ImuSamples
+from wildlab.navigation.receiver import (
+    Candidate,
+    ReceiverNoise,
+    Scale,
+    SourceNoise,
+    choose,
+    gaussian_log_likelihood,
+    maximise,
+    tell,
+)
+from wildlab.navigation.strapdown import ImuSamples
 
 POSITION = ["north_m", "east_m", "down_m"]
 VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
@@ -380,7 +388,7 @@ class Placement(NamedTuple):
     gain: float
 
 
-class _Filter(NamedTuple):
+class Filter(NamedTuple):
     """All but the aiding that a run takes."""
 
     imu: ImuSamples
@@ -410,7 +418,7 @@ def without_gross(flight: Flight, given: Inputs) -> dict[str, Aiding]:
     WildlabError
         Where that is more than `LOST` of a source.
     """
-    filtered = _filter_of(flight, given)
+    filtered = filter_of(flight, given)
     found = filtered.run(given.aiding, given.imu.times[-1:], 0.9999).innovations
     kept = {}
     for index, (name, source) in enumerate(given.aiding.items()):
@@ -467,7 +475,7 @@ def receiver_noise(flight: Flight) -> Receiver:
             file=flight.folder,
             field="gnss",
         )
-    short = _shortened(_filter_of(flight, given), aiding, begin, end)
+    short = _shortened(filter_of(flight, given), aiding, begin, end)
 
     def run(noise: ReceiverNoise) -> tuple[Array, Array]:
         found = short.run(told(aiding, noise), short.imu.times[-1:], 1.0).innovations
@@ -509,7 +517,7 @@ def place_receiver(flight: Flight, noise: ReceiverNoise) -> Placement:
     given = inputs_of(flight, noise=imu_noise(flight))
     aiding = told(without_gross(flight, given), noise)
     begin, end = _part(flight, given)
-    short = _shortened(_filter_of(flight, given), aiding, begin, end)
+    short = _shortened(filter_of(flight, given), aiding, begin, end)
     # The same fixes whatever the latency: a few at either end are left out, and so are those of the settling.
     low, high = max(begin, short.start.time) + LATEST_S, end - LATEST_S
     aiding = {name: _rows(one, (one.times >= short.start.time + LATEST_S)) for name, one in aiding.items()}
@@ -544,9 +552,9 @@ def _rows(source: Aiding, keep: Mask) -> Aiding:
     )  # fmt: skip
 
 
-def _filter_of(flight: Flight, given: Inputs) -> _Filter:
+def filter_of(flight: Flight, given: Inputs) -> Filter:
     latitude, _, height = flight.manifest.origin_tuple()
-    return _Filter(
+    return Filter(
         given.imu, given.start, imu_noise(flight), local_earth(latitude, height), axis_errors(flight)
     )
 
@@ -562,7 +570,7 @@ def _part(flight: Flight, given: Inputs) -> tuple[float, float]:
     return begin, min(end, begin + LONGEST_S)
 
 
-def _shortened(whole: _Filter, aiding: dict[str, Aiding], begin: float, end: float) -> _Filter:
+def _shortened(whole: Filter, aiding: dict[str, Aiding], begin: float, end: float) -> Filter:
     """The filter over that part and what settles it, with no more samples than it takes.
 
     It starts from where it was with what is stated, and surer of its position and velocity than it may be by

@@ -16,7 +16,7 @@ from wildlab.analysis.georeference import (
     georeference,
     pose_errors,
 )
-from wildlab.analysis.navigation_errors import AXES, PLACES, NavigationErrors, errors_against
+from wildlab.analysis.navigate import AXES, PLACES, NavigationErrors, errors_against
 from wildlab.analysis.navigation_inputs import VELOCITY
 from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_positions
 from wildlab.errors import WildlabError
@@ -38,7 +38,7 @@ from wildlab.tracking.records import Track
 PAUSE_S = 2.0
 #: From this bank on an airframe turns, rad.
 TURNING = np.radians(20.0)
-#: Columns of `wildlab.analysis.navigation_errors.NavigationErrors` that are a pose's, and their names.
+#: Columns of `wildlab.analysis.navigate.NavigationErrors` that are a pose's, and their names.
 _POSE = [0, 1, 2, 6, 7, 8]
 NAMES = (*PLACES, *AXES)
 

@@ -18,17 +18,17 @@ from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
-from wildlab.planning.high_level import (
+from wildlab.planning.information import SearchSensor, detection_probability, in_field_of_view
+from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk
+from wildlab.planning.patterns import Pattern, lawn_mower
+from wildlab.planning.planner import (
     SEARCH,
+    InformationPlanner,
     all_positioned,
     best_goal,
     lost_by_covariance,
     lost_by_search,
 )
-from wildlab.planning.information import SearchSensor, detection_probability, in_field_of_view
-from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk
-from wildlab.planning.patterns import Pattern, lawn_mower
-from wildlab.planning.planner import InformationPlanner
 
 
 class Rules(NamedTuple):

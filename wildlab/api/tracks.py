@@ -16,15 +16,18 @@ from wildlab.analysis.georeference import (
     georeference,
     observe,
 )
-from wildlab.analysis.navigate import MekfTuning, Navigated, navigate_mekf, navigate_observer
-from wildlab.analysis.navigation_errors import (
+from wildlab.analysis.navigate import (
     REFERENCES,
+    MekfTuning,
+    Navigated,
     NavigationErrors,
     Series,
     comparison_times,
     errors_against,
     flown_part,
     mean_of_runs,
+    navigate_mekf,
+    navigate_observer,
     navigation_series,
     summarise,
 )

@@ -101,9 +101,9 @@ def camera(
 
     from wildlab.analysis.camera import calibrate_images, camera_file, facts_of
     from wildlab.detection.boards import Board
-    from wildlab.flight.camera_file import write_camera
+    from wildlab.flight.calibration_files import write_camera
     from wildlab.flight.readers.frames.image import still_files
-    from wildlab.messages.page_texts import words
+    from wildlab.messages.catalogue import words
 
     columns, rows = board or circles or (0, 0)
     pattern = "chessboard" if board else "staggered circles" if staggered else "circles"
@@ -176,7 +176,7 @@ def clock(
     from wildlab.analysis import Fact, fact
     from wildlab.files import write_csv
     from wildlab.flight.store import load_flight
-    from wildlab.messages.page_texts import words
+    from wildlab.messages.catalogue import words
 
     loaded = load_flight(flight)
     if offset is not None:
@@ -267,9 +267,9 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     """
     import numpy as np
 
-    from wildlab.analysis.learn import learn_flight
+    from wildlab.analysis.accuracy import learn_flight
+    from wildlab.flight.calibration_files import write_learnt
     from wildlab.flight.checks.check import sense_sentences
-    from wildlab.flight.learnt import write_learnt
     from wildlab.flight.store import load_flight
     from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
 

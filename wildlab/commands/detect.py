@@ -64,7 +64,7 @@ def detect(as_json: bool, **asked: Any) -> None:
     """
     from wildlab.analysis.detecting.command import DetectRequest, detect_images
     from wildlab.flight.files import printable
-    from wildlab.messages.page_texts import words
+    from wildlab.messages.catalogue import words
 
     request = DetectRequest(**asked)
     result = detect_images(request, terminal_console())

@@ -12,6 +12,7 @@ import click
 from wildlab.commands import shared
 from wildlab.commands.shared import ANY, FILE, FOLDER, refuse_existing, terminal_console
 from wildlab.errors import WildlabError
+from wildlab.paths import REPORTS
 from wildlab.terminal import shown, stopped
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def evaluate(
 @click.command()
 @click.argument("flights", nargs=-1, required=True, type=FOLDER, metavar="DIR...")
 @shared.out(FOLDER, "The page's folder.  [default: reports/comparison]")
-@click.option("--reports", type=FOLDER, default=shared.REPORTS, help="Where reports on flights are, and go.")
+@click.option("--reports", type=FOLDER, default=REPORTS, help="Where reports on flights are, and go.")
 def compare(flights: tuple[Path, ...], out: Path | None, reports: Path) -> None:
     """Compare flights on one page, and as a table.
 
@@ -107,7 +108,7 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
     from wildlab.analysis.georeference import observe
     from wildlab.analysis.ground import SUFFIXES, ground_facts, write_points
     from wildlab.flight.store import load_flight
-    from wildlab.messages.page_texts import words
+    from wildlab.messages.catalogue import words
     from wildlab.runner.evaluate import tell_source
 
     if out.suffix not in SUFFIXES:

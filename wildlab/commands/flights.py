@@ -138,10 +138,10 @@ def _card(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Ca
 
 
 def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Wishes:
-    from wildlab.flight.camera_file import read_camera
+    from wildlab.flight.calibration_files import read_camera
     from wildlab.flight.card.importing import safe_name
     from wildlab.flight.card.proposal import Wishes
-    from wildlab.flight.recipe.parts import parse_zone
+    from wildlab.flight.recipe.quantities import parse_zone
 
     start = None
     if wishes["start"] is not None:
@@ -171,10 +171,10 @@ def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> 
 
 
 def _say(card: Card, as_json: bool) -> None:
-    from wildlab.flight.card.said import HEADINGS, rows_of, sentences_of
+    from wildlab.flight.card.description import HEADINGS, rows_of, sentences_of
 
     rows = rows_of(card.choices)
-    said = [stopped(one) for one in (*sentences_of(card.choices), *card.proposal.said)]
+    said = [stopped(one) for one in (*sentences_of(card.choices), *card.proposal.notes)]
     if as_json:
         print_json({"files": [dict(zip(HEADINGS, row, strict=True)) for row in rows], "said": said})
         return
@@ -264,9 +264,9 @@ def terrain(flight: Path, map_: Path, **stated: Any) -> None:
       wildlab terrain flights/tuesday dem.tif --heights 46.2
       wildlab terrain flights/tuesday map.png --crs EPSG:3006 --cell 2 --corner 571000 6502000 --heights 25
     """
-    from wildlab.flight.checks.terrain import terrain_sentence
+    from wildlab.flight.checks.camera import terrain_sentence
     from wildlab.flight.store import load_flight, save_flight
-    from wildlab.flight.terrain.laying import lay_terrain
+    from wildlab.flight.terrain import lay_terrain
 
     says = terrain_of(map_, stated, "--")
     assert says is not None  # noqa: S101 - for the type checker: there is a map

@@ -8,14 +8,15 @@ together.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize
 
-from wildlab.detection.detections import PART, Detections, describe, no_detections
+from wildlab.detection.detections import PART, Detections, describe, no_detections, remove_near
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, Mask
 
@@ -80,25 +81,24 @@ class Proposals(NamedTuple):
     detections
         N of them; their score is the contrast of the strongest pixel in standard deviations.
     features
-        (N, len(FEATURES)), without unit, near 1 in size.
+        (N, FEATURES), without unit, near 1 in size.
     """
 
     detections: Detections
     features: Array
 
 
-#: Names of the columns of `Proposals.features`.
-FEATURES = (
-    "log contrast of the strongest pixel, standard deviations",
-    "log area, px^2",
-    "log ratio of the axes",
-    "area over that of the ellipse with the same axes",
-    "mean contrast over that of the strongest pixel",
-    "largest contrast in the ring about it, over that of the strongest pixel",
-    "mean contrast in that ring, over that of the strongest pixel",
-    "contrast of the strongest pixel over the image's 99.9 per cent",
-    "brightness of the strongest pixel between the image's 1 and 99.9 per cent",
-)
+#: Columns of `Proposals.features`, in order:
+#: log contrast of the strongest pixel, standard deviations;
+#: log area, px^2;
+#: log ratio of the axes;
+#: area over that of the ellipse with the same axes;
+#: mean contrast over that of the strongest pixel;
+#: largest contrast in the ring about it, over that of the strongest pixel;
+#: mean contrast in that ring, over that of the strongest pixel;
+#: contrast of the strongest pixel over the image's 99.9 per cent;
+#: brightness of the strongest pixel between the image's 1 and 99.9 per cent.
+FEATURES = 9
 
 
 def find_by_contrast(image: NDArray[Any], valid: Mask, thresholds: Contrast | None = None) -> Detections:
@@ -178,7 +178,7 @@ def propose(
         t = replace(t, peak=max(t.peak, t.of_image * strong))
     labels, wholes, peaks = _regions(ratio, t)
     if not len(peaks):
-        return Proposals(no_detections(), np.zeros((0, len(FEATURES) if with_features else 0)))
+        return Proposals(no_detections(), np.zeros((0, FEATURES if with_features else 0)))
     blur = float(np.hypot(1.0, t.smooth_px))
     found = describe(
         labels, image, valid, contrast=contrast, noise=noise, blur_px=blur, part=t.part, score=peaks
@@ -435,3 +435,172 @@ def local_deviation(contrast: Image, valid: Mask, window_px: int, least: float =
     everywhere = robust_deviation(contrast, valid, least)
     there = MAD * median_background(np.abs(contrast), window_px)
     return np.asarray(np.maximum(there, 0.7 * everywhere), np.float32)
+
+
+#: What lets through nearly all that is warm: the regression decides.
+PERMISSIVE = Contrast(
+    window_px=41, peak=4.0, edge=2.5, of_peak=0.6, smallest_px=6.0, largest_px=3000.0, longest=12.0
+)
+#: Half the weight of a squared coefficient beside the mean log loss: coefficients stay small where regions
+#: are few. Chosen, not fitted.
+RIDGE = 0.01
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A fitted regression, and what its regions come from.
+
+    Attributes
+    ----------
+    regions
+        Thresholds of the chain that gives the regions.
+    mean, scale
+        Of the features and their squares, that they are brought to one size by.
+    weights
+        Of each; empty: not fitted.
+    bias
+        What is added.
+    least
+        The log odds that a detection has at least.
+    apart_px
+        Of detections nearer than this the surest stays.
+    """
+
+    regions: Contrast = field(default=PERMISSIVE)
+    mean: tuple[float, ...] = ()
+    scale: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    bias: float = 0.0
+    least: float = 0.0
+    apart_px: float = 10.0
+
+
+def fit_shape(features: ArrayLike, wanted: ArrayLike, regions: Contrast) -> Shape:
+    """Learn which regions are what was labelled.
+
+    Parameters
+    ----------
+    features
+        (N, F), of `wildlab.detection.contrast.Proposals`.
+    wanted
+        (N,) bool: which regions belong to a label.
+    regions
+        What the regions come from.
+
+    Returns
+    -------
+    Shape
+
+    Raises
+    ------
+    WildlabError
+        Where all regions are wanted, or none is.
+
+    Examples
+    --------
+    >>> x = np.random.default_rng(1).normal(size=(200, FEATURES))
+    >>> learnt = fit_shape(x, x[:, 1] > 0, PERMISSIVE)
+    >>> print(np.mean((log_odds(learnt, x) > 0) == (x[:, 1] > 0)) > 0.95)
+    True
+    """
+    X, y = _expanded(features), np.asarray(wanted, float)
+    if not 0 < y.sum() < len(y):
+        raise WildlabError(
+            f"{int(y.sum())} of {len(y)} warm regions belong to a label",
+            "give labelled frames that show what is looked for, and something else that is warm",
+        )
+    mean, scale = X.mean(axis=0), X.std(axis=0) + 1e-9
+    Z = (X - mean) / scale
+
+    def loss(w: Array) -> tuple[float, Array]:
+        odds = Z @ w[1:] + w[0]
+        over = 1 / (1 + np.exp(-np.clip(odds, -60, 60))) - y
+        value = float(np.mean(np.logaddexp(0, odds) - y * odds) + RIDGE * w[1:] @ w[1:])
+        return value, np.concatenate([[over.mean()], Z.T @ over / len(y) + 2 * RIDGE * w[1:]])
+
+    w = minimize(loss, np.zeros(Z.shape[1] + 1), jac=True, method="L-BFGS-B").x
+    plain = [tuple(float(one) for one in part) for part in (mean, scale, w[1:])]
+    return Shape(regions, plain[0], plain[1], plain[2], float(w[0]))
+
+
+def log_odds(learnt: Shape, features: ArrayLike) -> Array:
+    """How sure the regression is of each region.
+
+    Parameters
+    ----------
+    learnt
+        From `fit_shape`.
+    features
+        (N, F).
+
+    Returns
+    -------
+    (N,)
+
+    Raises
+    ------
+    WildlabError
+        Where nothing was fitted, or for other features.
+    """
+    X = _expanded(features)
+    if len(learnt.weights) != X.shape[1] or not len(learnt.mean) == len(learnt.scale) == X.shape[1]:
+        raise WildlabError(
+            f"a classifier of shapes has {len(learnt.weights)} weights, and {X.shape[1]} are needed",
+            "fit it to labelled frames, or name the thresholds.json of such a run",
+        )
+    return np.asarray(
+        (X - np.array(learnt.mean)) / np.array(learnt.scale) @ np.array(learnt.weights) + learnt.bias
+    )
+
+
+def find_by_shape(image: NDArray[Any], valid: Mask, thresholds: Shape) -> Detections:
+    """Things that stand out and have the shape of what was labelled.
+
+    Parameters
+    ----------
+    image, valid
+        As for `wildlab.detection.contrast.find_by_contrast`.
+    thresholds
+        From `fit_shape`.
+
+    Returns
+    -------
+    Detections
+        The score is the log odds.
+
+    Raises
+    ------
+    WildlabError
+        As `log_odds`, and where nothing is valid.
+    """
+    return choose(propose(image, valid, thresholds.regions), thresholds)
+
+
+def choose(proposals: Proposals, learnt: Shape) -> Detections:
+    """Of regions those that are sure enough.
+
+    Parameters
+    ----------
+    proposals
+        From `wildlab.detection.contrast.propose`.
+    learnt
+        From `fit_shape`.
+
+    Returns
+    -------
+    Detections
+        The score is the log odds.
+
+    Raises
+    ------
+    WildlabError
+        As `log_odds`.
+    """
+    odds = log_odds(learnt, proposals.features)
+    found = proposals.detections.with_score(odds).select(odds >= learnt.least)
+    return remove_near(found, learnt.apart_px)
+
+
+def _expanded(features: ArrayLike) -> Array:
+    x = np.asarray(features, float).reshape(-1, FEATURES)
+    return np.concatenate([x, x**2], axis=1)

@@ -27,7 +27,7 @@ from wildlab.detection.centres import (
     shape_of,
 )
 from wildlab.detection.detections import Detections
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, above_zero
 from wildlab.geometry.frames import Mask
 
 #: Of how many pixels along each side one is looked at to find an image's range.
@@ -373,32 +373,20 @@ def _described(
     return Detections(uv, covariance, area, intensity, box_table, axes, orientation, hu, score)
 
 
-#: What H prints of the detector's numbers, and where.
-PUBLISHED = {
-    "gradient": "H 4.4.1: 230 of 255",
-    "smallest_area": "H 4.4.1: 50 pixels",
-}
-#: What H leaves open, and why it is as it is here.
-CHOSEN = {
-    "smoothing_size": "n of (4.1) is not printed; five pixels keep what is ten pixels wide",
-    "smoothing_sd": "sigma_g of (4.1) is not printed; OpenCV's for a kernel of five pixels",
-    "scaling": "how 14 bits become 8 is not printed; a fixed range shows an object alike beside any other",
-    "stretched_share": "one pixel in a hundred may saturate at the dark end, as cameras do",
-    "smallest_range_k": "an even sea must not become black and white; 50 mK of noise are three levels",
-    "counts_per_kelvin": "the Tau 2's in its high gain; matters for images in counts only",
-    "gradient_gain": "(4.3) has no factor before it",
-    "clipping": "a gradient beyond 255 is 255; that an image's largest becomes 255 is the other reading",
-    "largest_area": "H 4.3 removes blobs that are too large, and prints no limit",
-    "area_of": "H removes small blobs before it fills them: what counts is the blob of steep pixels",
-    "nested": "H 4.3 compares the boxes",
-    "close_at_border": "what the border of the image cuts has an open contour, and figure 4.8 has it filled",
-    "warm": "H 4.1: vessels are warmer than the sea",
+#: What H prints of the detector's numbers; the others it leaves open.
+PUBLISHED = ("gradient", "smallest_area")
+
+_KINDS = {
+    "scaling": ("fixed", "stretched", "counts"),
+    "clipping": ("saturated", "normalised"),
+    "area_of": ("edges", "filled"),
+    "nested": ("boxes", "contours"),
 }
 
 
 @dataclass(frozen=True)
 class FloatingThresholds:
-    """Thresholds of the seven steps of H 4.3; `PUBLISHED` and `CHOSEN` say which are whose.
+    """Thresholds of the seven steps of H 4.3; `PUBLISHED` says which are its own.
 
     Attributes
     ----------
@@ -447,32 +435,22 @@ class FloatingThresholds:
     warm: bool = True
 
     def __post_init__(self) -> None:
+        positive = ("smallest_area", "smoothing_sd", "smallest_range_k", "counts_per_kelvin", "gradient_gain")
+        above_zero(**{name: getattr(self, name) for name in positive})
+        largest = np.inf if self.largest_area is None else self.largest_area
         limits: tuple[tuple[str, bool, str], ...] = (
             ("gradient", 0 < self.gradient <= 255, "give one above 0, up to 255"),
-            ("smallest_area", self.smallest_area > 0, "give an area above 0, in pixels"),
-            (
-                "largest_area",
-                self.largest_area is None or self.largest_area >= self.smallest_area,
-                "give one that is no smaller than smallest_area, or None",
-            ),
+            ("stretched_share", 0 <= self.stretched_share < 0.5, "give a share from 0 to below 0.5"),
+            ("largest_area", largest >= self.smallest_area, "give no less than smallest_area, or None"),
             (
                 "smoothing_size",
                 self.smoothing_size > 0 and self.smoothing_size % 2 == 1,
-                "give an odd number of pixels",
+                "give an odd number",
             ),
-            ("smoothing_sd", self.smoothing_sd > 0, "give one above 0, in pixels"),
-            ("stretched_share", 0 <= self.stretched_share < 0.5, "give a share from 0 to below 0.5"),
-            ("smallest_range_k", self.smallest_range_k > 0, "give a range above 0, in kelvin"),
-            ("counts_per_kelvin", self.counts_per_kelvin > 0, "give a number above 0"),
-            ("gradient_gain", self.gradient_gain > 0, "give a factor above 0"),
-            (
-                "scaling",
-                self.scaling in ("fixed", "stretched", "counts"),
-                "use 'fixed', 'stretched' or 'counts'",
+            *(
+                (name, getattr(self, name) in known, f"use {' or '.join(map(repr, known))}")
+                for name, known in _KINDS.items()
             ),
-            ("clipping", self.clipping in ("saturated", "normalised"), "use 'saturated' or 'normalised'"),
-            ("area_of", self.area_of in ("edges", "filled"), "use 'edges' or 'filled'"),
-            ("nested", self.nested in ("boxes", "contours"), "use 'boxes' or 'contours'"),
         )
         for field, fine, fix in limits:
             if not fine:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wildlab.detection.contrast import fill_invalid
 from wildlab.detection.detections import PART, Detections, describe, no_detections, remove_near
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, above_zero
 from wildlab.geometry.frames import Array, Mask
 
 Grey = NDArray[np.uint8]
@@ -187,8 +187,7 @@ def block_from_distance(distance_m: float, focal_px: float, animal_m: float = 2.
     >>> block_from_distance(60.0, 1000.0), block_from_distance(120.0, 1000.0)
     (251, 125)
     """
-    if not (distance_m > 0 and focal_px > 0 and animal_m > 0 and times > 0):
-        raise WildlabError("a distance, focal length or length is not above zero", "give lengths above zero")
+    above_zero(distance_m=distance_m, focal_px=focal_px, animal_m=animal_m, times=times)
     return max(3, int(times * animal_m * focal_px / distance_m) | 1)
 
 
@@ -218,8 +217,9 @@ def gate_from_distance(
     >>> gate_from_distance(100.0, 1000.0, 0.5, 4.0)
     (50.0, 400.0)
     """
-    if not (distance_m > 0 and focal_px > 0 and 0 < smallest_m2 < largest_m2):
-        raise WildlabError("a distance, focal length or area is not above zero", "give them above zero")
+    above_zero(distance_m=distance_m, focal_px=focal_px, smallest_m2=smallest_m2)
+    if not smallest_m2 < largest_m2:
+        raise WildlabError(f"largest_m2 is {largest_m2}", "give more than smallest_m2", field="largest_m2")
     per_m2 = (focal_px / distance_m) ** 2
     return smallest_m2 * per_m2, largest_m2 * per_m2
 

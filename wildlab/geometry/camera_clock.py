@@ -287,7 +287,7 @@ def clock_by_motion(
     spans
         (N, 2) s by the camera's clock, of two images each.
     motion
-        (N, 3) how the scene moved between them, from `wildlab.detection.image_motion`; NaN is left out.
+        (N, 3) how the scene moved between them, from `wildlab.detection.flow`; NaN is left out.
     times
         (T,) s of the log, increasing.
     turned

@@ -45,7 +45,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import date
 from functools import lru_cache
 from pathlib import Path
@@ -225,6 +225,18 @@ def load_texts(page: str, folder: Path = FOLDER) -> PageTexts:
         )
     except TypeError as error:
         raise WildlabError(f"an entry has a key that is none ({error})", "mend it", file=path) from None
+
+
+def words(page: str, facts: Iterable[tuple[str, Mapping[str, Any]]]) -> list[str]:
+    """The sentences of a catalogue for some facts: keys with the values of their placeholders.
+
+    Examples
+    --------
+    >>> words("plan", [("climb", {"speed": "3"})])
+    ['It climbs and sinks at 3 m/s at most.']
+    """
+    texts = load_texts(page).answers
+    return [fill(texts[key], {}, values) for key, values in facts]
 
 
 def words_of(names: Mapping[str, str], name: str) -> str:

@@ -15,7 +15,7 @@ C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, master's
 - `wildlab.planning.information`: what is known of each point of a grid, and what an image adds (F 5.3.2).
 - `wildlab.planning.planner`: where to fly and look next, by what is to be learnt; `legs`: what platform and
   gimbal can do, and flights along way points or by chance.
-- `wildlab.planning.high_level`: search on, or go back to an animal that is known (F 5.3.1).
+- `wildlab.planning.planner`: search on, or go back to an animal that is known (F 5.3.1).
 
 >>> from wildlab.planning.courses import fly
 >>> from wildlab.planning.patterns import lawn_mower

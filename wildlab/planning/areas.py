@@ -185,7 +185,7 @@ def inside_of(corners: ArrayLike) -> Callable[[Array], Mask]:
     inward = np.stack([-edges[:, 1], edges[:, 0]])
     least = np.einsum("ki,ik->k", fence, inward)
 
-    def inside(points: Array) -> NDArray[np.bool_]:
+    def inside(points: Array) -> Mask:
         north, east, within = points[..., 0], points[..., 1], np.ones(points.shape[:-1], bool)
         # Side by side: numpy is slow to ask whether all of a few are true.
         for (a, b), limit in zip(inward.T, least, strict=True):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, above_zero
 from wildlab.geometry.frames import Array, wrap
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.patterns import Pattern
@@ -130,8 +130,7 @@ def fly(
     [ 0. 10. 13. 15.]
     """
     air = np.asarray(wind, float)
-    if not (np.isfinite(speed) and speed > 0):
-        raise WildlabError(f"a speed of {speed} m/s", "give metres per second above zero", field="speed")
+    above_zero(speed=speed)
     if air.shape != (2,) or not np.hypot(*air) < speed:
         raise WildlabError(
             f"a wind of {np.hypot(*np.atleast_1d(air)[:2]):.1f} m/s against an airspeed of {speed:g} m/s",
@@ -185,8 +184,7 @@ def dubins(
     >>> round(float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum()), 2)
     31.42
     """
-    if not (np.isfinite(radius) and radius > 0):
-        raise WildlabError(f"a turn radius of {radius} m", "give metres above zero", field="radius")
+    above_zero(radius=radius)
     a, b = np.asarray(start, float), np.asarray(end, float)
     # Two turns to the same side and a line always make a way: there is one at least.
     ways = [(kind, _parts(kind, (b - a) / radius, heading, end_heading)) for kind in _KINDS]

@@ -3,7 +3,7 @@ meanwhile.
 
 A node counts as seen where an image shows it with nothing before it, and sharply: an image is blurred where
 the camera turns and moves by more than a stated number of pixels while it is exposed. All images are looked
-at at once (`wildlab.geometry.visibility.visible_nodes` does the same for one), and lines of sight are exact.
+at at once (`wildlab.geometry.viewsheds.visible_nodes` does the same for one), and lines of sight are exact.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, above_zero
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import image_border, lines_clear, widest_view
+from wildlab.geometry.viewsheds import image_border, lines_clear, widest_view
 from wildlab.planning.areas import check_area, contains, inside_of
 
 
@@ -266,19 +266,14 @@ def see(
     >>> print(np.bincount(see(flat, poses, 100.0).image))
     [121 121]
     """
-    if not (np.isfinite(furthest) and furthest > 0):
-        raise WildlabError(
-            f"a furthest distance of {furthest} m",
-            "say up to which distance anything is to be found, in metres above zero",
-            field="furthest",
-        )
+    above_zero(furthest=furthest)
     if len(poses.rows) != 1:
         raise WildlabError(f"poses with the rows {poses.rows}", "give one row of instants", field="poses")
     p, R = np.asarray(poses.p_nc, float), np.asarray(poses.R_nc, float)
     first, count = _blocks(terrain, poses.camera, p, R, furthest)
     # Compiled functions are imported where they are called: a compiler takes its time to be imported.
     from wildlab.geometry.compilation import announced
-    from wildlab.planning.view_kernels import in_images
+    from wildlab.planning.kernels import in_images
 
     camera = poses.camera
     lens = np.array(

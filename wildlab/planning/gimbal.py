@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, above_zero, share_below_one
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Mask, euler_to_matrix, matrix_to_rotation_vector
@@ -101,8 +101,7 @@ def swing(times: ArrayLike, limit: float, rate: float, start: float = 0.0) -> Ar
     """
     if not (np.isfinite(limit) and limit >= 0):
         raise WildlabError(f"a swing to {limit} rad", "give an angle of zero or more", field="limit")
-    if not (np.isfinite(rate) and rate > 0):
-        raise WildlabError(f"a rate of {rate} rad/s", "give radians per second above zero", field="rate")
+    above_zero(rate=rate)
     t = np.asarray(times, float)
     if limit == 0:
         return np.zeros(t.shape)
@@ -359,8 +358,7 @@ def adapt_roll(
         raise WildlabError(
             f"limits of {least} and {most} rad", "give the smaller one first, zero or more", field="limits"
         )
-    if not (np.isfinite(rate) and rate > 0):
-        raise WildlabError(f"a rate of {rate} rad/s", "give radians per second above zero", field="rate")
+    above_zero(rate=rate)
     t, known = np.asarray(times, float), np.asarray(rolls, float)
     roll = np.zeros(len(t))
     phase = float(np.mod(start + 0.25, 1.0))
@@ -406,9 +404,6 @@ def swing_rate(limit: float, length: float, speed: float, overlap: float = 0.0) 
     >>> swing_rate(limit=0.5, length=20.0, speed=5.0)
     0.5
     """
-    for value, name in ((limit, "limit"), (length, "length"), (speed, "speed")):
-        if not (np.isfinite(value) and value > 0):
-            raise WildlabError(f"a value of {value}", "give a number above zero", field=name)
-    if not 0 <= overlap < 1:
-        raise WildlabError(f"an overlap of {overlap}", "give a share from 0 to below 1", field="overlap")
+    above_zero(limit=limit, length=length, speed=speed)
+    share_below_one(overlap=overlap)
     return 4 * limit * speed / (length * (1 - overlap))

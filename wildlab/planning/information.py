@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, above_zero
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, Mask, ned_to_enu
 
@@ -50,9 +50,9 @@ class SearchSensor:
     nearest: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("half_width", "half_height", "sd", "reach", "nearest"):
-            if not getattr(self, name) > 0:
-                raise WildlabError(f"{name} is {getattr(self, name)}", "give a number above zero", field=name)
+        above_zero(
+            **{name: getattr(self, name) for name in ("half_width", "half_height", "sd", "reach", "nearest")}
+        )
 
 
 def sensor_of(camera: Camera, *, sd: float, reach: float, nearest: float = 1.0) -> SearchSensor:

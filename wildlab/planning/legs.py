@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, above_zero
 from wildlab.geometry.frames import Array, Mask, euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.geometry.terrain import Terrain
@@ -57,9 +57,9 @@ class Flying:
     stops_beyond: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("speed", "height", "interval", "images", "slew"):
-            if not getattr(self, name) > 0:
-                raise WildlabError(f"{name} is {getattr(self, name)}", "give a number above zero", field=name)
+        above_zero(
+            **{name: getattr(self, name) for name in ("speed", "height", "interval", "images", "slew")}
+        )
         if not self.turn_time >= 0:
             raise WildlabError(
                 f"turn_time is {self.turn_time}", "give seconds, or 0 for turns in no time", field="turn_time"

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, above_zero, share_below_one
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array, Indices
 from wildlab.planning.areas import check_area, edge_directions
@@ -92,8 +92,7 @@ def footprint(camera: Camera, height: float) -> Footprint:
     >>> footprint(Camera(100, 50, fx=99.0, fy=49.0, cx=49.5, cy=24.5), 10.0)
     Footprint(width=10.0, length=10.0)
     """
-    if not (np.isfinite(height) and height > 0):
-        raise WildlabError(f"a height of {height} m above ground", "give metres above zero", field="height")
+    above_zero(height=height)
     right, low = camera.width - 1.0, camera.height - 1.0
     u, v = np.linspace(0, right, 65), np.linspace(0, low, 65)
     xy = [
@@ -129,12 +128,8 @@ def row_distance(width: float, overlap: float = 0.0) -> float:
     >>> row_distance(30.0, 0.2)
     24.0
     """
-    if not (np.isfinite(width) and width > 0):
-        raise WildlabError(f"a strip of {width} m", "give metres above zero", field="width")
-    if not 0 <= overlap < 1:
-        raise WildlabError(
-            f"an overlap of {overlap}", "give a share from 0 to below 1, as 0.2", field="overlap"
-        )
+    above_zero(width=width)
+    share_below_one(overlap=overlap)
     return width * (1 - overlap)
 
 
@@ -284,8 +279,7 @@ def rows_over(corners: ArrayLike, distance: float, direction: float) -> tuple[li
     WildlabError
         Where the distance is not above zero, or too small.
     """
-    if not (np.isfinite(distance) and distance > 0):
-        raise WildlabError(f"a row distance of {distance} m", "give metres above zero", field="distance")
+    above_zero(distance=distance)
     fence = np.asarray(corners, float)
     along = np.array([np.cos(direction), np.sin(direction)])
     across = np.array([-along[1], along[0]])

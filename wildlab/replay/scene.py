@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.evaluate import score_points
 from wildlab.analysis.georeference import Observations, covariances_of, georeference, observe
-from wildlab.analysis.overviews.image_coverage import FLATTEST, POSITION, ground_height, ordered
-from wildlab.analysis.overviews.overview import length_of_way
+from wildlab.analysis.image_coverage import FLATTEST, POSITION, ground_height, ordered
+from wildlab.analysis.overview import length_of_way
 from wildlab.analysis.tracks.judged import LEADING, read_estimates
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
@@ -534,7 +534,7 @@ def _points(flight: Flight, source: str | None, lacks: list[str], ellipses: bool
         return None
     try:
         seen = observe(flight, source)
-        table = georeference(flight, seen, np.random.default_rng(0)) if ellipses else _placed(seen)
+        table = georeference(seen, np.random.default_rng(0)) if ellipses else _placed(seen)
     except WildlabError as refusal:
         lacks.append(f"detections on the ground: {refusal.problem}")
         return None

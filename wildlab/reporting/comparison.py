@@ -11,6 +11,8 @@ import pandas as pd
 
 from wildlab.analysis.tracks.judged import LEADING
 from wildlab.analysis.verdict import Verdict
+from wildlab.messages.catalogue import Message, fill, load_texts
+from wildlab.messages.quantities import NOTHING, area, duration, metres, number, percent, way_length
 from wildlab.names import listed
 from wildlab.paths import DATA
 from wildlab.reporting.charts.drawing import dots_chart

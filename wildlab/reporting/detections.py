@@ -13,8 +13,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.analysis.detecting.scores import ELLIPSE, rate_words
-from wildlab.messages.message import Message
-from wildlab.messages.page_texts import load_texts, percent_of, words
+from wildlab.messages.catalogue import Message, load_texts, words
+from wildlab.messages.quantities import NOTHING, percent_of
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
 from wildlab.reporting.layout import ADVICE

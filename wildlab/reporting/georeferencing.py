@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis import Fact
 from wildlab.analysis.accuracy import Accuracy
 from wildlab.analysis.diagnose import CAUSES, Diagnosis
 from wildlab.analysis.evaluate import errors_of, on_one_heading, score_points
@@ -30,7 +31,7 @@ from wildlab.analysis.verdict import (
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.store import Flight
-from wildlab.messages.catalogue import Message, PageTexts, load_texts
+from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
 from wildlab.messages.quantities import measure, percent_of, significant
 from wildlab.names import listed
 from wildlab.reporting.charts.georeferencing import error_scatter, error_shares, errors_by_image
@@ -377,6 +378,7 @@ def limits(
     nearest = found.nearest
     conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
         ("limit-heading", one_heading_hides(found), {}),
+        ("limit-extended", diagnosis is not None and diagnosis.extended, {}),
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": str(found.lost)}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
@@ -455,7 +457,7 @@ def show_accuracy(
     programs: Mapping[str, pd.DataFrame],
     unlabelled: Sequence[str],
     amiss: Sequence[str],
-    applied: str = "",
+    applied: Sequence[Fact] = (),
     source: str | None = None,
 ) -> None:
     """Write the page.
@@ -473,7 +475,7 @@ def show_accuracy(
     amiss
         What does not fit together in the flight: `wildlab.flight.checks.check.sense_sentences`.
     applied
-        What is to be said of the calibration of another flight that was applied.
+        Facts on the calibration of another flight that was applied.
     source
         Name of the poses' ``nav`` table; None for the flight's own.
     """
@@ -490,7 +492,7 @@ def show_accuracy(
     problems = sum(one.startswith("problem") for one in amiss)
     show_summary(report, wording, found, problems, calibrated_elsewhere=bool(applied))
     if applied:
-        report.text(applied)
+        report.text(" ".join(words("georeferencing", applied)))
     show_contradictions(report, amiss, shown=shown)
     logged, diagnosis = found.summary, found.diagnosis
     corrections = (

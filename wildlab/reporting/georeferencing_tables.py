@@ -63,7 +63,7 @@ def _errors_on_both(flight: Flight, observations: Observations, points: pd.DataF
     """Points with an error over terrain (``error_m``) and on level ground (``error_m_level``)."""
     if flight.truth is None or not len(flight.truth):
         return None
-    flat = georeference(flight, on_level(observations), np.random.default_rng(0))
+    flat = georeference(on_level(observations), np.random.default_rng(0))
     both = score_points(flight, points).merge(
         score_points(flight, flat), on="detection_id", suffixes=("", "_level")
     )

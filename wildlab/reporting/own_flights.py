@@ -12,12 +12,6 @@ from wildlab.reporting.text import render
 
 #: The page, beside the ledger.
 PAGE = "flights.html"
-#: How to begin, where there is none yet.
-BEGIN = (
-    "None was evaluated here yet. <code>wildlab import CARD --out flights/tuesday</code> makes a flight of "
-    "what the aircraft logged, <code>wildlab simulate slow-vessel --out flights/trial</code> makes one up; "
-    "<code>wildlab evaluate flights/tuesday</code> writes its reports, and they are shown here."
-)
 #: What the verdict follows from, of the overview.
 COUNTS = {"problems": "problems", "worth": "worth_fixing", "troubled": "troubled", "judged": "reports_beside"}
 

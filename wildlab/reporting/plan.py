@@ -12,14 +12,14 @@ from matplotlib.colors import to_rgba
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 
-from wildlab.analysis.plans.command import origin_text
 from wildlab.analysis.plans.coverage import Covered
 from wildlab.analysis.plans.plan import Plan
-from wildlab.analysis.plans.result import count, head_count, hectares, minutes, percent
-from wildlab.flight.readers.area import Area
+from wildlab.analysis.plans.result import count, head_count, hectares, minutes, origin_text, percent
+from wildlab.flight.readers.vector import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.messages.page_texts import words
+from wildlab.messages.catalogue import Message, load_texts, words
+from wildlab.messages.quantities import NOTHING
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.notebook_pages import finished_page

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 from rich.console import Console
 
-from wildlab.analysis.navigation_errors import reference_of
+from wildlab.analysis.navigate import reference_of
 from wildlab.analysis.navigation_inputs import imu_noise
 from wildlab.analysis.tracks.sensor_tuning import FEWEST
 from wildlab.analysis.tracks.tracker import refuse_unusable
@@ -139,7 +139,7 @@ def refuse_study_name(flight: Flight, name: str, studies: Collection[str]) -> No
     if name in studies:
         raise WildlabError(
             f"the flight is named {flight.name!r} like a study, whose report it would replace",
-            "rename the flight's folder, or name another folder for the report (--out, --out)",
+            "rename the flight's folder, or name another folder for the report (--out)",
         )
 
 

@@ -80,9 +80,9 @@ def replay(
         if target.resolve() == place.resolve():
             raise WildlabError(
                 "a replay is no part of a flight",
-                "name another folder with --out",
+                "name another folder with --into",
                 file=target,
-                field="--out",
+                field="--into",
             )
         target.mkdir(parents=True, exist_ok=True)
         written = [target / RECORDING]
@@ -151,31 +151,7 @@ def flight_of(report: Path) -> Path:
             "name the folder of a flight: wildlab replay flights/mine",
             file=report,
         )
-    for folder, found in flights_around(report, reports):
-        if found["files"] == theirs["files"]:
-            return folder
-    raise WildlabError(
-        f"the flight {json.dumps(str(theirs.get('name', '')))} that this report was made from is not among "
-        "the flights here, or was changed since",
-        "name its folder: wildlab replay flights/mine --out REPORT",
-        file=report,
-    )
-
-
-def flights_around(report: Path, reports: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """Flight folders where flights usually are, as seen from a report, and what provenance says of each."""
-    for place in _places(report, reports):
-        for manifest in sorted(place.glob(f"*/{FILE_NAME}")):
-            yield manifest.parent, provenance_of_flight(manifest.parent)
-
-
-def _places(report: Path, reports: Path) -> Iterator[Path]:
-    seen = set()
-    for base in (report.resolve().parent, reports.resolve(), Path.cwd()):
-        for place in (base / ".flights", base.parent / "flights", base / "flights", base, base.parent):
-            if place not in seen and place.is_dir():
-                seen.add(place)
-                yield place
+    return flight_of_report(report, theirs, "wildlab replay flights/mine --into REPORT")
 
 
 @contextmanager

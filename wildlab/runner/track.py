@@ -221,7 +221,7 @@ def _run_report(
     refuse_other_flight(folder, place)
     place.parent.mkdir(parents=True, exist_ok=True)
     again = typed_in_report(
-        "wildlab track", folder, **options, into=into or (other_reports(reports) and place)
+        "wildlab track", folder, **options, out=into or (other_reports(reports) and place)
     )
     job = make_job(
         study, flight=folder, reports=place.parent, notebooks=notebooks, name=place.name, again=again

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.georeference import observe
 from wildlab.analysis.overview import look_over
+from wildlab.analysis.verdict import Verdict
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels

@@ -7,8 +7,8 @@ import statistics
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from wildlab.analysis.overviews.overview import ALARMS, TROUBLES
-from wildlab.analysis.overviews.verdict import (
+from wildlab.analysis.overview import ALARMS, TROUBLES
+from wildlab.analysis.verdict import (
     MOST,
     WORTH,
     Verdict,
@@ -45,7 +45,7 @@ class Alarm(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """One thing to fix, as `wildlab.analysis.overviews.verdict.Gain`: ``value`` of ``of``."""
+    """One thing to fix, as `wildlab.analysis.verdict.Gain`: ``value`` of ``of``."""
 
     key: str
     causes: tuple[str, ...]
@@ -62,7 +62,7 @@ class Facts(NamedTuple):
     twin
         Whether nobody flew it.
     verdict
-        A key of `wildlab.analysis.overviews.verdict.Verdict`; None where the flight was not looked over.
+        A key of `wildlab.analysis.verdict.Verdict`; None where the flight was not looked over.
     problems
         Things in its records that cannot be used or contradict each other.
     length_s, height_m, area_m2

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from wildlab.analysis.navigation_errors import REFERENCES
+from wildlab.analysis.navigate import REFERENCES
 from wildlab.errors import WildlabError
 from wildlab.flight.schema import NAV, TABLES
 from wildlab.flight.store import PREFERRED

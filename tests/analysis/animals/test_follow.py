@@ -20,7 +20,7 @@ from wildlab.analysis.animals.tracking import (
     next_look,
     patrol,
 )
-from wildlab.analysis.plans.execution import ExecutionErrors
+from wildlab.analysis.plans.coverage import ExecutionErrors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
@@ -28,7 +28,7 @@ from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.planning.areas import inside_of, rectangle
 from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import look_down
-from wildlab.planning.high_level import SEARCH
+from wildlab.planning.planner import SEARCH
 from wildlab.tracking.particles import ImageLook, Rules, walk_of
 from wildlab.tracking.particles.clouds import Inside
 from wildlab.tracking.particles.steps import Moves

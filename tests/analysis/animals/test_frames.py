@@ -25,7 +25,7 @@ from wildlab.analysis.animals.images import (
     render_frame,
     take_frames,
 )
-from wildlab.analysis.plans.execution import ExecutionErrors
+from wildlab.analysis.plans.coverage import ExecutionErrors
 from wildlab.detection.detections import Detections, describe
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses

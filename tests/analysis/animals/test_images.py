@@ -16,7 +16,7 @@ from wildlab.analysis.animals.images import (
     sight_from,
     take_images,
 )
-from wildlab.analysis.plans.execution import ExecutionErrors, displaced, drawn_errors, with_errors
+from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors, with_errors
 from wildlab.geometry.camera import Camera, in_image
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix

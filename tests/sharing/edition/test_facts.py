@@ -10,8 +10,8 @@ from tests.analysis.robots import KNOWN, robot_flight
 from tests.sharing.edition.flights import flight, overview, report
 from wildlab.analysis.tracks.judged import judged
 from wildlab.analysis.tracks.tracker import track
-from wildlab.flight.tracking_settings import parse_settings
 from wildlab.analysis.verdict import numbers_of
+from wildlab.flight.tracking_settings import parse_settings
 from wildlab.reporting import tracking
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.report import open_report

@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from wildlab.analysis.overview import ALARMS
 from wildlab.analysis.verdict import CAUSES, PARTS, Verdict
-from wildlab.messages.catalogue import languages, load_language, say
-from wildlab.messages.message import Message, length
-from wildlab.sharing.edition.facts import _TROUBLES, Alarm, Facts, Gain
-from wildlab.sharing.edition.sentences import STEP_M, Story, steps_of, tell
+from wildlab.messages.catalogue import Message, languages, length, load_language, say
+from wildlab.sharing.edition_story import _TROUBLES, STEP_M, Alarm, Facts, Gain, Story, steps_of, tell
 
 LANGUAGES = [load_language(code) for code in languages()]
 RADAR = EMPTY._replace(

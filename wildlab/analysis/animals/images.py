@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.plans.execution import ExecutionErrors
+from wildlab.analysis.plans.coverage import ExecutionErrors
 from wildlab.detection.detections import Detections
 from wildlab.geometry.camera import Camera, in_image, normalise
 from wildlab.geometry.camera_poses import CameraPoses

@@ -24,14 +24,14 @@ from wildlab.analysis.animals.images import (
     shown,
     sight_from,
 )
-from wildlab.analysis.plans.execution import ExecutionErrors, displaced, drawn_errors
+from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.frames import Array, Indices, Mask
-from wildlab.geometry.quantiles import chi2_quantile
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course
-from wildlab.planning.high_level import SEARCH, all_positioned, best_goal
+from wildlab.planning.planner import SEARCH, all_positioned, best_goal
 from wildlab.tracking.kalman import update
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.particles import ImageLook, Rules, mahalanobis_squared, moments, nearest_animal, no_herd

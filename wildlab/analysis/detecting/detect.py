@@ -18,10 +18,9 @@ import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
 from wildlab.detection.colour import Colour, find_coloured
-from wildlab.detection.contrast import Contrast, find_by_contrast
+from wildlab.detection.contrast import Contrast, Shape, find_by_contrast, find_by_shape
 from wildlab.detection.detections import Detections, no_detections
 from wildlab.detection.floating import FloatingThresholds, detect_floating
-from wildlab.detection.shape import Shape, find_by_shape
 from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance, to_grey
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv, write_json

@@ -13,16 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.detecting.detect import METHODS, detect_frame
 from wildlab.analysis.detecting.scores import ELLIPSE
-from wildlab.detection.contrast import Contrast, Proposals, propose
+from wildlab.detection.contrast import PERMISSIVE, Contrast, Proposals, Shape, choose, fit_shape, propose
 from wildlab.detection.detections import Detections
 from wildlab.detection.floating import FloatingThresholds
-from wildlab.detection.shape import PERMISSIVE, Shape, choose, fit_shape
 from wildlab.detection.warm import Warm, to_grey
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.flight.readers.frames import Frame
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask
 
 #: What is tried: where regions come from and end, how far detections are apart, how sure they are at least.

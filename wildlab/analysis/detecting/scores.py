@@ -19,7 +19,7 @@ from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.score_curve import Curve, ScoredFrame, curve_along_score, difference_of_f1
 from wildlab.flight.files import printable
 from wildlab.flight.readers.labels import Labels, choose_classes, read_labels
-from wildlab.geometry.ellipses import inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask
 
 #: Probability of the ellipses that are held against labels.

@@ -57,13 +57,9 @@ def refuse_take_off(home: Array, terrain: Terrain | None, wanted: PlanRequest) -
     """
     if terrain is None or wanted.heights != "take-off" or np.isfinite(terrain.heights_at(home[None])).all():
         return
-    place = (
-        "another take-off point with --home" if wanted.home is not None else "a take-off point with --home"
-    )
     raise WildlabError(
-        "the take-off point lies outside the map of heights, or where it has a hole, and all heights of the "
-        "plan would be above it",
-        f"give a map that knows it, {place}, or --above ground for an autopilot with a map of its own",
+        "the map of heights does not know the take-off point, and all heights would be above it",
+        "give another map or --home, or --above ground for an autopilot with its own map",
         field="--home",
     )
 
@@ -93,19 +89,16 @@ def refuse_heights(sorties: Sequence[Sortie], home: Array, wanted: PlanRequest, 
         return
     north, east = worst.way.highest - home
     lower = above - (most - allowed)
-    helps = [f"plan {lower:.0f} m above the ground or lower (--height)"] if lower >= wanted.least_m else []
+    helps = [f"plan {lower:.0f} m or lower (--height)"] if lower >= wanted.least_m else []
     if wanted.vehicle == "fixed-wing":
         helps.append("fly slower (--speed)")
-        why = (
-            f": it climbs and sinks at {wanted.climb_m_s:g} m/s at most, and begins to before the ground does"
-        )
+        why = f"climbs at {wanted.climb_m_s:g} m/s at most"
     else:
-        why = ": it keeps its distance from ground that is as steep as a wall"
-    helps += ["lay the rows along the slopes (--direction)", "state with --max-height what you may fly"]
+        why = "keeps away from ground as steep as a wall"
+    helps += ["lay rows along the slopes (--direction)", "state --max-height"]
     raise WildlabError(
         f"{worst.name} is {most:.0f} m above the ground {_side(north, 'north', 'south')} and "
-        f"{_side(east, 'east', 'west')} of the take-off point, {most - allowed:.0f} m more than the rules "
-        f"allow{why}",
+        f"{_side(east, 'east', 'west')} of the take-off point, {most - allowed:.0f} m too high: it {why}",
         f"{', '.join(helps[:-1])}, or {helps[-1]}",
         field="--max-height",
     )
@@ -147,9 +140,8 @@ def refuse_near(
     least = clear_of(above, wanted.trees_m) / 2
     if nearest < least:
         raise WildlabError(
-            f"the way comes within {nearest:.1f} m of ground that is as steep as a wall, and "
-            f"{least:.1f} m are the least",
-            "lay the rows along it (--direction), or plan what lies above and below it by itself",
+            f"the way comes within {nearest:.1f} m of steep ground, and {least:.1f} m are the least",
+            "lay rows along it (--direction), or plan above and below by themselves",
             field="--terrain",
         )
     return nearest
@@ -350,14 +342,14 @@ def _height(wanted: PlanRequest, view: GroundView) -> float:
     if wanted.height_m is not None:
         if wanted.height_m > most:
             raise WildlabError(
-                f"a height of {wanted.height_m:g} m, and the rules allow {most:g} m above the ground",
-                "fly lower, or state with --max-height what you have permission for",
+                f"a height of {wanted.height_m:g} m, and the rules allow {most:g} m",
+                "fly lower, or state --max-height",
                 field="--height",
             )
         if wanted.height_m < least:
             raise WildlabError(
-                f"a height of {wanted.height_m:g} m above the ground, and trees of {wanted.trees_m:g} m",
-                f"fly {least:g} m above the ground at least, {CLEARANCE:g} m above the treetops",
+                f"a height of {wanted.height_m:g} m, and trees of {wanted.trees_m:g} m",
+                f"fly at {least:g} m or higher",
                 field="--height",
             )
         return wanted.height_m
@@ -366,9 +358,9 @@ def _height(wanted: PlanRequest, view: GroundView) -> float:
     if sharp < least:
         over = f"trees of {wanted.trees_m:g} m" if wanted.trees_m > 0 else "the ground"
         raise WildlabError(
-            f"{wanted.animal_m:g} m are {wanted.pixels:g} pixels in this camera from {sharp:.1f} m above the "
-            f"ground only, and over {over} nothing below {least:g} m is planned unasked",
-            "ask for fewer pixels with --pixels, or state --height",
+            f"{wanted.animal_m:g} m are {wanted.pixels:g} pixels from {sharp:.1f} m only: over {over}, "
+            f"{least:g} m are the least unasked",
+            "ask for fewer --pixels, or state --height",
             field="--pixels",
         )
     return float(math.floor(min(sharp, max(most - BELOW_RULE, min(most, least)))))
@@ -397,8 +389,8 @@ def _check_under(areas: Areas, terrain: Terrain, strip: float) -> None:
         unknown = float((~np.isfinite(terrain.heights_at(points))).mean())
         if unknown > MOST_UNKNOWN:
             raise WildlabError(
-                f"{100 * unknown:.0f} % of {area.name} lie outside the map of heights, or where it has none",
-                "give a map that holds the whole area, or plan the part that it holds",
+                f"the map of heights lacks {100 * unknown:.0f} % of {area.name}",
+                "give a map of the whole area, or plan what it holds",
                 field="--terrain",
             )
 

@@ -197,9 +197,8 @@ def look(camera: Camera, tilt_deg: float, gimbal: str = "fixed", swing_deg: floa
         edge = math.degrees(math.asin(float(np.nanmax(rays[:, 2] / np.linalg.norm(rays, axis=1)))))
         where = f"{abs(edge):.0f} degrees {'above' if edge < 0 else 'below'} the horizon"
         raise WildlabError(
-            f"a camera tilted {tilt_deg:g} degrees below the horizon sees no ground near enough: the lowest "
-            f"it looks is {where}",
-            f"tilt it further down (90 is straight down), so that ground within {FURTHEST:g} heights is seen",
+            f"a camera tilted by {tilt_deg:g} degrees looks {where} at the lowest",
+            f"tilt it further down, to see ground within {FURTHEST:g} heights",
             field="--tilt",
         )
     rows = np.flatnonzero(seen)
@@ -240,9 +239,8 @@ def _swept(camera: Camera, tilt_deg: float, gimbal: str, swing_deg: float, row: 
         far = np.linalg.norm(points - _LENS, axis=1)
         if not (far <= FURTHEST).all():
             raise WildlabError(
-                f"a swing of {swing_deg:g} degrees looks at ground more than {FURTHEST:g} heights away, or "
-                "over the horizon",
-                "swing less far with --swing, or tilt the camera further down",
+                f"a swing of {swing_deg:g} degrees looks further than {FURTHEST:g} heights",
+                "swing less, or tilt the camera further down",
                 field="--swing",
             )
         sides.append(points[:, 1])
@@ -385,21 +383,20 @@ class PlanRequest:
         if self.wind_m_s > 0 and self.wind_from_deg is None:
             raise WildlabError(
                 f"a wind of {self.wind_m_s:g} m/s from nowhere",
-                "say with --wind-from whence it blows, degrees clockwise from north",
+                "say --wind-from, degrees clockwise from north",
                 field="--wind",
             )
         if self.vehicle == "multicopter" and self.air_m_s > (self.max_air_m_s or math.inf):
             raise WildlabError(
-                f"{self.speed_m_s:g} m/s over the ground against a wind of {self.wind_m_s:g} m/s are "
-                f"{self.air_m_s:g} m/s through the air, and the aircraft can do {self.max_air_m_s:g}",
-                "plan slower with --speed, or wait for less wind",
+                f"{self.speed_m_s:g} m/s against this wind are {self.air_m_s:g} m/s through the air, more "
+                f"than {self.max_air_m_s:g}",
+                "plan a lower --speed, or wait for less wind",
                 field="--max-airspeed",
             )
         if self.vehicle == "fixed-wing" and self.wind_m_s >= self.speed_m_s:
             raise WildlabError(
-                f"a wind of {self.wind_m_s:g} m/s against an airspeed of {self.speed_m_s:g} m/s: the "
-                "aircraft would not come home",
-                "wait for less wind, or fly faster with --speed",
+                f"in a wind of {self.wind_m_s:g} m/s it would not come home at {self.speed_m_s:g} m/s",
+                "wait for less wind, or give a higher --speed",
                 field="--wind",
             )
         if self.animals is not None and self.density_km2 is not None:

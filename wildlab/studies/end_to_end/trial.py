@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from wildlab.analysis.georeference import observe, pose_errors
 from wildlab.analysis.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
 from wildlab.analysis.tracks.sighting import Sighting, sighting
-from wildlab.detection.ground import RISE
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.flight.store import Flight
@@ -31,6 +30,9 @@ from wildlab.studies.linear_vs_nonlinear import trial as filters
 Array = NDArray[np.float64]
 Numbers = dict[tuple[str, str], float]
 
+#: Standard deviation of the height of a visible centre above the water, as a share of the object's length:
+#: half of a freeboard of a tenth. Chosen.
+RISE = 0.05
 #: The twin's own detections, and those of rendered images.
 DRAWN, RENDERED = "drawn", "rendered"
 KINDS = (DRAWN, RENDERED)

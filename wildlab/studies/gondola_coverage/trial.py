@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.plans.execution import Executed, ExecutionErrors, execute
-from wildlab.evaluation.shares import Check
+from wildlab.analysis.plans.coverage import Executed, ExecutionErrors, execute
+from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain

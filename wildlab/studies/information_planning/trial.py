@@ -27,10 +27,9 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.frames import Array
 from wildlab.planning.areas import rectangle
-from wildlab.planning.high_level import Tour, greedy_tour, shortest_tour
 from wildlab.planning.information import SearchSensor, initial_information
 from wildlab.planning.legs import Flying, Platform, look_attitude
-from wildlab.planning.planner import Horizon, InformationPlanner
+from wildlab.planning.planner import Horizon, InformationPlanner, Tour, greedy_tour, shortest_tour
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.simulation.parameters import TwinParameters, load_twin

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from wildlab.analysis.navigation_errors import (
+from wildlab.analysis.navigate import (
     AXES,
     PLACES,
     TUNINGS,
@@ -22,7 +22,7 @@ from wildlab.analysis.navigation_errors import (
     summarise_innovations,
     unit_of,
 )
-from wildlab.analysis.overviews.verdict import Evidence, Verdict, verdict_of
+from wildlab.analysis.verdict import Evidence, Verdict, verdict_of
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight

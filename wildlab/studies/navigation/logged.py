@@ -8,18 +8,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab.analysis.navigate import likelihoods_of_latency
-from wildlab.analysis.navigation_errors import (
+from wildlab.analysis.navigate import (
     AXES,
     NavigationErrors,
     Studied,
     calibrated,
+    likelihoods_of_latency,
     summarise,
     summarise_innovations,
 )
-from wildlab.analysis.navigation_inputs import heading_from
-from wildlab.analysis.overviews.verdict import VERDICT_LEVEL
-from wildlab.analysis.receiver import Placement, Receiver, place_receiver
+from wildlab.analysis.navigation_inputs import Placement, Receiver, heading_from, place_receiver
+from wildlab.analysis.verdict import VERDICT_LEVEL
 from wildlab.evaluation.blocks import block_mean, time_blocks
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
@@ -147,7 +146,7 @@ def placement_message(found: Placement, configured: ArrayLike) -> Message:
     Parameters
     ----------
     found
-        As `wildlab.analysis.receiver.place_receiver` gives it.
+        As `wildlab.analysis.navigation_inputs.place_receiver` gives it.
     configured
         (4,) latency, s, and lever arm, m.
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.navigation_errors import SETTLING_S, numbers_of, study_navigation
+from wildlab.analysis.navigate import SETTLING_S, numbers_of, study_navigation
 from wildlab.evaluation.shares import Check
 from wildlab.simulation.twins import simulate_twin
 

@@ -17,8 +17,8 @@ from wildlab.geometry.frames import Array, ned_to_enu
 from wildlab.geometry.line_of_sight import compare_angles, in_field_of_view
 from wildlab.messages.quantities import number
 from wildlab.paths import DATA
-from wildlab.planning.high_level import utilities
 from wildlab.planning.information import SearchSensor, as_printed, bearing_information
+from wildlab.planning.planner import utilities
 from wildlab.reporting.charts.forms import Values, rows_chart
 from wildlab.reporting.figures import BLUE, INK, VERMILLION
 from wildlab.reporting.published import published_values

@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.navigation_errors import SETTLING_S
+from wildlab.analysis.navigate import SETTLING_S
 from wildlab.evaluation.consistency import Average, average, chi_square_interval, share_inside
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import Check, columns_of

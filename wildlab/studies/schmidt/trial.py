@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.navigate import PUBLISHED_LIKE, navigate_mekf
-from wildlab.analysis.navigation_errors import errors_against, worth
+from wildlab.analysis.navigate import PUBLISHED_LIKE, errors_against, navigate_mekf, worth
 from wildlab.analysis.pose_noise import NAMES as POSE_NAMES
 from wildlab.analysis.pose_noise import (
     covariance_of,

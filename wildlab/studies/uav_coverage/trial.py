@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.plans.execution import Executed, ExecutionErrors, Looks, execute
+from wildlab.analysis.plans.coverage import Executed, ExecutionErrors, Looks, execute
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.camera import Camera
@@ -23,7 +23,6 @@ from wildlab.planning.courses import Course, fly, follow_terrain
 from wildlab.planning.coverage import first_seen, nodes_in, see, share_seen, walks
 from wildlab.planning.gimbal import camera_on_course, look_down, swing_yaw
 from wildlab.planning.patterns import lawn_mowers
-from wildlab.simulation.animal_motion import enclosure_corners
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import EAST_M, NORTH_M, synthetic_landscape
 from wildlab.simulation.manifest import twin_manifest

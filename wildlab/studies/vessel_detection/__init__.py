@@ -11,13 +11,13 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.analysis.rendered import judge
-from wildlab.detection.floating import find_edges, find_objects
-from wildlab.detection.thresholds import CHOSEN, PUBLISHED, FloatingThresholds
+from wildlab.detection.floating import PUBLISHED, FloatingThresholds, find_edges, find_objects
 from wildlab.evaluation.runs import share_interval
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.charts.drawing import draw_dots, finish, name_rows
 from wildlab.reporting.charts.forms import Values, draw_picture, lines_chart, rows_chart, spread_points
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
@@ -195,13 +195,14 @@ def over_readings(images: list[Image]) -> pd.DataFrame:
 
 def thresholds_table(thresholds: FloatingThresholds) -> pd.DataFrame:
     """Every threshold with its value, published or chosen, and where it is published or why it is so."""
+    reasons = load_texts("vessel-detection").quantities
     return pd.DataFrame(
         [
             {
                 "name": field.name.replace("_", " "),
                 "value": str(getattr(thresholds, field.name)),
-                "status": "chosen" if field.name in CHOSEN else "published",
-                "reason": CHOSEN[field.name] if field.name in CHOSEN else PUBLISHED[field.name],
+                "status": "published" if field.name in PUBLISHED else "chosen",
+                "reason": reasons[field.name],
             }
             for field in fields(thresholds)
         ]

@@ -12,9 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.animals.follow import FollowedAnimals, Known, follow
 from wildlab.analysis.animals.images import NONE
-from wildlab.analysis.animals.revisit import Patrolled
+from wildlab.analysis.animals.tracking import FollowedAnimals, Known, Patrolled, follow
 from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
 from wildlab.evaluation.shares import Check, Pooled, columns_of
 from wildlab.geometry.frames import Array

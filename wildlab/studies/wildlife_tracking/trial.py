@@ -30,7 +30,7 @@ from wildlab.analysis.animals.tracking import (
     sight_numbers,
     turns,
 )
-from wildlab.analysis.plans.execution import ExecutionErrors, with_errors
+from wildlab.analysis.plans.coverage import ExecutionErrors, with_errors
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
