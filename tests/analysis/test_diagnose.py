@@ -12,12 +12,11 @@ from tests.analysis.conftest import build, changed, score
 from tests.analysis.survey_twin import CAMERA, Survey, simulate
 from tests.refused import refused
 from tests.sound_flights import simulate_sound_flight
-from wildlab.analysis.accuracy import compare_sightings, judge_repeats
+from wildlab.analysis.accuracy import compare_sightings, judge_repeats, learn_from
 from wildlab.analysis.camera_clock import clock_from_points
 from wildlab.analysis.diagnose import diagnose, find_implausible
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, observe
-from wildlab.analysis.learn import learn_from
 from wildlab.evaluation.outliers import find_outliers
 from wildlab.geometry.corrections import BOUNDS, Calibration
 
@@ -43,6 +42,16 @@ def test_a_sound_flight_whose_poses_wander_has_no_certain_cause(kind):
     found = diagnose(observations, score(flight, observations))
     assert not found.counts, found.winner.name
     assert found.noise.share > 0.5
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6])
+def test_targets_that_the_border_cuts_make_no_correction_certain(share):
+    """The centre of what is seen of them is not theirs: that looks like a turned camera, and is none."""
+    flight = simulate(Survey(down_m=8.0))
+    table = flight.table("detections")
+    cut = np.arange(len(table)) % 10 < 10 * share
+    tables = {**flight.tables, "detections": table.assign(touches_border=cut.astype(float))}
+    assert diagnosed(replace(flight, tables=tables)).counts == (share < 0.25)
 
 
 @cache

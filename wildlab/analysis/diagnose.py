@@ -167,6 +167,9 @@ class Diagnosis:
     places_known
         Whether errors are those of known places; otherwise distances of sightings to others of the same
         thing.
+    extended
+        Whether the border of the image cuts more than :data:`MANY_OUT` of what was found: targets are longer
+        than a point, and the centre of what is seen of one depends on how it lies.
     """
 
     scored: pd.DataFrame
@@ -180,6 +183,7 @@ class Diagnosis:
     implausible: tuple[Model, ...] = ()
     noise: WanderNoise | None = None
     places_known: bool = True
+    extended: bool = False
 
     @property
     def winner(self) -> Model:
@@ -201,9 +205,11 @@ class Diagnosis:
     @property
     def counts(self) -> bool:
         """Whether the winner is certain: taking it off gained something, its estimate is not chance, nothing
-        else explains the errors as well or better, and no more points are far out than :data:`MANY_OUT`."""
+        else explains the errors as well or better, they do not depend on how targets lie, and no more
+        points are far out than :data:`MANY_OUT`."""
         one = self.winner
         certain = bool(one.causes) and one.gain.counts and one.chance < CHANCE and not self.rivals
+        certain &= not self.extended
         return certain and not self.implausible and bool(nonzero(self.calibration)) and not self.too_many_out
 
     @property
@@ -427,6 +433,7 @@ class _Search:
         self.order = order
         self.assumed = _pose_points(chosen, order)[1]
         self.logged = self.place((), np.zeros(0))
+        self.cut = _cut(chosen)
         self._robust: tuple[Mask, Fit] | None = None
         images = np.unique(order, return_inverse=True)[1]
         self.groups = self.blocks
@@ -583,7 +590,7 @@ class _Search:
             calibration = replace(calibration, n_draws=max(2, round(freedom) + 1))
         return Diagnosis(
             self.scored, self.blocks, tuple(models), ranked, calibration, tuple(alike), (), inliers,
-            implausible, noise, self.places_known,
+            implausible, noise, self.places_known, bool(self.cut[used].mean() > MANY_OUT),
         )  # fmt: skip
 
     def _calibration(self, model: Model, used: Mask) -> Calibration:
@@ -615,6 +622,14 @@ def _pose_points(chosen: Observations, order: Array) -> tuple[PosePoints, dict[s
     }
     own = stated.plane * J.plane[:, :, None] * J.plane[:, None, :]
     return PosePoints(in_n, J.pixel @ np.swapaxes(J.pixel, 1, 2), own, order), assumed
+
+
+def _cut(chosen: Observations) -> Mask:
+    """(N,) which detections say that the border of the image cuts what they are of."""
+    table, names = chosen.flight.table("detections"), chosen.table["detection_id"]
+    if "touches_border" not in table:
+        return np.zeros(len(names), bool)
+    return table.set_index("detection_id").loc[names, "touches_border"].to_numpy(float) > 0
 
 
 def _survey_error(flight: Flight, names: NDArray[np.str_]) -> float:
