@@ -629,7 +629,7 @@ def _cut(chosen: Observations) -> Mask:
     table, names = chosen.flight.table("detections"), chosen.table["detection_id"]
     if "touches_border" not in table:
         return np.zeros(len(names), bool)
-    return table.set_index("detection_id").loc[names, "touches_border"].to_numpy(float) > 0
+    return np.asarray(table.set_index("detection_id").loc[names, "touches_border"].to_numpy(float) > 0)
 
 
 def _survey_error(flight: Flight, names: NDArray[np.str_]) -> float:
