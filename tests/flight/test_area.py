@@ -102,7 +102,10 @@ def swapped(at=(LAT, 100.0)):
 
 
 BAD = {
+    "not JSON": (b"{", "is not GeoJSON"),
+    "too deep": (b"[" * 200_000, "is not GeoJSON"),
     "nothing in it": (collection(), "has no polygon"),
+    "a line": ({"type": "LineString", "coordinates": []}, "LineString"),
     "another CRS": (
         {**polygon(SQUARE), "crs": {"type": "name", "properties": {"name": "EPSG:3006"}}},
         "EPSG:3006",
@@ -111,9 +114,11 @@ BAD = {
     "a huge integer": (
         raw([10**400, 1], [2, 2], [3, 3]), "no finite number",
     ),
+    "latitude": (raw([150, 95], [151, 95], [150, 96]), "latitude of 96"),
     "not closed": (ring(SQUARE[:4], closed=False), "is not closed"),
     "self-crossing": (ring([[0, 0], [100, 100], [100, 0], [0, 100]]), "crosses itself"),
     "next to nothing": (ring([[0, 0], [0, 0.6], [0.5, 0]]), "0.15 square"),
+    "no ring": ({"type": "Polygon", "coordinates": []}, "a polygon has no ring"),
     "animals": (feature(polygon(SQUARE), animals=-3), "'-3' animals"),
     "shared animals": (
         feature(
@@ -184,10 +189,16 @@ def test_kml_gives_the_same_as_geojson(tmp_path):
 
 BOMB = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]>'
 BAD_KML = {
+    "KML cut off": (kml(placemark(SQUARE))[:-30], "is not KML"),
     "entities": (kml("<Placemark><name>&b;</name></Placemark>", BOMB), "document type"),
+    "a file from elsewhere": (
+        kml("", '<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>'),
+        "document type",
+    ),
     "other XML": (b"<gpx></gpx>", "no KML"),
     "no polygon": (kml("<Placemark><Point><coordinates>1,2</coordinates></Point></Placemark>"), "has no"),
     "no coordinate": (kml(placemark(SQUARE).replace(",", ";")), "is no coordinate"),
+    "KML too deep": (kml("<a>" * 200 + "</a>" * 200), "too deep"),
     "no outline": (kml("<Placemark><Polygon></Polygon></Placemark>"), "no outline"),
 }  # fmt: skip
 

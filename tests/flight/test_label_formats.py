@@ -108,7 +108,10 @@ def test_yolo_has_centres_in_shares_of_the_image(tmp_path):
     ("name", "text"),
     [
         ("classes.txt", "deer\ncar\nboar\n"),
+        ("data.yaml", "path: x\nnames: ['deer', \"car\", boar]\nnc: 3\n"),
         ("data.yaml", "nc: 3\nnames:\n- deer\n- car\n- 'boar'\n"),
+        ("data.yaml", "names:\n  0: deer  # red\n  1: car\n  2: boar\ntrain: images\n"),
+        ("data.yaml", "names: {0: deer, 1: car, 2: boar}\n"),
         ("data.yaml", "names: [\n  deer, car,\n  boar,\n]\nnc: 3\n"),
     ],
 )
@@ -158,11 +161,16 @@ def test_an_image_with_a_class_and_no_box_is_not_judged(tmp_path):
     ("source", "old", "new", "word"),
     [
         (COCO, "[100, 50, 20.5, 10]", "[1, 2, -3, 4]", r"\[1\].bbox"),
+        (COCO, "[100, 50, 20.5, 10]", '[1, 2, 3, "4"]', "four numbers"),
         (COCO, '"id": 2, "image_id": 7', '"id": 2, "image_id": 8', "image_id: is 8"),
+        (COCO, '"image_id": 7, "category_id": 3', '"image_id": 7, "category_id": 2', "categories has 1, 3"),
         (COCO, '"id": 9', '"id": 7', "7 stands"),
+        (COCO, '"categories"', '"kinds"', "categories: is missing"),
         ('{"images": [], "categories": [], "annotations": []}', "", "", "names no image"),
+        (RESULTS, ', "score": 0.25', "", "has a score"),
         (RESULTS, "0.25", "Infinity", "is inf"),
         (BATCH, "[0.1, 0.1, 0.2, 0.3]", "[9, 9, 2, 3]", "shares of the image"),
+        (BATCH, '"category": "1"', '"category": "9"', "_categories has 1, 2"),
         (BATCH, '"detection_categories"', '"kinds"', "categories are called"),
         (r'{"a": 1, "b\u001b": 2}', "", "", r"'b\\x1b'"),
         ('{"images": [', "", "", "begins like"),
@@ -179,8 +187,10 @@ def test_what_is_wrong_in_json_is_named(tmp_path, source, old, new, word):
     ("line", "word"),
     [
         ("0 0.5 0.5 0.1", "line 1"),
+        ("0 0.5 0.5 0.1 -0.1", "no size below zero"),
         ("0 50 50 10 10", "shares"),
         ("deer 0.5 0.5 0.1 0.1", "the first a whole one"),
+        ("5 0.5 0.5 0.1 0.1", "class 5"),
     ],
 )
 def test_what_is_wrong_in_a_line_of_yolo_is_named(tmp_path, line, word):
@@ -280,9 +290,12 @@ def test_numbers_of_a_clip_and_names_without_ending(tmp_path):
         ("image,a\nb.png,3\n", "no columns"),
         ("image,x,y,w,h\n", "has no row"),
         ("image,x,y,w,h\na.png,1,2,3,4\na.png,1,2,-3,4\n", "line 3 has no box"),
+        ("image,x,y,w,h\na.png,1,?,3,4\n", "line 2 has no box"),
+        ("frame0,x,y,w,h\na,1,2,3,4\n", "line 2 has no number"),
         ("", "has no header"),
         ("image,x,y,w,h\na.png,1,2,3,4,5,6\n", "7 values"),
         ("image,x,y,w,h\na.png,.1,.2,.3,.4\n", "shares"),
+        ("image,x_min,y_min,x_max,y_max\na.png,5,2,3,4\n", "x_min 5"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, text, word):

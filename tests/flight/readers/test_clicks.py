@@ -146,9 +146,12 @@ def test_points_attributes_and_other_shapes_of_cvat():
     [
         (b"image,name\na.jpg,A\n", "say where"),
         (b"name,u,v\nA,1,2\n", "names the image"),
+        (b"image,u,v\na.jpg,,\n", "marks nothing"),
         (b"image,x,y,w,h\na.jpg,0.1,0.2,0.1,0.1\n", "shares"),
         (b"{}", "no format"),
+        (b"[[[", "begins like"),
         (b"<annotations><image name='a'></image></annotations>", "no box"),
+        (b"<annotations>", "is not readable XML"),
         (b'<!DOCTYPE a [<!ENTITY b "c">]><annotations>&b;</annotations>', "document type"),
         (b'{"images": [{"id": 1, "file_name": "a"}], "annotations": [], "categories": []}', "marks nothing"),
     ],

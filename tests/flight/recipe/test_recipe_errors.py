@@ -51,6 +51,23 @@ def both(*changes: Change) -> Change:
         ),
         (in_table("nav.csv", "63.440200", '"63,44"'), "nav.csv, lat: line 4: '63,44' has a decimal comma"),
         (in_table("nav.csv", "63.440200", "63,44"), "nav.csv, lat: 63,44 is read as two cells"),
+        (
+            in_recipe("poses.log.position.height.unit", "deg"),
+            "recipe.toml, poses.log.position.height: not of length",
+        ),
+        (in_table("nav.csv", "63.440200", "nan"), "nav.csv, lat: line 4: 'nan'"),
+        (in_recipe("camera.fx_px", 0.0), "recipe.toml, camera.fx_px: length is 0"),
+        (
+            in_table("photos.csv", "09:30:03Z", "09:30:01Z"),
+            "photos.csv, time_s (from [frames]): not increasing",
+        ),
+        (in_recipe("time.epoch", None), "recipe.toml: since an epoch"),
+        (in_recipe("detections.0.pixels", 1), "recipe.toml, detections[0].pixels: Did you mean 'pixel'"),
+        (in_recipe("files", {"../secret.txt": ""}), "recipe.toml, files.file: leaves the folder"),
+        (in_recipe("poses.log.file", "."), "raw, poses.log.file: is a folder"),
+        (in_recipe("poses.log.attitude.order", None), "recipe.toml, poses.log.attitude: with its order"),
+        (in_recipe("poses.log.time", None), "recipe.toml: neither a time"),
+        (lambda raw: raw.tables.update({"nav.csv": ""}), "nav.csv: no rows"),
         (in_table("nav.csv", "63.440200", "634.4"), "nav.csv, lat: no latitude"),
         (in_table("nav.csv", "63.440200,10.4,", "0,0,"), "nav.csv, lat: both 0"),
         (
