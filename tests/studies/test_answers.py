@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDABLE, UNDECIDED
 from wildlab.messages.catalogue import FOLDER, load_texts
+from wildlab.paths import PACKAGE
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import case_names, find_case
 
@@ -506,15 +508,7 @@ def test_facts_that_are_not_known_choose_a_sentence_that_needs_none(case):
     assert all("{" not in texts.answers[key] for key in answer(facts_of({})))
 
 
-def test_every_page_is_a_cases_or_a_flights():
-    of_flights = {
-        "published",
-        "detections",
-        "georeferencing",
-        "overview",
-        "repeat-sightings",
-        "tracking",
-        "tracking-many",
-    }
-    of_flights |= {"navigation-logged"}
-    assert {path.stem for path in FOLDER.glob("*.toml")} <= set(case_names()) | of_flights
+def test_every_file_of_texts_is_read_by_a_case_or_by_name():
+    code = "".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
+    read = {*case_names(), *re.findall(r'(?:load_texts|words)\("([a-z-]+)"', code)}
+    assert {path.stem for path in FOLDER.glob("*.toml")} <= read
