@@ -26,8 +26,7 @@ from wildlab.tracking import sensors
 from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.records import Start
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 
 RUNS, UPDATES = 10_000, 141

@@ -8,7 +8,7 @@ import pytest
 from tests.analysis.survey_twin import Survey, simulate
 from tests.commands import refuse, succeed
 from wildlab.errors import WildlabError
-from wildlab.evaluation.runs import Interval
+from wildlab.evaluation.intervals import Interval
 from wildlab.flight.calibration_files import parse_learnt, read_learnt, write_learnt
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight

@@ -10,7 +10,7 @@ import pytest
 
 from tests.commands import refuse, succeed
 from tests.replay.recordings import read_recording
-from wildlab.analysis.tracks.judged import COLUMNS
+from wildlab.analysis.tracks.scores import COLUMNS
 from wildlab.flight.store import save_flight
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.simulation.twins import simulate_twin

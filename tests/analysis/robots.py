@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from tests.analysis.building import manifest_of, poses_table
-from wildlab.analysis.tracks.judged import judged
 from wildlab.analysis.tracks.noise_model import NoiseModel, of_flight, of_sensor
 from wildlab.analysis.tracks.scans import Scans, scans_of
+from wildlab.analysis.tracks.scores import judged
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import parse_settings

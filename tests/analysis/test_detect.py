@@ -27,7 +27,7 @@ from wildlab.analysis.detecting.scores import judge_detections
 from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast, Shape, fit_shape
 from wildlab.detection.floating import FloatingThresholds
-from wildlab.evaluation.runs import Interval
+from wildlab.evaluation.intervals import Interval
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels
 

@@ -20,7 +20,7 @@ from wildlab.analysis.verdict import (
     parts_of,
     verdict_of,
 )
-from wildlab.evaluation.runs import Interval
+from wildlab.evaluation.intervals import Interval
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 

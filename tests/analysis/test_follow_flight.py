@@ -8,9 +8,9 @@ import pytest
 
 from tests.analysis.robots import boat, joined, paused, robot, robot_flight, rows_of
 from tests.refused import refused
-from wildlab.analysis.tracks.judged import apart, estimates_table, judged, worth_of_errors, write_estimates
 from wildlab.analysis.tracks.noise_model import errors_named
 from wildlab.analysis.tracks.scans import KINDS, SLOTS, Scans, predict_scan, scans_of, truths_at
+from wildlab.analysis.tracks.scores import apart, estimates_table, judged, worth_of_errors, write_estimates
 from wildlab.analysis.tracks.tracker import track
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from tests.analysis.robots import KNOWN, joined, paused, robot_flight, rows_of, seen_only
-from wildlab.analysis.tracks import tracker, tracks
+from wildlab.analysis.tracks import single_target, tracker
 from wildlab.analysis.tracks.initiation import Geometry, ends_by
 from wildlab.analysis.tracks.inputs import SensorInputs
-from wildlab.analysis.tracks.judged import UNKNOWN, estimates_table, judged, seen_of, used_of
 from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel
 from wildlab.analysis.tracks.scans import Scans, Truth
+from wildlab.analysis.tracks.scores import UNKNOWN, estimates_table, judged, seen_of, used_of
+from wildlab.analysis.tracks.single_target import SensorTrack, track_target
 from wildlab.analysis.tracks.tracker import TrackingResult
-from wildlab.analysis.tracks.tracks import SensorTrack
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
@@ -70,7 +70,7 @@ def by_camera(
     scans: Scans, truth: Truth, filters: tuple[str, ...] = FILTERS, targets: TargetModel = TARGETS
 ) -> list[SensorTrack]:
     one = SensorInputs(scans, beliefs(scans), [truth])
-    return tracks.track_target({"camera": one}, "deer", targets, filters)
+    return track_target({"camera": one}, "deer", targets, filters)
 
 
 def off_after(one: SensorTrack) -> float:
@@ -85,7 +85,7 @@ def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch):
     for one in followed:
         assert len(one.starts) == 2 and one.times[one.starts[1]] == pytest.approx(210.0)
         assert off_after(one) < 2 * np.sqrt(2) * on_ground
-    monkeypatch.setattr(tracks, "_ends", lambda *given: None)
+    monkeypatch.setattr(single_target, "_ends", lambda *given: None)
     without = follow()
     assert len(without[0].starts) == 1
     assert off_after(without[0]) > 10 * off_after(followed[0])
@@ -136,7 +136,7 @@ def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(
     monkeypatch,
 ):
     with_ends = follow(0.0)
-    monkeypatch.setattr(tracks, "_ends", lambda *given: None)
+    monkeypatch.setattr(single_target, "_ends", lambda *given: None)
     for one, other in zip(with_ends, follow(0.0), strict=True):
         assert len(one.starts) == 1 and not one.without.any()
         for name in ("estimate", "covariance", "innovation", "S", "nis", "nees"):

@@ -11,8 +11,8 @@ from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, joined, paused, robot_flight, rows_of, seen_only
 from tests.refused import refused
 from wildlab.analysis.tracks import tracker
-from wildlab.analysis.tracks.judged import _between, apart
-from wildlab.analysis.tracks.tuned import read_tuned, refuse_same, tune_flight, tuned_text
+from wildlab.analysis.tracks.scores import _between, apart
+from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flight, tuned_text
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.tracking.motion import white_acceleration

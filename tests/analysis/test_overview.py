@@ -20,7 +20,7 @@ from tests.planning.ground import FLAT
 from tests.refused import refused
 from wildlab.analysis.image_coverage import Recovered, cover_images, ground_height
 from wildlab.analysis.overview import TROUBLES, look_over
-from wildlab.analysis.tracks.judged import judged as judged_tracks
+from wildlab.analysis.tracks.scores import judged as judged_tracks
 from wildlab.analysis.tracks.tracker import track
 from wildlab.analysis.verdict import (
     Evidence,
@@ -31,8 +31,7 @@ from wildlab.analysis.verdict import (
     possible_gain,
     verdict_of,
 )
-from wildlab.evaluation.streams import pace_of, runs_of
-from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
+from wildlab.evaluation.streams import FLOOR_HZ, pace_of, runs_of, vibration_of
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.camera import Camera

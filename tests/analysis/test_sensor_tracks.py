@@ -8,12 +8,11 @@ import pytest
 
 from tests.analysis.robots import robot, robot_flight, seen_only
 from tests.refused import refused
-from wildlab.analysis.tracks.comparison import follow_flight, table
 from wildlab.analysis.tracks.initiation import start_near
-from wildlab.analysis.tracks.noise_model import from_tuning
+from wildlab.analysis.tracks.noise_model import SensorTuning, from_tuning
 from wildlab.analysis.tracks.scans import errors_near, scans_of, sensors_of, truths_at
-from wildlab.analysis.tracks.sensor_tuning import SensorTuning
-from wildlab.analysis.tracks.tracks import SensorTrack
+from wildlab.analysis.tracks.scores import follow_flight, table
+from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.studies.autoferry import BOATS, tune_sensor
 
 EXACT = {"kind": "position", "range_sd": 0.0, "bearing_sd_deg": 0.0, "position_sd": 0.0}

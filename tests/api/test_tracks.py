@@ -14,7 +14,7 @@ from tests.analysis.robots import KNOWN, joined, robot_flight
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated, Series, comparison_times, mean_of_runs
 from wildlab.analysis.tracks import tracker
-from wildlab.analysis.tracks.judged import STATE, estimates_table, judged
+from wildlab.analysis.tracks.scores import STATE, estimates_table, judged
 from wildlab.analysis.tracks.sighting import (
     FILTERS,
     CvTuning,
@@ -23,7 +23,7 @@ from wildlab.analysis.tracks.sighting import (
     sighting,
     truth_states,
 )
-from wildlab.analysis.tracks.tracks import TOGETHER
+from wildlab.analysis.tracks.single_target import TOGETHER
 from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
 from wildlab.evaluation.consistency import Average, chi_square_interval

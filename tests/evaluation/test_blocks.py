@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wildlab.evaluation.blocks import (
+from wildlab.evaluation.intervals import (
     block_mean,
     compare_halves,
     compare_neighbours,

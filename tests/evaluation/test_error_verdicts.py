@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from wildlab.evaluation.ambiguity import ambiguous, largest_visible
-from wildlab.evaluation.axes import split_along
-from wildlab.evaluation.blocks import time_blocks
-from wildlab.evaluation.ellipses import judge_ellipses
-from wildlab.evaluation.sightings import spread_of_sightings, try_averaging
+from wildlab.evaluation.ellipses import judge_ellipses, spread_of_sightings, try_averaging
+from wildlab.evaluation.errors import split_along
+from wildlab.evaluation.intervals import time_blocks
+from wildlab.evaluation.outliers import ambiguous, largest_visible
 
 BLOCKS = np.arange(240) // 12
 

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.identities import Moment, compare_identities, scan_gospa
-from wildlab.evaluation.sets import gospa
+from wildlab.evaluation.identities import Moment, compare_identities, gospa
 
 CUTOFF = 20.0
 
@@ -155,18 +154,22 @@ def test_time_to_confirm_counts_from_when_it_is_visible():
     assert never.tracked == 0
 
 
+def gospa_of(one, cutoff):
+    return compare_identities([one], cutoff).gospa[0]
+
+
 @pytest.mark.parametrize("how", ["hidden", "ignored"])
 def test_a_track_on_a_target_that_nobody_asks_for_costs_nothing(how):
     targets = {"A": (0, 0), "B": (100, 0)}
-    alone = scan_gospa(scan(0, {1: (3, 0)}, targets, **{how: "B"}), CUTOFF)
-    both = scan_gospa(scan(0, {1: (3, 0), 2: (110, 0)}, targets, **{how: "B"}), CUTOFF)
+    alone = gospa_of(scan(0, {1: (3, 0)}, targets, **{how: "B"}), CUTOFF)
+    both = gospa_of(scan(0, {1: (3, 0), 2: (110, 0)}, targets, **{how: "B"}), CUTOFF)
     assert alone == both
     assert (alone.distance, alone.n_missed, alone.n_false) == (pytest.approx(3), 0, 0)
     # As far off as the cut-off it is on nothing.
-    assert scan_gospa(scan(0, {1: (3, 0), 2: (120, 0)}, targets, **{how: "B"}), CUTOFF).n_false == 1
+    assert gospa_of(scan(0, {1: (3, 0), 2: (120, 0)}, targets, **{how: "B"}), CUTOFF).n_false == 1
     # One target takes one track.
     doubled = scan(0, {1: (3, 0), 2: (99, 0), 3: (101, 0)}, targets, **{how: "B"})
-    assert scan_gospa(doubled, CUTOFF).n_false == 1
+    assert gospa_of(doubled, CUTOFF).n_false == 1
 
 
 def test_dont_care_takes_no_part_in_swaps_breaks_and_anees_and_hidden_does():
@@ -240,8 +243,8 @@ def test_permuted_identities_change_nothing_but_names(run, order):
 
 @given(places, places)
 def test_gospa_of_a_scan_is_gospa_and_symmetric_where_all_are_visible(x, y):
-    there = scan_gospa(scan(0, dict(enumerate(x)), dict(enumerate(y))), CUTOFF)
-    back = scan_gospa(scan(0, dict(enumerate(y)), dict(enumerate(x))), CUTOFF)
+    there = gospa_of(scan(0, dict(enumerate(x)), dict(enumerate(y))), CUTOFF)
+    back = gospa_of(scan(0, dict(enumerate(y)), dict(enumerate(x))), CUTOFF)
     assert there == gospa(y, x, CUTOFF)
     assert (there.distance, there.n_missed) == (pytest.approx(back.distance), back.n_false)
 
@@ -275,7 +278,7 @@ def test_dont_care_against_every_pairing(x, y, flags):
     least = min(map(cost, ways))
     possible = [rest(way) for way in ways if cost(way) <= least + 1e-6]
     hidden = [name for name, flag in zip(range(4), flags, strict=True) if flag]
-    found = scan_gospa(scan(0, dict(enumerate(x)), dict(enumerate(y)), ignored=hidden), CUTOFF)
+    found = gospa_of(scan(0, dict(enumerate(x)), dict(enumerate(y)), ignored=hidden), CUTOFF)
     assert np.isclose(found.distance**2, possible, atol=1e-6).any()
 
 
@@ -296,7 +299,7 @@ def test_what_is_refused(change, words):
     with pytest.raises(WildlabError, match=words):
         compare_identities([good._replace(**change)], CUTOFF)
     with pytest.raises(WildlabError, match=words):
-        scan_gospa(good._replace(**change), CUTOFF)
+        gospa_of(good._replace(**change), CUTOFF)
 
 
 def test_scans_out_of_order_are_refused():

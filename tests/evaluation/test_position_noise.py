@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.evaluation.position_noise import estimate_position_noise
+from wildlab.evaluation.pose_noise import estimate_position_noise
 
 
 def boat(t: np.ndarray) -> np.ndarray:

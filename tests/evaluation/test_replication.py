@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from wildlab.evaluation import order_statistics as order
+from wildlab.evaluation import intervals as order
 from wildlab.evaluation import replication as r
-from wildlab.evaluation.characteristics import operating_characteristics
+from wildlab.evaluation.replication import operating_characteristics
 
 Pair = tuple[float, float]
 

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.matching import Rule, match, rates
-from wildlab.evaluation.score_curve import (
+from wildlab.evaluation.matching import (
+    Rule,
     ScoredFrame,
     average_precision,
     curve_along_score,
     difference_of_f1,
+    match,
+    rates,
     score_levels,
 )
 

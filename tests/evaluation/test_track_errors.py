@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import ERROR_CONVENTION
-from wildlab.evaluation.track_errors import summarise_track, track_errors
+from wildlab.evaluation.errors import summarise_track, track_errors
 
 
 def test_errors_are_truth_minus_estimate():

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2, kstest
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.whiteness import (
+from wildlab.evaluation.consistency import (
     autocorrelation,
     effective_sample_size,
     innovation_whiteness,

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from tests.navigation.flights import NOISE, begin, fly, spoil
 from tests.navigation.test_mekf import EARTH
-from wildlab.evaluation.whiteness import autocorrelation
+from wildlab.evaluation.consistency import autocorrelation
 from wildlab.geometry.frames import matrix_to_rotation_vector, quaternion_to_matrix
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import GaussMarkov, gather, positions, set_out, velocities

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.tracking.many import association_probabilities
-from wildlab.tracking.many.existence import weights
-from wildlab.tracking.many.tracks import compare
+from wildlab.tracking.many.tracks import compare, weights
 
 
 @pytest.mark.parametrize("seed", range(6))

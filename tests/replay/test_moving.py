@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.judged import COLUMNS, LEADING
+from wildlab.analysis.tracks.scores import COLUMNS, LEADING
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.replay.scene import MOST_BYTES, moving_flight, scene_of, show_moving

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from tests.figure_text import overlapping
 from wildlab.analysis.overview import Path
-from wildlab.analysis.tracks.tracks import SensorTrack
+from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, errors_shown

@@ -18,12 +18,11 @@ from wildlab.analysis.verdict import (
     possible_gain,
     verdict_of,
 )
-from wildlab.evaluation.axes import AlongAxis
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
-from wildlab.evaluation.errors import Scatter, summarise
+from wildlab.evaluation.errors import AlongAxis, Scatter, summarise
+from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.outliers import Outlier
-from wildlab.evaluation.runs import Interval
 from wildlab.geometry.calibration import Calibration
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing as page

@@ -12,8 +12,7 @@ import pytest
 
 from tests.figure_text import overlapping
 from wildlab.analysis.tracks.noise_model import ToldValue
-from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackLife, compare_identities
-from wildlab.evaluation.sets import gospa
+from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackLife, compare_identities, gospa
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import figures
 from wildlab.reporting import many_tracks as page

@@ -13,8 +13,8 @@ import pytest
 
 from tests.page_words import MOST_IN_ANSWER, MOST_WORDS, words_in_sight
 from wildlab.analysis.navigate import TUNINGS
+from wildlab.evaluation.consistency import white_bound
 from wildlab.evaluation.shares import Check
-from wildlab.evaluation.whiteness import white_bound
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.paths import DATA
 from wildlab.reporting.published import load_claims, load_published

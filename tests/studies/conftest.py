@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.analysis.conftest import make_flight
-from wildlab.analysis.tracks.sensor_tuning import SensorTuning
+from wildlab.analysis.tracks.noise_model import SensorTuning
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
 from wildlab.paths import DATA

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.comparison import FILTERS, follow_flight, table
-from wildlab.analysis.tracks.sensor_tuning import SensorTuning
+from wildlab.analysis.tracks.noise_model import SensorTuning
+from wildlab.analysis.tracks.scores import FILTERS, follow_flight, table
 from wildlab.flight.store import Flight
 from wildlab.studies.autoferry import BOATS
 from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.comparison import COLUMNS, table
-from wildlab.analysis.tracks.sensor_tuning import SensorTuning
-from wildlab.analysis.tracks.tracks import SensorTrack
+from wildlab.analysis.tracks.noise_model import SensorTuning
+from wildlab.analysis.tracks.scores import COLUMNS, table
+from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.report import Report, open_report

@@ -46,7 +46,7 @@ from wildlab.studies.crossing_vessels.trial import (
     identities_of,
     wrong_of,
 )
-from wildlab.tracking.many.appearance import Appearance
+from wildlab.tracking.association import Appearance
 from wildlab.tracking.many.bank import Bank, Looks
 
 TWIN, SEED = "crossing-vessels", 7

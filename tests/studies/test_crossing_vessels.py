@@ -30,7 +30,7 @@ from wildlab.studies.crossing_vessels.trial import (
     swapped,
     wrong_of,
 )
-from wildlab.tracking.many.appearance import Appearance
+from wildlab.tracking.association import Appearance
 from wildlab.tracking.many.bank import Bank, Looks
 
 INTERVAL = 0.5

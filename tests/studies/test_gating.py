@@ -41,7 +41,7 @@ from wildlab.studies.gating.monte_carlo import (
     overflight,
     streams,
 )
-from wildlab.tracking.predictions import Prediction, predict_pixel, target_in_camera
+from wildlab.tracking.sensors import Prediction, predict_pixel, target_in_camera
 
 
 def predict_azimuth_elevation(position, poses, plane_down) -> Prediction:

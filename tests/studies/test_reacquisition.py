@@ -14,7 +14,7 @@ from wildlab.studies.crossing_vessels.trial import (
     outcome,
     owners,
 )
-from wildlab.tracking.many.appearance import Appearance
+from wildlab.tracking.association import Appearance
 from wildlab.tracking.many.bank import Bank, Looks
 
 INTERVAL = 0.5

@@ -40,7 +40,7 @@ from wildlab.studies.schmidt.trial import (
     sheet_sighting,
     trial,
 )
-from wildlab.tracking.records import Track
+from wildlab.tracking.run import Track
 
 NOISE = PoseNoise(dict(zip(KINDS, (0.5, 0.8, 0.02, 0.05, 3.0), strict=True)), dict.fromkeys(KINDS, 1.1))
 

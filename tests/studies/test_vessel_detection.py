@@ -6,7 +6,7 @@ import pytest
 
 from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
-from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN

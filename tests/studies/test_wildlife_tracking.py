@@ -16,7 +16,7 @@ from wildlab.analysis.animals.tracking import (
     sight_numbers,
     turns,
 )
-from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
 from wildlab.planning.planner import SEARCH
 from wildlab.studies.wildlife_tracking import check_claims

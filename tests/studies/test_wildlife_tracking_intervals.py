@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.evaluation.runs import mean_interval
+from wildlab.evaluation.intervals import mean_interval
 from wildlab.studies.wildlife_tracking import positive_interval
 
 NOTEBOOKS = Path(__file__).parents[2] / "notebooks"

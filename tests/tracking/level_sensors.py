@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from wildlab.tracking.consider_parameters import TOGETHER, Considered
-from wildlab.tracking.predictions import Prediction, predict_position, predict_range_bearing
-from wildlab.tracking.sensors import Sensor, row_of
+from wildlab.tracking.schmidt import TOGETHER, Considered
+from wildlab.tracking.sensors import Prediction, Sensor, predict_position, predict_range_bearing, row_of
 
 
 def ranges_bearings(platform, yaw):

@@ -13,10 +13,8 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.tracking import schmidt
 from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import BatchCamera, run_batch
-from wildlab.tracking.batch_kernels import limit_one
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.records import Start
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
@@ -51,12 +49,9 @@ def flight(runs, seed=0):
     return times, z, CameraPoses.at_lens(CAMERA, p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2))
 
 
-@pytest.mark.parametrize(
-    ("runs", "gate", "alike"), [(3, 1.0, False), (70, 0.99, False), (1, 1.0, True), (70, 1.0, True)]
-)
+@pytest.mark.parametrize(("runs", "gate", "alike"), [(3, 1.0, False), (4, 0.99, False), (1, 1.0, True)])
 @pytest.mark.parametrize("row", [-1, 0])
 def test_positions(runs, gate, alike, row):
-    """Of runs that know the same of their errors, covariances are computed once."""
     rng = np.random.default_rng(runs)
     times = np.cumsum(rng.uniform(0, 2, N))
     times[7] = times[6]
@@ -68,7 +63,6 @@ def test_positions(runs, gate, alike, row):
         R[0, 4], z[1, 12] = np.nan, np.nan
     start = Start(times[0], rng.normal(size=(runs, 4)), np.diag([50.0, 40, 9, 4]), row=row)
     batch = run_batch(times, z, R, CV, start, gate_probability=gate)
-    assert batch.P.flags.writeable == (not alike)
     for run in {0, 1, runs // 2, runs - 1} & set(range(runs)):
         own, noise = start._replace(x=start.x[run]), R if alike else R[run]
         agree(
@@ -79,31 +73,23 @@ def test_positions(runs, gate, alike, row):
         )
 
 
-def test_one_gap_of_its_own_and_every_run_is_computed_by_itself():
-    times, z = np.arange(float(N)), np.ones((3, N, 2))
-    start = Start(0.0, np.zeros(4), np.eye(4))
-    assert not run_batch(times, z, np.eye(2), CV, start).P.flags.writeable
-    z[0, 12:14] = np.nan
-    assert run_batch(times, z, np.eye(2), CV, start).P.flags.writeable
-
-
 @pytest.mark.parametrize("gate", [1.0, 0.99])
 def test_pixels(gate):
-    runs = 67
+    runs = 5
     times, z, poses = flight(runs)
     plane = np.linspace(0, 1, N)
     start = Start(-0.5, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     R = np.diag([4.0, 6.0])
     batch = run_batch(times, z, R, CV, start, view=BatchCamera(poses, plane), gate_probability=gate)
-    for run in (0, 1, 33, 66):
+    for run in (0, 1, 2, 4):
         sensor = m.pixels(poses.take(run), plane)
         agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate_probability=gate), but=TWICE)
-    assert not batch.used[33, 5]
+    assert not batch.used[2, 5]
 
 
 @pytest.mark.parametrize("correlation_time", [np.inf, 5.0, 0.0])
 def test_schmidt(correlation_time, rng):
-    runs = 66
+    runs = 7
     times, z, poses = flight(runs)
     covariance = np.array([[random_pose_covariance(rng, 0.2) for _ in range(N)] for _ in range(runs)])
     covariance[3, 20] = np.nan
@@ -113,7 +99,7 @@ def test_schmidt(correlation_time, rng):
     R = np.tile(np.diag([4.0, 6.0]), (N, 1, 1))
     pose = PoseUncertainty(covariance, correlation_time)
     batch = run_batch(times, z, R, CV, start, view=BatchCamera(poses, 0.0), pose=pose, gate_probability=0.999)
-    for run in (0, 3, 4, 5, 33, 65):
+    for run in (0, 3, 4, 5, 6):
         own = start._replace(P=start.P[run])
         track = run_filter(
             times, z[run], R, m.pixels(poses.take(run), 0.0), CV, own,
@@ -122,23 +108,8 @@ def test_schmidt(correlation_time, rng):
         agree(batch, run, track, but=TWICE)
 
 
-def test_the_cross_covariance_is_limited_alike(rng):
-    changed = 0
-    for _ in range(50):
-        A = rng.normal(size=(10, 14)) * np.repeat([5, 1, 1, 0.02], [2, 2, 3, 3])[:, None]
-        J = A @ A.T
-        shrink = np.diag(rng.uniform(0.6, 1, 6))
-        given = J[:4, 4:], J[:4, :4], np.ascontiguousarray(shrink @ J[4:, 4:] @ shrink)
-        plain, limited = schmidt.limit_cross(*given)
-        fast, fast_limited = limit_one(*(np.ascontiguousarray(a) for a in given))
-        assert np.allclose(fast, plain, rtol=1e-9, atol=1e-12)
-        assert fast_limited == limited
-        changed += limited
-    assert 5 < changed < 50
-
-
 def test_only_the_rows_asked_for_are_kept():
-    times, z, poses = flight(66)
+    times, z, poses = flight(3)
     start = Start(times[1], np.ones(4), np.diag([25.0, 25, 9, 9]), row=1)
     arguments = dict(view=BatchCamera(poses, 0.0), gate_probability=0.99)
     full = run_batch(times, z, np.eye(2), CV, start, **arguments)
@@ -148,7 +119,7 @@ def test_only_the_rows_asked_for_are_kept():
     assert np.array_equal(some.x, full.x[:, rows], equal_nan=True)
     assert np.array_equal(some.P, full.P[:, rows], equal_nan=True)
     assert np.isnan(some.x[:, 0]).all()
-    assert np.array_equal(some.x[:, 1], np.ones((66, 4)))
+    assert np.array_equal(some.x[:, 1], np.ones((3, 4)))
     for ours, theirs in zip(some[3:], full[3:], strict=True):
         assert np.array_equal(ours, theirs, equal_nan=ours.dtype == float)
 

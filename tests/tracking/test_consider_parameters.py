@@ -11,14 +11,12 @@ from tests.tracking.level_sensors import bearings, consider, ranges_bearings
 from tests.tracking.poses import GENERATORS, overflight
 from tests.tracking.test_schmidt import growing
 from wildlab.errors import WildlabError
-from wildlab.tracking import predictions as p
 from wildlab.tracking import sensors as m
-from wildlab.tracking.consider_parameters import Considered, consider_all, errors_of
+from wildlab.tracking import sensors as p
 from wildlab.tracking.filters import run_imm, run_unscented
 from wildlab.tracking.motion import constant_velocity, white_acceleration
-from wildlab.tracking.records import Start
-from wildlab.tracking.run import run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.schmidt import Considered, PoseUncertainty, consider_all, errors_of
 from wildlab.tracking.sensors import SensorMeasurements, combined, merge, renamed
 from wildlab.tracking.smoothing import run_smoothed
 

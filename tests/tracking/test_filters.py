@@ -17,10 +17,9 @@ from wildlab.tracking import sensors as m
 from wildlab.tracking.filters import difference_model, run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import constant_velocity, rest, singer, white_acceleration
-from wildlab.tracking.predictions import predict_range_bearing
-from wildlab.tracking.records import Start
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.sensors import predict_range_bearing
 from wildlab.tracking.smoothing import run_smoothed, smooth
 
 ROUGH = partial(constant_velocity, sd_acceleration=0.3)

@@ -16,8 +16,8 @@ from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, posed
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
-from wildlab.tracking import predictions as p
 from wildlab.tracking import sensors as m
+from wildlab.tracking import sensors as p
 from wildlab.tracking.association import nearest_within
 from wildlab.tracking.motion import white_acceleration
 from wildlab.tracking.sensors import combined

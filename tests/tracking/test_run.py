@@ -24,8 +24,7 @@ from wildlab.tracking.motion import (
     rest,
     singer,
 )
-from wildlab.tracking.records import Start
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 
 

@@ -12,8 +12,7 @@ from tests.tracking.poses import GENERATORS, overflight
 from wildlab.tracking import schmidt
 from wildlab.tracking import sensors as m
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.records import Start
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 
 CV = partial(constant_velocity, sd_acceleration=0.2)

@@ -36,19 +36,26 @@ from wildlab.analysis.pose_noise import (
     used_deviations,
 )
 from wildlab.errors import WildlabError
-from wildlab.evaluation.axes import AlongAxis, split_along
-from wildlab.evaluation.blocks import Halves, Labels, compare_halves
 from wildlab.evaluation.causes import mean_of_others
-from wildlab.evaluation.ellipses import EllipseVerdict, judge_ellipses
+from wildlab.evaluation.ellipses import (
+    Averaged,
+    EllipseVerdict,
+    Spread,
+    judge_ellipses,
+    spread_of_sightings,
+    try_averaging,
+)
 from wildlab.evaluation.errors import (
+    AlongAxis,
     ErrorSummary,
     Scatter,
     bootstrap_interval,
     scatter_by_image,
+    split_along,
     summarise,
 )
+from wildlab.evaluation.intervals import Halves, Labels, compare_halves
 from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
 from wildlab.flight.calibration_files import (
     UNITS,
     Conditions,

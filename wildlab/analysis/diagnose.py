@@ -29,7 +29,6 @@ from wildlab.analysis.georeference import (
     truth_of,
 )
 from wildlab.errors import WildlabError
-from wildlab.evaluation.blocks import Labels, Neighbours, compare_neighbours
 from wildlab.evaluation.causes import (
     CHANCE,
     MARGIN,
@@ -55,6 +54,7 @@ from wildlab.evaluation.correlated_errors import (
     fit_generalised,
 )
 from wildlab.evaluation.errors import ErrorSummary, summarise
+from wildlab.evaluation.intervals import Labels, Neighbours, compare_neighbours
 from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import KINDS
 from wildlab.flight.store import Flight

@@ -9,8 +9,8 @@ import pandas as pd
 
 from wildlab.analysis.georeference import Observations, covariances_of, shifting_poses, truth_of
 from wildlab.errors import WildlabError
-from wildlab.evaluation.ambiguity import ambiguous, largest_visible
-from wildlab.evaluation.blocks import time_blocks
+from wildlab.evaluation.intervals import time_blocks
+from wildlab.evaluation.outliers import ambiguous, largest_visible
 from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate
@@ -169,7 +169,7 @@ def unlabelled_programs(flight: Flight) -> list[str]:
 
 
 def blocks_of(flight: Flight, table: pd.DataFrame) -> Indices:
-    """Which block in time order (N,) each point belongs to: see `wildlab.evaluation.blocks.time_blocks`.
+    """Which block in time order (N,) each point belongs to: see `wildlab.evaluation.intervals.time_blocks`.
 
     Parameters
     ----------

@@ -27,8 +27,16 @@ from wildlab.analysis.navigation_inputs import (
     without_gross,
 )
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import Average, average, chi_square_interval, nees, share_inside
-from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound
+from wildlab.evaluation.consistency import (
+    Average,
+    autocorrelation,
+    average,
+    chi_square_interval,
+    effective_sample_size,
+    nees,
+    share_inside,
+    white_bound,
+)
 from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import covariance_columns, covariances, frame_times, gnss_times, poses_at
 from wildlab.flight.manifest import replace_in_manifest

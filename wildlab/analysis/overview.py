@@ -22,8 +22,7 @@ from wildlab.analysis.image_coverage import (
     lost_data,
     ordered,
 )
-from wildlab.evaluation.streams import Pace, pace_of, runs_of
-from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration, vibration_of
+from wildlab.evaluation.streams import FINE, HARMFUL, Pace, Vibration, pace_of, runs_of, vibration_of
 from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.clocks import frame_times, gnss_times, longest_gap
 from wildlab.flight.store import Flight

@@ -20,10 +20,10 @@ from wildlab.analysis.navigate import AXES, PLACES, NavigationErrors, errors_aga
 from wildlab.analysis.navigation_inputs import VELOCITY
 from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_positions
 from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import effective_sample_size
 from wildlab.evaluation.correlated_errors import WanderNoise
+from wildlab.evaluation.errors import SLOWEST_M_S
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
-from wildlab.evaluation.track_errors import SLOWEST_M_S
-from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import level_axes, tilt_and_heading
@@ -32,7 +32,7 @@ from wildlab.geometry.camera import normalise
 from wildlab.geometry.frames import Array, Indices, matrix_to_euler, wrap
 from wildlab.geometry.uncertainty import ground_jacobians
 from wildlab.tracking.filters import thin
-from wildlab.tracking.records import Track
+from wildlab.tracking.run import Track
 
 #: A time without detections that is longer is a pause, s.
 PAUSE_S = 2.0

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from wildlab.analysis.image_coverage import Recovered
 from wildlab.analysis.overview import Overview
 from wildlab.evaluation.ellipses import is_overconfident
-from wildlab.evaluation.runs import Interval
+from wildlab.evaluation.intervals import Interval
 
 #: Share of the error, of the data or of the time below which nothing is worth mending.
 WORTH = 0.1

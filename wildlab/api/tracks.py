@@ -32,14 +32,13 @@ from wildlab.analysis.navigate import (
     summarise,
 )
 from wildlab.analysis.tracks import tracker
-from wildlab.analysis.tracks.filters import SMOOTHED
-from wildlab.analysis.tracks.judged import FEW_INDEPENDENT, seen_of, verdict, worth_of_errors
+from wildlab.analysis.tracks.scores import FEW_INDEPENDENT, seen_of, verdict, worth_of_errors
 from wildlab.analysis.tracks.sighting import FILTERS, CvTuning, follow_schmidt, sighting
+from wildlab.analysis.tracks.single_target import SMOOTHED, TOGETHER, SensorTrack
 from wildlab.analysis.tracks.tracker import WHITE, TrackingResult
-from wildlab.analysis.tracks.tracks import TOGETHER, SensorTrack
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import Average, nees, position_nees
-from wildlab.evaluation.track_errors import summarise_track, track_errors
+from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import check_model
 from wildlab.flight.store import Flight
@@ -252,7 +251,7 @@ def track(
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
     filter
-        Of `wildlab.analysis.tracks.filters`: ``"ekf"``, ``"schmidt"``, ``"ukf"``, ``"imm"``,
+        Of `wildlab.analysis.tracks.single_target`: ``"ekf"``, ``"schmidt"``, ``"ukf"``, ``"imm"``,
         ``"coloured"``, ``"thinned"``. Left out: the Schmidt filter where there are errors to consider, else
         the extended one. With a ``tuning``: ``"schmidt"``, ``"ekf"`` on pixels (H 7.4, 6.3), or ``"kf"`` on
         georeferenced positions (H 6.2).

@@ -35,7 +35,7 @@ def list_(reports: Path, as_json: bool, rule: bool) -> None:
     from wildlab.runner.record.status import as_plain, study_status
 
     if rule:
-        from wildlab.evaluation.characteristics import operating_characteristics
+        from wildlab.evaluation.replication import operating_characteristics
 
         table = operating_characteristics(trials=1000)
         if as_json:

@@ -7,8 +7,8 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 
 - `nees`, `nis`, `average`, `chi_square_interval`: is a filter consistent?
 - `innovation_whiteness`, `autocorrelation`, `effective_sample_size`: are its innovations white?
-- `track_errors.track_errors`, `summarise_track`: how far is a track from the truth?
-- `ospa`, `gospa`: how far is a set of tracks? `compare_identities`: who follows whom, how long, and how well.
+- `track_errors`, `summarise_track`: how far is a track from the truth?
+- `gospa`: how far is a set of tracks? `compare_identities`: who follows whom, how long, and how well.
 - `estimate_position_noise`: how rough is the truth itself?
 - `mean_interval`, `mean_share_interval`, `share_interval`: what do so many independent runs say?
 - `summarise`, `scatter_by_image`, `bootstrap_interval`, `estimate_pose_noise`: single positions, and why they
@@ -23,53 +23,60 @@ from typing import TYPE_CHECKING
 from wildlab.lazy import offer
 
 if TYPE_CHECKING:
-    from wildlab.evaluation.ambiguity import ambiguous, largest_visible
-    from wildlab.evaluation.axes import AlongAxis, split_along
-    from wildlab.evaluation.blocks import (
-        Halves,
-        Neighbours,
-        block_mean,
-        compare_halves,
-        compare_neighbours,
-        time_blocks,
-    )
     from wildlab.evaluation.causes import Gain, Linear, Ranked, gain_of, held_out, rank_models
     from wildlab.evaluation.consistency import (
         ERROR_CONVENTION,
         Average,
+        Whiteness,
+        autocorrelation,
         average,
         chi_square_interval,
+        effective_sample_size,
+        innovation_whiteness,
         nees,
         nis,
+        portmanteau,
         position_nees,
         share_inside,
+        white_bound,
         whiten,
     )
     from wildlab.evaluation.correlated_errors import WanderNoise, estimate_wander
-    from wildlab.evaluation.ellipses import EllipseVerdict, judge_ellipses
+    from wildlab.evaluation.ellipses import (
+        Averaged,
+        EllipseVerdict,
+        Spread,
+        judge_ellipses,
+        spread_of_sightings,
+        try_averaging,
+    )
     from wildlab.evaluation.errors import (
+        AlongAxis,
         ErrorSummary,
         Scatter,
+        TrackErrors,
+        TrackSummary,
         bootstrap_interval,
         scatter_by_image,
+        split_along,
         summarise,
+        summarise_track,
     )
-    from wildlab.evaluation.identities import Identities, Moment, compare_identities, scan_gospa
-    from wildlab.evaluation.outliers import Outlier, find_outliers
-    from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
-    from wildlab.evaluation.position_noise import estimate_position_noise
-    from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
-    from wildlab.evaluation.sets import Gospa, Ospa, gospa, ospa
-    from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
-    from wildlab.evaluation.track_errors import TrackErrors, TrackSummary, summarise_track
-    from wildlab.evaluation.whiteness import (
-        Whiteness,
-        autocorrelation,
-        effective_sample_size,
-        innovation_whiteness,
-        portmanteau,
-        white_bound,
+    from wildlab.evaluation.identities import Gospa, Identities, Moment, compare_identities, gospa
+    from wildlab.evaluation.intervals import (
+        Halves,
+        Interval,
+        Neighbours,
+        block_mean,
+        compare_halves,
+        compare_neighbours,
+        mean_interval,
+        mean_share_interval,
+        share_interval,
+        time_blocks,
     )
+    from wildlab.evaluation.outliers import Outlier, ambiguous, find_outliers, largest_visible
+    from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise, estimate_position_noise
 else:
     __getattr__, __dir__ = offer(__name__)
 
@@ -88,7 +95,6 @@ __all__ = [
     "Linear",
     "Moment",
     "Neighbours",
-    "Ospa",
     "Outlier",
     "PoseNoise",
     "Ranked",
@@ -122,11 +128,9 @@ __all__ = [
     "mean_share_interval",
     "nees",
     "nis",
-    "ospa",
     "portmanteau",
     "position_nees",
     "rank_models",
-    "scan_gospa",
     "scatter_by_image",
     "share_inside",
     "share_interval",

@@ -16,8 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from wildlab.evaluation.ambiguity import ODDS
-from wildlab.evaluation.blocks import PROBABILITY, Labels, block_mean
 from wildlab.evaluation.correlated_errors import (
     Covariance,
     KnownPlaces,
@@ -25,7 +23,8 @@ from wildlab.evaluation.correlated_errors import (
     WanderNoise,
     fit_generalised,
 )
-from wildlab.evaluation.runs import Interval
+from wildlab.evaluation.intervals import PROBABILITY, Interval, Labels, block_mean
+from wildlab.evaluation.outliers import ODDS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -7,6 +7,8 @@ three kinds at a scan:
 - **not visible**: nobody asks for a track of it, and one that is there costs nothing; who follows it is
   remembered, so that a track that comes back as another one is found out.
 - **don't-care**: as not visible, and neither swaps, breaks nor NEES are taken from it.
+
+`gospa` tells how far a set of estimates is from the true targets, when their number may be wrong.
 """
 
 from __future__ import annotations
@@ -21,7 +23,6 @@ from scipy.spatial.distance import cdist
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import nees
-from wildlab.evaluation.sets import Gospa, gospa
 
 Array = NDArray[np.float64]
 #: Row of an estimate and row of the target it follows.
@@ -165,33 +166,6 @@ class _Checked(NamedTuple):
     truth_sd: Array
 
 
-def scan_gospa(scan: Moment, cutoff: float, order: float = 2.0) -> Gospa:
-    """GOSPA of one scan, in which tracks on targets that nobody asks for cost nothing.
-
-    The tracks are assigned to all targets as in `gospa`. Those on targets that are not visible or don't-care
-    then leave with them, and such targets without a track leave too; what remains is assigned best as it is.
-    A target takes one track: a second one beside a don't-care target is a false one.
-
-    Parameters
-    ----------
-    scan
-        Tracks and targets.
-    cutoff, order
-        As in `gospa`.
-
-    Returns
-    -------
-    Gospa
-        `gospa` itself where every target is visible and the scan complete.
-
-    Raises
-    ------
-    WildlabError
-        If the scan's parts do not fit each other, a name or identity is there twice, or as `gospa`.
-    """
-    return _gospa(_checked(scan), cutoff, order)
-
-
 def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.0) -> Identities:
     """What became of tracks and targets over scans in the order of time.
 
@@ -218,7 +192,8 @@ def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.
     Raises
     ------
     WildlabError
-        If there are no scans, their times fall, or as `scan_gospa`.
+        If there are no scans, their times fall, a scan's parts do not fit each other, a name or identity is
+        there twice, or as `gospa`.
 
     Examples
     --------
@@ -303,6 +278,12 @@ def _checked(scan: Moment) -> _Checked:
 
 
 def _gospa(one: _Checked, cutoff: float, order: float) -> Gospa:
+    """GOSPA of one scan, in which tracks on targets that nobody asks for cost nothing.
+
+    The tracks are assigned to all targets as in `gospa`. Those on targets that are not visible or don't-care
+    then leave with them, and such targets without a track leave too; what remains is assigned best as it is.
+    A target takes one track: a second one beside a don't-care target is a false one.
+    """
     asked = one.visible & ~one.ignored
     on = dict(_assign(one.x, one.truth, cutoff, order))
     excused = {row for row, column in on.items() if not asked[column]}
@@ -423,3 +404,77 @@ def _nees_of(errors: Sequence[tuple[Array, Array, Array]]) -> tuple[Array, Array
 
 def _mean(values: Array) -> float:
     return float(values.mean()) if len(values) else np.nan
+
+
+class Gospa(NamedTuple):
+    """``distance ** p == localisation ** p + missed ** p + false ** p``, all in the unit of the points.
+
+    ``n_missed`` true targets have no estimate nearer than the cut-off, ``n_false`` estimates no target.
+    """
+
+    distance: float
+    localisation: float
+    missed: float
+    false: float
+    n_missed: int
+    n_false: int
+
+
+def gospa(truth: ArrayLike, estimates: ArrayLike, cutoff: float, order: float = 2.0) -> Gospa:
+    """Generalised OSPA (Rahmathullah, Garcia-Fernandez and Svensson 2017) with alpha = 2.
+
+    A sum over the targets, not a mean; with alpha = 2 it falls into localisation, missed and false targets. A
+    pair as far apart as ``cutoff``, or further, is not a pair: it is a missed target and a false one.
+
+    Parameters
+    ----------
+    truth, estimates
+        (M, k) and (N, k), in one unit; either may be empty.
+    cutoff
+        Distance from which a target counts as missed and an estimate as false, in that unit; to the power of
+        ``order``, each costs half of it.
+    order
+        p of the metric, at least 1: the higher, the more an outlier costs.
+
+    Returns
+    -------
+    Gospa
+        All zero where both sets are empty.
+
+    Raises
+    ------
+    WildlabError
+        If the points do not fit each other or are not finite, the cut-off is not positive or the order below
+        1.
+    """
+    cost = _costs(truth, estimates, cutoff, order)
+    rows, columns = linear_sum_assignment(cost)
+    # A pair at the cut-off costs as much as the two left alone: it counts as left alone.
+    paired = cost[rows, columns] < cutoff**order
+    near = float(cost[rows, columns][paired].sum())
+    n_missed, n_false = (size - int(paired.sum()) for size in cost.shape)
+    missed, false = (n * cutoff**order / 2 for n in (n_missed, n_false))
+    whole, *parts = (part ** (1 / order) for part in (near + missed + false, near, missed, false))
+    return Gospa(whole, parts[0], parts[1], parts[2], n_missed, n_false)
+
+
+def _costs(truth: ArrayLike, estimates: ArrayLike, cutoff: float, order: float) -> Array:
+    """``min(distance, cutoff) ** order`` (M, N)."""
+    if not (0 < cutoff < np.inf and 1 <= order < np.inf):
+        raise WildlabError(
+            f"a cut-off of {cutoff:g} and order {order:g} make no metric",
+            "give a positive cut-off, and an order of at least 1",
+        )
+    x, y = (np.asarray(points, float) for points in (truth, estimates))
+    size = max(x.shape[1] if x.ndim == 2 else 0, y.shape[1] if y.ndim == 2 else 0)
+    x, y = (points.reshape(0, size) if points.size == 0 else points for points in (x, y))
+    if x.ndim != 2 or y.ndim != 2 or x.shape[1] != y.shape[1]:
+        raise WildlabError(
+            f"points of shape {x.shape} do not go with points of shape {y.shape}",
+            "give (M, k) and (N, k), one row per point",
+        )
+    if not (np.isfinite(x).all() and np.isfinite(y).all()):
+        raise WildlabError("a point is not finite", "leave out rows without a position")
+    if not (len(x) and len(y)):
+        return np.empty((len(x), len(y)))
+    return np.asarray(np.minimum(cdist(x, y), cutoff) ** order)

@@ -1,8 +1,8 @@
 """Is a sentence true of flights? What a share of simulated flights, and its interval, allows to be said.
 
 A sentence that is true of some flights and not of others has a share, which so many simulated flights give
-with a 95 % interval (Wilson's, `wildlab.evaluation.runs.share_interval`). The verdict is by the interval, so
-that few flights decide little: of twenty, even all of them leave open whether it is nine in ten.
+with a 95 % interval (Wilson's, `share_interval`). The verdict is by the interval, so that few flights decide
+little: of twenty, even all of them leave open whether it is nine in ten.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.runs import Interval, mean_interval, share_interval
+from wildlab.evaluation.intervals import Interval, mean_interval, share_interval
 
 Array = NDArray[np.float64]
 
@@ -181,7 +181,7 @@ def share_verdict(share: Interval) -> str:
     Parameters
     ----------
     share
-        From `wildlab.evaluation.runs.share_interval`.
+        From `wildlab.evaluation.intervals.share_interval`.
 
     Returns
     -------

@@ -40,7 +40,7 @@ class Strict(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _true_is_no_number(cls, value: Any, info: ValidationInfo) -> Any:
-        # Python takes True for 1: `calm = true` would be a share of one.
+        # Python takes True for 1: `correlation = true` would be a share of one.
         annotation = cls.model_fields[str(info.field_name)].annotation
         truths = [] if _takes(annotation, bool) or _model_in(annotation) else list(_truths(value))
         if annotation in (bool, bool | None) and not isinstance(value, bool) and value is not None:

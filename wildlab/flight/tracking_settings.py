@@ -67,8 +67,6 @@ class ManyTargetsPart(Strict):
     moves_m: Annotated[float, Field(ge=0, le=1e6)] | None = None
     over_s: Above | None = None
     apart_m: Above | None = None
-    calm: Annotated[float, Field(gt=0, le=1)] | None = None
-    stay_s: Above | None = None
     others: bool = False
 
 

@@ -14,7 +14,7 @@ from wildlab.analysis.evaluate import score_points
 from wildlab.analysis.georeference import Observations, covariances_of, georeference, observe
 from wildlab.analysis.image_coverage import FLATTEST, POSITION, ground_height, ordered
 from wildlab.analysis.overview import length_of_way
-from wildlab.analysis.tracks.judged import LEADING, read_estimates
+from wildlab.analysis.tracks.scores import LEADING, read_estimates
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at
@@ -317,7 +317,7 @@ def scene_of(
     source
         Name of the ``nav`` table; left out, the best known one.
     estimates
-        A table of tracks, as `wildlab.analysis.tracks.judged.estimates_table` makes it.
+        A table of tracks, as `wildlab.analysis.tracks.scores.estimates_table` makes it.
 
     ellipses
         Whether points on the ground get their covariance, which takes most of the time.

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.tracks.judged import LEADING
+from wildlab.analysis.tracks.scores import LEADING
 from wildlab.analysis.verdict import Verdict
 from wildlab.messages.catalogue import Message, fill, load_texts
 from wildlab.messages.quantities import NOTHING, area, duration, metres, number, percent, way_length

@@ -12,8 +12,7 @@ from wildlab.analysis.diagnose import Diagnosis
 from wildlab.analysis.evaluate import blocks_of, errors_of, score_points
 from wildlab.analysis.georeference import Observations, georeference
 from wildlab.analysis.ground import on_level, points_geojson, shift_from_level, with_axes
-from wildlab.evaluation.axes import AlongAxis
-from wildlab.evaluation.errors import ErrorSummary, bootstrap_interval, summarise
+from wildlab.evaluation.errors import AlongAxis, ErrorSummary, bootstrap_interval, summarise
 from wildlab.evaluation.outliers import Outlier
 from wildlab.evaluation.pose_noise import PoseNoise
 from wildlab.files import csv_text

@@ -8,8 +8,7 @@ from functools import lru_cache
 
 from markupsafe import Markup
 
-from wildlab.evaluation.characteristics import operating_characteristics
-from wildlab.evaluation.replication import KINDS
+from wildlab.evaluation.replication import KINDS, operating_characteristics
 from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wrong
 from wildlab.messages.catalogue import fill, load_texts
 from wildlab.reporting.page import TAGS, page

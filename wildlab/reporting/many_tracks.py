@@ -11,19 +11,17 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.tracks.judged import FEWEST
-from wildlab.analysis.tracks.many import ManyTracks
+from wildlab.analysis.tracks.ground_positions import counted_twice, of_platform
+from wildlab.analysis.tracks.many import HERE, ManyTracks
 from wildlab.analysis.tracks.noise_model import ToldValue
-from wildlab.analysis.tracks.places import counted_twice, of_platform
-from wildlab.analysis.tracks.target_model import HERE
-from wildlab.evaluation.identities import Identities
-from wildlab.evaluation.sets import Gospa
+from wildlab.analysis.tracks.scores import FEWEST
+from wildlab.evaluation.identities import Gospa, Identities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import length, percent_of
 from wildlab.names import listed
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.report import Report, Wording
-from wildlab.tracking.many.existence import Count, count_interval, count_probabilities
+from wildlab.tracking.many.tracks import Count, count_interval, count_probabilities
 
 #: A target is tracked well where it has a track at this share of the scans at which it can be seen; below
 #: half it is lost.

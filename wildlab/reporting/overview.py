@@ -39,7 +39,7 @@ from wildlab.analysis.verdict import (
     possible_gain,
     verdict_of,
 )
-from wildlab.evaluation.vibration import FINE, FLOOR_HZ, HARMFUL
+from wildlab.evaluation.streams import FINE, FLOOR_HZ, HARMFUL
 from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS, gnss_times
 from wildlab.messages import quantities
 from wildlab.messages.catalogue import Message, load_texts

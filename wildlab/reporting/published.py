@@ -17,7 +17,7 @@ import pandas as pd
 from pydantic import Field
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.order_statistics import LEVEL, prediction_interval, prediction_rank
+from wildlab.evaluation.intervals import LEVEL, prediction_interval, prediction_rank, share_interval
 from wildlab.evaluation.replication import (
     Comparison,
     compare_calculation,
@@ -25,7 +25,6 @@ from wildlab.evaluation.replication import (
     compare_mean,
     not_judged,
 )
-from wildlab.evaluation.runs import share_interval
 from wildlab.flight.files import Strict, check_model
 from wildlab.paths import DATA
 from wildlab.reporting.metrics import metric

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from wildlab.evaluation.order_statistics import LEVEL, false_outside
+from wildlab.evaluation.intervals import LEVEL, false_outside
 from wildlab.evaluation.replication import SIZES, Closeness, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
 from wildlab.messages.catalogue import fill, load_texts, words_of

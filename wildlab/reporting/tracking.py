@@ -1,6 +1,6 @@
 """The page on a flight's tracks: how wrong they are, and whether their filters know.
 
-What is said follows by rules from the table of tracks (`wildlab.analysis.tracks.judged.judged`); the words
+What is said follows by rules from the table of tracks (`wildlab.analysis.tracks.scores.judged`); the words
 lie in ``data/messages/en/tracking.toml``.
 """
 
@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.tracks.judged import (
+from wildlab.analysis.tracks.noise_model import ROUGH, ToldValue, Tuned
+from wildlab.analysis.tracks.scores import (
     CAUTIOUS,
     CONSISTENT,
     FEW_INDEPENDENT,
@@ -24,9 +25,8 @@ from wildlab.analysis.tracks.judged import (
     leading_filter,
     verdict,
 )
-from wildlab.analysis.tracks.noise_model import ROUGH, ToldValue, Tuned
+from wildlab.analysis.tracks.single_target import TOGETHER
 from wildlab.analysis.tracks.tracker import TrackingResult
-from wildlab.analysis.tracks.tracks import TOGETHER
 from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
@@ -172,9 +172,9 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[Apart]) -> Verdict:
     Parameters
     ----------
     rows
-        From `wildlab.analysis.tracks.judged.judged`.
+        From `wildlab.analysis.tracks.scores.judged`.
     pairs
-        From `wildlab.analysis.tracks.judged.apart`.
+        From `wildlab.analysis.tracks.scores.apart`.
 
     Returns
     -------
@@ -437,7 +437,7 @@ def show_tracks(
     flight, followed
         The flight, and its tracks.
     rows, pairs
-        From `wildlab.analysis.tracks.judged`: a row a track, and sensors beside each other.
+        From `wildlab.analysis.tracks.scores`: a row a track, and sensors beside each other.
     tuned
         What another flight taught.
     source

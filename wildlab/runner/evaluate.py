@@ -12,8 +12,8 @@ from rich.console import Console
 
 from wildlab.analysis.navigate import reference_of
 from wildlab.analysis.navigation_inputs import imu_noise
-from wildlab.analysis.tracks.sensor_tuning import FEWEST
 from wildlab.analysis.tracks.tracker import refuse_unusable
+from wildlab.analysis.tracks.tuning import FEWEST
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import Use, find, usable_for

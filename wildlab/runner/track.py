@@ -14,11 +14,11 @@ from typing import Any, cast
 from rich.console import Console
 
 from wildlab.analysis.tracks.inputs import sensors_with_detections
+from wildlab.analysis.tracks.many import refuse_unfit as refuse_unfit_settings
 from wildlab.analysis.tracks.noise_model import Against, of_flight
 from wildlab.analysis.tracks.scans import sensors_of
-from wildlab.analysis.tracks.target_model import refuse_unfit as refuse_unfit_settings
 from wildlab.analysis.tracks.tracker import refuse_unusable
-from wildlab.analysis.tracks.tuned import refuse_same, tune_flight, tuned_text
+from wildlab.analysis.tracks.tuning import refuse_same, tune_flight, tuned_text
 from wildlab.errors import WildlabError
 from wildlab.flight.files import dump_toml
 from wildlab.flight.store import Flight, load_flight

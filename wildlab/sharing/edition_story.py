@@ -220,7 +220,7 @@ def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
     report = flight.report("tracking")
     if report is None:
         return []
-    from wildlab.analysis.tracks.judged import LEADING
+    from wildlab.analysis.tracks.scores import LEADING
     from wildlab.reporting.tracking import band_name
 
     rows = [(subject, entry) for (name, subject), entry in report.numbers.items() if name == "rmse"]

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from wildlab.evaluation.runs import mean_share_interval
+from wildlab.evaluation.intervals import mean_share_interval
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.messages.quantities import percent_between

@@ -10,9 +10,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.order_statistics import LEVEL, median_interval
+from wildlab.evaluation.intervals import LEVEL, Interval, median_interval, share_interval
 from wildlab.evaluation.replication import power_of
-from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.shares import (
     FITTED,
     NO_PREMISE,

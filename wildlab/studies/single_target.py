@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.pose_noise import VARIATIONS
 from wildlab.analysis.tracks.sighting import Sighting
-from wildlab.evaluation.whiteness import innovation_whiteness
+from wildlab.evaluation.consistency import innovation_whiteness
 from wildlab.reporting.charts.tracks import (
     error_over_time,
     innovation_correlations,

@@ -22,7 +22,6 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
 
 from wildlab.tracking.association import nearest_within
 from wildlab.tracking.batch import BatchCamera, BatchTracks, run_batch
-from wildlab.tracking.consider_parameters import Considered, consider_all
 from wildlab.tracking.filters import ModeTrack, run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.initiation import start_from_first, start_from_position, start_from_rays
 from wildlab.tracking.kalman import filter_at_rest
@@ -35,9 +34,8 @@ from wildlab.tracking.motion import (
     singer,
     white_acceleration,
 )
-from wildlab.tracking.records import Start, Track
-from wildlab.tracking.run import run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.run import Start, Track, run_filter
+from wildlab.tracking.schmidt import Considered, PoseUncertainty, consider_all
 from wildlab.tracking.sensors import Merged, Sensor, SensorMeasurements, merge, pixels, positions, renamed
 from wildlab.tracking.smoothing import run_smoothed, smooth
 

@@ -1,8 +1,10 @@
-"""Many runs of one flight at once: `wildlab.tracking.run.run_filter` for constant velocity, compiled.
+"""Many runs of one flight with constant velocity, compiled: `wildlab.tracking.run.run_filter` for each.
 
 For Monte Carlo studies: B runs share their times and their motion model; measurements, poses and covariances
 may differ from run to run. States are ``[pN, pE, vN, vE]``; measurements are positions, or pixels of a camera
-without distortion.
+without distortion. A row's errors that are considered stand behind the state: one joint covariance serves the
+Kalman and the Schmidt filter. All compiled functions stay in this one file, and have their many arguments,
+for the reasons that `wildlab.navigation.kernels` gives.
 """
 
 from __future__ import annotations
@@ -14,29 +16,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.compilation import announced
+from wildlab.geometry.compilation import announced, compiled
 from wildlab.geometry.frames import Array
-from wildlab.tracking import kalman, schmidt
-from wildlab.tracking.batch_kernels import Flags, filter_batch
+from wildlab.tracking import schmidt
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.records import Start, Track, check_rows, check_start, checked
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.run import Start, Track, check_rows, check_start, checked
+from wildlab.tracking.schmidt import LARGEST_CORRELATION, PoseUncertainty
+
+Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
 
 
 class BatchTracks(NamedTuple):
-    """What the filter made of B runs of N measurements; the estimates after each of M rows.
-
-    NaN before the start. Views of arrays in which the runs come last; where all runs have the same
-    covariances, ``P`` is one array that every run looks at, and cannot be written to.
-    """
+    """What the filter made of B runs of N measurements; the estimates after each of M rows, NaN before the
+    start."""
 
     times: Array  # (M,)
     x: Array  # (B, M, 4)
     P: Array  # (B, M, 4, 4)
     innovation: Array  # (B, N, 2)
     nis: Array  # (B, N)
-    used: NDArray[np.bool_]  # (B, N)
-    limited: NDArray[np.bool_]  # (B, N), see `run.Track`
+    used: Flags  # (B, N)
+    limited: Flags  # (B, N), see `run.Track`
 
 
 class BatchCamera(NamedTuple):
@@ -98,8 +99,7 @@ def run_batch(
     WildlabError
         As `run_filter`; and for measurements that are not (B, N, 2), or a camera that distorts.
     """
-    z = np.asarray(measurements, float)
-    R = np.asarray(R, float)
+    z, R = np.asarray(measurements, float), np.asarray(R, float)
     if z.ndim != 3 or z.shape[2] != 2:
         raise WildlabError(
             f"measurements of the shape {z.shape}", "give (runs, times, 2)", field="measurements"
@@ -118,50 +118,41 @@ def run_batch(
         )
         if pose is not None:
             left[first:] = np.array([schmidt.fade(dt, pose.correlation_time) for dt in steps.tolist()])[which]
-
     P_poses = phis = None
     if pose is not None:
         check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
         P_poses = _per_run(pose.covariance, 2, N)
         phis = _transitions(P_poses, pose)
-        unknown = ~np.isfinite(P_poses).all(axis=2)
+        unknown = ~np.isfinite(P_poses).all(axis=(2, 3))
         z[np.broadcast_to(unknown, (B, N))] = np.nan
         P_poses[unknown] = 0.0
     noise = _per_run(R, 2, N)
-    noise[~np.isfinite(noise).all(axis=2)] = [1.0, 0.0, 0.0, 1.0]  # their measurements are NaN by now
-    P0 = np.asarray(start.P, float)
+    noise[~np.isfinite(noise).all(axis=(2, 3))] = np.eye(2)  # their measurements are NaN by now
+    x0 = np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C")
+    P0 = np.ascontiguousarray(np.broadcast_to(np.asarray(start.P, float), (B, 4, 4)))
     kept = np.arange(N) if rows is None else np.arange(N)[np.asarray(rows, np.int64)]
     slots = np.full(N, -1)
     slots[kept] = np.arange(len(kept))
-    estimates = [np.empty((len(kept), *shape, B)) for shape in ((4,), (4, 4))]
-    scores = [np.empty((N, *shape, B)) for shape in ((2,), ())]
-    for a in estimates:
-        a[kept < first] = np.nan
-    for a in scores:
-        a[:first] = np.nan
-    out = (*estimates, *scores, np.zeros((N, B), bool), np.zeros((N, B), bool))
-    there = np.isfinite(z).all(axis=2)
-    alike = len(noise) == 1 and P0.ndim == 2 and bool((there == there[:1]).all())
-    if alike and view is None and pose is None and np.isinf(given.threshold):
-        x0 = np.broadcast_to(np.asarray(start.x, float), (B, 4))
-        return _run_alike(given.times, z, there[0], noise[0].reshape(N, 2, 2), F, Q, x0, start, first, kept)
-    poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, B, N)
+    x, P = (np.full((B, len(kept), *shape), np.nan) for shape in ((4,), (4, 4)))
+    innovation, nis = np.full((B, N, 2), np.nan), np.full((B, N), np.nan)
+    used, limited = np.zeros((B, N), bool), np.zeros((B, N), bool)
     kind = "Schmidt" if pose is not None else "Kalman" if view is None else "extended Kalman"
     with announced(f"the {kind} filter for many runs"):
-        singular = filter_batch(
-            F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
-            np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
-            np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),
-            first, given.threshold, slots, *out,
+        singular = filter_runs(
+            F, Q, left, phis, z, noise, *_camera_arrays(view, B, N), P_poses, x0, P0, first, given.threshold,
+            slots, x, P, innovation, nis, used, limited,
         )  # fmt: skip
     if singular >= 0:
-        raise _singular(singular)
+        raise WildlabError(
+            f"the innovation covariance S of row {singular} is not positive definite",
+            "check the covariances of start, motion and measurements",
+            field="S",
+        )
     if start.row >= 0:
+        used[:, start.row] = True
         if slots[start.row] >= 0:
-            out[0][slots[start.row]] = np.asarray(start.x, float).T.reshape(4, -1)
-            out[1][slots[start.row]] = np.moveaxis(P0, 0, -1) if P0.ndim == 3 else P0[..., None]
-        out[4][start.row] = True
-    return BatchTracks(given.times[kept], *(np.moveaxis(a, -1, 0) for a in out))
+            x[:, slots[start.row]], P[:, slots[start.row]] = x0, P0
+    return BatchTracks(given.times[kept], x, P, innovation, nis, used, limited)
 
 
 def as_tracks(found: BatchTracks) -> list[Track]:
@@ -186,56 +177,13 @@ def as_tracks(found: BatchTracks) -> list[Track]:
     ]
 
 
-def _run_alike(
-    times: Array, z: Array, there: Flags, R: Array, F: Array, Q: Array, x0: Array, start: Start, first: int,
-    kept: NDArray[np.int64],
-) -> BatchTracks:  # fmt: skip
-    """Positions without a gate, with the same noise and the same gaps in all runs.
-
-    What such a filter knows of its errors does not depend on what it measures: covariances and gains are
-    those of a single run, and only the estimates are many. z (B, N, 2); there (N,); R (N, 2, 2); x0 (B, 4).
-    """
-    B, N = z.shape[:2]
-    H, P, x = np.eye(2, 4), np.asarray(start.P, float), np.array(x0.T, order="C")
-    z_last = np.ascontiguousarray(np.moveaxis(z, 0, -1))
-    estimates, covariances = np.empty((len(kept), 4, B)), np.empty((len(kept), 4, 4))
-    innovation, nis = np.empty((N, 2, B)), np.empty((N, B))
-    used = np.zeros((N, B), bool)
-    slots = {int(row): slot for slot, row in enumerate(kept)}
-    for a in (estimates, covariances):
-        a[kept < first] = np.nan
-    unseen = ~there | (np.arange(N) < first)
-    innovation[unseen], nis[unseen] = np.nan, np.nan
-    if start.row >= 0:
-        used[start.row] = True
-        if start.row in slots:
-            estimates[slots[start.row]], covariances[slots[start.row]] = x, P
-    for row in range(first, N):
-        x = F[row] @ x
-        P = kalman.predict(np.zeros(4), P, F[row], Q[row])[1]
-        if there[row]:
-            S = P[:2, :2] + R[row]
-            if not (S[0, 0] > 0 and np.linalg.det(S) > 0):
-                raise _singular(row)
-            single = kalman.correct(np.zeros(4), P, np.zeros(2), H, R[row])
-            v = np.subtract(z_last[row], x[:2], out=innovation[row])
-            x = x + single.gain @ v
-            nis[row] = (v * (np.linalg.inv(single.S) @ v)).sum(axis=0)
-            P, used[row] = single.P, True
-        if row in slots:
-            estimates[slots[row]], covariances[slots[row]] = x, P
-    x_first, v_first = np.moveaxis(estimates, -1, 0), np.moveaxis(innovation, -1, 0)
-    shared = np.broadcast_to(covariances, (B, len(kept), 4, 4))
-    return BatchTracks(times[kept], x_first, shared, v_first, nis.T, used.T, np.zeros((B, N), bool))
-
-
 def _transitions(covariances: Array, pose: PoseUncertainty) -> Array:
-    """What `schmidt.transitions_of_pose` gives for each run's covariances (B, N, 36), as (B, N, 36).
+    """What `schmidt.transitions_of_pose` gives for each run's covariances (B, N, 6, 6).
 
     They take most of the time of a run. They do not depend on the scale: runs whose covariances are multiples
     of those of another share its own. And where nothing is left of ``C`` they do not matter.
     """
-    phis = np.tile(np.eye(6).ravel(), (*covariances.shape[:2], 1))
+    phis = np.tile(np.eye(6), (*covariances.shape[:2], 1, 1))
     if pose.correlation_time == 0:
         return phis
     known: list[int] = []
@@ -243,9 +191,7 @@ def _transitions(covariances: Array, pose: PoseUncertainty) -> Array:
         like = next((other for other in known if _multiples(covariances[other], own)), None)
         if like is None:
             known.append(run)
-            phis[run] = schmidt.transitions_of_pose(own.reshape(-1, 6, 6), pose.change).reshape(-1, 36)
-        else:
-            phis[run] = phis[like]
+        phis[run] = schmidt.transitions_of_pose(own, pose.change) if like is None else phis[like]
     return phis
 
 
@@ -258,20 +204,12 @@ def _multiples(one: Array, other: Array) -> bool:
     return bool(np.allclose(other, factor * one, rtol=1e-12, atol=0, equal_nan=True))
 
 
-def _singular(row: int) -> WildlabError:
-    return WildlabError(
-        f"the innovation covariance S of row {row} is not positive definite",
-        "check the covariances of start, motion and measurements",
-        field="S",
-    )
-
-
 def _camera_arrays(
     view: BatchCamera | None, runs: int, n_rows: int
-) -> tuple[Array | None, Array | None, Array, Array, Array]:
-    """Poses, R_bc, lever arm, planes and intrinsics for the kernel; without a camera no poses, and zeros."""
+) -> tuple[Array | None, Array | None, Array | None, Array, Array, Array]:
+    """p_nc, R_nc, R_bc, lever arm, planes and intrinsics for the kernel; None and zeros without a camera."""
     if view is None:
-        return None, None, np.zeros(3), np.zeros(n_rows), np.zeros(5)
+        return None, None, None, np.zeros(3), np.zeros(n_rows), np.zeros(5)
     poses = view.poses
     camera = poses.camera
     poses.require_rows((n_rows,) if len(poses.rows) == 1 else (runs, n_rows), "measurements")
@@ -283,19 +221,226 @@ def _camera_arrays(
             "take the distortion out of the pixels first, or use run_filter",
             field="camera",
         )
-    p_nc, R_nc = _per_run(poses.p_nc, 1, n_rows), _per_run(poses.R_nc, 2, n_rows)
     return (
-        np.ascontiguousarray(np.concatenate([p_nc, R_nc], axis=2)),
-        _per_run(poses.R_bc, 2, n_rows),
-        poses.lever_arm,
-        np.array(np.broadcast_to(np.asarray(view.plane_down, float), n_rows)),
+        _per_run(poses.p_nc, 1, n_rows), _per_run(poses.R_nc, 2, n_rows), _per_run(poses.R_bc, 2, n_rows),
+        poses.lever_arm, np.array(np.broadcast_to(np.asarray(view.plane_down, float), n_rows)),
         np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew]),
-    )
+    )  # fmt: skip
 
 
 def _per_run(values: ArrayLike, axes: int, n_rows: int) -> Array:
-    """(1 or B, N, k) from one value of so many axes, one for each row, or one for each run and row."""
+    """(1 or B, N, ...) from one value of so many axes, one for each row, or one for each run and row."""
     a = np.asarray(values, float)
-    single = a.shape[a.ndim - axes :]
-    a = np.broadcast_to(a, (1, n_rows, *single)) if a.ndim <= axes + 1 else a
-    return np.array(a, order="C").reshape(len(a), n_rows, -1)
+    if a.ndim <= axes + 1:
+        a = np.broadcast_to(a, (1, n_rows, *a.shape[a.ndim - axes :]))
+    return np.array(a, order="C")
+
+
+@compiled
+def filter_runs(
+    F: Array, Q: Array, left: Array, phis: Array | None, z: Array, R: Array, p_nc: Array | None,
+    R_nc: Array | None, R_bc: Array | None, lever: Array, planes: Array, A: Array, P_poses: Array | None,
+    x0: Array, P0: Array, start: int, threshold: float, slots: Integers,
+    out_x: Array, out_P: Array, out_v: Array, out_nis: Array, out_used: Flags, out_limited: Flags,
+) -> int:  # fmt: skip
+    """All runs through rows ``start`` to N; the row of a singular S, or -1.
+
+    F, Q (N, 4, 4), left (N,) and phis (1 or B, N, 6, 6) of the step to each row; z (B, N, 2); R, the camera's
+    poses and P_poses (1 or B, N, ...), None without a camera, or where the pose is taken as true; planes
+    (N,); A (5,): fx, fy, cx, cy, skew. Estimates of each row go to its place in ``slots`` (N,), nowhere where
+    that is -1. An argument of None is a type of its own: each kind of filter is compiled for itself.
+    """
+    n = 4 if P_poses is None else 10
+    joint, J, U, V, K = (
+        np.zeros((n, n)),
+        np.zeros((2, n)),
+        np.empty((n, 2)),
+        np.empty((4, 2)),
+        np.empty((4, 2)),
+    )
+    L, G, v = np.zeros((n, n)), np.empty((4, n)), np.zeros(2)
+    for run in range(len(z)):
+        x = x0[run].copy()
+        joint[:] = 0.0
+        joint[:4, :4] = P0[run]
+        noise = R[min(run, len(R) - 1)]
+        for row in range(start, z.shape[1]):
+            _predict(x, joint, F[row], Q[row], G)
+            if P_poses is not None:
+                of_run = min(run, len(P_poses) - 1)
+                _carry_errors(joint, G, left[row], phis[of_run, row], P_poses[of_run, row])  # type: ignore[index]  # there with `P_poses`
+            if p_nc is not None:
+                at = min(run, len(p_nc) - 1)
+                seen = _expect_pixel(
+                    x, z[run, row], p_nc[at, row], R_nc[min(run, len(R_nc) - 1), row],  # type: ignore[index, arg-type]
+                    R_bc[min(run, len(R_bc) - 1), row], lever, planes[row], A, v, J,  # type: ignore[index, arg-type]
+                )  # fmt: skip
+            else:
+                seen = np.isfinite(z[run, row, 0]) and np.isfinite(z[run, row, 1])
+                for i in range(2):
+                    v[i], J[i, i] = z[run, row, i] - x[i], 1.0
+            if seen:
+                if P_poses is not None and not _is_covariance(joint, L):
+                    C, out_limited[run, row] = schmidt.limit_cross(
+                        joint[:4, 4:].copy(), joint[:4, :4].copy(), joint[4:, 4:].copy()
+                    )
+                    joint[:4, 4:] = C
+                    joint[4:, :4] = C.T
+                nis = _update(x, joint, J, v, noise[row], threshold, U, V, K, G)
+                if nis < 0:
+                    return row
+                out_used[run, row], out_nis[run, row] = nis <= threshold, nis
+                out_v[run, row, 0], out_v[run, row, 1] = v[0], v[1]
+            if slots[row] >= 0:
+                for i in range(4):
+                    out_x[run, slots[row], i] = x[i]
+                    for j in range(4):
+                        out_P[run, slots[row], i, j] = joint[i, j]
+    return -1
+
+
+@compiled
+def _predict(x: Array, joint: Array, F: Array, Q: Array, G: Array) -> None:
+    """H (3.5a)-(3.5b) for x (4,) and the state's part of ``joint`` (n, n); G (4, n): F times its rows."""
+    for i in range(4):
+        for j in range(len(joint)):
+            G[i, j] = (
+                F[i, 0] * joint[0, j] + F[i, 1] * joint[1, j] + F[i, 2] * joint[2, j] + F[i, 3] * joint[3, j]
+            )
+    x0, x1, x2, x3 = x[0], x[1], x[2], x[3]
+    for i in range(4):
+        x[i] = F[i, 0] * x0 + F[i, 1] * x1 + F[i, 2] * x2 + F[i, 3] * x3
+        for j in range(i + 1):
+            joint[i, j] = joint[j, i] = Q[i, j] + (
+                G[i, 0] * F[j, 0] + G[i, 1] * F[j, 1] + G[i, 2] * F[j, 2] + G[i, 3] * F[j, 3]
+            )
+
+
+@compiled
+def _carry_errors(joint: Array, G: Array, left: float, phi: Array, P_pose: Array) -> None:
+    """``F C Phi'`` times what is left of the correlation, and the errors' own covariance of the row."""
+    for a in range(6):
+        for i in range(4):
+            value = 0.0
+            for b in range(6):
+                value += left * G[i, 4 + b] * phi[a, b]
+            joint[i, 4 + a] = joint[4 + a, i] = value
+        for b in range(6):
+            joint[4 + a, 4 + b] = P_pose[a, b]
+
+
+@compiled
+def _expect_pixel(
+    x: Array, z: Array, p: Array, R_nc: Array, R_bc: Array, lever: Array, plane: float, A: Array, v: Array,
+    J: Array,
+) -> bool:  # fmt: skip
+    """Innovation v (2,) and derivatives J (2, n) of `predictions.predict_pixel` without distortion.
+
+    False where the pixel or the pose is not there, or the target not in front of the camera.
+    """
+    n, e, d = x[0] - p[0], x[1] - p[1], plane - p[2]
+    X = R_nc[0, 0] * n + R_nc[1, 0] * e + R_nc[2, 0] * d
+    Y = R_nc[0, 1] * n + R_nc[1, 1] * e + R_nc[2, 1] * d
+    Z = R_nc[0, 2] * n + R_nc[1, 2] * e + R_nc[2, 2] * d
+    if not (Z > 0 and np.isfinite(X + Y + Z) and np.isfinite(z[0]) and np.isfinite(z[1])):
+        return False
+    q = 1 / Z
+    X, Y = X * q, Y * q
+    v[0], v[1] = z[0] - (A[0] * X + A[4] * Y + A[2]), z[1] - (A[1] * Y + A[3])
+    # The target as seen from b.
+    bx = (R_bc[0, 0] * X + R_bc[0, 1] * Y + R_bc[0, 2]) * Z + lever[0]
+    by = (R_bc[1, 0] * X + R_bc[1, 1] * Y + R_bc[1, 2]) * Z + lever[1]
+    bz = (R_bc[2, 0] * X + R_bc[2, 1] * Y + R_bc[2, 2]) * Z + lever[2]
+    for k in range(2):
+        # A row of the pixel's derivative with respect to the target in c.
+        jx, jy, jz = (
+            (A[0] * q, A[4] * q, -(A[0] * X + A[4] * Y) * q) if k == 0 else (0.0, A[1] * q, -A[1] * Y * q)
+        )
+        for i in range(3):
+            by_axis = jx * R_nc[i, 0] + jy * R_nc[i, 1] + jz * R_nc[i, 2]
+            if i < 2:
+                J[k, i] = by_axis
+            if J.shape[1] > 4:
+                J[k, 4 + i] = -by_axis
+        if J.shape[1] > 4:
+            # R_bc' S(b) J: rows of J R_cb, crossed with the target as seen from b.
+            gx = jx * R_bc[0, 0] + jy * R_bc[0, 1] + jz * R_bc[0, 2]
+            gy = jx * R_bc[1, 0] + jy * R_bc[1, 1] + jz * R_bc[1, 2]
+            gz = jx * R_bc[2, 0] + jy * R_bc[2, 1] + jz * R_bc[2, 2]
+            J[k, 7], J[k, 8], J[k, 9] = gy * bz - gz * by, gz * bx - gx * bz, gx * by - gy * bx
+    return True
+
+
+@compiled
+def _update(
+    x: Array, joint: Array, J: Array, v: Array, R: Array, threshold: float, U: Array, V: Array, K: Array,
+    G: Array,
+) -> float:  # fmt: skip
+    """The NIS, and where that is within the gate H (3.7d)-(3.7h), with errors (7.34)-(7.38); Joseph form.
+
+    -1 where S is no covariance. x (4,), joint (n, n), J (2, n), v (2,), R (2, 2); what follows is scratch.
+    """
+    n = len(joint)
+    for i in range(n):
+        for a in range(2):
+            value = joint[i, 0] * J[a, 0] + joint[i, 1] * J[a, 1]  # velocities are not seen
+            for j in range(4, n):
+                value += joint[i, j] * J[a, j]
+            U[i, a] = value
+    s00 = J[0, 0] * U[0, 0] + J[0, 1] * U[1, 0] + R[0, 0]
+    s01 = J[0, 0] * U[0, 1] + J[0, 1] * U[1, 1] + R[0, 1]
+    s11 = J[1, 0] * U[0, 1] + J[1, 1] * U[1, 1] + R[1, 1]
+    for j in range(4, n):
+        s00 += J[0, j] * U[j, 0]
+        s01 += J[0, j] * U[j, 1]
+        s11 += J[1, j] * U[j, 1]
+    determinant = s00 * s11 - s01 * s01
+    if not (determinant > 0 and s00 > 0):
+        return -1.0
+    i00, i01, i11 = s11 / determinant, -s01 / determinant, s00 / determinant
+    nis = v[0] * (i00 * v[0] + i01 * v[1]) + v[1] * (i01 * v[0] + i11 * v[1])
+    if not nis <= threshold:
+        return float(nis)
+    for i in range(4):
+        K[i, 0], K[i, 1] = U[i, 0] * i00 + U[i, 1] * i01, U[i, 0] * i01 + U[i, 1] * i11
+        x[i] += K[i, 0] * v[0] + K[i, 1] * v[1]
+        # The target's rows of (7.37): G is the left factor times the prior, then comes the right one.
+        for j in range(n):
+            G[i, j] = joint[i, j] - K[i, 0] * U[j, 0] - K[i, 1] * U[j, 1]
+        for a in range(2):
+            value = G[i, 0] * J[a, 0] + G[i, 1] * J[a, 1] - K[i, 0] * R[0, a] - K[i, 1] * R[1, a]
+            for j in range(4, n):
+                value += G[i, j] * J[a, j]
+            V[i, a] = value
+    for i in range(4):
+        for j in range(i + 1):
+            one = G[i, j] - V[i, 0] * K[j, 0] - V[i, 1] * K[j, 1]
+            other = G[j, i] - V[j, 0] * K[i, 0] - V[j, 1] * K[i, 1]
+            joint[i, j] = joint[j, i] = (one + other) / 2
+        for j in range(4, n):
+            joint[i, j] = joint[j, i] = G[i, j]
+    return float(nis)
+
+
+@compiled
+def _is_covariance(joint: Array, L: Array) -> bool:
+    """Whether ``[P C; C' P_pose]`` surely is one, with no correlation that `schmidt.limit_cross` would limit.
+
+    By Cholesky's pivots, the errors first; what is near nothing (or NaN) is left to the careful way.
+    """
+    n, highest = len(joint), LARGEST_CORRELATION**2
+    for a in range(n):
+        i = (a + 4) % n
+        for b in range(a + 1):
+            value = joint[i, (b + 4) % n]
+            if b >= n - 4:
+                value *= highest
+            for k in range(b):
+                value -= L[a, k] * L[b, k]
+            if b < a:
+                L[a, b] = value / L[b, b]
+            elif not value > 1e-9 * joint[i, i]:
+                return False
+            else:
+                L[a, a] = np.sqrt(value)
+    return True

@@ -34,9 +34,8 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import check_covariance
 from wildlab.geometry.frames import Array
 from wildlab.tracking import schmidt
-from wildlab.tracking.predictions import POSE
 from wildlab.tracking.schmidt import Change, PoseUncertainty
-from wildlab.tracking.sensors import Sensor
+from wildlab.tracking.sensors import POSE, Sensor
 
 #: One name for several.
 TOGETHER = {"attitude": POSE[3:], "tilt": POSE[3:5], "platform_position": POSE[:3]}
@@ -48,7 +47,7 @@ class Considered(NamedTuple):
     Attributes
     ----------
     names
-        (k,) of the errors, see `wildlab.tracking.consider_parameters`.
+        (k,) of the errors, see `wildlab.tracking.schmidt`.
     covariance
         (N, k, k) at each of N measurements, or (k, k) for all; units of the errors squared.
     correlation_time

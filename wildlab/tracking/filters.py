@@ -17,8 +17,7 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.predictions import Prediction
-from wildlab.tracking.records import (
+from wildlab.tracking.run import (
     Start,
     State,
     Track,
@@ -30,7 +29,7 @@ from wildlab.tracking.records import (
     single_detection,
     step_through,
 )
-from wildlab.tracking.sensors import Sensor, angles_at, check_states, difference, on_state
+from wildlab.tracking.sensors import Prediction, Sensor, angles_at, check_states, difference, on_state
 
 
 class Differenced(NamedTuple):

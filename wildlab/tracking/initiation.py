@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.tracking.records import FilterInputs, Start, check_rows, checked
+from wildlab.tracking.run import FilterInputs, Start, check_rows, checked
 from wildlab.tracking.sensors import Sensor, angles_at, difference, on_state
 
 #: rad. Rays that cross at less are near parallel: an error of them is some ten times as long along them.

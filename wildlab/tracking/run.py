@@ -11,26 +11,282 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from wildlab.errors import WildlabError
+from wildlab.geometry.covariances import check_covariance, gate_threshold
 from wildlab.geometry.frames import Array
-from wildlab.tracking import schmidt
 from wildlab.tracking.association import nearest_detection
-from wildlab.tracking.consider_parameters import Considers, Errors, errors_of
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.records import Start as Start
-from wildlab.tracking.records import (
-    State,
-    check_rows,
-    check_start,
-    checked,
-    predict_by_motion,
-    record,
-    step_through,
+from wildlab.tracking.schmidt import (
+    Considers,
+    Errors,
+    errors_of,
+    limit_cross,
+    spread_of_prediction,
+    update_schmidt,
 )
-from wildlab.tracking.records import Track as Track
 from wildlab.tracking.sensors import Sensor, angles_at, check_states, on_state
+
+
+class Start(NamedTuple):
+    """What is known before the filter runs.
+
+    Attributes
+    ----------
+    time
+        s; earlier measurements are not used.
+    x, P
+        (n,) and (n, n), in the order of the motion model.
+    row
+        The measurement that ``x`` was made from, which is not used again, nor any before it. -1: none.
+    """
+
+    time: float
+    x: Array
+    P: Array
+    row: int = -1
+
+
+class Track(NamedTuple):
+    """What a filter made of N measurements, asked at M times.
+
+    Attributes
+    ----------
+    times, x, P
+        (M,), (M, n), (M, n, n): estimates with all measurements up to and including that time; NaN before
+        the start.
+    innovation, S, nis
+        (N, m), (N, m, m), (N,): of each row's measurement, whether it passed the gate or not; NaN where
+        there was nothing to compare (no detection, target not in front of the camera, before the start).
+    used
+        (N,) bool: the measurement changed the estimate, or started it. An unused row with a NIS was
+        left out by the gate, one without had nothing usable.
+    chosen
+        (N,) index of the detection that was nearest, -1 where there was none to choose from.
+    limited
+        (N,) bool: the Schmidt filter's cross-covariance had to be shortened here (`schmidt.limit_cross`).
+    """
+
+    times: Array
+    x: Array
+    P: Array
+    innovation: Array
+    S: Array
+    nis: Array
+    used: NDArray[np.bool_]
+    chosen: NDArray[np.int64]
+    limited: NDArray[np.bool_]
+
+
+class FilterInputs(NamedTuple):
+    """Checked measurements: K detections in each of N rows."""
+
+    times: Array  # (N,)
+    z: Array  # (N, K, m)
+    R: Array  # (N, K, m, m)
+    output_times: Array  # (M,)
+    threshold: float  # largest NIS that is let in
+    thresholds: Array  # (N,) likewise, row by row
+    sizes: NDArray[np.int64] | None = None  # (N,) elements that a row measures; None: all m
+
+
+#: State of a filter: when, estimate, covariance.
+State = tuple[float, Array, Array]
+#: State and a later time -> estimate and covariance then.
+PredictTo = Callable[[State, float], tuple[Array, Array]]
+
+
+def record(track: Track, row: int, innovation: Array, S: Array, nis: float, chosen: int, used: bool) -> None:
+    """Enter a row's innovation with its covariance and NIS, and whether the measurement was used."""
+    track.innovation[row], track.S[row], track.nis[row] = innovation, S, nis
+    track.chosen[row], track.used[row] = chosen, used
+
+
+def predict_by_motion(motion: Motion) -> PredictTo:
+    """Prediction with a motion model."""
+    return lambda state, time: predict(state[1], state[2], *motion(time - state[0]))
+
+
+def step_through(
+    given: FilterInputs,
+    start: Start,
+    predict_to: PredictTo,
+    step: Callable[[int, State, Track], State | None],
+) -> Track:
+    """Apply a filter's ``step`` to the rows in order, and predict to the requested times in between.
+
+    ``predict_to`` gives estimate and covariance at a later time; ``step`` gives the state after a row, and
+    may leave it at an earlier time. None ends the track: it has no estimates from that row on.
+    """
+    N, _, m = given.z.shape
+    M, n = len(given.output_times), len(start.x)
+    track = Track(
+        given.output_times,
+        np.full((M, n), np.nan),
+        np.full((M, n, n), np.nan),
+        np.full((N, m), np.nan),
+        np.full((N, m, m), np.nan),
+        np.full(N, np.nan),
+        np.zeros(N, bool),
+        np.full(N, -1),
+        np.zeros(N, bool),
+    )
+    state: State = (float(start.time), np.asarray(start.x, float), np.asarray(start.P, float))
+    if start.row >= 0:
+        track.used[start.row] = True
+        track.chosen[start.row] = 0
+    first = max(int(np.searchsorted(given.times, start.time, "left")), start.row + 1)
+    out = int(np.searchsorted(given.output_times, start.time, "left"))
+
+    def write_until(time: float, out: int) -> int:
+        while out < M and given.output_times[out] < time:
+            track.x[out], track.P[out] = predict_to(state, float(given.output_times[out]))
+            out += 1
+        return out
+
+    for row in range(first, N):
+        out = write_until(given.times[row], out)
+        after = step(row, state, track)
+        if after is None:
+            break
+        state = after
+    else:
+        write_until(np.inf, out)
+    if given.sizes is not None:  # what a row does not measure was told and not seen
+        absent = np.arange(m) >= given.sizes[:, None]
+        track.innovation[absent] = np.nan
+        track.S[absent[:, :, None] | absent[:, None, :]] = np.nan
+    return track
+
+
+def checked(
+    times: ArrayLike,
+    measurements: ArrayLike,
+    R: ArrayLike,
+    gate_probability: float,
+    output_times: ArrayLike | None,
+    sizes: NDArray[np.int64] | None = None,
+) -> FilterInputs:
+    """FilterInputs of a run with all their axes, or a `WildlabError` that names the row.
+
+    ``sizes`` (N,) says how many elements a row measures; None: all. The others are taken for zeros that were
+    measured with a noise of one: a prediction of zero that nothing changes makes them weigh nothing.
+    """
+    t, z = np.asarray(times, float), np.asarray(measurements, float)
+    if z.ndim == 2:
+        z = z[:, None, :]
+    if t.ndim != 1 or z.ndim != 3 or len(z) != len(t):
+        raise WildlabError(
+            f"{t.shape} times and {np.shape(measurements)} measurements",
+            "give one row of measurements for each time",
+            field="measurements",
+        )
+    _check_order(t, "times")
+    out = t if output_times is None else np.asarray(output_times, float)
+    _check_order(out, "output_times")
+    N, K, m = z.shape
+    R = np.asarray(R, float)
+    R = R[:, None] if R.ndim == 3 else R
+    if R.shape not in ((m, m), (N, 1, m, m), (N, K, m, m)):
+        raise WildlabError(
+            f"R has the shape {R.shape} for {N} rows of {K} measurements with {m} elements",
+            "give (m, m), (N, m, m) or (N, K, m, m)",
+            field="R",
+        )
+    if sizes is not None:
+        z, R = _filled(z, R, np.asarray(sizes))
+    known = np.isfinite(R).all(axis=(-1, -2))
+    flat = R[known]
+    lowest = np.linalg.eigvalsh(flat)
+    bad = (lowest[:, 0] <= 1e-14 * np.abs(lowest[:, -1])) | (
+        np.abs(flat - np.swapaxes(flat, -1, -2)).max(axis=(-1, -2)) > 1e-9 * np.abs(lowest[:, -1])
+    )
+    if bad.any():
+        marked = np.zeros(known.shape, bool)
+        marked[known] = bad
+        row = int(np.flatnonzero(np.broadcast_to(marked, (N, K)).any(axis=1))[0])
+        raise WildlabError(
+            f"R of row {row} is not a covariance: it is not symmetric or not positive definite",
+            "give every measurement a noise in all its elements",
+            field="R",
+        )
+    # A measurement of which a part is missing is none, and neither is one without a covariance.
+    usable = np.where((known & np.isfinite(z).all(axis=-1))[..., None], z, np.nan)
+    threshold = gate_threshold(gate_probability, m)
+    thresholds = np.full(N, threshold)
+    if sizes is not None:
+        for size in np.unique(sizes):
+            thresholds[sizes == size] = gate_threshold(gate_probability, int(size))
+    return FilterInputs(t, usable, np.broadcast_to(R, (N, K, m, m)), out, threshold, thresholds, sizes)
+
+
+def _filled(z: Array, R: Array, sizes: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Zeros measured with a noise of one in the place of elements that rows do not have."""
+    N, _, m = z.shape
+    if sizes.shape != (N,):
+        raise WildlabError(
+            f"{len(sizes)} rows for {N} rows of measurements", "give one for each measurement", field="sensor"
+        )
+    absent = np.arange(m) >= sizes[:, None]
+    z, R = z.copy(), np.array(np.broadcast_to(R, (N, R.shape[1] if R.ndim == 4 else 1, m, m)))
+    z[np.broadcast_to(absent[:, None], z.shape)] = 0.0
+    R[np.broadcast_to((absent[:, :, None] | absent[:, None, :])[:, None], R.shape)] = 0.0
+    rows, element = np.nonzero(absent)
+    R[rows, :, element, element] = 1.0
+    return z, R
+
+
+def single_detection(given: FilterInputs) -> FilterInputs:
+    """The same inputs, for a filter that takes no more than one detection a row."""
+    if given.z.shape[1] != 1:
+        raise WildlabError(
+            "several detections in a frame", "choose one first, or use run_filter", field="measurements"
+        )
+    return given
+
+
+def check_start(start: Start) -> None:
+    """Refuse a start that is not finite, whose shapes do not fit, or whose ``P`` is no covariance.
+
+    ``x`` may be (n,) or (B, n), ``P`` (n, n) or (B, n, n).
+    """
+    x, P = np.asarray(start.x, float), np.asarray(start.P, float)
+    if x.ndim not in (1, 2) or P.ndim not in (2, 3) or P.shape[-2:] != (x.shape[-1],) * 2:
+        raise WildlabError(f"x of the shape {x.shape}, P {P.shape}", "give (n,) and (n, n)", field="start")
+    if not np.isfinite(start.time):
+        raise WildlabError(f"a time of {start.time}", "give seconds", field="start.time")
+    lost = np.argwhere(~np.isfinite(x))
+    if len(lost):
+        row = ", ".join(str(i) for i in lost[0])
+        raise WildlabError(
+            f"row {row} is {x[tuple(lost[0])]}", "give every state a value to start from", field="start.x"
+        )
+    check_covariance(P, "start.P")
+
+
+def check_rows(rows: int | None, wanted: int, what: str) -> None:
+    """Refuse ``rows`` of something that goes with ``wanted`` measurements; None is one value for all."""
+    if rows is not None and rows != wanted:
+        raise WildlabError(
+            f"{rows} rows for {wanted} rows of measurements", "give one for each measurement", field=what
+        )
+
+
+def _check_order(times: Array, field: str) -> None:
+    lost = np.flatnonzero(~np.isfinite(times))
+    if len(lost):
+        raise WildlabError(f"row {lost[0]} has no time ({times[lost[0]]})", "leave the row out", field=field)
+    back = np.flatnonzero(np.diff(times) < 0)
+    if len(back):
+        row = int(back[0]) + 1
+        raise WildlabError(
+            f"row {row} at {times[row]} s comes after row {row - 1} at {times[row - 1]} s",
+            "sort the rows by time, with all that belongs to them",
+            field=field,
+        )
+
 
 #: Row, the row of the detection that was used last, the estimate then, covariance now -> whether the track
 #: ends here, before anything of this row is used.
@@ -180,9 +436,9 @@ def filter_in_steps(
             P_pose, H_errors = errors.covariance[row], errors.of(expected.H_pose)
             if not (np.isfinite(P_pose).all() and np.isfinite(H_errors).all()):
                 return now, x, P
-            C, track.limited[row] = schmidt.limit_cross(C, P, P_pose)
+            C, track.limited[row] = limit_cross(C.copy(), P.copy(), P_pose.copy())
             steps[-1] = done = done._replace(C_prior=C, C=C)
-            spread = schmidt.spread_of_prediction(P, C, P_pose, H, H_errors)
+            spread = spread_of_prediction(P, C, P_pose, H, H_errors)
         with np.errstate(invalid="ignore"):
             angles = angles_at(sensor, row)
             best = nearest_detection(given.z[row], expected.z, spread, given.R[row], angles, row)
@@ -197,7 +453,7 @@ def filter_in_steps(
             update = correct(x, P, best.innovation, H, noise)
             x, P, gain = update.x, update.P, update.gain
         else:
-            considered = schmidt.update_schmidt(x, P, C, P_pose, best.innovation, H, H_errors, noise)
+            considered = update_schmidt(x, P, C, P_pose, best.innovation, H, H_errors, noise)
             x, P, C, gain = considered.x, considered.P, considered.C, considered.gain
         last, x_last = row, x
         steps[-1] = done._replace(x=x, P=P, C=C, gain=gain, H=H, H_errors=H_errors, R=noise)

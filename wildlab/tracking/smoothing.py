@@ -24,10 +24,9 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.tracking.consider_parameters import Considers, Errors
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.records import Start, Track
-from wildlab.tracking.run import Step, filter_in_steps
+from wildlab.tracking.run import Start, Step, Track, filter_in_steps
+from wildlab.tracking.schmidt import Considers, Errors
 from wildlab.tracking.sensors import Sensor
 
 #: Variances of a correction below this share of the prediction's count as zero: rounding.

@@ -17,8 +17,7 @@ from wildlab.analysis.georeference import (
     observe,
     pose_errors,
 )
-from wildlab.analysis.tracks.many import tracks_table
-from wildlab.analysis.tracks.places import (
+from wildlab.analysis.tracks.ground_positions import (
     OF_COVARIANCE,
     LastingErrors,
     OfPose,
@@ -32,6 +31,7 @@ from wildlab.analysis.tracks.places import (
     stated_roots,
     told_errors,
 )
+from wildlab.analysis.tracks.many import tracks_table
 from wildlab.analysis.tracks.scans import scans_of
 from wildlab.analysis.tracks.tracker import track
 from wildlab.flight.store import Flight
@@ -40,8 +40,8 @@ from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, 
 from wildlab.geometry.uncertainty import PoseErrors
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.many import smooth_many
-from wildlab.tracking.predictions import POSE
 from wildlab.tracking.schmidt import transition_of_pose
+from wildlab.tracking.sensors import POSE
 
 ALL = """
 [sensors.radar.considered.heading]

@@ -151,13 +151,6 @@ def test_settings_for_many_are_merged_key_by_key():
     assert many is not None and (many.gate, many.hits, many.hulls[0].name) == (3.0, 4, "ship")
 
 
-def test_calm_motions_are_used_where_they_are_stated():
-    calm = parse_settings("[targets.many]\ncalm = 0.2\nstay_s = 12.0\n")
-    found = track(robot_flight(kind="position", seconds=20.0), "joint", settings=calm)
-    assert (found.targets.calm, found.targets.stay_s) == (0.2, 12.0)
-    assert found.shown[-1].kinds.shape == (1, 1)
-
-
 def test_what_the_truth_may_be_off_is_beside_the_tracks_own():
     """Fixes of a receiver that is wrong by metres: without its own error tracks would be called wrong.
 

@@ -11,7 +11,7 @@ import pytest
 from tests.analysis.robots import believed, boat, robot, robot_flight
 from tests.refused import refused
 from wildlab.analysis.georeference import georeference, observe
-from wildlab.analysis.tracks.places import PlacedLooks, _of_ranges, places_of, sees_of
+from wildlab.analysis.tracks.ground_positions import PlacedLooks, _of_ranges, places_of, sees_of
 from wildlab.analysis.tracks.scans import Scans, scans_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera

@@ -8,7 +8,7 @@ import pytest
 
 from tests.analysis.robots import KNOWN, robot_flight
 from tests.sharing.edition.flights import flight, overview, report
-from wildlab.analysis.tracks.judged import judged
+from wildlab.analysis.tracks.scores import judged
 from wildlab.analysis.tracks.tracker import track
 from wildlab.analysis.verdict import numbers_of
 from wildlab.flight.tracking_settings import parse_settings

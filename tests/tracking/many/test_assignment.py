@@ -11,8 +11,14 @@ from scipy.stats import multivariate_normal, norm
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import gate_threshold
-from wildlab.tracking.association import Assignment, global_nearest
-from wildlab.tracking.many.appearance import feature_distances, image_features, veto, with_features
+from wildlab.tracking.association import (
+    Assignment,
+    feature_distances,
+    global_nearest,
+    image_features,
+    veto,
+    with_features,
+)
 from wildlab.tracking.many.life import look_differences, place_costs, reachable, recognise
 
 entries = st.one_of(st.integers(-5, 30), st.sampled_from([np.nan, np.inf]))

@@ -14,9 +14,7 @@ from scipy.stats import chi2
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import gate_threshold
-from wildlab.tracking.association import global_nearest
-from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many.appearance import (
+from wildlab.tracking.association import (
     DISTANCE,
     FEATURES,
     RULES,
@@ -25,12 +23,13 @@ from wildlab.tracking.many.appearance import (
     Appearance,
     associate,
     feature_distances,
+    global_nearest,
     limits_of,
 )
+from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.bank import Life, Looks, Tuning, compare_looks, nobody, run_bank
 from wildlab.tracking.motion import constant_velocity, in_steps
-from wildlab.tracking.records import Start
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.sensors import positions
 
 INTERVAL = 0.5

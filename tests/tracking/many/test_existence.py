@@ -18,8 +18,8 @@ from wildlab.tracking.association import (
     association_probabilities_by_enumeration,
     belief_propagation,
 )
-from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
+from wildlab.tracking.many.tracks import after_scan, still_there, visible_later, weights
 
 shares = st.floats(0.01, 0.99)
 

@@ -16,8 +16,7 @@ from wildlab.evaluation.consistency import chi_square_interval, nees
 from wildlab.tracking.many.run import Shown, run_many, smooth_considering, smooth_many
 from wildlab.tracking.many.target_model import Hull, own_columns, own_lasting
 from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.records import Start, Track
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Start, Track, run_filter
 from wildlab.tracking.sensors import positions
 from wildlab.tracking.smoothing import smooth
 

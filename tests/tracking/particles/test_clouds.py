@@ -11,7 +11,7 @@ from scipy.stats import poisson
 
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
-from wildlab.tracking.many.existence import count_interval, count_probabilities
+from wildlab.tracking.many.tracks import count_interval, count_probabilities
 from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.particles import (
     SCHEMES,

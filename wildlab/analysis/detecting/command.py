@@ -53,7 +53,7 @@ from wildlab.analysis.detecting.scores import (
 from wildlab.detection.detections import PART
 from wildlab.detection.warm import to_grey
 from wildlab.errors import WildlabError
-from wildlab.evaluation.runs import Interval
+from wildlab.evaluation.intervals import Interval
 from wildlab.files import write_atomic, write_csv, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import printable, read_regular

@@ -18,8 +18,8 @@ from wildlab.detection.detections import Detections
 from wildlab.detection.floating import FloatingThresholds
 from wildlab.detection.warm import Warm, to_grey
 from wildlab.errors import WildlabError
+from wildlab.evaluation.intervals import Interval, share_interval
 from wildlab.evaluation.matching import Rates, match, rates
-from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.flight.readers.frames import Frame
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask

@@ -14,9 +14,16 @@ import pandas as pd
 
 from wildlab.analysis import Fact, fact
 from wildlab.errors import WildlabError
-from wildlab.evaluation.matching import Rates, match, rates
-from wildlab.evaluation.runs import Interval, share_interval
-from wildlab.evaluation.score_curve import Curve, ScoredFrame, curve_along_score, difference_of_f1
+from wildlab.evaluation.intervals import Interval, share_interval
+from wildlab.evaluation.matching import (
+    Curve,
+    Rates,
+    ScoredFrame,
+    curve_along_score,
+    difference_of_f1,
+    match,
+    rates,
+)
 from wildlab.flight.files import printable
 from wildlab.flight.readers.labels import Labels, choose_classes, read_labels
 from wildlab.geometry.covariances import inside_ellipse

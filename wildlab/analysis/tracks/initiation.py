@@ -30,8 +30,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.initiation import start_from_position, start_from_rays
-from wildlab.tracking.records import Start, Track
-from wildlab.tracking.run import Ends
+from wildlab.tracking.run import Ends, Start, Track
 from wildlab.tracking.sensors import second_derivatives, share_left_out
 
 

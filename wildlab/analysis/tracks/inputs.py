@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from wildlab.analysis.tracks.ground_positions import ABLE
 from wildlab.analysis.tracks.noise_model import (
     NoiseModel,
     TargetModel,
@@ -18,7 +19,6 @@ from wildlab.analysis.tracks.noise_model import (
     of_sensor,
     of_targets,
 )
-from wildlab.analysis.tracks.places import ABLE
 from wildlab.analysis.tracks.scans import Scans, Truth, scans_of, sensors_of, truths_at
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.sensors import looks_of_others

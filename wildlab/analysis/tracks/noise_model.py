@@ -16,16 +16,15 @@ from scipy.spatial import cKDTree
 
 from wildlab.analysis.georeference import assumed_deviations
 from wildlab.analysis.tracks.scans import SLOTS, Scans
-from wildlab.analysis.tracks.sensor_tuning import SensorTuning
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import CONSIDERED, Settings, TargetsPart, read_settings, settings_over
 from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.frames import Array, wrap
 from wildlab.paths import DATA
-from wildlab.tracking.consider_parameters import TOGETHER, Considered
 from wildlab.tracking.motion import Motion, white_acceleration
-from wildlab.tracking.predictions import POSE
+from wildlab.tracking.schmidt import TOGETHER, Considered
+from wildlab.tracking.sensors import POSE
 
 #: Of which noise each element of a measurement has its standard deviation, and in what the file has it.
 NOISE_OF = {
@@ -52,6 +51,96 @@ OF_UNNAMED = (_GATE, _PATIENCE, _REACH, _REACH_OF_RAYS)
 STATED, ASSUMED = "stated", "assumed"
 #: Of a noise that nobody states: it is estimated where it is judged, and the page says so.
 ROUGH = "estimated here: how rough its detections are"
+
+
+#: Errors that last are put down to these together, each group with one standard deviation.
+GROUPS = (("platform_north", "platform_east"), ("clock",), ("heading",), ("range_bias",), ("roll", "pitch"))
+
+
+class SensorTuning(NamedTuple):
+    """One sensor, as a flight with truth shows it.
+
+    Attributes
+    ----------
+    offset_s, offset_low_s, offset_high_s
+        What to add to the stamps, with a 95 % interval for as many errors as the correlated ones are worth;
+        low and high are NaN where the clock was not tuned and is as it was stated.
+        A hull seen ahead of or behind its antenna is in it too: on a straight course nothing tells the two
+        apart.
+    sd
+        Of the error of each element, m or rad, standing part included.
+    share, correlation_time_s
+        The autocorrelation of the errors: ``share * exp(-lag / correlation_time_s)`` beyond lag zero.
+    position_sd_m, clock_sd_s, heading_sd_rad
+        What the part of the variance that stays from scan to scan is put down to.
+    range_m, range_sd_m
+        How far away what the sensor saw was: all that is known of the distance at a first bearing.
+    interval_s
+        Usual time between scans.
+    n
+        Errors it is from.
+    own_sds
+        Of each element, where they are of several units; ``sd`` is then in metres across the line of sight.
+    range_bias_sd_m, tilt_sd_rad
+        As ``heading_sd_rad``, for sensors that measure ranges, and for cameras (about each level axis).
+    """
+
+    sensor: str
+    kind: str
+    offset_s: float
+    offset_low_s: float
+    offset_high_s: float
+    sd: float
+    share: float
+    correlation_time_s: float
+    position_sd_m: float
+    clock_sd_s: float
+    heading_sd_rad: float
+    range_m: float
+    range_sd_m: float
+    interval_s: float
+    n: int
+    own_sds: tuple[float, ...] = ()
+    range_bias_sd_m: float = 0.0
+    tilt_sd_rad: float = 0.0
+
+    @property
+    def clock_tuned(self) -> bool:
+        """Whether the offset is an estimate."""
+        return bool(np.isfinite(self.offset_low_s))
+
+    @property
+    def sds(self) -> Array:
+        """(m,) standard deviation of the error of each element, standing part included."""
+        return np.array(self.own_sds or (self.sd,) * (1 if self.kind == "bearing" else 2))
+
+    @property
+    def considered(self) -> dict[str, float]:
+        """Standard deviations of errors that last, by name, m, s or rad; those that are zero too."""
+        sds = (self.position_sd_m, self.clock_sd_s, self.heading_sd_rad, self.range_bias_sd_m,
+               self.tilt_sd_rad)  # fmt: skip
+        return {name: sd for group, sd in zip(GROUPS, sds, strict=True) for name in group}
+
+    @property
+    def next_correlation(self) -> float:
+        """Correlation of the errors of two successive scans."""
+        return float(self.share * np.exp(-self.interval_s / self.correlation_time_s))
+
+    @property
+    def fading(self) -> float:
+        """What is left of the correlated part from one scan to the next: ``F_c`` of H (7.5)."""
+        return float(np.exp(-self.interval_s / self.correlation_time_s))
+
+    @property
+    def driving_sd(self) -> float:
+        """Standard deviation of ``e_2 - F_c e_1`` of successive errors: the root of ``R_w``, H (7.5)."""
+        F_c = self.fading
+        return float(self.sd * np.sqrt(1 + F_c**2 - 2 * F_c * self.next_correlation))
+
+    @property
+    def thinning_s(self) -> float:
+        """Lag from which errors are correlated by less than 1/e; nought where they never are by more."""
+        return float(max(0.0, self.correlation_time_s * (1 + np.log(max(self.share, 1e-9)))))
 
 
 class ConsideredError(NamedTuple):

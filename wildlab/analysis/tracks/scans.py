@@ -11,21 +11,22 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.position_noise import estimate_position_noise
+from wildlab.evaluation.pose_noise import estimate_position_noise
 from wildlab.flight.checks.sensors import looks_of_others
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.tracking.predictions import (
+from wildlab.tracking.sensors import (
     POSE,
     Prediction,
+    Sensor,
+    difference,
     predict_pixel,
     predict_position,
     predict_range_bearing,
 )
-from wildlab.tracking.sensors import Sensor, difference
 
 #: Elements of a measurement by kind of detection, and the columns that they are read from.
 KINDS: dict[str, dict[str, str]] = {

@@ -17,9 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.georeference import observe
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import average, chi_square_interval, position_nees, share_inside
-from wildlab.evaluation.track_errors import summarise_track, track_errors
-from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
+from wildlab.evaluation.consistency import (
+    autocorrelation,
+    average,
+    chi_square_interval,
+    effective_sample_size,
+    position_nees,
+    share_inside,
+)
+from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
@@ -28,7 +34,7 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
 from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import Motion, constant_velocity
-from wildlab.tracking.records import Start, Track
+from wildlab.tracking.run import Start, Track
 from wildlab.tracking.schmidt import Change, PoseUncertainty
 from wildlab.tracking.sensors import Sensor, pixels
 

@@ -14,7 +14,6 @@ from typing import Literal, NamedTuple, overload
 
 import numpy as np
 
-from wildlab.analysis.tracks.filters import NAMES, SMOOTHABLE, SMOOTHED, possible
 from wildlab.analysis.tracks.inputs import (
     UNNAMED,
     Association,
@@ -33,7 +32,14 @@ from wildlab.analysis.tracks.noise_model import (
     Tuned,
 )
 from wildlab.analysis.tracks.scans import Scans
-from wildlab.analysis.tracks.tracks import SensorTrack, track_target
+from wildlab.analysis.tracks.single_target import (
+    NAMES,
+    SMOOTHABLE,
+    SMOOTHED,
+    SensorTrack,
+    possible,
+    track_target,
+)
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import Settings
@@ -108,7 +114,7 @@ def track(
     tuned
         What another flight says of the sensors.
     filters
-        Of `wildlab.analysis.tracks.filters.NAMES`; left out: the one with white noise, and the Schmidt
+        Of `wildlab.analysis.tracks.single_target.NAMES`; left out: the one with white noise, and the Schmidt
         filter beside it where there are errors to consider.
     targets, sensors
         Names; left out: all of them.

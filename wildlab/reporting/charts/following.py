@@ -11,12 +11,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from wildlab.analysis.tracks.filters import SMOOTHED
-from wildlab.analysis.tracks.judged import seen_of, whitened
+from wildlab.analysis.tracks.scores import seen_of, whitened
+from wildlab.analysis.tracks.single_target import SMOOTHED, SensorTrack
 from wildlab.analysis.tracks.tracker import TrackingResult
-from wildlab.analysis.tracks.tracks import SensorTrack
-from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.evaluation.whiteness import autocorrelation, white_bound
+from wildlab.evaluation.consistency import autocorrelation, chi_square_interval, white_bound
 from wildlab.geometry.frames import Array
 from wildlab.messages.quantities import length
 from wildlab.reporting.charts.drawing import (

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.analysis.image_coverage import Coverage
 from wildlab.analysis.overview import TROUBLES, Issue, Path
-from wildlab.evaluation.streams import Pace
-from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
+from wildlab.evaluation.streams import FINE, HARMFUL, Pace, Vibration
 from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import (
     LINES,

@@ -17,7 +17,7 @@ from matplotlib.ticker import FuncFormatter, LogFormatter
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.evaluation.track_errors import SLOWEST_M_S
+from wildlab.evaluation.errors import SLOWEST_M_S
 from wildlab.reporting.charts.drawing import (
     TRUTH,
     Array,

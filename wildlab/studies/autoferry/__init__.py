@@ -9,14 +9,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.tracks.comparison import COLUMNS, FILTERS, table
-from wildlab.analysis.tracks.noise_model import of_targets
+from wildlab.analysis.tracks.noise_model import SensorTuning, of_targets
 from wildlab.analysis.tracks.scans import sensors_of
-from wildlab.analysis.tracks.sensor_tuning import SensorTuning, tune
-from wildlab.analysis.tracks.tracks import SensorTrack
-from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.evaluation.runs import share_interval
-from wildlab.evaluation.whiteness import innovation_whiteness
+from wildlab.analysis.tracks.scores import COMPARED, FILTERS, table
+from wildlab.analysis.tracks.single_target import SensorTrack
+from wildlab.analysis.tracks.tuning import tune
+from wildlab.evaluation.consistency import chi_square_interval, innovation_whiteness
+from wildlab.evaluation.intervals import share_interval
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import read_settings
 from wildlab.paths import DATA
@@ -49,7 +48,7 @@ def case_of(flight: Flight) -> str:
 
 
 def tune_sensor(flight: Flight, sensor: str) -> SensorTuning:
-    """Everything of a sensor from one scenario, see `wildlab.analysis.tracks.sensor_tuning.tune`."""
+    """Everything of a sensor from one scenario, see `wildlab.analysis.tracks.tuning.tune`."""
     return tune(flight, sensor, BOATS.reach)
 
 
@@ -59,7 +58,7 @@ def tune_sensors(flight: Flight) -> dict[str, SensorTuning]:
 
 
 def tracks_table(followed: Mapping[str, Sequence[SensorTrack]]) -> pd.DataFrame:
-    """A row for each track, with its ``case``: `wildlab.analysis.tracks.comparison.table` of all."""
+    """A row for each track, with its ``case``: `wildlab.analysis.tracks.scores.table` of all."""
     each = [table(ones, BOATS.size_m).assign(case=case) for case, ones in followed.items()]
     return pd.concat(each, ignore_index=True)
 
@@ -81,7 +80,7 @@ def record_tracks(report: Report, tracks: pd.DataFrame) -> None:
             "position": {"lag1_autocorrelation"},
             "bearing": {"lag1_autocorrelation_north", "lag1_autocorrelation_east"},
         }[row["kind"]]
-        for name, unit in COLUMNS.items():
+        for name, unit in COMPARED.items():
             if name not in of_other_kind:
                 of = "detections" if name.startswith(("anis", "lag1")) else "compared"
                 report.metric(name, subject, row[name], unit, n=int(row[of]))

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.tracks.comparison import FILTERS, WHITE
+from wildlab.analysis.tracks.scores import FILTERS, WHITE
 
 Array = NDArray[np.float64]
 

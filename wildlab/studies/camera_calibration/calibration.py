@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from wildlab.detection.boards import Board, find_board, grey8
+from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.replication import propagate_rounding
-from wildlab.evaluation.runs import Interval
 from wildlab.geometry.board_views import Views, parameters_of, project_board
 from wildlab.geometry.calibration import Mounting, mounting_from_points
 from wildlab.geometry.camera import Camera, camera_from_data_sheet

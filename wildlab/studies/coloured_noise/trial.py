@@ -33,8 +33,7 @@ from wildlab.studies.linear_vs_nonlinear.trial import (
 )
 from wildlab.tracking.filters import run_coloured
 from wildlab.tracking.motion import singer, singer_variance
-from wildlab.tracking.records import Track
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Track, run_filter
 from wildlab.tracking.sensors import positions
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval, share_inside, simulate_filter_runs
-from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.evaluation.intervals import Interval, share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED
 from wildlab.reporting.charts.drawing import finish
 from wildlab.reporting.charts.forms import Values, draw_lines

@@ -42,7 +42,7 @@ from wildlab.studies.crossing_vessels.trial import (
     swapped,
     wrong_of,
 )
-from wildlab.tracking.many.appearance import Appearance, image_features
+from wildlab.tracking.association import Appearance, image_features
 from wildlab.tracking.many.bank import Bank
 
 Array = NDArray[np.float64]

@@ -20,10 +20,10 @@ from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking import association as rules
+from wildlab.tracking.association import Appearance, image_features
 from wildlab.tracking.many import POINT, ManySensorModel, ManyTargetModel, run_many
 from wildlab.tracking.many import Scan as Look
-from wildlab.tracking.many import appearance as rules
-from wildlab.tracking.many.appearance import Appearance, image_features
 from wildlab.tracking.many.bank import Bank, Life, Looks, Tuning, run_bank
 
 Array = NDArray[np.float64]

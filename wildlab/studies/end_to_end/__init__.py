@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.evaluation.runs import mean_interval, mean_share_interval
+from wildlab.evaluation.intervals import mean_interval, mean_share_interval
 from wildlab.evaluation.shares import Check, Decision, decide
 from wildlab.reporting.charts.drawing import draw_dots, finish, name_rows
 from wildlab.reporting.charts.forms import draw_errors, draw_marks, draw_picture

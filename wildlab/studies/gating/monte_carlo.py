@@ -27,8 +27,7 @@ from wildlab.geometry.mount import Mount
 from wildlab.studies.gating import kernels
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.predictions import azimuth_elevation_of_pixel
-from wildlab.tracking.sensors import on_state
+from wildlab.tracking.sensors import azimuth_elevation_of_pixel, on_state
 
 #: The three forms of H table 6.6, in its order.
 FORMS = ("position", "pixels", "angles")

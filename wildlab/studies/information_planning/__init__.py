@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from wildlab.analysis.search import Searched, Searcher, rows_at, search
-from wildlab.evaluation.runs import mean_share_interval, share_interval
+from wildlab.evaluation.intervals import mean_share_interval, share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT
 from wildlab.messages.quantities import percent_between
 from wildlab.planning.legs import Leg, Platform

@@ -27,7 +27,7 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.uncertainty import ground_covariance
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.records import Track
+from wildlab.tracking.run import Track
 
 Array = NDArray[np.float64]
 #: Numbers of a flight by (subject, name).

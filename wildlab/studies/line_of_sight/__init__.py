@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from wildlab.evaluation.runs import mean_interval, mean_share_interval
+from wildlab.evaluation.intervals import mean_interval, mean_share_interval
 from wildlab.evaluation.shares import Check
 from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles, field_of_view, in_field_of_view

@@ -29,13 +29,13 @@ from wildlab.analysis.tracks.sighting import (
     start,
 )
 from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import white_bound
 from wildlab.evaluation.shares import Check
-from wildlab.evaluation.whiteness import white_bound
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.filters import run_imm, run_unscented
 from wildlab.tracking.motion import Motion, constant_velocity, in_steps
-from wildlab.tracking.records import Start, Track
+from wildlab.tracking.run import Start, Track
 from wildlab.tracking.sensors import Sensor, pixels
 
 Array = NDArray[np.float64]

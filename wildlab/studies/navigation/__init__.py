@@ -23,7 +23,7 @@ from wildlab.analysis.navigate import (
     unit_of,
 )
 from wildlab.analysis.verdict import Evidence, Verdict, verdict_of
-from wildlab.evaluation.whiteness import innovation_whiteness
+from wildlab.evaluation.consistency import innovation_whiteness
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.reporting.charts.georeferencing import aircraft_map

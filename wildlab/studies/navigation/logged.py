@@ -19,7 +19,7 @@ from wildlab.analysis.navigate import (
 )
 from wildlab.analysis.navigation_inputs import Placement, Receiver, heading_from, place_receiver
 from wildlab.analysis.verdict import VERDICT_LEVEL
-from wildlab.evaluation.blocks import block_mean, time_blocks
+from wildlab.evaluation.intervals import block_mean, time_blocks
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import significant

@@ -19,8 +19,8 @@ from wildlab.analysis.rendered import Photographer
 from wildlab.detection.floating import find_objects
 from wildlab.detection.flow import Features, filled_outlines, find_features, match_features
 from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import effective_sample_size
 from wildlab.evaluation.shares import Check, columns_of
-from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import student_quantile
 from wildlab.simulation.scene.flights import SceneFlight, VesselLook, corner_of
@@ -193,8 +193,8 @@ def half_of_mean(values: ArrayLike) -> float:
     ----------
     values
         (N,), of pairs in order. Neighbours share what the autopilot has wrong: they are worth fewer values
-        that are independent (`wildlab.evaluation.whiteness.effective_sample_size`). Pairs on both sides of a
-        gap count as neighbours; there are few of them.
+        that are independent (`effective_sample_size`). Pairs on both sides of a gap count as neighbours;
+        there are few of them.
 
     Returns
     -------

@@ -29,8 +29,7 @@ from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Study, name_metrics
 from wildlab.studies.replay import trial
 from wildlab.studies.replay.trial import CLOCK, NONE, ONE, SINGLE, Moments
-from wildlab.tracking.records import Start
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.sensors import positions
 
 #: Variance that a place gains in a second, m^2, along each axis: a metre in a second, chosen.

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.navigate import SETTLING_S
 from wildlab.evaluation.consistency import Average, average, chi_square_interval, share_inside
-from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.reporting.charts.drawing import finish, new_strips
 from wildlab.reporting.charts.forms import Values, draw_lines, plain_numbers

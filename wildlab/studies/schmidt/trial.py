@@ -38,13 +38,13 @@ from wildlab.analysis.tracks.sighting import (
 )
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval, position_nees, share_inside
+from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
-from wildlab.tracking.records import Track
+from wildlab.tracking.run import Track
 from wildlab.tracking.schmidt import PoseUncertainty
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from scipy import ndimage
 
+from wildlab.evaluation.intervals import mean_interval
 from wildlab.evaluation.replication import propagate_rounding
-from wildlab.evaluation.runs import mean_interval
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.flodell import linear_enu_error
 from wildlab.geometry.frames import Array, euler_to_matrix

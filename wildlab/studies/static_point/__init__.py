@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis.evaluate import errors_of
-from wildlab.evaluation.whiteness import autocorrelation
+from wildlab.evaluation.consistency import autocorrelation
 from wildlab.flight.store import Flight
 from wildlab.reporting.charts.georeferencing import (
     autocorrelation_chart,

@@ -10,9 +10,9 @@ from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, georeference, observe
 from wildlab.analysis.navigate import navigate_observer
 from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import autocorrelation
 from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.shares import Check, columns_of
-from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.simulation.onboard_sensors import as_mounted, mounted_imu

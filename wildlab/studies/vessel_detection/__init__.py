@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import PUBLISHED, FloatingThresholds, find_edges, find_objects
-from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.intervals import share_interval
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix

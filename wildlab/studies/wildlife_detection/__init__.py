@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.detection.warm import Warm
+from wildlab.evaluation.intervals import Interval, mean_interval
 from wildlab.evaluation.matching import Rates, rates, shares
-from wildlab.evaluation.runs import Interval, mean_interval
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.reporting.charts.drawing import finish
 from wildlab.reporting.charts.forms import Values, draw_picture, rows_chart

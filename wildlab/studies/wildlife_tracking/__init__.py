@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.animals.images import NONE
 from wildlab.analysis.animals.tracking import FollowedAnimals, Known, Patrolled, follow
-from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
+from wildlab.evaluation.intervals import Interval, mean_interval, mean_share_interval, share_interval
 from wildlab.evaluation.shares import Check, Pooled, columns_of
 from wildlab.geometry.frames import Array
 from wildlab.messages.quantities import number, percent_between

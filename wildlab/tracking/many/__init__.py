@@ -13,14 +13,12 @@ A matrix of distances has a row for each measurement and a column for each track
 """
 
 from wildlab.tracking.association import (
+    Appearance,
     Assignment,
     association_probabilities,
     belief_propagation,
-    global_nearest,
-)
-from wildlab.tracking.many.appearance import (
-    Appearance,
     feature_distances,
+    global_nearest,
     image_features,
     veto,
     with_features,

@@ -16,10 +16,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.tracking.association import innovation_squared
-from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many import bank_kernel
-from wildlab.tracking.many.appearance import (
+from wildlab.tracking.association import (
     DISTANCE,
     FEATURES,
     RULES,
@@ -32,8 +29,11 @@ from wildlab.tracking.many.appearance import (
     feature_distances,
     gate_with_more,
     has_room,
+    innovation_squared,
     limits_of,
 )
+from wildlab.tracking.kalman import predict, update
+from wildlab.tracking.many import bank_kernel
 from wildlab.tracking.many.life import (
     CONFIRMED,
     DROPPED,

@@ -13,7 +13,7 @@ from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 
 Index = NDArray[np.int64]
-#: Rules of `wildlab.tracking.many.appearance` as the loop knows them.
+#: Rules of `wildlab.tracking.association` as the loop knows them.
 DISTANCE, FEATURES, VETO, STATE = 0, 1, 2, 3
 #: So near to its limit a deviation is left to be decided by the eigenvalues.
 NEARLY = 1 + 1e-9

@@ -12,7 +12,7 @@ themselves.
 
 Back over the tracks, once the flight is over, which measurements were of which target stays as it was taken
 at the time, and the covariance knows nothing of what was taken wrongly: among many false measurements it is
-too small. Kinds of hull stay merged; targets that may also go calmly are smoothed by the lively motion.
+too small. Kinds of hull stay merged.
 Errors that last, ``o``, stay considered and are not estimated. An estimate is corrected by what the smoother
 changed at the next row, ``x^s_k = x_k + G (x^s_k+1 - x_k+1|k)``, with the ``G`` of Rauch, Tung and Striebel's
 for the joint state. With ``e`` for truth minus estimate, the smoothed error is ``A e_k + B o_k`` and what is
@@ -33,25 +33,23 @@ from scipy.spatial import cKDTree
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import association_probabilities
-from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
 from wildlab.tracking.many.target_model import (
     LEAST_KIND,
     ManySensorModel,
     ManyTargetModel,
     Scan,
     at_least,
-    each_motion,
     gather,
     hull_noise,
     largest_of,
     near_side,
-    of_hulls,
     own_columns,
     own_lasting,
 )
 from wildlab.tracking.many.tracks import (
     Compared,
     Tracks,
+    after_scan,
     alive,
     begin,
     both,
@@ -61,7 +59,10 @@ from wildlab.tracking.many.tracks import (
     later,
     likelihoods,
     no_tracks,
+    still_there,
     update,
+    visible_later,
+    weights,
     without_doubles,
 )
 from wildlab.tracking.motion import white_acceleration
@@ -249,7 +250,7 @@ def follow_many(
     WildlabError
         As `run_many`.
     """
-    eyes, targets = each_motion(sensors, targets)
+    eyes = tuple(sensors)
     for scan in scans:
         if not np.isfinite(scan.time):
             raise WildlabError("a scan has no time", "leave it out, or give it one")
@@ -350,7 +351,7 @@ def _corrected(
         existence, visible = tracks.existence, tracks.visible[:, which]
     own_here = np.concatenate([taken[:, :1], mine], axis=1)
     x, P, kinds, C = update(tracks.x, tracks.P, kinds, own_here, compared, tracks.C)
-    kinds = at_least(kinds, LEAST_KIND, targets)
+    kinds = at_least(kinds, LEAST_KIND)
     hit = (taken[:, 1:].sum(axis=1) > 0.5) & (not sensor.bearings)
     all_visible, looked = tracks.visible.copy(), tracks.looked.copy()
     all_visible[:, which], looked[:, which] = visible, scan.time
@@ -472,9 +473,7 @@ def _shown(
     mine = tracks.only(rows)
     x, P = mine.estimate()
     C = np.einsum("tk,tkij->tij", mine.kinds, mine.C)
-    return Shown(
-        scan.time, scan.sensor, mine.identity, x, P, mine.existence, of_hulls(mine.kinds, targets), C
-    )
+    return Shown(scan.time, scan.sensor, mine.identity, x, P, mine.existence, mine.kinds, C)
 
 
 def smooth_many(

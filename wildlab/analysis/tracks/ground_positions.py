@@ -44,8 +44,8 @@ from wildlab.geometry.uncertainty import PoseErrors, ground_jacobians
 from wildlab.tracking.filters import thin
 from wildlab.tracking.many import Scan
 from wildlab.tracking.many.target_model import Sees
-from wildlab.tracking.predictions import POSE
 from wildlab.tracking.schmidt import transition_of_pose, transitions_of_pose
+from wildlab.tracking.sensors import POSE
 
 #: An error of the clock moves a target by its speed, which nobody knows before it is tracked.
 UNKNOWN_EFFECT = "clock"

@@ -1,4 +1,4 @@
-"""Blocks in time order: what is drawn, left out and compared where errors that follow each other are alike.
+"""Intervals of a mean, a share, a median and of one more run: from independent runs, or blocks in time order.
 
 The error of a pose wanders over tens of seconds, so that neighbouring images say less than their number. A
 block is a stretch of neighbouring images; blocks are taken for independent of each other, images are not.
@@ -6,15 +6,218 @@ block is a stretch of neighbouring images; blocks are taken for independent of e
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.evaluation.runs import Interval
+from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import normal_quantile, student_quantile
 
+
+class Interval(NamedTuple):
+    """An estimate, and the two-sided interval about it."""
+
+    estimate: float
+    low: float
+    high: float
+
+
+def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
+    """Mean of what independent runs gave, with Student's interval.
+
+    Neighbouring moments of one run are not independent: give one value for each run.
+
+    Parameters
+    ----------
+    values
+        (N,), one for each run, in any unit; NaN are left out.
+    probability
+        With which the interval holds the mean over all such runs.
+
+    Returns
+    -------
+    Interval
+        In the unit of the values; its ends are NaN where fewer than two are known, all is where none is.
+
+    Raises
+    ------
+    WildlabError
+        If ``probability`` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> [round(x, 2) for x in mean_interval([1.0, 2.0, 3.0])]
+    [2.0, -0.48, 4.48]
+    """
+    array = np.asarray(values, float)
+    known = array[np.isfinite(array)]
+    if not 0 < probability < 1:
+        raise WildlabError(f"no interval with probability {probability}", "give one between 0 and 1")
+    if len(known) < 2:
+        return Interval(float(known[0]) if len(known) else np.nan, np.nan, np.nan)
+    mean = float(known.mean())
+    half = float(
+        student_quantile((1 + probability) / 2, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known))
+    )
+    return Interval(mean, mean - half, mean + half)
+
+
+def mean_share_interval(shares: ArrayLike) -> Interval:
+    """As `mean_interval` with 95 %, of shares: it ends at none and at all.
+
+    Parameters
+    ----------
+    shares
+        (N,) from 0 to 1, one for each run; NaN are left out.
+
+    Returns
+    -------
+    Interval
+        With NaN as `mean_interval` has it.
+
+    Examples
+    --------
+    >>> [round(x, 2) for x in mean_share_interval([0.9, 1.0, 1.0])]
+    [0.97, 0.82, 1.0]
+    """
+    found = mean_interval(shares)
+    return Interval(found.estimate, max(found.low, 0.0), min(found.high, 1.0))
+
+
+def share_interval(count: float, runs: float, probability: float = 0.95) -> Interval:
+    """Share of independent runs of which something is true, with Wilson's score interval.
+
+    It holds the share of all such runs with about that probability, also for few runs and for shares near
+    zero and one.
+
+    Parameters
+    ----------
+    count
+        Of how many runs it is true.
+    runs
+        How many there are.
+    probability
+        Between 0 and 1.
+
+    Returns
+    -------
+    Interval
+        From 0 to 1; NaN where there is no run.
+
+    Raises
+    ------
+    WildlabError
+        Where ``count`` is not among the runs, or ``probability`` not between 0 and 1.
+
+    Examples
+    --------
+    >>> [round(x, 2) for x in share_interval(8, 10)]
+    [0.8, 0.49, 0.94]
+    """
+    if 0 < runs < 1 or not 0 <= count <= runs or not 0 < probability < 1:
+        raise WildlabError(
+            f"no interval for {count} of {runs} runs with probability {probability}",
+            "give no more than all of them, and a probability between 0 and 1",
+        )
+    if runs == 0:
+        return Interval(np.nan, np.nan, np.nan)
+    share, z2 = count / runs, float(normal_quantile((1 + probability) / 2)) ** 2
+    centre = (share + z2 / (2 * runs)) / (1 + z2 / runs)
+    half = np.sqrt(z2 * (share * (1 - share) / runs + z2 / (4 * runs**2))) / (1 + z2 / runs)
+    return Interval(share, max(0.0, float(centre - half)), min(1.0, float(centre + half)))
+
+
 Array = NDArray[np.float64]
+
+#: Of both intervals: of the centre of our flights, and of one more flight.
+LEVEL = 0.9
+
+
+def median_interval(values: ArrayLike) -> tuple[float, float]:
+    """The 90 % confidence interval of a median by order statistics.
+
+    Parameters
+    ----------
+    values
+        (N,), one of each flight; NaN is left out.
+
+    Returns
+    -------
+    (low, high)
+        NaN of fewer than five.
+
+    Examples
+    --------
+    >>> median_interval(range(1, 21))
+    (6.0, 15.0)
+    """
+    known = finite_sorted(values)
+    return _between(known, _median_rank(len(known)))
+
+
+def prediction_interval(values: ArrayLike) -> tuple[float, float]:
+    """The 90 % prediction interval of one more flight by order statistics, exact for any distribution.
+
+    Parameters
+    ----------
+    values
+        (N,), one of each flight; NaN is left out.
+
+    Returns
+    -------
+    (low, high)
+        NaN of fewer than 19 flights, of which even the lowest and the highest hold less.
+
+    Examples
+    --------
+    >>> prediction_interval(range(1, 101))
+    (5.0, 96.0)
+    """
+    known = finite_sorted(values)
+    return _between(known, prediction_rank(len(known)))
+
+
+def prediction_rank(flights: int) -> int:
+    """From which lowest and highest flight the prediction interval goes; 0 where there are too few."""
+    return int((flights + 1) * (1 - LEVEL) / 2 + 1e-9)
+
+
+def false_outside(flights: int) -> float:
+    """The probability that one more flight like ours lies outside of our prediction interval.
+
+    Examples
+    --------
+    >>> round(false_outside(200), 4)
+    0.0995
+    """
+    return 2 * prediction_rank(flights) / (flights + 1)
+
+
+@lru_cache(maxsize=256)
+def _median_rank(flights: int) -> int:
+    """The number below the median is binomial: the largest rank that each side passes with at most 5 %."""
+    from scipy.special import bdtr
+
+    below = bdtr(np.arange(flights), flights, 0.5)
+    return int(np.searchsorted(below, (1 - LEVEL) / 2 + 1e-9, "right"))
+
+
+def finite_sorted(values: ArrayLike) -> Array:
+    """The finite ones of (N,) values, in order."""
+    array = np.asarray(values, float)
+    return np.sort(array[np.isfinite(array)])
+
+
+def _between(ordered: Array, rank: int) -> tuple[float, float]:
+    """The values of that rank from below and from above, NaN for rank 0."""
+    if rank < 1:
+        return math.nan, math.nan
+    return float(ordered[rank - 1]), float(ordered[-rank])
+
+
 Labels = NDArray[np.intp]
 
 #: Fewest and most blocks, images in a block where there are enough, and how long one is at least, s.

@@ -1,17 +1,30 @@
-"""What one flight with truth says of a sensor: how late its clock is, how large its errors are and how long
-they last. Meant for one flight, to be used unchanged on others.
+"""What one flight teaches about sensors and targets, for another one to be judged by.
 
-Where no detection says what it is of, the one nearest to a target, within reach, is taken for its own.
+Against truth: how late a sensor's clock is, how large its errors are and how long they last; where no
+detection says what it is of, the one nearest to a target, within reach, is taken for its own. Without truth:
+noise and liveliness under which a flight's own innovations are likeliest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import curve_fit, nnls
+from scipy.optimize import curve_fit, minimize, nnls
 
+from wildlab.analysis.tracks.inputs import SensorInputs, read_inputs
+from wildlab.analysis.tracks.noise_model import (
+    GROUPS,
+    Against,
+    SensorTuning,
+    TargetModel,
+    Tuned,
+    of_flight,
+    of_targets,
+)
 from wildlab.analysis.tracks.scans import (
     SLOTS,
     Scans,
@@ -22,10 +35,15 @@ from wildlab.analysis.tracks.scans import (
     scans_of,
     truths_at,
 )
+from wildlab.analysis.tracks.single_target import choose
 from wildlab.errors import WildlabError
-from wildlab.evaluation.whiteness import effective_sample_size
+from wildlab.evaluation.consistency import effective_sample_size
+from wildlab.flight.checksums import checksums_of
 from wildlab.flight.store import Flight
+from wildlab.flight.tracking_settings import Settings
 from wildlab.geometry.frames import Array
+from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.sensors import Merged, cut
 
 #: Offsets tried, s: the largest known delays are three.
 OFFSETS_S = np.arange(-5.0, 2.001, 0.05)
@@ -35,94 +53,6 @@ LONGEST_LAG_S = 30.0
 FEWEST = 20
 #: Half of chi-square's 95 % point with one degree of freedom: how far a log-likelihood may lie below its top.
 DROP = 1.92
-#: Errors that last are put down to these together, each group with one standard deviation.
-GROUPS = (("platform_north", "platform_east"), ("clock",), ("heading",), ("range_bias",), ("roll", "pitch"))
-
-
-class SensorTuning(NamedTuple):
-    """One sensor, as a flight with truth shows it.
-
-    Attributes
-    ----------
-    offset_s, offset_low_s, offset_high_s
-        What to add to the stamps, with a 95 % interval for as many errors as the correlated ones are worth;
-        low and high are NaN where the clock was not tuned and is as it was stated.
-        A hull seen ahead of or behind its antenna is in it too: on a straight course nothing tells the two
-        apart.
-    sd
-        Of the error of each element, m or rad, standing part included.
-    share, correlation_time_s
-        The autocorrelation of the errors: ``share * exp(-lag / correlation_time_s)`` beyond lag zero.
-    position_sd_m, clock_sd_s, heading_sd_rad
-        What the part of the variance that stays from scan to scan is put down to.
-    range_m, range_sd_m
-        How far away what the sensor saw was: all that is known of the distance at a first bearing.
-    interval_s
-        Usual time between scans.
-    n
-        Errors it is from.
-    own_sds
-        Of each element, where they are of several units; ``sd`` is then in metres across the line of sight.
-    range_bias_sd_m, tilt_sd_rad
-        As ``heading_sd_rad``, for sensors that measure ranges, and for cameras (about each level axis).
-    """
-
-    sensor: str
-    kind: str
-    offset_s: float
-    offset_low_s: float
-    offset_high_s: float
-    sd: float
-    share: float
-    correlation_time_s: float
-    position_sd_m: float
-    clock_sd_s: float
-    heading_sd_rad: float
-    range_m: float
-    range_sd_m: float
-    interval_s: float
-    n: int
-    own_sds: tuple[float, ...] = ()
-    range_bias_sd_m: float = 0.0
-    tilt_sd_rad: float = 0.0
-
-    @property
-    def clock_tuned(self) -> bool:
-        """Whether the offset is an estimate."""
-        return bool(np.isfinite(self.offset_low_s))
-
-    @property
-    def sds(self) -> Array:
-        """(m,) standard deviation of the error of each element, standing part included."""
-        return np.array(self.own_sds or (self.sd,) * (1 if self.kind == "bearing" else 2))
-
-    @property
-    def considered(self) -> dict[str, float]:
-        """Standard deviations of errors that last, by name, m, s or rad; those that are zero too."""
-        sds = (self.position_sd_m, self.clock_sd_s, self.heading_sd_rad, self.range_bias_sd_m,
-               self.tilt_sd_rad)  # fmt: skip
-        return {name: sd for group, sd in zip(GROUPS, sds, strict=True) for name in group}
-
-    @property
-    def next_correlation(self) -> float:
-        """Correlation of the errors of two successive scans."""
-        return float(self.share * np.exp(-self.interval_s / self.correlation_time_s))
-
-    @property
-    def fading(self) -> float:
-        """What is left of the correlated part from one scan to the next: ``F_c`` of H (7.5)."""
-        return float(np.exp(-self.interval_s / self.correlation_time_s))
-
-    @property
-    def driving_sd(self) -> float:
-        """Standard deviation of ``e_2 - F_c e_1`` of successive errors: the root of ``R_w``, H (7.5)."""
-        F_c = self.fading
-        return float(self.sd * np.sqrt(1 + F_c**2 - 2 * F_c * self.next_correlation))
-
-    @property
-    def thinning_s(self) -> float:
-        """Lag from which errors are correlated by less than 1/e; nought where they never are by more."""
-        return float(max(0.0, self.correlation_time_s * (1 + np.log(max(self.share, 1e-9)))))
 
 
 class _Errors(NamedTuple):
@@ -335,3 +265,203 @@ def _considered(errors: Sequence[_Errors], sds: Array, share: float) -> list[flo
     scale[scale == 0] = 1.0
     variances = iter(nnls(A / scale, b)[0] / scale)
     return [float(np.sqrt(next(variances))) if group else 0.0 for group in groups]
+
+
+#: Looks of a sensor that are gone over: enough to tell, and few enough to go over often.
+MOST_LOOKS = 600
+#: How far, as a factor, noise and liveliness may be from what was believed before.
+FARTHEST = 100.0
+EVALUATIONS = 80
+
+
+class _Case(NamedTuple):
+    """One track by one sensor: looks as filters take them, what is measured at each, and where it starts."""
+
+    sensor: str
+    merged: Merged
+    own: Array
+    begin: Start
+
+
+def tune_by_innovations(
+    flight: Flight, sensors: Sequence[str], settings: Settings | None = None, source: str | None = None
+) -> tuple[dict[str, SensorTuning], float]:
+    """For each sensor a factor on its noise, and the liveliness of the targets, together.
+
+    Detections are those that the filter lets in with what it believes before. Errors that last are in all
+    detections alike; innovations do not show them, and nothing is said of them.
+
+    Returns
+    -------
+    Tunings by sensor, their clocks as they are; and the acceleration density, m/s per root second.
+
+    Raises
+    ------
+    WildlabError
+        Where fewer than `FEWEST` detections of a sensor can be followed.
+    """
+    inputs = read_inputs(flight, settings=settings, sensors=sensors, source=source)
+    targets, cases = inputs.targets, list[_Case]()
+    for sensor, one in inputs.sensors.items():
+        mine = [case for truth in one.truths for case in _cases(sensor, one, truth.target, targets)]
+        used = sum(int(np.isfinite(case.own[:, 0]).sum()) for case in mine)
+        if used < FEWEST:
+            raise WildlabError(
+                f"only {used} detections of {sensor!r} can be followed",
+                "tune on a flight on which the sensor saw a target for longer",
+                file=flight.folder,
+                field="detections",
+            )
+        cases += mine
+    names = list(dict.fromkeys(one.sensor for one in cases))
+
+    def cost(logs: Array) -> float:
+        if np.abs(logs).max() > np.log(FARTHEST):
+            return float("inf")
+        lively = targets._replace(density=targets.density * float(np.exp(logs[0])))
+        sds = {
+            name: inputs.sensors[name].noise.noise * float(factor)
+            for name, factor in zip(names, np.exp(logs[1:]), strict=True)
+        }
+        return -sum(_log_likelihood(one, lively, sds[one.sensor]) for one in cases)
+
+    first = np.zeros(1 + len(names))
+    simplex = np.vstack([first, 0.7 * np.eye(len(first))])
+    found = minimize(
+        cost, first, method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": EVALUATIONS, "xatol": 0.01, "fatol": 0.05},
+    )  # fmt: skip
+    factors = np.exp(found.x)
+    tunings = {}
+    for name, factor in zip(names, factors[1:], strict=True):
+        scans, noise = inputs.sensors[name][:2]
+        sds = noise.noise * factor
+        n = sum(int(np.isfinite(one.own[:, 0]).sum()) for one in cases if one.sensor == name)
+        interval = scans.interval_s
+        tunings[name] = SensorTuning(
+            name, scans.kind, noise.offset_s, np.nan, np.nan, float(sds[0]), 0.0, max(interval, 1e-3),
+            0.0, 0.0, 0.0, noise.range_m, noise.range_sd_m, interval, n, tuple(sds.tolist()),
+        )  # fmt: skip
+    return tunings, float(targets.density * factors[0])
+
+
+def _cases(sensor: str, one: SensorInputs, target: str, targets: TargetModel) -> list[_Case]:
+    chosen = choose({sensor: one}, target, targets)
+    own = chosen.own.copy()
+    own[MOST_LOOKS:] = np.nan
+    found = []
+    for piece in chosen.pieces:
+        mine = own[piece.rows]
+        used = np.flatnonzero(np.isfinite(mine[:, 0]))
+        rows = slice(0, max(int(used[-1]) + 1 if len(used) else 0, piece.begin.row + 1))
+        merged = cut(chosen.merged, slice(piece.first, piece.first + rows.stop))
+        found.append(_Case(sensor, merged, mine[rows], piece.begin))
+    return found
+
+
+def _log_likelihood(case: _Case, targets: TargetModel, sds: Array) -> float:
+    merged = case.merged
+    track = run_filter(merged.times, case.own, np.diag(sds**2), merged.sensor, targets.motion(), case.begin)
+    used = np.isfinite(track.nis)
+    log_det = np.linalg.slogdet(track.S[used])[1]
+    return float(-(track.nis[used] + log_det).sum() / 2)
+
+
+def tuned_text(tuned: Tuned) -> str:
+    """As text, which a notebook is given."""
+    sensors = {name: one._asdict() for name, one in tuned.sensors.items()}
+    return json.dumps(
+        {"flight": tuned.flight, "against": tuned.against, "sensors": sensors, "density": tuned.density}
+    )
+
+
+def read_tuned(text: str) -> Tuned | None:
+    """What `tuned_text` wrote; None of an empty text."""
+    if not text:
+        return None
+    data: Mapping[str, Any] = json.loads(text)
+    sensors = {
+        name: SensorTuning(**{**one, "own_sds": tuple(one["own_sds"])})
+        for name, one in data["sensors"].items()
+    }
+    return Tuned(data["flight"], data["against"], sensors, data["density"])
+
+
+def tune_flight(
+    flight: Flight,
+    sensors: Sequence[str],
+    settings: Settings | None = None,
+    against: Against | None = None,
+    source: str | None = None,
+) -> Tuned:
+    """Tune sensors on a flight: against truth where it has any, else by the likelihood of innovations.
+
+    Raises
+    ------
+    WildlabError
+        Where truth is asked for and not there, or the flight shows too little of a sensor.
+    """
+    has_truth = flight.truth is not None and len(flight.truth) > 0
+    if against == "truth" and not has_truth:
+        raise WildlabError(
+            f"the flight {flight.name!r} has no truth to tune against",
+            "tune by its innovations (--against innovations), or on another flight",
+            file=flight.folder,
+            field="--against",
+        )
+    if against == "innovations" or not has_truth:
+        found, density = tune_by_innovations(flight, sensors, settings, source)
+        return Tuned(flight.name, "innovations", found, density)
+    reach = of_targets(of_flight(flight, settings).targets)[0].reach
+    found = {sensor: tune(flight, sensor, reach, source) for sensor in sensors}
+    return Tuned(flight.name, "truth", found)
+
+
+#: Fewest detections alike, stamp and values, by which two flights are one, and their share of the smaller.
+ALIKE, SHARE = 5, 0.05
+_VALUES = ("u_px", "v_px", "range_m", "azimuth_rad", "elevation_rad", "north_m", "east_m", "down_m",
+           "v_north_m_s", "v_east_m_s")  # fmt: skip
+
+
+def refuse_same(flight: Flight, other: Flight) -> None:
+    """Refuse to tune on the flight that is judged: one that shares detections with it, whatever its name, its
+    folder, or how much of it was imported.
+
+    Raises
+    ------
+    WildlabError
+        Where it is.
+    """
+    same = False
+    if flight.folder is not None and other.folder is not None:
+        mine, its = checksums_of(flight.folder), checksums_of(other.folder)
+        same = "detections.parquet" in mine and mine["detections.parquet"] == its.get("detections.parquet")
+    both = _as_measured(flight), _as_measured(other)
+    alike = sum((both[0] & both[1]).values())
+    if same or alike >= max(ALIKE, SHARE * min(map(Counter.total, both))):
+        raise WildlabError(
+            f"this is the flight that is judged, or part of it: {alike} of its detections have the same "
+            "stamps and values, and nothing is tuned where it is judged",
+            "tune on another flight",
+            file=other.folder,
+            field="--tune",
+        )
+
+
+def _as_measured(flight: Flight) -> Counter[tuple[object, ...]]:
+    """Detections by sensor, UTC to the millisecond, and values as they were measured."""
+    seen, frames = flight.detections, flight.frames
+    if seen is None or not len(seen):
+        return Counter()
+    times = np.full(len(seen), np.nan)
+    if frames is not None and "time_s" in frames and "frame_id" in seen:
+        by_frame = frames.drop_duplicates("frame_id").set_index("frame_id")["time_s"]
+        times = seen["frame_id"].map(by_frame).to_numpy(float)
+    epoch = flight.manifest.time.epoch
+    began = epoch.timestamp() if epoch is not None else 0.0
+    # Places match only where they are counted from the same origin; ranges, bearings and pixels in any case.
+    values = np.round(seen.reindex(columns=list(_VALUES)).to_numpy(float), 6) + 0.0
+    known = np.asarray(np.isfinite(values).any(axis=1))
+    stamps = np.where(np.isfinite(times), np.round(began + times, 3), -1.0)
+    rows = zip(seen["source"], stamps, map(bytes, values), strict=True)
+    return Counter(row for row, good in zip(rows, known, strict=True) if good)
