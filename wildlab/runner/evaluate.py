@@ -7,13 +7,11 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from rich.console import Console
 
 from wildlab.analysis.navigate import reference_of
 from wildlab.analysis.navigation_inputs import imu_noise
 from wildlab.analysis.tracks.tracker import refuse_unusable
-from wildlab.analysis.tracks.tuning import FEWEST
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import Use, find, usable_for
@@ -228,21 +226,13 @@ def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
 
 
 def lacking_for_tracking(flight: Flight, use: Use, source: str | None = None) -> str:
-    """Why no target of a flight can be followed, or nothing; ``use`` is what the checks say of it.
-
-    A target that is seen less often than `FEWEST` times makes no report.
-    """
+    """Why no target of a flight can be followed, or nothing; ``use`` is what the checks say of it."""
     if not use.usable:
         return use.why
     try:
         refuse_unusable(flight, None, (), (), (), source)
     except WildlabError as error:
         return str(error).rstrip(".")
-    seen = flight.table("detections")
-    names = seen["target_id"].fillna("") if "target_id" in seen else pd.Series("", index=seen.index)
-    most = int(seen.groupby([seen["source"], names])["frame_id"].nunique().max())
-    if most < FEWEST:
-        return f"no target is seen in more than {most} looks, and {FEWEST} are the fewest that tell anything"
     return ""
 
 

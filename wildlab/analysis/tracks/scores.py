@@ -34,12 +34,13 @@ from wildlab.evaluation.consistency import (
 from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.evaluation.intervals import share_interval
 from wildlab.files import write_csv
+from wildlab.flight.checks.check import FEWEST_SCANS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 
 #: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
 FEW_INDEPENDENT = 30.0
-#: Of fewer values than this nothing is judged: nearly any filter would pass.
+#: Of fewer independent values than this nothing is judged: nearly any filter would pass.
 FEWEST = 5
 #: The metric whose subject is the filter that a page speaks of.
 LEADING = "leading_filter"
@@ -47,8 +48,8 @@ CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN = "consistent", "overconfident", "t
 
 
 def verdict(mean: Average) -> str:
-    """Whether a filter is consistent, by the 95 % band of its mean NEES or NIS."""
-    if mean.n < FEWEST:
+    """Whether a filter is consistent, by the 95 % band of its mean NEES or NIS; few scans are not judged."""
+    if mean.n < FEWEST_SCANS:
         return UNKNOWN
     return CONSISTENT if mean.inside else OVERCONFIDENT if mean.mean > mean.high else CAUTIOUS
 
@@ -177,7 +178,7 @@ def _row(one: SensorTrack, kind: str) -> dict[str, object]:
         "nees_low": of_nees.low,
         "nees_high": of_nees.high,
         "nees_worth": of_nees.worth,
-        "verdict": verdict(of_nees) if used.sum() >= FEWEST else UNKNOWN,
+        "verdict": verdict(of_nees) if used.sum() >= FEWEST_SCANS else UNKNOWN,
         "inside": inside,
         "inside_low": band[0],
         "inside_high": band[1],

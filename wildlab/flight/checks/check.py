@@ -37,6 +37,8 @@ __all__ = ["Finding", "Use", "check_flight", "find", "sense", "sense_sentences",
 #: Parts of [uncertainty] without which a detection on the ground has no error ellipse.
 ASSUMED = ("pixel_px", "position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg")
 LEVELS = ("problem", "warning", "note")
+#: A target that is seen in fewer images or scans has no track that can be judged.
+FEWEST_SCANS = 20
 
 Question = Callable[[Flight], Iterator[Finding]]
 
@@ -221,9 +223,18 @@ def _for_tracking(flight: Flight, broken: set[str], good_nav: list[str], scored:
         usable, why = False, say("lacks", what=[f"{listed(wrong)} without a problem"])
     elif kinds == {"pixel"} and not good_nav:
         usable, why = False, say("no-poses-for-pixels")
+    elif (most := _most_scans(flight)) < FEWEST_SCANS:
+        usable, why = False, say("few-scans", most=most, fewest=FEWEST_SCANS)
     else:
         usable, why = True, say("tracking" if scored else "tracking-without-truth")
     return Use("tracking", usable, why)
+
+
+def _most_scans(flight: Flight) -> int:
+    """In how many images or scans the target is that is seen most; detections without a name are of one."""
+    seen = flight.table("detections")
+    names = [seen["target_id"].fillna("")] if "target_id" in seen else []
+    return int(seen.groupby([seen["source"], *names])["frame_id"].nunique().max())
 
 
 def _for_navigation(flight: Flight, broken: set[str]) -> Use:
