@@ -80,9 +80,9 @@ def replay(
         if target.resolve() == place.resolve():
             raise WildlabError(
                 "a replay is no part of a flight",
-                "name another folder with --into",
+                "name another folder with --out",
                 file=target,
-                field="--into",
+                field="--out",
             )
         target.mkdir(parents=True, exist_ok=True)
         written = [target / RECORDING]
@@ -151,7 +151,7 @@ def flight_of(report: Path) -> Path:
             "name the folder of a flight: wildlab replay flights/mine",
             file=report,
         )
-    return flight_of_report(report, theirs, "wildlab replay flights/mine --into REPORT")
+    return flight_of_report(report, theirs, "wildlab replay flights/mine --out REPORT")
 
 
 @contextmanager
