@@ -58,7 +58,7 @@ def simulated() -> dict[str, Any]:
         kept = rows[np.unique(np.floor((times[rows] - BEGIN) / every_s), return_index=True)[1]]
         return [times[kept] - BEGIN, *(one[kept] for one in arrays)]
 
-    points = georeference(flight, observe(flight, SOURCE), np.random.default_rng(0))
+    points = georeference(observe(flight, SOURCE), np.random.default_rng(0))
     # Per axis, root mean square.
     metres = float(np.sqrt(np.nanmean(np.trace(covariances_of(points), axis1=1, axis2=2) / 2)))
     assumed = assumed_deviations(flight)

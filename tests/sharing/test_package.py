@@ -98,7 +98,7 @@ def test_what_a_killed_run_left_beside_a_copy_is_swept(tmp_path):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from wildlab.sharing import package, redrawn, share as module
+from wildlab.sharing import package, recomputation, share as module
 def kill(*given, **more):
     print("all pages were made", flush=True)
     os.kill(os.getpid(), signal.SIGKILL)
@@ -108,10 +108,10 @@ def evaluate(folder, *, reports, **more):
     page.write_text(sys.argv[3])
     kill()
 os.fsync = kill
-redrawn.evaluate_flight = evaluate
+recomputation.evaluate_flight = evaluate
 tier, flight = ("team", None) if len(sys.argv) < 5 else ("public", Path(sys.argv[4]))
 if flight is not None:
-    redrawn.save_flight = lambda flight, copy, **more: copy.mkdir()
+    recomputation.save_flight = lambda flight, copy, **more: copy.mkdir()
 module.share(Path(sys.argv[1]), tier, flight=flight, out=Path(sys.argv[2]), password="correct horse battery")
 """
 

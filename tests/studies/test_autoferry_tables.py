@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from wildlab.analysis.tracks.noise_model import SensorTuning
-from wildlab.analysis.tracks.scores import COLUMNS, table
+from wildlab.analysis.tracks.scores import COMPARED, table
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.messages.catalogue import load_texts
@@ -70,8 +70,8 @@ def test_every_track_has_the_numbers_of_its_kind(report, tracks):
     found = recorded(report)
     lidar = {name for name, subject in found if subject == "lidar/a/scenario-3/kf"}
     camera = {name for name, subject in found if subject == "eo/a/scenario-3/ekf"}
-    assert lidar == {*COLUMNS, "detections_used"} - {"lag1_autocorrelation"}
-    assert camera == {*COLUMNS, "detections_used"} - {
+    assert lidar == {*COMPARED, "detections_used"} - {"lag1_autocorrelation"}
+    assert camera == {*COMPARED, "detections_used"} - {
         "lag1_autocorrelation_north",
         "lag1_autocorrelation_east",
     }

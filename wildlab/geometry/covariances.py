@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
+
+Array = NDArray[np.float64]
 
 
 def chi2_quantile(probability: float, dof: float) -> float:

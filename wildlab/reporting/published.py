@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-import pandas as pd
 from pydantic import Field
 
 from wildlab.errors import WildlabError
@@ -29,6 +28,9 @@ from wildlab.flight.files import Strict, check_model
 from wildlab.paths import DATA
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.status import MISSING, Number
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: From how many flights on there is a 90 % prediction interval of one more.
 MANY = 19
@@ -212,9 +214,6 @@ def _pair(found: Mapping[str, Any], low: str, high: str, unit: float = 1.0) -> t
     ends = found.get(low), found.get(high)
     return None if ends[0] is None or ends[1] is None else (ends[0] / unit, ends[1] / unit)
 
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FOLDER = DATA / "published"
 

@@ -17,6 +17,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.geometry.terrain import Terrain
+from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import Array, draw_band, draw_dots, draw_way, finish, name_rows
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, new_figure
 
@@ -45,7 +46,7 @@ def draw_lines(ax: Axes, x: ArrayLike, lines: Mapping[str, Values], *, bars: boo
             else:
                 draw_band(ax, x, low, high, one.color, name if one.middle is None else "", alpha=0.17)
         if one.middle is not None:
-            ax.plot(x, one.middle, one.look or "o-", color=one.color, label=name or None)
+            ax.plot(x, one.middle, one.look or "o-", color=one.color, label=figure_name(name))
 
 
 def lines_chart(
@@ -96,7 +97,7 @@ def draw_rows(ax: Axes, rows: Sequence[str], series: Mapping[str, Values], apart
             ax.hlines(at, *np.asarray(one.ends, float), color=one.color, lw=2)
         look: dict[str, Any] = {"mfc": "white", "mew": 1.6, "ms": 7} if one.look == "D" else {"ms": 5}
         dots = np.asarray(one.middle, float)
-        ax.plot(dots, at, one.look or "o", color=one.color, ls="none", label=name or None, **look)
+        ax.plot(dots, at, one.look or "o", color=one.color, ls="none", label=figure_name(name), **look)
     name_rows(ax, rows)
 
 
@@ -122,7 +123,7 @@ _MARKS = (("x", VERMILLION, 9), ("+", BLUE, 12), ("o", ORANGE, 9))
 def draw_marks(ax: Axes, places: Mapping[str, ArrayLike]) -> None:
     """Mark up to three places (2,) px in an image, each in its own way."""
     for (name, at), (sign, color, size) in zip(places.items(), _MARKS, strict=False):
-        ax.plot(*np.asarray(at), sign, mfc="none", mec=color, ms=size, mew=1.8, label=name)
+        ax.plot(*np.asarray(at), sign, mfc="none", mec=color, ms=size, mew=1.8, label=figure_name(name))
 
 
 def draw_picture(

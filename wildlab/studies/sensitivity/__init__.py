@@ -341,7 +341,7 @@ def wrong_heights(found: list[Shift], names: Mapping[str, str]) -> Figure:
     for name, color in _WRONG.items():
         middle, low, high = np.transpose([mean_interval(one.off[name]) for one in some])
         lines[names[name]] = Values(middle, (np.maximum(low, 1e-3), high), color)
-    x, y = "camera below the horizon (degrees)", "distance from the true point (m)"
+    x, y = "camera below the horizon (degrees)", "error (m)"
     return lines_chart([one.pitch for one in some], lines, x, y, yscale="log")
 
 
