@@ -156,7 +156,8 @@ def small(folder: Path) -> Path:
     return folder / "raw"
 
 
-def test_a_flight_of_what_was_and_was_not_seen(tmp_path):
+def test_a_flight_of_what_was_and_was_not_seen(tmp_path, monkeypatch):
+    monkeypatch.setattr("wildlab.flight.checks.check.FEWEST_SCANS", 1)  # it is a short one
     import_flight(DATA / "recipes" / "autoferry-2.toml", small(tmp_path), tmp_path / "flight")
     flight = load_flight(tmp_path / "flight")
     frames, detections = flight.table("frames"), flight.table("detections")

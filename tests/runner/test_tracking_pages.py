@@ -16,7 +16,7 @@ def test_what_a_flight_lacks_for_tracking_is_said():
     flight = robot_flight()
     assert lacking_for_tracking(flight, use_of(flight)) == ""
     short = robot_flight(seconds=6.0)
-    assert "10 looks" in lacking_for_tracking(short, use_of(short))
+    assert "10 images or scans" in lacking_for_tracking(short, use_of(short))
     nowhere = Flight(flight.manifest, {}, flight.tables)
     assert lacking_for_tracking(nowhere, use_of(nowhere))
     blind = Flight(flight.manifest, flight.nav, {"frames": flight.tables["frames"]})
