@@ -58,6 +58,44 @@ def test_beyond_the_fold_of_the_polynomial_there_is_no_inverse():
     assert np.isnan(inverse[1]).all()
 
 
+def before_the_fold(xy, distortion):
+    """Whether the image keeps its orientation all the way from the centre to a point (2,)."""
+    jacobian = distortion_jacobian(np.linspace(0, 1, 101)[:, None] * xy, distortion)
+    return bool((np.linalg.det(jacobian) > 0).all() and (jacobian[:, 0, 0] > 0).all())
+
+
+def test_lenses_stronger_than_any_have_no_other_inverse():
+    """A point before the fold comes back or is NaN (measured 3.2 %); seldom one beyond it comes (1.5 %)."""
+    random = np.random.default_rng(0)
+    low, high = (-0.6, -0.1, -0.1, -0.1, -0.1), (0.3, 0.3, 0.1, 0.1, 0.1)
+    lost, beyond, n = 0, 0, 3000
+    for distortion in random.uniform(low, high, (n, 5)):
+        xy = random.uniform(-1.2, 1.2, 2)
+        (back,) = undistort(distort(xy[None], distortion), distortion)
+        if np.isnan(back).any():
+            lost += before_the_fold(xy, distortion)
+        elif np.abs(back - xy).max() > 1e-6:
+            beyond += before_the_fold(xy, distortion) or not before_the_fold(back, distortion)
+    assert lost / n < 0.04 and beyond / n < 0.02
+
+
+def test_no_step_leaps_over_the_fold():
+    xy, distortion = np.array([[1.032, 1.176]]), (-0.036, 0.286, -0.075, -0.01, -0.018)
+    assert np.allclose(undistort(distort(xy, distortion), distortion), xy, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("target", "distortion"),
+    [
+        ((-0.999, 1.117), (-0.243, 0.079, 0.041, 0.062, -0.075)),
+        ((1.195, -0.909), (-0.282, -0.088, 0.075, -0.021, -0.091)),
+    ],
+)
+def test_a_root_where_the_image_is_turned_over_is_none(target, distortion):
+    """Turned by half a circle, the image keeps its orientation, but no lens does that."""
+    assert np.isnan(undistort(np.array([target]), distortion)).all()
+
+
 @given(
     st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), coefficient, coefficient, tangential, tangential, coefficient
 )

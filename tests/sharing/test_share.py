@@ -195,6 +195,8 @@ def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(made, monkeypatc
 
 def test_without_its_flight_a_report_is_refused(made):
     (made / "flights").rename(made / "elsewhere")
+    (made / "stranger").mkdir()
+    (made / "stranger" / "flight.toml").write_text("a = " + "[" * 5000)  # a neighbour's, and no crash
     with pytest.raises(WildlabError, match="--flight FOLDER"):
         share(REPORT)
     assert share(REPORT, flight=made / "elsewhere" / "kifaru-ridge").file.is_file()

@@ -114,7 +114,7 @@ def provenance_of_flight(folder: Path) -> dict[str, Any]:
     """What provenance says of a flight: its name, its kind, and what its files and raw files are told by."""
     try:
         manifest = tomllib.loads((folder / "flight.toml").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         manifest = {}
     files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
     try:
