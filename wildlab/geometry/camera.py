@@ -170,8 +170,8 @@ def undistort(xy_distorted: ArrayLike, distortion: ArrayLike, tolerance: float =
 
     By Newton's method. OpenCV's fixed-point iteration converges slowly or not at all where the distortion is
     strong; Newton's needs three to five steps. A polynomial folds back on itself at some radius: a point that
-    no ideal point inside the fold maps to becomes NaN; so do some close to the fold of lenses stronger than any
-    that is sold.
+    no ideal point inside the fold maps to becomes NaN; so do some close to the fold of lenses stronger than
+    any that is sold.
 
     Parameters
     ----------
