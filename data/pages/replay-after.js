@@ -2,7 +2,7 @@
 const say = (text) => {
   const hidden = { canvas: true, narrow: true, wait: true, said: false, why: false };
   for (const id in hidden) document.getElementById(id).hidden = hidden[id];
-  document.getElementById("why").textContent = text + " The moving picture in the flight's report shows the same path in any browser.";
+  document.getElementById("why").textContent = text;
 };
 async function unpack(id) {
   const text = atob(document.getElementById(id).textContent.trim());

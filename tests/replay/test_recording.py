@@ -78,7 +78,7 @@ def test_time_counts_from_the_first_pose_whatever_the_clock_shows(ship):
         }
 
     moved = replace(ship, nav=later(ship.nav), tables=later(ship.tables))
-    one, other = (scene_of(flight, ellipses=False) for flight in (ship, moved))
+    one, other = (scene_of(flight) for flight in (ship, moved))
     for part in ("path", "views", "points"):
         assert np.allclose(getattr(one, part).times, getattr(other, part).times)
     assert other.path is not None and other.path.times[0] == 0.0

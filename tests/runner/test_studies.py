@@ -21,6 +21,7 @@ from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.run import run_studies
+from wildlab.sharing.document import read_part
 from wildlab.studies.line_of_sight import WAYS
 from wildlab.studies.line_of_sight.trial import HEIGHTS, VIEW
 from wildlab.studies.printed_numbers import all_pairs
@@ -215,6 +216,7 @@ def test_a_study_and_its_page(name, reports, faults):
     has_intervals(found)
     if page.judge is not None:
         page.judge(found)
+    assert read_part(folder / "report.html", 1, exact=False, generalised=False).body, "it may go out"
     words, answer = words_in_sight(folder / "report.html")
     assert words <= MOST_WORDS and answer <= MOST_IN_ANSWER
     assert {f"{one}.png" for one in page.figures} <= {one.name for one in (folder / "figures").glob("*.png")}

@@ -46,8 +46,7 @@ role="table"><thead role="rowgroup"><tr role="row"><th role="columnheader" scope
 <tbody role="rowgroup"><tr role="row"><td role="cell" class="text" data-label="filter">12 %</td></tr></tbody></table>
 </div><figcaption><a class="data" download="flight-table-1.csv" href="data:text/csv;base64,{TABLE}">CSV</a></figcaption>
 </figure><svg class="flown" viewBox="0 0 620 420" role="img" aria-label="Map of the flight"><path class="gone"
-d="M369.2 245.6L368.1 244"/><circle class="point" cx="299" cy="319.7" r="3" opacity="0"><animate attributeName="r"
-values="10;10;3.4;3;3" keyTimes="0;0.0084;0.0166;0.0577;1" dur="60.75s" repeatCount="indefinite"/></circle>
+d="M369.2 245.6L368.1 244"/><circle class="point" cx="299" cy="319.7" r="3" opacity="0"/>
 <path class="craft" transform="translate(303.4 167) rotate(-593.3)" d="M0-15 2.6-9 8 17.5 0 16-8Z"/></svg>
 <img alt="Map of the path" width="457" height="525" style="max-width:457px;min-width:283px"
 src="data:image/png;base64,{PIXELS}">"""

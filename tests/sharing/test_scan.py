@@ -231,7 +231,6 @@ def test_the_zone_is_found_and_others_are_not():
     ("drawn", "found"),
     [
         ('<path d="M4 6 224.4L12.6 41.3h0M300.9 2"/>', False),
-        ('<animate values="6,334.6 141.3;62.4 12.7" keyTimes="0;0.4138;0.6838;1"/>', False),
         ('<path d="M62.4138 12.6838"/>', True),
         ('<polyline points="1,2 6224.828,1241.028"/>', True),
         ('<path d="M6224.8 1241.0"/>', True),

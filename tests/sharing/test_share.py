@@ -28,6 +28,8 @@ from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.reporting.metrics import AGAINST, metric
 from wildlab.reporting.page import page
+from wildlab.reporting.published_tables import strip
+from wildlab.reporting.status import Number
 from wildlab.reporting.text import escape
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.sharing import recomputation as redrawn
@@ -289,7 +291,8 @@ def test_a_study_is_copied_as_it_is(made):
     folder = made / "reports" / "static-point"
     twin = {"name": "static-antenna-1", "kind": "twin", "files": {}, "sources": []}
     folder.mkdir()
-    body = '<h1>Study</h1><p>63.6 N <a href="../index.html">back</a></p>'
+    drawn = strip(Number("rmse", "boat", "m", "H 6.2", 4.0, 1, 5.0, 4.5, 6.0, None, ratio=1.25))
+    body = f'<h1>Study</h1><p>63.6 N <a href="../index.html">back</a></p>{drawn}'
     foot = "<p>data <code>c0ffee42</code> · made 2026-11-22 10:15 UTC</p>"
     (folder / "report.html").write_text(page(title="x", body=body, footer=foot), encoding="utf-8")
     write_json(folder / "provenance.json", {"flight": twin, "parameters": {}})
@@ -297,7 +300,7 @@ def test_a_study_is_copied_as_it_is(made):
     copy = share(folder)
     assert copy.file.name == "static-point-public.html"
     text = copy.file.read_text(encoding="utf-8")
-    assert "63.6 N" in text and "index.html" not in text
+    assert "63.6 N" in text and "index.html" not in text and 'class="range"' in text
     assert "c0ffee42" not in text and "10:15" not in text
     assert "c0ffee42" in page_of(folder, "team")
     both = share(made / "reports", zipped=True)

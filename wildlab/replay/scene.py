@@ -11,10 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.evaluate import score_points
-from wildlab.analysis.georeference import Observations, covariances_of, georeference, observe
+from wildlab.analysis.georeference import covariances_of, georeference, observe
 from wildlab.analysis.image_coverage import FLATTEST, POSITION, ground_height, ordered
-from wildlab.analysis.overview import length_of_way
-from wildlab.analysis.tracks.scores import LEADING, read_estimates
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at
@@ -23,9 +21,6 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import georeference_pixels, pixel_rays
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
-from wildlab.names import listed
-from wildlab.reporting.animation import Course, Ellipses, Outlines, ShownFlight
-from wildlab.reporting.report import Report
 
 #: Letters of a name that are shown, at most.
 MOST_LETTERS = 60
@@ -305,8 +300,6 @@ def scene_of(
     flight: Flight,
     source: str | None = None,
     estimates: pd.DataFrame | None = None,
-    *,
-    ellipses: bool = True,
 ) -> ReplayScene:
     """What a replay shows of a flight.
 
@@ -318,9 +311,6 @@ def scene_of(
         Name of the ``nav`` table; left out, the best known one.
     estimates
         A table of tracks, as `wildlab.analysis.tracks.scores.estimates_table` makes it.
-
-    ellipses
-        Whether points on the ground get their covariance, which takes most of the time.
 
     Returns
     -------
@@ -339,7 +329,7 @@ def scene_of(
     path = _path(flight, source, lacks)
     views = _views(flight, source, lacks)
     sightings = _sightings(flight, views, lacks)
-    points = _points(flight, source, lacks, ellipses)
+    points = _points(flight, source, lacks)
     tracks = _tracks(flight, estimates, lacks)
     truth = _truth(flight, lacks)
     if path is None and views is None and not truth and not tracks:
@@ -527,14 +517,14 @@ def _sightings(flight: Flight, views: Views | None, lacks: list[str]) -> Sightin
     return Sightings(at[good].astype(np.intp), uv[good], names.to_numpy(object)[good])
 
 
-def _points(flight: Flight, source: str | None, lacks: list[str], ellipses: bool) -> Points | None:
+def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | None:
     if source is None or flight.frames is None or flight.manifest.camera is None:
         return None
     if flight.detections is None or not (flight.detections["kind"] == "pixel").any():
         return None
     try:
         seen = observe(flight, source)
-        table = georeference(seen, np.random.default_rng(0)) if ellipses else _placed(seen)
+        table = georeference(seen, np.random.default_rng(0))
     except WildlabError as refusal:
         lacks.append(f"detections on the ground: {refusal.problem}")
         return None
@@ -564,17 +554,6 @@ def _points(flight: Flight, source: str | None, lacks: list[str], ellipses: bool
         np.hypot(*error.T),
         position_nees(error, P),
     )
-
-
-def _placed(seen: Observations) -> pd.DataFrame:
-    """The table of `georeference` without covariances."""
-    if seen.terrain is not None:
-        ground = pixels_to_terrain(seen.poses, seen.uv, seen.terrain).points
-    else:
-        ground = georeference_pixels(seen.poses, seen.uv, seen.plane_down)
-    columns = dict(zip(("north_m", "east_m", "down_m"), ground.T, strict=True))
-    unknown = dict.fromkeys(("cov_nn", "cov_ne", "cov_ee"), np.nan)
-    return seen.table.assign(**columns, **unknown)
 
 
 def _tracks(flight: Flight, table: pd.DataFrame | None, lacks: list[str]) -> tuple[Estimates, ...]:
@@ -624,118 +603,3 @@ def _truth(flight: Flight, lacks: list[str]) -> tuple[Target, ...]:
             keep = good[_evenly(len(good), MOST_POSES)]
             found.append(Target(str(name), stamps[keep], where[keep]))
     return tuple(found)
-
-
-#: Bytes of the picture, and targets whose truth or estimate it shows, at most.
-MOST_BYTES, MOST_TARGETS = 400_000, 12
-
-
-def show_moving(report: Report, flight: Flight, source: str | None = None) -> None:
-    """Add the flight, moving, to its report; nothing where it knows no time or no path.
-
-    Parameters
-    ----------
-    report
-        Of that flight. Where it left a table of tracks, one filter's are shown, else single detections alone.
-    flight
-        With anything missing.
-    source
-        Name of the ``nav`` table; left out, the best known one.
-    """
-    estimates = None
-    if report.out is not None and (report.out / "estimates.parquet").is_file():
-        estimates = read_estimates(report.out / "estimates.parquet")
-        # The filter that the page speaks of, where it names one.
-        leading = {who for name, who in report.recorded if name == LEADING}
-        if estimates["filter"].isin(leading).any():
-            estimates = estimates[estimates["filter"].isin(leading)]
-    try:
-        scene = scene_of(flight, source if source in flight.nav else None, estimates, ellipses=False)
-        shown = moving_flight(scene)
-    except WildlabError:
-        return
-    report.animation(
-        shown, alt=alt(scene), most_bytes=MOST_BYTES, fold="The flight, moving", intro=said(scene)
-    )
-
-
-def moving_flight(scene: ReplayScene) -> ShownFlight:
-    """The arrays of an animation of a scene.
-
-    Parameters
-    ----------
-    scene
-        From `wildlab.replay.scene.scene_of`.
-
-    Returns
-    -------
-    ShownFlight
-        North and east only; every second corner of an outline.
-
-    Raises
-    ------
-    WildlabError
-        Where the flight has no path, or times that are no times.
-    """
-    path, views, points = scene.path, scene.views, scene.points
-    if path is None or not scene.timed:
-        raise WildlabError(
-            "there is no path over time to show", "give the flight poses with times", field="nav"
-        )
-    outlines = None
-    if views is not None and np.isfinite(views.outlines).any():
-        corners = views.outlines[:, :: views.outlines.shape[1] // 4, :2]
-        outlines = Outlines(views.times, corners)
-    tracks = one_filter(scene.tracks)
-    return ShownFlight(
-        Course(path.times, path.places[:, :2]),
-        outlines,
-        None if points is None else Course(points.times, points.places[:, :2]),
-        [Ellipses(one.times, one.places[:, :2], one.covariance) for one in tracks],
-        [
-            Course(np.zeros(1) if one.still else one.times, one.places[:, :2])
-            for one in scene.truth[:MOST_TARGETS]
-        ],
-    )
-
-
-def one_filter(tracks: tuple[Estimates, ...]) -> tuple[Estimates, ...]:
-    """Of several filters' tracks those of the first that considers errors, else of the first."""
-    names = dict.fromkeys(one.filter for one in tracks)
-    chosen = "schmidt" if "schmidt" in names else next(iter(names), "")
-    return tuple(one for one in tracks if one.filter == chosen)[:MOST_TARGETS]
-
-
-def said(scene: ReplayScene) -> str:
-    """The sentence above the picture: what moves in it."""
-    parts = ["the aircraft"]
-    if scene.views is not None and np.isfinite(scene.views.outlines).any():
-        parts.append("what its camera sees of the ground")
-    if scene.points is not None:
-        parts.append("each detection where it lies on the ground")
-    tracks = one_filter(scene.tracks)
-    if tracks:
-        parts.append(f"the 90 % ellipse of the filter {plain(tracks[0].filter)}")
-    if scene.truth:
-        parts.append("a cross where a target really was")
-    if len(scene.truth) > MOST_TARGETS:
-        parts[-1] += f" (the first {MOST_TARGETS} of {len(scene.truth)})"
-    return f"{minutes(scene.length)} of flight, over and over: {listed(parts)}. North is up."
-
-
-def alt(scene: ReplayScene) -> str:
-    """What the picture shows, in numbers, for who cannot see it."""
-    assert scene.path is not None  # noqa: S101 - for the type checker
-    low, high = scene.path.places[:, :2].min(axis=0), scene.path.places[:, :2].max(axis=0)
-    way = length_of_way(scene.path.times, scene.path.places[:, :2])
-    text = (
-        f"Map of the flight: the aircraft goes {way:.0f} m in {minutes(scene.length)}, "
-        f"within {high[0] - low[0]:.0f} m north-south and {high[1] - low[1]:.0f} m east-west"
-    )
-    if scene.points is not None:
-        text += f"; {len(scene.points.times)} detections land on the ground"
-    if scene.truth:
-        text += (
-            f"; {len(scene.truth)} true {'place' if len(scene.truth) == 1 else 'places or ways'} of targets"
-        )
-    return f"{text}."

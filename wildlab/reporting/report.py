@@ -33,7 +33,6 @@ from wildlab.errors import WildlabError
 from wildlab.messages.catalogue import Message, PageTexts, fill
 from wildlab.messages.quantities import known
 from wildlab.reporting import metrics as schema
-from wildlab.reporting.animation import PAUSE_STYLE, ShownFlight, animated_flight, with_pause
 from wildlab.reporting.figures import figure_html, png_bytes, save_figure
 from wildlab.reporting.layout import ALERT, LIMITS, METHOD, VERDICT
 from wildlab.reporting.page import PILLS, TAGS
@@ -225,28 +224,6 @@ class Report:
         if wide:
             html = f'<div class="scroll" role="region" tabindex="0" aria-label="{escape(alt)}">{html}</div>'
         self._show(f"<figure>{html}<figcaption>{escape(caption)}</figcaption></figure>")
-
-    def animation(
-        self, shown: ShownFlight, *, alt: str, most_bytes: int = 1_000_000, fold: str = "", intro: str = ""
-    ) -> None:
-        """Show a flight that moves without a script, and stands still on paper and where motion is unwanted.
-
-        Parameters
-        ----------
-        shown
-            The arrays.
-        alt
-            What a reader who cannot see it should know; never empty.
-        most_bytes
-            Of the picture.
-        fold, intro
-            The one-line summary behind which it is folded away, and what stands above it.
-        """
-        drawn = with_pause(animated_flight(shown, alt=alt, most_bytes=most_bytes))
-        html = f"<style>{PAUSE_STYLE}</style><figure>{drawn}</figure>"
-        if fold:
-            html = f"<details><summary>{inline(fold)}</summary><p>{inline(known(intro))}</p>{html}</details>"
-        self._show(html)
 
     def table(
         self,

@@ -24,7 +24,6 @@ from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import PageTexts, load_texts
 from wildlab.paths import REPORTS
-from wildlab.replay.scene import show_moving
 from wildlab.reporting.report import Report, open_report
 from wildlab.runner import vary
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
@@ -215,8 +214,6 @@ class OpenStudy:
                 digits={"factor": 2, "turned": 0},
                 fold="Verdicts that turn where chosen parameters are moved",
             )
-        if self.flights:
-            show_moving(self.report, self.data)
         self.report.save()
 
 

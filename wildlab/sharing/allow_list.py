@@ -37,11 +37,10 @@ _DRAWN = (
 #: What an attribute may be, by what it holds; `Writer` has functions for the other kinds.
 _FORMS = {
     "word": re.compile(r"[A-Za-z][\w-]{0,40}(?: [A-Za-z][\w-]{0,40}){0,4}"),
-    "size": re.compile(r"-?\d{0,4}(?:\.\d{1,3})?(?:s|em|rem|px|%)?"),
+    "size": re.compile(r"-?\d{0,4}(?:\.\d{1,3})?(?:em|rem|px|%)?"),
     "paper": re.compile(_DRAWN.format(r"1?\d{1,3}")),
     # Degrees of what turns many times; `wildlab.sharing.scan` looks at large ones.
     "turns": re.compile(_DRAWN.format(r"\d{1,5}")),
-    "times": re.compile(r"[01]?(?:\.\d{1,4})?(?:[; ][01]?(?:\.\d{1,4})?)*"),
     "flag": re.compile("|true|false"),
     "widths": re.compile(r"(?:m(?:ax|in)-width:\d{1,4}(?:\.\d+)?(?:px|rem);?)*"),
     "space": re.compile(r"http://www\.w3\.org/(?:1998/Math/MathML|2000/svg)"),

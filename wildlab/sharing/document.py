@@ -12,8 +12,6 @@ from bs4.element import NavigableString, PageElement
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
-from wildlab.reporting.animation import PAUSE_STYLE
-from wildlab.reporting.animation import STYLE as DRAWING_STYLE
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
 from wildlab.sharing.allow_list import Writer
@@ -196,7 +194,7 @@ def join_chapters(chapters: Sequence[Chapter], heading: str) -> str:
     return page(
         title=heading if several else chapters[0].heading,
         body="\n".join(filter(None, body)),
-        style="\n".join((DRAWING_STYLE, PAUSE_STYLE, _STYLE)),
+        style=_STYLE,
     )
 
 

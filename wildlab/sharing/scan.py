@@ -76,8 +76,7 @@ _DATA = re.compile(r"data:([\w/+.-]+);base64,([A-Za-z0-9+/=]*)")
 _TAG = re.compile(r"<(?:!--|-->|/?[A-Za-z][^<>]{0,2000}>)")
 #: Lines of drawings, and when they move. Among thousands of numbers in pixels some pair always is somebody's
 #: place; none hides in tenths of pixels within a sheet (below 2000), so of those nothing is read.
-_DRAWN = re.compile(r"""(\s(?:d|points|values|transform)=")([A-Za-z0-9.,;()\s+-]*)(?=")""")
-_TIMED = re.compile(r"""(\s(?:key[Tt]imes|key[Ss]plines)=")([01.][0-9.;\s]*)(?=")""")
+_DRAWN = re.compile(r"""(\s(?:d|points|transform)=")([A-Za-z0-9.,;()\s+-]*)(?=")""")
 _PAPER = re.compile(r"(?:[^\d.]*+(?:1?\d{1,3}(?:\.\d)?|\.\d\d?)(?!\.?\d))*+[^\d.]*")
 _PARTS = re.compile(r"[^\W_]+")
 #: What has no letters of the Latin alphabet to stand for it when signs above letters are lost.
@@ -240,7 +239,7 @@ def readings(text: str) -> list[str]:
 
     text = _DATA.sub(packed, text)
     if "<svg" in text:
-        text = _TIMED.sub(r"\1", _DRAWN.sub(drawn, text))
+        text = _DRAWN.sub(drawn, text)
     found = [text]
     for _ in range(3):  # escapes may stand inside of escapes
         found.append(unquote(html.unescape(found[-1]), errors="replace"))
