@@ -330,7 +330,7 @@ def test_wrong_use_is_a_sentence(call, sentence):
 
 @pytest.mark.parametrize("given", [{}, {("a/b", "c"): 1.0}])
 def test_a_function_that_gives_no_numbers_is_refused(monkeypatch, given):
-    empty = protocol.Study("static-point", (), lambda seed: given)
+    empty = protocol.Study("static-point", lambda seed: given)
     monkeypatch.setattr("wildlab.studies.static_point.STUDY", empty)
     with pytest.raises(WildlabError, match="Give numbers by"):
         protocol.run_trial("static-point", 1, {})

@@ -13,6 +13,7 @@ from wildlab.messages.catalogue import FOLDER, load_texts
 from wildlab.paths import PACKAGE
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import case_names, find_case
+from wildlab.studies.static_point.trial import COLUMNS as STATIC_COLUMNS
 
 #: Recorded numbers by "subject/name" (a number, or an entry), and claims' verdicts by their id (alone, or
 #: with the interval of their share) -> the keys of the sentences.
@@ -81,7 +82,7 @@ def differenced(plain: float, coloured: float) -> dict[str, Any]:
     return {"cv/nees": plain, "coloured/nees": coloured}
 
 
-COLUMNS_AT_REST = [f"{column}/mae" for column in find_case("static-point").subjects]
+COLUMNS_AT_REST = [f"{column}/mae" for column in STATIC_COLUMNS]
 BOTH_KINDS = {"drawn-kf/mae": 8.0, "rendered-kf/mae": 8.1}
 
 

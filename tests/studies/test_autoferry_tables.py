@@ -13,7 +13,7 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies import autoferry
-from wildlab.studies.autoferry.comparison import KEYS, Held, of_use, outcomes, with_hindsight
+from wildlab.studies.autoferry.comparison import KEYS, Held, of_use, outcomes
 
 NAMES = load_texts("autoferry").subjects
 
@@ -126,7 +126,7 @@ def test_nothing_of_use_is_a_page_all_the_same(report):
     rows = made("ir", ["lost"] * 2)
     use = of_use(rows)
     useful = rows[rows["sensor"].isin(use.loc[use["of_use"], "sensor"])]
-    held = Held("schmidt", rows, use, judged(useful), with_hindsight(useful, KEYS))
+    held = Held("schmidt", rows, use, judged(useful))
     for one in autoferry.tables(held, {}, NAMES).values():
         report.table(one)
     autoferry.record(report, rows.iloc[:0], {}, held)

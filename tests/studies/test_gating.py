@@ -297,9 +297,6 @@ def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight, over):
     uv = ground_to_pixel(camera, np.append(over.place, 0.0), p_nc, R_nc)
     np.testing.assert_allclose(uv[:, 1], camera.cy, atol=1e-6)
     assert np.all((uv[:, 0] > 0) & (uv[:, 0] < camera.width))
-    assert gating.share_in_image(over, 50, 1) > gating.share_in_image(
-        overflight(flight, gimbal="down"), 50, 1
-    )
 
 
 def test_what_is_printed_of_the_angles(over):
@@ -427,7 +424,6 @@ def test_every_mean_is_recorded_with_its_standard_error():
         outcome(np.array(means)[:, None] + rng.standard_normal((4, 400)))
         for means in ((96.6, 96.8, 96.0, 97.5), (88.0, 82.0, 71.0, 79.0))
     )
-    stress.rate[:, :80] = 30.0
     report = open_report(study="gating", kind="twin", flight="large-ship")
     for one in metrics_of({DEFAULT: own, "assigned": stress}):
         report.metric(**one)
@@ -437,8 +433,6 @@ def test_every_mean_is_recorded_with_its_standard_error():
             mean, se = (report.recorded[name, of] for name in ("success_rate", "success_rate_se"))
             assert mean["value"] == pytest.approx(rates.mean())
             assert se["value"] == pytest.approx(standard_error(rates))
-            # The spread of single runs is not that of the mean, and is not recorded as if it were.
             assert mean["low"] is None and mean["n"] == 400
     assert report.recorded["success_rate", "angles"]["published"] == 95.99
     assert report.recorded["success_rate", "angles/updated-with-assigned"]["published"] is None
-    assert report.recorded["runs_mostly_wrong", "angles/updated-with-assigned"]["value"] == 20.0

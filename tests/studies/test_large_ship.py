@@ -6,11 +6,10 @@ import pytest
 
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.large_ship import STUDY, check_claims, scatter_left
+from wildlab.studies.large_ship import check_claims
 from wildlab.studies.large_ship.trial import (
     DETECTOR,
     NEAR_M,
-    SLIVER,
     START_S,
     UNITS,
     WITH,
@@ -113,34 +112,10 @@ def test_distances_from_the_middle_leave_the_receiver_out(taken, tracked, number
     rows = [int(row) for row in one.marks.exposure]
     bodies = [taken.camera.flight.bodies(row)[0].centre(0.0) for row in rows]
     assert np.allclose(middle, np.array(bodies)[:, :2])
-    apart = middle - one.seen.truth[:, :2]
-    assert numbers[DETECTOR, "receiver_off"] == pytest.approx(np.nanmean(np.linalg.norm(apart, axis=1)))
     points = one.seen.positions[known]
     off = np.linalg.norm(points - middle[known], axis=1)
     for limit in NEAR_M:
         assert numbers[WITH, f"share_near_{limit}"] == pytest.approx((off < limit).mean())
-    # What the mean is off from both origins differs by what lies between these.
-    mean = (middle[known] - points).mean(axis=0)
-    assert numbers[WITH, "centre_error_of_mean"] == pytest.approx(np.linalg.norm(mean))
-    assert np.linalg.norm(mean - apart[known].mean(axis=0)) == pytest.approx(numbers[WITH, "error_of_mean"])
-    late = one.seen.times >= START_S
-    tracked_off = np.linalg.norm(middle - one.track.x[:, :2], axis=1)[late]
-    assert numbers[WITH, "centre_mae_after_start"] == pytest.approx(tracked_off.mean())
-    assert numbers[WITH, "centre_error_true_poses"] < numbers[WITH, "error_true_poses"] + np.linalg.norm(
-        apart[known].mean(axis=0)
-    )
-
-
-def test_slivers_are_counted_apart(taken, tracked, numbers):
-    marks = taken.marks(moved=False)
-    clear = marks.share >= SLIVER
-    assert numbers[DETECTOR, "rate_beyond_sliver"] == pytest.approx(marks.found[clear].mean())
-    best = int(np.argmax(np.where(marks.found, marks.share, -1.0)))
-    shots = list(taken.shots)
-    shots[best] = shots[best]._replace(judged=shots[best].judged._replace(found={}))
-    blind = numbers_of(taken._replace(shots=shots), tracked)
-    assert blind[DETECTOR, "largest_missed"] == marks.share[best] > SLIVER
-    assert blind[DETECTOR, "rate_beyond_sliver"] < numbers[DETECTOR, "rate_beyond_sliver"]
 
 
 def test_moving_brings_centres_nearer(numbers):
@@ -150,11 +125,10 @@ def test_moving_brings_centres_nearer(numbers):
     assert numbers[DETECTOR, "detection_rate"] > 0.8
 
 
-def test_every_recorded_number_is_computed_and_every_published_one_has_a_subject(numbers):
-    assert {name for _, name in numbers} <= set(UNITS)
+def test_every_number_is_recorded_and_every_published_one_computed(numbers):
+    assert {name for _, name in numbers} == set(UNITS)
     printed = load_published("large-ship")
     assert {(subject, name) for name, subject in printed[["name", "subject"]].to_numpy()} <= set(numbers)
-    assert all(STUDY.metric_of(*key) is not None for key in numbers)
 
 
 def test_published_differences_are_those_of_the_table():
@@ -226,4 +200,4 @@ def test_claims_follow_the_numbers(numbers):
 def test_what_scatters_is_that_of_the_worse_of_both(numbers):
     both = {(WITH, "sd_both"): 5.0, (WITHOUT, "sd_both"): 9.0}
     both |= {(WITH, "sd_true_poses"): 3.2, (WITHOUT, "sd_true_poses"): 8.3}
-    assert scatter_left(spread_of(numbers, both)) == pytest.approx(8.3 / 9)
+    assert check_claims(spread_of(numbers, both))["mainly-navigation"].measured == pytest.approx(8.3 / 9)

@@ -9,7 +9,7 @@ from wildlab.geometry.terrain import Terrain
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import grow_trees, synthetic_landscape
 from wildlab.studies import line_of_sight
-from wildlab.studies.line_of_sight import STUDY, WAYS, furthest_ratio, timed
+from wildlab.studies.line_of_sight import WAYS, furthest_ratio, timed
 from wildlab.studies.line_of_sight.trial import (
     ANGLES,
     EXACT,
@@ -17,7 +17,6 @@ from wildlab.studies.line_of_sight.trial import (
     HEIGHTS,
     INCIDENCES,
     LETTER,
-    OTHERS,
     RAYS,
     TILT,
     TREES,
@@ -29,7 +28,6 @@ from wildlab.studies.line_of_sight.trial import (
     look,
     nodes_of,
     settings,
-    trees_on,
     trial,
     width_on_ground,
 )
@@ -138,25 +136,3 @@ def test_times_are_taken_of_every_way_at_every_height():
 def test_every_setting_is_compared_once():
     found = [(height, tilt) for _, height, tilt in settings()]
     assert len(set(found)) == len(found) and (HEIGHT, TILT) in found
-
-
-def test_finer_steps_answer_nearer_to_the_exact_line(spread):
-    finer, coarser = (spread[RAYS, f"agreement_{name}"] for name in OTHERS)
-    usual = spread[RAYS, f"agreement_{HEIGHT}m"]
-    assert (finer >= usual).all() and (usual >= coarser).all() and (finer > coarser).any()
-
-
-def test_ground_below_the_surface_with_trees_is_what_they_hide_straight_down(spread):
-    land = Terrain(np.zeros((5, 5), np.float32), -4.0, -4.0, 2.0)
-    height = land.height.copy()
-    height[2, 2] = 9.0
-    assert trees_on(land, Terrain(height, -4.0, -4.0, 2.0)) == (1 / 25, 4 / 16)
-    planted, covered = spread[TREES, "planted"], spread[TREES, "covered"]
-    assert (covered > planted).all()
-    assert np.abs(spread[TREES, "hidden_0deg"] - covered).max() < 3 * np.sqrt(0.15 * 0.85 / 1000) + 0.01
-
-
-def test_metrics_have_units():
-    assert STUDY.metric_of is not None
-    assert STUDY.metric_of(VIEW, "width_20m").unit == "m" and STUDY.metric_of(EXACT, "points_20m") is None
-    assert STUDY.metric_of(VIEW, "exponent").unit == "1"

@@ -14,9 +14,9 @@ from wildlab.evaluation.shares import UNDECIDABLE, Check
 from wildlab.reporting.published import judge
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies import monte_carlo
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study
 
-STUDY = Study("x", ("ekf",), metric_of=lambda subject, name: Metric(name, subject, "m"))
+STUDY = Study("x", unit_of=lambda name: "m")
 #: Published there: mean error 9.4, mean north -4.1, of a sign that is not defined.
 PUBLISHED = "schmidt-fast-vessel"
 

@@ -6,6 +6,7 @@ import inspect
 
 import pytest
 
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.published import load_published
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.studies.protocol import Study, case_names, find_case
@@ -29,7 +30,7 @@ def test_a_case_is_what_it_says(case):
     assert isinstance(study, Study) and study.case == case
     given = shown_by(case)
     if study.trial is None:
-        assert study.check_claims is None and study.metric_of is None
+        assert study.check_claims is None and study.unit_of is None
         return
     found = inspect.signature(study.trial).parameters
     assert next(iter(found)) == "seed"
@@ -41,9 +42,7 @@ def test_a_case_is_what_it_says(case):
             assert set(study.parameters) - {"twin"} <= set(entry.parameters) and entry.twin is not None
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_published_numbers_have_the_subjects_of_their_case(case):
-    subjects = CASES[case].subjects
-    for entry in shown_by(case):
-        for published in load_published(entry.name)["subject"]:
-            assert any(published == one or published.startswith(f"{one}/") for one in subjects), published
+@pytest.mark.parametrize("name", [name for name in STUDIES if name not in ("sensitivity", "survey-markers")])
+def test_published_numbers_have_subjects_that_the_page_has_words_for(name):
+    subjects = load_texts(STUDIES[name].case).subjects
+    assert set(load_published(name)["subject"]) <= set(subjects)

@@ -40,14 +40,14 @@ def bank_of(boats, spans, identity, alive=()):
 @pytest.mark.parametrize(
     ("boats", "identity", "expected"),
     [
-        ([0, 0, 0], [0, 0, 0], Outcome(2, 0, 0, 0)),
-        ([0, 0, 0], [0, 1, 2], Outcome(0, 0, 2, 0)),
-        ([0, 1, 0], [0, 1, 0], Outcome(1, 0, 0, 1)),
-        ([0, 1, 0], [0, 0, 0], Outcome(0, 2, 0, 0)),
+        ([0, 0, 0], [0, 0, 0], Outcome(2, 0, 0)),
+        ([0, 0, 0], [0, 1, 2], Outcome(0, 0, 2)),
+        ([0, 1, 0], [0, 1, 0], Outcome(1, 0, 0)),
+        ([0, 1, 0], [0, 0, 0], Outcome(0, 2, 0)),
         # The second is new to begin with, and then its own identity is another's: what counts is the last.
-        ([0, 1, 1], [0, 0, 0], Outcome(1, 1, 0, 0)),
+        ([0, 1, 1], [0, 0, 0], Outcome(1, 1, 0)),
         # Once the first was taken by the other vessel's, nothing of the vessel's own is left to be found.
-        ([0, 1, 0], [0, 0, 2], Outcome(0, 1, 0, 1)),
+        ([0, 1, 0], [0, 0, 2], Outcome(0, 1, 0)),
     ],
 )
 def test_outcomes_one_after_the_other(boats, identity, expected):
@@ -57,10 +57,10 @@ def test_outcomes_one_after_the_other(boats, identity, expected):
 
 def test_what_lives_on_or_was_still_detected_cannot_be_found():
     spans = [(0, 5), (5, 25)]
-    assert outcome(*bank_of([0, 0], spans, [0, 1])) == Outcome(0, 0, 0, 0)
+    assert outcome(*bank_of([0, 0], spans, [0, 1])) == Outcome(0, 0, 0)
     spans = [(0, 5), (6, 25)]
-    assert outcome(*bank_of([0, 0], spans, [0, 1])) == Outcome(0, 0, 1, 0)
-    assert outcome(*bank_of([0, 0], spans, [0, 1], alive=(0, 1))) == Outcome(0, 0, 0, 0)
+    assert outcome(*bank_of([0, 0], spans, [0, 1])) == Outcome(0, 0, 1)
+    assert outcome(*bank_of([0, 0], spans, [0, 1], alive=(0, 1))) == Outcome(0, 0, 0)
 
 
 def test_a_track_is_of_whom_most_of_its_detections_are():
@@ -86,13 +86,11 @@ def test_far_apart_all_are_found_by_place_and_near_each_other_by_looks_alone():
     numbers = again_numbers(looks, boat, same, sure)
     assert {name for _, name in numbers} == set(REACQUIRED_UNITS) and {way for way, _ in numbers} == set(WAYS)
     for way in WAYS:
-        assert [numbers[way, name] for name in REACQUIRED_UNITS] == [10, 0, 0, 1], (
-            "the second vessel is new once"
-        )
+        assert [numbers[way, name] for name in REACQUIRED_UNITS] == [10, 0, 0]
     looks, boat = laps()
     told = Appearance(20.0 * boat[:, None].astype(float), np.ones(1), np.ones(1))
     numbers = again_numbers(looks, boat, told, sure)
-    assert [numbers[WITH, name] for name in REACQUIRED_UNITS] == [10, 0, 0, 1]
+    assert [numbers[WITH, name] for name in REACQUIRED_UNITS] == [10, 0, 0]
     assert numbers[WITHOUT, "found_wrong"] == 11, "whoever comes by is taken for who came by before"
 
 
@@ -107,7 +105,7 @@ def test_two_that_come_back_beside_each_other_are_guessed_or_stay_new():
 
 
 def spread_of(*flights):
-    """Flights with (right, wrong, missed, new) by each way."""
+    """Flights with (right, wrong, missed) by each way."""
     return pd.DataFrame(
         [
             {
@@ -120,12 +118,12 @@ def spread_of(*flights):
     )
 
 
-GOOD = {WITHOUT: (1, 0, 9, 0), WITH: (10, 0, 0, 0), GUESSED_WITHOUT: (7, 3, 0, 0), GUESSED_WITH: (9, 1, 0, 1)}
-BAD = {WITHOUT: (9, 0, 1, 0), WITH: (1, 2, 7, 0), GUESSED_WITHOUT: (9, 0, 1, 0), GUESSED_WITH: (1, 1, 8, 0)}
+GOOD = {WITHOUT: (1, 0, 9), WITH: (10, 0, 0), GUESSED_WITHOUT: (7, 3, 0), GUESSED_WITH: (9, 1, 0)}
+BAD = {WITHOUT: (9, 0, 1), WITH: (1, 2, 7), GUESSED_WITHOUT: (9, 0, 1), GUESSED_WITH: (1, 1, 8)}
 
 
 def test_shares_are_of_tracks_that_had_something_to_find():
-    runs = spread_of(GOOD, {way: (0, 0, 0, 5) for way in WAYS}, BAD)
+    runs = spread_of(GOOD, {way: (0, 0, 0) for way in WAYS}, BAD)
     right, guessed = reacquired_shares(runs, WITH, "found_right"), (GUESSED_WITHOUT, "found_wrong")
     assert np.array_equal(right, [1.0, np.nan, 0.1], equal_nan=True)
     assert np.array_equal(reacquired_shares(runs, *guessed), [0.3, np.nan, 0.0], equal_nan=True)
@@ -133,7 +131,7 @@ def test_shares_are_of_tracks_that_had_something_to_find():
 
 def test_flights_with_nothing_to_find_count_nowhere():
     """Half of eight flights have a track to find."""
-    nothing = {way: (0, 0, 0, 5) for way in WAYS}
+    nothing = {way: (0, 0, 0) for way in WAYS}
     table = reacquisition_table(spread_of(GOOD, BAD, GOOD, BAD, *[nothing] * 4), {way: way for way in WAYS})
     row = table.set_index("way").loc[WITH]
     assert (row["found_right"], row["found_wrong"]) == (pytest.approx(55.0), pytest.approx(10.0))

@@ -5,11 +5,10 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.reporting.published import load_claims, load_published
+from wildlab.reporting.published import load_claims
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.slow_vessel import trial as slow_vessel
 from wildlab.studies.slow_vessel.trial import (
-    METRICS,
     SD_MEASUREMENT,
     SUBJECTS,
     check_claims,
@@ -53,16 +52,6 @@ def test_the_filter_is_a_straight_line_through_the_first_points_where_nothing_ac
     assert np.allclose(got.measured, errors) and np.all(np.diff(got.times) > 0)
 
 
-def test_long_steps_state_more_and_are_the_same_without_pauses():
-    rng = np.random.default_rng(5)
-    even, errors = np.arange(40) / 7.5, rng.normal(0, 4, (40, 2))
-    points = scored_points(even, errors, np.zeros((40, 2)))
-    assert np.allclose(track_vessel(points).error, track_vessel(points, np.inf).error)
-    paused = scored_points(np.where(even > 3, even + 60, even), errors, np.zeros((40, 2)))
-    long, short = track_vessel(paused, np.inf).predicted, track_vessel(paused).predicted
-    assert np.all(long >= short) and np.all(long[even > 3] > short[even > 3])
-
-
 #: A flight on which every claim of H 5.6.2 is true, and what makes each untrue.
 GOOD = {(subject, name): 1.0 for subject in SUBJECTS for name in ("mean_north", "mean_east")}
 GOOD |= {
@@ -74,16 +63,16 @@ GOOD |= {
     ("observer-subset", "mae"): 7.0,
     ("pixhawk-autopilot-subset", "mae"): 7.1,
     ("first-case", "mae"): 6.0,
-    ("observer-exact", "mae"): 5.9,
-    ("observer", "largest"): 39.0,
-    ("observer", "below_20"): 0.6,
-    ("observer", "5_to_10"): 0.6,
-    ("observer", "last_tenth"): 11.0,
+    ("observer", "mae_without_reference_error"): 5.9,
+    ("observer", "largest_error"): 39.0,
+    ("observer", "share_below_20_m"): 0.6,
+    ("observer", "share_5_to_10_m"): 0.6,
+    ("observer", "mean_error_last_tenth"): 11.0,
     ("vessel", "speed_beginning"): 2.0,
     ("vessel", "speed_beginning_subset"): 0.5,
-    ("filter", "beginning"): 9.0,
-    ("filter-subset", "beginning"): 8.0,
-    ("filter", "at_end"): 4.0,
+    ("filter", "filter_error_beginning"): 9.0,
+    ("filter-subset", "filter_error_beginning"): 8.0,
+    ("filter", "filter_error_at_end"): 4.0,
 }
 OPPOSED = {
     "observer-autopilot-comparable": {("pixhawk-autopilot", "mae"): 8.0},
@@ -92,13 +81,13 @@ OPPOSED = {
     "observer-best-on-subset": {("pixhawk-autopilot-subset", "mae"): 6.9},
     "mean-about-two-metres": {("observer", "mean_north"): -3.0},
     "larger-than-first-case": {("first-case", "mae"): 10.1},
-    "reference-explains": {("observer-exact", "mae"): 6.1},
-    "largest-almost-forty": {("observer", "largest"): 41.0},
-    "majority-below-twenty": {("observer", "below_20"): 0.4},
-    "better-part-five-to-ten": {("observer", "5_to_10"): 0.4},
-    "grows-at-end": {("observer", "last_tenth"): 9.0},
-    "beginning-larger-on-whole-flight": {("filter", "beginning"): 7.0},
-    "few-metres-at-end": {("filter", "at_end"): 6.0},
+    "reference-explains": {("observer", "mae_without_reference_error"): 6.1},
+    "largest-almost-forty": {("observer", "largest_error"): 41.0},
+    "majority-below-twenty": {("observer", "share_below_20_m"): 0.4},
+    "better-part-five-to-ten": {("observer", "share_5_to_10_m"): 0.4},
+    "grows-at-end": {("observer", "mean_error_last_tenth"): 9.0},
+    "beginning-larger-on-whole-flight": {("filter", "filter_error_beginning"): 7.0},
+    "few-metres-at-end": {("filter", "filter_error_at_end"): 6.0},
 }
 
 
@@ -109,7 +98,6 @@ def test_claims_are_decided_flight_by_flight(claim):
     assert set(checks) == set(OPPOSED) == set(typed)
     threshold = float(typed[claim]["threshold"]) if "threshold" in typed[claim] else None
     assert checks[claim].holds(threshold).tolist() == [True, False]
-    assert set(GOOD) <= set(METRICS)
 
 
 def test_flights_without_what_a_claim_is_about_are_not_asked():
@@ -119,13 +107,6 @@ def test_flights_without_what_a_claim_is_about_are_not_asked():
     )
     assert list(checks["beginning-larger-on-whole-flight"].premise) == [True, False, True]
     assert list(checks["reference-explains"].premise) == [True, True, False]
-
-
-def test_every_published_number_has_a_metric():
-    published = load_published("slow-vessel")
-    assert set(zip(published["name"], published["subject"], strict=True)) <= {
-        (name, subject) for name, subject, _ in METRICS.values()
-    }
 
 
 def test_where_a_logged_vessel_truly_was_nobody_knows(make_flight):
@@ -139,13 +120,14 @@ def test_a_simulated_flight_gives_every_number():
     navigate_vessel(flight)
     scored = evaluate_sources(flight, np.random.default_rng(2))
     found = summarise_vessel(flight, scored) | {("first-case", "mae"): first_case(2, "static-antenna")}
-    assert set(found) == set(METRICS)
+    assert set(GOOD) <= set(found)
     table = scored["observer"]
     assert (len(table), len(subset_of(table))) == (3635, 1250)
     assert np.allclose(table["down_m"], 0.0, atol=1e-9), "points lie on the sea, not at the receiver"
     assert found["observer", "mae"] == pytest.approx(table["error_m"].mean())
     # The receiver is metres off, and a metre behind the middle: that is all that lies between the two truths.
-    assert abs(found["observer", "mae"] - found["observer-exact", "mae"]) < found["reference", "mae"] < 5.0
+    apart = found["observer", "mae"] - found["observer", "mae_without_reference_error"]
+    assert abs(apart) < found["reference", "mae"] < 5.0
 
 
 def test_no_share_is_asked_to_be_above_one():

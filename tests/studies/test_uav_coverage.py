@@ -11,7 +11,6 @@ from wildlab.evaluation.shares import FAILS, HOLDS, NO_PREMISE, decide_check
 from wildlab.planning.coverage import nodes_in
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.uav_coverage import STUDY
 from wildlab.studies.uav_coverage.trial import (
     CASES,
     DOWN,
@@ -45,8 +44,8 @@ def frame(rows: list[dict[tuple[str, str], float]]) -> pd.DataFrame:
 def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
     """Draws that are all the same, in which every claim is true, with some numbers changed."""
     usual = {
-        "seen": 0.9, "only_blurred": 0.0, "in_sight": 5.0, "ground": 1e5, "outside": 2e4, "detected": 0.9,
-        "time": 1000.0, "held": 0.99, "sure": 0.8, "flown": 0.9, "margin": 80.0, "kept": 0.9, "sharp": 1.0,
+        "seen": 0.9, "in_sight": 5.0, "ground": 1e5, "outside": 2e4, "time": 1000.0, "held": 0.99,
+        "sure": 0.8, "kept": 0.9, "sharp": 1.0,
     }  # fmt: skip
     row = {(name, key): value for name in CASES | MORE for key, value in usual.items()}
     row |= {(YAW, "seen"): 0.94, (YAW, "ground"): 1.5e5, (YAW, "in_sight"): 4.0, (LOW, "seen"): 0.8}
@@ -71,7 +70,7 @@ def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws):
 
 def test_a_plan_without_a_margin_promises_more_than_flights_show(draws):
     assert (draws[LOW, "kept"] < draws[LOW, "held"]).all() and (draws[LOW, "kept"] < 0.95).any()
-    assert (draws[LOW, "sure"] < draws[LOW, "flown"]).all()
+    assert (draws[LOW, "sure"] < draws[LOW, "seen"]).all()
 
 
 def test_numbers_agree_with_one_another(draws):
@@ -80,10 +79,8 @@ def test_numbers_agree_with_one_another(draws):
     for name in CASES | MORE:
         inside = draws[name, "ground"] - draws[name, "outside"]
         assert np.allclose(inside, draws[name, "seen"] * area)
-        assert (draws[name, "detected"] <= draws[name, "seen"]).all()
     assert (draws[YAW, "ground"] > draws[DOWN, "ground"]).all()
     assert (draws[LOW_CLOSE, "time"] > 1.8 * draws[LOW, "time"]).all()
-    assert {subject for subject, _ in draws} == set(STUDY.subjects)
 
 
 def test_the_platform_keeps_its_height_above_ground():

@@ -217,7 +217,7 @@ def test_a_trial_has_what_is_published_and_the_same_twice():
     assert one[SHIP, "images"] == 3
     for row in load_published("vessel-detection").itertuples():
         assert np.isfinite(one[row.subject, row.name])
-        assert STUDY.metric_of(row.subject, row.name) is not None
+        assert STUDY.unit_of(row.name) is not None
     assert 0 <= one[SHIP, "detection_rate"] <= 1
 
 

@@ -12,7 +12,7 @@ from wildlab.simulation.scene import (
     sensor_of,
 )
 from wildlab.studies import wildlife_detection
-from wildlab.studies.wildlife_detection import STUDY, trial
+from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
     BY_EMPTY,
@@ -49,8 +49,6 @@ def test_a_seed_has_all_numbers(numbers):
         at = wildlife_detection.places([CLOUDY])
         assert wildlife_detection.counts_of(spread, subject, at).shape == (9, 3)
     assert not wildlife_detection.counts_of(spread, SMALL, ["never"]).size
-    assert STUDY.metric_of("herd", "mean_rise") is not None
-    assert STUDY.metric_of(CONSTANT, "found_night_15") is None
 
 
 def test_the_sun_makes_ground_as_warm_as_animals(numbers):

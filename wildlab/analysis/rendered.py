@@ -228,8 +228,8 @@ class Marks(NamedTuple):
         (K,) of its outline in view.
     moved
         (K,) whether the centre was moved by H (4.7).
-    pieces, false
-        (K,) how many detections are the target's, and how many are of nothing.
+    false
+        (K,) how many detections are of nothing.
     """
 
     exposure: Indices
@@ -238,7 +238,6 @@ class Marks(NamedTuple):
     centre: Array
     share: Array
     moved: Mask
-    pieces: Indices
     false: Indices
 
     @property
@@ -277,15 +276,13 @@ def marks_of(
     taken = list(shots)
     n = len(taken)
     uv, centre, covariance = np.full((n, 2), np.nan), np.full((n, 2), np.nan), np.full((n, 2, 2), np.nan)
-    share, moved = np.zeros(n), np.zeros(n, bool)
-    pieces, false = np.zeros(n, np.intp), np.zeros(n, np.intp)
+    share, moved, false = np.zeros(n), np.zeros(n, bool), np.zeros(n, np.intp)
     for k, shot in enumerate(taken):
         false[k] = shot.judged.false
         for seen in shot.seen:
             if seen.number == number:
                 centre[k], share[k] = seen.centre, seen.share
         rows = shot.judged.found.get(number, [])
-        pieces[k] = len(rows)
         if not rows:
             continue
         one = shot.detections.select(rows[:1])
@@ -293,7 +290,7 @@ def marks_of(
         uv[k], covariance[k] = found.uv[0], found.covariance[0]
         moved[k] = bool((found.uv[0] != one.uv[0]).any())
     exposure = np.array([shot.exposure for shot in taken], np.intp)
-    return Marks(exposure, uv, covariance, centre, share, moved, pieces, false)
+    return Marks(exposure, uv, covariance, centre, share, moved, false)
 
 
 def with_detections(

@@ -64,7 +64,7 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
     Parameters
     ----------
     study
-        It says what each column is called.
+        It says what is recorded, and in which unit.
     spread
         Columns (subject, name), one row for each flight; a flight on which a quantity was not computed has
         NaN.
@@ -72,17 +72,16 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         How many observations stand behind each subject, where that is known.
     """
     columns: Any = spread.columns
-    for key in columns:
-        named = None if study.metric_of is None else study.metric_of(*key)
-        if named is None:
+    for subject, name in columns:
+        unit = None if study.unit_of is None else study.unit_of(name)
+        if unit is None:
             continue
-        name, subject, unit, scale = named
-        values, printed = scale * spread[key], report.printed(name, subject)
+        values, printed = spread[subject, name], report.printed(name, subject)
         if len(values) > 1 and values.notna().sum() == 1 and np.isfinite(values.iloc[0]):
             report.metric(name, subject, values.iloc[0], unit, n=1, flights=1)
             continue
         if printed is not None and printed["kind"] == SHARE_OF_IMAGES:
-            share, images = pooled_share(spread, *key)
+            share, images = pooled_share(spread, subject, name)
             if images:
                 centre = share_interval(min(share.estimate, 1.0) * images, images, LEVEL)
                 report.metric(

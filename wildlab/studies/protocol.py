@@ -34,7 +34,7 @@ import inspect
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
@@ -53,16 +53,6 @@ Numbers = Mapping[tuple[str, str], float]
 Values = dict[str, float]
 
 
-class Metric(NamedTuple):
-    """What a number of a trial is called in ``metrics.json``, and its unit there, of which ``scale`` are one
-    of the trial's: 180/pi for degrees of radians."""
-
-    name: str
-    subject: str
-    unit: str
-    scale: float = 1.0
-
-
 @dataclass(frozen=True)
 class Study:
     """One case.
@@ -71,26 +61,22 @@ class Study:
     ----------
     case
         Its name: the folder's, with hyphens.
-    subjects
-        What the published tables compare, as metrics name it: every published number of the case has one of
-        these subjects, or one that begins with it and a ``/``.
     trial
         What is computed for a seed; None where the case does not go over simulated flights one by one.
     check_claims
         Trials, one row for each flight and columns (subject, name), and whatever else the notebook has to say
         -> what the flights give for each claim, by the claim's id: a `Check`, or (flights,) bools.
-    metric_of
-        Subject and name of a number of the trial -> its metric; None where it is recorded as none.
+    unit_of
+        Name of a number of the trial -> its unit in ``metrics.json``; None where it is not recorded.
     answer
         What was recorded (`wildlab.studies.page.Facts`) -> keys of the sentences of
         ``data/messages/en/<case>.toml`` that answer the page's question, the most important first.
     """
 
     case: str
-    subjects: tuple[str, ...]
     trial: Callable[..., Numbers] | None = None
     check_claims: Callable[..., Mapping[str, Check] | Mapping[str, ArrayLike]] | None = None
-    metric_of: Callable[[str, str], Metric | None] | None = None
+    unit_of: Callable[[str], str | None] | None = None
     answer: Callable[[Facts], Sequence[str]] | None = None
 
     @property
@@ -99,15 +85,6 @@ class Study:
         if self.trial is None:
             return ()
         return tuple(name for name in inspect.signature(self.trial).parameters if name != "seed")
-
-
-def name_metrics(units: Mapping[str, str]) -> Callable[[str, str], Metric | None]:
-    """A `Study.metric_of` that records the numbers named in ``units`` under their names, and no others."""
-
-    def metric_of(subject: str, name: str) -> Metric | None:
-        return Metric(name, subject, units[name]) if name in units else None
-
-    return metric_of
 
 
 def case_names() -> tuple[str, ...]:

@@ -132,8 +132,7 @@ def test_detections_are_judged_by_what_is_under_them():
     found = detections((100, 50, 20, 10), (200, 150, 20, 10), (20, 200, 10, 10))
     judged = judge(frame, found)
     order = np.argsort(found.uv[:, 1])
-    assert judged.animal[order].tolist() == [4, NONE, NONE]
-    assert judged.standing[order].tolist() == [True, True, False]
+    assert judged[order].tolist() == [4, NONE, NONE]
     # A centroid near an animal is of it, one of much more than the animal is not.
     widest = int(TOO_LARGE * 20)
     for box, whose in (
@@ -142,7 +141,7 @@ def test_detections_are_judged_by_what_is_under_them():
         ((110 - (widest - 1) // 2, 50, widest - 1, 10), 4),
         ((110 - (widest + 1) // 2, 50, widest + 1, 10), NONE),
     ):
-        assert judge(frame, detections(box)).animal.tolist() == [whose], box
+        assert judge(frame, detections(box)).tolist() == [whose], box
 
 
 def framed(labels: Array, find: Callable[[np.ndarray, float], Detections]) -> Framed:
@@ -186,7 +185,7 @@ def test_detections_go_to_the_ground_from_the_told_pose():
 
 def test_frames_without_detections_give_images_without():
     found = framed(np.zeros(SHAPE), lambda counts, distance: detections())
-    assert found.images.z.shape == (0, 2) and found.uv.shape == (0, 2) and not len(found.standing)
+    assert found.images.z.shape == (0, 2) and found.uv.shape == (0, 2)
 
 
 def test_the_distance_to_the_ground_is_limited():

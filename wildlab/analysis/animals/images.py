@@ -390,13 +390,10 @@ class Framed(NamedTuple):
         Their detections on the ground, those of no animal with `NONE`.
     uv
         (D, 2) px.
-    standing
-        (D,) bool: whether something stands there, animals included, or it is bare ground.
     """
 
     images: Images
     uv: Array
-    standing: Mask
 
 
 def furnish(
@@ -491,30 +488,22 @@ def _half_height(body: Body) -> float:
     return max(layer.height for layer in body.layers) / 2
 
 
-class FrameMatch(NamedTuple):
-    """Of D detections of a frame: whose each is, `NONE` for no animal's; and if anything stands there."""
-
-    animal: Indices
-    standing: Mask
-
-
-def judge(frame: Frame, found: Detections) -> FrameMatch:
+def judge(frame: Frame, found: Detections) -> Indices:
     """Whose each detection is: the animal's on whose pixels, or near them, its centroid lies.
 
-    Where pixels of several bodies are there, that which has most of them; no animal's is a detection that is
-    `TOO_LARGE` for it.
+    Where pixels of several bodies are there, that which has most of them; `NONE` for no animal's, and for one
+    that is `TOO_LARGE`.
     """
     labels = frame.view.labels
-    animal, standing = np.full(len(found), NONE, np.intp), np.zeros(len(found), bool)
+    animal = np.full(len(found), NONE, np.intp)
     for row in range(len(found)):
         u, v = np.rint(found.uv[row]).astype(int)
         part = labels[max(v - NEAR, 0) : v + NEAR + 1, max(u - NEAR, 0) : u + NEAR + 1]
         near = np.bincount(part[part > 0], minlength=1)
         best = int(near.argmax())
-        standing[row] = near[best] > 0
-        if standing[row] and found.area[row] <= TOO_LARGE * int((labels == best).sum()):
+        if near[best] > 0 and found.area[row] <= TOO_LARGE * int((labels == best).sum()):
             animal[row] = frame.animal[best]
-    return FrameMatch(animal, standing)
+    return animal
 
 
 def ground_distance(terrain: Terrain, told: CameraPoses) -> float:
@@ -563,7 +552,7 @@ def take_frames(
     -------
     Framed
     """
-    uv, image, judged = list[Array](), list[Indices](), list[FrameMatch]()
+    uv, image, judged = list[Array](), list[Indices](), list[Indices]()
     for k in range(len(images.times)):
         shot = frame(k)
         found = find(shot.counts, ground_distance(terrain, images.poses.take(np.array([k]))))
@@ -574,6 +563,5 @@ def take_frames(
     z, R = np.zeros((0, 2)), np.zeros((0, 2, 2))
     if len(rows):
         z, R = to_ground(terrain, images.poses.take(rows), headings[rows], pixels, errors, detector, rng)
-    animal = np.concatenate([one.animal for one in judged])
-    standing = np.concatenate([one.standing for one in judged])
-    return Framed(images._replace(z=z, R=R, image=rows, animal=animal), pixels, standing)
+    animal = np.concatenate(judged)
+    return Framed(images._replace(z=z, R=R, image=rows, animal=animal), pixels)

@@ -27,7 +27,6 @@ from wildlab.analysis.animals.images import (
 from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course
@@ -641,22 +640,14 @@ def out_of_sight(
 def sight_numbers(away: OutOfSight) -> dict[str, float]:
     """How well animals out of sight are known, by name; NaN where there was none.
 
-    ``rmse`` and ``sd`` in m (`sd` for one axis), ``anees``, ``beyond``: the share outside the ellipse that
-    should hold 95 %; the same of tracks of one animal alone, ``own``, and the share of these.
+    ``rmse`` and ``sd`` in m (`sd` for one axis), and ``anees``.
     """
-    names = ("rmse", "sd", "anees", "beyond", "rmse_own", "anees_own", "own_share")
     if not len(away.off):
-        return dict.fromkeys(names, np.nan)
-    squares, mine, nees = (away.off**2).sum(axis=1), away.own, away.nees
-    trace = np.trace(away.covariance, axis1=1, axis2=2)
+        return dict.fromkeys(("rmse", "sd", "anees"), np.nan)
     return {
-        "rmse": float(np.sqrt(squares.mean())),
-        "sd": float(np.sqrt(trace.mean() / 2)),
-        "anees": float(nees.mean()),
-        "beyond": float((nees > chi2_quantile(0.95, 2)).mean()),
-        "rmse_own": float(np.sqrt(squares[mine].mean())) if mine.any() else np.nan,
-        "anees_own": float(nees[mine].mean()) if mine.any() else np.nan,
-        "own_share": float(mine.mean()),
+        "rmse": float(np.sqrt((away.off**2).sum(axis=1).mean())),
+        "sd": float(np.sqrt(np.trace(away.covariance, axis1=1, axis2=2).mean() / 2)),
+        "anees": float(away.nees.mean()),
     }
 
 

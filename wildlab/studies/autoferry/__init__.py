@@ -68,8 +68,6 @@ def record(report: Report, tracks: pd.DataFrame, tunings: Mapping[str, SensorTun
     record_tracks(report, tracks)
     record_tunings(report, tunings)
     record_outcomes(report, held.found, held.use, held.fixed)
-    gained = int(held.hindsight["gained"].sum())
-    report.metric("tracks_gained_with_hindsight", "all-sensors", gained, "1", n=len(held.hindsight))
 
 
 def record_tracks(report: Report, tracks: pd.DataFrame) -> None:
@@ -95,7 +93,6 @@ def record_tunings(report: Report, tunings: Mapping[str, SensorTuning]) -> None:
             "clock_offset", sensor, one.offset_s, "s", n=one.n, low=one.offset_low_s, high=one.offset_high_s
         )
         report.metric("error_sd", sensor, scale * one.sd, unit, n=one.n)
-        report.metric("error_correlation_time", sensor, one.correlation_time_s, "s", n=one.n)
 
 
 def record_outcomes(report: Report, found: pd.DataFrame, use: pd.DataFrame, fixed: str) -> None:
@@ -316,4 +313,4 @@ def _use(facts: Facts) -> str:
     return "all" if not useless else "ranging" if useless == {"ir", "eo"} else "some"
 
 
-STUDY = Study("autoferry", (), answer=answer)
+STUDY = Study("autoferry", answer=answer)

@@ -132,15 +132,14 @@ class Held(NamedTuple):
         The filter, from `choose_filter`.
     judged
         Tracks of the flights that nothing was tuned on; of the only one where there is one.
-    use, found, hindsight
-        From `of_use`, and of the sensors that are of use from `outcomes` and `with_hindsight`.
+    use, found
+        From `of_use`, and of the sensors that are of use from `outcomes`.
     """
 
     fixed: str
     judged: pd.DataFrame
     use: pd.DataFrame
     found: pd.DataFrame
-    hindsight: pd.DataFrame
 
     @property
     def counts(self) -> dict[str, int]:
@@ -156,7 +155,7 @@ def hold_fixed(tracks: pd.DataFrame, first: str) -> Held:
     judged = tracks if own.all() else tracks[~own]
     use = of_use(judged)
     useful = judged[judged["sensor"].isin(use.loc[use["of_use"], "sensor"])]
-    return Held(fixed, judged, use, outcomes(useful, KEYS, fixed), with_hindsight(useful, KEYS))
+    return Held(fixed, judged, use, outcomes(useful, KEYS, fixed))
 
 
 def choose_filter(table: pd.DataFrame, keys: Sequence[str]) -> str:
@@ -208,22 +207,6 @@ def of_use(table: pd.DataFrame) -> pd.DataFrame:
         mine, most = group[group["filter"] == best], int(kept.max())
         rows.append((str(sensor), best, most, len(mine), 2 * most > len(mine), float(mine["rmse"].median())))
     return pd.DataFrame(rows, columns=["sensor", "filter", "kept", "tracks", "of_use", "rmse"])
-
-
-def with_hindsight(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
-    """In which cases any of the other filters gains: what one could have had who knew which to take.
-
-    Returns
-    -------
-    One row for each case: ``keys``, ``gained`` and ``filters``, the names of those that do.
-    """
-    names = dict.fromkeys(name for some in FILTERS.values() for name in some if name not in WHITES)
-    every = pd.concat([outcomes(table, keys, name) for name in names], ignore_index=True)
-    rows = []
-    for key, group in every.groupby(list(keys), sort=False):
-        gainers = group.loc[group["outcome"] == "gained", "filter"].tolist()
-        rows.append(dict(zip(keys, key, strict=True)) | {"gained": bool(gainers), "filters": gainers})
-    return pd.DataFrame(rows, columns=[*keys, "gained", "filters"])
 
 
 def check_claims(table: pd.DataFrame, keys: Sequence[str]) -> dict[str, NDArray[np.bool_]]:

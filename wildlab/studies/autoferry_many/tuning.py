@@ -212,13 +212,13 @@ def follow_mode(flight: Flight, mode: str, settings: Settings) -> Identities | N
     )
 
 
-def anees_of(lives: Identities | None, alone: bool = True) -> float:
+def anees_of(lives: Identities | None) -> float:
     """Mean NEES / 2 over tracks, each by its NEES; NaN where there is none.
 
-    ``alone``: the truth taken for exact, so that no draw is preferred for what somebody assumed of the truth.
+    The truth is taken for exact, so that no draw is preferred for what somebody assumed of the truth.
     """
     on = [one for one in (lives.tracks.values() if lives else ()) if np.isfinite(one.anees)]
-    values = [(one.anees_alone if alone else one.anees) / 2 for one in on]
+    values = [one.anees_alone / 2 for one in on]
     return float(np.average(values, weights=[one.compared for one in on])) if on else np.nan
 
 

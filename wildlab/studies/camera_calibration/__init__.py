@@ -173,4 +173,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study("camera-calibration", ("tau2", "data-sheet", "tau2-data-sheet", "mounting"), answer=answer)
+STUDY = Study("camera-calibration", answer=answer)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from wildlab.studies.coloured_noise import trial
-from wildlab.studies.linear_vs_nonlinear import track_metric
+from wildlab.studies.linear_vs_nonlinear import unit_of
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
 
@@ -42,11 +42,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study(
-    "coloured-noise",
-    (*trial.SUBJECTS, "measurements"),
-    trial.trial,
-    trial.check_claims,
-    track_metric,
-    answer,
-)
+STUDY = Study("coloured-noise", trial.trial, trial.check_claims, unit_of, answer)

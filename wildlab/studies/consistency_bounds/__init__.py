@@ -147,4 +147,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study("consistency-bounds", ("nees-1-run", "nis-1-run", "nis-50-runs"), answer=answer)
+STUDY = Study("consistency-bounds", answer=answer)

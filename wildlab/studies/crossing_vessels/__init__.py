@@ -36,7 +36,7 @@ from wildlab.studies.crossing_vessels.trial import (
     looks_of,
 )
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 
 Array = NDArray[np.float64]
 
@@ -280,17 +280,4 @@ def answer(facts: Facts) -> list[str]:
     return [f"swap-{facts.outcome('no-swap-with-features')}", f"feature-{best}"]
 
 
-STUDY = Study(
-    "crossing-vessels",
-    (
-        *trial.SUBJECTS,
-        JOINT,
-        trial.LOOKS,
-        *map(trial.curve_subject, trial.SEPARATIONS),
-        *WAYS,
-    ),
-    trial.trial,
-    check_claims,
-    name_metrics(trial.UNITS),
-    answer,
-)
+STUDY = Study("crossing-vessels", trial.trial, check_claims, trial.UNITS.get, answer)

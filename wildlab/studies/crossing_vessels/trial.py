@@ -223,7 +223,7 @@ WAYS = {
     "again-guessed-with-features": ReacquisitionRule(rules.FEATURES, GUESS),
 }
 #: Names of the numbers that are recorded, and their units: tracks, by `Outcome`.
-REACQUIRED_UNITS = {"found_right": "1", "found_wrong": "1", "not_found": "1", "rightly_new": "1"}
+REACQUIRED_UNITS = {"found_right": "1", "found_wrong": "1", "not_found": "1"}
 
 
 class Outcome(NamedTuple):
@@ -235,14 +235,11 @@ class Outcome(NamedTuple):
         Those taken for a track of the same vessel, and of the other one.
     missed
         Those taken for none, although one of the same vessel was kept.
-    new
-        Those taken for none where none of the same vessel was kept.
     """
 
     right: int
     wrong: int
     missed: int
-    new: int
 
 
 def owners(boat: Index, track: Index, count: int) -> Index:
@@ -283,7 +280,7 @@ def outcome(image: Index, boat: Index, bank: Bank) -> Outcome:
     count = len(bank.started)
     owner = owners(boat, bank.track, count)
     of = [image[bank.track == number] for number in range(count)]
-    right, wrong, missed, new = 0, 0, 0, 0
+    right, wrong, missed = 0, 0, 0
     left = np.ones(count, bool)
     for number in range(count):
         before = np.arange(number)
@@ -294,9 +291,8 @@ def outcome(image: Index, boat: Index, bank: Bank) -> Outcome:
             right += owner[same[-1]] == owner[number]
             wrong += owner[same[-1]] != owner[number]
         elif kept:
-            own = (owner[kept] == owner[number]).any()
-            missed, new = missed + int(own), new + int(not own)
-    return Outcome(int(right), int(wrong), missed, new)
+            missed += (owner[kept] == owner[number]).any()
+    return Outcome(int(right), int(wrong), int(missed))
 
 
 def again_numbers(
@@ -344,9 +340,8 @@ UNITS = {
     **{f"wrong_rate_boat_{n}": "1" for n in (1, 2)}, "wrong": "1", "unassigned": "1", "tracks": "1",
     "swapped": "1", "swapped_at_end": "1", "swaps": "1", "breaks": "1",
     "near_share": "1", "any_near_share": "1", "mae": "m", "gospa": "m", "anees": "1", "closest": "m",
-    "detections": "1",
     **REACQUIRED_UNITS,
-    **{f"separation_{name}": "1" for name in NAMES}, **{f"spread_{name}": "1" for name in NAMES},
+    **{f"separation_{name}": "1" for name in NAMES},
 }  # fmt: skip
 
 
@@ -494,7 +489,6 @@ def looks_of(looks: list[Array]) -> Numbers:
         enough = all(len(group) > 1 for group in groups)
         spread = float(np.sqrt(np.mean([group.var(ddof=1) for group in groups]))) if enough else np.nan
         apart = abs(float(groups[0].mean() - groups[1].mean())) if enough else np.nan
-        numbers[LOOKS, f"spread_{name}"] = spread
         numbers[LOOKS, f"separation_{name}"] = apart / spread if spread > 0 else np.nan
     return numbers
 
@@ -545,7 +539,6 @@ def all_numbers(flown: Flown, seed: int) -> Numbers:
         **joint_numbers(flown.crossing),
         **looks_of(flown.looks),
         **curve_of(flown.crossing, seed),
-        (LOOKS, "detections"): float(len(flown.crossing.boat)),
         (LOOKS, "closest"): float(np.nanmin(flown.crossing.apart)),
     }
 

@@ -29,7 +29,7 @@ from wildlab.studies.end_to_end.trial import (
 )
 from wildlab.studies.linear_vs_nonlinear.trial import UNITS
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study
 
 #: Of the detections' numbers: shares, shown in per cent, and decimals of the others.
 SHARES = ("detection_rate", "ellipse_coverage_90", "ground_coverage_90_true_poses", "ground_coverage_90")
@@ -174,12 +174,6 @@ def track_errors(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     return finish(fig, "", "mean distance from the truth (m)")
 
 
-def _metric(subject: str, name: str) -> Metric | None:
-    if subject in trial.KINDS:
-        return Metric(name, subject, trial.PIXEL_UNITS[name])
-    return Metric(name, subject, UNITS[name]) if name in UNITS else None
-
-
 def answer(facts: Facts) -> list[str]:
     """Whether tracks change, then how many claims do."""
     if math.isnan(sum(facts.value(f"{kind}-kf", "mae") for kind in trial.KINDS)):
@@ -187,4 +181,4 @@ def answer(facts: Facts) -> list[str]:
     return [f"tracks-{facts.choose('tracks-alike', 'alike', 'differ')}", "claims"]
 
 
-STUDY = Study("end-to-end", trial.KINDS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study("end-to-end", trial.trial, trial.check_claims, (UNITS | PIXEL_UNITS).get, answer)

@@ -30,7 +30,6 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
-from wildlab.reporting.published import bounds_of
 from wildlab.studies.gating.monte_carlo import (
     FORMS,
     GATES,
@@ -72,28 +71,13 @@ def mostly_wrong(rates: Array) -> Array:
 
 
 def metrics_of(outcomes: Mapping[str, Outcome]) -> list[dict[str, Any]]:
-    """Every mean rate with its standard error, the spread of single runs, and how many are mostly wrong.
-
-    The bounds of the spread are of single runs, so they stand with the median run and not with the mean.
-    """
-    found: list[dict[str, Any]] = []
-    for reading, one in outcomes.items():
-        for name, rates, half in zip(GATES, one.rate, mostly_wrong(one.rate), strict=True):
-            about = {"subject": subject(name, reading), "unit": "%", "n": len(rates)}
-            low, high = bounds_of(pd.Series(rates))
-            found += [
-                {"name": "success_rate", "value": rates.mean(), **about},
-                {"name": "success_rate_se", "value": standard_error(rates), **about},
-                {
-                    "name": "success_rate_median_run",
-                    "value": np.median(rates),
-                    "low": low,
-                    "high": high,
-                    **about,
-                },
-                {"name": "runs_mostly_wrong", "value": half, **about},
-            ]
-    return found
+    """Every mean rate with its standard error."""
+    return [
+        {"name": name, "subject": subject(gate, reading), "value": value, "unit": "%", "n": len(rates)}
+        for reading, one in outcomes.items()
+        for gate, rates in zip(GATES, one.rate, strict=True)
+        for name, value in (("success_rate", rates.mean()), ("success_rate_se", standard_error(rates)))
+    ]
 
 
 def rates_table(outcomes: Mapping[str, Outcome], names: Mapping[str, str]) -> pd.DataFrame:
@@ -346,4 +330,4 @@ def answer(facts: Facts) -> list[str]:
     return ["rate-forms-agree" if agree else "rate-by-form", f"stress-{stress_test}"]
 
 
-STUDY = Study("gating", FORMS, answer=answer)
+STUDY = Study("gating", answer=answer)

@@ -304,12 +304,6 @@ def _outcome(done: Gated) -> Outcome:
     return Outcome(100 * done.right.sum(axis=-1) / of, 100 * apart / of, (pixels == angles).all(axis=-1))
 
 
-def share_in_image(over: Overflight, runs: int, seed: int) -> float:
-    """Share of the images of some runs that have both detections inside the edge."""
-    pixels = draw_scene(over, streams(seed, runs)).pixels
-    return float(in_image(over.poses.camera, pixels).all(axis=-1).mean())
-
-
 def _warm_up(scene: GatingScene, choices: Choices) -> tuple[Array, Array]:
     """State (N, 4) and covariance (4, 4) after the iterations on positions: the same for all three forms."""
     x = np.concatenate([scene.start, np.zeros_like(scene.start)], axis=-1)

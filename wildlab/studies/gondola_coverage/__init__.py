@@ -7,7 +7,7 @@ import pandas as pd
 from wildlab.studies.gondola_coverage import trial
 from wildlab.studies.gondola_coverage.trial import ADAPT, DOWN, ROLL, STRATEGIES
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 
 #: Quantities of the page's tables, by its key.
 TABLES = {
@@ -39,6 +39,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study(
-    "gondola-coverage", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer
-)
+STUDY = Study("gondola-coverage", trial.trial, trial.check_claims, trial.RECORDED.get, answer)

@@ -53,7 +53,6 @@ YAW = {f"yaw-pitch{-pitch:.0f}": pitch for pitch in PITCHES}
 ROLL = {f"roll-{limit:.0f}": limit for limit in LIMITS}
 ADAPT = {f"adaptive-{limit:.0f}": limit for limit in LIMITS}
 STRATEGIES = (DOWN, *YAW, *ROLL, *ADAPT)
-SUBJECTS = STRATEGIES
 RECORDED = {
     "seen": "1",
     "near": "1",
@@ -232,12 +231,10 @@ def numbers_of(
         "near": float(planned.seen[near].mean()),
         "in_sight": float(planned.looks[planned.seen].mean()) * step,
         "ground": float(planned.seen.sum()) * cell,
-        "inside": float((planned.seen & inside).sum()) * cell,
         "outside": float((planned.seen & ~inside).sum()) * cell,
         "only_blurred": share.only_blurred,
         "held": done.held,
         "sure": float(done.sure[planned.seen].mean()),
-        "sharp": float(done.sharp.mean()),
     }
 
 

@@ -45,7 +45,7 @@ from wildlab.studies.information_planning.trial import (
     searchers,
 )
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 
 #: Over how many worlds at most planning is timed.
 TIMED = 10
@@ -214,11 +214,4 @@ def answer(facts: Facts) -> list[str]:
     return [f"free-{swing}{limit}", f"fixed-{fixed}"]
 
 
-STUDY = Study(
-    "information-planning",
-    trial.SUBJECTS,
-    trial.trial,
-    trial.check_claims,
-    name_metrics(trial.RECORDED),
-    answer,
-)
+STUDY = Study("information-planning", trial.trial, trial.check_claims, trial.RECORDED.get, answer)

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.analysis.georeference import observe, pose_errors
 from wildlab.analysis.rendered import (
     Marks,
     Photographer,
@@ -22,9 +21,7 @@ from wildlab.analysis.rendered import (
 )
 from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_pixels, sighting
 from wildlab.flight.store import Flight
-from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.uncertainty import ground_covariance
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.run import Track
@@ -50,24 +47,16 @@ START_S = 10.0
 AT_REST_M_S = 1.0
 #: Within what distances of the ship's centre measurements are counted, m: the claim's, half and twice it.
 NEAR_M = (5, 10, 20)
-#: From what share of its outline on the ship is called more than a sliver.
-SLIVER = 0.01
 #: Below what the two estimates differ for most of the time, m (H 6.4.1).
 APART_M = 5.0
 
 #: Names of the numbers that are recorded, and their units.
 UNITS = {
     "mean_north": "m", "mean_east": "m", "sd_north": "m", "sd_east": "m", "sd_both": "m",
-    "error_of_mean": "m",
-    "mae": "m", "mae_after_start": "m", "speed_after_start": "m/s", "time_to_rest": "s",
+    "error_of_mean": "m", "mae": "m", "mae_after_start": "m", "sd_true_poses": "m",
     **{f"share_near_{near}": "1" for near in NEAR_M},
-    "centre_error_of_mean": "m", "centre_error_true_poses": "m", "centre_mae_after_start": "m",
-    "receiver_off": "m", "rate_beyond_sliver": "1", "largest_missed": "1",
-    "ellipse_coverage_90": "1", "ground_coverage_90": "1",
-    "sd_true_poses": "m", "error_true_poses": "m", "pixel_error": "px",
-    "detection_rate": "1", "share_cut": "1", "share_moved": "1", "share_within_5_m": "1", "images": "1",
-    "share_in_pieces": "1",
-    "false_alarms_per_image": "1",
+    "speed_after_start": "m/s", "time_to_rest": "s", "pixel_error": "px", "detection_rate": "1",
+    "share_cut": "1", "share_moved": "1", "share_within_5_m": "1",
 }  # fmt: skip
 
 
@@ -189,15 +178,15 @@ def centres_of(taken: Photographs, one: Tracked) -> Array:
     return np.array([taken.camera.flight.bodies(int(row))[0].centre(0.0)[:2] for row in one.marks.exposure])
 
 
-def time_to_rest(times: Array, speed: Array, limit: float = AT_REST_M_S) -> float:
-    """From when on a speed (N,) stays below a limit, s; NaN where it does not at the end.
+def time_to_rest(times: Array, speed: Array) -> float:
+    """From when on a speed (N,) stays below `AT_REST_M_S`, s; NaN where it does not at the end.
 
     Examples
     --------
     >>> time_to_rest(np.arange(5.0), np.array([3.0, 0.5, 2.0, 0.5, 0.1]))
     3.0
     """
-    above = np.flatnonzero(~(speed < limit))
+    above = np.flatnonzero(~(speed < AT_REST_M_S))
     if not len(above):
         return float(times[0])
     return float(times[above[-1] + 1]) if above[-1] + 1 < len(times) else np.nan
@@ -206,56 +195,28 @@ def time_to_rest(times: Array, speed: Array, limit: float = AT_REST_M_S) -> floa
 def numbers_of_track(taken: Photographs, one: Tracked) -> dict[str, float]:
     """What the detections on the sea and their track are worth, by the names of `UNITS`."""
     measured, estimated = errors_of(one)
-    known = one.seen.seen
-    e = measured[known]
-    times = one.seen.times
-    distance = np.hypot(*estimated.T)
-    speed = np.hypot(*one.track.x[:, 2:4].T)
-    later = times >= START_S
-    marks = one.marks
+    known, marks, times = one.seen.seen, one.marks, one.seen.times
+    positions, distance = one.seen.positions[known], np.hypot(*estimated.T)
+    speed, later = np.hypot(*one.track.x[:, 2:4].T), times >= START_S
     exact = taken.camera.flight.poses.take(marks.exposure)
     on_sea = georeference_pixels(exact, marks.uv, one.seen.plane_down)[:, :2]
     off = (one.seen.truth[:, :2] - on_sea)[known]
-    found = marks.found & np.isfinite(marks.centre).all(axis=1)
-    apart = (marks.uv - marks.centre)[found]
-    centre = centres_of(taken, one)
-    from_centre = (centre - one.seen.positions)[known]
-    near = np.hypot(*from_centre.T)
-    tracked_off = np.hypot(*(centre - one.track.x[:, :2]).T)
+    e, near = measured[known], np.hypot(*(centres_of(taken, one)[known] - positions).T)
     return {
         "mean_north": float(e[:, 0].mean()),
         "mean_east": float(e[:, 1].mean()),
         "error_of_mean": float(np.hypot(*e.mean(axis=0))),
-        "sd_north": float(one.seen.positions[known, 0].std(ddof=1)),
-        "sd_east": float(one.seen.positions[known, 1].std(ddof=1)),
-        "sd_both": float(np.hypot(*one.seen.positions[known].std(axis=0, ddof=1))),
+        "sd_north": float(positions[:, 0].std(ddof=1)),
+        "sd_east": float(positions[:, 1].std(ddof=1)),
+        "sd_both": float(np.hypot(*positions.std(axis=0, ddof=1))),
         "mae": float(np.nanmean(distance)),
         "mae_after_start": float(np.nanmean(distance[later])),
         "speed_after_start": float(np.nanmean(speed[later])),
         "time_to_rest": time_to_rest(times, speed),
         **{f"share_near_{limit}": float((near < limit).mean()) for limit in NEAR_M},
-        "centre_error_of_mean": float(np.hypot(*from_centre.mean(axis=0))),
-        "centre_error_true_poses": float(np.hypot(*(centre - on_sea)[known].mean(axis=0))),
-        "centre_mae_after_start": float(np.nanmean(tracked_off[later])),
-        "pixel_error": float(np.hypot(*apart.T).mean()),
-        "ellipse_coverage_90": float(inside_ellipse(apart, marks.covariance[found], 0.9).mean()),
-        "ground_coverage_90": float(ground_inside(taken, one).mean()),
+        "pixel_error": float(np.nanmean(np.hypot(*(marks.uv - marks.centre)[marks.found].T))),
         "sd_true_poses": float(np.hypot(*off.std(axis=0, ddof=1))),
-        "error_true_poses": float(np.hypot(*off.mean(axis=0))),
     }
-
-
-def ground_inside(taken: Photographs, one: Tracked) -> NDArray[np.bool_]:
-    """Whether the 90 % ellipses of the detections on the sea, pixel and pose together, hold the ship: (K,).
-
-    The pixel's covariance is the detector's; the rest is what the flight states of its poses.
-    """
-    target = str(taken.flight.table("detections")["target_id"].iloc[0])
-    seen = observe(with_detections(taken.flight, one.marks, target), SOURCE)
-    errors = pose_errors(seen)._replace(pixel=one.marks.covariance[one.marks.found])
-    found = ground_covariance(seen.poses, seen.uv, seen.plane_down, errors, np.random.default_rng(0))
-    off = errors_of(one)[0][one.marks.found]
-    return np.asarray(inside_ellipse(off, found.covariance, 0.9))
 
 
 def numbers_of(taken: Photographs, tracked: dict[str, Tracked]) -> Numbers:
@@ -267,21 +228,13 @@ def numbers_of(taken: Photographs, tracked: dict[str, Tracked]) -> Numbers:
     }
     marks = taken.marks(moved=False)
     visible = marks.share > 0
-    missed, clear = marks.share[visible & ~marks.found], marks.share >= SLIVER
-    receiver = tracked[WITH].seen.truth[:, :2] - centres_of(taken, tracked[WITH])
-    numbers |= {
-        (DETECTOR, "images"): float(visible.sum()),
+    within = tracked[WITH].marks
+    return numbers | {
         (DETECTOR, "detection_rate"): float(marks.found[visible].mean()),
-        (DETECTOR, "rate_beyond_sliver"): float(marks.found[clear].mean()) if clear.any() else np.nan,
-        (DETECTOR, "largest_missed"): float(missed.max()) if len(missed) else np.nan,
-        (DETECTOR, "receiver_off"): float(np.nanmean(np.hypot(*receiver.T))),
-        (DETECTOR, "false_alarms_per_image"): float(marks.false.mean()),
         (DETECTOR, "share_cut"): float((marks.share[visible] < 1 - 1e-9).mean()),
-        (DETECTOR, "share_moved"): float(tracked[WITH].marks.moved[tracked[WITH].marks.found].mean()),
-        (DETECTOR, "share_in_pieces"): float((marks.pieces[marks.found] > 1).mean()),
+        (DETECTOR, "share_moved"): float(within.moved[within.found].mean()),
         (DETECTOR, "share_within_5_m"): share_within(tracked),
     }
-    return numbers
 
 
 def share_within(tracked: dict[str, Tracked]) -> float:

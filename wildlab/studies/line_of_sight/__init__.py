@@ -47,7 +47,7 @@ from wildlab.studies.line_of_sight.trial import (
     settings,
 )
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study
 
 #: How often each call is timed; the quickest counts.
 REPEATS = 5
@@ -283,24 +283,9 @@ def _mean(values: Array, colour: str, most: float = np.inf) -> Values:
     return Values(mean, ends, colour)
 
 
-#: Names of the numbers that are recorded begin with these; and their units.
-_UNITS = {
-    "agreement": "1",
-    "too_many": "1",
-    "too_few": "1",
-    "seen": "1",
-    "steps": "1",
-    "hidden": "1",
-    "planted": "1",
-    "covered": "1",
-    "width": "m",
-    "exponent": "1",
-}
-
-
-def _metric(subject: str, name: str) -> Metric | None:
-    unit = _UNITS.get(name.rpartition("_")[0] or name)
-    return None if unit is None else Metric(name, subject, unit)
+def unit_of(name: str) -> str:
+    """The unit of a number of the trial."""
+    return "m" if name.startswith("width") else "1"
 
 
 def answer(facts: Facts) -> list[str]:
@@ -313,4 +298,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study("line-of-sight", trial.SUBJECTS, trial.trial, check_claims, _metric, answer)
+STUDY = Study("line-of-sight", trial.trial, check_claims, unit_of, answer)

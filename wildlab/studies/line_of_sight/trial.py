@@ -28,7 +28,6 @@ RAYS, ANGLES, EXACT = "ray-casting", "bresenham", "exact"
 #: Rays that begin at the camera and not at the highest ground in view.
 WHOLE_RAYS = "whole-rays"
 LETTER, VIEW, TREES = "by-the-letter", "field-of-view", "trees"
-SUBJECTS = (RAYS, WHOLE_RAYS, ANGLES, EXACT, LETTER, VIEW, TREES)
 #: Heights above the ground below the camera, metres: F's gondola is at 3 to 20 m (8.2), its multicopter at
 #: 25 to 60 m (7.5.1); twice and four times that beside them.
 HEIGHTS = (10, 20, 40, 60, 120, 240)
@@ -38,8 +37,6 @@ TILTS = (0, 30, 60, 75)
 TILT, HEIGHT = 60, 60
 #: Of algorithm 1, metres: half a cell, and a cell. F prints neither.
 STEP, TOLERANCE = 1.0, 2.0
-#: Others, to see what hangs on them: both half as large, and twice as large; at `HEIGHT` and `TILT`.
-OTHERS = {"finer": (STEP / 2, TOLERANCE / 2), "coarser": (2 * STEP, 2 * TOLERANCE)}
 #: Between the line of sight and straight down, degrees, where trees are looked at; and at how many points.
 INCIDENCES = (0, 15, 30, 45, 60, 75)
 POINTS = 1000
@@ -138,10 +135,8 @@ def trial(seed: int, *, twin: str, views: int) -> dict[tuple[str, str], float]:
         ``seen``; of both ways of F their ``agreement`` with the exact one, the shares that only they see
         (``too_many``) and only the exact one (``too_few``), and their ``steps`` a grid point, those of rays
         that begin at the camera, too; of (2.24) by the letter the share that is
-        ``seen``, and on how much of the ground its choice of the axis alone changes the answer (``axis``).
-        Of ray casting also its ``agreement`` with the steps of `OTHERS`. Of trees the shares of
-        `trees_on`, and at each of `INCIDENCES` the share that they hide of what is seen without them
-        (``hidden``).
+        ``seen``. Of trees the share of the grid points on which they are ``planted``, and at each of
+        `INCIDENCES` the share that they hide of what is seen without them (``hidden``).
         Of the field of view, straight down, its ``width`` at each height and the ``exponent`` with which it
         grows.
     """
@@ -151,11 +146,8 @@ def trial(seed: int, *, twin: str, views: int) -> dict[tuple[str, str], float]:
         drawn = [look(land, camera, rng, height, tilt) for _ in range(views)]
         for (subject, what), value in compare(land, drawn).items():
             numbers[subject, f"{what}_{name}"] = value
-        if (height, tilt) == (HEIGHT, TILT):
-            numbers |= with_other_steps(land, drawn)
     grown = grow_trees(land, seed)
-    planted, covered = trees_on(land, grown)
-    numbers |= {(TREES, "planted"): planted, (TREES, "covered"): covered}
+    numbers[TREES, "planted"] = float((grown.height > land.height).mean())
     trees = hidden_by_trees(land, grown, stream(seed, "trees"))
     numbers |= {(TREES, f"hidden_{degrees}deg"): share for degrees, share in trees.items()}
     widths = []
@@ -185,7 +177,7 @@ def compare(land: Terrain, views: list[TerrainView]) -> dict[tuple[str, str], fl
         RAYS: [cast_rays(land, one.nodes, one.p_nc, STEP, TOLERANCE) for one in views],
         ANGLES: [compare_angles(land, one.nodes, one.p_nc) for one in views],
     }
-    numbers = {(EXACT, "seen"): _share(exact), (EXACT, "points"): len(exact) / len(views)}
+    numbers = {(EXACT, "seen"): _share(exact)}
     for subject, found in ways.items():
         clear = np.concatenate([one.clear for one in found]).astype(float)
         numbers[subject, "agreement"] = _share(1 - np.abs(clear - exact))
@@ -196,32 +188,7 @@ def compare(land: Terrain, views: list[TerrainView]) -> dict[tuple[str, str], fl
     numbers[WHOLE_RAYS, "steps"] = _share(_steps(whole) + 0 * exact)
     letter = [compare_angles(land, one.nodes, one.p_nc, itself=True, signed=True) for one in views]
     numbers[LETTER, "seen"] = _share(np.concatenate([one.clear for one in letter]) + 0 * exact)
-    signed = [compare_angles(land, one.nodes, one.p_nc, signed=True) for one in views]
-    changed = [one.clear != other.clear for one, other in zip(signed, ways[ANGLES], strict=True)]
-    numbers[LETTER, "axis"] = _share(np.concatenate(changed) + 0 * exact)
     return numbers
-
-
-def with_other_steps(land: Terrain, views: list[TerrainView]) -> dict[tuple[str, str], float]:
-    """Agreement of ray casting with the exact line of sight with the steps and tolerances of `OTHERS`."""
-    exact = np.concatenate([lines_clear(land, one.points, one.p_nc) for one in views])
-    known = len(exact) >= FEWEST
-    found = {}
-    for name, (step, tolerance) in OTHERS.items():
-        clear = np.concatenate([cast_rays(land, one.nodes, one.p_nc, step, tolerance).clear for one in views])
-        found[RAYS, f"agreement_{name}"] = float((clear == exact).mean()) if known else np.nan
-    return found
-
-
-def trees_on(land: Terrain, grown: Terrain) -> tuple[float, float]:
-    """Share of the grid points on which trees stand, and share of the ground below the surface with trees.
-
-    Between a grid point with a tree and one without the surface slopes, so that it stands above the ground of
-    every patch that has a tree at one of its corners.
-    """
-    tree = grown.height > land.height
-    patch = tree[:-1, :-1] | tree[:-1, 1:] | tree[1:, :-1] | tree[1:, 1:]
-    return float(tree.mean()), float(patch.mean())
 
 
 def hidden_by_trees(land: Terrain, grown: Terrain, rng: np.random.Generator) -> dict[int, float]:

@@ -6,11 +6,9 @@ import math
 
 from wildlab.studies.linear_vs_nonlinear import trial
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study
 from wildlab.studies.single_target import consistency_of
 
-#: What is recorded of the georeferenced detections themselves.
-MEASURED = ("mae_georeferenced", "mean_north", "mean_east")
 #: The numbers of the thesis's figures, by twin.
 FIGURES = {
     twin: {
@@ -21,11 +19,9 @@ FIGURES = {
 }
 
 
-def track_metric(subject: str, name: str) -> Metric | None:
-    """Of a number that `wildlab.studies.linear_vs_nonlinear.trial.numbers_of` gives."""
-    if subject == "measurements":
-        return Metric(name, subject, "m") if name in MEASURED else None
-    return Metric(name, subject, trial.UNITS.get(name, "1"))
+def unit_of(name: str) -> str:
+    """The unit of a number of the trial; those of innovations and bands have none."""
+    return trial.UNITS.get(name, "1")
 
 
 def answer(facts: Facts) -> list[str]:
@@ -38,11 +34,4 @@ def answer(facts: Facts) -> list[str]:
     return [f"accuracy-{accuracy}", f"consistency-{consistency_of(facts, 'kf', 'ekf')}"]
 
 
-STUDY = Study(
-    "linear-vs-nonlinear",
-    (*trial.PUBLISHED, "measurements"),
-    trial.trial,
-    trial.check_claims,
-    track_metric,
-    answer,
-)
+STUDY = Study("linear-vs-nonlinear", trial.trial, trial.check_claims, unit_of, answer)

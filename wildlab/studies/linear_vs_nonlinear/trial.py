@@ -84,6 +84,8 @@ UNITS = {
     "error_at_end": "m",
     "nees_at_end": "1",
     "p95_measured": "m",
+    "rmse_speed_beginning": "m/s",
+    "mae_georeferenced": "m",
 }
 
 

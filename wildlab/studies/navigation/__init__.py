@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from wildlab.analysis.navigate import (
     AXES,
     PLACES,
-    TUNINGS,
     NavigationErrors,
     Studied,
     against_autopilot,
@@ -41,7 +40,7 @@ from wildlab.reporting.charts.navigation import (
 )
 from wildlab.studies.navigation import trial
 from wildlab.studies.page import Facts, Shown
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study
 
 Array = NDArray[np.float64]
 Period = tuple[float, float]
@@ -277,10 +276,6 @@ IDEAL_NEES = 3.0
 _ATTITUDE = tuple(f"{of}_{axis}" for of in ("rms", "mean_sd") for axis in AXES)
 
 
-def _metric(subject: str, name: str) -> Metric:
-    return Metric(name, subject, unit_of(name))
-
-
 def attitude_of(found: Mapping[str, float]) -> tuple[float, float]:
     """RMS error or difference, and predicted deviation, of all three axes together, degrees.
 
@@ -335,4 +330,4 @@ def _position(facts: Facts) -> str:
     return "near" if low >= IDEAL_NEES / NEAR**2 and high <= IDEAL_NEES * NEAR**2 else "unclear"
 
 
-STUDY = Study("navigation", ("mekf", *TUNINGS), trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study("navigation", trial.trial, trial.check_claims, unit_of, answer)

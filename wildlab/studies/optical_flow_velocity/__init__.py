@@ -32,7 +32,7 @@ from wildlab.studies.optical_flow_velocity.trial import (
     sizes,
 )
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 
 #: Displacements are drawn so many times as long: they are of a few pixels.
 LONGER = 4.0
@@ -145,11 +145,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study(
-    "optical-flow-velocity",
-    trial.SUBJECTS,
-    trial.trial,
-    trial.check_claims,
-    name_metrics(trial.RECORDED),
-    answer,
-)
+STUDY = Study("optical-flow-velocity", trial.trial, trial.check_claims, trial.RECORDED.get, answer)

@@ -12,17 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from wildlab.analysis.flow import FramePair, Reading, pair_velocities
 from wildlab.analysis.rendered import Photographer
 from wildlab.detection.floating import find_objects
 from wildlab.detection.flow import Features, filled_outlines, find_features, match_features
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import effective_sample_size
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.flight.store import Flight
-from wildlab.geometry.covariances import student_quantile
 from wildlab.simulation.scene.flights import SceneFlight, VesselLook, corner_of
 from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
 
@@ -34,7 +32,6 @@ STILL, DECK, TRUE = "still-gimbal", "deck", "true-poses"
 #: Some of the pairs of the first reading alone.
 SLOW, LIKELY = "slow-gimbal", "likely-speed"
 READINGS = (LOGGED, STAMPS, SYNCHRONISED, STILL, CALIBRATED, DECK, TRUE)
-SUBJECTS = (IMAGES, *READINGS, SLOW, LIKELY)
 #: Names of the numbers that are recorded, and their units.
 RECORDED = {
     "in_view_share": "1",
@@ -42,8 +39,6 @@ RECORDED = {
     "feature_rate": "1",
     "mean_north": "m/s",
     "mean_east": "m/s",
-    "half_mean_north": "m/s",
-    "half_mean_east": "m/s",
     "sd_north": "m/s",
     "sd_east": "m/s",
     "pairs": "1",
@@ -186,35 +181,6 @@ def readings(looked: Looked) -> dict[str, pd.DataFrame]:
     return {name: pair_velocities(flight, looked.pairs, way) for name, (flight, way) in ways.items()}
 
 
-def half_of_mean(values: ArrayLike) -> float:
-    """Half of the 95 % interval of the mean of correlated values, in their unit.
-
-    Parameters
-    ----------
-    values
-        (N,), of pairs in order. Neighbours share what the autopilot has wrong: they are worth fewer values
-        that are independent (`effective_sample_size`). Pairs on both sides of a gap count as neighbours;
-        there are few of them.
-
-    Returns
-    -------
-    float
-        Student's; NaN where the values are worth fewer than two.
-
-    Examples
-    --------
-    >>> round(half_of_mean([1.0, -1.0, 1.0, -1.0]), 2)
-    1.84
-    """
-    v = np.asarray(values, float)
-    if len(v) < 2 or not np.ptp(v) > 0:
-        return np.nan
-    worth = float(np.clip(effective_sample_size(v, len(v) - 1), 1.0, len(v)))
-    if worth < 2:
-        return np.nan
-    return float(student_quantile(0.975, worth - 1) * v.std(ddof=1) / np.sqrt(worth))
-
-
 def velocity_numbers(table: pd.DataFrame) -> dict[str, float]:
     """Means and standard deviations of the velocities of a ship at rest, and whether intervals hold zero."""
     known = table.dropna(subset=["v_north_m_s", "v_east_m_s"])
@@ -223,7 +189,6 @@ def velocity_numbers(table: pd.DataFrame) -> dict[str, float]:
     for axis, variance in (("north", "cov_nn"), ("east", "cov_ee")):
         v = known[f"v_{axis}_m_s"].to_numpy(float)
         numbers[f"mean_{axis}"] = float(v.mean()) if len(v) else np.nan
-        numbers[f"half_mean_{axis}"] = half_of_mean(v)
         numbers[f"sd_{axis}"] = float(v.std(ddof=1)) if len(v) > 1 else np.nan
         inside.append(np.abs(v) <= 1.96 * np.sqrt(known[variance].to_numpy(float)))
     numbers["interval_share_95"] = float(np.mean(inside)) if len(known) else np.nan

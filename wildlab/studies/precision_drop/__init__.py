@@ -16,7 +16,7 @@ from wildlab.simulation.scene.coloured import ColourView
 from wildlab.studies.page import Facts
 from wildlab.studies.precision_drop import trial
 from wildlab.studies.precision_drop.trial import COUNTS, MEAN, SINGLE
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 
 
 def plot_image(view: ColourView, thresholds: Colour) -> Figure:
@@ -57,6 +57,4 @@ def answer(facts: Facts) -> list[str]:
     return [f"mean-{facts.outcome('within-a-few-metres')}", f"single-{facts.outcome('single-is-inaccurate')}"]
 
 
-STUDY = Study(
-    "precision-drop", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer
-)
+STUDY = Study("precision-drop", trial.trial, trial.check_claims, trial.RECORDED.get, answer)

@@ -20,7 +20,6 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN
@@ -33,17 +32,14 @@ from wildlab.simulation.twins import simulate_twin
 
 #: What is found in the images, single positions, their mean, and images that show the horizon.
 FOUND, SINGLE, MEAN, HORIZON = "tarpaulin", "single", "mean", "horizon"
-SUBJECTS = (FOUND, SINGLE, MEAN, HORIZON)
 #: Names of the numbers that are recorded, and their units.
 RECORDED = {
     "detection_rate": "1",
     "false_alarms_per_image": "1",
     "pixel_error": "px",
-    "ellipse_coverage_90": "1",
     "area_share": "1",
     "median_error": "m",
     "error": "m",
-    "detections": "1",
     "alarms_with_borders": "1",
     "alarms_without_borders": "1",
 }
@@ -76,8 +72,6 @@ class Drop(NamedTuple):
         (K, 2) what was accepted, px.
     true
         (K, 2) where the tarpaulin's middle is in these images, px.
-    within
-        (K,) whether the ellipse (90 %) about the detection holds that.
     area_share
         (K,) area of what was found over that of the tarpaulin in the image.
     looked_at, should
@@ -94,7 +88,6 @@ class Drop(NamedTuple):
     exposures: NDArray[np.intp]
     uv: Array
     true: Array
-    within: NDArray[np.bool_]
     area_share: Array
     looked_at: int
     should: int
@@ -176,7 +169,7 @@ def search(
     with np.errstate(invalid="ignore"):
         shown = ((uv > -MARGIN_PX) & (uv < size + MARGIN_PX)).all(axis=1)
         beyond = np.maximum(limits.border_px - uv, uv - (size - 1 - limits.border_px)).max(axis=1)
-    rows: list[tuple[int, Array, Array, bool, float]] = []
+    rows: list[tuple[int, Array, Array, float]] = []
     looked_at = should = right = false = 0
     valid = np.ones((camera.height, camera.width), bool)
     for exposure in map(int, np.flatnonzero(beyond < NEAR_PX)):
@@ -190,9 +183,8 @@ def search(
         on_it = bool(view.labels[row, column])
         false += not on_it
         right += on_it and bool(beyond[exposure] <= 0)
-        held = inside_ellipse(found.uv[:1] - view.centre, found.covariance[:1], 0.9)[0]
         share = float(found.area[0] / max(view.labels.sum(), 1))
-        rows.append((exposure, found.uv[0], view.centre, bool(held), share))
+        rows.append((exposure, found.uv[0], view.centre, share))
         if len(rows) == wanted:
             break
     away = stream(seed, "images without").permutation(np.flatnonzero(~shown))[:empty]
@@ -204,8 +196,7 @@ def search(
         np.array([row[0] for row in rows], np.intp),
         np.array([row[1] for row in rows]).reshape(-1, 2),
         np.array([row[2] for row in rows]).reshape(-1, 2),
-        np.array([row[3] for row in rows], bool),
-        np.array([row[4] for row in rows]),
+        np.array([row[3] for row in rows]),
         looked_at,
         should,
         right,
@@ -265,19 +256,12 @@ def numbers_of(drop: Drop, errors: Array, camera: Camera, height: float) -> dict
     numbers = {
         (FOUND, "detection_rate"): drop.right / drop.should if drop.should else np.nan,
         (FOUND, "false_alarms_per_image"): drop.false / (drop.looked_at + drop.empty),
-        (FOUND, "right"): float(drop.right),
-        (FOUND, "should"): float(drop.should),
-        (FOUND, "false"): float(drop.false),
-        (FOUND, "images"): float(drop.looked_at + drop.empty),
         (FOUND, "pixel_error"): float(np.hypot(*off.T).mean()),
         (FOUND, "off_centre"): float(np.hypot(*off.mean(axis=0))),
-        (FOUND, "ellipse_coverage_90"): float(drop.within.mean()),
         (FOUND, "area_share"): float(drop.area_share.mean()),
         (FOUND, "few_pixels"): FEW_PX * height / camera.fx,
         (SINGLE, "median_error"): float(np.median(distance)),
-        (SINGLE, "rms_error"): float(np.sqrt((distance**2).mean())),
         (MEAN, "error"): error_of_mean(errors, len(errors)),
-        (MEAN, "detections"): float(len(errors)),
     }
     return numbers | {(MEAN, f"after_{count}"): error_of_mean(errors, count) for count in COUNTS}
 
@@ -327,7 +311,6 @@ def flown(
     camera = scene.poses.camera
     numbers = numbers_of(drop, errors, camera, parameters.flight.altitude.si)
     kept, every = alarms(horizon_views(camera, look, seed, images))
-    numbers[HORIZON, "images"] = float(images)
     numbers[HORIZON, "alarms_with_borders"] = kept / images
     numbers[HORIZON, "alarms_without_borders"] = every / images
     return drop, errors, numbers

@@ -376,4 +376,4 @@ def answer(facts: Facts) -> list[str]:
     return ["some-differ", "reasons"]
 
 
-STUDY = Study("printed-numbers", (), answer=answer)
+STUDY = Study("printed-numbers", answer=answer)

@@ -26,7 +26,7 @@ from wildlab.reporting.figures import (
     new_figure,
 )
 from wildlab.studies.page import Facts, Shown
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 from wildlab.studies.replay import trial
 from wildlab.studies.replay.trial import CLOCK, NONE, ONE, SINGLE, Moments
 from wildlab.tracking.run import Start, run_filter
@@ -201,4 +201,4 @@ def answer(facts: Facts) -> list[str]:
     return [f"view-{view}", f"clock-{clock}"]
 
 
-STUDY = Study("replay", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer)
+STUDY = Study("replay", trial.trial, trial.check_claims, trial.RECORDED.get, answer)

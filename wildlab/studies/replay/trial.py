@@ -27,8 +27,7 @@ from wildlab.simulation.twins import simulate_twin
 SOURCE, TRUE = "autopilot", "truth"
 #: What the screenshots show, and the clock of the images.
 ONE, SINGLE, NONE, CLOCK = "one-of-several", "one-detected", "none-in-view", "clock"
-SUBJECTS = (ONE, SINGLE, NONE, CLOCK)
-RECORDED = {"share_of_frames": "1", "error_unset": "m", "error_set": "m", "off": "s"}
+RECORDED = {"share_of_frames": "1", "error_unset": "m", "error_set": "m"}
 #: Tracks that "several" and "a number of" are read as, at least.
 SEVERAL = 2
 #: How far the stamps of images from another computer are off, s, either way; and the steps of the parameter
@@ -155,13 +154,8 @@ def numbers_of(flight: Flight, seed: int) -> dict[tuple[str, str], float]:
     """The numbers of `trial` of a flight."""
     moments = moments_of(flight)
     numbers = {(kind, "share_of_frames"): float(moments.of(kind).mean()) for kind in (ONE, SINGLE, NONE)}
-    off = off_of(seed)
-    unset, after = clock_errors(flight, off)
-    return numbers | {
-        (CLOCK, "error_unset"): unset,
-        (CLOCK, "error_set"): after,
-        (CLOCK, "off"): abs(off),
-    }
+    unset, after = clock_errors(flight, off_of(seed))
+    return numbers | {(CLOCK, "error_unset"): unset, (CLOCK, "error_set"): after}
 
 
 def check_claims(runs: pd.DataFrame) -> dict[str, Check]:

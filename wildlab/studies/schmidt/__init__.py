@@ -27,7 +27,7 @@ from wildlab.reporting.charts.tracks import (
 from wildlab.reporting.figures import GREEN, GREY, INK, colour
 from wildlab.reporting.published import bounds_of
 from wildlab.studies.page import Facts, Shown
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study
 from wildlab.studies.schmidt import trial
 from wildlab.studies.schmidt.trial import (
     BOUNDS,
@@ -85,15 +85,10 @@ def predicted_error(runs: pd.DataFrame, who: str) -> PredictedError:
 
 def more_metrics(runs: pd.DataFrame) -> list[tuple[str, str, float]]:
     """Name, subject and value of what is recorded of every filter besides the medians of its numbers."""
-    found = []
-    for who in SUBJECTS:
-        one = predicted_error(runs, who)
-        found += [
-            ("share_of_flights_inside", who, one.inside),
-            ("mean_of_drawn_nees", who, one.drawn.mean),
-            ("error_over_stated", who, one.ratio),
-        ]
-    return found
+    found = {who: predicted_error(runs, who) for who in SUBJECTS}
+    return [("mean_of_drawn_nees", who, one.drawn.mean) for who, one in found.items()] + [
+        ("error_over_stated", who, one.ratio) for who, one in found.items()
+    ]
 
 
 def mean_deviations(runs: pd.DataFrame, source: str, what: str = "mean_sd") -> dict[str, float]:
@@ -113,7 +108,6 @@ def covariances_table(runs: pd.DataFrame) -> pd.DataFrame:
                 **{f"sd_{axis}": value for axis, value in mean_deviations(runs, predicted).items()},
                 **{f"rms_{axis}": value for axis, value in mean_deviations(runs, true, "rms").items()},
                 "median": one.median,
-                "ratio": one.ratio,
                 "drawn": one.drawn.mean,
                 "low": one.drawn.low,
                 "high": one.drawn.high,
@@ -136,11 +130,10 @@ def filters_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
 
 
 def tables(runs: pd.DataFrame, names: Mapping[str, str]) -> dict[str, pd.DataFrame]:
-    """Both tables of the page, with courses in degrees, by the key of their texts."""
+    """Both tables of the page, by the key of their texts."""
     covariances = covariances_table(runs)
-    filters = filters_table(runs, names)
-    filters["rmse_course"] = np.degrees(filters["rmse_course"])
-    return {"covariances": covariances.assign(who=covariances["who"].map(names)), "filters": filters}
+    covariances["who"] = covariances["who"].map(names)
+    return {"covariances": covariances, "filters": filters_table(runs, names)}
 
 
 def curve_table(runs: pd.DataFrame) -> pd.DataFrame:
@@ -211,15 +204,14 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     Parameters
     ----------
     spread
-        What `trial.summarise` gives, one row for each flight; SI and radians, angles of poses in degrees.
+        What `trial.summarise` gives, one row for each flight.
     """
 
     of = columns_of(spread)
 
     def smaller(second: str, first: str, name: str, unit: str, premise: Flags | None) -> Check:
         """True where ``second`` has less of it than ``first``."""
-        scale = 180 / np.pi if unit == "deg" else 1.0
-        return Check.larger(scale * of(first, name), scale * of(second, name), unit, premise)
+        return Check.larger(of(first, name), of(second, name), unit, premise)
 
     def pose(name: str) -> Array:
         return of(SOURCE, name)
@@ -382,23 +374,16 @@ def flight_figures(compared: Compared, first: int, names: Mapping[str, str]) -> 
     return [Shown(fig, text, f"fig-7-{n}") for n, (text, fig) in enumerate(figures.items(), first)]
 
 
-_COURSES = ("rmse_course", "rmse_course_start")
 _SHARES = ("outside", "sd_spread", "turning", "moving", "detections", "pauses")
 #: Errors this many times as large as predicted, or less, are called nearly as predicted.
 NEARLY = 1.5
 
 
-def _metric(subject: str, name: str) -> Metric:
-    """With courses, which are radians in a trial, in degrees."""
-    if name in _COURSES:
-        return Metric(name, subject, "deg", 180 / math.pi)
+def unit_of(name: str) -> str:
+    """The unit of a number of the trial; those that `NAMES` has not are of poses and of the flight."""
     known = NAMES | MORE_NAMES
     if name in known:
-        return Metric(name, subject, known[name])
-    return Metric(name, subject, _unit_of_pose(subject, name))
-
-
-def _unit_of_pose(subject: str, name: str) -> str:
+        return known[name]
     if name.endswith("_px"):
         return "px"
     if name == "settled":
@@ -430,4 +415,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study("schmidt", PUBLISHED, trial.trial, check_claims, _metric, answer)
+STUDY = Study("schmidt", trial.trial, check_claims, unit_of, answer)

@@ -101,7 +101,7 @@ NAMES = NEES_NAMES | {
     "mae": "m",
     "nis": "1",
     "rmse_speed": "m/s",
-    "rmse_course": "rad",
+    "rmse_course": "deg",
     "fraction_nis_inside": "1",
     "nis_worth": "1",
     "nees_predicted": "1",
@@ -117,7 +117,7 @@ MORE_NAMES = {
     "oscillation": "m",
     "mean_speed": "m/s",
     "rmse_speed_start": "m/s",
-    "rmse_course_start": "rad",
+    "rmse_course_start": "deg",
 }
 
 
@@ -300,13 +300,14 @@ def evaluate(seen: Sighting, track: Track, moment: float = 0.0) -> Scored:
         oscillation=float(np.sqrt(np.nanvar(error, axis=0).sum())),
         mean_speed=mean(np.hypot(*track.x[:, 2:4].T)),
         rmse_speed_start=started.rmse_speed,
-        rmse_course_start=started.rmse_course,
+        rmse_course=180 / np.pi * found.numbers["rmse_course"],
+        rmse_course_start=180 / np.pi * started.rmse_course,
     )
     return found
 
 
 def summarise(compared: Compared) -> Numbers:
-    """All numbers by (subject, name), SI and radians, and those beside them."""
+    """All numbers by (subject, name), and those beside them."""
     asked = {who: NEES_NAMES for who in SUBJECTS} | {who: NAMES for who in FILTERS}
     asked |= {who: NAMES | MORE_NAMES for who in PUBLISHED}
     scored = compared.scored

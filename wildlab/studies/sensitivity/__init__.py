@@ -363,4 +363,4 @@ def answer(facts: Facts) -> list[str]:
     return [f"tilt-{tilt}", "position-alike" if alike["north"] else "position-differs"]
 
 
-STUDY = Study("sensitivity", ("level", "turn", "ascent"), answer=answer)
+STUDY = Study("sensitivity", answer=answer)

@@ -12,7 +12,7 @@ from wildlab.flight.store import Flight
 from wildlab.reporting.charts.georeferencing import aircraft_map, errors_over_time, positions_map
 from wildlab.reporting.figures import colour
 from wildlab.studies.page import Facts, Shown
-from wildlab.studies.protocol import Metric, Study
+from wildlab.studies.protocol import Study
 from wildlab.studies.slow_vessel import trial
 from wildlab.studies.slow_vessel.trial import COLUMNS, subset_of, track_vessel
 
@@ -53,23 +53,18 @@ def track_figures(scored: pd.DataFrame) -> list[Shown]:
     ]
 
 
-def _metric(subject: str, name: str) -> Metric | None:
-    found = trial.METRICS.get((subject, name))
-    return None if found is None else Metric(*found)
+def unit_of(name: str) -> str:
+    """The unit of a number of the trial."""
+    return "1" if name.startswith("share") else "m/s" if name.startswith("speed") else "m"
 
 
 def answer(facts: Facts) -> list[str]:
     """How far a single image is off, then whether a track is nearer, by the intervals of both medians."""
-    image, receiver = facts.value("observer", "mae"), facts.value("reference", "mae")
-    track = facts.value("filter", "filter_error_mean")
-    if math.isnan(image + receiver + track):
+    track = ("filter", "filter_error_mean")
+    if math.isnan(facts.value("observer", "mae") + facts.value("reference", "mae") + facts.value(*track)):
         return ["unknown"]
-    low, high = (facts.value("observer", "mae", f"centre_{end}") for end in ("low", "high"))
-    track_low, track_high = (
-        facts.value("filter", "filter_error_mean", f"centre_{end}") for end in ("low", "high")
-    )
-    track_is = "nearer" if track_high < low else "farther" if track_low > high else "unclear"
+    track_is = {"less": "nearer", "more": "farther"}.get(facts.compare(track, ("observer", "mae")), "unclear")
     return ["located", f"track-{track_is}"]
 
 
-STUDY = Study("slow-vessel", trial.SUBJECTS, trial.trial, trial.check_claims, _metric, answer)
+STUDY = Study("slow-vessel", trial.trial, trial.check_claims, unit_of, answer)

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from wildlab.studies.protocol import Study
 
-STUDY = Study("survey-markers", ("recorded-answers",))
+STUDY = Study("survey-markers")

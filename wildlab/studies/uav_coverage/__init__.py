@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 from wildlab.studies.uav_coverage import trial
 from wildlab.studies.uav_coverage.trial import DOWN, LOW, LOW_CLOSE, YAW
 
@@ -45,6 +45,4 @@ def _half_height(facts: Facts) -> str:
     return "open"
 
 
-STUDY = Study(
-    "uav-coverage", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer
-)
+STUDY = Study("uav-coverage", trial.trial, trial.check_claims, trial.RECORDED.get, answer)

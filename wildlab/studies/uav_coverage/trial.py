@@ -54,13 +54,10 @@ LOW_FASTER = "yaw-30m-25m-faster"
 MORE = {LOW_FASTER: Case(30.0, 25.0, True, faster=2.0)}
 #: Row distances at which animals that move are looked for, the camera down from 60 m.
 SPACINGS = (25.0, 40.0, 60.0)
-SUBJECTS = (*CASES, *MORE, *(f"rows-{one:.0f}m" for one in SPACINGS))
 RECORDED = {
     "seen": "1",
-    "only_blurred": "1",
     "in_sight": "s",
     "ground": "m2",
-    "detected": "1",
     "time": "s",
     "held": "1",
     "missed": "1",
@@ -194,23 +191,18 @@ def all_runs(
 
 def numbers_of(flown: Flown, done: Executed, inside: NDArray[np.bool_]) -> dict[str, float]:
     """What is compared of a case, by name."""
-    share = share_seen(done.planned, inside)
-    everywhere = float(done.planned.seen.sum()) * done.planned.step**2
-    mean_looks = done.planned.looks[done.planned.seen].mean() if done.planned.seen.any() else np.nan
-    within, hoped = done.sure & inside, done.planned.seen & inside
+    planned = done.planned
+    mean_looks = planned.looks[planned.seen].mean() if planned.seen.any() else np.nan
+    within, hoped, cell = done.sure & inside, planned.seen & inside, planned.step**2
     return {
-        "seen": share.seen,
-        "only_blurred": share.only_blurred,
+        "seen": share_seen(planned, inside).seen,
         "in_sight": float(mean_looks) * float(np.median(np.diff(flown.times))),
-        "ground": everywhere,
-        "outside": float((done.planned.seen & ~inside).sum()) * done.planned.step**2,
-        "detected": share.detected,
+        "ground": float(planned.seen.sum()) * cell,
+        "outside": float((planned.seen & ~inside).sum()) * cell,
         "time": flown.course.duration,
         "held": float(done.flown.seen[within].mean()) if within.any() else np.nan,
         "kept": float(done.flown.seen[hoped].mean()) if hoped.any() else np.nan,
         "sure": float(done.sure[inside].mean()),
-        "flown": float(done.flown.seen[inside].mean()),
-        "margin": done.margin_px,
         "sharp": float(done.sharp.mean()),
     }
 

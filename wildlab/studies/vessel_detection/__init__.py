@@ -28,7 +28,7 @@ from wildlab.simulation.scene.response import CameraResponse, expose, sensor_of
 from wildlab.simulation.scene.sea import Sea
 from wildlab.studies.monte_carlo import pooled_share
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 from wildlab.studies.vessel_detection import trial
 from wildlab.studies.vessel_detection.trial import CUT, SHIP, WHOLE, Image, numbers_of, tally
 
@@ -285,6 +285,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study(
-    "vessel-detection", trial.SUBJECTS, trial.trial, trial.check_claims, name_metrics(trial.RECORDED), answer
-)
+STUDY = Study("vessel-detection", trial.trial, trial.check_claims, trial.RECORDED.get, answer)

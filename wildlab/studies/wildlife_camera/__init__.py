@@ -264,7 +264,6 @@ def metrics_of(
     about = {"subject": "tau2", "unit": "px", "n": len(straight)}
     return [
         *found,
-        {"name": "ratio", "subject": "tau2", "value": FX / FY, "unit": ""},
         {"name": "best_video_off", "subject": "tau2-data-sheet", "value": videos[0].off, "unit": "%"},
         {"name": "largest_error", "subject": "inverse", "value": inverse.error.max(), "unit": "px"},
         {"name": "rms_error", "subject": "inverse", "value": rms, "unit": "px"},
@@ -299,4 +298,4 @@ def answer(facts: Facts) -> list[str]:
     ]
 
 
-STUDY = Study("wildlife-camera", ("tau2", "tau2-data-sheet", "inverse"), answer=answer)
+STUDY = Study("wildlife-camera", answer=answer)

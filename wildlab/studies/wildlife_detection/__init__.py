@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -21,7 +20,7 @@ from wildlab.reporting.charts.drawing import finish
 from wildlab.reporting.charts.forms import Values, draw_picture, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
@@ -58,8 +57,6 @@ from wildlab.studies.wildlife_detection.trial import (
 Array = NDArray[np.float64]
 #: How many grey levels the ground changes at least where it "changes too much": a tenth of all.
 TOO_MUCH = 25.0
-#: The reading of figures 7.7 and 7.8 for the claims, that of `METHODS`.
-CLAIMED = "pieces_offset_65"
 
 
 def places(weathers: Iterable[str] = tuple(WEATHERS), heights: Iterable[int] = tuple(VIEWS)) -> list[str]:
@@ -144,7 +141,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
         for method in (CONSTANT, OVER_MEAN)
     }
     seen = {method: f1(by_seed(runs, method, ["before"])) > 0 for method in drop}
-    pieces = {method: of(method, CLAIMED) for method in (SMALL, LARGE)}
+    pieces = {method: of(method, "pieces_offset_65") for method in (SMALL, LARGE)}
     left = {
         method: np.mean([of(method, f"background_{one}") for one in cloudy], axis=0)
         for method in (SUBTRACTED, ENHANCED)
@@ -243,13 +240,13 @@ def image_by_sun(before: Picture, after: Picture, names: Mapping[str, str]) -> F
     return fig
 
 
-def animal_by_block(picture: Picture, kind: Literal["floor", "offset"], level: float) -> Figure:
+def animal_by_block(picture: Picture) -> Figure:
     """The largest animal with the small and the large block (F figures 7.7, 7.8)."""
     number = max(picture.animals, key=lambda one: picture.animals[one])
     v, u = np.nonzero(picture.view.labels == number)
     fig, axes = new_figure(5.6, 2.9, rows=1, columns=2)
     for ax, method in zip(axes.flat, (SMALL, LARGE), strict=True):
-        thresholds = replace(METHODS[method], level=level, level_is=kind)
+        thresholds = METHODS[method]
         count = len(_thresholded(ax, picture, thresholds).rows[number])
         ax.set_title(f"block {thresholds.block_px} px: {count} detection{'s' * (count != 1)}")
         middle, half = np.array([np.mean(u), np.mean(v)]), 0.9 * max(float(np.ptp(u)), float(np.ptp(v)), 40.0)
@@ -358,11 +355,4 @@ def _at_noon(facts: Facts) -> str:
     return "unusable" if all(facts.value(one, "f1_noon", "high") < USABLE for one in known) else "open"
 
 
-STUDY = Study(
-    "wildlife-detection",
-    (*trial.SUBJECTS, "ground", "herd"),
-    trial.trial,
-    check_claims,
-    name_metrics(trial.RECORDED),
-    answer,
-)
+STUDY = Study("wildlife-detection", trial.trial, check_claims, trial.RECORDED.get, answer)

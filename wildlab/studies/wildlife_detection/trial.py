@@ -53,7 +53,7 @@ HERD = replace(VIEWS[30], animals=(14, 20), kinds=("rhinoceros",))
 #: it stands alone, as that of a constant one, and "level" after subtraction or enhancement. On seeds 101 to
 #: 108, which no study uses, "val" finds more as a floor (F1 .83, else .45), "level" as an offset from the
 #: mean of the block (.93 and .68, else .62 and .67); `READINGS` are tried on all seeds. Blocks of 51 and of
-#: 251 without a level have that of figure 7.10a here, see `PIECES`.
+#: 251 without a level have that of figure 7.10a here.
 CONSTANT, ADAPTIVE, SMALL, LARGE = "constant", "adaptive", "adaptive-51", "adaptive-251"
 SUBTRACTED, ENHANCED = "subtracted", "enhanced"
 #: `ADAPTIVE` with its level read the other way. As a floor of 150 it is hardly more than `CONSTANT`: the mean
@@ -90,12 +90,6 @@ PRINTED = (ADAPTIVE, SUBTRACTED, ENHANCED)
 #: What the level of an adaptive threshold may be: beside `Warm.level_is`, the number that white gets in
 #: OpenCV (``maxValue``, of no effect), and what OpenCV takes off the mean (``C``).
 READINGS = ("floor", "offset", "white", "off-mean")
-#: Of the images without a level (figures 7.7, 7.8): the levels printed elsewhere as they are read, and none.
-PIECES: tuple[tuple[Literal["floor", "offset"], float], ...] = (
-    ("offset", 65.0),
-    ("floor", 150.0),
-    ("floor", 0.0),
-)
 #: At which heights they are tried, under clouds.
 READ_AT = (15, 30)
 
@@ -113,8 +107,6 @@ COUNTS = ("found", "invented", "missed")
 #: Names of the numbers of one seed that are recorded, and their units; rates are those of all images.
 RECORDED = {
     "pieces_offset_65": "1",
-    "pieces_floor_150": "1",
-    "pieces_floor_0": "1",
     "mean_rise": "1",
     "median_rise": "1",
     "level_before": "1",
@@ -359,16 +351,13 @@ def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], 
                 tally(read_subject(method, reading), at, picture, read_as(METHODS[method], reading))
     near = pictures.plain[CLOUDY, min(VIEWS)]
     for method in (SMALL, LARGE):
-        for kind, level in PIECES:
-            pieces = pieces_of(near, replace(METHODS[method], level=level, level_is=kind))
-            numbers[method, f"pieces_{kind}_{level:g}"] = pieces
+        numbers[method, "pieces_offset_65"] = pieces_of(near, METHODS[method])
     for method in (BY_MEAN, BY_MEDIAN):
         tally(method, "herd", pictures.herd, METHODS[method])
     for name, middle in (("mean", np.mean), ("median", np.median)):
         numbers["herd", f"{name}_rise"] = float(middle(pictures.herd.grey) - middle(pictures.no_herd.grey))
     lower = METHODS[BY_MEAN].level - numbers["herd", "mean_rise"]
     tally(BY_EMPTY, "herd", pictures.herd, replace(METHODS[BY_MEAN], level=float(np.clip(lower, 0, 255))))
-    numbers["herd", "share"] = float((pictures.herd.view.labels > 0).mean())
     return numbers
 
 

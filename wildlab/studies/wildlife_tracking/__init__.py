@@ -32,7 +32,7 @@ from wildlab.reporting.figures import (
     new_figure,
 )
 from wildlab.studies.page import Facts, Shown
-from wildlab.studies.protocol import Study, name_metrics
+from wildlab.studies.protocol import Study
 from wildlab.studies.wildlife_tracking import trial
 from wildlab.studies.wildlife_tracking.rendered import Counted, Renderings, seen_again, telling_image
 from wildlab.studies.wildlife_tracking.trial import (
@@ -155,7 +155,7 @@ def frames_table(counts: Mapping[str, Counted], frames: int, names: Mapping[str,
                 "found": count_cell(one.found, one.shown),
                 "with_false": count_cell(one.with_false, frames),
                 "by_false": count_cell(one.by_false, one.tracks),
-                "rmse": number(one.sight["rmse"], 1),
+                "rmse": number(one.rmse, 1),
             }
             for who, one in counts.items()
         ]
@@ -434,8 +434,8 @@ def frame_in_weathers(runs: Renderings, names: Mapping[str, str]) -> Figure:
     in_view = set(np.flatnonzero(runs.world.images.in_view[k]).tolist())
     for ax, (name, one) in zip(axes.flat, runs.by_weather.items(), strict=True):
         grey, found, judged = seen_again(runs.world, one, k)
-        colors = [VERMILLION if animal == NONE else SKY for animal in judged.animal]
-        hits = len(in_view & set(judged.animal.tolist()))
+        colors = [VERMILLION if animal == NONE else SKY for animal in judged]
+        hits = len(in_view & set(judged.tolist()))
         title = f"{names[name]}: {hits} of {len(in_view)} found, {colors.count(VERMILLION)} false"
         draw_picture(ax, grey, title, boxes=found.box, colors=colors, margin=5)
     return fig
@@ -467,6 +467,4 @@ def _reacquired(facts: Facts) -> str:
     return "hard" if found == {"holds"} else "easy" if found == {"fails"} else "open"
 
 
-STUDY = Study(
-    "wildlife-tracking", trial.SUBJECTS, trial.trial, check_claims, name_metrics(trial.RECORDED), answer
-)
+STUDY = Study("wildlife-tracking", trial.trial, check_claims, trial.RECORDED.get, answer)

@@ -18,7 +18,6 @@ from wildlab.analysis.animals.images import (
     NONE,
     Frame,
     Framed,
-    FrameMatch,
     Images,
     Thermal,
     furnish,
@@ -31,8 +30,6 @@ from wildlab.analysis.animals.tracking import FollowedAnimals, follow, out_of_si
 from wildlab.detection.detections import Detections
 from wildlab.detection.warm import find_warm, gate_from_distance, to_grey
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
-from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.scene.ground import Weather
@@ -51,8 +48,6 @@ class Rendered(NamedTuple):
 
     Attributes
     ----------
-    weather
-        Of all its frames.
     framed
         What was found in them.
     followed
@@ -65,7 +60,6 @@ class Rendered(NamedTuple):
         What the detector finds in counts, with the distance to the ground, m.
     """
 
-    weather: Weather
     framed: Framed
     followed: FollowedAnimals
     frame: Callable[[int], Frame]
@@ -98,33 +92,20 @@ class Counted(NamedTuple):
     ----------
     shown, found
         How often an animal was in view, and of these how often it was detected there.
-    further
-        How often an animal was detected that does not count as in view: cut by the border, or too far.
-    animals
-        How many were detected at all.
-    detections, false, standing, with_false
-        All; those of no animal; of these those where something stands, and not bare ground; and how many
-        images have a false one.
-    off_px
-        RMS distance, an axis, of detections from the middles of their animals, px.
+    with_false
+        How many images have a detection of no animal.
     tracks, by_false
         That were started, and of these by a false detection.
-    sight
-        As `sight_numbers` has it.
+    rmse
+        RMS distance of tracks from animals out of sight, m.
     """
 
     shown: int
     found: int
-    further: int
-    animals: int
-    detections: int
-    false: int
-    standing: int
     with_false: int
-    off_px: float
     tracks: int
     by_false: int
-    sight: dict[str, float]
+    rmse: float
 
 
 def weathers(twin: TwinParameters) -> dict[str, Weather]:
@@ -187,61 +168,29 @@ def _in_weather(world: World, seed: int, weather: Weather) -> Rendered:
         world.land, images, world.headings, frame, find, world.errors, world.detector,
         stream(seed, "covariances of frames"),
     )  # fmt: skip
-    return Rendered(weather, framed, _followed(world, framed.images, seed), frame, grey, find)
+    return Rendered(framed, _followed(world, framed.images, seed), frame, grey, find)
 
 
-def counted(world: World, images: Images, followed: FollowedAnimals, framed: Framed | None = None) -> Counted:
-    """What came of images, drawn or rendered.
-
-    Parameters
-    ----------
-    world
-        Of which they are.
-    images
-        With their detections.
-    followed
-        The tracks through them.
-    framed
-        Where they are rendered.
-    """
+def counted(images: Images, followed: FollowedAnimals) -> Counted:
+    """What came of images, drawn or rendered, and of the tracks through them."""
     false = images.animal == NONE
     hit = np.zeros(images.in_view.shape, bool)
     hit[images.image[~false], images.animal[~false]] = True
+    away = out_of_sight(followed.known, followed.found, images.times, images.truth)
     return Counted(
         shown=int(images.in_view.sum()),
         found=int((images.in_view & hit).sum()),
-        further=int((~images.in_view & hit).sum()),
-        animals=int(hit.any(axis=0).sum()),
-        detections=len(false),
-        false=int(false.sum()),
-        standing=0 if framed is None else int((false & framed.standing).sum()),
         with_false=len(np.unique(images.image[false])),
-        off_px=np.nan if framed is None else off_px(world, framed),
         tracks=followed.tracks,
         by_false=sum(one.started and one.animal == NONE for one in followed.found),
-        sight=sight_numbers(out_of_sight(followed.known, followed.found, images.times, images.truth)),
+        rmse=sight_numbers(away)["rmse"],
     )
 
 
 def count_all(runs: Renderings) -> dict[str, Counted]:
     """What came of the simulated detections (`SIMULATED`), and of the frames in each weather."""
-    return {SIMULATED: counted(runs.world, runs.world.images, runs.drawn)} | {
-        name: counted(runs.world, one.framed.images, one.followed, one.framed)
-        for name, one in runs.by_weather.items()
-    }
-
-
-def off_px(world: World, framed: Framed) -> float:
-    """RMS distance, an axis, of detections from the middles of their animals, px; NaN without any."""
-    images = framed.images
-    own = images.animal != NONE
-    if not own.any():
-        return float("nan")
-    image = images.image[own]
-    places = images.truth[image, images.animal[own]]
-    points: Array = np.column_stack([places, -world.land.heights_at(places) - world.detector.height])
-    uv = ground_to_pixel(world.true.camera, points, world.true.p_nc[image], world.true.R_nc[image])
-    return float(np.sqrt(((framed.uv[own] - uv) ** 2).mean()))
+    by_weather = {name: counted(one.framed.images, one.followed) for name, one in runs.by_weather.items()}
+    return {SIMULATED: counted(runs.world.images, runs.drawn)} | by_weather
 
 
 def telling_image(runs: Renderings) -> int:
@@ -257,7 +206,7 @@ def telling_image(runs: Renderings) -> int:
     return int((in_view.sum(axis=1) + (in_view.shape[1] + 1) * with_false).argmax())
 
 
-def seen_again(world: World, run: Rendered, k: int) -> tuple[NDArray[np.uint8], Detections, FrameMatch]:
+def seen_again(world: World, run: Rendered, k: int) -> tuple[NDArray[np.uint8], Detections, NDArray[np.intp]]:
     """A frame as the operator sees it, with its detections and whose each is."""
     shot = run.frame(k)
     found = run.find(shot.counts, ground_distance(world.land, world.images.poses.take(np.array([k]))))

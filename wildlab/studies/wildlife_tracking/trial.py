@@ -54,14 +54,9 @@ NEGATIVE, POSITIVE, KALMAN = "negative", "without-negative", "kalman"
 FILTERS = (NEGATIVE, POSITIVE, KALMAN)
 #: The same enclosures with the high-level planner, and rows alone flown by the same means.
 REVISITS, ROWS = "uav-revisits", "uav-rows"
-#: Numbers of images are those of a platform, the same for all filters.
-SUBJECTS = (
-    *(f"{platform}-{one}" for platform in (GONDOLA, UAV) for one in FILTERS), GONDOLA, UAV, REVISITS, ROWS,
-)  # fmt: skip
 RECORDED = {
-    "rmse": "m", "sd": "m", "anees": "1", "right_share": "1", "sd_later": "m", "tracks": "1", "beyond": "1",
-    "grew": "1", "seen_share": "1", "in_view": "s", "minutes": "min", "visits": "1", "turns": "1",
-    "given_up": "1", "done": "1", "animals_share": "1", "rmse_own": "m", "anees_own": "1",
+    "rmse": "m", "sd": "m", "anees": "1", "right_share": "1", "sd_later": "m", "grew": "1", "in_view": "s",
+    "minutes": "min", "visits": "1", "turns": "1", "given_up": "1", "done": "1", "animals_share": "1",
 }  # fmt: skip
 #: F 4.2.1, figure 4.1.
 PARTICLES = 500
@@ -288,8 +283,6 @@ def filter_numbers(world: World, followed: FollowedAnimals) -> dict[str, float]:
         "right": float(right),
         "right_share": right / len(later) if later else np.nan,
         "sd_later": float(np.median(own)) if own else np.nan,
-        "tracks": float(followed.tracks),
-        "looks": float(followed.steps),
     }
 
 
@@ -300,10 +293,8 @@ def platform_numbers(world: World) -> dict[str, float]:
     seconds = first.sum(axis=0) * float(np.median(np.diff(images.times)))
     seen = seconds > 0
     return {
-        "seen_share": float(seen.mean()),
         "at_once": float(first.mean()),
         "in_view": float(np.median(seconds[seen])) if seen.any() else np.nan,
-        "minutes": world.lap / 60,
         "by_fence_alone": float(np.sqrt(np.mean([_uniform_trace(one) / 2 for one in world.fences]))),
     }
 

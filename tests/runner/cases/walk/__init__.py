@@ -28,4 +28,4 @@ def trial(seed: int, *, steps: int, seconds: float) -> dict[tuple[str, str], flo
     }
 
 
-STUDY = Study("walk", ("walk",), trial)
+STUDY = Study("walk", trial)
