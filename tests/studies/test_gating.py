@@ -24,8 +24,6 @@ from wildlab.studies.gating import (
     metrics_of,
     standard_error,
     subject,
-    variations,
-    vary,
     verdict,
 )
 from wildlab.studies.gating import monte_carlo as gating
@@ -60,7 +58,7 @@ def predict_azimuth_elevation(position, poses, plane_down) -> Prediction:
     return Prediction(angles, J @ inner.H_position, J @ inner.H_pose)
 
 
-FEEDS = ("own", "assigned", "nothing")
+FEEDS = ("own", "assigned")
 
 
 @pytest.fixture(scope="module")
@@ -104,8 +102,7 @@ def test_positions_as_another_filter_gates_them(over, feed):
             nis = [v @ np.linalg.inv(S) @ v for v in gated.measured[run, t] - kf.x[:2]]
             np.testing.assert_allclose(gated.nis[0, run, t], nis, rtol=1e-8)
             assert gated.right[0, run, t] == (nis[0] < nis[1])
-            if feed != "nothing":
-                kf.update(gated.measured[run, t, int(np.argmin(nis)) if feed == "assigned" else 0])
+            kf.update(gated.measured[run, t, int(np.argmin(nis)) if feed == "assigned" else 0])
             np.testing.assert_allclose(gated.estimate[0, run, t], kf.x[:2], atol=1e-7)
 
 
@@ -188,21 +185,18 @@ def test_what_is_expected_is_what_tracking_expects():
         poses = CameraPoses.at_lens(camera, p, R, np.eye(3))
         for form, predict in ((kernels.PIXELS, predict_pixel), (kernels.ANGLES, predict_azimuth_elevation)):
             want = predict(at, poses, 0.0)
-            found = kernels.expected(form, False, *at, p, R, A)
+            found = kernels.expected(form, *at, p, R, A)
             np.testing.assert_allclose(found[:2], want.z, rtol=1e-10)
             np.testing.assert_allclose(found[2:], want.H_position.ravel(), rtol=1e-9)
-        azimuth = kernels.expected(kernels.ANGLES, True, *at, p, R, A)[0]
-        one = np.arctan(np.tan(predict_azimuth_elevation(at, poses, 0.0).z[0]))
-        assert azimuth == pytest.approx(one, nan_ok=True)
 
 
 def test_what_is_behind_the_lens_or_on_its_axis_is_not_expected():
     A, down, p = np.array([700.0, 700.0, 320.0, 256.0, 0.0]), np.eye(3), np.array([0.0, 0.0, -100.0])
     up = np.diag([1.0, -1.0, -1.0])
     for form in (kernels.PIXELS, kernels.ANGLES):
-        assert np.isnan(kernels.expected(form, False, 5.0, 5.0, p, up, A)).all()
-    assert np.isnan(kernels.expected(kernels.ANGLES, False, 0.0, 0.0, p, down, A)).all()
-    assert np.isfinite(kernels.expected(kernels.PIXELS, False, 0.0, 0.0, p, down, A)).all()
+        assert np.isnan(kernels.expected(form, 5.0, 5.0, p, up, A)).all()
+    assert np.isnan(kernels.expected(kernels.ANGLES, 0.0, 0.0, p, down, A)).all()
+    assert np.isfinite(kernels.expected(kernels.PIXELS, 0.0, 0.0, p, down, A)).all()
     nan = np.nan
     assert [kernels.nearest(np.array(d)) for d in ((1.0, 2.0), (2.0, 1.0), (nan, 9.0), (nan, nan))] == [
         0,
@@ -232,23 +226,26 @@ def test_two_targets_in_one_place_are_a_toss_up(over, monkeypatch):
     """Nothing but the noise of the detector tells them apart, and it favours neither."""
     monkeypatch.setattr(gating, "APART", (0.0, 0.0))
     monkeypatch.setattr(gating, "DISPLACED_M", 0.0)
-    rates = gating.success_rates(over, Choices(), 200, 5)
+    rates = rates_of(over, 200, 5)
     for form in rates:
         assert abs(form.mean() - 50) < 5 * standard_error(form)
     assert rates.std(axis=1, ddof=1) == pytest.approx(100 * np.sqrt(0.25 / IMAGES), rel=0.3)
 
 
+def rates_of(over: Overflight, runs: int, seed: int, chunk: int = 500) -> Array:
+    return outcomes(over, {"": Choices()}, runs, seed, chunk)[""].rate
+
+
 def test_a_run_does_not_depend_on_the_others(over):
-    many = gating.success_rates(over, Choices(), 7, 3, chunk=3)
+    many = rates_of(over, 7, 3, chunk=3)
     assert many.shape == (len(GATES), 7)
-    np.testing.assert_array_equal(many[:, :4], gating.success_rates(over, Choices(), 4, 3))
-    assert (gating.success_rates(over, Choices(), 4, 4) != many[:, :4]).any()
+    np.testing.assert_array_equal(many[:, :4], rates_of(over, 4, 3))
+    assert (rates_of(over, 4, 4) != many[:, :4]).any()
 
 
 def test_readings_are_judged_on_the_same_draws(over):
     found = outcomes(over, READINGS, 6, 3, chunk=4)
-    for name, one in READINGS.items():
-        np.testing.assert_array_equal(found[name].rate, gating.success_rates(over, one, 6, 3))
+    np.testing.assert_array_equal(found[DEFAULT].rate, rates_of(over, 6, 3))
     # Angles in the update change the track that angles gate, and no other.
     same = np.isclose(found["own"].rate, found["angles"].rate).all(axis=1)
     assert same.tolist() == [True, True, False, True]
@@ -294,81 +291,22 @@ def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight, over):
     # Hardly any stretch is nearer, and what is has the origin out of view at one of its ends.
     assert (farthest < farthest[round(10 * over.time_s[0])]).mean() < 0.02
     camera, p_nc, R_nc = over.poses.camera, over.poses.p_nc, over.poses.R_nc
-    uv = ground_to_pixel(camera, np.append(over.place, 0.0), p_nc, R_nc)
+    uv = ground_to_pixel(camera, np.zeros(3), p_nc, R_nc)
     np.testing.assert_allclose(uv[:, 1], camera.cy, atol=1e-6)
     assert np.all((uv[:, 0] > 0) & (uv[:, 0] < camera.width))
-
-
-def test_what_is_printed_of_the_angles(over):
-    c = over.poses.camera
-    uv = np.array([[c.cx + 100, c.cy + 60], [c.cx - 100, c.cy + 60], [c.cx - 100, c.cy - 60]])
-    u, v = (uv - (c.cx, c.cy)).T
-    azimuth = np.arctan((v / c.fy) / (u / c.fx))
-    printed = np.column_stack([azimuth, np.arctan(c.fx / u * np.cos(azimuth))])
-    found = gating._measured_angles(c, uv, Choices(azimuth="printed"))
-    np.testing.assert_allclose(found, printed, atol=1e-12)
-    mended = gating._measured_angles(c, uv, Choices(azimuth="arctan"))
-    np.testing.assert_allclose(mended, np.abs(printed) * [[1, 1], [-1, 1], [1, 1]], atol=1e-12)
-    sound = gating._measured_angles(c, uv, Choices())
-    np.testing.assert_allclose(sound[0], printed[0], atol=1e-12)  # right half: the same
-    np.testing.assert_allclose(sound[:, 0], np.arctan2(v, u), atol=1e-12)
 
 
 def test_what_feeds_the_track(over):
     runs = streams(1, 60)
     fed = {name: gate(over, Choices(updated_with=name), runs) for name in FEEDS}  # type: ignore[arg-type]
-    own, nothing = fed["own"], fed["nothing"]
+    own = fed["own"]
     # Gated by angles and updated by pixels, the track fed with its own is that of the pixels.
     np.testing.assert_allclose(own.estimate[2], own.estimate[1])
     np.testing.assert_allclose(own.estimate[3], own.estimate[1])
-    # Without updates the track goes straight on, whatever the form.
-    np.testing.assert_allclose(np.diff(nothing.estimate, 2, axis=2), 0, atol=1e-8)
-    np.testing.assert_allclose(nothing.estimate[0], nothing.estimate[2])
     # Until the first mistake, it is the same track.
     same = np.cumprod(fed["assigned"].right, axis=2).astype(bool)
     np.testing.assert_allclose(fed["assigned"].estimate[same], own.estimate[same])
     assert same.any() and not same.all()
-
-
-def test_images_that_do_not_show_both_can_be_left_out(flight):
-    aside = overflight(flight, right=25.0)
-    gated = gate(aside, Choices(in_image_only=True), streams(1, 30))
-    assert 0 < gated.counted.mean() < 1
-    assert not gated.right[:, ~gated.counted].any()
-    # Through two images in a row that do not count, the track is only carried on.
-    skipped = ~gated.counted[:, 1:-1] & ~gated.counted[:, 2:]
-    bend = np.linalg.norm(np.diff(gated.estimate, 2, axis=2), axis=-1)
-    assert skipped.any() and bend[:, skipped].max() < 1e-9 < np.median(bend[:, ~skipped])
-
-
-def test_variations_change_one_thing_each(flight, over):
-    named = variations(flight, Choices())
-    first = next(iter(named.values()))
-    for name, (other, choices) in list(named.items())[1:]:
-        ours, theirs = other.poses, first[0].poses
-        same_flight = all(np.array_equal(getattr(ours, a), getattr(theirs, a)) for a in ("p_nb", "tilt"))
-        same_flight &= other.poses.camera == over.poses.camera
-        assert same_flight != (choices == first[1]), name
-    aside = overflight(flight, right=30.0).place
-    along = over.poses.p_nb[-1, :2] - over.poses.p_nb[0, :2]
-    assert np.hypot(*aside) == pytest.approx(30) and aside @ along == pytest.approx(0, abs=1e-9)
-    assert along[0] * aside[1] - along[1] * aside[0] > 0  # north to east is clockwise: right
-
-
-def test_a_table_of_variations(flight):
-    table = vary(flight, Choices(), 12, 1)
-    assert list(table["variation"]) == list(variations(flight, Choices()))
-    first = table.iloc[0]
-    assert first[[f"{form}_change" for form in gating.FORMS]].abs().max() == 0
-    assert np.isfinite(table.drop(columns="variation").to_numpy(float)).all()
-    changed = table.set_index("variation")["angles_change"]
-    assert changed["(6.10) to the letter"] == pytest.approx(
-        table.set_index("variation").loc["(6.10) to the letter", "angles"] - first["angles"]
-    )
-
-
-def test_standard_error_leaves_out_what_is_missing():
-    assert standard_error(np.array([1.0, 3.0, np.nan])) == pytest.approx(1.0)
 
 
 def test_a_flight_without_truth_or_too_short(flight):

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -14,10 +13,9 @@ from matplotlib.figure import Figure
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDABLE
-from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
-from wildlab.reporting.charts.forms import Values, draw_lines, rows_chart
+from wildlab.reporting.charts.forms import Values, draw_lines
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -38,8 +36,6 @@ from wildlab.studies.gating.monte_carlo import (
     Outcome,
     Overflight,
     gate,
-    overflight,
-    success_rates,
 )
 from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Study
@@ -49,9 +45,9 @@ DEFAULT = "own"
 #: The one that shows what mistakes do to a tracker that believes them.
 STRESS = "assigned"
 READINGS: Mapping[str, Choices] = {
-    "own": Choices(updated_with="own"),
+    "own": Choices(),
     "assigned": Choices(updated_with="assigned"),
-    "angles": Choices(updated_with="own", angles_update="angles"),
+    "angles": Choices(angles_update="angles"),
 }
 #: Less than this share of right associations (per cent) is mostly wrong.
 MOSTLY_WRONG = 50.0
@@ -101,9 +97,8 @@ def typical_run(over: Overflight, sources: Sequence[np.random.SeedSequence]) -> 
 
 
 def standard_error(values: Array) -> float:
-    """Of the mean of independent values (N,), those that are NaN left out."""
-    finite = values[np.isfinite(values)]
-    return float(finite.std(ddof=1) / np.sqrt(len(finite)))
+    """Of the mean of independent values (N,)."""
+    return float(values.std(ddof=1) / np.sqrt(len(values)))
 
 
 def claim_margins(outcome: Outcome) -> dict[str, Array]:
@@ -135,65 +130,6 @@ def verdict(margins: Array) -> str:
     if (mean > unsure).all():
         return HOLDS
     return FAILS if (mean < -unsure).any() else UNDECIDABLE
-
-
-#: How far to the side the targets are put, m: three quarters of the way to the edge of the image.
-ASIDE_M = 30.0
-
-
-def variations(flight: Flight, chosen: Choices) -> dict[str, tuple[Overflight, Choices]]:
-    """The flight and the choices of each variation, by what is changed; the first changes nothing."""
-    over = overflight(flight)
-    flights = {
-        "as chosen": over,
-        "camera at rest, looking down": overflight(flight, gimbal="down"),
-        "camera of half the focal length": overflight(flight, focal_scale=0.5),
-        "camera of one and a half times it": overflight(flight, focal_scale=1.5),
-        "50 m high": overflight(flight, height_scale=0.5),
-        "200 m high": overflight(flight, height_scale=2.0),
-        f"targets {ASIDE_M:.0f} m to the right": overflight(flight, right=ASIDE_M),
-        f"targets {ASIDE_M:.0f} m to the left": overflight(flight, right=-ASIDE_M),
-    }
-    filters: dict[str, Callable[[Choices], Choices]] = {
-        "no process noise": lambda c: replace(c, sd_acceleration=0.0),
-        "process noise 0.2 m/s²": lambda c: replace(c, sd_acceleration=0.2),
-        "process noise 1 m/s²": lambda c: replace(c, sd_acceleration=1.0),
-        "a second between the 50 iterations": lambda c: replace(c, warm_up_step=1.0),
-        "track not updated": lambda c: replace(c, updated_with="nothing"),
-        "one-argument arctangent": lambda c: replace(c, azimuth="arctan"),
-        "(6.10) to the letter": lambda c: replace(c, azimuth="printed"),
-        "only images that show both": lambda c: replace(c, in_image_only=True),
-    }
-    return {name: (other, chosen) for name, other in flights.items()} | {
-        name: (over, change(chosen)) for name, change in filters.items()
-    }
-
-
-def vary(flight: Flight, chosen: Choices, runs: int, seed: int) -> pd.DataFrame:
-    """Mean success rates (per cent) of every variation, on the same draws.
-
-    Returns
-    -------
-    DataFrame
-        ``variation``; for each form its mean, and as ``<form>_change`` and ``<form>_se`` the mean difference
-        from the first row, run by run, with its standard error; and as ``<form>_mean_se`` the mean's own.
-    """
-    rows: list[dict[str, object]] = []
-    first: Array | None = None
-    for name, (over, choices) in variations(flight, chosen).items():
-        rates = success_rates(over, choices, runs, seed)[: len(FORMS)]
-        first = rates if first is None else first
-        row: dict[str, object] = {"variation": name}
-        for form, own, base in zip(FORMS, rates, first, strict=True):
-            change = (own - base)[np.isfinite(own)]
-            row |= {
-                form: np.nanmean(own),
-                f"{form}_change": change.mean(),
-                f"{form}_se": standard_error(change),
-                f"{form}_mean_se": standard_error(own),
-            }
-        rows.append(row)
-    return pd.DataFrame(rows)
 
 
 #: Runs behind a published success rate, H 6.4.3.
@@ -290,18 +226,6 @@ def plot_detections(one: Gated) -> Figure:
     ax.plot(*one.targets[0, :, ::-1].T, "k+", ms=13, mew=2, label="truth")
     map_axes(ax)
     return finish(fig, "")
-
-
-def plot_variations(
-    varied: pd.DataFrame, published: Mapping[tuple[str, str], float], names: Mapping[str, str]
-) -> Figure:
-    """Success rates of each variation of `vary`; dashed: published."""
-    series = {names[form]: Values(varied[form], color=_COLOURS[form]) for form in FORMS}
-    label = "right associations (%)\ndashed: published"
-    fig = rows_chart(list(varied["variation"]), series, label, size=(5.9, 5.6), apart=0.2)
-    for form in FORMS:
-        fig.axes[0].axvline(published[form, "success_rate"], color=_COLOURS[form], lw=0.8, ls=(0, (3, 3)))
-    return fig
 
 
 def run_figures(one: Gated, names: Mapping[str, str]) -> list[Shown]:

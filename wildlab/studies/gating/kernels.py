@@ -14,19 +14,18 @@ from numpy.typing import NDArray
 from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 
-#: What a distance is computed from, and what a track is updated with, as the numbers that the loop knows.
+#: What a distance is computed from, as the numbers that the loop knows.
 POSITION, PIXELS, ANGLES, BOTH = 0, 1, 2, 3
-NOTHING, OWN, ASSIGNED = 0, 1, 2
 
 
 @compiled
 def expected(
-    form: int, one_argument: bool, n: float, e: float, p: Array, R: Array, A: Array
+    form: int, n: float, e: float, p: Array, R: Array, A: Array
 ) -> tuple[float, float, float, float, float, float]:
     """Measurement of a target at (n, e, 0) and its derivatives by n and e, row by row.
 
     H (6.3), (6.4), (6.7), (6.9). ``p`` (3,) and ``R`` (3, 3) are the camera's pose, ``A`` (5,) fx, fy, cx, cy
-    and skew; with ``one_argument`` the azimuth is the print's arctangent.
+    and skew.
     """
     if form == POSITION:
         return n, e, 1.0, 0.0, 0.0, 1.0
@@ -46,11 +45,10 @@ def expected(
     if not level2 > 0:
         return np.nan, np.nan, np.nan, np.nan, np.nan, np.nan
     level, range2 = np.sqrt(level2), level2 + Z * Z
-    azimuth = np.arctan(Y / X) if one_argument else np.arctan2(Y, X)
     ax, ay = -Y / level2, X / level2
     ex, ey, ez = -Z * X / (level * range2), -Z * Y / (level * range2), level / range2
     return (
-        azimuth, np.arctan2(Z, level), ax * R[0, 0] + ay * R[0, 1], ax * R[1, 0] + ay * R[1, 1],
+        np.arctan2(Y, X), np.arctan2(Z, level), ax * R[0, 0] + ay * R[0, 1], ax * R[1, 0] + ay * R[1, 1],
         ex * R[0, 0] + ey * R[0, 1] + ez * R[0, 2], ex * R[1, 0] + ey * R[1, 1] + ez * R[1, 2],
     )  # fmt: skip
 
@@ -64,18 +62,17 @@ def gap_of(measured: float, predicted: float, wrapped: bool) -> float:
 
 @compiled
 def add_distances(
-    form: int, one_argument: bool, x: Array, P: Array, p: Array, R: Array, A: Array, noise: Array,
+    form: int, x: Array, P: Array, p: Array, R: Array, A: Array, noise: Array,
     measured: Array, nis: Array,
 ) -> None:  # fmt: skip
     """Adds the normalised innovation squared of both detections (2, 2) to ``nis`` (2,), H (3.12)."""
-    z0, z1, h00, h01, h10, h11 = expected(form, one_argument, x[0], x[1], p, R, A)
+    z0, z1, h00, h01, h10, h11 = expected(form, x[0], x[1], p, R, A)
     a0, a1 = P[0, 0] * h00 + P[0, 1] * h01, P[1, 0] * h00 + P[1, 1] * h01
     b0, b1 = P[0, 0] * h10 + P[0, 1] * h11, P[1, 0] * h10 + P[1, 1] * h11
     s00, s11 = h00 * a0 + h01 * a1 + noise[0, 0], h10 * b0 + h11 * b1 + noise[1, 1]
     s01 = h10 * a0 + h11 * a1 + noise[0, 1]
-    wrapped = form == ANGLES and not one_argument
     for k in range(2):
-        v0, v1 = gap_of(measured[k, 0], z0, wrapped), measured[k, 1] - z1
+        v0, v1 = gap_of(measured[k, 0], z0, form == ANGLES), measured[k, 1] - z1
         nis[k] += (s11 * v0 * v0 - 2 * s01 * v0 * v1 + s00 * v1 * v1) / (s00 * s11 - s01 * s01)
 
 
@@ -106,15 +103,15 @@ def move(x: Array, P: Array, F: Array, Q: Array, y: Array, M: Array) -> None:
 
 @compiled
 def update_with(
-    form: int, one_argument: bool, x: Array, P: Array, p: Array, R: Array, A: Array, noise: Array,
+    form: int, x: Array, P: Array, p: Array, R: Array, A: Array, noise: Array,
     measured: Array, U: Array, K: Array,
 ) -> None:  # fmt: skip
     """H (3.7d)-(3.7h) in place with ``measured`` (2,); nothing happens where it cannot be predicted.
 
     ``U`` and ``K`` (4, 2) are scratch.
     """
-    z0, z1, h00, h01, h10, h11 = expected(form, one_argument, x[0], x[1], p, R, A)
-    v0, v1 = gap_of(measured[0], z0, form == ANGLES and not one_argument), measured[1] - z1
+    z0, z1, h00, h01, h10, h11 = expected(form, x[0], x[1], p, R, A)
+    v0, v1 = gap_of(measured[0], z0, form == ANGLES), measured[1] - z1
     if not np.isfinite(v0 + v1):
         return
     for i in range(4):
@@ -134,25 +131,22 @@ def update_with(
 
 @compiled
 def associate_runs(
-    gate: int, update: int, feed: int, one_argument: bool, A: Array, p_nc: Array, R_nc: Array,
-    measured: Array, counted: NDArray[np.bool_], F: Array, Q: Array, noise: Array, x0: Array, P0: Array,
-    taken: NDArray[np.int64], nis: Array, estimate: Array,
+    gate: int, update: int, assigned: bool, A: Array, p_nc: Array, R_nc: Array, measured: Array, F: Array,
+    Q: Array, noise: Array, x0: Array, P0: Array, taken: NDArray[np.int64], nis: Array, estimate: Array,
 ) -> None:  # fmt: skip
     """All N runs through their T images.
 
     Parameters
     ----------
-    gate, update, feed
-        By what detections are associated (`BOTH`: the sum of the distances by pixels and by angles), by what
-        the track is updated, and with which detection.
-    one_argument
-        Whether the predicted azimuth is the arctangent of one argument; then its differences are not wrapped.
+    gate, update
+        By what detections are associated (`BOTH`: the sum of the distances by pixels and by angles), and by what
+        the track is updated.
+    assigned
+        Whether with the detection that was associated, else with the main object's.
     A, p_nc, R_nc
         (5,) of the camera; (N, T, 3) and (N, T, 3, 3) the poses as they are known.
     measured
         (3, N, T, 2, 2): by form the two detections, the main object's first.
-    counted
-        (N, T); an image that does not count updates nothing.
     F, Q, noise, x0, P0
         (4, 4), (4, 4), (3, 2, 2) by form, (N, 4), (4, 4).
     taken, nis, estimate
@@ -161,19 +155,19 @@ def associate_runs(
     """
     x, P, y, M = np.empty(4), np.empty((4, 4)), np.empty(4), np.empty((4, 4))
     U, K, d = np.empty((4, 2)), np.empty((4, 2)), np.empty(2)
-    for r in range(counted.shape[0]):
+    for r in range(taken.shape[0]):
         x[:], P[:] = x0[r], P0
-        for t in range(counted.shape[1]):
+        for t in range(taken.shape[1]):
             move(x, P, F, Q, y, M)
             p, R = p_nc[r, t], R_nc[r, t]
             d[:] = 0.0
             for form in range(3):
                 if form == gate or (gate == BOTH and form != POSITION):
-                    add_distances(form, one_argument, x, P, p, R, A, noise[form], measured[form, r, t], d)
+                    add_distances(form, x, P, p, R, A, noise[form], measured[form, r, t], d)
             best = nearest(d)
             taken[r, t], nis[r, t, 0], nis[r, t, 1] = best, d[0], d[1]
-            used = best if feed == ASSIGNED else 0
-            if feed != NOTHING and counted[r, t] and used >= 0:
+            used = best if assigned else 0
+            if used >= 0:
                 z = measured[update, r, t, used]
-                update_with(update, one_argument, x, P, p, R, A, noise[update], z, U, K)
+                update_with(update, x, P, p, R, A, noise[update], z, U, K)
             estimate[r, t, 0], estimate[r, t, 1] = x[0], x[1]

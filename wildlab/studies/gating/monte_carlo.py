@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.geometry.camera import Camera, in_image
+from wildlab.geometry.camera import in_image
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler, quaternion_to_matrix
@@ -49,13 +49,17 @@ R_FORM = {
     "angles": np.diag(np.radians([6.0, 3.0]) ** 2),
 }
 
+#: Not printed. Process noise of H (6.1), m/s^2: that of the slow vessel of H 6.4.2, the same 10 m of noise beside
+#: it. The iterations before association begins are as far apart as the images.
+SD_ACCELERATION = 0.01
+
 #: Normal draws of a run: targets, start, warm-up, poses and pixels.
 _DRAWS = (4, 2, 2 * WARM_UP, 8 * IMAGES, 4 * IMAGES)
 
 
 @dataclass(frozen=True)
 class Overflight:
-    """True poses of `IMAGES` images, and where between the two targets the middle is.
+    """True poses of `IMAGES` images over the middle between the targets, the origin of n.
 
     Attributes
     ----------
@@ -65,56 +69,37 @@ class Overflight:
         (T,).
     euler
         (T, 3) rad, roll, pitch, yaw of the poses, to which the noise is added.
-    place
-        (2,) north and east of the middle between the targets' mean positions, on the plane ``down = 0``.
     """
 
     poses: CameraPoses
     time_s: Array
     euler: Array
-    place: Array
 
 
 @dataclass(frozen=True)
 class Choices:
-    """What H 6.4.3 does not print about the filters; each default has its reason.
+    """What H 6.4.3 does not print about the update of the track.
 
     Attributes
     ----------
-    sd_acceleration
-        Process noise of H (6.1), m/s^2: that of the slow vessel of H 6.4.2, the same 10 m of noise beside it.
     updated_with
-        The main object's ``own`` measurement whatever was assigned, the one that was ``assigned``, or
-        nothing: see `wildlab.studies.gating`.
+        The main object's ``own`` measurement whatever was assigned, or the one that was ``assigned``: see
+        `wildlab.studies.gating`.
     angles_update
         What updates the track that angles gate. H 6.3.2: pixels are used in the update and angles for gating.
-    azimuth
-        ``atan2``: two-argument arctangents. ``arctan``: an azimuth that cannot tell a target from the one
-        opposite. ``printed``: H (6.10) to the letter, where moreover the measured elevation is negative for
-        detections in the left half of the image.
-    warm_up_step
-        Seconds between the iterations before association begins: that of the images.
-    in_image_only
-        Leave out images where one of the two lies beyond the edge; the print has both in all 141.
     """
 
-    sd_acceleration: float = 0.01
-    updated_with: Literal["own", "assigned", "nothing"] = "own"
+    updated_with: Literal["own", "assigned"] = "own"
     angles_update: Literal["pixels", "angles"] = "pixels"
-    azimuth: Literal["atan2", "arctan", "printed"] = "atan2"
-    warm_up_step: float = 1 / RATE_HZ
-    in_image_only: bool = False
 
 
 class Gated(NamedTuple):
     """What happened in N runs of T images; gates in the order of `GATES`, the main object first."""
 
     right: NDArray[np.bool_]  # (4, N, T)
-    counted: NDArray[np.bool_]  # (N, T)
     nis: Array  # (4, N, T, 2)
     estimate: Array  # (4, N, T, 2) north, east after the update
     measured: Array  # (N, T, 2, 2) georeferenced detections
-    pixels: Array  # (N, T, 2, 2) detections
     targets: Array  # (N, 2, 2) true positions
 
 
@@ -128,28 +113,13 @@ class GatingScene(NamedTuple):
     poses: CameraPoses  # (N, T) rows
 
 
-def overflight(
-    flight: Flight,
-    *,
-    gimbal: Literal["follows", "down"] = "follows",
-    focal_scale: float = 1.0,
-    height_scale: float = 1.0,
-    right: float = 0.0,
-) -> Overflight:
+def overflight(flight: Flight) -> Overflight:
     """The stretch of a twin's true trajectory that passes over the origin of n with the targets in view.
 
     Of all stretches of 141 images at 10 Hz in which every image shows the origin, the one whose farthest
     image (horizontally) is nearest to it. A camera that looks straight down from 100 m has a point in view
     for five seconds, not for fourteen: so the gimbal, which H table 6.4 says there was, keeps pan zero and
-    tilts forwards and backwards after the targets (``follows``). ``down`` leaves it at rest, and the pinhole
-    camera goes on beyond the edge.
-
-    Parameters
-    ----------
-    focal_scale, height_scale
-        Factors on focal length and height, on the same stretch, to see what they do.
-    right
-        How far to the right of the origin, seen along the stretch, the middle between the targets is, m.
+    tilts forwards and backwards after the targets.
 
     Raises
     ------
@@ -165,22 +135,17 @@ def overflight(
     p = nav[["north_m", "east_m", "down_m"]].to_numpy(float)[rows]
     R_nb = quaternion_to_matrix(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)[rows])
     camera = flight.manifest.geometry_camera()
-    part = _stretch(camera, p, R_nb)
-    p, R_nb = p[part], R_nb[part]
-    along = (p[-1, :2] - p[0, :2]) / np.hypot(*(p[-1, :2] - p[0, :2]))
-    place = right * np.array([-along[1], along[0]])
-    p = p * (1.0, 1.0, height_scale)
-    tilt = _tilt_after(place, p, R_nb) if gimbal == "follows" else np.zeros(IMAGES)
-    camera = replace(camera, fx=camera.fx * focal_scale, fy=camera.fy * focal_scale)
-    euler = matrix_to_euler(R_nb)
-    poses = CameraPoses(camera, Mount(), p, euler_to_matrix(*euler.T), np.zeros(IMAGES), tilt)
-    return Overflight(poses, ticks[part], euler, place)
+    tilt = _tilt_to_origin(p, R_nb)
+    part = _stretch(CameraPoses(camera, Mount(), p, R_nb, np.zeros(len(p)), tilt))
+    euler = matrix_to_euler(R_nb[part])
+    poses = CameraPoses(camera, Mount(), p[part], euler_to_matrix(*euler.T), np.zeros(IMAGES), tilt[part])
+    return Overflight(poses, ticks[part], euler)
 
 
-def _stretch(camera: Camera, p: Array, R_nb: Array) -> slice:
+def _stretch(seen: CameraPoses) -> slice:
     """See `overflight`."""
-    seen = CameraPoses(camera, Mount(), p, R_nb, np.zeros(len(p)), _tilt_after(np.zeros(2), p, R_nb))
-    shown = in_image(camera, ground_to_pixel(camera, np.zeros(3), seen.p_nc, seen.R_nc))
+    p = seen.p_nb
+    shown = in_image(seen.camera, ground_to_pixel(seen.camera, np.zeros(3), seen.p_nc, seen.R_nc))
     away = np.where(shown, np.hypot(p[:, 0], p[:, 1]), np.inf)
     windows = np.lib.stride_tricks.sliding_window_view(away, min(IMAGES, len(away)))
     first = int(np.argmin(windows.max(axis=1)))
@@ -190,10 +155,10 @@ def _stretch(camera: Camera, p: Array, R_nb: Array) -> slice:
     return slice(first, first + IMAGES)
 
 
-def _tilt_after(place: Array, p: Array, R_nb: Array) -> Array:
-    """Tilt (T,) with which a camera that looks down has ``place`` on the line across its axis."""
-    to_place = np.einsum("tji,tj->ti", R_nb, np.append(place, 0.0) - p)
-    return np.asarray(np.arctan2(to_place[:, 0], to_place[:, 2]))
+def _tilt_to_origin(p: Array, R_nb: Array) -> Array:
+    """Tilt (T,) with which a camera that looks down has the origin of n on the line across its axis."""
+    to_origin = np.einsum("tji,tj->ti", R_nb, -p)
+    return np.asarray(np.arctan2(to_origin[:, 0], to_origin[:, 2]))
 
 
 def streams(seed: int, runs: int) -> list[np.random.SeedSequence]:
@@ -207,7 +172,7 @@ def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> GatingSc
     around, start, warm_up, pose, pixel = np.split(normal, np.cumsum(_DRAWS)[:-1], axis=1)
     N, T = len(runs), IMAGES
     half = np.array(APART) / 2
-    targets = over.place + np.stack([-half, half]) + DISPLACED_M * around.reshape(N, 2, 2)
+    targets = np.stack([-half, half]) + DISPLACED_M * around.reshape(N, 2, 2)
     at_sea = np.concatenate([targets, np.zeros((N, 2, 1))], axis=-1)
     exact = over.poses
     true = ground_to_pixel(exact.camera, at_sea[:, None], exact.p_nc[:, None], exact.R_nc[:, None])
@@ -243,7 +208,7 @@ def gate(over: Overflight, choices: Choices, runs: list[np.random.SeedSequence])
 
 
 class Outcome(NamedTuple):
-    """What became of each of N runs, per cent of its images; NaN where no image of a run counts."""
+    """What became of each of N runs, per cent of its images."""
 
     rate: Array  # (4, N) associated rightly, gates in the order of `GATES`
     mistakes: Array  # (3, N) wrong by pixels alone, by angles alone, by both
@@ -288,28 +253,19 @@ def outcomes(
     }
 
 
-def success_rates(over: Overflight, choices: Choices, runs: int, seed: int, chunk: int = 500) -> Array:
-    """Share of right associations in each run, (4, runs) in per cent; gates in the order of `GATES`.
-
-    The arguments are those of `outcomes`. A run without an image that counts is NaN.
-    """
-    return outcomes(over, {"": choices}, runs, seed, chunk)[""].rate
-
-
 def _outcome(done: Gated) -> Outcome:
-    n = done.counted.sum(axis=-1)
-    of = np.where(n > 0, n, np.nan)
-    pixels, angles = (~done.right[GATES.index(form)] & done.counted for form in ("pixels", "angles"))
-    apart = np.stack([pixels & ~angles, angles & ~pixels, pixels & angles]).sum(axis=-1)
-    return Outcome(100 * done.right.sum(axis=-1) / of, 100 * apart / of, (pixels == angles).all(axis=-1))
+    pixels, angles = (~done.right[GATES.index(form)] for form in ("pixels", "angles"))
+    apart = np.stack([pixels & ~angles, angles & ~pixels, pixels & angles])
+    same = (pixels == angles).all(axis=-1)
+    return Outcome(100 * done.right.sum(axis=-1) / IMAGES, 100 * apart.sum(axis=-1) / IMAGES, same)
 
 
-def _warm_up(scene: GatingScene, choices: Choices) -> tuple[Array, Array]:
+def _warm_up(scene: GatingScene) -> tuple[Array, Array]:
     """State (N, 4) and covariance (4, 4) after the iterations on positions: the same for all three forms."""
     x = np.concatenate([scene.start, np.zeros_like(scene.start)], axis=-1)
     P = START_P
     H, R = on_state(np.eye(2), 4), R_FORM["position"]
-    F, Q = constant_velocity(choices.warm_up_step, choices.sd_acceleration)
+    F, Q = constant_velocity(1 / RATE_HZ, SD_ACCELERATION)
     for k in range(WARM_UP):
         x, P = predict(x, P, F, Q)
         step = correct(x, P, scene.warm_up[:, k] - x[:, :2], H, R)
@@ -327,17 +283,12 @@ def _gate(scene: GatingScene, choices: Choices) -> Gated:
         )
     ground = pixel_to_plane(camera, scene.pixels, p_nc[:, :, None], R_nc[:, :, None], 0.0)[..., :2]
     p_nc, R_nc = np.ascontiguousarray(p_nc), np.ascontiguousarray(R_nc)
-    measured = np.stack([ground, scene.pixels, _measured_angles(camera, scene.pixels, choices)])
-    inside = np.asarray(in_image(camera, scene.pixels).all(axis=-1), bool)
-    counted = inside if choices.in_image_only else np.ones_like(inside)
-    x, P = _warm_up(scene, choices)
-    F, Q = constant_velocity(1 / RATE_HZ, choices.sd_acceleration)
+    measured = np.stack([ground, scene.pixels, azimuth_elevation_of_pixel(camera, scene.pixels)])
+    x, P = _warm_up(scene)
+    F, Q = constant_velocity(1 / RATE_HZ, SD_ACCELERATION)
     A = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
     noise = np.stack([R_FORM[form] for form in FORMS])
-    feed = {"nothing": kernels.NOTHING, "own": kernels.OWN, "assigned": kernels.ASSIGNED}[
-        choices.updated_with
-    ]
-    N, T = counted.shape
+    N, T = scene.pixels.shape[:2]
     taken = np.empty((len(GATES), N, T), np.int64)
     nis, estimate = np.empty((len(GATES), N, T, 2)), np.empty((len(GATES), N, T, 2))
     with announced("the loop of the study of gating"):
@@ -345,17 +296,7 @@ def _gate(scene: GatingScene, choices: Choices) -> Gated:
             angles = by == kernels.ANGLES and choices.angles_update == "angles"
             update = kernels.ANGLES if angles else min(by, kernels.PIXELS)
             kernels.associate_runs(
-                by, update, feed, choices.azimuth != "atan2", A, p_nc, R_nc, measured, counted, F, Q, noise,
-                x, P, taken[by], nis[by], estimate[by],
+                by, update, choices.updated_with == "assigned", A, p_nc, R_nc, measured, F, Q, noise, x, P,
+                taken[by], nis[by], estimate[by],
             )  # fmt: skip
-    return Gated((taken == 0) & counted, counted, nis, estimate, ground, scene.pixels, scene.targets)
-
-
-def _measured_angles(camera: Camera, pixels: Array, choices: Choices) -> Array:
-    angles = azimuth_elevation_of_pixel(camera, pixels)
-    if choices.azimuth == "atan2":
-        return angles
-    azimuth, elevation = np.moveaxis(angles, -1, 0)
-    if choices.azimuth == "printed":
-        elevation = np.where(np.cos(azimuth) < 0, -elevation, elevation)
-    return np.stack([np.arctan(np.tan(azimuth)), elevation], axis=-1)
+    return Gated(taken == 0, nis, estimate, ground, scene.targets)
