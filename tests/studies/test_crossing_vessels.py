@@ -10,7 +10,6 @@ from wildlab.reporting.published import load_claims, load_published
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import check_claims
 from wildlab.studies.crossing_vessels import trial as study
-from wildlab.studies.crossing_vessels.rendered import part_of
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
     FEATURES,
@@ -44,7 +43,11 @@ def flight():
 @pytest.fixture(scope="module")
 def flown(flight):
     """Of a third of the detections, about the crossing."""
-    crossing = part_of(gather(flight), (200.0, 500.0))
+    whole = gather(flight)
+    kept = (whole.times >= 200) & (whole.times <= 500)
+    rows = kept[np.unique(whole.looks.image, return_inverse=True)[1]]
+    some = whole.looks._replace(image=whole.looks.image[rows], positions=whole.looks.positions[rows])
+    crossing = Crossing(some, whole.boat[rows], whole.times[kept], whole.truth[:, kept])
     looks = photograph("crossing-vessels", 6, flight, 2)
     appearance = dressed(crossing, looks, 6)
     banks = {rule: follow_by(crossing, rule, appearance) for rule in SUBJECTS}

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -15,18 +14,17 @@ from wildlab.analysis.rendered import Photographer
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish, new_strips
 from wildlab.reporting.charts.forms import Values, draw_lines, draw_picture, spread_points
-from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
+from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.published import bounds_of
 from wildlab.studies.crossing_vessels import trial
-from wildlab.studies.crossing_vessels.rendered import WHOLE, Counted, CrossingTracks, Rendering, Spotted, spot
 from wildlab.studies.crossing_vessels.trial import (
+    APART_M,
     BOATS,
     DISTANCE,
     FEATURES,
     JOINT,
     LOOKS,
     NAMES,
-    NONE,
     SEPARATIONS,
     SUBJECTS,
     TUNING,
@@ -112,38 +110,10 @@ def reacquisition_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.Data
     return pd.DataFrame(rows)
 
 
-def detected_table(flights: Sequence[Rendering]) -> pd.DataFrame:
-    """What the detector makes of both vessels in rendered frames, a row for each flight."""
-    rows = []
-    for one in flights:
-        near: Counted = one.near
-        counts = {name: getattr(near, name) for name in ("whole", "found", "joined", "missed")}
-        rows.append({"flight": str(one.seed), **counts, "false": near.false + one.sea.false})
-    return pd.DataFrame(rows)
-
-
-def rendered_table(flights: Sequence[Rendering], names: Mapping[str, str]) -> pd.DataFrame:
-    """One row for each rule: flights swapped, and detections wrong (%), drawn and from rendered frames."""
-
-    def row(rule: str) -> dict[str, object]:
-        cells: dict[str, object] = {"rule": names[rule]}
-        for way in ("drawn", "frames", "inside"):
-            tracks: list[CrossingTracks] = [getattr(one, way) for one in flights]
-            found = [one.by_rule[rule] for one in tracks]
-            own = sum(one.own or 0 for one in found)
-            cells[f"{way}_swapped"] = sum(one.swapped for one in found)
-            cells[f"{way}_wrong"] = 100 * sum(one.wrong or 0 for one in found) / own if own else np.nan
-        return cells
-
-    return pd.DataFrame([row(rule) for rule in (*SUBJECTS, JOINT)])
-
-
 #: Tracks by the vessel whose detections started them, as in H figure 6.21.
 _COLOURS = (BLUE, ORANGE)
 #: Of the height of a map, left free below everything on it for the scale bar.
 FREE = 0.3
-#: Around the boxes of a frame, px, and how wide what is shown is at least.
-AROUND, LEAST = 30, 200
 _AXES = {"size": "ln of the size in m²", "intensity": "intensity (counts)", "hu": "ln of Hu's first moment"}
 
 
@@ -198,79 +168,23 @@ def plot_separation(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     return finish(fig, "", "difference of the two (spreads of the feature)", "wrong")
 
 
-class Picture(NamedTuple):
-    """A frame of the crossing: its counts (H, W), its detections and their boxes, (D, 4) px; m apart."""
-
-    exposure: int
-    counts: NDArray[np.uint16]
-    spotted: Spotted
-    box: NDArray[np.float64]
-    apart: float
-
-
-def telling_exposures(one: Rendering) -> list[int]:
-    """Of the frames with both whole in view: where they are nearest and detected each alone, and as one.
-
-    None, one or two of these; a frame without any detection has no place among them.
-    """
-    spotted, crossing = one.spotted, one.frames.crossing
-    images = np.unique(crossing.looks.image)
-    both = (spotted.share >= WHOLE).all(axis=1)
-    chosen = []
-    for kind in (spotted.found.all(axis=1), spotted.joined.any(axis=1)):
-        rows = np.flatnonzero(np.isin(images, spotted.frames[both & kind]))
-        if len(rows) and np.isfinite(crossing.apart[rows]).any():
-            chosen.append(int(images[rows[np.nanargmin(crossing.apart[rows])]]))
-    return chosen
-
-
-def picture_of(twin: str, one: Rendering, exposure: int) -> Picture:
-    """A frame rendered and searched again."""
-    camera = Photographer(twin, one.seed)
-    _, counts = camera.image(exposure)
-    shot = next(iter(camera.shoot([exposure])))
-    crossing = one.frames.crossing
-    apart = float(crossing.apart[np.searchsorted(np.unique(crossing.looks.image), exposure)])
-    rows, columns = counts.shape
-    return Picture(exposure, counts, spot([shot], (rows, columns)), shot.detections.box, apart)
-
-
-def plot_frames(twin: str, flights: Sequence[Rendering]) -> Figure | None:
-    """The two at the crossing, each detected alone, and as one: of the first flight that has most of these.
-
-    None where both are whole in no frame with a detection.
-    """
-    chosen = [telling_exposures(one) for one in flights]
-    most = max((len(found) for found in chosen), default=0)
-    if not most:
-        return None
-    at = next(k for k, found in enumerate(chosen) if len(found) == most)
-    fig, axes = new_figure(5.9, 3.1 if most > 1 else 4.6, columns=most, squeeze=False)
-    for ax, exposure in zip(axes.flat, chosen[at], strict=True):
-        picture = picture_of(twin, flights[at], exposure)
-        (left, top), (right, bottom) = _part(picture)
-        low, high = np.percentile(picture.counts[top:bottom, left:right], (0.5, 99.8))
-        owners_of = zip(picture.spotted.boat, picture.spotted.both, strict=True)
-        colors = [
-            VERMILLION if boat == NONE else GREEN if both else _COLOURS[boat] for boat, both in owners_of
-        ]
-        title, box = f"{picture.apart:.0f} m apart", picture.box
-        draw_picture(ax, picture.counts, title, limits=(low, high), boxes=box, colors=colors)
-        ax.set(xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5))
+def plot_frame(flown: Flown, twin: str, seed: int) -> Figure:
+    """A rendered frame in which both are detected, about `APART_M` apart, with what the detector finds."""
+    crossing = flown.crossing
+    images, detections = np.unique(crossing.looks.image, return_counts=True)
+    both = np.flatnonzero(detections == len(BOATS))
+    row = both[np.nanargmin(np.abs(crossing.apart[both] - APART_M))]
+    camera = Photographer(twin, seed)
+    _, counts = camera.image(int(images[row]))
+    (shot,) = camera.shoot([int(images[row])])
+    found, box = shot.judged.found, shot.detections.box
+    colors = [
+        next((_COLOURS[number - 1] for number, rows in found.items() if k in rows), VERMILLION)
+        for k in range(len(box))
+    ]
+    fig, ax = new_figure(5.9, 4.6)
+    draw_picture(ax, counts, f"{crossing.apart[row]:.0f} m apart", limits=None, boxes=box, colors=colors)
     return fig
-
-
-def _part(picture: Picture) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Corners of the part that is shown, px: all boxes, and some sea about them."""
-    rows, columns = picture.counts.shape
-    low = picture.box[:, :2].min(axis=0) - AROUND
-    high = (picture.box[:, :2] + picture.box[:, 2:]).max(axis=0) + AROUND
-    middle, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST / 2).max()
-    size = np.array([columns, rows])
-    half = min(half, size.min() / 2)
-    middle = np.clip(middle, half, size - half)
-    first, last = np.floor(middle - half).astype(int), np.ceil(middle + half).astype(int)
-    return (int(first[0]), int(first[1])), (min(int(last[0]), columns), min(int(last[1]), rows))
 
 
 def answer(facts: Facts) -> list[str]:

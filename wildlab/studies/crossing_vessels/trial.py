@@ -7,10 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.analysis.georeference import (
-    Observations,
-    observe,
-)
+from wildlab.analysis.georeference import observe
 from wildlab.analysis.rendered import Photographer, exposures_of
 from wildlab.analysis.tracks.sighting import truth_states
 from wildlab.evaluation.identities import Identities, Moment, compare_identities
@@ -33,8 +30,6 @@ Numbers = dict[tuple[str, str], float]
 
 #: The vessels as H 6.4.4 names them.
 BOATS = ("boat 1", "boat 2")
-#: Boat of a detection that is of neither.
-NONE = -1
 #: H 6.4.4; the gate is of 99 %, of the 95 to 99 % of H 3.3, and the largest speed, which serves the start
 #: alone, the deviation of the first velocity. Both are chosen.
 TUNING = Tuning(
@@ -55,7 +50,7 @@ class Crossing(NamedTuple):
     looks
         All detections.
     boat
-        (D,) 0 or 1: whose each is, as by manual classification; `NONE` where it is of nothing.
+        (D,) 0 or 1: whose each is, as by manual classification.
     times
         (K,) s, of the images with detections.
     truth
@@ -73,28 +68,20 @@ class Crossing(NamedTuple):
         return np.asarray(np.linalg.norm(self.truth[0] - self.truth[1], axis=-1))
 
 
-def gather(flight: Flight, source: str = "autopilot") -> Crossing:
-    """The detections of both vessels on the sea, with the poses of a source."""
-    seen = observe(flight, source)
-    return arrange(flight, seen, np.array([BOATS.index(name) for name in seen.table["target_id"]]))[0]
-
-
-def arrange(flight: Flight, seen: Observations, boat: Index) -> tuple[Crossing, Index]:
-    """Observations on the sea, in order; and which of them are left, in that order, to have a place.
-
-    ``boat`` (N,) is 0 or 1, or `NONE` for a detection of nothing.
-    """
+def gather(flight: Flight) -> Crossing:
+    """The detections of both vessels on the sea, in order, with the autopilot's poses."""
+    seen = observe(flight, "autopilot")
+    boat = np.array([BOATS.index(name) for name in seen.table["target_id"]])
     positions = georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
     number = exposures_of(seen.table).astype(int)
     stamps = frame_times(flight)
     at = {one: stamp for one, stamp in zip(exposures_of(flight.table("frames")), stamps, strict=True)}
     order = np.lexsort((boat, number))
     order = order[np.isfinite(positions[order]).all(axis=1)]
-    images = np.unique(number[order])
-    times = np.array([at[int(one)] for one in images])
+    times = np.array([at[int(one)] for one in np.unique(number[order])])
     looks = Looks(number[order], positions[order], float(np.median(np.diff(stamps))))
     truth = np.stack([truth_states(flight, name, times)[:, :2] for name in BOATS])
-    return Crossing(looks, boat[order], times, truth), order
+    return Crossing(looks, boat[order], times, truth)
 
 
 def apart_times(crossing: Crossing) -> tuple[float, float]:
@@ -386,9 +373,9 @@ def made_up(crossing: Crossing, separation: float, seed: int) -> Appearance:
 
 
 def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
-    """(D,) which vessels' detections went to a track that the other vessel's detection started."""
-    owner = np.append(crossing.boat[bank.started], NONE)[bank.track]  # track -1: of none
-    return np.asarray((owner != NONE) & (crossing.boat != NONE) & (owner != crossing.boat))
+    """(D,) which detections went to a track that the other vessel's detection started."""
+    owner = np.append(crossing.boat[bank.started], -1)[bank.track]  # track -1: of none
+    return np.asarray((owner >= 0) & (owner != crossing.boat))
 
 
 def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
@@ -413,8 +400,7 @@ def identities_of(crossing: Crossing, bank: Bank) -> Identities:
     """Tracks against vessels at every `EVERY`-th image; visible is who was detected in it."""
     count = len(bank.images)
     shown = np.zeros((count, 2), bool)
-    own = crossing.boat != NONE
-    shown[np.searchsorted(bank.images, crossing.looks.image)[own], crossing.boat[own]] = True
+    shown[np.searchsorted(bank.images, crossing.looks.image), crossing.boat] = True
     ignored = np.zeros(2, bool)
     scans = []
     for row in range(0, count, EVERY):

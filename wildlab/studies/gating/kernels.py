@@ -139,8 +139,8 @@ def associate_runs(
     Parameters
     ----------
     gate, update
-        By what detections are associated (`BOTH`: the sum of the distances by pixels and by angles), and by what
-        the track is updated.
+        By what detections are associated (`BOTH`: the sum of the distances by pixels and by angles), and
+        by what the track is updated.
     assigned
         Whether with the detection that was associated, else with the main object's.
     A, p_nc, R_nc

@@ -49,8 +49,8 @@ R_FORM = {
     "angles": np.diag(np.radians([6.0, 3.0]) ** 2),
 }
 
-#: Not printed. Process noise of H (6.1), m/s^2: that of the slow vessel of H 6.4.2, the same 10 m of noise beside
-#: it. The iterations before association begins are as far apart as the images.
+#: Not printed. Process noise of H (6.1), m/s^2: that of the slow vessel of H 6.4.2, beside the same 10 m of
+#: noise. The iterations before association begins are as far apart as the images.
 SD_ACCELERATION = 0.01
 
 #: Normal draws of a run: targets, start, warm-up, poses and pixels.
