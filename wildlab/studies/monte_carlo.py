@@ -58,8 +58,7 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
     """Record medians over flights, as their range what `bounds_of` gives, and the flights below the print.
 
     A signed mean that is published is recorded by its size as well, which is what it is compared by where
-    the thesis does not define its sign. A quantity that only the flight drawn has, which stands first, is
-    recorded from that one alone.
+    the thesis does not define its sign.
 
     Parameters
     ----------
@@ -77,9 +76,6 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         if unit is None:
             continue
         values, printed = spread[subject, name], report.printed(name, subject)
-        if len(values) > 1 and values.notna().sum() == 1 and np.isfinite(values.iloc[0]):
-            report.metric(name, subject, values.iloc[0], unit, n=1, flights=1)
-            continue
         if printed is not None and printed["kind"] == SHARE_OF_IMAGES:
             share, images = pooled_share(spread, subject, name)
             if images:

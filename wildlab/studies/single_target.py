@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.pose_noise import VARIATIONS
 from wildlab.analysis.tracks.sighting import Sighting
 from wildlab.evaluation.consistency import innovation_whiteness
 from wildlab.reporting.charts.tracks import (
@@ -32,7 +31,7 @@ Array = NDArray[np.float64]
 
 #: Lags of the autocorrelations, in detections: eight seconds of uninterrupted images.
 LAGS = 60
-#: Columns of `filters_table` besides the filter and its detections.
+#: Columns of `filters_table` besides the filter.
 COLUMNS = ("mae", "nees", "nis")
 
 
@@ -134,19 +133,10 @@ def correlation_figure(
 
 
 def filters_table(runs: pd.DataFrame, names: Mapping[str, str], filters: Sequence[str]) -> pd.DataFrame:
-    """Medians over flights of filters and of the noise variations of the first: ``filter``, ``detections``
-    that it was given, and `COLUMNS`. What was computed on the flight drawn alone has that one's numbers."""
+    """Medians over flights, a row for each filter."""
     middle = runs.median()
-    every = [*filters, *(f"{filters[0]}-{name}" for name in VARIATIONS)]
     return pd.DataFrame(
-        [
-            {
-                "filter": names[who],
-                "detections": middle.get((who, "detections"), middle["measurements", "detections"]),
-                **{name: middle[who, name] for name in COLUMNS},
-            }
-            for who in every
-        ]
+        [{"filter": names[who], **{name: middle[who, name] for name in COLUMNS}} for who in filters]
     )
 
 

@@ -26,7 +26,6 @@ from wildlab.studies.linear_vs_nonlinear.trial import (
     every_of,
     fly_sighting,
     lag1,
-    numbers_beside,
     numbers_of,
     remembered,
     start_on_detections,
@@ -163,8 +162,7 @@ def beginnings(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
 
 
 def trial(seed: int, *, twin: str) -> Numbers:
-    """One simulated flight with the observer's poses through the three filters; `numbers_of` and
-    `numbers_beside` name the numbers.
+    """One simulated flight with the observer's poses through the three filters, by `numbers_of`.
 
     Raises
     ------
@@ -174,8 +172,7 @@ def trial(seed: int, *, twin: str) -> Numbers:
     tuning = tuning_of(twin)
     _, seen = fly_sighting(twin, seed, OBSERVER)
     tracks = track_target(seen, tuning)
-    beside = numbers_beside(seen, tuning.cv, "cv", tracks["cv"])
-    return numbers_of(seen, tracks | track_varied(seen, tuning)) | beginnings(seen, tracks) | beside
+    return numbers_of(seen, tracks | track_varied(seen, tuning)) | beginnings(seen, tracks)
 
 
 def check_claims(spread: pd.DataFrame) -> dict[str, Check]:

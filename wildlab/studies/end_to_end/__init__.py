@@ -32,7 +32,7 @@ from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
 
 #: Of the detections' numbers: shares, shown in per cent, and decimals of the others.
-SHARES = ("detection_rate", "ellipse_coverage_90", "ground_coverage_90_true_poses", "ground_coverage_90")
+SHARES = ("detection_rate", "ellipse_coverage_90")
 DECIMALS = {"false_alarms_per_image": 3}
 
 

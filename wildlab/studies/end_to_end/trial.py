@@ -13,15 +13,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.georeference import observe, pose_errors
 from wildlab.analysis.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
 from wildlab.analysis.tracks.sighting import Sighting, sighting
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import inside_ellipse
-from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
-from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
+from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
 from wildlab.studies.coloured_noise import trial as coloured
@@ -30,9 +28,6 @@ from wildlab.studies.linear_vs_nonlinear import trial as filters
 Array = NDArray[np.float64]
 Numbers = dict[tuple[str, str], float]
 
-#: Standard deviation of the height of a visible centre above the water, as a share of the object's length:
-#: half of a freeboard of a tenth. Chosen.
-RISE = 0.05
 #: The twin's own detections, and those of rendered images.
 DRAWN, RENDERED = "drawn", "rendered"
 KINDS = (DRAWN, RENDERED)
@@ -53,8 +48,7 @@ MARGIN = 48
 PIXEL_UNITS = {
     "pixel_rms": "px", "bias_ahead": "px", "bias_right": "px", "pixel_sd": "px",
     "detection_rate": "1", "false_alarms_per_image": "1", "images": "1",
-    "ellipse_coverage_90": "1", "ground_coverage_90_true_poses": "1", "ground_coverage_90": "1",
-    "stated_sd": "px",
+    "ellipse_coverage_90": "1",
 }  # fmt: skip
 
 
@@ -176,43 +170,10 @@ def detection_numbers(pair: FlightPair, twin: str, seed: int) -> Numbers:
     marks = pair.marks
     found = marks.found & np.isfinite(marks.centre).all(axis=1)
     off = (marks.uv - marks.centre)[found]
-    predicted = np.sqrt(np.trace(marks.covariance[found], axis1=1, axis2=2))
     return result | {
         (RENDERED, "false_alarms_per_image"): float(marks.false.mean()),
         (RENDERED, "ellipse_coverage_90"): float(inside_ellipse(off, marks.covariance[found], 0.9).mean()),
-        (RENDERED, "stated_sd"): float(np.median(predicted)),
-        (RENDERED, "ground_coverage_90_true_poses"): float(_inside_with_true_poses(pair, twin, seed).mean()),
-        (RENDERED, "ground_coverage_90"): float(_inside_as_flown(pair, source_of(twin)).mean()),
     }
-
-
-def _inside_with_true_poses(pair: FlightPair, twin: str, seed: int) -> NDArray[np.bool_]:
-    """(K,) whether the detector's ellipses, put on the water by true poses, hold the true target."""
-    rows = pair.marks.found
-    scenes, exposure = pair.camera.flight, pair.marks.exposure[rows]
-    poses = scenes.poses.take(exposure)
-    uv, plane = pair.marks.uv[rows], np.zeros(int(rows.sum()))
-    body = scenes.bodies(int(exposure[0]))[0]
-    length = float(np.ptp([x for layer in body.layers for x, _ in layer.outline]))
-    errors = PoseErrors(
-        pair.marks.covariance[rows], np.zeros((6, 6)), np.zeros((3, 3)), (RISE * length) ** 2
-    )  # fmt: skip
-    found = ground_covariance(poses, uv, plane, errors, np.random.default_rng(0))
-    truth = target_path(load_twin(twin).targets[0], seed)(scenes.times[exposure])
-    off = georeference_pixels(poses, uv, plane)[:, :2] - truth[:, :2]
-    return np.asarray(inside_ellipse(off, found.covariance, 0.9))
-
-
-def _inside_as_flown(pair: FlightPair, source: str) -> NDArray[np.bool_]:
-    """(K,) whether the ellipses with the flight's own poses and their reported errors hold the receiver."""
-    flight = pair.flights[RENDERED]
-    seen = observe(flight, source)
-    errors = pose_errors(seen)._replace(pixel=pair.marks.covariance[pair.marks.found])
-    found = ground_covariance(seen.poses, seen.uv, seen.plane_down, errors, np.random.default_rng(0))
-    own = pair.seen[RENDERED]
-    off = (own.truth[:, :2] - own.positions)[own.seen]
-    known = np.isfinite(off).all(axis=1)
-    return np.asarray(inside_ellipse(off[known], found.covariance[known], 0.9))
 
 
 def track_numbers(seen: Sighting, twin: str) -> Numbers:
@@ -227,7 +188,6 @@ def track_numbers(seen: Sighting, twin: str) -> Numbers:
         tracks = coloured.track_target(seen, tuning)
         result |= filters.numbers_of(seen, tracks | coloured.track_varied(seen, tuning))
         result |= coloured.beginnings(seen, tracks)
-        result |= filters.numbers_beside(seen, tuning.cv, "cv", tracks["cv"])
     return result
 
 

@@ -1,8 +1,7 @@
 """Tracking on the ground against tracking in the image: H 6.4.2, on two flights.
 
 The same detections, poses and tuning go through the Kalman filter on georeferenced positions (``kf``) and the
-extended one on pixels (``ekf``); and, beyond the thesis, through an unscented filter (``ukf``) and
-interacting multiple models (``imm``) on pixels.
+extended one on pixels (``ekf``); and, beyond the thesis, through an unscented filter on pixels (``ukf``).
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.navigate import navigate_observer
-from wildlab.analysis.pose_noise import follow_variations
 from wildlab.analysis.tracks.sighting import (
     CvTuning,
     Scored,
@@ -33,8 +31,8 @@ from wildlab.evaluation.consistency import white_bound
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.filters import run_imm, run_unscented
-from wildlab.tracking.motion import Motion, constant_velocity, in_steps
+from wildlab.tracking.filters import run_unscented
+from wildlab.tracking.motion import Motion, in_steps
 from wildlab.tracking.run import Start, Track
 from wildlab.tracking.sensors import Sensor, pixels
 
@@ -58,17 +56,10 @@ class Case(NamedTuple):
 
 CASES = {"fast-vessel": Case(OBSERVER, FAST), "slow-vessel-eight": Case(AUTOPILOT, SLOW)}
 
-#: The IMM's second mode, beside the thesis's own: a small boat that opens its throttle or turns, m/s^2, and
-#: how long it goes straight and how long it manoeuvres, s. Chosen, before any run, for small boats at large.
-MANOEUVRE_M_S2 = 0.5
-MEAN_STAY_S = (60.0, 10.0)
-
 #: Elements of the innovation, by subject.
-AXES = {subject: ("u", "v") for subject in ("ekf", "ukf", "imm")} | {"kf": ("north", "east")}
-#: The thesis's two filters, and those beside them.
-PUBLISHED, BESIDE = ("kf", "ekf"), ("ukf", "imm")
-#: Those that every flight goes through; the others only the one that is drawn.
-EVERYWHERE = ("kf", "ekf", "ukf")
+AXES = {"kf": ("north", "east"), "ekf": ("u", "v"), "ukf": ("u", "v")}
+#: The thesis's two filters, and all.
+PUBLISHED, SUBJECTS = ("kf", "ekf"), ("kf", "ekf", "ukf")
 #: Units of the numbers that `evaluate_track` gives, without those of the innovations' autocorrelation.
 UNITS = {
     "mean_north": "m",
@@ -161,18 +152,6 @@ def _unscented(seen: Sighting, tuning: CvTuning) -> Track:
     )  # fmt: skip
 
 
-def _interacting(seen: Sighting, tuning: CvTuning) -> Track:
-    rows, sensor = detections_of(seen)
-    motions = [
-        as_in_frames(seen, partial(constant_velocity, sd_acceleration=sd))
-        for sd in (tuning.acceleration, MANOEUVRE_M_S2)
-    ]
-    return run_imm(
-        seen.times[rows], seen.uv[rows], np.eye(2) * tuning.pixel**2, sensor, motions, MEAN_STAY_S,
-        start_on_detections(seen, tuning), output_times=seen.times,
-    ).track  # fmt: skip
-
-
 def start_on_detections(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
     """As `wildlab.analysis.tracks.sighting.start`, its row counted among the detections alone."""
     rows = np.flatnonzero(seen.seen)
@@ -184,16 +163,15 @@ FILTERS: dict[str, Callable[[Sighting, CvTuning], Track]] = {
     "kf": follow_positions,
     "ekf": follow_pixels,
     "ukf": _unscented,
-    "imm": _interacting,
 }
 
 
 def track_target(
-    seen: Sighting, tuning: CvTuning, subjects: tuple[str, ...] = (*PUBLISHED, *BESIDE)
+    seen: Sighting, tuning: CvTuning, subjects: tuple[str, ...] = SUBJECTS
 ) -> dict[str, ScoredTrack]:
     """A sighting through the filters of these names.
 
-    The unscented filter and the multiple models run over the detections alone, with `as_in_frames`.
+    The unscented filter runs over the detections alone, with `as_in_frames`.
     """
     tracks = {subject: FILTERS[subject](seen, tuning) for subject in subjects}
     return {
@@ -211,23 +189,8 @@ def numbers_of(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
     return result | {("measurements", name): value for name, value in measured.items()}
 
 
-def numbers_beside(seen: Sighting, tuning: CvTuning, base: str, base_track: ScoredTrack) -> Numbers:
-    """Numbers of a filter on the ground with the noise that H 8.2 proposes, and with fewer detections.
-
-    The subjects are ``base`` and one of `wildlab.analysis.pose_noise.VARIATIONS`; ``detections`` says
-    how many each was given. ``base_track`` is what the filter itself made of the sighting.
-    """
-    result: Numbers = {}
-    for name, (given, track) in follow_variations(seen, tuning, base_track.track).items():
-        who = f"{base}-{name}"
-        result |= {(who, key): value for key, value in evaluate_track(seen, track).numbers.items()}
-        result[who, "detections"] = float(given.seen.sum())
-    return result
-
-
 def trial(seed: int, *, twin: str, beside: str) -> Numbers:
-    """One simulated flight through all filters but the multiple models, which take seconds; see `numbers_of`
-    and `numbers_beside`.
+    """One simulated flight through all filters; see `numbers_of`.
 
     Where ``beside`` names the twin of the other flight, its innovations' mean autocorrelation at lag one, on
     a flight of the same seed, is the number ``lag1`` of ``beside``.
@@ -239,8 +202,7 @@ def trial(seed: int, *, twin: str, beside: str) -> Numbers:
     """
     case = case_of(twin)
     _, seen = fly_sighting(twin, seed, case.source)
-    tracks = track_target(seen, case.tuning, EVERYWHERE)
-    found = numbers_of(seen, tracks) | numbers_beside(seen, case.tuning, "kf", tracks["kf"])
+    found = numbers_of(seen, track_target(seen, case.tuning))
     if beside:
         case = case_of(beside)
         _, seen = fly_sighting(beside, seed, case.source)
