@@ -15,7 +15,7 @@ from wildlab.detection.warm import Warm, find_warm
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.labels import read_labels
-from wildlab.studies.wildlife_detection.trial import CONSTANT, ENHANCED, METHODS, SUBTRACTED, read_as
+from wildlab.studies.wildlife_detection.trial import CONSTANT, ENHANCED, METHODS, SUBTRACTED
 
 pytestmark = pytest.mark.slow
 
@@ -49,5 +49,5 @@ def test_subtraction_and_enhancement_beat_a_constant_threshold_by_night_and_day_
         assert dark[name].f1.low > dark[CONSTANT].f1.high
         assert judged(day, METHODS[name]).f1.high < dark[name].f1.estimate
         # The reading of "level" that rendered images of other seeds favour is the better one here, too.
-        floor = judged(night, read_as(METHODS[name], "floor"))
+        floor = judged(night, replace(METHODS[name], level_is="floor"))
         assert floor.f1.estimate < dark[name].f1.estimate

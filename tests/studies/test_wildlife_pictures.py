@@ -14,16 +14,13 @@ from wildlab.simulation.scene import (
     tree,
 )
 from wildlab.simulation.scene.drawn import LandDraw, draw_layout
-from wildlab.studies import wildlife_detection
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (
-    ADAPTIVE,
     CONSTANT,
     METHODS,
     SUBTRACTED,
     find,
     judge,
-    read_as,
 )
 
 
@@ -62,18 +59,6 @@ def test_a_detection_much_larger_than_the_animal_is_not_of_it():
     picture = picture_of(rhino())
     found = find(picture, METHODS[CONSTANT])
     assert judge(picture, replace(found, area=found.area * 5)).counts.tolist() == [0, 1, 1]
-
-
-def test_readings_are_what_they_are_called():
-    base = METHODS[SUBTRACTED]
-    assert read_as(base, "offset") == base
-    assert read_as(base, "floor").level_is == "floor"
-    assert read_as(base, "white").level == 0
-    assert read_as(base, "off-mean").level == -65
-    # Taken off the mean, everything is above.
-    picture = picture_of(rhino())
-    assert wildlife_detection.above(picture, read_as(METHODS[ADAPTIVE], "off-mean")).all()
-    assert not wildlife_detection.above(picture, METHODS[ADAPTIVE]).all()
 
 
 def test_what_is_proposed_follows_from_the_ground():

@@ -198,7 +198,7 @@ def start(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
     return start_from_first(seen.times, seen.positions, tuning.position_0, tuning.velocity_0, n, **more)
 
 
-def follow_positions(seen: Sighting, tuning: CvTuning, R: ArrayLike | None = None) -> Track:
+def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
     """The Kalman filter on georeferenced detections, H 6.2.
 
     Parameters
@@ -207,8 +207,6 @@ def follow_positions(seen: Sighting, tuning: CvTuning, R: ArrayLike | None = Non
         From `sighting`.
     tuning
         Its ``pixel`` is not used.
-    R
-        (N, 2, 2) m^2, noise of each detection in place of the tuning's ``measurement``.
 
     Returns
     -------
@@ -223,8 +221,7 @@ def follow_positions(seen: Sighting, tuning: CvTuning, R: ArrayLike | None = Non
     >>> track.x.shape == (len(seen.times), 4)
     True
     """
-    noise = np.eye(2) * tuning.measurement**2 if R is None else np.asarray(R, float)
-    return _compiled(seen, seen.positions, noise, tuning, None, None)
+    return _compiled(seen, seen.positions, np.eye(2) * tuning.measurement**2, tuning, None, None)
 
 
 def follow_pixels(seen: Sighting, tuning: CvTuning) -> Track:

@@ -22,7 +22,6 @@ from wildlab.studies.crossing_vessels.trial import (
     BOATS,
     DISTANCE,
     FEATURES,
-    JOINT,
     LOOKS,
     NAMES,
     SEPARATIONS,
@@ -80,8 +79,8 @@ def rules_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
     return pd.DataFrame(
         [
             {"rule": names[rule], "swapped": 100 * float(runs[rule, "swapped"].mean())}
-            | {name: float(runs[rule, name].median()) if (rule, name) in runs else np.nan for name in medians}
-            for rule in (*SUBJECTS, JOINT)
+            | {name: float(runs[rule, name].median()) for name in medians}
+            for rule in SUBJECTS
         ]
     )
 

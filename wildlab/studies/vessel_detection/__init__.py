@@ -30,7 +30,7 @@ from wildlab.studies.monte_carlo import pooled_share
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
 from wildlab.studies.vessel_detection import trial
-from wildlab.studies.vessel_detection.trial import CUT, SHIP, WHOLE, Image, numbers_of, tally
+from wildlab.studies.vessel_detection.trial import CUT, SHIP, WHOLE, Image
 
 #: Heights of the sweep over kinds, m, and for which of them the smallest area of 50 px is.
 HEIGHTS = (25.0, 50.0, 100.0, 150.0, 200.0, 300.0, 400.0)
@@ -148,48 +148,6 @@ def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
                 view = render(Scene(sea), camera, poses.p_nc, poses.R_nc)
                 alarmed += bool(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
             rows.append({"wind": wind, "glint": glint, "found": alarmed / draws, "draws": draws})
-    return pd.DataFrame(rows)
-
-
-#: What H leaves open, another way each.
-READINGS: dict[str, FloatingThresholds] = {
-    "as chosen": FloatingThresholds(),
-    "8 bits stretched over each image": FloatingThresholds(scaling="stretched"),
-    "only the gradient in 8 bits, of counts": FloatingThresholds(scaling="counts"),
-    "gradient divided by its largest": FloatingThresholds(clipping="normalised"),
-    "8 bits over 2 K": FloatingThresholds(smallest_range_k=2.0),
-    "8 bits over 8 K": FloatingThresholds(smallest_range_k=8.0),
-    "Prewitt operator divided by three": FloatingThresholds(gradient_gain=1 / 3),
-    "hardly smoothed (3 px)": FloatingThresholds(smoothing_size=3, smoothing_sd=0.8),
-    "smoothed more (9 px)": FloatingThresholds(smoothing_size=9, smoothing_sd=2.0),
-    "area of the filled blob": FloatingThresholds(area_of="filled"),
-    "nested by contours, not by boxes": FloatingThresholds(nested="contours"),
-    "open contours not closed at the border": FloatingThresholds(close_at_border=False),
-}
-
-
-def over_readings(images: list[Image]) -> pd.DataFrame:
-    """The same images with each of `READINGS`.
-
-    Returns
-    -------
-    DataFrame
-        ``reading``; ``ship`` and ``boats`` found, % of images, ``false`` alarms per image, ``pieces`` per
-        ship.
-    """
-    rows = []
-    for reading, thresholds in READINGS.items():
-        objects, frames = tally(images, thresholds)
-        numbers = numbers_of(objects, frames)
-        rows.append(
-            {
-                "reading": reading,
-                "ship": 100 * numbers[SHIP, "detection_rate"],
-                "boats": 100 * numbers[WHOLE, "detection_rate"],
-                "false": float(frames["false"].mean()),
-                "pieces": numbers[SHIP, "pieces"],
-            }
-        )
     return pd.DataFrame(rows)
 
 

@@ -39,10 +39,7 @@ from wildlab.studies.wildlife_detection.trial import (
     NOON,
     NOT_HOT,
     OVER_MEAN,
-    PRINTED,
     PROPOSED,
-    READ_AT,
-    READINGS,
     SMALL,
     SUBTRACTED,
     VIEWS,
@@ -51,7 +48,6 @@ from wildlab.studies.wildlife_detection.trial import (
     Picture,
     find,
     judge,
-    read_subject,
 )
 
 Array = NDArray[np.float64]
@@ -289,24 +285,14 @@ def f1_by_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     return finish(fig, "", "height above the ground", "F1")
 
 
-def tables(runs: pd.DataFrame, names: Mapping[str, str]) -> dict[str, pd.DataFrame]:
-    """F1 of every method by weather, and of the printed settings by what their level may mean."""
+def methods_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """F1 of every method by weather."""
     methods = [
         {"method": names[method]}
         | {weather: _ranged(rates_of(runs, method, places([weather])).f1) for weather in WEATHERS}
         for method in (*METHODS, *PROPOSED)
     ]
-    heights = [str(height) for height in READ_AT]
-    readings = [
-        {"reading": names[reading]}
-        | {one: _ranged(rates_of(runs, read_subject(one, reading), heights).f1) for one in PRINTED}
-        | {
-            when: _ranged(rates_of(runs, read_subject(ADAPTIVE, reading), [when]).f1)
-            for when in ("before", "after")
-        }
-        for reading in READINGS
-    ]
-    return {"methods": pd.DataFrame(methods), "readings": pd.DataFrame(readings)}
+    return pd.DataFrame(methods)
 
 
 def _counted(ax: Axes, picture: Picture, method: str, names: Mapping[str, str]) -> None:

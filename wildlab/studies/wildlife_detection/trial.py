@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,8 @@ HERD = replace(VIEWS[30], animals=(14, 20), kinds=("rhinoceros",))
 #: F's methods with F's numbers (figures 7.5 to 7.11). F calls the number of an adaptive threshold "val" where
 #: it stands alone, as that of a constant one, and "level" after subtraction or enhancement. On seeds 101 to
 #: 108, which no study uses, "val" finds more as a floor (F1 .83, else .45), "level" as an offset from the
-#: mean of the block (.93 and .68, else .62 and .67); `READINGS` are tried on all seeds. Blocks of 51 and of
-#: 251 without a level have that of figure 7.10a here.
+#: mean of the block (.93 and .68, else .62 and .67). Blocks of 51 and of 251 without
+#: a level have that of figure 7.10a here.
 CONSTANT, ADAPTIVE, SMALL, LARGE = "constant", "adaptive", "adaptive-51", "adaptive-251"
 SUBTRACTED, ENHANCED = "subtracted", "enhanced"
 #: `ADAPTIVE` with its level read the other way. As a floor of 150 it is hardly more than `CONSTANT`: the mean
@@ -85,14 +85,6 @@ METHODS = {
 }
 PROPOSED = (BY_SIZE, BY_BLOCK, NOT_HOT)
 SUBJECTS = (*METHODS, *PROPOSED)
-#: What the three images with a printed level are, for the readings of that level.
-PRINTED = (ADAPTIVE, SUBTRACTED, ENHANCED)
-#: What the level of an adaptive threshold may be: beside `Warm.level_is`, the number that white gets in
-#: OpenCV (``maxValue``, of no effect), and what OpenCV takes off the mean (``C``).
-READINGS = ("floor", "offset", "white", "off-mean")
-#: At which heights they are tried, under clouds.
-READ_AT = (15, 30)
-
 #: Area of an animal from above, m^2: half a small antelope's, twice a rhinoceros'.
 AREA = (0.2, 8.0)
 #: The hottest that the mean of an animal can be, K: that of its blood.
@@ -204,11 +196,6 @@ def above(picture: Picture, thresholds: Warm) -> NDArray[np.bool_]:
     return np.asarray(grey_above(grey, thresholds), bool)
 
 
-def read_subject(method: str, reading: str) -> str:
-    """What a setting in a reading is called in the numbers."""
-    return f"{method}-{reading}"
-
-
 def proposed(name: str, picture: Picture, camera: Camera, response: CameraResponse) -> Warm:
     """One of `PROPOSED` for a picture."""
     base, focal = METHODS[SUBTRACTED], float(np.sqrt(camera.fx * camera.fy))
@@ -218,16 +205,6 @@ def proposed(name: str, picture: Picture, camera: Camera, response: CameraRespon
     if name == BY_BLOCK:
         return replace(base, block_px=block_from_distance(picture.distance, focal))
     return replace(base, hottest=float(to_counts(HOTTEST, response)))
-
-
-def read_as(thresholds: Warm, reading: str) -> Warm:
-    """The same with its level read as one of `READINGS`."""
-    if reading == "white":
-        return replace(thresholds, level=0.0, level_is="floor")
-    if reading == "off-mean":
-        return replace(thresholds, level=-thresholds.level, level_is="offset")
-    kind: Literal["floor", "offset"] = "offset" if reading == "offset" else "floor"
-    return replace(thresholds, level_is=kind)
 
 
 class Operator(NamedTuple):
@@ -313,7 +290,7 @@ def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
     Returns
     -------
     dict
-        By (method, ``found_WEATHER_HEIGHT``) and so on; readings are subjects of their own.
+        By (method, ``found_WEATHER_HEIGHT``).
     """
     operator = operator_of(twin, seed)
     return numbers_of(operator, take_pictures(operator, seed))
@@ -339,16 +316,9 @@ def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], 
         left = background_left(picture)
         numbers[SUBTRACTED, f"background_{at}"], numbers[ENHANCED, f"background_{at}"] = left
     for name, picture in zip(("before", "after"), pictures.sequence, strict=True):
-        for method in (CONSTANT, *PRINTED, BY_MEAN, BY_MEDIAN):
+        for method in (CONSTANT, OVER_MEAN):
             tally(method, name, picture, METHODS[method])
         numbers["ground", f"level_{name}"] = float(np.median(picture.grey[picture.view.labels == 0]))
-    read = {str(height): pictures.plain[CLOUDY, height] for height in READ_AT}
-    sequence = dict(zip(("before", "after"), pictures.sequence, strict=True))
-    for reading in READINGS:
-        for method in PRINTED:
-            of = read | sequence if method == ADAPTIVE else read
-            for at, picture in of.items():
-                tally(read_subject(method, reading), at, picture, read_as(METHODS[method], reading))
     near = pictures.plain[CLOUDY, min(VIEWS)]
     for method in (SMALL, LARGE):
         numbers[method, "pieces_offset_65"] = pieces_of(near, METHODS[method])
