@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
@@ -12,7 +10,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.reporting.report import open_report
 from wildlab.simulation.twins import simulate_twin
@@ -20,7 +18,6 @@ from wildlab.studies.gating import (
     DEFAULT,
     READINGS,
     claim_margins,
-    kernels,
     metrics_of,
     standard_error,
     subject,
@@ -39,24 +36,6 @@ from wildlab.studies.gating.monte_carlo import (
     overflight,
     streams,
 )
-from wildlab.tracking.sensors import Prediction, predict_pixel, target_in_camera
-
-
-def predict_azimuth_elevation(position, poses, plane_down) -> Prediction:
-    """Azimuth and elevation in c, H (6.9), with their derivatives: what the kernels are held against."""
-    inner = target_in_camera(position, poses, plane_down)
-    x, y, z = np.moveaxis(inner.z, -1, 0)
-    seen = (z > 0) & (x * x + y * y > 0)
-    x, y, z = (np.where(seen, v, np.nan) for v in (x, y, z))
-    level2 = x * x + y * y
-    level, range2 = np.sqrt(level2), level2 + z * z
-    J = np.zeros((*level.shape, 2, 3))
-    J[..., 0, 0], J[..., 0, 1] = -y / level2, x / level2
-    J[..., 1, 0], J[..., 1, 1] = -z * x / (level * range2), -z * y / (level * range2)
-    J[..., 1, 2] = level / range2
-    angles = np.stack([np.arctan2(y, x), np.arctan2(z, level)], axis=-1)
-    return Prediction(angles, J @ inner.H_position, J @ inner.H_pose)
-
 
 FEEDS = ("own", "assigned")
 
@@ -174,43 +153,15 @@ def test_pixels_and_angles_as_written_out(over, form, feed, angles_update):
             P = P - K @ H @ P
 
 
-def test_what_is_expected_is_what_tracking_expects():
-    """Measurements and derivatives of any camera, against the room that filters use."""
-    rng = np.random.default_rng(3)
-    camera = Camera(640, 512, 700.0, 690.0, 310.0, 260.0, skew=3.0)
-    A = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
-    for _ in range(20):
-        R = euler_to_matrix(*rng.normal(0, 0.4, 3))
-        p, at = np.append(rng.normal(0, 30, 2), -100.0), rng.normal(0, 30, 2)
-        poses = CameraPoses.at_lens(camera, p, R, np.eye(3))
-        for form, predict in ((kernels.PIXELS, predict_pixel), (kernels.ANGLES, predict_azimuth_elevation)):
-            want = predict(at, poses, 0.0)
-            found = kernels.expected(form, *at, p, R, A)
-            np.testing.assert_allclose(found[:2], want.z, rtol=1e-10)
-            np.testing.assert_allclose(found[2:], want.H_position.ravel(), rtol=1e-9)
-
-
 def test_what_is_behind_the_lens_or_on_its_axis_is_not_expected():
-    A, down, p = np.array([700.0, 700.0, 320.0, 256.0, 0.0]), np.eye(3), np.array([0.0, 0.0, -100.0])
-    up = np.diag([1.0, -1.0, -1.0])
-    for form in (kernels.PIXELS, kernels.ANGLES):
-        assert np.isnan(kernels.expected(form, 5.0, 5.0, p, up, A)).all()
-    assert np.isnan(kernels.expected(kernels.ANGLES, 0.0, 0.0, p, down, A)).all()
-    assert np.isfinite(kernels.expected(kernels.PIXELS, 0.0, 0.0, p, down, A)).all()
-    nan = np.nan
-    assert [kernels.nearest(np.array(d)) for d in ((1.0, 2.0), (2.0, 1.0), (nan, 9.0), (nan, nan))] == [
-        0,
-        1,
-        1,
-        -1,
-    ]
-
-
-def test_a_camera_that_distorts_is_refused(over):
-    camera = replace(over.poses.camera, distortion=(0.1, 0.0, 0.0, 0.0, 0.0))
-    bent = replace(over, poses=replace(over.poses, camera=camera))
-    with pytest.raises(WildlabError, match="distorts"):
-        gate(bent, Choices(), streams(1, 2))
+    camera = Camera(640, 512, 700.0, 700.0, 320.0, 256.0)
+    at, p = np.array([[5.0, 5.0], [0.0, 0.0]]), np.array([0.0, 0.0, -100.0])
+    down, up = (CameraPoses.at_lens(camera, p, R, np.eye(3)) for R in (np.eye(3), np.diag([1.0, -1.0, -1.0])))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for form in ("pixels", "angles"):
+            assert np.isnan(gating.expected(form, at, up)[0]).all()
+        assert np.isnan(gating.expected("angles", at, down)[0]).any(axis=1).tolist() == [False, True]
+    assert np.isfinite(gating.expected("pixels", at, down)[0]).all()
 
 
 def test_without_noise_and_far_apart_nothing_goes_wrong(over, monkeypatch):

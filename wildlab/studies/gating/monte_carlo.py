@@ -20,14 +20,19 @@ from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import Mount
-from wildlab.studies.gating import kernels
+from wildlab.tracking.association import innovation_squared
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.sensors import azimuth_elevation_of_pixel, on_state
+from wildlab.tracking.sensors import (
+    azimuth_elevation_of_pixel,
+    difference,
+    on_state,
+    predict_pixel,
+    target_in_camera,
+)
 
 #: The three forms of H table 6.6, in its order.
 FORMS = ("position", "pixels", "angles")
@@ -197,13 +202,7 @@ def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> GatingSc
 
 
 def gate(over: Overflight, choices: Choices, runs: list[np.random.SeedSequence]) -> Gated:
-    """Every image of every run, associated by each of `GATES`. Keeps everything: for some 1000 runs.
-
-    Raises
-    ------
-    WildlabError
-        If the camera distorts.
-    """
+    """Every image of every run, associated by each of `GATES`. Keeps everything: for some 1000 runs."""
     return _gate(draw_scene(over, runs), choices)
 
 
@@ -235,11 +234,6 @@ def outcomes(
     -------
     dict
         By the names of ``readings``.
-
-    Raises
-    ------
-    WildlabError
-        If the camera distorts.
     """
     sources = streams(seed, runs)
     parts: dict[str, list[Outcome]] = {name: [] for name in readings}
@@ -273,30 +267,58 @@ def _warm_up(scene: GatingScene) -> tuple[Array, Array]:
     return x, P
 
 
+def expected(form: str, position: Array, poses: CameraPoses) -> tuple[Array, Array]:
+    """Measurements (N, 2) of targets at (N, 2) north and east, H (6.3), (6.4), (6.9), and their derivatives.
+
+    NaN of a target in or behind the plane of the lens, and of an azimuth on its axis.
+    """
+    if form == "position":
+        return position, np.broadcast_to(np.eye(2), (*position.shape, 2))
+    if form == "pixels":
+        return predict_pixel(position, poses, 0.0)[:2]
+    inner = target_in_camera(position, poses, 0.0)
+    level2 = (inner.z[..., :2] ** 2).sum(axis=-1)
+    seen = (inner.z[..., 2] > 0) & (level2 > 0)
+    x, y, z = np.moveaxis(np.where(seen[..., None], inner.z, np.nan), -1, 0)
+    level, range2 = np.sqrt(level2), level2 + z * z
+    azimuth = np.stack([-y, x, 0 * z], axis=-1) / level2[..., None]
+    elevation = np.stack([-z * x / level, -z * y / level, level], axis=-1) / range2[..., None]
+    slopes = np.stack([azimuth, elevation], axis=-2) @ inner.H_position
+    return np.stack([np.arctan2(y, x), np.arctan2(z, level)], axis=-1), slopes
+
+
 def _gate(scene: GatingScene, choices: Choices) -> Gated:
-    camera, p_nc, R_nc = scene.poses.camera, scene.poses.p_nc, scene.poses.R_nc
-    if camera.distorts:
-        raise WildlabError(
-            "the camera distorts, and the simulation of H 6.4.3 knows the pinhole alone",
-            "use a twin whose camera has no distortion",
-            field="camera",
-        )
-    ground = pixel_to_plane(camera, scene.pixels, p_nc[:, :, None], R_nc[:, :, None], 0.0)[..., :2]
-    p_nc, R_nc = np.ascontiguousarray(p_nc), np.ascontiguousarray(R_nc)
-    measured = np.stack([ground, scene.pixels, azimuth_elevation_of_pixel(camera, scene.pixels)])
-    x, P = _warm_up(scene)
+    poses, pixels = scene.poses, scene.pixels
+    lens = poses.p_nc[:, :, None], poses.R_nc[:, :, None]
+    ground = pixel_to_plane(poses.camera, pixels, *lens, 0.0)[..., :2]
+    angles = azimuth_elevation_of_pixel(poses.camera, pixels)
+    measured = dict(zip(FORMS, (ground, pixels, angles), strict=True))
     F, Q = constant_velocity(1 / RATE_HZ, SD_ACCELERATION)
-    A = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
-    noise = np.stack([R_FORM[form] for form in FORMS])
-    N, T = scene.pixels.shape[:2]
-    taken = np.empty((len(GATES), N, T), np.int64)
+    N, T = pixels.shape[:2]
+    right = np.empty((len(GATES), N, T), bool)
     nis, estimate = np.empty((len(GATES), N, T, 2)), np.empty((len(GATES), N, T, 2))
-    with announced("the loop of the study of gating"):
-        for by in range(len(GATES)):
-            angles = by == kernels.ANGLES and choices.angles_update == "angles"
-            update = kernels.ANGLES if angles else min(by, kernels.PIXELS)
-            kernels.associate_runs(
-                by, update, choices.updated_with == "assigned", A, p_nc, R_nc, measured, F, Q, noise, x, P,
-                taken[by], nis[by], estimate[by],
-            )  # fmt: skip
-    return Gated(taken == 0, nis, estimate, ground, scene.targets)
+    for row, by in enumerate(GATES):
+        forms = ("pixels", "angles") if by == "both" else (by,)
+        update = by if by == "position" or (by, choices.angles_update) == ("angles", "angles") else "pixels"
+        x, P = _warm_up(scene)
+        P = np.tile(P, (N, 1, 1))
+        for t in range(T):
+            x, P = predict(x, P, F, Q)
+            here, d = poses.take((slice(None), t)), np.zeros((N, 2))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                for form in forms:
+                    h, H = expected(form, x[:, :2], here)
+                    S = H @ P[:, :2, :2] @ np.swapaxes(H, -1, -2) + R_FORM[form]
+                    v = difference(measured[form][:, t], h[:, None], (form == "angles", False))
+                    d += innovation_squared(v, S[:, None])
+                nearest = np.where(np.isfinite(d), d, np.inf).argmin(axis=1)
+                known = np.isfinite(d).any(axis=1)
+                own = choices.updated_with == "own"
+                z = measured[update][np.arange(N), t, 0 if own else nearest]
+                h, H = expected(update, x[:, :2], here)
+                gap = difference(z, h, (update == "angles", False))
+                step = correct(x, P, gap, on_state(H, 4), R_FORM[update])
+            used = np.isfinite(gap).all(axis=1) & (own | known)
+            x, P = np.where(used[:, None], step.x, x), np.where(used[:, None, None], step.P, P)
+            right[row, :, t], nis[row, :, t], estimate[row, :, t] = known & (nearest == 0), d, x[:, :2]
+    return Gated(right, nis, estimate, ground, scene.targets)
