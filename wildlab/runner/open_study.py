@@ -272,7 +272,8 @@ def trials_table(
                 f"seed {one} has numbers of other names than seed {work.seeds[0]}: {apart}",
                 "let the trial give the same names for each seed, and NaN for what a flight has no value for",
             )
-    tables = [dict(drawn), *(split_keys(values) for values in rows.values() if values is not None)]
+    own = {key: float(value) for key, value in drawn.items()}
+    tables = [own, *(split_keys(values) for values in rows.values() if values is not None)]
     return pd.DataFrame(tables, index=pd.Index([seed, *work.seeds], name="seed"))
 
 

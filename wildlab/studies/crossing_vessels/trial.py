@@ -209,7 +209,7 @@ def again_numbers(
         life = Life(max_age=MAX_AGE_S, likelier=way.likelier)
         bank = run_bank(looks, tuning._replace(life=life), way.rule, appearance)
         found = outcome(looks.image, boat, bank)
-        numbers |= {(subject, name): float(one) for name, one in zip(REACQUIRED_UNITS, found, strict=True)}
+        numbers |= {(subject, name): one for name, one in zip(REACQUIRED_UNITS, found, strict=True)}
     return numbers
 
 
@@ -333,19 +333,19 @@ def numbers_of(crossing: Crossing, banks: dict[str, Bank]) -> Numbers:
         after, end = swapped(crossing, bank)
         anees = [track.anees for track in told.tracks.values() if np.isfinite(track.anees)]
         numbers |= {
-            (subject, "wrong"): float(wrong.sum()),
-            (subject, "unassigned"): float((bank.track < 0).sum()),
-            (subject, "tracks"): float(len(bank.started)),
-            (subject, "swapped"): float(after),
-            (subject, "swapped_at_end"): float(end),
-            (subject, "swaps"): float(told.swaps),
-            (subject, "breaks"): float(told.breaks),
+            (subject, "wrong"): wrong.sum(),
+            (subject, "unassigned"): (bank.track < 0).sum(),
+            (subject, "tracks"): len(bank.started),
+            (subject, "swapped"): after,
+            (subject, "swapped_at_end"): end,
+            (subject, "swaps"): told.swaps,
+            (subject, "breaks"): told.breaks,
             (subject, "gospa"): float(np.mean([one.distance for one in told.gospa])),
-            (subject, "anees"): float(np.median(anees)) if anees else np.nan,
+            (subject, "anees"): np.median(anees) if anees else np.nan,
             (subject, "mae"): float(np.nanmean(own)),
             # Of the vessel with less.
-            (subject, "near_share"): float(np.min(_share_near(own))),
-            (subject, "any_near_share"): float(np.min(_share_near(any_one))),
+            (subject, "near_share"): np.min(_share_near(own)),
+            (subject, "any_near_share"): np.min(_share_near(any_one)),
         }
         for number in (0, 1):
             rate = float(wrong[crossing.boat == number].mean())
@@ -398,8 +398,8 @@ def curve_of(crossing: Crossing, seed: int) -> Numbers:
     for separation in SEPARATIONS:
         bank = follow_by(crossing, FEATURES, made_up(crossing, separation, seed))
         subject = curve_subject(separation)
-        numbers[subject, "wrong"] = float(wrong_of(crossing, bank).sum())
-        numbers[subject, "swapped"] = float(swapped(crossing, bank)[0])
+        numbers[subject, "wrong"] = wrong_of(crossing, bank).sum()
+        numbers[subject, "swapped"] = swapped(crossing, bank)[0]
     return numbers
 
 
@@ -432,7 +432,7 @@ def all_numbers(flown: Flown, seed: int) -> Numbers:
         **again_numbers(crossing.looks, crossing.boat, appearance, TUNING),
         **looks_of(flown.looks),
         **curve_of(flown.crossing, seed),
-        (LOOKS, "closest"): float(np.nanmin(flown.crossing.apart)),
+        (LOOKS, "closest"): np.nanmin(flown.crossing.apart),
     }
 
 

@@ -160,19 +160,19 @@ def detection_numbers(pair: FlightPair, twin: str, seed: int) -> Numbers:
     for kind, errors in pixel_errors(pair, twin, seed)._asdict().items():
         e = errors[np.isfinite(errors).all(axis=1)]
         result |= {
-            (kind, "images"): float(len(errors)),
+            (kind, "images"): len(errors),
             (kind, "detection_rate"): len(e) / len(errors),
-            (kind, "pixel_rms"): float(np.sqrt((e**2).sum(axis=1).mean())),
-            (kind, "bias_ahead"): float(e[:, 0].mean()),
-            (kind, "bias_right"): float(e[:, 1].mean()),
-            (kind, "pixel_sd"): float(np.sqrt((e.std(axis=0) ** 2).sum())),
+            (kind, "pixel_rms"): np.sqrt((e**2).sum(axis=1).mean()),
+            (kind, "bias_ahead"): e[:, 0].mean(),
+            (kind, "bias_right"): e[:, 1].mean(),
+            (kind, "pixel_sd"): np.sqrt((e.std(axis=0) ** 2).sum()),
         }
     marks = pair.marks
     found = marks.found & np.isfinite(marks.centre).all(axis=1)
     off = (marks.uv - marks.centre)[found]
     return result | {
-        (RENDERED, "false_alarms_per_image"): float(marks.false.mean()),
-        (RENDERED, "ellipse_coverage_90"): float(inside_ellipse(off, marks.covariance[found], 0.9).mean()),
+        (RENDERED, "false_alarms_per_image"): marks.false.mean(),
+        (RENDERED, "ellipse_coverage_90"): inside_ellipse(off, marks.covariance[found], 0.9).mean(),
     }
 
 

@@ -318,7 +318,7 @@ def _gate(scene: GatingScene, choices: Choices) -> Gated:
                 h, H = expected(update, x[:, :2], here)
                 gap = difference(z, h, (update == "angles", False))
                 step = correct(x, P, gap, on_state(H, 4), R_FORM[update])
-            used = np.isfinite(gap).all(axis=1) & (own | known)
+            used = np.asarray(np.isfinite(gap).all(axis=1) & (own | known))
             x, P = np.where(used[:, None], step.x, x), np.where(used[:, None, None], step.P, P)
             right[row, :, t], nis[row, :, t], estimate[row, :, t] = known & (nearest == 0), d, x[:, :2]
     return Gated(right, nis, estimate, ground, scene.targets)

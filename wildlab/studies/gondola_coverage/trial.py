@@ -228,13 +228,13 @@ def numbers_of(
     share, cell = share_seen(planned, inside), planned.step**2
     return {
         "seen": share.seen,
-        "near": float(planned.seen[near].mean()),
+        "near": planned.seen[near].mean(),
         "in_sight": float(planned.looks[planned.seen].mean()) * step,
         "ground": float(planned.seen.sum()) * cell,
         "outside": float((planned.seen & ~inside).sum()) * cell,
         "only_blurred": share.only_blurred,
         "held": done.held,
-        "sure": float(done.sure[planned.seen].mean()),
+        "sure": done.sure[planned.seen].mean(),
     }
 
 

@@ -210,10 +210,10 @@ def numbers_of(found: Searched) -> dict[str, float]:
     times = np.sort(np.minimum(found.found, BUDGET_S))
     last = np.arange(1, STATIONS + 1) * BUDGET_S / STATIONS
     return {
-        "half_found": float(times[(len(times) + 1) // 2 - 1]),
-        "all_found": float(times[-1]),
-        "share_found": float(np.isfinite(found.found).mean()),
-        **{f"share_{n + 1}": float((found.found <= at).mean()) for n, at in enumerate(last)},
+        "half_found": times[(len(times) + 1) // 2 - 1],
+        "all_found": times[-1],
+        "share_found": np.isfinite(found.found).mean(),
+        **{f"share_{n + 1}": (found.found <= at).mean() for n, at in enumerate(last)},
     }
 
 
@@ -268,11 +268,11 @@ def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
     """One drawn world, searched by every planner, and one choice of the high-level planner in it."""
     scene, found = search_all(seed, twin)
     numbers = {(who, name): value for who, one in found.items() for name, value in numbers_of(one).items()}
-    numbers[SURVEY, "lost_by_covariance"] = float(survey_rows(seed, scene).lost_by_covariance)
+    numbers[SURVEY, "lost_by_covariance"] = survey_rows(seed, scene).lost_by_covariance
     situation = draw_situation(seed, scene)
     for who, tour in ((GREEDY, situation.greedy), (AHEAD, situation.ahead)):
         numbers[who, "tour_time"] = tour.time
-        numbers[who, "broken_off"] = float(tour.broken_off)
+        numbers[who, "broken_off"] = tour.broken_off
     return numbers
 
 

@@ -203,19 +203,19 @@ def numbers_of_track(taken: Photographs, one: Tracked) -> dict[str, float]:
     off = (one.seen.truth[:, :2] - on_sea)[known]
     e, near = measured[known], np.hypot(*(centres_of(taken, one)[known] - positions).T)
     return {
-        "mean_north": float(e[:, 0].mean()),
-        "mean_east": float(e[:, 1].mean()),
-        "error_of_mean": float(np.hypot(*e.mean(axis=0))),
-        "sd_north": float(positions[:, 0].std(ddof=1)),
-        "sd_east": float(positions[:, 1].std(ddof=1)),
-        "sd_both": float(np.hypot(*positions.std(axis=0, ddof=1))),
-        "mae": float(np.nanmean(distance)),
-        "mae_after_start": float(np.nanmean(distance[later])),
-        "speed_after_start": float(np.nanmean(speed[later])),
+        "mean_north": e[:, 0].mean(),
+        "mean_east": e[:, 1].mean(),
+        "error_of_mean": np.hypot(*e.mean(axis=0)),
+        "sd_north": positions[:, 0].std(ddof=1),
+        "sd_east": positions[:, 1].std(ddof=1),
+        "sd_both": np.hypot(*positions.std(axis=0, ddof=1)),
+        "mae": np.nanmean(distance),
+        "mae_after_start": np.nanmean(distance[later]),
+        "speed_after_start": np.nanmean(speed[later]),
         "time_to_rest": time_to_rest(times, speed),
-        **{f"share_near_{limit}": float((near < limit).mean()) for limit in NEAR_M},
-        "pixel_error": float(np.nanmean(np.hypot(*(marks.uv - marks.centre)[marks.found].T))),
-        "sd_true_poses": float(np.hypot(*off.std(axis=0, ddof=1))),
+        **{f"share_near_{limit}": (near < limit).mean() for limit in NEAR_M},
+        "pixel_error": np.nanmean(np.hypot(*(marks.uv - marks.centre)[marks.found].T)),
+        "sd_true_poses": np.hypot(*off.std(axis=0, ddof=1)),
     }
 
 
@@ -230,9 +230,9 @@ def numbers_of(taken: Photographs, tracked: dict[str, Tracked]) -> Numbers:
     visible = marks.share > 0
     within = tracked[WITH].marks
     return numbers | {
-        (DETECTOR, "detection_rate"): float(marks.found[visible].mean()),
-        (DETECTOR, "share_cut"): float((marks.share[visible] < 1 - 1e-9).mean()),
-        (DETECTOR, "share_moved"): float(within.moved[within.found].mean()),
+        (DETECTOR, "detection_rate"): marks.found[visible].mean(),
+        (DETECTOR, "share_cut"): (marks.share[visible] < 1 - 1e-9).mean(),
+        (DETECTOR, "share_moved"): within.moved[within.found].mean(),
         (DETECTOR, "share_within_5_m"): share_within(tracked),
     }
 

@@ -147,7 +147,7 @@ def trial(seed: int, *, twin: str, views: int) -> dict[tuple[str, str], float]:
         for (subject, what), value in compare(land, drawn).items():
             numbers[subject, f"{what}_{name}"] = value
     grown = grow_trees(land, seed)
-    numbers[TREES, "planted"] = float((grown.height > land.height).mean())
+    numbers[TREES, "planted"] = (grown.height > land.height).mean()
     trees = hidden_by_trees(land, grown, stream(seed, "trees"))
     numbers |= {(TREES, f"hidden_{degrees}deg"): share for degrees, share in trees.items()}
     widths = []
@@ -155,7 +155,7 @@ def trial(seed: int, *, twin: str, views: int) -> dict[tuple[str, str], float]:
         below = [look(land, camera, rng, height, 0.0) for _ in range(views)]
         widths.append(float(np.nanmean([width_on_ground(land, camera, one) for one in below])))
         numbers[VIEW, f"width_{height}m"] = widths[-1]
-    numbers[VIEW, "exponent"] = float(np.polyfit(np.log(HEIGHTS), np.log(widths), 1)[0])
+    numbers[VIEW, "exponent"] = np.polyfit(np.log(HEIGHTS), np.log(widths), 1)[0]
     return numbers
 
 
@@ -211,7 +211,7 @@ def hidden_by_trees(land: Terrain, grown: Terrain, rng: np.random.Generator) -> 
         lenses[~on_map, :2] -= 2 * away[~on_map]
         on_map = ~np.isnan(land.heights_at(lenses[:, :2]))
         seen = on_map & lines_clear(land, points, lenses)
-        found[degrees] = float(1 - lines_clear(grown, points[seen], lenses[seen]).mean())
+        found[degrees] = 1 - lines_clear(grown, points[seen], lenses[seen]).mean()
     return found
 
 

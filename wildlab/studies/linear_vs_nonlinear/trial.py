@@ -185,7 +185,7 @@ def numbers_of(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
     The subject ``measurements`` has those of `evaluate_measurements`, and ``detections``, how many there are.
     """
     result = {(who, name): value for who, one in tracks.items() for name, value in one.scored.numbers.items()}
-    measured = {**evaluate_measurements(seen), "detections": float(seen.seen.sum())}
+    measured = {**evaluate_measurements(seen), "detections": seen.seen.sum()}
     return result | {("measurements", name): value for name, value in measured.items()}
 
 

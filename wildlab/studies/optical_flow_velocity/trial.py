@@ -184,14 +184,14 @@ def readings(looked: Looked) -> dict[str, pd.DataFrame]:
 def velocity_numbers(table: pd.DataFrame) -> dict[str, float]:
     """Means and standard deviations of the velocities of a ship at rest, and whether intervals hold zero."""
     known = table.dropna(subset=["v_north_m_s", "v_east_m_s"])
-    numbers: dict[str, float] = {"pairs": float(len(known))}
+    numbers: dict[str, float] = {"pairs": len(known)}
     inside = []
     for axis, variance in (("north", "cov_nn"), ("east", "cov_ee")):
         v = known[f"v_{axis}_m_s"].to_numpy(float)
-        numbers[f"mean_{axis}"] = float(v.mean()) if len(v) else np.nan
-        numbers[f"sd_{axis}"] = float(v.std(ddof=1)) if len(v) > 1 else np.nan
+        numbers[f"mean_{axis}"] = v.mean() if len(v) else np.nan
+        numbers[f"sd_{axis}"] = v.std(ddof=1) if len(v) > 1 else np.nan
         inside.append(np.abs(v) <= 1.96 * np.sqrt(known[variance].to_numpy(float)))
-    numbers["interval_share_95"] = float(np.mean(inside)) if len(known) else np.nan
+    numbers["interval_share_95"] = np.mean(inside) if len(known) else np.nan
     return numbers
 
 
@@ -200,8 +200,8 @@ def numbers_of(looked: Looked, tables: dict[str, pd.DataFrame]) -> dict[tuple[st
     count, shares = len(looked.shares), looked.shares
     usable = int(((shares[:-1] > 0) & (shares[1:] > 0)).sum())
     numbers = {
-        (IMAGES, "in_view_share"): float((shares > 0).sum() / count),
-        (IMAGES, "whole_share"): float((shares > 1 - 1e-9).sum() / count),
+        (IMAGES, "in_view_share"): (shares > 0).sum() / count,
+        (IMAGES, "whole_share"): (shares > 1 - 1e-9).sum() / count,
         # Of all images of the flight, as if the pairs not looked at were like those that were.
         (IMAGES, "feature_rate"): len(looked.pairs) / looked.tried * usable / count,
     }
@@ -212,7 +212,7 @@ def numbers_of(looked: Looked, tables: dict[str, pd.DataFrame]) -> dict[tuple[st
         numbers |= {(name, key): value for key, value in velocity_numbers(logged[chosen]).items()}
     for axis in "uv":
         pair = logged[[f"flow_{axis}", f"camera_{axis}"]].dropna().to_numpy(float)
-        numbers[LOGGED, f"correlation_{axis}"] = float(np.corrcoef(pair.T)[0, 1])
+        numbers[LOGGED, f"correlation_{axis}"] = np.corrcoef(pair.T)[0, 1]
     return numbers
 
 

@@ -256,11 +256,11 @@ def numbers_of(drop: Drop, errors: Array, camera: Camera, height: float) -> dict
     numbers = {
         (FOUND, "detection_rate"): drop.right / drop.should if drop.should else np.nan,
         (FOUND, "false_alarms_per_image"): drop.false / (drop.looked_at + drop.empty),
-        (FOUND, "pixel_error"): float(np.hypot(*off.T).mean()),
-        (FOUND, "off_centre"): float(np.hypot(*off.mean(axis=0))),
-        (FOUND, "area_share"): float(drop.area_share.mean()),
+        (FOUND, "pixel_error"): np.hypot(*off.T).mean(),
+        (FOUND, "off_centre"): np.hypot(*off.mean(axis=0)),
+        (FOUND, "area_share"): drop.area_share.mean(),
         (FOUND, "few_pixels"): FEW_PX * height / camera.fx,
-        (SINGLE, "median_error"): float(np.median(distance)),
+        (SINGLE, "median_error"): np.median(distance),
         (MEAN, "error"): error_of_mean(errors, len(errors)),
     }
     return numbers | {(MEAN, f"after_{count}"): error_of_mean(errors, count) for count in COUNTS}

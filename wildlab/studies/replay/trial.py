@@ -153,7 +153,7 @@ def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
 def numbers_of(flight: Flight, seed: int) -> dict[tuple[str, str], float]:
     """The numbers of `trial` of a flight."""
     moments = moments_of(flight)
-    numbers = {(kind, "share_of_frames"): float(moments.of(kind).mean()) for kind in (ONE, SINGLE, NONE)}
+    numbers = {(kind, "share_of_frames"): moments.of(kind).mean() for kind in (ONE, SINGLE, NONE)}
     unset, after = clock_errors(flight, off_of(seed))
     return numbers | {(CLOCK, "error_unset"): unset, (CLOCK, "error_set"): after}
 

@@ -259,7 +259,7 @@ def evaluate_nees(seen: Sighting, track: Track, moment: float) -> Scored:
     known = np.flatnonzero(np.isfinite(values))
     numbers = {
         "nees": mean(values),
-        "nees_drawn": float(values[known[int(moment * len(known))]]),
+        "nees_drawn": values[known[int(moment * len(known))]],
         "nees_worth": worth(values),
         "fraction_nees_inside": share_inside(values, BOUNDS),
     }

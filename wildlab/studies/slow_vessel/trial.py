@@ -145,17 +145,17 @@ def summarise_vessel(flight: Flight, scored: dict[str, pd.DataFrame]) -> dict[tu
     off = table[["north_m", "east_m"]].to_numpy(float) - true_positions(flight, table)
     (whole, errors), (part, _) = (_track_errors(one) for one in (table, subset_of(table)))
     return result | {
-        ("observer", "largest_error"): float(np.nanmax(distance)),
-        ("observer", "share_below_20_m"): float((distance < 20).mean()),
-        ("observer", "share_5_to_10_m"): float(((distance >= 5) & (distance <= 10)).mean()),
-        ("observer", "mean_error_last_tenth"): float(np.nanmean(distance[-max(1, len(table) // 10) :])),
-        ("observer", "mae_without_reference_error"): float(np.nanmean(np.hypot(*off.T))),
-        ("reference", "mae"): float(np.nanmean(np.hypot(*(off - errors_of(table)).T))),
+        ("observer", "largest_error"): np.nanmax(distance),
+        ("observer", "share_below_20_m"): (distance < 20).mean(),
+        ("observer", "share_5_to_10_m"): ((distance >= 5) & (distance <= 10)).mean(),
+        ("observer", "mean_error_last_tenth"): np.nanmean(distance[-max(1, len(table) // 10) :]),
+        ("observer", "mae_without_reference_error"): np.nanmean(np.hypot(*off.T)),
+        ("reference", "mae"): np.nanmean(np.hypot(*(off - errors_of(table)).T)),
         ("vessel", "speed_beginning"): speed_in_beginning(flight, table),
         ("vessel", "speed_beginning_subset"): speed_in_beginning(flight, subset_of(table)),
         ("filter", "filter_error_beginning"): whole,
-        ("filter", "filter_error_mean"): float(errors.mean()),
-        ("filter", "filter_error_at_end"): float(errors[-1]),
+        ("filter", "filter_error_mean"): errors.mean(),
+        ("filter", "filter_error_at_end"): errors[-1],
         (f"filter-{SUBSET}", "filter_error_beginning"): part,
     }
 

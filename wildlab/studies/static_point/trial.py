@@ -117,7 +117,7 @@ def summarise_at_rest(scored: dict[str, pd.DataFrame]) -> dict[tuple[str, str], 
         "lag1_autocorrelation_north": autocorrelation(track.innovation[1:, 0], 1)[1],
         "lag1_autocorrelation_east": autocorrelation(track.innovation[1:, 1], 1)[1],
     }
-    return result | {("observer", name): float(value) for name, value in numbers.items()}
+    return result | {("observer", name): value for name, value in numbers.items()}
 
 
 def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:

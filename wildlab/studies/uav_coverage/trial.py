@@ -185,7 +185,7 @@ def all_runs(
     }
     open_view = see(land, runs[DOWN][0].poses, LOOKS.furthest, hidden=False)
     shown = np.bincount(open_view.node, minlength=land.height.size).reshape(inside.shape) > 0
-    numbers[DOWN, "in_view"] = float(shown[inside].mean())
+    numbers[DOWN, "in_view"] = shown[inside].mean()
     return runs, numbers | _moving(parameters, land, seed, fields, rate)
 
 
@@ -200,10 +200,10 @@ def numbers_of(flown: Flown, done: Executed, inside: NDArray[np.bool_]) -> dict[
         "ground": float(planned.seen.sum()) * cell,
         "outside": float((planned.seen & ~inside).sum()) * cell,
         "time": flown.course.duration,
-        "held": float(done.flown.seen[within].mean()) if within.any() else np.nan,
-        "kept": float(done.flown.seen[hoped].mean()) if hoped.any() else np.nan,
-        "sure": float(done.sure[inside].mean()),
-        "sharp": float(done.sharp.mean()),
+        "held": done.flown.seen[within].mean() if within.any() else np.nan,
+        "kept": done.flown.seen[hoped].mean() if hoped.any() else np.nan,
+        "sure": done.sure[inside].mean(),
+        "sharp": done.sharp.mean(),
     }
 
 
@@ -231,7 +231,7 @@ def _moving(
         shown = np.bincount(found.node, minlength=land.height.size).reshape(inside.shape) > 0
         rows = f"rows-{spacing:.0f}m"
         numbers[rows, "time"] = flown.course.duration
-        numbers[rows, "unseen"] = float(1 - shown[inside].mean())
+        numbers[rows, "unseen"] = 1 - shown[inside].mean()
         for name, kept in (("missed", slice(count)), ("missed_still", np.zeros(count, np.intp))):
             seen = [np.isfinite(first_seen(found, land, flown.times, sharp, one[:, kept])) for one in herds]
             numbers[rows, name] = float(1 - np.mean(seen))

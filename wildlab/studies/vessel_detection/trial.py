@@ -171,22 +171,22 @@ def numbers_of(objects: pd.DataFrame, frames: pd.DataFrame) -> dict[tuple[str, s
         own = [WHOLE, CUT, SEA] if subject == BOATS else [subject]
         shown, seen = frames[frames["subject"].isin(own)], objects[objects["subject"].isin(own)]
         numbers[subject, "images"] = len(shown)
-        numbers[subject, "images_with_false"] = float((shown["false"] > 0).sum())
-        numbers[subject, "false_alarms_per_image"] = float(shown["false"].mean()) if len(shown) else np.nan
+        numbers[subject, "images_with_false"] = (shown["false"] > 0).sum()
+        numbers[subject, "false_alarms_per_image"] = shown["false"].mean() if len(shown) else np.nan
         if subject in (BOATS, SEA):
             continue
         with_some = shown[shown["bodies"] > 0]
         rate = 1 - float((with_some["missed"] > 0).mean()) if len(with_some) else np.nan
         numbers[subject, "detection_rate"] = rate
-        numbers[subject, "images_with_missed"] = float((with_some["missed"] > 0).sum())
+        numbers[subject, "images_with_missed"] = (with_some["missed"] > 0).sum()
         found = seen[seen["found"].astype(bool)]
-        numbers[subject, "pieces"] = float(found["pieces"].mean()) if len(found) else np.nan
-        numbers[subject, "ellipse_coverage_90"] = float(found["inside"].mean()) if len(found) else np.nan
-        numbers[subject, "smallest_share_found"] = float(found["share"].min()) if len(found) else np.nan
+        numbers[subject, "pieces"] = found["pieces"].mean() if len(found) else np.nan
+        numbers[subject, "ellipse_coverage_90"] = found["inside"].mean() if len(found) else np.nan
+        numbers[subject, "smallest_share_found"] = found["share"].min() if len(found) else np.nan
         missed = seen[~seen["found"].astype(bool)]
-        numbers[subject, "missed"] = float(len(missed))
-        numbers[subject, "merged"] = float(missed["merged"].sum())
-        numbers[subject, "largest_share_missed"] = float(missed["share"].max()) if len(missed) else np.nan
+        numbers[subject, "missed"] = len(missed)
+        numbers[subject, "merged"] = missed["merged"].sum()
+        numbers[subject, "largest_share_missed"] = missed["share"].max() if len(missed) else np.nan
     return numbers
 
 

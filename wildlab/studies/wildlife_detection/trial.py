@@ -303,7 +303,7 @@ def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], 
     def tally(subject: str, at: str, picture: Picture, thresholds: Warm) -> DetectionScore:
         judged = judge(picture, find(picture, thresholds))
         for name, value in zip(COUNTS, judged.counts, strict=True):
-            numbers[subject, f"{name}_{at}"] = float(value)
+            numbers[subject, f"{name}_{at}"] = value
         return judged
 
     for (weather, height), picture in pictures.plain.items():

@@ -279,10 +279,10 @@ def filter_numbers(world: World, followed: FollowedAnimals) -> dict[str, float]:
     away = out_of_sight(followed.known, followed.found, images.times, images.truth)
     return {
         **sight_numbers(away),
-        "later": float(len(later)),
-        "right": float(right),
+        "later": len(later),
+        "right": right,
         "right_share": right / len(later) if later else np.nan,
-        "sd_later": float(np.median(own)) if own else np.nan,
+        "sd_later": np.median(own) if own else np.nan,
     }
 
 
@@ -293,9 +293,9 @@ def platform_numbers(world: World) -> dict[str, float]:
     seconds = first.sum(axis=0) * float(np.median(np.diff(images.times)))
     seen = seconds > 0
     return {
-        "at_once": float(first.mean()),
-        "in_view": float(np.median(seconds[seen])) if seen.any() else np.nan,
-        "by_fence_alone": float(np.sqrt(np.mean([_uniform_trace(one) / 2 for one in world.fences]))),
+        "at_once": first.mean(),
+        "in_view": np.median(seconds[seen]) if seen.any() else np.nan,
+        "by_fence_alone": np.sqrt(np.mean([_uniform_trace(one) / 2 for one in world.fences])),
     }
 
 
@@ -316,13 +316,13 @@ def patrol_numbers(world: World, herd: Array, flown: Patrolled, until: float) ->
     back = found_on_visits(flown)
     return {
         **sight_numbers(away),
-        "fall": float(np.median([one.after / one.before for one in back])) if back else np.nan,
-        "grew": float(np.mean([one.before > one.after_last for one in back])) if back else np.nan,
+        "fall": np.median([one.after / one.before for one in back]) if back else np.nan,
+        "grew": np.mean([one.before > one.after_last for one in back]) if back else np.nan,
         "minutes": float(flown.times[-1]) / 60,
-        "turns": float(turns(flown)),
-        "visits": float(len(back)),
-        "given_up": float(len(flown.given_up)),
-        "done": float(np.isfinite(flown.done).mean()),
+        "turns": turns(flown),
+        "visits": len(back),
+        "given_up": len(flown.given_up),
+        "done": np.isfinite(flown.done).mean(),
         "animals_share": len({one.animal for one in flown.found}) / herd.shape[1],
     }
 
