@@ -109,27 +109,12 @@ def test_the_log_alone_says_about_as_much_as_it_claims(flight, seen):
     assert np.abs(speeds(better)).mean() < np.abs(off).mean() / 5
 
 
-def test_the_interval_is_the_cameras_pace_or_what_the_stamps_say(flight, seen):
-    pairs = pairs_of(seen)
-    steady, stamped = (
-        pair_velocities(flight, pairs, Reading("autopilot", interval=kind)) for kind in ("median", "stamps")
-    )
-    stamps = flight.frames["time_s"].to_numpy()
-    pace = np.median(np.diff(stamps))
-    assert pace == pytest.approx(1 / 7.5, rel=0.1)
-    apart = np.array([stamps[pair.second] - stamps[pair.first] for pair in pairs])
-    assert np.allclose(steady["flow_u"] * pace, stamped["flow_u"] * apart)
-
-
-def test_no_row_is_left_out_and_each_says_whether_it_would_pass(flight, seen):
+def test_no_row_is_left_out(flight, seen):
     pairs = pairs_of(seen)
     pairs[2] = pairs[2]._replace(matches=Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.nan))
-    table = pair_velocities(flight, pairs, Reading("autopilot"), largest_gimbal_rate=0.05, largest_speed=5.0)
+    table = pair_velocities(flight, pairs, Reading("autopilot"))
     assert len(table) == len(pairs)
-    assert np.isnan(speeds(table)[2]).all() and not table["likely_speed"][2]
-    assert np.array_equal(table["slow_gimbal"], table["gimbal_rate_rad_s"] <= 0.05)
-    with np.errstate(invalid="ignore"):
-        assert np.array_equal(table["likely_speed"], np.hypot(*speeds(table).T) <= 5.0)
+    assert np.isnan(speeds(table)[2]).all()
     outside = pair_velocities(flight, pairs, Reading("autopilot", times=seen.times + 1000.0))
     assert np.isnan(speeds(outside)).all()
     assert pair_velocities(flight, [], Reading("autopilot")).empty

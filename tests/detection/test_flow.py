@@ -11,10 +11,8 @@ from wildlab.detection.flow import (
     agreeing,
     filled_outlines,
     find_features,
-    likely_speed,
     match_features,
     nearest_by_ratio,
-    slow_gimbal,
 )
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
@@ -133,11 +131,6 @@ def test_nothing_is_found_where_nothing_is():
     other = shifted(texture(7), 0, 0)
     assert len(matched(picture, other, EVERYWHERE, EVERYWHERE)) < 6
     assert len(agreeing(np.zeros((2, 2)), np.zeros((2, 2)))) == 0
-
-
-def test_pairs_that_say_little_can_be_told():
-    assert slow_gimbal([[0.05, 0.05], [0.09, 0.09]], 0.1).tolist() == [True, False]
-    assert likely_speed([[6, 7], [8, 8], [np.nan, 0]], 10.0).tolist() == [True, False, False]
 
 
 def test_what_does_not_fit_is_refused():

@@ -27,21 +27,6 @@ def receiver(noise: ReceiverNoise, gross: int = 0, scale: Scale = SCALE) -> Rece
     return Receiver([stated, other], chosen, 100.0, 400.0, scale, 301, gross)
 
 
-@pytest.mark.parametrize(
-    ("ratio", "lag1", "left"),
-    [
-        (1.0, 0.1, ()),
-        (0.69, 0.1, ("level",)),
-        (1.41, -0.1, ("level",)),
-        (1.0, 0.31, ("colour",)),
-        (1.0, -0.31, ("colour",)),
-        (0.2, 0.9, ("level", "colour")),
-    ],
-)
-def test_what_is_left_is_level_or_colour_or_both_or_nothing(ratio, lag1, left):
-    assert noise.left_over(ratio, lag1) == left
-
-
 def test_tables_have_every_number_that_was_found_and_no_other():
     table = noise.parameters_table(receiver(COLOURED)).set_index(["source", "what"])
     assert len(table) == 6 + 2
@@ -73,11 +58,6 @@ def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict):
         return NavigationErrors(times, e, np.ones_like(e), {})
 
     assert noise.attitude_change(errors(1.0), errors(scale), 0.0, 900.0) == verdict
-
-
-def test_thirds_are_equal_and_leave_nothing_out():
-    found = noise.thirds(10.0, 40.0)
-    assert [(begin, end) for _, begin, end in found] == [(10.0, 20.0), (20.0, 30.0), (30.0, 40.0)]
 
 
 def test_a_receiver_that_is_not_where_or_when_it_is_said_to_be_gets_advice():

@@ -10,12 +10,9 @@ from wildlab.studies.optical_flow_velocity import trial as study
 from wildlab.studies.optical_flow_velocity.trial import (
     CALIBRATED,
     IMAGES,
-    LIKELY,
     LOGGED,
     READINGS,
     RECORDED,
-    SLOW,
-    STAMPS,
     STILL,
     SYNCHRONISED,
     TRUE,
@@ -114,13 +111,13 @@ def test_a_flight_without_features_says_so(monkeypatch, looked):
 
 def spread_of(count=40, **changes):
     numbers = {(IMAGES, name): 0.5 for name in ("in_view_share", "whole_share", "feature_rate")}
-    for subject in (*READINGS, SLOW, LIKELY):
+    for subject in READINGS:
         values = {
             "mean_north": 0.2, "mean_east": -0.3, "sd_north": 6.0, "sd_east": 5.0, "pairs": 50.0,
             "interval_share_95": 0.95,
         }  # fmt: skip
         numbers |= {(subject, name): value for name, value in values.items()}
-    for one, sd in ((SYNCHRONISED, 2.5), (STILL, 3.0), (CALIBRATED, 4.5), (TRUE, 0.5), (STAMPS, 90.0)):
+    for one, sd in ((SYNCHRONISED, 2.5), (STILL, 3.0), (CALIBRATED, 4.5), (TRUE, 0.5)):
         numbers[one, "sd_north"] = numbers[one, "sd_east"] = sd
     numbers[LOGGED, "correlation_u"], numbers[LOGGED, "correlation_v"] = 0.9, 0.8
     for key, value in changes.items():

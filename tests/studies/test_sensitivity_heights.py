@@ -27,7 +27,6 @@ def test_flat_rays_suffer_most_and_none_straight_down(found):
         assert medians[-1] < 1e-6, name
         assert (np.diff(medians[2:]) < 0).all() and medians[0] > 2 * medians[3], name
     assert [one.pitch for one in found] == list(PITCHES_DEG)
-    assert all(one.used <= one.drawn == 240 for one in found)
     assert all(np.mean(one.off["coarse"]) <= np.mean(one.off["plane"]) for one in found)
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
-from wildlab.detection.flow import LARGEST_GIMBAL_RATE, LARGEST_SPEED, Matches, likely_speed, slow_gimbal
+from wildlab.detection.flow import Matches
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import between, frame_times, poses_at
 from wildlab.flight.store import Flight
@@ -43,9 +43,6 @@ class Reading:
     ----------
     source
         Name of the nav table; None where there is only one.
-    interval
-        Time between two images that follow each other: the ``"median"`` of the flight's stamps, for a camera
-        that keeps its pace, or what their two ``"stamps"`` say.
     times
         (frames,) s, when the images were really taken, where that is known better than from the stamps.
     camera, mount
@@ -55,7 +52,6 @@ class Reading:
     """
 
     source: str | None = None
-    interval: Literal["median", "stamps"] = "median"
     times: Array | None = None
     camera: Camera | None = None
     mount: Mount | None = None
@@ -65,11 +61,11 @@ class Reading:
 def pair_velocities(
     flight: Flight,
     pairs: Sequence[FramePair],
-    reading: Reading | None = None,
-    largest_gimbal_rate: float = LARGEST_GIMBAL_RATE,
-    largest_speed: float = LARGEST_SPEED,
+    reading: Reading,
 ) -> pd.DataFrame:
     """Velocities of a target from pairs of images that follow each other, H (5.30).
+
+    Two images are as far apart as the median of the flight's stamps: the camera keeps its pace.
 
     Parameters
     ----------
@@ -78,9 +74,7 @@ def pair_velocities(
     pairs
         Each of two frames, the second one the next that was taken.
     reading
-        None takes the only nav source, and the manifest.
-    largest_gimbal_rate, largest_speed
-        For ``slow_gimbal`` (rad/s) and ``likely_speed`` (m/s); no row is left out.
+        Of the log.
 
     Returns
     -------
@@ -88,16 +82,14 @@ def pair_velocities(
         A row for each pair: ``first`` and ``second`` (rows of the frames), ``time_s`` half way, ``features``,
         measured flow ``flow_u`` and ``flow_v``, that of the camera's own motion ``camera_u`` and ``camera_v``
         (px/s, means over the features), ``v_north_m_s``, ``v_east_m_s`` and their covariance ``cov_nn``,
-        ``cov_ne``, ``cov_ee``, ``gimbal_rate_rad_s``, and whether it would pass: ``slow_gimbal``,
-        ``likely_speed``. NaN where a pair has no features or no pose.
+        ``cov_ne``, ``cov_ee``. NaN where a pair has no features or no pose.
 
     Raises
     ------
     WildlabError
         Where the flight has no frames or poses, a row is none of its frames, or ``times`` has another length.
     """
-    given = reading or Reading()
-    stamps = frame_times(flight) if given.times is None else np.asarray(given.times, float)
+    stamps = frame_times(flight) if reading.times is None else np.asarray(reading.times, float)
     if len(stamps) != len(flight.table("frames")):
         raise WildlabError(
             f"{len(stamps)} times for {len(flight.table('frames'))} frames",
@@ -111,30 +103,22 @@ def pair_velocities(
             "give rows of the table frames, from 0",
             field="pairs",
         )
-    poses = camera_poses_at(flight, stamps, given)
+    poses = camera_poses_at(flight, stamps, reading)
     middle = stamps[rows].mean(axis=1)
-    velocities = _nav_velocities(flight, middle, given)
+    velocities = _nav_velocities(flight, middle, reading)
     usual = float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.nan
     found = []
     for number, pair in enumerate(pairs):
         apart = float(stamps[pair.second] - stamps[pair.first])
-        seconds = usual if given.interval == "median" else apart
         velocity = None if velocities is None else velocities[number]
-        row = _one(flight, poses, pair, (apart, seconds), velocity, given.plane_down)
+        row = _one(flight, poses, pair, (apart, usual), velocity, reading.plane_down)
         found.append({"first": pair.first, "second": pair.second, "time_s": middle[number], **row})
-    table = pd.DataFrame(found, columns=list(_COLUMNS))
-    rates = table[["pan_rate", "tilt_rate"]].to_numpy(float)
-    speeds = table[["v_north_m_s", "v_east_m_s"]].to_numpy(float)
-    return table.drop(columns=["pan_rate", "tilt_rate"]).assign(
-        gimbal_rate_rad_s=np.hypot(*rates.T),
-        slow_gimbal=slow_gimbal(rates, largest_gimbal_rate),
-        likely_speed=likely_speed(speeds, largest_speed),
-    )
+    return pd.DataFrame(found, columns=list(_COLUMNS))
 
 
 _COLUMNS = (
     "first", "second", "time_s", "features", "flow_u", "flow_v", "camera_u", "camera_v", "v_north_m_s",
-    "v_east_m_s", "cov_nn", "cov_ne", "cov_ee", "pan_rate", "tilt_rate",
+    "v_east_m_s", "cov_nn", "cov_ne", "cov_ee",
 )  # fmt: skip
 
 
@@ -177,8 +161,6 @@ def _one(
     ):
         return row
     pose, motion = motion_between(one, two, times[0], velocity)
-    if motion.gimbal_rates is not None:
-        row["pan_rate"], row["tilt_rate"] = motion.gimbal_rates
     if not len(pair.matches) or not np.isfinite(motion.velocity).all():
         return row
     uv, flow = flow_between(pair.matches.first, pair.matches.second, times[1])

@@ -37,9 +37,6 @@ LARGEST_TURN = 0.15
 #: Features that must be left; with more than two the scatter about a motion of four numbers is known, and of
 #: few that fit each other some do so by chance.
 FEWEST = 4
-#: Pairs of images between which the gimbal turned faster (rad/s), and velocities above it (m/s; 25 m/s are 49
-#: kn), are dropped: H 5.6.3 proposes such limits and does not apply them.
-LARGEST_GIMBAL_RATE, LARGEST_SPEED = float(np.radians(3.0)), 25.0
 #: Standard deviation of a displacement, px, where the scatter of features says less.
 SMALLEST_SD = 0.1
 
@@ -250,31 +247,6 @@ def moved_together(first: Array, second: Array) -> Array:
     a, b = (first - centre_first) @ [1, 1j], (second - centre_second) @ [1, 1j]
     turned = a * (np.vdot(a, b) / max(np.vdot(a, a).real, 1e-12))
     return np.asarray(centre_second + np.stack([turned.real, turned.imag], axis=1))
-
-
-def slow_gimbal(gimbal_rates: ArrayLike, largest: float = LARGEST_GIMBAL_RATE) -> Mask:
-    """Pairs of images between which the gimbal hardly moved: (N, 2) rad/s of pan and tilt -> (N,).
-
-    Examples
-    --------
-    >>> slow_gimbal([[0.0, 0.01], [0.0, -0.2]]).tolist()
-    [True, False]
-    """
-    rates = np.asarray(gimbal_rates, float)
-    return np.asarray(np.hypot(rates[..., 0], rates[..., 1]) <= largest)
-
-
-def likely_speed(velocities: ArrayLike, largest: float = LARGEST_SPEED) -> Mask:
-    """Velocities (N, 2) m/s that a vessel can have; NaN is none.
-
-    Examples
-    --------
-    >>> likely_speed([[3.0, 4.0], [40.0, 0.0]]).tolist()
-    [True, False]
-    """
-    v = np.asarray(velocities, float)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.hypot(v[..., 0], v[..., 1]) <= largest)
 
 
 def _none() -> Matches:

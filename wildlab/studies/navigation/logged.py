@@ -9,13 +9,11 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from wildlab.analysis.navigate import (
-    AXES,
     NavigationErrors,
     Studied,
     calibrated,
     likelihoods_of_latency,
     summarise,
-    summarise_innovations,
 )
 from wildlab.analysis.navigation_inputs import Placement, Receiver, heading_from, place_receiver
 from wildlab.analysis.verdict import VERDICT_LEVEL
@@ -35,8 +33,6 @@ from wildlab.studies.navigation import (
 )
 from wildlab.studies.page import tile_of
 
-#: Mean NIS over its ideal within this is of the right level; correlations at lag 1 below that are no colour.
-LEVEL, COLOUR = (0.7, 1.4), 0.3
 #: So many standard deviations from what is configured are an error: four numbers are looked at.
 FAR = 3.0
 #: Delays of a receiver that are tried, s.
@@ -113,20 +109,6 @@ def _model(one: Candidate, receiver: Receiver) -> str:
     return f"positions {_ORDERS[one.noise.position.order]}{moving}"
 
 
-def left_over(ratio: float, lag1: float) -> tuple[str, ...]:
-    """What innovations still have that they should not: ``"level"``, ``"colour"``, both or nothing.
-
-    Parameters
-    ----------
-    ratio
-        Mean NIS over its ideal.
-    lag1
-        Largest correlation at lag 1.
-    """
-    level = () if LEVEL[0] <= ratio <= LEVEL[1] else ("level",)
-    return level if abs(lag1) < COLOUR else (*level, "colour")
-
-
 def attitude_change(before: NavigationErrors, after: NavigationErrors, begin: float, end: float) -> str:
     """How the attitude's difference from the reference changed between two times, s: ``nearer``, ``farther``,
     ``same``, or ``unknown`` where the time is too short."""
@@ -170,51 +152,6 @@ def latency_message(flight: Flight) -> Message:
     likeliest = float(LATENCIES[int(np.argmax(likelihoods_of_latency(flight, LATENCIES)))])
     configured = flight.manifest.gnss.latency_s
     return Message("latency", {"latency": f"{likeliest:.2f}", "configured": f"{configured:.2f}"})
-
-
-def parts_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> pd.DataFrame:
-    """Innovations and attitude in parts of a flight (words, from, to, s), with what is stated and as found.
-
-    Returns
-    -------
-    DataFrame
-        A row for each part and source: ``part``, ``source``; NIS over its ideal and correlation at lag 1
-        (``ratio_before``, ``lag1_before``, ``ratio``, ``lag1``); RMS of the attitude's difference from the
-        reference (``off_before``, ``off``, degrees); and what is ``left``, in words. Where nothing was
-        changed, before is now.
-    """
-    rows = []
-    last = "mekf-receiver" if "mekf-receiver" in studied.found else "mekf"
-    for words, begin, end in parts:
-        now = summarise_innovations(studied.found[last], begin, end)
-        was = summarise_innovations(studied.found["mekf"], begin, end)
-        off = {}
-        for who in ("mekf", last):
-            numbers = summarise(studied.scored[who], begin, end)
-            off[who] = float(np.linalg.norm([numbers[f"rms_{axis}"] for axis in AXES]))
-        for (_, before), (_, after) in zip(was.iterrows(), now.iterrows(), strict=True):
-            ratio, lag1 = after["nis"] / after["dof"], after["lag1"]
-            rows.append(
-                {
-                    "part": words,
-                    "source": after["source"],
-                    "ratio_before": before["nis"] / before["dof"],
-                    "lag1_before": before["lag1"],
-                    "ratio": ratio,
-                    "lag1": lag1,
-                    "off_before": off["mekf"],
-                    "off": off[last],
-                    "left": " and ".join(left_over(ratio, lag1)),
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def thirds(begin: float, end: float) -> list[tuple[str, float, float]]:
-    """The thirds of a time, s, for a flight of which nobody named parts."""
-    edges = np.linspace(begin, end, 4)
-    names = ("first third", "second third", "last third")
-    return [(name, float(edges[i]), float(edges[i + 1])) for i, name in enumerate(names)]
 
 
 Part = tuple[str, float, float]
@@ -297,8 +234,6 @@ def show_logged(report: Report, studied: Studied, parts: Sequence[Part]) -> None
     wording.table("innovations", innovations_table(studied, window))
     receiver = studied.receiver
     if receiver is not None:
-        named = parts if len(parts) > 1 else thirds(receiver.begin, receiver.end)
-        wording.table("parts", parts_table(studied, named))
         wording.table("models", models_table(receiver))
         if receiver.noise is not None:
             wording.table("parameters", parameters_table(receiver))

@@ -22,15 +22,7 @@ from wildlab.reporting.charts.forms import draw_picture
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.simulation.twins import AUTOPILOT
 from wildlab.studies.optical_flow_velocity import trial
-from wildlab.studies.optical_flow_velocity.trial import (
-    LIKELY,
-    LOGGED,
-    READINGS,
-    SLOW,
-    STAMPS,
-    Looked,
-    sizes,
-)
+from wildlab.studies.optical_flow_velocity.trial import LOGGED, READINGS, Looked, sizes
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
 
@@ -110,13 +102,14 @@ def plot_velocity(table: pd.DataFrame) -> Figure:
 
 def plot_readings(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """Standard deviation of a pair's velocity by each way of reading the log, medians over flights."""
-    shown = [one for one in READINGS if one != STAMPS]
-    medians = [float(pd.Series(sizes(runs, one)).median()) for one in shown]
+    medians = [float(pd.Series(sizes(runs, one)).median()) for one in READINGS]
     fig, ax = new_figure(5.8, 3.0)
-    ax.barh(range(len(shown)), medians, color=[BLUE if one == LOGGED else GREY for one in shown], height=0.6)
+    ax.barh(
+        range(len(READINGS)), medians, color=[BLUE if one == LOGGED else GREY for one in READINGS], height=0.6
+    )
     for row, value in enumerate(medians):
         ax.text(value, row, f" {value:.1f}", va="center")
-    name_rows(ax, [names[one] for one in shown])
+    name_rows(ax, [names[one] for one in READINGS])
     ax.set_xlim(0, 1.15 * max(medians))
     return finish(fig, "", "SD along an axis (m/s)")
 
@@ -132,7 +125,7 @@ def readings_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame
                 "inside": 100 * float(runs[one, "interval_share_95"].median()),
                 "pairs": float(runs[one, "pairs"].sum()),
             }
-            for one in (*READINGS, SLOW, LIKELY)
+            for one in READINGS
         ]
     )
 

@@ -27,11 +27,9 @@ from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
 #: Images of the flight.
 IMAGES = "images"
 #: Ways to read the same features; the first is what the judged claims are about.
-LOGGED, STAMPS, SYNCHRONISED, CALIBRATED = "logged", "stamps", "synchronised", "calibrated"
+LOGGED, SYNCHRONISED, CALIBRATED = "logged", "synchronised", "calibrated"
 STILL, DECK, TRUE = "still-gimbal", "deck", "true-poses"
-#: Some of the pairs of the first reading alone.
-SLOW, LIKELY = "slow-gimbal", "likely-speed"
-READINGS = (LOGGED, STAMPS, SYNCHRONISED, STILL, CALIBRATED, DECK, TRUE)
+READINGS = (LOGGED, SYNCHRONISED, STILL, CALIBRATED, DECK, TRUE)
 #: Names of the numbers that are recorded, and their units.
 RECORDED = {
     "in_view_share": "1",
@@ -171,7 +169,6 @@ def readings(looked: Looked) -> dict[str, pd.DataFrame]:
     logged = Reading(AUTOPILOT)
     ways = {
         LOGGED: (looked.flight, logged),
-        STAMPS: (looked.flight, replace(logged, interval="stamps")),
         SYNCHRONISED: (looked.flight, replace(logged, times=times)),
         STILL: (known, replace(logged, times=times)),
         CALIBRATED: (looked.flight, replace(logged, mount=poses.mount)),
@@ -208,8 +205,6 @@ def numbers_of(looked: Looked, tables: dict[str, pd.DataFrame]) -> dict[tuple[st
     for name, table in tables.items():
         numbers |= {(name, key): value for key, value in velocity_numbers(table).items()}
     logged = tables[LOGGED]
-    for name, chosen in ((SLOW, logged["slow_gimbal"]), (LIKELY, logged["likely_speed"])):
-        numbers |= {(name, key): value for key, value in velocity_numbers(logged[chosen]).items()}
     for axis in "uv":
         pair = logged[[f"flow_{axis}", f"camera_{axis}"]].dropna().to_numpy(float)
         numbers[LOGGED, f"correlation_{axis}"] = np.corrcoef(pair.T)[0, 1]

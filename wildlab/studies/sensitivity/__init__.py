@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from scipy import ndimage
@@ -154,13 +153,6 @@ def flat_map_errors(latitude: float) -> Array:
     return np.asarray(found.max(axis=0))
 
 
-def differing_digits(errors: Mapping[str, float], published: pd.DataFrame) -> pd.DataFrame:
-    """The rows of ``published`` that differ in the last printed digit, with ``here`` and ``difference``."""
-    here = published["subject"].map(errors)
-    table = published.assign(here=here, difference=here - published["value"])
-    return table[table["difference"].abs() >= 0.5001 * 10.0 ** -table["digits"]]
-
-
 #: Degrees below the horizon that a ray looks.
 PITCHES_DEG = (15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0)
 #: Metres above the ground below; metres between the nodes of a coarse map, as of free ones of all the Earth.
@@ -183,19 +175,10 @@ class Shift(NamedTuple):
         Degrees below the horizon.
     off
         By `WRONG`: (LANDS,) median distance on each landscape, metres; NaN where no ray met both.
-    lost
-        By `WRONG`: share of the rays that meet the true ground and not the wrong one.
-    used
-        How many rays met the true ground, of ``drawn``.
-    drawn
-        All rays.
     """
 
     pitch: float
     off: dict[str, Array]
-    lost: dict[str, float]
-    used: int
-    drawn: int
 
 
 def shifts(seed: int = 0, lands: int = LANDS, rays: int = RAYS) -> list[Shift]:
@@ -218,15 +201,12 @@ def shifts(seed: int = 0, lands: int = LANDS, rays: int = RAYS) -> list[Shift]:
     found = []
     for pitch in PITCHES_DEG:
         off: dict[str, list[float]] = {name: [] for name in WRONG}
-        lost = dict.fromkeys(WRONG, 0)
-        used = 0
         for number, (land, rough) in enumerate(zip(worlds, coarse, strict=True)):
             # The same rays for every pitch: pitches are compared, not draws.
             starts, directions = _rays(land, np.radians(pitch), rays, np.random.default_rng([seed, number]))
             below = land.heights_at(starts[:, :2])
             true = intersect_terrain(land, directions, starts).points
             met = np.isfinite(true[:, 0])
-            used += int(met.sum())
             raised = Terrain(land.height + np.float32(1.0), land.north, land.east, land.step)
             wrong = {
                 "level": intersect_terrain(raised, directions, starts).points,
@@ -235,18 +215,9 @@ def shifts(seed: int = 0, lands: int = LANDS, rays: int = RAYS) -> list[Shift]:
             }
             for name, points in wrong.items():
                 distance = np.hypot(*(points - true)[met, :2].T)
-                lost[name] += int((~np.isfinite(distance)).sum())
                 known = distance[np.isfinite(distance)]
                 off[name].append(float(np.median(known)) if len(known) else np.nan)
-        found.append(
-            Shift(
-                pitch,
-                {name: np.array(values) for name, values in off.items()},
-                {name: count / max(used, 1) for name, count in lost.items()},
-                used,
-                lands * rays,
-            )
-        )
+        found.append(Shift(pitch, {name: np.array(values) for name, values in off.items()}))
     return found
 
 
@@ -281,20 +252,6 @@ def _rays(land: Terrain, pitch: float, count: int, rng: np.random.Generator) -> 
         [flat * np.cos(course), flat * np.sin(course), np.full(count, np.sin(pitch))]
     )
     return starts, directions
-
-
-def shifts_table(found: list[Shift]) -> pd.DataFrame:
-    """Medians with the interval of their mean over landscapes, and what was lost, by pitch."""
-    rows = []
-    for one in found:
-        row: dict[str, object] = {"pitch": one.pitch}
-        for name in WRONG:
-            estimate, low, high = mean_interval(one.off[name])
-            row[name] = f"{estimate:.2f} ({max(low, 0):.2f} to {high:.2f})"
-            row[f"{name}_lost"] = 100 * one.lost[name]
-        row["rays"] = one.used
-        rows.append(row)
-    return pd.DataFrame(rows)
 
 
 _WRONG = {"plane": VERMILLION, "coarse": ORANGE, "level": BLUE}
