@@ -40,8 +40,7 @@ def frame(rows: list[dict[tuple[str, str], float]]) -> pd.DataFrame:
 def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
     """Draws that are all the same, in which every claim is true, with some numbers changed."""
     usual = {
-        "seen": 0.3, "near": 0.5, "in_sight": 2.0, "ground": 1e5, "outside": 6e4,
-        "only_blurred": 0.0, "held": 0.99, "sure": 0.7,
+        "seen": 0.3, "near": 0.5, "in_sight": 2.0, "ground": 1e5, "outside": 6e4
     }  # fmt: skip
     row = {(name, key): value for name in STRATEGIES for key, value in usual.items()}
     for k, name in enumerate((DOWN, *ROLL)):
@@ -56,12 +55,6 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
     }
     row |= {tuple(key.split("/", 1)): value for key, value in changes.items()}  # type: ignore[misc]
     return frame([row] * count)
-
-
-def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws):
-    for name in STRATEGIES:
-        assert (draws[name, "held"] >= 0.95).all(), name
-        assert (draws[name, "sure"] > 0.3).all(), name
 
 
 def test_numbers_agree_with_one_another(draws):
@@ -104,7 +97,7 @@ def test_what_the_adaptive_camera_does_and_sees_hardly_hangs_on_the_rate_of_imag
     seen = []
     for one in rides:
         poses = poses_of("adaptive-60", twin, land, fences, one, 2)
-        seen.append(as_planned(land, poses, one.times, LOOKS).coverage.seen.sum())
+        seen.append(as_planned(land, poses, one.times, LOOKS).seen.sum())
     assert seen[0] == pytest.approx(seen[1], rel=0.03)
 
 

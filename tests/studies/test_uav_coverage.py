@@ -44,8 +44,7 @@ def frame(rows: list[dict[tuple[str, str], float]]) -> pd.DataFrame:
 def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
     """Draws that are all the same, in which every claim is true, with some numbers changed."""
     usual = {
-        "seen": 0.9, "in_sight": 5.0, "ground": 1e5, "outside": 2e4, "time": 1000.0, "held": 0.99,
-        "sure": 0.8, "kept": 0.9, "sharp": 1.0,
+        "seen": 0.9, "in_sight": 5.0, "ground": 1e5, "outside": 2e4, "time": 1000.0
     }  # fmt: skip
     row = {(name, key): value for name in CASES | MORE for key, value in usual.items()}
     row |= {(YAW, "seen"): 0.94, (YAW, "ground"): 1.5e5, (YAW, "in_sight"): 4.0, (LOW, "seen"): 0.8}
@@ -59,18 +58,6 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
         }
     row |= {tuple(key.split("/", 1)): value for key, value in changes.items()}  # type: ignore[misc]
     return frame([row] * count)
-
-
-def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws):
-    """What has to be shown: 95 % of it at least, in every draw of every case."""
-    for name in CASES | MORE:
-        assert (draws[name, "held"] >= 0.95).all(), name
-        assert (draws[name, "sure"] > 0.3).all(), name
-
-
-def test_a_plan_without_a_margin_promises_more_than_flights_show(draws):
-    assert (draws[LOW, "kept"] < draws[LOW, "held"]).all() and (draws[LOW, "kept"] < 0.95).any()
-    assert (draws[LOW, "sure"] < draws[LOW, "seen"]).all()
 
 
 def test_numbers_agree_with_one_another(draws):

@@ -66,30 +66,6 @@ class Coverage(NamedTuple):
         return np.asarray(self.duration - self.last)
 
 
-class Share(NamedTuple):
-    """How much of an area was seen.
-
-    Attributes
-    ----------
-    seen
-        Share of its nodes that were seen sharply.
-    only_blurred
-        Share that is in blurred images alone.
-    looks
-        Mean number of sharp images of a node that was seen: the redundancy of F 5.4.
-    detected
-        Mean probability of detection over all its nodes.
-    area
-        Of its nodes, square metres.
-    """
-
-    seen: float
-    only_blurred: float
-    looks: float
-    detected: float
-    area: float
-
-
 def from_sightings(
     found: Sightings, terrain: Terrain, times: Array, sharp: Mask, range_scale: float = np.inf
 ) -> Coverage:
@@ -166,34 +142,6 @@ def nodes_in(terrain: Terrain, fences: list[Array]) -> Indices:
     for k, fence in enumerate(fences):
         owner[(owner < 0) & contains(fence, points)] = k
     return owner.reshape(rows, columns)
-
-
-def share_seen(shown: Coverage, where: Mask) -> Share:
-    """How much of some nodes was seen.
-
-    Parameters
-    ----------
-    shown
-        From `from_sightings`.
-    where
-        (R, C) bool: the nodes, as by `nodes_in`.
-
-    Returns
-    -------
-    Share
-        Of no nodes at all, NaN and an area of zero.
-    """
-    count = int(where.sum())
-    if not count:
-        return Share(np.nan, np.nan, np.nan, np.nan, 0.0)
-    looks, seen = shown.looks[where], shown.seen[where]
-    return Share(
-        float(seen.mean()),
-        float((~seen & (shown.blurred[where] > 0)).mean()),
-        float(looks[seen].mean()) if seen.any() else np.nan,
-        float(shown.detected[where].mean()),
-        count * shown.step**2,
-    )
 
 
 #: Lines of sight that are looked at together; what they take is some tens of megabytes.

@@ -25,7 +25,7 @@ from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
-from wildlab.planning.coverage import Coverage, Sightings, from_sightings, see
+from wildlab.planning.coverage import Coverage, from_sightings, see
 from wildlab.planning.gimbal import (
     GimbalAngles,
     adapt_roll,
@@ -364,57 +364,6 @@ class ExecutionErrors(NamedTuple):
     attitude_time: float
 
 
-class Planned(NamedTuple):
-    """A plan alone.
-
-    Attributes
-    ----------
-    coverage
-        By its sharp images.
-    found
-        Its sightings.
-    sharp
-        (N,) bool of its images.
-    distance
-        (N,) metres to the ground in the middle of each image.
-    """
-
-    coverage: Coverage
-    found: Sightings
-    sharp: Mask
-    distance: Array
-
-
-class Executed(NamedTuple):
-    """A plan, and one flight of it.
-
-    Attributes
-    ----------
-    planned, flown
-        Coverage of both.
-    sure
-        (R, C) bool: planned to be seen with a margin against errors.
-    found
-        Sightings of the plan.
-    sharp
-        (N,) bool of its images.
-    margin_px
-        Median margin, pixels.
-    """
-
-    planned: Coverage
-    flown: Coverage
-    sure: Mask
-    found: Sightings
-    sharp: Mask
-    margin_px: float
-
-    @property
-    def held(self) -> float:
-        """Share of what was surely to be seen that the flight showed; NaN where that is nothing."""
-        return float(self.flown.seen[self.sure].mean()) if self.sure.any() else np.nan
-
-
 def with_errors(
     poses: CameraPoses, headings: ArrayLike, errors: ExecutionErrors, step: float, rng: np.random.Generator
 ) -> CameraPoses:
@@ -466,44 +415,8 @@ def displaced(poses: CameraPoses, headings: ArrayLike, off: Array, turn: Array) 
     return CameraPoses.at_lens(poses.camera, poses.p_nc + off, R, np.eye(3))
 
 
-def margin_px(camera: Camera, errors: ExecutionErrors, distance: ArrayLike, sigmas: float) -> Array:
-    """How far inside an image something must be planned to be in it on the flight, too.
-
-    Parameters
-    ----------
-    camera
-        The intrinsic parameters.
-    errors
-        Of the execution.
-    distance
-        (N,) to what is looked at, metres.
-    sigmas
-        Standard deviations that the margin allows for.
-
-    Returns
-    -------
-    (N,) pixels: position over distance and attitude, each by the focal length; height and yaw at half the
-    image's diagonal, which is the most that they move.
-    """
-    d = np.asarray(distance, float)
-    focal, half = max(camera.fx, camera.fy), np.hypot(camera.width, camera.height) / 2
-    tilt = max(errors.roll, errors.pitch)
-    variance = (focal * errors.horizontal / d) ** 2 + (focal * tilt) ** 2
-    variance += (half * errors.vertical / d) ** 2 + (half * errors.yaw) ** 2
-    return np.asarray(sigmas * np.sqrt(variance))
-
-
-def execute(
-    terrain: Terrain,
-    poses: CameraPoses,
-    headings: ArrayLike,
-    times: ArrayLike,
-    looks: Looks,
-    errors: ExecutionErrors,
-    sigmas: float,
-    rng: np.random.Generator,
-) -> Executed:
-    """What a plan says will be seen, and what a flight of it with errors of the pose sees.
+def as_planned(terrain: Terrain, poses: CameraPoses, times: ArrayLike, looks: Looks) -> Coverage:
+    """What a plan says will be seen in sharp images, without any errors.
 
     Parameters
     ----------
@@ -511,50 +424,10 @@ def execute(
         In the same n.
     poses
         As planned, N rows, evenly spaced in time.
-    headings
-        (N,) of the platform, radians.
     times
         (N,) s.
     looks
         What is looked for.
-    errors, sigmas
-        Of the execution, and how many standard deviations of them the plan's margin allows for.
-    rng
-        Random numbers.
-
-    Returns
-    -------
-    Executed
-    """
-    t = np.asarray(times, float)
-    planned = as_planned(terrain, poses, t, looks)
-    found, sharp = planned.found, planned.sharp
-    margin = margin_px(poses.camera, errors, planned.distance, sigmas)
-    surely = found.take((found.edge >= margin[found.image]) & sharp[found.image])
-    sure = np.bincount(surely.node, minlength=terrain.height.size).reshape(terrain.height.shape) > 0
-    really = with_errors(poses, headings, errors, float(np.median(np.diff(t))), rng)
-    seen = see(terrain, really, looks.furthest)
-    return Executed(
-        planned.coverage,
-        from_sightings(seen, terrain, t, sharp, looks.range_scale),
-        np.asarray(sure),
-        found,
-        sharp,
-        float(np.median(margin)),
-    )
-
-
-def as_planned(terrain: Terrain, poses: CameraPoses, times: ArrayLike, looks: Looks) -> Planned:
-    """What a plan says will be seen, without any errors.
-
-    Parameters
-    ----------
-    terrain, poses, times, looks
-        As for `execute`.
-
-    Returns
-    -------
-    Planned
     """
     t, camera = np.asarray(times, float), poses.camera
     middle = pixel_rays(camera, np.array([[camera.width / 2, camera.height / 2]]), poses.R_nc)
@@ -564,4 +437,4 @@ def as_planned(terrain: Terrain, poses: CameraPoses, times: ArrayLike, looks: Lo
     allowed = looks.blur_share * looks.size * min(camera.fx, camera.fy) / distance
     sharp = blur(camera, poses, t, looks.exposure, distance) <= allowed
     found = see(terrain, poses, looks.furthest)
-    return Planned(from_sightings(found, terrain, t, sharp, looks.range_scale), found, sharp, distance)
+    return from_sightings(found, terrain, t, sharp, looks.range_scale)

@@ -9,11 +9,8 @@ from wildlab.studies.gondola_coverage.trial import ADAPT, DOWN, ROLL, STRATEGIES
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
 
-#: Quantities of the page's tables, by its key.
-TABLES = {
-    "strategies": ("seen", "near", "ground", "share_outside", "in_sight", "only_blurred"),
-    "held": ("sure", "held"),
-}
+#: Quantities of the page's table.
+TABLE = ("seen", "near", "ground", "share_outside", "in_sight")
 #: The settings that are compared in words: of the thesis's limits the middle one.
 PLAIN, ADAPTIVE = list(ROLL)[1], list(ADAPT)[1]
 

@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.plans.coverage import Executed, ExecutionErrors, execute
+from wildlab.analysis.plans.coverage import ExecutionErrors, as_planned
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.courses import fly
-from wildlab.planning.coverage import nodes_in, share_seen
+from wildlab.planning.coverage import Coverage, nodes_in
 from wildlab.planning.gimbal import (
     NADIR,
     GimbalAngles,
@@ -35,11 +35,11 @@ from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters, load_twin
 from wildlab.studies.uav_coverage.trial import (
     LOOKS,
-    SIGMAS,
     camera_of,
     fences_of,
     land_of,
     required,
+    seen_numbers,
 )
 
 DOWN = "down"
@@ -59,8 +59,6 @@ RECORDED = {
     "in_sight": "s",
     "ground": "m2",
     "outside": "m2",
-    "only_blurred": "1",
-    "held": "1",
 }
 #: Within so many metres of the cable is close to it. Chosen: what a swing of 45 degrees reaches from 15 m.
 NEAR = 15.0
@@ -160,16 +158,6 @@ def poses_of(
     return camera_on_course(camera_of(twin), there.places, there.headings, angles)
 
 
-def run_strategy(
-    name: str, twin: TwinParameters, land: Terrain, fences: list[Array], there: Ride, seed: int
-) -> Executed:
-    """One of `STRATEGIES` along a ride, as planned and as it comes out."""
-    poses = poses_of(name, twin, land, fences, there, seed)
-    rng = stream(seed, f"execution of {name}")
-    errors = errors_of_execution(twin)
-    return execute(land, poses, there.headings, there.times, LOOKS, errors, SIGMAS, rng)
-
-
 def near_cable(land: Terrain, there: Ride, within: float = NEAR) -> NDArray[np.bool_]:
     """(R, C) bool: nodes so near to the way, over ground."""
     rows, columns = land.height.shape
@@ -190,7 +178,7 @@ def trial(seed: int, *, twin: str, rate: float, percent_of_lap: float) -> dict[t
     Parameters
     ----------
     seed
-        Of land, swing and errors.
+        Of land and swing.
     twin
         Whose cable, enclosures, camera and gimbal it is.
     rate
@@ -203,39 +191,31 @@ def trial(seed: int, *, twin: str, rate: float, percent_of_lap: float) -> dict[t
 
 def all_runs(
     seed: int, twin: str, rate: float, percent_of_lap: float
-) -> tuple[dict[str, Executed], dict[tuple[str, str], float]]:
-    """Every one of `STRATEGIES` as planned and as it comes out, by name, and the numbers of `trial`."""
+) -> tuple[dict[str, Coverage], dict[tuple[str, str], float]]:
+    """What every one of `STRATEGIES` covers, by name, and the numbers of `trial`."""
     parameters = load_twin(twin)
     land = land_of(seed)
     fences = fences_of(parameters, len(parameters.enclosures))
     there = ride(parameters, land, rate, percent_of_lap / 100)
     inside = nodes_in(land, fences) >= 0
     near = near_cable(land, there)
-    runs = {name: run_strategy(name, parameters, land, fences, there, seed) for name in STRATEGIES}
+    runs = {}
+    for name in STRATEGIES:
+        poses = poses_of(name, parameters, land, fences, there, seed)
+        runs[name] = as_planned(land, poses, there.times, LOOKS)
     numbers = {
         (name, key): value
-        for name, done in runs.items()
-        for key, value in numbers_of(done, inside, near, 1 / rate).items()
+        for name, covered in runs.items()
+        for key, value in numbers_of(covered, inside, near, 1 / rate).items()
     }
     return runs, numbers
 
 
 def numbers_of(
-    done: Executed, inside: NDArray[np.bool_], near: NDArray[np.bool_], step: float
+    covered: Coverage, inside: NDArray[np.bool_], near: NDArray[np.bool_], step: float
 ) -> dict[str, float]:
     """What is compared of a strategy, by name; ``step`` is the time between two images, s."""
-    planned = done.planned
-    share, cell = share_seen(planned, inside), planned.step**2
-    return {
-        "seen": share.seen,
-        "near": planned.seen[near].mean(),
-        "in_sight": float(planned.looks[planned.seen].mean()) * step,
-        "ground": float(planned.seen.sum()) * cell,
-        "outside": float((planned.seen & ~inside).sum()) * cell,
-        "only_blurred": share.only_blurred,
-        "held": done.held,
-        "sure": done.sure[planned.seen].mean(),
-    }
+    return seen_numbers(covered, inside, step) | {"near": covered.seen[near].mean()}
 
 
 def _all_larger(pairs: list[tuple[Array, Array]]) -> Check:

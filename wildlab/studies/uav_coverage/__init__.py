@@ -9,8 +9,7 @@ from wildlab.studies.uav_coverage.trial import DOWN, LOW, LOW_CLOSE, YAW
 
 #: Quantities of the page's tables, by its key.
 TABLES = {
-    "plans": ("seen", "ground", "outside", "in_sight", "sharp", "time"),
-    "held": ("sure", "held", "kept"),
+    "plans": ("seen", "ground", "outside", "in_sight", "time"),
     "rows": ("time", "unseen", "missed_still", "missed"),
 }
 #: A plan that sees so much of the enclosures leaves little to gain; so small a difference is none.
