@@ -16,8 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
 if TYPE_CHECKING:
-    from wildlab.flight.card.importing import Card
-    from wildlab.flight.card.proposal import Wishes
+    from wildlab.flight.card.proposal import Proposal, Wishes
     from wildlab.flight.store import Flight
 
 #: Images without a frame that are named.
@@ -121,7 +120,7 @@ def _report(flight: Flight, out: Path) -> None:
         click.echo(line, err=True)
 
 
-def _card(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Card:
+def _card(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Proposal:
     from wildlab.flight.card.importing import read_card
     from wildlab.flight.files import printable
 
@@ -141,7 +140,7 @@ def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> 
     from wildlab.flight.calibration_files import read_camera
     from wildlab.flight.card.importing import safe_name
     from wildlab.flight.card.proposal import Wishes
-    from wildlab.flight.recipe.quantities import parse_zone
+    from wildlab.flight.time_scales import find_zone
 
     start = None
     if wishes["start"] is not None:
@@ -153,11 +152,7 @@ def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> 
             problem = f"{wishes['start']!r} is no time with a zone"
             raise WildlabError(problem, "write it as 2026-05-01T06:00:00Z", field="--start")
     if wishes["zone"] is not None:
-        try:
-            parse_zone(wishes["zone"])
-        except ValueError as error:
-            problem, _, fix = str(error).partition("; ")
-            raise WildlabError(problem, fix, field="--zone") from None
+        find_zone(wishes["zone"], "--zone")
     return Wishes(
         name=wishes["name"] or safe_name(raw[0].resolve().stem if out is None else out.resolve().name),
         camera=None if wishes["camera"] is None else read_camera(wishes["camera"]).camera,
@@ -170,11 +165,11 @@ def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> 
     )
 
 
-def _say(card: Card, as_json: bool) -> None:
+def _say(card: Proposal, as_json: bool) -> None:
     from wildlab.flight.card.description import HEADINGS, rows_of, sentences_of
 
     rows = rows_of(card.choices)
-    said = [stopped(one) for one in (*sentences_of(card.choices), *card.proposal.notes)]
+    said = [stopped(one) for one in (*sentences_of(card.choices), *card.notes)]
     if as_json:
         print_json({"files": [dict(zip(HEADINGS, row, strict=True)) for row in rows], "said": said})
         return

@@ -6,7 +6,7 @@ import os
 from collections.abc import Collection, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,7 +59,7 @@ class HeightPlan(NamedTuple):
         Names of streams that have places and no heights.
     """
 
-    reference: Literal["ellipsoid", "sea"]
+    reference: str
     uses: dict[str, HeightUse]
     without: tuple[str, ...] = ()
 
@@ -151,10 +151,10 @@ def choose_reference(
     without = tuple(name for name in placed if not there[name])
     ways: dict[str, dict[str, HeightUse]] = {name: {} for name in names}
     for name in names:
-        if "height_ellipsoid_m" in there[name]:
-            ways[name]["ellipsoid"] = HeightUse("height_ellipsoid_m", 0.0, "counts from the ellipsoid")
-        if "height_sea_m" in there[name]:
-            ways[name]["sea"] = HeightUse("height_sea_m", 0.0, "counts from sea level")
+        for kind in ("ellipsoid", "sea"):
+            column = f"height_{kind}_m"
+            if column in there[name]:
+                ways[name][kind] = HeightUse(column, 0.0, f"counts from {_COUNTED[column]}")
     for name in names:
         if not ways[name]:
             tied = _tie(name, streams, there, [one for one in own if one in names], home_sea_m)
@@ -172,21 +172,17 @@ def choose_reference(
         found = geoid[name]
         if found is None:
             continue
-        if "ellipsoid" not in ways[name]:
-            use = ways[name]["sea"]
-            ways[name]["ellipsoid"] = use._replace(
-                add_m=use.add_m + found[0], reason=f"{use.reason}, and the geoid's height {found[1]} is added"
-            )
-        elif "sea" not in ways[name]:
-            use = ways[name]["ellipsoid"]
-            ways[name]["sea"] = use._replace(
-                add_m=use.add_m - found[0],
-                reason=f"{use.reason}, and the geoid's height {found[1]} is taken off",
-            )
+        way = ways[name]
+        for has, lacks, sign, done in (
+            ("sea", "ellipsoid", 1, "added"),
+            ("ellipsoid", "sea", -1, "taken off"),
+        ):
+            if lacks not in way:
+                reason = f"{way[has].reason}, and the geoid's height {found[1]} is {done}"
+                way[lacks] = way[has]._replace(add_m=way[has].add_m + sign * found[0], reason=reason)
     for reference in ("ellipsoid", "sea"):
         if all(reference in ways[name] for name in names):
-            kept: Literal["ellipsoid", "sea"] = "ellipsoid" if reference == "ellipsoid" else "sea"
-            return HeightPlan(kept, {name: ways[name][reference] for name in names}, without)
+            return HeightPlan(reference, {name: ways[name][reference] for name in names}, without)
     low = [name for name in names if "ellipsoid" not in ways[name]]
     high = [name for name in names if "sea" not in ways[name]]
     raise WildlabError(

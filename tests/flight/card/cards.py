@@ -73,12 +73,12 @@ def write_photo(
     path.write_bytes(jpeg(size, exif, xmp))
 
 
-def write_card(folder: Path, images: int = 4) -> None:
+def write_card(folder: Path) -> None:
     """A card: images, a table of surveyed points and one of clicks."""
     pictures = folder / "DCIM" / "100MEDIA"
     pictures.mkdir(parents=True)
     rows = ["image,name,u,v"]
-    for i in range(images):
+    for i in range(4):
         camera = (-30.0 + 4 * i, -8.0 + 5 * i, 60.0 + i)
         angles = (0.0, -60.0 - 5 * i, 10.0 + 7 * i)
         name = f"DJI_{i + 1:04d}.JPG"

@@ -14,8 +14,8 @@ from tests.flight.card.cards import MARKS, TAKEN, geodetic, gpx, write_card, wri
 from wildlab.api.points import georeference
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
-from wildlab.flight.card.importing import Card, import_card, read_card, recipe_beside
-from wildlab.flight.card.proposal import Wishes
+from wildlab.flight.card.importing import import_card, read_card, recipe_beside
+from wildlab.flight.card.proposal import Proposal, Wishes
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import load_flight
@@ -27,7 +27,7 @@ def card(tmp_path: Path) -> Path:
     return tmp_path / "card"
 
 
-def read(card: Path, roles: dict[str, str] | None = None, **wishes: Any) -> Card:
+def read(card: Path, roles: dict[str, str] | None = None, **wishes: Any) -> Proposal:
     """The card in a folder, by a clock in UTC unless another zone is given."""
     return read_card([card], Wishes("card", **{"zone": "UTC", **wishes}), roles or {})
 

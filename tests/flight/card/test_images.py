@@ -47,7 +47,7 @@ def test_records_of_triggers_give_whole_seconds_their_fractions():
     records = triggers(np.insert(TAKEN, 7, (TAKEN[6] + TAKEN[7]) / 2))
     found = images(wall)
     clock = clock_of_images(found, own(), None, ("triggers", records))
-    assert clock.block == {"triggers": "triggers"}
+    assert clock.triggers == "triggers"
     stamped = stamped_by(photos_of(found), records, Path("x"))
     np.testing.assert_allclose(stamped.columns["time_s"], TAKEN)
 

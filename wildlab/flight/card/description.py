@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.flight.card.roles import OTHER, Choice
+from wildlab.flight.card.roles import OTHER, PARTS_SHOWN, ROLES, Choice
 from wildlab.flight.files import printable
 from wildlab.flight.readers.log import Clock, Stream
 
@@ -18,7 +18,6 @@ from wildlab.flight.readers.log import Clock, Stream
 HEADINGS = ("file", "format", "begins (UTC)", "lasts", "holds", "time from", "heights from", "role")
 #: A rate is of so many steps together, and a pause is a step of so many usual ones.
 STRETCH, PAUSE = 10, 5.0
-_COUNTED = {"photos": "images", "marks": "points", "clicks": "pixels"}
 _REFERENCES = {"height_ellipsoid_m": "ellipsoid", "height_sea_m": "sea level", "height_home_m": "take-off"}
 
 
@@ -53,8 +52,8 @@ def _row(choice: Choice) -> list[str]:
 
 
 def _amount(name: str, stream: Stream) -> str:
-    if name in _COUNTED:
-        return f"{len(stream)} {_COUNTED[name]}"
+    if name in PARTS_SHOWN:
+        return f"{len(stream)} {PARTS_SHOWN[name]}"
     return f"{name} {len(stream)}{paced(_times(stream))}"
 
 
@@ -121,7 +120,7 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
             continue
         if log is not None:
             if not own:
-                own = [f"is taken for {_ARTICLES[one.role]}{one.target and f', {one.target}'}: {one.why}"]
+                own = [f"is taken for {ROLES[one.role]}{one.target and f', {one.target}'}: {one.why}"]
             fixes = one.item.part("gnss")
             own = [log.vehicle and f"is of {log.vehicle}", "" if fixes is None else _quality(fixes), *own]
             # An image without a place is one all the same, and its reader says what it lacks.
@@ -172,18 +171,6 @@ def _quality(fixes: Stream) -> str:
         low, middle, high = np.percentile(known["satellites"], (0, 50, 100))
         notes.append(f"satellites {low:.0f} to {high:.0f}, median {middle:.0f}")
     return ", ".join(notes)
-
-
-_ARTICLES = {
-    "own": "the vehicle's own log",
-    "camera": "a log that rides on the camera",
-    "receiver": "a receiver on board",
-    "target": "the track of a target",
-    "triggers": "records of the camera's triggers",
-    "images": "the images",
-    "marks": "surveyed points",
-    "clicks": "pixels of things in the images",
-}
 
 
 def _unused(part: str, stream: Stream) -> str:

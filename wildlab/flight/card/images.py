@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from wildlab.flight.files import printable
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.log import Stream
 from wildlab.flight.readers.photos import camera_of, of_camera
-from wildlab.flight.time_scales import hours_words, whole_hours
+from wildlab.flight.time_scales import Span
 from wildlab.flight.trigger_matching import match_triggers
 
 #: Time zones are whole quarters of an hour, s.
@@ -25,8 +25,7 @@ QUARTER_S = 900.0
 SET_WITHIN_S = 300.0
 
 
-@dataclass(frozen=True)
-class ImageClock:
+class ImageClock(NamedTuple):
     """How the images' stamps become flight time.
 
     Attributes
@@ -37,14 +36,14 @@ class ImageClock:
         What to add to the stamps.
     note
         A sentence on it.
-    block
-        What the recipe says of the images' table beside its file.
+    triggers
+        Name of the recipe's table of triggers that they have their times from, where there is one.
     """
 
     kind: Literal["utc", "sequence"]
     offset_s: float
     note: str
-    block: dict[str, Any] = field(default_factory=dict)
+    triggers: str = ""
 
 
 def one_camera(
@@ -185,20 +184,15 @@ def clock_of_images(
         clock = _by_triggers(photos, *triggers)
         if clock is not None:
             return clock
-    offset, flown = stated_offset_s or 0.0, _flown(own, others)
+    offset = stated_offset_s or 0.0
     if len(utc):
         base = images.log.clock.base if images.log is not None and images.log.clock is not None else ""
         note = f"The images' stamps are {printable(base) if base.startswith('local') else 'in UTC'}."
         note += f" {offset:g} s are added to them, as you said." if offset else ""
-        by = whole_hours((float(np.min(utc)) + offset, float(np.max(utc)) + offset), flown)
-        if by is not None:
-            note += (
-                f" They are {hours_words(by)} {'ahead of' if by < 0 else 'behind'} the flight's log: a zone "
-                f"is wrong (--zone), or the camera's clock (--camera-offset {offset + by:g})."
-            )
         return ImageClock("utc", offset, note)
     if stated_offset_s is not None:
         return ImageClock("utc", offset, f"The camera's wall clock gets {offset:g} s, as you said.")
+    flown = _flown(own, others)
     quarters = None if flown is None else _quarters(wall, flown)
     if quarters is None:
         note = "The camera's wall clock states no zone and is taken for UTC: give --zone or --camera-offset."
@@ -210,7 +204,7 @@ def clock_of_images(
     return ImageClock("utc", -quarters * QUARTER_S, note)
 
 
-def _flown(own: CardItem | None, others: Sequence[CardItem]) -> tuple[float, float] | None:
+def _flown(own: CardItem | None, others: Sequence[CardItem]) -> Span | None:
     """When the flight was: by the vehicle's log, or where it has none by the tracks of targets."""
     spans = [span for one in others if (span := span_of(one)) is not None]
     if own is not None or not spans:
@@ -235,7 +229,7 @@ def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | No
         0.0,
         f"{len(stamps) - match.images_left} of {len(stamps)} images have the time of a trigger's record, by "
         f"the pattern of intervals ({match.triggers_left} records are left over).",
-        {"triggers": name},
+        name,
     )
 
 
@@ -246,7 +240,7 @@ def _known(column: NDArray[Any] | None) -> NDArray[np.float64]:
     return np.asarray(values[np.isfinite(values)])
 
 
-def _quarters(wall: NDArray[np.float64], flown: tuple[float, float]) -> int | None:
+def _quarters(wall: NDArray[np.float64], flown: Span) -> int | None:
     """How many quarters of an hour the wall clock is ahead of UTC, where one number alone fits the flight."""
     shares = {}
     for quarters in range(-14 * 4, 14 * 4 + 1):

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
-from pathlib import PurePosixPath
-from typing import Any, Literal, NamedTuple, cast
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.flight.card.images import camera_of_images, clock_of_images
-from wildlab.flight.card.roles import OTHER, PARTS_SHOWN, Choice
+from wildlab.flight.card.images import camera_of_images, clock_of_images, one_camera
+from wildlab.flight.card.roles import OTHER, PARTS_SHOWN, ROLES, Choice, has_place
 from wildlab.flight.files import dump_toml, printable, read_toml
-from wildlab.flight.heights import NO_GRID, choose_reference
+from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.log import Stream
 from wildlab.paths import DATA
@@ -32,6 +32,18 @@ TIMED: list[dict[str, Any]] = [{"column": "time_s", "above": 0.0}]
 UTC = {"column": "time_s", "format": "unix"}
 #: Below any angle in degrees: a condition that leaves rows without one out.
 NO_ANGLE = -1e6
+#: A vehicle that goes up or down by more than this does not do so at 0 m/s.
+CLIMBED_M = 3.0
+#: How far level ground beside a take-off is assumed to be from its height, standard deviation, m.
+TAKE_OFF_SD_M = 5.0
+#: What is assumed where logs say nothing, as it stands in a recipe.
+ASSUMED = DATA / "recipes" / "assumed.toml"
+#: The parts that a recipe begins with.
+ORDER = (
+    *("name", "description", "locations", "platform", "camera", "mount", "time", "clocks", "vertical"),
+    *("uncertainty", "logs"),
+)
+TURNS, AXES = ("roll", "pitch", "yaw"), ("north", "east", "down")
 
 
 @dataclass(frozen=True)
@@ -68,30 +80,497 @@ class Wishes:
     zone: str | None = None
 
 
-@dataclass
 class Proposal:
-    """A recipe, as nested mappings and as text, and what was decided on the way, in sentences."""
+    """A recipe of a flight, as nested mappings and as text, and what was decided on the way, in sentences.
 
-    data: dict[str, Any]
-    notes: list[str] = field(default_factory=list)
+    Parameters
+    ----------
+    source
+        The folder that all names are below.
+    choices
+        From `roles.choose_roles`.
+    wishes
+        What the user states.
 
-    def text(self, choices: Sequence[Choice]) -> str:
+    Raises
+    ------
+    WildlabError
+        Where nothing says where a camera was, no time is known, or heights cannot be brought together.
+    """
+
+    def __init__(self, source: Path, choices: Sequence[Choice], wishes: Wishes) -> None:
+        _refuse_without_zone(choices)
+        self.source, self.choices, self.wishes = source, choices, wishes
+        self.by_role = {role: [one for one in choices if one.role == role] for role in ROLES}
+        self.notes: list[str] = []
+        self.logs: dict[str, dict[str, Any]] = {}
+        self.data: dict[str, Any] = {"name": wishes.name}
+        self.own, camera, receiver, self.triggers = map(self._only, ("own", "camera", "receiver", "triggers"))
+        images = _with_most_rows(one for one in self.by_role["images"] if one.item.part("photos") is not None)
+        lens: str | None = None
+        if images is not None:
+            found, lens, said = one_camera(images.item, images.target, wishes.camera)
+            images = replace(images, item=found)
+            self.notes += [said] if said else []
+        placed = images is not None and has_place(images.item) and bool(angles(stream_of(images, "photos")))
+        if not (self.own or camera or receiver or placed):
+            raise WildlabError(
+                "nothing here says where a camera was",
+                "name the log of the flight (--role FILE=own), or write a recipe (data/recipes/README.md)",
+            )
+        aboard = [(one, part) for one in (self.own, camera) for part in ("poses", "gnss")]
+        aboard += [(receiver, "gnss"), (images, "photos")]
+        others = [(one, part) for one in self.by_role["target"] for part in ("gnss", "poses")]
+        self.streams = {
+            key_of(one, part): stream
+            for one, part in (*aboard, *others, *((one, "marks") for one in self.by_role["marks"]))
+            if one is not None and (stream := one.item.part(part)) is not None
+            if "latitude_deg" in stream.columns and stream.used.any()
+        }
+        before = len(self.notes)
+        self.heights = self._choose_heights({key_of(one, part) for one, part in aboard if one is not None})
+        self._state(" ".join(self.notes[before:]))
+        if self.own is not None:
+            self._add_vehicle(self.own, receiver is None)
+        if receiver is not None:
+            self._add_satellites(receiver, "receiver")
+        if camera is not None:
+            self._add_poses(camera, "camera")
+        if images is not None:
+            self._add_frames(images, lens, placed)
+        self._add_mount(camera is not None or "camera" in self.data.get("poses", {}))
+        self._add_targets()
+        if self.by_role["clicks"]:
+            self._add_clicks(images)
+        self._add_uncertainty()
+        self.data["logs"] = self.logs
+        if "poses" not in self.data and "gnss" not in self.data:
+            left_out = [one for one in self.notes if one.startswith("The images are left out")]
+            because = f" ({left_out[0]})" if left_out else ""
+            raise WildlabError(
+                f"nothing here says where a camera was{because}",
+                "add the log of the flight (--role FILE=own)",
+            )
+        self.data = {key: self.data[key] for key in ORDER if key in self.data} | self.data
+
+    @property
+    def recipe(self) -> str:
         """The recipe as TOML, with what it rests on in front."""
         lines = [
             "# Written by wildlab import. To change it: wildlab import THIS --source FOLDER --out FLIGHT"
         ]
-        for one in choices:
-            if one.item.problem == OTHER:
-                continue
-            role = one.role + (f" {one.target}" if one.target else "")
-            lines.append(_comment(f"{one.item.shown}: {role} ({one.why})"))
-        lines += [_comment(one) for one in self.notes]
+        for one in self.choices:
+            if one.item.problem != OTHER:
+                role = one.role + (f" {one.target}" if one.target else "")
+                lines.append(_comment(f"{one.item.shown}: {role} ({one.why})"))
+        lines += map(_comment, self.notes)
         return "\n".join(lines) + "\n\n" + dump_toml(self.data, inline=True)
+
+    def _only(self, role: str) -> Choice | None:
+        """The one thing of a role that only one can have; of several the one with the most rows."""
+        several = self.by_role[role]
+        taken = _with_most_rows(several)
+        for one in several:
+            if taken is not None and one is not taken:
+                left = f"{one.item.shown} is left out: {taken.item.shown} has more rows, and a flight has one"
+                self.notes.append(f"{left} of that role ({role}).")
+        return taken
+
+    def _choose_heights(self, own: set[str]) -> HeightPlan:
+        """One reference for all parts with heights; the take-off where none has any other."""
+        wishes, streams = self.wishes, self.streams
+        alone = streams and streams.keys() <= own and all(map(_above_take_off_alone, streams.values()))
+        if alone and wishes.take_off_m is None:
+            self.notes.append(
+                "Heights count from the take-off, since the log has no others; --take-off states its height."
+            )
+            use = HeightUse("height_home_m", 0.0, "")
+            return HeightPlan("take-off", dict.fromkeys(streams, use))
+        try:
+            plan = choose_reference(
+                streams, [one for one in streams if one in own], wishes.geoid_m, wishes.take_off_m
+            )
+        except WildlabError as error:
+            option = "--take-off" if "take-off" in error.problem else "--geoid"
+            fix = f"{error.fix} ({option} METRES), or leave a file out (--role FILE=nothing)"
+            raise WildlabError(error.problem, fix, field=option) from None
+        if plan.reference == "sea" and plan.uses:
+            self.notes.append(
+                f"Heights count from mean sea level, since {NO_GRID}; --geoid states how high it is."
+            )
+        self.notes += [f"Heights of {name}: {use.reason}." for name, use in plan.uses.items() if use.add_m]
+        self.notes += [f"{name} has places and no heights." for name in plan.without]
+        return plan
+
+    def _state(self, of_heights: str) -> None:
+        """What is so of the whole flight."""
+        start, reference = self.wishes.start, self.heights.reference
+        vehicle = self.own.item.log.vehicle if self.own is not None and self.own.item.log else ""
+        self.data |= {
+            "description": f"Logged by {vehicle}." if vehicle else "",
+            "locations": {"sensitivity": "withheld"},
+            "platform": {"name": vehicle or "not stated"},
+            "vertical": {
+                "reference": "mean sea level" if reference == "sea" else reference,
+                "note": of_heights,
+            },
+            "time": {"kind": "utc"} | ({"epoch": start} if start is not None else {}),
+        }
+
+    # -- the logs' tables, each named once
+
+    def _over_time(self, choice: Choice, part: str, name: str) -> dict[str, Any]:
+        """What every block over time has: its table, which of its rows count, and their times."""
+        return {"file": self._table(choice, part, name), "where": USED, "time": UTC}
+
+    def _table(self, choice: Choice, part: str, name: str) -> str:
+        """The name of a table of one part of a log, with its heights and stamps brought to the flight's."""
+        found = choice.item
+        block: dict[str, Any] = {"file": found.name, "format": found.format, "part": part}
+        if self.wishes.zone is not None:
+            block["zone"] = self.wishes.zone
+        use = self.heights.uses.get(key_of(choice, part))
+        if use is not None:
+            block["height"] = use.column.removeprefix("height_").removesuffix("_m")
+            block |= {"add_m": added} if (added := round(use.add_m, 4)) else {}
+        # Images have ways of their own to their time; points and pixels have none.
+        if part not in ("photos", "marks", "clicks") and not has_utc(stream_of(choice, part)):
+            if self.wishes.start is None:
+                raise _no_utc(choice)
+            block["offset_s"] = self.wishes.start.timestamp()
+        self.logs[name] = block
+        return name
+
+    # -- the vehicle: poses and sensors
+
+    def _add_vehicle(self, own: Choice, receiver: bool) -> None:
+        """What the vehicle's own log has: poses, and its sensors."""
+        if own.item.part("gnss") is not None and receiver:
+            self._add_satellites(own, "vehicle")
+        if own.item.part("poses") is not None:
+            self._add_poses(own, "autopilot")
+        if own.item.part("imu") is not None:
+            self.data["imu"] = {
+                **read_assumed("imu"),
+                **self._over_time(own, "imu", "vehicle-imu"),
+                "force": quantities("xyz", "f_{}_m_s2", "m/s2"),
+                "rate": quantities("xyz", "w_{}_rad_s", "rad/s"),
+            }
+        if own.item.part("magnetometer") is not None:
+            block = self._over_time(own, "magnetometer", "vehicle-magnetometer")
+            self.data["magnetometer"] = block | {"field": quantities("xyz", "field_{}_ut", "uT")}
+        if own.item.part("gimbal") is not None:
+            self._add_gimbal(own)
+
+    def _add_satellites(self, choice: Choice, name: str) -> None:
+        stream = stream_of(choice, "gnss")
+        block = self._over_time(choice, "gnss", f"{name}-gnss")
+        block |= {"position": position(), **velocity(stream), **stated_spreads(stream)}
+        if "sd_velocity_m_s" in stream.columns:
+            block |= quantities(["sd_velocity"], "{}_m_s", "m/s")
+        self.data["gnss"] = block | {key: key for key in ("satellites", "fix") if key in stream.columns}
+
+    def _add_poses(self, choice: Choice, name: str) -> None:
+        stream = stream_of(choice, "poses")
+        block = self._over_time(choice, "poses", f"{name}-poses")
+        block |= {"attitude": attitude(stream), **velocity(stream), **pose_spreads(stream)}
+        placed = "latitude_deg" in stream.columns
+        block |= {"position": position()} if placed else {"position_from": "gnss"}
+        self.data.setdefault("poses", {})[name] = block
+
+    def _add_gimbal(self, own: Choice) -> None:
+        """Its angles: against the airframe a table of their own, against the world the camera's poses."""
+        stream = stream_of(own, "gimbal")
+        block = self._over_time(own, "gimbal", "vehicle-gimbal")
+        if {"pan_deg", "tilt_deg"} <= set(stream.columns):
+            self.data["gimbal"] = block | quantities(("pan", "tilt"), "{}_deg", "deg")
+        elif angles(stream) and "gnss" in self.data:
+            block |= {"position_from": "gnss", "attitude": quantities(TURNS, "{}_world_deg", "deg")}
+            self.data.setdefault("poses", {})["camera"] = block
+        else:
+            del self.logs[block["file"]]
+
+    # -- what was seen: images, pixels of things in them, and where these truly were
+
+    def _add_frames(self, images: Choice, lens: str | None, placed: bool) -> None:
+        """The images, with the poses that stand in them."""
+        photos, data, wishes, own = stream_of(images, "photos"), self.data, self.wishes, self.own
+        self.notes += [
+            f"The images of {one.item.shown} are left out: {images.item.shown} has more, and a flight has "
+            "those of one folder."
+            for one in self.by_role["images"]
+            if one.item.name != images.item.name
+        ]
+        camera, how = camera_of_images(images.item, wishes.camera, wishes.focal_px)
+        if camera is None:
+            self.notes.append(
+                f"The images are left out: {how}. Give the camera with --camera, or with --focal alone."
+            )
+            return
+        data["camera"] = camera.model_dump()
+        self.notes.append(f"The camera: {how}.")
+        clock = clock_of_images(
+            images.item,
+            None if own is None else own.item,
+            wishes.camera_offset_s,
+            records := self._records(),
+            [one.item for one in self.by_role["target"]],
+        )
+        self.notes.append(clock.note)
+        if records is not None and not clock.triggers and wishes.camera_offset_s is None:
+            self.notes.append(
+                f"{int(records[1].used.sum())} records of triggers fit no images for certain, and are not "
+                "used."
+            )
+        id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"
+        file = self._table(images, "photos", "images")
+        self.logs[file] |= {"triggers": clock.triggers} if clock.triggers else {}
+        self.logs[file] |= {} if lens is None else {"camera": lens}
+        if not clock.triggers:
+            self.logs.pop("triggers", None)
+        frames: dict[str, Any] = {"file": file, "id": id_}
+        if clock.kind == "sequence":
+            data["time"] = {"kind": "sequence"}
+        else:
+            frames |= {"time": UTC, "where": TIMED}
+        if clock.offset_s:
+            data["clocks"] = {"camera_offset_s": clock.offset_s}
+        data["frames"] = frames
+        if placed and (own is None or own.item.part("poses") is None):
+            end = angles(photos)
+            data.setdefault("poses", {})["camera" if end == "_world_deg" else "images"] = {
+                "file": file,
+                "where": [*USED, *({"column": f"{axis}{end}", "above": NO_ANGLE} for axis in TURNS)],
+                "frame": id_,
+                "position": position(),
+                "attitude": quantities(TURNS, "{}" + end, "deg"),
+            }
+
+    def _records(self) -> tuple[str, Stream] | None:
+        """The table of the triggers' records, where there are any, and its rows."""
+        for one in (self.triggers, self.own):
+            stream = None if one is None else one.item.part("triggers")
+            if one is not None and stream is not None and has_utc(stream):
+                return self._table(one, "triggers", "triggers"), stream
+        return None
+
+    def _add_mount(self, camera: bool) -> None:
+        """Which way the camera looks: along its own poses where there are any, else down."""
+        if "frames" not in self.data:
+            return
+        if camera:
+            poses = list(self.data.get("poses", {}))
+            own = {"poses": "camera"} if "camera" in poses and len(poses) > 1 else {}
+            self.data["mount"] = own | {"looks": "forward"}
+            others = [name for name in poses if name != "camera"]
+            self.notes.append(
+                f"[mount] is that of the camera's own poses (--source camera); images are not used with "
+                f"{', '.join(others)}."
+                if own
+                else "The poses are those of the camera itself: its lens points along them."
+            )
+        elif "gimbal" not in self.data:
+            self.data["mount"] = {"looks": "down"}
+            self.notes.append(
+                "The camera is taken to look straight down, the top of its images forward: change [mount] "
+                "where that is wrong."
+            )
+
+    def _add_targets(self) -> None:
+        """Truth: tracks of targets, and points that do not move."""
+        truth = []
+        names = self._named_as_clicked()
+        for number, one in enumerate(self.by_role["target"], 1):
+            part = "gnss" if one.item.part("gnss") is not None else "poses"
+            block = self._over_time(one, part, f"target-{number}")
+            block |= {"target": names.get(one.target, one.target), "position": position()}
+            truth.append(block | stated_spreads(stream_of(one, part)))
+        for number, one in enumerate(self.by_role["marks"], 1):
+            stream = stream_of(one, "marks")
+            block = {"file": self._table(one, "marks", f"marks-{number}"), "where": USED, "id": "name"}
+            truth.append(block | {"position": position()} | stated_spreads(stream))
+        if truth:
+            self.data["truth"] = truth
+
+    def _named_as_clicked(self) -> dict[str, str]:
+        """Names of targets: where one track and one clicked name are left over, they are the same thing."""
+        tracks = [one.target for one in self.by_role["target"]]
+        marked, clicked = (
+            {str(name) for one in self.by_role[part] for name in stream_of(one, part).columns.get("name", ())}
+            for part in ("marks", "clicks")
+        )
+        left, names = [one for one in tracks if one not in clicked], clicked - {""} - marked - set(tracks)
+        if len(left) != 1 or len(names) != 1:
+            return {}
+        name = names.pop()
+        said = f"The track {left[0]} is taken for what was clicked as {printable(name)}: no other is left."
+        self.notes.append(said)
+        return {left[0]: name}
+
+    def _add_clicks(self, images: Choice | None) -> None:
+        """What was clicked in the images."""
+        if images is None or "frames" not in self.data:
+            self.notes.append("The pixels are left out: there are no images that they are of.")
+            return
+        frames, clicks = self.data["frames"], self.by_role["clicks"]
+        level = self._level()
+        photos = stream_of(images, "photos")
+        known = {*_stems(photos), *map(str, photos.columns["file"])}
+        blocks = []
+        for number, one in enumerate(clicks, 1):
+            stream = stream_of(one, "clicks")
+            block: dict[str, Any] = {
+                "source": "clicks" if len(clicks) == 1 else f"clicks-{number}",
+                "file": self._table(one, "clicks", f"clicks-{number}"),
+                "where": USED,
+                "prefix": f"click-{number}-",
+                "frame": "stem" if frames["id"] == "stem" else "image",
+                "pixel": quantities("uv", "{}_px", "px"),
+            }
+            if "name" in stream.columns:
+                block["target"] = "name"
+            if level is not None:
+                block["ground"] = {"height": {"value": level, "unit": "m"}}
+            self.logs[block["file"]]["images"] = frames["file"]
+            of = map(str, stream.columns["image"][stream.used])
+            strange = sum(known.isdisjoint((name, PurePosixPath(name).stem)) for name in of)
+            if strange:
+                self.notes.append(
+                    f"{one.item.shown}: {strange} of {len(stream)} pixels are of no image here, and left out."
+                )
+            blocks.append(block)
+        self.data["detections"] = blocks
+
+    def _level(self) -> float | None:
+        """Height of level ground: the mean of the surveyed points', or that of the take-off, where a log has
+        heights above it beside others."""
+        heights: list[float] = []
+        for one in self.by_role["marks"]:
+            heights += self._heights_of(key_of(one, "marks"))
+        if heights:
+            mean, spread = float(np.mean(heights)), float(np.ptp(heights))
+            if len(heights) > 1 and spread > 0:
+                self._uncertain_plane(float(np.std(heights, ddof=1)))
+            self.notes.append(
+                f"The ground is taken to be level at the mean of {len(heights)} surveyed points, which "
+                f"differ by {spread:.1f} m. A map does better: --terrain."
+            )
+            return _to_millimetres(mean)
+        for key, stream in self.streams.items():
+            home = stream.columns.get("height_home_m")
+            of_home = [] if home is None else self._heights_of(key, home)
+            if of_home:
+                self._uncertain_plane(TAKE_OFF_SD_M)
+                self.notes.append(
+                    "The ground is taken to be level and as high as the take-off. A map does better: "
+                    "--terrain."
+                )
+                return _to_millimetres(float(np.median(of_home)))
+        return None
+
+    def _heights_of(self, key: str, above: Any = 0.0) -> list[float]:
+        """Heights of a part that can be used, m, less those above something."""
+        use, stream = self.heights.uses.get(key), self.streams.get(key)
+        if use is None or stream is None:
+            return []
+        column = (stream.columns[use.column] + round(use.add_m, 4) - above)[stream.used]
+        return [float(one) for one in column[np.isfinite(column)]]
+
+    def _uncertain_plane(self, sd_m: float) -> None:
+        """The ground's height is as uncertain as that: ellipses know it."""
+        self.data["uncertainty"] = {"plane_height_m": round(max(sd_m, 0.01), 3)}
+
+    def _add_uncertainty(self) -> None:
+        """How good poses are, where not each of them says so itself: positions by the receivers' own
+        statements where there are any."""
+        if any("spreads" not in one for one in self.data.get("poses", {}).values()):
+            found, stated = read_assumed("uncertainty"), []
+            for way in ("horizontal", "vertical"):
+                name = f"sd_{way}_m"
+                values = [s.columns[name][s.used] for s in self.streams.values() if name in s.columns]
+                every = np.concatenate([np.empty(0), *values])
+                every = every[np.isfinite(every) & (every > 0)]
+                if len(every):
+                    found[f"position_{way}_m"] = round(float(np.median(every)), 4)
+                    stated.append(f"position {way}")
+            if stated:
+                found["note"] = (
+                    f"{' and '.join(stated).capitalize()}: median of what the receiver stated. The rest: "
+                    + found["note"]
+                )
+            said = (
+                f"Assumed, since no log states it: pixels to {found['pixel_px']:g} px, tilt to "
+                f"{found['tilt_deg']:g} deg, heading to {found['heading_deg']:g} deg"
+            )
+            if "position horizontal" not in stated:
+                level, height = found["position_horizontal_m"], found["position_vertical_m"]
+                said += f", positions to {level:g} m ({height:g} m in height)"
+            said += ". [uncertainty] has them: ellipses and verdicts on consistency rest on that."
+            self.data["uncertainty"] = found | self.data.get("uncertainty", {})
+            self.notes.append(said)
+        if "imu" in self.data:
+            self.notes.append("[imu] assumes an inertial sensor typical of autopilots.")
+
+
+def _refuse_without_zone(choices: Sequence[Choice]) -> None:
+    """A log whose clock states no zone may be the vehicle's own: none without an attitude takes its place."""
+    if any(one.role == "own" and one.item.part("poses") is not None for one in choices):
+        return
+    for one in choices:
+        if one.role == "nothing" and "without a zone" in one.why:
+            raise WildlabError(
+                f"the clock of {one.item.shown} is local time, and nothing says its zone",
+                "state it, as --zone Europe/Oslo or --zone +02:00; or leave the file out, as "
+                f"--role {one.item.name}=nothing",
+                field="--zone",
+            )
+
+
+def _no_utc(choice: Choice) -> WildlabError:
+    """What to state of a log that does not know UTC."""
+    clock = choice.item.log.clock if choice.item.log is not None else None
+    if clock is not None and "zone" in clock.base:
+        problem = f"the clock of {choice.item.shown} is local time, and nothing says its zone"
+        return WildlabError(problem, "state it, as --zone Europe/Oslo or --zone +02:00", field="--zone")
+    problem = f"the clock of {choice.item.shown} does not know UTC"
+    return WildlabError(
+        problem, "state when it stood at zero, as --start 2026-05-01T06:00:00Z", field="--start"
+    )
+
+
+def _with_most_rows(several: Iterable[Choice]) -> Choice | None:
+    """That of which most rows can be used."""
+
+    def rows(one: Choice) -> int:
+        return sum(int(part.used.sum()) for part in one.item.log.parts.values()) if one.item.log else 0
+
+    return max(several, key=rows, default=None)
+
+
+def _above_take_off_alone(stream: Stream) -> bool:
+    """Whether a part has heights above the take-off, and none of another kind in any row that can be used."""
+    others = [stream.columns.get(f"height_{kind}_m") for kind in ("ellipsoid", "sea")]
+    if any(one is not None and np.isfinite(one[stream.used]).any() for one in others):
+        return False
+    return "height_home_m" in stream.columns
 
 
 def _comment(text: str) -> str:
     """One line of a comment, whatever is in the text."""
     return "# " + re.sub(r"[\x00-\x1f\x7f\u0085\u2028\u2029]+", " ", text)
+
+
+def _to_millimetres(metres: float) -> float:
+    return math.floor(metres * 1000 + 0.5) / 1000
+
+
+def _stems(photos: Stream) -> list[str]:
+    return [PurePosixPath(str(one)).stem for one in photos.columns["file"]]
+
+
+def key_of(choice: Choice, part: str) -> str:
+    """What a part of a file is called in sentences."""
+    return f"{choice.item.name} ({part})"
 
 
 def stream_of(choice: Choice, part: str) -> Stream:
@@ -119,534 +598,70 @@ def has_utc(stream: Stream) -> bool:
     return times is not None and bool(np.isfinite(times[stream.used]).any())
 
 
-def angles(stream: Stream) -> tuple[str, str] | None:
-    """Which angles a part has: beginning and end of their columns' names, None without any."""
-    for end in ("_world_deg", "_deg"):
-        names = [f"{axis}{end}" for axis in ("roll", "pitch", "yaw")]
-        if all(name in stream.columns for name in names):
-            values = np.column_stack([stream.columns[name] for name in names])[stream.used]
-            if np.isfinite(values).all(axis=1).any():
-                return "", end
-    return None
+# -- what a part of a log gives a recipe
 
 
-Kind = Literal["ellipsoid", "sea", "home"]
-#: A part of a file: (name of the file, part).
-Key = tuple[str, str]
-
-
-class Chosen(NamedTuple):
-    """Which heights of a part are taken, and what is added to them, m."""
-
-    kind: Kind
-    add_m: float = 0.0
-
-
-@dataclass(frozen=True)
-class Heights:
-    """The reference of a flight, for each part how it gets there, and sentences on it."""
-
-    reference: str
-    chosen: dict[Key, Chosen]
-    notes: list[str] = field(default_factory=list)
-
-    def of(self, file: str, part: str) -> Chosen | None:
-        """How a part's heights are taken; None where it has none."""
-        return self.chosen.get((file, part))
-
-
-def heights_of(
-    streams: Mapping[Key, Stream],
-    own: Collection[Key],
-    geoid_m: float | None,
-    take_off_m: float | None = None,
-) -> Heights:
-    """One reference for all parts with heights, see `wildlab.flight.heights.choose_reference`; the take-off
-    where none has any other.
-
-    Parameters
-    ----------
-    streams
-        The parts that have positions.
-    own
-        Those of the vehicle itself.
-    geoid_m
-        How far the geoid is above the ellipsoid, m, where the user states it.
-    take_off_m
-        Height of the take-off above sea level, m, likewise.
-
-    Returns
-    -------
-    Heights
-
-    Raises
-    ------
-    WildlabError
-        Where there is no one reference for all.
-    """
-    names = {key: f"{key[0]} ({key[1]})" for key in streams}
-    by_name = {names[key]: stream for key, stream in streams.items()}
-    alone = streams and set(streams) <= set(own) and all(map(_above_take_off_alone, streams.values()))
-    if alone and take_off_m is None:
-        said = ["Heights count from the take-off, since the log has no others; --take-off states its height."]
-        return Heights("take-off", {key: Chosen("home") for key in streams}, said)
-    try:
-        plan = choose_reference(by_name, [names[key] for key in own if key in names], geoid_m, take_off_m)
-    except WildlabError as error:
-        option = "--take-off" if "take-off" in error.problem else "--geoid"
-        fix = f"{error.fix} ({option} METRES), or leave a file out (--role FILE=nothing)"
-        raise WildlabError(error.problem, fix, field=option) from None
-    chosen = {
-        key: Chosen(cast(Kind, use.column.removeprefix("height_").removesuffix("_m")), round(use.add_m, 4))
-        for key, name in names.items()
-        if (use := plan.uses.get(name)) is not None
-    }
-    said = [f"Heights of {name}: {use.reason}." for name, use in plan.uses.items() if use.add_m]
-    said += [f"{name} has places and no heights." for name in plan.without]
-    if plan.reference == "sea" and chosen:
-        said.insert(
-            0,
-            f"Heights count from mean sea level, since {NO_GRID}; --geoid states how high it is.",
-        )
-    return Heights({"sea": "mean sea level"}.get(plan.reference, plan.reference), chosen, said)
-
-
-def _above_take_off_alone(stream: Stream) -> bool:
-    """Whether a part has heights above the take-off, and none of another kind in any row that can be used."""
-    others = [stream.columns.get(f"height_{kind}_m") for kind in ("ellipsoid", "sea")]
-    if any(one is not None and np.isfinite(one[stream.used]).any() for one in others):
-        return False
-    return "height_home_m" in stream.columns
-
-
-class Sources:
-    """The logs' tables that a recipe asks for, each named once."""
-
-    def __init__(self, wishes: Wishes, streams: dict[Key, Stream], own: Collection[Key]) -> None:
-        self.wishes, self.streams = wishes, streams
-        self.heights: Heights = heights_of(streams, own, wishes.geoid_m, wishes.take_off_m)
-        self.logs: dict[str, dict[str, Any]] = {}
-
-    def over_time(self, choice: Choice, part: str, name: str) -> dict[str, Any]:
-        """What every block over time has: its table, which of its rows count, and their times."""
-        return {"file": self.table(choice, part, name), "where": USED, "time": UTC}
-
-    def table(self, choice: Choice, part: str, name: str) -> str:
-        """The name of a table of one part of a log, with its heights and stamps brought to the flight's."""
-        found = choice.item
-        block: dict[str, Any] = {"file": found.name, "format": found.format, "part": part}
-        if self.wishes.zone is not None:
-            block["zone"] = self.wishes.zone
-        chosen = self.heights.of(found.name, part)
-        if chosen is not None:
-            block |= {"height": chosen.kind} | ({"add_m": chosen.add_m} if chosen.add_m else {})
-        stream = stream_of(choice, part)
-        # Images have ways of their own to their time; points and pixels have none.
-        if part not in ("photos", "marks", "clicks") and not has_utc(stream):
-            if self.wishes.start is None:
-                raise _no_utc(choice)
-            block["offset_s"] = self.wishes.start.timestamp()
-        self.logs[name] = block
-        return name
-
-
-def _no_utc(choice: Choice) -> WildlabError:
-    """What to state of a log that does not know UTC."""
-    clock = choice.item.log.clock if choice.item.log is not None else None
-    if clock is not None and "zone" in clock.base:
-        problem = f"the clock of {choice.item.shown} is local time, and nothing says its zone"
-        return WildlabError(problem, "state it, as --zone Europe/Oslo or --zone +02:00", field="--zone")
-    problem = f"the clock of {choice.item.shown} does not know UTC"
-    return WildlabError(
-        problem, "state when it stood at zero, as --start 2026-05-01T06:00:00Z", field="--start"
-    )
-
-
-# -- the vehicle: poses and sensors
-
-FILE = DATA / "recipes" / "assumed.toml"
-
-
-def assumed(part: str) -> dict[str, Any]:
+def read_assumed(part: str) -> dict[str, Any]:
     """What is assumed of ``"uncertainty"`` or ``"imu"``, as it stands in a recipe."""
-    return dict(read_toml(FILE, "what is assumed where logs say nothing")[part])
+    return dict(read_toml(ASSUMED, "what is assumed where logs say nothing")[part])
 
 
-def uncertainty_of(streams: Mapping[tuple[str, str], Stream]) -> tuple[dict[str, Any], str]:
-    """The part ``[uncertainty]``: positions by the receivers' own statements where there are any.
-
-    Parameters
-    ----------
-    streams
-        The parts with positions.
-
-    Returns
-    -------
-    dict, and a sentence on it
-    """
-    found, stated = assumed("uncertainty"), []
-    for key, column in (
-        ("position_horizontal_m", "sd_horizontal_m"),
-        ("position_vertical_m", "sd_vertical_m"),
-    ):
-        values = [one.columns[column][one.used] for one in streams.values() if column in one.columns]
-        every = np.concatenate([np.empty(0), *values])
-        every = every[np.isfinite(every) & (every > 0)]
-        if len(every):
-            found[key] = round(float(np.median(every)), 4)
-            stated.append(key.removesuffix("_m").replace("_", " "))
-    if stated:
-        found["note"] = (
-            f"{' and '.join(stated).capitalize()}: median of what the receiver stated. The rest: "
-            + found["note"]
-        )
-    said = (
-        f"Assumed, since no log states it: pixels to {found['pixel_px']:g} px, tilt to "
-        f"{found['tilt_deg']:g} deg, heading to {found['heading_deg']:g} deg"
-    )
-    if "position horizontal" not in stated:
-        level, height = found["position_horizontal_m"], found["position_vertical_m"]
-        said += f", positions to {level:g} m ({height:g} m in height)"
-    return found, said + ". [uncertainty] has them: ellipses and verdicts on consistency rest on that."
-
-
-def quantity(column: str, unit: str) -> dict[str, Any]:
-    return {"column": column, "unit": unit}
+def quantities(names: Iterable[str], column: str, unit: str) -> dict[str, Any]:
+    """Quantities by name, each with a column that has the name in it."""
+    return {name: {"column": column.format(name), "unit": unit} for name in names}
 
 
 def position() -> dict[str, Any]:
-    return {
-        "latitude": quantity("latitude_deg", "deg"),
-        "longitude": quantity("longitude_deg", "deg"),
-        "height": quantity("height_m", "m"),
-    }
+    return quantities(("latitude", "longitude"), "{}_deg", "deg") | quantities(["height"], "{}_m", "m")
 
 
-def velocity(stream: Stream) -> dict[str, Any]:
-    """The velocity, where each row that can be used has one."""
-    names = [f"v_{axis}_m_s" for axis in ("north", "east", "down")]
-    if any(name not in stream.columns for name in names):
-        return {}
-    values = np.column_stack([stream.columns[name] for name in names])[stream.used]
-    if not np.isfinite(values).all() or _only_level(stream):
-        return {}
-    axes = ("north", "east", "down")
-    return {"velocity": {axis: quantity(name, "m/s") for axis, name in zip(axes, names, strict=True)}}
+def angles(stream: Stream) -> str:
+    """How the columns of a part's angles end; nothing where it has none."""
+    for end in ("_world_deg", "_deg"):
+        values = _together(stream, [f"{axis}{end}" for axis in TURNS])
+        if values is not None and np.isfinite(values).all(axis=1).any():
+            return end
+    return ""
 
 
 def attitude(stream: Stream) -> dict[str, Any]:
     parts = ("q_w", "q_x", "q_y", "q_z")
-    turned = all(name in stream.columns for name in parts)
-    if turned and np.isfinite(stream.columns["q_w"][stream.used]).all():
+    turned = _together(stream, parts)
+    if turned is not None and np.isfinite(turned[:, 0]).all():
         return {"quaternion": parts, "order": "wxyz"}
-    _, end = angles(stream) or ("", "_deg")
-    return {axis: quantity(f"{axis}{end}", "deg") for axis in ("roll", "pitch", "yaw")}
+    return quantities(TURNS, "{}" + (angles(stream) or "_deg"), "deg")
 
 
-def spreads(stream: Stream) -> dict[str, Any]:
-    names = {
-        "horizontal": ("sd_horizontal_m", "m"),
-        "vertical": ("sd_vertical_m", "m"),
-        **{axis: (f"sd_{axis}_deg", "deg") for axis in ("tilt", "heading")},
-    }
-    for column, _ in names.values():
-        values = stream.columns.get(column)
-        if values is None or not (np.isfinite(values) & (values > 0))[stream.used].all():
-            return {}
-    return {"spreads": {name: quantity(column, unit) for name, (column, unit) in names.items()}}
-
-
-def truth_spreads(stream: Stream) -> dict[str, Any]:
-    names = {"sd_horizontal": "sd_horizontal_m", "sd_vertical": "sd_vertical_m"}
-    return {key: quantity(column, "m") for key, column in names.items() if column in stream.columns}
-
-
-#: A vehicle that goes up or down by more than this does not do so at 0 m/s.
-CLIMBED_M = 3.0
-
-
-def _only_level(stream: Stream) -> bool:
-    """Whether a receiver that does not measure climbing says 0 for it, as those that speak NMEA do."""
-    if stream.columns["v_down_m_s"][stream.used].any():
-        return False
-    heights = [one[stream.used] for name, one in stream.columns.items() if name.startswith("height_")]
-    return any(np.isfinite(one).any() and np.nanmax(one) - np.nanmin(one) > CLIMBED_M for one in heights)
-
-
-def add_vehicle(proposal: Proposal, sources: Sources, own: Choice, name: str, receiver: bool) -> None:
-    """What the vehicle's own log has: poses, and its sensors."""
-    data = proposal.data
-    if own.item.part("gnss") is not None and receiver:
-        add_satellites(proposal, sources, own, name)
-    if own.item.part("poses") is not None:
-        add_poses(proposal, sources, own, "autopilot")
-    imu, field_, gimbal = (own.item.part(one) for one in ("imu", "magnetometer", "gimbal"))
-    if imu is not None:
-        data["imu"] = {
-            **assumed("imu"),
-            **sources.over_time(own, "imu", f"{name}-imu"),
-            "force": {axis: quantity(f"f_{axis}_m_s2", "m/s2") for axis in "xyz"},
-            "rate": {axis: quantity(f"w_{axis}_rad_s", "rad/s") for axis in "xyz"},
-        }
-    if field_ is not None:
-        data["magnetometer"] = {
-            **sources.over_time(own, "magnetometer", f"{name}-magnetometer"),
-            "field": {axis: quantity(f"field_{axis}_ut", "uT") for axis in "xyz"},
-        }
-    if gimbal is not None:
-        add_gimbal(proposal, sources, own, gimbal, name)
-
-
-def add_satellites(proposal: Proposal, sources: Sources, choice: Choice, name: str) -> None:
-    stream = stream_of(choice, "gnss")
-    block = sources.over_time(choice, "gnss", f"{name}-gnss")
-    block |= {"position": position(), **velocity(stream), **truth_spreads(stream)}
-    if "sd_velocity_m_s" in stream.columns:
-        block["sd_velocity"] = quantity("sd_velocity_m_s", "m/s")
-    block |= {key: key for key in ("satellites", "fix") if key in stream.columns}
-    proposal.data["gnss"] = block
-
-
-def add_poses(proposal: Proposal, sources: Sources, choice: Choice, name: str) -> None:
-    stream = stream_of(choice, "poses")
-    block = sources.over_time(choice, "poses", f"{name}-poses")
-    block |= {"attitude": attitude(stream), **velocity(stream), **spreads(stream)}
-    placed = "latitude_deg" in stream.columns
-    block |= {"position": position()} if placed else {"position_from": "gnss"}
-    proposal.data.setdefault("poses", {})[name] = block
-
-
-def add_gimbal(proposal: Proposal, sources: Sources, own: Choice, stream: Stream, name: str) -> None:
-    """A gimbal's angles: against the airframe a table of its own, against the world the camera's poses."""
-    block = sources.over_time(own, "gimbal", f"{name}-gimbal")
-    if {"pan_deg", "tilt_deg"} <= set(stream.columns):
-        turned = {"pan": quantity("pan_deg", "deg"), "tilt": quantity("tilt_deg", "deg")}
-        proposal.data["gimbal"] = block | turned
-    elif angles(stream) is not None and "gnss" in proposal.data:
-        attitude = {axis: quantity(f"{axis}_world_deg", "deg") for axis in ("roll", "pitch", "yaw")}
-        poses = block | {"position_from": "gnss", "attitude": attitude}
-        proposal.data.setdefault("poses", {})["camera"] = poses
-    else:
-        del sources.logs[block["file"]]
-
-
-# -- what was seen: images, pixels of things in them, and where these truly were
-
-
-def add_frames(
-    proposal: Proposal,
-    sources: Sources,
-    images: Choice,
-    lens: str | None,
-    own: Choice | None,
-    triggers: Choice | None,
-    by_role: Mapping[str, Sequence[Choice]],
-    placed: bool,
-) -> None:
-    """The images, with the poses that stand in them."""
-    photos, data, wishes = stream_of(images, "photos"), proposal.data, sources.wishes
-    others = [one for one in by_role["images"] if one.item.name != images.item.name]
-    for one in others:
-        proposal.notes.append(
-            f"The images of {one.item.shown} are left out: {images.item.shown} has more, and a flight has "
-            "those of one folder."
-        )
-    camera, how = camera_of_images(images.item, wishes.camera, wishes.focal_px)
-    if camera is None:
-        proposal.notes.append(
-            f"The images are left out: {how}. Give the camera with --camera, or with --focal alone."
-        )
-        return
-    data["camera"] = camera.model_dump()
-    proposal.notes.append(f"The camera: {how}.")
-    clock = clock_of_images(
-        images.item,
-        None if own is None else own.item,
-        wishes.camera_offset_s,
-        records := _triggers(sources, own, triggers),
-        [one.item for one in by_role.get("target", ())],
-    )
-    proposal.notes.append(clock.note)
-    if records is not None and "triggers" not in clock.block and wishes.camera_offset_s is None:
-        proposal.notes.append(
-            f"{int(records[1].used.sum())} records of triggers fit no images for certain, and are not used."
-        )
-    id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"
-    file = sources.table(images, "photos", "images")
-    sources.logs[file] |= clock.block | ({} if lens is None else {"camera": lens})
-    if "triggers" not in clock.block:
-        sources.logs.pop("triggers", None)
-    frames: dict[str, Any] = {"file": file, "id": id_}
-    if clock.kind == "sequence":
-        data["time"] = {"kind": "sequence"}
-    else:
-        frames |= {"time": UTC, "where": TIMED}
-    if clock.offset_s:
-        data["clocks"] = {"camera_offset_s": clock.offset_s}
-    data["frames"] = frames
-    if not placed:
-        return
-    if own is not None and own.item.part("poses") is not None:
-        return
-    _, end = angles(photos) or ("", "_deg")
-    where = [*USED, *({"column": f"{axis}{end}", "above": NO_ANGLE} for axis in ("roll", "pitch", "yaw"))]
-    data.setdefault("poses", {})["camera" if end == "_world_deg" else "images"] = {
-        "file": file,
-        "where": where,
-        "frame": id_,
-        "position": position(),
-        "attitude": {axis: quantity(f"{axis}{end}", "deg") for axis in ("roll", "pitch", "yaw")},
-    }
-
-
-def _triggers(sources: Sources, own: Choice | None, triggers: Choice | None) -> tuple[str, Stream] | None:
-    """The table of the triggers' records, where there are any, and its rows."""
-    for one in (triggers, own):
-        stream = None if one is None else one.item.part("triggers")
-        if one is not None and stream is not None and has_utc(stream):
-            return sources.table(one, "triggers", "triggers"), stream
-    return None
-
-
-def _stems(photos: Stream) -> list[str]:
-    return [PurePosixPath(str(one)).stem for one in photos.columns["file"]]
-
-
-def named_as_clicked(proposal: Proposal, by_role: Mapping[str, Sequence[Choice]]) -> dict[str, str]:
-    """Names of targets: where one track and one clicked name are left over, they are the same thing."""
-    tracks = [one.target for one in by_role.get("target", ())]
-    marked = {
-        str(name) for one in by_role.get("marks", ()) for name in stream_of(one, "marks").columns["name"]
-    }
-    clicked = {
-        str(name)
-        for one in by_role.get("clicks", ())
-        for name in stream_of(one, "clicks").columns.get("name", ())
-        if str(name)
-    }
-    left, names = [one for one in tracks if one not in clicked], clicked - marked - set(tracks)
-    if len(left) != 1 or len(names) != 1:
+def velocity(stream: Stream) -> dict[str, Any]:
+    """The velocity, where each row that can be used has one; none of a receiver that does not measure
+    climbing and says 0 for it, as those that speak NMEA do."""
+    values = _together(stream, [f"v_{axis}_m_s" for axis in AXES])
+    if values is None or not np.isfinite(values).all():
         return {}
-    name = names.pop()
-    said = f"The track {left[0]} is taken for what was clicked as {printable(name)}: no other is left."
-    proposal.notes.append(said)
-    return {left[0]: name}
+    heights = [one[stream.used] for name, one in stream.columns.items() if name.startswith("height_")]
+    climbs = any(np.isfinite(one).any() and np.nanmax(one) - np.nanmin(one) > CLIMBED_M for one in heights)
+    if climbs and not values[:, 2].any():
+        return {}
+    return {"velocity": quantities(AXES, "v_{}_m_s", "m/s")}
 
 
-def add_targets(proposal: Proposal, sources: Sources, by_role: Mapping[str, Sequence[Choice]]) -> None:
-    """Truth: tracks of targets, and points that do not move."""
-    truth = []
-    names = named_as_clicked(proposal, by_role)
-    for number, one in enumerate(by_role.get("target", ()), 1):
-        part = "gnss" if one.item.part("gnss") is not None else "poses"
-        stream = stream_of(one, part)
-        block = sources.over_time(one, part, f"target-{number}")
-        block |= {"target": names.get(one.target, one.target), "position": position()}
-        truth.append(block | truth_spreads(stream))
-    for number, one in enumerate(by_role.get("marks", ()), 1):
-        stream = stream_of(one, "marks")
-        block = {
-            "file": sources.table(one, "marks", f"marks-{number}"),
-            "where": USED,
-            "id": "name",
-            "position": position(),
-        }
-        truth.append(block | truth_spreads(stream))
-    if truth:
-        proposal.data["truth"] = truth
+def pose_spreads(stream: Stream) -> dict[str, Any]:
+    lengths, turns = ("horizontal", "vertical"), ("tilt", "heading")
+    names = [*(f"sd_{one}_m" for one in lengths), *(f"sd_{one}_deg" for one in turns)]
+    values = _together(stream, names)
+    if values is None or not (np.isfinite(values) & (values > 0)).all():
+        return {}
+    return {"spreads": quantities(lengths, "sd_{}_m", "m") | quantities(turns, "sd_{}_deg", "deg")}
 
 
-def add_seen(
-    proposal: Proposal,
-    sources: Sources,
-    clicks: Sequence[Choice],
-    images: Choice | None,
-    by_role: Mapping[str, Sequence[Choice]],
-) -> None:
-    """What was clicked in the images."""
-    if not clicks:
-        return
-    if images is None or "frames" not in proposal.data:
-        proposal.notes.append("The pixels are left out: there are no images that they are of.")
-        return
-    id_ = proposal.data["frames"]["id"]
-    level = _level(proposal, sources, by_role)
-    blocks = []
-    for number, one in enumerate(clicks, 1):
-        stream = stream_of(one, "clicks")
-        block: dict[str, Any] = {
-            "source": "clicks" if len(clicks) == 1 else f"clicks-{number}",
-            "file": sources.table(one, "clicks", f"clicks-{number}"),
-            "where": USED,
-            "prefix": f"click-{number}-",
-            "frame": "stem" if id_ == "stem" else "image",
-            "pixel": {"u": quantity("u_px", "px"), "v": quantity("v_px", "px")},
-        }
-        if "name" in stream.columns:
-            block["target"] = "name"
-        if level is not None:
-            block["ground"] = {"height": {"value": level, "unit": "m"}}
-        sources.logs[block["file"]]["images"] = proposal.data["frames"]["file"]
-        strange = _strange(stream, images)
-        if strange:
-            proposal.notes.append(
-                f"{one.item.shown}: {strange} of {len(stream)} pixels are of no image here, and left out."
-            )
-        blocks.append(block)
-    proposal.data["detections"] = blocks
+def stated_spreads(stream: Stream) -> dict[str, Any]:
+    """Standard deviations of positions that a part has."""
+    names = ("sd_horizontal", "sd_vertical")
+    return quantities((one for one in names if f"{one}_m" in stream.columns), "{}_m", "m")
 
 
-def _strange(pixels: Stream, images: Choice) -> int:
-    """How many pixels are of none of the images."""
-    photos = stream_of(images, "photos")
-    known = {*_stems(photos), *(str(one) for one in photos.columns["file"])}
-    of = [str(one) for one in pixels.columns["image"][pixels.used]]
-    return sum(one not in known and PurePosixPath(one).stem not in known for one in of)
-
-
-def _level(proposal: Proposal, sources: Sources, by_role: Mapping[str, Sequence[Choice]]) -> float | None:
-    """Height of level ground: the mean of the surveyed points'; None where there are none."""
-    heights: list[float] = []
-    for one in by_role.get("marks", ()):
-        stream, chosen = stream_of(one, "marks"), sources.heights.of(one.item.name, "marks")
-        if chosen is not None:
-            column = stream.columns[f"height_{chosen.kind}_m"][stream.used] + chosen.add_m
-            heights += column[np.isfinite(column)].tolist()
-    if not heights:
-        return _take_off(proposal, sources)
-    mean, spread = float(np.mean(heights)), float(np.ptp(heights))
-    if len(heights) > 1 and spread > 0:
-        uncertain_plane(proposal, float(np.std(heights, ddof=1)))
-    proposal.notes.append(
-        f"The ground is taken to be level at the mean of {len(heights)} surveyed points, which differ by "
-        f"{spread:.1f} m. A map does better: --terrain."
-    )
-    return math.floor(mean * 1000 + 0.5) / 1000
-
-
-#: How far level ground beside a take-off is assumed to be from its height, standard deviation, m.
-TAKE_OFF_SD_M = 5.0
-
-
-def uncertain_plane(proposal: Proposal, sd_m: float) -> None:
-    """The ground's height is as uncertain as that: ellipses know it."""
-    part = proposal.data.setdefault("uncertainty", {})
-    part["plane_height_m"] = round(max(sd_m, 0.01), 3)
-
-
-def _take_off(proposal: Proposal, sources: Sources) -> float | None:
-    """Height of the take-off, where a log has heights above it beside others; None else."""
-    for (file, part), stream in sources.streams.items():
-        chosen = sources.heights.of(file, part)
-        home = stream.columns.get("height_home_m")
-        if chosen is None or home is None:
-            continue
-        of_home = (stream.columns[f"height_{chosen.kind}_m"] + chosen.add_m - home)[stream.used]
-        of_home = of_home[np.isfinite(of_home)]
-        if len(of_home):
-            uncertain_plane(proposal, TAKE_OFF_SD_M)
-            proposal.notes.append(
-                "The ground is taken to be level and as high as the take-off. A map does better: --terrain."
-            )
-            return math.floor(float(np.median(of_home)) * 1000 + 0.5) / 1000
-    return None
+def _together(stream: Stream, names: Sequence[str]) -> Any:
+    """Columns side by side, of rows that can be used, (N, K); None where one is not there."""
+    if any(name not in stream.columns for name in names):
+        return None
+    return np.column_stack([stream.columns[name] for name in names])[stream.used]

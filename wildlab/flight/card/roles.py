@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from wildlab.flight.readers.formats import FOLDERS, FORMATS, HEAD, read_folder, 
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.recipe.raw import RAW_LIMIT
-from wildlab.flight.time_scales import hours_words, whole_hours
+from wildlab.flight.time_scales import Span
 from wildlab.geometry.frames import geodetic_to_ned
 
 Array = NDArray[np.float64]
@@ -229,15 +230,15 @@ def _why(error: WildlabError) -> str:
 
 # -- roles
 
-#: Role -> what it is of a flight.
+#: Role -> what is taken for that.
 ROLES: dict[str, str] = {
     "own": "the vehicle's own log",
-    "camera": "attitude and place of the camera, by a log that rides on it",
-    "receiver": "satellite positions of the vehicle, in place of its own log's",
-    "target": "where a target truly was",
-    "triggers": "when the camera was triggered",
+    "camera": "a log that rides on the camera",
+    "receiver": "a receiver on board",
+    "target": "the track of a target",
+    "triggers": "records of the camera's triggers",
     "images": "the images",
-    "marks": "points that do not move, and where they truly are",
+    "marks": "surveyed points",
     "clicks": "pixels of things in the images",
     "nothing": "not used",
 }
@@ -397,11 +398,11 @@ def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem |
     this order, and of those that are alike the longest. None where the images have poses of their own and no
     log turns."""
     turned = [one for one in open_ if any(one.part(part) is not None for part in ("poses", "gimbal"))]
-    if not turned and (not open_ or (images is not None and _has_place(images))):
+    if not turned and (not open_ or (images is not None and has_place(images))):
         return None, ""
     if len(open_) == 1:
         return open_[0], "it is the only log"
-    taken = span_of(images, "photos") if images is not None else None
+    taken = span_of(images, ["photos"]) if images is not None else None
     left, among = list(open_), f"of {len(open_)} logs"
     for said, holds in (
         ("has an attitude", lambda one: one in turned),
@@ -444,7 +445,8 @@ def _climb(one: CardItem) -> float:
     return 0.0
 
 
-def _has_place(images: CardItem) -> bool:
+def has_place(images: CardItem) -> bool:
+    """Whether some image says where it was taken."""
     photos = images.part("photos")
     return photos is not None and "latitude_deg" in photos.columns and bool(photos.used.any())
 
@@ -452,7 +454,9 @@ def _has_place(images: CardItem) -> bool:
 def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choice:
     """A log that is not the vehicle's own."""
     if own is None:
-        apart = _apart(span_of(one), None if images is None else _taken(images))
+        # By UTC, or else by the wall clock of their camera.
+        taken = None if images is None else span_of(images, ["photos"], ("time_s", "time_log_s"))
+        apart = -_overlap(span_of(one), taken)
         if apart > ZONES_S:
             why = (
                 f"it is of another time, or a clock is wrong: {_lasting(apart)} lie between it and the images"
@@ -466,9 +470,8 @@ def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choi
         return Choice(one, "nothing", "the vehicle's own log has no times to compare with")
     shared = _overlap((mine.times[0], mine.times[-1]), (theirs.times[0], theirs.times[-1]))
     if shared < SHARED_S:
-        apart = max(mine.times[0] - theirs.times[-1], theirs.times[0] - mine.times[-1])
-        why = f"it is of another time, or a clock is wrong: {_lasting(apart)} lie between it and the flight"
-        return Choice(one, "nothing", why + _by_hours(one, mine, theirs))
+        why = f"it is of another time, or a clock is wrong: {_lasting(-shared)} lie between it and the flight"
+        return Choice(one, "nothing", why)
     distance, above = _distance(mine, theirs)
     height = "" if math.isnan(above) else f" and {abs(above):.0f} m {'below' if above > 0 else 'above'}"
     if distance < ON_BOARD_M and not abs(above) >= ON_BOARD_M:
@@ -481,36 +484,8 @@ def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choi
     )
 
 
-def _by_hours(one: CardItem, mine: LoggedPath, theirs: LoggedPath) -> str:
-    """That another log's clock is off by whole or half hours, and what to write; nothing where it is not."""
-    by = whole_hours((theirs.times[0], theirs.times[-1]), (mine.times[0], mine.times[-1]))
-    if by is None:
-        return ""
-    return (
-        f"; its stamps are {hours_words(by)} {'ahead' if by < 0 else 'behind'}: give --role "
-        f"{one.name}=target (or camera, receiver), and offset_s = {by:g} in its part [logs] of the recipe"
-    )
-
-
 #: Clocks on Earth differ by no more than this, s: wall clocks state no zone.
 ZONES_S = 14 * 3600.0
-
-
-def _taken(images: CardItem) -> tuple[float, float] | None:
-    """When images were taken, by UTC or else by the wall clock of their camera."""
-    stream = images.part("photos")
-    for name in ("time_s", "time_log_s"):
-        column = None if stream is None else stream.columns.get(name)
-        times = np.empty(0) if column is None else np.asarray(column, float)
-        times = times[np.isfinite(times)]
-        if len(times):
-            return float(times.min()), float(times.max())
-    return None
-
-
-def _apart(a: tuple[float, float] | None, b: tuple[float, float] | None) -> float:
-    """Seconds between two stretches of time, 0 where they meet or are not known."""
-    return 0.0 if a is None or b is None else max(0.0, a[0] - b[1], b[0] - a[1])
 
 
 def way_of(one: CardItem) -> LoggedPath | None:
@@ -533,7 +508,7 @@ def way_of(one: CardItem) -> LoggedPath | None:
 
 def _level(place: Array, origin: tuple[float, float, float]) -> Array:
     """(N, 3) metres from the origin, of latitudes and longitudes."""
-    return np.asarray(geodetic_to_ned(place[:, 0], place[:, 1], np.zeros(len(place)), origin))
+    return geodetic_to_ned(place[:, 0], place[:, 1], np.zeros(len(place)), origin)
 
 
 def _distance(mine: LoggedPath, theirs: LoggedPath) -> tuple[float, float]:
@@ -556,13 +531,14 @@ def _distance(mine: LoggedPath, theirs: LoggedPath) -> tuple[float, float]:
     return level, math.nan
 
 
-def span_of(one: CardItem, part: str | None = None) -> tuple[float, float] | None:
-    names = (part,) if part else ("poses", "gnss")
-    for name in names:
-        stream = one.part(name)
-        if stream is not None and "time_s" in stream.columns:
-            times = stream.columns["time_s"]
-            times = times if name == "photos" else times[stream.used]
+def span_of(
+    one: CardItem, parts: Sequence[str] = ("poses", "gnss"), clocks: Sequence[str] = ("time_s",)
+) -> Span | None:
+    """First and last stamp of the first part, by the first clock, that has some, s; of images all count."""
+    for part, clock in product(parts, clocks):
+        stream = one.part(part)
+        if stream is not None and clock in stream.columns:
+            times = stream.columns[clock] if part == "photos" else stream.columns[clock][stream.used]
             times = times[np.isfinite(times)]
             if len(times):
                 return float(times.min()), float(times.max())
@@ -574,7 +550,8 @@ def _duration(one: CardItem) -> float:
     return span[1] - span[0] if span else 0.0
 
 
-def _overlap(a: tuple[float, float] | None, b: tuple[float, float] | None) -> float:
+def _overlap(a: Span | None, b: Span | None) -> float:
+    """Seconds that two stretches of time share, below zero those between them; 0 where one is not known."""
     if a is None or b is None:
         return 0.0
     return min(a[1], b[1]) - max(a[0], b[0])
