@@ -22,18 +22,15 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checksums import accept_changes
 from wildlab.flight.clocks import covariances
-from wildlab.flight.recipe.quantities import Attitude, parse_zone
+from wildlab.flight.recipe.quantities import Attitude
 from wildlab.flight.recipe.tables import _rotation
 from wildlab.flight.store import Flight, load_flight
+from wildlab.flight.time_scales import find_zone
 from wildlab.flight.units import UNITS, factor
-from wildlab.geometry.flodell import geodetic_to_enu_linear
 from wildlab.geometry.frames import geodetic_to_ned, matrix_to_euler, quaternion_to_matrix
 from wildlab.runner.track import track_many
 
 ORIGIN = "latitude_deg = 63.44\nlongitude_deg = 10.4\nheight_m = 40.0"
-
-
-ZERO = "".join(f'{name} = {{value = 0.0, unit = "deg"}}\n' for name in ("roll", "pitch", "yaw"))
 
 
 def _position(flight: Flight) -> np.ndarray:
@@ -89,23 +86,6 @@ def test_local_positions_both_ways(raw):
         up = {column = "c", unit = "cm", negate = true}
     """
     near(_position(again(raw, "poses.log.position", turned))[0], [2000, 30.48, -30])
-
-
-def test_linear_enu_is_undone(raw):
-    latitude, longitude = np.radians([63.45, 63.43]), np.radians([10.41, 10.38])
-    origin = (math.radians(63.44), math.radians(10.4), 40.0)
-    enu = geodetic_to_enu_linear(latitude, longitude, origin[:2]).tolist()
-    raw.tables["nav.csv"] = "time,e,n,u\n" + "".join(f"{4 * i},{e},{n},60\n" for i, (e, n) in enumerate(enu))
-    raw.set("origin", ORIGIN)
-    raw.set("poses.log.time.format", "elapsed")
-    raw.set("poses.log.attitude", ZERO)
-    raw.set("poses.log.position", """
-        linear = true
-        east = {column = "e", unit = "m"}
-        north = {column = "n", unit = "m"}
-        up = {column = "u", unit = "m"}
-    """)  # fmt: skip
-    near(_position(raw.run()), geodetic_to_ned(latitude, longitude, 100.0, origin))
 
 
 @given(st.lists(st.floats(-3, 3), min_size=3, max_size=3))
@@ -324,7 +304,7 @@ def test_ways_to_write_one_time(raw, stamp, zone, cell):
 @given(st.integers(-14 * 60, 14 * 60))
 def test_fixed_offsets(minutes):
     sign, size = "-" if minutes < 0 else "+", abs(minutes)
-    zone = parse_zone(f"{sign}{size // 60:02d}:{size % 60:02d}")
+    zone = find_zone(f"{sign}{size // 60:02d}:{size % 60:02d}")
     assert datetime(2024, 1, 1, tzinfo=UTC).astimezone(zone).utcoffset() == timedelta(minutes=minutes)
 
 

@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 
 from tests.flight.recipe.comparing import near
+from tests.sound_logs import NED
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
-
-NED = ["north_m", "east_m", "down_m"]
-
 
 IMU = """
 name = "box"

@@ -9,6 +9,7 @@ import math
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,18 +19,15 @@ from pydantic import BaseModel
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import parse_camera, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import find
-from wildlab.flight.clocks import poses_at
+from wildlab.flight.clocks import between, poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.flight.manifest_parts import CameraPart, GnssPart, ImuPart, MagnetometerPart, TerrainSays
 from wildlab.flight.recipe.model import Recipe, read_recipe
-from wildlab.flight.recipe.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
+from wildlab.flight.recipe.raw import RawFiles, nanoseconds, plain_numbers
 from wildlab.flight.recipe.tables import (
-    Fixes,
-    FrameRows,
     LocalFrame,
-    PoseRows,
-    SensorRows,
+    Rows,
     frames_of_rows,
     read_detections,
     read_frames,
@@ -119,7 +117,7 @@ def import_flight(
 def _build(recipe: Recipe, raw: RawFiles) -> Flight:
     camera = _camera(recipe, raw)
     frames = read_frames(recipe, raw)
-    poses: dict[str, PoseRows] = {}
+    poses: dict[str, Rows] = {}
     for name, block in recipe.poses.items():
         part = f"poses.{name}"
         table = raw.series(block, part)
@@ -133,17 +131,25 @@ def _build(recipe: Recipe, raw: RawFiles) -> Flight:
     epoch = _epoch(recipe, stamps + [one.stamps for one in sensors.values()])
     start = 0 if epoch is None else nanoseconds(epoch)
 
-    time_s = np.arange(len(frames.table), dtype=float)
+    time_s = np.arange(len(frames.columns["frame_id"]), dtype=float)
     if frames.stamps is not None:
         time_s = (frames.stamps - start) / 1e9
-    tables = {} if recipe.frames is None else {"frames": frames.table.assign(time_s=time_s)}
-    tables |= {name: one.table(start, places) for name, one in sensors.items()}
-    fixes = _fixes(recipe, tables)
+    ids = frames.columns["frame_id"]
+    tables = {} if recipe.frames is None else {"frames": pd.DataFrame({**frames.columns, "time_s": time_s})}
+    for name, rows in sensors.items():
+        stamps_s = np.asarray((rows.stamps - start) / 1e9)
+        position = None if rows.position is None else places.ned(rows.position, "gnss")
+        tables[name] = rows.table(stamps_s, position)
     flight_time = time_s + recipe.clocks.camera_offset_s
-    nav = {
-        name: one.nav(_pose_times(one, start, flight_time, frames, recipe, raw, name), places, fixes)
-        for name, one in poses.items()
-    }
+    nav = {}
+    for name, rows in poses.items():
+        times = _pose_times(rows, start, pd.Series(flight_time, index=ids), recipe, raw, name)
+        if rows.position is not None:
+            nav[name] = rows.table(times, places.ned(rows.position, "poses"))
+        else:
+            position = _positions_of_receiver(recipe, tables, times)
+            known = np.isfinite(position[:, 0])
+            nav[name] = rows.table(times, position)[known].reset_index(drop=True)
     if recipe.truth:
         truth = [
             read_truth(one, raw, recipe, f"truth[{i}]", places, start) for i, one in enumerate(recipe.truth)
@@ -156,9 +162,9 @@ def _build(recipe: Recipe, raw: RawFiles) -> Flight:
     manifest = _manifest(recipe, raw, camera, places, epoch, " ".join(filter(None, notes)))
     if recipe.detections:
         _refuse_problems(Flight(manifest, nav, tables), recipe, raw.folder)
-        of_frame = pd.DataFrame(np.nan, frames.table["frame_id"], ["north", "east", "down", "heading"])
+        of_frame = pd.DataFrame(np.nan, ids, ["north", "east", "down", "heading"])
         if nav:
-            lens, R, _ = poses_at(next(iter(nav.values())), flight_time, frames.table["frame_id"], math.inf)
+            lens, R, _ = poses_at(next(iter(nav.values())), flight_time, ids, math.inf)
             of_frame[["north", "east", "down"]] = lens
             # The horizontal direction of the axis ahead: the yaw, whatever roll and pitch are.
             of_frame["heading"] = np.arctan2(R[:, 1, 0], R[:, 0, 0])
@@ -218,7 +224,7 @@ def _camera_changes(found: NDArray[np.float64], row: int) -> str:
     return f"the camera changes: {found[row]:g} here, {found[0]:g} before"
 
 
-def _places(recipe: Recipe, poses: dict[str, PoseRows], sensors: dict[str, SensorRows]) -> LocalFrame:
+def _places(recipe: Recipe, poses: dict[str, Rows], sensors: dict[str, Rows]) -> LocalFrame:
     """What takes positions to frame n; without an origin in the recipe, the first pose is it, or the first
     satellite position where there are no poses."""
     vertical = recipe.vertical
@@ -235,16 +241,18 @@ def _places(recipe: Recipe, poses: dict[str, PoseRows], sensors: dict[str, Senso
     return LocalFrame(origin, vertical.correction_m, vertical.taken_off)
 
 
-def _fixes(recipe: Recipe, tables: dict[str, pd.DataFrame]) -> Fixes | None:
-    """Where the receiver was, for poses without positions of their own."""
+def _positions_of_receiver(
+    recipe: Recipe, tables: dict[str, pd.DataFrame], times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Where the receiver was, (N, 3), for poses without positions of their own."""
     if recipe.gnss is None:
-        return None
-    table = tables["gnss"]
-    times = table["time_s"].to_numpy() + recipe.clocks.gnss_offset_s - recipe.gnss.latency_s
-    return Fixes(times, table[["north_m", "east_m", "down_m"]].to_numpy())
+        raise ValueError("poses without positions")
+    gnss = tables["gnss"]
+    stamps = gnss["time_s"].to_numpy() + recipe.clocks.gnss_offset_s - recipe.gnss.latency_s
+    return between(stamps, gnss[["north_m", "east_m", "down_m"]].to_numpy(), times, "gnss")
 
 
-def _epoch(recipe: Recipe, stamps: list[Nanoseconds | None]) -> datetime | None:
+def _epoch(recipe: Recipe, stamps: list[Any]) -> datetime | None:
     """The epoch of the recipe, else the last whole second before anything happens."""
     if recipe.time.epoch is not None:
         return recipe.time.epoch.astimezone(UTC)
@@ -255,10 +263,9 @@ def _epoch(recipe: Recipe, stamps: list[Nanoseconds | None]) -> datetime | None:
 
 
 def _pose_times(
-    poses: PoseRows,
+    poses: Rows,
     start: int,
-    flight_time: NDArray[np.float64],
-    frames: FrameRows,
+    of_frame: pd.Series,
     recipe: Recipe,
     raw: RawFiles,
     name: str,
@@ -266,7 +273,6 @@ def _pose_times(
     """Flight time of each pose: its own stamp, or that of its frame."""
     if poses.stamps is not None:
         return np.asarray((poses.stamps - start) / 1e9)
-    of_frame = pd.Series(flight_time, index=frames.table["frame_id"])
     of_frame = of_frame[~of_frame.index.duplicated()]
     strange = [frame for frame in poses.ids if frame not in of_frame.index] if poses.ids is not None else []
     if strange:

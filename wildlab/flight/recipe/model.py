@@ -6,6 +6,7 @@ signs, constants, and the few operations named here. `data/recipes/README.md` ex
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -365,104 +366,77 @@ class Recipe(Strict):
         return value
 
     @model_validator(mode="after")
-    def _names_once(self) -> Self:
-        twice = sorted(set(self.tables) & set(self.logs))
-        if twice:
-            raise ValueError(f"{twice[0]!r} names a table and a log; give each its own name")
+    def _consistent(self) -> Self:
+        for problem in self._contradictions():
+            raise ValueError(problem)
         return self
 
-    @model_validator(mode="after")
-    def _enough(self) -> Self:
-        for name, poses in self.poses.items():
-            if poses.position_from and self.gnss is None:
-                raise ValueError(
-                    f"[poses.{name}] takes its positions from gnss, and there is none; add the part [gnss]"
-                )
-        if not self.poses and self.gnss is None:
-            raise ValueError("there are no poses; add a part such as [poses.autopilot], or at least [gnss]")
-        images = self.frames is not None and self.frames.sensor is None
+    def _contradictions(self) -> Iterator[str]:
+        """Where parts contradict each other: ``"problem; fix"``."""
+        frames, truth = self.frames, {f"truth[{i}]": one for i, one in enumerate(self.truth)}
+        poses = {f"poses.{name}": one for name, one in self.poses.items()}
+        detections = {f"detections[{i}]": one for i, one in enumerate(self.detections)}
+        for name in sorted(set(self.tables) & set(self.logs))[:1]:
+            yield f"{name!r} names a table and a log; give each its own name"
+        for name, one in poses.items():
+            if one.position_from and self.gnss is None:
+                yield f"[{name}] takes its positions from gnss, and there is none; add the part [gnss]"
+        if not poses and self.gnss is None:
+            yield "there are no poses; add a part such as [poses.autopilot], or at least [gnss]"
+        images = frames is not None and frames.sensor is None
         if not self.has_camera and (images or any(one.pixel for one in self.detections)):
-            raise ValueError("there are images, and no camera; add the part [camera]")
-        return self
-
-    @model_validator(mode="after")
-    def _times(self) -> Self:
-        times = {} if self.frames is None else {"frames": self.frames.time}
-        times |= {name: one.time for name, one in self.on_board.items()}
-        times |= {f"poses.{name}": one.time for name, one in self.poses.items()}
-        times |= {f"truth[{i}]": one.time for i, one in enumerate(self.truth)}
-        if self.time.kind == "utc" and self.frames is not None and self.frames.time is None:
-            raise ValueError('time.kind is "utc" and [frames] has no time; add it, or set kind = "sequence"')
+            yield "there are images, and no camera; add the part [camera]"
+        times = {} if frames is None else {"frames": frames.time}
+        over_time: dict[str, Any] = {**self.on_board, **poses, **truth}
+        times |= {name: one.time for name, one in over_time.items()}
+        if self.time.kind == "utc" and frames is not None and frames.time is None:
+            yield 'time.kind is "utc" and [frames] has no time; add it, or set kind = "sequence"'
         for name, time in times.items():
             if self.time.kind == "sequence" and time is not None:
-                raise ValueError(f'time.kind is "sequence" and [{name}] has a time; set kind = "utc"')
+                yield f'time.kind is "sequence" and [{name}] has a time; set kind = "utc"'
             if time is not None and time.format == "elapsed" and self.time.epoch is None:
-                raise ValueError(
+                yield (
                     f"[{name}] counts the time elapsed since an epoch, and [time] has no epoch; add the epoch"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _frames_whole(self) -> Self:
-        frames = self.frames
-        if frames is None or not (frames.where or frames.changed):
-            return self
-        others = {f"poses.{name}": one.frame is None and one.time is None for name, one in self.poses.items()}
-        others |= {f"detections[{i}]": one.frame is None for i, one in enumerate(self.detections)}
-        for name, by_row in others.items():
-            if by_row:
-                raise ValueError(
+        if frames is not None and (frames.where or frames.changed):
+            by_row = [name for name, one in poses.items() if one.frame is None and one.time is None]
+            for name in [*by_row, *(name for name, one in detections.items() if one.frame is None)]:
+                yield (
                     f"some rows of [frames] do not count, and [{name}] belongs to them row by row; "
                     "name the column of the frame there"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _mount_of_poses(self) -> Self:
         if self.mount.poses and self.mount.poses not in self.poses:
-            known = ", ".join(sorted(self.poses)) or "none"
-            raise ValueError(
+            yield (
                 f"[mount] is said to sit on the poses {self.mount.poses!r}, and there are none of that name; "
-                f"name one of these: {known}"
+                f"name one of these: {', '.join(sorted(self.poses)) or 'none'}"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _poses_belong(self) -> Self:
-        for name, poses in self.poses.items():
-            if poses.time is not None and poses.frame is not None:
-                raise ValueError(f"[poses.{name}] has a time and a frame; take one out")
-            of_frames = self.frames is not None and (poses.frame or poses.file == self.frames.file)
-            if poses.time is None and not of_frames:
-                raise ValueError(
-                    f"[poses.{name}] has neither a time nor a frame; "
-                    "add the time, or name the column of the frame"
+        for name, one in poses.items():
+            if one.time is not None and one.frame is not None:
+                yield f"[{name}] has a time and a frame; take one out"
+            of_frames = frames is not None and (one.frame or one.file == frames.file)
+            if one.time is None and not of_frames:
+                yield (
+                    f"[{name}] has neither a time nor a frame; add the time, or name the column of the frame"
                 )
-            if poses.time is None and poses.frame is None and (poses.where or poses.changed):
-                raise ValueError(
-                    f"[poses.{name}] has no time and no frame, and where and changed would tear its rows "
-                    "from those of the frames; name the column of the frame, or take them out"
+            if one.time is None and one.frame is None and (one.where or one.changed):
+                yield (
+                    f"[{name}] has no time and no frame, and where and changed would tear its rows from "
+                    "those of the frames; name the column of the frame, or take them out"
                 )
-            bearing = poses.attitude.yaw_from_bearing is not None
-            local = poses.position is None or poses.position.form != "wgs84"
-            if bearing and (poses.time is not None or local):
-                raise ValueError(
-                    f"[poses.{name}] has yaw_from_bearing, which is for poses of frames with latitude and "
+            local = one.position is None or one.position.form != "wgs84"
+            if one.attitude.yaw_from_bearing is not None and (one.time is not None or local):
+                yield (
+                    f"[{name}] has yaw_from_bearing, which is for poses of frames with latitude and "
                     "longitude; give a yaw instead"
                 )
-        positions = {f"poses.{name}": one.position for name, one in self.poses.items() if one.position}
-        positions |= {f"truth[{i}]": one.position for i, one in enumerate(self.truth)}
-        positions |= {} if self.gnss is None else {"gnss": self.gnss.position}
-        positions |= {
-            f"detections[{i}]": one.position for i, one in enumerate(self.detections) if one.position
-        }
-        for name, position in positions.items():
-            if position.form != "wgs84" and self.origin is None:
-                raise ValueError(
+        gnss = {} if self.gnss is None else {"gnss": self.gnss}
+        placed: dict[str, Any] = {**poses, **truth, **gnss, **detections}
+        for name, each in placed.items():
+            if each.position and each.position.form != "wgs84" and self.origin is None:
+                yield (
                     f"[{name}] has local positions, and there is no origin; "
                     "add [origin] with latitude_deg, longitude_deg and height_m"
                 )
-        return self
 
 
 def read_recipe(path: Path) -> Recipe:

@@ -5,19 +5,18 @@ A part has rules: what it may not be, and what to say then.
 
 from __future__ import annotations
 
-import re
-import zoneinfo
 from collections.abc import Callable
-from datetime import timedelta, timezone, tzinfo
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, did_you_mean, leaves_folder
 from wildlab.flight.manifest_parts import GnssPart, ImuPart, MagnetometerPart
 from wildlab.flight.readers.autoferry import Part
 from wildlab.flight.readers.formats import FOLDERS, FORMATS
 from wildlab.flight.readers.log import PARTS
+from wildlab.flight.time_scales import find_zone
 from wildlab.flight.units import Dimension, factor
 
 
@@ -79,28 +78,11 @@ Rate = Annotated[Quantity, _of("rate")]
 MagneticField = Annotated[Quantity, _of("field")]
 
 
-def parse_zone(text: str) -> tzinfo:
-    """A time zone by its IANA name, or as a fixed offset such as ``+02:00``.
-
-    Raises
-    ------
-    ValueError
-        ``"problem; fix"`` where it is neither.
-    """
-    fixed = re.fullmatch(r"([+-])(0[0-9]|1[0-4]):([0-5][0-9])", text)
-    if fixed:
-        size = timedelta(hours=int(fixed[2]), minutes=int(fixed[3]))
-        return timezone(-size if fixed[1] == "-" else size)
-    try:
-        return zoneinfo.ZoneInfo(text)
-    except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
-        raise ValueError(
-            f"{text!r} is not a time zone; use UTC, a name as Europe/Oslo, or an offset as +02:00"
-        ) from None
-
-
 def _known_zone(text: str) -> str:
-    parse_zone(text)
+    try:
+        find_zone(text)
+    except WildlabError as error:
+        raise ValueError(f"{error.problem}; {error.fix}") from None
     return text
 
 
@@ -157,10 +139,7 @@ FORMS = {
 
 
 class Position(Ruled):
-    """Where: latitude, longitude, height (WGS84); or about the origin north, east, down or east, north, up.
-
-    `linear`: east and north were made from WGS84 by the linear formula F (2.2)-(2.3).
-    """
+    """Latitude, longitude, height (WGS84); or about the origin north, east, down, or east, north, up."""
 
     latitude: Angle | None = None
     longitude: Angle | None = None
@@ -169,17 +148,12 @@ class Position(Ruled):
     east: Length | None = None
     down: Length | None = None
     up: Length | None = None
-    linear: bool = False
 
     rules = (
         (
             lambda s: s.form is None,
             "a position is latitude, longitude and height, or north, east and down, or east, north and "
             "up; give all three of one kind and none of another",
-        ),
-        (
-            lambda s: s.linear and s.form != "enu",
-            "linear is about east, north and up; leave it out",
         ),
     )
 

@@ -25,8 +25,9 @@ from wildlab.flight.readers.autoferry import Part, read_part
 from wildlab.flight.readers.formats import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import of_camera
-from wildlab.flight.recipe.quantities import LogTable, MatlabTable, Quantity, Series, Stamp, parse_zone
+from wildlab.flight.recipe.quantities import LogTable, MatlabTable, Quantity, Series, Stamp
 from wildlab.flight.recipe.source_files import is_packed, packed, read_delimited, read_matlab, table_of
+from wildlab.flight.time_scales import find_zone
 from wildlab.flight.trigger_matching import match_triggers
 from wildlab.flight.units import Dimension, factor
 
@@ -351,7 +352,7 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
         if _DECIMAL_COMMA.fullmatch(cell):
             problem, fix = "has a decimal comma", "write a decimal point in place of it, in all of the column"
         raise table.fail(f"{_short(cell)} {problem}", fix, column, part, row)
-    return np.asarray(found)
+    return found
 
 
 def times(table: RawTable, stamp: Stamp, part: str, zone: str | None, epoch: datetime | None) -> Nanoseconds:
@@ -393,7 +394,7 @@ def times(table: RawTable, stamp: Stamp, part: str, zone: str | None, epoch: dat
             problem = f"{_short(cells[0])} has no time zone, and the recipe names none"
             fix = 'add zone to [time], such as zone = "UTC" or "Europe/Oslo"'
             raise table.fail(problem, fix, name, part, 0)
-        found = found.tz_localize(parse_zone(zone), ambiguous="NaT", nonexistent="NaT")
+        found = found.tz_localize(find_zone(zone), ambiguous="NaT", nonexistent="NaT")
         problem = f"{{}} does not exist or exists twice in {zone}, where the clocks change"
         refuse(pd.isna(found), problem, "give the zone as an offset such as +02:00")
     return found.tz_convert(None).to_numpy("datetime64[ns]").astype(np.int64)
@@ -415,7 +416,7 @@ def _counted(table: RawTable, stamp: Stamp, part: str, epoch: datetime | None) -
         name,
         part,
     )
-    return np.asarray(start + np.round(seconds * 1e9).astype(np.int64))
+    return start + np.round(seconds * 1e9).astype(np.int64)
 
 
 def nanoseconds(when: datetime) -> int:

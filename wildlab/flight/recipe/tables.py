@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.flight.checks.findings import NORM_TOLERANCE, POSITION, QUATERNION, VELOCITY
-from wildlab.flight.clocks import between, covariance_columns
+from wildlab.flight.clocks import covariance_columns
 from wildlab.flight.recipe.model import Detections, FramesPart, Ground, Poses, Recipe, Truth
 from wildlab.flight.recipe.quantities import (
     FORMS,
@@ -38,7 +38,6 @@ from wildlab.flight.recipe.raw import (
 )
 from wildlab.flight.units import Dimension
 from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
-from wildlab.geometry.flodell import metres_per_degree
 from wildlab.geometry.frames import (
     R_NED_ENU,
     Origin,
@@ -63,16 +62,11 @@ AS_TILT_AND_HEADING = (
 SAME = 1e-9
 
 
-@dataclass(frozen=True)
-class RawPosition:
-    """Positions as a table has them, in radians and metres: columns as in `form`."""
+class RawPosition(NamedTuple):
+    """Positions as a table has them, in radians and metres: columns (N, 3) as in `form`."""
 
     form: str
-    linear: bool
     values: Array
-
-    def rows(self, chosen: NDArray[np.intp]) -> RawPosition:
-        return RawPosition(self.form, self.linear, self.values[chosen])
 
 
 @dataclass(frozen=True)
@@ -94,12 +88,7 @@ class LocalFrame:
             return np.column_stack([a, b, c + off])
         if position.form == "wgs84":
             return geodetic_to_ned(a, b, c - off, self.origin)
-        if not position.linear:
-            return enu_to_ned(np.column_stack([a, b, c - off]))
-        north, east = metres_per_degree(self.origin[0])
-        latitude = self.origin[0] + np.radians(b / north)
-        longitude = self.origin[1] + np.radians(a / east)
-        return geodetic_to_ned(latitude, longitude, self.origin[2] + c - off, self.origin)
+        return enu_to_ned(np.column_stack([a, b, c - off]))
 
 
 def ned_columns(position: Array) -> dict[str, Array]:
@@ -113,45 +102,33 @@ def velocity_columns(velocity: Array) -> dict[str, Array]:
 
 
 @dataclass(frozen=True)
-class Fixes:
-    """Satellite positions: flight times (N,) and positions in n (N, 3)."""
+class Rows:
+    """One table without its times and places.
 
-    times: Array
-    position: Array
+    Attributes
+    ----------
+    columns
+        (N,) each, as the flight has them.
+    stamps
+        Of each row; None where rows have none of their own.
+    position
+        As the raw table has them; None where it has none.
+    ids
+        Frames: of poses that belong to frames, (N,); of frames, of each row of their file.
+    note
+        A sentence for the flight's description.
+    """
 
+    columns: dict[str, Any]
+    stamps: Any
+    position: RawPosition | None = None
+    ids: Text | None = None
+    note: str = ""
 
-@dataclass(frozen=True)
-class PoseRows:
-    """Poses of one source, by time (`stamps`) or by frame (`ids`); without positions of its own, where those
-    of the receiver are to be taken."""
-
-    position: RawPosition | None
-    rotation: Array
-    velocity: Array | None
-    covariance: Array | None
-    stamps: Nanoseconds | None
-    ids: Text | None
-    note: str
-
-    def nav(self, time_s: Array, places: LocalFrame, fixes: Fixes | None) -> pd.DataFrame:
-        """The nav table, its positions in n; without those poses that `fixes` have no position for."""
-        if self.position is not None:
-            p = places.ned(self.position, "poses")
-        elif fixes is not None:
-            p = between(fixes.times, fixes.position, time_s, "gnss")
-        else:
-            raise ValueError("poses without positions")
-        q = matrix_to_quaternion(self.rotation)
-        columns: dict[str, Array | Text] = {"time_s": time_s}
-        columns |= ned_columns(p) | dict(zip(QUATERNION, q.T, strict=True))
-        if self.velocity is not None:
-            columns |= velocity_columns(self.velocity)
-        if self.ids is not None:
-            columns["frame_id"] = self.ids
-        table = pd.DataFrame(columns)
-        if self.covariance is not None:
-            table = pd.concat([table, covariance_columns(self.covariance)], axis=1)
-        return table if self.position is not None else table[np.isfinite(p[:, 0])].reset_index(drop=True)
+    def table(self, time_s: Array, position: Array | None) -> pd.DataFrame:
+        """The table of the flight, with positions (N, 3) in n where it has any."""
+        placed = {} if position is None else ned_columns(position)
+        return pd.DataFrame({"time_s": time_s} | placed | self.columns)
 
 
 def read_position(table: RawTable, position: Position, part: str) -> RawPosition:
@@ -193,7 +170,7 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
             (position.latitude.column if position.latitude else None) or "value",
             f"{part}.latitude",
         )
-    return RawPosition(form, position.linear, np.column_stack(columns))
+    return RawPosition(form, np.column_stack(columns))
 
 
 def read_velocity(table: RawTable, velocity: Velocity, part: str) -> Array:
@@ -217,7 +194,7 @@ def read_velocity(table: RawTable, velocity: Velocity, part: str) -> Array:
     return np.column_stack([north, east, down])
 
 
-def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Text | None) -> PoseRows:
+def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Text | None) -> Rows:
     """One nav source. Where several rows are of one frame (`ids`), they have to say the same, and become one.
 
     Raises
@@ -249,17 +226,26 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
                 table, bearing, f"{part}.attitude.yaw_from_bearing", position, frame, first
             )
             attitude = np.column_stack([attitude, yaw[frame]])
-        position, attitude, ids = position.rows(first), attitude[first], ids[first]
+        position, attitude, ids = (
+            position._replace(values=position.values[first]),
+            attitude[first],
+            ids[first],
+        )
         velocity = None if velocity is None else velocity[first]
         spreads = None if spreads is None else spreads[first]
     rotation = _rotation(attitude, block.attitude)
-    covariance = None
+    columns: dict[str, Any] = dict(zip(QUATERNION, matrix_to_quaternion(rotation).T, strict=True))
+    if velocity is not None:
+        columns |= velocity_columns(velocity)
+    if ids is not None:
+        columns["frame_id"] = ids
     if spreads is not None:
         horizontal, vertical, tilt, heading = spreads.T
-        covariance = pose_covariance(horizontal, vertical, tilt, heading, rotation)
+        P = pose_covariance(horizontal, vertical, tilt, heading, rotation)
+        columns |= dict(covariance_columns(P))
     if block.spreads is not None and block.spreads.tilt is None:
         note = f"{note} {AS_TILT_AND_HEADING.format(part.removeprefix('poses.'))}".strip()
-    return PoseRows(position, rotation, velocity, covariance, stamps, ids, note)
+    return Rows(columns, stamps, position, ids, note)
 
 
 def _read_attitude(table: RawTable, attitude: Attitude, part: str) -> Array:
@@ -286,7 +272,7 @@ def _read_attitude(table: RawTable, attitude: Attitude, part: str) -> Array:
 def _rotation(values: Array, attitude: Attitude) -> Array:
     """``R_nb`` (N, 3, 3)."""
     R = quaternion_to_matrix(values) if attitude.quaternion is not None else euler_to_matrix(*values.T)
-    return np.asarray(R_NED_ENU @ R @ FLIP if attitude.axes == "flu-enu" else R)
+    return R_NED_ENU @ R @ FLIP if attitude.axes == "flu-enu" else R
 
 
 def _read_spreads(table: RawTable, spreads: Spreads, part: str) -> Array:
@@ -410,23 +396,7 @@ def read_columns(
     }
 
 
-@dataclass(frozen=True)
-class SensorRows:
-    """One table without its times and positions; its stamps, and the raw positions of a receiver."""
-
-    columns: dict[str, Array]
-    stamps: Nanoseconds
-    position: RawPosition | None = None
-
-    def table(self, start: int, places: LocalFrame) -> pd.DataFrame:
-        """The table of the flight; `start` is its epoch in nanoseconds since 1970."""
-        columns: dict[str, Array] = {"time_s": (self.stamps - start) / 1e9}
-        if self.position is not None:
-            columns |= ned_columns(places.ned(self.position, "gnss"))
-        return pd.DataFrame(columns | self.columns)
-
-
-def read_sensors(recipe: Recipe, raw: RawFiles) -> dict[str, SensorRows]:
+def read_sensors(recipe: Recipe, raw: RawFiles) -> dict[str, Rows]:
     """Those of `imu`, `gnss`, `magnetometer` and `gimbal` that the recipe has.
 
     Raises
@@ -446,20 +416,11 @@ def read_sensors(recipe: Recipe, raw: RawFiles) -> dict[str, SensorRows]:
             if (column := getattr(block, key)) is not None:
                 columns[key] = plain_numbers(rows, column, f"gnss.{key}", may_be_empty=True)
         stamps = times(rows, block.time, f"{name}.time", recipe.time.zone, recipe.time.epoch)
-        found[name] = SensorRows(columns, stamps, position)
+        found[name] = Rows(columns, stamps, position)
     return found
 
 
-@dataclass(frozen=True)
-class FrameRows:
-    """The frames (without time_s), their stamps, and for each row of their file the frame it belongs to."""
-
-    table: pd.DataFrame
-    stamps: Nanoseconds | None
-    of_row: Text
-
-
-def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
+def read_frames(recipe: Recipe, raw: RawFiles) -> Rows:
     """The images: one per row with its id, or one per unique combination of columns, numbered as they come.
     None at all where the recipe has no frames.
 
@@ -470,7 +431,7 @@ def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
     """
     block = recipe.frames
     if block is None:
-        return FrameRows(pd.DataFrame({"frame_id": np.empty(0, object)}), None, np.empty(0, object))
+        return Rows({"frame_id": np.empty(0, object)}, None, ids=np.empty(0, object))
     rows = raw.series(block, "frames")
     if block.id is not None:
         of_row = texts(rows, block.id, "frames.id")
@@ -505,7 +466,7 @@ def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
             "frames",
         )
     table = table.iloc[first].reset_index(drop=True).drop(columns="stamp", errors="ignore")
-    return FrameRows(table, None if stamps is None else stamps[first], of_row)
+    return Rows(dict(table), None if stamps is None else stamps[first], ids=of_row)
 
 
 def _groups(rows: RawTable, block: FramesPart) -> Text:
@@ -533,7 +494,7 @@ def _numbered(prefix: str, n: int) -> list[str]:
 
 
 def frames_of_rows(
-    frames: FrameRows, recipe: Recipe, block: Block, column: str | None, table: RawTable, part: str
+    frames: Rows, recipe: Recipe, block: Block, column: str | None, table: RawTable, part: str
 ) -> Text | None:
     """For each row of a file the frame it belongs to: by a column, or because the frames are of that file.
 
@@ -544,7 +505,7 @@ def frames_of_rows(
     if recipe.frames is None:
         return None
     same = (block.file, block.separator) == (recipe.frames.file, recipe.frames.separator)
-    return frames.of_row if same else None
+    return frames.ids if same else None
 
 
 def read_detections(
@@ -552,7 +513,7 @@ def read_detections(
     raw: RawFiles,
     recipe: Recipe,
     part: str,
-    frames: FrameRows,
+    frames: Rows,
     places: LocalFrame,
     image: tuple[float, float],
     lens: pd.DataFrame,
