@@ -8,9 +8,7 @@ a pinhole of its own, so that no check is held against its own formulas.
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,9 +37,7 @@ from tests.sound_logs import (
     sample_times,
     smooth,
 )
-from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import make_manifest
-from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
 
 KINDS = ("fixed wing", "multirotor", "gimbal oblique", "nadir", "gondola", "boat")
@@ -99,10 +95,10 @@ def _walks(rng: Any, t: Array, starts: Array, speed: float) -> Array:
 
 
 def _photos(
-    rng: Any, t: Array, p: Array, R: Rotation, points: Array, focal: float, every: float = 2.0
+    rng: Any, t: Array, p: Array, R: Rotation, points: Array, focal: float
 ) -> tuple[pd.DataFrame, pd.DataFrame, Array]:
     """Images and what was clicked in them, at most four each; `points` (M, 3), or (M, N, 3) that move."""
-    at = np.arange(int(2 * RATE), len(t) - 2 * RATE, int(every * RATE))
+    at = np.arange(int(2 * RATE), len(t) - 2 * RATE, 2 * RATE)
     rows = []
     for number, k in enumerate(at):
         uv = _see(p[k], R[int(k)], points if points.ndim == 2 else points[:, k], focal)
@@ -146,7 +142,7 @@ def _manifest(kind: str, seed: int, level: Level, focal: float, **parts: Any) ->
         "time": {"kind": "utc", "epoch": EPOCH},
         "uncertainty": {
             "pixel_px": 1.5, "position_horizontal_m": level.level, "position_vertical_m": level.vertical,
-            "roll_deg": tilt, "pitch_deg": tilt, "yaw_deg": heading, "plane_height_m": 0.1,
+            "tilt_deg": tilt, "heading_deg": heading, "plane_height_m": 0.1,
         },
         **parts,
     }  # fmt: skip
@@ -227,7 +223,7 @@ def _gimbal_oblique(rng: Any, seed: int) -> Flight:
 
 
 def _nadir(rng: Any, seed: int) -> Flight:
-    """A survey multirotor over marks, imported by a recipe from the camera's own attitude at -90 deg.
+    """A survey multirotor over marks, with the camera's own attitude at -90 deg.
 
     The yaw is along the lanes, one and the same, or against every other lane. With odd seeds each photo has a
     pose, with even ones a log; with every fifth the airframe's log and inertial sensor are there too.
@@ -265,61 +261,17 @@ def _nadir(rng: Any, seed: int) -> Flight:
     if seed % 2:
         rows = at
         log = pd.DataFrame({name: np.interp(frames["time_s"], log["time_s"], log[name]) for name in NED})
-        log["photo"] = frames["frame_id"]
-    log = log.assign(roll=0.0, pitch=pitch[rows], yaw=np.degrees(yaw[rows]) % 360)
-    files = {"camera.csv": log.round(3), "photos.csv": frames, "clicks.csv": detections, "marks.csv": truth}
-    with_airframe = seed % 5 == 0
-    if with_airframe:
-        files |= {"airframe.csv": nav, "imu.csv": measure_inertial(rng, m), "gnss.csv": gnss}
-    return _imported(_nadir_recipe(seed, level, focal, with_airframe), files)
-
-
-def _ned(unit: str = "m") -> dict[str, Any]:
-    return {axis: {"column": f"{axis}_m", "unit": unit} for axis in ("north", "east", "down")}
-
-
-def _nadir_recipe(seed: int, level: Level, focal: float, with_airframe: bool) -> dict[str, Any]:
-    stamp = {"column": "time_s", "format": "elapsed"}
-    recipe = _manifest("nadir", seed, level, focal)
-    del recipe["kind"]
-    poses: dict[str, Any] = {"file": "camera.csv", "position": _ned()}
-    poses["attitude"] = {name: {"column": name, "unit": "deg"} for name in ("roll", "pitch", "yaw")}
-    poses |= {"frame": "photo"} if seed % 2 else {"time": stamp}
-    pixel = {axis: {"column": f"{axis}_px", "unit": "px"} for axis in "uv"}
-    clicks = {
-        "source": "click",
-        "file": "clicks.csv",
-        "frame": "frame_id",
-        "target": "target_id",
-        "pixel": pixel,
-    }
-    recipe |= {
-        "mount": {"looks": "forward", "poses": "camera"},
-        "frames": {"file": "photos.csv", "id": "frame_id", "time": stamp},
-        "poses": {"camera": poses},
-        "detections": [clicks | {"ground": {"height": {"value": 40.0, "unit": "m"}}}],
-        "truth": [{"file": "marks.csv", "id": "target_id", "position": _ned()}],
-    }
-    if with_airframe:
-        turns = {"quaternion": QUATERNION, "order": "wxyz"}
-        velocity = {a: {"column": f"v_{a}_m_s", "unit": "m/s"} for a in ("north", "east", "down")}
-        recipe["poses"]["airframe"] = {"file": "airframe.csv", "time": stamp, "position": _ned(),
-                                       "attitude": turns, "velocity": velocity}  # fmt: skip
-        recipe["gnss"] = {"file": "gnss.csv", "time": stamp, "position": _ned(), "velocity": velocity}
-        recipe["imu"] = {"file": "imu.csv", "time": stamp}
-        recipe["imu"]["force"] = {a: {"column": f"f_{a}_m_s2", "unit": "m/s2"} for a in "xyz"}
-        recipe["imu"]["rate"] = {a: {"column": f"w_{a}_rad_s", "unit": "rad/s"} for a in "xyz"}
-    return recipe
-
-
-def _imported(recipe: dict[str, Any], files: dict[str, pd.DataFrame]) -> Flight:
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        for name, table in files.items():
-            table.to_csv(place / name, index=False)
-        (place / "recipe.toml").write_text(dump_toml(recipe), encoding="utf-8")
-        flight = import_flight(place / "recipe.toml", place, place / "flight")
-    return Flight(flight.manifest, flight.nav, flight.tables, None)
+        log = log.assign(time_s=frames["time_s"], frame_id=frames["frame_id"])
+    # Angles in degrees, with as many digits as logs have.
+    turned = from_euler(0.0, *np.radians([pitch[rows].round(3), (np.degrees(yaw[rows]) % 360).round(3)]))
+    log = log.round(dict.fromkeys(NED, 3))
+    log[QUATERNION] = turned.as_quat(scalar_first=True)
+    poses, tables = {"camera": log}, {}
+    if seed % 5 == 0:
+        poses["airframe"], tables = nav, {"gnss": gnss, "imu": measure_inertial(rng, m)}
+    tables |= {"frames": frames, "detections": detections, "truth": truth}
+    mount = {"looks": "forward", "poses": "camera"}
+    return Flight(make_manifest(_manifest("nadir", seed, level, focal, mount=mount)), poses, tables)
 
 
 def _gondola(rng: Any, seed: int) -> Flight:

@@ -9,6 +9,8 @@ import pandas as pd
 import pytest
 
 from tests.flight.checks.found import levels
+from tests.sound_logs import NED, QUATERNION
+from tests.sound_logs import VELOCITY as SPEED
 from wildlab.flight.checks.check import Finding, find, usable_for
 from wildlab.flight.checks.inertial import FORCE, RATE
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
@@ -22,9 +24,6 @@ from wildlab.simulation import (
     specific_forces,
 )
 
-NED = ["north_m", "east_m", "down_m"]
-SPEED = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
-QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
 DURATION = 240.0
 
 Change = Callable[[Flight], None]
@@ -170,14 +169,6 @@ def _other_flight(flight: Flight) -> None:
     rng = np.random.default_rng(9)
     gnss = flight.tables["gnss"]
     gnss[SPEED] = 20 + np.cumsum(rng.standard_normal((len(gnss), 3)), axis=0)
-
-
-def _both(*changes: Change) -> Change:
-    def change(flight: Flight) -> None:
-        for one in changes:
-            one(flight)
-
-    return change
 
 
 FLU = np.diag([1, -1, -1])

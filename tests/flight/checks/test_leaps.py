@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildlab.flight.checks.check import sense
+from wildlab.flight.checks.check import find
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.motion import find_leaps, positions, without_leaps
 from wildlab.flight.manifest import Manifest
@@ -26,7 +26,6 @@ def way(t: np.ndarray, turning: float) -> tuple[np.ndarray, np.ndarray]:
 def straight_flight(
     *,
     leap: float = 0.0,
-    at: float = 25.0,
     clock: float = 0.0,
     who: str = "gnss",
     velocity: bool = True,
@@ -39,7 +38,7 @@ def straight_flight(
     p, v = way(t, turning)
     fixes = slice(None, None, 2)
     along = leap * SPEED / np.linalg.norm(SPEED)
-    leapt = np.where((t >= at)[:, None], along, 0.0)
+    leapt = np.where((t >= 25.0)[:, None], along, 0.0)
     own = p + (leapt if who == "nav" else 0.0) + rng.normal(0, 0.05, p.shape)
     said = p + (leapt if who == "gnss" else 0.0) + np.cumsum(rng.normal(0, 0.03, p.shape), axis=0)
     columns = ["north_m", "east_m", "down_m"]
@@ -71,7 +70,7 @@ def test_a_leap_is_not_the_clock_though_it_looks_like_one(who, velocity):
     flight = straight_flight(leap=60.0, who=who, velocity=velocity)
     # Without what tells the two apart the clock is blamed: 60 m at 17 m/s are three and a half seconds.
     assert "clock of the receiver" in causes(list(positions(flight)))
-    found = list(sense(flight))
+    found = find(flight, plain=False)
     assert causes(found) == {"leap of the position"}
     (leap,) = (one for one in found if one.causes)
     assert leap.table == ("gnss" if who == "gnss" else "nav/autopilot")
@@ -98,12 +97,12 @@ def test_mistakes_about_places_are_named_and_undone(change, cause):
 @pytest.mark.parametrize("velocity", [True, False])
 def test_a_clock_that_is_off_is_still_named(turning, velocity):
     flight = straight_flight(clock=3.5, velocity=velocity, turning=turning)
-    assert "clock of the receiver" in causes(list(sense(flight)))
+    assert "clock of the receiver" in causes(find(flight, plain=False))
     assert without_leaps(flight)[1] == []
 
 
 def test_both_are_named_where_both_are():
-    found = list(sense(straight_flight(leap=60.0, clock=3.5, turning=0.8)))
+    found = find(straight_flight(leap=60.0, clock=3.5, turning=0.8), plain=False)
     assert {"leap of the position", "clock of the receiver"} <= causes(found)
 
 

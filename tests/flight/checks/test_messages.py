@@ -11,7 +11,7 @@ from wildlab.flight.checks.mistakes import rows_of
 
 SOURCES = "".join(path.read_text(encoding="utf-8") for path in Path(checks.__path__[0]).glob("*.py"))
 #: Codes that are put together from a word and an end.
-ENDS = ("-twice", "-off", "-gap")
+ENDS = ("-twice", "-off", "-gap", "-explained", "-unexplained")
 
 
 class Fact(str):

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.spatial.transform import Rotation
 
+from tests.flight.checks.test_sound_flights import POSES, euler
 from wildlab.flight.checks import known_points
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.checks.findings import Finding
@@ -15,8 +15,6 @@ from wildlab.flight.checks.sightings import sightings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
-
-QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +31,8 @@ def told(flight: Flight) -> list[Finding]:
 
 
 def turned(flight: Flight, change: Callable[[np.ndarray], np.ndarray]) -> Flight:
-    """With other angles (N, 3), yaw, pitch and roll, in the poses."""
-    nav = flight.nav["autopilot"].copy()
-    angles = Rotation.from_quat(nav[QUATERNION].to_numpy()[:, [1, 2, 3, 0]]).as_euler("ZYX")
-    nav[QUATERNION] = Rotation.from_euler("ZYX", change(angles)).as_quat()[:, [3, 0, 1, 2]]
-    return replace(flight, nav={"autopilot": nav})
+    """With other angles (N, 3), roll, pitch and yaw in degrees, in the poses."""
+    return euler(POSES, change)(flight)
 
 
 def few(flight: Flight, count: int) -> Flight:
@@ -63,7 +58,7 @@ def test_what_is_right_is_not_accused_however_few_are_known(flown, count):
 
 def test_where_few_are_known_a_share_that_grows_proves_nothing(flown):
     """Negated yaw, and undone: of 1 of 25 animals a share is too small to be told from others'."""
-    assert told(few(turned(flown, lambda a: a * [-1, 1, 1]), 1)) == []
+    assert told(few(turned(flown, lambda a: a * [1, 1, -1]), 1)) == []
 
 
 @pytest.mark.parametrize(("before", "accused"), [(0.29, True), (0.31, False)])
@@ -79,8 +74,8 @@ def test_what_meets_targets_often_enough_needs_no_explanation(flown, monkeypatch
 @pytest.mark.parametrize(
     ("change", "cause"),
     [
-        (lambda a: a * [-1, 1, 1], "sign of yaw"),
-        (lambda a: a + np.array([np.pi / 2, 0, 0]), "yaw off by -90 deg"),
+        (lambda a: a * [1, 1, -1], "sign of yaw"),
+        (lambda a: a + np.array([0, 0, 90.0]), "yaw off by -90 deg"),
     ],
 )
 def test_a_wrong_attitude_is_named_also_where_half_of_them_are_known(flown, change, cause):
@@ -99,7 +94,7 @@ def test_a_clock_that_is_off_is_named_with_what_to_write(flown):
 
 
 def test_a_name_that_is_no_known_targets_says_nothing_of_known_ones(flown):
-    wrong = turned(flown, lambda a: a * [-1, 1, 1])
+    wrong = turned(flown, lambda a: a * [1, 1, -1])
     detections = wrong.table("detections").assign(target_id="somebody else")
     assert told(replace(wrong, tables={**wrong.tables, "detections": detections})) == []
 

@@ -1,8 +1,6 @@
 """Sound flights are accused of nothing, and a mistake made in one is named, alone."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,14 +9,12 @@ from scipy.spatial.transform import Rotation
 from tests.sound_flights import simulate_sound_flight, sound_flights
 from wildlab.flight.checks.attitude import Felt, heading_error
 from wildlab.flight.checks.check import find
-from wildlab.flight.checks.findings import Finding
-from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.checks.findings import QUATERNION, Finding
+from wildlab.flight.checks.mistakes import Correction, change_columns, state
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 
-QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
 POSES = "nav/autopilot"
-Change = Callable[[Flight], Flight]
 
 
 def turning(
@@ -44,28 +40,11 @@ def turning(
     return Felt(R[:-1], R[1:], np.diff(t), 0 * force[1:], force, R, a, t)
 
 
-def manifest_of(flight: Flight, **parts: dict[str, Any]) -> Flight:
-    return replace(flight, manifest=replace_in_manifest(flight.manifest, parts))
+def shift(table: str, seconds: float) -> Correction:
+    return change_columns(table, ["time_s"], lambda t: t + seconds)
 
 
-def of_columns(table: str, names: list[str], change: Callable[[np.ndarray], np.ndarray]) -> Change:
-    """Columns (N, K) of one table as a wrong recipe would have read them."""
-
-    def apply(flight: Flight) -> Flight:
-        source = table.removeprefix("nav/")
-        part, tables = ("nav", flight.nav) if source != table else ("tables", flight.tables)
-        data = tables[source].copy()
-        data[names] = change(data[names].to_numpy(float))
-        return replace(flight, **{part: {**tables, source: data}})
-
-    return apply
-
-
-def shift(table: str, seconds: float) -> Change:
-    return of_columns(table, ["time_s"], lambda t: t + seconds)
-
-
-def euler(table: str, change: Callable[[np.ndarray], np.ndarray]) -> Change:
+def euler(table: str, change: Callable[[np.ndarray], np.ndarray]) -> Correction:
     """Roll, pitch, yaw (degrees, (N, 3)) as a wrong recipe would have read them."""
 
     def turned(q: np.ndarray) -> np.ndarray:
@@ -73,7 +52,7 @@ def euler(table: str, change: Callable[[np.ndarray], np.ndarray]) -> Change:
         read = Rotation.from_euler("ZYX", change(angles)[:, ::-1], degrees=True)
         return np.asarray(read.as_quat(scalar_first=True, canonical=True))
 
-    return of_columns(table, QUATERNION, turned)
+    return change_columns(table, QUATERNION, turned)
 
 
 #: Those that fly sideways, look straight down along their course, or have a camera's attitude beside an
@@ -105,7 +84,7 @@ def test_a_twin_is_not_accused(twin):
 
 def focal_length(flight: Flight) -> Flight:
     camera = {name: 1000 * getattr(flight.manifest.camera, name) for name in ("fx_px", "fy_px")}
-    return manifest_of(flight, camera=camera)
+    return state({"camera": camera})(flight)
 
 
 @pytest.mark.slow
@@ -196,12 +175,12 @@ def test_the_heading_error_is_the_turn_between_forces_and_accelerations():
 def test_a_camera_tilted_by_nine_degrees_is_named():
     flight = simulate_sound_flight("multirotor", 4)
     tilt = flight.manifest.mount.tilt_deg
-    (found,) = accusations(manifest_of(flight, mount={"tilt_deg": tilt + 9.0}))
+    (found,) = accusations(state({"mount": {"tilt_deg": tilt + 9.0}})(flight))
     assert found.causes == ("camera turned",)
 
 
 def test_height_is_no_certain_cause_where_a_tilt_explains_it_too():
     flight = simulate_sound_flight("boat", 3)
-    wrong = manifest_of(flight, mount={"tilt_deg": 8.0})
+    wrong = state({"mount": {"tilt_deg": 8.0}})(flight)
     for one in accusations(wrong):
         assert "constant height" not in one.causes or "camera turned" in one.causes

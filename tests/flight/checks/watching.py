@@ -9,8 +9,8 @@ import pandas as pd
 from wildlab.flight.store import Flight
 
 
-def level_poses(t: Any, north: Any, east: Any = 0.0, yaw: Any = 0.0, down: Any = 0.0) -> pd.DataFrame:
-    nav = pd.DataFrame({"time_s": t, "north_m": north, "east_m": east, "down_m": down})
+def level_poses(t: Any, north: Any, east: Any = 0.0, yaw: Any = 0.0) -> pd.DataFrame:
+    nav = pd.DataFrame({"time_s": t, "north_m": north, "east_m": east, "down_m": 0.0})
     return nav.assign(q_w=np.cos(yaw / 2), q_x=0.0, q_y=0.0, q_z=np.sin(yaw / 2))
 
 

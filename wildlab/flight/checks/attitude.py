@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding
+from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, finite_rows, thin
 from wildlab.flight.checks.inertial import (
     FORCE,
     RATE,
@@ -30,11 +30,13 @@ from wildlab.flight.checks.mistakes import (
     Mistake,
     alternate,
     attitude_mistakes,
+    attitudes_in,
     axes_words,
     blame,
     change_attitude,
     change_by,
     change_columns,
+    compare,
     crosswise,
     explain,
     mistake,
@@ -88,7 +90,7 @@ class Felt:
     def turned(self) -> Array:
         """The mean rates that the attitudes have, (K, 3)."""
         turned = Rotation.from_matrix(np.swapaxes(self.before, 1, 2) @ self.after).as_rotvec()
-        return np.asarray(turned / self.length[:, None])
+        return turned / self.length[:, None]
 
     @property
     def expected(self) -> Array:
@@ -105,12 +107,12 @@ def felt(flight: Flight, source: str, imu: Inertial) -> Felt | None:
         return None
     t = values[:, 0]
     last = np.minimum(np.searchsorted(t, t + STEP_S / 5), len(t) - 1)
-    first = np.arange(len(t))
-    inside = (t[first] >= imu.times[0]) & (t[last] <= imu.times[-1])
-    good = np.flatnonzero((last > first) & (t[last] - t[first] <= STEP_S) & inside)
+    length = t[last] - t
+    inside = (t >= imu.times[0]) & (t[last] <= imu.times[-1])
+    good = np.flatnonzero((length > 0) & (length <= STEP_S) & inside)
     if len(good) < ENOUGH:
         return None
-    first = first[good][np.unique(np.linspace(0, len(good) - 1, MOST).astype(int))]
+    first = good[thin(len(good), MOST)]
     last = last[first]
     used = moves(fixes(flight))
     if used is None and VELOCITY[0] in nav:
@@ -130,7 +132,7 @@ def felt(flight: Flight, source: str, imu: Inertial) -> Felt | None:
     return Felt(
         before,
         after,
-        t[last] - t[first],
+        length[first],
         rate,
         force[known],
         R_force[known],
@@ -150,7 +152,7 @@ def _felt_misfit(f: Felt) -> Misfit:
     usual_force = USUAL_FORCE + FORCE_SHARE * _rms(expected - np.median(expected, axis=0))
 
     def judge(left: Array, usual: float) -> Misfit:
-        return crosswise(alternate(len(left), 10), lambda _, judged: (_rms(left[judged]) / usual,))
+        return crosswise(len(left), 10, lambda _, judged: (_rms(left[judged]) / usual,))
 
     return np.concatenate([judge(rate, usual_rate), judge(f.force - expected, usual_force)])
 
@@ -164,23 +166,24 @@ def _rms(values: Array) -> float:
 def forces(flight: Flight) -> Iterator[Finding]:
     """The inertial sensor against every nav source."""
     imu = samples(flight)
-    for source in airframe_sources(flight) if imu is not None else ():
-        given = felt(flight, source, imu) if imu is not None else None
+    if imu is None:
+        return
+    for source in airframe_sources(flight):
+        given = felt(flight, source, imu)
         if given is None:
             continue
-        named = [(one.mistake, one.undone) for one in explain(_felt_misfit, given, felt_mistakes(source))]
+        named = explain(_felt_misfit, given, felt_mistakes(source))
         before = _felt_misfit(given)[:, 0]
         table = f"nav/{source}"
         facts: dict[str, Any] = {"source": source, "turns": before[0], "forces": before[1]}
         if named:
-            after = _felt_misfit(named[0][1])[:, 0]
-            mistakes = [one for one, _ in named]
+            after = _felt_misfit(named[0].undone)[:, 0]
             yield blame(
                 "problem" if before.max() > UNEXPLAINED else "warning",
-                "imu" if all("[imu" in one.fix for one in mistakes) else table,
+                "imu" if all("[imu" in one.fix for one in named) else table,
                 "",
                 "felt-explained",
-                mistakes,
+                named,
                 {**facts, "turns_then": after[0], "forces_then": after[1]},
             )
         # Where the turns do not fit either, the sign of a force is none of the causes.
@@ -270,9 +273,7 @@ def _turned_by(M: Array, x: Array) -> Array:
 
 def felt_mistakes(source: str) -> Iterator[Mistake[Felt]]:
     """Mistakes about the attitude, and about axes and units of the sensor."""
-    for a in attitude_mistakes(f"poses.{source}"):
-        undo = undo_in(a.undo, "before", "after", "R_force")
-        yield a.within("attitude", undo, change_attitude(source, a.undo))
+    yield from attitudes_in(source, "attitude", "before", "after", "R_force")
     columns = {"rate": RATE, "force": FORCE}
     for M in other_axes():
         for row in rows_of("inertial-axes"):
@@ -340,14 +341,14 @@ def _field_misfit(s: FieldStep) -> Misfit:
         A = turned[fit].reshape(-1, 3)
         earth = np.linalg.solve(A.T @ A + 1e-9 * np.eye(3), A.T @ change[fit].ravel())
         size = np.linalg.norm(change[judged] - turned[judged] @ earth, axis=1)
-        total = max(float(np.mean(np.linalg.norm(change[judged], axis=1) ** 2)), 1e-12)
+        total = max(np.mean(np.linalg.norm(change[judged], axis=1) ** 2), 1e-12)
         off = 0.0
         if s.earth is not None:
             cosine = float(earth @ s.earth / max(float(np.linalg.norm(earth)), 1e-9))
             off = float(np.arccos(np.clip(cosine, -1, 1)))
         return float(np.sqrt(np.mean(size**2) / total)) / UNEXPLAINED_FIELD, 1 + off / DIRECTION
 
-    return crosswise(alternate(len(change), 10), left)
+    return crosswise(len(change), 10, left)
 
 
 def field(flight: Flight) -> Iterator[Finding]:
@@ -355,9 +356,8 @@ def field(flight: Flight) -> Iterator[Finding]:
     table = flight.tables.get("magnetometer")
     if table is None or len(table) < ENOUGH:
         return
-    values = table[["time_s", *FIELD]].to_numpy(float)
-    values = values[np.isfinite(values).all(axis=1)]
-    size = float(np.median(np.linalg.norm(values[:, 1:], axis=1)))
+    values = finite_rows(table, ("time_s", *FIELD))
+    size = np.median(np.linalg.norm(values[:, 1:], axis=1))
     if not WEAK <= size <= STRONG:
         units = other_units("field")
         ways = [unit for unit, factor in units.items() if 20 <= size * factor <= 80]
@@ -369,21 +369,23 @@ def field(flight: Flight) -> Iterator[Finding]:
         return
     for source in airframe_sources(flight):
         given = field_steps(values, flight.nav[source], _earth(flight))
-        named = [] if given is None else explain(_field_misfit, given, field_mistakes(source))
-        if given is not None and named:
-            before, after = (
-                100 * (1 - (UNEXPLAINED_FIELD * _field_misfit(x)[0, 0]) ** 2)
-                for x in (given, named[0].undone)
+        if given is not None:
+            yield from compare(
+                "field",
+                _field_misfit,
+                given,
+                field_mistakes(source),
+                lambda s: {"share": 100 * max(1 - (UNEXPLAINED_FIELD * _field_misfit(s)[0, 0]) ** 2, 0.0)},
+                "magnetometer",
+                FIELD[0],
+                source=source,
             )
-            facts = {"source": source, "before": max(before, 0.0), "after": after}
-            mistakes = [one.mistake for one in named]
-            yield blame("problem", "magnetometer", FIELD[0], "field-explained", mistakes, facts)
 
 
 def field_steps(values: Array, nav: pd.DataFrame, earth: Array | None) -> FieldStep | None:
     """Steps of the field (N, 4; time first) with the attitudes of a nav table; None of too few."""
     t = values[:, 0]
-    first = np.unique(np.linspace(0, len(t) - 1, MOST_FIELD).astype(int))
+    first = thin(len(t), MOST_FIELD)
     last = np.minimum(np.searchsorted(t, t[first] + FIELD_STEP_S), len(t) - 1)
     good = (t[last] - t[first] > FIELD_STEP_S / 2) & (t[last] - t[first] < 2 * FIELD_STEP_S)
     first, last = first[good], last[good]
@@ -405,8 +407,7 @@ def _earth(flight: Flight) -> Array | None:
 
 def field_mistakes(source: str) -> Iterator[Mistake[FieldStep]]:
     """Axes of the magnetometer that are exchanged or count the other way, and a yaw from elsewhere."""
-    for a in attitude_mistakes(f"poses.{source}"):
-        yield a.within("attitude", undo_in(a.undo, "R_before", "R_after"), change_attitude(source, a.undo))
+    yield from attitudes_in(source, "attitude", "R_before", "R_after")
     for M in other_axes():
         turn = undo_in(partial(_turned_by, M), "before", "after")
         yield mistake(one_row("field-axes"), turn, axes=axes_words(M))
@@ -469,7 +470,7 @@ def headed(nav: pd.DataFrame) -> tuple[Array, Array, Array] | None:
     if values is None:
         return None
     t = values[:, 0]
-    middle = np.unique(np.linspace(0, len(t) - 1, MOST_COURSES).astype(int))
+    middle = thin(len(t), MOST_COURSES)
     half = COURSE_S / 2
     before, here, after = (
         np.column_stack([np.interp(t[middle] + s, t, place) for place in values[:, 5:7].T])

@@ -9,7 +9,16 @@ import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.findings import POSITION, Finding, Level, bad_rows, messages, phrase
+from wildlab.flight.checks.findings import (
+    POSITION,
+    Finding,
+    Level,
+    bad_rows,
+    finite_rows,
+    messages,
+    phrase,
+    thin,
+)
 from wildlab.flight.checks.mistakes import Mistake, blame, change_by, mistake, rows_of
 from wildlab.flight.checks.sightings import MOST
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, poses_at
@@ -90,7 +99,7 @@ def lens(flight: Flight) -> Iterator[Finding]:
     if camera is None:
         return
     widest = max(camera.width_px / camera.fx_px, camera.height_px / camera.fy_px)
-    across = float(np.degrees(2 * np.arctan(widest / 2)))
+    across = np.degrees(2 * np.arctan(widest / 2))
     facts = {"fx": camera.fx_px, "across": across}
     if across > WIDE:
         causes = ("focal length in mm",)
@@ -136,12 +145,12 @@ def ground(flight: Flight) -> Iterator[Finding]:
         heights = truth.groupby("target_id")["down_m"].median()
         known = detections["target_id"].map(heights).to_numpy(float)
     else:
-        known = np.full(len(down), float(truth["down_m"].median()))
+        known = np.full(len(down), truth["down_m"].median())
     apart = (down - known)[pixel & np.isfinite(down - known)]
     if len(apart) < 4:
         return
-    off = float(np.median(apart))
-    spread = 1.4826 * float(np.median(np.abs(apart - off)))
+    off = np.median(apart)
+    spread = 1.4826 * np.median(np.abs(apart - off))
     of_truth = float(truth["sd_vertical_m"].median()) if "sd_vertical_m" in truth else np.nan
     sd = of_truth if np.isfinite(of_truth) else 2.0
     stated = np.hypot(flight.manifest.uncertainty.plane_height_m or 1.0, sd)
@@ -153,13 +162,12 @@ def ground(flight: Flight) -> Iterator[Finding]:
 
 def _rays(flight: Flight, pixels: pd.DataFrame, frames: pd.DataFrame) -> Iterator[Finding]:
     """The share of rays that meet the ground, where it is known how high that is."""
-    if len(pixels) > MOST:
-        pixels = pixels.iloc[np.linspace(0, len(pixels) - 1, MOST).astype(int)]
+    pixels = pixels.iloc[thin(len(pixels), MOST)]
     plane = np.full(len(pixels), np.nan)
     if "plane_down_m" in pixels:
         plane = pixels["plane_down_m"].to_numpy(float)
     if flight.truth is not None and len(flight.truth):
-        plane = np.where(np.isfinite(plane), plane, float(flight.truth["down_m"].median()))
+        plane = np.where(np.isfinite(plane), plane, flight.truth["down_m"].median())
     terrain, manifest = flight.terrain, flight.manifest
     frame = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
     for name, nav in flight.nav.items():
@@ -180,10 +188,10 @@ def _rays(flight: Flight, pixels: pd.DataFrame, frames: pd.DataFrame) -> Iterato
         known = np.isfinite(p).all(axis=1) & (frame >= 0) & (np.isfinite(plane) | (terrain is not None))
         if known.sum() < 4:
             continue
-        lost = 1 - float(np.isfinite(met[known, 0]).mean())
+        lost = 1 - np.isfinite(met[known, 0]).mean()
         if lost > LOST:
             other = "forward" if manifest.mount.looks == "down" else "down"
-            below = float(np.mean(under[known])) > LOST
+            below = np.mean(under[known]) > LOST
             facts = {"percent": 100 * lost, "source": name, "other": other}
             code = "rays-from-below" if below else "rays-past-ground"
             level: Level = "problem" if lost > 0.9 else "warning"
@@ -232,8 +240,7 @@ def terrain_findings(flight: Flight) -> Iterator[Finding]:
     yield Finding("note", "terrain.tif", "", "terrain-there", facts)
     yield from _known_points(flight, ground)
     for name, nav in flight.nav.items():
-        p = nav[list(POSITION)].to_numpy(float)
-        p = p[np.isfinite(p).all(axis=1)]
+        p = finite_rows(nav, POSITION)
         if not len(p):
             continue
         above = -p[:, 2] - ground.heights_at(p[:, :2])
@@ -264,8 +271,8 @@ def _known_points(flight: Flight, ground: Terrain) -> Iterator[Finding]:
     above = above[np.isfinite(above)]
     if len(above) < 3:
         return
-    middle = float(np.median(above))
-    spread = 1.4826 * float(np.median(np.abs(above - middle)))
+    middle = np.median(above)
+    spread = 1.4826 * np.median(np.abs(above - middle))
     off = abs(middle) > max(OFF, OFF_SPREAD * spread)
     facts = {"n": len(above), "above": middle, "spread": spread}
     code = "points-off-ground" if off else "points-on-ground"

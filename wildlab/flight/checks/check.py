@@ -32,7 +32,7 @@ from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight
 from wildlab.names import listed
 
-__all__ = ["Finding", "Use", "check_flight", "find", "sense", "sense_sentences", "usable_for"]
+__all__ = ["Finding", "Use", "check_flight", "find", "sense_sentences", "usable_for"]
 
 #: Parts of [uncertainty] without which a detection on the ground has no error ellipse.
 ASSUMED = ("pixel_px", "position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg")
@@ -105,12 +105,13 @@ def check_flight(flight: Flight) -> list[Finding]:
     return find(flight)
 
 
-def find(flight: Flight, *, meaning: bool = True) -> list[Finding]:
-    """The same; without `meaning`, whether a flight can be read, and not whether it makes sense."""
+def find(flight: Flight, *, plain: bool = True, meaning: bool = True) -> list[Finding]:
+    """The same of a part: ``plain``, whether a flight can be read; ``meaning``, whether it makes sense, and
+    the mistake that explains it."""
 
     def ask(of: Flight) -> list[Finding]:
-        plain = [finding for question in PLAIN for finding in question(of)]
-        return [*plain, *contradictions(of)] if meaning else plain
+        found = [finding for question in PLAIN for finding in question(of)] if plain else []
+        return [*found, *contradictions(of)] if meaning else found
 
     found = report_alone(flight, ask(flight), ask) if meaning else ask(flight)
     return sorted(found, key=lambda finding: LEVELS.index(finding.level))
@@ -125,24 +126,8 @@ def contradictions(flight: Flight) -> list[Finding]:
     return [finding for some in found.values() for finding in some]
 
 
-def sense(flight: Flight) -> list[Finding]:
-    """Everything in which a flight contradicts itself, and the mistake that explains it.
-
-    Parameters
-    ----------
-    flight
-        The flight; nothing in it is changed.
-
-    Returns
-    -------
-    list of Finding
-        Of mistakes that explain others, these alone.
-    """
-    return report_alone(flight, contradictions(flight), contradictions)
-
-
 def sense_sentences(flight: Flight) -> list[str]:
-    """What `sense` finds, in whole sentences with the remedy; notes are left out. For reports and commands.
+    """In what a flight contradicts itself, in sentences with the remedy; notes are left out.
 
     Parameters
     ----------
@@ -160,7 +145,7 @@ def sense_sentences(flight: Flight) -> list[str]:
     >>> sense_sentences(simulate_twin("large-ship", 1))
     []
     """
-    found = sorted(sense(flight), key=lambda finding: LEVELS.index(finding.level))
+    found = find(flight, plain=False)
     return [f"{one.level}: {one.sentence} {one.fix}" for one in found if one.level != "note"]
 
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 import dataclasses
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from string import Formatter
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.names import listed
 from wildlab.paths import DATA
 
@@ -151,6 +153,17 @@ def bad_rows(
         for key, value in (facts or {}).items():
             counted[key] = value[row] if isinstance(value, np.ndarray) else value
         yield Finding(level or ("problem" if bad.all() else "warning"), table, field, code, counted, causes)
+
+
+def thin(n: int, most: int) -> NDArray[np.intp]:
+    """At most so many of n rows, evenly."""
+    return np.unique(np.linspace(0, n - 1, most).astype(np.intp))
+
+
+def finite_rows(table: pd.DataFrame, names: Sequence[str]) -> Array:
+    """The rows of some columns that hold numbers alone, (N, K)."""
+    values = table[[*names]].to_numpy(float)
+    return np.asarray(values[np.isfinite(values).all(axis=1)])
 
 
 def part_of(table: str) -> str:

@@ -20,7 +20,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, Level, say
+from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, Level, finite_rows, say
 from wildlab.flight.checks.mistakes import APART, Correction, change_columns, shift_clock
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import SECOND_COLUMNS
@@ -39,6 +39,8 @@ LONGEST_S = 2.5
 MOST = 3000
 #: Sine of the angle below the horizon from which x is no nose: 45 deg.
 STEEP = 0.7
+#: A pose further than this from a time (s) is not that of it.
+NEAREST_S = 0.3
 #: Turns further than this between two attitudes could as well be the other way round.
 TURN = 2.5
 
@@ -104,12 +106,12 @@ class Moves:
     @property
     def acceleration(self) -> Array:
         """Mean over each interval, in n. (K, 3)"""
-        return np.asarray((self.after - self.before) / (self.end - self.start)[:, None])
+        return (self.after - self.before) / (self.end - self.start)[:, None]
 
     @property
     def force(self) -> Array:
         """The specific force that goes with it, in n. (K, 3)"""
-        return np.asarray(self.acceleration - [0.0, 0.0, USUAL_GRAVITY])
+        return self.acceleration - [0.0, 0.0, USUAL_GRAVITY]
 
     def course_rate(self, slowest: float) -> Array:
         """How fast the course turns, rad/s; NaN below a speed. (K,)"""
@@ -193,7 +195,7 @@ def airframe_sources(flight: Flight) -> list[str]:
 
     def of_camera(name: str) -> bool:
         w, x, y, z = flight.nav[name][list(QUATERNION)].to_numpy(float).T
-        steep = len(w) > 0 and float(np.nanmedian(2 * (x * z - w * y))) > STEEP
+        steep = len(w) > 0 and np.nanmedian(2 * (x * z - w * y)) > STEEP
         return along_x and (steep or (name == mount.poses and len(logs) > 1))
 
     return [name for name in logs if not of_camera(name)]
@@ -203,8 +205,8 @@ def turns(flight: Flight) -> Iterator[Turns]:
     """Intervals of each nav source of the airframe whose poses follow each other closely enough."""
     for name in airframe_sources(flight):
         nav = flight.nav[name]
-        values = nav[["time_s", *QUATERNION]].to_numpy(float)
-        values = values[np.isfinite(values).all(axis=1) & (np.abs(values[:, 1:]).sum(axis=1) > 0.5)]
+        values = finite_rows(nav, ("time_s", *QUATERNION))
+        values = values[np.abs(values[:, 1:]).sum(axis=1) > 0.5]
         times = values[:, 0]
         if len(times) < 2 or (np.diff(times) <= 0).any():
             continue
@@ -218,13 +220,13 @@ def turns(flight: Flight) -> Iterator[Turns]:
         yield Turns(name, start, end, turned[clear] / (end - start)[:, None])
 
 
-def attitudes_near(nav: pd.DataFrame, times: Array, within_s: float = 0.3) -> tuple[NDArray[np.intp], Array]:
+def attitudes_near(nav: pd.DataFrame, times: Array) -> tuple[NDArray[np.intp], Array]:
     """``R_nb`` of the pose nearest to each time, for those times that have one. (K,) rows, (K, 3, 3)"""
     stamps = nav["time_s"].to_numpy(float)
     after = np.clip(np.searchsorted(stamps, times), 1, len(stamps) - 1)
     nearest = np.where(times - stamps[after - 1] < stamps[after] - times, after - 1, after)
     q = nav[list(QUATERNION)].to_numpy(float)[nearest]
-    near = (np.abs(stamps[nearest] - times) < within_s) & np.isfinite(q).all(axis=1)
+    near = (np.abs(stamps[nearest] - times) < NEAREST_S) & np.isfinite(q).all(axis=1)
     near &= np.abs(q).sum(axis=1) > 0.5
     rows = np.flatnonzero(near)
     if len(rows) == 0:
@@ -234,8 +236,7 @@ def attitudes_near(nav: pd.DataFrame, times: Array, within_s: float = 0.3) -> tu
 
 def increasing_rows(table: pd.DataFrame, names: Sequence[str], enough: int) -> Array | None:
     """Finite rows of times and columns (N, 1 + K); None of too few, or where the times do not increase."""
-    values = table[["time_s", *names]].to_numpy(float)
-    values = values[np.isfinite(values).all(axis=1)]
+    values = finite_rows(table, ("time_s", *names))
     return None if len(values) < enough or (np.diff(values[:, 0]) <= 0).any() else values
 
 
@@ -340,7 +341,7 @@ def inertial(flight: Flight) -> Iterator[Finding]:
 
 def _gaps(table: str, times: Array, longest: float) -> Iterator[Finding]:
     step = np.diff(times)
-    long = step > max(longest, 5 * float(np.median(step)))
+    long = step > max(longest, 5 * np.median(step))
     if long.any():
         worst = int(np.argmax(step))
         facts = {"seconds": step[worst], "after": times[worst], "n": int(long.sum())}
@@ -464,7 +465,7 @@ def _rate_unit(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[F
         size = np.linalg.norm(turn.rate, axis=1)
         good = np.isfinite(rate).all(axis=1) & (size > TURNING)
         if good.sum() >= ENOUGH_TURNS:
-            ratio = float(np.median(np.linalg.norm(rate[good], axis=1) / size[good]))
+            ratio = np.median(np.linalg.norm(rate[good], axis=1) / size[good])
             # Another unit leaves the direction as it was; another clock, or another attitude, does not.
             if not 1 / FACTOR < ratio < FACTOR and _together(rate[good], turn.rate[good]) > CLEAR:
                 yield wrong("rate-against-attitude", ratio, source=turn.source)
@@ -474,21 +475,21 @@ def _rate_unit(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[F
         course = np.abs(moved.course_rate(SLOWEST))
         good = np.isfinite(speed) & (course > TURNING)
         if good.sum() >= ENOUGH_TURNS:
-            ratio = float(np.median(speed[good] / course[good]))
+            ratio = np.median(speed[good] / course[good])
             if not 1 / FACTOR <= ratio <= FACTOR:
                 yield wrong("rate-against-course", ratio)
                 return
     end = imu.times[imu.times >= imu.times[0] + 1.0]
     end = end[:: max(1, len(end) // SECONDS)]
     fast = np.linalg.norm(imu.mean_rate(end - 1.0, end), axis=1) if len(end) else np.zeros(1)
-    if (fastest := float(np.nanmax(fast))) > FASTEST:
+    if (fastest := np.nanmax(fast)) > FASTEST:
         yield Finding("problem", "imu", "w_z_rad_s", "rate-too-fast", {"turned": fastest / (2 * np.pi)})
 
 
 def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """On average an aircraft neither climbs nor falls: the mean force points to its upper side."""
     mean = imu.mean_of_forces()
-    size = float(np.linalg.norm(mean))
+    size = np.linalg.norm(mean)
     if size < USUAL_GRAVITY / 2 or mean[2] < -ALONG * size:
         return
     axis = int(np.argmax(np.abs(mean)))

@@ -17,16 +17,13 @@ from wildlab.flight.checks.mistakes import (
     FAR_BETTER,
     MOST_NAMED,
     Mistake,
-    Named,
-    attitude_mistakes,
+    attitudes_in,
     blame,
-    change_attitude,
     change_by,
-    change_place,
     explain,
     mistake,
     one_row,
-    place_mistakes,
+    places_in,
     raise_by,
     rotations_of_axes,
     rows_of,
@@ -117,7 +114,7 @@ def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
         given = named[0].undone
     else:
         m = missed(given)
-        angle = float(np.degrees(np.median(m.angle[m.good]))) if m.good.any() else np.nan
+        angle = np.degrees(np.median(m.angle[m.good])) if m.good.any() else np.nan
         if misfit(given)[0, 0] > UNEXPLAINED and angle > UNEXPLAINED_DEG:
             facts = {"metres": metres(given), "angle": angle}
             yield Finding("warning", f"nav/{given.source}", "", "points-missed", facts)
@@ -129,7 +126,7 @@ def _plain(given: Sightings, undone: Sightings) -> bool:
     return metres(undone) * FAR_BETTER <= metres(given)
 
 
-def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
+def _finding(given: Sightings, named: list[Mistake[Sightings]]) -> Finding:
     # Where other small errors hide what is gained, it is the distance without these that shows it.
     plain = _plain(given, named[0].undone)
     # What is as good in angles and leaves ten times the distance explains it less.
@@ -138,15 +135,15 @@ def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
         (one, off) for one, off in zip(named, left, strict=True) if off <= ALIKE * max(left.min(), CLOSE_M)
     ]
     first = chosen[0][0]
-    alike = [f"{one.mistake.said} ({number(float(off))} m)" for one, off in chosen[1:]]
+    alike = [f"{one.said} ({number(off)} m)" for one, off in chosen[1:]]
     return blame(
         "problem",
         f"nav/{given.source}",
         "",
         "points-explained",
-        [one.mistake for one, _ in chosen],
+        [one for one, _ in chosen],
         {
-            "first": first.mistake.said,
+            "first": first.said,
             "plain": plain,
             "before": metres(given, plain),
             "after": metres(first.undone, plain),
@@ -155,7 +152,7 @@ def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
         [
             correct
             for one, _ in chosen
-            for correct in one.mistake.corrections or (_stated(one.undone.camera, one.undone.mount),)
+            for correct in one.corrections or (_stated(one.undone.camera, one.undone.mount),)
         ],
     )
 
@@ -180,18 +177,12 @@ def _stated(camera: Camera, mount: Mount) -> Callable[[Flight], Flight | None]:
 
 def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]]:
     """All usual mistakes that change where known points are seen."""
-    part = f"poses.{s.source}"
     yield from mount_mistakes(s)
-    for b in attitude_mistakes(part):
-        yield b.within("", undo_in(b.undo, "R_nb"), change_attitude(s.source, b.undo))
+    yield from attitudes_in(s.source, "", "R_nb")
     yield from pixel_mistakes(s)
     yield from calibration_mistakes(s)
-    for where, table, label, field in (
-        (part, f"nav/{s.source}", "poses", "p_nb"),
-        ("truth", "truth", "truth", "points"),
-    ):
-        for a in place_mistakes(where, s.origin):
-            yield a.within(label, undo_in(a.undo, field), change_place(table, a.undo))
+    yield from places_in(f"nav/{s.source}", s.origin, "poses", "p_nb")
+    yield from places_in("truth", s.origin, "truth", "points")
     yield from height_mistakes(s)
     yield from turn_mistakes(s)
     if flight.manifest.time.kind == "utc":
@@ -288,14 +279,14 @@ def calibration_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
 # -- constants that are fitted: height, clock, turn
 
 
-def best_of(cost: Callable[[float], float], grid: Array, rounds: int = 12) -> float:
+def best_of(cost: Callable[[float], float], grid: Array) -> float:
     """Where a cost is least: the best of a grid, refined between its neighbours."""
-    costs = np.array([cost(float(x)) for x in grid])
+    costs = np.array([cost(x) for x in grid])
     if not np.isfinite(costs).any():
         return 0.0
     k = int(np.nanargmin(np.where(np.isfinite(costs), costs, np.inf)))
     low, high = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
-    for _ in range(rounds):
+    for _ in range(12):
         a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         low, high = (low, b) if cost(a) < cost(b) else (a, high)
     return (low + high) / 2
@@ -334,7 +325,7 @@ def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
         weight = _weight(np.linalg.norm(m.turn[rows] - across @ e, axis=1))
         A = np.einsum("nij,n->ij", across, weight) + 1e-9 * np.eye(3)
         e = np.linalg.solve(A, np.einsum("n,ni->i", weight, m.turn[rows]))
-    size = float(np.degrees(np.linalg.norm(e)))
+    size = np.degrees(np.linalg.norm(e))
     if not TURNED_DEG < size < LARGEST_TURN_DEG:
         return
 
@@ -350,7 +341,7 @@ def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
 
 def _weight(size: Array) -> Array:
     """Of misses: far ones count little, since a wrong click must not shift what all others say."""
-    return np.asarray(1 / (1 + (size / (2 * max(float(np.median(size)), 1e-9))) ** 2))
+    return 1 / (1 + (size / (2 * max(np.median(size), 1e-9))) ** 2)
 
 
 class OffsetFit(NamedTuple):
@@ -450,7 +441,7 @@ def shares(s: Sightings) -> Array:
     m = missed(s)
     with np.errstate(invalid="ignore"):
         meets = m.good & (m.angle < np.minimum(MEETS * m.expected, np.radians(MEETS_DEG)))
-    return np.array([float(meets[rows].mean()) for rows in (slice(None), *halves_of(s.image))])
+    return np.array([meets[rows].mean() for rows in (slice(None), *halves_of(s.image))])
 
 
 def nameless(flight: Flight, given: Sightings) -> Iterator[Finding]:
@@ -478,7 +469,7 @@ def nameless(flight: Flight, given: Sightings) -> Iterator[Finding]:
             after = shares(undone)
             more = MORE**2 if one.fitted else MORE
             if after[0] >= LEAST and (after >= more * before).all():
-                found.append((one.fitted, -float(after[0]), one))
+                found.append((one.fitted, -after[0], one))
     best = min((less for _, less, _ in found), default=0.0)
     alike = sorted((one for one in found if one[1] <= ALIKE_SHARE * best), key=lambda one: one[:2])
     if alike:
@@ -491,8 +482,7 @@ def nameless(flight: Flight, given: Sightings) -> Iterator[Finding]:
 
 def _nameless_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]]:
     yield from mount_mistakes(s)
-    for one in attitude_mistakes(f"poses.{s.source}"):
-        yield one.within("", undo_in(one.undo, "R_nb"))
+    yield from attitudes_in(s.source, "", "R_nb")
     yield from pixel_mistakes(s)
     by = best_of(lambda t: -float(shares(s.shifted(t)).min()), NAMELESS_CLOCKS)
     if flight.manifest.time.kind == "utc" and abs(by) >= 1.0:
@@ -520,7 +510,7 @@ def _single(s: Sightings) -> Iterator[Finding]:
     ):
         count = len(set(names))
         most = np.sqrt(2 * np.log(max(count, 1) / BY_CHANCE))
-        far = (size > SINGLE * float(np.median(size[good]))) & (size > SINGLE_EXPECTED)
+        far = (size > SINGLE * np.median(size[good])) & (size > SINGLE_EXPECTED)
         off = _off(far & (angle > most * least), names, good)
         if off and len(off) <= max(1, count // 5):
             facts = {"source": s.source, "n": len(off), "which": [_turned(m, names, one) for one in off[:5]]}

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.findings import POSITION, QUATERNION, Finding, Level, messages, phrase
+from wildlab.flight.checks.findings import POSITION, QUATERNION, Finding, Level, messages, part_of, phrase
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.flight.units import UNITS
@@ -81,6 +81,8 @@ class Mistake(Generic[T]):
         What undoes it in a flight, the likeliest first; see `Finding`.
     about
         ``height`` where positions are wrong in that alone.
+    undone, left
+        What `explain` looked at without the mistake, and the misfit that is left.
     """
 
     cause: str
@@ -90,20 +92,13 @@ class Mistake(Generic[T]):
     fitted: bool = False
     corrections: tuple[Correction, ...] = ()
     about: str = ""
+    undone: Any = None
+    left: float = 0.0
 
     def within(self, part: str, undo: Callable[[S], S | None], *corrections: Correction) -> Mistake[S]:
         """The same mistake in a part of something larger, which ``undo`` takes; "" names no part."""
         of = f"{part}: " if part else ""
         return Mistake(f"{of}{self.cause}", f"{of}{self.said}", self.fix, undo, corrections=corrections)
-
-
-class Named(NamedTuple, Generic[T]):
-    """A mistake that explains a misfit, and the misfit before and after it is undone."""
-
-    mistake: Mistake[T]
-    undone: T
-    before: float
-    after: float
 
 
 def undo_in(change: Change, *fields: str) -> Callable[[T], T | None]:
@@ -150,7 +145,7 @@ def explain(
     given: T,
     mistakes: Iterable[Mistake[T]],
     glance: Callable[[T], Array] | None = None,
-) -> list[Named[T]]:
+) -> list[Mistake[T]]:
     """The mistakes that explain best why a pair disagrees.
 
     Parameters
@@ -166,13 +161,13 @@ def explain(
 
     Returns
     -------
-    list of Named
+    list of Mistake
         The best first, with those as good as it; empty where none is far better.
     """
     before = misfit(given)
     if not (before[:, 0] > EXPECTED).any():
         return []  # what is like noise needs no explanation, see `far_better`
-    found: list[Named[T]] = []
+    found: list[Mistake[T]] = []
     for mistake in mistakes:
         undone = mistake.undo(given)
         if undone is None:
@@ -185,10 +180,10 @@ def explain(
         after = misfit(undone)
         if far_better(before, after, fitted=mistake.fitted):
             left = float(np.sqrt(np.prod(np.maximum(after[:, 0], NOTHING))))
-            found.append(Named(mistake, undone, float(before[0, 0]), left))
-    best = min((one.after for one in found), default=0.0)
-    alike = [one for one in found if one.after <= ALIKE * best]
-    return sorted(alike, key=lambda one: (one.mistake.fitted, one.after))[:MOST_NAMED]
+            found.append(replace(mistake, undone=undone, left=left))
+    best = min((one.left for one in found), default=0.0)
+    alike = [one for one in found if one.left <= ALIKE * best]
+    return sorted(alike, key=lambda one: (one.fitted, one.left))[:MOST_NAMED]
 
 
 def blame(
@@ -213,18 +208,45 @@ def blame(
     )
 
 
-def alternate(n: int, length: int) -> NDArray[np.bool_]:
+Mask = NDArray[np.bool_]
+
+
+def compare(
+    code: str,
+    misfit: Callable[[T], Misfit],
+    given: T,
+    mistakes: Iterable[Mistake[T]],
+    state: Callable[[T], dict[str, float]],
+    table: str,
+    field: str,
+    limit: float = np.inf,
+    **facts: Any,
+) -> Iterator[Finding]:
+    """What is found where two things that say the same disagree: a problem that mistakes explain, or a
+    warning beyond a limit.
+
+    ``state`` gives facts of what is compared; their names end in ``_then`` where the mistake is undone.
+    """
+    named = explain(misfit, given, mistakes)
+    facts |= state(given) | {"times": misfit(given)[1, 0]}
+    if named:
+        facts |= {f"{name}_then": value for name, value in state(named[0].undone).items()}
+        yield blame("problem", table, field, f"{code}-explained", named, facts)
+    elif facts["times"] > limit:
+        yield Finding("warning", table, field, f"{code}-unexplained", facts)
+
+
+def alternate(n: int, length: int) -> Mask:
     """Every other stretch of so many of n rows: errors that drift are then the same in both halves."""
     return np.asarray(np.arange(n) // length % 2 == 0)
 
 
-def crosswise(
-    half: NDArray[np.bool_], left: Callable[[NDArray[np.bool_], NDArray[np.bool_]], tuple[float, ...]]
-) -> Misfit:
-    """Misfits (2, 3) of the whole by a fit to the whole, and of either half (N,) by one to the other.
+def crosswise(n: int, length: int, left: Callable[[Mask, Mask], tuple[float, ...]]) -> Misfit:
+    """Misfits (2, 3) of n rows by a fit to all, and of every other stretch of so many by one to the rest.
 
     ``left`` takes the rows that are fitted and those that are judged.
     """
+    half = alternate(n, length)
     everything = half | True
     parts = ((everything, everything), (half, ~half), (~half, half))
     return np.array([left(fit, judged) for fit, judged in parts]).T
@@ -259,14 +281,9 @@ def change_attitude(source: str, undo: Change) -> Correction:
     return change_columns(f"nav/{source}", QUATERNION, change)
 
 
-def change_place(table: str, undo: Change) -> Correction:
-    """Correct the positions of one table."""
-    return change_columns(table, POSITION, undo)
-
-
 def raise_by(table: str, metres: float) -> Correction:
     """Correct the heights of one table by a constant."""
-    return change_place(table, lambda p: p - np.array([0.0, 0.0, metres]))
+    return change_columns(table, POSITION, lambda p: p - np.array([0.0, 0.0, metres]))
 
 
 def shift_poses(source: str, by: float) -> Correction:
@@ -354,7 +371,7 @@ FLIP = np.diag([1.0, -1.0, -1.0])
 #: What is no scale and no shift of angles.
 ATTITUDES: dict[str, Callable[[Array], Array]] = {
     "transposed": lambda R: np.swapaxes(R, -1, -2),
-    "flu-enu": lambda R: np.asarray(R_NED_ENU @ R @ FLIP),
+    "flu-enu": lambda R: R_NED_ENU @ R @ FLIP,
     "xyzw": lambda R: quaternion_to_matrix(matrix_to_quaternion(R)[..., [3, 0, 1, 2]]),
     "wxyz": lambda R: quaternion_to_matrix(matrix_to_quaternion(R)[..., [1, 2, 3, 0]]),
 }
@@ -417,6 +434,12 @@ def attitude_mistakes(part: str) -> Iterator[Mistake[Array]]:
         yield mistake(row, ATTITUDES.get(row.get("way", "")) or _by_angles(row), part=part)
 
 
+def attitudes_in(source: str, label: str, *fields: str) -> Iterator[Mistake[Any]]:
+    """The same in fields of something larger, as corrected in one nav source."""
+    for one in attitude_mistakes(f"poses.{source}"):
+        yield one.within(label, undo_in(one.undo, *fields), change_attitude(source, one.undo))
+
+
 def _by_angles(row: Row) -> Change:
     exchanged = "order" in row
     change = change_by(row, np.radians(1.0))
@@ -464,6 +487,12 @@ def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[Mi
             if local or group != "local":
                 change = change_by(row)
                 yield mistake(row, change if group in ("local", "down") else geodetic(change), part=part)
+
+
+def places_in(table: str, origin: Origin, label: str, *fields: str) -> Iterator[Mistake[Any]]:
+    """The same in fields of something larger, as corrected in one table."""
+    for one in place_mistakes(part_of(table), origin):
+        yield one.within(label, undo_in(one.undo, *fields), change_columns(table, POSITION, one.undo))
 
 
 def other_axes() -> Iterator[Array]:

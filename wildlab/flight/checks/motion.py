@@ -16,23 +16,31 @@ import pandas as pd
 from scipy.integrate import cumulative_trapezoid
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.findings import POSE, POSITION, VELOCITY, Finding, Level, part_of
+from wildlab.flight.checks.findings import (
+    POSE,
+    POSITION,
+    VELOCITY,
+    Finding,
+    Level,
+    finite_rows,
+    part_of,
+    thin,
+)
 from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
 from wildlab.flight.checks.known_points import LONGEST_LEVER, best_of
 from wildlab.flight.checks.mistakes import (
     LEAP,
     Misfit,
     Mistake,
-    alternate,
     blame,
     change_by,
     change_columns,
-    change_place,
+    compare,
     crosswise,
-    explain,
     mistake,
     one_row,
     place_mistakes,
+    places_in,
     raise_by,
     rows_of,
     shift_clock,
@@ -63,7 +71,7 @@ class Moved:
     @property
     def gone(self) -> Array:
         """The velocity that the positions have, (K, 3)."""
-        return np.asarray((self.after - self.before) / self.length[:, None])
+        return (self.after - self.before) / self.length[:, None]
 
 
 def moved(table: pd.DataFrame) -> Moved | None:
@@ -88,7 +96,7 @@ def _motion_misfit(m: Moved) -> Misfit:
     """How far displacement and velocity are apart, (2, 3), in units of what is usual; both rows alike."""
     speed = np.minimum(_size(m.gone), _size(m.velocity))
     left = (m.gone - m.velocity) / np.maximum([LEVEL, LEVEL, VERTICAL], SHARE * speed)
-    return crosswise(alternate(len(left), 10), lambda _, judged: (_size(left[judged]),) * 2)
+    return crosswise(len(left), 10, lambda _, judged: (_size(left[judged]),) * 2)
 
 
 def _size(values: Array) -> float:
@@ -103,47 +111,39 @@ def motion(flight: Flight) -> Iterator[Finding]:
         tables["gnss"] = flight.gnss
     for name, table in tables.items():
         given = None if "frame_id" in table else moved(table)
-        if given is None:
-            continue
-        named = explain(_motion_misfit, given, motion_mistakes(name, flight.manifest.origin_tuple()))
-        if named:
-            apart = {
-                key: _size(m.gone - m.velocity) for key, m in (("before", given), ("after", named[0].undone))
-            }
-            mistakes = [one.mistake for one in named]
-            yield blame("problem", name, VELOCITY[0], "motion-explained", mistakes, apart)
-        elif (before := _motion_misfit(given)[0, 0]) > 10.0:
-            facts = {"times": before, "part": part_of(name)}
-            yield Finding("warning", name, VELOCITY[0], "motion-unexplained", facts)
+        if given is not None:
+            yield from compare(
+                "motion",
+                _motion_misfit,
+                given,
+                map(_moving, motion_mistakes(name, flight.manifest.origin_tuple())),
+                lambda m: {"apart": _size(m.gone - m.velocity)},
+                name,
+                VELOCITY[0],
+                limit=10.0,
+                part=part_of(name),
+            )
+
+
+def _moving(one: Mistake[Moved]) -> Mistake[Moved]:
+    """The same mistake where it leaves something that moves: nothing agrees with nothing in any unit."""
+
+    def undo(m: Moved) -> Moved | None:
+        found = one.undo(m)
+        return found if found and max(_size(found.gone), _size(found.velocity)) > MOVING else None
+
+    return replace(one, undo=undo)
 
 
 def motion_mistakes(table: str, origin: Origin) -> Iterator[Mistake[Moved]]:
-    """Mistakes about velocities, and about positions, that leave something that moves."""
-    for one in _motion_mistakes(table, origin):
-        yield replace(one, undo=_moving(one.undo))
-
-
-def _moving(undo: Callable[[Moved], Moved | None]) -> Callable[[Moved], Moved | None]:
-    """Nothing agrees with nothing in any unit."""
-
-    def still_moving(m: Moved) -> Moved | None:
-        found = undo(m)
-        return found if found and max(_size(found.gone), _size(found.velocity)) > MOVING else None
-
-    return still_moving
-
-
-def _motion_mistakes(table: str, origin: Origin) -> Iterator[Mistake[Moved]]:
+    """Mistakes about velocities, and about positions."""
     part = part_of(table)
     velocities = [(row, change_by(row)) for row in rows_of("velocity")]
     velocities.append((one_row("course-in-radians"), _course_from_radians))
     for row, change in velocities:
         yield mistake(row, undo_in(change, "velocity"), change_columns(table, VELOCITY, change), part=part)
     yield mistake(one_row("course-in-degrees"), _nearest_course, fitted=True, part=part)
-    for place in place_mistakes(part, origin):
-        yield place.within(
-            "position", undo_in(place.undo, "before", "after"), change_place(table, place.undo)
-        )
+    yield from places_in(table, origin, "position", "before", "after")
 
 
 def _course(v: Array, course: Array) -> Array:
@@ -190,11 +190,10 @@ class PositionPair:
         """How far the receiver is from where the poses have its antenna, (N, 3) m."""
         return np.asarray(self.gnss - np.einsum("nij,j->ni", self.R_nb, self.lever) - self.nav)
 
-    @property
-    def apart(self) -> tuple[float, float]:
+    def apart(self) -> dict[str, float]:
         """Medians of the distance level and in height, m."""
-        left = self.left
-        return float(np.nanmedian(np.hypot(left[:, 0], left[:, 1]))), float(np.nanmedian(np.abs(left[:, 2])))
+        level, height = np.hypot(*self.left.T[:2]), np.abs(self.left[:, 2])
+        return {"horizontal": np.nanmedian(level), "height": np.nanmedian(height)}
 
     def shifted(self, by: float) -> PositionPair:
         """The same with poses that are so many seconds later."""
@@ -207,7 +206,7 @@ def pair_of(flight: Flight, source: str) -> PositionPair | None:
     table, nav = fixes(flight), flight.nav[source]
     if table is None or "frame_id" in nav or len(nav) < 2:
         return None
-    table = table.iloc[np.unique(np.linspace(0, len(table) - 1, MOST_FIXES).astype(int))]
+    table = table.iloc[thin(len(table), MOST_FIXES)]
     t, p = table["time_s"].to_numpy(float), table[list(POSITION)].to_numpy(float)
     brief = nav[list(POSE)]
 
@@ -240,7 +239,8 @@ def _position_misfit(pair: PositionPair) -> Misfit:
         return float(np.median(np.linalg.norm(values, axis=1))) / 1.54  # of three axes
 
     return crosswise(
-        alternate(len(left), 5),
+        len(left),
+        5,
         lambda fit, judged: (
             size((left[judged] - np.median(left[fit], axis=0)) / usual[judged]),
             size(left[judged] / usual[judged]),
@@ -252,26 +252,25 @@ def positions(flight: Flight) -> Iterator[Finding]:
     """The positions of every nav source against those of the receiver."""
     for source in flight.nav:
         given = None if source.startswith("truth") else pair_of(flight, source)
-        if given is None:
-            continue
-        named = explain(_position_misfit, given, position_mistakes(flight, source, given))
-        times = _position_misfit(given)[1, 0]
-        table, field = f"nav/{source}", "north_m"
-        horizontal, height = given.apart
-        facts = {"source": source, "times": times, "horizontal": horizontal, "height": height}
-        if named:
-            then = dict(zip(("horizontal_then", "height_then"), named[0].undone.apart, strict=True))
-            mistakes = [one.mistake for one in named]
-            yield blame("problem", table, field, "positions-explained", mistakes, {**facts, **then})
-        elif times > 6.0:
-            yield Finding("warning", table, field, "positions-unexplained", facts)
+        if given is not None:
+            yield from compare(
+                "positions",
+                _position_misfit,
+                given,
+                position_mistakes(flight, source, given),
+                PositionPair.apart,
+                f"nav/{source}",
+                "north_m",
+                limit=6.0,
+                source=source,
+            )
 
 
 def position_mistakes(flight: Flight, source: str, pair: PositionPair) -> Iterator[Mistake[PositionPair]]:
     """Mistakes about the places of either, heights from elsewhere, and clocks that differ."""
-    for part, table, field in ((f"poses.{source}", f"nav/{source}", "nav"), ("gnss", "gnss", "gnss")):
-        for place in place_mistakes(part, flight.manifest.origin_tuple()):
-            yield place.within(part, undo_in(place.undo, field), change_place(table, place.undo))
+    origin = flight.manifest.origin_tuple()
+    yield from places_in(f"nav/{source}", origin, f"poses.{source}", "nav")
+    yield from places_in("gnss", origin, "gnss", "gnss")
     up = float(np.nanmedian(-(pair.gnss - pair.nav)[:, 2]))
     yield mistake(
         one_row("gnss-height"),
@@ -355,11 +354,11 @@ def find_leaps(table: pd.DataFrame, name: str = "") -> list[Leap]:
         padded = np.pad(gone / step, ((STEPS // 2, STEPS // 2), (0, 0)), mode="edge")
         expected = np.median(np.lib.stride_tricks.sliding_window_view(padded, STEPS, axis=0), axis=-1) * step
     # Behind a gap nobody knows how far it should have gone.
-    unexplained = np.where(step > max(WITHIN_S, 3 * float(np.median(step))), 0.0, gone - expected)
+    unexplained = np.where(step > max(WITHIN_S, 3 * np.median(step)), 0.0, gone - expected)
     left = np.concatenate([np.zeros((1, 3)), np.cumsum(unexplained, axis=0)])
     end = np.minimum(np.searchsorted(t, t + WITHIN_S), len(t) - 1)
     size = np.linalg.norm(left[end] - left, axis=1)
-    limit = max(LEAST_M, FAR * float(np.median(size)))
+    limit = max(LEAST_M, FAR * np.median(size))
     found: list[Leap] = []
     # The first row of each run of stretches that are too long is as much before the leap as a stretch is.
     rows = np.flatnonzero(size > limit)
@@ -412,7 +411,7 @@ def distinguish_leaps(check: Callable[[Flight], Iterable[Finding]], flight: Flig
 
 def _leap_finding(one: Leap) -> Finding:
     table, _, target = one.table.partition(" of ")
-    facts = {"of": f" of {target}" if target else "", "size": float(np.linalg.norm(one.by)), "at": one.time_s}
+    facts = {"of": f" of {target}" if target else "", "size": np.linalg.norm(one.by), "at": one.time_s}
     return Finding("problem", table, "north_m", "leap", facts, (LEAP,))
 
 
@@ -482,9 +481,8 @@ def middles(flight: Flight) -> dict[str, Array]:
     """The middle (3,) in n of each table of positions."""
     tables = {f"nav/{name}": nav for name, nav in flight.nav.items()}
     tables |= {name: flight.tables[name] for name in ("gnss", "truth") if name in flight.tables}
-    places = {name: table[list(POSITION)].to_numpy(float) for name, table in tables.items()}
-    places = {name: p[np.isfinite(p).all(axis=1)] for name, p in places.items()}
-    return {name: np.asarray(np.median(p, axis=0)) for name, p in places.items() if len(p)}
+    places = {name: finite_rows(table, POSITION) for name, table in tables.items()}
+    return {name: np.median(p, axis=0) for name, p in places.items() if len(p)}
 
 
 def together(flight: Flight) -> Iterator[Finding]:

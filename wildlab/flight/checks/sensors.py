@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.findings import POSITION, Finding, Level
+from wildlab.flight.checks.findings import POSITION, Finding, Level, thin
 from wildlab.flight.checks.mistakes import (
     ALIKE,
     FAR_BETTER_ALONE,
@@ -130,7 +130,7 @@ class SourceLooks:
         if self.azimuth is not None:
             return self.azimuth
         away = np.asarray(self.places) - self.own
-        return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
+        return np.arctan2(away[:, 1], away[:, 0])
 
     def turned(self, by_deg: float) -> SourceLooks:
         """The same looks with all bearings, or all places about the own one, turned clockwise."""
@@ -208,7 +208,7 @@ def _clock(flight: Flight, source: str) -> float:
 def _some_of_each_look(rows: pd.DataFrame) -> pd.DataFrame:
     """At most `MOST` detections, as many of every look where there are, drawn with a fixed seed."""
     looks = rows["frame_id"].drop_duplicates().to_numpy()
-    looks = looks[np.unique(np.linspace(0, len(looks) - 1, min(len(looks), MOST)).astype(int))]
+    looks = looks[thin(len(looks), MOST)]
     rows = rows.reset_index(drop=True)
     mixed = rows[rows["frame_id"].isin(looks)].sample(frac=1.0, random_state=0)
     return mixed[mixed.groupby("frame_id").cumcount() < max(1, MOST // len(looks))].sort_index()
@@ -232,7 +232,7 @@ def hits(s: SourceLooks) -> Array:
 
 def shares(s: SourceLooks) -> Array:
     """Of every look, the share of its detections that are where a target is, (L,)."""
-    return np.asarray(np.bincount(s.look, hits(s)) / np.bincount(s.look))
+    return np.bincount(s.look, hits(s)) / np.bincount(s.look)
 
 
 def misfit(scans: Scans) -> Misfit:
@@ -244,7 +244,7 @@ def misfit(scans: Scans) -> Misfit:
     for s in scans:
         share = shares(s)
         halves = (share[::2], share[1::2]) if len(share) > 1 else (share * np.nan, share * np.nan)
-        means = [float(part.mean()) for part in (share, *halves)]
+        means = [part.mean() for part in (share, *halves)]
         result += np.log(np.maximum(means, NONE)) / len(scans)
     return USUAL * np.tile(np.exp(-result), (2, 1))
 
@@ -269,8 +269,7 @@ def scans(flight: Flight) -> Iterator[Finding]:
     # What concerns all is simpler; but it is not it where the sources' own mistakes explain far more.
     if named and misfit(named[0].undone)[0, 0] <= ALIKE * misfit(undone)[0, 0]:
         facts = {"share": _percent(given), "then": _percent(named[0].undone)}
-        mistakes = [one.mistake for one in named]
-        yield blame("problem", "truth", "", "scans-explained", mistakes, facts, [])
+        yield blame("problem", "truth", "", "scans-explained", named, facts, [])
         return
     for one, own in zip(given, of_each, strict=True):
         turn = best_turn((one,), [way.undone for way in own])
@@ -278,9 +277,8 @@ def scans(flight: Flight) -> Iterator[Finding]:
             yield _turned_finding((one,), turn)
         elif own:
             then = {"share": _percent((one,)), "then": _percent(own[0].undone), "source": one.source}
-            mistakes = [way.mistake for way in own]
             field = "north_m" if one.places is not None else "azimuth_rad"
-            yield blame("problem", "detections", field, "source-explained", mistakes, then, [])
+            yield blame("problem", "detections", field, "source-explained", own, then, [])
 
 
 def common_mistakes(flight: Flight) -> Iterator[Mistake[Scans]]:
@@ -327,7 +325,7 @@ def source_mistakes(one: SourceLooks, offset_s: float = 0.0) -> Iterator[Mistake
         That offset.
     """
     # The clock of the sensor alone: what it saw stays, and all else is where it was at other times.
-    by = min(CLOCKS, key=lambda t: float(misfit((one.with_stamps(t),))[0, 0]))
+    by = min(CLOCKS, key=lambda t: misfit((one.with_stamps(t),))[0, 0])
     if by != 0:
         undo = _each(lambda s: s.with_stamps(by))
         row = one_row("sensor-clock")
@@ -371,7 +369,7 @@ def best_turn(given: Scans, rivals: Sequence[Scans]) -> float | None:
         return tuple(s.turned(by) for s in given)
 
     # All within the gate of a bearing fit alike: the middle of these.
-    k = int(np.argmin([float(misfit(turned(by))[0, 0]) for by in TURNS]))
+    k = int(np.argmin([misfit(turned(by))[0, 0] for by in TURNS]))
     by = float(TURNS[k])
     if k in (0, len(TURNS) - 1):
         return None
@@ -456,7 +454,7 @@ def targets(flight: Flight) -> Iterator[Finding]:
             if own.sum() < ENOUGH_AROUND:
                 continue
             offset, there, here = offset_of(-level[k, own])
-            size = float(np.hypot(*offset))
+            size = np.hypot(*offset)
             if size > OFF_M and there > SHARE and there > FAR_BETTER_ALONE * max(here, 0.01):
                 seen = {"there": 100 * there, "here": 100 * here, "size": size}
                 facts = {"source": scan.source, "name": name, **seen}

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.findings import POSE
+from wildlab.flight.checks.findings import POSE, thin
 from wildlab.flight.checks.mistakes import Misfit
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
@@ -147,10 +147,9 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         rows = labelled if named else rows & (names.isna() | (names == "")).to_numpy()
     frame = pd.Index(frames["frame_id"]).get_indexer(pd.Index(detections["frame_id"]))
     chosen = np.flatnonzero(rows & (frame >= 0))
-    if len(chosen) > MOST:
-        chosen = chosen[np.linspace(0, len(chosen) - 1, MOST).astype(int)]
     if len(chosen) < ENOUGH:
         return None
+    chosen = chosen[thin(len(chosen), MOST)]
     frame, detections = frame[chosen], detections.iloc[chosen]
     nav = flight.nav[source]
     brief = nav[[name for name in nav if name in (*POSE, "frame_id")]]  # covariances take long
@@ -214,7 +213,7 @@ def _expected(flight: Flight, P: Array | None, n: int) -> Array:
     turns = [USUAL_ATTITUDE if angle is None else np.radians(angle) for angle in angles]
     level = stated.position_horizontal_m or USUAL_HORIZONTAL
     place = np.hypot(level, stated.position_vertical_m or USUAL_VERTICAL) / np.sqrt(2)
-    sd = np.tile([float(np.mean(turns)), place, stated.pixel_px or USUAL_PIXEL, max(turns)], (n, 1))
+    sd = np.tile([np.mean(turns), place, stated.pixel_px or USUAL_PIXEL, max(turns)], (n, 1))
     if P is not None:
         with np.errstate(invalid="ignore"):
             own = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
@@ -250,7 +249,7 @@ class Missed:
     def across(self) -> Array:
         """(N, 3, 3): how misses grow with a turn in c."""
         d = self.towards
-        return np.asarray(np.eye(3) - d[:, :, None] * d[:, None, :])
+        return np.eye(3) - d[:, :, None] * d[:, None, :]
 
 
 def missed(s: Sightings) -> Missed:
@@ -309,21 +308,12 @@ def left_over(m: Missed, fit: NDArray[np.bool_]) -> Array:
     return np.asarray(np.linalg.norm(m.turn - J @ value, axis=1))
 
 
-def glance(s: Sightings) -> Array:
-    """The misfit of the whole alone, (2,)."""
-    m = missed(s)
-    good = m.good
-    if good.mean() < 0.5 or good.sum() < ENOUGH:
-        return np.full(2, np.inf)
-    return _sizes(m, good, good)
-
-
-def misfit(s: Sightings) -> Misfit:
+def misfit(s: Sightings, halves: bool = True) -> Misfit:
     """Misses of the whole and of each half, (2, 3), in units of what is expected.
 
     What is allowed for is found on one half and taken off the other; the second row is without.
 
-    NaN where a half is too small, infinite where the lens has no rays.
+    NaN where a half is too small or not asked for, infinite where the lens has no rays.
     """
     m = missed(s)
     good = m.good
@@ -331,11 +321,17 @@ def misfit(s: Sightings) -> Misfit:
         return np.full((2, 3), np.inf)
     result = np.full((2, 3), np.nan)
     result[:, 0] = _sizes(m, good, good)
-    parts = [half & good for half in halves_of(s.image)]
-    if all(part.sum() >= ENOUGH_HALF and len(np.unique(s.image[part])) >= IMAGES_HALF for part in parts):
+    parts = [half & good for half in halves_of(s.image)] if halves else []
+    enough = [part.sum() >= ENOUGH_HALF and len(np.unique(s.image[part])) >= IMAGES_HALF for part in parts]
+    if parts and all(enough):
         for column, (fit, judged) in enumerate((parts, parts[::-1]), start=1):
             result[:, column] = _sizes(m, fit, judged)
     return result
+
+
+def glance(s: Sightings) -> Array:
+    """The misfit of the whole alone, (2,)."""
+    return misfit(s, halves=False)[:, 0]
 
 
 def _sizes(m: Missed, fit: NDArray[np.bool_], judged: NDArray[np.bool_]) -> Array:

@@ -19,12 +19,14 @@ from wildlab.flight.checks.findings import (
     Finding,
     Level,
     bad_rows,
+    finite_rows,
     part_of,
 )
 from wildlab.flight.clocks import covariances, frame_times, gnss_times, longest_gap
 from wildlab.flight.files import printable
 from wildlab.flight.schema import NAV, TABLES, Table, extra_columns
 from wildlab.flight.store import Flight
+from wildlab.flight.time_scales import Span
 from wildlab.geometry.frames import Array
 
 #: Truth further from every pose than this belongs to another flight, or has its coordinates exchanged.
@@ -147,8 +149,7 @@ def truth_place(flight: Flight) -> Iterator[Finding]:
     """Truth that is nowhere near the flight."""
     if flight.truth is None or not flight.nav:
         return
-    poses = np.concatenate([nav[list(POSITION)].to_numpy() for nav in flight.nav.values()])
-    poses = poses[np.isfinite(poses).all(axis=1)]
+    poses = np.concatenate([finite_rows(nav, POSITION) for nav in flight.nav.values()])
     truth = flight.truth[list(POSITION)].to_numpy()
     if len(poses) == 0 or len(truth) == 0:
         return
@@ -409,16 +410,16 @@ def stamps(flight: Flight) -> Iterator[Finding]:
         return
     wrong = [name for name, others in off.items() if len(others) == most]
     name = wrong[0] if len(spans) > 2 and most == len(spans) - 1 else wrong[-1]
-    other, (start, end) = off[name][0], spans[name]
+    other = off[name][0]
     for hours in HOURS:
-        if _common((start + 3600 * hours, end + 3600 * hours), spans[other]) >= WITHIN:
+        if _common(spans[name], spans[other], 3600 * hours) >= WITHIN:
             facts = {"hours": hours, "other": other, "part": part_of(name)}
             causes = (f"zone ({hours:+g} h)",)
             yield Finding("problem", name, "time_s", "stamps-of-another-zone", facts, causes)
             return
 
 
-def _spans(flight: Flight) -> dict[str, tuple[float, float]]:
+def _spans(flight: Flight) -> dict[str, Span]:
     """First and last time of each part that has two."""
     times: dict[str, Any] = {
         f"nav/{name}": nav["time_s"] for name, nav in flight.nav.items() if not name.startswith("truth")
@@ -438,7 +439,7 @@ def _spans(flight: Flight) -> dict[str, tuple[float, float]]:
     return {name: span for name, span in spans.items() if span[1] > span[0]}
 
 
-def _common(one: tuple[float, float], other: tuple[float, float]) -> float:
-    """Share of the shorter that both have."""
-    common = min(one[1], other[1]) - max(one[0], other[0])
+def _common(one: Span, other: Span, by: float = 0.0) -> float:
+    """Share of the shorter that both have once ``by`` is added to the first."""
+    common = min(one[1] + by, other[1]) - max(one[0] + by, other[0])
     return max(common, 0.0) / max(min(one[1] - one[0], other[1] - other[0]), 1e-9)
