@@ -9,7 +9,7 @@ from tests.analysis.survey_twin import Survey, simulate
 from tests.commands import refuse, succeed
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import Interval
-from wildlab.flight.calibration_files import parse_learnt, read_learnt, write_learnt
+from wildlab.flight.calibration_files import parse_learnt, read_learnt, write_calibration
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.paths import DATA
@@ -49,7 +49,7 @@ def learn(monkeypatch, **found):
     learnt = SimpleNamespace(gain=None, parameter=())
     both = learnt, SimpleNamespace(**found)
     monkeypatch.setattr("wildlab.analysis.accuracy.learn_flight", lambda *_: both)
-    monkeypatch.setattr("wildlab.flight.calibration_files.write_learnt", lambda *_: None)
+    monkeypatch.setattr("wildlab.flight.calibration_files.write_calibration", lambda *_: None)
 
 
 def test_causes_that_are_inseparable_are_named(folder, tmp_path, monkeypatch):
@@ -100,7 +100,7 @@ def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(fol
     flight, learnt = load_flight(tmp_path / "f"), read_learnt(tmp_path / "c.toml")
     # The same learnt values, of this flight's own camera.
     mine = learnt.model_copy(update={"camera": flight.manifest.camera, "mount": flight.manifest.mount})
-    write_learnt(mine, tmp_path / "mine.toml")
+    write_calibration(mine, tmp_path / "mine.toml")
     succeed("import", recipe, "--out", tmp_path / "f", "--calibration", tmp_path / "mine.toml", "--overwrite")
     kept = load_flight(tmp_path / "f")
     assert kept.calibration is not None and read_learnt(kept.calibration) == mine

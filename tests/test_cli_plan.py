@@ -100,7 +100,7 @@ def test_wrong_use_leaves_nothing(area, tmp_path, given, said):
 
 
 def test_a_calibrated_camera_is_taken(area, tmp_path):
-    from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, write_camera
+    from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, write_calibration
     from wildlab.flight.manifest_parts import CameraPart
 
     content = CameraFile(
@@ -108,7 +108,7 @@ def test_a_calibrated_camera_is_taken(area, tmp_path):
         board=BoardPart(pattern="chessboard", columns=9, rows=6, spacing_m=0.03),
         evidence=EvidencePart(images=20, views=20, points=1080, lens="none", rms_px=0.3, covered=0.9),
     )
-    write_camera(content, tmp_path / "camera.toml")
+    write_calibration(content, tmp_path / "camera.toml")
     out = succeed(
         area, "--camera", tmp_path / "camera.toml", "--height", 60, "--out", tmp_path / "o", "--json"
     )

@@ -77,17 +77,6 @@ def test_settings_that_make_no_sense_are_refused(text, said):
         parse_settings(text)
 
 
-def test_errors_of_roll_and_pitch_in_older_settings_are_one_of_the_tilt():
-    text = "[sensors.eye.considered.roll]\nsd_deg = 1.0\ncorrelation_time_s = 9.0\n"
-    both = text + "[sensors.eye.considered.pitch]\nsd_deg = 7.0\nshared = false\n"
-    for stated, sd, shared in ((text, 1.0, True), (both, 5.0, False)):
-        (name, found), *rest = parse_settings(stated).sensors["eye"].considered.items()
-        assert (name, rest, found.correlation_time_s, found.shared) == ("tilt", [], 9.0, shared)
-        assert found.sd == pytest.approx(sd)
-    with refused("beside"):
-        parse_settings(text + "[sensors.eye.considered.tilt]\nsd_deg = 1.0\n")
-
-
 def test_errors_of_a_camera_that_looks_straight_down_are_tilts_and_a_heading():
     """Against rotations of the camera; and all of them make the covariance of the pose."""
     flight = simulate(Survey(images=6, slant_deg=(90.0, 90.0), stated_heading_deg=4.0))

@@ -13,10 +13,10 @@ from wildlab.analysis.diagnose import diagnose
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.flight.calibration_files import (
     LearntParameter,
-    learnt_toml,
+    calibration_toml,
     parse_learnt,
     read_learnt,
-    write_learnt,
+    write_calibration,
 )
 from wildlab.flight.checks.check import sense_sentences
 
@@ -35,8 +35,8 @@ def learnt():
 
 
 def test_it_comes_back_from_its_file_as_it_was(tmp_path):
-    write_learnt(learnt(), tmp_path / "calibration.toml")
-    assert read_learnt(tmp_path / "calibration.toml") == learnt() == parse_learnt(learnt_toml(learnt()))
+    write_calibration(learnt(), tmp_path / "calibration.toml")
+    assert read_learnt(tmp_path / "calibration.toml") == learnt() == parse_learnt(calibration_toml(learnt()))
     values = {one.name: one for one in learnt().parameter}
     assert {"tilt", "clock"} <= set(values) <= {"roll", "tilt", "pan", "clock"}
     assert values["tilt"].low <= -5.0 <= values["tilt"].high and values["tilt"].unit == "deg"
@@ -44,7 +44,7 @@ def test_it_comes_back_from_its_file_as_it_was(tmp_path):
     assert (learnt().learnt_on.flight, learnt().learnt_on.images) == ("tuesday", 40)
     assert learnt().conditions.height_m[0] == pytest.approx(55.0, abs=3.0)
     # The place of a flight is in no calibration.
-    assert "latitude" not in learnt_toml(learnt())
+    assert "latitude" not in calibration_toml(learnt())
 
 
 def only(name, value, half, unit):
@@ -147,7 +147,7 @@ def test_where_nothing_gains_for_certain_the_noise_alone_is_kept():
     assert not diagnosis.counts
     assert found.parameter == () and found.gain is None
     assert 0.4 < found.noise.tilt_deg < 1.1
-    assert parse_learnt(learnt_toml(found)) == found
+    assert parse_learnt(calibration_toml(found)) == found
     flight = named(tuesday(seed=5), "wednesday")
     applied = apply_learnt(observe(flight), found)
     assert np.allclose(applied.observations.poses.p_nb, observe(flight).poses.p_nb)
@@ -164,15 +164,6 @@ def test_a_tilt_that_is_not_certain_is_no_noise():
     np.testing.assert_allclose(noises[1], noises[0], rtol=0.1)
 
 
-def test_noise_of_roll_pitch_and_yaw_in_older_files_is_read_as_tilt_and_heading():
-    text = learnt_toml(learnt())
-    noise = learnt().noise
-    older = text.replace(f"tilt_deg = {noise.tilt_deg!r}", "roll_deg = 1.0\npitch_deg = 7.0")
-    older = older.replace(f"heading_deg = {noise.heading_deg!r}", "yaw_deg = 3.0")
-    found = parse_learnt(older).noise
-    assert (found.tilt_deg, found.heading_deg) == (pytest.approx(5.0), 3.0)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -185,7 +176,7 @@ def test_noise_of_roll_pitch_and_yaw_in_older_files_is_read_as_tilt_and_heading(
     ],
 )
 def test_a_damaged_file_is_refused(old, new, words):
-    text = learnt_toml(learnt())
+    text = calibration_toml(learnt())
     assert old in text
     with refused(words):
         parse_learnt(text.replace(old, new, 1))
@@ -195,4 +186,4 @@ def test_files_that_cannot_be_read_or_written_are_refused(tmp_path):
     with refused("no such file"):
         read_learnt(tmp_path / "none.toml")
     with refused("cannot be written"):
-        write_learnt(learnt(), tmp_path / "nowhere" / "calibration.toml")
+        write_calibration(learnt(), tmp_path / "nowhere" / "calibration.toml")

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import SURE, ClockFit, fit_clock, fit_steady, rate_is_off, shortfall
+from wildlab.flight.clock_fitting import ClockFit, fit_clock, fit_steady
 
 EPOCH = 1.7e9
 
@@ -35,7 +35,6 @@ def test_rate_and_offset_through_jitter_and_outliers(jitter, outliers):
         wrong = rng.random(len(own)) < outliers
         fit = fit_clock(own, true + rng.normal(0, jitter, len(own)) + wrong * rng.normal(0, 100, len(own)))
         assert_as_promised(fit, own, true, rate)
-        assert shortfall(fit) == ""
         assert 0.8 * jitter < fit.spread_s < 1.2 * jitter
 
 
@@ -49,28 +48,8 @@ def test_under_stamps_that_are_only_late(kind):
             stamps = np.ceil(stamps * 1000) / 1000
         fit = fit_clock(own, stamps, late=True)
         assert_as_promised(fit, own, true, rate)
-        assert shortfall(fit) == ""
         # Through them, it would be off by the mean delay.
         assert abs(fit_clock(own, stamps).to_reference(300.0) - fit.to_reference(300.0)) > 0.1
-
-
-@settings(max_examples=50, deadline=None)
-@given(
-    seed=st.integers(0, 2**31),
-    pairs=st.integers(3, 2000),
-    jitter=st.floats(0, 0.05),
-    late=st.booleans(),
-    long=st.floats(1.0, 5000.0),
-)
-def test_what_is_not_said_to_fall_short_is_as_promised(seed, pairs, jitter, late, long):
-    rng, own, true, rate = clocks(seed, pairs, long)
-    noise = rng.uniform(0, 10 * jitter, pairs) if late else rng.normal(0, jitter, pairs)
-    fit = fit_clock(own, true + noise, late)
-    if not shortfall(fit):
-        # Three standard deviations are not certainty.
-        at = np.array([0, -1])
-        assert np.abs(fit.to_reference(own[at]) - true[at]).max() < 0.015
-        assert abs(fit.rate - rate) < 1.5e-4
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -98,30 +77,12 @@ def test_residuals_that_go_together_count_for_fewer():
     assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.4
 
 
-def test_a_wrong_rate_is_found_and_a_right_one_is_not():
-    for seed in range(15):
-        rng, own, true, rate = clocks(seed)
-        found = rate_is_off(fit_clock(own, true + rng.normal(0, 0.03, len(own))))
-        assert (found is not None) == (abs(rate - 1) > 2.5e-4) or abs(rate - 1) < 1e-3
-        if found is not None:
-            assert found.low < rate < found.high
-            assert found.drift_s == pytest.approx((rate - 1) * (own[-1] - own[0]), abs=0.05)
-            assert ("slow" if rate > 1 else "fast") in found.sentence
-        right = fit_clock(own, EPOCH + 2.0 + own * (1 + 5e-5) + rng.normal(0, 0.03, len(own)))
-        assert rate_is_off(right) is None
-
-
 def test_few_pairs_say_that_they_do_not_tell():
     fit = fit_clock([1.0, 2.0], [11.0, 12.0])
     assert fit.to_reference(3.0) == pytest.approx(13.0)
-    assert shortfall(fit)
-    assert rate_is_off(fit) is None
     one = fit_clock([4.0], [9.0])
     assert one.rate == 1.0 and one.offset_s == pytest.approx(5.0)
-    assert np.isinf(one.sd_at(4.0))
-    rng = np.random.default_rng(1)
-    own = np.linspace(0, 60, 30)
-    assert shortfall(fit_clock(own, 3 + own + rng.normal(0, 0.05, 30)))
+    assert np.isinf([fit.rate_sd, one.middle_sd_s]).all()
 
 
 def test_missing_stamps_are_left_out():
@@ -139,7 +100,6 @@ def test_stamps_that_are_all_alike_have_no_rate(late):
     fit = fit_clock([5.0] * 10, [7.0, 7.1] * 5, late)
     assert fit.rate == 1.0
     assert np.isinf(fit.rate_sd)
-    assert rate_is_off(fit) is None
 
 
 def test_coarse_stamps_do_not_hide_the_rate():
@@ -147,7 +107,7 @@ def test_coarse_stamps_do_not_hide_the_rate():
     true = np.arange(0.0, 17.0, 0.2)
     own = np.floor((true / 1.0013 + 0.004) / 0.02) * 0.02
     fit = fit_clock(own, true, resolution_s=0.02)
-    assert fit.rate == pytest.approx(1.0013, abs=SURE * fit.rate_sd) and fit.used.all()
+    assert fit.rate == pytest.approx(1.0013, abs=3 * fit.rate_sd) and fit.used.all()
 
 
 UTC = 1.7e9

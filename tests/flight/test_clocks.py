@@ -154,7 +154,7 @@ def test_gimbal_from_frames_from_its_log_or_fixed(make_flight):
 
 def test_truth_of_fixed_and_moving_targets(make_flight):
     truth = make_flight().tables["truth"]
-    names, p = truth_at(truth, [0.0, 5.0, 11.0], max_gap_s=20.0, offset_s=1.0)
+    names, p = truth_at(truth, [0.0, 5.0, 11.0], offset_s=1.0)
     assert names == ["buoy", "boat"]
     np.testing.assert_allclose(p[0], [[50.0, 5.0, 0.0]] * 3)
     np.testing.assert_allclose(p[1], [[np.nan] * 3, [40.0, 4.0, 0.0], [100.0, 10.0, 0.0]])
@@ -175,18 +175,16 @@ def test_a_slow_log_is_bridged_at_its_own_rate_but_not_over_a_missing_sample():
     assert np.isnan(where[0, 2]).all()
     assert longest_gap(stamps) == 3.0
     assert longest_gap(np.arange(0, 5, 0.1)) == MAX_GAP_S
-    assert np.isnan(truth_at(truth, [1.0], max_gap_s=1.0)[1]).all()
 
 
 @given(vectors, vectors, vectors, st.lists(st.floats(-1.0, 7.0), min_size=1, max_size=5))
 def test_a_finder_finds_what_is_found_at_once(rate, velocity, start, times):
     nav = _turning(rate, velocity, np.array([0.0, 0.5, 1.0, 3.0, 3.5, 6.0]), start)
     nav.loc[1, "q_x"] = np.nan
-    for longest in (None, 2.5):
-        p, R = pose_finder(nav, max_gap_s=longest)(times)
-        p_once, R_once, _ = poses_at(nav, times, max_gap_s=longest)
-        np.testing.assert_array_equal(p, p_once)
-        np.testing.assert_array_equal(R, R_once)
+    p, R = pose_finder(nav)(times)
+    p_once, R_once, _ = poses_at(nav, times)
+    np.testing.assert_array_equal(p, p_once)
+    np.testing.assert_array_equal(R, R_once)
 
 
 def two_sources(poses: str) -> Flight:

@@ -8,6 +8,8 @@ import pytest
 import scipy.io
 from scipy.spatial.transform import Rotation
 
+from tests.sound_logs import NED, QUATERNION
+from tests.sound_logs import VELOCITY as SPEED
 from wildlab.files import sha256
 from wildlab.flight.catalog import read_catalog
 from wildlab.flight.checks.check import check_flight, usable_for
@@ -18,9 +20,6 @@ from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 
-NED = ["north_m", "east_m", "down_m"]
-SPEED = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
-QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
 THOR = "thor_flight75_WaypointTracker_150squareWaypointNew_2012_10_10.mat"
 
 

@@ -73,9 +73,7 @@ def test_manifest_survives_the_file(description, note, height, fx, offset, epoch
         ("origin.latitude_deg", 91, "origin.latitude_deg: equal to 90"),
         ("sources", [{"file": "../a.csv", "sha256": "0" * 64}], "sources[0].file: leaves the folder"),
         ("locations.sensitivity", "secret", "locations.sensitivity: 'open'"),
-        ("uncertainty", {"tilt_deg": 1.0, "roll_deg": 1.0}, "state the same"),
-        ("uncertainty", {"roll_deg": 0.0, "pitch_deg": 1.0}, "greater than 0"),
-        ("uncertainty", {"yaw_deg": math.nan}, "greater than 0"),
+        ("uncertainty", {"tilt_deg": 0.0}, "greater than 0"),
     ],
 )
 def test_a_wrong_manifest_names_file_field_and_fix(manifest_data, key, value, said):
@@ -146,18 +144,3 @@ def test_sensors_are_kept_and_checked(manifest_data, tmp_path):
     ):
         with pytest.raises(WildlabError, match=fault(f"{part}.{key}")):
             replace_in_manifest(manifest, {part: {key: value}})
-
-
-def test_roll_pitch_and_yaw_of_older_files_are_a_tilt_and_a_heading(manifest_data):
-    older = {"roll_deg": 1.0, "pitch_deg": 7.0, "yaw_deg": 3.0}
-    for stated, tilt, heading in (
-        (older, 5.0, 3.0),
-        ({"pitch_deg": 2.0}, 2.0, None),
-        ({"roll_deg": None, "yaw_deg": 4.0}, None, 4.0),
-        ({"tilt_deg": 0.5, "yaw_deg": 4.0}, 0.5, 4.0),
-    ):
-        found = make_manifest(manifest_data | {"uncertainty": stated})
-        assert (found.uncertainty.tilt_deg, found.uncertainty.heading_deg) == (tilt, heading)
-        written = tomllib.loads(manifest_toml(found))["uncertainty"]
-        assert not written.keys() & older.keys()
-        assert make_manifest(tomllib.loads(manifest_toml(found))) == found

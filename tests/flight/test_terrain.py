@@ -41,14 +41,13 @@ def write_map(
     side: int = 400,
     turn: float = 0.0,
     height: Callable[[np.ndarray, np.ndarray], np.ndarray] = hills,
-    off: tuple[float, float] = (0.0, 0.0),
     **more: Any,
 ) -> Path:
     """A map of `height` about the place, cells of ``cell`` units of its CRS, turned by degrees."""
     there = Transformer.from_crs(4326, crs, always_xy=True)
     x0, y0 = there.transform(LONGITUDE, LATITUDE)
     transform = (
-        Affine.translation(x0 + off[0], y0 + off[1])
+        Affine.translation(x0, y0)
         @ Affine.rotation(turn)
         @ Affine(cell, 0.0, -cell * side / 2, 0.0, -cell, cell * side / 2)
     )
@@ -219,8 +218,6 @@ def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path, flown):
     [
         # A map of elsewhere.
         ({"latitude_deg": 47.8}, {}, r"nearest cell is 110\."),
-        ({"latitude_deg": -LATITUDE}, {}, "sign of latitude"),
-        ({}, {"off": (0.0, 1e7)}, "other hemisphere"),
         ({"height_m": 400.0}, {}, "below the ground"),
         # No map of heights.
         ({}, {"stated": None}, "states no CRS"),

@@ -101,7 +101,7 @@ def camera(
 
     from wildlab.analysis.camera import calibrate_images, camera_file, facts_of
     from wildlab.detection.boards import Board
-    from wildlab.flight.calibration_files import write_camera
+    from wildlab.flight.calibration_files import write_calibration
     from wildlab.flight.readers.frames.image import still_files
     from wildlab.messages.catalogue import words
 
@@ -118,7 +118,7 @@ def camera(
     )
     content = camera_file(found, name)
     if out is not None:
-        write_camera(content, out)
+        write_calibration(content, out)
     left, said = [one for one in found.images if one.problem], words("terminal", facts_of(found))
     if as_json:
         unused = [{"name": one.name, "why": one.problem} for one in left]
@@ -268,7 +268,7 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     import numpy as np
 
     from wildlab.analysis.accuracy import learn_flight
-    from wildlab.flight.calibration_files import write_learnt
+    from wildlab.flight.calibration_files import write_calibration
     from wildlab.flight.checks.check import sense_sentences
     from wildlab.flight.store import load_flight
     from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
@@ -282,7 +282,7 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
             file=flight,
         )
     learnt, diagnosis = learn_flight(loaded, np.random.default_rng(seed), source)
-    write_learnt(learnt, out)
+    write_calibration(learnt, out)
     if as_json:
         print_json(learnt.model_dump())
         return

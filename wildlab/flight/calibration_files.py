@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -13,7 +12,7 @@ from wildlab.errors import WildlabError, system_error
 from wildlab.files import write_atomic
 from wildlab.flight.files import Strict, check_model, dump_toml, parse_toml, read_toml
 from wildlab.flight.manifest import Manifest
-from wildlab.flight.manifest_parts import AttitudeSpreads, CameraPart, MountPart, Spread
+from wildlab.flight.manifest_parts import CameraPart, MountPart, Spread
 
 WHAT = "what `wildlab camera` wrote"
 Count = Annotated[int, Field(ge=0)]
@@ -104,21 +103,6 @@ def parse_camera(text: str, path: Path) -> CameraFile:
     return check_model(CameraFile, parse_toml(text, path), path)
 
 
-def write_camera(camera: CameraFile, path: Path) -> None:
-    """Write a ``camera.toml``, whole or not at all.
-
-    Raises
-    ------
-    WildlabError
-        Where it cannot be written.
-    """
-    try:
-        write_atomic(path, dump_toml(camera.model_dump(exclude_none=True)))
-    except OSError as error:
-        fix = "name a file in a folder that is there and may be written to"
-        raise WildlabError(f"cannot be written ({error.strerror})", fix, file=path) from None
-
-
 #: Focal lengths and principal points that differ by no more than this share of the focal length are the same.
 SAME_CAMERA = 1e-3
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -175,7 +159,7 @@ class LearntParameter(Strict):
         return self
 
 
-class LearntNoise(AttitudeSpreads):
+class LearntNoise(Strict):
     """Standard deviations of poses and pixels, learnt with the corrections taken off."""
 
     pixel_px: Spread
@@ -225,20 +209,16 @@ def parse_learnt(text: str) -> Learnt:
     WildlabError
         Where it is not TOML, or a key is unknown, missing or wrong.
     """
-    try:
-        data: dict[str, Any] = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise WildlabError(f"the calibration is not valid TOML ({error})", "mend that line") from None
-    return check_model(Learnt, data, None)
+    return check_model(Learnt, parse_toml(text, Path("calibration.toml")), None)
 
 
-def learnt_toml(learnt: Learnt) -> str:
+def calibration_toml(calibration: CameraFile | Learnt) -> str:
     """The file's text."""
-    return dump_toml(learnt.model_dump(exclude_none=True))
+    return dump_toml(calibration.model_dump(exclude_none=True))
 
 
-def write_learnt(learnt: Learnt, path: Path) -> None:
-    """Write a ``calibration.toml``, whole or not at all.
+def write_calibration(calibration: CameraFile | Learnt, path: Path) -> None:
+    """Write a ``camera.toml`` or a ``calibration.toml``, whole or not at all.
 
     Raises
     ------
@@ -246,7 +226,7 @@ def write_learnt(learnt: Learnt, path: Path) -> None:
         Where it cannot be written.
     """
     try:
-        write_atomic(path, learnt_toml(learnt))
+        write_atomic(path, calibration_toml(calibration))
     except OSError as error:
         raise system_error(error, path) from None
 

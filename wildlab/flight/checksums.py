@@ -152,7 +152,7 @@ def manifest_changed(folder: Path) -> bool | None:
     path = inside(folder, FILE_NAME, file=folder, field=FILE_NAME)
     stated = read_manifest(path).checksums.get(FILE_NAME)
     text = _text(path)
-    return None if stated is None else stated not in (_of_text(text), _of_whole_text(text))
+    return None if stated is None else stated != _of_text(text)
 
 
 def confirmed_locations(folder: Path) -> LocationsPart:
@@ -200,11 +200,6 @@ def _text(path: Path) -> str:
 def _of_text(text: str) -> str:
     """SHA-256 of a manifest's text but for the checksums and what is `STATED` of places."""
     return hashlib.sha256(_without(_without(text), STATED).encode("utf-8")).hexdigest()
-
-
-def _of_whole_text(text: str) -> str:
-    """As `_of_text`, with what is stated of places: so flights were written before that was left out."""
-    return hashlib.sha256(_without(text).encode("utf-8")).hexdigest()
 
 
 def _without(text: str, part: str = PART) -> str:

@@ -18,10 +18,6 @@ RESOLUTION_S = 1e-6
 REACH = 4.685
 #: Fewer pairs than this are all believed.
 FEW = 6
-#: A rate further from 1 than this is none of a quartz, which keep 1e-4 and better.
-QUARTZ = 2e-4
-#: What is promised is promised at so many standard deviations.
-SURE = 3.0
 
 
 class ClockFit(NamedTuple):
@@ -41,8 +37,6 @@ class ClockFit(NamedTuple):
         Robust standard deviation of the residuals used.
     middle_sd_s, rate_sd
         Standard deviations of ``reference_0`` and of ``rate``; infinite where the pairs do not tell.
-    first_s, last_s
-        Of the clock's stamps that the fit rests on, s.
     """
 
     own_0: float
@@ -53,55 +47,15 @@ class ClockFit(NamedTuple):
     spread_s: float
     middle_sd_s: float = np.inf
     rate_sd: float = np.inf
-    first_s: float = np.nan
-    last_s: float = np.nan
 
     def to_reference(self, own: ArrayLike) -> Array:
         """Stamps (...) of the clock, s, as the reference has them."""
-        return np.asarray(self.reference_0 + self.rate * (np.asarray(own, float) - self.own_0))
-
-    def sd_at(self, own: ArrayLike) -> Array:
-        """Standard deviation of the fit at stamps (...) of the clock, s."""
-        away = np.asarray(own, float) - self.own_0
-        # At the middle nothing comes of a rate that is not known.
-        turned = np.where(away == 0, 0.0, self.rate_sd) * np.where(away == 0, 0.0, away)
-        return np.asarray(np.hypot(self.middle_sd_s, turned))
+        return self.reference_0 + self.rate * (np.asarray(own, float) - self.own_0)
 
     @property
     def offset_s(self) -> float:
         """The reference's time at the clock's zero, s."""
         return float(self.to_reference(0.0))
-
-
-class WrongRate(NamedTuple):
-    """A clock that does not run as the reference does.
-
-    Attributes
-    ----------
-    rate, low, high
-        Seconds of the reference for a second of the clock, with its 99.7 % interval.
-    drift_s
-        What clocks that agreed at the first pair differ by at the last, s.
-    pairs, over_s
-        How many pairs say so, over how long a time of the reference, s.
-    """
-
-    rate: float
-    low: float
-    high: float
-    drift_s: float
-    pairs: int
-    over_s: float
-
-    @property
-    def sentence(self) -> str:
-        """The same in words."""
-        way = "slow" if self.rate > 1 else "fast"
-        return (
-            f"the clock runs {way}: {self.rate:.6g} s of the reference go by in one of its seconds "
-            f"({self.low:.6g} to {self.high:.6g}), {abs(self.drift_s):.3g} s over the {self.over_s:.0f} s "
-            f"that {self.pairs} pairs of stamps cover"
-        )
 
 
 def fit_clock(
@@ -166,57 +120,7 @@ def fit_clock(
         every,
         _scale(residual[every]),
         *sds,
-        float(x[every].min()),
-        float(x[every].max()),
     )
-
-
-def rate_is_off(fit: ClockFit, tolerance: float = QUARTZ) -> WrongRate | None:
-    """Whether a clock runs at a wrong rate, beyond what a quartz and the pairs' noise explain.
-
-    Parameters
-    ----------
-    fit
-        Of it.
-    tolerance
-        How far from 1 a rate may be.
-
-    Returns
-    -------
-    WrongRate, or None where nothing says so.
-    """
-    low, high = fit.rate - SURE * fit.rate_sd, fit.rate + SURE * fit.rate_sd
-    if not np.isfinite(fit.rate_sd) or (low <= 1 + tolerance and high >= 1 - tolerance):
-        return None
-    long = fit.last_s - fit.first_s
-    return WrongRate(fit.rate, low, high, (fit.rate - 1) * long, int(fit.used.sum()), fit.rate * long)
-
-
-def shortfall(fit: ClockFit, offset_s: float = 0.01, rate: float = 1e-4) -> str:
-    """Why a fit is not good to an offset (s) everywhere in its log and to a rate; empty where it is.
-
-    Parameters
-    ----------
-    fit
-        Of a clock.
-    offset_s, rate
-        What is wanted, at three standard deviations.
-
-    Returns
-    -------
-    A clause.
-    """
-    pairs = int(fit.used.sum())
-    if not np.isfinite(fit.middle_sd_s + fit.rate_sd):
-        return f"{pairs} pairs of stamps do not tell how good the fit of the clock is"
-    worst = SURE * float(fit.sd_at([fit.first_s, fit.last_s]).max())
-    said = []
-    if worst > offset_s:
-        said.append(f"the offset to {worst:.2g} s (wanted: {offset_s:g})")
-    if fit.rate_sd * SURE > rate:
-        said.append(f"the rate to {fit.rate_sd * SURE:.2g} (wanted: {rate:g})")
-    long = fit.last_s - fit.first_s
-    return f"{pairs} pairs of stamps over {long:.0f} s give " + " and ".join(said) if said else ""
 
 
 def _start(dx: Array, dy: Array) -> tuple[float, float]:
@@ -349,12 +253,10 @@ def fit_steady(
         middle + offset,
         rate,
         residual,
-        np.asarray(used),
+        used,
         max(_scale(residual[used]), RESOLUTION_S),
         fit.middle_sd_s,
         fit.rate_sd,
-        float(x[used].min()),
-        float(x[used].max()),
     )
 
 

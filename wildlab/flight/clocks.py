@@ -53,7 +53,7 @@ def frame_times(flight: Flight) -> Array:
     True
     """
     stamps = flight.table("frames")["time_s"].to_numpy(float)
-    return np.asarray(stamps + flight.manifest.clocks.camera_offset_s)
+    return stamps + flight.manifest.clocks.camera_offset_s
 
 
 def gnss_times(flight: Flight) -> Array:
@@ -76,7 +76,7 @@ def gnss_times(flight: Flight) -> Array:
     """
     manifest = flight.manifest
     stamps = flight.table("gnss")["time_s"].to_numpy(float)
-    return np.asarray(stamps + manifest.clocks.gnss_offset_s - manifest.gnss.latency_s)
+    return stamps + manifest.clocks.gnss_offset_s - manifest.gnss.latency_s
 
 
 def poses_at(
@@ -137,7 +137,7 @@ def poses_at(
             "give times, or a nav table with a frame_id",
             field="nav",
         )
-    before, after, share = _neighbours(nav["time_s"].to_numpy(float), times, max_gap_s, "nav")
+    before, after, share = _neighbours(nav["time_s"].to_numpy(float), times, "nav", max_gap_s)
     p = _between(position, before, after, share)
     turn = between_attitudes(attitude, before, after, share)
     if covariance is None:
@@ -146,13 +146,13 @@ def poses_at(
 
 
 def pose_finder(
-    nav: pd.DataFrame, frame_ids: Sequence[str] | pd.Series | None = None, max_gap_s: float | None = None
+    nav: pd.DataFrame, frame_ids: Sequence[str] | pd.Series | None = None
 ) -> Callable[[ArrayLike], tuple[Array, Array]]:
     """`poses_at` of one table for whoever asks over and over: what does not hang on the times is done once.
 
     Parameters
     ----------
-    nav, frame_ids, max_gap_s
+    nav, frame_ids
         As for `poses_at`.
 
     Returns
@@ -178,7 +178,7 @@ def pose_finder(
     stamps = nav["time_s"].to_numpy(float)
     position = nav[["north_m", "east_m", "down_m"]].to_numpy(float)
     attitude = np.ascontiguousarray(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float))
-    longest = _longest(stamps, max_gap_s, "nav")
+    longest = _longest(stamps, "nav")
 
     def find(times: ArrayLike) -> tuple[Array, Array]:
         rows = _rows_about(stamps, times, longest)
@@ -263,7 +263,7 @@ def covariance_columns(covariance: ArrayLike) -> pd.DataFrame:
     return pd.DataFrame(P[:, _UPPER[0], _UPPER[1]], columns=list(COVARIANCE_COLUMNS))
 
 
-def gimbal_angles(flight: Flight, max_gap_s: float | None = None) -> tuple[Array, Array]:
+def gimbal_angles(flight: Flight) -> tuple[Array, Array]:
     """Pan and tilt of the gimbal for every frame, radians, (N,) each.
 
     From the columns of the frames where they have them, else from the gimbal table (linear in time), else the
@@ -273,8 +273,6 @@ def gimbal_angles(flight: Flight, max_gap_s: float | None = None) -> tuple[Array
     ----------
     flight
         With frames.
-    max_gap_s
-        As in `poses_at`.
 
     Returns
     -------
@@ -293,14 +291,12 @@ def gimbal_angles(flight: Flight, max_gap_s: float | None = None) -> tuple[Array
         return np.full(len(frames), mount.pan), np.full(len(frames), mount.tilt)
     angles = np.unwrap(flight.gimbal[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
     stamps = flight.gimbal["time_s"].to_numpy(float)
-    neighbours = _neighbours(stamps, frame_times(flight), max_gap_s, "gimbal")
+    neighbours = _neighbours(stamps, frame_times(flight), "gimbal")
     pan, tilt = _between(angles, *neighbours).T
     return pan, tilt
 
 
-def truth_at(
-    truth: pd.DataFrame, times: ArrayLike, max_gap_s: float | None = None, offset_s: float = 0.0
-) -> tuple[list[str], Array]:
+def truth_at(truth: pd.DataFrame, times: ArrayLike, offset_s: float = 0.0) -> tuple[list[str], Array]:
     """Where every target truly was at given times.
 
     Parameters
@@ -309,8 +305,6 @@ def truth_at(
         The table; rows with a NaN time are points that never move.
     times
         (T,) flight times in seconds.
-    max_gap_s
-        As in `poses_at`.
     offset_s
         What to add to the stamps of the truth (`clocks.truth_offset_s`).
 
@@ -333,7 +327,7 @@ def truth_at(
         if np.isnan(stamps).all():
             where.append(np.broadcast_to(position[0], (len(at), 3)))
         else:
-            where.append(_between(position, *_neighbours(stamps, at, max_gap_s, f"truth of {name!r}")))
+            where.append(_between(position, *_neighbours(stamps, at, f"truth of {name!r}")))
     return names, np.stack(where) if where else np.empty((0, len(at), 3))
 
 
@@ -343,9 +337,7 @@ def longest_gap(stamps: ArrayLike) -> float:
     return max(MAX_GAP_S, USUAL_STEPS * float(np.median(steps))) if len(steps) else MAX_GAP_S
 
 
-def between(
-    stamps: ArrayLike, values: ArrayLike, times: ArrayLike, what: str, max_gap_s: float | None = None
-) -> Array:
+def between(stamps: ArrayLike, values: ArrayLike, times: ArrayLike, what: str) -> Array:
     """Values (N, K) of increasing stamps (N,) at other times (T,), linear in time; `what` is for messages.
 
     (T, K); NaN outside of the stamps, and in a gap as in `poses_at`.
@@ -355,19 +347,17 @@ def between(
     WildlabError
         Where the stamps do not increase, or there are none.
     """
-    return _between(
-        np.asarray(values, float), *_neighbours(np.asarray(stamps, float), times, max_gap_s, what)
-    )
+    return _between(np.asarray(values, float), *_neighbours(np.asarray(stamps, float), times, what))
 
 
 def _neighbours(
-    stamps: Array, times: ArrayLike, max_gap_s: float | None, what: str
+    stamps: Array, times: ArrayLike, what: str, max_gap_s: float | None = None
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Rows before and after each time, and how far between them (0..1); NaN where there is no answer."""
-    return _rows_about(stamps, times, _longest(stamps, max_gap_s, what))
+    return _rows_about(stamps, times, _longest(stamps, what, max_gap_s))
 
 
-def _longest(stamps: Array, max_gap_s: float | None, what: str) -> float:
+def _longest(stamps: Array, what: str, max_gap_s: float | None = None) -> float:
     """The longest gap that is bridged between stamps, which must increase; ``what`` is for messages."""
     if not (np.diff(stamps) > 0).all():
         raise WildlabError(
@@ -397,4 +387,4 @@ def _rows_about(
 
 def _between(values: Array, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> Array:
     # A time that falls on a stamp takes that row alone, whatever stands in the next.
-    return np.asarray(values[before] + share[:, None] * (values[after] - values[before]))
+    return values[before] + share[:, None] * (values[after] - values[before])

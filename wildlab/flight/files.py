@@ -128,11 +128,11 @@ def printable(text: str) -> str:
     return text if text.isprintable() else repr(text)
 
 
-def did_you_mean(wrong: str, known: Iterable[str], most: int = 40) -> str:
-    """A clause that names the closest known word, and all of them (or the first `most`)."""
+def did_you_mean(wrong: str, known: Iterable[str]) -> str:
+    """A clause that names the closest known word, and all of them (or the first 40)."""
     known = sorted(printable(word) for word in known)
     close = difflib.get_close_matches(wrong, known, n=1)
-    every = ", ".join(known[:most]) + (", ..." if len(known) > most else "")
+    every = ", ".join(known[:40]) + (", ..." if len(known) > 40 else "")
     return f"did you mean {close[0]!r}? Known are {every}" if close else f"use one of {every}"
 
 

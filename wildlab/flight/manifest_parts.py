@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AwareDatetime, Field, field_validator, model_validator
 
 from wildlab.flight.files import Strict, leaves_folder
-from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 Spread = Annotated[float, Field(gt=0, le=1e6)]
@@ -209,32 +208,7 @@ class VerticalPart(Strict):
     note: str = ""
 
 
-class AttitudeSpreads(Strict):
-    """Reads standard deviations of roll, pitch and yaw in older files as those of tilt and heading.
-
-    The rule is that of `wildlab.geometry.attitude_uncertainty`; of roll and pitch one may be missing.
-    """
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_roll_pitch_yaw(cls, data: Any) -> Any:
-        if not isinstance(data, dict):
-            return data
-        found = dict(data)
-        for name, older in (("tilt_deg", ("roll_deg", "pitch_deg")), ("heading_deg", ("yaw_deg",))):
-            stated = {key: found.pop(key, None) for key in older}
-            given = {key: value for key, value in stated.items() if value is not None}
-            if given and found.get(name) is not None:
-                raise ValueError(f"{name} and {', '.join(given)} state the same; take out {', '.join(given)}")
-            for key, value in given.items():
-                if not isinstance(value, int | float) or not value > 0:
-                    raise ValueError(f"{key} is a standard deviation; give a number greater than 0")
-            if given:
-                found[name] = float(tilt_from_roll_pitch(*given.values()))
-        return found
-
-
-class UncertaintyPart(AttitudeSpreads):
+class UncertaintyPart(Strict):
     """Standard deviations to assume where the log has none. Absent = not assumed.
 
     ``tilt_deg`` and ``heading_deg``: see `wildlab.geometry.attitude_uncertainty`.

@@ -20,7 +20,7 @@ import pyarrow
 import pyarrow.parquet
 
 from wildlab.errors import WildlabError
-from wildlab.flight.calibration_files import Learnt, write_learnt
+from wildlab.flight.calibration_files import Learnt, write_calibration
 from wildlab.flight.checksums import CALIBRATION, TERRAIN, checksums_of, verify, with_checksums
 from wildlab.flight.files import flight_name, inside, is_safe_name, printable, regular_size
 from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_manifest
@@ -318,7 +318,7 @@ def save_flight(
         if flight.terrain is not None:
             write_terrain(flight.terrain, folder_now / TERRAIN)
         if calibration is not None:
-            write_learnt(calibration, folder_now / CALIBRATION)
+            write_calibration(calibration, folder_now / CALIBRATION)
         elif flight.calibration is not None:
             shutil.copyfile(flight.calibration, folder_now / CALIBRATION)
         text = with_checksums(manifest_toml(flight.manifest), checksums_of(folder_now))

@@ -63,13 +63,13 @@ class MapPlaces:
         """(N, 3): column and row, counted from the corner of the first cell, and height as in the map."""
         llh = ned_to_geodetic(p_n, self.origin)
         x, y = self.to_map(np.degrees(llh[:, 1]), np.degrees(llh[:, 0]))
-        column, row = self.map.to_cells(np.asarray(x), np.asarray(y))
+        column, row = self.map.to_cells(x, y)
         return np.column_stack([column, row, llh[:, 2] - self.added])
 
     def of_cells(self, cells: Array, heights: Array) -> Array:
         """(N, 3) in n of columns and rows (N, 2) with heights as in the map."""
         x, y = self.map.to_crs(cells[:, 0], cells[:, 1])
-        longitude, latitude = self.from_map(np.asarray(x), np.asarray(y))
+        longitude, latitude = self.from_map(x, y)
         return geodetic_to_ned(np.radians(latitude), np.radians(longitude), heights + self.added, self.origin)
 
 
@@ -635,33 +635,11 @@ def _refuse_elsewhere(
     far = f"{distance / 1000:,.1f} km away" if distance >= 1000 else f"{distance:.0f} m away"
     far = far if math.isfinite(distance) else "beyond the reach of its own CRS"
     raise WildlabError(
-        f"{what} over this map, whose nearest cell is {far}{_mirrored(places)}",
+        f"{what} over this map, whose nearest cell is {far}",
         f"give a map of the place, or check its CRS and {also}",
         file=places.map.path,
         field="terrain",
     )
-
-
-def _mirrored(places: MapPlaces) -> str:
-    """A clause where the flight would lie over the map with another sign of a coordinate, or another zone."""
-    latitude, longitude, _ = (math.degrees(value) for value in places.origin)
-    rows, columns = places.map.shape
-
-    def over(x: Array, y: Array) -> bool:
-        column, row = places.map.to_cells(x, y)
-        return bool(0 <= column[0] <= columns and 0 <= row[0] <= rows)
-
-    for signs, what in (((-1, 1), "latitude"), ((1, -1), "longitude"), ((-1, -1), "latitude and longitude")):
-        x, y = places.to_map(np.array([signs[1] * longitude]), np.array([signs[0] * latitude]))
-        if over(x, y):
-            return f"; with the other sign of {what} it would"
-    if abs(longitude) <= 90 and over(*places.to_map(np.array([latitude]), np.array([longitude]))):
-        return "; with latitude and longitude swapped it would"
-    x, y = places.to_map(np.array([longitude]), np.array([latitude]))
-    for shift in (-1e7, 1e7):
-        if over(x, y + shift):
-            return "; it would with the zone of the other hemisphere as CRS"
-    return ""
 
 
 def _named(elevation: ElevationMap) -> str:

@@ -1,4 +1,4 @@
-"""Time scales and zones: GPS time, UTC, wall clocks, and clocks that are off by whole hours."""
+"""Time scales and zones: GPS time, UTC and wall clocks."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def gps_to_utc(gps_s: ArrayLike) -> Array:
     counted = np.asarray(gps_s, float) + GPS_START_S
     # A leap second begins where GPS time, too, is ahead by it.
     behind = np.searchsorted(_STARTS + np.arange(1, len(_STARTS) + 1), counted, side="right")
-    return np.asarray(np.where(np.isnan(counted), np.nan, counted - behind))
+    return np.where(np.isnan(counted), np.nan, counted - behind)
 
 
 def week_to_utc(week: ArrayLike, time_of_week_s: ArrayLike) -> Array:
@@ -78,19 +78,15 @@ def week_to_utc(week: ArrayLike, time_of_week_s: ArrayLike) -> Array:
     return gps_to_utc(np.asarray(week, float) * WEEK_S + np.asarray(time_of_week_s, float))
 
 
-def utc_to_gps(utc_s: ArrayLike) -> Array:
-    """GPS time (...) in s since 6 January 1980 of UTC (...) in s since 1970; the inverse of `gps_to_utc`."""
-    at = np.asarray(utc_s, float)
-    return np.asarray(at - GPS_START_S + leap_seconds(at))
-
-
-def find_zone(text: str) -> tzinfo:
+def find_zone(text: str, field: str = "zone") -> tzinfo:
     """A time zone by its IANA name, or as a fixed offset such as ``+02:00``.
 
     Parameters
     ----------
     text
         As a person gives it.
+    field
+        Who asks, for messages.
 
     Returns
     -------
@@ -116,7 +112,7 @@ def find_zone(text: str) -> tzinfo:
         raise WildlabError(
             f"{text[:60]!r} is not a time zone",
             "give UTC, a name as Europe/Oslo, or an offset as +02:00",
-            field="zone",
+            field=field,
         ) from None
 
 
@@ -161,54 +157,5 @@ def wall_to_utc(wall_s: ArrayLike, zone: str) -> NDArray[np.float64]:
     return np.asarray(wall - ahead)
 
 
+#: First and last stamp, s.
 Span = tuple[float, float]
-
-#: Share of the shorter that has to lie within the other then, and the farthest that zones are apart, s.
-WITHIN, FARTHEST_S = 0.9, 14 * 3600.0
-HALF_HOUR_S = 1800.0
-
-
-def whole_hours(one: Span | None, other: Span | None) -> float | None:
-    """What to add to the stamps of one so that it was under way with the other: half hours and hours alone.
-
-    Parameters
-    ----------
-    one, other
-        First and last stamp, s.
-
-    Returns
-    -------
-    float or None
-        Seconds; None where they share time as they are, where no such step brings them together, and where
-        several do: of these whole hours go before half ones.
-
-    Examples
-    --------
-    >>> whole_hours((3600.0, 4500.0), (0.0, 900.0)), whole_hours((3000.0, 3900.0), (0.0, 900.0))
-    (-3600.0, None)
-    """
-    if one is None or other is None or _shared(one, other, 0.0) > 0:
-        return None
-    steps = np.arange(HALF_HOUR_S, FARTHEST_S + 1, HALF_HOUR_S)
-    found = [float(by) for by in (*steps, *-steps) if _shared(one, other, float(by)) >= WITHIN]
-    whole = [by for by in found if by % 3600 == 0]
-    chosen = found if len(found) == 1 else whole
-    return chosen[0] if len(chosen) == 1 else None
-
-
-def hours_words(seconds: float) -> str:
-    """``1 h``, ``5 h 30 min``, ``30 min``: of a length, whatever its sign.
-
-    Examples
-    --------
-    >>> hours_words(-3600.0), hours_words(19800.0), hours_words(1800.0)
-    ('1 h', '5 h 30 min', '30 min')
-    """
-    hours, minutes = divmod(round(abs(seconds) / 60), 60)
-    return " ".join([*([f"{hours} h"] if hours else []), *([f"{minutes} min"] if minutes else [])])
-
-
-def _shared(one: Span, other: Span, by: float) -> float:
-    """Share of the shorter that both have once ``by`` is added to the first."""
-    common = min(one[1] + by, other[1]) - max(one[0] + by, other[0])
-    return max(common, 0.0) / max(min(one[1] - one[0], other[1] - other[0]), 1.0)

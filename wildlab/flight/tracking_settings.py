@@ -10,10 +10,9 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from wildlab.flight.files import Strict, check_model, did_you_mean, parse_toml, read_toml
-from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 #: Errors that a filter may consider, with the unit of their standard deviation. Position of the platform (and
 #: of the part of a target that is seen), the tilt (about each level axis) and the heading of its attitude,
@@ -143,23 +142,6 @@ class SensorPart(Strict):
     range_sd_m: Above | None = None
     considered: dict[str, ConsideredPart] = Field(default_factory=dict)
     many: ManySensorPart = ManySensorPart()
-
-    @field_validator("considered")
-    @classmethod
-    def _from_roll_and_pitch(cls, value: dict[str, ConsideredPart]) -> dict[str, ConsideredPart]:
-        """Errors of roll and pitch, in older files, are one of the tilt: the rule is that of spreads."""
-        older = [value[name] for name in ("roll", "pitch") if name in value]
-        if not older or any(one.sd_deg is None for one in older):
-            return value
-        if "tilt" in value:
-            raise ValueError("tilt stands beside roll or pitch, which are the same; take these out")
-        times = [one.correlation_time_s for one in older if one.correlation_time_s is not None]
-        tilt = ConsideredPart(
-            sd_deg=float(tilt_from_roll_pitch(*(one.sd for one in older))),
-            correlation_time_s=min(times, default=None),
-            shared=all(one.shared for one in older),
-        )
-        return {name: one for name, one in value.items() if name not in ("roll", "pitch")} | {"tilt": tilt}
 
     @model_validator(mode="after")
     def _known(self) -> SensorPart:

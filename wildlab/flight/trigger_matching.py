@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import ClockFit, fit_clock
+from wildlab.flight.clock_fitting import fit_clock
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -36,39 +36,17 @@ class TriggerMatch(NamedTuple):
     ----------
     trigger
         (N,) the trigger of each image, counted from 0; -1 where it has none.
-    fit
-        The camera's clock against that of the triggers, through the middle of the steps of its stamps.
-    resolution_s
-        Step of the images' stamps, s; 0 where they have none.
     images_left, triggers_left
         How many have no partner.
     certain
         Whether no other offset does nearly as well. Evenly timed images of which some are missing fit at
         many offsets.
-    rival_s
-        How far off the next best offset is, s; NaN where there is none.
     """
 
     trigger: Index
-    fit: ClockFit
-    resolution_s: float
     images_left: int
     triggers_left: int
     certain: bool
-    rival_s: float
-
-    @property
-    def sentence(self) -> str:
-        """What was matched, in a clause."""
-        images = len(self.trigger)
-        said = f"{images - self.images_left} of {images} images go with a record of their trigger"
-        if self.images_left or self.triggers_left:
-            said += f" ({self.images_left} images and {self.triggers_left} records are left over)"
-        if not self.certain:
-            said += (
-                f"; {abs(self.rival_s):.3g} s {'later' if self.rival_s > 0 else 'earlier'} nearly as many do"
-            )
-        return said
 
 
 def match_triggers(image_stamps: ArrayLike, trigger_times: ArrayLike) -> TriggerMatch:
@@ -108,29 +86,23 @@ def match_triggers(image_stamps: ArrayLike, trigger_times: ArrayLike) -> Trigger
         what = "image" if not len(images) else "trigger"
         raise WildlabError(f"no {what} has a time", "state the offset of the camera's clock", field="time")
     s, t = stamps[images], times[triggers]
-    resolution = _resolution(s)
-    s = s + resolution / 2
     apart = np.diff(t)
     usual = float(np.median(apart[apart > 0])) if (apart > 0).any() else np.inf
-    near = max(resolution, min(NEAR_S, SHARE * usual))
-    best: list[tuple[float, float, Index]] = []
+    near = max(_resolution(s), min(NEAR_S, SHARE * usual))
+    best: list[tuple[float, Index]] = []
     for offset in _offsets(s, t, near):
-        score, settled, pairs = _settle(s, t, offset, near)
-        if all(len(pairs) != len(other[2]) or (pairs != other[2]).any() for other in best):
-            best.append((score, settled, pairs))
+        score, pairs = _settle(s, t, offset, near)
+        if not any(np.array_equal(pairs, other) for _, other in best):
+            best.append((score, pairs))
     best.sort(key=lambda one: -one[0])
-    _, offset, pairs = best[0]
-    fit = fit_clock(s[pairs[:, 0]] - resolution / 2, t[pairs[:, 1]])
+    (most, pairs), *rivals = best
     index = np.full(len(stamps), -1, np.intp)
     index[images[pairs[:, 0]]] = triggers[pairs[:, 1]]
     left = len(stamps) - len(pairs), len(times) - len(pairs)
     # What one image more is worth; where all have a partner, any other offset leaves some without.
-    one = best[0][0] / len(pairs)
-    rivals = best[1:]
-    near_best = [r for r in rivals if r[0] > best[0][0] - AHEAD * one and len(r[2]) > len(pairs) - AHEAD]
-    certain = len(pairs) > 1 and (left == (0, 0) or not near_best)
-    rival = (near_best or rivals)[0][1] - offset if rivals else float("nan")
-    return TriggerMatch(index, fit, resolution, *left, certain, float(rival))
+    least = most - AHEAD * most / len(pairs)
+    rivalled = any(score > least and len(other) > len(pairs) - AHEAD for score, other in rivals)
+    return TriggerMatch(index, *left, len(pairs) > 1 and (left == (0, 0) or not rivalled))
 
 
 def _resolution(stamps: Array) -> float:
@@ -157,12 +129,12 @@ def _offsets(s: Array, t: Array, near: float) -> list[float]:
     return found
 
 
-def _settle(s: Array, t: Array, offset: float, near: float) -> tuple[float, float, Index]:
-    """Pairs (K, 2) near an offset, the offset that they have, and how much they explain."""
+def _settle(s: Array, t: Array, offset: float, near: float) -> tuple[float, Index]:
+    """How much the pairs near an offset explain, and these, (K, 2)."""
     at, pairs = s + offset, np.zeros((0, 2), np.intp)
     for _ in range(4):
         found = _pair(at, t, near)
-        if len(found) == len(pairs) and (found == pairs).all():
+        if np.array_equal(found, pairs):
             break
         pairs = found
         fit = fit_clock(s[pairs[:, 0]], t[pairs[:, 1]])
@@ -173,8 +145,7 @@ def _settle(s: Array, t: Array, offset: float, near: float) -> tuple[float, floa
     left = t[pairs[:, 1]] - at[pairs[:, 0]]
     # Against anything within reach, each pair that is known to its spread gains the logarithm of the ratio.
     spread = max(float(np.sqrt(np.mean(left**2))), 1e-3)
-    settled = float(np.median(t[pairs[:, 1]] - s[pairs[:, 0]]))
-    return len(pairs) * float(np.log(np.e * near / spread)), settled, pairs
+    return len(pairs) * float(np.log(np.e * near / spread)), pairs
 
 
 def _pair(at: Array, t: Array, near: float) -> Index:

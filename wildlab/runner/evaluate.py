@@ -13,7 +13,7 @@ from wildlab.analysis.navigate import reference_of
 from wildlab.analysis.navigation_inputs import imu_noise
 from wildlab.analysis.tracks.tracker import refuse_unusable
 from wildlab.errors import WildlabError
-from wildlab.flight.calibration_files import learnt_toml, read_learnt, refuse_other_camera
+from wildlab.flight.calibration_files import calibration_toml, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
@@ -93,7 +93,7 @@ def evaluate_flight(
             learnt = read_learnt(applied)
             refuse_other_camera(flight.manifest, learnt)
             # Its text, not its path: the report can be made again without the file, and names no folder.
-            parameters["calibration"] = learnt_toml(learnt)
+            parameters["calibration"] = calibration_toml(learnt)
         prepare("", "georeferencing.ipynb", parameters, source=found, calibration=calibration)
     elif calibration is not None:
         raise WildlabError(

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_atomic
-from wildlab.flight.calibration_files import Learnt, parse_learnt, read_learnt, write_learnt
+from wildlab.flight.calibration_files import Learnt, parse_learnt, read_learnt, write_calibration
 from wildlab.flight.checksums import CALIBRATION
 from wildlab.flight.files import dump_toml
 from wildlab.flight.store import Flight, save_flight
@@ -97,7 +97,7 @@ def recompute_reports(
     applied = None
     if learnt is not None and not (kept is not None and learnt == kept):
         applied = work / CALIBRATION
-        write_learnt(learnt, applied)
+        write_calibration(learnt, applied)
     outcomes = evaluate_flight(
         copy,
         source=told["source"],

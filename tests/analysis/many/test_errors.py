@@ -197,7 +197,7 @@ def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it():
     assert of("[sensors.eye]\ncorrelation_time_s = 40.0\n") == 40.0
     heading = "[sensors.eye.considered.heading]\nsd_deg = 3.0\n"
     assert of(heading) == np.inf
-    assert of(heading + "[sensors.eye.considered.roll]\nsd_deg = 1.0\ncorrelation_time_s = 9.0\n") == 9.0
+    assert of(heading + "[sensors.eye.considered.tilt]\nsd_deg = 1.0\ncorrelation_time_s = 9.0\n") == 9.0
     # An error of the clock is no error of the pose.
     assert of("[sensors.eye.considered.clock]\nsd_s = 0.1\ncorrelation_time_s = 0.5\n") == 0.0
 
