@@ -173,7 +173,7 @@ def test_maps_that_do_not_fit_are_refused(over_map, tmp_path):
     turned = folder / "turned.geojson"
     ring = [[b, a] for a, b in polygon(FIELD)["coordinates"][0]]
     turned.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
-    assert "swapped" in refused(dem, area=turned)
+    assert "order of their coordinates" in refused(dem, area=turned)
     holes = heights.copy()
     holes[:, 80:] = np.nan
     assert "% of Wolf" in refused(write_map(folder / "holes.tif", holes, corner))
