@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -181,12 +179,10 @@ def test_images_count_from_when_the_camera_is_at_rest():
     assert turn_between(look_attitude(0.3, -0.2, 0.0), look_attitude(0.3, 0.5, 0.0)) == pytest.approx(0.7)
 
 
-def test_turns_take_time_in_proportion_or_as_a_whole():
+def test_turns_take_time_in_proportion():
     flying = Flying(5.0, 50.0, turn_time=4.0)
     turns = np.radians([0, 20, 45, -90, 180])
     assert flying.turning(turns) == pytest.approx([0, 4 / 9, 1, 2, 4])
-    stopping = replace(flying, stops_beyond=np.radians(30))
-    assert stopping.turning(turns).tolist() == [0, 0, 4, 4, 4]
     assert flying.taken_at([2.0, 0.0, 1.0]).tolist() == [3, 4, 6]
     # While the platform turns, the gimbal turns too: at 60 deg/s, 170 deg are done after three seconds.
     assert flying.ready(np.radians(170), 2.0).all() and not flying.ready(np.radians(170)).all()

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies.claims import turn
 from wildlab.detection.colour import Colour
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
 from wildlab.geometry.camera import Camera
-from wildlab.reporting.published import load_claims
 from wildlab.reporting.report import open_report
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.coloured import Ground
@@ -125,16 +125,12 @@ def test_a_few_pixels_on_the_ground_are_a_calculation():
 
 
 def test_claims_turn_with_the_numbers():
-    claims = {one["id"]: one for one in load_claims("precision-drop")}
     good, bad = check_claims(table()), check_claims(
         table(
             tarpaulin_false_alarms_per_image=0.1, tarpaulin_off_centre=2, tarpaulin_few_pixels=2,
             mean_error=5, horizon_alarms_with_borders=0.4,
         )
     )  # fmt: skip
-    assert set(good) == set(claims)
-    for name, claim in claims.items():
-        assert good[name].holds(claim.get("threshold")).all(), name
-        assert not bad[name].holds(claim.get("threshold")).any(), name
+    assert turn("precision-drop", good, bad)
     none = check_claims(table(horizon_alarms_without_borders=0))["horizon-near-the-border"]
     assert decide(none.holds(0.1), none.premise).met == 0

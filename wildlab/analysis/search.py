@@ -208,7 +208,7 @@ def _next(
         filters.x[each], filters.P[each], platform.north_east, way_point, alpha=rules.alpha, c=rules.c
     )
     if chosen == SEARCH:
-        return rows.next_leg(platform, open_areas)[0], SEARCH
+        return rows.next_leg(platform, open_areas), SEARCH
     animal = int(each[chosen])
     sides = (0.0, rules.scan, 0.0, -rules.scan)
     return PatternPlanner(filters.x[animal], rows.terrain, rows.flying, sides).choose(platform), animal
@@ -263,28 +263,19 @@ class Searched(NamedTuple):
         (L,) s, when.
     counts
         (L,) images for which the camera was at rest.
-    covered
-        (L,) share of the grid that had been in an image, and not hidden.
-    asked
-        Candidate steps that were weighed, in all.
-    decisions
-        How often the planner was asked.
     """
 
     found: Array
     p_nc: Array
     at: Array
     counts: Mask
-    covered: Array
-    asked: int
-    decisions: int
 
 
 class Searcher(Protocol):
     """A planner, as the loop asks it."""
 
-    def next_leg(self, platform: Platform, open_areas: Mask) -> tuple[Leg, int]:
-        """The next leg, and how many candidate steps were weighed.
+    def next_leg(self, platform: Platform, open_areas: Mask) -> Leg:
+        """The next leg.
 
         Parameters
         ----------
@@ -301,7 +292,7 @@ class Searcher(Protocol):
 
 
 def search(
-    world: World, searcher: Searcher, start: Platform, sensor: SearchSensor, flying: Flying, grid: Array
+    world: World, searcher: Searcher, start: Platform, sensor: SearchSensor, flying: Flying
 ) -> Searched:
     """Let a planner search until all are found or the world ends.
 
@@ -317,8 +308,6 @@ def search(
         The camera; it decides what is found.
     flying
         What the platform can do.
-    grid
-        (N, 3) points for the share that was covered, m.
 
     Returns
     -------
@@ -326,33 +315,25 @@ def search(
     """
     images, animals = world.chance.shape
     found = np.full(animals, np.inf)
-    seen = np.zeros(len(grid), bool)
-    platform, clock, asked, decisions = start, 0.0, 0, 0
-    p_nc, at, counts, covered = [], [], [], []
+    platform, clock = start, 0.0
+    p_nc, at, counts = [], [], []
     while np.isinf(found).any():
         still = np.isinf(found)
         open_areas = np.array([still[world.area_of == k].any() for k in range(len(world.areas))])
-        leg, weighed = searcher.next_leg(platform, open_areas)
+        leg = searcher.next_leg(platform, open_areas)
         times = clock + leg.at
         rows = rows_at(times, flying.interval)
         if rows[-1] >= images or times[-1] > images * flying.interval:
             break
-        asked, decisions = asked + weighed, decisions + 1
         shown = found_in(world, leg, rows, sensor) & still
         for image in range(flying.images):
             found[shown[image] & np.isinf(found)] = times[image]
-            if leg.counts[image]:
-                seen |= shown_points(world.terrain, grid, leg, image, sensor, ~seen)
-            covered.append(seen.mean())
         searcher.flown(leg)
         platform, clock = leg.end, float(times[-1])
         p_nc.append(leg.p_nc)
         at.append(times)
         counts.append(leg.counts)
-    return Searched(
-        found, np.concatenate(p_nc), np.concatenate(at), np.concatenate(counts), np.array(covered), asked,
-        decisions,
-    )  # fmt: skip
+    return Searched(found, np.concatenate(p_nc), np.concatenate(at), np.concatenate(counts))
 
 
 def rows_at(times: Array, interval: float) -> Indices:
@@ -376,18 +357,6 @@ def found_in(world: World, leg: Leg, rows: Indices, sensor: SearchSensor) -> Mas
     return hit
 
 
-def shown_points(
-    terrain: Terrain, points: Array, leg: Leg, image: int, sensor: SearchSensor, asked: Mask
-) -> Mask:
-    """(N,) which of the points that are asked for an image shows, and nothing hides."""
-    p, R = leg.p_nc[image], leg.R_nc[min(image, len(leg.R_nc) - 1)]
-    inside = np.flatnonzero(asked & in_field_of_view(points, p, R, sensor))
-    shown = np.zeros(len(points), bool)
-    if len(inside):
-        shown[inside] = lines_clear(terrain, points[inside], p)
-    return shown
-
-
 class SearchByInformation:
     """The planner of F 5.3.2 over the grids of all areas that are not done.
 
@@ -405,11 +374,10 @@ class SearchByInformation:
     def __init__(self, planner: InformationPlanner, area_of: Indices, walk: float) -> None:
         self.planner, self.area_of, self.walk = planner, area_of, walk
 
-    def next_leg(self, platform: Platform, open_areas: Mask) -> tuple[Leg, int]:
+    def next_leg(self, platform: Platform, open_areas: Mask) -> Leg:
         """As `Searcher` has it."""
         self.planner.weights[:] = open_areas[self.area_of]
-        chosen = self.planner.choose(platform)
-        return chosen.leg, chosen.asked
+        return self.planner.choose(platform).leg
 
     def flown(self, leg: Leg) -> None:
         """As `Searcher` has it."""
@@ -448,9 +416,9 @@ class SearchInRows:
         self._now: PatternPlanner | None = None
         self._area = -1
 
-    def next_leg(self, platform: Platform, open_areas: Mask) -> tuple[Leg, int]:
+    def next_leg(self, platform: Platform, open_areas: Mask) -> Leg:
         """As `Searcher` has it."""
-        return self._rows(platform, open_areas).choose(platform), 0
+        return self._rows(platform, open_areas).choose(platform)
 
     def way_point(self, platform: Platform, open_areas: Mask) -> Array:
         """(2,) m, the first that was not visited: where the search would go on."""
@@ -494,10 +462,10 @@ class SearchByChance:
         self.areas = world.areas
         self._walk = RandomWalk(list(world.areas), world.terrain, flying, rng)
 
-    def next_leg(self, platform: Platform, open_areas: Mask) -> tuple[Leg, int]:
+    def next_leg(self, platform: Platform, open_areas: Mask) -> Leg:
         """As `Searcher` has it."""
         self._walk.areas = [area for area, still in zip(self.areas, open_areas, strict=True) if still]
-        return self._walk.choose(platform), 0
+        return self._walk.choose(platform)
 
     def flown(self, leg: Leg) -> None:
         """As `Searcher` has it; chance does not ask what was seen."""

@@ -39,8 +39,6 @@ class Flying:
     turn_time
         How long the platform takes to turn round, through 180 degrees, s. It stands still meanwhile, and no
         image is taken; smaller turns take less in proportion.
-    stops_beyond
-        None, or the angle beyond which any turn takes the whole ``turn_time``, and up to which none, rad.
 
     Raises
     ------
@@ -54,7 +52,6 @@ class Flying:
     images: int = 3
     slew: float = np.radians(60.0)
     turn_time: float = 0.0
-    stops_beyond: float | None = None
 
     def __post_init__(self) -> None:
         above_zero(
@@ -87,10 +84,7 @@ class Flying:
         >>> print(Flying(5.0, 60.0, turn_time=4.0).turning(np.radians([0, 45, -180])))
         [0. 1. 4.]
         """
-        angle = np.abs(np.asarray(turned, float))
-        if self.stops_beyond is None:
-            return np.asarray(self.turn_time * angle / np.pi)
-        return np.where(angle > self.stops_beyond, self.turn_time, 0.0)
+        return np.asarray(self.turn_time * np.abs(turned) / np.pi)
 
     def taken_at(self, waits: ArrayLike) -> Array:
         """When the images of a step are taken, counted from its beginning.

@@ -75,13 +75,10 @@ class Chosen(NamedTuple):
         To be flown.
     gain
         By how much all steps of the horizon lower F (5.6), m^2, without fading.
-    asked
-        How many candidate steps were weighed.
     """
 
     leg: Leg
     gain: float
-    asked: int
 
 
 class InformationPlanner:
@@ -197,7 +194,6 @@ class InformationPlanner:
         Y, left = self.Y[None], self.left[None]
         worth, gained, late = np.zeros(1), np.zeros(1), np.zeros(1)
         first: list[Leg] = []
-        asked = 0
         length = self.flying.speed * self.flying.step / -np.log(h.fades) if h.fades < 1 else np.inf
         for ahead in range(h.steps):
             blocks = self._in_blocks(left)
@@ -218,7 +214,6 @@ class InformationPlanner:
                 Y, left, self.weights, self.points, parents, cams, R, counts, limits, clear, self._half,
                 s.sd, s.reach, s.nearest,
             )  # fmt: skip
-            asked += gains.size
             off = ~np.isfinite(cams).all(axis=(1, 2))
             tail = worth_beyond(blocks, self._middles, parents, cams[:, -1], length)
             value = worth[parents][:, None] + fade[:, None] * gains
@@ -245,7 +240,7 @@ class InformationPlanner:
                         self._half, s.sd, s.reach, s.nearest,
                     )  # fmt: skip
                 states = [leg.end for leg in legs]
-        return Chosen(first[0], float(gained[0]), asked)
+        return Chosen(first[0], float(gained[0]))
 
     def _at(self, wait: float) -> Array:
         """(L,) s when images of a step are taken that begins with a turn."""

@@ -58,7 +58,7 @@ class _Timed:
         self.searcher = searcher
         self.seconds: list[float] = []
 
-    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> Leg:
         """As `Searcher` has it."""
         began = process_time()
         chosen = self.searcher.next_leg(platform, open_areas)
@@ -92,7 +92,7 @@ def planning_cost(seeds: Iterable[int], twin: str) -> pd.DataFrame:
     for seed in list(seeds)[:TIMED]:
         scene = draw_scene(seed, twin)
         timed = _Timed(searchers(scene, seed)[INFORMATION]())
-        found = search(scene.world, timed, scene.start, scene.sensor, scene.flying, scene.grid[:1])
+        found = search(scene.world, timed, scene.start, scene.sensor, scene.flying)
         spent = timed.seconds[1:]
         flown = found.at[-1] - found.at[scene.flying.images - 1]
         rows[seed] = {"decision": float(np.mean(spent)), "load": float(np.sum(spent) / flown)}

@@ -200,8 +200,7 @@ def search_all(
     scene = draw_scene(seed, twin)
     each = searchers(scene, seed)
     return scene, {
-        name: search(scene.world, each[name](), scene.start, scene.sensor, scene.flying, scene.grid)
-        for name in only
+        name: search(scene.world, each[name](), scene.start, scene.sensor, scene.flying) for name in only
     }
 
 
