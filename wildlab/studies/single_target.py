@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.analysis.tracks.sighting import Sighting
 from wildlab.evaluation.consistency import innovation_whiteness
+from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.tracks import (
     error_over_time,
     innovation_correlations,
@@ -26,8 +26,6 @@ from wildlab.studies.page import Facts, Shown
 
 if TYPE_CHECKING:
     from wildlab.studies.linear_vs_nonlinear.trial import ScoredTrack
-
-Array = NDArray[np.float64]
 
 #: Lags of the autocorrelations, in detections: eight seconds of uninterrupted images.
 LAGS = 60

@@ -15,8 +15,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.tracks.scores import FILTERS, WHITE
-
-Array = NDArray[np.float64]
+from wildlab.geometry.frames import Array
 
 #: Degrees of freedom of the NEES of a position, and so what its mean should be.
 IDEAL = 2.0

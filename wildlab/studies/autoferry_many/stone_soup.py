@@ -14,15 +14,13 @@ from datetime import UTC, datetime, timedelta
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
 from wildlab.studies.autoferry_many.tuning import even, scale
 from wildlab.tracking.many import Scan, Shown
 from wildlab.tracking.many.run import in_reach
 from wildlab.tracking.many.tracks import moves
-
-Array = NDArray[np.float64]
 
 #: A track is followed as north, its velocity, east, its velocity; these are in our order of a state.
 _OURS = np.array([0, 2, 1, 3])

@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.analysis.tracks.sighting import CvTuning, Sighting, evaluate_track, follow_positions
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, columns_of
+from wildlab.geometry.frames import Array
 from wildlab.studies.linear_vs_nonlinear.trial import (
     OBSERVER,
     Numbers,
@@ -34,8 +34,6 @@ from wildlab.tracking.filters import run_coloured
 from wildlab.tracking.motion import singer, singer_variance
 from wildlab.tracking.run import Track, run_filter
 from wildlab.tracking.sensors import positions
-
-Array = NDArray[np.float64]
 
 SUBJECTS = ("cv", "singer", "coloured")
 

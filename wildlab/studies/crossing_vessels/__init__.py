@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from wildlab.analysis.rendered import Photographer
 from wildlab.evaluation.shares import Check, columns_of
+from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish, new_strips
 from wildlab.reporting.charts.forms import Values, draw_lines, draw_picture, spread_points
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
@@ -34,8 +34,6 @@ from wildlab.studies.crossing_vessels.trial import (
 )
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
-
-Array = NDArray[np.float64]
 
 
 def check_claims(runs: pd.DataFrame) -> dict[str, Check]:

@@ -14,6 +14,7 @@ from wildlab.evaluation.identities import Identities, Moment, compare_identities
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import gate_threshold
+from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
@@ -21,7 +22,6 @@ from wildlab.tracking import association as rules
 from wildlab.tracking.association import Appearance, image_features
 from wildlab.tracking.many.bank import Bank, Life, Looks, Tuning, run_bank
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 #: Numbers of a flight by (subject, name).
 Numbers = dict[tuple[str, str], float]

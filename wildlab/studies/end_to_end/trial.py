@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.analysis.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
 from wildlab.analysis.tracks.sighting import Sighting, sighting
@@ -19,13 +18,13 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import inside_ellipse
+from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
 from wildlab.studies.coloured_noise import trial as coloured
 from wildlab.studies.linear_vs_nonlinear import trial as filters
 
-Array = NDArray[np.float64]
 Numbers = dict[tuple[str, str], float]
 
 #: The twin's own detections, and those of rendered images.

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
-from numpy.typing import NDArray
 
 from wildlab.evaluation.shares import Check
+from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.drawing import draw_line, finish, new_strips
 from wildlab.reporting.charts.forms import draw_errors, draw_marks, draw_picture
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, map_axes, new_figure
@@ -28,8 +28,6 @@ from wildlab.studies.large_ship.trial import (
 )
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
-
-Array = NDArray[np.float64]
 
 
 def check_claims(spread: pd.DataFrame) -> dict[str, Check]:

@@ -21,12 +21,12 @@ from wildlab.analysis.rendered import (
 )
 from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_pixels, sighting
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.run import Track
 
-Array = NDArray[np.float64]
 #: Numbers of a flight by (subject, name).
 Numbers = dict[tuple[str, str], float]
 

@@ -137,8 +137,7 @@ def trial(seed: int, *, twin: str, views: int) -> dict[tuple[str, str], float]:
         that begin at the camera, too; of (2.24) by the letter the share that is
         ``seen``. Of trees the share of the grid points on which they are ``planted``, and at each of
         `INCIDENCES` the share that they hide of what is seen without them (``hidden``).
-        Of the field of view, straight down, its ``width`` at each height and the ``exponent`` with which it
-        grows.
+        Of the field of view, straight down, the ``exponent`` with which its width grows with the height.
     """
     land, camera, rng = synthetic_landscape(seed), camera_of(twin), stream(seed, "line of sight")
     numbers: dict[tuple[str, str], float] = {}
@@ -154,7 +153,6 @@ def trial(seed: int, *, twin: str, views: int) -> dict[tuple[str, str], float]:
     for height in HEIGHTS:
         below = [look(land, camera, rng, height, 0.0) for _ in range(views)]
         widths.append(float(np.nanmean([width_on_ground(land, camera, one) for one in below])))
-        numbers[VIEW, f"width_{height}m"] = widths[-1]
     numbers[VIEW, "exponent"] = np.polyfit(np.log(HEIGHTS), np.log(widths), 1)[0]
     return numbers
 

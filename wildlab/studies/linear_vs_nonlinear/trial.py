@@ -30,13 +30,13 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import white_bound
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.filters import run_unscented
 from wildlab.tracking.motion import Motion, in_steps
 from wildlab.tracking.run import Start, Track
 from wildlab.tracking.sensors import Sensor, pixels
 
-Array = NDArray[np.float64]
 #: Numbers of a flight by (subject, name).
 Numbers = dict[tuple[str, str], float]
 

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from wildlab.analysis.navigate import (
     AXES,
@@ -25,6 +24,7 @@ from wildlab.analysis.verdict import Evidence, Verdict, verdict_of
 from wildlab.evaluation.consistency import innovation_whiteness
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.georeferencing import aircraft_map
 from wildlab.reporting.charts.navigation import (
     bias_chart,
@@ -42,7 +42,6 @@ from wildlab.studies.navigation import trial
 from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Study
 
-Array = NDArray[np.float64]
 Period = tuple[float, float]
 #: The map of a flight by the first of its other figures; that of 7.13 on is another case's figure 7.2.
 MAPS = {23: 22, 33: 32}

@@ -45,6 +45,8 @@ RECORDED = {
 }
 #: After how many detections the mean is looked at.
 COUNTS = (1, 2, 5, 10, 20, 40, 75)
+#: Of the detector, H 4.4.2.
+LIMITS = Colour()
 #: Pixels that "a few pixels" are read as.
 FEW_PX = 3.0
 #: How far the tarpaulin's middle lies outside of an image at least that shows nothing of it; and how far
@@ -136,7 +138,7 @@ def search(
     seed: int,
     wanted: int,
     empty: int,
-    thresholds: Colour | None = None,
+    limits: Colour = LIMITS,
 ) -> Drop:
     """Look through the images as they come until enough was found.
 
@@ -152,14 +154,13 @@ def search(
         Detections that are gathered.
     empty
         Images without the tarpaulin that are looked at besides.
-    thresholds
-        Of the detector; None takes those of H 4.4.2.
+    limits
+        Of the detector.
 
     Returns
     -------
     Drop
     """
-    limits = thresholds or Colour()
     camera = flight.poses.camera
     size = np.array([camera.width, camera.height])
     middle = np.array([look.tarpaulin.north, look.tarpaulin.east, 0.0])
@@ -229,13 +230,13 @@ def horizon_views(camera: Camera, look: GroundLook, seed: int, images: int) -> l
     return views
 
 
-def alarms(views: list[ColourView], thresholds: Colour | None = None) -> tuple[int, int]:
+def alarms(views: list[ColourView]) -> tuple[int, int]:
     """In how many images something is found: with the borders that keep the horizon out, and without."""
-    limits = thresholds or Colour()
-    open_limits = replace(limits, border_px=(0.0, 0.0))
     valid = [np.ones(view.labels.shape, bool) for view in views]
-    kept = sum(bool(len(find_coloured(v.image, m, limits))) for v, m in zip(views, valid, strict=True))
-    every = sum(bool(len(find_coloured(v.image, m, open_limits))) for v, m in zip(views, valid, strict=True))
+    kept, every = (
+        sum(bool(len(find_coloured(v.image, m, one))) for v, m in zip(views, valid, strict=True))
+        for one in (LIMITS, replace(LIMITS, border_px=(0.0, 0.0)))
+    )
     return kept, every
 
 

@@ -14,6 +14,7 @@ from wildlab.flight.clocks import truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.replay.scene import Estimates, Points, ReplayScene
+from wildlab.reporting.charts.forms import draw_heights
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -134,7 +135,7 @@ def operator_view(scene: ReplayScene, t: float) -> Figure:
     row = int(np.abs(views.times - t).argmin())
     here = np.array([np.interp(t, path.times, path.places[:, k]) for k in range(2)])
     if scene.terrain is not None:
-        _contours(ax, scene, here)
+        draw_heights(ax, scene.terrain)
     flown = path.times <= t
     ax.plot(path.places[flown, 1], path.places[flown, 0], lw=1.0, color=BLUE, label="flown so far")
     outline = views.outlines[row]
@@ -173,19 +174,6 @@ def _at(times: np.ndarray, places: np.ndarray, t: float, *, still: bool) -> np.n
     if still:
         return np.asarray(places[0])
     return np.array([np.interp(t, times, places[:, k]) for k in range(3)])
-
-
-def _contours(ax: object, scene: ReplayScene, here: np.ndarray) -> None:
-    terrain = scene.terrain
-    assert terrain is not None  # noqa: S101
-    rows, columns = terrain.height.shape
-    north = terrain.north + terrain.step * np.arange(rows)
-    east = terrain.east + terrain.step * np.arange(columns)
-    n, e = (np.abs(north - here[0]) <= AROUND + 20, np.abs(east - here[1]) <= AROUND + 20)
-    if n.sum() > 2 and e.sum() > 2:
-        ax.contour(  # type: ignore[attr-defined]
-            east[e], north[n], terrain.height[np.ix_(n, e)], levels=8, colors=GREY, linewidths=0.4, alpha=0.5
-        )
 
 
 _CLOCK = {HOLDS: "better", MOSTLY: "better", MOSTLY_NOT: "no-better", FAILS: "no-better"}

@@ -15,6 +15,7 @@ from wildlab.analysis.navigate import SETTLING_S
 from wildlab.evaluation.consistency import Average, average, chi_square_interval, share_inside
 from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import Check, columns_of
+from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.drawing import finish, new_strips
 from wildlab.reporting.charts.forms import Values, draw_lines, plain_numbers
 from wildlab.reporting.charts.tracks import (
@@ -153,7 +154,6 @@ def curve_table(runs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 #: Of the time: an airframe turns, and flies straight, in a part that one can speak of.

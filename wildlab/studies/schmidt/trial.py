@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.analysis.navigate import PUBLISHED_LIKE, errors_against, navigate_mekf, worth
 from wildlab.analysis.pose_noise import NAMES as POSE_NAMES
@@ -42,12 +42,12 @@ from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.evaluation.pose_noise import PoseNoise
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
 from wildlab.tracking.run import Track
 from wildlab.tracking.schmidt import PoseUncertainty
 
-Array = NDArray[np.float64]
 Numbers = dict[tuple[str, str], float]
 
 #: The poses that all filters see, and those that one sees whose navigation believes the data sheets.

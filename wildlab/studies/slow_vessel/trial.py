@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import georeference, observe
@@ -17,6 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.twins import simulate_twin
@@ -25,8 +25,6 @@ from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.run import run_filter
 from wildlab.tracking.sensors import positions
-
-Array = NDArray[np.float64]
 
 #: Navigation source behind each column of the tables.
 COLUMNS = {"observer": "observer", "pixhawk-autopilot": "autopilot"}

@@ -16,6 +16,7 @@ from wildlab.detection.warm import Warm
 from wildlab.evaluation.intervals import Interval, mean_interval
 from wildlab.evaluation.matching import Rates, rates, shares
 from wildlab.evaluation.shares import Check, columns_of
+from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.drawing import finish
 from wildlab.reporting.charts.forms import Values, draw_picture, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
@@ -50,7 +51,6 @@ from wildlab.studies.wildlife_detection.trial import (
     judge,
 )
 
-Array = NDArray[np.float64]
 #: How many grey levels the ground changes at least where it "changes too much": a tenth of all.
 TOO_MUCH = 25.0
 
