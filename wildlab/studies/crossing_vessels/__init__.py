@@ -27,7 +27,6 @@ from wildlab.studies.crossing_vessels.trial import (
     SEPARATIONS,
     SUBJECTS,
     TUNING,
-    WAYS,
     Flown,
     curve_subject,
     looks_of,
@@ -81,30 +80,6 @@ def rules_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
             for rule in SUBJECTS
         ]
     )
-
-
-def reacquired_shares(runs: pd.DataFrame, subject: str, name: str) -> Array:
-    """(n,) of the tracks of each flight that could be reacquired or were, which share was; NaN for none.
-
-    Tracks that are rightly new do not count.
-    """
-    parts = {one: runs[subject, one].to_numpy(float) for one in ("found_right", "found_wrong", "not_found")}
-    total = sum(parts.values())
-    return np.where(total > 0, parts[name] / np.where(total > 0, total, 1.0), np.nan)
-
-
-def reacquisition_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
-    """One row for each way: mean shares of tracks (%), and flights (%) with none wrong, of those with any."""
-    rows = []
-    for way in WAYS:
-        shares = {
-            name: pd.Series(reacquired_shares(runs, way, name)).dropna()
-            for name in ("found_right", "found_wrong", "not_found")
-        }
-        none_wrong = 100 * float((shares["found_wrong"] == 0).mean())
-        means = {name: 100 * float(one.mean()) for name, one in shares.items()}
-        rows.append({"way": names[way], **means, "none_wrong": none_wrong})
-    return pd.DataFrame(rows)
 
 
 #: Tracks by the vessel whose detections started them, as in H figure 6.21.
