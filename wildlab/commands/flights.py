@@ -173,9 +173,7 @@ def _say(card: Proposal, as_json: bool) -> None:
     if as_json:
         print_json({"files": [dict(zip(HEADINGS, row, strict=True)) for row in rows], "said": said})
         return
-    # The rest of each row is told in sentences: a terminal is narrow.
-    short = [HEADINGS.index(one) for one in ("file", "format", "begins (UTC)", "lasts", "role")]
-    print_table([HEADINGS[i] for i in short], [[row[i] for i in short] for row in rows], err=True)
+    print_table(HEADINGS, rows, err=True)
     for one in said:
         click.echo(one, err=True)
 

@@ -1,16 +1,13 @@
-"""Logs on their way into a flight: real ones, and what is said of their clocks and rates."""
+"""Logs on their way into a flight: real ones, and what is said of their clocks."""
 
-import re
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from wildlab.flight.card.description import paced, sentences_of
+from wildlab.flight.card.description import sentences_of
 from wildlab.flight.card.importing import import_card, read_card
 from wildlab.flight.card.proposal import Wishes
 from wildlab.flight.card.roles import CardItem, Choice
@@ -97,22 +94,3 @@ def test_stamps_of_a_log_without_utc_count_from_what_is_stated():
     wanted = LogTable(file="a.srt", format="dji-srt", part="gnss", offset_s=1000.0)
     found = log_part(RawLog("dji-srt", {"gnss": stream}), wanted, Path("a.srt"))
     assert found.columns["time_s"].tolist() == [1000.5, 1002.0]
-
-
-@given(
-    st.sampled_from([1.0, 5.0, 10.0, 50.0, 200.0]),
-    st.lists(st.tuples(st.integers(30, 200), st.floats(8, 500)), min_size=1, max_size=5),
-    st.integers(0, 99),
-)
-def test_running_periods_have_their_rate_and_pauses_are_counted(rate, periods, seed):
-    rng = np.random.default_rng(seed)
-    stamps, at, paused = [], 0.0, []
-    for count, steps in periods:
-        stamps.append(at + (np.arange(count) + rng.uniform(-0.1, 0.1, count)) / rate)
-        at = stamps[-1][-1] + steps / rate
-        paused.append(steps / rate)
-    said = paced(rng.permutation(np.concatenate(stamps)))
-    hertz, pauses, lost = (*map(float, re.findall(r"\d[\d.e+-]*", said)), 0, 0)[:3]
-    assert hertz == pytest.approx(rate, rel=0.05)
-    assert pauses == len(periods) - 1
-    assert lost == pytest.approx(sum(paused[:-1]), rel=0.05, abs=0.3 / rate)

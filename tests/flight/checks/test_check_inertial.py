@@ -1,7 +1,6 @@
 """`check_flight` on inertial and satellite measurements: right ones pass, one fault at a time is found."""
 
-import dataclasses
-from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,10 +8,13 @@ import pandas as pd
 import pytest
 
 from tests.flight.checks.found import levels
+from tests.flight.checks.test_sound_flights import shift
+from tests.flight.conftest import MANIFEST
 from tests.sound_logs import NED, QUATERNION
 from tests.sound_logs import VELOCITY as SPEED
 from wildlab.flight.checks.check import Finding, find, usable_for
 from wildlab.flight.checks.inertial import FORCE, RATE
+from wildlab.flight.checks.mistakes import Correction, change_columns
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_quaternion
@@ -25,8 +27,6 @@ from wildlab.simulation import (
 )
 
 DURATION = 240.0
-
-Change = Callable[[Flight], None]
 
 
 @pytest.mark.parametrize(("imu", "gnss", "value"), [(FORCE[0], NED[0], np.nan), ("time_s", "time_s", 0.0)])
@@ -76,15 +76,7 @@ def _flight(path: Any = _eight, noisy: float = 1.0) -> Flight:
     motion = trajectory(t)
     nav = pd.DataFrame({"time_s": t})
     nav[NED], nav[QUATERNION] = motion.position, matrix_to_quaternion(motion.R_nb)
-    manifest = make_manifest(
-        {
-            "name": "synthetic",
-            "kind": "logged",
-            "origin": {"latitude_deg": 63.4, "longitude_deg": 10.4, "height_m": 40.0},
-            "platform": {"name": "X8"},
-            "time": {"kind": "utc", "epoch": "2024-07-25T04:05:57Z"},
-        }
-    )
+    manifest = make_manifest({key: value for key, value in MANIFEST.items() if key != "camera"})
     return Flight(manifest, {"autopilot": nav}, {"imu": imu, "gnss": gnss})
 
 
@@ -125,50 +117,36 @@ def test_right_measurements_pass(path, nav, speeds, noisy):
     assert usable_for(flight)[2].usable
 
 
-def _drop(table: str, start: float, end: float) -> Change:
-    def change(flight: Flight) -> None:
+def _drop(table: str, start: float, end: float) -> Correction:
+    def change(flight: Flight) -> Flight:
         rows = flight.tables[table]
-        flight.tables[table] = rows[~rows["time_s"].between(start, end)]
+        kept = rows[~rows["time_s"].between(start, end)]
+        return replace(flight, tables={**flight.tables, table: kept})
 
     return change
 
 
-def _shift(table: str, seconds: float) -> Change:
-    def change(flight: Flight) -> None:
-        flight.tables[table]["time_s"] += seconds
-
-    return change
+def _scale(columns: tuple[str, ...], factor: float) -> Correction:
+    return change_columns("imu", columns, lambda x: x * factor)
 
 
-def _scale(columns: tuple[str, ...], factor: float) -> Change:
-    def change(flight: Flight) -> None:
-        flight.tables["imu"][list(columns)] *= factor
-
-    return change
-
-
-def _turn(matrix: Any, *parts: tuple[str, ...]) -> Change:
+def _turn(matrix: Any, *parts: tuple[str, ...]) -> Correction:
     """What a sensor measures whose axes are the rows of a matrix, in the axes of the body."""
-
-    def change(flight: Flight) -> None:
-        for columns in parts:
-            imu = flight.tables["imu"]
-            imu[list(columns)] = imu[list(columns)].to_numpy() @ np.asarray(matrix, float).T
-
-    return change
+    M = np.kron(np.eye(len(parts)), matrix)
+    return change_columns("imu", [name for part in parts for name in part], lambda x: x @ M.T)
 
 
-def _gravity_off(flight: Flight) -> None:
-    imu, nav = flight.tables["imu"], flight.nav["autopilot"]
-    up = fixed_wing_trajectory(_eight, trim_pitch=0.05)(imu["time_s"].to_numpy()).R_nb[:, 2, :]
-    assert len(nav)
-    imu[list(FORCE)] += 9.81 * up
+def _gravity_off(flight: Flight) -> Flight | None:
+    t = flight.tables["imu"]["time_s"].to_numpy()
+    up = fixed_wing_trajectory(_eight, trim_pitch=0.05)(t).R_nb[:, 2, :]
+    return change_columns("imu", FORCE, lambda f: f + 9.81 * up)(flight)
 
 
-def _other_flight(flight: Flight) -> None:
+def _other_flight(flight: Flight) -> Flight | None:
     rng = np.random.default_rng(9)
-    gnss = flight.tables["gnss"]
-    gnss[SPEED] = 20 + np.cumsum(rng.standard_normal((len(gnss), 3)), axis=0)
+    return change_columns("gnss", SPEED, lambda v: 20 + np.cumsum(rng.standard_normal(v.shape), axis=0))(
+        flight
+    )
 
 
 FLU = np.diag([1, -1, -1])
@@ -178,10 +156,10 @@ CASES: list[Any] = [
     (_drop("imu", 31.01, 32.99), "warning imu time_s: for 2.0 s after 31.000 s"),
     (_drop("gnss", 100.1, 159.9), "warning gnss time_s: for 60.0 s after 100.000 s"),
     (_drop("gnss", 180, 999), "warning gnss time_s: for 60.5 s after 179.500 s"),
-    (_shift("gnss", 1e6), "problem gnss time_s: do not overlap"),
-    (_shift("gnss", 180), "warning gnss time_s: only 60 s"),
-    (_shift("gnss", 3.0), "warning gnss time_s: gnss_offset_s = -3.0"),
-    (_shift("imu", 0.6), "warning gnss time_s: gnss_offset_s = 0.6"),
+    (shift("gnss", 1e6), "problem gnss time_s: do not overlap"),
+    (shift("gnss", 180), "warning gnss time_s: only 60 s"),
+    (shift("gnss", 3.0), "warning gnss time_s: gnss_offset_s = -3.0"),
+    (shift("imu", 0.6), "warning gnss time_s: gnss_offset_s = 0.6"),
     (_other_flight, "warning gnss time_s: nothing in common"),
     (_scale(FORCE, 1 / 9.80665), 'problem imu f_z_m_s2: unit = "g"'),
     (_gravity_off, "problem imu f_z_m_s2: gravity was taken off"),
@@ -199,8 +177,7 @@ CASES: list[Any] = [
 
 @pytest.mark.parametrize(("change", "said"), CASES)
 def test_each_fault_is_found(right, change, said):
-    flight = _copy(right)
-    change(flight)
+    flight = change(right)
     found = _found(flight)
     level, _, place = said.partition(" ")
     assert levels(found, place) == [level], found
@@ -218,25 +195,22 @@ def test_each_fault_is_found(right, change, said):
     ],
 )
 def test_without_any_attitude(right, change, level, field):
-    flight = _copy(right, nav=False)
-    change(flight)
+    flight = replace(change(right), nav={})
     assert (level, field) in [(one.level, one.field) for one in _found(flight)]
 
 
 def test_degrees_without_anything_to_compare_with(right):
-    flight = _copy(right, nav=False)
-    _scale(RATE, 180 / np.pi)(flight)
+    flight = replace(_scale(RATE, 180 / np.pi)(right), nav={})
     del flight.tables["gnss"]
     (found,) = _found(flight)
     assert found.level == "problem" and "deg/s" in found.sentence
 
 
 def test_the_suggested_offset_and_a_latency_are_taken_into_account(right):
-    flight = _copy(right)
-    _shift("gnss", 3.0)(flight)
+    flight = shift("gnss", 3.0)(right)
 
     def stated(parts: dict[str, Any]) -> list[Finding]:
-        return _found(dataclasses.replace(flight, manifest=replace_in_manifest(flight.manifest, parts)))
+        return _found(replace(flight, manifest=replace_in_manifest(flight.manifest, parts)))
 
     assert stated({"clocks": {"gnss_offset_s": -3.0}}) == stated({"gnss": {"latency_s": 3.0}}) == []
     found = next(one for one in stated({"clocks": {"gnss_offset_s": 2.0}}) if one.table == "gnss")
@@ -247,8 +221,7 @@ def test_the_suggested_offset_and_a_latency_are_taken_into_account(right):
 def test_an_offset_without_velocities(offset):
     flight = _copy(_flight(noisy=0.05), nav=False)  # positions as good as RTK
     flight.tables["gnss"] = flight.tables["gnss"].drop(columns=SPEED)
-    _shift("gnss", -offset)(flight)
-    (found,) = _found(flight)
+    (found,) = _found(shift("gnss", -offset)(flight))
     assert f"gnss_offset_s = {offset:.1f}" in found.fix
 
 

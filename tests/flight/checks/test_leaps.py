@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.flight.conftest import MANIFEST
 from wildlab.flight.checks.check import find
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.motion import find_leaps, positions, without_leaps
-from wildlab.flight.manifest import Manifest
+from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
 
 SPEED = np.array([16.0, 6.0, 0.0])
@@ -48,15 +49,7 @@ def straight_flight(
     gnss = pd.DataFrame(said[fixes], columns=columns).assign(time_s=t[fixes] - clock)
     if velocity:
         gnss[speeds] = (v + rng.normal(0, 0.2, v.shape))[fixes]
-    manifest = Manifest.model_validate(
-        {
-            "name": "straight",
-            "kind": "logged",
-            "origin": {"latitude_deg": 60.0, "longitude_deg": 10.0, "height_m": 0.0},
-            "platform": {"name": "made up"},
-            "time": {"kind": "utc", "epoch": "2024-01-01T00:00:00Z"},
-        }
-    )
+    manifest = make_manifest({key: value for key, value in MANIFEST.items() if key != "camera"})
     return Flight(manifest, {"autopilot": nav}, {"gnss": gnss})
 
 

@@ -129,15 +129,16 @@ def test_gravity_in_a_tilted_sensor_on_a_circle_is_no_heading():
     assert heading_error(circling(5.6, 0.0, swings=False)) is None
 
 
-@pytest.mark.parametrize("late_s", [0.2, 0.35])
-@pytest.mark.parametrize("turn", [0.25, 0.6])
-def test_a_late_receiver_in_steady_turns_is_no_heading(turn, late_s):
-    assert heading_error(turning(np.arange(300.0), 10.0, turn, 3, banked=False, late_s=late_s)) is None
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_no_heading_is_told_from_steady_coordinated_turns(seed):
-    assert heading_error(turning(np.arange(0.0, 1200.0), 12.0, 0.25, seed, banked=True)) is None
+@pytest.mark.parametrize(
+    ("t", "speed", "turn", "banked", "late_s"),
+    [
+        *((np.arange(300.0), 10.0, turn, False, late_s) for turn in (0.25, 0.6) for late_s in (0.2, 0.35)),
+        (np.arange(0.0, 1200.0), 12.0, 0.25, True, 0.0),
+    ],
+)
+def test_steady_turns_tell_no_heading(t, speed, turn, banked, late_s):
+    for seed in range(4):
+        assert heading_error(turning(t, speed, turn, seed, banked=banked, late_s=late_s)) is None
 
 
 @pytest.mark.parametrize(("pitch_deg", "roll_deg"), [(5.6, 0.0), (15.0, 0.0), (-3.0, 8.0)])

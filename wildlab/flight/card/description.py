@@ -8,17 +8,14 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from wildlab.flight.card.roles import OTHER, PARTS_SHOWN, ROLES, Choice
+from wildlab.flight.card.roles import OTHER, ROLES, Choice
 from wildlab.flight.files import printable
 from wildlab.flight.readers.log import Clock, Stream
 
 #: Headings of `rows_of`.
-HEADINGS = ("file", "format", "begins (UTC)", "lasts", "holds", "time from", "heights from", "role")
-#: A rate is of so many steps together, and a pause is a step of so many usual ones.
-STRETCH, PAUSE = 10, 5.0
-_REFERENCES = {"height_ellipsoid_m": "ellipsoid", "height_sea_m": "sea level", "height_home_m": "take-off"}
+HEADINGS = ("file", "format", "begins (UTC)", "lasts", "role")
 
 
 def rows_of(choices: Sequence[Choice]) -> list[list[str]]:
@@ -28,74 +25,12 @@ def rows_of(choices: Sequence[Choice]) -> list[list[str]]:
 
 def _row(choice: Choice) -> list[str]:
     found, role = choice.item, choice.role + (f" {choice.target}" if choice.target else "")
-    if found.log is None:
-        return [found.shown, found.called, "", "", printable(found.problem), "", "", role]
-    parts = found.log.parts
-    times = np.concatenate([np.empty(0), *(_times(one) for one in parts.values())])
+    times = np.concatenate([np.empty(0), *map(_times, [] if found.log is None else found.log.parts.values())])
     begins = lasts = ""
     if len(times):
         begins = datetime.fromtimestamp(float(times.min()), UTC).strftime("%Y-%m-%d %H:%M:%S")
         lasts = f"{np.ptp(times):.0f} s"
-    references = [
-        text for name, text in _REFERENCES.items() if any(name in one.columns for one in parts.values())
-    ]
-    return [
-        found.shown,
-        found.called,
-        begins,
-        lasts,
-        ", ".join(_amount(name, stream) for name, stream in parts.items()) or "nothing that can be used",
-        found.log.clock.base if found.log.clock is not None else "",
-        ", ".join(references),
-        role,
-    ]
-
-
-def _amount(name: str, stream: Stream) -> str:
-    if name in PARTS_SHOWN:
-        return f"{len(stream)} {PARTS_SHOWN[name]}"
-    return f"{name} {len(stream)}{paced(_times(stream))}"
-
-
-def paced(stamps: ArrayLike) -> str:
-    """The rate of a stream while it runs, and its pauses, as they stand behind its name.
-
-    A rate is of stretches of samples and not of single steps: what comes in bursts has the rate of the whole,
-    and a step of several usual ones is a pause and no part of the rate.
-
-    Parameters
-    ----------
-    stamps
-        (N,) s, in any order.
-
-    Returns
-    -------
-    str
-        Empty where there is no rate.
-
-    Examples
-    --------
-    >>> paced(np.concatenate([np.arange(0, 60, 0.1), np.arange(90, 150, 0.1)]))
-    ' at 10 Hz (1 pause, 30.1 s)'
-    >>> paced(np.repeat(np.arange(0, 60, 0.5), 5) + np.tile(np.arange(5) * 1e-3, 120))  # five at once
-    ' at 10 Hz'
-    """
-    t = np.sort(np.asarray(stamps, float))
-    width = min(STRETCH, len(t) - 1)
-    if width < 1:
-        return ""
-    stretches = (t[width:] - t[:-width]) / width
-    usual = float(np.median(stretches))
-    if not usual > 0:
-        return ""
-    steps = np.diff(t)
-    pauses = steps[steps > PAUSE * usual]
-    # Of stretches without a pause, where there are such.
-    before = np.concatenate([[0], np.cumsum(steps > PAUSE * usual)])
-    running = stretches[before[width:] == before[:-width]]
-    rate = 1 / float(np.median(running)) if len(running) and np.median(running) > 0 else 1 / usual
-    count = f"{len(pauses)} pause{'' if len(pauses) == 1 else 's'}"
-    return f" at {rate:.3g} Hz" + (f" ({count}, {pauses.sum():.3g} s)" if len(pauses) else "")
+    return [found.shown, found.called, begins, lasts, role]
 
 
 def _times(stream: Stream) -> NDArray[np.float64]:

@@ -172,13 +172,15 @@ def usable_for(flight: Flight) -> list[Use]:
     good_nav = [name for name in flight.estimated_sources if f"nav/{name}" not in broken]
     scored = _filled(flight, "truth")
     return [
-        _for_georeferencing(flight, broken, good_nav, scored),
-        _for_tracking(flight, broken, good_nav, scored),
-        _for_navigation(flight, broken),
+        Use("georeferencing accuracy", *_for_georeferencing(flight, broken, good_nav, scored)),
+        Use("tracking", *_for_tracking(flight, broken, good_nav, scored)),
+        Use("navigation", *_for_navigation(flight, broken)),
     ]
 
 
-def _for_georeferencing(flight: Flight, broken: set[str], good_nav: list[str], scored: bool) -> Use:
+def _for_georeferencing(
+    flight: Flight, broken: set[str], good_nav: list[str], scored: bool
+) -> tuple[bool, str]:
     needed = {
         "poses without a problem": bool(good_nav),
         "detections of kind pixel": "pixel" in _kinds(flight),
@@ -190,29 +192,25 @@ def _for_georeferencing(flight: Flight, broken: set[str], good_nav: list[str], s
     if not lacks and not of_known_targets(flight):
         lacks = ["detections that are said to be of a known target"]
     if lacks:
-        return Use("georeferencing accuracy", False, say("lacks", what=lacks))
+        return False, say("lacks", what=lacks)
     pixels = int((flight.table("detections")["kind"] == "pixel").sum())
     true_targets = flight.table("truth")["target_id"].nunique()
-    why = say("georeferencing", pixels=pixels, poses=good_nav, targets=true_targets)
-    return Use("georeferencing accuracy", True, why)
+    return True, say("georeferencing", pixels=pixels, poses=good_nav, targets=true_targets)
 
 
-def _for_tracking(flight: Flight, broken: set[str], good_nav: list[str], scored: bool) -> Use:
+def _for_tracking(flight: Flight, broken: set[str], good_nav: list[str], scored: bool) -> tuple[bool, str]:
     kinds = _kinds(flight)
-    wrong = [name for name in ("detections", "frames") if name in broken]
     if flight.manifest.time.kind != "utc":
-        usable, why = False, say("no-times")
-    elif not kinds and "detections" not in broken:
-        usable, why = False, say("lacks", what=["detections"])
-    elif wrong:
-        usable, why = False, say("lacks", what=[f"{listed(wrong)} without a problem"])
-    elif kinds == {"pixel"} and not good_nav:
-        usable, why = False, say("no-poses-for-pixels")
-    elif (most := _most_scans(flight)) < FEWEST_SCANS:
-        usable, why = False, say("few-scans", most=most, fewest=FEWEST_SCANS)
-    else:
-        usable, why = True, say("tracking" if scored else "tracking-without-truth")
-    return Use("tracking", usable, why)
+        return False, say("no-times")
+    if not kinds and "detections" not in broken:
+        return False, say("lacks", what=["detections"])
+    if wrong := [name for name in ("detections", "frames") if name in broken]:
+        return False, say("lacks", what=[f"{listed(wrong)} without a problem"])
+    if kinds == {"pixel"} and not good_nav:
+        return False, say("no-poses-for-pixels")
+    if (most := _most_scans(flight)) < FEWEST_SCANS:
+        return False, say("few-scans", most=most, fewest=FEWEST_SCANS)
+    return True, say("tracking" if scored else "tracking-without-truth")
 
 
 def _most_scans(flight: Flight) -> int:
@@ -222,16 +220,15 @@ def _most_scans(flight: Flight) -> int:
     return int(seen.groupby([seen["source"], *names])["frame_id"].nunique().max())
 
 
-def _for_navigation(flight: Flight, broken: set[str]) -> Use:
+def _for_navigation(flight: Flight, broken: set[str]) -> tuple[bool, str]:
     needed = {"imu": "inertial measurements (imu)", "gnss": "satellite positions (gnss)"}
     lacks = [what for name, what in needed.items() if name in broken or not _filled(flight, name)]
     why_not = say("lacks", what=lacks) if lacks else why_no_start(flight)
     if why_not:
-        return Use("navigation", False, why_not)
+        return False, why_not
     unstated = [] if flight.manifest.twin is not None else flight.manifest.imu.unstated_noise()
     names = [f"imu.{name}" for name in unstated]
-    why = say("navigation-unreported", names=names, n=len(names)) if names else say("navigation")
-    return Use("navigation", True, why)
+    return True, say("navigation-unreported", names=names, n=len(names)) if names else say("navigation")
 
 
 def _filled(flight: Flight, table: str) -> bool:
