@@ -151,17 +151,17 @@ class Position(Ruled):
 
     rules = (
         (
-            lambda s: s.form is None,
+            lambda s: not s.form,
             "a position is latitude, longitude and height, or north, east and down, or east, north and "
             "up; give all three of one kind and none of another",
         ),
     )
 
     @property
-    def form(self) -> str | None:
-        """One of `FORMS`."""
+    def form(self) -> str:
+        """One of `FORMS`; nothing of another mixture."""
         given = set(self.given(*(name for form in FORMS.values() for name in form)))
-        return next((form for form, names in FORMS.items() if set(names) == given), None)
+        return next((form for form, names in FORMS.items() if set(names) == given), "")
 
 
 class Velocity(Ruled):

@@ -293,7 +293,7 @@ def numbers(
     """
     scale = factor(quantity.unit, dimension, *image) * (-1 if quantity.negate else 1)
     if quantity.column is None:
-        return np.full(len(table), scale * (0.0 if quantity.value is None else quantity.value))
+        return np.full(len(table), scale * (quantity.value or 0.0))
     found = plain_numbers(table, quantity.column, part, may_be_empty=may_be_empty)
     if quantity.plus is not None:
         found = found + plain_numbers(table, quantity.plus, f"{part}.plus", may_be_empty=may_be_empty)

@@ -139,11 +139,8 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
     WildlabError
         Where a column is missing or a cell is not a number.
     """
-    form = position.form
-    if form is None:
-        raise ValueError("a position without a form")
     columns = []
-    for name in FORMS[form]:
+    for name in FORMS[position.form]:
         dimension: Literal["angle", "length"] = "angle" if name in ("latitude", "longitude") else "length"
         values = numbers(table, getattr(position, name), dimension, f"{part}.{name}")
         limit = {"latitude": np.pi / 2, "longitude": 2 * np.pi}.get(name, np.inf)
@@ -161,7 +158,7 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
         columns.append(values)
     nowhere = (columns[0] == 0) & (columns[1] == 0)
     # A receiver writes zeros until it knows where it is; a local position may well be zero.
-    if form == "wgs84":
+    if position.form == "wgs84":
         table.refuse(
             nowhere,
             f"latitude and longitude are both 0, here and in {int(nowhere.sum()) - 1} other rows: no "
@@ -170,7 +167,7 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
             (position.latitude.column if position.latitude else None) or "value",
             f"{part}.latitude",
         )
-    return RawPosition(form, np.column_stack(columns))
+    return RawPosition(position.form, np.column_stack(columns))
 
 
 def read_velocity(table: RawTable, velocity: Velocity, part: str) -> Array:
@@ -219,7 +216,8 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         frame, first = _rows_of_frames(ids)
         for values in (position.values, attitude, velocity, spreads):
             if values is not None:
-                _same(table, values, frame, first, ids, part)
+                differs = np.abs(values - values[first][frame]).max(axis=1) > SAME
+                _refuse_differing(table, differs, frame, first, ids, "pose", part)
         if block.attitude.yaw_from_bearing is not None:
             bearing = block.attitude.yaw_from_bearing
             yaw, note = _yaw_from_bearing(
@@ -295,17 +293,23 @@ def _rows_of_frames(ids: Text) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return frame, first
 
 
-def _same(
-    table: RawTable, values: Array, frame: NDArray[np.intp], first: NDArray[np.intp], ids: Text, part: str
+def _refuse_differing(
+    table: RawTable,
+    differs: NDArray[np.bool_],
+    frame: NDArray[np.intp],
+    first: NDArray[np.intp],
+    ids: Text,
+    column: str,
+    part: str,
 ) -> None:
-    differs = np.abs(values - values[first][frame]).max(axis=1) > SAME
+    """Refuse rows (N,) that say something else of their frame than its first row does."""
     table.refuse(
         differs,
         lambda row: (
             f"this row of frame {ids[row]!r} says something else than line {table.lines[first[frame[row]]]}"
         ),
         "give each frame one pose, or name more columns that tell frames apart",
-        "pose",
+        column,
         part,
     )
 
@@ -455,16 +459,7 @@ def read_frames(recipe: Recipe, raw: RawFiles) -> Rows:
     if block.id is None:
         others = table.iloc[first[frame]].reset_index(drop=True)
         differs = np.asarray((table != others).to_numpy().any(axis=1))
-        rows.refuse(
-            differs,
-            lambda row: (
-                f"this row of frame {of_row[row]!r} says something else than line "
-                f"{rows.lines[first[frame[row]]]}"
-            ),
-            "name more columns in unique",
-            ", ".join(block.unique),
-            "frames",
-        )
+        _refuse_differing(rows, differs, frame, first, of_row, ", ".join(block.unique), "frames")
     table = table.iloc[first].reset_index(drop=True).drop(columns="stamp", errors="ignore")
     return Rows(dict(table), None if stamps is None else stamps[first], ids=of_row)
 
