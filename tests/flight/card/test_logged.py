@@ -85,7 +85,7 @@ def test_how_a_clock_runs(rate, sd, said):
     """A second of a fast clock is less than one of UTC."""
     stream = make_stream("gnss", {"time_s": [1.0, 2.0]})
     clock = Clock("GPS weeks", rate, 0.0, 0.001, 0.002, 10, sd)
-    found = CardItem("a.bin", 1, "dataflash", RawLog("dataflash", {"gnss": stream}, clock=clock))
+    found = CardItem("a.bin", "dataflash", RawLog("dataflash", {"gnss": stream}, clock=clock))
     assert any(said in one for one in sentences_of([Choice(found, "own", "why")]))
 
 

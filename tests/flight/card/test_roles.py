@@ -41,7 +41,7 @@ def log(
 
 def holding(name: str, vehicle: str = "", **parts: dict[str, Any]) -> CardItem:
     streams = {part: make_stream(part, columns) for part, columns in parts.items()}
-    return CardItem(name, 1, "gpx", RawLog("gpx", streams, vehicle=vehicle))
+    return CardItem(name, "gpx", RawLog("gpx", streams, vehicle=vehicle))
 
 
 DRONE = log("drone", attitude=True)
@@ -111,5 +111,5 @@ def test_rows_that_cannot_be_used_are_no_track():
     t = np.arange(5.0)
     columns = {"time_s": t, "latitude_deg": t, "longitude_deg": t, "height_sea_m": t}
     stream = make_stream("gnss", columns, unusable={"no fix": np.ones(5, bool)})
-    choice = choose_roles([CardItem("bench", 1, "gpx", RawLog("gpx", {"gnss": stream}))], {})[0]
+    choice = choose_roles([CardItem("bench", "gpx", RawLog("gpx", {"gnss": stream}))], {})[0]
     assert choice.role == "nothing"

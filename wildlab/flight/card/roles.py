@@ -47,8 +47,6 @@ class CardItem:
     ----------
     name
         Below the source folder, with ``/``.
-    size
-        Bytes.
     format
         As in `FORMATS` and `FOLDERS`; empty where none is known.
     log
@@ -58,7 +56,6 @@ class CardItem:
     """
 
     name: str
-    size: int
     format: str = ""
     log: RawLog | None = None
     problem: str = ""
@@ -139,7 +136,7 @@ def search(
         name = path.resolve().relative_to(source.resolve()).as_posix()
         if folder or path.suffix.lower() not in KNOWN_OTHERS:
             tell(name)
-        found.append(_read_folder(path, name, folder, zone) if folder else _read_file(path, name, zone))
+        found.append(_read(path, name, folder, zone))
     return sorted(found, key=lambda one: one.name)
 
 
@@ -147,7 +144,9 @@ def _items(paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
     """Files, and folders of one of `FOLDERS`, each once."""
     seen: set[Path] = set()
     for path in paths:
-        for item, folder in _below(path) if path.is_dir() else _single(path):
+        if path.is_file() and path.suffix.lower() in IMAGES:
+            raise WildlabError("is a single image", "name the folder of the images", file=path)
+        for item, folder in _below(path) if path.is_dir() else [(path, "")]:
             key = item.resolve() / folder
             if key not in seen:
                 seen.add(key)
@@ -156,12 +155,6 @@ def _items(paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
                 raise WildlabError(
                     f"there are more than {MOST_FILES} files", "name the folder of one flight", file=path
                 )
-
-
-def _single(path: Path) -> Iterator[tuple[Path, str]]:
-    if path.suffix.lower() in IMAGES:
-        raise WildlabError("is a single image", "name the folder of the images", file=path)
-    yield path, ""
 
 
 def _below(folder: Path) -> Iterator[tuple[Path, str]]:
@@ -191,32 +184,27 @@ def _is_yolo(path: Path) -> bool:
         return False
 
 
-def _read_folder(folder: Path, name: str, format_: str, zone: str | None) -> CardItem:
-    size = sum(one.stat().st_size for one in folder.rglob("*") if one.is_file())
-    try:
-        log, _ = read_folder(folder, format_, zone)
-    except WildlabError as error:
-        return CardItem(name, size, format_, problem=_why(error))
-    return CardItem(name, size, format_, log)
-
-
-def _read_file(path: Path, name: str, zone: str | None) -> CardItem:
-    if path.is_symlink() and not path.resolve().is_file():
-        return CardItem(name, 0, problem="a link that leads nowhere")
-    size = path.stat().st_size
-    try:
-        with path.open("rb") as stored:
-            head = stored.read(HEAD)
-    except OSError as error:
-        return CardItem(name, size, problem=f"cannot be opened ({error.strerror})")
-    format_ = recognise(head, path.name)
+def _read(path: Path, name: str, folder: str, zone: str | None) -> CardItem:
+    """A file, or a folder of one of `FOLDERS`, read where a reader knows it."""
+    format_: str | None = folder
+    if not folder:
+        if path.is_symlink() and not path.resolve().is_file():
+            return CardItem(name, problem="a link that leads nowhere")
+        try:
+            with path.open("rb") as stored:
+                head = stored.read(HEAD)
+        except OSError as error:
+            return CardItem(name, problem=f"cannot be opened ({error.strerror})")
+        format_ = recognise(head, path.name)
     if format_ is None:
         known = path.suffix.lower() in KNOWN_OTHERS
-        return CardItem(name, size, problem=OTHER if known else _unknown(head))
+        return CardItem(name, problem=OTHER if known else _unknown(head))
     try:
-        return CardItem(name, size, format_, read_log(path, read_regular(path, RAW_LIMIT), format_, zone))
+        if folder:
+            return CardItem(name, format_, read_folder(path, format_, zone)[0])
+        return CardItem(name, format_, read_log(path, read_regular(path, RAW_LIMIT), format_, zone))
     except WildlabError as error:
-        return CardItem(name, size, format_, problem=_why(error))
+        return CardItem(name, format_, problem=_why(error))
 
 
 def _unknown(head: bytes) -> str:
