@@ -24,7 +24,7 @@ def test_wrong_bytes_leave_nothing(web, dataset, tmp_path, monkeypatch, bad, mir
     if mirrored:
         monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(web[1]))
     with pytest.raises(WildlabError) as caught:
-        fetch("small", tmp_path / "here")
+        fetch("small")
     for content in (b"evil", GOOD[f"{bad}.csv"]):
         assert hashlib.sha256(content).hexdigest() in str(caught.value)
     assert f"{bad}.csv" in str(caught.value)
@@ -50,9 +50,10 @@ def web(tmp_path: Path) -> Iterator[tuple[str, Path]]:
 
 
 @pytest.fixture
-def dataset(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+def dataset(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[str], None]:
     """``dataset("http://...")`` makes a catalog with one data set of two files at that address."""
     monkeypatch.delenv("WILDLAB_DATA_MIRROR", raising=False)
+    monkeypatch.setattr(catalog, "fetched", lambda: tmp_path / "here")
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
 
     def make(address: str) -> None:
@@ -82,21 +83,20 @@ def test_download_and_not_again(web, dataset, tmp_path):
     dataset(web[0])
     _put(web[1])
     told: list[tuple[str, int, int]] = []
-    here = tmp_path / "here"
 
     def fetched() -> list[Path]:
         told.clear()
-        return fetch("small", here, lambda *progress: told.append(progress))
+        return fetch("small", lambda *progress: told.append(progress))
 
-    assert not is_fetched("small", here)
+    assert not is_fetched("small")
     paths = fetched()
     assert [path.read_bytes() for path in paths] == list(GOOD.values())
     assert told == [("a.csv", 0, 2), ("b.csv", 1, 2)]
-    assert is_fetched("small", here)
+    assert is_fetched("small")
     (web[1] / "a.csv").unlink()
     assert fetched() == paths and told == []
     paths[1].write_bytes(b"changed")
-    assert not is_fetched("small", here)
+    assert not is_fetched("small")
     fetched()
     assert told == [("b.csv", 0, 1)]
     assert paths[1].read_bytes() == b"two\n"
@@ -105,7 +105,7 @@ def test_download_and_not_again(web, dataset, tmp_path):
 def test_no_network_and_no_mirror_is_one_sentence(dataset, tmp_path):
     dataset("http://127.0.0.1:1")
     with pytest.raises(WildlabError, match="WILDLAB_DATA_MIRROR") as caught:
-        fetch("small", tmp_path / "here")
+        fetch("small")
     assert caught.value.__cause__ is None
     assert caught.value.__suppress_context__
     assert list(tmp_path.iterdir()) == []
@@ -116,7 +116,7 @@ def test_mirror_instead_of_network(dataset, tmp_path, monkeypatch, layout):
     dataset("http://127.0.0.1:1")
     monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(tmp_path / "mirror"))
     _put(tmp_path / "mirror" / layout)
-    paths = fetch("small", tmp_path / "here")
+    paths = fetch("small")
     assert [path.read_bytes() for path in paths] == list(GOOD.values())
     assert sorted(path.name for path in (tmp_path / "here" / "small").iterdir()) == ["a.csv", "b.csv"]
 
@@ -137,12 +137,13 @@ def test_an_unknown_data_set_lists_the_known():
         (("4785d352", "4785D352"), "sha256"),
     ],
 )
-def test_the_catalog_is_checked(tmp_path, change, said):
+def test_the_catalog_is_checked(tmp_path, monkeypatch, change, said):
     text = (catalog.DATA / "catalog.toml").read_text()
     assert change[0] in text
     (tmp_path / "catalog.toml").write_text(text.replace(*change))
+    monkeypatch.setattr(catalog, "DATA", tmp_path)
     with pytest.raises(WildlabError, match=said):
-        read_catalog(tmp_path / "catalog.toml")
+        read_catalog()
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -152,7 +153,7 @@ def test_no_more_bytes_are_taken_than_the_catalog_says(web, dataset, tmp_path, m
     if mirrored:
         monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(web[1]))
     with pytest.raises(WildlabError, match="larger than the 4"):
-        fetch("small", tmp_path / "here")
+        fetch("small")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["web"]
 
 
@@ -161,7 +162,7 @@ def test_a_folder_in_the_way_of_a_file(web, dataset, tmp_path):
     _put(web[1])
     (tmp_path / "here" / "small" / "b.csv").mkdir(parents=True)
     with pytest.raises(WildlabError, match="in the way"):
-        fetch("small", tmp_path / "here")
+        fetch("small")
     assert not (tmp_path / "here" / "small" / "a.csv").exists()
 
 
@@ -173,5 +174,5 @@ def test_a_link_out_of_the_folder_is_not_written_through(web, dataset, tmp_path)
     (tmp_path / "here" / "small").mkdir(parents=True)
     (tmp_path / "here" / "small" / "a.csv").symlink_to(mine)
     with pytest.raises(WildlabError, match="leaves the folder"):
-        fetch("small", tmp_path / "here")
+        fetch("small")
     assert mine.read_text() == "mine"

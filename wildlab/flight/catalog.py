@@ -77,13 +77,8 @@ class _Catalog(RootModel[dict[str, DataSet]]):
         return value
 
 
-def read_catalog(path: Path | None = None) -> dict[str, DataSet]:
+def read_catalog() -> dict[str, DataSet]:
     """The data sets by name.
-
-    Parameters
-    ----------
-    path
-        The catalog; left out, wildlab's own.
 
     Returns
     -------
@@ -100,7 +95,7 @@ def read_catalog(path: Path | None = None) -> dict[str, DataSet]:
     >>> "openathena" in read_catalog()
     True
     """
-    path = DATA / "catalog.toml" if path is None else path
+    path = DATA / "catalog.toml"
     return check_model(_Catalog, read_toml(path, "the catalog of data sets"), path).root
 
 
@@ -118,8 +113,8 @@ def find_dataset(name: str) -> DataSet:
     return catalog[name]
 
 
-def dataset_folder(name: str, into: Path | None = None) -> Path:
-    """Folder of a data set below `into` (by default `wildlab.paths.fetched`), fetched or not.
+def dataset_folder(name: str) -> Path:
+    """Folder of a data set below `wildlab.paths.fetched`, fetched or not.
 
     Raises
     ------
@@ -127,18 +122,16 @@ def dataset_folder(name: str, into: Path | None = None) -> Path:
         Where there is no data set of that name.
     """
     find_dataset(name)
-    return (fetched() if into is None else into) / name
+    return fetched() / name
 
 
-def is_fetched(name: str, into: Path | None = None) -> bool:
+def is_fetched(name: str) -> bool:
     """Whether every file of a data set is there and has the right checksum.
 
     Parameters
     ----------
     name
         Of the data set.
-    into
-        Folder that holds data sets; left out, that of wildlab.
 
     Returns
     -------
@@ -149,11 +142,11 @@ def is_fetched(name: str, into: Path | None = None) -> bool:
     WildlabError
         Where there is no data set of that name.
     """
-    folder = dataset_folder(name, into)
+    folder = dataset_folder(name)
     return all(_is_right(folder / file.path, file) for file in find_dataset(name).files)
 
 
-def fetch(name: str, into: Path | None = None, progress: Progress | None = None) -> list[Path]:
+def fetch(name: str, progress: Progress | None = None) -> list[Path]:
     """Get the files of a data set; those that are there and right are not fetched again.
 
     All of them or none: a failure leaves the folder as it was.
@@ -162,8 +155,6 @@ def fetch(name: str, into: Path | None = None, progress: Progress | None = None)
     ----------
     name
         Of the catalog.
-    into
-        Folder to put the folder of the data set in, by default `wildlab.paths.fetched`.
     progress
         Called before each file that has to be fetched.
 
@@ -178,7 +169,7 @@ def fetch(name: str, into: Path | None = None, progress: Progress | None = None)
         checksum is wrong, or the folder cannot take it (a link out of it, a folder in the way, a full disk).
     """
     dataset = find_dataset(name)
-    folder = dataset_folder(name, into)
+    folder = dataset_folder(name)
     missing = [file for file in dataset.files if not _is_right(folder / file.path, file)]
     if missing:
         for file in missing:
