@@ -38,7 +38,7 @@ def write(path: Path, image: np.ndarray) -> Path:
     return path
 
 
-def fff(counts: np.ndarray, planck: Planck, *, as_png: bool = False, swapped: bool = False) -> bytes:
+def fff(counts: np.ndarray, *, as_png: bool = False, swapped: bool = False) -> bytes:
     """Records of FLIR as a camera would write them."""
     height, width = counts.shape
     if as_png:
@@ -49,8 +49,8 @@ def fff(counts: np.ndarray, planck: Planck, *, as_png: bool = False, swapped: bo
     raw = struct.pack("<HHH", 2, width, height).ljust(32, b"\0") + body
     camera = bytearray(0x400)
     struct.pack_into("<H", camera, 0, 2)
-    struct.pack_into("<fff", camera, 0x58, planck.R1, planck.B, planck.F)
-    struct.pack_into("<if", camera, 0x308, int(planck.O), planck.R2)
+    struct.pack_into("<fff", camera, 0x58, PLANCK.R1, PLANCK.B, PLANCK.F)
+    struct.pack_into("<if", camera, 0x308, int(PLANCK.O), PLANCK.R2)
     head = b"FFF\0" + b"made".ljust(16, b"\0") + struct.pack(">III", 100, 64, 2)
     head = head.ljust(64, b"\0")
     at = 64 + 2 * 32
@@ -86,7 +86,7 @@ def test_temperatures_are_those_of_plancks_law(tmp_path):
     kelvin = np.linspace(280, 320, 64 * 48).reshape(48, 64)
     counts = PLANCK.R1 / (PLANCK.R2 * (np.exp(PLANCK.B / kelvin) - PLANCK.F)) - PLANCK.O
     assert np.abs(to_kelvin(np.rint(counts).astype(np.uint16), PLANCK) - kelvin).max() < 0.02
-    records = fff(np.rint(counts).astype(np.uint16), PLANCK)
+    records = fff(np.rint(counts).astype(np.uint16))
     (tmp_path / "a.fff").write_bytes(records)
     (tmp_path / "b.jpg").write_bytes(as_jpeg(records, piece=1000))
     for frame in open_frames(tmp_path):
@@ -97,14 +97,14 @@ def test_temperatures_are_those_of_plancks_law(tmp_path):
 @pytest.mark.parametrize("swapped", [False, True])
 def test_a_png_of_either_order_of_bytes_gives_the_same_counts(swapped):
     counts = (3000 + np.add.outer(np.arange(40), np.arange(50))).astype(np.uint16)
-    found = read_records(fff(counts, PLANCK, as_png=True, swapped=swapped))
+    found = read_records(fff(counts, as_png=True, swapped=swapped))
     assert not isinstance(found, str)
     assert (found.counts == counts).all()
 
 
 def test_records_that_lie_or_lack_a_piece_are_sentences():
     counts = np.full((20, 30), 3000, np.uint16)
-    whole = fff(counts, PLANCK)
+    whole = fff(counts)
     assert "cut off" in str(read_records(whole[:700]))
     lying = whole.replace(struct.pack("<HHH", 2, 30, 20), struct.pack("<HHH", 2, 60000, 60000))
     assert "claims 60000 x 60000 pixels" in str(read_records(lying))
@@ -258,7 +258,7 @@ def test_kinds_of_numbers(tmp_path):
 
 def test_polarity_is_the_callers_unless_the_file_knows(tmp_path):
     write(tmp_path / "a.png", scene())
-    (tmp_path / "b.fff").write_bytes(fff(np.full((96, 128), 3000, np.uint16) + scene(), PLANCK))
+    (tmp_path / "b.fff").write_bytes(fff(np.full((96, 128), 3000, np.uint16) + scene()))
     grey, kelvin = open_frames(tmp_path, polarity="black-hot")
     assert (grey.polarity, kelvin.polarity) == ("black-hot", "white-hot")
 

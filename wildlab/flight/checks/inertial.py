@@ -113,15 +113,15 @@ class Moves:
         """The specific force that goes with it, in n. (K, 3)"""
         return self.acceleration - [0.0, 0.0, USUAL_GRAVITY]
 
-    def course_rate(self, slowest: float) -> Array:
-        """How fast the course turns, rad/s; NaN below a speed. (K,)"""
+    def course_rate(self) -> Array:
+        """How fast the course turns, rad/s; NaN where it is too slow for a course. (K,)"""
         north, east = self.before[:, 0], self.before[:, 1]
         turned = np.arctan2(
             north * self.after[:, 1] - east * self.after[:, 0],
             north * self.after[:, 0] + east * self.after[:, 1],
         )
         speed = np.minimum(np.hypot(north, east), np.hypot(self.after[:, 0], self.after[:, 1]))
-        return np.where(speed > slowest, turned / (self.end - self.start), np.nan)
+        return np.where(speed > SLOWEST, turned / (self.end - self.start), np.nan)
 
 
 @dataclass(frozen=True)
@@ -472,7 +472,7 @@ def _rate_unit(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[F
                 return
     if moved is not None:
         speed = np.linalg.norm(imu.mean_rate(moved.start, moved.end), axis=1)
-        course = np.abs(moved.course_rate(SLOWEST))
+        course = np.abs(moved.course_rate())
         good = np.isfinite(speed) & (course > TURNING)
         if good.sum() >= ENOUGH_TURNS:
             ratio = np.median(speed[good] / course[good])
@@ -562,7 +562,7 @@ def _turning(imu: Inertial, moved: Moves | None) -> tuple[Array, Array] | None:
     """Rates (K, 3) and how fast the course turns (K,), where there are turns."""
     if moved is None:
         return None
-    rate, course = imu.mean_rate(moved.start, moved.end), moved.course_rate(SLOWEST)
+    rate, course = imu.mean_rate(moved.start, moved.end), moved.course_rate()
     good = np.isfinite(rate).all(axis=1) & np.isfinite(course)
     return (rate[good], course[good]) if (good & (np.abs(course) > TURNING)).sum() >= ENOUGH else None
 
