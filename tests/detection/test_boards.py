@@ -1,4 +1,4 @@
-"""Boards are found where they are, warm on cold or cold on warm, and coded ones are told apart."""
+"""Boards are found where they are, warm on cold or cold on warm."""
 
 import cv2
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 
 from tests.refused import refused
 from wildlab.detection import boards
-from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_board, grey8
+from wildlab.detection.boards import Board, find_board, grey8
 from wildlab.geometry.board_views import Views, parameters_of, project_board
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
@@ -75,15 +75,6 @@ def test_what_is_not_there_is_not_found():
         find_board(grey8(image(BOARDS[0], np.random.default_rng(1), 200, 50)), Board("chessboard", 9, 8))
         is None
     )
-
-
-@pytest.mark.slow
-def test_codes_are_counted_either_way_round_and_not_in_plain_boards():
-    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_250)
-    coded = cv2.aruco.CharucoBoard((7, 5), 0.03, 0.022, family).generateImage((420, 300), marginSize=20)
-    assert count_codes(coded) >= FEWEST_CODES
-    assert count_codes(255 - coded) >= FEWEST_CODES
-    assert count_codes(grey8(image(BOARDS[0], np.random.default_rng(1), 200, 50))) < FEWEST_CODES
 
 
 def test_points_of_a_staggered_grid_are_half_a_step_apart():

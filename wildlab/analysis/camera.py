@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.analysis import Fact, fact
-from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_board, grey8
+from wildlab.detection.boards import Board, find_board, grey8
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
 from wildlab.flight.manifest_parts import CameraPart
@@ -33,8 +33,6 @@ from wildlab.geometry.intrinsics import (
 )
 from wildlab.names import listed
 
-#: In how many images codes are looked for where boards are found without them.
-LOOKED_AT = 2
 #: A view disagrees where its held-out error is this many times the median, and this many robust standard
 #: deviations above it.
 TIMES, DEVIATIONS = 3.0, 4.0
@@ -141,7 +139,7 @@ def calibrate_images(
     Raises
     ------
     WildlabError
-        Where the images have several sizes, show a coded board, too few show the board, or no camera fits.
+        Where the images have several sizes, too few show the board, or no camera fits.
     """
     unknown = sorted(set(leave_out) - {file_name(path) for path in paths})
     if unknown:
@@ -160,14 +158,6 @@ def calibrate_images(
         pixels = frame.image
         sizes[frame.name] = (pixels.shape[1], pixels.shape[0])
         images.append(_look(frame.name, pixels, board))
-        if len(sizes) <= LOOKED_AT or images[-1].uv is None:
-            codes = count_codes(grey8(pixels))
-            if codes >= FEWEST_CODES:
-                raise WildlabError(
-                    f"shows a coded board ({codes} codes were read), and such boards are not read",
-                    "photograph a plain chessboard or a grid of circles",
-                    file=path,
-                )
     width, height = _one_size(sizes)
     wanted = f"most of the images have {width} x {height}"
     images = [

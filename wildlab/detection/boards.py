@@ -20,10 +20,6 @@ from wildlab.geometry.frames import Array
 Pattern = Literal["chessboard", "circles", "staggered circles"]
 Grey = NDArray[np.uint8]
 
-#: Codes that common coded boards carry.
-CODES = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
-#: Fewer codes than this may be chance.
-FEWEST_CODES = 4
 #: Of a square's side, how far about a corner its edges are looked at.
 WINDOW = 0.35
 #: Shares of the pixels that an image is stretched between: a few hot ones do not make the rest dark.
@@ -131,29 +127,6 @@ def find_board(grey: Grey, board: Board) -> BoardImage | None:
                 # Squares are dark and light in turn: which way round they were found says nothing of them.
                 return BoardImage(_refined(uv, grey, board), inverted and find is _by_grid)
     return None
-
-
-def count_codes(grey: Grey) -> int:
-    """How many different codes of a coded board (ArUco, ChArUco) an image shows, either way round.
-
-    Parameters
-    ----------
-    grey
-        (H, W) uint8.
-
-    Returns
-    -------
-    int
-        Of the family with the most; fewer than `FEWEST_CODES` may be chance.
-    """
-    most = 0
-    settings = cv2.aruco.DetectorParameters()
-    settings.detectInvertedMarker = True
-    for name in CODES:
-        family = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
-        _, ids, _ = cv2.aruco.ArucoDetector(family, settings).detectMarkers(grey)
-        most = max(most, 0 if ids is None else len(np.unique(ids)))
-    return most
 
 
 def _by_grid(grey: Grey, board: Board) -> Array | None:
