@@ -142,8 +142,7 @@ def test_what_planning_takes_is_measured_for_each_world(monkeypatch):
     clock = iter(np.arange(0.0, 1e6, 0.25))
     monkeypatch.setattr(information_planning, "process_time", lambda: next(clock))
     cost = information_planning.planning_cost([2], "uav-search")
-    # Two intervals of a quarter of a second for each decision, one to choose and one to add.
-    assert cost["decision"].tolist() == [0.5]
-    assert cost["load"].iloc[0] == pytest.approx(0.5 / 3, rel=0.4) and cost["load"].iloc[0] < 0.5 / 3
+    assert cost["decision"].tolist() == [0.25]
+    assert cost["load"].iloc[0] == pytest.approx(0.25 / 3, rel=0.4) and cost["load"].iloc[0] < 0.25 / 3
     monkeypatch.setattr(information_planning, "TIMED", 0)
     assert information_planning.planning_cost([2, 3], "uav-search").empty

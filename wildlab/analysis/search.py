@@ -20,7 +20,7 @@ from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.areas import contains
 from wildlab.planning.information import SearchSensor, detection_probability, in_field_of_view
 from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk
-from wildlab.planning.patterns import Pattern, lawn_mower
+from wildlab.planning.patterns import lawn_mower
 from wildlab.planning.planner import (
     SEARCH,
     InformationPlanner,
@@ -286,10 +286,6 @@ class Searcher(Protocol):
         """
         ...
 
-    def flown(self, leg: Leg) -> None:
-        """Told of each leg that was flown."""
-        ...
-
 
 def search(
     world: World, searcher: Searcher, start: Platform, sensor: SearchSensor, flying: Flying
@@ -328,7 +324,6 @@ def search(
         shown = found_in(world, leg, rows, sensor) & still
         for image in range(flying.images):
             found[shown[image] & np.isinf(found)] = times[image]
-        searcher.flown(leg)
         platform, clock = leg.end, float(times[-1])
         p_nc.append(leg.p_nc)
         at.append(times)
@@ -377,12 +372,10 @@ class SearchByInformation:
     def next_leg(self, platform: Platform, open_areas: Mask) -> Leg:
         """As `Searcher` has it."""
         self.planner.weights[:] = open_areas[self.area_of]
-        return self.planner.choose(platform).leg
-
-    def flown(self, leg: Leg) -> None:
-        """As `Searcher` has it."""
+        leg = self.planner.choose(platform).leg
         self.planner.add(leg)
         self.planner.wait(self.walk * float(leg.at[-1]))
+        return leg
 
 
 class SearchInRows:
@@ -432,17 +425,9 @@ class SearchInRows:
             if not self._queue:
                 self._queue = [one for one in self.order if open_areas[one]]
             self._area = self._queue.pop(0)
-            rows = rows_from(self.areas[self._area], self.distance, platform.north_east)
+            rows = lawn_mower(self.areas[self._area], self.distance, start=platform.north_east)
             self._now = PatternPlanner(rows.waypoints, self.terrain, self.flying, self.sides)
         return self._now
-
-    def flown(self, leg: Leg) -> None:
-        """As `Searcher` has it; rows do not ask what was seen."""
-
-
-def rows_from(area: Array, distance: float, start: Array) -> Pattern:
-    """Rows over an area that begin at the corner nearest to where one is."""
-    return lawn_mower(area, distance, start=start)
 
 
 class SearchByChance:
@@ -466,9 +451,6 @@ class SearchByChance:
         """As `Searcher` has it."""
         self._walk.areas = [area for area, still in zip(self.areas, open_areas, strict=True) if still]
         return self._walk.choose(platform)
-
-    def flown(self, leg: Leg) -> None:
-        """As `Searcher` has it; chance does not ask what was seen."""
 
 
 def grid_over(areas: Sequence[Array], terrain: Terrain, step: float) -> tuple[Array, Indices]:

@@ -65,12 +65,6 @@ class _Timed:
         self.seconds.append(process_time() - began)
         return chosen
 
-    def flown(self, leg: Leg) -> None:
-        """As `Searcher` has it."""
-        began = process_time()
-        self.searcher.flown(leg)
-        self.seconds[-1] += process_time() - began
-
 
 def planning_cost(seeds: Iterable[int], twin: str) -> pd.DataFrame:
     """What planning by information takes of the processor, without the world and the camera about it.
