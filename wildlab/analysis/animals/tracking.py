@@ -20,13 +20,11 @@ from wildlab.analysis.animals.images import (
     Detector,
     Images,
     footprint_circles,
-    put_on_ground,
-    shown,
     sight_from,
+    take_images,
 )
 from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course
@@ -247,6 +245,14 @@ class Ledger:
         self._own = np.zeros(animals, np.int64)
         self._after_last: dict[int, float] = {}
 
+    def take(self, image: int, follower: Follower, look: ImageLook, animals: Indices) -> None:
+        """Let the tracks have an image, and enter its detections; ``animals`` (M,) whose these are."""
+        # First on to the image alone: a trace before it is one at its time.
+        follower.step(blind(look.time))
+        before = traces_of(follower)
+        names = follower.step(look)
+        self.enter(image, look.time, animals, names, before, traces_of(follower))
+
     def enter(
         self,
         image: int,
@@ -314,29 +320,28 @@ def follow(
     detected[images.image] = True
     ledger, known = Ledger(images.truth.shape[1]), list[Known]()
     steps, k, tells = 0, 0, True
-
-    def look(k: int) -> ImageLook:
-        z, R, _ = images.taken(k)
-        p, circle = images.poses, (middle[k], float(radius[k]))
-        sight = sight_from(terrain, p.camera, p.p_nc[k], p.R_nc[k], circle, detector)
-        return ImageLook(float(times[k]), z, R, sight)
-
     while k < T:
         steps += 1
-        time = float(times[k])
+        look = look_at(terrain, images, k, (middle[k], float(radius[k])), detector)
         if detected[k]:
-            # First on to the image alone: a trace before it is one at its time.
-            follower.step(blind(time))
-            before = traces_of(follower)
-            names = follower.step(look(k))
-            ledger.enter(k, time, images.taken(k)[2], names, before, traces_of(follower))
+            ledger.take(k, follower, look, images.taken(k)[2])
         else:
-            follower.step(look(k) if tells else blind(time))
+            follower.step(look if tells else blind(look.time))
         if stations[k]:
             known.append(Known(k, *follower.known()))
         k, tells = next_look(follower, k, times, middle, radius, detected | stations, motion)
     tracks = max((one.track for one in ledger.found), default=0)
     return FollowedAnimals(known, ledger.found, steps, tracks)
+
+
+def look_at(
+    terrain: Terrain, images: Images, row: int, circle: tuple[Array, float], detector: Detector
+) -> ImageLook:
+    """What one of the images tells tracks; ``circle`` is that of its footprint."""
+    z, R, _ = images.taken(row)
+    p = images.poses
+    sight = sight_from(terrain, p.camera, p.p_nc[row], p.R_nc[row], circle, detector)
+    return ImageLook(float(images.times[row]), z, R, sight)
 
 
 def blind(time: float) -> ImageLook:
@@ -511,9 +516,19 @@ def patrol(
             sought, arrived, scanned = goal, False, 0.0
         arrived |= goal != SEARCH and away <= reach
         scanned += step if arrived else 0.0
-        told = _pose(terrain, aircraft, here, heading, times[k : k + 1])
-        true = displaced(told, [heading], off[k : k + 1], turn[k : k + 1])
-        _see(terrain, aircraft, told, true, heading, truth[k], time, follower, ledger, k, rng)
+        row = slice(k, k + 1)
+        up = float(np.nan_to_num(terrain.heights_at(here[None]))[0]) + aircraft.height
+        told = camera_on_course(
+            aircraft.camera, np.array([[*here, -up]]), [heading], aircraft.gimbal(times[row])
+        )
+        true = displaced(told, [heading], off[row], turn[row])
+        images = take_images(
+            terrain, told, true, np.array([heading]), times[row], truth[row], aircraft.errors,
+            aircraft.detector, rng,
+        )  # fmt: skip
+        middle, radius = footprint_circles(terrain, told)
+        look = look_at(terrain, images, 0, (middle[0], float(radius[0])), aircraft.detector)
+        ledger.take(k, follower, look, images.taken(0)[2])
         if scanned > visits.patience and not follower.seen_now(goal):
             follower.give_up(goal)
             given_up.append(goal)
@@ -525,43 +540,6 @@ def patrol(
         times[:flown], np.array(path).reshape(-1, 3), np.array(goals, np.int64), known, ledger.found,
         given_up, done,
     )  # fmt: skip
-
-
-def _pose(terrain: Terrain, aircraft: Aircraft, here: Array, heading: float, time: Array) -> CameraPoses:
-    up = float(np.nan_to_num(terrain.heights_at(here[None]))[0]) + aircraft.height
-    p = np.array([[here[0], here[1], -up]])
-    return camera_on_course(aircraft.camera, p, [heading], aircraft.gimbal(time))
-
-
-def _see(
-    terrain: Terrain, aircraft: Aircraft, told: CameraPoses, true: CameraPoses, heading: float,
-    truth: Array, time: float, follower: Particles, ledger: Ledger, k: int, rng: np.random.Generator,
-) -> None:  # fmt: skip
-    """One image for the tracks."""
-    detector = aircraft.detector
-    in_view = shown(terrain, true.camera, true.p_nc[0], true.R_nc[0], truth, detector)
-    seen = np.flatnonzero(in_view & (rng.random(len(truth)) < detector.detected))
-    z, R = np.zeros((0, 2)), np.zeros((0, 2, 2))
-    if len(seen):
-        rows = np.zeros(len(seen), np.intp)
-        z, R = put_on_ground(
-            terrain,
-            told.take(rows),
-            true.take(rows),
-            np.full(len(seen), heading),
-            truth[seen],
-            aircraft.errors,
-            detector,
-            rng,
-        )
-    follower.step(blind(time))
-    before = traces_of(follower)
-    middle, radius = footprint_circles(terrain, told)
-    sight = sight_from(
-        terrain, told.camera, told.p_nc[0], told.R_nc[0], (middle[0], float(radius[0])), detector
-    )
-    names = follower.step(ImageLook(time, z, R, sight))
-    ledger.enter(k, time, seen, names, before, traces_of(follower))
 
 
 #: An animal is out of sight once it has not been detected for so long, s. Chosen.
