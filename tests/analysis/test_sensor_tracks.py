@@ -78,9 +78,6 @@ def test_clock_noise_and_correlation_come_back():
     assert np.mean([one.sd for one in found]) == pytest.approx(2.0, rel=0.12)
     assert np.mean([one.correlation_time_s for one in found]) == pytest.approx(6.0, rel=0.4)
     assert np.mean([one.next_correlation for one in found]) == pytest.approx(correlation, abs=0.05)
-    assert np.mean([one.driving_sd for one in found]) == pytest.approx(
-        2 * np.sqrt(1 - correlation**2), rel=0.15
-    )
 
 
 # --- following ----------------------------------------------------------------------------------------------

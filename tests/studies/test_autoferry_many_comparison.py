@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.many import ManyTracks, judged
-from wildlab.analysis.tracks.tracker import track
+from wildlab.analysis.tracks.many import ManyTracks, judged, track_jointly
 from wildlab.errors import WildlabError
 from wildlab.studies import autoferry_many
 from wildlab.studies.autoferry_many import stone_soup, tuning
@@ -201,7 +200,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, mo
     # One of them by hand, from the flight on.
     row = rows[(rows["case"] == "scenario-17") & (rows["mode"] == "radar") & (rows["rank"] == 2)].iloc[0]
     drawn = draw_choice(np.random.default_rng(1).spawn(2)[row["draw"] - 1], autoferry_many.FAR_M)
-    given = track(scenario(17), "joint", settings=settings, sensors=["radar"])
+    given = track_jointly(scenario(17), settings=settings, sensors=["radar"])
     shown = run_stone_soup(given.scans, ["radar"], drawn)
     lives = judged(given._replace(shown=shown), tuning.reach_of(scenario(17), "radar"))
     assert tuning.gospa_of(lives) == row["gospa"]

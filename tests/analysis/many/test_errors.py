@@ -20,7 +20,6 @@ from wildlab.analysis.georeference import (
 from wildlab.analysis.tracks.ground_positions import (
     OF_COVARIANCE,
     LastingErrors,
-    OfPose,
     _pose_roots,
     counted_twice,
     laid_out,
@@ -31,9 +30,8 @@ from wildlab.analysis.tracks.ground_positions import (
     stated_roots,
     told_errors,
 )
-from wildlab.analysis.tracks.many import tracks_table
+from wildlab.analysis.tracks.many import track_jointly, tracks_table
 from wildlab.analysis.tracks.scans import scans_of
-from wildlab.analysis.tracks.tracker import track
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, rotation_vector_to_matrix
@@ -105,7 +103,9 @@ def _pixels() -> tuple[Flight, Observations]:
 MANUAL = "manual", "autopilot"
 
 
-def taken(flight: Flight, observed: Observations, lasting_s: float = np.inf) -> tuple[PoseErrors, OfPose]:
+def taken(
+    flight: Flight, observed: Observations, lasting_s: float = np.inf
+) -> tuple[PoseErrors, tuple[np.ndarray, tuple[str, ...]]]:
     belief = believed(flight, "", *MANUAL)[1]
     told = told_errors(flight, observed, belief)
     return told, of_poses(flight, observed, told, belief, lasting_s)
@@ -127,7 +127,7 @@ def test_an_error_stays_itself_along_the_flight():
         assert np.allclose(phi @ roots[a], roots[b], atol=1e-9)
     points = georeference(observed, np.random.default_rng(0))
     linear = points["ellipse"].to_numpy(str) == "linear"
-    of_pose = OfPose(roots, OF_COVARIANCE)
+    of_pose = roots, OF_COVARIANCE
     _, shared, _ = of_pixels(observed, errors, of_pose, covariances_of(points), np.inf)
     small = 1e-4
     for i in (0, 4, 5):
@@ -159,7 +159,7 @@ def test_a_heading_that_is_off_is_in_the_covariance_of_tracks():
     nees = []
     flight = robot_flight(heading_off_deg=3.0, labelled=False)
     for considered in ("", "[sensors.radar.considered.heading]\nsd_deg = 3.0\n"):
-        followed = track(flight, "joint", settings=parse_settings(NOISE + considered))
+        followed = track_jointly(flight, settings=parse_settings(NOISE + considered))
         own = []
         for one in followed.shown[20:]:
             e = one.x[:, :2] - boat(np.array([one.time]))
@@ -207,7 +207,7 @@ def test_mount_and_ground_are_in_what_is_shared_and_stay():
     errors = pose_errors(observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
     points = georeference(observed, np.random.default_rng(0), errors)
     linear = points["ellipse"].to_numpy(str) == "linear"
-    of_pose = OfPose(_pose_roots(observed, errors), OF_COVARIANCE)
+    of_pose = _pose_roots(observed, errors), OF_COVARIANCE
     R, shared, found = of_pixels(observed, errors, of_pose, np.full((len(observed.uv), 2, 2), np.nan), 7.0)
     whole = R + shared @ np.swapaxes(shared, 1, 2)
     assert linear.sum() > 100 and np.allclose(whole[linear], covariances_of(points)[linear], rtol=1e-6)
@@ -227,7 +227,7 @@ def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one():
 
 def test_tables_of_tracks_are_smoothed_by_what_lasts():
     told = NOISE + "[sensors.radar.considered.heading]\nsd_deg = 3.0\ncorrelation_time_s = 5.0\n"
-    followed = track(robot_flight(labelled=False, seconds=60.0), "joint", settings=parse_settings(told))
+    followed = track_jointly(robot_flight(labelled=False, seconds=60.0), settings=parse_settings(told))
     table = tracks_table(followed)
     after = smooth_many(followed.shown, followed.targets.density, followed.lasting_s)
     forever = smooth_many(followed.shown, followed.targets.density, [np.inf])
@@ -240,7 +240,7 @@ def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_la
     flight = robot_flight(labelled=False, seconds=30.0)
     covariances = []
     for more in ("", "[sensors.radar]\ncorrelation = 0.0\n", "[sensors.radar]\ncorrelation = 0.8\n"):
-        table = tracks_table(track(flight, "joint", settings=parse_settings(more + NOISE)))
+        table = tracks_table(track_jointly(flight, settings=parse_settings(more + NOISE)))
         assert np.isfinite(table["smoothed_north_m"]).all()
         covariances.append(float(table["smoothed_p_00"].mean()) if "smoothed_p_00" in table else np.nan)
     assert np.isnan(covariances[0]) and covariances[2] > 1.5 * covariances[1]
@@ -265,7 +265,7 @@ def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places():
     """North, east and heading, by the same closed form: a radar on board has one and the same error."""
     flight, observed = _pixels()
     told, of_pose = taken(flight, observed, 30.0)
-    assert of_pose.names == POSE
+    assert of_pose[1] == POSE
     nothing = np.full((len(observed.uv), 2, 2), np.nan)
     _, shared, errors = of_pixels(observed, told, of_pose, nothing, 30.0)
     assert errors.names[:6] == POSE and set(errors.lasting_s[:6]) == {30.0}
@@ -285,15 +285,15 @@ def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last():
     radar = LastingErrors(("heading", "radar: range_bias"), (np.inf, np.inf))
     for lasting_s, twice in ((0.0, True), (30.0, False)):
         told, of_pose = taken(flight, observed, lasting_s)
-        camera = LastingErrors(of_pose.names, (lasting_s,) * 6)
+        camera = LastingErrors(of_pose[1], (lasting_s,) * 6)
         assert counted_twice(camera, radar) is twice
         known = replace(observed, poses=replace(observed.poses, covariance=told.pose))
         of_pose = of_poses(flight, known, told, believed(flight, "", *MANUAL)[1], lasting_s)
-        assert counted_twice(LastingErrors(of_pose.names, (lasting_s,) * 6), radar)
+        assert counted_twice(LastingErrors(of_pose[1], (lasting_s,) * 6), radar)
         assert not counted_twice(camera, LastingErrors(("radar: range_bias",), (np.inf,)))
     text = "[sensors.manual]\ncorrelation_time_s = 9.0\n[sensors.manual.considered.heading]\nsd_deg = 3.0\n"
     apart = believed(flight, text + "shared = false\n", *MANUAL)[1]
-    names = of_poses(flight, observed, told, apart, 9.0).names
+    names = of_poses(flight, observed, told, apart, 9.0)[1]
     assert names == (*POSE[:5], "manual: heading")
 
 

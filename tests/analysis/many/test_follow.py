@@ -7,14 +7,13 @@ import pytest
 from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, joined, robot_flight
 from tests.refused import refused
-from wildlab.analysis.tracks.many import complete_looks, judged, known_looks, tracks_table
-from wildlab.analysis.tracks.tracker import track
+from wildlab.analysis.tracks.many import complete_looks, judged, known_looks, track_jointly, tracks_table
 from wildlab.flight.tracking_settings import parse_settings, settings_over
 
 
 def test_a_boat_among_clutter_is_found_without_its_name():
     flight = robot_flight(kind="position", clutter=2, labelled=False, seed=3)
-    followed = track(flight, "joint")
+    followed = track_jointly(flight)
     lives = judged(followed)
     assert lives is not None
     assert lives.targets["boat"].tracked > 0.9 and lives.swaps == lives.breaks == 0
@@ -27,12 +26,12 @@ def test_a_boat_among_clutter_is_found_without_its_name():
 
 
 def test_without_truth_there_is_nothing_to_compare():
-    followed = track(robot_flight(kind="position", truth=False), "joint")
+    followed = track_jointly(robot_flight(kind="position", truth=False))
     assert judged(followed) is None and followed.truth == {} and followed.minutes > 1
 
 
 def test_a_target_out_of_reach_costs_nothing():
-    followed = track(robot_flight(kind="position", labelled=False), "joint")
+    followed = track_jointly(robot_flight(kind="position", labelled=False))
     lives = judged(followed, {"boat": 1.0})
     assert lives is not None and lives.targets["boat"].visible == 0
     assert max(one.distance for one in lives.gospa) == 0
@@ -42,7 +41,7 @@ def test_bearings_help_where_places_are_known_and_begin_nothing_alone():
     """They are exact here, and the places wrong by metres: across the line of sight tracks are nearer."""
     places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
     both = joined(places, bearings)
-    with_eye, without = track(both, "joint"), track(places, "joint")
+    with_eye, without = track_jointly(both), track_jointly(places)
     assert list(with_eye.places) == ["radar", "eye"] and not with_eye.notes
     errors = []
     for followed in (with_eye, without):
@@ -53,17 +52,17 @@ def test_bearings_help_where_places_are_known_and_begin_nothing_alone():
     assert errors[0] < errors[1]
     several = parse_settings("[sensors.eye.many]\nseveral = true\n")
     with refused("one hull"):
-        track(both, "joint", settings=several)
+        track_jointly(both, settings=several)
     with refused("bearings alone"):
-        track(bearings, "joint")
+        track_jointly(bearings)
 
 
 def test_bearings_whose_errors_last_are_thinned():
     places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
     both = joined(places, bearings)
-    followed = track(both, "joint", settings=parse_settings("[sensors.eye]\nthinning_s = 5.0\n"))
+    followed = track_jointly(both, settings=parse_settings("[sensors.eye]\nthinning_s = 5.0\n"))
     times = np.array([one.time for one in followed.places["eye"].scans])
-    every = len(track(both, "joint").places["eye"].scans)
+    every = len(track_jointly(both).places["eye"].scans)
     assert np.diff(times).min() >= 5 - 1e-6 and len(times) < every
     assert any(f"{len(times)} are used" in note for note in followed.notes)
 
@@ -84,11 +83,11 @@ HULL = "[[targets.many.hulls]]\nname = 'a'\n"
 )
 def test_settings_that_nothing_can_satisfy_are_refused(text, words):
     with refused(words):
-        track(robot_flight(kind="position"), "joint", settings=parse_settings(text))
+        track_jointly(robot_flight(kind="position"), settings=parse_settings(text))
 
 
 def test_only_what_an_image_shows_or_a_detection_names_could_be_seen():
-    followed = track(robot_flight(kind="position", labelled=False), "joint")
+    followed = track_jointly(robot_flight(kind="position", labelled=False))
     away = [scan._replace(sees=lambda at: np.zeros(len(at), bool)) for scan in followed.scans]
     lives = judged(followed._replace(scans=away))
     assert lives is not None and lives.targets["boat"].visible == 0
@@ -99,7 +98,7 @@ def test_only_what_an_image_shows_or_a_detection_names_could_be_seen():
 
 def test_no_track_leaves_an_empty_table():
     text = "[targets.many]\nhits = 1000\n"
-    followed = track(robot_flight(kind="position"), "joint", settings=parse_settings(text))
+    followed = track_jointly(robot_flight(kind="position"), settings=parse_settings(text))
     assert list(tracks_table(followed)) == ["time_s", "sensor", "track", "north_m", "east_m"]
 
 
@@ -108,7 +107,7 @@ def test_where_a_true_place_is_not_known_nothing_is_judged():
     flight = robot_flight(kind="position", seconds=100.0)
     truth = flight.table("truth")
     early = truth[truth["time_s"] < truth["time_s"].min() + 50]
-    followed = track(changed(flight, truth=early), "joint")
+    followed = track_jointly(changed(flight, truth=early))
     lives, known = judged(followed), known_looks(followed)
     assert lives is not None and 0.3 < known.mean() < 0.7 and len(lives.gospa) == known.sum()
     assert lives.false_tracks_per_minute == 0 and not any(one.n_false for one in lives.gospa)
@@ -120,7 +119,7 @@ def test_where_some_true_places_are_known_tracks_on_others_are_not_judged():
     truth = flight.table("truth")
     other = truth[truth["time_s"] < truth["time_s"].min() + 50].assign(target_id="other", north_m=900.0)
     both = pd.concat([truth, other], ignore_index=True)
-    followed = track(changed(flight, truth=both), "joint")
+    followed = track_jointly(changed(flight, truth=both))
     lives, whole = judged(followed), complete_looks(followed)
     assert lives is not None and 0.3 < whole.mean() < 0.7
     assert lives.incomplete == int((~whole).sum()) and len(lives.gospa) == len(whole)
@@ -130,15 +129,15 @@ def test_detections_that_are_no_sensors_are_told_and_not_left_out_in_silence():
     flight = robot_flight()
     frames, seen = flight.table("frames").assign(sensor="radar"), flight.table("detections")
     some = seen.assign(source=np.where(np.arange(len(seen)) < 5, "rader", "radar"))
-    followed = track(changed(flight, frames=frames, detections=some), "joint")
+    followed = track_jointly(changed(flight, frames=frames, detections=some))
     assert any("5 detections" in note and "are not used" in note for note in followed.notes)
-    assert not any("are not used" in note for note in track(flight, "joint").notes)
+    assert not any("are not used" in note for note in track_jointly(flight).notes)
 
 
 def test_what_settings_say_in_vain_is_named_and_not_considered():
     text = "[sensors.rader.many]\ndetection = 0.7\n[sensors.radar.considered.clock]\nsd_s = 2.0\n"
     text += "[sensors.radar.considered.heading]\nsd_deg = 2.0\n"
-    followed = track(robot_flight(), "joint", settings=parse_settings(text))
+    followed = track_jointly(robot_flight(), settings=parse_settings(text))
     assert any("'rader'" in note for note in followed.notes) and any(
         "clock" in note for note in followed.notes
     )
@@ -162,7 +161,7 @@ def test_what_the_truth_may_be_off_is_beside_the_tracks_own():
     truth[["north_m", "east_m"]] += rng.normal(0, 5.0, (len(truth), 2))
     found = []
     for sd in (0.0, 5.0, np.nan):
-        followed = track(changed(flight, truth=truth.assign(sd_horizontal_m=sd)), "joint")
+        followed = track_jointly(changed(flight, truth=truth.assign(sd_horizontal_m=sd)))
         lives = judged(followed)
         assert lives is not None
         found.append(max(one.anees / 2 for one in lives.tracks.values()))
@@ -174,14 +173,14 @@ def test_what_the_truth_may_be_off_is_beside_the_tracks_own():
 def test_how_near_a_track_counts_and_whether_others_are_about_is_stated():
     flight = robot_flight(kind="position", clutter=2, labelled=False, seed=3, heading_off_deg=8.0)
     near, far = (
-        judged(track(flight, "joint", settings=parse_settings(f"[targets]\nreach_m = {reach}\n")))
+        judged(track_jointly(flight, settings=parse_settings(f"[targets]\nreach_m = {reach}\n")))
         for reach in (5.0, 40.0)
     )
     assert near is not None and far is not None
     assert near.targets["boat"].tracked < 0.5 < far.targets["boat"].tracked
     alone = [one for one in near.tracks.values() if one.false]
     text = "[targets]\nreach_m = 5.0\n[targets.many]\nothers = true\n"
-    followed = track(flight, "joint", settings=parse_settings(text))
+    followed = track_jointly(flight, settings=parse_settings(text))
     beside = judged(followed)
     assert beside is not None and alone and not any(one.false for one in beside.tracks.values())
     assert not complete_looks(followed).any() and beside.incomplete == len(beside.gospa)

@@ -158,31 +158,26 @@ def said_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> lis
     return said
 
 
-class OfPose(NamedTuple):
-    """Errors of the poses: ``roots`` (N, 6, 6) whose columns are what a standard deviation of each does to a
-    pose, and the ``names`` of the six."""
-
-    roots: Array
-    names: tuple[str, ...]
-
-
 def of_poses(
     flight: Flight,
     observed: Observations,
     errors: PoseErrors,
     beliefs: NoiseModel,
     lasting_s: float,
-) -> OfPose:
+) -> tuple[Array, tuple[str, ...]]:
     """What the poses of pixels are wrong by, error by error.
+
+    That is (N, 6, 6), whose columns are what a standard deviation of each error does to a pose, and the names
+    of the six.
 
     Where poses have no covariance of their own and it is stated how long their errors last, these are errors
     of the platform, and those that another sensor on it considers are the same. Else they are the sensor's.
     """
     if observed.poses.covariance is not None:
-        return OfPose(_pose_roots(observed, errors), OF_COVARIANCE)
+        return _pose_roots(observed, errors), OF_COVARIANCE
     apart = {one.name for one in beliefs.considered if not one.shared}
     names = (f"{beliefs.sensor}: {name}" if lasting_s == 0 or name in apart else name for name in POSE)
-    return OfPose(stated_roots(observed.poses.R_nb, stated_deviations(flight, beliefs)), tuple(names))
+    return stated_roots(observed.poses.R_nb, stated_deviations(flight, beliefs)), tuple(names)
 
 
 def of_platform(errors: LastingErrors) -> set[str]:
@@ -198,7 +193,11 @@ def counted_twice(errors: LastingErrors, other: LastingErrors) -> bool:
 
 
 def of_pixels(
-    observed: Observations, errors: PoseErrors, of_pose: OfPose, total: Array, lasting_s: float
+    observed: Observations,
+    errors: PoseErrors,
+    of_pose: tuple[Array, tuple[str, ...]],
+    total: Array,
+    lasting_s: float,
 ) -> tuple[Array, Array, LastingErrors]:
     """What georeferenced pixels have of their own and in common.
 
@@ -229,7 +228,7 @@ def of_pixels(
     shared = np.concatenate(
         [
             # As of other sensors: what is added to the known pose for the true one comes off the place.
-            -J["pose"] @ of_pose.roots,
+            -J["pose"] @ of_pose[0],
             J["mount"] * mount,
             (J["plane"] * np.broadcast_to(plane, len(own))[:, None])[..., None],
         ],
@@ -241,7 +240,7 @@ def of_pixels(
         values, axes = np.linalg.eigh(rest[row])
         whole = (axes * np.maximum(values, 0.0)) @ axes.T
         shared[row] = transition_of_pose(first[row], whole, "bias") @ shared[row]
-    names = [*of_pose.names, *(f"mount {i}" for i in range(1, 4)), "ground"]
+    names = [*of_pose[1], *(f"mount {i}" for i in range(1, 4)), "ground"]
     return own, shared, LastingErrors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
 
 

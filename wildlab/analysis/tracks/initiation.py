@@ -31,7 +31,8 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.initiation import start_from_position, start_from_rays
 from wildlab.tracking.run import Ends, Start, Track
-from wildlab.tracking.sensors import second_derivatives, share_left_out
+from wildlab.tracking.schmidt import Considered
+from wildlab.tracking.sensors import Prediction, second_derivatives, share_left_out
 
 
 def begin_of_target(
@@ -113,15 +114,29 @@ def _start_from_rays(scans: Scans, own: Array, beliefs: NoiseModel, targets: Tar
         return None  # all near parallel, or they settle on no place
 
 
-def place_of(scans: Scans, row: int, z: Array, beliefs: NoiseModel) -> tuple[Array, Array] | None:
+def _noise_at(
+    scans: Scans, beliefs: NoiseModel, errors: Considered | None, row: int, seen: Prediction
+) -> Array:
+    """(m, m) all that a detection may be wrong by: white noise, and what considered errors make of it."""
+    R: Array = np.diag(beliefs.white**2)
+    if errors is not None and np.isfinite(errors.covariance[row]).all():
+        G = seen.H_pose[:, [SLOTS[scans.kind].index(name) for name in errors.names]]
+        R = R + G @ errors.covariance[row] @ G.T
+    return R
+
+
+def place_of(
+    scans: Scans, row: int, z: Array, beliefs: NoiseModel, white: bool = False
+) -> tuple[Array, Array] | None:
     """North and east that a measurement (m,) says, with what noise and considered errors leave uncertain.
+
+    ``white``: noise alone.
 
     None where it does not say: a velocity, a ray that meets no ground, a bearing whose distance nobody knows.
     """
     place = _place(scans, row, z, beliefs)
     if place is None or not np.isfinite(place).all():
         return None
-    R = np.diag(beliefs.white**2)
     if scans.kind == "bearing" and len(z) == 1:
         ahead = np.array([np.cos(z[0]), np.sin(z[0])])
         right = np.array([-ahead[1], ahead[0]])
@@ -130,13 +145,10 @@ def place_of(scans: Scans, row: int, z: Array, beliefs: NoiseModel) -> tuple[Arr
         return place, P
     seen = sensor_of(scans, np.zeros_like(scans.platform)).predict(row, np.append(place, [0.0, 0.0]))
     H = seen.H_position[:, :2]
-    errors = errors_of(scans, beliefs)
-    if errors is not None and np.isfinite(errors.covariance[row]).all():
-        G = seen.H_pose[:, [SLOTS[scans.kind].index(name) for name in errors.names]]
-        R = R + G @ errors.covariance[row] @ G.T
     if not np.isfinite(H).all():
         return None
     inverse = np.linalg.pinv(H)
+    R = _noise_at(scans, beliefs, None if white else errors_of(scans, beliefs), row, seen)
     return place, np.asarray(inverse @ R @ inverse.T)
 
 
@@ -194,15 +206,11 @@ def geometry_of(scans: Scans, seen: Array, beliefs: NoiseModel) -> Geometry | No
         return None
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     errors = errors_of(scans, beliefs)
-    slots = [] if errors is None else [SLOTS[scans.kind].index(name) for name in errors.names]
     there: NDArray[np.bool_] = np.asarray(np.isfinite(seen).all(axis=-1))
 
     def at(row: int, place: Array) -> tuple[Array, Array]:
         state = np.append(place, [0.0, 0.0])
-        noise = np.diag(beliefs.white**2)
-        if errors is not None and np.isfinite(errors.covariance[row]).all():
-            G = sensor.predict(row, state).H_pose[:, slots]
-            noise = noise + G @ errors.covariance[row] @ G.T
+        noise = _noise_at(scans, beliefs, errors, row, sensor.predict(row, state))
         return second_derivatives(sensor, row, state), noise
 
     def now(row: int) -> tuple[Array, Array] | None:

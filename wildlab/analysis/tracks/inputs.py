@@ -5,7 +5,7 @@ truly were.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,9 +27,6 @@ from wildlab.flight.tracking_settings import Settings, absent_sensors
 
 #: What a target is called of which nobody says a name.
 UNNAMED = "target"
-#: Whose a detection is: the target's that it names; that in whose gate it is nearest; all of one; or by joint
-#: probabilities, of any of the targets that the tracker finds.
-Association = Literal["label", "gate", "one", "joint"]
 
 
 class SensorInputs(NamedTuple):
@@ -79,14 +76,16 @@ class TrackingInputs(NamedTuple):
 
 def read_inputs(
     flight: Flight,
-    association: Association | None = None,
     *,
     settings: Settings | None = None,
     tuned: Tuned | None = None,
     sensors: Sequence[str] = (),
     source: str | None = None,
+    joint: bool = False,
 ) -> TrackingInputs:
     """Read what a tracker takes of a flight; arguments as of `wildlab.analysis.tracks.tracker.track`.
+
+    ``joint``: for all targets at once, whatever detections name.
 
     Raises
     ------
@@ -96,8 +95,6 @@ def read_inputs(
     refuse_without_times(flight)
     told = of_flight(flight, settings)
     targets, said = of_targets(told.targets)
-    if association is not None:
-        targets = targets._replace(identified=association)
     if tuned is not None and tuned.density is not None and told.targets.acceleration_m_s_sqrt_s is None:
         targets = targets._replace(density=tuned.density)
         said = [one for one in said if not one.what.startswith("acceleration")]
@@ -107,14 +104,14 @@ def read_inputs(
     found: dict[str, SensorInputs] = {}
     for name in sensors_with_detections(flight, sensors):
         looks = scans_of(flight, name, 0.0, source)
-        if association == "joint" and looks.kind not in ABLE and not sensors:
+        if joint and looks.kind not in ABLE and not sensors:
             notes.append(f"{name} was left out: what it detects ({looks.kind}) tells nothing of a place.")
             continue
         there, on = (None, "") if tuned is None else (tuned.sensors.get(name), tuned.flight)
         noise, more = of_sensor(flight, looks, told, there, on)
         if noise.offset_s:
             looks = scans_of(flight, name, noise.offset_s, source)
-        looks = looks if association == "joint" else _identified(looks, targets)
+        looks = looks if joint else _identified(looks, targets)
         found[name] = SensorInputs(looks, noise, _targets_of(flight, looks), more)
     return TrackingInputs(found, told, targets, said, notes, strays)
 

@@ -21,7 +21,7 @@ from wildlab.analysis.tracks.ground_positions import (
     said_of_pixels,
     thinned,
 )
-from wildlab.analysis.tracks.inputs import TrackingInputs, order_notes
+from wildlab.analysis.tracks.inputs import order_notes, read_inputs
 from wildlab.analysis.tracks.noise_model import ASSUMED, STATED, ToldValue
 from wildlab.analysis.tracks.noise_model import TargetModel as Following
 from wildlab.analysis.tracks.scans import truth_deviations, truths_at
@@ -29,7 +29,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.identities import Identities, compare_identities
 from wildlab.evaluation.identities import Moment as Compared
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import HullPart, ManyTargetsPart, SensorPart, Settings, read_settings
+from wildlab.flight.tracking_settings import ManyTargetsPart, SensorPart, Settings, read_settings
 from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
 from wildlab.tracking.many import (
@@ -78,16 +78,10 @@ _HULLS = {
 }
 
 
-class Told(NamedTuple):
-    """Of the targets, of each sensor in its order, and of each value where it is from."""
-
-    targets: ManyTargetModel
-    sensors: list[ManySensorModel]
-    said: list[ToldValue]
-
-
-def of_many(settings: Settings, following: Following, places: list[PlacedLooks]) -> Told:
-    """What the tracker is told.
+def of_many(
+    settings: Settings, following: Following, places: list[PlacedLooks]
+) -> tuple[ManyTargetModel, list[ManySensorModel], list[ToldValue]]:
+    """What the tracker is told of the targets and of each sensor, and where each value is from.
 
     Parameters
     ----------
@@ -115,7 +109,9 @@ def of_many(settings: Settings, following: Following, places: list[PlacedLooks])
         said.append(ToldValue("targets", what, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
         return value
 
-    hulls = tuple(_hull(part) for part in stated.hulls or usual.hulls)
+    hulls = tuple(
+        Hull(part.name, part.length_m, part.beam_m, part.share) for part in stated.hulls or usual.hulls
+    )
     said.append(
         ToldValue(
             "targets",
@@ -134,11 +130,7 @@ def of_many(settings: Settings, following: Following, places: list[PlacedLooks])
         found, more = _of_sensor(settings, looks, len(hulls), farthest)
         sensors.append(found)
         said += more
-    return Told(targets, sensors, said)
-
-
-def _hull(part: HullPart) -> Hull:
-    return Hull(part.name, part.length_m, part.beam_m, part.share)
+    return targets, sensors, said
 
 
 def _of_sensor(
@@ -358,21 +350,26 @@ class ManyTracks(NamedTuple):
         return (self.scans[-1].time - self.scans[0].time) / 60 if len(self.scans) > 1 else 0.0
 
 
-def track_jointly(flight: Flight, inputs: TrackingInputs, source: str | None = None) -> ManyTracks:
+def track_jointly(
+    flight: Flight,
+    *,
+    settings: Settings | None = None,
+    sensors: Sequence[str] = (),
+    source: str | None = None,
+) -> ManyTracks:
     """Track all targets by all sensors at once, whatever detections name.
 
     Parameters
     ----------
-    inputs
-        Of the flight, read for ``"joint"``.
-    source
-        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+    settings, sensors, source
+        As for `wildlab.analysis.tracks.tracker.track`.
 
     Raises
     ------
     WildlabError
-        Where no detection tells a place.
+        As that, and where no detection tells a place.
     """
+    inputs = read_inputs(flight, settings=settings, sensors=sensors, source=source, joint=True)
     told = inputs.settings
     said = [one for one in inputs.said if one.what.startswith(("acceleration", "speed"))]
     notes = list(inputs.notes)
@@ -408,7 +405,7 @@ def track_jointly(flight: Flight, inputs: TrackingInputs, source: str | None = N
             else "follow one target by its bearings: wildlab track without --many",
             file=flight.folder, field="detections.kind",
         )  # fmt: skip
-    beliefs = of_many(told, inputs.targets, list(places.values()))
+    targets, sensors_told, more_said = of_many(told, inputs.targets, list(places.values()))
     lasting_s, shared = laid_out(
         [(one.errors, [scan.shared for scan in one.scans]) for one in places.values()]
     )
@@ -419,13 +416,10 @@ def track_jointly(flight: Flight, inputs: TrackingInputs, source: str | None = N
     ]
     pairs.sort(key=lambda pair: pair[0].time)
     scans = [scan for scan, _ in pairs]
-    shown = run_many(scans, beliefs.sensors, beliefs.targets, lasting_s)
-    truth: dict[str, Array] = {}
-    truth_sd: dict[str, float] = {}
-    estimated: list[str] = []
+    shown = run_many(scans, sensors_told, targets, lasting_s)
+    truth, truth_sd, estimated = dict[str, Array](), dict[str, float](), list[str]()
     if flight.truth is not None and len(flight.truth):
-        times = np.array([scan.time for scan in scans])
-        known = truths_at(flight, times)
+        known = truths_at(flight, [scan.time for scan in scans])
         truth = {one.target: one.position for one in known}
         truth_sd, estimated = truth_deviations(flight)
     return ManyTracks(
@@ -433,10 +427,10 @@ def track_jointly(flight: Flight, inputs: TrackingInputs, source: str | None = N
         [names for _, names in pairs],
         shown,
         places,
-        beliefs.sensors,
-        beliefs.targets,
+        sensors_told,
+        targets,
         truth,
-        [*said, *beliefs.said],
+        [*said, *more_said],
         notes,
         lasting_s,
         inputs.targets.reach_m if np.isfinite(inputs.targets.reach_m) else CUTOFF_M,

@@ -132,12 +132,6 @@ class SensorTuning(NamedTuple):
         return float(np.exp(-self.interval_s / self.correlation_time_s))
 
     @property
-    def driving_sd(self) -> float:
-        """Standard deviation of ``e_2 - F_c e_1`` of successive errors: the root of ``R_w``, H (7.5)."""
-        F_c = self.fading
-        return float(self.sd * np.sqrt(1 + F_c**2 - 2 * F_c * self.next_correlation))
-
-    @property
     def thinning_s(self) -> float:
         """Lag from which errors are correlated by less than 1/e; nought where they never are by more."""
         return float(max(0.0, self.correlation_time_s * (1 + np.log(max(self.share, 1e-9)))))
@@ -557,35 +551,14 @@ def roughness(scans: Scans) -> Array:
     NaN where there are no three looks in a row, or
     nothing in them lies better in line than chance makes it.
     """
-    if not any(str(one) for one in scans.labels.ravel()):
+    if not scans.labelled:
         return _unnamed(scans)
-    times, z = scans.times, scans.detections
-    gap = NEIGHBOURS * scans.interval_s
-    found: list[Array] = []
-    names = sorted({str(one) for one in scans.labels.ravel() if one})
-    angles = np.array(scans.angles)
-    for name in names:
-        last: list[tuple[float, Array]] = []
-        for row in range(len(times)):
-            here = z[row][np.isfinite(z[row]).all(axis=-1) & (scans.labels[row] == name)]
-            if not len(here):
-                continue
-            if last and times[row] - last[-1][0] > gap:
-                last = []
-            step = here - last[-1][1] if last else np.zeros_like(here)
-            step = np.where(angles, wrap(step), step)
-            nearest = int(np.argmin(np.linalg.norm(step, axis=-1)))
-            value = here[nearest] if not last else last[-1][1] + step[nearest]
-            last.append((float(times[row]), value))
-            if len(last) > 2:
-                (t0, z0), (t1, z1), (t2, z2) = last[-3:]
-                if t2 > t0:
-                    share = (t1 - t0) / (t2 - t0)
-                    weight = 1 + share**2 + (1 - share) ** 2
-                    found.append((z1 - (1 - share) * z0 - share * z2) / np.sqrt(weight))
-    if not found:
-        return np.full(z.shape[-1], np.nan)
-    return _spread(np.stack(found))
+    found = []
+    for name in sorted({str(one) for one in scans.labels.ravel() if one}):
+        own = np.where((scans.labels == name)[..., None], scans.detections, np.nan)
+        found.append(_triples(scans._replace(detections=own), 0.0)[0])
+    values = np.concatenate(found)
+    return _spread(values) if len(values) else np.full(values.shape[1], np.nan)
 
 
 def _spread(values: Array) -> Array:

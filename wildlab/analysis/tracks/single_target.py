@@ -79,19 +79,12 @@ def possible(scans: Scans, beliefs: NoiseModel) -> dict[str, str]:
     }
 
 
-class Measured(NamedTuple):
-    """A target's detections: looks ``merged`` with white noise, its ``own`` (N, m), the track ``first`` that
-    the filter with white noise made of them, and where it begins."""
-
-    merged: Merged
-    own: Array
-    first: Track
-    begin: Start
-
-
 def run_named(
     name: str,
-    measured: Measured,
+    merged: Merged,
+    own: Array,
+    first: Track,
+    begin: Start,
     targets: TargetModel,
     considering: tuple[Merged, Considered] | None,
     alone: tuple[Scans, NoiseModel, slice] | None,
@@ -100,6 +93,9 @@ def run_named(
 
     Parameters
     ----------
+    merged, own, first, begin
+        Looks with white noise, the target's own detections (N, m) among them, the track that the filter with
+        white noise made of these, and where it begins.
     considering
         The same detections with what is new at each, and the errors that are considered beside it.
     alone
@@ -125,7 +121,7 @@ def run_named(
                 f"use one of {', '.join(one for one, reason in able.items() if not reason)}",
                 field="--filter",
             )
-    (times, _, R, sensor, *_), own, first, begin = measured
+    times, _, R, sensor, *_ = merged
     R, motion = R if R.ndim == 3 else R[:, 0], targets.motion()
     run = run_smoothed if smoothed else run_filter
     if base == "coloured" and alone is not None:
@@ -195,13 +191,8 @@ def _positions(scans: Scans, own: Array, beliefs: NoiseModel) -> tuple[Array, Ar
     if scans.kind == "position":
         return own, np.tile(np.diag(beliefs.white**2), (n, 1, 1))
     places, R = np.full((n, 2), np.nan), np.full((n, 2, 2), np.nan)
-    bare = beliefs._replace(considered=())
-    alone = scans if scans.poses is None else scans._replace(
-        poses=type(scans.poses)(scans.poses.camera, scans.poses.mount, scans.poses.p_nb, scans.poses.R_nb,
-                                scans.poses.pan, scans.poses.tilt)
-    )  # fmt: skip
     for row in np.flatnonzero(np.isfinite(own).all(axis=1)):
-        found = place_of(alone, int(row), own[row], bare)
+        found = place_of(scans, int(row), own[row], beliefs, white=True)
         if found is not None:
             places[row], R[row] = found
     return places, R
@@ -307,7 +298,7 @@ def track_target(
     sizes = np.asarray(merged.sensor.sizes, np.int64) if len(inputs) > 1 else np.empty(0, np.int64)
     if first is None:
         return [_no_track(looks, truth, name, targets)._replace(sizes=sizes) for name in filters]
-    count, rows = len(merged.times), np.arange(len(merged.times))
+    count = len(merged.times)
     # What names its target finds it again, however long that was out of view.
     patience = np.inf if looks.labelled else targets.patience_s
     last = _last_row(merged.times, first.used, pieces[0].begin.time, patience, targets.patience_s)
@@ -315,26 +306,23 @@ def track_target(
     first, own = _ended(first, own, last)
     starts, begun = starts_of(merged.times, pieces), np.zeros(count, bool)
     for piece in pieces:
-        at, start = piece.first, piece.begin
-        begun[piece.rows] = (rows > at + start.row if start.row >= 0 else merged.times > start.time)[
-            piece.rows
-        ]
+        own_times, start = merged.times[piece.rows], piece.begin
+        begun[piece.rows] = (
+            np.arange(len(own_times)) > start.row if start.row >= 0 else own_times > start.time
+        )
     considering = _considering(inputs, chosen._replace(track=first, own=own))
     alone = next(iter(inputs.values())) if len(inputs) == 1 else None
     found = []
     for name in filters:
         tracks = []
         for piece in pieces:
-            measured = Measured(
-                cut(merged, piece.rows), own[piece.rows], Track._make(part[piece.rows] for part in first),
-                piece.begin,
-            )  # fmt: skip
-            errors = None
+            rows, errors = piece.rows, None
             if considering is not None:
                 by, every = considering
-                errors = cut(by, piece.rows), every._replace(covariance=every.covariance[piece.rows])
-            white = None if alone is None else (alone.scans, alone.noise, piece.rows)
-            track = run_named(name, measured, targets, errors, white)
+                errors = cut(by, rows), every._replace(covariance=every.covariance[rows])
+            white = None if alone is None else (alone.scans, alone.noise, rows)
+            part = Track._make(column[rows] for column in first)
+            track = run_named(name, cut(merged, rows), own[rows], part, piece.begin, targets, errors, white)
             tracks += [] if track is None else [track]
         if tracks:
             one = _scored(looks, truth, name, joined(tracks, pieces, count), begun, last, targets, ids)

@@ -1,28 +1,19 @@
 """The tracker: targets of a flight through all of its sensors, as `wildlab track` and `wildlab.track` call
 it.
 
-What depends on a flight is read once (`wildlab.analysis.tracks.inputs`). Whose a detection is, is one
-parameter. Where identity is known or the nearest in the gate is taken, each target has tracks of its own, by
-each sensor and by all together, through several filters; with ``"joint"`` all targets are followed at once,
-and tracks begin and end by themselves.
+What depends on a flight is read once (`wildlab.analysis.tracks.inputs`). Identity is known or the nearest in
+the gate is taken: each target has tracks of its own, by each sensor and by all together, through several
+filters. `wildlab.analysis.tracks.many` follows all targets at once instead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, overload
+from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.analysis.tracks.inputs import (
-    UNNAMED,
-    Association,
-    TrackingInputs,
-    names_of,
-    order_notes,
-    read_inputs,
-)
-from wildlab.analysis.tracks.many import ManyTracks, track_jointly
+from wildlab.analysis.tracks.inputs import UNNAMED, names_of, order_notes, read_inputs
 from wildlab.analysis.tracks.noise_model import (
     OF_UNNAMED,
     STATED,
@@ -76,24 +67,8 @@ class TrackingResult(NamedTuple):
     truth: bool
 
 
-@overload
-def track(
-    flight: Flight, association: Literal["joint"], *, settings: Settings | None = None,
-    sensors: Sequence[str] = (), source: str | None = None,
-) -> ManyTracks: ...  # fmt: skip
-
-
-@overload
-def track(
-    flight: Flight, association: Literal["label", "gate", "one"] | None = None, *,
-    settings: Settings | None = None, tuned: Tuned | None = None, filters: Sequence[str] = (),
-    targets: Sequence[str] = (), sensors: Sequence[str] = (), source: str | None = None, smooth: bool = False,
-) -> TrackingResult: ...  # fmt: skip
-
-
 def track(
     flight: Flight,
-    association: Association | None = None,
     *,
     settings: Settings | None = None,
     tuned: Tuned | None = None,
@@ -102,13 +77,11 @@ def track(
     sensors: Sequence[str] = (),
     source: str | None = None,
     smooth: bool = False,
-) -> TrackingResult | ManyTracks:
-    """Track targets by each sensor, and by all of them.
+) -> TrackingResult:
+    """Track each target alone, by each sensor and by all together.
 
     Parameters
     ----------
-    association
-        Whose a detection is; left out: as the settings say, else by the names where detections have any.
     settings
         What is told of sensors and targets besides ``flight.toml``.
     tuned
@@ -126,19 +99,9 @@ def track(
     Raises
     ------
     WildlabError
-        Where there is no such sensor, target or filter, no detection, no time, or noise nobody knows; with
-        ``"joint"`` where no detection tells a place.
+        Where there is no such sensor, target or filter, no detection, no time, or noise nobody knows.
     """
-    inputs = read_inputs(flight, association, settings=settings, tuned=tuned, sensors=sensors, source=source)
-    if association == "joint":
-        return track_jointly(flight, inputs, source)
-    return _track_each(flight, inputs, filters, targets, smooth)
-
-
-def _track_each(
-    flight: Flight, inputs: TrackingInputs, filters: Sequence[str], targets: Sequence[str], smooth: bool
-) -> TrackingResult:
-    """Each target alone, by each sensor and by all together."""
+    inputs = read_inputs(flight, settings=settings, tuned=tuned, sensors=sensors, source=source)
     said, notes, tracks = list(inputs.said), list(inputs.notes), list[SensorTrack]()
     known: set[str] = set()
     for sensor, one in inputs.sensors.items():

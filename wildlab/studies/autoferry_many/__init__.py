@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.tracks.many import ManyTracks, judged
-from wildlab.analysis.tracks.tracker import track
+from wildlab.analysis.tracks.many import ManyTracks, judged, track_jointly
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import Settings
@@ -206,7 +205,7 @@ def judge_stone_soup(
     choices = [draw_choice(rng, FAR_M) for rng in generators]
     for mode in position_modes():
         given = {
-            case: track(flight, "joint", settings=settings[mode], sensors=MODES[mode])
+            case: track_jointly(flight, settings=settings[mode], sensors=MODES[mode])
             for case, flight in flights.items()
         }
         reach = {case: reach_of(flight, mode) for case, flight in flights.items()}
