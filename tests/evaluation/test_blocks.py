@@ -6,7 +6,6 @@ import pytest
 from wildlab.evaluation.intervals import (
     block_mean,
     compare_halves,
-    compare_neighbours,
     standard_error,
     time_blocks,
 )
@@ -67,41 +66,3 @@ def test_blocks_of_equal_size_give_the_standard_error_of_their_means():
     many = rng.normal(size=20) + blocks
     means = many.reshape(5, 4).mean(axis=1)
     assert standard_error(many, blocks) == pytest.approx(means.std(ddof=1) / np.sqrt(5))
-
-
-def wandering(rng, images, keep):
-    """Two components of unit variance, of which a share ``keep`` lasts from image to image."""
-    e = rng.normal(size=(images, 2))
-    for i in range(1, images):
-        e[i] = keep * e[i - 1] + np.sqrt(1 - keep**2) * e[i]
-    return e
-
-
-def test_images_that_wander_are_told_from_those_that_do_not():
-    rng = np.random.default_rng(0)
-    image = np.repeat(np.arange(30), 3)
-    found = {}
-    for keep in (0.0, 0.9):
-        of = [wandering(rng, 30, keep)[image] + 0.5 * rng.normal(size=(90, 2)) for _ in range(200)]
-        found[keep] = [compare_neighbours(e, image) for e in of]
-    assert np.mean([one.alike for one in found[0.0]]) < 0.06
-    assert np.mean([one.alike for one in found[0.9]]) > 0.9
-    assert np.mean([one.correlation for one in found[0.0]]) == pytest.approx(-1 / 30, abs=0.03)
-    assert {one.images for one in found[0.9]} == {30}
-
-
-def test_neighbours_are_those_in_time_and_one_wild_click_does_not_decide():
-    rng = np.random.default_rng(1)
-    slow, mixed = wandering(rng, 60, 0.9), rng.permutation(60)
-    assert compare_neighbours(slow[mixed], mixed).correlation == pytest.approx(
-        compare_neighbours(slow, np.arange(60)).correlation
-    )
-    assert not compare_neighbours(slow[mixed], np.arange(60)).alike
-    slow[30] = 1e6
-    assert compare_neighbours(slow, np.arange(60)).alike
-    slow[31] = np.nan
-    assert compare_neighbours(slow, np.arange(60)).images == 59
-    # A constant error is no wandering one, and few images say nothing.
-    assert not compare_neighbours(rng.normal(size=(60, 2)) + 2.0, np.arange(60)).alike
-    assert not compare_neighbours(slow[:5], np.arange(5)).alike
-    assert not compare_neighbours(np.zeros((9, 2)), np.arange(9)).alike

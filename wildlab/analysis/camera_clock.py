@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -12,11 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis import Fact, fact
-from wildlab.analysis.accuracy import compare_sightings, judge_repeats
-from wildlab.analysis.diagnose import nonzero
 from wildlab.analysis.evaluate import blocks_of
 from wildlab.analysis.flow import Reading, camera_poses_at
-from wildlab.analysis.georeference import georeference, observe, truth_of
+from wildlab.analysis.georeference import truth_of
 from wildlab.detection.flow import as_grey, image_motion
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
@@ -62,26 +60,6 @@ def refuse_without_clock(flight: Flight, source: str | None = None) -> None:
         )
 
 
-def sightings_of(flight: Flight) -> pd.DataFrame:
-    """Pixel detections that name a target whose position is known: the rows of ``detections``.
-
-    Parameters
-    ----------
-    flight
-        Any.
-
-    Returns
-    -------
-    DataFrame
-        Empty where there are none.
-    """
-    detections, truth = flight.detections, flight.truth
-    if detections is None or truth is None or "target_id" not in detections:
-        return pd.DataFrame()
-    known = detections["target_id"].isin(set(truth["target_id"]))
-    return detections[(detections["kind"] == "pixel") & known].reset_index(drop=True)
-
-
 def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockByPoints:
     """What to add to the stamps of the images so that known points appear where they were seen.
 
@@ -103,10 +81,12 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
         Where the images have no clock, or fewer than four sightings have a pose.
     """
     refuse_without_clock(flight, source)
-    pixels = sightings_of(flight)
-    frames = flight.table("frames")
-    if len(pixels):
-        pixels = pixels[pixels["frame_id"].isin(set(frames["frame_id"]))].reset_index(drop=True)
+    frames, pixels, truth = flight.table("frames"), flight.detections, flight.truth
+    if pixels is None or truth is None or "target_id" not in pixels:
+        pixels = pd.DataFrame()
+    else:
+        known = pixels["target_id"].isin(truth["target_id"]) & pixels["frame_id"].isin(frames["frame_id"])
+        pixels = pixels[(pixels["kind"] == "pixel") & known].reset_index(drop=True)
     if len(pixels) < 4:
         raise WildlabError(
             f"{len(pixels)} detections are of a target whose position is known, at least 4 are needed",
@@ -266,7 +246,7 @@ def camera_rotation(flight: Flight) -> Array:
     still = CameraPoses(
         flight.manifest.geometry_camera(), flight.manifest.geometry_mount(), np.zeros((1, 3)), np.eye(3)
     )
-    return np.asarray(np.asarray(still.R_bc).reshape(-1, 3, 3)[0])
+    return np.asarray(still.R_bc).reshape(-1, 3, 3)[0]
 
 
 class CameraClock(NamedTuple):
@@ -289,67 +269,17 @@ class CameraClock(NamedTuple):
 
 
 def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
-    """`camera_clock_by_points` with its facts; without truth, from things that several images show.
+    """`camera_clock_by_points` with its facts.
 
     Raises
     ------
     WildlabError
-        As that, or where neither truth nor names of things are there.
+        As that.
     """
-    refuse_without_clock(flight, source)
-    if flight.truth is None and flight.detections is not None:
-        return _by_sightings(flight, source)
     found = camera_clock_by_points(flight, source)
     rests = {"points": found.points, "images": found.images, "blocks": found.draws}
-    numbers = {**_numbers(found, "known points"), **rests}
     curve = pd.DataFrame({"offset_s": found.offsets, "cost": found.cost})
-    return CameraClock(numbers, curve, _facts("points", numbers))
-
-
-def _by_sightings(flight: Flight, source: str | None) -> CameraClock:
-    """The clock under which sightings of the same things from different images lie closest together.
-
-    It is certain where the search for a constant error finds it so: see `wildlab.analysis.diagnose`.
-    """
-    observations, rng = observe(flight, source), np.random.default_rng(0)
-    diagnosis = judge_repeats(observations, rng).diagnosis
-    if diagnosis is None:
-        raise WildlabError(
-            "fewer than six images show a thing that another image shows too",
-            "name the targets of more detections, or give the images with --images",
-            file=flight.folder,
-            field="detections",
-        )
-    alone = next((one for one in diagnosis.models if one.causes == ("clock",)), None)
-    best = diagnosis.winner if "clock" in diagnosis.winner.fit.names else alone
-    if best is None:
-        raise WildlabError(
-            "an offset of the camera's clock would not show in these sightings",
-            "give the images with --images, or state the offset",
-            file=flight.folder,
-            field="detections",
-        )
-    place, stated = best.fit.names.index("clock"), flight.manifest.clocks.camera_offset_s
-    offset = float(best.fit.values[place])
-    certain = diagnosis.counts and best is diagnosis.winner and "clock" in nonzero(diagnosis.calibration)
-    numbers: dict[str, object] = {
-        "offset_s": offset + stated,
-        "sd_s": float(np.sqrt(best.covariance[place, place])),
-        "certain": certain,
-        "method": "repeated sightings",
-        "inseparable": list(diagnosis.inseparable),
-        "points": diagnosis.calibration.n_points,
-        "images": diagnosis.calibration.n_images,
-        "apart_without_m": best.gain.without,
-        "apart_m": best.gain.with_,
-    }
-    tried = offset + np.arange(-1.0, 1.01, 0.1)
-    apart = [
-        compare_sightings(georeference(observe(flight, source, clock_shift=float(one)), rng))["error_m"]
-        for one in tried
-    ]
-    curve = pd.DataFrame({"offset_s": tried + stated, "cost": [one.mean() for one in apart]})
-    return CameraClock(numbers, curve, _facts("things", numbers | {"points": len(diagnosis.scored)}))
+    return _told("points", "known points", found, rests, curve)
 
 
 def clock_from_motion(
@@ -369,29 +299,26 @@ def clock_from_motion(
     pairs, motion = image_motions(frames, flight, flight.manifest.geometry_camera(), progress)
     found = camera_clock_by_motion(flight, pairs, motion, source)
     rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
-    numbers = {**_numbers(found, "image motion"), **rests, "gain": found.gain}
     curve = pd.DataFrame({"offset_s": found.offsets, "correlation": found.correlation})
-    return CameraClock(numbers, curve, _facts("motion", numbers))
+    return _told("motion", "image motion", found, rests | {"gain": found.gain}, curve)
 
 
-def _numbers(found: ClockByPoints | ClockByMotion, method: str) -> dict[str, object]:
-    return {
+def _told(
+    way: str,
+    method: str,
+    found: ClockByPoints | ClockByMotion,
+    rests: Mapping[str, float],
+    curve: pd.DataFrame,
+) -> CameraClock:
+    numbers: dict[str, object] = {
         "offset_s": found.offset_s,
         "sd_s": found.sd_s,
         "certain": found.certain,
         "method": method,
         "rival_s": found.rival_s,
+        **rests,
     }
-
-
-def _facts(way: str, numbers: dict[str, object]) -> tuple[Fact, ...]:
-    shown = {
-        name: f"{one:+.3f}"
-        if name in ("offset_s", "rival_s")
-        else f"{one:.2f}"
-        if isinstance(one, float)
-        else str(one)
-        for name, one in numbers.items()
-    }
-    sd = f"{numbers['sd_s']:.3f}"
-    return (fact(f"clock-{way}-{'certain' if numbers['certain'] else 'open'}", **shown | {"sd_s": sd}),)
+    shown = {name: f"{one:.2f}" if isinstance(one, float) else str(one) for name, one in rests.items()}
+    shown |= {name: f"{getattr(found, name):+.3f}" for name in ("offset_s", "rival_s")}
+    key = f"clock-{way}-{'certain' if found.certain else 'open'}"
+    return CameraClock(numbers, curve, (fact(key, sd_s=f"{found.sd_s:.3f}", **shown),))

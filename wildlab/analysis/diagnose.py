@@ -54,7 +54,7 @@ from wildlab.evaluation.correlated_errors import (
     fit_generalised,
 )
 from wildlab.evaluation.errors import ErrorSummary, summarise
-from wildlab.evaluation.intervals import Labels, Neighbours, compare_neighbours
+from wildlab.evaluation.intervals import Labels
 from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import KINDS
 from wildlab.flight.store import Flight
@@ -225,12 +225,6 @@ class Diagnosis:
     def shown(self) -> Model:
         """The winner where it gained something for certain, else the poses as logged."""
         return self.winner if self.counts else self.models[0]
-
-    def neighbours(self) -> Neighbours:
-        """How alike images that follow each other are once what is shown is taken off."""
-        whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(self.scored)))
-        left = np.einsum("nij,nj->ni", whiten, self.shown.held)
-        return compare_neighbours(left[self.inliers], self.scored["time_s"].to_numpy()[self.inliers])
 
     def held_summary(self, rows: Mask | None = None) -> ErrorSummary:
         """Held-out errors of what is shown; of rows (N,) or all."""
@@ -445,7 +439,7 @@ class _Search:
         values = scaled * np.array([PARAMETERS[name] for name in names])
         trial = Calibration(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
         ground = georeference_calibrated(trial, self.poses_at, self.chosen.uv, self.known[:, 2])
-        return np.asarray(ground[:, :2] - self.known[:, :2])
+        return ground[:, :2] - self.known[:, :2]
 
     def fit_robustly(self, inliers: Mask) -> Fit:
         """All parameters that the data determine, by their robust likelihood."""
@@ -471,7 +465,7 @@ class _Search:
         if self.places_known:
             return positions
         middle = pd.DataFrame(positions).groupby(self.names_of).transform("median").to_numpy()
-        return np.asarray(positions - middle)
+        return positions - middle
 
     def run(self, inliers: Mask) -> Diagnosis:
         """Search for the cause of the errors of the inliers (N,)."""
@@ -509,7 +503,7 @@ class _Search:
 
         def residuals(of: tuple[str, ...], scaled: Array) -> Array:
             # A trial that tips a ray over the horizon is far off; a large residual turns it back.
-            return np.asarray(np.nan_to_num(self.place(of, scaled)[used], nan=1e4))
+            return np.nan_to_num(self.place(of, scaled)[used], nan=1e4)
 
         def derivatives(of: tuple[str, ...], scaled: Array) -> Array:
             J = differentiate(lambda x: self.place(of, x)[used], of, scaled)
@@ -629,7 +623,7 @@ def _cut(chosen: Observations) -> Mask:
     table, names = chosen.flight.table("detections"), chosen.table["detection_id"]
     if "touches_border" not in table:
         return np.zeros(len(names), bool)
-    return np.asarray(table.set_index("detection_id").loc[names, "touches_border"].to_numpy(float) > 0)
+    return table.set_index("detection_id").loc[names, "touches_border"].to_numpy(float) > 0
 
 
 def _survey_error(flight: Flight, names: NDArray[np.str_]) -> float:
@@ -651,7 +645,7 @@ def _scaled(fit: Fit | None) -> tuple[tuple[str, ...], Array]:
 def _root(information: Array) -> Array:
     """A matrix (P, P) whose square, transposed first, is the information."""
     values, vectors = np.linalg.eigh(information)
-    return np.asarray(np.sqrt(np.clip(values, 0, None))[:, None] * vectors.T)
+    return np.sqrt(np.clip(values, 0, None))[:, None] * vectors.T
 
 
 def _deviance(r: Array, covariance: Covariance) -> float:

@@ -303,60 +303,6 @@ def standard_error(values: Array, blocks: Labels) -> float:
     return float(np.sqrt(count / (count - 1) * (apart**2).sum()) / len(values))
 
 
-class Neighbours(NamedTuple):
-    """How alike the errors of images are that follow each other.
-
-    Attributes
-    ----------
-    correlation
-        Of neighbouring images, -1 to 1; NaN where there are fewer than six images.
-    images
-        How many there are.
-    """
-
-    correlation: float
-    images: int
-
-    @property
-    def alike(self) -> bool:
-        """Whether independent images would be so alike once in twenty flights at most."""
-        return bool(self.correlation > normal_quantile(0.95) / np.sqrt(max(self.images, 1)))
-
-
-def compare_neighbours(errors: ArrayLike, order: ArrayLike) -> Neighbours:
-    """Correlation of the mean errors of images that follow each other.
-
-    Parameters
-    ----------
-    errors
-        (N, 2) in units of their standard deviation; rows with NaN are left out, far ones drawn in to three.
-    order
-        (N,) when the image of each point was taken: points of one image have the same.
-
-    Returns
-    -------
-    Neighbours
-
-    Examples
-    --------
-    >>> slow = np.column_stack([np.sin(np.arange(40) / 4), np.cos(np.arange(40) / 4)])
-    >>> compare_neighbours(slow, np.arange(40)).alike
-    True
-    """
-    e, when = np.asarray(errors, float), np.asarray(order, float)
-    keep = np.isfinite(e).all(axis=1) & np.isfinite(when)
-    e, image = e[keep], np.unique(when[keep], return_inverse=True)[1]
-    count = np.bincount(image)
-    if len(count) < FEWEST:
-        return Neighbours(float("nan"), len(count))
-    e = e / np.maximum(1.0, np.hypot(*e.T) / 3.0)[:, None]
-    mean = np.stack([np.bincount(image, weights=axis) / count for axis in e.T], axis=-1)
-    mean -= mean.mean(axis=0)
-    square = float((mean**2).sum())
-    alike = float((mean[1:] * mean[:-1]).sum()) / square if square > 0 else float("nan")
-    return Neighbours(alike, len(count))
-
-
 class Halves(NamedTuple):
     """First and second half of a flight.
 
