@@ -84,7 +84,7 @@ def compare(flights: tuple[Path, ...], out: Path | None, reports: Path) -> None:
 
 @click.command()
 @click.argument("flight", type=FOLDER)
-@shared.out(FILE, "The file to write: .csv, .geojson or .gpkg.", required=True)
+@shared.out(FILE, "The file to write: .csv or .geojson.", required=True)
 @shared.overwrite
 @shared.source
 @shared.seed
@@ -92,15 +92,14 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
     """Put the pixel detections of FLIGHT on the ground.
 
     Each has its 90 % ellipse, on its terrain where it has one, else on a level plane at the height of each
-    target. A CSV holds metres north and east of the flight's origin and no coordinates; a GeoJSON and a
-    GeoPackage hold the places themselves, so send them to nobody who may not know them. A GeoPackage has the
-    ellipses as a layer of their own, and opens in QGIS as it is.
+    target. A CSV holds metres north and east of the flight's origin and no coordinates; a GeoJSON
+    holds the places themselves, so send it to nobody who may not know them. It has the ellipses as polygons,
+    and opens in QGIS as it is.
 
     \b
     Examples:
       wildlab georeference flights/tuesday --out points.csv
       wildlab georeference flights/tuesday --out points.geojson
-      wildlab georeference flights/tuesday --out points.gpkg
     """
     import numpy as np
 
