@@ -259,7 +259,7 @@ def odd_views(errors: Array) -> Mask:
     most = _most_odd(len(errors))
     if odd.sum() > most:
         odd &= errors >= (np.sort(errors)[-most] if most > 0 else np.inf)
-    return np.asarray(odd)
+    return odd
 
 
 def coverage(uv: Array, width: int, height: int) -> Mask:
@@ -449,7 +449,7 @@ def _directions(found: CameraCalibration) -> Fact:
 
 def tilts_deg(found: Intrinsics) -> Array:
     """By how much the board is tilted against the image in each view, (V,) degrees."""
-    return np.asarray(np.degrees(np.arccos(np.clip(np.abs(found.views.rotation[:, 2, 2]), 0, 1))))
+    return np.degrees(np.arccos(np.clip(np.abs(found.views.rotation[:, 2, 2]), 0, 1)))
 
 
 def rim_px(found: Intrinsics) -> float:

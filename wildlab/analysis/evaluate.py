@@ -269,7 +269,7 @@ def axes_of(observations: Observations, scored: pd.DataFrame) -> dict[str, Array
 def _unit(vectors: Array, least: Array) -> Array:
     length = np.hypot(*vectors.T)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.where((length > least)[:, None], vectors / length[:, None], np.nan))
+        return np.where((length > least)[:, None], vectors / length[:, None], np.nan)
 
 
 def _right(axis: Array) -> Array:

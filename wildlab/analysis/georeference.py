@@ -371,4 +371,4 @@ def _ground_heights(flight: Flight, table: pd.DataFrame, pixels: pd.DataFrame) -
     of_target = truth_of(flight, table)[:, 2]
     if "plane_down_m" not in pixels:
         return of_target
-    return np.asarray(np.where(np.isnan(of_target), pixels["plane_down_m"].to_numpy(float), of_target))
+    return np.where(np.isnan(of_target), pixels["plane_down_m"].to_numpy(float), of_target)

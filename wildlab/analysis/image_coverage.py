@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -212,9 +213,13 @@ class Recovered(NamedTuple):
         return self.lost / self.of if self.of else 0.0
 
 
-def ordered(table: pd.DataFrame, stamps: Array, columns: list[str]) -> tuple[Array, Array]:
-    """Increasing stamps (N,) and values (N, K): what is finite, in order, the first of equal stamps."""
+def ordered(table: pd.DataFrame, columns: list[str], stamps: Array | None = None) -> tuple[Array, Array]:
+    """Increasing stamps (N,) and values (N, K): what is finite, in order, the first of equal stamps.
+
+    The stamps are those of the table, unless others are given.
+    """
     values = table[columns].to_numpy(float)
+    stamps = table["time_s"].to_numpy(float) if stamps is None else stamps
     known = np.isfinite(stamps) & np.isfinite(values).all(axis=1)
     t, values = stamps[known], values[known]
     _, first = np.unique(t, return_index=True)
@@ -249,15 +254,12 @@ def lost_data(flight: Flight, source: str | None, streams: dict[str, Pace]) -> l
     found = []
     frames, timed = flight.frames, flight.manifest.time.kind == "utc"
     if frames is not None and len(frames) and source is not None:
-        try:
-            p, _, _ = frame_poses(flight, source)
-            pan, tilt = gimbal_angles(flight)
-        except WildlabError:
-            p, pan, tilt = np.full((len(frames), 3), np.nan), np.zeros(len(frames)), np.zeros(len(frames))
-        posed = np.asarray(np.isfinite(p).all(axis=1))
+        posed, turned = np.zeros(len(frames), bool), np.ones(len(frames), bool)
+        with suppress(WildlabError):
+            p, angles = frame_poses(flight, source)[0], gimbal_angles(flight)
+            posed, turned = np.asarray(np.isfinite(p).all(axis=1)), np.isfinite(np.sum(angles, axis=0))
         why = _why_unposed(flight, source, ~posed) if timed and (~posed).any() else ""
         found.append(Recovered("images_without_pose", int((~posed).sum()), len(frames), "images", why))
-        turned = np.isfinite(pan + tilt)
         missing = int((posed & ~turned).sum())
         found.append(Recovered("images_without_gimbal", missing, len(frames), "images", ""))
         placed, has_pose = _placed(flight, source)
@@ -329,7 +331,7 @@ def _untrue(flight: Flight) -> list[Recovered]:
         stamps = rows["time_s"].to_numpy(float)
         if np.isnan(stamps).all():
             continue
-        t, place = ordered(rows, stamps + flight.manifest.clocks.truth_offset_s, POSITION)
+        t, place = ordered(rows, POSITION, stamps + flight.manifest.clocks.truth_offset_s)
         if len(t):
             missing += int(np.isnan(between(t, place, own, "truth")[:, 0]).sum())
     total = int((named != "").sum())

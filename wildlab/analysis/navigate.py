@@ -370,7 +370,7 @@ def comparison_times(flight: Flight, reference: str) -> Array:
     stamps = flight.nav[reference]["time_s"].to_numpy(float)
     felt = flight.table("imu")["time_s"].to_numpy(float)
     every = max(1, round(1 / (RATE_HZ * float(np.median(np.diff(stamps))))))
-    return np.asarray(stamps[(stamps >= felt[0]) & (stamps <= felt[-1])][::every])
+    return stamps[(stamps >= felt[0]) & (stamps <= felt[-1])][::every]
 
 
 def flown_part(flight: Flight, times: ArrayLike) -> tuple[str, float, float]:
@@ -503,7 +503,7 @@ def normalised_innovations(innovations: pd.DataFrame, dof: int = 3) -> Array:
     """Elements (N, dof) of one source's innovations in units of the deviations that the filter expects."""
     names = ["first", "second", "third"][:dof]
     expected = innovations[[f"sd_{name}" for name in names]].to_numpy(float)
-    return np.asarray(innovations[names].to_numpy(float) / expected)
+    return innovations[names].to_numpy(float) / expected
 
 
 def calibrated(flight: Flight) -> bool:
@@ -630,7 +630,7 @@ def corrections(flight: Flight, found: Navigated) -> Array:
     felt = (rate[1:] + rate[:-1]) / 2 - bias[1:]
     attitude = Rotation.from_quat(found.nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float), scalar_first=True)
     turned = (attitude[:-1].inv() * attitude[1:]).as_rotvec()
-    return np.asarray(np.linalg.norm(turned - felt * np.diff(times)[:, None], axis=1))
+    return np.linalg.norm(turned - felt * np.diff(times)[:, None], axis=1)
 
 
 def unit_of(name: str) -> str:

@@ -214,8 +214,8 @@ def _velocity_sd(flight: Flight, gnss: pd.DataFrame) -> Array | None:
 def _velocities(gnss: pd.DataFrame, times: Array) -> Array:
     """(N, 3) m/s, as logged or else from the positions."""
     if set(VELOCITY) <= set(gnss.columns):
-        return np.asarray(gnss[VELOCITY].to_numpy(float))
-    return np.asarray(np.gradient(gnss[POSITION].to_numpy(float), times, axis=0))
+        return gnss[VELOCITY].to_numpy(float)
+    return np.gradient(gnss[POSITION].to_numpy(float), times, axis=0)
 
 
 def _levers(flight: Flight, gnss: pd.DataFrame) -> list[Array]:
@@ -225,7 +225,7 @@ def _levers(flight: Flight, gnss: pd.DataFrame) -> list[Array]:
 
 def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Array:
     if set(columns) <= set(gnss.columns):
-        return np.asarray(gnss[list(columns)].iloc[0].to_numpy(float))
+        return gnss[list(columns)].iloc[0].to_numpy(float)
     return np.array(flight.manifest.gnss.lever_arm_m)
 
 

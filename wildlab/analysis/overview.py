@@ -102,7 +102,7 @@ def alarms_of(
             found.append(
                 Alarm("jumps", len(spells), spells[0, 0], spells[at, 0], float(sizes[at]), JUMP_M, 0.0)
             )
-        t, q = ordered(nav, nav["time_s"].to_numpy(float), QUATERNION)
+        t, q = ordered(nav, QUATERNION)
         length = np.linalg.norm(q, axis=1)
         t, q = t[length > 0], q[length > 0] / length[length > 0, None]
         # Between down in the body and down in n: the last element of the rotation's matrix.
@@ -129,7 +129,7 @@ def jumps_of(nav: pd.DataFrame, pace: Pace) -> tuple[Array, Array]:
     (K, 2) begin and end, s, and (K,) m by which they are off.
     """
     stated = set(VELOCITY) <= set(nav) and bool(nav[VELOCITY].notna().any().all())
-    t, values = ordered(nav, nav["time_s"].to_numpy(float), POSITION + (VELOCITY if stated else []))
+    t, values = ordered(nav, POSITION + (VELOCITY if stated else []))
     if len(t) < 4:
         return np.empty((0, 2)), np.empty(0)
     step, way = np.diff(t)[:, None], np.diff(values[:, :3], axis=0)
@@ -183,7 +183,7 @@ def _beyond(what: str, t: Array, values: Array, limit: float) -> list[Alarm]:
 
 def _apart(flight: Flight, source: str, pace: Pace) -> list[Alarm]:
     nav = flight.nav[source]
-    t, place = ordered(nav, nav["time_s"].to_numpy(float), POSITION)
+    t, place = ordered(nav, POSITION)
     if flight.gnss is None or not len(t):
         return []
     stamps, off, sd = beside_satellites(flight, t, place, pace.gaps)
@@ -407,17 +407,17 @@ def _path(flight: Flight, source: str | None) -> Path | None:
     timed = flight.manifest.time.kind == "utc"
     if source is not None:
         nav = flight.nav[source]
-        t, place = ordered(nav, nav["time_s"].to_numpy(float), POSITION)
+        t, place = ordered(nav, POSITION)
         if len(t):
             return Path(f"nav/{source}", t, place, timed)
     if flight.gnss is not None:
-        t, place = ordered(flight.gnss, gnss_times(flight), POSITION)
+        t, place = ordered(flight.gnss, POSITION, gnss_times(flight))
         if len(t):
             return Path("gnss", t, place, timed)
     truth = flight.truth
     if truth is not None and len(truth):
         first = truth[truth["target_id"] == truth["target_id"].iloc[0]]
-        t, place = ordered(first, first["time_s"].to_numpy(float), POSITION)
+        t, place = ordered(first, POSITION)
         if len(t) > 1:
             return Path("truth", t + flight.manifest.clocks.truth_offset_s, place, timed)
     return None
@@ -435,10 +435,10 @@ def _troubles(
         gnss, stamps = flight.gnss, gnss_times(flight)
         found["no satellite positions"] = streams["gnss"].gaps
         if "satellites" in gnss:
-            t, count = ordered(gnss, stamps, ["satellites"])
+            t, count = ordered(gnss, ["satellites"], stamps)
             found[TROUBLES[3]] = runs_of(count[:, 0] < FEW_SATELLITES, t)
         if "sd_horizontal_m" in gnss:
-            t, sd = ordered(gnss, stamps, ["sd_horizontal_m"])
+            t, sd = ordered(gnss, ["sd_horizontal_m"], stamps)
             if len(t):
                 found[TROUBLES[4]] = runs_of(sd[:, 0] > UNSURE * np.median(sd), t)
     if vibration is not None:
@@ -460,27 +460,27 @@ def _searched(flight: Flight, source: str | None, streams: dict[str, Pace]) -> t
 def _series(flight: Flight) -> dict[str, dict[str, tuple[Array, Array]]]:
     height, speed, attitude, turning = {}, {}, {}, {}
     for name, nav in flight.nav.items():
-        t, place = ordered(nav, nav["time_s"].to_numpy(float), POSITION)
+        t, place = ordered(nav, POSITION)
         if not len(t):
             continue
         height[name] = t, -place[:, 2]
         if set(VELOCITY) <= set(nav) and nav[VELOCITY].notna().any().all():
-            at, v = ordered(nav, nav["time_s"].to_numpy(float), VELOCITY)
+            at, v = ordered(nav, VELOCITY)
             speed[name] = at, np.hypot(v[:, 0], v[:, 1])
-        at, q = ordered(nav, nav["time_s"].to_numpy(float), QUATERNION)
+        at, q = ordered(nav, QUATERNION)
         good = np.linalg.norm(q, axis=1) > 0
         if good.any():
             attitude[name] = at[good], np.degrees(matrix_to_euler(quaternion_to_matrix(q[good])))
     if flight.gnss is not None:
-        t, place = ordered(flight.gnss, gnss_times(flight), POSITION)
+        t, place = ordered(flight.gnss, POSITION, gnss_times(flight))
         if len(t):
             height["satellites"] = t, -place[:, 2]
         if set(VELOCITY) <= set(flight.gnss):
-            t, v = ordered(flight.gnss, gnss_times(flight), VELOCITY)
+            t, v = ordered(flight.gnss, VELOCITY, gnss_times(flight))
             if len(t):
                 speed["satellites"] = t, np.hypot(v[:, 0], v[:, 1])
     if flight.imu is not None:
-        t, w = ordered(flight.imu, flight.imu["time_s"].to_numpy(float), RATE)
+        t, w = ordered(flight.imu, RATE)
         if len(t):
             turning["inertial sensor"] = t, np.degrees(w)
     return {"height": height, "speed": speed, "attitude": attitude, "turning": turning}
@@ -499,7 +499,7 @@ def _above(flight: Flight, path: Path | None) -> tuple[Array, str] | None:
 def _vibration(flight: Flight) -> tuple[Vibration, Array] | None:
     if flight.imu is None or flight.manifest.time.kind != "utc":
         return None
-    t, force = ordered(flight.imu, flight.imu["time_s"].to_numpy(float), FORCE)
+    t, force = ordered(flight.imu, FORCE)
     found = vibration_of(t, force)
     return None if found is None else (found, t)
 

@@ -107,7 +107,7 @@ class _Filters:
     @property
     def P(self) -> Array:
         """(A, 2, 2) m^2."""
-        return np.asarray(self.p[:, None, None] * np.eye(2))
+        return self.p[:, None, None] * np.eye(2)
 
     def see(self, animals: Indices, positions: Array) -> None:
         """Positions (K, 2) of animals that an image shows."""
@@ -416,7 +416,7 @@ class SearchInRows:
     def way_point(self, platform: Platform, open_areas: Mask) -> Array:
         """(2,) m, the first that was not visited: where the search would go on."""
         rows = self._rows(platform, open_areas)
-        return np.asarray(rows.way_points[rows.visited])
+        return rows.way_points[rows.visited]
 
     def _rows(self, platform: Platform, open_areas: Mask) -> PatternPlanner:
         """What is left of the rows that are being flown, or the rows over the next area."""

@@ -377,7 +377,7 @@ def _path(flight: Flight, source: str | None, lacks: list[str]) -> Path | None:
         lacks.append("the aircraft: the flight has no poses")
         return None
     nav = flight.nav[source]
-    times, places = ordered(nav, nav["time_s"].to_numpy(float), POSITION)
+    times, places = ordered(nav, POSITION)
     if not len(times):
         lacks.append(f"the aircraft: no pose of {source} has a time and a place")
         return None

@@ -193,7 +193,7 @@ class Particles:
         if not self.rules.negative or not len(self.herd.identity):
             return np.full(len(self.herd.identity), -np.inf)
         off = self.herd.cloud.x[..., :2] - self._moments[0][:, None, :2]
-        return np.asarray(np.sqrt((off**2).sum(axis=-1).max(axis=1)))
+        return np.sqrt((off**2).sum(axis=-1).max(axis=1))
 
 
 class Kalman:
@@ -567,7 +567,7 @@ class OutOfSight(NamedTuple):
     def nees(self) -> Array:
         """(N,) squared distances in units of the covariance; 2 on average where it is right."""
         solved = np.linalg.solve(self.covariance, self.off[..., None])[..., 0]
-        return np.asarray(np.einsum("ni,ni->n", self.off, solved))
+        return np.einsum("ni,ni->n", self.off, solved)
 
 
 def out_of_sight(

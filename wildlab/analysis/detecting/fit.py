@@ -210,7 +210,7 @@ def parts_needed(found: Found) -> Array:
     half = (first + second - a - b) / 2
     rest = first * second - a * second - b * first
     s = -half + np.sqrt(np.maximum(half**2 - rest, 0.0))
-    return np.asarray(np.sqrt(np.maximum(s, 0.0)) / found.major)
+    return np.sqrt(np.maximum(s, 0.0)) / found.major
 
 
 def part_of(needed: ArrayLike) -> float:

@@ -180,7 +180,7 @@ def _instants(times: Array, row_of: Indices, step: float) -> Array:
     ends = times[begins + 1] - 1e-3 * step
     every = np.unique(np.concatenate([np.arange(0.0, times[-1], step), times[begins], ends]))
     apart = np.diff(every, prepend=-np.inf) > 1e-2 * step
-    return np.asarray(every[apart | np.isin(every, times[begins])])
+    return every[apart | np.isin(every, times[begins])]
 
 
 def gimbal_rate(plan: Plan) -> float:
@@ -197,12 +197,12 @@ def gimbal_rate(plan: Plan) -> float:
 def _nose(headings: Array, speed: float, wind: Array) -> Array:
     """Where the nose points so that the way over ground is that of the headings: into the wind."""
     across = np.cos(headings) * wind[1] - np.sin(headings) * wind[0]
-    return np.asarray(headings - np.arcsin(across / speed))
+    return headings - np.arcsin(across / speed)
 
 
 def _known(terrain: Terrain, points: Array) -> Array:
     """Heights of the ground; zero where nothing is known, which is nowhere on a row that was planned."""
-    return np.asarray(np.nan_to_num(terrain.heights_at(points)))
+    return np.nan_to_num(terrain.heights_at(points))
 
 
 def _above(sortie: Sortie, points: Array, times: Array) -> Array:
@@ -213,7 +213,7 @@ def _above(sortie: Sortie, points: Array, times: Array) -> Array:
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(course.points, axis=0), axis=1))])
     # Way points leave out some of an arc, so both are counted by their share of the whole.
     at = np.interp(times, course.times, along) * far[-1] / max(float(along[-1]), 1e-9)
-    return np.asarray(np.interp(at, far, way.height - way.ground))
+    return np.interp(at, far, way.height - way.ground)
 
 
 def _angles(plan: Plan, times: Array, positions: Array, headings: Array, rate: float) -> GimbalAngles:

@@ -397,7 +397,7 @@ def _check_under(areas: Areas, terrain: Terrain, strip: float) -> None:
 
 def _home(home: tuple[float, float], areas: Areas) -> Array:
     lat, lon = np.radians(home)
-    here = np.asarray(geodetic_to_ned(lat, lon, 0.0, areas.origin)[:2])
+    here = geodetic_to_ned(lat, lon, 0.0, areas.origin)[:2]
     far = float(np.hypot(*here))
     if not far <= FURTHEST_HOME:
         swapped = geodetic_to_ned(lon, lat, 0.0, areas.origin)[:2] if abs(home[1]) <= 90 else here

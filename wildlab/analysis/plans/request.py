@@ -110,7 +110,7 @@ def sizes_alone(areas: Sequence[Area]) -> dict[str, float]:
 
 def _within(area: Area, points: Array) -> Mask:
     """Which points (N, 2) lie in an area, and not in its holes."""
-    inside = np.asarray(contains(area.outline, points))
+    inside = contains(area.outline, points)
     for hole in area.holes:
         inside &= ~contains(hole, points)
     return inside
@@ -120,7 +120,7 @@ def _distances(points: Array, a: Array, b: Array) -> Array:
     """How far points (N, 2) are from the segment a-b, metres."""
     along = b - a
     share = np.clip((points - a) @ along / max(float(along @ along), 1e-300), 0, 1)
-    return np.asarray(np.linalg.norm(points - a - share[:, None] * along, axis=1))
+    return np.linalg.norm(points - a - share[:, None] * along, axis=1)
 
 
 #: Rows and columns of the image that are looked at; angles of a swing.
@@ -414,7 +414,7 @@ class PlanRequest:
     def wind(self) -> Array:
         """(2,) where the air goes to, north and east, m/s."""
         towards = math.radians((self.wind_from_deg or 0.0) + 180.0)
-        return np.asarray(self.wind_m_s * np.array([math.cos(towards), math.sin(towards)]))
+        return self.wind_m_s * np.array([math.cos(towards), math.sin(towards)])
 
     @property
     def drift(self) -> Array:

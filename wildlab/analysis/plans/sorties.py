@@ -383,7 +383,7 @@ def _corners(course: Course, radius: float) -> Indices:
             if off.max() <= BULGE * radius:
                 continue
         chosen.append(k)
-    return np.asarray(kept[np.array(chosen)])
+    return kept[np.array(chosen)]
 
 
 def _times(course: Course, corners: Indices, way: HeightProfile, wanted: PlanRequest) -> tuple[float, float]:

@@ -360,7 +360,7 @@ def _disc(count: int) -> Array:
     """(count, 2) places of a disc of radius one, evenly spread: a spiral whose turns never fall in line."""
     number = np.arange(count) + 0.5
     angle = np.pi * (3 - np.sqrt(5)) * number
-    return np.asarray(np.sqrt(number / count)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    return np.sqrt(number / count)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 _DISC = _disc(PLACES)

@@ -154,10 +154,10 @@ def place_of(
 
 def _place(scans: Scans, row: int, z: Array, beliefs: NoiseModel) -> Array | None:
     if scans.kind == "position":
-        return np.asarray(z[:2])
+        return z[:2]
     if scans.kind == "pixel" and scans.poses is not None:
         ground = georeference_pixels(scans.poses.take(np.array([row])), z[None], scans.plane_down[[row]])
-        return np.asarray(ground[0, :2])
+        return ground[0, :2]
     if scans.kind == "velocity":
         return None
     elements = dict(zip(scans.elements, z, strict=True))
@@ -170,7 +170,7 @@ def _place(scans: Scans, row: int, z: Array, beliefs: NoiseModel) -> Array | Non
     else:
         r = beliefs.range_m
     azimuth = elements["azimuth"]
-    return np.asarray(scans.platform[row] + r * np.array([np.cos(azimuth), np.sin(azimuth)]))
+    return scans.platform[row] + r * np.array([np.cos(azimuth), np.sin(azimuth)])
 
 
 class Piece(NamedTuple):
@@ -206,7 +206,7 @@ def geometry_of(scans: Scans, seen: Array, beliefs: NoiseModel) -> Geometry | No
         return None
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     errors = errors_of(scans, beliefs)
-    there: NDArray[np.bool_] = np.asarray(np.isfinite(seen).all(axis=-1))
+    there: NDArray[np.bool_] = np.isfinite(seen).all(axis=-1)
 
     def at(row: int, place: Array) -> tuple[Array, Array]:
         state = np.append(place, [0.0, 0.0])

@@ -525,7 +525,7 @@ def spread_of(scans: Scans, beliefs: NoiseModel, H_pose: Array) -> Array | None:
     if errors is None:
         return None
     H = H_pose[..., [SLOTS[scans.kind].index(name) for name in errors.names]]
-    return np.asarray(H @ errors.covariance @ np.swapaxes(H, -1, -2))
+    return H @ errors.covariance @ np.swapaxes(H, -1, -2)
 
 
 #: Median of the size of a standard normal number.
@@ -563,7 +563,7 @@ def roughness(scans: Scans) -> Array:
 
 def _spread(values: Array) -> Array:
     """(m,) standard deviations of (N, m) by their medians."""
-    return np.asarray(np.median(np.abs(values), axis=0) / MEDIAN_OF_NORMAL)
+    return np.median(np.abs(values), axis=0) / MEDIAN_OF_NORMAL
 
 
 def _unnamed(scans: Scans) -> Array:
@@ -634,10 +634,10 @@ def _metric(scans: Scans, z: Array, row: int, turn: float) -> Array:
         return np.column_stack([np.cos(azimuth), np.sin(azimuth), z[:, 1:]])
     if scans.kind == "range-bearing":
         azimuth = z[:, 1] + turn
-        return np.asarray(z[:, :1] * np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1))
+        return z[:, :1] * np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
     c, s = np.cos(turn), np.sin(turn)
     centre = np.nan_to_num(scans.platform[row]) if scans.kind == "position" else np.zeros(2)
-    return np.asarray((z[:, :2] - centre) @ np.array([[c, s], [-s, c]]) + centre)
+    return (z[:, :2] - centre) @ np.array([[c, s], [-s, c]]) + centre
 
 
 def _mutual(before: Array, here: Array) -> NDArray[np.intp]:

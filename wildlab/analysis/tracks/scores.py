@@ -71,7 +71,7 @@ def worth_of_errors(errors: Array, covariances: Array) -> float:
     Of errors in units of their own standard deviation, about zero and not about their mean: an error that is
     the same throughout is one, however steady its square is.
     """
-    white = np.asarray(whiten(errors, covariances))
+    white = whiten(errors, covariances)
     white = white[np.isfinite(white).all(axis=1)]
     n = len(white)
     if n < 4:

@@ -188,7 +188,7 @@ def truth_states(flight: Flight, target: str, times: ArrayLike) -> Array:
     offset, half = flight.manifest.clocks.truth_offset_s, TRUTH_VELOCITY_OVER_S / 2
 
     def where(t: Array) -> Array:
-        return np.asarray(truth_at(rows, t, offset_s=offset)[1][0, :, :2])
+        return truth_at(rows, t, offset_s=offset)[1][0, :, :2]
 
     return np.hstack([where(at), (where(at + half) - where(at - half)) / (2 * half)])
 

@@ -157,7 +157,7 @@ def _unscented_at_rest(times: Array, own: Array, R: Array, sensor: Sensor, begin
     track = run_unscented(times, own, R, sensor, rest, start)
     x, P = np.zeros((len(times), 4)), np.zeros((len(times), 4, 4))
     x[:, :2], P[:, :2, :2] = track.x, track.P
-    gone: NDArray[np.bool_] = np.asarray(~np.isfinite(track.x).all(axis=1))
+    gone = np.asarray(~np.isfinite(track.x).all(axis=1))
     x[gone], P[gone] = np.nan, np.nan
     return track._replace(x=x, P=P)
 
@@ -205,7 +205,7 @@ def _lasting(scans: Scans, positions: Array, beliefs: NoiseModel) -> Array:
     spread = spread_of(scans, beliefs, np.nan_to_num(expected.H_pose))
     if spread is None:
         return np.zeros((len(positions), 2, 2))
-    return np.asarray(inverse @ np.nan_to_num(spread) @ np.swapaxes(inverse, 1, 2))
+    return inverse @ np.nan_to_num(spread) @ np.swapaxes(inverse, 1, 2)
 
 
 #: What all sensors at once are called.
@@ -248,7 +248,7 @@ class SensorTrack(NamedTuple):
     @property
     def without(self) -> NDArray[np.bool_]:
         """(N,) looks at which there is no track, from the first start to where the last track ends."""
-        gone: NDArray[np.bool_] = np.asarray(~np.isfinite(self.estimate).all(axis=1))
+        gone = np.asarray(~np.isfinite(self.estimate).all(axis=1))
         gone[self.last :] = False
         gone[: self.starts[0] if len(self.starts) else None] = False
         return gone

@@ -38,7 +38,6 @@ from wildlab.analysis.tracks.scans import (
 from wildlab.analysis.tracks.single_target import choose
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import effective_sample_size
-from wildlab.flight.checksums import checksums_of
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import Settings
 from wildlab.geometry.frames import Array
@@ -224,7 +223,7 @@ def _autocorrelation(errors: list[_Errors], sds: Array, interval: float) -> tupl
     doubt = np.maximum(1 - r**2, 0.05) / np.sqrt(pairs[used])
 
     def model(lag: Array, share: float, time: float) -> Array:
-        return np.asarray(share * np.exp(-lag / time))
+        return share * np.exp(-lag / time)
 
     found, _ = curve_fit(
         model,
@@ -304,7 +303,7 @@ def tune_by_innovations(
     targets, cases = inputs.targets, list[_Case]()
     for sensor, one in inputs.sensors.items():
         mine = [case for truth in one.truths for case in _cases(sensor, one, truth.target, targets)]
-        used = sum(int(np.isfinite(case.own[:, 0]).sum()) for case in mine)
+        used = sum(_count(case) for case in mine)
         if used < FEWEST:
             raise WildlabError(
                 f"only {used} detections of {sensor!r} can be followed",
@@ -336,13 +335,17 @@ def tune_by_innovations(
     for name, factor in zip(names, factors[1:], strict=True):
         scans, noise = inputs.sensors[name][:2]
         sds = noise.noise * factor
-        n = sum(int(np.isfinite(one.own[:, 0]).sum()) for one in cases if one.sensor == name)
+        n = sum(_count(one) for one in cases if one.sensor == name)
         interval = scans.interval_s
         tunings[name] = SensorTuning(
             name, scans.kind, noise.offset_s, np.nan, np.nan, float(sds[0]), 0.0, max(interval, 1e-3),
             0.0, 0.0, 0.0, noise.range_m, noise.range_sd_m, interval, n, tuple(sds.tolist()),
         )  # fmt: skip
     return tunings, float(targets.density * factors[0])
+
+
+def _count(case: _Case) -> int:
+    return int(np.isfinite(case.own[:, 0]).sum())
 
 
 def _cases(sensor: str, one: SensorInputs, target: str, targets: TargetModel) -> list[_Case]:
@@ -432,13 +435,9 @@ def refuse_same(flight: Flight, other: Flight) -> None:
     WildlabError
         Where it is.
     """
-    same = False
-    if flight.folder is not None and other.folder is not None:
-        mine, its = checksums_of(flight.folder), checksums_of(other.folder)
-        same = "detections.parquet" in mine and mine["detections.parquet"] == its.get("detections.parquet")
     both = _as_measured(flight), _as_measured(other)
     alike = sum((both[0] & both[1]).values())
-    if same or alike >= max(ALIKE, SHARE * min(map(Counter.total, both))):
+    if alike >= max(ALIKE, SHARE * min(map(Counter.total, both))):
         raise WildlabError(
             f"this is the flight that is judged, or part of it: {alike} of its detections have the same "
             "stamps and values, and nothing is tuned where it is judged",
