@@ -193,11 +193,11 @@ def points_geojson(flight: Flight, points: pd.DataFrame, source: str = "", *, el
 
 def _features(table: pd.DataFrame, kind: str, places: Sequence[object]) -> list[dict[str, object]]:
     """One feature a row, with what `PROPERTIES` names."""
-    kept = table[[name for name in PROPERTIES if name in table]].astype(object)
-    rows = kept.where(kept.notna(), None).to_dict("records")
+    rows = table[[name for name in PROPERTIES if name in table]].to_dict("records")
+    known = [{key: None if value != value else value for key, value in row.items()} for row in rows]
     return [
         {"type": "Feature", "geometry": {"type": kind, "coordinates": place}, "properties": row}
-        for place, row in zip(places, rows, strict=True)
+        for place, row in zip(places, known, strict=True)
     ]
 
 

@@ -206,7 +206,7 @@ def geometry_of(scans: Scans, seen: Array, beliefs: NoiseModel) -> Geometry | No
         return None
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     errors = errors_of(scans, beliefs)
-    there: NDArray[np.bool_] = np.isfinite(seen).all(axis=-1)
+    there = np.asarray(np.isfinite(seen).all(axis=-1))
 
     def at(row: int, place: Array) -> tuple[Array, Array]:
         state = np.append(place, [0.0, 0.0])
