@@ -20,11 +20,11 @@ def candidate(noise: ReceiverNoise, parameters: int, score: float) -> Candidate:
     return Candidate(noise, sd, parameters, score + 10, score, 7)
 
 
-def receiver(noise: ReceiverNoise, gross: int = 0, scale: Scale = SCALE) -> Receiver:
+def receiver(noise: ReceiverNoise, scale: Scale = SCALE) -> Receiver:
     stated = candidate(ReceiverNoise(), 0, 0.0)
     other = candidate(noise, 8, -5.0 if noise == ReceiverNoise() else 5.0)
     chosen = stated if noise == ReceiverNoise() else other
-    return Receiver([stated, other], chosen, 100.0, 400.0, scale, 301, gross)
+    return Receiver([stated, other], chosen, 100.0, 400.0, scale, 301)
 
 
 def test_tables_have_every_number_that_was_found_and_no_other():

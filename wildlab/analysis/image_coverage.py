@@ -73,12 +73,6 @@ class Coverage(NamedTuple):
         seen = self.counts[self.counts > 0]
         return float(seen.mean()) if len(seen) else float("nan")
 
-    @property
-    def twice(self) -> float:
-        """Share of what was seen that two images or more show; NaN where nothing was."""
-        seen = self.counts[self.counts > 0]
-        return float((seen > 1).mean()) if len(seen) else float("nan")
-
 
 def ground_height(flight: Flight) -> tuple[float, str] | None:
     """Down coordinate of level ground, and where it is from: the truth, else the detections; None without.
@@ -104,7 +98,7 @@ def ground_height(flight: Flight) -> tuple[float, str] | None:
     return None
 
 
-def cover_images(flight: Flight, source: str | None) -> tuple[Coverage | None, str]:
+def cover_images(flight: Flight, source: str | None) -> Coverage | None:
     """What the images of a flight have shown of the ground, as far as their poses and the ground are known.
 
     Parameters
@@ -116,26 +110,20 @@ def cover_images(flight: Flight, source: str | None) -> tuple[Coverage | None, s
 
     Returns
     -------
-    (Coverage or None, str)
-        Where there is none, why not, as a clause.
+    Coverage or None
     """
     frames, manifest = flight.frames, flight.manifest
-    lacks = [
-        *(["images"] if frames is None or not len(frames) else []),
-        *(["poses"] if source is None else []),
-        *(["a camera"] if manifest.camera is None else []),
-    ]
-    if lacks or frames is None or source is None:
-        return None, f"it lacks {' and '.join(lacks)}"
-    level = ground_height(flight) if flight.terrain is None else None
-    if flight.terrain is None and level is None:
-        return None, "the height of the ground is not known: there is neither terrain nor truth"
+    if frames is None or not len(frames) or source is None or manifest.camera is None:
+        return None
+    level = (0.0, "the flight's terrain") if flight.terrain is not None else ground_height(flight)
+    if level is None:
+        return None
     try:
         p, R, _ = frame_poses(flight, source)
         pan, tilt = gimbal_angles(flight)
         mount = manifest.geometry_mount(source)
-    except WildlabError as error:
-        return None, error.problem
+    except WildlabError:
+        return None
     posed = np.isfinite(p).all(axis=1) & np.isfinite(R).all(axis=(1, 2)) & np.isfinite(pan + tilt)
     poses = CameraPoses(manifest.geometry_camera(), mount, p[posed], R[posed], pan[posed], tilt[posed])
     uv = _border(poses.camera.width, poses.camera.height)
@@ -151,13 +139,11 @@ def cover_images(flight: Flight, source: str | None) -> tuple[Coverage | None, s
         if flight.terrain is not None:
             points = pixels_to_terrain(each, pixels, flight.terrain).points
         else:
-            assert level is not None  # noqa: S101 - for the type checker: it was looked for above
             points = georeference_pixels(each, pixels, np.full(len(pixels), level[0]))
         border = points[:, :2].reshape(-1, len(uv), 2)
         border[~steep] = np.nan
         outlines[posed] = border
-    words = "the flight's terrain" if level is None else level[1]
-    return _counted(len(frames), posed, flat, outlines, words), ""
+    return _counted(len(frames), posed, flat, outlines, level[1])
 
 
 def _border(width: int, height: int) -> Array:

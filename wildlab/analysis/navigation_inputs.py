@@ -350,8 +350,6 @@ class Receiver(NamedTuple):
         What is stated, of positions and of velocities.
     fixes
         How many positions that were.
-    gross
-        Fixes of the whole flight that were left out as no noise.
     """
 
     candidates: list[Candidate]
@@ -360,7 +358,6 @@ class Receiver(NamedTuple):
     end: float
     scale: Scale
     fixes: int
-    gross: int
 
     @property
     def noise(self) -> ReceiverNoise | None:
@@ -465,7 +462,6 @@ def receiver_noise(flight: Flight) -> Receiver:
     """
     given = inputs_of(flight, noise=imu_noise(flight))
     aiding = without_gross(flight, given)
-    gross = sum(len(given.aiding[name].times) - len(aiding[name].times) for name in aiding)
     begin, end = _part(flight, given)
     inside = (aiding["position"].times >= begin) & (aiding["position"].times <= end)
     if inside.sum() < FEWEST:
@@ -490,7 +486,7 @@ def receiver_noise(flight: Flight) -> Receiver:
     scale = Scale(stated["position"], stated.get("velocity"), interval, end - begin)
     candidates = choose(run, scale)
     chosen = max(candidates, key=lambda one: one.score)
-    return Receiver(candidates, chosen, begin, end, scale, int(inside.sum()), gross)
+    return Receiver(candidates, chosen, begin, end, scale, int(inside.sum()))
 
 
 def place_receiver(flight: Flight, noise: ReceiverNoise) -> Placement:

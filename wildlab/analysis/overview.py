@@ -256,24 +256,22 @@ class Overview:
         What is so wrong that it comes before all else, worst first.
     troubles
         Those of `TROUBLES` that there are.
-    searched
-        Of what troubles were looked for: ``poses``, ``satellites``, ``inertial samples``.
     series
         Over time: ``height``, ``speed``, ``attitude``, ``turning``, each {name: (times, values)}.
     above
         Height above ground: (N,) m along the path, and what the ground is; None where it is not known.
     vibration
         Of the inertial sensor, and the (N,) stamps of its samples; None where it cannot be told.
-    coverage, uncovered
-        What the images showed, or why that is not known.
+    coverage
+        What the images showed; None where that is not known.
     detections
         How many, in how many of the images, and how many of their pixels have a place on the ground.
     lost
         Data that are lost, most first.
     uses
         What the flight is good for.
-    problems, warnings
-        How many findings of either kind the checks of its tables have.
+    problems
+        How many the checks of its tables have found.
     """
 
     flight: Flight
@@ -283,17 +281,14 @@ class Overview:
     path: Path | None
     alarms: tuple[Alarm, ...]
     troubles: tuple[Issue, ...]
-    searched: tuple[str, ...]
     series: dict[str, dict[str, tuple[Array, Array]]]
     above: tuple[Array, str] | None
     vibration: tuple[Vibration, Array] | None
     coverage: Coverage | None
-    uncovered: str
     detections: tuple[int, int, int]
     lost: tuple[Recovered, ...]
     uses: tuple[Use, ...]
     problems: int
-    warnings: int
 
     @property
     def detections_in_images(self) -> int:
@@ -359,8 +354,6 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
     length = max(p.end for p in carried) - min(p.begin for p in carried) if carried and timed else np.nan
     path = _path(flight, source)
     vibration = _vibration(flight)
-    coverage, uncovered = cover_images(flight, source)
-    findings = [one.level for one in find(flight, meaning=False)]
     return Overview(
         flight=flight,
         source=source,
@@ -369,17 +362,14 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
         path=path,
         alarms=tuple(alarms_of(flight, source, streams.get(f"nav/{source}"), vibration)) if timed else (),
         troubles=tuple(_troubles(flight, source, streams, vibration)) if timed else (),
-        searched=_searched(flight, source, streams) if timed else (),
         series=_series(flight) if timed else {},
         above=_above(flight, path),
         vibration=vibration,
-        coverage=coverage,
-        uncovered=uncovered,
+        coverage=cover_images(flight, source),
         detections=detections_of(flight, source),
         lost=tuple(sorted(lost_data(flight, source, streams), key=lambda one: -one.share)),
         uses=tuple(usable_for(flight)),
-        problems=findings.count("problem"),
-        warnings=findings.count("warning"),
+        problems=sum(one.level == "problem" for one in find(flight, meaning=False)),
     )
 
 
@@ -446,15 +436,6 @@ def _troubles(
     if "imu" in streams:
         found["no inertial samples"] = streams["imu"].gaps
     return [Issue(what, found[what]) for what in TROUBLES if len(found.get(what, ()))]
-
-
-def _searched(flight: Flight, source: str | None, streams: dict[str, Pace]) -> tuple[str, ...]:
-    """Of what there is enough to look for troubles in."""
-    posed = source is not None and "frame_id" not in flight.nav[source]
-    there = {"poses": posed and streams[f"nav/{source}"].n > 1}
-    for name, of in (("satellites", "gnss"), ("inertial samples", "imu")):
-        there[name] = of in streams and streams[of].n > 1
-    return tuple(name for name, some in there.items() if some)
 
 
 def _series(flight: Flight) -> dict[str, dict[str, tuple[Array, Array]]]:
