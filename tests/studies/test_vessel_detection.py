@@ -92,7 +92,6 @@ def spread_of(**changes):
             "detection_rate": 1.0,
             "false_alarms_per_image": 0.0,
             "missed": 0.0,
-            "merged": 0.0,
             "largest_share_missed": np.nan,
             "images_with_false": 0.0,
             "images_with_missed": 0.0,

@@ -94,9 +94,8 @@ def outcomes(table: pd.DataFrame, keys: Sequence[str], fixed: str) -> pd.DataFra
 
     Returns
     -------
-    One row for each case: ``keys``, ``outcome`` (of `OUTCOMES`), ``stays`` and ``inside`` (it stays, and its
-    mean NEES is in its band), ``stays_white`` and ``inside_white``, ``rmse_ratio``, and the
-    columns of the two filters' rows, the white one's as ``*_white``.
+    One row for each case: ``outcome`` (of `OUTCOMES`), and the columns of the two filters' rows, the white
+    one's as ``*_white``.
     """
     kinds = [kind for kind, names in FILTERS.items() if fixed in names]
     rows = table[table["kind"].isin(kinds)]
@@ -111,14 +110,7 @@ def outcomes(table: pd.DataFrame, keys: Sequence[str], fixed: str) -> pd.DataFra
         ["lost", "both inside", "gained", "too dear", "spoilt"],
         "neither inside",
     )
-    found: pd.DataFrame = both.assign(
-        outcome=outcome,
-        stays=kept,
-        inside=kept & inside,
-        stays_white=stays(before),
-        inside_white=stays(before) & inside_white,
-        rmse_ratio=ratio,
-    )
+    found: pd.DataFrame = both.assign(outcome=outcome)
     return found
 
 
@@ -196,16 +188,15 @@ def of_use(table: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     One row for each sensor, in the order of the table: ``sensor``, ``filter`` (the one that keeps most),
-    ``kept``, ``tracks``, ``of_use``, and of that filter's tracks the median ``rmse`` (m; of those that are
-    there at all).
+    ``kept``, ``tracks``, ``of_use``.
     """
     rows = []
     for sensor, group in table.groupby("sensor", sort=False):
         kept = pd.Series(stays(group), group.index).groupby(group["filter"], sort=False).sum()
         best = str(kept.idxmax())
-        mine, most = group[group["filter"] == best], int(kept.max())
-        rows.append((str(sensor), best, most, len(mine), 2 * most > len(mine), float(mine["rmse"].median())))
-    return pd.DataFrame(rows, columns=["sensor", "filter", "kept", "tracks", "of_use", "rmse"])
+        of, most = int((group["filter"] == best).sum()), int(kept.max())
+        rows.append((str(sensor), best, most, of, 2 * most > of))
+    return pd.DataFrame(rows, columns=["sensor", "filter", "kept", "tracks", "of_use"])
 
 
 def check_claims(table: pd.DataFrame, keys: Sequence[str]) -> dict[str, NDArray[np.bool_]]:

@@ -33,9 +33,7 @@ SUBJECTS = (SHIP, WHOLE, CUT, BOATS, SEA)
 RECORDED = {
     "detection_rate": "1",
     "false_alarms_per_image": "1",
-    "pieces": "1",
     "ellipse_coverage_90": "1",
-    "smallest_share_found": "1",
     "images": "1",
 }
 
@@ -116,13 +114,12 @@ def tally(images: list[Image], thresholds: FloatingThresholds) -> tuple[pd.DataF
     Returns
     -------
     (objects, frames)
-        One row for each body in view (``subject``, ``image``, ``kind``, ``share`` in view, ``area`` px^2,
-        ``found``, ``merged`` with another, ``pieces``, ``inside`` its 90 % ellipse, NaN where not found); one
-        for each image (``subject``, ``image``, ``false`` alarms, ``bodies``, ``missed``).
+        One row for each body in view (``subject``, ``share`` in view, ``found``, ``inside`` its 90 % ellipse,
+        NaN where not found); one for each image (``subject``, ``false`` alarms, ``bodies``, ``missed``).
     """
     objects: list[dict[str, object]] = []
     frames: list[dict[str, object]] = []
-    for number, (subject, view, counts) in enumerate(images):
+    for subject, view, counts in images:
         result = find_objects(counts, thresholds=thresholds)
         judged = judge(view, result)
         missed = bodies = 0
@@ -134,22 +131,14 @@ def tally(images: list[Image], thresholds: FloatingThresholds) -> tuple[pd.DataF
             missed += not rows
             objects.append(
                 {
-                    "subject": subject, "image": number, "kind": seen.kind, "share": seen.share,
-                    "area": seen.area, "found": bool(rows), "merged": seen.number in judged.merged,
-                    "pieces": len(rows) if rows else np.nan,
+                    "subject": subject, "share": seen.share, "found": bool(rows),
                     "inside": _inside(seen, result, rows),
                 }
             )  # fmt: skip
-        frames.append(
-            {
-                "subject": subject, "image": number, "false": judged.false, "bodies": bodies,
-                "missed": missed,
-            }
-        )  # fmt: skip
-    columns = ["subject", "image", "kind", "share", "area", "found", "merged", "pieces", "inside"]
+        frames.append({"subject": subject, "false": judged.false, "bodies": bodies, "missed": missed})
     return (
-        pd.DataFrame(objects, columns=columns),
-        pd.DataFrame(frames, columns=["subject", "image", "false", "bodies", "missed"]),
+        pd.DataFrame(objects, columns=["subject", "share", "found", "inside"]),
+        pd.DataFrame(frames, columns=["subject", "false", "bodies", "missed"]),
     )
 
 
@@ -180,12 +169,9 @@ def numbers_of(objects: pd.DataFrame, frames: pd.DataFrame) -> dict[tuple[str, s
         numbers[subject, "detection_rate"] = rate
         numbers[subject, "images_with_missed"] = (with_some["missed"] > 0).sum()
         found = seen[seen["found"].astype(bool)]
-        numbers[subject, "pieces"] = found["pieces"].mean() if len(found) else np.nan
         numbers[subject, "ellipse_coverage_90"] = found["inside"].mean() if len(found) else np.nan
-        numbers[subject, "smallest_share_found"] = found["share"].min() if len(found) else np.nan
         missed = seen[~seen["found"].astype(bool)]
         numbers[subject, "missed"] = len(missed)
-        numbers[subject, "merged"] = missed["merged"].sum()
         numbers[subject, "largest_share_missed"] = missed["share"].max() if len(missed) else np.nan
     return numbers
 
