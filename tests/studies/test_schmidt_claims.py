@@ -53,7 +53,7 @@ def flight_with(**changed: float) -> dict[tuple[str, str], float]:
         "shift_px": 18.0,
         "largest_shift_px": 70.0,
     }
-    pose |= {"rms_turning": 2.0, "rms_straight": 1.0, "difference_turning": 2.0, "difference_straight": 1.0}
+    pose |= {"difference_turning": 2.0, "difference_straight": 1.0}
     row |= {("mekf", name): value for name, value in (pose | {"difference_yaw": 2.0}).items()}
     return row | {tuple(key.split("__")): value for key, value in changed.items()}  # type: ignore[misc]
 

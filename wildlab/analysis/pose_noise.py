@@ -93,10 +93,10 @@ def premise_numbers(flight: Flight, seen: Sighting, source: str, own: Navigation
     dict
         ``sd_spread``: the range that nine of ten of a stated deviation lie in over its median, of the
         coordinate or angle that changes most. ``difference_roll`` to ``difference_yaw``: RMS against the
-        autopilot; ``outside_...``: share beyond two deviations. ``difference_turning``, ``..._straight`` and
-        ``rms_turning``, ``..._straight``: roll's, against autopilot and truth, while the airframe turns and
-        not. ``shift_px``: RMS over detections and both axes of what the pose's error moves the target by in
-        the image; ``largest_shift_px``: the farthest that it does.
+        autopilot; ``outside_...``: share beyond two deviations. ``difference_turning`` and
+        ``..._straight``: roll's, while the airframe turns and not. ``shift_px``: RMS over detections and both
+        axes of what the pose's error moves the target by in the image; ``largest_shift_px``: the farthest
+        that it does.
     """
     sd = own.sd[np.isfinite(own.sd[:, 0])][:, _POSE]
     low, middle, high = np.quantile(sd, (0.05, 0.5, 0.95), axis=0)
@@ -110,7 +110,6 @@ def premise_numbers(flight: Flight, seen: Sighting, source: str, own: Navigation
     turns = np.abs(matrix_to_euler(seen.poses.R_nb)[:, 0]) > TURNING
     for word, rows in (("turning", turns), ("straight", ~turns)):
         numbers[f"difference_{word}"] = shown("roll", rms(beside.error[rows, 6]))
-        numbers[f"rms_{word}"] = shown("roll", rms(own.error[rows, 6]))
     rows = np.flatnonzero(seen.seen)
     J = ground_jacobians(seen.poses.take(rows), seen.uv[rows], seen.plane_down[rows])
     shift = np.linalg.solve(J.pixel, J.pose @ own.error[rows][:, _POSE, None])

@@ -325,8 +325,8 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
     The truth is taken for exact, as in H 7.5; where it comes from a receiver of its own, that receiver's
     error counts as the filter's.
 
-    Besides means over the track there are ``error_at_end`` (m) and ``nees_at_end``, of the last frame at
-    which the target's place is known; ``p95_measured`` (m), below which the distance is at 95 % of the frames
+    Besides means over the track there are ``error_at_end`` (m), of the last frame at which the target's place
+    is known; ``p95_measured`` (m), below which the distance is at 95 % of the frames
     with a detection; and ``nees_band_low``, ``nees_band_high``: the 95 % band of the mean NEES of a
     consistent filter, for as many independent values as this one's are worth.
 
@@ -352,7 +352,6 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
         "mean_north": summary.mean_north,
         "mean_east": summary.mean_east,
         "mae": summary.mae,
-        "rmse": summary.rmse,
         "rmse_speed": summary.rmse_speed,
         "rmse_course": summary.rmse_course,
         "nees": float(np.nanmean(values)),
@@ -365,7 +364,6 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
     band = average(values, 2, _worth(values[known]))
     numbers |= {
         "error_at_end": float(distance[known[-1]]) if len(known) else math.nan,
-        "nees_at_end": float(values[known[-1]]) if len(known) else math.nan,
         "p95_measured": float(np.quantile(distance[measured], 0.95)) if measured.any() else math.nan,
         "nees_band_low": band.low,
         "nees_band_high": band.high,
