@@ -213,16 +213,6 @@ def test_a_distance_is_refused_where_no_length_follows_from_it(method):
         for_distance(method, METHODS[method].thresholds(), 60.0, 765.0, 1.5)
 
 
-@pytest.mark.parametrize("method", list(METHODS))
-def test_what_a_method_says_of_itself_holds(method):
-    """Thresholds for dark warmth and for a distance are of the same kind, and others than the defaults."""
-    how = METHODS[method]
-    defaults = how.thresholds()
-    changed = [how.black_hot(defaults)] if how.black_hot else []
-    changed += [how.for_distance(defaults, 30.0, 400.0, 3.0)] if how.for_distance else []
-    assert all(type(one) is how.thresholds and one != defaults for one in changed)
-
-
 def test_stated_ellipses_are_held_against_the_middle_of_labels(tmp_path):
     count, covariance = 400, np.array([[4.0, 1.0], [1.0, 2.0]])
     off = np.random.default_rng(8).multivariate_normal([0, 0], covariance, count)

@@ -71,8 +71,6 @@ def test_the_filter_states_its_covariance_and_its_innovations(flight):
     assert set(COVARIANCE_COLUMNS) <= set(found.nav.columns)
     assert set(found.innovations["source"]) == {"position", "second position", "velocity"}
     assert (found.innovations["dof"] == 3).all()
-    without = navigate_mekf(flight, np.arange(0.0, 120.0, 1.0), velocity=False)
-    assert "velocity" not in set(without.innovations["source"])
 
 
 def test_the_manifest_says_how_uncertain_velocities_are_where_the_log_does_not(flight):

@@ -15,30 +15,21 @@ import pytest
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
 from tests.analysis.conftest import build, changed, receiver, without_poses
-from tests.analysis.robots import KNOWN, robot_flight
 from tests.planning.ground import FLAT
 from tests.refused import refused
 from wildlab.analysis.image_coverage import Recovered, cover_images, ground_height
 from wildlab.analysis.overview import TROUBLES, look_over
-from wildlab.analysis.tracks.scores import judged as judged_tracks
-from wildlab.analysis.tracks.tracker import track
 from wildlab.analysis.verdict import (
-    Evidence,
-    Verdict,
     gains_of,
     numbers_of,
-    parts_of,
     possible_gain,
-    verdict_of,
 )
 from wildlab.evaluation.streams import FLOOR_HZ, pace_of, runs_of, vibration_of
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.reporting.overview import counts_of, show_overview
 from wildlab.reporting.report import open_report
-from wildlab.reporting.tracking import show_answer
 from wildlab.simulation.twins import simulate_twin
 
 
@@ -318,12 +309,6 @@ def test_the_best_estimated_poses_come_first_and_others_are_refused():
         look_over(flight, "other")
 
 
-def test_trouble_that_lasts_asks_for_a_closer_look():
-    flight = build(n_images=40)
-    flight.tables["gnss"] = receiver(flight, satellites=lambda t: np.where(t < t[0] + 12, 4.0, 9.0))
-    assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 1
-
-
 def test_poses_that_pause_shortly_count_as_trouble():
     flight = build(n_images=80)
     assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 0
@@ -349,22 +334,6 @@ def test_a_gain_that_is_large_and_not_certain_is_possible(gain, possible):
     ]
     found = possible_gain(numbers_of([{"metrics": metrics}]))
     assert (found is not None and found.share == pytest.approx(gain / 4.5)) == possible
-
-
-@pytest.mark.parametrize("off_deg", [2.0, 0.0])
-def test_tracks_that_their_own_report_doubts_are_not_sound_here(off_deg, tmp_path):
-    """The verdict of a true report on tracking, through its metrics.json, is read by the overview."""
-    followed = track(
-        robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=parse_settings(KNOWN)
-    )
-    rows = judged_tracks(followed)
-    tracking = open_report(study="tracking", kind="logged", flight="f", out=str(tmp_path))
-    show_answer(tracking, followed, rows, [])
-    tracking.save()
-    numbers = numbers_of([json.loads((tmp_path / "metrics.json").read_text())])
-    assert verdict_of(Evidence(judged=1, parts=tuple(parts_of(numbers).values()))) == (
-        Verdict.LOOK if off_deg else Verdict.SOUND
-    )
 
 
 def test_detections_of_no_camera_are_not_held_against_the_ground(tmp_path):

@@ -278,7 +278,6 @@ class Calibrated(NamedTuple):
 def calibrate_flight(
     flight: Flight,
     rng: np.random.Generator,
-    source: str | None = None,
     estimate: tuple[str, ...] = BORESIGHT,
     splits: int = 20,
 ) -> Calibrated:
@@ -294,8 +293,6 @@ def calibrate_flight(
         With pixel detections, poses and truth.
     rng
         Draws the halves, and samples of flat rays.
-    source
-        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     estimate
         What to estimate: see `wildlab.geometry.calibration.calibrate`.
     splits
@@ -312,7 +309,7 @@ def calibrate_flight(
     """
     if flight.manifest.time.kind == "sequence":
         estimate = tuple(name for name in estimate if name != "clock")
-    observations = observe(flight, source)
+    observations = observe(flight)
     plain = score_points(flight, georeference(observations, rng))
     plain = plain[np.isfinite(plain["error_m"]) & np.isfinite(plain["cov_nn"])]
     if plain["frame_id"].nunique() < 4:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -124,9 +124,7 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
     )
 
 
-def image_motions(
-    frames: Iterable[Frame], flight: Flight, camera: Camera, progress: Callable[[], None] | None = None
-) -> tuple[Indices, Array]:
+def image_motions(frames: Iterable[Frame], flight: Flight, camera: Camera) -> tuple[Indices, Array]:
     """How the scene moved from each image of a flight to the next that follows it closely.
 
     Parameters
@@ -137,8 +135,6 @@ def image_motions(
         With frames.
     camera
         Its lens.
-    progress
-        Called after each image.
 
     Returns
     -------
@@ -155,8 +151,6 @@ def image_motions(
     before: tuple[int, NDArray[np.uint8], Mask] | None = None
     for frame in frames:
         row = rows.get(frame.name, rows.get(Path(frame.name).stem))
-        if progress is not None:
-            progress()
         if row is None or not frame.usable:
             before = None
             continue
@@ -286,7 +280,6 @@ def clock_from_motion(
     flight: Flight,
     frames: Iterable[Frame],
     source: str | None = None,
-    progress: Callable[[], None] | None = None,
 ) -> CameraClock:
     """`camera_clock_by_motion` of images, with its facts.
 
@@ -296,7 +289,7 @@ def clock_from_motion(
         As that.
     """
     refuse_without_clock(flight, source)
-    pairs, motion = image_motions(frames, flight, flight.manifest.geometry_camera(), progress)
+    pairs, motion = image_motions(frames, flight, flight.manifest.geometry_camera())
     found = camera_clock_by_motion(flight, pairs, motion, source)
     rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
     curve = pd.DataFrame({"offset_s": found.offsets, "correlation": found.correlation})

@@ -125,7 +125,6 @@ def navigate_mekf(
     flight: Flight,
     times: ArrayLike | None = None,
     *,
-    velocity: bool = True,
     magnetometer: bool = False,
     tuning: MekfTuning | None = None,
     receiver: ReceiverNoise | None = None,
@@ -143,8 +142,6 @@ def navigate_mekf(
     times
         Flight times (M,) at which poses are wanted; if not given those of the frames, or, of a flight without
         any, those of the inertial samples.
-    velocity
-        Whether to use GNSS velocities where the flight has them; H uses positions only.
     magnetometer
         Whether to use headings by the magnetic field as well, with what ``[magnetometer]`` states of them.
     tuning
@@ -175,7 +172,7 @@ def navigate_mekf(
         walks = tuning.velocity_random_walk, float(np.radians(tuning.angle_random_walk_deg))
         noise, axes = noise._replace(velocity_random_walk=walks[0], angle_random_walk=walks[1]), None
     position_sd = None if tuning is None else (tuning.horizontal, tuning.vertical)
-    given = inputs_of(flight, velocity=velocity and tuning is None, noise=noise, position_sd=position_sd)
+    given = inputs_of(flight, velocity=tuning is None, noise=noise, position_sd=position_sd)
     if receiver is not None:
         given = given._replace(aiding=told(without_gross(flight, given), receiver))
     if magnetometer:
@@ -212,7 +209,6 @@ def navigate_observer(
     flight: Flight,
     times: ArrayLike | None = None,
     *,
-    velocity: bool = True,
     accelerometer_bias: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Navigated:
     """Poses by the nonlinear observer of H 5.5, which has no covariance. Parameters as `navigate_mekf`.
@@ -227,8 +223,6 @@ def navigate_observer(
         As for `navigate_mekf`.
     times
         As for `navigate_mekf`.
-    velocity
-        As for `navigate_mekf`.
     accelerometer_bias
         (3,) m/s^2, what a calibration found.
 
@@ -237,7 +231,7 @@ def navigate_observer(
     Navigated
         Without covariances.
     """
-    given = inputs_of(flight, velocity=velocity, accelerometer_bias=accelerometer_bias)
+    given = inputs_of(flight, accelerometer_bias=accelerometer_bias)
     by_course = heading_from(flight) == "course"
     found = run_observer(
         given.imu,

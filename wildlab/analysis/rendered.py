@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wildlab.detection.centres import adjust_at_border
 from wildlab.detection.detections import Detections, no_detections
-from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
+from wildlab.detection.floating import FloatingObjects, find_objects
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Indices, Mask
@@ -141,7 +141,6 @@ class Photographer:
     def shoot(
         self,
         exposures: Iterable[int],
-        thresholds: FloatingThresholds | None = None,
         margin: int | None = None,
     ) -> Iterator[Shot]:
         """Take images, and look for what floats.
@@ -150,8 +149,6 @@ class Photographer:
         ----------
         exposures
             Their numbers.
-        thresholds
-            Of the detector; those of H 4.4.1 by default.
         margin
             Render only so many pixels around the vessels, which takes a fraction of the time where these are
             small; None is the whole image. False alarms elsewhere are not seen then.
@@ -168,7 +165,7 @@ class Photographer:
                 yield Shot(exposure, (), no_detections(), ImageScore({}, set(), 0))
                 continue
             view, counts = self.image(exposure, window)
-            objects = find_objects(counts, thresholds=thresholds)
+            objects = find_objects(counts)
             corner = corner_of(window)
             yield Shot(
                 exposure,

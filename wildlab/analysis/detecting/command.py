@@ -511,27 +511,25 @@ def overlay_picture(frame: Frame, things: pd.DataFrame) -> Picture:
     return picture
 
 
-def contact_sheet(tiles: list[tuple[Picture, str, str]], columns: int = IN_A_ROW) -> Picture:
+def contact_sheet(tiles: list[tuple[Picture, str, str]]) -> Picture:
     """Small pictures in rows, each with a line below it.
 
     Parameters
     ----------
     tiles
         (picture (TILE, TILE, 3), line, word of `COLOURS` for its frame).
-    columns
-        How many stand in a row.
 
     Returns
     -------
     (H, W, 3) uint8
     """
     below, gap = 18, 4
-    rows = max(1, -(-len(tiles) // columns))
-    height, width = rows * (TILE + below + gap) + gap, columns * (TILE + gap) + gap
+    rows = max(1, -(-len(tiles) // IN_A_ROW))
+    height, width = rows * (TILE + below + gap) + gap, IN_A_ROW * (TILE + gap) + gap
     sheet = np.full((height, width, 3), 255, np.uint8)
     for number, (picture, line, word) in enumerate(tiles):
-        top = gap + (number // columns) * (TILE + below + gap)
-        left = gap + (number % columns) * (TILE + gap)
+        top = gap + (number // IN_A_ROW) * (TILE + below + gap)
+        left = gap + (number % IN_A_ROW) * (TILE + gap)
         sheet[top : top + TILE, left : left + TILE] = picture
         cv2.rectangle(sheet, (left, top), (left + TILE - 1, top + TILE - 1), COLOURS[word], 2)
         text = "".join(sign if sign.isascii() and sign.isprintable() else "?" for sign in line)[-26:]
