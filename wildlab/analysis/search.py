@@ -67,8 +67,6 @@ class Surveyed(NamedTuple):
     positioned
         s, when of every enclosure as many animals had been known at once as live there; infinite where that
         never was.
-    p_nc
-        (L, 3) where images were taken, m.
     goal
         (D,) of each leg: an animal, or `SEARCH`.
     known
@@ -80,18 +78,11 @@ class Surveyed(NamedTuple):
     """
 
     positioned: float
-    p_nc: Array
     goal: Indices
     known: Indices
     lost_by_covariance: int
     lost_by_search: int
     error: Array
-
-    @property
-    def revisits(self) -> int:
-        """How often the planner turned from one goal to an animal that was known."""
-        changed = np.append(True, self.goal[1:] != self.goal[:-1])
-        return int((changed & (self.goal != SEARCH)).sum())
 
 
 class _Filters:
@@ -153,7 +144,7 @@ def survey(
     filters = _Filters(animals, rules)
     lives = np.bincount(world.area_of, minlength=len(world.areas))
     platform, clock, lost = start, 0.0, np.zeros(2, int)
-    p_nc, goals, known, errors = [], list[int](), list[int](), list[float]()
+    goals, known, errors = list[int](), list[int](), list[float]()
     positioned, done = np.inf, np.zeros(len(world.areas), bool)
     while clock + flying.step <= images * flying.interval:
         count = np.bincount(world.area_of[filters.live], minlength=len(world.areas))
@@ -181,13 +172,11 @@ def survey(
         filters.missed[~filters.live] = 1.0
         platform, clock = leg.end, float(times[-1])
         off = np.hypot(*(filters.x - world.animals[window[-1], :, :2])[filters.live].T)
-        p_nc.append(leg.p_nc)
         goals.append(goal)
         known.append(int(filters.live.sum()))
         errors.append(float(off.mean()) if len(off) else np.nan)
     return Surveyed(
         float(positioned),
-        np.concatenate([*p_nc, np.zeros((0, 3))]),
         np.array(goals, np.intp),
         np.array(known, np.intp),
         int(lost[0]),
