@@ -26,29 +26,6 @@ LEAP_DAYS = (
 _STARTS = np.array([datetime.fromisoformat(day).replace(tzinfo=UTC).timestamp() for day in LEAP_DAYS])
 
 
-def leap_seconds(utc_s: ArrayLike) -> Array:
-    """GPS time minus UTC, s, at UTC times (...) in s since 1970.
-
-    Parameters
-    ----------
-    utc_s
-        (...) s since 1970; NaN stays NaN.
-
-    Returns
-    -------
-    (...)
-
-    Examples
-    --------
-    >>> from datetime import UTC, datetime
-    >>> at = [datetime(year, 6, 1, tzinfo=UTC).timestamp() for year in (2014, 2025)]
-    >>> leap_seconds(at).tolist()
-    [16.0, 18.0]
-    """
-    at = np.asarray(utc_s, float)
-    return np.where(np.isnan(at), np.nan, np.searchsorted(_STARTS, at, side="right").astype(float))
-
-
 def gps_to_utc(gps_s: ArrayLike) -> Array:
     """UTC in s since 1970 of GPS time (...) in s since 6 January 1980.
 
