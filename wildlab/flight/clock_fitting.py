@@ -35,8 +35,8 @@ class ClockFit(NamedTuple):
         (N,) pairs that the fit rests on; the others are outliers.
     spread_s
         Robust standard deviation of the residuals used.
-    middle_sd_s, rate_sd
-        Standard deviations of ``reference_0`` and of ``rate``; infinite where the pairs do not tell.
+    rate_sd
+        Standard deviation of ``rate``; infinite where the pairs do not tell.
     """
 
     own_0: float
@@ -45,7 +45,6 @@ class ClockFit(NamedTuple):
     residual: Array
     used: NDArray[np.bool_]
     spread_s: float
-    middle_sd_s: float = np.inf
     rate_sd: float = np.inf
 
     def to_reference(self, own: ArrayLike) -> Array:
@@ -106,7 +105,7 @@ def fit_clock(
     dx, dy = x[known] - x_0, y[known] - y_0
     at_0, rate = _start(dx, dy)
     line = _under(dx, dy, at_0, rate) if late else _through(dx, dy, at_0, rate, resolution_s)
-    at_0, rate, used, sds = line
+    at_0, rate, used, rate_sd = line
     middle = float(dx[used].mean())
     residual = np.full(len(x), np.nan)
     residual[known] = dy - at_0 - rate * dx
@@ -119,7 +118,7 @@ def fit_clock(
         residual,
         every,
         _scale(residual[every]),
-        *sds,
+        rate_sd,
     )
 
 
@@ -157,8 +156,9 @@ def _through(dx: Array, dy: Array, at_0: float, rate: float, resolution_s: float
             break
     used = weight > 0
     left = (base - A @ solution)[used]
-    sds = _standard_deviations(dx[used], left, turns)
-    return float(solution[0]), float(solution[1]) if turns else rate, used, sds
+    if not turns:
+        return float(solution[0]), rate, used, np.inf
+    return float(solution[0]), float(solution[1]), used, _rate_sd(dx[used], left)
 
 
 def _under(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
@@ -167,14 +167,14 @@ def _under(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
     left = dy - at_0 - rate * dx
     low = float(np.quantile(left, 0.05)) if len(left) > 20 else -np.inf
     kept = left >= 4 * low - 2 * RESOLUTION_S if low < 0 else np.ones(len(left), bool)
-    line = lower_line(dx[kept], left[kept])
+    above_0, slope, below, slope_sd = lower_line(dx[kept], left[kept])
     used = np.zeros(len(dx), bool)
-    used[np.flatnonzero(kept)[line.used]] = True
-    sds = (max(line.middle_sd, RESOLUTION_S / 10), line.slope_sd)
-    return at_0 + line.at_0, rate + line.slope, used, sds
+    used[np.flatnonzero(kept)[below]] = True
+    return at_0 + above_0, rate + slope, used, slope_sd
 
 
-_Line = tuple[float, float, NDArray[np.bool_], tuple[float, float]]
+#: Height at zero, slope, the points that it rests on, and the standard deviation of the slope.
+_Line = tuple[float, float, NDArray[np.bool_], float]
 
 
 def _scale(left: Array) -> float:
@@ -182,19 +182,18 @@ def _scale(left: Array) -> float:
     return 1.4826 * float(np.median(np.abs(left - np.median(left)))) if len(left) else np.nan
 
 
-def _standard_deviations(dx: Array, left: Array, turns: bool) -> tuple[float, float]:
-    """Of the height at the middle and of the slope, from residuals (N,) in order of time."""
-    n, parameters = len(left), 1 + turns
-    if n < parameters + 2:
-        return np.inf, np.inf
-    spread = max(float(np.sqrt((left**2).sum() / (n - parameters))), RESOLUTION_S / np.sqrt(12))
+def _rate_sd(dx: Array, left: Array) -> float:
+    """Standard deviation of the slope, from residuals (N,)."""
+    n = len(left)
+    if n < 4 or np.ptp(dx) == 0:
+        return np.inf
+    spread = max(float(np.sqrt((left**2).sum() / (n - 2))), RESOLUTION_S / np.sqrt(12))
     in_order = left[np.argsort(dx, kind="stable")]
     power = float((in_order**2).sum())
     together = float((in_order[1:] * in_order[:-1]).sum()) / power if power > 0 and n > 10 else 0.0
     # Residuals of a first-order Gauss-Markov process count for fewer than there are.
     more = np.sqrt((1 + np.clip(together, 0, 0.98)) / (1 - np.clip(together, 0, 0.98)))
-    middle = float(spread * more / np.sqrt(n))
-    return middle, middle / float(np.std(dx)) if turns and np.ptp(dx) > 0 else np.inf
+    return float(spread * more / np.sqrt(n)) / float(np.std(dx))
 
 
 #: A rate is another than 1 where it is so many of its standard deviations away.
@@ -255,7 +254,6 @@ def fit_steady(
         residual,
         used,
         max(_scale(residual[used]), RESOLUTION_S),
-        fit.middle_sd_s,
         fit.rate_sd,
     )
 
@@ -269,17 +267,7 @@ FEW_STAMPS = 60
 STRETCHES, LOWEST = 200, 12
 
 
-class Envelope(NamedTuple):
-    """``y = at_0 + slope x`` under all used; standard deviations at the mean of ``x``, of the slope."""
-
-    at_0: float
-    slope: float
-    used: NDArray[np.bool_]
-    middle_sd: float
-    slope_sd: float
-
-
-def lower_line(x: Array, y: Array) -> Envelope:
+def lower_line(x: Array, y: Array) -> _Line:
     """The line under all points that has the least sum of distances above it.
 
     It is the edge of the lower convex hull under the mean of ``x``. A few points far under all others are
@@ -293,8 +281,8 @@ def lower_line(x: Array, y: Array) -> Envelope:
 
     Returns
     -------
-    Envelope
-        Standard deviations are infinite where there are fewer than four points.
+    Height at zero, slope, the points it rests on, and the standard deviation of the slope, infinite where
+    there are fewer than four points.
     """
     x_0 = float(x.mean())
     near = _lowest(x, y)
@@ -317,8 +305,8 @@ def lower_line(x: Array, y: Array) -> Envelope:
         at_0, slope, _ = _edge(x[good], y[good], x_0)
         above = y - at_0 - slope * x
         # Where some are early, others may be, by less than it takes to be seen.
-        middle_sd, slope_sd = (3 * sd for sd in _spreads(x, above))
-    return Envelope(at_0, slope, above >= -1e-6, middle_sd, slope_sd)
+        slope_sd = 3 * _spreads(x, above)[1]
+    return at_0, slope, above >= -1e-6, slope_sd
 
 
 def _lowest(x: Array, y: Array) -> NDArray[np.intp]:
