@@ -1,11 +1,13 @@
-"""Blocks in time order: what they hold, and that intervals from them hold the truth where images do not."""
+"""Blocks in time order: what they hold, and that intervals from them hold the truth."""
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from wildlab.evaluation.intervals import (
     block_mean,
     compare_halves,
+    independent_blocks,
     standard_error,
     time_blocks,
 )
@@ -37,8 +39,22 @@ def test_intervals_by_blocks_hold_what_they_say_where_errors_wander():
         for name, labels in (("blocks", np.repeat(np.arange(12), 10)), ("images", np.arange(120))):
             _, low, high = block_mean(values, labels)
             inside[name] += low <= 0 <= high
-    assert 0.84 < inside["blocks"] / 200 < 0.96
-    assert inside["images"] / 200 < 0.6
+    assert all(0.86 < held / 200 < 0.98 for held in inside.values())
+
+
+@pytest.mark.parametrize(("seconds", "lasts"), [(60.0, 20.0), (136.0, 20.0), (300.0, 20.0), (136.0, 0.2)])
+def test_intervals_hold_what_they_say_where_errors_outlast_a_block(seconds, lasts):
+    """Of 300 flights at 7.5 Hz; by independent blocks it would be 40 to 60 % where errors last for 20 s."""
+    times = np.arange(0.0, seconds, 0.133)
+    blocks, keep = time_blocks(times, seconds=True), np.exp(-0.133 / lasts)
+    rng, n, before = np.random.default_rng(1), len(times), int(8 * lasts / 0.133)
+    white = rng.normal(size=(300, n + before)) * np.sqrt(1 - keep**2)
+    white[:, 0] /= np.sqrt(1 - keep**2)
+    errors = lfilter([1.0], [1.0, -keep], white)[:, before:]
+    found = [block_mean(one, blocks) for one in errors]
+    assert 0.84 < np.mean([one.low <= 0 <= one.high for one in found]) < 0.96
+    ratio = np.median([independent_blocks(one, blocks) for one in errors]) / (blocks.max() + 1)
+    assert ratio > 0.7 if lasts < 1 else ratio < 0.4
 
 
 def test_what_cannot_be_said_is_nan():
@@ -60,9 +76,10 @@ def test_halves_that_disagree_are_found(step, disagree):
 
 def test_blocks_of_equal_size_give_the_standard_error_of_their_means():
     rng = np.random.default_rng(3)
-    values = rng.normal(size=6)
+    values = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # neighbours are not alike
     assert standard_error(values, np.arange(6)) == pytest.approx(values.std(ddof=1) / np.sqrt(6))
     blocks = np.repeat(np.arange(5), 4)
     many = rng.normal(size=20) + blocks
     means = many.reshape(5, 4).mean(axis=1)
-    assert standard_error(many, blocks) == pytest.approx(means.std(ddof=1) / np.sqrt(5))
+    worth = independent_blocks(many, blocks)
+    assert standard_error(many, blocks) == pytest.approx(means.std(ddof=1) / np.sqrt(worth))

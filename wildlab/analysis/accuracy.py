@@ -176,7 +176,9 @@ def judge_accuracy(
             "horizontal_error_median": lambda e: float(np.median(np.hypot(*e.T))),
             "horizontal_error_p90": lambda e: float(np.quantile(np.hypot(*e.T), 0.9)),
         }
-        intervals = {name: bootstrap_interval(f, errors, blocks, rng) for name, f in figures.items()}
+        for name, figure in figures.items():
+            low, high = bootstrap_interval(figure, errors, blocks, rng)
+            intervals[name] = max(low, 0.0), high
     left, of = errors, scored
     if diagnosis is not None and diagnosis.counts:
         left, of = diagnosis.winner.held, diagnosis.scored

@@ -11,7 +11,14 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.evaluation.intervals import FEWEST, PROBABILITY, Interval, block_mean, mean_interval
+from wildlab.evaluation.intervals import (
+    FEWEST,
+    PROBABILITY,
+    Interval,
+    block_mean,
+    mean_interval,
+    widening,
+)
 from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.robust import student_scale
 
@@ -112,6 +119,7 @@ def judge_ellipses(
         for _ in range(draws)
     ]
     ends = np.sqrt(np.quantile(drawn, [(1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2]) / bound)
+    ends = size * (ends / size) ** widening(np.log(np.maximum(squared, _LEAST)), group)
     # No draw holds an error larger than was seen: six honest ellipses hold the truth all, half the time.
     factor = Interval(size, float(ends[0]), max(float(ends[1]), _largest_factor(squared, group)))
     return EllipseVerdict(_word(factor), coverage, factor, stated, len(e))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.intervals import PROBABILITY, Interval, block_mean
+from wildlab.evaluation.intervals import PROBABILITY, Interval, block_mean, widening
 from wildlab.geometry.frames import wrap
 
 Array = NDArray[np.float64]
@@ -162,19 +162,22 @@ def bootstrap_interval(
     Returns
     -------
     low, high
-        Ends of the middle ``level`` of the draws, in the unit of the statistic; NaN where no error is left.
+        Ends of the middle ``level`` of the draws, in the unit of the statistic, the further from its value
+        the more alike images are that follow each other (`wildlab.evaluation.intervals.widening`); NaN where
+        fewer than two images are left.
     """
     e = np.asarray(errors, float).reshape(-1, 2)
     keep = np.isfinite(e).all(axis=1)
     e, group = e[keep], np.unique(np.asarray(image)[keep], return_inverse=True)[1]
-    if not len(e):
+    if not len(e) or group.max() < 1:
         return float("nan"), float("nan")
     members = [np.flatnonzero(group == g) for g in range(group.max() + 1)]
     values = []
     for _ in range(draws):
         picked = rng.integers(0, len(members), len(members))
         values.append(statistic(e[np.concatenate([members[g] for g in picked])]))
-    low, high = np.quantile(values, [(1 - level) / 2, (1 + level) / 2])
+    whole, wider = statistic(e), widening(np.hypot(*e.T), group, level)
+    low, high = whole + wider * (np.quantile(values, [(1 - level) / 2, (1 + level) / 2]) - whole)
     return float(low), float(high)
 
 

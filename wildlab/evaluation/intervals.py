@@ -260,7 +260,7 @@ def time_blocks(order: ArrayLike, seconds: bool) -> Labels:
 
 
 def block_mean(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABILITY) -> Interval:
-    """Mean of values that go together within blocks, with Student's interval by the number of blocks.
+    """Mean of values that go together within blocks, with Student's interval by the independent blocks.
 
     Parameters
     ----------
@@ -286,21 +286,92 @@ def block_mean(values: ArrayLike, blocks: ArrayLike, probability: float = PROBAB
     x, group = x[keep], np.unique(np.asarray(blocks)[keep], return_inverse=True)[1]
     if not len(x):
         return Interval(np.nan, np.nan, np.nan)
-    mean, count = float(x.mean()), int(group.max()) + 1
-    if count < 2:
+    mean = float(x.mean())
+    if group.max() < 1:
         return Interval(mean, np.nan, np.nan)
-    half = float(student_quantile((1 + probability) / 2, count - 1)) * standard_error(x, group)
+    freedom = independent_blocks(x, group) - 1
+    half = float(student_quantile((1 + probability) / 2, freedom)) * standard_error(x, group)
     return Interval(mean, mean - half, mean + half)
 
 
-def standard_error(values: Array, blocks: Labels) -> float:
-    """Standard error of the mean of values (N,) in blocks (N,): as of a ratio of sums over blocks."""
-    group = np.unique(blocks, return_inverse=True)[1]
-    count = int(group.max()) + 1
+def independent_blocks(values: ArrayLike, blocks: ArrayLike) -> float:
+    """How many independent blocks the mean of values is worth, two at least.
+
+    Errors that wander make neighbouring blocks alike. Their correlation is that of a process of the first
+    order, its estimate freed of its bias (Kendall 1954): so many seconds of a short flight are one sample.
+
+    Parameters
+    ----------
+    values
+        (N,) without NaN.
+    blocks
+        (N,) which block each belongs to, in time order; two at least.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> wave = np.sin(np.arange(20) / 4)
+    >>> round(independent_blocks(wave, np.arange(20)), 1)
+    2.0
+    """
+    apart, count = _apart(values, blocks)
+    square = float(apart @ apart)
+    alike = float(apart[1:] @ apart[:-1]) / square if square > 0 else 0.0
+    alike = float(np.clip(alike + (1 + 3 * alike) / count, 0.0, 0.9))
+    return max(count * (1 - alike) / (1 + alike), 2.0)
+
+
+def standard_error(values: ArrayLike, blocks: ArrayLike) -> float:
+    """Standard error of the mean of values in blocks: as of a ratio of sums over independent blocks.
+
+    Parameters
+    ----------
+    values
+        (N,) without NaN.
+    blocks
+        (N,) which block each belongs to, in time order.
+
+    Returns
+    -------
+    float
+        NaN where there is one block.
+    """
+    apart, count = _apart(values, blocks)
     if count < 2:
         return float("nan")
-    apart = np.bincount(group, weights=values - values.mean())
-    return float(np.sqrt(count / (count - 1) * (apart**2).sum()) / len(values))
+    worth = independent_blocks(values, blocks)
+    return float(np.sqrt(count / (count - 1) * (apart @ apart) * count / worth) / np.size(values))
+
+
+def widening(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABILITY) -> float:
+    """By which factor an interval is wider that takes all blocks for independent and many.
+
+    Parameters
+    ----------
+    values
+        (N,) without NaN.
+    blocks
+        (N,) which block each belongs to, in time order; two at least.
+    probability
+        Of the interval.
+
+    Returns
+    -------
+    float
+    """
+    worth, count = independent_blocks(values, blocks), _apart(values, blocks)[1]
+    tail = (1 + probability) / 2
+    return float(np.sqrt(count / worth) * student_quantile(tail, worth - 1) / normal_quantile(tail))
+
+
+def _apart(values: ArrayLike, blocks: ArrayLike) -> tuple[Array, int]:
+    """Sums over blocks of what lies above the mean, and how many blocks there are."""
+    x, group = np.asarray(values, float), np.unique(np.asarray(blocks), return_inverse=True)[1]
+    sums = np.bincount(group, weights=x - x.mean())
+    return sums, len(sums)
 
 
 class Halves(NamedTuple):
@@ -353,15 +424,13 @@ def compare_halves(values: ArrayLike, blocks: ArrayLike, probability: float = 0.
     if late.all() or not late.any():
         nan = float("nan")
         return Halves(nan, nan, Interval(nan, nan, nan))
-    parts = [x[~late], x[late]]
-    blocks_of = [group[~late], group[late]]
-    first, second = (float(part.mean()) for part in parts)
-    errors = [standard_error(part, of) for part, of in zip(parts, blocks_of, strict=True)]
-    freedom = min(len(np.unique(of)) for of in blocks_of) - 1
-    half = (
-        float(student_quantile((1 + probability) / 2, freedom) * np.hypot(errors[0], errors[1]))
-        if freedom > 0
-        else float("nan")
-    )
+    first, second = float(x[~late].mean()), float(x[late].mean())
+    half, left = float("nan"), np.where(late, x - second, x - first)
+    if min(len(np.unique(group[~late])), len(np.unique(group[late]))) > 1:
+        sums, count = _apart(left, group)
+        worth = max(independent_blocks(left, group), 3.0)
+        size = np.bincount(late).astype(float)[(np.arange(count) >= count / 2).astype(int)]
+        error = np.sqrt(count / (count - 2) * ((sums / size) ** 2).sum() * count / worth)
+        half = float(student_quantile((1 + probability) / 2, worth - 2) * error)
     apart = second - first
     return Halves(first, second, Interval(apart, apart - half, apart + half))
