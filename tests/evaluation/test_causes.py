@@ -72,6 +72,24 @@ def test_the_simplest_within_the_odds_wins_and_others_like_it_are_rivals():
     assert rank_models([45.0, 40.0, 40.0, 38.0, 38.0], contents, 40).winner == 0
 
 
+def test_held_out_errors_take_a_part_away_and_make_rivals_of_what_places_as_well():
+    """The likelihood prefers ``ab`` to its part ``b`` by far, and ``b`` to ``c``; unseen images do not."""
+    rng = np.random.default_rng(0)
+    blocks = np.repeat(np.arange(20), 5)
+    scatter = rng.normal(0, 1.0, (100, 2))
+    unit = scatter / np.hypot(*scatter.T)[:, None]
+    contents = [frozenset(), frozenset("a"), frozenset("b"), frozenset("ab"), frozenset("c")]
+    held = [scatter + one * unit for one in (9.0, 9.0, 0.0, 0.5, 4.0)]
+    found = rank_models([900.0, 880.0, 300.0, 100.0, 400.0], contents, 40, {}, held, blocks)
+    assert contents[found.winner] == {"b"} and found.rivals == ()
+    held[4] = scatter + 0.2 * rng.normal(0, 1.0, (100, 2))
+    found = rank_models([900.0, 880.0, 300.0, 100.0, 400.0], contents, 40, {}, held, blocks)
+    assert contents[found.winner] == {"b"} and [contents[m] for m in found.rivals] == [{"c"}]
+    held[3] = scatter - 0.3 * unit
+    found = rank_models([900.0, 880.0, 300.0, 100.0, 400.0], contents, 40, {}, held, blocks)
+    assert contents[found.winner] == {"a", "b"}
+
+
 def test_a_chance_is_that_of_the_f_distribution_for_each_that_was_tried():
     assert chance_of(8.0, 2, 5.0, 10) == pytest.approx(10 * f.sf(4.0, 2, 5.0))
     assert chance_of(0.0, 0, 5.0, 10) == chance_of(0.1, 1, 5.0, 10) == 1.0

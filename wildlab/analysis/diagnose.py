@@ -94,6 +94,8 @@ FEWEST_IMAGES = 6
 MOST_CAUSES = 4
 #: Beyond this share of points far out no cause is certain: who is out depends on who is believed.
 MANY_OUT = 0.25
+#: Deviance for each residual beyond which the noise does not explain what a cause leaves: none is certain.
+MISFIT = 3.0
 
 
 @dataclass(frozen=True)
@@ -170,6 +172,8 @@ class Diagnosis:
     extended
         Whether the border of the image cuts more than :data:`MANY_OUT` of what was found: targets are longer
         than a point, and the centre of what is seen of one depends on how it lies.
+    misfit
+        Whether what the winner leaves is far more than the noise explains: see :data:`MISFIT`.
     """
 
     scored: pd.DataFrame
@@ -184,6 +188,7 @@ class Diagnosis:
     noise: WanderNoise | None = None
     places_known: bool = True
     extended: bool = False
+    misfit: bool = False
 
     @property
     def winner(self) -> Model:
@@ -205,11 +210,11 @@ class Diagnosis:
     @property
     def counts(self) -> bool:
         """Whether the winner is certain: taking it off gained something, its estimate is not chance, nothing
-        else explains the errors as well or better, they do not depend on how targets lie, and no more
-        points are far out than :data:`MANY_OUT`."""
+        else explains the errors as well or better, they do not depend on how targets lie, no more points are
+        far out than :data:`MANY_OUT`, and the noise explains what is left."""
         one = self.winner
         certain = bool(one.causes) and one.gain.counts and one.chance < CHANCE and not self.rivals
-        certain &= not self.extended
+        certain &= not self.extended and not self.misfit
         return certain and not self.implausible and bool(nonzero(self.calibration)) and not self.too_many_out
 
     @property
@@ -321,10 +326,12 @@ def score_model(model: Model, images: int) -> float:
     return float(model.deviance + np.log(images) * len(model.fit.names))
 
 
-def order_models(models: list[Model], images: int) -> Ranked:
+def order_models(models: list[Model], images: int, rows: Mask, blocks: Labels) -> Ranked:
     contents = [frozenset(one.fit.names) for one in models]
     # In level flight a camera that is turned and a heading that is wrong are the same correction.
-    return rank_models([one.deviance for one in models], contents, images, {"heading": "pan"})
+    held = [one.held[rows] for one in models]
+    deviances = [one.deviance for one in models]
+    return rank_models(deviances, contents, images, {"heading": "pan"}, held, blocks[rows])
 
 
 #: Over which a target's speed is measured, either way, s.
@@ -572,7 +579,7 @@ class _Search:
             told = nonzero(self._calibration(one, used))
             if told and not any(set(other.fit.names) == set(told) for other in models):
                 sort_in(model(tuple(c for c in one.causes if set(CAUSES[c]) & set(told)), told), models, wild)
-        ranked = order_models(models, images)
+        ranked = order_models(models, images, inliers, self.blocks)
         winner = models[ranked.winner]
         implausible = find_implausible(winner, models, wild, images)
         calibration = self._calibration(winner, used)
@@ -585,6 +592,7 @@ class _Search:
         return Diagnosis(
             self.scored, self.blocks, tuple(models), ranked, calibration, tuple(alike), (), inliers,
             implausible, noise, self.places_known, bool(self.cut[used].mean() > MANY_OUT),
+            winner.deviance > MISFIT * winner.fit.r.size,
         )  # fmt: skip
 
     def _calibration(self, model: Model, used: Mask) -> Calibration:

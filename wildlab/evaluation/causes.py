@@ -1,10 +1,11 @@
 """Which constant error is behind those of a flight? Nested models, compared by their likelihood.
 
 Pose errors wander, so that a constant is compared with noise that is correlated in time:
-`wildlab.evaluation.correlated_errors`. Models are ordered by Schwarz's criterion under that covariance. The
-simplest one within the odds of the best wins, and any other within them that does not hold it is one that the
-data do not separate from it. What taking it off gains is measured on blocks of images in time order, each
-placed by parameters from the others.
+`wildlab.evaluation.correlated_errors`. Models are ordered by Schwarz's criterion under that covariance, and
+what taking one off gains is measured on blocks of images in time order, each placed by parameters from the
+others. The likelihood hangs on the noise that is estimated, and models with other clocks see other samples of
+the log's noise: so a model wins that is the simplest within the odds of the best and no part of which places
+unseen images as well, and any other that does so is one that the data do not separate from it.
 """
 
 from __future__ import annotations
@@ -207,9 +208,11 @@ class Ranked(NamedTuple):
     scores
         (M,) Schwarz's criterion: deviance, and the logarithm of the number of images for each parameter.
     winner
-        Number of the simplest model within the odds of the best.
+        Number of the simplest model within the odds of the best, or of the part of it that has the least
+        held-out errors.
     rivals
-        Those within the odds of the winner, of no more parameters, that do not hold it.
+        Those of no more parameters that do not hold the winner, and are within its odds or have held-out
+        errors that are not larger for certain.
     """
 
     scores: Array
@@ -222,8 +225,10 @@ def rank_models(
     contents: Sequence[frozenset[str]],
     images: int,
     alike: Mapping[str, str] | None = None,
+    held: Sequence[Array] = (),
+    blocks: Labels | None = None,
 ) -> Ranked:
-    """Rank models by their likelihood and their number of parameters.
+    """Rank models by their likelihood, their number of parameters and their held-out errors.
 
     Parameters
     ----------
@@ -236,6 +241,9 @@ def rank_models(
     alike
         Parameters that correct the same as another one, by name: models that differ in these alone are no
         rivals.
+    held, blocks
+        For each model, its held-out errors (N, 2), and the blocks (N,) of these; left out, the likelihood
+        alone decides.
 
     Returns
     -------
@@ -251,12 +259,23 @@ def rank_models(
     scores = np.asarray(deviances, float) + np.log(images) * np.array([len(one) for one in contents])
     near = np.flatnonzero(scores <= scores.min() + MARGIN).tolist()
     winner = int(min(near, key=lambda m: (len(contents[m]), scores[m])))
+
+    def gain(of: int, over: int) -> Gain:
+        return gain_of(held[over], held[of], np.zeros(0, np.intp) if blocks is None else blocks)
+
+    while held:
+        parts = [m for m, one in enumerate(contents) if one and one < contents[winner]]
+        gains = {m: gain(m, winner).gain.estimate for m in parts}
+        if not gains or not max(gains.values()) >= 0:
+            break
+        winner = max(gains, key=lambda m: gains[m])
     effects = [frozenset((alike or {}).get(name, name) for name in one) for one in contents]
     rivals = tuple(
         m
-        for m in np.flatnonzero(scores <= scores[winner] + MARGIN).tolist()
+        for m in range(len(contents))
         if m != winner and contents[m] and contents[winner]
         and len(contents[m]) <= len(contents[winner]) and not effects[m] <= effects[winner]
+        and (scores[m] <= scores[winner] + MARGIN or (held and not gain(winner, m).counts))
     )  # fmt: skip
     return Ranked(scores, winner, rivals)
 

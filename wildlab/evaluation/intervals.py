@@ -222,6 +222,8 @@ Labels = NDArray[np.intp]
 
 #: Fewest and most blocks, images in a block where there are enough, and how long one is at least, s.
 FEWEST, MOST, IMAGES, LONG_S = 6, 20, 3, 60.0
+#: Independent blocks that a mean is worth at least: with fewer, intervals are wider and hold no more.
+FEWEST_WORTH = 3.0
 #: With what probability an interval holds, unless another is asked for.
 PROBABILITY = 0.9
 
@@ -295,7 +297,7 @@ def block_mean(values: ArrayLike, blocks: ArrayLike, probability: float = PROBAB
 
 
 def independent_blocks(values: ArrayLike, blocks: ArrayLike) -> float:
-    """How many independent blocks the mean of values is worth, two at least.
+    """How many independent blocks the mean of values is worth, three at least.
 
     Errors that wander make neighbouring blocks alike. Their correlation is that of a process of the first
     order, its estimate freed of its bias (Kendall 1954): so many seconds of a short flight are one sample.
@@ -315,13 +317,13 @@ def independent_blocks(values: ArrayLike, blocks: ArrayLike) -> float:
     --------
     >>> wave = np.sin(np.arange(20) / 4)
     >>> round(independent_blocks(wave, np.arange(20)), 1)
-    2.0
+    3.0
     """
     apart, count = _apart(values, blocks)
     square = float(apart @ apart)
     alike = float(apart[1:] @ apart[:-1]) / square if square > 0 else 0.0
     alike = float(np.clip(alike + (1 + 3 * alike) / count, 0.0, 0.9))
-    return max(count * (1 - alike) / (1 + alike), 2.0)
+    return max(count * (1 - alike) / (1 + alike), min(FEWEST_WORTH, count))
 
 
 def standard_error(values: ArrayLike, blocks: ArrayLike) -> float:
@@ -428,7 +430,7 @@ def compare_halves(values: ArrayLike, blocks: ArrayLike, probability: float = 0.
     half, left = float("nan"), np.where(late, x - second, x - first)
     if min(len(np.unique(group[~late])), len(np.unique(group[late]))) > 1:
         sums, count = _apart(left, group)
-        worth = max(independent_blocks(left, group), 3.0)
+        worth = independent_blocks(left, group)
         size = np.bincount(late).astype(float)[(np.arange(count) >= count / 2).astype(int)]
         error = np.sqrt(count / (count - 2) * ((sums / size) ** 2).sum() * count / worth)
         half = float(student_quantile((1 + probability) / 2, worth - 2) * error)
