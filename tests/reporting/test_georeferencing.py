@@ -157,7 +157,9 @@ def limits_with(offset=0.0, kind="logged", truth=EXACT, certain=False, halves=Fa
     flight = SimpleNamespace(manifest=manifest, pose_source=lambda _: ("nav", []))
     winner = SimpleNamespace(causes=())
     found = SimpleNamespace(
-        diagnosis=SimpleNamespace(counts=certain, winner=winner, inseparable=(), extended=False),
+        diagnosis=SimpleNamespace(
+            counts=certain, winner=winner, inseparable=(), extended=False, misfit=False
+        ),
         nearest=None,
         lost=lost, scored=range(100), halves=SimpleNamespace(disagree=halves),
     )  # fmt: skip

@@ -378,6 +378,7 @@ def limits(
     nearest = found.nearest
     conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
         ("limit-heading", one_heading_hides(found), {}),
+        ("limit-misfit", diagnosis is not None and diagnosis.misfit, {}),
         ("limit-extended", diagnosis is not None and diagnosis.extended, {}),
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": str(found.lost)}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
