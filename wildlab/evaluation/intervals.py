@@ -372,7 +372,7 @@ def widening(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABIL
 def _apart(values: ArrayLike, blocks: ArrayLike) -> tuple[Array, int]:
     """Sums over blocks of what lies above the mean, and how many blocks there are."""
     x, group = np.asarray(values, float), np.unique(np.asarray(blocks), return_inverse=True)[1]
-    sums = np.bincount(group, weights=x - x.mean())
+    sums = np.bincount(group, weights=x - x.mean()).astype(float)
     return sums, len(sums)
 
 
