@@ -28,13 +28,7 @@ from wildlab.studies.uav_coverage.trial import LOOKS, fences_of, land_of
 
 @pytest.fixture(scope="module")
 def draws() -> pd.DataFrame:
-    return frame([trial(1, twin="gondola", rate=3, percent_of_lap=6)])
-
-
-def frame(rows: list[dict[tuple[str, str], float]]) -> pd.DataFrame:
-    table = pd.DataFrame(rows)
-    table.columns = pd.MultiIndex.from_tuples(table.columns)
-    return table
+    return pd.DataFrame([trial(1, twin="gondola", rate=3, percent_of_lap=6)])
 
 
 def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
@@ -54,7 +48,7 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
         (DOWN, "outside"): 5e3,
     }
     row |= {tuple(key.split("/", 1)): value for key, value in changes.items()}  # type: ignore[misc]
-    return frame([row] * count)
+    return pd.DataFrame([row] * count)
 
 
 def test_numbers_agree_with_one_another(draws):

@@ -32,13 +32,7 @@ from wildlab.studies.uav_coverage.trial import (
 
 @pytest.fixture(scope="module")
 def draws() -> pd.DataFrame:
-    return frame([trial(seed, twin="uav-search", fields=1, rate=1) for seed in (1, 2)])
-
-
-def frame(rows: list[dict[tuple[str, str], float]]) -> pd.DataFrame:
-    table = pd.DataFrame(rows)
-    table.columns = pd.MultiIndex.from_tuples(table.columns)
-    return table
+    return pd.DataFrame([trial(seed, twin="uav-search", fields=1, rate=1) for seed in (1, 2)])
 
 
 def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
@@ -57,7 +51,7 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
             (f"rows-{spacing:.0f}m", "unseen"): 0.05 * k,
         }
     row |= {tuple(key.split("/", 1)): value for key, value in changes.items()}  # type: ignore[misc]
-    return frame([row] * count)
+    return pd.DataFrame([row] * count)
 
 
 def test_numbers_agree_with_one_another(draws):

@@ -8,25 +8,25 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from wildlab.detection.colour import Colour, coloured, find_coloured
+from wildlab.detection.colour import coloured, find_coloured
 from wildlab.reporting.charts.forms import Values, draw_picture, lines_chart
 from wildlab.reporting.figures import GREY, INK, ORANGE, new_figure
 from wildlab.reporting.published import bounds_of, spread_key
 from wildlab.simulation.scene.coloured import ColourView
 from wildlab.studies.page import Facts
 from wildlab.studies.precision_drop import trial
-from wildlab.studies.precision_drop.trial import COUNTS, MEAN, SINGLE
+from wildlab.studies.precision_drop.trial import COUNTS, LIMITS, MEAN, SINGLE
 from wildlab.studies.protocol import Study
 
 
-def plot_image(view: ColourView, thresholds: Colour) -> Figure:
+def plot_image(view: ColourView) -> Figure:
     """A rendered image, what of it lies within the limits of colour, and what is accepted."""
-    found = find_coloured(view.image, np.ones(view.labels.shape, bool), thresholds)
+    found = find_coloured(view.image, np.ones(view.labels.shape, bool), LIMITS)
     hsv = np.asarray(cv2.cvtColor(view.image, cv2.COLOR_RGB2HSV), np.uint8)
     fig, axes = new_figure(5.8, 2.3, columns=2)
     height, width = view.labels.shape
-    across, down = thresholds.border_px
-    panels = {"Image": view.image, "Within the limits": coloured(hsv, thresholds)}
+    across, down = LIMITS.border_px
+    panels = {"Image": view.image, "Within the limits": coloured(hsv, LIMITS)}
     for ax, (title, picture) in zip(axes, panels.items(), strict=True):
         draw_picture(ax, picture, title, limits=(0, 1))
         inner = (width - 1 - 2 * across, height - 1 - 2 * down)
