@@ -51,6 +51,15 @@ MARKS = holding("marks", marks={"name": ["a"], **PLACE})
 PHOTOS = holding("DCIM", photos={"file": ["a.jpg"], "time_log_s": [START], "height_sea_m": [80.0], **PLACE})
 
 
+def photographed(hours: float, up: float) -> CardItem:
+    """Images taken every 5 s along the track of `log`, by a wall clock so many hours ahead of UTC."""
+    own = log("", seconds=96, up=up).log
+    assert own is not None
+    c = {key: value[::5] for key, value in own.parts["gnss"].columns.items() if "_" in key}
+    wall = c.pop("time_s") + 3600 * hours
+    return holding("DCIM", photos={"file": [f"{k}.jpg" for k in range(20)], "time_log_s": wall, **c})
+
+
 @pytest.mark.parametrize(
     ("logs", "stated", "roles"),
     [
@@ -81,6 +90,11 @@ PHOTOS = holding("DCIM", photos={"file": ["a.jpg"], "time_log_s": [START], "heig
         ([log("boat", seconds=300), log("DJI_0001", north=40.0, gimbal=True)], {}, "target own"),
         # A track of another day is no target of images.
         ([PHOTOS, log("today"), log("yesterday", begin=-30 * 3600.0)], {}, "images target nothing"),
+        # A track on the places of the images is the vehicle's own, whatever the zone of the clock; one far
+        # below them is not.
+        ([photographed(0, 2.0), log("drone")], {}, "images own"),
+        ([photographed(3, 2.0), log("drone", north=4.0), BOAT], {}, "images own target"),
+        ([photographed(3, 60.0), log("boat")], {}, "images target"),
         # A copy is not used, even where it is cut shorter; a log of nearly the same place is none.
         (
             [log("b", north=80.0, seconds=40), DRONE, BOAT, log("boat (1)", north=80.0)],

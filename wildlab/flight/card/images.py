@@ -11,18 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.card.roles import CardItem, span_of
+from wildlab.flight.card.roles import QUARTER_S, CardItem, quarters_ahead, span_of
 from wildlab.flight.files import printable
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.log import Stream
 from wildlab.flight.readers.photos import camera_of, of_camera
 from wildlab.flight.time_scales import Span
 from wildlab.flight.trigger_matching import match_triggers
-
-#: Time zones are whole quarters of an hour, s.
-QUARTER_S = 900.0
-#: The clock of a camera is set to within this of its zone's time, s.
-SET_WITHIN_S = 300.0
 
 
 class ImageClock(NamedTuple):
@@ -193,7 +188,7 @@ def clock_of_images(
     if stated_offset_s is not None:
         return ImageClock("utc", offset, f"The camera's wall clock gets {offset:g} s, as you said.")
     flown = _flown(own, others)
-    quarters = None if flown is None else _quarters(wall, flown)
+    quarters = None if flown is None else quarters_ahead(wall, flown)
     if quarters is None:
         note = "The camera's wall clock states no zone and is taken for UTC: give --zone or --camera-offset."
         return ImageClock("utc", 0.0, note)
@@ -238,17 +233,3 @@ def _known(column: NDArray[Any] | None) -> NDArray[np.float64]:
         return np.empty(0)
     values = np.asarray(column, float)
     return np.asarray(values[np.isfinite(values)])
-
-
-def _quarters(wall: NDArray[np.float64], flown: Span) -> int | None:
-    """How many quarters of an hour the wall clock is ahead of UTC, where one number alone fits the flight."""
-    shares = {}
-    for quarters in range(-14 * 4, 14 * 4 + 1):
-        at = wall - quarters * QUARTER_S
-        inside = (at >= flown[0] - SET_WITHIN_S) & (at <= flown[1] + SET_WITHIN_S)
-        shares[quarters] = float(inside.mean())
-    best = max(shares.values())
-    those = [quarters for quarters, share in shares.items() if share > best - 0.01]
-    whole = [quarters for quarters in those if quarters % 4 == 0]
-    chosen = those if len(those) == 1 else whole
-    return chosen[0] if best > 0.5 and len(chosen) == 1 else None

@@ -383,10 +383,16 @@ def _images(found: Sequence[CardItem], choices: Mapping[str, Choice]) -> CardIte
 
 def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem | None, str]:
     """The vehicle's own log, with the reason: what turns, covers the images, triggers, flies and climbs, in
-    this order, and of those that are alike the longest. None where the images have poses of their own and no
-    log turns."""
+    this order, and of those that are alike the longest. Where the images have poses of their own and no log
+    turns, the one that was where they say that the camera was, or None."""
     turned = [one for one in open_ if any(one.part(part) is not None for part in ("poses", "gimbal"))]
-    if not turned and (not open_ or (images is not None and has_place(images))):
+    if not turned and images is not None and has_place(images):
+        for one in open_:
+            distance, above = _from_images(one, images)
+            if _on_board(distance, above):
+                return one, f"half of the time it is within {distance:.1f} m of where the images were taken"
+        return None, ""
+    if not open_:
         return None, ""
     if len(open_) == 1:
         return open_[0], "it is the only log"
@@ -462,7 +468,7 @@ def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choi
         return Choice(one, "nothing", why)
     distance, above = _distance(mine, theirs)
     height = "" if math.isnan(above) else f" and {abs(above):.0f} m {'below' if above > 0 else 'above'}"
-    if distance < ON_BOARD_M and not abs(above) >= ON_BOARD_M:
+    if _on_board(distance, above):
         near = f"half of the time it is within {distance:.1f} m of the vehicle's own log"
         return Choice(one, "camera" if one.part("poses") is not None else "receiver", near)
     return Choice(
@@ -472,25 +478,59 @@ def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choi
     )
 
 
+def _on_board(distance: float, above: float) -> bool:
+    return distance < ON_BOARD_M and not abs(above) >= ON_BOARD_M
+
+
+def _from_images(one: CardItem, images: CardItem) -> tuple[float, float]:
+    """The distance of a log from where the images say that the camera was, see `_distance`."""
+    theirs, mine = way_of(one), way_of(images, ("photos", "time_s"))
+    if theirs is not None and mine is None and (wall := way_of(images, ("photos", "time_log_s"))):
+        quarters = quarters_ahead(wall.times, (theirs.times[0], theirs.times[-1]))
+        mine = None if quarters is None else wall._replace(times=wall.times - quarters * QUARTER_S)
+    return (math.inf, math.nan) if mine is None or theirs is None else _distance(mine, theirs)
+
+
+#: Time zones are whole quarters of an hour, s.
+QUARTER_S = 900.0
+#: The clock of a camera is set to within this of its zone's time, s.
+SET_WITHIN_S = 300.0
 #: Clocks on Earth differ by no more than this, s: wall clocks state no zone.
 ZONES_S = 14 * 3600.0
 
 
-def way_of(one: CardItem) -> LoggedPath | None:
-    """Where a log says that it was, rows that can be used; None where it does not say."""
-    for name in ("gnss", "poses"):
+def quarters_ahead(wall: Array, flown: Span) -> int | None:
+    """How many quarters of an hour the wall clock is ahead of UTC, where one number alone fits the flight."""
+    shares = {}
+    for quarters in range(-14 * 4, 14 * 4 + 1):
+        at = wall - quarters * QUARTER_S
+        inside = (at >= flown[0] - SET_WITHIN_S) & (at <= flown[1] + SET_WITHIN_S)
+        shares[quarters] = float(inside.mean())
+    best = max(shares.values())
+    those = [quarters for quarters, share in shares.items() if share > best - 0.01]
+    whole = [quarters for quarters in those if quarters % 4 == 0]
+    chosen = those if len(those) == 1 else whole
+    return chosen[0] if best > 0.5 and len(chosen) == 1 else None
+
+
+def way_of(one: CardItem, *stamped: tuple[str, str]) -> LoggedPath | None:
+    """Where a log says that it was, rows that can be used; None where it does not say.
+
+    ``stamped`` are the parts to look at in turn, each with its column of times.
+    """
+    for name, time in stamped or (("gnss", "time_s"), ("poses", "time_s")):
         stream = one.part(name)
-        if stream is None or "latitude_deg" not in stream.columns or "time_s" not in stream.columns:
+        if stream is None or not {"latitude_deg", time} <= stream.columns.keys():
             continue
         c = stream.columns
         place = np.radians(np.column_stack([c["latitude_deg"], c["longitude_deg"]]))
-        good = stream.used & np.isfinite(place).all(axis=1) & np.isfinite(c["time_s"])
+        good = stream.used & np.isfinite(place).all(axis=1) & np.isfinite(c[time])
         if good.any():
             # Above take-off, a boat and an aircraft have nothing in common.
             heights: dict[str, Array] = {
                 key: c[key][good] for key in ("height_ellipsoid_m", "height_sea_m") if key in c
             }
-            return LoggedPath(c["time_s"][good], place[good], heights)
+            return LoggedPath(c[time][good], place[good], heights)
     return None
 
 
