@@ -109,6 +109,13 @@ def both(*changes: Change) -> Change:
             in_table("buoy.csv", "63.44,10.401", "10.401,63.44"),
             "buoy.csv, north_m (from [truth]): far from the flight",
         ),
+        (
+            both(
+                in_table("buoy.csv", "63.44,10.401", "10.401,63.44"),
+                lambda raw: raw.recipe["truth"].pop(1),
+            ),
+            "nav.csv, buoy.csv, north_m (from [poses] or [truth]): far from all poses",
+        ),
         (in_table("clicks.csv", "\nC,", "\nD,"), "clicks.csv, frame_id (from [detections]): first 'D'"),
         (in_table("photos.csv", "\nB,", "\nA,"), "photos.csv, frame_id (from [frames]): 'A' stands"),
         (in_recipe("detections.0.frame", None), "clicks.csv, frame (in [detections[0]]): which frame"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import permutations, product
 from typing import Any, Generic, TypeVar
 
@@ -457,6 +458,17 @@ def _by_angles(row: Row) -> Change:
     return undo
 
 
+def change_geodetic(change: Change, p: Array, origin: Origin, to: Origin | None = None) -> Array | None:
+    """Positions (N, 3) whose latitude, longitude and height are changed, about another origin or the same."""
+    changed = change(ned_to_geodetic(p, origin))
+    if changed is None:
+        return None
+    lat, lon, height = np.moveaxis(changed, -1, 0)
+    with np.errstate(invalid="ignore"):
+        off_earth = (np.abs(lat) > np.pi / 2).any() or (np.abs(lon) > 2 * np.pi).any()
+    return None if off_earth else geodetic_to_ned(lat, lon, height, to or origin)
+
+
 def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[Mistake[Array]]:
     """Mistakes about one table of positions, as they are undone.
 
@@ -469,24 +481,13 @@ def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[Mi
     local
         Whether coordinates about the origin count too, beside latitude and longitude.
     """
-
-    def geodetic(change: Change) -> Change:
-        def undo(p: Array) -> Array | None:
-            changed = change(ned_to_geodetic(p, origin))
-            if changed is None:
-                return None
-            lat, lon, height = np.moveaxis(changed, -1, 0)
-            with np.errstate(invalid="ignore"):
-                off_earth = (np.abs(lat) > np.pi / 2).any() or (np.abs(lon) > 2 * np.pi).any()
-            return None if off_earth else geodetic_to_ned(lat, lon, height, origin)
-
-        return undo
-
     for group in ("geodetic", "local", "height", "down"):
         for row in rows_of(group):
             if local or group != "local":
                 change = change_by(row)
-                yield mistake(row, change if group in ("local", "down") else geodetic(change), part=part)
+                plain = group in ("local", "down")
+                undo = change if plain else partial(change_geodetic, change, origin=origin)
+                yield mistake(row, undo, part=part)
 
 
 def places_in(table: str, origin: Origin, label: str, *fields: str) -> Iterator[Mistake[Any]]:

@@ -158,7 +158,8 @@ def truth_place(flight: Flight) -> Iterator[Finding]:
     distance = np.hypot(beyond[:, 0], beyond[:, 1])
     far = distance > FAR_M
     facts = {"name": flight.truth["target_id"].to_numpy(object), "km": distance / 1e3}
-    yield from bad_rows(far, "problem", "truth", "north_m", "truth-far", facts)
+    code = "all-truth-far" if far.all() else "truth-far"
+    yield from bad_rows(far, "problem", "truth", "north_m", code, facts)
     if not far.any():
         above = truth[:, 2] < poses[:, 2].min()
         yield from bad_rows(above, None, "truth", "down_m", "truth-above")

@@ -340,6 +340,8 @@ def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
         else:
             blocks = recipe.truth if finding.table == "truth" else recipe.detections
             part, files = finding.table, [block.file for block in blocks]
+            if finding.code == "all-truth-far":  # either may be the wrong one
+                part, files = "poses] or [truth", [*(one.file for one in recipe.poses.values()), *files]
         raise WildlabError(
             finding.clause,
             finding.remedy,
