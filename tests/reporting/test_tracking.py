@@ -62,6 +62,19 @@ def test_a_filter_that_its_detections_surprise_is_looked_at(nis, level):
     assert ("surprised" in keys(odd)) == (level == "warn")
 
 
+def test_every_track_that_is_surprised_is_counted():
+    """Also one whose errors are not as predicted; and the table has a verdict on each of both."""
+    odd = {"nis": 18.0, "nis_verdict": "overconfident"}
+    both = pd.concat([rows(**odd), rows(target="b", nees=5.6, verdict="overconfident", **odd)])
+    beside = page.answer(both, [])[1]
+    assert beside.key == "surprised" and beside.values == {"tracks": "2", "n": "2", "times": "3.0"}
+    mine = both[both["filter"] == "schmidt"]
+    assert page.tracks_table(mine)[["verdict", "nis_verdict"]].to_numpy().tolist() == [
+        ["consistent", "overconfident"],
+        ["overconfident*", "overconfident"],
+    ]
+
+
 @pytest.mark.parametrize(
     ("changes", "level", "first"),
     [

@@ -33,7 +33,7 @@ from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant
 from wildlab.reporting.charts import following as charts
 from wildlab.reporting.charts.following import beside_plain_shown
-from wildlab.reporting.figures import filter_words, short_words
+from wildlab.reporting.figures import filter_words
 from wildlab.reporting.report import Report, Wording
 
 #: A target tracked by all sensors together may be this many times as far off as by the best one alone.
@@ -118,9 +118,9 @@ def on_few(row: pd.Series, what: str = "nees") -> bool:
 
 
 def surprised(rows: pd.DataFrame) -> pd.DataFrame:
-    """Tracks whose errors are as predicted, and whose detections are not where they expect them."""
+    """Tracks whose detections are not where they expect them, whatever their errors."""
     beyond = np.sqrt(rows["nis"] / rows["dof"]) > SURPRISED
-    beyond &= (rows["verdict"] == CONSISTENT) & (rows["nis_verdict"] == OVERCONFIDENT)
+    beyond &= rows["nis_verdict"] == OVERCONFIDENT
     return rows[beyond & ~rows.apply(on_few, axis=1, what="nis")]
 
 
@@ -216,7 +216,7 @@ def answer(rows: pd.DataFrame, pairs: Sequence[Apart]) -> list[Message]:
     ratio = np.sqrt(known[what] / (2.0 if with_truth else known["dof"]))
     values = {
         "n": str(len(mine)),
-        "filter": short_words(str(mine["filter"].iloc[0])),
+        "filter": load_texts("tracking").subjects[str(mine["filter"].iloc[0])],
         "judged": str(len(judged)),
         "rmse": length(float(shown["rmse"].median())) if with_truth else "",
         "times": significant(float(np.median(ratio)) if len(ratio) else np.nan),
@@ -246,8 +246,9 @@ def _beside(
     """The most important thing beside the first sentence."""
     if (worse := worse_together(rows)) is not None:
         return worse
-    odd = surprised(mine) if with_truth else mine.iloc[:0]
-    if len(odd):
+    odd = surprised(mine)
+    # Where errors are as predicted, nothing else says so.
+    if with_truth and (odd["verdict"] == CONSISTENT).any():
         times = significant(float(np.sqrt((odd["nis"] / odd["dof"]).median())))
         return Message("surprised", {"tracks": str(len(odd)), "n": str(len(mine)), "times": times})
     by_pair = rows.groupby(["sensor", "target"], sort=False)["detections"].max()
@@ -308,15 +309,16 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
             return NOTHING
         return f"{row[what]:.2f} ({row[f'{what}_low']:.2f} to {row[f'{what}_high']:.2f})"
 
+    def verdict_on(row: pd.Series, what: str) -> str:
+        return str(row["verdict" if what == "nees" else "nis_verdict"]) + ("*" if on_few(row, what) else "")
+
     shown = []
     for _, row in rows.iterrows():
-        what = "nees" if truth else "nis"
-        word = str(row["verdict" if truth else "nis_verdict"]) + ("*" if on_few(row, what) else "")
         used = NOTHING if row["filter"].endswith("-smoothed") else f"{row['detections']:.0f}"
         one = {
             "track": f"{row['target']}, {row['sensor']}",
             "filter": filter_words(row["filter"]),
-            "verdict": word,
+            "nis_verdict": verdict_on(row, "nis"),
             "detections": used,
         }
         if truth:
@@ -325,6 +327,7 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
                 low, high = 100 * row["inside_low"], 100 * row["inside_high"]
                 inside = f"{100 * row['inside']:.0f} ({low:.0f} to {high:.0f})"
             one |= {
+                "verdict": verdict_on(row, "nees"),
                 "compared": row["compared"],
                 "rmse": row["rmse"],
                 "rmse_without": row["rmse_without"],
