@@ -19,7 +19,7 @@ from wildlab.analysis.plans.sorties import TOLERANCE, fly_rows, follow
 from wildlab.flight.writers import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
-from wildlab.reporting.plan import with_words
+from wildlab.reporting.plan import finding_of, place_name, with_words
 
 CAMERA = Camera(640, 512, 800.0, 800.0, 319.5, 255.5)
 #: 200 m east and 400 m north.
@@ -211,6 +211,17 @@ def test_what_lies_in_two_areas_counts_once(tmp_path):
     said = result_of(made)
     assert said["animals"] == pytest.approx(14, rel=0.01)
     assert dict(said["warnings"]) == {"overlap": {"size": "2.0 ha"}}
+
+
+def test_a_battery_that_was_not_given_was_not_checked(field):
+    assert finding_of(plan(field)) != finding_of(plan(field, battery_min=30.0)) == "no-objection"
+
+
+def test_the_name_of_an_area_does_not_hide_take_off():
+    square = np.array([[0.0, 0.0], [0.0, 10.0], [10.0, 10.0], [10.0, 0.0]])
+    assert place_name(square, np.array([-3.0, 0.0])).tolist() == [5.0, 5.0]
+    for home in ([5.0, 5.0], [6.0, 4.0]):
+        assert np.linalg.norm(place_name(square, np.array(home)) - home) > 2.0
 
 
 def test_where_one_takes_off(field):

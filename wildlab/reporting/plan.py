@@ -31,6 +31,8 @@ FLIGHTS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 GROUND = {"seen": "#D6EBDF", "hidden": "#D55E00", "only blurred": "#CC79A7", "in no image": "#F0C24B"}
 #: Places along a flight at which its ground is drawn.
 PLACES = 800
+#: The name of an area needs this share of its size about its middle.
+TAKEN = 0.2
 #: Flights that a key names one by one.
 NAMED = 6
 
@@ -88,9 +90,10 @@ def plan_page(
     place = wording.say(texts["exact"], {"origin": origin_text(plan)}) if exact else texts["withheld"]
     report.head(title, f"{names}; {place}")
     against = " ".join(result["warnings"])
-    reason = against or wording.texts.answers["no-objection"]
-    word = texts["look-closer" if against else "no-objection"]
-    report.summary(result["sentences"], level="warn" if against else "neutral", verdict=(word, reason))
+    found = "look-closer" if against else finding_of(plan)
+    reason = against or wording.texts.answers[found]
+    level = "warn" if against else "neutral"
+    report.summary(result["sentences"], level=level, verdict=(texts[found], reason))
     report.tiles(_tiles(plan, result, wording))
     report.section(texts["map"])
     _show_map(wording, plan, covered, result)
@@ -102,6 +105,11 @@ def plan_page(
     report.section(texts["assumed"])
     report.points(result["assumed"])
     return finished_page(report.parts, title=title, name="plan", kicker="wildlab › plan")
+
+
+def finding_of(plan: Plan) -> str:
+    """What the checks of a plan come to that nothing speaks against."""
+    return "battery-unchecked" if plan.wanted.battery_min is None else "no-objection"
 
 
 def _tiles(plan: Plan, result: Mapping[str, Any], wording: Wording) -> list[tuple[str, str]]:
@@ -124,7 +132,7 @@ def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: 
     fig, ax = new_figure(5.8, 5.2)
     there = [_draw_covered(ax, one) for one in covered]
     for area, name in zip(plan.areas.areas, plan.names, strict=True):
-        _draw_area(ax, area, name)
+        _draw_area(ax, area, name, plan.home)
     many = len(plan.sorties) > NAMED
     for k, one in enumerate(plan.sorties):
         points, colour = one.course.points, FLIGHTS[k % len(FLIGHTS)]
@@ -138,7 +146,7 @@ def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: 
     side = high - low
     # Above and to the right there is room for the arrow to the north, below for the scale.
     ax.set(xlim=(low[1] - 0.06 * side.max(), high[1] + 0.12 * side.max()))
-    ax.set(ylim=(low[0] - 0.10 * side.max(), high[0] + 0.06 * side.max()))
+    ax.set(ylim=(low[0] - 0.17 * side.max(), high[0] + 0.06 * side.max()))
     map_axes(ax)
     ax.set_aspect("equal", adjustable="box")
     handles, _ = ax.get_legend_handles_labels()
@@ -224,7 +232,16 @@ def _show_heights(wording: Wording, plan: Plan, terrain: Terrain) -> None:
     wording.figure("heights", fig)
 
 
-def _draw_area(ax: Axes, area: Area, name: str) -> None:
+def place_name(outline: Array, home: Array) -> Array:
+    """Where the name of an area stands: its middle, or where take-off is, half-way to the farthest corner."""
+    middle = outline.mean(axis=0)
+    if np.linalg.norm(home - middle) > TAKEN * np.ptp(outline, axis=0).max():
+        return np.asarray(middle)
+    away = np.linalg.norm(outline - home, axis=1)
+    return np.asarray((middle + outline[np.argmax(away)]) / 2)
+
+
+def _draw_area(ax: Axes, area: Area, name: str, home: Array) -> None:
     rings = [area.outline, *area.holes]
     corners = np.concatenate([np.concatenate([ring, ring[:1]])[:, ::-1] for ring in rings])
     codes = np.concatenate(
@@ -232,7 +249,7 @@ def _draw_area(ax: Axes, area: Area, name: str) -> None:
     )
     # Holes show only where they run the other way round; a line round each says where they are.
     ax.add_patch(PathPatch(Outline(corners, codes), facecolor="none", edgecolor=INK, lw=1.4, zorder=3))
-    middle = area.outline.mean(axis=0)
+    middle = place_name(area.outline, home)
     ax.annotate(
         name,
         xy=(float(middle[1]), float(middle[0])),
