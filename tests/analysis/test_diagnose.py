@@ -12,7 +12,7 @@ from tests.analysis.conftest import build, changed, score
 from tests.analysis.survey_twin import CAMERA, Survey, simulate
 from tests.refused import refused
 from tests.sound_flights import simulate_sound_flight
-from wildlab.analysis.accuracy import compare_sightings, judge_repeats, learn_from
+from wildlab.analysis.accuracy import compare_sightings, judge_accuracy, judge_repeats, learn_from
 from wildlab.analysis.diagnose import diagnose, find_implausible
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, observe
@@ -51,6 +51,15 @@ def test_targets_that_the_border_cuts_make_no_correction_certain(share):
     cut = np.arange(len(table)) % 10 < 10 * share
     tables = {**flight.tables, "detections": table.assign(touches_border=cut.astype(float))}
     assert diagnosed(replace(flight, tables=tables)).counts == (share < 0.25)
+
+
+@pytest.mark.parametrize("points", [9, 10])
+def test_a_cause_is_looked_for_with_ten_points(points):
+    flight = simulate(Survey(images=12))
+    table = flight.table("detections").groupby("frame_id").head(1).head(points).reset_index(drop=True)
+    few = replace(flight, tables={**flight.tables, "detections": table})
+    found = judge_accuracy(observe(few), np.random.default_rng(0))
+    assert found.summary.n == points and (found.diagnosis is None) == (points < 10)
 
 
 @cache

@@ -35,6 +35,7 @@ from wildlab.analysis.pose_noise import (
     evaluate_with_estimated_noise,
     used_deviations,
 )
+from wildlab.analysis.verdict import FEW_POINTS
 from wildlab.errors import WildlabError
 from wildlab.evaluation.causes import mean_of_others
 from wildlab.evaluation.ellipses import (
@@ -168,7 +169,7 @@ def judge_accuracy(
     summary = summarise(errors)
     located = np.isfinite(scored["error_m"]) & np.isfinite(scored["cov_nn"])
     enough = scored.loc[located, "frame_id"].nunique() >= FEWEST_IMAGES
-    diagnosis = diagnose(observations, scored) if enough else None
+    diagnosis = diagnose(observations, scored) if enough and summary.n >= FEW_POINTS else None
     intervals = {}
     if enough:
         figures = {

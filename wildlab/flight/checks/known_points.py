@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.special import bdtrc
 
-from wildlab.flight.checks.findings import Finding, number, phrase
+from wildlab.flight.checks.findings import POSITION, Finding, number, phrase
 from wildlab.flight.checks.mistakes import (
     ALIKE,
     FAR_BETTER,
@@ -22,8 +22,8 @@ from wildlab.flight.checks.mistakes import (
     attitudes_in,
     blame,
     change_by,
+    change_columns,
     change_geodetic,
-    change_place,
     explain,
     mistake,
     one_row,
@@ -212,7 +212,7 @@ def shared_place_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
         def correct(flight: Flight, moved: Change = moved, at: Origin = at) -> Flight | None:
             placed = [one for one in ("gnss", "truth") if one in flight.tables]
             for table in (*(f"nav/{name}" for name in flight.nav), *placed):
-                changed = change_place(table, moved)(flight)
+                changed = change_columns(table, POSITION, moved)(flight)
                 if changed is None:
                     return None
                 flight = changed
