@@ -1,7 +1,11 @@
-"""`wildlab detect`, through the real command: folders, bad images, labels and fits."""
+"""`wildlab detect`, through the real command: folders, bad images, labels, fits, and going on."""
 
 import json
 import os
+import signal
+import subprocess
+import sys
+import time
 
 import cv2
 import numpy as np
@@ -156,7 +160,7 @@ def test_whatever_lies_in_the_folder_is_counted(capsys, tmp_path):
     path, names = hostile(tmp_path / "in")
     out = succeed("detect", path, "--out", tmp_path / "out", "--json")
     result = json.loads(out)
-    assert result["frames"] == {"all": 3 + len(names), "usable": 3}
+    assert result["frames"] == {"all": 3 + len(names), "usable": 3, "kept": 0}
     assert set(dict(result["problems"])) == names
     assert set(pd.read_csv(tmp_path / "out" / "frames.csv")["frame_id"]) >= {"ünï – 鹿.png", "new\nline.png"}
     assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 3
@@ -174,6 +178,37 @@ def test_names_that_become_one_file_name_keep_a_picture_each(tmp_path):
     succeed("detect", path, "--out", tmp_path / "out")
     found = sorted(one.name for one in (tmp_path / "out" / "overlays").glob("*.jpg"))
     assert found == ["000-2.jpg", "000.jpg", "001.jpg", "_-2.jpg", "_.jpg"]
+
+
+@pytest.mark.slow
+def test_control_c_in_the_middle_loses_nothing_that_was_finished(tmp_path):
+    path = folder(tmp_path / "in", 150)
+
+    def command(into):
+        arguments = ["detect", str(path), "--out", str(tmp_path / into), "--overlays", "0"]
+        return [sys.executable, "-m", "wildlab.cli", *arguments]
+
+    # Where the tests run in the background of a shell, the interrupt is ignored by all that they start.
+    running = subprocess.Popen(
+        command("out"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    parts = tmp_path / "out" / "parts"
+    while running.poll() is None and len(list(parts.glob("*.json"))) < 2:
+        time.sleep(0.02)
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=60)
+    assert running.returncode == 130 and "Traceback" not in err
+    kept = 25 * len(list(parts.glob("*.json")))
+    assert 50 <= kept < 150 and not (tmp_path / "out" / "detections.csv").exists()
+    again = subprocess.run(command("out"), capture_output=True, text=True, check=True)
+    assert f"{kept} frames" in again.stdout
+    subprocess.run(command("whole"), capture_output=True, check=True)
+    at_once, in_two = ((tmp_path / into / "detections.csv").read_bytes() for into in ("whole", "out"))
+    assert at_once == in_two
 
 
 def test_what_the_camera_does_is_seen(capsys, tmp_path):

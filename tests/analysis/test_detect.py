@@ -1,4 +1,4 @@
-"""Detection over folders: what is written, and what it is worth."""
+"""Detection over folders: what is written, what is kept when it is broken off, what it is worth."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pytest
 
 from tests.analysis.test_detection_part_fit import sample
 from tests.refused import refused
+from wildlab.analysis.detecting import detect as subject
 from wildlab.analysis.detecting.command import samples_of
 from wildlab.analysis.detecting.detect import (
     METHODS,
@@ -56,13 +57,40 @@ def folder(path: Path, count: int = 6) -> Path:
 def test_tables_hold_what_was_put_in(tmp_path):
     frames = open_frames(folder(tmp_path / "in"))
     done = run_detection(frames, tmp_path / "out", "contrast", Contrast())
-    assert len(done.detections) == 12 and len(done.frames) == 6
+    assert len(done.detections) == 12 and len(done.frames) == 6 and done.kept == 0
     read = pd.read_csv(tmp_path / "out" / "detections.csv")
     assert np.allclose(read["u_px"], pd.read_parquet(tmp_path / "out" / "detections.parquet")["u_px"])
     moving = read[read["v_px"] < 50].sort_values("frame_id")
     assert np.allclose(moving["u_px"], 20 + 10 * np.arange(6), atol=0.3)
     assert (read["kind"] == "pixel").all() and (read["touches_border"] == 0).all()
     assert (read["cov_uu_px2"] * read["cov_vv_px2"] > read["cov_uv_px2"] ** 2).all()
+
+
+def test_a_run_that_was_broken_off_goes_on_and_gives_the_same(tmp_path, monkeypatch):
+    monkeypatch.setattr(subject, "PART", 4)
+    frames = open_frames(folder(tmp_path / "in", 11))
+    whole = run_detection(frames, tmp_path / "whole", "contrast", Contrast())
+    seen = []
+
+    def stop(done: int) -> None:
+        seen.append(done)
+        if done == 6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_detection(frames, tmp_path / "out", "contrast", Contrast(), stop)
+    assert not (tmp_path / "out" / "detections.csv").exists()
+    looked = []
+    true = subject.detect_frame
+    monkeypatch.setattr(subject, "detect_frame", lambda f, *rest: looked.append(f.name) or true(f, *rest))
+    done = run_detection(frames, tmp_path / "out", "contrast", Contrast(), seen.append)
+    assert done.kept == 4 and looked[0] == "004.png" and len(looked) == 7 and seen[-1] == 11
+    pd.testing.assert_frame_equal(done.detections, whole.detections)
+    pd.testing.assert_frame_equal(done.frames, whole.frames)
+    # Other thresholds, or a damaged part: computed again.
+    assert run_detection(frames, tmp_path / "out", "contrast", Contrast(peak=10)).kept == 0
+    (tmp_path / "out" / "parts" / "000000.parquet").write_bytes(b"broken")
+    assert run_detection(frames, tmp_path / "out", "contrast", Contrast(peak=10)).kept == 0
 
 
 def test_frames_that_cannot_be_used_stay_in_the_denominator(tmp_path):

@@ -30,7 +30,7 @@ def rates(found, invented, missed, *, interval=True):
 def run(detections=10, usable=5, **more):
     result = {
         "method": "warm",
-        "frames": {"all": usable + len(more.get("problems", [])), "usable": usable},
+        "frames": {"all": usable + len(more.get("problems", [])), "usable": usable, "kept": 0},
         "detections": detections,
         "problems": [],
         "pictures": {"overlays": 1},

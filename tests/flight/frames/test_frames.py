@@ -221,6 +221,9 @@ def test_a_video_gives_its_frames_with_times_and_can_be_entered_anywhere(tmp_pat
     assert len(clip) == len(frames) == 12 and frames[3].name == "clip#000003"
     assert frames[3].time == pytest.approx(0.3) and frames[3].unit == "grey"
     assert [one.name for one in clip.some([11, 2])] == [frames[2].name, frames[11].name]
+    later = list(clip.starting_at(9))
+    assert [one.name for one in later] == [one.name for one in frames[9:]]
+    assert (later[0].image == frames[9].image).all()
 
 
 def test_a_playlist_that_calls_itself_a_video_is_refused(tmp_path):

@@ -113,11 +113,13 @@ def held_folder(path: Path, numbers: list[int]) -> Path:
     return path
 
 
-def test_some_of_the_frames_are_marked_as_all_are(tmp_path):
+def test_a_run_that_goes_on_marks_the_same_frames(tmp_path):
     numbers = [*range(10), 10, 10, 10, 10, *range(11, 30)]
     frames = open_frames(held_folder(tmp_path / "in", numbers))
     whole = [one.problem for one in frames]
     assert [number for number, problem in enumerate(whole) if problem] == [12, 13]
+    for first in (0, 1, 11, 12, 13, 14):
+        assert [one.problem for one in frames.starting_at(first)] == whole[first:]
     assert [one.problem for one in frames.some([10, 13, 20])] == [whole[10], whole[13], whole[20]]
 
 

@@ -332,6 +332,7 @@ def _result(
         "frames": {
             "all": len(detected.frames),
             "usable": len(detected.frames) - len(problems),
+            "kept": detected.kept,
         },
         "detections": len(detected.detections),
         "problems": [
@@ -341,6 +342,8 @@ def _result(
         "facts": [],
     }
     said: list[Fact] = result["facts"]
+    if detected.kept:
+        said.append(fact("detect-kept", kept=detected.kept))
     if fitted is not None:
         result["fit"] = {
             "sets_tried": fitted.tried,

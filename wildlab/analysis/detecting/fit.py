@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.detecting.detect import METHODS, detect_frame
-from wildlab.analysis.detecting.scores import ELLIPSE, plain_interval
+from wildlab.analysis.detecting.scores import ELLIPSE
 from wildlab.detection.contrast import PERMISSIVE, Contrast, Proposals, Shape, choose, fit_shape, propose
 from wildlab.detection.detections import Detections
 from wildlab.detection.floating import FloatingThresholds
@@ -255,7 +255,8 @@ def found_labels(method: str, samples: Sequence[Sample], thresholds: Any) -> Fou
     parts: list[tuple[Array, Array, Array]] = []
     for sample in samples:
         found = detect_frame(sample.frame, method, bare)
-        pairs = match(_boxes(found), sample.boxes, ignore=sample.ignore).pairs
+        boxes = np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
+        pairs = match(boxes, sample.boxes, ignore=sample.ignore).pairs
         if len(pairs):
             own, label = pairs.T
             middle = sample.boxes[label, :2] + sample.boxes[label, 2:] / 2
@@ -298,10 +299,13 @@ class PartFit(NamedTuple):
 
     def as_plain(self) -> dict[str, Any]:
         """For a JSON file."""
+        names = ("estimate", "low", "high")
         return {
             "part": round(self.part, 5) if np.isfinite(self.part) else None,
             "labels_found": self.labels,
-            "held_out_coverage_90": None if self.held_out is None else plain_interval(self.held_out),
+            "held_out_coverage_90": None
+            if self.held_out is None
+            else {name: round(value, 4) for name, value in zip(names, self.held_out, strict=True)},
         }
 
 

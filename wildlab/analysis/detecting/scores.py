@@ -81,7 +81,8 @@ class DetectorScore:
         found: dict[str, Any] = plain_rates(self.rates)
         found |= {"frames": self.frames, "frames_without_labels": self.without_labels}
         if self.ellipse is not None:
-            found["ellipse_coverage_90"] = plain_interval(self.ellipse)
+            names = zip(("estimate", "low", "high"), self.ellipse, strict=True)
+            found["ellipse_coverage_90"] = {name: round(value, 4) for name, value in names}
         return found | {"frames_unusable": self.unusable, "labelled_frames_absent": len(self.absent)}
 
 
@@ -98,12 +99,11 @@ def plain_rates(given: Rates) -> dict[str, Any]:
     dict
     """
     found: dict[str, Any] = {name: getattr(given, name) for name in ("found", "invented", "missed", "groups")}
-    return found | {name: plain_interval(getattr(given, name)) for name in ("precision", "recall", "f1")}
-
-
-def plain_interval(given: Interval) -> dict[str, float | None]:
-    """An interval for JSON, None in place of NaN."""
-    return {name: round(one, 4) if np.isfinite(one) else None for name, one in given._asdict().items()}
+    for name in ("precision", "recall", "f1"):
+        value = getattr(given, name)
+        numbers = zip(("estimate", "low", "high"), value, strict=True)
+        found[name] = {key: round(number, 4) if np.isfinite(number) else None for key, number in numbers}
+    return found
 
 
 def rate_words(one: Mapping[str, float | None] | None, sign: str = "") -> str:
@@ -303,10 +303,15 @@ class Compared:
         -------
         dict
         """
+
+        def plain(values: Sequence[float]) -> dict[str, float | None]:
+            named = zip(("estimate", "low", "high"), values, strict=True)
+            return {key: round(one, 4) if np.isfinite(one) else None for key, one in named}
+
         found: dict[str, Any] = {"name": self.name, **plain_rates(self.rates)}
-        found["average_precision"] = self.curve and plain_interval(self.curve.average_precision)
+        found["average_precision"] = None if self.curve is None else plain(self.curve.average_precision)
         found["lowest_score"] = self.lowest if np.isfinite(self.lowest) else None
-        return found | {"f1_beyond_ours": plain_interval(self.beyond), "told": list(self.told)}
+        return found | {"f1_beyond_ours": plain(self.beyond), "told": list(self.told)}
 
 
 def named_file(text: str) -> tuple[str, Path]:

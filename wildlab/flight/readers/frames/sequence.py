@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import compress
+from itertools import compress, islice
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +81,7 @@ class Kept:
 
 @dataclass(frozen=True)
 class Frames:
-    """What `open_frames` opened. Iterate over it.
+    """What `open_frames` opened. Iterate over it; `starting_at` leaves out what was done before.
 
     Attributes
     ----------
@@ -112,7 +112,25 @@ class Frames:
         return self.count
 
     def __iter__(self) -> Iterator[Frame]:
-        return self._checked(self._read(lambda _: True))
+        return self.starting_at(0)
+
+    def starting_at(self, first: int) -> Iterator[Frame]:
+        """Frames from a number on.
+
+        Parameters
+        ----------
+        first
+            From 0.
+
+        Yields
+        ------
+        Frame
+            With burnt-in overlays taken out of what is valid, and a problem where it is of another size than
+            most.
+        """
+        # A picture that is held is told by those before it.
+        early = max(first - HELD + 1, 0)
+        yield from islice(self._checked(self._read(lambda number: number >= early)), first - early, None)
 
     def some(self, numbers: Collection[int]) -> Iterator[Frame]:
         """Some of the frames; the others are not decoded.
@@ -125,8 +143,7 @@ class Frames:
         Yields
         ------
         Frame
-            In their order: with burnt-in overlays taken out of what is valid, and a problem where it is of
-            another size than most.
+            As of `starting_at`, in their order.
         """
         wanted = set(numbers)
         needed = {number - back for number in wanted for back in range(HELD) if number >= back}
