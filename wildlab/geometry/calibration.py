@@ -447,10 +447,6 @@ class Mounting(NamedTuple):
         """Mean distance of the points from where their pixels fall, metres (0.0229 m in H 5.6.1)."""
         return float(np.nanmean(np.linalg.norm(self.residuals, axis=1)))
 
-    def error_at(self, range: float) -> float:
-        """The same at another distance, metres, if it is all from the camera's orientation (H 5.6.1)."""
-        return self.error * range / self.range
-
 
 def mounting_from_points(
     poses: CameraPoses, uv: ArrayLike, known_points: ArrayLike, image: Sequence[object] | np.ndarray

@@ -4,7 +4,7 @@ Flow is in px/s: H's definition 5.2 has it as a displacement in px, and (5.18) a
 letter, (5.30) would give metres an image and not metres a second; `flow_between` divides by the time between
 the images. Where on the way from one image to the other pixel and pose belong, H does not say (but for the
 gimbal: its mean orientation); here it is half way, for pixel and pose, which leaves an error of second order
-in that time. `velocity_from_pair` has none: it is the finite form.
+in that time.
 """
 
 from __future__ import annotations
@@ -276,42 +276,6 @@ def target_velocity(
     R_cn = np.swapaxes(poses.R_nc, -1, -2)
     A = by_twist[..., :3] @ R_cn[..., :, :2]
     return np.asarray(np.linalg.solve(A, own[..., None])[..., 0])
-
-
-def velocity_from_pair(
-    first: CameraPoses,
-    second: CameraPoses,
-    uv_first: ArrayLike,
-    uv_second: ArrayLike,
-    interval: float,
-    plane_down: ArrayLike,
-) -> Array:
-    """Mean velocity over a plane between two images, exactly: two ground points and the time between them.
-
-    Parameters
-    ----------
-    first, second
-        The camera at either image, for each pixel or one for all.
-    uv_first, uv_second
-        (N, 2) pixels of the same points in both.
-    interval
-        From the first to the second, s.
-    plane_down
-        Down coordinate of the plane, m, scalar or (N,).
-
-    Returns
-    -------
-    (N, 2) north and east, m/s; NaN where a ray does not meet the plane.
-
-    Raises
-    ------
-    WildlabError
-        Where the interval is not above zero, or there is another number of poses than of pixels.
-    """
-    seconds = _positive_interval(interval)
-    there = georeference_pixels(second, uv_second, plane_down)
-    here = georeference_pixels(first, uv_first, plane_down)
-    return np.asarray((there - here)[..., :2] / seconds)
 
 
 def _positive_interval(interval: float) -> float:

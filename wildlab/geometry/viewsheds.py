@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.camera import Camera, distort, in_image, normalise, normalise_jacobian
+from wildlab.geometry.camera import Camera, distort, in_image, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, wrap
-from wildlab.geometry.georeference import HIT, ground_to_pixel, matching, pixel_rays
-from wildlab.geometry.terrain import Terrain, _to_grid, intersect_terrain, pixels_to_terrain
+from wildlab.geometry.georeference import HIT, ground_to_pixel, pixel_rays
+from wildlab.geometry.terrain import Terrain, _to_grid, intersect_terrain
 
 #: A line of sight ends this share of its length before the point: the point lies on the ground itself.
 SHORT_OF = 1e-7
@@ -223,156 +223,6 @@ def _block(
         for a, b, n in zip(first, last, (rows, columns), strict=True)
     ]
     return spans[0], spans[1]
-
-
-class Viewshed(NamedTuple):
-    """How often each node of a terrain was seen.
-
-    Attributes
-    ----------
-    counts
-        (R, C) int32, of how many images; 0 where the height is not known.
-    known
-        (R, C) bool, whether the node has a height.
-    """
-
-    counts: NDArray[np.int32]
-    known: NDArray[np.bool_]
-
-    @property
-    def share(self) -> float:
-        """Share of the known nodes that were seen at all."""
-        return float((self.counts > 0).sum() / self.known.sum())
-
-
-def viewshed(terrain: Terrain, poses: CameraPoses, above: float = 0.0, furthest: float = np.inf) -> Viewshed:
-    """How many images show each node of a terrain.
-
-    Parameters
-    ----------
-    terrain
-        In the same n.
-    poses
-        Of the camera, one for each image; an image whose pose is not known shows nothing.
-    above
-        How far above the ground what is looked for stands, metres.
-    furthest
-        Distance up to which it can be seen, metres.
-
-    Returns
-    -------
-    Viewshed
-
-    Examples
-    --------
-    Two images of even ground, 20 m apart, of 20 m by 20 m each:
-
-    >>> from wildlab.geometry import Camera, Mount
-    >>> camera = Camera(100, 100, 100.0, 100.0, 50.0, 50.0)
-    >>> flat = Terrain(np.zeros((101, 101), np.float32), north=-100.0, east=-100.0, step=2.0)
-    >>> where = np.array([[0.0, 0.0, -20.0], [10.0, 0.0, -20.0]])
-    >>> seen = viewshed(flat, CameraPoses(camera, Mount("down"), where, np.eye(3)))
-    >>> int(seen.counts.max()), int((seen.counts > 0).sum())
-    (2, 176)
-    """
-    counts = np.zeros(terrain.height.shape, np.int32)
-    rows = poses.rows[0] if poses.rows else 1
-    for row in range(rows):
-        pose = poses.take(row)
-        if np.isfinite(pose.p_nc).all() and np.isfinite(pose.R_nc).all():
-            seen = visible_nodes(terrain, pose, above, furthest)
-            counts[seen.rows, seen.columns] += seen.visible
-    return Viewshed(counts, np.isfinite(terrain.height))
-
-
-class Hidden(NamedTuple):
-    """What stands between a camera and points.
-
-    Attributes
-    ----------
-    clear
-        (N,) bool, whether the camera sees the point.
-    by
-        (N, 3) metres in n, where a line from the camera first meets the ground before the point; NaN of
-        clear ones, and where the map knows nothing.
-    """
-
-    clear: NDArray[np.bool_]
-    by: Array
-
-
-def hidden_by(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> Hidden:
-    """Whether points are occluded, and by what.
-
-    Parameters
-    ----------
-    terrain
-        In the same n.
-    points
-        (N, 3) metres in n, on the ground or above it.
-    p_nc
-        Where the camera is, (3,) or (N, 3) metres.
-
-    Returns
-    -------
-    Hidden
-
-    Examples
-    --------
-    >>> height = np.zeros((3, 5), np.float32)
-    >>> height[:, 2] = 10.0
-    >>> wall = Terrain(height, north=-1.0, east=0.0, step=1.0)
-    >>> print(np.round(hidden_by(wall, [[0.0, 4.0, 0.0]], [0.0, 0.0, -5.0]).by, 2))
-    [[ 0.    1.33 -3.33]]
-    """
-    targets, starts = np.atleast_2d(np.asarray(points, float)), np.asarray(p_nc, float)
-    clear = lines_clear(terrain, targets, starts)
-    by = np.full(targets.shape, np.nan)
-    some = ~clear
-    if some.any():
-        begins = np.broadcast_to(starts, targets.shape)[some]
-        by[some] = intersect_terrain(terrain, targets[some] - begins, begins, furthest=1.0).points
-    return Hidden(clear, by)
-
-
-def ground_per_pixel(poses: CameraPoses, uv: ArrayLike, terrain: Terrain) -> Array:
-    """How much ground one pixel covers, along the slope of the ground.
-
-    Parameters
-    ----------
-    poses
-        The camera, with a pose for each pixel or one for all.
-    uv
-        (N, 2) pixels.
-    terrain
-        In the same n.
-
-    Returns
-    -------
-    (N, 2) metres for a pixel to the right, and for one down; NaN where the ray does not meet the ground.
-
-    Examples
-    --------
-    >>> from wildlab.geometry import Camera, Mount
-    >>> camera = Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0)
-    >>> flat = Terrain(np.zeros((3, 3), np.float32), north=-500.0, east=-500.0, step=500.0)
-    >>> pose = CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -100.0]), np.eye(3))
-    >>> print(ground_per_pixel(pose, [[320.0, 256.0]], flat))
-    [[0.1 0.1]]
-    """
-    pixels, _ = matching(poses, np.atleast_2d(np.asarray(uv, float)))
-    ends = pixels_to_terrain(poses, pixels, terrain).points
-    R = np.broadcast_to(poses.R_nc, (len(pixels), 3, 3))
-    xy = normalise(poses.camera, pixels)
-    rays = pixel_rays(poses.camera, pixels, R)
-    # How the ray turns with the pixel, and the normal of the ground where it ends.
-    turns = R[:, :, :2] @ normalise_jacobian(poses.camera, xy)
-    normal = np.concatenate([terrain.slopes_at(ends[:, :2]), np.ones((len(ends), 1))], axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        length = ((ends - poses.p_nc) * rays).sum(axis=1) / (rays * rays).sum(axis=1)
-        across = np.einsum("ni,nik->nk", normal, turns) / (normal * rays).sum(axis=1)[:, None]
-        moves = length[:, None, None] * (turns - rays[:, :, None] * across[:, None, :])
-    return np.asarray(np.linalg.norm(moves, axis=1))
 
 
 class Footprint(NamedTuple):
