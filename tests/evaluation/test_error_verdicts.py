@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wildlab.evaluation.ellipses import judge_ellipses, spread_of_sightings, try_averaging
+from wildlab.evaluation.ellipses import judge_ellipses, spread_of_sightings
 from wildlab.evaluation.errors import split_along
 from wildlab.evaluation.intervals import time_blocks
 from wildlab.evaluation.outliers import ambiguous, largest_visible
@@ -115,22 +115,6 @@ def test_too_few_or_too_scattered_for_a_verdict_on_ellipses():
     wild = normal(2, n=240) * np.exp(np.repeat(rng.normal(0, 1.2, 8), 30))[:, None]
     assert judge_ellipses(wild, 2 * P, np.arange(240) // 30, rng).word in ("undecided", "too small")
     assert judge_ellipses(wild, 400 * P, np.arange(240) // 30, rng).word != "honest"
-
-
-def test_averaging_four_halves_what_images_do_not_share_and_nothing_else():
-    things, images = np.repeat(np.arange(30), 8), np.tile(np.arange(8), 30)
-    own = normal(3)
-    assert try_averaging(own, things, images, np.random.default_rng(0)).halves
-    shared = try_averaging(own + np.array([9.0, 0.0]), things, images, np.random.default_rng(0))
-    assert not shared.halves and shared.ratio.estimate > 0.8
-    constant = try_averaging(np.tile([3.0, 0.0], (240, 1)), things, images, np.random.default_rng(0))
-    assert not constant.helps
-    # Two clicks of one image are one sighting, and few things say nothing.
-    assert (
-        try_averaging(own, things, np.tile(np.repeat([0, 1, 2], [3, 3, 2]), 30), np.random.default_rng(0))
-        is None
-    )
-    assert try_averaging(own[:32], things[:32], images[:32], np.random.default_rng(0)) is None
 
 
 def test_the_spread_of_sightings_is_that_of_one_and_blind_to_what_all_share():

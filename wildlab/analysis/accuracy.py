@@ -39,12 +39,10 @@ from wildlab.analysis.verdict import FEW_POINTS
 from wildlab.errors import WildlabError
 from wildlab.evaluation.causes import mean_of_others
 from wildlab.evaluation.ellipses import (
-    Averaged,
     EllipseVerdict,
     Spread,
     judge_ellipses,
     spread_of_sightings,
-    try_averaging,
 )
 from wildlab.evaluation.errors import (
     AlongAxis,
@@ -100,9 +98,9 @@ class Accuracy:
         Errors along axes, and first half beside second.
     diagnosis
         The cause, where six images or more show a known point.
-    remaining, averaged
-        What the errors are made of once the cause is taken off, and what averaging four images gained; of
-        the errors as they are where no cause gained anything for certain; without what is far out.
+    remaining
+        What the errors are made of once the cause is taken off, or as they are where no cause gained anything
+        for certain; without what is far out.
     noise, learnt
         How noisy the poses were, and the share of the truth that ellipses with noise learnt on the other half
         of the images hold (mean over five halvings); without what is far out.
@@ -124,7 +122,6 @@ class Accuracy:
     halves: Halves
     diagnosis: Diagnosis | None
     remaining: Scatter
-    averaged: Averaged | None
     noise: PoseNoise | None
     learnt: float
     nearest: NearestRule | None
@@ -187,7 +184,6 @@ def judge_accuracy(
         left, of = errors_of(diagnosis.scored), diagnosis.scored
     if diagnosis is not None:
         left, of = left[diagnosis.inliers], of[diagnosis.inliers]
-    averaged = try_averaging(left, of["truth_id"], of["frame_id"], rng) if enough else None
     noise, learnt = _learn_noise(observations, diagnosis, rng)
     nearest = look_at_nearest_rule(flight, scored) if flight.manifest.scoring.rule == "nearest" else None
     unambiguous = None
@@ -209,7 +205,6 @@ def judge_accuracy(
         halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
         remaining=scatter_by_image(left, of["frame_id"]),
-        averaged=averaged,
         noise=noise,
         learnt=learnt,
         nearest=nearest,

@@ -15,7 +15,7 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
   err; `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
 - `held_out`, `gain_of`, `rank_models`: which constant error is behind them, `estimate_wander`: against noise
   that is correlated in time; `split_along`; `find_outliers`.
-- `judge_ellipses`, `try_averaging`, `spread_of_sightings`, `ambiguous`: what they are worth.
+- `judge_ellipses`, `spread_of_sightings`, `ambiguous`: what they are worth.
 """
 
 from typing import TYPE_CHECKING
@@ -43,12 +43,10 @@ if TYPE_CHECKING:
     )
     from wildlab.evaluation.correlated_errors import WanderNoise, estimate_wander
     from wildlab.evaluation.ellipses import (
-        Averaged,
         EllipseVerdict,
         Spread,
         judge_ellipses,
         spread_of_sightings,
-        try_averaging,
     )
     from wildlab.evaluation.errors import (
         AlongAxis,
@@ -82,7 +80,6 @@ __all__ = [
     "ERROR_CONVENTION",
     "AlongAxis",
     "Average",
-    "Averaged",
     "EllipseVerdict",
     "ErrorSummary",
     "Gain",
@@ -135,7 +132,6 @@ __all__ = [
     "summarise",
     "summarise_track",
     "time_blocks",
-    "try_averaging",
     "white_bound",
     "whiten",
 ]

@@ -16,7 +16,6 @@ from wildlab.evaluation.intervals import (
     PROBABILITY,
     Interval,
     block_mean,
-    mean_interval,
     widening,
 )
 from wildlab.geometry.covariances import chi2_quantile
@@ -153,99 +152,6 @@ def _word(factor: Interval) -> Word:
         return "too large"
     close = 1 / CLOSE <= factor.estimate <= CLOSE
     return "honest" if close and WIDEST[0] < factor.low and factor.high < WIDEST[1] else "undecided"
-
-
-#: Fewer things than this say nothing for the others.
-FEWEST_THINGS = 5
-
-
-class Averaged(NamedTuple):
-    """What averaging sightings of the same thing gained.
-
-    Attributes
-    ----------
-    k
-        How many images were averaged.
-    single, averaged
-        Mean error of one image and of the average, m, over the same things.
-    ratio
-        Averaged over single, with its interval over the things.
-    things
-        How many there are.
-    """
-
-    k: int
-    single: float
-    averaged: float
-    ratio: Interval
-    things: int
-
-    @property
-    def helps(self) -> bool:
-        """Whether the interval of the ratio lies below one."""
-        return self.ratio.high < 1
-
-    @property
-    def halves(self) -> bool:
-        """Whether the ratio is a half, within a tenth of it, and known to lie below two thirds."""
-        return 0.45 <= self.ratio.estimate <= 0.55 and self.ratio.high < 2 / 3
-
-
-def try_averaging(
-    errors: ArrayLike,
-    thing: ArrayLike,
-    image: ArrayLike,
-    rng: np.random.Generator,
-    k: int = 4,
-    draws: int = 40,
-) -> Averaged | None:
-    """Average ``k`` sightings of the same thing from different images, and see how far off that is.
-
-    Parameters
-    ----------
-    errors
-        (N, 2) north-east, m; rows with NaN are left out.
-    thing, image
-        (N,) names; "" is a thing that is not known.
-    rng
-        Picks the images.
-    k
-        How many are averaged.
-    draws
-        How often, for each thing.
-
-    Returns
-    -------
-    Averaged or None
-        None where fewer than five things are in ``k`` images.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> things, images = np.repeat(np.arange(30), 8), np.tile(np.arange(8), 30)
-    >>> try_averaging(rng.normal(size=(240, 2)), things, images, rng).halves
-    True
-    """
-    e, names, images = np.asarray(errors, float), np.asarray(thing).astype(str), np.asarray(image).astype(str)
-    keep = np.isfinite(e).all(axis=1) & (names != "")
-    singles, averages = [], []
-    for name in np.unique(names[keep]):
-        rows = np.flatnonzero(keep & (names == name))
-        # One sighting of each image: those of one share its pose.
-        rows = rows[np.unique(images[rows], return_index=True)[1]]
-        if len(rows) < k:
-            continue
-        picked = np.stack([rng.permutation(rows)[:k] for _ in range(draws)])
-        singles.append(np.hypot(*e[rows].T).mean())
-        averages.append(np.hypot(*e[picked].mean(axis=1).T).mean())
-    if len(singles) < FEWEST_THINGS:
-        return None
-    single, averaged = float(np.mean(singles)), float(np.mean(averages))
-    # The ratio of the means, with the spread over the things of what is left of it.
-    left = mean_interval(np.array(averages) - averaged / single * np.array(singles), 0.9)
-    half = (left.high - left.low) / 2 / single
-    ratio = averaged / single
-    return Averaged(k, single, averaged, Interval(ratio, ratio - half, ratio + half), len(singles))
 
 
 class Spread(NamedTuple):
