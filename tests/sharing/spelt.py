@@ -1,4 +1,4 @@
-"""A place written in every way that is looked for; grids by pyproj, everything else written out here."""
+"""Places and days as they are commonly written, which are looked for, and as codes, which are refused."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 from pyproj import Transformer
 
-from wildlab.sharing.scan import Secrets
+from wildlab.sharing.secrets import Secrets
 
 #: Somewhere in the north of the Baltic Sea, and on both sides of the other hemispheres.
 LATITUDE, LONGITUDE, HEIGHT = 63.417982, 10.391237, 152.738
@@ -42,8 +42,8 @@ def minutes(angle: float, digits: int) -> tuple[int, str]:
 
 
 @cache
-def to_grid(code: int, of: int = 4326) -> Transformer:
-    return Transformer.from_crs(of, code, always_xy=True)
+def to_grid(code: int) -> Transformer:
+    return Transformer.from_crs(4326, code, always_xy=True)
 
 
 def _ns(latitude: float) -> str:
@@ -59,19 +59,6 @@ def utm(latitude: float, longitude: float) -> tuple[int, float, float]:
     code = (32600 if latitude >= 0 else 32700) + zone
     east, north = to_grid(code).transform(longitude, latitude)
     return zone, east, north
-
-
-def ecef(latitude: float, longitude: float) -> tuple[float, float, float]:
-    found = to_grid(4978, 4979).transform(longitude, latitude, HEIGHT)
-    return found[0], found[1], found[2]
-
-
-def _grid(code: int) -> Callable[[float, float], str]:
-    def written(latitude: float, longitude: float) -> str:
-        x, y = to_grid(code).transform(longitude, latitude)
-        return f"x={x:.1f} y={y:.1f}"
-
-    return written
 
 
 def _dms(pattern: str, digits: int) -> Callable[[float, float], str]:
@@ -90,10 +77,6 @@ def _dm(pattern: str, digits: int) -> Callable[[float, float], str]:
     return written
 
 
-def _thousands(value: float, sign: str) -> str:
-    return f"{value:,.0f}".replace(",", sign)
-
-
 # ruff: noqa: E501 - one spelling a line
 SPELLINGS: dict[str, Callable[[float, float], str]] = {
     "two decimals": lambda a, b: f"{a:.2f}, {b:.2f}",
@@ -101,19 +84,12 @@ SPELLINGS: dict[str, Callable[[float, float], str]] = {
     "all decimals": lambda a, b: f"({a!r}, {b!r})",
     "the other order": lambda a, b: f"[{b:.6f}, {a:.6f}]",
     "decimal commas": lambda a, b: f"{a:.4f}; {b:.4f}".replace(".", ","),
-    "exponents": lambda a, b: f"{a:.6e} {b:.6e}",
     "in JSON": lambda a, b: f'{{"latitude_deg": {a:.5f},\n  "longitude_deg": {b:.5f}}}',
     "with hemispheres": lambda a, b: f"{_ns(a)} {abs(a):.4f}° {_ew(b)} {abs(b):.4f}°",
     "in an address": lambda a, b: f"https://maps.example/@{a:.5f},{b:.5f},17z",
     "latitude alone": lambda a, b: f"y {a:.6f}",
     "longitude alone": lambda a, b: f"x {b:.6f}",
     "ISO 6709": lambda a, b: f"{a:+010.6f}{b:+011.6f}/",
-    "radians": lambda a, b: f"{math.radians(a):.7f}, {math.radians(b):.7f}",
-    "one in radians": lambda a, b: f"phi = {math.radians(a):.9f}",
-    "E7": lambda a, b: f"{round(a * 1e7)} {round(b * 1e7)}",
-    "E7 alone": lambda a, b: f"lat={round(a * 1e7)}",
-    "gradians": lambda a, b: f"{a * 10 / 9:.5f} {b * 10 / 9:.5f}",
-    "arcseconds": lambda a, b: f"{a * 3600:.2f} {b * 3600:.2f}",
     "DMS": _dms("{0}°{1:02d}'{2}\"{n} {3}°{4:02d}'{5}\"{e}", 1),
     "DMS, primes": _dms("{0}° {1}′ {2}″ {n}, {3}° {4}′ {5}″ {e}", 2),
     "DMS, whole seconds": _dms("{n} {0}°{1:02d}'{2}\" {e} {3}°{4:02d}'{5}\"", 0),
@@ -121,21 +97,11 @@ SPELLINGS: dict[str, Callable[[float, float], str]] = {
     "DMS, words": _dms("{0} deg {1}' {2}\" {n}, {3} deg {4}' {5}\" {e}", 2),
     "DMS, colons": _dms("{0}:{1:02d}:{2} {n} {3}:{4:02d}:{5} {e}", 1),
     "DMS, blanks": _dms("{0} {1:02d} {2} {n}   {3} {4:02d} {5} {e}", 2),
-    "DMS, packed": _dms("{0:02d}{1:02d}{2}{n} {3:03d}{4:02d}{5}{e}", 1),
     "DMS, latitude alone": _dms("{n} {0}°{1:02d}'{2}\"", 0),
     "DM": _dm("{0}° {1}' {n}, {2}° {3}' {e}", 3),
-    "NMEA": _dm("$GPGGA,064219,{0:02d}{1},{n},{2:03d}{3},{e},1,08", 4),
     "UTM": lambda a, b: "{1:.1f} {2:.1f}".format(*utm(a, b)),
     "UTM, whole metres": lambda a, b: "E {1:.0f} N {2:.0f}".format(*utm(a, b)),
-    "UTM, thousands apart": lambda a, b: f"{_thousands(utm(a, b)[1], ' ')} E; {_thousands(utm(a, b)[2], ' ')} N",
-    "UTM, commas": lambda a, b: f"{_thousands(utm(a, b)[1], ',')} E  {_thousands(utm(a, b)[2], ',')} N",
     "UTM northing alone": lambda a, b: "N {2:.2f}".format(*utm(a, b)),
-    "ECEF": lambda a, b: "{:.1f}, {:.1f}, {:.1f}".format(*ecef(a, b)),
-    "ECEF in km": lambda a, b: "{:.4f} {:.4f} {:.4f}".format(*(v / 1000 for v in ecef(a, b))),
-    "Web Mercator": _grid(3857),
-    "World Mercator": _grid(3395),
-    "semicircles": lambda a, b: f"{round(a * 2**31 / 180)} {round(b * 2**31 / 180)}",
-    "turns": lambda a, b: f"{a / 360:.8f} {b / 360:.8f}",
     "float32": lambda a, b: f"{float(np.float32(a))!r} {float(np.float32(b))!r}",
 }  # fmt: skip
 
@@ -185,28 +151,13 @@ def _polyline(value: int) -> str:
     return letters + chr(value + 63)
 
 
-#: The day of `WHEN` and others of its week, in the spellings that are looked for; %-codes of strftime.
+#: The day of `WHEN` in the spellings that are looked for; %-codes of strftime.
 DATES = (
     "%Y-%m-%d", "%Y/%m/%d", "%Y:%m:%d", "%Y_%m_%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y",
-    "%-m/%-d/%y", "%-d/%-m/%y", "%-d.%-m.%y", "%m/%d/%y", "%d.%m.%y", "%y-%m-%d", "%Y%m%d", "%d%m%Y", "%m%d%Y",
-    "%y%m%d", "%d%m%y", "%Y%m%d%H%M%S", "%Y%m%dT%H%M", "%Y-%m-%dT%H:%M:%SZ", "%Y-%j", "%Y%j", "%j/%Y", "day %-j",
-    "day of year %j", "DOY %j", "%G-W%V-%u", "%GW%V", "%-d %B %Y", "%B %-d, %Y", "%-d. %b %Y", "%b %-d '%y",
-    "%-dth of %B %Y", "%Y %b %-d", "%A, %-d %B %Y", "%H:%M:%S", "%-H:%M:%S",
+    "%-m/%-d/%y", "%-d/%-m/%y", "%-d.%-m.%y", "%m/%d/%y", "%d.%m.%y", "%y-%m-%d", "%Y%m%d", "%Y%m%dT%H%M",
+    "%Y-%m-%dT%H:%M:%SZ", "%-d %B %Y", "%B %-d, %Y", "%-d. %b %Y", "%b %-d '%y", "%-dth of %B %Y", "%Y %b %-d",
+    "%A, %-d %B %Y", "%H:%M:%S", "%-H:%M:%S",
 )  # fmt: skip
-
-
-def counted(moment: datetime) -> dict[str, str]:
-    """A moment as counts of time."""
-    unix, gps = moment.timestamp(), (moment - datetime(1980, 1, 6, tzinfo=UTC)).total_seconds() + 18
-    return {
-        "seconds": f"{unix:.0f}", "with a fraction": f"{unix + 0.25:.2f}", "ms": f"{unix * 1e3:.0f}",
-        "us": f"{unix * 1e6:.0f}", "ns": f"{unix * 1e9:.0f}", "GPS seconds": f"{gps:.0f}",
-        "GPS week and seconds": f"week {gps // 604_800:.0f}, {gps % 604_800:.1f} s",
-        "GPS week and ms": f"{gps // 604_800:.0f},{gps % 604_800 * 1e3:.0f}",
-        "days since 1970": f"{unix / 86_400:.4f}", "a spreadsheet's": f"{unix / 86_400 + 25_569:.5f}",
-        "Julian date": f"{unix / 86_400 + 2_440_587.5:.4f}", "MJD": f"{unix / 86_400 + 40_587:.4f}",
-        "Matlab's": f"{unix / 86_400 + 719_529:.4f}",
-    }  # fmt: skip
 
 
 #: One of each thing that is looked for: what kind it is found as, and how it is written.

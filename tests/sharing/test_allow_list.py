@@ -4,24 +4,36 @@ from __future__ import annotations
 
 # ruff: noqa: E501 - elements and attributes as they stand in a page
 import base64
+import gzip
 import io
 import re
 import struct
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from bs4 import BeautifulSoup
-from PIL import Image
+from PIL import Image, PngImagePlugin
 
-from tests.sharing.packed import PACKED, picture, saved
 from tests.sharing.spelt import CODED, DATES, LATITUDE, LEAKS, LONGITUDE, WHEN, secrets
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.reporting.page import page
 from wildlab.sharing.allow_list import first_foreign_word
 from wildlab.sharing.document import read_part
-from wildlab.sharing.scan import scan
+from wildlab.sharing.scan import SecretSearch
+
+
+def picture() -> Image.Image:
+    return Image.fromarray(np.arange(48 * 32 * 3, dtype=np.uint8).reshape(48, 32, 3))
+
+
+def saved(image: Image.Image, kind: str, **options: Any) -> bytes:
+    out = io.BytesIO()
+    image.save(out, kind, **options)
+    return out.getvalue()
+
 
 LEAK = "; ".join(text for _, text in LEAKS.values())
 
@@ -189,6 +201,36 @@ def test_comments_are_not_written(tmp_path):
     assert "jonas" not in written(tmp_path, f"{PLAIN}<!-- by jonas -->")
 
 
+def _exif(text: str) -> bytes:
+    exif = Image.Exif()
+    exif[0x010E] = text
+    return saved(picture(), "JPEG", exif=exif.tobytes())
+
+
+def _png_text(text: str) -> bytes:
+    info = PngImagePlugin.PngInfo()
+    info.add_text("Comment", text, zip=True)
+    return saved(picture(), "PNG", pnginfo=info)
+
+
+PACKED = {
+    "plain text": str.encode,
+    "UTF-16": lambda text: text.encode("utf-16"),
+    "HTML, each letter an entity": lambda text: "".join(f"&#{ord(c)};" for c in text).encode(),
+    "HTML, tags between": lambda text: ("<p>" + "<b></b>".join(text) + "</p>").encode(),
+    "JSON escapes": lambda text: ('"' + "".join(f"\\u{ord(c):04x}" for c in text) + '"').encode(),
+    "percent-encoded": lambda text: "".join(f"%{ord(c):02X}" for c in text).encode(),
+    "data address": lambda text: b'<img src="data:text/plain,' + text.replace('"', "").encode() + b'">',
+    "base64 of base64": lambda text: base64.b64encode(b"-- " + base64.b64encode(text.encode())),
+    "base64, broken lines": lambda text: base64.encodebytes(text.encode() * 9),
+    "hexadecimal": lambda text: b"x " + text.encode().hex().encode() + b" y",
+    "gzip": lambda text: gzip.compress(text.encode(), mtime=0),
+    "PNG, packed text": _png_text,
+    "PNG, behind its end": lambda text: saved(picture(), "PNG") + text.encode(),
+    "JPEG, EXIF": _exif,
+}
+
+
 @pytest.mark.parametrize("kind", PACKED)
 def test_what_is_packed_goes_nowhere(kind, tmp_path):
     """Leaks in every format: as they are, in the address of a link or picture, and as letters."""
@@ -207,7 +249,7 @@ def test_what_is_packed_goes_nowhere(kind, tmp_path):
             text = written(tmp_path, body)
         except WildlabError:
             continue
-        if scan({"a.html": text}, secrets()):
+        if SecretSearch(secrets()).scan({"a.html": text}):
             continue
         seen = BeautifulSoup(text, "html.parser").get_text()
         assert packed not in text and "TROLLHOLMEN" not in seen and "2023" not in seen, body

@@ -35,7 +35,7 @@ _DRAWN = (
     r"(?:{}(?:\.\d)?|\.\d\d?)(?!\.?\d))*+[Zz); ]{{0,3}}"
 )
 #: What an attribute may be, by what it holds; `Writer` has functions for the other kinds.
-_FORMS = {
+FORMS = {
     "word": re.compile(r"[A-Za-z][\w-]{0,40}(?: [A-Za-z][\w-]{0,40}){0,4}"),
     "size": re.compile(r"-?\d{0,4}(?:\.\d{1,3})?(?:em|rem|px|%)?"),
     "paper": re.compile(_DRAWN.format(r"1?\d{1,3}")),
@@ -58,7 +58,7 @@ _AROUND = "()[]{}\"'“”‘’.,;:!?=<>≤≥≈±×·…%°²³*/$\\|"
 _LETTERS = re.compile(r"[^\W\d_]+")
 #: A run of letters and digits this long is a coded text: no page of ours has one.
 _CODED = re.compile(r"(?=[A-Za-z0-9+/]*\d)[A-Za-z0-9+/]{28,}|[A-Za-z0-9]{40,}")
-_DATA = re.compile(r"data:([\w/+.-]+);base64,([A-Za-z0-9+/=]*)")
+DATA_ADDRESS = re.compile(r"data:([\w/+.-]+);base64,([A-Za-z0-9+/=]*)")
 #: Chunks of a PNG that draw it; another may say anything.
 _DRAWING = (b"IHDR", b"PLTE", b"tRNS", b"pHYs", b"IDAT", b"IEND")
 _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
@@ -182,7 +182,7 @@ class Writer:
         value = tag.attrs[name]
         text = " ".join(value) if isinstance(value, list) else str(value)
         kind = _kinds()[1].get(name, "")
-        if kind in _FORMS and _FORMS[kind].fullmatch(text):
+        if kind in FORMS and FORMS[kind].fullmatch(text):
             self._words(text.replace("-", " ") if kind == "word" else "", tag)
             return text
         if kind == "spoken":
@@ -196,7 +196,7 @@ class Writer:
         if kind == "file" and re.fullmatch(r"[\w-]{1,80}\.csv", text):
             self._words(re.sub("[-.]", " ", text), tag)
             return text
-        packed = _DATA.fullmatch(text)
+        packed = DATA_ADDRESS.fullmatch(text)
         readers: dict[tuple[str, str], Callable[[bytes, Tag], bytes]] = {
             ("link", "text/csv"): self._table, ("picture", "image/png"): self._picture,
         }  # fmt: skip

@@ -33,15 +33,8 @@ from wildlab.sharing.package import (
 )
 from wildlab.sharing.recomputation import RecomputedReports, recompute_reports
 from wildlab.sharing.reports import Source, flight_folder, sources_of
-from wildlab.sharing.scan import (
-    Secrets,
-    SecretSearch,
-    all_of,
-    flight_secrets,
-    machine_secrets,
-    scan,
-    search_limits,
-)
+from wildlab.sharing.scan import SecretSearch, search_limits
+from wildlab.sharing.secrets import Secrets, all_of, flight_secrets, machine_secrets
 from wildlab.sharing.sender_list import describe_agreement, removal_lines, sender_list
 from wildlab.sharing.tiers import (
     Tier,
@@ -351,12 +344,12 @@ def _refuse_leaks(pages: Mapping[str, str], target: Path, sought: SecretSearch) 
     Raises
     ------
     RunFailed
-        Naming what was found, how it is written, and where.
+        Naming what was found, and where.
     """
-    found = scan(pages, sought)
+    found = sought.scan(pages)
     if not found:
         return
-    several = "; ".join(f"{one} ({one.found!r})" if one.found else str(one) for one in found[:_MOST])
+    several = "; ".join(f"{one} ({one.found!r})" for one in found[:_MOST])
     more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
     named = all(one.file.startswith("the name of the file") for one in found)
     raise RunFailed(
