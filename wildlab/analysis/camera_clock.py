@@ -27,6 +27,7 @@ from wildlab.geometry.camera_clock import (
     ClockByPoints,
     clock_by_motion,
     clock_by_points,
+    translation_over_ground,
 )
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_rotation_vector
@@ -208,7 +209,7 @@ def camera_clock_by_motion(
 
 
 def _camera_motion(flight: Flight, source: str | None) -> tuple[Array, Array, Array]:
-    """Times (T,), and integrals (T, 3) of the camera's angular velocity and velocity in c."""
+    """Times (T,), and integrals (T, 3) of the camera's angular velocity in c and of what its travel shows."""
     _, nav = flight.pose_source(source)
     t = nav["time_s"].to_numpy(float)
     poses = camera_poses_at(flight, t, Reading(source=source))
@@ -220,13 +221,14 @@ def _camera_motion(flight: Flight, source: str | None) -> tuple[Array, Array, Ar
         )
     steps = matrix_to_rotation_vector(np.einsum("nji,njk->nik", R[:-1], R[1:]))
     turned = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
-    moved = np.vstack([np.zeros(3), np.cumsum(np.einsum("nji,nj->ni", R[:-1], np.diff(p, axis=0)), axis=0)])
+    moved = translation_over_ground(p, R)
     if flight.imu is None or flight.gimbal is not None or "pan_rad" in flight.table("frames"):
         return t, turned, moved
     imu = flight.imu
     rates = imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float)
     at = imu["time_s"].to_numpy(float)
-    known = np.isfinite(rates).all(axis=1) & np.isfinite(at) & (at >= t[0]) & (at <= t[-1])
+    known = np.isfinite(rates).all(axis=1) & (at >= t[0]) & (at <= t[-1])
+    known &= np.diff(np.fmax.accumulate(at), prepend=-np.inf) > 0
     if known.sum() < len(t):
         return t, turned, moved
     at, rates = at[known], rates[known] @ camera_rotation(flight)

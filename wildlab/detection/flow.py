@@ -315,21 +315,41 @@ def image_motion(first: Grey, second: Grey, camera: Camera, valid: Mask | None =
     good = found & found_back & (np.linalg.norm(back[:, 0] - here, axis=1) < BACK_PX)
     if good.sum() < FEWEST_CORNERS:
         return lost
-    _, kept = cv2.estimateAffinePartial2D(
-        here[good], after[good], method=cv2.RANSAC, ransacReprojThreshold=AGREEMENT_PX, maxIters=500
-    )
-    rows = np.zeros(int(good.sum()), bool) if kept is None else np.asarray(kept).ravel() > 0
-    if rows.sum() < max(FEWEST_CORNERS, AGREE * len(rows)):
-        return lost
-    a = normalise(camera, here[good][rows].astype(float)) @ [1, 1j]
-    b = normalise(camera, after[good][rows].astype(float)) @ [1, 1j]
-    known = np.isfinite(a) & np.isfinite(b)
+    a, b = normalise(camera, here[good].astype(float)), normalise(camera, after[good].astype(float))
+    known = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1)
     if known.sum() < FEWEST_CORNERS:
         return lost
-    # Shift, turn and scale by least squares, as numbers of the complex plane.
-    A = np.stack([np.ones(int(known.sum()), complex), a[known]], axis=1)
-    shift, turn = np.linalg.lstsq(A, b[known], rcond=None)[0]
-    return np.array([shift.real, shift.imag, np.angle(turn)])
+    a, b = a[known], b[known]
+    _, kept = cv2.findHomography(a, b, cv2.RANSAC, AGREEMENT_PX / camera.fx, maxIters=500)
+    rows = np.zeros(len(a), bool) if kept is None else np.asarray(kept).ravel() > 0
+    if rows.sum() < max(FEWEST_CORNERS, AGREE * len(rows)):
+        return lost
+    return plane_motion(a[rows], b[rows])
+
+
+def plane_motion(first: Array, second: Array) -> Array:
+    """Fit the motion of a plane to directions: its shift at the optical axis, and its turn.
+
+    In the middle between two images a plane moves by ``d(x) = s + A x + x (q . x)``, whether the camera turns
+    or travels. Without ``q``, or from the first image instead of the middle, what lies off the axis makes a
+    shift of a turn: an error in proportion to the time between the images.
+
+    Parameters
+    ----------
+    first, second
+        (N, 2) tangents of the same features in both images.
+
+    Returns
+    -------
+    (3,)
+        As `image_motion`.
+    """
+    x, y = (first + second).T / 2
+    one, none = np.ones_like(x), np.zeros_like(x)
+    along_x = [one, none, x, y, none, none, x * x, x * y]
+    along_y = [none, one, none, none, x, y, x * y, y * y]
+    fitted = np.linalg.lstsq(np.hstack([along_x, along_y]).T, (second - first).T.ravel())[0]
+    return np.array([fitted[0], fitted[1], (fitted[4] - fitted[3]) / 2])
 
 
 def _follow(first: Grey, second: Grey, points: NDArray[np.float32]) -> tuple[NDArray[np.float32], Mask]:

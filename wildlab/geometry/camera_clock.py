@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import Akima1DInterpolator
 
 from wildlab.geometry.calibration import BORESIGHT, BOUNDS, PARAMETERS, Fit, with_covariance
 from wildlab.geometry.camera_poses import CameraPoses
@@ -228,6 +229,11 @@ DRAWS = 20
 #: The correlation that a peak has to have, and the logarithm of how much more likely it has to be than any
 #: other, for each draw of the errors.
 LEAST, MOTION_CERTAIN = 0.3, 5.0
+#: Standard deviation that all pairs share, by the time between two images: where the axis of the turn turns
+#: too, the mean of the rates is not quite the motion.
+INTERVAL_SHARE = 0.01
+#: Height (m) above the ground that translation is divided by at least: the log's ground may lie elsewhere.
+LOWEST_M = 10.0
 
 
 class ClockByMotion(NamedTuple):
@@ -236,7 +242,8 @@ class ClockByMotion(NamedTuple):
     Attributes
     ----------
     offset_s, sd_s
-        s; the standard deviation follows from how far the peak moves when one stretch of time is left out.
+        s; the standard deviation follows from how far the peak moves when one stretch of time is left out,
+        and is at least `INTERVAL_SHARE` of the time between images.
     offsets, correlation
         (K,) s and the curve: how well motion seen and motion logged go together under each offset, from 0 to
         1, negative where they go against each other. NaN where too few pairs have both.
@@ -272,15 +279,37 @@ class ClockByMotion(NamedTuple):
         return bool(inside and likely and np.isfinite(self.sd_s))
 
 
+def translation_over_ground(p_nc: Array, R_nc: Array) -> Array:
+    """Integrate the image motion that travel over level ground causes, at the optical axis.
+
+    With the velocity ``v`` in c, down ``n`` in c and the height ``h``, a plane's homography has the rate
+    ``-v n^T / h``: a motion of ``(-v_x n_z, -v_y n_z, (v_x n_y - v_y n_x) / 2) / h``.
+
+    Parameters
+    ----------
+    p_nc, R_nc
+        (T, 3) m and (T, 3, 3), of the camera; ground is at zero.
+
+    Returns
+    -------
+    (T, 3)
+        Two tangents and a turn (rad), zero at first.
+    """
+    R, height = (R_nc[:-1] + R_nc[1:]) / 2, -(p_nc[:-1, 2] + p_nc[1:, 2]) / 2
+    v, n = np.einsum("nji,nj->in", R, np.diff(p_nc, axis=0)), R[:, 2].T
+    steps = np.stack([-v[0] * n[2], -v[1] * n[2], (v[0] * n[1] - v[1] * n[0]) / 2], axis=1)
+    steps /= np.maximum(height, LOWEST_M)[:, None]
+    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+
+
 def clock_by_motion(
-    spans: ArrayLike, motion: ArrayLike, times: ArrayLike, turned: ArrayLike, moved: ArrayLike | None = None
+    spans: ArrayLike, motion: ArrayLike, times: ArrayLike, turned: ArrayLike, moved: ArrayLike
 ) -> ClockByMotion | None:
     """The offset of the camera's clock by the peak of the correlation of two motions.
 
-    What is seen at the principal point is ``(-w_y, w_x, -w_z)`` of the camera's angular velocity, and
-    ``(-v_x, -v_y, 0) / depth`` of its velocity; a common gain, one over a mean depth, and a constant for each
-    of the three are fitted under each offset, so that neither the scale of the log nor a bias of gyros or
-    the steady motion over the ground counts.
+    What is seen is ``g (-w_y, w_x, -w_z) + k m + c``: of the camera's angular velocity ``w`` in c and of its
+    travel, ``m`` from `translation_over_ground`. Gains ``g``, ``k`` and constants ``c`` (3,) are fitted under
+    each offset, so that neither the log's scale nor a bias of gyros nor the height of the ground counts.
 
     Parameters
     ----------
@@ -293,7 +322,7 @@ def clock_by_motion(
     turned
         (T, 3) rad, the integral of the camera's angular velocity in c up to each.
     moved
-        (T, 3) m, the integral of its velocity in c.
+        (T, 3) from `translation_over_ground`.
 
     Returns
     -------
@@ -311,8 +340,7 @@ def clock_by_motion(
     scale = 1.4826 * np.median(np.abs(seen - middle), axis=0)
     seen = np.clip(seen, middle - 8 * scale, middle + 8 * scale)
     t = np.asarray(times, float)
-    sums = np.asarray(turned, float)
-    sums = sums if moved is None else np.hstack([sums, np.asarray(moved, float)])
+    sums = np.hstack([np.asarray(turned, float), np.asarray(moved, float)])
     # Between samples closer than these, integrals are as good as straight.
     near = (t >= span.min() - FAR_S - 1) & (t <= span.max() + FAR_S + 1)
     if near.sum() < 2:
@@ -320,13 +348,13 @@ def clock_by_motion(
     t, sums = t[near], sums[near]
     every = max(1, int(LOG_STEP_S / max(float(np.median(np.diff(t))), 1e-6)))
     t, sums = np.append(t[:-1:every], t[-1]), np.vstack([sums[:-1:every], sums[-1]])
+    integral = Akima1DInterpolator(t, sums)
 
     def logged(offset: float) -> tuple[Array, Array]:
-        """Which pairs lie within the log, and mean rates (n, 3 or 6) of these."""
+        """Which pairs lie within the log, and mean rates (n, 6) of these."""
         at = span + offset
         inside = (at[:, 0] >= t[0]) & (at[:, 1] <= t[-1])
-        ends = [np.stack([np.interp(at[inside, k], t, one) for one in sums.T], axis=1) for k in (0, 1)]
-        return inside, (ends[1] - ends[0]) / apart[inside]
+        return inside, (integral(at[inside, 1]) - integral(at[inside, 0])) / apart[inside]
 
     def fit(offset: float) -> tuple[float, float, Array]:
         """Correlation, gain and squares (N,) left over, NaN outside; whitened by the scatter seen."""
@@ -336,22 +364,17 @@ def clock_by_motion(
             return np.nan, np.nan, left
         y = seen[inside] - seen[inside].mean(axis=0)
         weight = 1 / np.maximum(y.std(axis=0), 1e-12)
-        w = rates[:, :3] - rates[:, :3].mean(axis=0)
-        columns = [(np.stack([-w[:, 1], w[:, 0], -w[:, 2]], axis=1) * weight).ravel()]
-        if rates.shape[1] > 3:
-            v = rates[:, 3:] - rates[:, 3:].mean(axis=0)
-            columns.append((np.stack([-v[:, 0], -v[:, 1], 0 * v[:, 0]], axis=1) * weight).ravel())
-        target = (y * weight).ravel()
+        w, v = np.split(rates - rates.mean(axis=0), 2, axis=1)
+        turning = (np.stack([-w[:, 1], w[:, 0], -w[:, 2]], axis=1) * weight).ravel()
+        moving, target = (v * weight).ravel(), (y * weight).ravel()
         # Translation alone explains some of it under any offset; what turning adds is the signal.
-        rest = columns[1:]
-        for other in rest:
-            along = float(other @ other)
-            if along > 0:
-                columns[0] = columns[0] - other * (other @ columns[0]) / along
-                target = target - other * (other @ target) / along
-        power = float(columns[0] @ columns[0])
-        gain = float(columns[0] @ target) / power if power > 0 else 0.0
-        over = target - gain * columns[0]
+        along = float(moving @ moving)
+        if along > 0:
+            turning = turning - moving * (moving @ turning) / along
+            target = target - moving * (moving @ target) / along
+        power = float(turning @ turning)
+        gain = float(turning @ target) / power if power > 0 else 0.0
+        over = target - gain * turning
         total = float(target @ target)
         share = 1 - float(over @ over) / total if total > 0 else 0.0
         left[inside] = (over.reshape(-1, 3) ** 2).sum(axis=1) / total
@@ -378,9 +401,10 @@ def clock_by_motion(
     rival = _other_peak(offsets, curve, offset)
     best, other = float(np.nanmax(curve)), float(curve[rival]) if rival is not None else 0.0
     margin = DRAWS / 2 * float(np.log((1 - max(other, 0.0) ** 2) / max(1 - best**2, 1e-9)))
+    spread = _spread(fine, np.array([one[2] for one in fits]), span.mean(axis=1))
     return ClockByMotion(
         offset,
-        _spread(fine, np.array([one[2] for one in fits]), span.mean(axis=1), offset),
+        float(np.hypot(spread, INTERVAL_SHARE * np.median(apart))),
         offsets,
         curve,
         float(offsets[rival]) if rival is not None else float("nan"),
@@ -415,7 +439,7 @@ def _other_peak(offsets: Array, curve: Array, offset: float) -> int | None:
     return int(outside[np.argmax(curve[outside])])
 
 
-def _spread(offsets: Array, squares: Array, at: Array, offset: float) -> float:
+def _spread(offsets: Array, squares: Array, at: Array) -> float:
     """Standard deviation of the offset, by leaving out one stretch of time after the other."""
     known = np.isfinite(squares).all(axis=0)
     if known.sum() < FEWEST:
