@@ -142,6 +142,14 @@ def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna):
         clock_from_motion(antenna, iter(()), "autopilot")
 
 
+def test_repeated_stamps_of_the_gyro_change_nothing(antenna):
+    pairs = np.arange(3000, 3100)[:, None] + [0, 1]
+    motion = np.random.default_rng(2).normal(0, 0.01, (100, 3))
+    repeated = changed(antenna, imu=antenna.imu.loc[antenna.imu.index.repeat(2)].reset_index(drop=True))
+    one, two = (camera_clock_by_motion(each, pairs, motion, "autopilot") for each in (antenna, repeated))
+    assert one.offset_s == two.offset_s
+
+
 @pytest.mark.slow
 def test_the_command_writes_a_curve_and_sets_the_offset(tracking, tmp_path):
     folder, curve = tmp_path / "flight", tmp_path / "curve.csv"
