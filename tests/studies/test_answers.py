@@ -47,7 +47,7 @@ def rates(own: float, stress: float) -> dict[str, Any]:
 
 def navigated(rms: float, sd: float, nees: tuple[float, float | None, float | None]) -> dict[str, Any]:
     """Error and predicted deviation (degrees) of each axis, and NEES of position with its interval."""
-    axes = {f"mekf/rms_{axis}": rms for axis in ("roll", "pitch", "yaw")}
+    axes: dict[str, Any] = {f"mekf/rms_{axis}": known(rms, rms / 4) for axis in ("roll", "pitch", "yaw")}
     axes |= {f"mekf/mean_sd_{axis}": sd for axis in ("roll", "pitch", "yaw")}
     value, low, high = nees
     return {**axes, "mekf/nees_position": {"value": value, "centre_low": low, "centre_high": high}}
@@ -459,7 +459,12 @@ ANSWERS: dict[str, list[Case]] = {
             for axis in ("roll", "pitch", "yaw")
         ),
         (navigated(0.1, 1.0, (0.5, 0.4, 0.6)), ("attitude-fits", "position-conservative")),
-        (navigated(1.0, 1.0, (9.5, None, None)), ("attitude-fits", "position-few")),
+        # Intervals decide: from 1.35 to 2.25 times, and without an interval.
+        (navigated(1.8, 1.0, (3.5, 2.5, 4.5)), ("attitude-unclear", "position-near")),
+        (
+            navigated(1.0, 1.0, (9.5, None, None)) | {"mekf/rms_pitch": 2.24},
+            ("attitude-few", "position-few"),
+        ),
         ({}, ("attitude-unknown", "position-unknown")),
     ],
     "autoferry-many": [

@@ -307,13 +307,19 @@ def answer(facts: Facts) -> list[str]:
 
 def _attitude(facts: Facts) -> str:
     """By the axis whose errors are largest by what is predicted: a good axis does not make up for it."""
-    times = {
-        axis: facts.value("mekf", f"rms_{axis}") / facts.value("mekf", f"mean_sd_{axis}") for axis in AXES
-    }
-    if any(math.isnan(one) for one in times.values()):
-        return "unknown"
-    worst = max(times, key=lambda axis: times[axis])
-    return f"overconfident-{worst}" if times[worst] > OVERCONFIDENT else "fits"
+    low, high = {}, {}
+    for axis in AXES:
+        predicted = facts.value("mekf", f"mean_sd_{axis}")
+        if math.isnan(facts.value("mekf", f"rms_{axis}") / predicted):
+            return "unknown"
+        ends = (facts.value("mekf", f"rms_{axis}", end) for end in ("centre_low", "centre_high"))
+        low[axis], high[axis] = (end / predicted for end in ends)
+    if any(map(math.isnan, (*low.values(), *high.values()))):
+        return "few"
+    worst = max(low, key=lambda axis: low[axis])
+    if low[worst] > OVERCONFIDENT:
+        return f"overconfident-{worst}"
+    return "fits" if max(high.values()) <= OVERCONFIDENT else "unclear"
 
 
 def _position(facts: Facts) -> str:
