@@ -17,7 +17,7 @@ from wildlab.analysis.diagnose import diagnose, find_implausible
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, observe
 from wildlab.evaluation.outliers import find_outliers
-from wildlab.geometry.corrections import BOUNDS, Calibration
+from wildlab.geometry.corrections import BOUNDS, Calibration, calibrated_camera
 
 #: Parameter and correction (degrees, seconds, metres) for what is put wrong.
 WRONG = {
@@ -51,6 +51,15 @@ def test_targets_that_the_border_cuts_make_no_correction_certain(share):
     cut = np.arange(len(table)) % 10 < 10 * share
     tables = {**flight.tables, "detections": table.assign(touches_border=cut.astype(float))}
     assert diagnosed(replace(flight, tables=tables)).counts == (share < 0.25)
+
+
+@pytest.mark.parametrize("focal", [0.1, 1e3, -1e3])
+def test_a_focal_length_that_goes_astray_stays_a_number(focal):
+    found = Calibration(("focal",), np.array([focal]), np.eye(1), {}, 1, 1)
+    with np.errstate(all="raise"):
+        camera = calibrated_camera(found, CAMERA)
+    assert np.isfinite(camera.fx) and camera.fx > 0
+    assert abs(focal) > 1 or camera.fx == pytest.approx(CAMERA.fx * np.exp(focal), rel=1e-12)
 
 
 @pytest.mark.parametrize("points", [9, 10])

@@ -57,6 +57,8 @@ BOUNDS: dict[str, float] = {
     "centre_v": 200.0,
     "radial": 0.3,
 }
+#: Logarithm of the largest factor by which focal lengths are changed, whatever is estimated.
+MOST_FOCAL = 10.0
 BORESIGHT = ("roll", "tilt", "pan")
 
 #: Poses at the times of N pixels, shifted by so many seconds.
@@ -147,10 +149,12 @@ def calibrated_camera(calibration: Calibration, camera: Camera) -> Camera:
     The camera, otherwise unchanged.
     """
     both, half = calibration.value("focal"), calibration.value("aspect") / 2
+    # A search that goes astray leaves what any lens has.
+    times_x, times_y = np.exp(np.clip([both + half, both - half], -MOST_FOCAL, MOST_FOCAL)).tolist()
     return replace(
         camera,
-        fx=camera.fx * float(np.exp(both + half)),
-        fy=camera.fy * float(np.exp(both - half)),
+        fx=camera.fx * times_x,
+        fy=camera.fy * times_y,
         cx=camera.cx + calibration.value("centre_u"),
         cy=camera.cy + calibration.value("centre_v"),
         distortion=(camera.distortion[0] + calibration.value("radial"), *camera.distortion[1:]),
