@@ -146,6 +146,21 @@ def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name):
     assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH
 
 
+@pytest.mark.parametrize("towards", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
+def test_names_lie_on_no_line_of_errors(towards):
+    """The mean of errors is near the truth on any side, and two curves of shares near each other."""
+    errors = 0.3 * np.array(towards) + np.random.default_rng(0).normal(0, 2, (40, 2))
+    curves = {name: (scale * errors, "black") for name, scale in (("as logged", 1), ("unseen images", 0.8))}
+    for figure in (georeferencing.error_scatter(errors, ""), georeferencing.error_shares(curves, "")):
+        figures.png_bytes(figure)
+        (ax,) = figure.axes
+        marks = [line for line in ax.lines if line.get_marker() == "o" or line.get_linestyle() == "-"]
+        points = np.concatenate([ax.transData.transform(line.get_xydata()) for line in marks])
+        for text in ax.texts:
+            box = text.get_window_extent()
+            assert text.get_text() == "N" or not box.padded(2.0).count_contains(points)
+
+
 def test_the_look_out_finds_what_is_wrong():
     figure, ax = figures.new_figure()
     ax.text(0.5, 0.5, "one")

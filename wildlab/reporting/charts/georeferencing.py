@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
+from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import (
     DASHED,
     Array,
@@ -50,7 +51,7 @@ def error_scatter(errors: ArrayLike, title: str, color: str = BLUE, reach: float
     if len(e) > 2:
         ellipse(ax, e.mean(axis=0)[::-1], np.cov(e[:, ::-1].T), color=color)
     ax.plot(*e.mean(axis=0)[::-1], "o", mfc="white", mec=color, ms=7, mew=1.6)
-    _mark_target(ax, "truth")
+    _mark_target(ax, "truth", e.mean(axis=0) if len(e) else (0.0, 0.0))
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
     map_axes(ax, east="error, east (m)", north="error, north (m)")
     return finish(fig, title)
@@ -61,12 +62,9 @@ def error_shares(series: Mapping[str, tuple[ArrayLike, str]], title: str) -> Fig
     fig, ax = new_figure(4.6, 4.4)
     ax.axhline(90, color=GREY, **DASHED)
     distances = {name: np.sort(np.hypot(*_finite(errors).T)) for name, (errors, _) in series.items()}
-    # Names stand beside their own line at different heights, so that lines close together keep theirs apart.
-    by_middle = sorted(distances, key=lambda name: float(np.median(distances[name])))
-    for place, name in enumerate(by_middle):
-        distance, color, level = distances[name], series[name][1], 62 - 24 * place
-        ax.step(distance, 100 * np.arange(1, len(distance) + 1) / len(distance), where="post", color=color)
-        end_label(ax, float(np.quantile(distance, level / 100)), level, name, color)
+    for name, distance in distances.items():
+        share = 100 * np.arange(1, len(distance) + 1) / len(distance)
+        ax.step(distance, share, where="post", color=series[name][1], label=figure_name(name))
     ax.set(xlim=(0, 1.02 * max(float(one[-1]) for one in distances.values())), ylim=(0, 102))
     return finish(fig, title, "distance from the truth (m)", "points within that distance (%)")
 
@@ -77,9 +75,8 @@ def errors_by_image(scored: pd.DataFrame, title: str, color: str = BLUE) -> Figu
     place = scored["frame_id"].map({name: i for i, name in enumerate(order)})
     mean = scored.groupby(place)["error_m"].mean()
     fig, ax = new_figure(5.9, 3.0)
-    draw_dots(ax, place, scored["error_m"], color, size=6)
-    draw_line(ax, mean.index, mean, VERMILLION)
-    end_label(ax, mean.index[-1], float(mean.iloc[-1]), "mean per\nimage", VERMILLION)
+    draw_dots(ax, place, scored["error_m"], color, "point", size=6)
+    draw_line(ax, mean.index, mean, VERMILLION, "mean of an image")
     ax.set_ylim(0, None)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     return finish(fig, title, "image, in order", "error (m)")
@@ -179,10 +176,13 @@ def autocorrelation_chart(series: Mapping[str, ArrayLike], bound: float, title: 
     return finish(fig, title, "lag (observations)", "autocorrelation")
 
 
-def _mark_target(ax: Axes, name: str) -> None:
-    """A cross at the origin, and its name beside it."""
+def _mark_target(ax: Axes, name: str, taken: ArrayLike = (0.0, 0.0)) -> None:
+    """A cross at the origin, and its name beside it, away from what lies north and east of it."""
+    north, east = np.asarray(taken, float)
     ax.plot(0, 0, "+", color=colour("truth"), ms=13, mew=2)
-    ax.annotate(name, (0, 0), (8, -14), textcoords="offset points", fontsize=10)
+    side, aside = ("right", -8) if east > 0 else ("left", 8)
+    above, up = ("bottom", 6) if north < 0 else ("top", -6)
+    ax.annotate(name, (0, 0), (aside, up), textcoords="offset points", fontsize=10, ha=side, va=above)
 
 
 def _finite(errors: ArrayLike) -> Array:
