@@ -254,8 +254,9 @@ def test_anybodys_filter_by_its_errors_and_covariances():
         {"errors": e, "covariances": P[0]},
         {"errors": e[0, 0], "covariances": P[0, 0]},
     ):
-        with pytest.raises(wildlab.WildlabError):
+        with pytest.raises(wildlab.WildlabError) as caught:
             wildlab.consistency(**wrong)
+        assert caught.value.field == "covariances"
 
 
 @pytest.mark.parametrize(("worth", "hedged"), [(FEW_INDEPENDENT - 1, True), (FEW_INDEPENDENT + 1, False)])

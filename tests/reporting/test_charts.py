@@ -17,7 +17,7 @@ from wildlab.analysis.overview import Path
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, errors_shown
+from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, errors_shown, map_shown
 from wildlab.reporting.charts.navigation import (
     bias_chart,
     error_bands,
@@ -57,6 +57,19 @@ def assert_readable(figure: Figure) -> None:
 
 
 PLAIN = np.full(N, 10.0)
+
+
+@pytest.mark.parametrize("at_rest", [False, True])
+def test_the_map_of_a_target_at_rest_is_of_its_track(at_rest):
+    """Its covariance has no velocity; of one that moves the map has the platform's way of 900 m too."""
+    one = track("ekf", PLAIN)
+    states = np.diag([1.0, 1.0, *([0.0, 0.0] if at_rest else [1.0, 1.0])])
+    one = one._replace(covariance=np.tile(states, (N, 1, 1)), estimate=np.zeros((N, 4)))
+    way = np.linspace([-400.0, 0.0], [500.0, 0.0], 50)
+    known: Any = SimpleNamespace(tracks=[one])
+    figure = map_shown(known, "boat", "ekf", np.array([[2.0, 1.0]]), {"aircraft": way})[0]
+    north = np.ptp(figure.axes[0].get_ylim())
+    assert north < 20.0 if at_rest else north > 900.0
 
 
 def test_gains_are_differences_of_distances_where_both_see_the_target():

@@ -481,7 +481,10 @@ def consistency(
         ]
         known = [one for one in found if np.isfinite(one.values).any()]
         gathered = {"NEES": known} if known else {}
-    elif errors is not None or covariances is not None or len({type(one) for one in results}) != 1:
+    elif (errors is None) != (covariances is None):
+        missing = "errors" if errors is None else "covariances"
+        raise WildlabError("errors and covariances go together", f"give {missing} too", field=missing)
+    elif errors is not None or len({type(one) for one in results}) != 1:
         raise WildlabError(
             "results of one kind are needed",
             "give tracks, or navigations, or errors with their covariances",

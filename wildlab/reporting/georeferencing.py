@@ -620,13 +620,12 @@ def _ellipse_message(verdict: EllipseVerdict) -> Message:
 
 def _figures(report: Report, wording: Wording, found: Accuracy, programs: Mapping[str, pd.DataFrame]) -> None:
     errors, diagnosis, names = found.errors, found.diagnosis, wording.texts.subjects
-    reach = 1.1 * np.nanmax(np.abs(errors))
     series = {names["logged"]: (errors, colour("logged-pose"))}
     if diagnosis is not None and diagnosis.counts:
         series[names["corrected"]] = (diagnosis.winner.held, colour("calibrated-pose"))
     for program, table in programs.items():
         series[names["recorded"].format(program)] = (errors_of(table), colour("recorded"))
-    wording.figure("error-scatter", error_scatter(errors, "", colour("logged-pose"), reach), main=True)
+    wording.figure("error-scatter", error_scatter(errors, "", colour("logged-pose")), main=True)
     report.figures(
         [
             wording.captioned("error-shares", error_shares(series, "")),

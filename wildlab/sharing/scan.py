@@ -230,7 +230,7 @@ def phrases_of(words: Iterable[str]) -> tuple[list[tuple[str, ...]], list[str]]:
     said = []
     for reason, ones in rare:
         some = ", ".join(map(repr, islice(ones, MOST_TOLD))) + (" and so on" if len(ones) > MOST_TOLD else "")
-        said.append(f"{len(ones)} of the names are not looked for, {some}; of each: {reason}")
+        said.append(f"Not looked for, {len(ones)} of the names: {some}; of each: {reason}")
     return list(wanted), said
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from wildlab.analysis.tracks.scores import seen_of, whitened
+from wildlab.analysis.tracks.scores import is_at_rest, seen_of, whitened
 from wildlab.analysis.tracks.single_target import SMOOTHED, SensorTrack
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.evaluation.consistency import autocorrelation, chi_square_interval, white_bound
@@ -87,6 +87,9 @@ def map_shown(
     """
     mine = [one for one in followed.tracks if (one.target, one.filter) == (target, name)]
     fig, ax = new_figure(5.6, 5.0)
+    # Beside the whole way of the platform, a target at rest and its track are a dot.
+    at_rest = bool(mine) and all(map(is_at_rest, mine))
+    platforms = {} if at_rest else platforms
     for words, way in platforms.items():
         draw_platform(ax, way, words)
     shown = [truth] if len(truth) else []
@@ -96,7 +99,9 @@ def map_shown(
             draw_way(ax, one.estimate, tint, one.sensor, width=1.6)
             shown.append(_middle(x))
     if len(truth):
-        draw_way(ax, truth, name="truth", **TRUTH)
+        draw_way(
+            ax, truth, name="truth", **(TRUTH | {"marker": "+", "ms": 13, "mew": 2} if at_rest else TRUTH)
+        )
     if shown:
         every = np.concatenate([*shown, *platforms.values()])
         low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)

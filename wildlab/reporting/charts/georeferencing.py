@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
+from wildlab.geometry.covariances import chi2_quantile
 from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import (
     DASHED,
@@ -46,10 +47,13 @@ def error_scatter(errors: ArrayLike, title: str, color: str = BLUE, reach: float
     """
     e = _finite(errors)
     fig, ax = new_figure(4.6, 4.4)
-    reach = reach or float(max(1.0, 1.15 * np.abs(e).max())) if len(e) else 1.0
+    far = np.abs(e).max(initial=0.0)
     draw_dots(ax, e[:, 1], e[:, 0], color, size=6)
     if len(e) > 2:
         ellipse(ax, e.mean(axis=0)[::-1], np.cov(e[:, ::-1].T), color=color)
+        half = np.sqrt(e.var(axis=0, ddof=1) * chi2_quantile(0.9, 2))
+        far = max(far, float((np.abs(e.mean(axis=0)) + half).max()))
+    reach = reach or max(1.0, 1.1 * float(far))
     ax.plot(*e.mean(axis=0)[::-1], "o", mfc="white", mec=color, ms=7, mew=1.6)
     _mark_target(ax, "truth", e.mean(axis=0) if len(e) else (0.0, 0.0))
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
