@@ -125,8 +125,7 @@ def test_a_swap_is_looked_for_just_after_the_crossing_and_at_the_end(from_s, to_
     crossed = (when >= from_s) & (when < to_s)
     track = np.where(crossed, 1 - crossing.boat, crossing.boat)
     empty = np.empty((1200, 2, 4))
-    life = np.arange(2), np.full(2, -1), np.ones(2, bool)
-    bank = Bank(track, np.array([0, 1]), np.arange(1200), empty, np.empty((1200, 2, 4, 4)), *life)
+    bank = Bank(track, np.array([0, 1]), np.arange(1200), empty, np.empty((1200, 2, 4, 4)))
     assert swapped(crossing, bank) == found
     one_side = bank._replace(track=np.where(crossing.boat == 0, track, crossing.boat))
     assert swapped(crossing, one_side) == (False, False), "one of the two is no exchange"

@@ -624,14 +624,9 @@ def limits_of(rule: str, gate: float, veto_probability: float, appearance: Appea
     if rule == STATE and appearance is not None:
         return Limits(float(gate_with_more(gate, np.array([appearance.used.sum()]))[0]))
     if rule == VETO and appearance is not None:
-        return Limits(gate, alike_limit(veto_probability, appearance))
+        count = int(appearance.used.sum())
+        return Limits(gate, gate_threshold(veto_probability, count) if count else np.inf)
     return Limits(gate)
-
-
-def alike_limit(probability: float, appearance: Appearance) -> float:
-    """The largest distance of looks that lets in so many of a target's own; none where no feature counts."""
-    count = int(appearance.used.sum())
-    return gate_threshold(probability, count) if count else np.inf
 
 
 def gate_with_more(gate: float, count: Array) -> Array:

@@ -1,8 +1,7 @@
-"""Existence, association and the life of a track: every state and every way counted one by one."""
+"""Existence, association and the start of a track: every state and every way counted one by one."""
 
 from __future__ import annotations
 
-import itertools
 from itertools import product
 
 import numpy as np
@@ -18,7 +17,7 @@ from wildlab.tracking.association import (
     association_probabilities_by_enumeration,
     belief_propagation,
 )
-from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
+from wildlab.tracking.many.bank import pair_scans
 from wildlab.tracking.many.tracks import after_scan, still_there, visible_later, weights
 
 shares = st.floats(0.01, 0.99)
@@ -111,40 +110,6 @@ def test_existence_decays_with_its_lifetime():
 GATE = gate_threshold(0.99, 2)
 
 
-@pytest.mark.parametrize(("m", "n"), [(3, 5), (1, 1), (2, 2), (1, 4)])
-def test_every_course_of_scans_is_decided_as_its_end_says(m, n):
-    """Judged at every scan: open until the end is certain, and right from then on."""
-    for course in itertools.product([0, 1], repeat=n):
-        verdicts = [int(judge_start([sum(course[:scans])], [scans], m, n)[0]) for scans in range(1, n + 1)]
-        assert verdicts[-1] == (CONFIRMED if sum(course) >= m else DROPPED)
-        for scans, verdict in enumerate(verdicts, start=1):
-            ends = {
-                sum(course[:scans]) + sum(rest) >= m for rest in itertools.product([0, 1], repeat=n - scans)
-            }
-            certain = {True: CONFIRMED, False: DROPPED}
-            assert verdict == (certain[ends.pop()] if len(ends) == 1 else UNDECIDED)
-
-
-def test_before_the_first_scan_nothing_is_decided():
-    assert judge_start([0], [0]).tolist() == [UNDECIDED]
-
-
-@pytest.mark.parametrize(
-    ("hits", "scans", "m", "n"),
-    [
-        ([1], [1], 0, 5),
-        ([1], [1], 6, 5),
-        ([2], [1], 3, 5),
-        ([0], [6], 3, 5),
-        ([-1], [1], 3, 5),
-        ([1], [1, 2], 3, 5),
-    ],
-)
-def test_counts_that_cannot_be_are_refused(hits, scans, m, n):
-    with pytest.raises(WildlabError):
-        judge_start(hits, scans, m, n)
-
-
 @given(st.floats(0, 2 * np.pi), st.floats(0.1, 3), st.floats(0, 10), st.floats(0.5, 20))
 def test_the_region_is_that_of_noise_about_where_motion_may_lead(angle, dt, speed, sd):
     """Without correlation its edge lies the reach of noise beyond that of motion, all around."""
@@ -184,16 +149,6 @@ def test_no_detections():
 def test_times_and_speeds_that_cannot_be_are_refused(dt, speed, field):
     with pytest.raises(WildlabError, match=f"{field} is"):
         pair_scans([[0.0, 0.0]], [[0.0, 0.0]], dt, np.eye(2), speed, GATE)
-
-
-def test_a_track_ends_by_time_or_by_its_largest_deviation():
-    turned = np.array([[26.0, 24.0], [24.0, 26.0]])  # 50 along the diagonal, 2 across
-    P = np.array([turned, turned, turned, np.full((2, 2), np.nan)])
-    assert outlived([1, 1, 6, 1], P, 5.0, 7.1).tolist() == [False, False, True, True]
-    assert outlived([1, 1, 6, 1], P, np.inf, 7.0).tolist() == [True, True, True, True]
-    assert outlived([5, 5, 1e9, 1], P, np.inf, np.inf).tolist() == [False, False, False, True]
-    with pytest.raises(WildlabError, match="do not go with covariances"):
-        outlived([1.0], P, 1.0, 1.0)
 
 
 def weights_of(seed: int, n: int, m: int, empty: float = 0.4) -> tuple[np.ndarray, np.ndarray]:

@@ -8,8 +8,6 @@ A matrix of distances has a row for each measurement and a column for each track
 - `global_nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
   look like.
 - `run_bank`: a bank of filters on positions, with any of these.
-- `pair_scans`, `judge_start`, `outlived`: the life of a track. `Life`: what a bank is told of it.
-- `reachable`, `place_costs`, `look_differences`, `recognise`: whether a new track is one that had ended.
 """
 
 from wildlab.tracking.association import (
@@ -23,19 +21,7 @@ from wildlab.tracking.association import (
     veto,
     with_features,
 )
-from wildlab.tracking.many.bank import Bank, Life, Looks, Tuning, run_bank
-from wildlab.tracking.many.life import (
-    CONFIRMED,
-    DROPPED,
-    UNDECIDED,
-    judge_start,
-    look_differences,
-    outlived,
-    pair_scans,
-    place_costs,
-    reachable,
-    recognise,
-)
+from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
 from wildlab.tracking.many.run import Shown, follow_many, run_many, smooth_many
 from wildlab.tracking.many.target_model import (
     POINT,
@@ -47,15 +33,11 @@ from wildlab.tracking.many.target_model import (
 )
 
 __all__ = [
-    "CONFIRMED",
-    "DROPPED",
     "POINT",
-    "UNDECIDED",
     "Appearance",
     "Assignment",
     "Bank",
     "Hull",
-    "Life",
     "Looks",
     "ManySensorModel",
     "ManyTargetModel",
@@ -68,14 +50,7 @@ __all__ = [
     "follow_many",
     "global_nearest",
     "image_features",
-    "judge_start",
-    "look_differences",
-    "outlived",
     "own_lasting",
-    "pair_scans",
-    "place_costs",
-    "reachable",
-    "recognise",
     "run_bank",
     "run_many",
     "smooth_many",
