@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tests.simulation import plain_kernels as plain
 from wildlab.geometry.frames import matrix_to_quaternion
 from wildlab.geometry.gravity import Earth
-from wildlab.simulation import kernels, plain
+from wildlab.simulation import kernels
 from wildlab.simulation.courses import _polynomials, _smoothed, _times_of_angles
 from wildlab.simulation.trajectory import Disturbance
 

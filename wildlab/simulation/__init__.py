@@ -14,7 +14,7 @@ Where a change belongs:
   `twin_trajectory`, what it looks for in `target_motion`, and the ground in `landscape`;
 - sensors: `imu`, receivers and gimbal in `onboard_sensors`, and the `error_models` that they share; what they
   are rather than what is said of them: `perturbed_flight`;
-- speed: `kernels`, compiled, each with its twin in readable numpy in `plain`;
+- speed: `kernels`, compiled;
 - tables: `camera_detections`, `manifest`;
 - the whole flight: `twins`; what its camera would have seen, as images with labels: `scene`.
 """

@@ -18,7 +18,6 @@ from scipy.interpolate import BSpline
 from wildlab.geometry.frames import Array
 from wildlab.simulation import kernels
 from wildlab.simulation.parameter_groups import Cable, Enclosure
-from wildlab.simulation.plain import rate_on_circle
 from wildlab.simulation.target_motion import enclosure_axes
 from wildlab.simulation.trajectory import Disturbance, FlightPath, Signal, no_disturbance
 
@@ -355,7 +354,8 @@ def _times_of_angles(circle: tuple[float, ...]) -> tuple[float, Array, Array]:
     *_, sense, start = circle
     count = 1024
     turned = 2 * np.pi * np.arange(count) / count  # how far around since the start, always increasing
-    spectrum = np.fft.rfft(1.0 / np.abs(rate_on_circle(start + sense * turned, circle)[0])) / count
+    rates = [kernels.round_rate(angle, *circle[:5])[0] for angle in start + sense * turned]
+    spectrum = np.fft.rfft(1.0 / np.abs(rates)) / count
     mean = float(spectrum[0].real)
     series = 2 * spectrum[1:-1] / (1j * np.arange(1, count // 2))
     strong = np.flatnonzero(np.abs(series) > 1e-17 * mean)

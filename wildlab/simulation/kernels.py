@@ -1,32 +1,22 @@
 """The hot loops of a simulated flight, compiled: its path, attitude, rates and sensor errors.
 
-What they compute is written out again, short and slow, in `plain`; tests hold the two together. All compiled
-functions that call each other stay in this one file: the compiler's cache only looks at the file a function
-stands in, and would go on using the old version of what it calls in another one. Arrays are contiguous and
-of doubles, so that each function is compiled once.
+Tests hold each against the same in readable numpy. Arrays are contiguous and of doubles, so that each
+function is compiled once.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
 
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 #: Sines are computed afresh after so many equal steps; in between they follow by the addition theorem.
 BLOCK = 64
 #: Newton steps until the angle on a circle has settled; one or two are enough but at the first time.
 _STEPS = 100
-
-
-def compiled(function: F) -> F:
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
 
 
 @compiled
@@ -104,7 +94,7 @@ def piecewise_polynomial(
 
 
 @compiled
-def _round_rate(
+def round_rate(
     angle: float, radius: float, airspeed: float, north: float, east: float, sense: float
 ) -> tuple[float, float]:
     """Angular rate around a circle in a wind (north, east), and its derivative with respect to the angle."""
@@ -141,7 +131,7 @@ def angles_on_circle(
             for k in range(len(real) - 1, -1, -1):  # Horner
                 re, im = re + real[k], im + imaginary[k]
                 re, im = re * c - im * s, re * s + im * c
-            spin, slope = _round_rate(start + sense * x, radius, airspeed, north, east, sense)
+            spin, slope = round_rate(start + sense * x, radius, airspeed, north, east, sense)
             late = mean * x + re - constant - times[n]
             step = late * abs(spin)
             if abs(step) < 1e-9:  # what is left after it is its square
@@ -164,7 +154,7 @@ def circle_motion(
     radius, airspeed, north, east, sense, _ = circle
     for n in range(len(angles)):
         c, s = math.cos(angles[n]), math.sin(angles[n])
-        spin, slope = _round_rate(angles[n], radius, airspeed, north, east, sense)
+        spin, slope = round_rate(angles[n], radius, airspeed, north, east, sense)
         r, r1, r2 = radius + off_circle[0, n], off_circle[1, n], off_circle[2, n]
         outward, clockwise = r2 - r * spin * spin, 2.0 * r1 * spin + r * slope * spin
         p[n, 0], p[n, 1] = r * c, r * s

@@ -162,6 +162,28 @@ def moment() -> AfterValidator:
     return AfterValidator(check)
 
 
+def ordered(low: str, high: str) -> Any:
+    """Refuse a group of which one parameter is above the other."""
+
+    def check(group: Any) -> Any:
+        if getattr(group, low).number > getattr(group, high).number:
+            raise ValueError(f"{low} is more than {high}; exchange the two")
+        return group
+
+    return model_validator(mode="after")(check)
+
+
+def together(*names: str) -> Any:
+    """Refuse a group that has some of these parameters and not the others."""
+
+    def check(group: Any) -> Any:
+        if len({getattr(group, name) is None for name in names}) > 1:
+            raise ValueError(f"{', '.join(names)} belong together; give all or none")
+        return group
+
+    return model_validator(mode="after")(check)
+
+
 # Upper bounds keep a mistyped file from asking for a flight of days.
 Text = Annotated[Parameter, word()]
 Angle = Annotated[Parameter, quantity("deg", -360, 360)]
@@ -175,9 +197,8 @@ Pixels = Annotated[Parameter, quantity("px", 0, 1e6)]
 PixelCount = Annotated[Parameter, quantity("px", high=1e5, above=0, whole=True)]
 FocalLength = Annotated[Parameter, quantity("px", high=1e6, above=0)]
 Count = Annotated[Parameter, quantity("1", 1, 1e6, whole=True)]
-
-
 Latency = Annotated[Parameter, quantity("ms", 0, 1e4)]
+Instant = Annotated[Parameter, quantity("s", 0, 7200)]
 Arm = Annotated[Parameter, quantity("m", -1e3, 1e3)]
 
 
@@ -196,9 +217,9 @@ class TwinCamera(Strict):
     cx: Annotated[Parameter, quantity("px", -1e5, 1e5)]
     cy: Annotated[Parameter, quantity("px", -1e5, 1e5)]
     frame_rate: Rate
-    recording_start: Annotated[Parameter, quantity("s", 0, 7200)]
+    recording_start: Instant
     images: Count
-    latency: Annotated[Parameter, quantity("ms", 0, 1e4)]
+    latency: Latency
     marking_sd: Pixels
     k1: Annotated[Parameter, quantity("1", -1, 1)] | None = None
     stamped_by: Annotated[Parameter, word("synchronisation", "computer")] | None = None
@@ -233,13 +254,9 @@ class Gimbal(Strict):
     noise: AngleSpread
     tilt_limit: Annotated[Parameter, quantity("deg", 0, 90)] | None = None
     tilt_period: Duration | None = None
-    tilt_middle: Annotated[Parameter, quantity("s", 0, 7200)] | None = None
+    tilt_middle: Instant | None = None
 
-    @model_validator(mode="after")
-    def _tilts(self) -> Gimbal:
-        if len({part is None for part in (self.tilt_limit, self.tilt_period, self.tilt_middle)}) > 1:
-            raise ValueError("tilt_limit, tilt_period and tilt_middle belong together; give all or none")
-        return self
+    _tilts = together("tilt_limit", "tilt_period", "tilt_middle")
 
 
 class OnboardClock(Strict):
@@ -247,7 +264,7 @@ class OnboardClock(Strict):
 
     offset: Annotated[Parameter, quantity("s", -3600, 3600)]
     drift: Annotated[Parameter, quantity("ppm", -1e4, 1e4)]
-    latency: Annotated[Parameter, quantity("ms", 0, 1e4)]
+    latency: Latency
 
 
 class Autopilot(Strict):
@@ -270,11 +287,7 @@ class Autopilot(Strict):
     imu_pitch: Angle | None = None
     imu_yaw: Angle | None = None
 
-    @model_validator(mode="after")
-    def _levelled(self) -> Autopilot:
-        if len({angle is None for angle in (self.imu_roll, self.imu_pitch, self.imu_yaw)}) > 1:
-            raise ValueError("imu_roll, imu_pitch and imu_yaw belong together; give all or none")
-        return self
+    _levelled = together("imu_roll", "imu_pitch", "imu_yaw")
 
 
 class Tolerance(Strict):
@@ -323,11 +336,7 @@ class Boresight(Strict):
     shortest_period: Duration
     longest_period: Duration
 
-    @model_validator(mode="after")
-    def _band(self) -> Boresight:
-        if self.shortest_period.number > self.longest_period.number:
-            raise ValueError("shortest_period is longer than longest_period; exchange the two")
-        return self
+    _band = ordered("shortest_period", "longest_period")
 
 
 class CameraSway(Strict):
@@ -342,11 +351,7 @@ class CameraSway(Strict):
     shortest_period: Duration
     longest_period: Duration
 
-    @model_validator(mode="after")
-    def _band(self) -> CameraSway:
-        if self.shortest_period.number > self.longest_period.number:
-            raise ValueError("shortest_period is longer than longest_period; exchange the two")
-        return self
+    _band = ordered("shortest_period", "longest_period")
 
 
 class Imu(Strict):
@@ -426,6 +431,9 @@ class AirframeFlight(Strict):
     attitude_longest_period: Duration
     kind: Annotated[Parameter, word("fixed wing", "multicopter", "gondola")] | None = None
 
+    _path_band = ordered("path_shortest_period", "path_longest_period")
+    _attitude_band = ordered("attitude_shortest_period", "attitude_longest_period")
+
     @model_validator(mode="after")
     def _flies(self) -> AirframeFlight:
         if self.wind_speed.number > 0.8 * self.airspeed.number:
@@ -433,10 +441,6 @@ class AirframeFlight(Strict):
                 "wind_speed is more than 0.8 of airspeed, too much to hold a course; "
                 "lower wind_speed or raise airspeed"
             )
-        for band in ("path", "attitude"):
-            shortest, longest = f"{band}_shortest_period", f"{band}_longest_period"
-            if getattr(self, shortest).number > getattr(self, longest).number:
-                raise ValueError(f"{shortest} is longer than {longest}; exchange the two")
         return self
 
 
@@ -478,11 +482,7 @@ class Cable(Strict):
     highest: Length
     spans: Count
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Cable:
-        if self.lowest.number > self.highest.number:
-            raise ValueError("lowest is above highest; exchange the two")
-        return self
+    _heights = ordered("lowest", "highest")
 
 
 class Land(Strict):
@@ -504,7 +504,7 @@ class Climb(Strict):
     """One change of altitude during the flight."""
 
     altitude: Length
-    start: Annotated[Parameter, quantity("s", 0, 7200)]
+    start: Instant
     duration: Duration
 
 
@@ -530,19 +530,9 @@ class TargetMotion(Strict):
     early_speed: Speed | None = None
     slowing_time: Duration | None = None
 
-    @model_validator(mode="after")
-    def _slowed(self) -> TargetMotion:
-        if (self.early_speed is None) != (self.slowing_time is None):
-            raise ValueError("early_speed and slowing_time belong together; give both or none")
-        return self
+    _slowed = together("early_speed", "slowing_time")
 
-    @model_validator(mode="after")
-    def _band(self) -> TargetMotion:
-        if self.deviation_shortest_period.number > self.deviation_longest_period.number:
-            raise ValueError(
-                "deviation_shortest_period is longer than deviation_longest_period; exchange the two"
-            )
-        return self
+    _band = ordered("deviation_shortest_period", "deviation_longest_period")
 
 
 class TargetGps(Strict):

@@ -124,98 +124,77 @@ class TwinParameters(Strict):
             )
         return value
 
-    @model_validator(mode="after")
-    def _one_course(self) -> TwinParameters:
-        courses = {"loiter": self.loiter, "route": self.route, "survey": self.survey}
-        if len([name for name, course in courses.items() if course is not None]) != 1:
-            raise ValueError("a twin flies one course; describe one of loiter, route and survey")
-        if self.loiter is not None and (self.target is None or self.target.motion is not None):
-            raise ValueError("a loiter stands beside a target that never moves; describe a route")
-        if self.route is None and (self.climb is not None or self.cable is not None):
-            raise ValueError(
-                "only a route changes its altitude; describe a route, or take out climb and cable"
-            )
-        if self.climb is not None and self.cable is not None:
-            raise ValueError("a cable has its own heights; take out climb or cable")
-        if self.survey is not None and not self.enclosures:
-            raise ValueError("a survey goes over enclosures, and there are none; add enclosures")
-        return self
-
     @property
     def targets(self) -> list[Target]:
         """All targets with a description of their own, in their order; animals are in `animal_motion`."""
         return [target for target in (self.target, self.second_target) if target is not None]
 
     @model_validator(mode="after")
-    def _one_kind_of_target(self) -> TwinParameters:
+    def _possible(self) -> TwinParameters:
+        for mistake in self._mistakes():
+            raise ValueError(mistake)
+        return self
+
+    def _mistakes(self) -> Iterator[str]:
+        """What does not go together, one after the other."""
+        courses = {"loiter": self.loiter, "route": self.route, "survey": self.survey}
+        if len([name for name, course in courses.items() if course is not None]) != 1:
+            yield "a twin flies one course; describe one of loiter, route and survey"
+        if self.loiter is not None and (self.target is None or self.target.motion is not None):
+            yield "a loiter stands beside a target that never moves; describe a route"
+        if self.route is None and (self.climb is not None or self.cable is not None):
+            yield ("only a route changes its altitude; describe a route, or take out climb and cable")
+        if self.climb is not None and self.cable is not None:
+            yield "a cable has its own heights; take out climb or cable"
+        if self.survey is not None and not self.enclosures:
+            yield "a survey goes over enclosures, and there are none; add enclosures"
         if (self.target is None) == (self.animals is None):
-            raise ValueError("a twin looks for targets or for animals; describe either target or animals")
+            yield "a twin looks for targets or for animals; describe either target or animals"
         if self.animals is not None and not self.enclosures:
-            raise ValueError("animals live in enclosures, and there are none; add enclosures")
+            yield "animals live in enclosures, and there are none; add enclosures"
         others = (self.second_target, self.pair, self.subset, self.segments)
         if self.target is None and any(part is not None for part in others):
-            raise ValueError("second_target, pair, subset and segments go with a target; add target")
-        return self
-
-    @model_validator(mode="after")
-    def _on_land(self) -> TwinParameters:
+            yield "second_target, pair, subset and segments go with a target; add target"
         if self.land is not None and self.animals is None:
-            raise ValueError("land lies under animals; take out land, or describe animals")
+            yield "land lies under animals; take out land, or describe animals"
         if self.land is not None and self.loiter is not None:
-            raise ValueError("a loiter does not follow the ground; describe a survey or a route")
-        return self
-
-    @model_validator(mode="after")
-    def _apart(self) -> TwinParameters:
+            yield "a loiter does not follow the ground; describe a survey or a route"
         names = [target.identifier.text for target in self.targets]
         if len(set(names)) < len(names):
-            raise ValueError("two targets have the same identifier; give each its own")
+            yield "two targets have the same identifier; give each its own"
         if (self.second_target is None) != (self.pair is None):
-            raise ValueError("two targets need pair.both, one does not; add the one or take out the other")
+            yield "two targets need pair.both, one does not; add the one or take out the other"
         if self.pair and self.pair.both.number > min(target.observations.number for target in self.targets):
-            raise ValueError("pair.both is more than the observations of a target; lower pair.both")
+            yield "pair.both is more than the observations of a target; lower pair.both"
         wanted = sum(int(target.observations.number) for target in self.targets)
         if self.subset and self.subset.first.number + self.subset.observations.number - 1 > wanted:
-            raise ValueError(
+            yield (
                 f"the subset ends behind the last of {wanted} detections; lower subset.first or "
                 "subset.observations"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _partly_in_view(self) -> TwinParameters:
         outlined = self.target is not None and self.target.outline is not None
         if self.pair is not None and any(target.outline is not None for target in self.targets):
-            raise ValueError("of two targets none can have an outline; take out the outline")
+            yield "of two targets none can have an outline; take out the outline"
         if (self.segments is not None) != outlined:
-            raise ValueError("a target with an outline needs segments, any other none; add or take out one")
+            yield "a target with an outline needs segments, any other none; add or take out one"
         if self.segments and self.target and self.segments.images.number < self.target.observations.number:
-            raise ValueError(
+            yield (
                 "there are fewer images in the segments than observations of the target; "
                 "lower target.observations"
             )
         if outlined and self.camera.k1 is not None:
-            raise ValueError("an outline stays straight only in a camera without k1; take out camera.k1")
-        return self
-
-    @model_validator(mode="after")
-    def _sensors(self) -> TwinParameters:
+            yield "an outline stays straight only in a camera without k1; take out camera.k1"
         if len({part is None for part in (self.imu, self.gnss, self.boresight)}) > 1:
-            raise ValueError("imu, gnss and boresight describe one payload; give all or none")
+            yield "imu, gnss and boresight describe one payload; give all or none"
         by_computer = self.camera.stamped_by is not None and self.camera.stamped_by.text == "computer"
         if by_computer and self.onboard_clock is None:
-            raise ValueError("the computer stamps the images, and its clock is missing; add onboard_clock")
-        return self
-
-    @model_validator(mode="after")
-    def _recorded_in_flight(self) -> TwinParameters:
+            yield "the computer stamps the images, and its clock is missing; add onboard_clock"
         end = self.camera.recording_start.si + (self.camera.images.si - 1) / self.camera.frame_rate.si
         if end > self.flight.duration.si:
-            raise ValueError(
+            yield (
                 f"the camera would record until {end:.0f} s, after the flight's end; lower camera.images or "
                 "camera.recording_start"
             )
-        return self
 
 
 def twin_names() -> list[str]:

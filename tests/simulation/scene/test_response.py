@@ -9,10 +9,7 @@ from wildlab.simulation.scene import (
     IDEAL,
     CameraResponse,
     expose,
-    gain_control,
-    in_shutter,
     sensor_of,
-    shutter_image,
     to_kelvin,
 )
 from wildlab.simulation.scene.bodies import fitted_out, vessel
@@ -77,27 +74,6 @@ def test_dead_pixels_show_the_same_in_every_image():
     one, two = (expose(even(280.0 + k), response, sensor, np.random.default_rng(k)) for k in (1, 9))
     assert np.array_equal(one[sensor.dead], two[sensor.dead])
     assert set(np.unique(one[sensor.dead])) <= {0, 2**14 - 1}
-
-
-def test_the_shutter_closes_for_its_time_and_shows_an_even_image():
-    times = np.arange(0, 300, 1 / 7.5)
-    closed = in_shutter(times, every=60.0, lasting=0.6)
-    assert closed.sum() == 5 * 5
-    assert not in_shutter([-1.0], every=60.0, lasting=0.5).any()
-    image = to_kelvin(
-        shutter_image(SHAPE, 301.0, CameraResponse(), np.random.default_rng(1)), CameraResponse()
-    )
-    assert np.isclose(image.mean(), 301.0, atol=0.02)
-    assert image.std() < 0.07
-
-
-def test_gain_control_stretches_to_all_levels():
-    counts = np.linspace(7000, 7400, 19200).reshape(SHAPE).astype(np.uint16)
-    grey = gain_control(counts)
-    assert grey.min() == 0
-    assert grey.max() == 255
-    assert np.isclose(grey[60, 80], 127, atol=4)
-    assert gain_control(np.full(SHAPE, 5000, np.uint16)).max() == 0
 
 
 def test_a_sensor_of_another_size_is_refused():

@@ -1,4 +1,4 @@
-"""What a thermal camera makes of a scene: blur, vignetting, noise, dead pixels, 14 bits, shutter, 8 bits."""
+"""What a thermal camera makes of a scene: blur, vignetting, noise, dead pixels, 14 bits."""
 
 from __future__ import annotations
 
@@ -136,69 +136,3 @@ def to_kelvin(counts: NDArray[np.integer], response: CameraResponse) -> NDArray[
     """Kelvin of counts (H, W), by the gain and the level of ``response``."""
     value = (counts.astype(np.float32) - response.counts_level) / response.counts_per_kelvin
     return np.asarray(value + np.float32(response.counts_at), np.float32)
-
-
-def gain_control(counts: NDArray[np.integer], share: float = 0.01) -> NDArray[np.uint8]:
-    """256 grey levels of counts, from the ``share`` of the darkest to that of the brightest: simple AGC.
-
-    Parameters
-    ----------
-    counts
-        (H, W).
-    share
-        Of the pixels that may be black, and white.
-
-    Returns
-    -------
-    (H, W) uint8.
-    """
-    low, high = np.quantile(counts, [share, 1 - share])
-    return np.asarray(np.clip(np.rint((counts - low) * (255 / max(high - low, 1.0))), 0, 255), np.uint8)
-
-
-def in_shutter(times: ArrayLike, every: float, lasting: float, first: float = 0.0) -> NDArray[np.bool_]:
-    """Which exposures meet a closed shutter (flat-field correction), at which the image is even and the same.
-
-    Parameters
-    ----------
-    times
-        (N,) s.
-    every, lasting, first
-        A correction begins so often, takes so long, and begins then for the first time, s.
-
-    Returns
-    -------
-    (N,) bool.
-
-    Examples
-    --------
-    >>> in_shutter([0.0, 0.3, 1.0, 60.2], every=60.0, lasting=0.5).tolist()
-    [True, True, False, True]
-    """
-    since = np.asarray(times, float) - first
-    return np.asarray((since >= 0) & (np.mod(since, every) < lasting))
-
-
-def shutter_image(
-    shape: tuple[int, int], level: float, response: CameraResponse, rng: np.random.Generator
-) -> NDArray[np.uint16]:
-    """What a camera shows with its shutter closed: the shutter's temperature ``level`` (K), and noise.
-
-    Parameters
-    ----------
-    shape
-        Rows and columns.
-    level
-        K.
-    response
-        The camera.
-    rng
-        Of the image.
-
-    Returns
-    -------
-    (H, W) counts.
-    """
-    even = np.full(shape, level, np.float32)
-    nothing = Sensor(np.zeros(shape, np.float32), np.zeros(shape, bool), np.zeros(shape, np.uint16))
-    return expose(even, response, nothing, rng)
