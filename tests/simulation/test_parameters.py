@@ -364,7 +364,7 @@ source = "H 6.4.4: 349 images had both vessels within the same image"
             "[target.motion.deviation_longest_period]\nvalue = 9.0",
             "deviation_shortest_period",
         ),
-        ("gondola", "[cable.lowest]\nvalue = 3.0", "[cable.lowest]\nvalue = 30.0", "lowest is more than highest"),
+        ("gondola", "[cable.lowest]\nvalue = 3.0", "[cable.lowest]\nvalue = 30.0", "lowest is more"),
         (
             "gondola",
             "[enclosures.lake.length]\nvalue = 280.0",

@@ -37,11 +37,9 @@ from wildlab.navigation.mekf import (
     signs_of_trouble,
 )
 from wildlab.navigation.noise import (
-    ADIS16490,
     STIM300,
     AxisErrors,
     ImuNoise,
-    from_data_sheet,
     with_turn_on,
 )
 from wildlab.navigation.observer import (
@@ -56,7 +54,6 @@ from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
 from wildlab.navigation.strapdown import DeadReckoning, Gap, ImuSamples, integrate_strapdown
 
 __all__ = [
-    "ADIS16490",
     "STIM300",
     "Aiding",
     "AxisErrors",
@@ -84,7 +81,6 @@ __all__ = [
     "earth_field",
     "field_reference",
     "find_rest",
-    "from_data_sheet",
     "hard_iron",
     "headings",
     "integrate_strapdown",

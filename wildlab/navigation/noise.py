@@ -93,51 +93,8 @@ def with_turn_on(noise: ImuNoise, accelerometer: float, gyro: float) -> ImuNoise
     return ImuNoise(*noise[:2], *biases)
 
 
-def from_data_sheet(
-    *,
-    velocity_random_walk: float,
-    angle_random_walk_deg: float,
-    accelerometer_bias: float,
-    gyro_bias_deg: float,
-    bias_time: float,
-) -> ImuNoise:
-    """Noise in the units of data sheets.
-
-    Parameters
-    ----------
-    velocity_random_walk
-        m/s/sqrt(h).
-    angle_random_walk_deg
-        deg/sqrt(h).
-    accelerometer_bias
-        In-run stability, m/s^2 (a milli-g is 0.00981).
-    gyro_bias_deg
-        In-run stability, deg/h.
-    bias_time
-        How long biases keep, s. Data sheets do not say.
-
-    Returns
-    -------
-    ImuNoise
-        In SI units, with that time for both biases.
-    """
-    return ImuNoise(
-        velocity_random_walk / 60,
-        float(np.radians(angle_random_walk_deg)) / 60,
-        accelerometer_bias,
-        bias_time,
-        float(np.radians(gyro_bias_deg)) / 3600,
-        bias_time,
-    )
-
-
-#: H table A.5; the time is chosen: the minute or so at which Allan deviations of such sensors are lowest.
-ADIS16490 = from_data_sheet(
-    velocity_random_walk=0.008, angle_random_walk_deg=0.09, accelerometer_bias=3.6e-6 * USUAL_GRAVITY,
-    gyro_bias_deg=1.8, bias_time=100.0,
-)  # fmt: skip
-#: H table A.6; the time as above.
-STIM300 = from_data_sheet(
-    velocity_random_walk=0.07, angle_random_walk_deg=0.15, accelerometer_bias=0.05e-3 * USUAL_GRAVITY,
-    gyro_bias_deg=0.3, bias_time=100.0,
+#: H table A.6; the time is chosen: the minute or so at which Allan deviations of such sensors are lowest.
+STIM300 = ImuNoise(
+    0.07 / 60, float(np.radians(0.15)) / 60, 0.05e-3 * USUAL_GRAVITY, 100.0, float(np.radians(0.3)) / 3600,
+    100.0,
 )  # fmt: skip

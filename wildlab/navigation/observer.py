@@ -8,9 +8,6 @@ usual.
 H's second vector is the baseline between two antennas. A log with one antenna has none;
 :func:`field_reference` takes the magnetic field, :func:`course_reference` the course, instead. Both are
 beyond H, and as wrong as the field's calibration or the crab angle. So are antennas' velocities.
-
-The compiled loop works quaternions out again rather than call `kernels`: the compiler's cache looks only at
-the file that a function stands in. Tests hold it against the same in plain numpy.
 """
 
 from __future__ import annotations
@@ -29,9 +26,16 @@ from wildlab.geometry.frames import (
     matrix_to_quaternion,
     quaternion_to_matrix,
 )
-from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather, set_out
-from wildlab.navigation.kernels import POSITION, VELOCITY, Integers
+from wildlab.navigation.kernels import (
+    POSITION,
+    VELOCITY,
+    Integers,
+    exponential,
+    multiply,
+    normalise,
+    rotation_of,
+)
 from wildlab.navigation.mekf import InitialState, check_initial
 from wildlab.navigation.strapdown import Gap, ImuSamples, Measurements, Timeline, checked_imu
 
@@ -54,28 +58,14 @@ def gravity_at(p: Array, g: Array) -> None:
 
 
 @compiled
-def attitude_step(q: Array, x: float, y: float, z: float, turned: float) -> None:
-    """``q`` turned by the rotation vector x, y, z in b, and by ``turned`` (rad) of the Earth."""
-    angle = np.sqrt(x * x + y * y + z * z)
-    scale = 0.5 - angle * angle / 48 if angle < 1e-4 else np.sin(angle / 2) / angle
-    c, sx, sy, sz = np.cos(angle / 2), scale * x, scale * y, scale * z
-    w0 = q[0] * c - q[1] * sx - q[2] * sy - q[3] * sz
-    x0 = q[0] * sx + c * q[1] + q[2] * sz - q[3] * sy
-    y0 = q[0] * sy + c * q[2] + q[3] * sx - q[1] * sz
-    z0 = q[0] * sz + c * q[3] + q[1] * sy - q[2] * sx
-    ce, se = np.cos(turned / 2), np.sin(turned / 2)
-    q[0], q[1], q[2], q[3] = ce * w0 + se * z0, ce * x0 + se * y0, ce * y0 - se * x0, ce * z0 - se * w0
-    size = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    for i in range(4):
-        q[i] /= size
-
-
-@compiled
-def rotation(q: Array, R: Array) -> None:
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    R[0, 0], R[0, 1], R[0, 2] = w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)
-    R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)
-    R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z
+def attitude_step(q: Array, turn: Array, turned: float, work: Array) -> None:
+    """``q`` turned by half a rotation vector ``turn`` (3,) in b, and by ``turned`` (rad) of the Earth."""
+    by, after = work[0], work[1]
+    exponential(turn[0] / 2, turn[1] / 2, turn[2] / 2, by)
+    multiply(q, by, after)
+    exponential(0.0, 0.0, -turned, by)
+    multiply(by, after, q)
+    normalise(q)
 
 
 @compiled
@@ -178,7 +168,7 @@ def observe(
     k1, k2, k_i, inner, outer, theta, q_f, q_xi, limit, hold = gains
     R, f_mean, sigma, held, move = np.empty((3, 3)), np.empty(3), np.empty(3), np.zeros(3), np.empty(3)
     f_b, f_e, g, a, c, work = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    y, K, held_until = np.empty(3), np.empty((9, 3)), -np.inf
+    y, K, held_until, quaternions = np.empty(3), np.empty((9, 3)), -np.inf, np.empty((2, 4))
     event = 0
     for k in range(len(times)):
         if k > 0:
@@ -189,7 +179,7 @@ def observe(
             else:
                 for i in range(3):
                     f_mean[i] = (f[k - 1, i] + f[k, i]) / 2
-                rotation(q, R)
+                rotation_of(q, R)
                 force_directions(f_mean, R, x[6:9], limit, f_b, f_e, work)
                 injection(f_b, f_e, R, k1, sigma, work)
                 if times[k] <= held_until:
@@ -198,9 +188,9 @@ def observe(
                 for i in range(3):
                     a[i] = dt * ((w[k - 1, i] + w[k, i]) / 2 - b[i] + sigma[i])
                     move[i] = -k_i * sigma[i]
-                attitude_step(q, a[0] / 2, a[1] / 2, a[2] / 2, RATE * dt / 2)
-                rotation(q, R)
-                attitude_step(q, a[0] / 2, a[1] / 2, a[2] / 2, RATE * dt / 2)
+                attitude_step(q, a, RATE * dt / 2, quaternions)
+                rotation_of(q, R)
+                attitude_step(q, a, RATE * dt / 2, quaternions)
                 project(b, move, inner, outer)
                 gravity_at(x, g)
                 cross(sigma, f_mean, c)
@@ -216,7 +206,7 @@ def observe(
                     x[6 + i] -= dt * (R[i, 0] * c[0] + R[i, 1] * c[1] + R[i, 2] * c[2])
             riccati_step(P, theta * dt, q_f, q_xi)
         while event < len(node) and node[event] == k:
-            rotation(q, R)
+            rotation_of(q, R)
             sort = kind[event]
             if sort in (POSITION, VELOCITY):
                 first = 0 if sort == POSITION else 3
@@ -418,7 +408,7 @@ def prepare(
     check_initial(start)
     line, gaps = set_out(imu, start.time, aiding, wanted, max_gap)
     p_e, R_en = earth_axes(origin)
-    in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == kernels.POSITION else 0.0)) for a in aiding]
+    in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == POSITION else 0.0)) for a in aiding]
     measured, _, unused = gather(in_e, line)
     between = np.diff(np.unique(measured.node[measured.kind == REFERENCE]))
     apart = (
