@@ -173,9 +173,9 @@ def first_generation(truth: Truth, seconds: float = 40.0) -> Log:
 
 SECOND = """
     MSG QZ TimeUS,Message
-    ORGN QBLLe TimeUS,Type,Lat,Lng,Alt
     ATT QccccCCCC TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw
-    NKF1 QccCfffffffccce TimeUS,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH
+    NKF1 Qfff TimeUS,VN,VE,VD
+    POS QLLff TimeUS,Lat,Lng,Alt,RelHomeAlt
     IMU2 Qffffff TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ
     IMU Qffffff TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ
     GPS QBIHBcLLefffB TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,U
@@ -184,16 +184,10 @@ SECOND = """
 """
 
 
-def second_generation(truth: Truth, seconds: float = 40.0, origin: bool = True) -> Log:
-    """TimeUS; one message name per sensor; positions by POS or by NKF1 and ORGN."""
+def second_generation(truth: Truth, seconds: float = 40.0) -> Log:
+    """TimeUS; one message name per sensor."""
     log = Log(SECOND)
-    began = round(truth.boot_s * 1e6)
-    log.add("MSG", began, "ArduPlane V3.8.2-dev (8178ab40)")
-    if origin:
-        log.add("ORGN", began, 1, 0.5, 0.5, 0)
-        log.add("ORGN", began, 0, LATITUDE, LONGITUDE, HOME)
-    # Metres of a degree, as the autopilot takes them.
-    degree = 0.011131884502145034 * 1e7
+    log.add("MSG", round(truth.boot_s * 1e6), "ArduPlane V3.8.2-dev (8178ab40)")
 
     def fast(t: float) -> None:
         us = round(t * 1e6)
@@ -201,11 +195,8 @@ def second_generation(truth: Truth, seconds: float = 40.0, origin: bool = True) 
         log.add("IMU2", us, 9, 9, 9, 9, 9, 9)
         log.add("IMU", us, 0.01, 0.02, 0.03, 0.1, 0.2, -9.8)
         log.add("ATT", us, 0, roll, 0, pitch, 0, yaw, 0, 0)
-        latitude, longitude, height = truth.place(t)
-        step = latitude - LATITUDE
-        east = (longitude - LONGITUDE) * degree * np.cos(np.radians(LATITUDE + step / 2))
-        moved = (9.9, -9.9, -0.5, 0, step * degree, east, HOME - height)
-        log.add("NKF1", us, roll, pitch, yaw, *moved, 0, 0, 0, 0)
+        log.add("NKF1", us, 9.9, -9.9, -0.5)
+        log.add("POS", us, *truth.place(t)[:2], *truth.heights(t)[:2])
 
     def slow(t: float) -> None:
         us, (week, ms) = round(t * 1e6), truth.week_ms(t)

@@ -112,16 +112,6 @@ def test_missing_columns():
     assert set(seconds["why"]) == {"", "repeated stamp"}
 
 
-def test_text_in_columns_of_numbers_and_placeholders():
-    made = rows()
-    made[3]["latitude"] = "Available with any HD 360 subscription"
-    made[4]["latitude"] = made[4]["longitude"] = 0
-    made[5][" roll(degrees)"] = "nan"
-    made[6][" xSpeed(m/s)"] = "1e9"
-    why = ["", "no position", "position is a placeholder", "no attitude", "impossible speed", ""]
-    assert columns_of(airdata, table(made), "poses")["why"][2:8].tolist() == why
-
-
 def test_a_quotation_mark_costs_one_line():
     text = table(rows()).replace("63.4000090", '"63.4000090')
     log = airdata.read(Path("x.csv"), text.encode())

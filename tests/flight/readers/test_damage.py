@@ -10,7 +10,7 @@ from tests.flight.readers import test_nmea as of_nmea
 from tests.flight.readers import test_rtklib_pos as of_pos
 from tests.flight.readers.test_dji_mrk import row
 from tests.flight.readers.test_dji_srt import new, subtitles
-from tests.flight.readers.test_ubx import message, old, pvt
+from tests.flight.readers.test_ubx import message, pvt
 from tests.flight.readers.tracks import Reader, survives
 from wildlab.errors import WildlabError
 
@@ -34,11 +34,6 @@ AIRDATA = of_airdata.table(of_airdata.rows(120))
             gpx,
             of_gpx.document(of_gpx.point(0, inside="<a>" * 100000 + "</a>" * 100000)),
             "has no point of a track",
-        ),
-        (
-            rtklib_pos,
-            of_pos.WAYS["UTC"].replace(of_pos.LLH, "e-baseline(m) n-baseline(m) u-baseline(m)"),
-            "out-solformat = llh",
         ),
         (rtklib_pos, "%  GPST latitude(deg) longitude(deg) height(m)\nhello\n1,2\n", "no position; 2 lines"),
         (airdata, "time(millisecond),longitude\n1,2\n", "column 'latitude'"),
@@ -72,7 +67,6 @@ def test_others_are_not_taken_for_them(reader, head, name):
     ("reader", "data", "share"),
     [
         (ubx, b"".join(map(pvt, range(30))), 0.89),
-        (ubx, b"".join(map(old, range(10))), 0.83),
         (nmea, of_nmea.track(of_nmea.datetime(2020, 1, 1, tzinfo=of_nmea.UTC), 40), 0.89),
         (mrk, "".join(map(row, range(1, 30))).encode(), 0.89),
         (srt, subtitles(*map(new, range(30))).encode(), 0.89),

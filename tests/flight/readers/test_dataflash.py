@@ -75,13 +75,6 @@ def test_every_field_is_as_pymavlink_has_it(shared_data, name):
     assert compare(shared_data("logs", *name.split("/"))) > 10_000
 
 
-@pytest.mark.parametrize("make", [first_generation, second_generation, third_generation])
-def test_made_up_logs_too(tmp_path, make):
-    path = tmp_path / "made.bin"
-    path.write_bytes(make(Truth(2025), 8.0).binary())
-    assert compare(path) > 1000
-
-
 def test_every_format_character(tmp_path):
     characters = "bBhHiIfdcCeELMqQ"
     columns = ",".join(f"A{i}" for i in range(len(characters)))

@@ -65,30 +65,6 @@ def test_no_times():
     assert log.clock is None
 
 
-def test_order_repetition_and_jumps():
-    wrong = {
-        5: (point(4, lat=63.001), "repeated stamp"),
-        9: (point(0, stamp="2026-06-03T10:00:00Z"), "stamp out of order"),
-        15: (point(12, lat=-30.0, stamp="2026-06-01T10:00:12.500Z"), "impossible jump"),
-        16: (point(12, lat=63.0013, inside="<ele>1</ele>"), "no time"),
-        17: (point(0, lat=0.0).replace('lon="10.5"', 'lon="0.0"'), "position is a placeholder"),
-    }
-    body = [point(k) for k in range(20)]
-    for at, (one, _) in wrong.items():
-        body.insert(at, one)
-    found = columns_of(gpx, document("".join(body)))["why"]
-    assert {k: one for k, one in enumerate(found) if one} == {k: why for k, (_, why) in wrong.items()}
-
-
-@pytest.mark.parametrize(("some", "used"), [(6, 6), (4, 10)])
-def test_heights_of_some_points(some, used):
-    body = "".join(point(k) if k < some else point(k).replace("ele>", "x>") for k in range(10))
-    log = gpx.read(Path("x.gpx"), document(body))
-    check(log)
-    assert log.parts["gnss"].used.sum() == used
-    assert bool(log.notes) == (some == 4)
-
-
 def test_segments_newest_first():
     late, early = "".join(map(point, range(50, 60))), "".join(map(point, range(10)))
     log = gpx.read(Path("x.gpx"), document(late, early))

@@ -127,14 +127,12 @@ def test_no_fix_no_dilution_and_repeated():
     assert columns["why"].tolist() == [why for _, _, why in cases]
 
 
-def test_gns_gll_vtg_and_old_vtg():
+def test_gns_gll_and_vtg():
     zda = "GNZDA,101010.00,05,06,2022,00,00"
     gns = "GNGNS,101010.00,6300.0,N,01030.0,E,NRA,17,0.5,55.2,39.1,,"
     one = bodies(zda, gns, "GNVTG,90.0,T,,M,10.0,N,18.52,K,A")
     near(one, time_s=datetime(2022, 6, 5, 10, 10, 10, tzinfo=UTC).timestamp(), fix=6)
     near(one, height_sea_m=55.2, undulation_m=39.1, v_east_m_s=10 * KNOT)
-    near(bodies(zda, gns, "GPVTG,90.0,,10.0,18.52"), v_east_m_s=10 * KNOT)
-    near(bodies(zda, gns, "GPVTG,180.0,,,,,,18.0,K"), v_north_m_s=-5.0)
     gll = bodies(zda, *(f"GPGLL,6300.0,N,01030.0,E,1010{rest}" for rest in ("11.00,V,N", "12.00,A,D")))
     assert gll["why"].tolist() == ["no fix", ""]
     assert gll["fix"].tolist() == [0.0, 4.0]

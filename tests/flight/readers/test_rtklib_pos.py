@@ -128,11 +128,6 @@ def test_reordered_and_missing_columns():
     assert "sd_horizontal_m" not in columns
 
 
-def test_repeated_rows():
-    columns = columns_of(rtklib_pos, document("GPST", [*GPST[:5], *GPST[4:10]], [llh()[0]] * 11))
-    assert columns["why"].tolist() == [*[""] * 5, "repeated stamp", *[""] * 5]
-
-
 def test_lost_lines_and_wide_headers():
     text = document("GPST", GPST, llh()).replace(GPST[3], "2025/13/45 99:00:00")
     text = text.replace("ratio", "ratio " + "x " * 10000)

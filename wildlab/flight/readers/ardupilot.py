@@ -32,7 +32,10 @@ from wildlab.flight.readers.log import (
     Mask,
     Readings,
     any_of,
+    holding,
     in_order,
+    level_velocity,
+    named,
     placed,
 )
 from wildlab.flight.readers.text import percent
@@ -49,8 +52,6 @@ _SURE_ROWS = 5
 _LASTING = frozenset({"FMT", "FMTU", "UNIT", "MULT", "PARM", "VER", "MSG"})
 #: Spreads of this and more are what 16 bits hold, not what a receiver found; no undulation is so large.
 WORST_SPREAD_M, WORST_UNDULATION_M = 655.0, 200.0
-#: Metres of a step of 1e-7 deg of latitude, as ArduPilot takes it between degrees and metres.
-_STEP_M = 0.011131884502145034
 #: What an autopilot of this family calls itself, with its version.
 _VEHICLE = re.compile(
     r"\b(?:Ardu\w+|APM:?\w+|AntennaTracker|Blimp|Rover|Sub)\s+V?\d[\w.()-]*(?: \([0-9a-f]+\))?"
@@ -170,7 +171,7 @@ def _decoded(
     tables, left_out = longest_run(tables)
     log, receivers = _clocked(tables, counted_in)
     gnss = None if log.receiver is None else _gnss(log, log.receiver)
-    place = next((one for name in ("POS", "AHR2", "XKF1", "NKF1") if (one := _place_of(name, log))), None)
+    place = next((one for name in ("POS", "AHR2") if (one := _place_of(name, log))), None)
     if place is None and gnss is not None and log.receiver is not None:
         place = _place_of_gnss(gnss, log.receiver, log)
     found = {
@@ -308,21 +309,17 @@ class PlaceTrack(NamedTuple):
         high = any_of([np.isfinite(self.columns[one]) for one in _PLACE[2:]], len(self.stamps))
         return at_times(self.stamps, self.columns, stamps, f"messages {self.name}", ~high)
 
-    def is_known(self) -> bool:
-        """Whether any of its rows can be used."""
-        return bool(np.isfinite(self.at(self.stamps)["latitude_deg"]).any())
-
 
 def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Readings:
     """Satellite positions of one receiver, with what messages GPA say of how sure it was."""
     stamps, columns = log.of(receiver), receiver.columns(GNSS)
-    speed, course = receiver.get("Spd"), np.radians(receiver.get("GCrs"))
+    speed = receiver.get("Spd")
     # A fix may be written down late; its own time then says so. One far from the clock's is damaged.
     clock, own = log.utc(stamps), gps_utc(receiver)
     columns |= {
         "time_s": np.where(_true_fix(receiver) & (np.abs(own - clock) < LATEST_S), own, clock),
         "time_log_s": stamps,
-        **{"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)},
+        **level_velocity(speed, receiver.get("GCrs")),
         **_accuracies(receiver, log, stamps, columns["v_down_m_s"]),
     }
     unusable = {
@@ -360,20 +357,17 @@ def _accuracies(receiver: MessageTable, log: ArdupilotLog, stamps: Array, down: 
 
 
 def _place_of(name: str, log: ArdupilotLog) -> PlaceTrack | None:
-    """True positions by messages POS, AHR2, or XKF1 and NKF1 with the origin of ORGN; None where none is."""
+    """True positions by messages POS or AHR2; None where none is."""
     table = next(iter(log.sensors(name)), None)
     if table is None:
         return None
-    if name in ("XKF1", "NKF1"):
-        columns = _from_origin(table, log)
-    else:
-        columns = table.columns(PLACE)
-        if table.has("RelOriginAlt"):
-            # Before the filter has its origin, heights count from nothing.
-            nowhere = np.isnan(table.get("RelOriginAlt"))
-            columns |= {one: np.where(nowhere, np.nan, columns[one]) for one in _PLACE[2:]}
+    columns = table.columns(PLACE)
+    if table.has("RelOriginAlt"):
+        # Before the filter has its origin, heights count from nothing.
+        nowhere = np.isnan(table.get("RelOriginAlt"))
+        columns |= {one: np.where(nowhere, np.nan, columns[one]) for one in _PLACE[2:]}
     place = PlaceTrack(name, log.of(table), columns)
-    return place if columns and place.is_known() else None
+    return place if np.isfinite(place.at(place.stamps)["latitude_deg"]).any() else None
 
 
 def _place_of_gnss(gnss: Readings, receiver: MessageTable, log: ArdupilotLog) -> PlaceTrack | None:
@@ -387,30 +381,6 @@ def _place_of_gnss(gnss: Readings, receiver: MessageTable, log: ArdupilotLog) ->
     return PlaceTrack(receiver.name, stamps[used], columns) if used.any() else None
 
 
-def _from_origin(table: MessageTable, log: ArdupilotLog) -> dict[str, Array]:
-    if "ORGN" not in log.tables:
-        return {}
-    origins = log.tables["ORGN"]
-    # Type 0 is where the filter counts from; 1 is home.
-    origins = origins.take(origins.get("Type") == 0) if origins.has("Type") else origins
-    latitude, longitude = origins.get("Lat"), origins.get("Lng")
-    since = log.of(origins)
-    kept = in_order(since, placed(latitude, longitude))
-    if not kept.any():
-        return {}
-    at = np.maximum(np.searchsorted(since[kept], log.of(table), side="right") - 1, 0)
-    latitude_0, longitude_0 = latitude[kept][at], longitude[kept][at]
-    north, east, down = (table.get(one) for one in ("PN", "PE", "PD"))
-    step = north / _STEP_M * 1e-7
-    # The width of a degree halfway, as the autopilot has it: so its own degrees come back.
-    width = np.maximum(np.cos(np.radians(latitude_0 + step / 2)), 0.01)
-    return {
-        **{"latitude_deg": latitude_0 + step, "longitude_deg": longitude_0 + east / _STEP_M * 1e-7 / width},
-        "height_sea_m": origins.get("Alt")[kept][at] - down,
-        "height_home_m": np.full(len(table), np.nan),
-    }
-
-
 # -- motion
 
 #: Parts -> messages that have them, best first; fields that they need; our columns of theirs; a factor.
@@ -418,12 +388,12 @@ SENSORS: dict[str, tuple[tuple[str, ...], str, dict[str, str], float]] = {
     # Milligauss.
     "magnetometer": (
         ("MAG", "MAG2", "MAG3"), "MagX MagY MagZ",
-        dict(zip(FIELD, ("MagX", "MagY", "MagZ"), strict=True)), 0.1,
+        named(FIELD, ("MagX", "MagY", "MagZ")), 0.1,
     ),
     # Against north and the horizon, and its yaw against the airframe.
     "gimbal": (
         ("MNT", "MNT1", "MOUNT"), "Roll Pitch",
-        dict(zip((*WORLD, "pan_deg"), ("Roll", "Pitch", "YawE", "YawB"), strict=True)), 1.0,
+        named((*WORLD, "pan_deg"), ("Roll", "Pitch", "YawE", "YawB")), 1.0,
     ),
     # The first generation has only GPS time, of the fix before: the messages around tell more closely.
     "triggers": (
@@ -448,10 +418,6 @@ def _sensor(log: ArdupilotLog, part: str) -> Readings | None:
         # Without it, copters and planes meant different things by `Alt`.
         there.pop("height_sea_m", None)
     columns = {name: values * factor for name, values in table.columns(there).items()}
-    if part == "triggers":
-        # Before the first fix images have no place, but they were taken.
-        known = placed(columns["latitude_deg"], columns["longitude_deg"])
-        columns |= {name: np.where(known, columns[name], np.nan) for name in _PLACE[:2]}
     return log.readings(table, columns)
 
 
@@ -460,8 +426,8 @@ def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
 
     Attitudes are those of messages ATT, else quaternions of XKQ or NKQ, else of AHR2.
     """
-    euler = dict(zip(ANGLES, ("Roll", "Pitch", "Yaw"), strict=True))
-    q = dict(zip(("q_w", "q_x", "q_y", "q_z"), ("Q1", "Q2", "Q3", "Q4"), strict=True))
+    euler = named(ANGLES, ("Roll", "Pitch", "Yaw"))
+    q = named(("q_w", "q_x", "q_y", "q_z"), ("Q1", "Q2", "Q3", "Q4"))
     filters = ("XKQ", "XKQ1", "NKQ", "NKQ1", "XKQ2", "NKQ2")
     ways = ((("ATT",), euler), (filters, q), (("AHR2", "AHRS"), euler))
     found = ((table, one) for names, one in ways if (table := log.first(names, *one.values())) is not None)
@@ -482,7 +448,7 @@ def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
 
 def _imu(log: ArdupilotLog) -> Readings | None:
     """Specific force and rates of turn of the first IMU; None where the log has none."""
-    f, w = (dict(zip(IMU[at : at + 3], (f"{start}{axis}" for axis in "XYZ"), strict=True))
+    f, w = (named(IMU[at : at + 3], (f"{start}{axis}" for axis in "XYZ"))
             for at, start in ((0, "Acc"), (3, "Gyr")))  # fmt: skip
     both = log.first(("IMU", "IMU2", "IMU3"), "GyrX", "AccX")
     force = both or log.first(("ACC", "ACC1", "ACC2", "ACC3"))
@@ -514,7 +480,7 @@ def _notes(
             "triggers" in parts and "height_sea_m" not in parts["triggers"].columns
         ),
     }
-    return [text for text, holds in notes.items() if holds]
+    return holding(notes)
 
 
 __all__ = ["decode", "sniff", "text_decode", "text_sniff"]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.readers.log import named
 from wildlab.flight.readers.text import Field, parse_json
 
 Part = Literal["frames", "lidar", "radar", "ir", "eo", "truth"]
@@ -77,12 +78,12 @@ def _detections(frames: list[Field], part: Part) -> tuple[dict[str, NDArray[Any]
     if part == "frames":
         kinds = np.array(sensors, dtype=object)[order]
         columns = {"frame": names[order], "sensor": kinds, "time": times[order]}
-        return columns | dict(zip(("north", "east"), own[order].T, strict=True)), order + 1
+        return columns | named(("north", "east"), own[order].T), order + 1
     rows = [i for i in order if sensors[i] == part]
     of_row = np.repeat(rows, [len(seen[i]) for i in rows]).astype(np.int64)
     measures = ("bearing",) if part in CAMERAS else ("north", "east")
     values = np.concatenate([np.empty((0, len(measures))), *(seen[i] for i in rows)])
-    return {"frame": names[of_row], **dict(zip(measures, values.T, strict=True))}, of_row + 1
+    return {"frame": names[of_row], **named(measures, values.T)}, of_row + 1
 
 
 def _truth(frames: list[Field]) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
@@ -103,7 +104,7 @@ def _truth(frames: list[Field]) -> tuple[dict[str, NDArray[Any]], NDArray[np.int
         "target": np.array([target for target, _ in keys], dtype=object),
         "time": np.array([time for _, time in keys], dtype=float),
     }
-    columns |= dict(zip(("north", "east", "down"), values.T, strict=True))
+    columns |= named(("north", "east", "down"), values.T)
     return columns, np.array([found[key][1] + 1 for key in keys], dtype=np.int64)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.clocks import between
-from wildlab.flight.readers.log import WORLD, Array, Mask, Readings, any_of, judge
+from wildlab.flight.readers.log import WORLD, Array, Mask, Readings, any_of, judge, named
 from wildlab.flight.readers.text import decode
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 
@@ -146,7 +146,7 @@ def at_times(
         # Damaged values may be anything.
         with np.errstate(over="ignore", invalid="ignore"):
             found[finite] = between(own[good], np.stack(list(taken.values()), axis=1), times[finite], what)
-    made = dict(zip(values, found.T, strict=True))
+    made = named(values, found.T)
     if "longitude_deg" in made:
         made["longitude_deg"] = wrapped(made["longitude_deg"])
     return made
@@ -182,7 +182,7 @@ def device_angles(q: ArrayLike, flags: ArrayLike, heading_deg: ArrayLike) -> dic
     said = np.asarray(flags).astype(np.int64)
     north = np.where(said & (YAW_NORTH | YAW_VEHICLE), said & YAW_NORTH, said & YAW_LOCK) > 0
     yaw = np.where(north, angles[:, 2], wrapped(angles[:, 2] + np.asarray(heading_deg, float)))
-    return dict(zip(WORLD, (angles[:, 0], angles[:, 1], yaw), strict=True))
+    return named(WORLD, (angles[:, 0], angles[:, 1], yaw))
 
 
 def euler_deg(q: ArrayLike, tolerance: float) -> Array:

@@ -27,7 +27,19 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import ClockFit, fit_clock
-from wildlab.flight.readers.log import ANGLES, PLACE, VELOCITY, WORLD, Array, Clock, Decoded, Mask, Readings
+from wildlab.flight.readers.log import (
+    ANGLES,
+    PLACE,
+    VELOCITY,
+    WORLD,
+    Array,
+    Clock,
+    Decoded,
+    Mask,
+    Readings,
+    holding,
+    named,
+)
 from wildlab.flight.readers.text import calendar_s, decode, number, numbers, plural, stamp_s
 from wildlab.flight.time_scales import WEEK_S, wall_to_utc, week_to_utc
 
@@ -57,7 +69,7 @@ _GIMBAL = ("pitch_world_deg", "roll_world_deg", "yaw_world_deg")
 class _Block(NamedTuple):
     """What one subtitle says: seconds, `_PLACE`, `_AIRCRAFT` and `_GIMBAL`.
 
-    `unnamed`: the place stood as longitude and latitude without names; `vague`: the height as `altitude`.
+    `vague`: the height stood as `altitude`.
     """
 
     code: float
@@ -65,7 +77,6 @@ class _Block(NamedTuple):
     place: list[float]
     aircraft: list[float]
     gimbal: list[float]
-    unnamed: bool
     vague: bool
 
 
@@ -101,30 +112,27 @@ def srt_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         fix = "switch video captions on in DJI's app before the flight, and take the aircraft's own file"
         raise WildlabError(problem, fix, file=path)
     place = np.array([block.place for block in blocks])
-    turned = _turn(place, np.array([block.unnamed for block in blocks]))
     times, clock, reasons = _times(blocks, zone)
     notes = {
-        "the numbers behind GPS can only be latitude and longitude, in this order": turned,
         "no clock in it: stamps are those of the subtitles, from the beginning of the video": clock is None,
         "its clock is local time without a zone: state the zone": NO_ZONE in reasons,
         "altitude is taken as height above take-off, which the file does not say": any(
             block.vague for block in blocks
         ),
     }
-    columns = {**times, **dict(zip(_PLACE, place.T, strict=True))}
+    columns = times | named(_PLACE, place.T)
     parts = {"gnss": Readings(columns, rows, "subtitle", reasons)}
     placed = {name: values for name, values in columns.items() if name != "satellites"}
     for part, names, before in (("poses", _AIRCRAFT, placed), ("gimbal", _GIMBAL, times)):
         angles = np.array([block.aircraft if part == "poses" else block.gimbal for block in blocks])
         if np.isfinite(angles).any():
-            made = before | dict(zip(names, angles.T, strict=True))
-            parts[part] = Readings(made, rows, "subtitle", reasons)
+            parts[part] = Readings(before | named(names, angles.T), rows, "subtitle", reasons)
     bad = len(found) - len(blocks)
     return Decoded(
         parts,
         clock=clock,
         lost=[(bad, "subtitle", f"of {len(found)} without a place")],
-        notes=[said for said, holds in notes.items() if holds],
+        notes=holding(notes),
     )
 
 
@@ -138,18 +146,17 @@ def _block(code: re.Match[str], body: str) -> _Block | None:
     # So the word stands in files of some aircraft.
     latitude, longitude = of("latitude"), of("longitude", "longtitude")
     home, sea, satellites = of("rel_alt"), of("abs_alt"), np.nan
-    unnamed = vague = False
+    vague = False
     if "latitude" in pairs:
         vague = "altitude" in pairs and np.isnan(home) and np.isnan(sea)
         home = of("altitude") if vague else home
     elif len(said := groups.get("GPS", [])) >= 2:
         longitude, latitude = _first(said[0]), _first(said[1])
         # The family that says its height here has the latitude first.
-        unnamed = len(said) == 2 or not said[2].strip().upper().endswith("M")
-        if unnamed:
-            satellites = _first(said[2]) if len(said) > 2 else np.nan
-        else:
+        if len(said) > 2 and said[2].strip().upper().endswith("M"):
             latitude, longitude = longitude, latitude
+        elif len(said) > 2:
+            satellites = _first(said[2])
         height = _HEIGHT.search(body)
         home = number(height[1]) if height else of("barometer")
     if "GPS" not in groups and (np.isnan(latitude) or np.isnan(longitude)):
@@ -164,7 +171,6 @@ def _block(code: re.Match[str], body: str) -> _Block | None:
         [latitude, longitude, home, sea, satellites],
         _three(groups.get("F.PRY")),
         gimbal,
-        unnamed,
         vague,
     )
 
@@ -186,15 +192,6 @@ def _wall(found: re.Match[str] | None) -> float:
     return calendar_s(*found.groups()[:6]) + int(digits) * 1e-6
 
 
-def _turn(place: Array, unnamed: Mask) -> bool:
-    """Puts latitude and longitude of the unnamed in order where they can only stand the other way."""
-    found = np.abs(place[unnamed])
-    if not len(found) or (found[:, 0] > 90).mean() <= 0.5 or (found[:, 1] <= 90).mean() <= 0.5:
-        return False
-    place[unnamed, :2] = place[unnamed][:, [1, 0]]
-    return True
-
-
 def _times(blocks: list[_Block], zone: str | None) -> tuple[dict[str, Array], Clock | None, dict[str, Mask]]:
     wall = np.array([block.wall for block in blocks])
     none = np.full(len(wall), np.nan)
@@ -205,8 +202,7 @@ def _times(blocks: list[_Block], zone: str | None) -> tuple[dict[str, Array], Cl
         times = {"time_s": none, "time_log_s": wall}
         return times, Clock(NO_ZONE, pairs=int(clocked.sum())), {NO_ZONE: clocked, "no time": ~clocked}
     utc = wall_to_utc(wall, zone)
-    ahead = float(np.median((utc - wall)[clocked]))
-    clock = Clock(f"wall clock of zone {zone[:60]}", offset_s=ahead, pairs=int(clocked.sum()))
+    clock = Clock.shifted(f"wall clock of zone {zone[:60]}", wall, utc)
     return {"time_s": utc, "time_log_s": wall}, clock, {}
 
 
@@ -253,11 +249,9 @@ def mrk_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         **{"latitude_deg": latitude, "longitude_deg": longitude, "height_ellipsoid_m": height},
         **{"sd_horizontal_m": np.sqrt((north**2 + east**2) / 2.0), "sd_vertical_m": up, "fix": fix},
     }
-    known = np.isfinite(time)
-    ahead = float(np.median((time - columns["time_log_s"])[known])) if known.any() else 0.0
     return Decoded(
         {"triggers": Readings(columns, [at for at, _ in found], "line", {"no fix": fix == 0.0})},
-        clock=Clock("GPS weeks", offset_s=ahead, pairs=int(known.sum())) if known.any() else None,
+        clock=Clock.shifted("GPS weeks", columns["time_log_s"], time),
         lost=[(len(lines) - len(found), "line", f"of {len(lines)} could not be read")],
         notes=["places are the camera's: the way from the antenna is in them already"],
     )

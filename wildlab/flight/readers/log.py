@@ -113,6 +113,28 @@ class Clock(NamedTuple):
         left = float(np.abs(fit.residual[fit.used]).max())
         return cls(base, fit.rate, fit.offset_s, fit.spread_s, left, int(fit.used.sum()), fit.rate_sd)
 
+    @classmethod
+    def shifted(cls, base: str, own: Array, utc: Array) -> Clock | None:
+        """As pairs of stamps (N,) have it whose rate is 1, by their median; None where there is none."""
+        apart = (utc - own)[np.isfinite(utc - own)]
+        return cls(base, offset_s=float(np.median(apart)), pairs=len(apart)) if len(apart) else None
+
+
+def named(names: Iterable[str], values: Iterable[Any]) -> dict[str, Any]:
+    """Values by as many names."""
+    return dict(zip(names, values, strict=True))
+
+
+def holding(notes: Mapping[str, object]) -> list[str]:
+    """Sentences for which what stands beside them holds."""
+    return [sentence for sentence, holds in notes.items() if holds]
+
+
+def level_velocity(speed: Array, course_deg: Array) -> dict[str, Array]:
+    """Columns of a speed over ground (N,) towards a course (N,), clockwise from north."""
+    course = np.radians(course_deg)
+    return {"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)}
+
 
 def any_of(masks: Iterable[ArrayLike], count: int) -> Mask:
     """(N,) where any of some masks (N,) holds; nowhere, if there is none."""
@@ -312,7 +334,7 @@ def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
     parts = {name: one for name, one in found.parts.items() if len(next(iter(one.columns.values())))}
     notes = list(found.notes)
     for name, one in parts.items():
-        columns = one.columns if name in STILL else _filled(name, one.columns)
+        columns = one.columns if name in STILL else _filled(name, one)
         notes += drop_rare_heights(columns) if track else []
         parts[name] = one._replace(columns=columns)
     if "gnss" in parts and _one_height(parts["gnss"].columns):
@@ -330,7 +352,12 @@ def _stream(name: str, one: Readings) -> Any:
     return make_stream(name, one.columns, one.rows, one.counted_in, wrong)
 
 
-def _filled(part: str, columns: Mapping[str, Any]) -> dict[str, Any]:
+def _filled(part: str, one: Readings) -> dict[str, Any]:
+    """Columns with any value; images may be taken before the first fix, and then have no place."""
+    columns = dict(one.columns)
+    if one.anywhere and "latitude_deg" in columns:
+        there = placed(columns["latitude_deg"], columns["longitude_deg"])
+        columns |= {name: np.where(there, columns[name], np.nan) for name in PLACE if name in columns}
     return {
         name: values
         for name, values in columns.items()

@@ -37,7 +37,7 @@ from wildlab.flight.readers.autopilot import (
     heading_at,
     wrapped,
 )
-from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Readings, placed
+from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Readings, named
 
 # -- what can be believed
 
@@ -93,8 +93,8 @@ class Sound(NamedTuple):
 class _Walk:
     """A walk over a file; what was learnt on the way decides what holds next."""
 
-    def __init__(self, data: bytes, topics: frozenset[str]) -> None:
-        self.data, self.topics = data, topics
+    def __init__(self, data: bytes) -> None:
+        self.data = data
         self.formats: dict[str, list[tuple[str, int, str]]] = {}
         self.measured: dict[str, tuple[int, int] | None] = {}
         self.names: dict[int, str] = {}
@@ -229,7 +229,7 @@ class _Walk:
                 if bounds is not None:
                     self.sizes[topic] = bounds
                     self.instances[name] += 1
-                    if name in self.topics and self.instances[name] <= INSTANCES:
+                    if name in TOPICS and self.instances[name] <= INSTANCES:
                         self.wanted.add(topic)
                         self.kept.append((pos, end))
         elif kind == _INFO:
@@ -260,21 +260,9 @@ class _Walk:
         return limit
 
 
-def sound_part(data: bytes, topics: frozenset[str]) -> Sound:
-    """Walk a ULog.
-
-    Parameters
-    ----------
-    data
-        The whole file, which begins with `MAGIC`.
-    topics
-        Whose messages are wanted.
-
-    Returns
-    -------
-    Sound
-    """
-    walk = _Walk(data, topics)
+def sound_part(data: bytes) -> Sound:
+    """Walk a ULog, the whole file, which begins with `MAGIC`; of its messages those of `TOPICS` are kept."""
+    walk = _Walk(data)
     skipped = places = 0
     pos = rest = min(HEADER, len(data))
     edges = [len(data)]
@@ -365,7 +353,7 @@ def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     """
     if not data.startswith(MAGIC):
         raise WildlabError("does not begin as a ULog does", "give the .ulg as it was logged", file=path)
-    sound = sound_part(data, TOPICS)
+    sound = sound_part(data)
     if sound.flags:
         raise WildlabError(
             f"says that it holds what readers have to know of, and is not known (flags {sound.flags:#x})",
@@ -508,7 +496,7 @@ def _poses(log: Px4Log, notes: list[str]) -> Readings | None:
         q = q / np.linalg.norm(q, axis=1)[:, None]
     angles = euler_deg(attitude.quaternion(), 0.1)
     q[np.isnan(angles).any(axis=1)] = np.nan
-    columns |= dict(zip(("q_w", "q_x", "q_y", "q_z", *ANGLES), (*q.T, *angles.T), strict=True))
+    columns |= named(("q_w", "q_x", "q_y", "q_z", *ANGLES), (*q.T, *angles.T))
     return log.readings(attitude, columns)
 
 
@@ -523,7 +511,7 @@ def _at(found: Messages, values: dict[str, Array], times_s: Array) -> dict[str, 
 def _from_global(place: Messages) -> dict[str, Array]:
     return {
         **_position(place),
-        **place.columns(dict(zip(VELOCITY, ("vel_n", "vel_e", "vel_d"), strict=True))),
+        **place.columns(named(VELOCITY, ("vel_n", "vel_e", "vel_d"))),
         **place.columns(SPREADS),
     }
 
@@ -551,7 +539,7 @@ def _local_motion(local: Messages) -> dict[str, Array]:
         # The variance of the tilt is that of both axes together.
         tilt, heading = np.sqrt(local.get("tilt_var") / 2), np.sqrt(local.get("heading_var"))
     return {
-        **local.columns(dict(zip(VELOCITY, ("vx", "vy", "vz"), strict=True))),
+        **local.columns(named(VELOCITY, ("vx", "vy", "vz"))),
         **{"sd_tilt_deg": np.degrees(tilt), "sd_heading_deg": np.degrees(heading)},
     }
 
@@ -560,7 +548,7 @@ def _gnss(log: Px4Log) -> Readings | None:
     found = log.first("vehicle_gps_position", "sensor_gps")
     if found is None or not (found.has("lat") or found.has("latitude_deg")):
         return None
-    velocity = found.columns(dict(zip(VELOCITY, ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s"), strict=True)))
+    velocity = found.columns(named(VELOCITY, ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")))
     moving = found.get("vel_ned_valid") != 0
     columns = _position(found) | found.columns(SPREADS | QUALITY)
     columns |= {name: np.where(moving, one, np.nan) for name, one in velocity.items()}
@@ -572,7 +560,7 @@ def _imu(log: Px4Log) -> Readings | None:
     if found is None:
         return None
     names = [f"{name}[{i}]" for name in ("accelerometer_m_s2", "gyro_rad") for i in range(3)]
-    columns = found.columns(dict(zip(IMU, names, strict=True)))
+    columns = found.columns(named(IMU, names))
     return None if np.isnan(list(columns.values())).all() else log.readings(found, columns)
 
 
@@ -592,12 +580,8 @@ def _triggers(log: Px4Log) -> Readings | None:
     found = log.first("camera_capture", "camera_trigger")
     if found is None:
         return None
-    columns = found.columns({"number": "seq"})
-    if found.has("lat"):
-        place = found.columns(LAT_LON | {"height_sea_m": "alt"})
-        there = placed(place["latitude_deg"], place["longitude_deg"])
-        columns |= {name: np.where(there, one, np.nan) for name, one in place.items()}
-    return log.readings(found, columns, anywhere=True)
+    fields = LAT_LON | {"height_sea_m": "alt"} if found.has("lat") else {}
+    return log.readings(found, found.columns({"number": "seq", **fields}), anywhere=True)
 
 
 def _gimbal(log: Px4Log, poses: Readings | None) -> Readings | None:
@@ -610,4 +594,4 @@ def _gimbal(log: Px4Log, poses: Readings | None) -> Readings | None:
         return None
     roll, pitch, yaw = np.degrees(mount.several(*(f"attitude_euler_angle[{i}]" for i in range(3)))).T
     world = wrapped(yaw + heading_at(poses, taken_s(mount), "time_log_s"))
-    return log.readings(mount, dict(zip(WORLD, (roll, pitch, world), strict=True)))
+    return log.readings(mount, named(WORLD, (roll, pitch, world)))

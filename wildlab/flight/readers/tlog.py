@@ -46,7 +46,9 @@ from wildlab.flight.readers.log import (
     Mask,
     Readings,
     any_of,
-    placed,
+    holding,
+    level_velocity,
+    named,
 )
 
 #: So many sound frames say what a file is, where its name does not.
@@ -240,7 +242,7 @@ class Boot(NamedTuple):
     offset_s: Array
     behind_s: Array
     clock: Clock
-    notes: tuple[str, ...]
+    notes: list[str]
 
     def utc(self, boot_s: Array, found: Messages) -> tuple[Array, Mask]:
         """UTC (N,) of stamps (N,) in messages, s since 1970, and whether it goes with their receipts."""
@@ -301,14 +303,7 @@ def find_boot(frames: MavlinkFrames, system: int, component: int) -> Boot | None
     }
     rate, offset_s = np.array([(one.rate, one.offset_s) for one in fits]).T
     clock = Clock.fitted(base, fits[main])
-    return Boot(
-        number[starts],
-        rate,
-        offset_s,
-        np.array(behind),
-        clock,
-        tuple(text for text, holds in notes.items() if holds),
-    )
+    return Boot(number[starts], rate, offset_s, np.array(behind), clock, holding(notes))
 
 
 class Vehicle(NamedTuple):
@@ -403,7 +398,7 @@ def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         (frames.rest, "byte", f"of {len(data)} at the end: it ends within a frame"),
         (sum(frames.unknown.values()), "message", f"of kinds that are not known (numbers {kinds}{more})"),
     ]
-    clock, before = (vehicle.boot.clock, vehicle.boot.notes) if vehicle.boot else (None, ())
+    clock, before = (vehicle.boot.clock, vehicle.boot.notes) if vehicle.boot else (None, [])
     return Decoded(parts, _called(vehicle), clock, lost, [*before, *notes])
 
 
@@ -466,7 +461,7 @@ def _poses(vehicle: Vehicle, notes: list[str]) -> Readings | None:
     columns = {name: np.degrees(attitude.get(name[:-4])) for name in ANGLES}
     place = position.columns(LAT_LON, 1e7)
     place |= position.columns({"height_sea_m": "alt", "height_home_m": "relative_alt"}, 1e3)
-    place |= position.columns(dict(zip(VELOCITY, ("vx", "vy", "vz"), strict=True)), 1e2)
+    place |= position.columns(named(VELOCITY, ("vx", "vy", "vz")), 1e2)
     made = vehicle.readings(attitude, "time_boot_ms", columns)
     where = vehicle.readings(position, "time_boot_ms", {})
     doubtful = any_of(where.unusable.values(), len(position))
@@ -485,7 +480,6 @@ def _gnss(vehicle: Vehicle) -> Readings:
         }
 
     motion = known(_NO_16, 1e2, speed="vel", course="cog")
-    speed, course = motion["speed"], np.radians(motion["course"])
     columns = {
         **found.columns(LAT_LON, 1e7),
         **found.columns({"height_sea_m": "alt"}, 1e3),
@@ -494,7 +488,7 @@ def _gnss(vehicle: Vehicle) -> Readings:
         **known(0, 1e3, sd_velocity_m_s="vel_acc"),
         **known(_NO_8, 1.0, satellites="satellites_visible"),
         **known(_NO_16, 1e2, hdop="eph"),
-        **{"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)},
+        **level_velocity(motion["speed"], motion["course"]),
         "fix": found.get("fix_type"),
     }
     return vehicle.readings(found, "time_usec", columns, fix_reasons(columns["fix"]))
@@ -517,11 +511,11 @@ def _inertial(vehicle: Vehicle, notes: list[str]) -> dict[str, Readings | None]:
         felt = float(np.median(np.linalg.norm(force, axis=0))) / STANDARD_GRAVITY
         parts: dict[str, Readings | None] = {}
         if _FELT[0] < felt < _FELT[1]:
-            parts["imu"] = vehicle.readings(found, stamp, dict(zip(IMU, (*force, *rate), strict=True)))
+            parts["imu"] = vehicle.readings(found, stamp, named(IMU, (*force, *rate)))
         else:
             notes.append(f"{name} is left out: its median is {felt:.3g} g, so its units are not known")
         if (field != 0).any():
-            parts["magnetometer"] = vehicle.readings(found, stamp, dict(zip(FIELD, field, strict=True)))
+            parts["magnetometer"] = vehicle.readings(found, stamp, named(FIELD, field))
         return parts
     return {}
 
@@ -531,11 +525,8 @@ def _triggers(vehicle: Vehicle, notes: list[str]) -> Readings | None:
     if not len(found):
         made = vehicle.readings(trigger, "time_usec", {"number": trigger.get("seq")})
         return made if len(trigger) else None
-    place = found.columns(LAT_LON, 1e7)
-    there = placed(*place.values())
-    place |= found.columns({"height_sea_m": "alt_msl", "height_home_m": "alt_rel"})
-    columns = found.columns({"number": "img_idx", **{name: name[:-4] for name in ANGLES}})
-    columns |= {name: np.where(there, values, np.nan) for name, values in place.items()}
+    fields = {"number": "img_idx", "height_sea_m": "alt_msl", "height_home_m": "alt_rel"}
+    columns = found.columns(fields | {name: name[:-4] for name in ANGLES}) | found.columns(LAT_LON, 1e7)
     made = vehicle.readings(found, "time_usec", columns)._replace(anywhere=True)
     if np.isnan(made.columns["time_log_s"]).all():
         notes.append("times of the triggers are those of receipt")
@@ -543,26 +534,19 @@ def _triggers(vehicle: Vehicle, notes: list[str]) -> Readings | None:
 
 
 def _gimbal(vehicle: Vehicle, poses: Readings | None, notes: list[str]) -> Readings | None:
-    kinds = ("GIMBAL_DEVICE_ATTITUDE_STATUS", "MOUNT_ORIENTATION", "MOUNT_STATUS")
+    kinds = ("GIMBAL_DEVICE_ATTITUDE_STATUS", "MOUNT_ORIENTATION")
     found = next((one for name in kinds if len(one := vehicle.any(name))), None)
     if found is None:
         return None
     made = vehicle.readings(found, "time_boot_ms", {})
     heading = heading_at(poses, made.columns["time_s"])
-    if found.name == "MOUNT_STATUS":
-        notes.append(
-            "MOUNT_STATUS has no stamps (times are those of receipt): pitch and roll are taken against the "
-            "horizon, yaw against the vehicle"
-        )
-        roll, pitch, yaw = (found.get(f"pointing_{one}") / 1e2 for one in "bac")
-        angles = dict(zip(WORLD, (roll, pitch, wrapped(yaw + heading)), strict=True))
-    elif np.isnan(made.columns["time_log_s"]).all():
+    if np.isnan(made.columns["time_log_s"]).all():
         notes.append("times of the gimbal are those of receipt")
-    if found.name == "GIMBAL_DEVICE_ATTITUDE_STATUS":
+    if found.has("flags"):
         angles = device_angles(found.quaternion(), found.get("flags"), heading)
-    elif found.name == "MOUNT_ORIENTATION":
+    else:
         yaw = found.get("yaw_absolute")
         # Where the extension is not sent, its yaw is against the vehicle.
         yaw = yaw if (yaw != 0).any() else wrapped(found.get("yaw") + heading)
-        angles = dict(zip(WORLD, (found.get("roll"), found.get("pitch"), yaw), strict=True))
+        angles = named(WORLD, (found.get("roll"), found.get("pitch"), yaw))
     return made._replace(columns=made.columns | angles)

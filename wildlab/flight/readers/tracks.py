@@ -20,7 +20,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers import text
-from wildlab.flight.readers.log import Array, Clock, Decoded, Readings
+from wildlab.flight.readers.log import Array, Clock, Decoded, Readings, holding, level_velocity, named
 from wildlab.flight.readers.text import number, numbers, parse_xml, plural, stamp_s
 from wildlab.flight.time_scales import GPS_START_S, WEEK_S, gps_to_utc
 
@@ -85,7 +85,7 @@ def gpx_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         {"gnss": Readings(columns, rows, "point", {"no fix": columns["fix"] == 0.0})},
         clock=Clock("UTC of the log", pairs=timed) if timed else None,
         lost=[(broken, "point", f"of {broken + len(columns['fix'])} could not be read")],
-        notes=[note for note, holds in notes.items() if holds],
+        notes=holding(notes),
     )
 
 
@@ -113,8 +113,7 @@ def _columns(points: Sequence[Element]) -> dict[str, Array]:
         "fix": np.array([_FIXES.get(point.findtext("fix", "").strip(), np.nan) for point in points]),
     }
     # GPX 1.0 knows speed in m/s and course from true north.
-    speed, course = columns.pop("speed"), np.radians(columns.pop("course"))
-    return columns | {"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)}
+    return columns | level_velocity(columns.pop("speed"), columns.pop("course"))
 
 
 def _seconds(said: str) -> float:
@@ -167,9 +166,7 @@ def pos_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         problem = "has no position" + (f"; {plural(bad, 'line')} cannot be read" if bad else "")
         raise WildlabError(problem, "write the solution of RTKLIB again, with its header", file=path)
     flat = [cell for _, _, row in rows for cell in (row + [""] * len(names))[: len(names)]]
-    values: dict[str, Array] = dict(
-        zip((name.partition("(")[0] for name in names), numbers(flat).reshape(len(rows), -1).T, strict=True)
-    )
+    values = named((name.partition("(")[0] for name in names), numbers(flat).reshape(len(rows), -1).T)
 
     def of(name: str) -> Array:
         return values.get(name, np.full(len(rows), np.nan))
@@ -198,13 +195,12 @@ def pos_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     }
     columns = {name: one[order] for name, one in columns.items()}
     reasons = {"no fix": columns["fix"] == 0.0, "estimated, not measured": columns["fix"] == 1.0}
-    ahead = float(np.nanmedian(columns["time_s"] - columns["time_log_s"]))
     base = "GPS time of the rows" if scale == "GPST" else "UTC of the log"
     return Decoded(
         {"gnss": Readings(columns, np.array([at for at, _, _ in rows])[order], "line", reasons)},
-        clock=Clock(base, offset_s=ahead, pairs=len(rows)),
+        clock=Clock.shifted(base, columns["time_log_s"], columns["time_s"]),
         lost=[(bad, "line", f"of {bad + len(rows)} could not be read")],
-        notes=[note for note, holds in notes.items() if holds],
+        notes=holding(notes),
     )
 
 

@@ -21,7 +21,7 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular
-from wildlab.flight.readers.log import Decoded, Readings
+from wildlab.flight.readers.log import Decoded, Readings, holding
 from wildlab.flight.readers.text import (
     Field,
     finite,
@@ -629,7 +629,7 @@ def kml_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         "<altitudeMode>absolute</altitudeMode> before <coordinates>, or give a table": not absolute.all(),
     }
     lost = [(found.others, "geometry", "besides: only points are marks")]
-    return _decoded(columns, range(1, count + 1), "point", lost, [said for said in notes if notes[said]])
+    return _decoded(columns, range(1, count + 1), "point", lost, holding(notes))
 
 
 def geojson_sniff(head: bytes, name: str) -> bool:
