@@ -42,7 +42,7 @@ def table(made: list[dict[str, object]], names: tuple[str, ...] = METRIC) -> str
 def test_equals_pandas(shared_data):
     path = shared_data("logs", "dji_airdata_p4rtk", "Jul-7th-2022-11-10AM-Flight-Airdata.csv")
     data = path.read_bytes()
-    assert airdata.sniff(data[:8192], path.name)
+    assert airdata.sniff(data[:8192])
     log = airdata.read(path, data)
     check(log)
     table = pd.read_csv(path, skipinitialspace=True)

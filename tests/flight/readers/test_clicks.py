@@ -73,12 +73,12 @@ OTHER_NAMES = (
 
 @pytest.mark.parametrize("data", [COCO, CVAT, CORNERS, SIZES_CSV, OTHER_NAMES])
 def test_boxes_out_of_every_format(data):
-    assert clicks_sniff(data[:8192], "x")
+    assert clicks_sniff(data[:8192])
     check_boxes(read(HERE, data))
 
 
 def test_shares_of_an_image_want_its_size(tmp_path):
-    assert clicks_sniff(MEGADETECTOR, "x")
+    assert clicks_sniff(MEGADETECTOR)
     log = read(tmp_path / "md.json", MEGADETECTOR)
     assert column(log, "score") == [0.5, 0.5]
     assert column(log, "why") == ["no place in the image"] * 2
@@ -165,13 +165,13 @@ def test_what_is_refused(data, problem):
     "head", [b"", b"\x00\xff", b"{}", b'{"type": "Point"}', b"<kml>", b"time,u,v\n", b"image,note\n"]
 )
 def test_what_is_not_recognised(head):
-    assert not clicks_sniff(head, "x.csv")
+    assert not clicks_sniff(head)
 
 
 @pytest.mark.parametrize("data", [COCO, CVAT, MEGADETECTOR, b"image,u,v\n" + b"a,1,2\n" * 9])
 def test_damaged_files_end_in_a_sentence(data):
     for one in spoilt(data):
-        clicks_sniff(one, "x")
+        clicks_sniff(one)
         try:
             part = read(HERE, one).parts["clicks"]
         except WildlabError:

@@ -208,11 +208,11 @@ def test_other_logs_with_the_same_heads_are_refused():
 
 def test_a_file_is_known_by_its_content():
     log = second_generation(Truth(2025), 3.0)
-    assert dataflash.sniff(b"\0\0lost" + log.binary()[:8192], "x")
-    assert dataflash_text.sniff(log.text()[:8192], "x")
+    assert dataflash.sniff(b"\0\0lost" + log.binary()[:8192])
+    assert dataflash_text.sniff(log.text()[:8192])
     others = (b"", b"$GPGGA,1,2,3", b"\xa3\x95\x80 nothing", b"ULog\x01\x12\x35", b"<gpx>")
-    assert not any(dataflash.sniff(one, "x.bin") for one in (*others, log.text()[:8192]))
-    assert not any(dataflash_text.sniff(one, "x.log") for one in (*others, log.binary()[:8192]))
+    assert not any(dataflash.sniff(one) for one in (*others, log.text()[:8192]))
+    assert not any(dataflash_text.sniff(one) for one in (*others, log.binary()[:8192]))
 
 
 def read_damaged(data: bytes, text: bool) -> None:

@@ -22,7 +22,7 @@ def row(k: int, **other: object) -> str:
 
 def test_values():
     data = "".join(map(row, range(1, 21))).encode()
-    assert dji_mrk.sniff(data[:8192], "x.MRK")
+    assert dji_mrk.sniff(data[:8192])
     columns, k = columns_of(dji_mrk, data, "triggers"), np.arange(1, 21)
     near(columns, 1e-6, time_s=week_to_utc(2200, 302400 + 2.5 * k))
     near(columns, number=k, latitude_deg=63.4 + 1e-5 * k, height_ellipsoid_m=100 + 0.1 * k, fix=6, use=1)

@@ -53,7 +53,7 @@ def test_samples(name, shared_data):
     path = shared_data("logs", "dji_srt", name)
     data = path.read_bytes()
     blocks, places, latitude, longitude, height, stamp, satellites = SAMPLES[name]
-    assert dji_srt.sniff(data[:8192], name)
+    assert dji_srt.sniff(data[:8192])
     for zone, ahead in ((None, 0), ("+02:00", 7200), ("Europe/Madrid", 7200)):
         columns = columns_of(dji_srt, data, zone=zone)
         assert len(columns["use"]) == blocks

@@ -64,9 +64,9 @@ def test_order_comments_and_spreads_of_a_table():
 
 def test_a_table_of_metres_is_known_to_be_refused_and_others_are_not_taken():
     for header in ("Punkt;Rechtswert;Hochwert;H", "name;Easting (m);Northing (m);h"):
-        assert marks_csv.sniff(table(POINTS, header, ";"), "x")
+        assert marks_csv.sniff(table(POINTS, header, ";"))
     for header in ("Name;X;Y;Z", "a;b;c;d", "time;easting;northing;name"):
-        assert not marks_csv.sniff(table(POINTS, header, ";"), "x")
+        assert not marks_csv.sniff(table(POINTS, header, ";"))
 
 
 def test_rows_that_cannot_be_used_stay_and_say_why():
@@ -121,7 +121,7 @@ def test_other_geometries_are_counted():
 )
 def test_damaged_files_end_in_a_sentence(reader, data):
     for one in spoilt(data):
-        reader.sniff(one[:8192], "x")
+        reader.sniff(one[:8192])
         try:
             part = reader.read(HERE, one).parts["marks"]
         except WildlabError:
@@ -187,7 +187,7 @@ OLDER = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}
     ],
 )
 def test_points_out_of_every_format(reader, data, height):
-    assert reader.sniff(data[:8192], "x")
+    assert reader.sniff(data[:8192])
     log = reader.read(HERE, data)
     for name, at in (("name", 0), ("latitude_deg", 1), ("longitude_deg", 2), (f"height_{height}_m", 3)):
         assert values(log, name) == [one[at] for one in POINTS]

@@ -62,7 +62,7 @@ def track(start: datetime, count: int, **other: object) -> bytes:
 def test_equals_pynmea2(shared_data):
     path = shared_data("logs", "target_boat_nmea", "bundg_zeus_9.log")
     data = path.read_bytes()
-    assert nmea.sniff(data[:8192], path.name)
+    assert nmea.sniff(data[:8192])
     columns = columns_of(nmea, data)
     by_time: dict[float, dict[str, Any]] = {}
     for line in data.decode("utf-8", "replace").splitlines():

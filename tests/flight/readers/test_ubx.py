@@ -36,7 +36,7 @@ def pvt(k: int, **other: object) -> bytes:
 def test_equals_pyubx2(shared_data):
     path = shared_data("logs", "target_ubx_m8l", "ublox-neo-m8l.log")
     data = path.read_bytes()
-    assert ubx.sniff(data[:8192], path.name)
+    assert ubx.sniff(data[:8192])
     log = ubx.read(path, data)
     check(log)
     seen: dict[str, list[object]] = {}

@@ -86,7 +86,7 @@ def flight(**more: Any) -> dict[str, Any]:
 def test_every_value_of_the_samples_is_pyulogs(shared_data, folder, name):
     path = shared_data("logs", folder, name)
     data = path.read_bytes()
-    assert recognise(data[:8192], "unnamed") == "ulog"
+    assert recognise(data[:8192]) == "ulog"
     sound = sound_part(data)
     assert (sound.skipped, sound.rest, sound.homeless) == (0, 0, {})
     whole = ULog(str(path), list(TOPICS))

@@ -195,7 +195,7 @@ def _read(path: Path, name: str, folder: str, zone: str | None) -> CardItem:
                 head = stored.read(HEAD)
         except OSError as error:
             return CardItem(name, problem=f"cannot be opened ({error.strerror})")
-        format_ = recognise(head, path.name)
+        format_ = recognise(head)
     if format_ is None:
         known = path.suffix.lower() in KNOWN_OTHERS
         return CardItem(name, problem=OTHER if known else _unknown(head))

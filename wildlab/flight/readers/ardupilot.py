@@ -66,11 +66,18 @@ PLACE = {
 _PLACE = tuple(PLACE)
 #: The same of messages GPS, and of GPA beside them.
 GNSS = {
-    **{"latitude_deg": "Lat", "longitude_deg": "Lng", "height_sea_m": "Alt", "v_down_m_s": "VZ"},
-    **{"satellites": "NSats", "fix": "Status", "hdop": "HDop"},
+    "latitude_deg": "Lat",
+    "longitude_deg": "Lng",
+    "height_sea_m": "Alt",
+    "v_down_m_s": "VZ",
+    "satellites": "NSats",
+    "fix": "Status",
+    "hdop": "HDop",
 }
 GPA = {
-    **{"sd_horizontal_m": "HAcc", "sd_vertical_m": "VAcc", "sd_velocity_m_s": "SAcc"},
+    "sd_horizontal_m": "HAcc",
+    "sd_vertical_m": "VAcc",
+    "sd_velocity_m_s": "SAcc",
     "undulation_m": "Und",
 }
 
@@ -131,7 +138,7 @@ class ArdupilotLog(NamedTuple):
         return Readings(times | columns, table.rows, self.counted_in, unusable or {}, anywhere=True)
 
 
-def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """A DataFlash log, its rows counted in messages.
 
     Raises
@@ -146,7 +153,7 @@ def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     return _decoded(path, found.tables, "message", lost, "")
 
 
-def text_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def text_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """A DataFlash log as text, its rows counted in lines; errors as of `decode`."""
     tables, lost, title = read_lines(data)
     return _decoded(path, tables, "line", lost, title)
@@ -399,9 +406,9 @@ SENSORS: dict[str, tuple[tuple[str, ...], str, dict[str, str], float]] = {
     "triggers": (
         ("CAM", "TRIG"), "Lat Lng",
         {
-            **{"latitude_deg": "Lat", "longitude_deg": "Lng", "number": "Img"},
+            "latitude_deg": "Lat", "longitude_deg": "Lng", "number": "Img",
             **{name: f"{name[:-4].title()} {name[0].upper()}" for name in ANGLES},
-            **{"height_sea_m": "Alt", "height_home_m": "RelAlt"},
+            "height_sea_m": "Alt", "height_home_m": "RelAlt",
         }, 1.0,
     ),
 }  # fmt: skip

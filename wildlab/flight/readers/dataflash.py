@@ -34,9 +34,27 @@ FMT_KIND, FMT_BYTES = 128, 89
 MOST_LAYOUTS = 8
 #: numpy's type of each format character.
 TYPES: dict[str, str | tuple[str, int]] = {
-    **{"a": ("<i2", 32), "b": "i1", "B": "u1", "g": "<f2", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"},
-    **{"f": "<f4", "d": "<f8", "n": "S4", "N": "S16", "Z": "S64", "c": "<i2", "C": "<u2", "e": "<i4"},
-    **{"E": "<u4", "L": "<i4", "M": "i1", "q": "<i8", "Q": "<u8"},
+    "a": ("<i2", 32),
+    "b": "i1",
+    "B": "u1",
+    "g": "<f2",
+    "h": "<i2",
+    "H": "<u2",
+    "i": "<i4",
+    "I": "<u4",
+    "f": "<f4",
+    "d": "<f8",
+    "n": "S4",
+    "N": "S16",
+    "Z": "S64",
+    "c": "<i2",
+    "C": "<u2",
+    "e": "<i4",
+    "E": "<u4",
+    "L": "<i4",
+    "M": "i1",
+    "q": "<i8",
+    "Q": "<u8",
 }
 #: What a raw value is divided by, by its format character; others stand as they are.
 DIVISORS = {"c": 100.0, "C": 100.0, "e": 100.0, "E": 100.0, "L": 1e7}
@@ -95,7 +113,7 @@ class Records(NamedTuple):
     places: int
 
 
-def sniff(head: bytes, name: str) -> bool:
+def sniff(head: bytes) -> bool:
     """Whether a file has a message among its first bytes that defines another."""
     mark = HEAD + bytes([FMT_KIND])
     places = (one.end() for one in re.finditer(re.escape(mark), head))
@@ -259,7 +277,7 @@ def merge(tables: Sequence[MessageTable]) -> MessageTable:
 # -- as text
 
 
-def text_sniff(head: bytes, name: str) -> bool:
+def text_sniff(head: bytes) -> bool:
     """Whether a line among the first bytes of a file defines a message."""
     return _FMT_LINE.search(head) is not None
 

@@ -80,13 +80,13 @@ class _Block(NamedTuple):
     vague: bool
 
 
-def srt_sniff(head: bytes, name: str) -> bool:
+def srt_sniff(head: bytes) -> bool:
     """Whether subtitles with words of DJI begin the file."""
     text = decode(head)
     return _CODES.search(text) is not None and _TRACE.search(text) is not None
 
 
-def srt_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def srt_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """Subtitles of a video, a row each.
 
     Without a zone, rows with a wall clock are marked; where there is no clock at all, stamps are the
@@ -222,12 +222,12 @@ _ROW = re.compile(
 _FIXES = {0.0: 0.0, 16.0: 3.0, 17.0: 4.0, 34.0: 5.0, 50.0: 6.0}
 
 
-def mrk_sniff(head: bytes, name: str) -> bool:
+def mrk_sniff(head: bytes) -> bool:
     """Whether a row of a log of images begins the file."""
     return any(_ROW.match(line) for line in decode(head).splitlines()[:5])
 
 
-def mrk_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def mrk_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """Records of images, a line each.
 
     Raises
@@ -245,9 +245,15 @@ def mrk_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     time = np.where(seconds < WEEK_S, week_to_utc(week, seconds), np.nan)
     fix = np.array([_FIXES.get(one, 3.0 if np.isfinite(one) else np.nan) for one in state.tolist()])
     columns = {
-        **{"time_s": time, "time_log_s": week * WEEK_S + seconds, "number": count},
-        **{"latitude_deg": latitude, "longitude_deg": longitude, "height_ellipsoid_m": height},
-        **{"sd_horizontal_m": np.sqrt((north**2 + east**2) / 2.0), "sd_vertical_m": up, "fix": fix},
+        "time_s": time,
+        "time_log_s": week * WEEK_S + seconds,
+        "number": count,
+        "latitude_deg": latitude,
+        "longitude_deg": longitude,
+        "height_ellipsoid_m": height,
+        "sd_horizontal_m": np.sqrt((north**2 + east**2) / 2.0),
+        "sd_vertical_m": up,
+        "fix": fix,
     }
     return Decoded(
         {"triggers": Readings(columns, [at for at, _ in found], "line", {"no fix": fix == 0.0})},
@@ -261,9 +267,23 @@ def mrk_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
 
 #: m, or m/s, in a unit as headers have it.
 _UNITS = {
-    **{"meters": 1.0, "m": 1.0, "feet": 0.3048, "ft": 0.3048, "m/s": 1.0, "mph": 0.44704},
-    **{"km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6, "knots": 1852 / 3600, "kn": 1852 / 3600},
-    **{"ft/s": 0.3048, "degrees": 1.0, "deg": 1.0, "millisecond": 1e-3, "ms": 1e-3, "": 1.0},
+    "meters": 1.0,
+    "m": 1.0,
+    "feet": 0.3048,
+    "ft": 0.3048,
+    "m/s": 1.0,
+    "mph": 0.44704,
+    "km/h": 1 / 3.6,
+    "kmh": 1 / 3.6,
+    "kph": 1 / 3.6,
+    "knots": 1852 / 3600,
+    "kn": 1852 / 3600,
+    "ft/s": 0.3048,
+    "degrees": 1.0,
+    "deg": 1.0,
+    "millisecond": 1e-3,
+    "ms": 1e-3,
+    "": 1.0,
 }
 #: Our name -> names in headers, in lower case and without anything but letters; the first there is counts.
 _COLUMNS = {
@@ -291,13 +311,13 @@ UTC_BASE = "UTC of the log"
 _PAUSE_S, _FEW = 1.5, 10
 
 
-def airdata_sniff(head: bytes, name: str) -> bool:
+def airdata_sniff(head: bytes) -> bool:
     """Whether the first line has AirData's columns of time, UTC and place."""
     names = {one for one, _ in _header(decode(head).split("\n", 1)[0])}
     return {"time", "latitude", "longitude"} <= names and any(one.startswith("datetime") for one in names)
 
 
-def airdata_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def airdata_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """A flight record, a row for each line.
 
     Raises

@@ -2,12 +2,12 @@
 
 A reader's module has two functions::
 
-    def sniff(head: bytes, name: str) -> bool
+    def sniff(head: bytes) -> bool
     def decode(path: Path, data: bytes, zone: str | None) -> Decoded
 
-``head`` are the first `HEAD` bytes, and the name decides only where content is not enough; the path is
-only for messages; ``zone`` is that of wall clocks without one. What is decoded is judged in one place
-(`wildlab.flight.readers.log`). A module is imported when a file may be of its format.
+``head`` are the first `HEAD` bytes; the path is only for messages; ``zone`` is that of wall clocks without
+one. What is decoded is judged in one place (`wildlab.flight.readers.log`). A module is imported when a file
+may be of its format.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ FORMATS: dict[str, Format] = {
 }
 
 
-def recognise(head: bytes, name: str) -> str | None:
-    """The format of a file by its first `HEAD` bytes, None where none is known; `name` is the file's."""
-    return next((found for found, one in FORMATS.items() if one.function("sniff")(head, name)), None)
+def recognise(head: bytes) -> str | None:
+    """The format of a file by its first `HEAD` bytes, None where none is known."""
+    return next((found for found, one in FORMATS.items() if one.function("sniff")(head)), None)
 
 
 def read_log(path: Path, data: bytes, format_: str, zone: str | None = None) -> RawLog:

@@ -254,7 +254,7 @@ NAMES = frozenset({"name", "target", "target_id", "id", "marker"})
 MOST, MOST_LETTERS, MOST_FILES = 1_000_000, 200, 200_000
 
 
-def clicks_sniff(head: bytes, name: str) -> bool:
+def clicks_sniff(head: bytes) -> bool:
     """Whether a file is one of the known kinds, by its content."""
     start = head.lstrip(b"\xef\xbb\xbf \r\n\t")
     if start[:1] in (b"{", b"["):
@@ -267,7 +267,7 @@ def clicks_sniff(head: bytes, name: str) -> bool:
     return image and way_of(names, points_first=True) is not None
 
 
-def clicks_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def clicks_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """Clicks and boxes of one file; images whose sizes are wanted lie beside it.
 
     Raises
@@ -281,7 +281,7 @@ def clicks_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     return _decoded(_cvat(data, path) if start == b"<" else read_table_clicks(data, path), path, path)
 
 
-def folder_decode(folder: Path, zone: str | None = None) -> Decoded:
+def folder_decode(folder: Path, zone: str | None) -> Decoded:
     """Boxes of a folder of YOLO's text files, one for each image; ``image`` is its name without the ending.
 
     Raises
@@ -312,7 +312,8 @@ def _decoded(marked: Marked, path: Path, folder: Path) -> Decoded:
     columns: dict[str, Any] = {
         "image": [one[:MOST_LETTERS] for one in names],
         "name": [printable(marked.kinds[row][:MOST_LETTERS]) for row in at],
-        **{"u_px": boxes[:, 0] + boxes[:, 2] / 2, "v_px": boxes[:, 1] + boxes[:, 3] / 2},
+        "u_px": boxes[:, 0] + boxes[:, 2] / 2,
+        "v_px": boxes[:, 1] + boxes[:, 3] / 2,
         "score": marked.scores[at],
     }
     for side, name in enumerate(("box_u_px", "box_v_px", "box_width_px", "box_height_px")):

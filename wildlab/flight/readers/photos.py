@@ -73,7 +73,7 @@ OFF_S = 2.0
 LOCAL, BY_GPS, BY_ZONE = "local time without a zone", "GPS time of the images", "zones that the images state"
 
 
-def folder_decode(folder: Path, zone: str | None = None) -> Decoded:
+def folder_decode(folder: Path, zone: str | None) -> Decoded:
     """The images of a folder and of all folders below it, as a card has them: ``100MEDIA``, ``101MEDIA``.
 
     Parameters
@@ -148,7 +148,9 @@ def _one_folder(folder: Path, zone: str | None) -> Decoded:
         **{name: [size[i] or np.nan for size in sizes] for i, (name, _) in enumerate(_SIDES)},
         "focal_mm": [values.focal_mm_of(one) for one in tags],
         "focal_35mm": [values.film_of(one) for one in tags],
-        **{"focal_px": [px for _, px in focal], "focal_from": [how for how, _ in focal], "camera": cameras},
+        "focal_px": [px for _, px in focal],
+        "focal_from": [how for how, _ in focal],
+        "camera": cameras,
         "why": [why or ("" if up else "no height") for why, up in zip(reasons, high, strict=True)],
     }
     columns["time_log_s"], columns["time_s"], clock, notes = _times(tags, zone)

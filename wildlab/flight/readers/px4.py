@@ -46,7 +46,10 @@ HEADER = 16
 #: Bytes of the types of ULog's fields.
 SIZES = {
     **{f"{kind}{bits}_t": bits // 8 for kind in ("int", "uint") for bits in (8, 16, 32, 64)},
-    **{"float": 4, "double": 8, "bool": 1, "char": 1},
+    "float": 4,
+    "double": 8,
+    "bool": 1,
+    "char": 1,
 }
 #: No message is longer, for its length has two bytes; no format nests deeper than this, none has more fields.
 LONGEST, DEEPEST, MOST_FIELDS = 65535, 8, 2048
@@ -317,9 +320,18 @@ def _written(name: str, fields: list[tuple[str, int, str]]) -> bytes:
 
 TOPICS = frozenset(
     {
-        *("vehicle_attitude", "vehicle_global_position", "vehicle_local_position"),
-        *("vehicle_gps_position", "sensor_gps", "sensor_combined", "vehicle_magnetometer", "sensor_mag"),
-        *("camera_capture", "camera_trigger", "gimbal_device_attitude_status", "mount_orientation"),
+        "vehicle_attitude",
+        "vehicle_global_position",
+        "vehicle_local_position",
+        "vehicle_gps_position",
+        "sensor_gps",
+        "sensor_combined",
+        "vehicle_magnetometer",
+        "sensor_mag",
+        "camera_capture",
+        "camera_trigger",
+        "gimbal_device_attitude_status",
+        "mount_orientation",
     }
 )
 #: 2000 and 2100, s since 1970: no receiver's UTC is of another time.
@@ -330,19 +342,21 @@ _GAUSS_UT = 100.0
 #: Columns -> fields of old and new firmware.
 SPREADS = {"sd_horizontal_m": "eph", "sd_vertical_m": "epv"}
 QUALITY = {
-    **{"sd_velocity_m_s": "s_variance_m_s", "satellites": "satellites_used", "fix": "fix_type"},
+    "sd_velocity_m_s": "s_variance_m_s",
+    "satellites": "satellites_used",
+    "fix": "fix_type",
     "hdop": "hdop",
 }
 #: Kinds of releases, by the lowest number of each.
 _RELEASES = ((255, ""), (192, "release candidate"), (128, "beta"), (64, "alpha"), (0, "development"))
 
 
-def sniff(head: bytes, name: str) -> bool:
-    """Whether a file that begins with `head` is a ULog; its name is not needed."""
+def sniff(head: bytes) -> bool:
+    """Whether a file that begins with `head` is a ULog."""
     return head.startswith(MAGIC)
 
 
-def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """A ULog.
 
     Raises
@@ -540,7 +554,8 @@ def _local_motion(local: Messages) -> dict[str, Array]:
         tilt, heading = np.sqrt(local.get("tilt_var") / 2), np.sqrt(local.get("heading_var"))
     return {
         **local.columns(named(VELOCITY, ("vx", "vy", "vz"))),
-        **{"sd_tilt_deg": np.degrees(tilt), "sd_heading_deg": np.degrees(heading)},
+        "sd_tilt_deg": np.degrees(tilt),
+        "sd_heading_deg": np.degrees(heading),
     }
 
 

@@ -86,13 +86,13 @@ class Sentences(NamedTuple):
     unread: int
 
 
-def nmea_sniff(head: bytes, name: str) -> bool:
+def nmea_sniff(head: bytes) -> bool:
     """Whether a file begins with sentences."""
     found = sentences(head)
     return bool(found.found) or found.unread >= 3
 
 
-def nmea_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def nmea_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """A log of sentences; rows are lines of the file.
 
     Raises
@@ -297,7 +297,8 @@ def _columns(epochs: list[dict[str, Sentence]]) -> tuple[dict[str, Array], Mask,
         "longitude_deg": each(lambda one: _degrees(one, POSITIONS[one.kind] + 2)),
         "height_sea_m": each(lambda one: one.value(9), high),
         "undulation_m": each(lambda one: one.value(11 if one.kind == "GGA" else 10), high),
-        **{"v_north_m_s": motion[:, 0], "v_east_m_s": motion[:, 1]},
+        "v_north_m_s": motion[:, 0],
+        "v_east_m_s": motion[:, 1],
         # The root of the mean of both variances.
         "sd_horizontal_m": np.array([math.sqrt((s.value(6) ** 2 + s.value(7) ** 2) / 2.0) for s in gst]),
         "sd_vertical_m": np.array([one.value(8) for one in gst]),
@@ -369,7 +370,7 @@ LAYOUTS: dict[tuple[int, int], Any] = {
     }.items()
 }
 #: Classes that the interface descriptions have; others are chance.
-CLASSES = (*(0x01, 0x02, 0x04, 0x05, 0x06, 0x09, 0x0A, 0x0B, 0x0C, 0x0D, 0x10), *(0x13, 0x21, 0x27, 0x28))
+CLASSES = (0x01, 0x02, 0x04, 0x05, 0x06, 0x09, 0x0A, 0x0B, 0x0C, 0x0D, 0x10, 0x13, 0x21, 0x27, 0x28)
 
 
 class UbxFrames(NamedTuple):
@@ -454,12 +455,12 @@ def frames(data: bytes) -> UbxFrames:
     return UbxFrames(data, starts, stops, kind, int((~inside).sum()))
 
 
-def ubx_sniff(head: bytes, name: str) -> bool:
+def ubx_sniff(head: bytes) -> bool:
     """Whether a message with the right checksum is among the first bytes."""
     return len(frames(head).start) > 0
 
 
-def ubx_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def ubx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """A log of a u-blox receiver; text and NMEA between the messages do no harm. Rows are messages of UBX.
 
     Raises
@@ -521,9 +522,12 @@ def _place(found: UbxFrames, row: Rows) -> dict[str, Array]:
     """Place, heights and spreads of messages, with more digits where there are any at the same time."""
     own = row["own_s"]
     columns = {
-        **{"latitude_deg": row["lat"] * 1e-7, "longitude_deg": row["lon"] * 1e-7},
-        **{"height_ellipsoid_m": row["height"] * 1e-3, "height_sea_m": row["sea"] * 1e-3},
-        **{"sd_horizontal_m": row["h_acc"] * 1e-3, "sd_vertical_m": row["v_acc"] * 1e-3},
+        "latitude_deg": row["lat"] * 1e-7,
+        "longitude_deg": row["lon"] * 1e-7,
+        "height_ellipsoid_m": row["height"] * 1e-3,
+        "height_sea_m": row["sea"] * 1e-3,
+        "sd_horizontal_m": row["h_acc"] * 1e-3,
+        "sd_vertical_m": row["v_acc"] * 1e-3,
     }
     more = found.rows(HPPOSLLH)
     finer = {
@@ -531,7 +535,8 @@ def _place(found: UbxFrames, row: Rows) -> dict[str, Array]:
         "longitude_deg": more["lon"] * 1e-7 + more["lon_hp"] * 1e-9,
         "height_ellipsoid_m": more["height"] * 1e-3 + more["height_hp"] * 1e-4,
         "height_sea_m": more["sea"] * 1e-3 + more["sea_hp"] * 1e-4,
-        **{"sd_horizontal_m": more["h_acc"] * 1e-4, "sd_vertical_m": more["v_acc"] * 1e-4},
+        "sd_horizontal_m": more["h_acc"] * 1e-4,
+        "sd_vertical_m": more["v_acc"] * 1e-4,
     }
     for name, values in finer.items():
         fine = _at(own, more, np.where((more["flags"] & 1) == 0, values, np.nan))

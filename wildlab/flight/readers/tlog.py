@@ -51,8 +51,6 @@ from wildlab.flight.readers.log import (
     named,
 )
 
-#: So many sound frames say what a file is, where its name does not.
-ENOUGH = 3
 #: MAV_AUTOPILOT_INVALID and MAV_TYPE_GCS: what is no autopilot says so in its heartbeat.
 _NO_AUTOPILOT, _GROUND_STATION = 8, 6
 #: What vehicles are known by, best first.
@@ -72,7 +70,8 @@ _BEGINNING = re.compile(rb"\x00(?=[\x00-\xff]{7}[\xfd\xfe])", re.DOTALL)
 
 _TYPES = {
     **{f"{kind}{bits}_t": f"<{kind[0]}{bits // 8}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)},
-    **{"float": "<f4", "double": "<f8"},
+    "float": "<f4",
+    "double": "<f8",
 }
 
 
@@ -350,15 +349,15 @@ def _most(rows: Mask) -> bool:
     return bool(len(rows) and rows.mean() > 0.5)
 
 
-def sniff(head: bytes, name: str) -> bool:
-    """Whether a file that begins with `head` is such a log; its name only makes up for a short beginning."""
-    if not any(_plausible(head, one.start()) for one in _BEGINNING.finditer(head)):
-        return False
-    found = len(walk(head).table)
-    return found >= ENOUGH or (found > 0 and name.lower().endswith(".tlog"))
+def sniff(head: bytes) -> bool:
+    """Whether a sound frame behind a time that can be true is among the first bytes of a file."""
+    # Without the look at times, all that it takes to walk would be loaded for any file.
+    return (
+        any(_plausible(head, one.start()) for one in _BEGINNING.finditer(head)) and len(walk(head).table) > 0
+    )
 
 
-def decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """A telemetry log, its rows counted in frames.
 
     Raises

@@ -30,18 +30,22 @@ from wildlab.flight.time_scales import GPS_START_S, WEEK_S, gps_to_utc
 _FIXES = {"none": 0.0, "2d": 2.0, "3d": 3.0, "dgps": 4.0, "pps": 3.0}
 #: Our columns -> elements of a point.
 _ELEMENTS = {
-    **{"height_sea_m": "ele", "undulation_m": "geoidheight", "satellites": "sat", "hdop": "hdop"},
-    **{"speed": "speed", "course": "course"},
+    "height_sea_m": "ele",
+    "undulation_m": "geoidheight",
+    "satellites": "sat",
+    "hdop": "hdop",
+    "speed": "speed",
+    "course": "course",
 }
 _POINT = re.compile(r"<trkpt\b[^<>]*?(?:/>|>.*?</trkpt\s*>)", re.DOTALL)
 
 
-def gpx_sniff(head: bytes, name: str) -> bool:
+def gpx_sniff(head: bytes) -> bool:
     """Whether a file begins as GPX."""
     return re.search(r"<(?:\w+:)?gpx[\s>]", text.decode(head[:-1] if len(head) % 2 else head)) is not None
 
 
-def gpx_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def gpx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """The tracks of a GPX file, all segments in order of time; rows are points as counted in the file.
 
     Raises
@@ -104,7 +108,8 @@ def _points(points: list[str]) -> list[Element]:
 def _columns(points: Sequence[Element]) -> dict[str, Array]:
     time = np.array([_seconds(point.findtext("time", "")) for point in points])
     columns = {
-        **{"time_s": time, "time_log_s": time},
+        "time_s": time,
+        "time_log_s": time,
         **{f"{one}itude_deg": numbers(point.get(one[:3]) for point in points) for one in ("lat", "long")},
         **{
             ours: numbers(point.findtext(tag, "").strip() for point in points)
@@ -135,13 +140,13 @@ _NAMED = re.compile("latitude|x-ecef|e-baseline")
 MOST_COLUMNS = 64
 
 
-def pos_sniff(head: bytes, name: str) -> bool:
+def pos_sniff(head: bytes) -> bool:
     """Whether a header names columns, or rows look as RTKLIB writes them."""
     lines = text.decode(head).splitlines()
     return any(one.startswith("%") and re.search(f"{_NAMED.pattern}|program   : RTK", one) for one in lines)
 
 
-def pos_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def pos_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """Positions as RTKLIB wrote them, in order of time; rows are lines of the file.
 
     Raises
@@ -181,8 +186,11 @@ def pos_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
         **{f"{name}_deg": of(name) for name in ("latitude", "longitude")},
         "height_sea_m" if above_sea else "height_ellipsoid_m": of("height"),
         "sd_horizontal_m": np.sqrt((of("sdn") ** 2 + of("sde") ** 2) / 2.0),
-        **{"sd_vertical_m": of("sdu"), "satellites": of("ns")},
-        **{"v_north_m_s": of("vn"), "v_east_m_s": of("ve"), "v_down_m_s": -of("vu")},
+        "sd_vertical_m": of("sdu"),
+        "satellites": of("ns"),
+        "v_north_m_s": of("vn"),
+        "v_east_m_s": of("ve"),
+        "v_down_m_s": -of("vu"),
         "fix": np.where(
             known, _QUALITY[np.where(known, quality, 0).astype(int)], np.where(np.isnan(quality), np.nan, 0.0)
         ),

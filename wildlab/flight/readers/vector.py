@@ -597,12 +597,12 @@ def _decoded(
     return Decoded({"marks": part}, lost=lost, notes=notes)
 
 
-def kml_sniff(head: bytes, name: str) -> bool:
+def kml_sniff(head: bytes) -> bool:
     """Whether a file is KML, by its first element."""
     return head.lstrip(b"\xef\xbb\xbf \r\n\t")[:1] == b"<" and b"<kml" in head
 
 
-def kml_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def kml_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """Points of placemarks; a height counts from sea level, and only where its mode is ``absolute``.
 
     Raises
@@ -619,7 +619,8 @@ def kml_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     absolute = np.array([one.mode == "absolute" for one in found.points], bool)
     columns = {
         "name": [one.name for one in found.points],
-        **{"longitude_deg": longitude, "latitude_deg": latitude},
+        "longitude_deg": longitude,
+        "latitude_deg": latitude,
         "height_sea_m": np.where(absolute, height, np.nan),
     }
     ground = int((~absolute & (height != 0) & np.isfinite(height)).sum())
@@ -632,7 +633,7 @@ def kml_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     return _decoded(columns, range(1, count + 1), "point", lost, holding(notes))
 
 
-def geojson_sniff(head: bytes, name: str) -> bool:
+def geojson_sniff(head: bytes) -> bool:
     """Whether a file is GeoJSON, by the words that it begins with."""
     start = head.lstrip(b"\xef\xbb\xbf \r\n\t")[:1]
     bare = head.translate(None, b" \n\r\t")
@@ -640,7 +641,7 @@ def geojson_sniff(head: bytes, name: str) -> bool:
     return start == b"{" and any(one in bare for one in kinds)
 
 
-def geojson_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def geojson_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """Points of features: longitude, latitude and height above the ellipsoid of WGS 84.
 
     Raises
@@ -666,7 +667,9 @@ def geojson_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
     longitude, latitude, height = np.array([place for _, place, _ in rows], float).T
     columns = {
         "name": [name for name, _, _ in rows],
-        **{"longitude_deg": longitude, "latitude_deg": latitude, "height_ellipsoid_m": height},
+        "longitude_deg": longitude,
+        "latitude_deg": latitude,
+        "height_ellipsoid_m": height,
     }
     lost = [
         (others, "geometry", "besides: only points are marks"),
@@ -699,7 +702,7 @@ def _metres(names: list[str]) -> int:
     return len(METRES & {one.removesuffix("_m") for one in names})
 
 
-def table_sniff(head: bytes, name: str) -> bool:
+def table_sniff(head: bytes) -> bool:
     """Whether a file is a table without times that has latitudes and longitudes, or names points and has
     metres of a projection, which `table_decode` refuses with what to do."""
     names = header_of(head)
@@ -708,7 +711,7 @@ def table_sniff(head: bytes, name: str) -> bool:
     return (places or projected) and not any(TIMES & set(one.split("_")) for one in names)
 
 
-def table_decode(path: Path, data: bytes, zone: str | None = None) -> Decoded:
+def table_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """Rows of a table as marks: names, latitudes and longitudes in degrees, and heights.
 
     Raises
