@@ -63,6 +63,21 @@ def test_the_plain_case(raw):
     assert flight.manifest.locations.sensitivity == "withheld"
 
 
+def test_decimal_commas_are_stated(raw):
+    """As Excel writes tables in Norwegian; points beside them are refused, and so are commas unstated."""
+    points, plain = raw.tables["nav.csv"], _position(raw.run())
+    commas = re.sub(r"(?<=\d)\.(?=\d)", ",", points.replace(",", ";"))
+    commas = re.sub(r"(:\d\d),(\d+Z)", r"\1.\2", commas)  # a time is no number
+    raw.tables["nav.csv"] = commas
+    raw.set("poses.log.separator", ";")
+    assert np.array_equal(_position(again(raw, "poses.log.decimal", ",")), plain)
+    with pytest.raises(WildlabError, match="decimal = ','"):
+        again(raw, "poses.log.decimal", ".")
+    raw.tables["nav.csv"] = points.replace(",", ";")
+    with pytest.raises(WildlabError, match="not a finite number"):
+        again(raw, "poses.log.decimal", ",")
+
+
 def test_local_positions_both_ways(raw):
     raw.tables["nav.csv"] = "time,a,b,c,roll,pitch,yaw\n0,100,2,-3000,10,-20,30\n4,300,2,-3000,10,-20,30\n"
     raw.set("origin", ORIGIN)

@@ -198,7 +198,7 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
     data: dict[str, object] = {name: getattr(block, name) for name in CameraPart.model_fields}
     path = raw.recipe
     if block.file is not None:
-        rows = raw.table(block.file, block.separator, "camera")
+        rows = raw.table(block.file, block.separator, "camera", decimal=block.decimal)
         for name, column in block.columns.items():
             found = plain_numbers(rows, column, f"camera.{name}")
             rows.refuse(
@@ -216,7 +216,7 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
         named = block.columns.get(name)
         if named is None or block.file is None:
             raise WildlabError(error.problem, error.fix, file=path, field=f"camera.{name}") from None
-        rows = raw.table(block.file, block.separator, "camera")
+        rows = raw.table(block.file, block.separator, "camera", decimal=block.decimal)
         raise rows.fail(error.problem, error.fix, named, f"camera.{name}", 0) from None
 
 

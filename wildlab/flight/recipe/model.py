@@ -27,6 +27,7 @@ from wildlab.flight.manifest_parts import (
 from wildlab.flight.recipe.quantities import (
     Angle,
     Attitude,
+    Decimal,
     Gimbal,
     Inertial,
     Length,
@@ -229,6 +230,7 @@ class RecipeCamera(Strict):
     name: str
     file: str | None = None
     separator: Separator = ","
+    decimal: Decimal = "."
     width_px: Number
     height_px: Number
     fx_px: Number

@@ -281,15 +281,17 @@ class Spreads(Ruled):
 # -- tables over time, and the sensors on board
 
 Separator = Annotated[str, Field(min_length=1, max_length=1)]
+Decimal = Literal[".", ","]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class Block(Ruled):
-    """What every part that reads a table has: the name of its file below the source folder and its separator,
-    or the name of one of the `tables`."""
+    """What every part that reads a table has: the name of its file below the source folder, its separator and
+    what its numbers have for a decimal point, or the name of one of the `tables`."""
 
     file: str
     separator: Separator = ","
+    decimal: Decimal = "."
 
 
 class Condition(Ruled):

@@ -9,7 +9,7 @@ import hashlib
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, cast
@@ -25,7 +25,7 @@ from wildlab.flight.readers.autoferry import Part, read_part
 from wildlab.flight.readers.formats import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import of_camera
-from wildlab.flight.recipe.quantities import LogTable, MatlabTable, Quantity, Series, Stamp
+from wildlab.flight.recipe.quantities import Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
 from wildlab.flight.recipe.source_files import is_packed, packed, read_delimited, read_matlab, table_of
 from wildlab.flight.time_scales import find_zone
 from wildlab.flight.trigger_matching import match_triggers
@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 Text = NDArray[np.object_]
 Nanoseconds = NDArray[np.int64]
 
+#: Decimal commas as points; beside them, a point would part thousands, and is no number.
+_POINTS = {ord(","): ".", ord("."): "?"}
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+", re.ASCII)
 #: Stamps that end so carry their own zone.
 _ZONED = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d.*(?:[Zz]|[+-]\d\d(?::?\d\d)?)")
@@ -54,6 +56,7 @@ class RawTable:
     cells: dict[str, Any]
     lines: NDArray[np.int64]
     counted_in: str = "line"
+    decimal: Decimal = "."
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -64,7 +67,7 @@ class RawTable:
             name: column.take(pyarrow.array(chosen)) if is_packed(column) else column[chosen]
             for name, column in self.cells.items()
         }
-        return RawTable(self.path, self.header, cells, self.lines[chosen], self.counted_in)
+        return replace(self, cells=cells, lines=self.lines[chosen])
 
     def cell(self, column: str, row: int) -> str:
         """One cell as text."""
@@ -94,7 +97,7 @@ class RawFiles:
     matlab: dict[str, MatlabTable] = field(default_factory=dict)
     logs: dict[str, LogTable] = field(default_factory=dict)
     hashes: dict[str, str] = field(default_factory=dict)
-    _tables: dict[tuple[str, str], RawTable] = field(default_factory=dict)
+    _tables: dict[tuple[str, ...], RawTable] = field(default_factory=dict)
     _variables: dict[str, dict[str, Any]] = field(default_factory=dict)
     _logs: dict[tuple[str, str, str | None], RawLog] = field(default_factory=dict)
 
@@ -119,7 +122,9 @@ class RawFiles:
         self.hashes[name] = hashlib.sha256(data).hexdigest()
         return data
 
-    def table(self, name: str, separator: str, part: str, *, may_be_empty: bool = False) -> RawTable:
+    def table(
+        self, name: str, separator: str, part: str, *, may_be_empty: bool = False, decimal: Decimal = "."
+    ) -> RawTable:
         """A file as a table of text, its first line the names of the columns (and all there is, where it may
         be empty); or one of the tables that the recipe makes of MATLAB files and logs.
 
@@ -133,16 +138,17 @@ class RawFiles:
             return self._log_table(name)
         if name in self.matlab:
             return self._matlab_table(name)
-        if (name, separator) not in self._tables:
+        key = name, separator, decimal
+        if key not in self._tables:
             data = self.read(name, part)
             header, cells, lines = read_delimited(
                 self.folder / name, data, separator, may_be_empty=may_be_empty
             )
-            table = RawTable(self.folder / name, header, cells, lines)
+            table = RawTable(self.folder / name, header, cells, lines, decimal=decimal)
             if not len(table):
                 return table  # kept, it would pass where rows are asked for
-            self._tables[name, separator] = table
-        return self._tables[name, separator]
+            self._tables[key] = table
+        return self._tables[key]
 
     def _matlab_table(self, name: str) -> RawTable:
         block, part = self.matlab[name], f"tables.{name}"
@@ -216,7 +222,9 @@ class RawFiles:
         WildlabError
             As `table`; and where a column of a condition is missing or not of numbers, or no row counts.
         """
-        table = self.table(block.file, block.separator, part, may_be_empty=may_be_empty)
+        table = self.table(
+            block.file, block.separator, part, may_be_empty=may_be_empty, decimal=block.decimal
+        )
         if not len(table) or (not block.changed and not block.where):
             return table
         counts = np.ones(len(table), bool)
@@ -333,8 +341,10 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
         start = 0
         for chunk in cells.iterchunks():  # a block at a time are Python's own strings
             block = slice(start, start := start + len(chunk))
-            words = chunk.to_numpy(zero_copy_only=False)
-            found[block] = pd.to_numeric(pd.Series(words), errors="coerce").to_numpy(dtype=float)
+            words = pd.Series(chunk.to_numpy(zero_copy_only=False))
+            if table.decimal == ",":
+                words = words.str.translate(_POINTS)
+            found[block] = pd.to_numeric(words, errors="coerce").to_numpy(dtype=float)
             empty[block] = words == ""
         if not may_be_empty:
             table.refuse(empty, *_EMPTY, column, part)
@@ -350,7 +360,7 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
             "mend the cell (no unit behind it), or take out the row",
         )
         if _DECIMAL_COMMA.fullmatch(cell):
-            problem, fix = "has a decimal comma", "write a decimal point in place of it, in all of the column"
+            problem, fix = "has a decimal comma", "write `decimal = ','` beside the file in the recipe"
         raise table.fail(f"{_short(cell)} {problem}", fix, column, part, row)
     return found
 
