@@ -14,8 +14,8 @@ import importlib.util
 import numpy as np
 
 from benchmarks.timing import best_of
+from tests.tracking.many.enumeration import association_probabilities_by_enumeration
 from wildlab.geometry.frames import Array
-from wildlab.tracking.association import association_probabilities_by_enumeration
 from wildlab.tracking.many import (
     POINT,
     ManySensorModel,

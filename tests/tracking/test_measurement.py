@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from scipy.linalg import expm
 from scipy.stats import chi2
 
 from tests.tracking.level_sensors import bearings, measured_from, ranges_bearings
@@ -18,8 +17,7 @@ from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.tracking import sensors as m
 from wildlab.tracking import sensors as p
-from wildlab.tracking.association import nearest_within
-from wildlab.tracking.motion import white_acceleration
+from wildlab.tracking.particles import nearest_animal
 from wildlab.tracking.sensors import combined
 
 
@@ -152,16 +150,8 @@ def test_many_positions_are_seen_as_each_alone(pose, seed):
             np.testing.assert_allclose(together, single, rtol=1e-12, atol=1e-12)
 
 
-def test_process_noise_by_van_loans_integral():
-    A, L = np.kron([[0.0, 1.0], [0.0, 0.0]], np.eye(2)), np.kron([[0.0], [0.3]], np.eye(2))
-    block = expm(np.block([[-A, L @ L.T], [np.zeros((4, 4)), A.T]]) * 1.7)
-    F, Q = white_acceleration(1.7, 0.3)
-    np.testing.assert_allclose(F, block[4:, 4:].T, atol=1e-12)
-    np.testing.assert_allclose(Q, block[4:, 4:].T @ block[:4, 4:], atol=1e-12)
-
-
 def test_outside_the_gate_there_is_no_neighbour():
     nis = np.array([[5.0, 3.0, np.nan], [np.nan, np.nan, np.nan], [30.0, 20.0, 10.0]])
-    assert nearest_within(nis, 0.95, 2).tolist() == [1, -1, -1]
-    assert nearest_within(nis, 1.0, 2).tolist() == [1, -1, 2]
+    assert nearest_animal(nis.T, 0.95).tolist() == [1, -1, -1]
+    assert nearest_animal(nis.T, 1.0).tolist() == [1, -1, 2]
     assert gate_threshold(0.95, 3) == pytest.approx(chi2.ppf(0.95, 3))

@@ -24,7 +24,6 @@ CONTINUOUS = {
 }
 HELD = {
     "constant velocity": partial(motion.constant_velocity, sd_acceleration=0.4),
-    "singer as printed": partial(motion.singer, alpha=0.1, variance=0.3, printed=True),
 }
 ALL = CONTINUOUS | HELD
 
@@ -71,6 +70,12 @@ def test_constant_velocity_is_the_print():
     assert np.allclose(Q, sd**2 * G @ G.T)
 
 
+def test_white_acceleration_agrees_with_van_loan():
+    axis = van_loan_discretization(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [0.3]]), 1.7)
+    for ours, one in zip(motion.white_acceleration(1.7, 0.3), axis, strict=True):
+        np.testing.assert_allclose(ours, np.kron(one, np.eye(2)), atol=1e-12)
+
+
 @given(alpha=st.floats(1e-3, 3), dt=st.floats(1e-3, 5))
 def test_singer_agrees_with_van_loan_and_with_the_integral(alpha, dt):
     F, Q = motion.singer(dt, alpha, 0.3)
@@ -96,7 +101,9 @@ def test_singer_agrees_with_van_loan_and_with_the_integral(alpha, dt):
 def test_the_printed_noise_is_the_limit_of_short_steps(exponent, dt):
     alpha = 10**exponent / dt
     _, exact = motion.singer(dt, alpha, 0.3)
-    _, printed = motion.singer(dt, alpha, 0.3, printed=True)
+    size = np.array([[20, 8, 6], [8, 3, 2], [6, 2, 1]])
+    axis = dt ** np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]]) / size
+    printed = 2 * alpha * 0.3 * np.kron(axis, np.eye(2))
     rows, columns = np.nonzero(printed)
     ratio = exact[rows, columns] / printed[rows, columns]
     assert np.allclose(ratio, 1, atol=2 * alpha * dt + 1e-12)

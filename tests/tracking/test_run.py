@@ -12,7 +12,6 @@ from tests.tracking.level_sensors import ranges_bearings
 from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
 from wildlab.tracking import sensors as m
-from wildlab.tracking.association import nearest_within
 from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented
 from wildlab.tracking.initiation import start_from_first
@@ -314,8 +313,6 @@ FILTERS = [by_kalman, by_coloured, by_unscented, by_imm, by_batch]
 def test_a_gate_is_a_probability(run, wrong):
     with pytest.raises(WildlabError, match=r"^gate_probability: "):
         run(gate_probability=wrong)
-    with pytest.raises(WildlabError, match=r"^gate_probability: "):
-        nearest_within(np.ones((1, 2)), wrong, 2)
 
 
 def spoilt(value, at=(1, 1)):

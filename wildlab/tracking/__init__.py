@@ -20,7 +20,6 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
   animals, with what an image did not show.
 """
 
-from wildlab.tracking.association import nearest_within
 from wildlab.tracking.batch import BatchCamera, BatchTracks, run_batch
 from wildlab.tracking.filters import ModeTrack, run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.initiation import start_from_first, start_from_position, start_from_rays
@@ -56,7 +55,6 @@ __all__ = [
     "filter_at_rest",
     "in_steps",
     "merge",
-    "nearest_within",
     "pixels",
     "positions",
     "random_walk",

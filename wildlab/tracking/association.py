@@ -14,7 +14,6 @@ caller's to choose.
 
 from __future__ import annotations
 
-from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -78,35 +77,6 @@ def nearest_detection(
     nis = innovation_squared(innovations, S)
     best = int(np.argmin(nis))
     return Nearest(int(there[best]), innovations[best], S[best], float(nis[best]))
-
-
-def nearest_within(nis: ArrayLike, gate_probability: float, m: int) -> NDArray[np.int64]:
-    """Nearest neighbour within the validation region, H 3.3.
-
-    Parameters
-    ----------
-    nis
-        (..., K), K at least one; NaN where there is nothing to compare.
-    gate_probability
-        Probability that the target's own measurement is let in, in (0, 1]; 1 is no gate.
-    m
-        Elements of the measurement.
-
-    Returns
-    -------
-    (...) index of the smallest NIS along the last axis, -1 where none lies within the gate.
-
-    Raises
-    ------
-    WildlabError
-        For a ``gate_probability`` outside (0, 1].
-    """
-    d = np.asarray(nis, float)
-    d = np.where(np.isnan(d), np.inf, d)
-    best = np.argmin(d, axis=-1)
-    least = np.take_along_axis(d, best[..., None], axis=-1)[..., 0]
-    limit = min(gate_threshold(gate_probability, m), float(np.finfo(float).max))
-    return np.asarray(np.where(least <= limit, best, -1))
 
 
 Index = NDArray[np.int64]
@@ -367,25 +337,6 @@ def belief_propagation(weights: ArrayLike, missed: ArrayLike) -> Array:
             break
     all_of = np.concatenate([np.ones((len(w), 1)), odds * free], axis=1)
     return np.asarray(all_of / all_of.sum(axis=1, keepdims=True))
-
-
-def association_probabilities_by_enumeration(weights: ArrayLike, missed: ArrayLike) -> Array:
-    """The same as `association_probabilities`, way by way: what the fast sums are held against.
-
-    Parameters and result as there; for a handful of targets.
-    """
-    w, w0 = np.asarray(weights, float), np.asarray(missed, float)
-    n, m = w.shape
-    found = np.zeros((n, 1 + m))
-    # None of the measurements is there once for each target.
-    choices = [*range(1, 1 + m), *([0] * n)]
-    for way in set(permutations(choices, n)):
-        weight = 1.0
-        for target, choice in enumerate(way):
-            weight *= w0[target] if choice == 0 else w[target, choice - 1]
-        for target, choice in enumerate(way):
-            found[target, choice] += weight
-    return np.asarray(found / found.sum(axis=1, keepdims=True))
 
 
 def image_features(area: ArrayLike, intensity: ArrayLike, hu: ArrayLike, metres_per_px: ArrayLike) -> Array:

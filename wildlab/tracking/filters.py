@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.tracking.association import nearest_detection
+from wildlab.tracking.association import Nearest, nearest_detection
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import (
@@ -29,7 +29,7 @@ from wildlab.tracking.run import (
     single_detection,
     step_through,
 )
-from wildlab.tracking.sensors import Prediction, Sensor, angles_at, check_states, difference, on_state
+from wildlab.tracking.sensors import Sensor, angles_at, check_states, difference, on_state
 
 
 class Differenced(NamedTuple):
@@ -281,44 +281,6 @@ class ModeTrack(NamedTuple):
     probabilities: Array  # (N, K), NaN before the start
 
 
-class _Mode:
-    """One of an IMM's filters, with what filterpy asks of it: x, P, likelihood, predict and update."""
-
-    def __init__(self, x: Array, P: Array) -> None:
-        self.x, self.P, self.likelihood = x.copy(), P.copy(), 1.0
-        self.F, self.Q = np.eye(len(x)), np.zeros((len(x), len(x)))
-        self.expected: Prediction | None = None
-        self.innovation, self.S = np.zeros(0), np.zeros((0, 0))
-        self.R = self.S
-
-    def predict(self, u: None = None) -> None:
-        self.x, self.P = predict(self.x, self.P, self.F, self.Q)
-
-    def evaluate(self, row: int, z: Array, R: Array, sensor: Sensor) -> bool:
-        """Whether this mode's target would be seen; then innovation and ``S`` are there."""
-        expected = sensor.predict(row, self.x[: sensor.states])
-        self.expected, self.R = expected, R
-        if not all(np.isfinite(part).all() for part in (expected.z, expected.H_position, R)):
-            return False
-        H = on_state(expected.H_position, len(self.x))
-        near = nearest_detection(z[None], expected.z, H @ self.P @ H.T, R[None], angles_at(sensor, row), row)
-        if near is None:
-            return False
-        self.innovation, self.S = near.innovation, near.S
-        return True
-
-    def log_likelihood(self) -> float:
-        weighed = self.innovation @ np.linalg.solve(self.S, self.innovation)
-        return float(-(weighed + np.linalg.slogdet(2 * np.pi * self.S)[1]) / 2)
-
-    def update(self, z: Array) -> None:
-        if self.expected is None:
-            raise AssertionError("evaluate() comes first")
-        H = on_state(self.expected.H_position, len(self.x))
-        done = correct(self.x, self.P, self.innovation, H, self.R)
-        self.x, self.P = done.x, done.P
-
-
 def run_imm(
     times: ArrayLike,
     measurements: ArrayLike,
@@ -381,10 +343,7 @@ def run_imm(
         )
     rates = np.tile(1 / stay[:, None] / (K - 1), (1, K))
     np.fill_diagonal(rates, -1 / stay)
-    modes = [_Mode(np.asarray(start.x, float), np.asarray(start.P, float)) for _ in motions]
-    # Imported here, for it brings scipy.stats along, which takes longer than all else that is imported.
-    from filterpy.kalman import IMMEstimator
-
+    xs, Ps = [np.asarray(start.x, float)] * K, [np.asarray(start.P, float)] * K
     weights = np.full(K, 1 / K)
     probabilities = np.full((len(given.times), K), np.nan)
     if start.row >= 0:
@@ -396,36 +355,49 @@ def run_imm(
         spread = np.asarray(covariances) + off[:, :, None] * off[:, None, :]
         return np.asarray(centre), np.asarray(np.tensordot(shares, spread, 1))
 
+    def compare(row: int, x: Array, P: Array) -> tuple[Nearest, Array] | None:
+        """What this mode makes of a row, with its ``H``; None where its target would not be seen."""
+        expected, R_now = sensor.predict(row, x[: sensor.states]), given.R[row, 0]
+        if not all(np.isfinite(part).all() for part in (expected.z, expected.H_position, R_now)):
+            return None
+        H = on_state(expected.H_position, len(x))
+        angles = angles_at(sensor, row)
+        near = nearest_detection(given.z[row], expected.z, H @ P @ H.T, R_now[None], angles, row)
+        return None if near is None else (near, H)
+
     def step(row: int, state: State, track: Track) -> State:
-        nonlocal weights
+        nonlocal xs, Ps, weights
         dt = given.times[row] - state[0]
-        for mode, motion in zip(modes, motions, strict=True):
-            mode.F, mode.Q = motion(dt)
-        # Made anew at each row: filterpy's own object forgets to switch where there is no measurement.
-        imm = IMMEstimator(modes, weights, expm(rates * dt))
-        imm.predict()
-        weights = imm.cbar
-        z = given.z[row, 0]
-        R_now = given.R[row, 0]
-        if np.isfinite(z).all() and all([one.evaluate(row, z, R_now, sensor) for one in modes]):
-            middle = modes[0].innovation  # angles: the others' are near it, on the same side of the wrap
-            gaps = [middle + difference(one.innovation, middle, angles_at(sensor, row)) for one in modes]
-            innovation, S = mixed(gaps, [mode.S for mode in modes], weights)
+        joint = weights[:, None] * expm(rates * dt)
+        weights = joint.sum(axis=0)
+        begun = [mixed(xs, Ps, shares) for shares in (joint / weights).T]
+        prior = [predict(*one, *motion(dt)) for one, motion in zip(begun, motions, strict=True)]
+        xs, Ps = [x for x, _ in prior], [P for _, P in prior]
+        found = [one for one in (compare(row, *mode) for mode in prior) if one is not None]
+        if len(found) == K:
+            middle = found[0][0].innovation  # angles: the others' are near it, on the same side of the wrap
+            gaps = [middle + difference(one.innovation, middle, angles_at(sensor, row)) for one, _ in found]
+            innovation, S = mixed(gaps, [one.S for one, _ in found], weights)
             nis = float(innovation @ np.linalg.solve(S, innovation))
             record(track, row, innovation, S, nis, 0, nis <= given.thresholds[row])
             if track.used[row]:
-                logs = np.array([mode.log_likelihood() for mode in modes])
-                for mode, relative in zip(modes, np.exp(logs - logs.max()), strict=True):
-                    mode.likelihood = max(float(relative), LEAST_LIKELIHOOD)
-                imm.update(z)
-                weights = imm.mu
+                logs = np.array(
+                    [-(one.nis + np.linalg.slogdet(2 * np.pi * one.S)[1]) / 2 for one, _ in found]
+                )
+                weights = weights * np.maximum(np.exp(logs - logs.max()), LEAST_LIKELIHOOD)
+                weights = weights / weights.sum()
+                after = [
+                    correct(*mode, one.innovation, H, given.R[row, 0])
+                    for mode, (one, H) in zip(prior, found, strict=True)
+                ]
+                xs, Ps = [one.x for one in after], [one.P for one in after]
         probabilities[row] = weights
-        x, P = mixed([mode.x for mode in modes], [mode.P for mode in modes], weights)
+        x, P = mixed(xs, Ps, weights)
         return given.times[row], x, (P + P.T) / 2
 
     def predict_to(state: State, time: float) -> tuple[Array, Array]:
         """Each mode goes its own way; between rows none is left for another."""
-        gone = [predict(m.x, m.P, *f(time - state[0])) for m, f in zip(modes, motions, strict=True)]
+        gone = [predict(x, P, *f(time - state[0])) for x, P, f in zip(xs, Ps, motions, strict=True)]
         return mixed([x for x, _ in gone], [P for _, P in gone], weights)
 
     return ModeTrack(step_through(given, start, predict_to, step), probabilities)

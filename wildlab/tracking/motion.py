@@ -143,7 +143,7 @@ def singer_variance(max_acceleration: float, p_max: float, p_zero: float) -> flo
     return max_acceleration**2 / 3 * (1 + 4 * p_max - p_zero)
 
 
-def singer(dt: float, alpha: float, variance: float, printed: bool = False) -> tuple[Array, Array]:
+def singer(dt: float, alpha: float, variance: float) -> tuple[Array, Array]:
     """Singer's model, H (7.1)-(7.3): acceleration as a first-order Markov process.
 
     State ``[pN, pE, vN, vE, aN, aE]``.
@@ -156,8 +156,6 @@ def singer(dt: float, alpha: float, variance: float, printed: bool = False) -> t
         Inverse of the manoeuvre's time constant, 1/s; zero is constant acceleration without noise.
     variance
         Stationary variance of the acceleration, (m/s^2)^2, see `singer_variance`.
-    printed
-        Use the ``Q`` printed as H (7.4), the limit for small ``alpha dt``, instead of the exact one.
 
     Returns
     -------
@@ -184,11 +182,6 @@ def singer(dt: float, alpha: float, variance: float, printed: bool = False) -> t
     F = F * h ** np.array([[0, 1, 2], [0, 0, 1], [0, 0, 0]])  # back to SI
     for _ in range(doublings):
         F, Q = F @ F, F @ Q @ F.T + Q
-    if printed:
-        T = dt
-        Q = 2 * alpha * variance * np.array(
-            [[T**5 / 20, T**4 / 8, T**3 / 6], [T**4 / 8, T**3 / 3, T**2 / 2], [T**3 / 6, T**2 / 2, T]]
-        )  # fmt: skip
     return _both(F), _both((Q + Q.T) / 2)
 
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.tracking.many.enumeration import association_probabilities_by_enumeration
 from tests.tracking.poses import GENERATORS
 from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.tracking.association import (
     association_probabilities,
-    association_probabilities_by_enumeration,
     belief_propagation,
 )
 from wildlab.tracking.many.bank import pair_scans

@@ -1,7 +1,6 @@
-"""Particles against exact answers: Kalman's filter, a grid, and pairs by trying all."""
+"""Particles against exact answers: Kalman's filter and a grid."""
 
 from functools import partial
-from itertools import permutations
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from scipy.stats import chi2, norm
 
 from tests.tracking.particles.worlds import Grid, grid_over, grid_weigh, walk_matrix
 from tests.tracking.poses import GENERATORS
-from wildlab.errors import WildlabError
 from wildlab.tracking import kalman
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.particles import (
@@ -23,7 +21,6 @@ from wildlab.tracking.particles import (
     moments,
     move,
     nearest_animal,
-    one_to_one,
     resample,
     sight_of,
     start_gaussian,
@@ -184,28 +181,6 @@ def test_each_detection_takes_its_closest_track(rng, animals, detections):
         assert taken[j] == (best if inside else -1)
 
 
-@given(rng=GENERATORS, animals=st.integers(0, 4), detections=st.integers(0, 4))
-def test_pairs_gain_as_much_as_the_best_of_all_ways(rng, animals, detections):
-    gain = rng.normal(0.5, 2, (animals, detections))
-    gain[rng.random(gain.shape) < 0.3] = -np.inf
-    taken = one_to_one(gain)
-    pairs = [(a, j) for j, a in enumerate(taken) if a >= 0]
-    assert len({a for a, _ in pairs}) == len(pairs) and all(gain[p] > 0 for p in pairs)
-    # Every way: each track takes one of the detections, or one of as many that stand for none.
-    ways = permutations(range(detections + animals), animals)
-    best = max(
-        sum(gain[a, j] for a, j in enumerate(way) if j < detections and gain[a, j] > 0) for way in ways
-    )
-    assert np.isclose(sum(gain[p] for p in pairs), best)
-
-
-@pytest.mark.parametrize("wrong", [np.nan, np.inf])
-def test_a_gain_that_is_no_number_is_refused(wrong):
-    with pytest.raises(WildlabError, match="not a number"):
-        one_to_one([[wrong, 0.0]])
-
-
-def test_a_group_takes_one_track_by_f_and_each_its_own_when_counted():
+def test_a_group_takes_one_track_by_f():
     squared = mahalanobis_squared([[0.0, 0.0]], [4 * np.eye(2)], [[0.5, 0.0], [-0.5, 0.0]], np.eye(2))
     assert nearest_animal(squared, 0.99).tolist() == [0, 0]
-    assert sorted(one_to_one(9.21 - squared).tolist()) == [-1, 0]

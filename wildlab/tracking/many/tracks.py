@@ -115,10 +115,6 @@ def after_scan(
     return after, np.asarray(own[:, 1:].sum(axis=1) + own[:, 0] * hidden), own
 
 
-#: What a Poisson distribution leaves out beyond its largest number.
-TAIL = 1e-12
-
-
 class Count(NamedTuple):
     """A number of animals.
 
@@ -138,15 +134,13 @@ class Count(NamedTuple):
     probability: float
 
 
-def count_probabilities(existence: ArrayLike, unseen: float = 0.0) -> Array:
+def count_probabilities(existence: ArrayLike) -> Array:
     """Probability of each number of animals.
 
     Parameters
     ----------
     existence
         (A,) probability that each track is an animal that is there; independent of each other.
-    unseen
-        Expected number of animals that were never detected.
 
     Returns
     -------
@@ -155,7 +149,7 @@ def count_probabilities(existence: ArrayLike, unseen: float = 0.0) -> Array:
     Raises
     ------
     WildlabError
-        Where a probability is not from 0 to 1, or the expected number below zero.
+        Where a probability is not from 0 to 1.
 
     Examples
     --------
@@ -163,20 +157,15 @@ def count_probabilities(existence: ArrayLike, unseen: float = 0.0) -> Array:
     [0.  0.5 0.5]
     """
     r = np.asarray(existence, float).reshape(-1)
-    if not ((r >= 0) & (r <= 1)).all() or not 0 <= unseen < np.inf:
+    if not ((r >= 0) & (r <= 1)).all():
         raise WildlabError(
-            f"no count from probabilities {np.round(r, 3).tolist()} and {unseen} animals never seen",
-            "give probabilities from 0 to 1, and a number of zero or more",
+            f"no count from probabilities {np.round(r, 3).tolist()}",
+            "give probabilities from 0 to 1",
             field="existence",
         )
     p = np.ones(1)
     for one in r:
         p = np.convolve(p, [1 - one, one])
-    if unseen > 0:
-        numbers = np.arange(int(unseen + 12 * np.sqrt(unseen) + 30))
-        logarithm = numbers * np.log(unseen) - unseen - np.cumsum(np.log(np.maximum(numbers, 1)))
-        poisson = np.exp(logarithm)
-        p = np.convolve(p, poisson[: np.searchsorted(np.cumsum(poisson), 1 - TAIL) + 1])
     return np.asarray(p / p.sum())
 
 

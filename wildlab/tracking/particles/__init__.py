@@ -5,8 +5,7 @@ Animals are the first axis, particles the second: states (A, N, n), weights (A, 
 found nothing; then `moments`, and `resample`. Always resampling is SIR, by the effective size alone SIS.
 
 - `walk_of`: F (4.5) with the step that its noise depends on. `sight_of`: a footprint from a mask.
-- `step_nearest`: many animals image after image, by F's rule, with `nearest_animal` and `one_to_one` behind
-  it.
+- `step_nearest`: many animals image after image, by F's rule, with `nearest_animal` behind it.
 
 >>> import numpy as np
 >>> from wildlab.tracking.particles import *
@@ -44,7 +43,6 @@ from wildlab.tracking.particles.steps import (
     mahalanobis_squared,
     nearest_animal,
     no_herd,
-    one_to_one,
     step_nearest,
 )
 
@@ -63,7 +61,6 @@ __all__ = [
     "move",
     "nearest_animal",
     "no_herd",
-    "one_to_one",
     "resample",
     "sight_of",
     "start_gaussian",

@@ -44,20 +44,6 @@ def pick(cumulative: Array, points: Array) -> NDArray[np.int64]:
 
 
 @compiled
-def take(x: Array, chosen: NDArray[np.int64]) -> Array:
-    """The chosen particles (A, M) of each animal's (A, N, n): (A, M, n)."""
-    rows, wanted = chosen.shape
-    n = x.shape[2]
-    found = np.empty((rows, wanted, n))
-    for a in range(rows):
-        for k in range(wanted):
-            i = chosen[a, k]
-            for c in range(n):
-                found[a, k, c] = x[a, i, c]
-    return found
-
-
-@compiled
 def weighted_moments(x: Array, w: Array) -> tuple[Array, Array]:
     """Means (A, n) and covariances (A, n, n) of particles (A, N, n) with weights (A, N), F (4.12)-(4.13)."""
     rows, particles, n = x.shape
@@ -345,10 +331,8 @@ def resample(
     if not due.any():
         return cloud, due
     chosen = draw(cloud.w[due], rng, scheme)
-    if due.all():
-        return Cloud(take(np.ascontiguousarray(cloud.x), chosen), np.full_like(cloud.w, 1 / N)), due
     x, w = cloud.x.copy(), cloud.w.copy()
-    x[due] = take(cloud.x[due], chosen)
+    x[due] = np.take_along_axis(cloud.x[due], chosen[..., None], axis=1)
     w[due] = 1 / N
     return Cloud(x, w), due
 

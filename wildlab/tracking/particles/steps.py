@@ -11,12 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linear_sum_assignment
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array
-from wildlab.tracking.association import nearest_within
+from wildlab.tracking.association import global_nearest, innovation_squared
 from wildlab.tracking.kalman import update
 from wildlab.tracking.particles.clouds import (
     FLODELL_THRESHOLD,
@@ -55,8 +54,7 @@ def mahalanobis_squared(mean: ArrayLike, covariance: ArrayLike, z: ArrayLike, R:
     x, P = np.asarray(mean, float)[:, None, :2], np.asarray(covariance, float)[:, None, :2, :2]
     found = np.asarray(z, float).reshape(-1, 2)
     S = P + np.broadcast_to(np.asarray(R, float), (len(found), 2, 2))
-    off = found - x
-    return np.asarray(np.einsum("ami,ami->am", off, np.linalg.solve(S, off[..., None])[..., 0]))
+    return innovation_squared(found - x, S)
 
 
 def nearest_animal(squared: ArrayLike, gate_probability: float) -> NDArray[np.int64]:
@@ -89,45 +87,9 @@ def nearest_animal(squared: ArrayLike, gate_probability: float) -> NDArray[np.in
     d = np.asarray(squared, float)
     if not len(d):
         return np.full(d.shape[1], -1)
-    return nearest_within(d.T, gate_probability, 2)
-
-
-def one_to_one(gain: ArrayLike) -> NDArray[np.int64]:
-    """The pairs that gain most together, no track and no detection in two of them.
-
-    Parameters
-    ----------
-    gain
-        (A, M) what a pair gains over leaving both alone, such as the logarithm of a ratio of likelihoods; no
-        pair is made that gains nothing. Minus infinity outside the gate.
-
-    Returns
-    -------
-    (M,) index of the track, -1 where there is none.
-
-    Raises
-    ------
-    WildlabError
-        Where a gain is NaN or infinite.
-
-    Examples
-    --------
-    >>> print(one_to_one([[5.0, 4.0, -1.0], [4.0, 1.0, -1.0]]))
-    [ 1  0 -1]
-    """
-    worth = np.asarray(gain, float)
-    if np.isnan(worth).any() or (worth == np.inf).any():
-        raise WildlabError(
-            "what a pair gains is not a number", "give minus infinity where there is no pair", field="gain"
-        )
-    A, M = worth.shape
-    # A column for each track that stays alone, which gains nothing.
-    padded = np.concatenate([np.where(worth > 0, worth, -1.0), np.zeros((A, A))], axis=1)
-    rows, columns = linear_sum_assignment(padded, maximize=True)
-    found = np.full(M, -1)
-    pairs = columns < M
-    found[columns[pairs]] = rows[pairs]
-    return found
+    d = np.where(np.isnan(d), np.inf, d)
+    limit = min(gate_threshold(gate_probability, 2), float(np.finfo(float).max))
+    return np.asarray(np.where(d.min(axis=0) <= limit, d.argmin(axis=0), -1))
 
 
 #: Clouds, which animals the last image showed (A,), seconds, random numbers -> clouds.
@@ -354,8 +316,8 @@ def _associated(
     # Then those that were lost, one detection each: a lap later no two are likely to be one animal's.
     limit = min(gate_threshold(rules.gate_probability, 2), 1e6)
     free = taken < 0
-    again = one_to_one(np.where(herd.lost[:, None] & free, limit - squared, -np.inf))
-    taken = np.where(free, again, taken)
+    again = global_nearest(np.where(herd.lost[:, None] & free, squared, np.inf).T, limit)
+    taken = np.where(free, again.track, taken)
     given = np.zeros(herd.cloud.w.shape)
     for j in np.flatnonzero(taken >= 0):
         a = taken[j]
