@@ -15,7 +15,7 @@ from wildlab.simulation.error_models import (
     stream,
     with_attitude_error,
 )
-from wildlab.simulation.onboard_sensors import PositionErrors, antenna_motion, position_fixes
+from wildlab.simulation.onboard_sensors import antenna_motion, position_fixes
 from wildlab.simulation.parameter_groups import CameraSway
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.trajectory import (
@@ -113,15 +113,12 @@ def test_an_antennas_velocity_is_the_derivative_of_its_position():
 def test_fixes_scatter_about_the_truth_as_stated(rng):
     runs, count = 300, 200
     true = np.tile([10.0, 20.0, -300.0], (count, 1))
-    off = (
-        np.array(
-            [
-                position_fixes(true, 0.5, PositionErrors((2.0, 3.0), 25.0, (0.5, 1.0)), rng)
-                for _ in range(runs)
-            ]
-        )
-        - true
-    )
+    sizes = {
+        "horizontal_correlated_sd": 2.0, "vertical_correlated_sd": 3.0, "correlation_time": 25.0,
+        "horizontal_noise": 0.5, "vertical_noise": 1.0, "rate": 2.0, "resolution": 0.0,
+    }  # fmt: skip
+    receiver = with_values(load_twin("static-antenna"), **{f"gnss__{k}": v for k, v in sizes.items()}).gnss
+    off = np.array([position_fixes(true, receiver, rng) for _ in range(runs)]) - true
     variance = np.array([2.0**2 + 0.5**2] * 2 + [3.0**2 + 1.0**2])
     # 100 s hold two independent errors of the correlated kind (100 / 2 tau).
     assert (off**2).mean(axis=(0, 1)) == pytest.approx(variance, rel=5 * np.sqrt(2 / (2 * runs)))

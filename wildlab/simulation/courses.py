@@ -351,10 +351,12 @@ def _times_of_angles(circle: tuple[float, ...]) -> tuple[float, Array, Array]:
     -------
     The mean, s per rad, and the real and imaginary parts of the series, (K,) s.
     """
-    *_, sense, start = circle
+    radius, airspeed, *wind, sense, start = circle
     count = 1024
     turned = 2 * np.pi * np.arange(count) / count  # how far around since the start, always increasing
-    rates = [kernels.round_rate(angle, *circle[:5])[0] for angle in start + sense * turned]
+    c, s = np.cos(start + sense * turned), np.sin(start + sense * turned)
+    tail, cross = sense * np.stack([-s, c], axis=-1) @ wind, np.stack([c, s], axis=-1) @ wind
+    rates = sense * (tail + np.sqrt(airspeed**2 - cross**2)) / radius  # by the wind triangle
     spectrum = np.fft.rfft(1.0 / np.abs(rates)) / count
     mean = float(spectrum[0].real)
     series = 2 * spectrum[1:-1] / (1j * np.arange(1, count // 2))

@@ -135,28 +135,11 @@ def read_triad(true: ArrayLike, rate: float, sheet: TriadDataSheet, rng: np.rand
     return noise
 
 
-def triad_data_sheets(imu: Imu) -> tuple[TriadDataSheet, TriadDataSheet]:
-    """Of a unit's accelerometers, and of its gyros."""
-    angles = (imu.axis_misalignment.si, imu.package_misalignment.si)
-    accelerometers = TriadDataSheet(
-        imu.accelerometer_random_walk.si,
-        imu.accelerometer_bias_stability.si,
-        imu.accelerometer_bias_time.si,
-        imu.accelerometer_turn_on_bias.si,
-        *angles,
-        imu.accelerometer_range.si,
-        imu.accelerometer_resolution.si,
-    )
-    gyros = TriadDataSheet(
-        imu.gyro_random_walk.si,
-        imu.gyro_bias_stability.si,
-        imu.gyro_bias_time.si,
-        imu.gyro_turn_on_bias.si,
-        *angles,
-        imu.gyro_range.si,
-        imu.gyro_resolution.si,
-    )
-    return accelerometers, gyros
+def triad_data_sheet(imu: Imu, triad: str) -> TriadDataSheet:
+    """Of a unit's triad, ``accelerometer`` or ``gyro``."""
+    names = ("random_walk", "bias_stability", "bias_time", "turn_on_bias", "range", "resolution")
+    own = [getattr(imu, f"{triad}_{name}").si for name in names]
+    return TriadDataSheet._make([*own[:4], imu.axis_misalignment.si, imu.package_misalignment.si, *own[4:]])
 
 
 def read_imu(
@@ -166,8 +149,8 @@ def read_imu(
 
     ``stream`` gives the random numbers of each triad by its name.
     """
-    accelerometers, gyros = triad_data_sheets(imu)
-    return (
-        read_triad(force, imu.rate.si, accelerometers, stream("accelerometers")),
-        read_triad(angular_rate, imu.rate.si, gyros, stream("gyros")),
+    force, rate = (
+        read_triad(true, imu.rate.si, triad_data_sheet(imu, triad), stream(f"{triad}s"))
+        for true, triad in ((force, "accelerometer"), (angular_rate, "gyro"))
     )
+    return force, rate

@@ -94,7 +94,7 @@ def piecewise_polynomial(
 
 
 @compiled
-def round_rate(
+def _round_rate(
     angle: float, radius: float, airspeed: float, north: float, east: float, sense: float
 ) -> tuple[float, float]:
     """Angular rate around a circle in a wind (north, east), and its derivative with respect to the angle."""
@@ -131,7 +131,7 @@ def angles_on_circle(
             for k in range(len(real) - 1, -1, -1):  # Horner
                 re, im = re + real[k], im + imaginary[k]
                 re, im = re * c - im * s, re * s + im * c
-            spin, slope = round_rate(start + sense * x, radius, airspeed, north, east, sense)
+            spin, slope = _round_rate(start + sense * x, radius, airspeed, north, east, sense)
             late = mean * x + re - constant - times[n]
             step = late * abs(spin)
             if abs(step) < 1e-9:  # what is left after it is its square
@@ -154,7 +154,7 @@ def circle_motion(
     radius, airspeed, north, east, sense, _ = circle
     for n in range(len(angles)):
         c, s = math.cos(angles[n]), math.sin(angles[n])
-        spin, slope = round_rate(angles[n], radius, airspeed, north, east, sense)
+        spin, slope = _round_rate(angles[n], radius, airspeed, north, east, sense)
         r, r1, r2 = radius + off_circle[0, n], off_circle[1, n], off_circle[2, n]
         outward, clockwise = r2 - r * spin * spin, 2.0 * r1 * spin + r * slope * spin
         p[n, 0], p[n, 1] = r * c, r * s

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,7 @@ from wildlab.geometry.gravity import local_earth
 from wildlab.simulation import kernels
 from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_attitude_error
 from wildlab.simulation.imu import ideal_imu, read_imu
-from wildlab.simulation.parameter_groups import Gimbal, Gnss
+from wildlab.simulation.parameter_groups import Gimbal, Gnss, TargetGps
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.trajectory import (
     AttitudeDisturbance,
@@ -57,25 +56,6 @@ def gimbal_table(gimbal: Gimbal, duration: float, seed: int) -> pd.DataFrame:
     return pd.DataFrame({"time_s": times, "pan_rad": pan + error[0], "tilt_rad": tilt + error[1]})
 
 
-class PositionErrors(NamedTuple):
-    """How far off a receiver's positions are.
-
-    Attributes
-    ----------
-    correlated_sd
-        SDs of the time-correlated error, a first-order Gauss-Markov process, per horizontal axis and in
-        height, m: multipath, and of a single-frequency receiver the ionosphere and orbits too.
-    correlation_time
-        Its correlation time, s.
-    noise_sd
-        SDs of the white error from fix to fix, likewise, m.
-    """
-
-    correlated_sd: tuple[float, float]
-    correlation_time: float
-    noise_sd: tuple[float, float]
-
-
 def antenna_motion(motion: Motion, angular_rate: ArrayLike, arm: ArrayLike) -> tuple[Array, Array]:
     """Position and velocity in n of an antenna that is rigidly fixed to b.
 
@@ -97,26 +77,23 @@ def antenna_motion(motion: Motion, angular_rate: ArrayLike, arm: ArrayLike) -> t
     return motion.position + motion.R_nb @ r, motion.velocity + np.einsum("nij,nj->ni", motion.R_nb, around)
 
 
-def position_fixes(
-    position: ArrayLike, step: float, errors: PositionErrors, rng: np.random.Generator
-) -> Array:
+def position_fixes(position: ArrayLike, receiver: Gnss | TargetGps, rng: np.random.Generator) -> Array:
     """Positions as a receiver gives them: with a time-correlated error, and noise from fix to fix.
 
     Parameters
     ----------
     position
-        True positions of the antenna in n, (N, 3) m, ``step`` seconds apart.
+        True positions of the antenna in n at the receiver's rate, (N, 3) m.
 
     Returns
     -------
     (N, 3) m, in n.
     """
-    p = np.asarray(position, float)
-    correlated_sd, noise_sd = (
-        np.array([sd[0], sd[0], sd[1]]) for sd in (errors.correlated_sd, errors.noise_sd)
-    )
-    correlated = gauss_markov(len(p), step, correlated_sd, errors.correlation_time, rng)
-    return p + correlated + noise_sd * rng.standard_normal(p.shape)
+    p, r = np.asarray(position, float), receiver
+    spread = np.array([r.horizontal_correlated_sd.si] * 2 + [r.vertical_correlated_sd.si])
+    noise_sd = np.array([r.horizontal_noise.si] * 2 + [r.vertical_noise.si])
+    correlated = gauss_markov(len(p), 1 / r.rate.si, spread, r.correlation_time.si, rng)
+    return rounded(p + correlated + noise_sd * rng.standard_normal(p.shape), r.resolution.si)
 
 
 def sample_times(rate: float, duration: float) -> Array:
@@ -252,16 +229,11 @@ def gnss_table(
         "": (g.first_x.si, g.first_y.si, g.first_z.si),
         "second_": (g.second_x.si, g.second_y.si, g.second_z.si),
     }
-    errors = PositionErrors(
-        (g.horizontal_correlated_sd.si, g.vertical_correlated_sd.si),
-        g.correlation_time.si,
-        (g.horizontal_noise.si, g.vertical_noise.si),
-    )
     columns = {"time_s": times + g.latency.si}
     for which, arm in arms.items():
         position, velocity = antenna_motion(motion, rate, arm)
         rng = stream(seed, f"gnss {which or 'first_'}antenna")
-        fix = rounded(position_fixes(position, 1 / g.rate.si, errors, rng), g.resolution.si)
+        fix = position_fixes(position, g, rng)
         columns |= {f"{which}{axis}_m": fix[:, i] for i, axis in enumerate(("north", "east", "down"))}
         if not which:
             slip = g.velocity_noise.si * stream(seed, "gnss velocity").standard_normal(velocity.shape)

@@ -10,9 +10,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
-from wildlab.simulation.error_models import rounded, stream
+from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import ground_heights
-from wildlab.simulation.onboard_sensors import PositionErrors, position_fixes
+from wildlab.simulation.onboard_sensors import position_fixes
 from wildlab.simulation.parameter_groups import Animals, Enclosure, Target, TargetMotion
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.trajectory import Signal, band_limited_disturbance
@@ -192,13 +192,7 @@ def truth_table(target: Target, duration: float, seed: int) -> pd.DataFrame:
         times = np.arange(int(duration * gps.rate.si + 1e-9) + 1) / gps.rate.si
         course = motion.course.si
         antenna = path(times) + gps.ahead.si * np.array([np.cos(course), np.sin(course), 0.0])
-        errors = PositionErrors(
-            (gps.horizontal_correlated_sd.si, gps.vertical_correlated_sd.si),
-            gps.correlation_time.si,
-            (gps.horizontal_noise.si, gps.vertical_noise.si),
-        )
-        position = position_fixes(antenna, 1 / gps.rate.si, errors, stream(seed, f"gps of {name}"))
-        position = rounded(position, gps.resolution.si)
+        position = position_fixes(antenna, gps, stream(seed, f"gps of {name}"))
     return pd.DataFrame(
         {
             "target_id": [name] * len(times),

@@ -295,7 +295,7 @@ def camera_motion(twin: TwinParameters, trajectory: Trajectory, times: Array, se
     roll, pitch, yaw = (np.ascontiguousarray(angle) for angle in sway(times).T)
     R = np.empty_like(motion.R_nb)
     kernels.turn(np.ascontiguousarray(motion.R_nb), roll, pitch, yaw, R)
-    return Motion(motion.times, motion.position, motion.velocity, motion.acceleration, R)
+    return replace(motion, R_nb=R)
 
 
 #: Times (N,) in s -> position, velocity, acceleration in n, (N, 3) each, in m, m/s, m/s^2.

@@ -1,6 +1,6 @@
 """Other filters with the arguments of `wildlab.tracking.run.run_filter`: differenced measurements, whose
-noise is correlated in time (H (7.5)-(7.12)), sigma points, and several motion models (H 3.2.3), the last
-two by filterpy. Poses are taken as true.
+noise is correlated in time (H (7.5)-(7.12)), sigma points by
+filterpy, and several motion models (H 3.2.3). Poses are taken as true.
 """
 
 from __future__ import annotations

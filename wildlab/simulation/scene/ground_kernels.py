@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wildlab.geometry.compilation import compiled
+from wildlab.simulation.scene.kernels import sampled
 
 #: Any array: the types are the compiler's business.
 Array = Any
@@ -21,22 +22,8 @@ CLOSE, REFINEMENTS = 1e-6, 60
 
 
 @compiled
-def channel(tile: Array, per_metre: float, north: float, east: float, which: int) -> float:
-    """Bilinear value of one channel of a tile (n, n, c) that repeats; its side is a power of two."""
-    a, b = north * per_metre, east * per_metre
-    fa, fb = np.floor(a), np.floor(b)
-    wa, wb = a - fa, b - fb
-    last = tile.shape[0] - 1
-    i, j = int(fa) & last, int(fb) & last
-    k, m = (i + 1) & last, (j + 1) & last
-    low = tile[i, j, which] + wb * (tile[i, m, which] - tile[i, j, which])
-    high = tile[k, j, which] + wb * (tile[k, m, which] - tile[k, j, which])
-    return float(low + wa * (high - low))
-
-
-@compiled
 def channels(tile: Array, per_metre: float, north: float, east: float, out: Array) -> None:
-    """Bilinear values of all channels, as `channel` gives them one by one."""
+    """Bilinear values of all channels (n, n, c), as `sampled` gives them one by one."""
     a, b = north * per_metre, east * per_metre
     fa, fb = np.floor(a), np.floor(b)
     wa, wb = a - fa, b - fb
@@ -54,7 +41,7 @@ def above_ground(
     relief: Array, per_metre: float, p: Array, dn: float, de: float, dd: float, t: float
 ) -> float:
     """How far a ray is above the ground after t, m."""
-    high = channel(relief, per_metre, p[0] + t * dn, p[1] + t * de, 0)
+    high = sampled(relief[:, :, 0], per_metre, p[0] + t * dn, p[1] + t * de)
     return float(-(p[2] + t * dd) - high)
 
 
@@ -148,9 +135,9 @@ def render_ground(
             sn, se = slope[1], slope[2]
             norm = 1 / np.sqrt(1 + sn * sn + se * se)
             lit = norm * (warm[3] - sn * warm[1] - se * warm[2])
-            lit = max(lit, 0.0) * (1 - depth * channel(shadow, scales[3], north, east, 0))
+            lit = max(lit, 0.0) * (1 - depth * sampled(shadow, scales[3], north, east))
             # A pixel averages over what is smaller than itself.
             wide = t / (focal * dd) * scales[2] / 4
             rough = (warm[4] + sunlit * lit) / (1 + wide * wide)
             value = warm[0] + lit
-            out[i, j] = air + value + rough * channel(uneven, scales[2], north, east, 0)
+            out[i, j] = air + value + rough * sampled(uneven, scales[2], north, east)

@@ -19,6 +19,7 @@ from wildlab.geometry.terrain import Terrain
 from wildlab.simulation.scene import ground_kernels as kernels
 from wildlab.simulation.scene.bodies import Body
 from wildlab.simulation.scene.ground import CLOUDS, SHADOW_DEPTH, SUNLIT_UNEVEN, UNEVEN, Land
+from wildlab.simulation.scene.kernels import sampled
 from wildlab.simulation.scene.render import SeenBody, check_above, draw_bodies, pixel_coordinates
 
 #: Cells of covers and of heights along a side at most: more would not fit into a small computer's memory.
@@ -169,7 +170,7 @@ def render_land(scene: LandScene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLi
     check_above(p, "ground", height_at(land, p[:2]))
     shape = (camera.height, camera.width)
     kelvin, ground = np.empty(shape, np.float32), np.empty(shape, bool)
-    tiles = (land.relief, land.warmth, land.uneven[..., None], land.shadow[..., None])
+    tiles = (land.relief, land.warmth, land.uneven, land.shadow)
     sides = (land.side, land.side, UNEVEN[0], CLOUDS[0])
     scales = np.array([len(tile) / side for tile, side in zip(tiles, sides, strict=True)])
     weather = land.weather
@@ -200,7 +201,7 @@ def height_at(land: Land, place: ArrayLike) -> float:
     1.0
     """
     north, east = np.asarray(place, float)
-    return kernels.channel(land.relief, len(land.heights) / land.side, north, east, 0)
+    return sampled(land.relief[..., 0], len(land.heights) / land.side, north, east)
 
 
 def ground_points(land: Land, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, uv: ArrayLike) -> Array:
