@@ -314,25 +314,18 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
 
     shown = []
     for _, row in rows.iterrows():
-        used = NOTHING if row["filter"].endswith("-smoothed") else f"{row['detections']:.0f}"
         one = {
             "track": f"{row['target']}, {row['sensor']}",
             "filter": filter_words(row["filter"]),
             "nis_verdict": verdict_on(row, "nis"),
-            "detections": used,
         }
         if truth:
-            inside = NOTHING
-            if np.isfinite(row["inside"]):
-                low, high = 100 * row["inside_low"], 100 * row["inside_high"]
-                inside = f"{100 * row['inside']:.0f} ({low:.0f} to {high:.0f})"
             one |= {
                 "verdict": verdict_on(row, "nees"),
                 "compared": row["compared"],
                 "rmse": row["rmse"],
                 "rmse_without": row["rmse_without"],
                 "nees": band(row, "nees"),
-                "inside": inside,
             }
         one |= {"nis": band(row, "nis"), "lag1": row["lag1"]}
         shown.append(one)

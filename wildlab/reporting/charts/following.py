@@ -158,7 +158,7 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
 
 
 def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
-    """Distance from the truth over time of one target by one sensor, with what each filter states of it."""
+    """Distance from the truth over time of one target by one sensor, with the reported standard deviation of each filter."""
     first, rmse = tracks[0], _rows_of(tracks, rows)["rmse"].to_dict()
     fig, ax = new_figure(5.8, 3.6)
     drawn: dict[str, str] = {}
@@ -173,7 +173,7 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
         draw_line(ax, *_lines(one, np.where(there, stated, np.nan)), _tint(one.filter), width=1.0, ls=":")
         drawn[one.filter] = length(float(rmse[one.filter]))
         sizes.append(away[there])
-    draw_line(ax, [], [], INK, "what each states of it", width=1.0, ls=":")
+    draw_line(ax, [], [], INK, "reported standard deviation", width=1.0, ls=":")
     # One filter that is lost would press all others flat.
     if len(sizes) > 1 and max(map(np.max, sizes)) > UNEVEN * min(map(np.max, sizes)):
         ax.set_yscale("log")
@@ -184,7 +184,7 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
     title = f"{_of(first)}: root mean square error\n{_brief(drawn)}"
     finish(fig, title, "time (s)", "distance from the truth (m)")
     alt = f"Distance from the truth over time of {_of(first)}; root mean squares: {_each(drawn)}."
-    caption = "Dotted: the standard deviation stated. Means: of looks with the target seen."
+    caption = "Dotted: the reported standard deviation. Means are over scans in which the target was detected."
     return fig, _name("error", first), alt, caption
 
 
