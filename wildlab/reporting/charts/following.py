@@ -158,7 +158,7 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
 
 
 def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
-    """Distance from the truth over time of one target by one sensor, with the reported standard deviation of each filter."""
+    """Distance from the truth over time of one target by one sensor, with each filter's standard deviation."""
     first, rmse = tracks[0], _rows_of(tracks, rows)["rmse"].to_dict()
     fig, ax = new_figure(5.8, 3.6)
     drawn: dict[str, str] = {}
@@ -184,7 +184,7 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
     title = f"{_of(first)}: root mean square error\n{_brief(drawn)}"
     finish(fig, title, "time (s)", "distance from the truth (m)")
     alt = f"Distance from the truth over time of {_of(first)}; root mean squares: {_each(drawn)}."
-    caption = "Dotted: the reported standard deviation. Means are over scans in which the target was detected."
+    caption = "Dotted: reported standard deviation. Means: over scans in which the target was detected."
     return fig, _name("error", first), alt, caption
 
 
