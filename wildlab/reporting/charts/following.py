@@ -158,7 +158,7 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
 
 
 def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
-    """Distance from the truth over time of one target by one sensor, with each filter's standard deviation."""
+    """Distance from the truth over time of one target by one sensor, and the reported standard deviation."""
     first, rmse = tracks[0], _rows_of(tracks, rows)["rmse"].to_dict()
     fig, ax = new_figure(5.8, 3.6)
     drawn: dict[str, str] = {}
