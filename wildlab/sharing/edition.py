@@ -27,10 +27,10 @@ from wildlab.messages.catalogue import (
     of_unflown,
     say,
 )
-from wildlab.reporting.georeferencing import FEW
+from wildlab.messages.quantities import nice_length
 from wildlab.reporting.page import POLICY
 from wildlab.reporting.text import escape, mark_up, read_style, render
-from wildlab.sharing.edition_story import MEDIAN_DISTANCE, STEP_M, Facts, tell
+from wildlab.sharing.edition_story import Facts, tell
 
 Array = NDArray[np.float64]
 
@@ -39,8 +39,6 @@ WIDTH, HEIGHT, MARGIN = 480.0, 360.0, 26.0
 FOOT = 46.0
 #: More points of a line, and more dots, than can be told apart at this size.
 MOST_POINTS, MOST_DOTS = 600, 400
-#: Marks a text of the drawing that counts in steps.
-IN_STEPS = 'class="steps"'
 
 
 class MapPicture(NamedTuple):
@@ -100,62 +98,15 @@ def _true(flight: Flight) -> Array:
     return flight.truth[["north_m", "east_m"]].to_numpy(float)
 
 
-def nice_length(most: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above ``most``.
-
-    Parameters
-    ----------
-    most
-        Above 0.
-
-    Returns
-    -------
-    float
-    """
-    power = 10.0 ** math.floor(math.log10(most))
-    return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= most * (1 + 1e-12))
-
-
-def picture_html(picture: MapPicture | None, facts: Facts, language: Language) -> str:
-    """The picture with its caption, or nothing where there is nothing to draw.
-
-    Parameters
-    ----------
-    picture
-        What to show; None for a drawing of the numbers.
-    facts
-        Of the flight.
-    language
-        From `wildlab.messages.catalogue.load_language`.
-
-    Returns
-    -------
-    str
-        A ``<figure>``.
-    """
-    if picture is not None and len(_known_points(picture.path)) + len(_known_points(picture.seen)) >= 2:
-        return _map(picture, language)
-    return _drawn(facts, language)
-
-
-def _figure(drawing: str, caption: str) -> str:
-    below = f"<figcaption>{caption}</figcaption>" if caption else ""
-    return f"<figure>{drawing}{below}</figure>"
-
-
-def _svg(content: str, alt: str) -> str:
-    return (
-        f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(alt)}">'
-        f"<title>{escape(alt)}</title>{content}</svg>"
-    )
-
-
 def _known_points(points: Array) -> Array:
     points = np.asarray(points, float).reshape(-1, 2)
     return points[np.isfinite(points).all(axis=1)]
 
 
-def _map(picture: MapPicture, language: Language) -> str:
+def picture_html(picture: MapPicture | None, language: Language) -> str:
+    """A ``<figure>`` with the map and its caption, or nothing where there is nothing to draw."""
+    if picture is None or len(_known_points(picture.path)) + len(_known_points(picture.seen)) < 2:
+        return ""
     seen, truth = _known_points(picture.seen), _known_points(picture.truth)
     path = np.asarray(picture.path, float).reshape(-1, 2)
     # No point that is kilometres off, of whatever it is, shrinks the rest; nor does one who walked elsewhere.
@@ -196,7 +147,10 @@ def _map(picture: MapPicture, language: Language) -> str:
         for name, key in keys
     )
     caption = f'<ul class="legend">{legend}</ul>{escape(say(language, Message("picture.map")))}'
-    return _figure(_svg("".join(drawn), alt), caption)
+    return (
+        f'<figure><svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(alt)}">'
+        f"<title>{escape(alt)}</title>{''.join(drawn)}</svg><figcaption>{caption}</figcaption></figure>"
+    )
 
 
 def _usual(points: Array) -> Array:
@@ -208,9 +162,8 @@ def _usual(points: Array) -> Array:
 
 
 def _line(points: Array) -> str:
-    keep = points[np.unique(np.linspace(0, len(points) - 1, min(len(points), MOST_POINTS)).astype(int))]
     parts, pen = [], "M"
-    for x, y in keep:
+    for x, y in _thinned(points, MOST_POINTS):
         if not (math.isfinite(x) and math.isfinite(y)):
             pen = "M"
             continue
@@ -219,14 +172,16 @@ def _line(points: Array) -> str:
     return "".join(parts)
 
 
+def _thinned(points: Array, most: int) -> Array:
+    return points[:: max(1, -(-len(points) // most))]
+
+
 def _dots(points: Array, name: str, radius: float) -> str:
     inside = points[((points > 4) & (points < [WIDTH - 4, HEIGHT - FOOT - 4])).all(axis=1)]
-    keep = (
-        inside[np.unique(np.linspace(0, len(inside) - 1, min(len(inside), MOST_DOTS)).astype(int))]
-        if len(inside)
-        else inside
+    return "".join(
+        f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}"/>'
+        for x, y in _thinned(inside, MOST_DOTS)
     )
-    return "".join(f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}"/>' for x, y in keep)
 
 
 def _north() -> str:
@@ -234,77 +189,13 @@ def _north() -> str:
     return f'<path class="north" d="M{x:g} 14l8 24l-8 -6l-8 6z"/><text class="mid" x="{x:g}" y="55">N</text>'
 
 
-def _bar(scale: float, language: Language, steps: bool = False) -> str:
+def _bar(scale: float, language: Language) -> str:
     """A bar of a round length; ``scale`` is drawn units for a metre."""
     metres = nice_length(0.42 * WIDTH / scale)
     x, y, wide = MARGIN, HEIGHT - 24.0, metres * scale
-    said = say(language, length(metres))
-    count = round(metres / STEP_M)
-    shows = ""
-    if steps and 1 <= count <= 200:
-        said += f" ({say(language, Message('steps.some', {}, count))})"
-        shows = f" {IN_STEPS}"
     return (
         f'<path class="scale" d="M{x:g} {y - 6:g}v12M{x:g} {y:g}h{wide:.1f}M{x + wide:.1f} {y - 6:g}v12"/>'
-        f'<text{shows} x="{x + wide + 10:.1f}" y="{y + 5:g}">{escape(said)}</text>'
-    )
-
-
-def _drawn(facts: Facts, language: Language) -> str:
-    """Circles of how far off things are, by the best that is known; else the sightings with a place."""
-    if facts.compared >= FEW and facts.error_p90 > 0:
-        words = {"median": length(facts.error_median), "p90": length(facts.error_p90)}
-        alt, caption = Message("picture.errors_alt", words), Message("picture.errors")
-        return _circles([(facts.error_median, "median"), (facts.error_p90, "p90")], alt, caption, language)
-    if facts.tracks and facts.track_error > 0:
-        alt = Message("picture.track_alt", {"error": length(facts.track_error)})
-        return _circles([(facts.track_error, "about")], alt, Message("picture.track"), language)
-    if facts.scatter > 0:
-        radius = MEDIAN_DISTANCE * facts.scatter
-        alt = Message("picture.scatter_alt", {"apart": length(radius)})
-        return _circles([(radius, "about")], alt, Message("picture.scatter"), language)
-    if facts.seen > 0 and math.isfinite(facts.placed):
-        return _share(facts, language)
-    return ""
-
-
-def _circles(rings: list[tuple[float, str]], alt: Message, caption: Message, language: Language) -> str:
-    biggest = max(radius for radius, _ in rings)
-    scale = ((HEIGHT - FOOT) / 2 - 14) / biggest
-    x, y = 0.36 * WIDTH, (HEIGHT - FOOT) / 2
-    drawn = [f'<rect class="ground" width="{WIDTH:g}" height="{HEIGHT - FOOT:g}" rx="10"/>']
-    last, legend = math.inf, ""
-    for radius, key in sorted(rings, reverse=True):
-        r = radius * scale
-        drawn.append(f'<circle class="ring {key}" cx="{x:g}" cy="{y:g}" r="{r:.1f}"/>')
-        # A label beside the upper right of its circle; two of them never on one line.
-        at = min(y - 0.82 * r, last if last == math.inf else 1e9)
-        at = max(at, 26.0) if last == math.inf else max(at, last + 26.0)
-        last = at
-        edge = x + math.sqrt(max(0.0, r * r - min(r, abs(y - at)) ** 2))
-        said = escape(say(language, length(radius)))
-        legend += f'<li><i class="{key}"></i>{escape(say(language, Message(f"picture.{key}")))}</li>'
-        drawn.append(f'<path class="lead" d="M{edge:.1f} {at:.1f}H{0.69 * WIDTH:.1f}"/>')
-        drawn.append(f'<text x="{0.7 * WIDTH:.1f}" y="{at + 5:.1f}">{said}</text>')
-    drawn.append(f'<path class="cross" d="M{x - 9:g} {y:g}h18M{x:g} {y - 9:g}v18"/>')
-    drawn.append(_bar(scale, language, steps=True))
-    below = f'<ul class="legend">{legend}</ul>{escape(say(language, caption))}'
-    return _figure(_svg("".join(drawn), say(language, alt)), below)
-
-
-def _share(facts: Facts, language: Language) -> str:
-    wide = WIDTH - 2 * MARGIN
-    part = wide * min(1.0, facts.placed / facts.seen)
-    y = HEIGHT / 2 - 30
-    drawn = (
-        f'<rect class="ground" width="{WIDTH:g}" height="{HEIGHT:g}" rx="10"/>'
-        f'<rect class="whole" x="{MARGIN:g}" y="{y:g}" width="{wide:g}" height="60" rx="6"/>'
-        f'<rect class="part" x="{MARGIN:g}" y="{y:g}" width="{part:.1f}" height="60" rx="6"/>'
-    )
-    words = {"placed": number(facts.placed), "seen": number(facts.seen)}
-    return _figure(
-        _svg(drawn, say(language, Message("picture.share_alt", words))),
-        escape(say(language, Message("picture.share"))),
+        f'<text x="{x + wide + 10:.1f}" y="{y + 5:g}">{escape(say(language, length(metres)))}</text>'
     )
 
 
@@ -349,7 +240,7 @@ def edition_html(
     day
         When it was flown; None where that is not to be said.
     picture
-        A map from points; None for a drawing of the numbers.
+        A map from points.
     language
         A code, the path of a file of texts, or texts that were loaded.
 
@@ -370,10 +261,10 @@ def edition_html(
     def shown(one: Value) -> Markup:
         return mark_up(say(words, one))
 
-    drawn = picture_html(picture, facts, words)
+    drawn = picture_html(picture, words)
     # What a step is taken as stands where steps are.
     values = [value for one in story.measured for value in one.values.values() if isinstance(value, Message)]
-    steps = IN_STEPS in drawn or any(value.key.startswith("steps.") for value in values)
+    steps = any(value.key.startswith("steps.") for value in values)
     return (
         render(
             "edition",
