@@ -46,7 +46,7 @@ def on_axis(ratio: float, width: float) -> float:
     st.sampled_from((1, 3, 5)),
 )
 def test_every_number_is_drawn_where_its_ratio_lies(given_, levels):
-    marks = ratios.arrange_marks([number(*one) for one in given_], 320.0, levels)
+    marks = ratios.arrange_marks([number(*one) for one in given_], levels)
     assert sorted((round(one.x, 6), one.closeness, one.beyond) for one in marks) == sorted(
         (round(on_axis(ratio, 320.0), 6), verdict, (ratio > 8) - (ratio < 1 / 8)) for ratio, verdict in given_
     )
@@ -57,8 +57,8 @@ def test_every_number_is_drawn_where_its_ratio_lies(given_, levels):
 @given(st.lists(st.floats(0.2, 5.0), max_size=14))
 def test_no_mark_hides_another_where_there_is_room(given_):
     numbers = [number(one) for one in given_]
-    levels = ratios.levels_for(numbers, 320.0, 29)
-    marks = ratios.arrange_marks(numbers, 320.0, levels)
+    levels = ratios.levels_for(numbers, 29)
+    marks = ratios.arrange_marks(numbers, levels)
     for row in {one.y for one in marks}:
         xs = sorted(one.x for one in marks if one.y == row)
         assert all(b - a >= 2 * 3.6 for a, b in pairwise(xs))
@@ -66,7 +66,7 @@ def test_no_mark_hides_another_where_there_is_room(given_):
 
 def test_the_plot_shows_what_has_a_ratio_and_nothing_else():
     numbers = [number(2.0), number(0.01, NOT_CLOSE), number(None), number(1.0, MISSING), number(-1.0)]
-    drawn = ratios.plot(numbers, alt="<two>", width=320.0)
+    drawn = ratios.plot(numbers, alt="<two>")
     at = dict(re.findall(r'translate\(([\d.]+) [^>]*><g class="mark \w*"><path class="(\w+)"', drawn))
     assert {name: float(x) for x, name in at.items()} == {
         "same": pytest.approx(on_axis(2.0, 320.0), abs=0.06),

@@ -28,7 +28,7 @@ from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.record.status import study_status
 
-PAGES = ("index.html", "ledger.html", "numbers.html", "flights.html", "partners.html")
+PAGES = ("index.html", "ledger.html", "flights.html", "partners.html")
 #: A word that would run, were it not only text.
 HOSTILE = "<script>alert(1)</script>"
 
@@ -234,11 +234,3 @@ def whole(tmp_path: Path) -> Path:
 def test_pages_open_anywhere(whole, name, faults):
     assert faults(whole / name) == []
     html.examine((whole / name).read_text(encoding="utf-8"), name, alone=False)
-
-
-def test_damaged_front_flight_is_named(tmp_path):
-    path = tmp_path / "front-flight.json"
-    for text in ("{", "[]", '{"path": 1}', json.dumps({"path": {}})):
-        path.write_text(text)
-        with pytest.raises(Exception, match=r"cannot be read.*[Mm]ake it again"):
-            load_front_flight(path)

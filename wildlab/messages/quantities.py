@@ -16,8 +16,8 @@ Entry = Mapping[str, Any]
 _UNITS = {"1": "", "": "", "deg": "°", "%": " %"}
 
 
-def significant(value: float, figures: int = 2) -> str:
-    """A number with so many significant figures, whole from a hundred on, and a true minus sign.
+def significant(value: float) -> str:
+    """A number with two significant figures, whole from a hundred on, and a true minus sign.
 
     Examples
     --------
@@ -26,8 +26,8 @@ def significant(value: float, figures: int = 2) -> str:
     """
     if not math.isfinite(value) or not value:
         return "0" if not value else str(value).replace("-", "−").replace("inf", "∞")
-    value = float(f"{value:.{figures}g}") if abs(value) < 10**figures else value
-    digits = max(0, figures - 1 - math.floor(math.log10(abs(value))))
+    value = float(f"{value:.2g}") if abs(value) < 100 else value
+    digits = max(0, 1 - math.floor(math.log10(abs(value))))
     return f"{value:.{digits}f}".replace("-", "−")
 
 

@@ -561,22 +561,20 @@ class _Writer:
             self.dot(f"{entity}/now", rgba(TRUTH), 4.0, one, **label)
 
 
-def show_replay(flight: Flight, source: str | None = None) -> None:
+def show_replay(flight: Flight) -> None:
     """Show a flight in rerun's viewer below the cell, or say what to install.
 
     Parameters
     ----------
     flight
         With anything missing; what lacks is said in the viewer.
-    source
-        Name of the ``nav`` table; left out, the best known one.
 
     Raises
     ------
     WildlabError
-        Where a source is named that the flight has not, or there is nothing that could be shown.
+        Where there is nothing that could be shown.
     """
-    scene = scene_of(flight, source)
+    scene = scene_of(flight, None)
     # The widget else gets its viewer from the network.
     os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "inline")
     import rerun.notebook as widgets

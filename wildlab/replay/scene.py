@@ -53,6 +53,8 @@ Array = NDArray[np.float64]
 Names = NDArray[np.object_]
 #: Corners of an ellipse, and vertices of the ground along its longer side at most.
 CORNERS, MOST_NODES = 32, 200
+#: Of a normal distribution that an ellipse holds.
+SHARE = 0.9
 
 
 class Path(NamedTuple):
@@ -226,8 +228,8 @@ def heights(scene: ReplayScene) -> Array:
     return np.asarray(up + (scene.ground if np.isfinite(scene.ground) else 0.0))
 
 
-def ellipse_rings(places: Array, covariance: Array, share: float = 0.9) -> Array:
-    """The ellipses about points on the ground.
+def ellipse_rings(places: Array, covariance: Array) -> Array:
+    """The ellipses about points on the ground that hold `SHARE` of a normal distribution.
 
     Parameters
     ----------
@@ -235,14 +237,12 @@ def ellipse_rings(places: Array, covariance: Array, share: float = 0.9) -> Array
         (N, 3) m in n.
     covariance
         (N, 2, 2) m^2, north before east.
-    share
-        Of a normal distribution that an ellipse holds.
 
     Returns
     -------
     (N, CORNERS + 1, 3) m in n, closed.
     """
-    size = float(np.sqrt(-2.0 * np.log(1.0 - share)))  # the chi-square with two degrees of freedom
+    size = float(np.sqrt(-2.0 * np.log(1.0 - SHARE)))  # the chi-square with two degrees of freedom
     values, vectors = np.linalg.eigh(covariance)
     turn = np.linspace(0.0, 2 * np.pi, CORNERS + 1)
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)

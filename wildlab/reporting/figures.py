@@ -471,7 +471,6 @@ def ellipse(
     probability: float = 0.9,
     *,
     color: str = BLUE,
-    fill: bool = False,
     **patch: Any,
 ) -> Ellipse | None:
     """Draw the ellipse that holds ``probability`` of a two-dimensional normal distribution.
@@ -487,9 +486,7 @@ def ellipse(
     probability
         Between 0 and 1.
     color
-        Of the line, and of the filling.
-    fill
-        Whether to fill it, lightly.
+        Of the line.
     **patch
         Passed to `matplotlib.patches.Ellipse`.
 
@@ -504,9 +501,7 @@ def ellipse(
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
     half_axes = np.sqrt(np.clip(values, 0, None) * chi2_quantile(probability, 2))
     angle = math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
-    patch = {"lw": 1.6, "edgecolor": color, "facecolor": color if fill else "none"} | patch
-    if fill:
-        patch.setdefault("alpha", 0.18)
+    patch = {"lw": 1.6, "edgecolor": color, "facecolor": "none"} | patch
     shape = Ellipse((centre[0], centre[1]), 2 * half_axes[1], 2 * half_axes[0], angle=angle, **patch)
     ax.add_patch(shape)
     # Patches do not widen the view by themselves when the axes are shared with scatter points.

@@ -21,7 +21,6 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.paths import DATA
 from wildlab.reporting import published_marks as marks
 from wildlab.reporting.animation import (
@@ -119,28 +118,16 @@ def _between(course: Course, times: Array) -> Array:
     return np.stack([np.interp(times, course.times, course.points[:, axis]) for axis in (0, 1)], axis=1)
 
 
-def load_front_flight(path: Path = FILE) -> FrontFlight:
-    """The kept flight.
-
-    Raises
-    ------
-    WildlabError
-        Where the file cannot be read, or is none such.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        parts = {name: [np.array(one, float) for one in content[name].values()] for name in _PARTS}
-        path_, outlines, points, ellipses, truth = parts.values()
-        shown = ShownFlight(
-            Course(*path_), Outlines(*outlines), Course(*points), [Ellipses(*ellipses)], [Course(*truth)]
-        )
-        return FrontFlight(shown, str(content["twin"]), float(content["height_m"]))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise WildlabError(
-            f"the flight of the front page cannot be read ({error})",
-            "make it again: python tools/front_flight.py",
-            file=path.name,
-        ) from error
+def load_front_flight() -> FrontFlight:
+    """The kept flight, which ``tools/front_flight.py`` makes."""
+    content = json.loads(FILE.read_text(encoding="utf-8"))
+    path, outlines, points, ellipses, truth = (
+        [np.array(one, float) for one in content[name].values()] for name in _PARTS
+    )
+    shown = ShownFlight(
+        Course(*path), Outlines(*outlines), Course(*points), [Ellipses(*ellipses)], [Course(*truth)]
+    )
+    return FrontFlight(shown, content["twin"], content["height_m"])
 
 
 class Glimpse(NamedTuple):
@@ -273,7 +260,7 @@ class Card(NamedTuple):
         if not self.numbers:
             return Markup()
         ratios = sorted(one.ratio for one in self.numbers if one.ratio is not None)
-        return marks.plot(self.numbers, alt=render("strip-alt", ratios=ratios)) + marks.ticks(few=True)
+        return marks.plot(self.numbers, alt=render("strip-alt", ratios=ratios)) + marks.ticks()
 
 
 def case_cards(studies: Iterable[tuple[StudyStatus, Glimpse]], cases: Sequence[Case] = ()) -> list[Card]:
@@ -412,7 +399,7 @@ def front_page(
         legend=marks.legend(n for one in study_cards for n in one.numbers),
         headline=marks.headline(counts),
         counts=counts,
-        pages={"flights": FLIGHTS, "partners": PARTNERS, "ledger": marks.LEDGER, "numbers": marks.POSTER},
+        pages={"flights": FLIGHTS, "partners": PARTNERS, "ledger": marks.LEDGER},
     )
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC") + (f", {code}" if code else "")
     style = "\n".join((read_style("front"), marks.STYLE, PAUSE_STYLE))

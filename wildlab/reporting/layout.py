@@ -7,13 +7,11 @@ import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 from bs4 import BeautifulSoup, Tag
 from bs4.element import NavigableString, PageElement
 
-from wildlab.errors import WildlabError
 from wildlab.paths import DATA
 from wildlab.reporting.text import escape, slug
 
@@ -162,7 +160,7 @@ class Word(NamedTuple):
     """A word: what it is called in the list, how it is written in text, and what it means."""
 
     name: str
-    match: tuple[str, ...]
+    match: Sequence[str]
     text: str
 
     @property
@@ -172,26 +170,9 @@ class Word(NamedTuple):
 
 
 @cache
-def load_glossary(file: Path = FILE) -> tuple[Word, ...]:
-    """All words of the glossary.
-
-    Raises
-    ------
-    WildlabError
-        If a word lacks a part, or two share a name or a way of writing.
-    """
-    found = []
-    for row in tomllib.loads(file.read_text(encoding="utf-8")).get("word", []):
-        if lacking := [field for field in Word._fields if not row.get(field)]:
-            problem = f"the word {row.get('name', '?')!r} has no {lacking[0]}"
-            raise WildlabError(problem, "write it", file=file.name, field=lacking[0])
-        found.append(Word(row["name"], tuple(row["match"]), row["text"]))
-    spellings = [spelling.lower() for word in found for spelling in word.match]
-    for many in ([word.anchor for word in found], spellings):
-        for one in many:
-            if many.count(one) > 1:
-                raise WildlabError(f"{one!r} is explained twice", "keep one", file=file.name, field="match")
-    return tuple(found)
+def load_glossary() -> tuple[Word, ...]:
+    """All words of the glossary."""
+    return tuple(Word(**row) for row in tomllib.loads(FILE.read_text(encoding="utf-8"))["word"])
 
 
 def with_glossary(body: str, known: Sequence[Word] | None = None) -> str:

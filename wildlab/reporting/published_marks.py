@@ -8,16 +8,13 @@ says how many.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
-from datetime import UTC, datetime
 from typing import NamedTuple
 
 from markupsafe import Markup
 
 from wildlab.evaluation.replication import KINDS, Closeness, Compatibility
-from wildlab.reporting.page import page
-from wildlab.reporting.published_tables import PREDICTED, WIDEST, Counts, count_answers, groups_table, tally
+from wildlab.reporting.published_tables import PREDICTED, WIDEST, Counts, place
 from wildlab.reporting.status import FIRST_LOOK, Number, Standing, StudyStatus, standing
 from wildlab.reporting.text import read_style, render
 
@@ -38,8 +35,10 @@ CLOSE = KINDS["error size"].factor
 #: Half of a mark, and how far its neighbours are, in units of the drawing.
 _HALF, _APART = 6.0, 8.6
 STYLE = read_style("marks")
-#: The pages beside the front page.
-LEDGER, POSTER = "ledger.html", "numbers.html"
+#: The page beside the front page, and the width of the axis, in units.
+LEDGER, WIDTH = "ledger.html", 320.0
+#: Rows of marks on an axis at most; beyond that, marks overlap.
+MOST_LEVELS = 5
 
 
 class Mark(NamedTuple):
@@ -54,26 +53,18 @@ class Mark(NamedTuple):
     beyond: int
 
 
-def place(ratio: float, width: float) -> float:
-    """Where a ratio above zero lies on an axis of this width; what lies beyond its ends is put at them."""
-    share = (math.log(ratio) / math.log(WIDEST) + 1) / 2
-    return _HALF + min(max(share, 0.0), 1.0) * (width - 2 * _HALF)
-
-
 def drawable(numbers: Iterable[Number]) -> list[Number]:
     """Those with a ratio and a shape."""
     return [one for one in numbers if one.ratio is not None and one.ratio > 0 and one.answers[0] in SHAPES]
 
 
-def arrange_marks(numbers: Sequence[Number], width: float, levels: int) -> list[Mark]:
+def arrange_marks(numbers: Sequence[Number], levels: int) -> list[Mark]:
     """Marks for numbers, beside one another where they would hide each other.
 
     Parameters
     ----------
     numbers
         From `drawable`.
-    width
-        Of the axis, in units.
     levels
         Rows of marks there is room for, an odd number; beyond that, marks overlap.
 
@@ -88,7 +79,7 @@ def arrange_marks(numbers: Sequence[Number], width: float, levels: int) -> list[
     marks = []
     for one in sorted(numbers, key=lambda n: order.index(n.answers[0]), reverse=True):
         ratio = one.ratio or 0.0  # `drawable` has left out those without
-        x = place(ratio, width)
+        x = place(ratio, WIDTH, _HALF)
         crowd = {k: sum(abs(x - other) < _APART for other in taken[k]) for k in middle_first}
         level = min(middle_first, key=lambda k: crowd[k])
         taken[level].append(x)
@@ -97,16 +88,16 @@ def arrange_marks(numbers: Sequence[Number], width: float, levels: int) -> list[
     return marks[::-1]
 
 
-def levels_for(numbers: Sequence[Number], width: float, most: int) -> int:
+def levels_for(numbers: Sequence[Number], most: int = MOST_LEVELS) -> int:
     """Rows of marks that numbers need so that none hides another, odd, and at most so many."""
     for levels in range(1, most, 2):
-        marks = arrange_marks(numbers, width, levels)
+        marks = arrange_marks(numbers, levels)
         if all(abs(a.x - b.x) >= _APART or a.y != b.y for i, a in enumerate(marks) for b in marks[:i]):
             return levels
     return most
 
 
-def plot(numbers: Iterable[Number], *, alt: str, width: float = 320.0, most_levels: int = 5) -> Markup:
+def plot(numbers: Iterable[Number], *, alt: str) -> Markup:
     """Numbers as marks on the axis, an SVG element.
 
     Parameters
@@ -115,22 +106,20 @@ def plot(numbers: Iterable[Number], *, alt: str, width: float = 320.0, most_leve
         Those that cannot be drawn are left out.
     alt
         What a reader who cannot see it should know.
-    width
-        In units; the height follows from how many marks are beside one another.
     """
     shown = drawable(numbers)
-    levels = levels_for(shown, width, most_levels)
+    levels = levels_for(shown)
     height = levels * _APART + 5
     return render(
         "marks",
         alt=alt,
-        width=width,
+        width=WIDTH,
         height=height,
-        axis=[("one" if ratio == 1 else "axis", place(ratio, width)) for ratio in TICKS],
-        near=(place(1 / CLOSE, width), place(CLOSE, width)),
+        axis=[("one" if ratio == 1 else "axis", place(ratio, WIDTH, _HALF)) for ratio in TICKS],
+        near=(place(1 / CLOSE, WIDTH, _HALF), place(CLOSE, WIDTH, _HALF)),
         marks=[
             (one, height / 2 + one.y, symbol(one.closeness, one.compatibility, one.fitted))
-            for one in arrange_marks(shown, width, levels)
+            for one in arrange_marks(shown, levels)
         ],
     )
 
@@ -147,12 +136,12 @@ def symbol(closeness: str, compatibility: str, fitted: bool) -> Markup:
     return render("mark", state=state, name=name, path=path, ring=ring, below=below)
 
 
-def ticks(few: bool = False) -> Markup:
-    """The axis in words, as HTML below a `plot` of the same width; ``few`` leaves out quarters."""
+def ticks() -> Markup:
+    """The axis in words, as HTML below a `plot` of the same width."""
     words = [
-        (place(ratio, 320.0) / 3.2, one, ratio in (1 / 2, 2.0))
+        (100 * place(ratio, WIDTH, _HALF) / WIDTH, one, ratio in (1 / 2, 2.0))
         for ratio, one in TICKS.items()
-        if not (few and ratio in (1 / 4, 4.0))
+        if ratio not in (1 / 4, 4.0)
     ]
     return render("ticks", ticks=words)
 
@@ -190,47 +179,3 @@ def headline(counts: Counts) -> list[tuple[str, str]]:
         (str(found.compatible["within"]), "within 90 % of our flights"),
         (str(found.compatible["outside"]), f"outside; chance alone gives {found.chance:.1f}"),
     ]
-
-
-def numbers_page(studies: Sequence[StudyStatus]) -> str:
-    """``numbers.html``: a row of marks for each study with published numbers, to be read or printed on A4.
-
-    Returns
-    -------
-    str
-        HTML; it works with no study run.
-    """
-    counts, rows = count_answers(studies), []
-    for one in studies:
-        shown = drawable(one.counted) if one.ran else []
-        if shown:
-            found, name = study_verdict(one), one.study.name.replace("-", " ")
-            alt = f"{name}: {len(shown)} numbers; {found.word}: {found.reason}"
-            rows.append((one.study.name, name, plot(shown, alt=alt, width=480.0, most_levels=7), _tally(one)))
-    body = render(
-        "numbers",
-        counts=counts,
-        headline=headline(counts),
-        legend=legend(n for one in studies if one.ran for n in one.counted),
-        ticks=ticks(),
-        rows=rows,
-        groups=Markup(groups_table(counts)),  # noqa: S704 - HTML
-        ledger=LEDGER,
-    )
-    return page(
-        title="The published numbers at once",
-        body=body,
-        kicker='<a href="index.html">wildlab</a> › the published numbers',
-        footer=f"<p>{datetime.now(UTC):%Y-%m-%d}</p>",
-        style=f"{STYLE}\n{read_style('numbers')}",
-    )
-
-
-def _tally(one: StudyStatus) -> str:
-    """The answers on a study's numbers in few figures."""
-    if one.state == FIRST_LOOK:
-        return f"first look: {sum(n.here is not None for n in one.counted)}"
-    found = tally(one.counted)
-    outside = found.compatible[Compatibility.OUTSIDE]
-    close = f"{found.close[Closeness.CLOSE]} of {sum(found.close.values())} close"
-    return close + (f", {outside} outside" if outside else "")

@@ -295,10 +295,10 @@ def _why(n: Number) -> str:
     return "; ".join(part for part in parts if part)
 
 
-def place(ratio: float) -> float:
-    """Where a ratio lies on the axis of every strip, pixels; what lies beyond its ends is put at them."""
+def place(ratio: float, width: float = WIDTH, margin: float = _MARGIN) -> float:
+    """Where a ratio lies on an axis of this width; what lies beyond its ends is put at them."""
     share = (math.log(ratio) / math.log(WIDEST) + 1) / 2 if ratio > 0 else 0.0
-    return _MARGIN + min(max(share, 0.0), 1.0) * (WIDTH - 2 * _MARGIN)
+    return margin + min(max(share, 0.0), 1.0) * (width - 2 * margin)
 
 
 def strip(n: Number) -> Markup | str:

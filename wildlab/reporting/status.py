@@ -6,10 +6,8 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from wildlab.errors import WildlabError
 from wildlab.evaluation.replication import Comparison, Reproduction
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
 from wildlab.paths import DATA
@@ -25,33 +23,15 @@ class Case(NamedTuple):
     shows: str
 
 
-def load_cases(path: Path = FILE) -> list[Case]:
+def load_cases() -> list[Case]:
     """All cases, in the order of the theses.
-
-    Parameters
-    ----------
-    path
-        Left out, ``data/cases.toml``.
-
-    Returns
-    -------
-    list of Case
-
-    Raises
-    ------
-    WildlabError
-        If the file cannot be read, or an entry is not a case.
 
     Examples
     --------
     >>> load_cases()[0].id
     'camera-calibration'
     """
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-        return [Case(**{key: str(value) for key, value in entry.items()}) for entry in content["case"]]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise WildlabError(f"it is no list of cases ({error})", "mend the file", file=path.name) from error
+    return [Case(**entry) for entry in tomllib.loads(FILE.read_text(encoding="utf-8"))["case"]]
 
 
 #: As published, in all that was decided; in part; in less than half of it.

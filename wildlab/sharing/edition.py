@@ -59,22 +59,20 @@ class MapPicture(NamedTuple):
     truth: Array
 
 
-def map_of(flight: Flight, source: str | None = None) -> MapPicture | None:
+def map_of(flight: Flight) -> MapPicture | None:
     """Way, sightings and true places of a flight, as it is: generalise it before, where that is needed.
 
     Parameters
     ----------
     flight
         Whatever it lacks.
-    source
-        Name of its poses; None for the best known ones.
 
     Returns
     -------
     MapPicture or None
         None where there is nothing to put on it. Without poses there is no way of the aircraft on it.
     """
-    overview = look_over(flight, source)
+    overview = look_over(flight, None)
     path = overview.path
     flown = path is not None and path.who.startswith("nav/")
     way = path.place[:, :2] if flown and path is not None else np.empty((0, 2))

@@ -73,20 +73,20 @@ def error_shares(series: Mapping[str, tuple[ArrayLike, str]], title: str) -> Fig
     return finish(fig, title, "distance from the truth (m)", "points within that distance (%)")
 
 
-def errors_by_image(scored: pd.DataFrame, title: str, color: str = BLUE) -> Figure:
+def errors_by_image(scored: pd.DataFrame, title: str) -> Figure:
     """Distance of every point from the truth by image in order of time, with each image's mean."""
     order = scored.groupby("frame_id", sort=False)["time_s"].first().sort_values(kind="stable").index
     place = scored["frame_id"].map({name: i for i, name in enumerate(order)})
     mean = scored.groupby(place)["error_m"].mean()
     fig, ax = new_figure(5.9, 3.0)
-    draw_dots(ax, place, scored["error_m"], color, "point", size=6)
+    draw_dots(ax, place, scored["error_m"], BLUE, "point", size=6)
     draw_line(ax, mean.index, mean, VERMILLION, "mean of an image")
     ax.set_ylim(0, None)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     return finish(fig, title, "image, in order", "error (m)")
 
 
-def path_map(nav: pd.DataFrame, times: ArrayLike, title: str, target: str = "target") -> Figure:
+def path_map(nav: pd.DataFrame, times: ArrayLike, title: str, target: str) -> Figure:
     """The path of a nav table in local metres, the places at ``times`` marked, the target at the origin."""
     at = np.clip(np.searchsorted(nav["time_s"], np.asarray(times, float)), 0, len(nav) - 1)
     path = nav[["north_m", "east_m"]].to_numpy(float)

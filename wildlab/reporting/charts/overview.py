@@ -49,6 +49,8 @@ LOOKS = (1, 2, 3, 5, 10, 30)
 SHADES = ("#D6E8F2", "#A9CFE4", "#74B0D4", "#3F8DBF", "#14679E", "#083F66")
 #: Troubles shorter than this are drawn this long, s: a line of no length is not seen.
 SHORTEST_S = 1.0
+#: Of a chart of many samples.
+COLUMNS = 700
 #: Values of a source by time: (N,) s, (N, ...).
 Series = Mapping[str, tuple[Array, Array]]
 
@@ -209,9 +211,9 @@ def turning_chart(times: Array, rates: Array, clock: Clock, title: str) -> Figur
     return finish(fig, title, clock.label, "turning about each axis (°/s)")
 
 
-def _envelope(times: Array, values: Array, columns: int = 700) -> tuple[Array, Array, Array]:
+def _envelope(times: Array, values: Array) -> tuple[Array, Array, Array]:
     """Least and greatest (C, K) of bins of equal numbers of samples: nothing short is thinned away."""
-    edges = np.unique(np.linspace(0, len(times), min(columns, len(times)) + 1).astype(int))[:-1]
+    edges = np.unique(np.linspace(0, len(times), min(COLUMNS, len(times)) + 1).astype(int))[:-1]
     return times[edges], np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
 
 

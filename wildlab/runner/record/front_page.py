@@ -21,7 +21,7 @@ from wildlab.reporting.front_page import (
 from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.reporting.own_flights import PAGE, flights_page
-from wildlab.reporting.published_marks import LEDGER, POSTER, numbers_page
+from wildlab.reporting.published_marks import LEDGER
 from wildlab.reporting.status import load_cases
 from wildlab.reporting.text import escape
 from wildlab.runner.catalogue import StudyEntry
@@ -36,7 +36,7 @@ COMPARISON = "comparison"
 def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     """Write ``index.html`` and return its path. Works whichever of the studies have been run.
 
-    The pages that it leads to are written with it: the ledger, every number on a sheet, the flights that
+    The pages that it leads to are written with it: the ledger, the flights that
     somebody evaluated, and how to share.
     """
     statuses = [study_status(study, reports) for study in studies.values()]
@@ -48,7 +48,6 @@ def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     write_atomic(reports / PAGE, flights_page(own, compared if (reports / compared).is_file() else ""))
     cases = load_cases()
     write_atomic(reports / LEDGER, ledger_page(statuses, code=code, cases=cases))
-    write_atomic(reports / POSTER, numbers_page(statuses))
     newest = sorted(own, key=lambda flight: flight.finished, reverse=True)
     shared = [flight.reports[0].folder for flight in newest if flight.reports[0].state == "done"]
     write_atomic(reports / PARTNERS, partners_page(shared))
