@@ -1,22 +1,33 @@
-"""Tracks and tables: what holds nothing is refused, others are not taken for them, damage costs little."""
+"""What holds nothing is refused, others are not taken for it, damage costs little, and nothing takes long."""
 
+import time
 from pathlib import Path
 
 import pytest
 
 from tests.flight.readers import test_airdata as of_airdata
+from tests.flight.readers import test_clicks as of_clicks
 from tests.flight.readers import test_gpx as of_gpx
+from tests.flight.readers import test_marks as of_marks
 from tests.flight.readers import test_nmea as of_nmea
 from tests.flight.readers import test_rtklib_pos as of_pos
+from tests.flight.readers.dataflash_logs import Truth, first_generation, second_generation, third_generation
+from tests.flight.readers.mavlink_logs import START_S, frame, joined, made, telemetry, ulog
 from tests.flight.readers.test_dji_mrk import row
 from tests.flight.readers.test_dji_srt import new, subtitles
 from tests.flight.readers.test_ubx import message, pvt
-from tests.flight.readers.tracks import Reader, survives
+from tests.flight.readers.test_ulog import flight
+from tests.flight.readers.tracks import Reader, check, survives
 from wildlab.errors import WildlabError
 
 gpx, nmea, ubx, airdata = (Reader(one) for one in ("gpx", "nmea", "ubx", "airdata"))
 mrk, srt, rtklib_pos = (Reader(one) for one in ("dji-mrk", "dji-srt", "rtklib-pos"))
+px4, tlog, dataflash, dataflash_text = (
+    Reader(one) for one in ("ulog", "tlog", "dataflash", "dataflash-text")
+)
+clicks = Reader("clicks")
 
+GENERATIONS = (first_generation, second_generation, third_generation)
 AIRDATA = of_airdata.table(of_airdata.rows(120))
 
 
@@ -73,6 +84,16 @@ def test_others_are_not_taken_for_them(reader, head):
         (gpx, of_gpx.document(of_gpx.track(40)), 0.64),
         (rtklib_pos, of_pos.WAYS["calendar GPST"].encode(), 0.89),
         (airdata, AIRDATA.encode(), 0.83),
+        (px4, ulog(flight(), {"sys_name": "PX4"}), 0.65),
+        (tlog, joined(telemetry(60), [(START_S, frame(made("SYSTEM_TIME", time_boot_ms=5), START_S))]), 0.8),
+        *((dataflash, make(Truth(2025), 8.0).binary(), 0.5) for make in GENERATIONS),
+        *((dataflash_text, make(Truth(2025), 8.0).text(), 0.5) for make in GENERATIONS),
+        # XML and JSON are read whole or not at all.
+        (of_marks.marks_kml, of_marks.kml(of_marks.POINTS * 5), -1),
+        (of_marks.marks_geojson, of_marks.geojson(of_marks.POINTS * 5), -1),
+        (of_marks.marks_csv, of_marks.table(of_marks.POINTS * 5, "name,lat,lon,height_sea"), 0.5),
+        *((clicks, data, -1) for data in (of_clicks.COCO, of_clicks.CVAT, of_clicks.MEGADETECTOR)),
+        (clicks, b"image,u,v\n" + b"a,1,2\n" * 9, 0.5),
     ],
 )
 def test_damage(reader, data, share):
@@ -90,8 +111,32 @@ def test_damage(reader, data, share):
         (gpx, "target_gpx/around-visnjan-with-car.gpx", 0.63),
         (rtklib_pos, "target_car_rtk_pos/demo5_b34f_f.pos", 0.78),
         (airdata, "dji_airdata_p4rtk/Jul-7th-2022-11-10AM-Flight-Airdata.csv", 0.72),
+        (dataflash, "copter_2014_joey/2014-10-18 20-04-24.bin", 0.5),
+        (dataflash, "plane42_bench_badgps/pilot_0004.BIN", 0.5),
+        (dataflash, "damaged/pymavlink_test.BIN", 0.5),
+        (dataflash_text, "damaged/nan.log", 0.5),
     ],
 )
 def test_damaged_files_of_receivers(shared_data, reader, name, share):
     data = shared_data("logs", *name.split("/")).read_bytes()[:200_000]
     assert survives(reader.read, data, 4, 6) > share
+
+
+@pytest.mark.parametrize(
+    ("reader", "start", "unit"),
+    [
+        *((tlog, joined(telemetry(5)), one) for one in (
+            b"\x00\x06" * 4 + b"\xfe", b"\x00" * 7 + b"\xfd\xff", b"\xfe", b"\x00",
+        )),
+        *((px4, ulog(flight()), one) for one in (
+            b"\x02\x00D", b"\x00", b"\xff", b"\x03\x00A\x00\x09\x09", b"\x10\x00Q" + bytes(16),
+        )),
+        (ubx, pvt(0), b"\xb5\x62\x01\x07\xf0\xff"),
+        (gpx, of_gpx.document(of_gpx.track()), b'<trkpt lat="1" lon="1">'),
+    ],
+)  # fmt: skip
+def test_no_input_takes_long(reader, start, unit):
+    began = time.monotonic()
+    log = reader.read(Path("x"), start + unit * (900_000 // len(unit)))
+    check(log)
+    assert log.parts and time.monotonic() - began < 10.0

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.flight.readers.tracks import Reader, spoilt
+from tests.flight.readers.tracks import Reader
 from wildlab.errors import WildlabError
 from wildlab.flight.readers import text
 from wildlab.flight.readers.log import RawLog
@@ -109,26 +109,6 @@ def test_other_geometries_are_counted():
     log = marks_geojson.read(HERE, json.dumps(both).encode())
     assert (values(log, "name"), values(log, "height_ellipsoid_m")) == (["1"], [3.0])
     assert log.lost[0].startswith("1 ")
-
-
-@pytest.mark.parametrize(
-    ("reader", "data"),
-    [
-        (marks_kml, kml(POINTS * 5)),
-        (marks_geojson, geojson(POINTS * 5)),
-        (marks_csv, table(POINTS * 5, "name,lat,lon,height_sea")),
-    ],
-)
-def test_damaged_files_end_in_a_sentence(reader, data):
-    for one in spoilt(data):
-        reader.sniff(one[:8192])
-        try:
-            part = reader.read(HERE, one).parts["marks"]
-        except WildlabError:
-            continue
-        assert np.isfinite(
-            [part.columns[f"{name}_deg"][part.used] for name in ("latitude", "longitude")]
-        ).all()
 
 
 @pytest.mark.parametrize(

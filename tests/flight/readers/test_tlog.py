@@ -1,7 +1,6 @@
 """Telemetry logs: values against pymavlink's own decoding, clocks against the truth, damage of all kinds."""
 
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
 from tests.flight.readers.mavlink_logs import BOOT_S, ORIGIN, START_S, frame, joined, made, telemetry
-from tests.flight.readers.tracks import Reader, check, near, survives
+from tests.flight.readers.tracks import Reader, check, near
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.formats import recognise
 from wildlab.flight.readers.tlog import messages, walk
@@ -24,7 +23,7 @@ PATH = Path("flight.tlog")
 
 def read(data: bytes) -> Any:
     log = tlog.read(PATH, data)
-    check(replace(log, parts={name: part for name, part in log.parts.items() if name != "triggers"}))
+    check(log)
     return log
 
 
@@ -253,19 +252,6 @@ def test_losses_are_counted():
     # A wrong checksum, and an end within a frame.
     assert [one.startswith("1 frame ") for one in read(bytes(spoilt[:-5])).lost] == [True, False]
     assert len(read(data[:2000] + b"garbage" * 10 + data[2000:]).lost) > 0
-
-
-def test_damage_anywhere():
-    data = joined(telemetry(60), [(START_S, frame(made("SYSTEM_TIME", time_boot_ms=5), START_S))])
-    assert survives(tlog.read, data) > 0.8
-
-
-@pytest.mark.parametrize("unit", [b"\x00\x06" * 4 + b"\xfe", b"\x00" * 7 + b"\xfd\xff", b"\xfe", b"\x00"])
-def test_no_input_takes_long(unit):
-    start = joined(telemetry(5))
-    began = time.monotonic()
-    read(start + unit * (300_000 // len(unit)))
-    assert time.monotonic() - began < 5.0
 
 
 def test_clocks_without_end_take_no_time():

@@ -107,8 +107,7 @@ def fix_reasons(fix: Array) -> dict[str, Mask]:
 
 def usable(part: str, found: Readings) -> Mask:
     """(N,) rows of a part that can be used."""
-    wrong = judge(part, found.columns, found.unusable, anywhere=found.anywhere)
-    return ~any_of(wrong.values(), len(found.columns["time_log_s"]))
+    return ~any_of(judge(part, found).values(), len(found.columns["time_log_s"]))
 
 
 def at_times(

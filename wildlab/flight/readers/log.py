@@ -348,7 +348,7 @@ def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
 
 
 def _stream(name: str, one: Readings) -> Any:
-    wrong = one.unusable if name in STILL else judge(name, one.columns, one.unusable, anywhere=one.anywhere)
+    wrong = one.unusable if name in STILL else judge(name, one)
     return make_stream(name, one.columns, one.rows, one.counted_in, wrong)
 
 
@@ -408,60 +408,51 @@ def _misplaced(latitude: Array, longitude: Array) -> dict[str, Mask]:
         }
 
 
-def judge(
-    part: str,
-    columns: Mapping[str, ArrayLike],
-    unusable: Mapping[str, ArrayLike] | None = None,
-    *,
-    anywhere: bool = False,
-) -> dict[str, Mask]:
+def judge(part: str, decoded: Readings) -> dict[str, Mask]:
     """Why rows of a part cannot be used.
 
     Parameters
     ----------
     part
         Of `log.PARTS`.
-    columns
-        As for `make_stream`. Looked at are times in UTC, or the log's own where no row has UTC.
-    unusable
-        Reason -> (N,) bool, as the format has it; these come first.
-    anywhere
-        Whether rows without a place count, too.
+    decoded
+        By a reader. Looked at are times in UTC, or the log's own where no row has UTC. What the format itself
+        says of its rows comes first.
 
     Returns
     -------
     dict
         Reason -> (N,) bool for `make_stream`.
     """
-    have = {name: np.asarray(values, float) for name, values in columns.items() if name not in TEXTS}
+    have = {name: np.asarray(values, float) for name, values in decoded.columns.items() if name not in TEXTS}
     time = _stamps(have)
     utc = have.get("time_s", np.full(len(time), np.nan))
-    found = {reason: np.asarray(mask, bool) for reason, mask in (unusable or {}).items()}
+    found = dict(decoded.unusable)
 
     def add(reason: str, *masks: Mask) -> None:
         found[reason] = any_of([*masks, *([found[reason]] if reason in found else [])], len(time))
 
-    def named(*starts: str) -> list[Array]:
+    def starting(*starts: str) -> list[Array]:
         return [values for name, values in have.items() if name.startswith(starts)]
 
     # Damaged values may be anything: they are marked, not warned of.
     with np.errstate(invalid="ignore", over="ignore"):
-        where = "latitude_deg" in have and not anywhere
+        where = "latitude_deg" in have and not decoded.anywhere
         if where:
             for reason, mask in _misplaced(have["latitude_deg"], have["longitude_deg"]).items():
                 add(reason, mask)
             low, high = BOUNDS["down"]
-            add("impossible height", *((-one < low) | (-one > high) for one in named("height_")))
-            add("impossible speed", *(np.abs(one) > BOUNDS["speed"][1] for one in named("v_")))
-            add("no dilution of precision", *(one >= NO_DILUTION for one in named("hdop")))
+            add("impossible height", *((-one < low) | (-one > high) for one in starting("height_")))
+            add("impossible speed", *(np.abs(one) > BOUNDS["speed"][1] for one in starting("v_")))
+            add("no dilution of precision", *(one >= NO_DILUTION for one in starting("hdop")))
         if part in TURNS:
-            turns = named("roll_", "pitch_", "yaw_", "pan_", "tilt_")
-            add("no attitude", *(np.isnan(one) for one in (*turns, *named("q_"))))
+            turns = starting("roll_", "pitch_", "yaw_", "pan_", "tilt_")
+            add("no attitude", *(np.isnan(one) for one in (*turns, *starting("q_"))))
             add("impossible attitude", *(np.abs(one) > TURNS[part] for one in turns))
-            if q := named("q_"):
+            if q := starting("q_"):
                 add("no attitude", ~(np.abs(np.linalg.norm(q, axis=0) - 1) < 0.01))
         for start, most in SENSORS.items():
-            if measured := named(start):
+            if measured := starting(start):
                 add("no measurement", *(~np.isfinite(one) for one in measured))
                 add("beyond any sensor", *(np.abs(one) > most for one in measured))
                 if start == "field_":
@@ -470,7 +461,7 @@ def judge(
             add("no time", np.isnan(time))
             add("impossible time", (utc < GPS_START_S) | (utc > LATEST_S))
         bad = any_of(found.values(), len(time))
-        heights = named("height_")
+        heights = starting("height_")
         if where and heights:
             without = ~any_of([~np.isnan(one) for one in heights], len(time))
             if not without[~bad].all():
@@ -543,9 +534,8 @@ def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> Mask:
     usable = np.isfinite(at) if wanted is None else np.isfinite(at) & np.asarray(wanted, bool)
     kept = np.zeros(len(at), bool)
     rows = np.flatnonzero(usable)
-    few = _without_few(at[rows])
-    if few is not None:
-        kept[rows[few]] = True
+    if (np.diff(at[rows]) > 0).all():
+        kept[rows] = True
         return kept
     # The longest increasing run of rows: for each length, the row with the smallest stamp that ends one. Of
     # repeated stamps the first is kept.
@@ -565,22 +555,6 @@ def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> Mask:
         kept[rows[i]] = True
         i = before[i]
     return kept
-
-
-def _without_few(at: Array) -> Mask | None:
-    """(N,) what is left where one row is taken out at each step back; None where that does not mend all.
-
-    One has to go at each, so that no more can be left.
-    """
-    kept = np.ones(len(at), bool)
-    back = np.flatnonzero(np.diff(at) <= 0)
-    if not len(back):
-        return kept
-    before = np.where(back > 0, at[back - 1], -np.inf)
-    ahead = (before < at[back + 1]) & (at[back] != at[back + 1])
-    kept[np.where(ahead, back, back + 1)] = False
-    mended = (np.diff(at[kept]) > 0).all() and (np.diff(back) > 1).all()
-    return kept if mended else None
 
 
 def _reachable(time: Array, latitude: Array, longitude: Array, height: Array) -> Mask:
