@@ -142,10 +142,3 @@ def test_early_receipts_of_a_short_log_are_outliers():
     assert abs(fit.rate - 1) < 1e-4
     assert not fit.used[20]
     assert abs(fit.to_reference(305.0) - UTC - 305) < 0.01
-
-
-def test_one_pair_gives_an_offset_and_none_an_error():
-    fit = fit_steady([5.0], [UTC])
-    assert (fit.rate, fit.offset_s) == (1.0, UTC - 5)
-    with pytest.raises(WildlabError, match="no stamp"):
-        fit_steady([np.nan], [1.0], late=True)

@@ -236,15 +236,6 @@ def table(path: Path, text: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["image,x,y,w,h\na.png,1,2,3,4\n", "file,x_min,y_min,x_max,y_max\na.png,1,2,4,6\n",
-     "\ufefffilename,x0,y0,x1,y1\na.png,1,2,4,6\n"],
-)  # fmt: skip
-def test_boxes_in_any_of_the_ways(tmp_path, text):
-    assert read_labels(table(tmp_path / "l.csv", text)).boxes["a.png"].tolist() == [[1, 2, 3, 4]]
-
-
 def test_points_empty_frames_classes_and_groups(tmp_path):
     text = "image,u_px,v_px,class,clip\na.png,1,2,deer,x\na.png,5,6,car,x\n"
     text += "b.png,,,deer,y\na.png,7,8,DontCare,x\n"

@@ -93,12 +93,6 @@ clocks = {gnss_offset_s = -1.5}
 """
 
 
-def test_missing_key_is_named(manifest_data):
-    del manifest_data["camera"]["cx_px"]
-    with pytest.raises(WildlabError, match="cx_px: this key is missing"):
-        make_manifest(manifest_data)
-
-
 @pytest.mark.parametrize("content", [b"name = ", b"\xff\xfe", b"[[[", b"a = " + b"[" * 5000])
 def test_what_is_not_toml_is_one_sentence(tmp_path, content):
     (tmp_path / "flight.toml").write_bytes(content)

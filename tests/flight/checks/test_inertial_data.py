@@ -41,13 +41,6 @@ def test_the_mean_of_a_ramp_is_its_value_in_the_middle(offset, slope, start, len
         assert np.isnan(found[1:]).all()
 
 
-def test_sizes_and_mean_of_forces():
-    imu = ramps(1.0, 0.5)
-    ramp = 1.0 + 0.5 * TIMES
-    np.testing.assert_allclose(imu.sizes_of_forces(), np.sqrt(1 + 4 + 9) * ramp)
-    np.testing.assert_allclose(imu.mean_of_forces(), ramp.mean() * np.array([1, 2, 3]))
-
-
 def test_samples_without_a_number_are_left_out():
     class Flight:
         imu = pd.DataFrame({"time_s": TIMES, **{name: 1.0 + 0 * TIMES for name in (*FORCE, *RATE)}})

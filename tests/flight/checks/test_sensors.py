@@ -14,7 +14,7 @@ from wildlab.analysis.tracks.scans import scans_of
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sensors import looks_of_others, sensors
+from wildlab.flight.checks.sensors import sensors
 from wildlab.flight.checks.tables import duplicates
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
@@ -60,12 +60,6 @@ def test_detections_in_looks_of_another_sensor_contradict_it(
     assert found.level == level and counted in found.sentence
     with pytest.raises(WildlabError, match=refused):
         scans_of(flight, "radar")
-
-
-def test_the_rows_in_looks_of_others_are_given(make_flight):
-    flight = detected(make_flight, LOOKS, [(k, "radar") for k in range(4)])
-    others = looks_of_others(flight.table("frames"), flight.table("detections"))
-    assert others["detection_id"].tolist() == ["d-1", "d-3"] and set(others["sensor"]) == {"lidar"}
 
 
 def test_a_misspelt_sensor_is_named(make_flight):

@@ -212,20 +212,6 @@ def test_real_frames_are_no_shutter_and_one_camera_has_one_dead_pixel(shared_dat
         assert vignetting is not None and -60 < vignetting.corner < -20
 
 
-def test_what_stands_still_before_a_camera_is_not_dead():
-    rng = np.random.default_rng(3)
-    images = [rng.normal(100, 2, (60, 80)) for _ in range(6)]
-    for number, image in enumerate(images):
-        image[20:25, 30:35] += 60.0  # sharp corners, always at the same place
-        image[40, 10 + number] += 80.0  # a hot pixel that moves is none
-    seen = [np.clip(image, 0, 255).astype(np.uint8) for image in images]
-    dead = find_dead(seen, np.ones((60, 80), bool))
-    assert dead is not None and not dead.any()
-    for image in seen:
-        image[50, 60] = 190
-    assert np.argwhere(find_dead(seen, np.ones((60, 80), bool))).tolist() == [[50, 60]]
-
-
 def test_few_grey_levels_repeat_without_a_fault():
     rng = np.random.default_rng(4)
     seen = [rng.normal(100, 0.8, (120, 160)).round().astype(np.uint8) for _ in range(7)]

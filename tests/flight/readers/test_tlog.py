@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
 from tests.flight.readers.mavlink_logs import BOOT_S, ORIGIN, START_S, frame, joined, made, telemetry
@@ -87,26 +85,6 @@ def test_straight_flight(version_1):
     near(columns, 0.01, time_s=START_S + at)
     assert np.allclose((columns["latitude_deg"] - ORIGIN[0]) * 111_412, 10 * at, atol=0.02)
     near(columns, 1e-5, height_sea_m=150, height_home_m=50, roll_deg=np.degrees(0.1), v_north_m_s=10)
-
-
-@settings(max_examples=8, deadline=None)
-@given(
-    offset=st.floats(0.05, 5.0),
-    ppm=st.floats(-200.0, 200.0),
-    jitter=st.floats(0.0, 0.5),
-    seed=st.integers(0, 1000),
-)
-def test_clock_along_the_earliest_receipts(offset, ppm, jitter, seed):
-    rng = np.random.default_rng(seed)
-    rows = []
-    for own in BOOT_S + np.arange(1500) * 0.2:
-        received = START_S + offset + own * (1 + ppm * 1e-6) + rng.uniform(0, jitter)
-        rows.append((received, frame(made("ATTITUDE", time_boot_ms=round(own * 1e3)), received)))
-    clock = read(joined(rows)).clock
-    ends = np.array([BOOT_S, BOOT_S + 300])
-    wanted = START_S + offset + ends * (1 + ppm * 1e-6)
-    assert np.abs(clock.offset_s + clock.rate * ends - wanted).max() < 0.01
-    assert abs(clock.rate - 1 - ppm * 1e-6) < 1e-4
 
 
 def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts():

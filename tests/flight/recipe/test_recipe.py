@@ -226,14 +226,6 @@ def test_a_bow_whose_heading_is_not_known_is_refused(raw):
         raw.run()
 
 
-def test_detections_of_one_sensor_in_looks_of_another_are_refused(raw):
-    looks = zip(raw.tables["photos.csv"].splitlines(), ["who", "click", "click", "lidar"], strict=True)
-    raw.tables["photos.csv"] = "\n".join(map(",".join, looks))
-    raw.set("frames.sensor", "who")
-    with pytest.raises(WildlabError, match=r"clicks\.csv.*source 'click'"):
-        raw.run()
-
-
 def test_groups_by_edges(raw):
     raw.tables["photos.csv"] = "photo,time,h\n" + "".join(
         f"{name},2024-06-12T09:30:0{at}Z,{h}\n" for name, at, h in (("A", 1, 10), ("B", 2, 30), ("C", 3, 52))

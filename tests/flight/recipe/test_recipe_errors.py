@@ -8,7 +8,6 @@ import pytest
 from tests.flight.conftest import fault
 from wildlab.errors import WildlabError
 from wildlab.flight.recipe.importing import import_flight
-from wildlab.flight.store import load_flight
 
 Change = Callable[[Any], None]
 
@@ -185,18 +184,6 @@ def test_an_hour_that_is_there_twice(raw):
         raw.run()
     raw.set("time.zone", "+02:00")
     assert str(raw.run().manifest.time.epoch) == "2024-10-27 00:30:00+00:00"
-
-
-def test_a_flight_that_is_there_stays(raw):
-    raw.run()
-    raw.set("description", "second")
-    with pytest.raises(WildlabError, match="already"):
-        raw.run()
-    assert load_flight(raw.into).manifest.description == ""
-    flight = import_flight(raw.write(), raw.folder / "raw", raw.into, overwrite=True)
-    assert flight.manifest.description == "second"
-    with pytest.raises(WildlabError, match="holds other things"):
-        import_flight(raw.write(), raw.folder / "raw", raw.folder / "raw", overwrite=True)
 
 
 def test_names_of_columns_cannot_command_a_terminal(raw):
