@@ -6,7 +6,7 @@ The same arguments in the same order, but results are returned.
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import PPoly
+from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, euler_to_matrix
@@ -20,15 +20,6 @@ def sum_of_sines(times: Array, amplitudes: Array, frequencies: Array, phases: Ar
     return np.stack(
         [np.sin(angles) @ amplitudes, np.cos(angles) @ slopes, -np.sin(angles) @ (slopes * frequencies)]
     )
-
-
-def piecewise_polynomial(
-    times: Array, start: float, interval: float, coefficients: Array
-) -> tuple[Array, Array, Array]:
-    """Value, first and second derivative, (N, 3) each; NaN outside of the pieces."""
-    breaks = start + interval * np.arange(len(coefficients) + 1)
-    value = PPoly(np.moveaxis(coefficients, 2, 0)[::-1], breaks, extrapolate=False)
-    return value(times), value.derivative(1)(times), value.derivative(2)(times)
 
 
 def _directions(angles: Array) -> tuple[Array, Array]:
@@ -86,11 +77,6 @@ def coordinated_attitude(
     return np.asarray(R @ euler_to_matrix(0.0, trim_pitch, 0.0))
 
 
-def turn(R: Array, roll: Array, pitch: Array, yaw: Array) -> Array:
-    """(N, 3, 3)."""
-    return np.asarray(R @ euler_to_matrix(roll, pitch, yaw))
-
-
 def body_rates(far_before: Array, before: Array, after: Array, far_after: Array, step: float) -> Array:
     """(N, 3) rad/s."""
     near, far = (
@@ -109,8 +95,6 @@ def felt_on_earth(R: Array, p: Array, v: Array, a: Array, earth: Earth, rate: Ar
 
 def gauss_markov(draws: Array, sd: Array, kept: Array) -> Array:
     """(N, K), in the stationary distribution from the first on."""
-    from scipy.signal import lfilter  # brings scipy.stats along, which takes long
-
     drive = draws * sd
     drive[1:] *= np.sqrt(1 - kept**2)
     columns = [lfilter([1.0], [1.0, -a], column) for a, column in zip(kept, drive.T, strict=True)]

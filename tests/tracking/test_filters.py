@@ -14,7 +14,7 @@ from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import wrap
 from wildlab.tracking import sensors as m
-from wildlab.tracking.filters import difference_model, run_coloured, run_imm, run_unscented, thin
+from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import constant_velocity, rest, singer, white_acceleration
 from wildlab.tracking.run import Start, run_filter
@@ -62,19 +62,6 @@ def test_differencing_is_the_augmented_filter(motion, n, F_c):
         assert np.allclose(track.P[row], P[:n, :n], rtol=1e-8, atol=1e-8)
 
 
-def test_the_model_is_the_print():
-    F, Q = SINGER(0.4)
-    H = np.eye(2, 6)
-    model = difference_model(F, Q, H, SLOW, R_W)
-    R = H @ Q @ H.T + R_W
-    T = Q @ H.T @ np.linalg.inv(R)
-    assert np.allclose(model.H, H @ F - SLOW @ H)
-    assert np.allclose(model.R, R)
-    assert np.allclose(model.T, T)
-    assert np.allclose(model.F, F - T @ model.H)
-    assert np.allclose(model.Q, Q - Q @ H.T @ np.linalg.inv(R) @ H @ Q)
-
-
 def test_after_a_gap_the_position_itself_is_used():
     times, z = data(20)
     times[10:] += 5.0
@@ -118,12 +105,6 @@ def test_two_at_once_say_nothing_of_the_velocity():
     without = run_coloured(times[:3], z[:3], R_W, ROUGH, start)
     assert np.allclose(track.x[3], without.x[2])
     assert np.allclose(track.P[3], without.P[2])
-
-
-def test_several_detections_are_refused():
-    times, z = data(4)
-    with pytest.raises(WildlabError, match="several detections"):
-        run_coloured(times, np.stack([z, z], axis=1), R_W, ROUGH, start_from_first(times, z, 1.0))
 
 
 @given(
@@ -280,6 +261,8 @@ def test_bad_input_is_named():
         run_imm(times, both, R2, m.positions(), [CV, CALM], [1.0, 1.0], START)
     with pytest.raises(WildlabError, match="several detections"):
         run_unscented(times, both, R2, m.positions(), CV, START)
+    with pytest.raises(WildlabError, match="several detections"):
+        run_coloured(times, both, R2, CV, START)
     with pytest.raises(WildlabError, match="row 3 at"):
         run_unscented(np.where(np.arange(50) == 3, 0.0, times), z, R2, m.positions(), CV, START)
 

@@ -21,7 +21,6 @@ from wildlab.tracking.motion import (
     in_steps,
     random_walk,
     rest,
-    singer,
 )
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
@@ -83,40 +82,6 @@ def walk_of(n=40, seed=0):
     rng = np.random.default_rng(seed)
     times = np.cumsum(rng.uniform(0.05, 2.0, n))
     return times, np.cumsum(rng.normal(0, 2, (n, 2)), axis=0)
-
-
-def by_hand(times, z, R, motion=CV, start=START):
-    """The loop of H (3.5)."""
-    x, P, then = start.x, start.P, start.time
-    H = np.eye(2, len(x))
-    for t, one in zip(times, z, strict=True):
-        x, P = predict(x, P, *motion(t - then))
-        done = update(x, P, one, H, R)
-        x, P, then = done.x, done.P, t
-        yield done
-
-
-MODELS = {
-    "constant velocity": (CV, 4),
-    "singer": (partial(singer, alpha=0.2, variance=0.3), 6),
-    "random walk": (partial(random_walk, density=1.0), 2),
-    "rest": (rest, 2),
-}
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_on_a_linear_model_the_extended_filter_is_the_kalman_filter(name):
-    motion, n = MODELS[name]
-    times, z = walk_of()
-    start = Start(0.0, np.zeros(n), 50.0 * np.eye(n))
-    track = run_filter(times, z, R2, m.positions(), motion, start)
-    for row, done in enumerate(by_hand(times, z, R2, motion, start)):
-        assert np.allclose(track.x[row], done.x, rtol=1e-10, atol=1e-10)
-        assert np.allclose(track.P[row], done.P, rtol=1e-10, atol=1e-10)
-        assert np.allclose(track.innovation[row], done.innovation)
-        assert np.allclose(track.S[row], done.S)
-        assert np.isclose(track.nis[row], done.innovation @ np.linalg.solve(done.S, done.innovation))
-    assert track.used.all()
 
 
 def test_estimates_between_measurements_are_predictions_from_the_last():
