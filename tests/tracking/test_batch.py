@@ -10,7 +10,6 @@ from tests.tracking.poses import CAMERA, CROOKED, overflight
 from tests.tracking.test_schmidt import random_pose_covariance
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.tracking import schmidt
 from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.motion import constant_velocity
@@ -87,8 +86,10 @@ def test_pixels(gate):
     assert not batch.used[2, 5]
 
 
-@pytest.mark.parametrize("correlation_time", [np.inf, 5.0, 0.0])
-def test_schmidt(correlation_time, rng):
+@pytest.mark.parametrize(
+    ("correlation_time", "change"), [(np.inf, "bias"), (5.0, "navigated"), (0.0, "bias")]
+)
+def test_schmidt(correlation_time, change, rng):
     runs = 7
     times, z, poses = flight(runs)
     covariance = np.array([[random_pose_covariance(rng, 0.2) for _ in range(N)] for _ in range(runs)])
@@ -97,7 +98,7 @@ def test_schmidt(correlation_time, rng):
     covariance[5] = 0.0
     start = Start(0.0, np.zeros(4), np.tile(np.diag([25.0, 25, 9, 9]), (runs, 1, 1)))
     R = np.tile(np.diag([4.0, 6.0]), (N, 1, 1))
-    pose = PoseUncertainty(covariance, correlation_time)
+    pose = PoseUncertainty(covariance, correlation_time, change)
     batch = run_batch(times, z, R, CV, start, view=BatchCamera(poses, 0.0), pose=pose, gate_probability=0.999)
     for run in (0, 3, 4, 5, 6):
         own = start._replace(P=start.P[run])
@@ -144,27 +145,3 @@ def test_bad_input_is_named():
             run_batch(
                 times, nothing, R, lambda dt: (np.eye(4), -99 * np.eye(4)), start, gate_probability=gate
             )
-
-
-@pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_covariances_of_poses_that_differ_by_a_factor(change, monkeypatch, rng):
-    """Share their transitions, and give what each gives alone; one that differs otherwise has its own."""
-    times, uv, poses, _ = overflight(N)
-    P = np.array([random_pose_covariance(rng, 0.3) for _ in range(N)])
-    bent = P.copy()
-    bent[7:, 3, 3] *= 1.1
-    told = np.array([P, 0.01 * P, bent, 9 * P])
-    view, start = BatchCamera(poses, 0.0), Start(times[0], np.zeros(4), np.diag([50.0, 50, 9, 9]))
-    z = np.tile(uv, (4, 1, 1))
-    computed = []
-    whole = schmidt.transitions_of_pose
-    monkeypatch.setattr(schmidt, "transitions_of_pose", lambda *a: computed.append(1) or whole(*a))
-    pose = PoseUncertainty(told, change=change)
-    together = run_batch(times, z, 4 * np.eye(2), CV, start, view=view, pose=pose)
-    assert len(computed) == 2
-    for run in range(4):
-        own = pose._replace(covariance=told[run])
-        alone = run_batch(times, z[:1], 4 * np.eye(2), CV, start, view=view, pose=own)
-        assert np.allclose(together.x[run], alone.x[0], rtol=1e-9, equal_nan=True)
-        assert np.allclose(together.P[run], alone.P[0], rtol=1e-9, equal_nan=True)
-    assert not np.allclose(together.P[0, -1], together.P[3, -1])

@@ -122,7 +122,7 @@ def run_batch(
     if pose is not None:
         check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
         P_poses = _per_run(pose.covariance, 2, N)
-        phis = _transitions(P_poses, pose)
+        phis = np.array([schmidt.transitions_of_pose(one, pose.change) for one in P_poses])
         unknown = ~np.isfinite(P_poses).all(axis=(2, 3))
         z[np.broadcast_to(unknown, (B, N))] = np.nan
         P_poses[unknown] = 0.0
@@ -175,33 +175,6 @@ def as_tracks(found: BatchTracks) -> list[Track]:
         Track(found.times, x, P, v, S, nis, used, which, limited)
         for x, P, v, nis, used, which, limited in each
     ]
-
-
-def _transitions(covariances: Array, pose: PoseUncertainty) -> Array:
-    """What `schmidt.transitions_of_pose` gives for each run's covariances (B, N, 6, 6).
-
-    They take most of the time of a run. They do not depend on the scale: runs whose covariances are multiples
-    of those of another share its own. And where nothing is left of ``C`` they do not matter.
-    """
-    phis = np.tile(np.eye(6), (*covariances.shape[:2], 1, 1))
-    if pose.correlation_time == 0:
-        return phis
-    known: list[int] = []
-    for run, own in enumerate(covariances):
-        like = next((other for other in known if _multiples(covariances[other], own)), None)
-        if like is None:
-            known.append(run)
-        phis[run] = schmidt.transitions_of_pose(own, pose.change) if like is None else phis[like]
-    return phis
-
-
-def _multiples(one: Array, other: Array) -> bool:
-    """Whether ``other`` is ``one`` times a number above zero, but for rounding; NaN where that has it."""
-    largest = np.nanargmax(np.abs(one)) if np.isfinite(one).any() else 0
-    if not (one.flat[largest] > 0 and other.flat[largest] > 0):
-        return False
-    factor = other.flat[largest] / one.flat[largest]
-    return bool(np.allclose(other, factor * one, rtol=1e-12, atol=0, equal_nan=True))
 
 
 def _camera_arrays(
