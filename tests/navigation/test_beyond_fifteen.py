@@ -15,7 +15,7 @@ from tests.navigation.test_mekf import (
 )
 from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.geometry.gravity import flat_earth, local_earth
-from wildlab.navigation.aiding import positions, velocities
+from wildlab.navigation.aiding import GaussMarkov, positions, velocities
 from wildlab.navigation.mekf import Outages, prepare, run_mekf
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.strapdown import ImuSamples
@@ -29,18 +29,15 @@ def flight():
 
 
 @pytest.mark.slow
-def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight, rate_time=2.0):
+def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight):
     """With every state beyond the fifteen, a gap, and one antenna of two with a Gauss-Markov error."""
     imu, start, antennas, _ = spoilt(flight, 0, every=50)
     keep = (imu.times < 30) & ~((imu.times > 20.0) & (imu.times < 21.3))
     imu = ImuSamples(*(part[keep] for part in imu))
-    correlated = positions(
-        antennas[1].times, antennas[1].value, GNSS_SD, LEVERS[1], 0.0, [0.1, 0.2, 0.3], 15.0, rate_time
-    )
+    correlated = antennas[1]._replace(gauss_markov=GaussMarkov(np.array([0.1, 0.2, 0.3]), 15.0, 2.0))
     seconds = np.arange(1.0, 29)
-    moving = velocities(
-        seconds, moved(seconds)[0], 0.5, gauss_markov_sd=[0.2, 0.2, 0.4], gauss_markov_time=3.0
-    )
+    moving = velocities(seconds, moved(seconds)[0], 0.5)
+    moving = moving._replace(gauss_markov=GaussMarkov(np.array([0.2, 0.2, 0.4]), 3.0))
     aiding = [antennas[0], correlated, moving]
     axes, earth = AxisErrors(0.01, 0.003, 0.005), local_earth(0.9, 100.0)
     wanted = np.arange(0.5, 29.5, 1.0)

@@ -68,8 +68,8 @@ def test_errors_of_second_order_have_room_for_their_rates():
     t = np.array([1.0, 2.0])
     smooth = positions(t, np.zeros((2, 3)), 1.0, gauss_markov_sd=1.0, gauss_markov_time=9.0)
     smooth = smooth._replace(gauss_markov=smooth.gauss_markov._replace(rate_time=2.0))
-    moving = velocities(t, np.zeros((2, 3)), 1.0, gauss_markov_sd=[0.1, 0.2, 0.3], gauss_markov_time=4.0)
     plain = velocities(t, np.zeros((2, 3)), 1.0)
+    moving = plain._replace(gauss_markov=GaussMarkov(np.array([0.1, 0.2, 0.3]), 4.0))
     line, _ = set_out(flight.imu, 0.0, [smooth, moving, plain], t, 1.0)
     measured, source, _ = gather([smooth, moving, plain], line, 15)
     assert {int(s): set(measured.gauss_markov[source == s]) for s in (0, 1, 2)} == {0: {15}, 1: {21}, 2: {-1}}

@@ -119,7 +119,6 @@ def positions(
     latency: float = 0.0,
     gauss_markov_sd: ArrayLike = 0.0,
     gauss_markov_time: float = np.inf,
-    gauss_markov_rate_time: float = 0.0,
 ) -> Aiding:
     """Positions of a GNSS antenna, H (7.25).
 
@@ -139,8 +138,6 @@ def positions(
         Of a first-order Gauss-Markov error on top of ``sd``, which neighbouring fixes share (multipath, for
         instance): standard deviation, m, (3,) or one number, and correlation time, s. The filter estimates
         it.
-    gauss_markov_rate_time
-        Makes it one of second order; see `GaussMarkov`.
 
     Returns
     -------
@@ -155,14 +152,8 @@ def positions(
     """
     t = np.asarray(times, float) - latency
     found = _aiding(kernels.POSITION, t, p_n, sd, lever_arm, "GNSS positions")
-    return found._replace(
-        gauss_markov=_gauss_markov(gauss_markov_sd, gauss_markov_time, gauss_markov_rate_time)
-    )
-
-
-def _gauss_markov(sd: ArrayLike, time: float, rate_time: float) -> GaussMarkov | None:
-    slow = np.array(np.broadcast_to(np.asarray(sd, float), 3))
-    return GaussMarkov(slow, float(time), float(rate_time)) if slow.any() else None
+    slow = np.array(np.broadcast_to(np.asarray(gauss_markov_sd, float), 3))
+    return found._replace(gauss_markov=GaussMarkov(slow, gauss_markov_time) if slow.any() else None)
 
 
 def velocities(
@@ -171,8 +162,6 @@ def velocities(
     sd: ArrayLike,
     lever_arm: ArrayLike = (0.0, 0.0, 0.0),
     latency: float = 0.0,
-    gauss_markov_sd: ArrayLike = 0.0,
-    gauss_markov_time: float = np.inf,
 ) -> Aiding:
     """Velocities of a GNSS antenna; beyond H.
 
@@ -188,8 +177,6 @@ def velocities(
         Of the antenna in b, (3,) m.
     latency
         How long before its stamp a velocity was valid, s.
-    gauss_markov_sd, gauss_markov_time
-        As for `positions`, of the velocities, m/s.
 
     Returns
     -------
@@ -199,12 +186,9 @@ def velocities(
     ------
     WildlabError
         For shapes that do not fit, or a standard deviation that is not positive.
-    ValueError
-        For a ``gauss_markov_sd`` that is neither (3,) nor one number.
     """
     t = np.asarray(times, float) - latency
-    found = _aiding(kernels.VELOCITY, t, v_n, sd, lever_arm, "GNSS velocities")
-    return found._replace(gauss_markov=_gauss_markov(gauss_markov_sd, gauss_markov_time, 0.0))
+    return _aiding(kernels.VELOCITY, t, v_n, sd, lever_arm, "GNSS velocities")
 
 
 def standstill(times: ArrayLike, sd: float) -> Aiding:

@@ -287,13 +287,10 @@ def run_mekf(
     for gap in ready.gaps:
         unknown = (times > gap.start) & (times < gap.end)
         states[unknown], covariances[unknown] = np.nan, np.nan
-    if len(times) != len(wanted):  # stamps that repeat, or are NaN
-        spread_out = np.full(len(wanted), -1)
-        spread_out[known] = row
-        states = np.vstack([states, np.full((1, 16), np.nan)])[spread_out]
-        covariances = np.concatenate([covariances, np.full((1, 15, 15), np.nan)])[spread_out]
-    elif not np.array_equal(times, wanted):
-        states, covariances = states[row], covariances[row]
+    whole = np.full((len(wanted), 16), np.nan), np.full((len(wanted), 15, 15), np.nan)
+    for all_rows, found in zip(whole, (states, covariances), strict=True):
+        all_rows[known] = found[row]
+    states, covariances = whole
     what = Innovations(line.times[measured.node], ready.source, innovation, S, nis, verdict)
     parts = (states[:, :3], states[:, 3:6], states[:, 6:10], states[:, 10:13], states[:, 13:])
     return Navigation(wanted, *parts, covariances, what, ready.gaps, ready.unused)
