@@ -70,7 +70,6 @@ def test_the_filter_states_its_covariance_and_its_innovations(flight):
     found = navigate_mekf(flight, np.arange(0.0, 120.0, 1.0))
     assert set(COVARIANCE_COLUMNS) <= set(found.nav.columns)
     assert set(found.innovations["source"]) == {"position", "second position", "velocity"}
-    assert (found.innovations["dof"] == 3).all()
 
 
 def test_the_manifest_says_how_uncertain_velocities_are_where_the_log_does_not(flight):
@@ -129,18 +128,13 @@ def with_field(flight: Flight, **stated: object) -> Flight:
 def test_a_magnetometer_stands_in_for_the_second_antenna():
     """On eights, which bank to both sides. By the course, the observer is off by the crab angle."""
     flight, times = simulate_twin("slow-vessel-eight", 3), np.arange(0.0, 420.0, 0.5)
-    stated = {"declination_deg": np.degrees(0.05), "inclination_deg": np.degrees(1.2), "heading_sd_deg": 3.0}
+    stated = {"declination_deg": np.degrees(0.05), "inclination_deg": np.degrees(1.2)}
     known, silent = with_field(flight, **stated), with_field(flight)  # silent: where does the field point?
     by_field, by_course = (errors(one, navigate_observer(one, times).nav)[1][2] for one in (known, silent))
     assert 2 * by_field < by_course
-    filtered = navigate_mekf(known, times, magnetometer=True)
-    assert set(filtered.innovations["source"]) == {"position", "velocity", "heading"}
-    assert errors(known, filtered.nav)[1][2] < 2.0
     known.tables["magnetometer"]["field_y_ut"] *= -1
     with refused("gyros"):
         navigate_observer(known, times)
-    with refused("declination_deg", field="magnetometer.declination_deg"):
-        navigate_mekf(silent, times, magnetometer=True)
 
 
 def test_a_flight_that_banks_to_one_side_has_its_iron_stated(flight):

@@ -29,7 +29,7 @@ from wildlab.flight.manifest import make_manifest
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight
-from wildlab.navigation.aiding import headings, positions
+from wildlab.navigation.aiding import positions
 from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
 from wildlab.navigation.strapdown import ImuSamples
 from wildlab.paths import DATA
@@ -85,15 +85,13 @@ def test_what_was_refused_is_kept_for_the_report(early):
 
 def test_a_receiver_has_one_noise_for_all_its_antennas():
     p = positions([0.0, 1.0], np.zeros((2, 3)), sd=2.0)
-    h = headings([0.0, 1.0], np.ones((2, 3)), sd=0.1)
     noise = ReceiverNoise(SourceNoise(0.5, 0.25, 1.0, 2.0, 30.0))
-    heard = told({"position": p, "second position": p, "velocity": p, "heading": h}, noise)
+    heard = told({"position": p, "second position": p, "velocity": p}, noise)
     for name in ("position", "second position"):
         assert np.allclose(np.sqrt(heard[name].variance[0]), [1.0, 1.0, 0.5])
         assert heard[name].gauss_markov is not None
         assert heard[name].gauss_markov.sd.tolist() == [1.0, 1.0, 2.0]
     assert np.allclose(heard["velocity"].variance, p.variance) and heard["velocity"].gauss_markov is None
-    assert heard["heading"] is h
 
 
 def test_thinned_samples_are_means_of_neighbours():

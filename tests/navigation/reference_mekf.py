@@ -7,7 +7,7 @@ from scipy.linalg import block_diag, expm
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, skew
-from wildlab.navigation.kernels import ACCEPTED, FORCED, HEADING, POSITION, REJECTED, Integers
+from wildlab.navigation.kernels import ACCEPTED, FORCED, POSITION, REJECTED, Integers
 from wildlab.navigation.mekf import MekfInputs
 
 
@@ -80,13 +80,6 @@ def carry_errors(extra: Array, dt: float) -> tuple[Array, Array]:
 def predict_measurement(kind: int, x: Array, w: Array, value: Array, lever: Array) -> tuple[Array, Array]:
     """Innovation (m,) and Jacobian (m, 15)."""
     R = rotation(x[6:10]).as_matrix()
-    if kind == HEADING:
-        north, east, _ = R @ value
-        turned = -R @ skew(value)
-        H = np.zeros((1, 15))
-        H[0, 6:9] = (north * turned[1] - east * turned[0]) / (north**2 + east**2)
-        off = lever[0] - np.arctan2(east, north)
-        return np.array([off - 2 * np.pi * np.round(off / (2 * np.pi))]), H
     H = np.zeros((3, 15))
     if kind == POSITION:
         H[:, :3], H[:, 6:9] = np.eye(3), -R @ skew(lever)
@@ -125,7 +118,7 @@ def mekf(ready: MekfInputs, earth: Array, patience: float) -> tuple[Array, Array
     n = len(P)
     states, covariances = np.empty((line.rows, n + 1)), np.empty((line.rows, n, n))
     nis, verdicts = np.full(len(measured.node), np.nan), np.zeros(len(measured.node), np.int64)
-    rejected_since = np.full(3, np.nan)
+    rejected_since = np.full(2, np.nan)
     event = 0
     for k, t in enumerate(line.times):
         if k > 0:
@@ -160,13 +153,13 @@ def mekf(ready: MekfInputs, earth: Array, patience: float) -> tuple[Array, Array
             R = np.diag(measured.variance[event, : len(y)])
             nis[event] = y @ np.linalg.solve(H @ P @ H.T + R, y)
             verdicts[event] = ACCEPTED
-            if nis[event] > gate[kind]:
+            if nis[event] > gate:
                 if np.isnan(rejected_since[kind]):
                     rejected_since[kind] = t
                 verdicts[event] = REJECTED if t - rejected_since[kind] < patience else FORCED
             if verdicts[event] == FORCED:
                 growth = 1.0
-                while growth <= 1e12 and y @ np.linalg.solve(growth * H @ P @ H.T + R, y) > gate[kind]:
+                while growth <= 1e12 and y @ np.linalg.solve(growth * H @ P @ H.T + R, y) > gate:
                     growth *= 2
                 P = growth * P
             if verdicts[event] != REJECTED:

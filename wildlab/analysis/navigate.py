@@ -18,7 +18,6 @@ from wildlab.analysis.navigation_inputs import (
     axis_errors,
     filter_of,
     heading_from,
-    headings_of,
     imu_noise,
     inputs_of,
     receiver_noise,
@@ -68,7 +67,7 @@ class Navigated(NamedTuple):
     biases
         ``time_s`` and the estimated biases; for the filter their standard deviations too (``sd_...``).
     innovations
-        For the filter, one row for each measurement: ``time_s``, ``source`` (words), ``nis``, ``dof``,
+        For the filter, one row for each measurement: ``time_s``, ``source`` (words), ``nis``,
         ``verdict``, the innovation's elements (``first`` to ``third``) and the standard deviations that the
         filter expects of them (``sd_...``); empty for the observer.
     velocity_covariance
@@ -125,7 +124,6 @@ def navigate_mekf(
     flight: Flight,
     times: ArrayLike | None = None,
     *,
-    magnetometer: bool = False,
     tuning: MekfTuning | None = None,
     receiver: ReceiverNoise | None = None,
 ) -> Navigated:
@@ -142,8 +140,6 @@ def navigate_mekf(
     times
         Flight times (M,) at which poses are wanted; if not given those of the frames, or, of a flight without
         any, those of the inertial samples.
-    magnetometer
-        Whether to use headings by the magnetic field as well, with what ``[magnetometer]`` states of them.
     tuning
         Noise in place of what the manifest states, for a filter as H has it: fifteen states, white noise, and
         positions only. ``PUBLISHED_LIKE`` gives standard deviations like those of H 7.5.3 and is what the
@@ -175,8 +171,6 @@ def navigate_mekf(
     given = inputs_of(flight, velocity=tuning is None, noise=noise, position_sd=position_sd)
     if receiver is not None:
         given = given._replace(aiding=told(without_gross(flight, given), receiver))
-    if magnetometer:
-        given.aiding["heading"] = headings_of(flight)
     filtered = filter_of(flight, given)._replace(noise=noise, axes=axes)
     gate = GATE if receiver is None else 1.0
     found = filtered.run(given.aiding, _wanted(flight, times), gate)
@@ -192,7 +186,6 @@ def navigate_mekf(
             "time_s": what.times,
             "source": names[what.source] if len(what.source) else np.empty(0, object),
             "nis": what.nis,
-            "dof": np.isfinite(what.innovation).sum(axis=1),
             "verdict": what.verdict,
             "first": what.innovation[:, 0],
             "second": what.innovation[:, 1],
@@ -468,7 +461,7 @@ def _rms(values: Array) -> Array:
 def summarise_innovations(found: Navigated, begin: float = -np.inf, end: float = np.inf) -> pd.DataFrame:
     """NIS and whiteness of each source's innovations between two times (s), one row for each source.
 
-    Columns: ``source``, ``n``, ``nis`` (mean, ideally ``dof``), ``dof``, ``inside`` (share within the 95 %
+    Columns: ``source``, ``n``, ``nis`` (mean, ideally 3), ``inside`` (share within the 95 %
     interval of one), ``left_out`` (share), ``lag1`` (largest autocorrelation of an element of the innovation,
     in units of what the filter expects of it, at lag 1) and ``bound`` (what white noise stays below).
     """
@@ -476,15 +469,13 @@ def summarise_innovations(found: Navigated, begin: float = -np.inf, end: float =
     stamps = found.innovations["time_s"]
     inside = found.innovations[(stamps >= begin) & (stamps < end)]
     for source, part in inside.groupby("source", sort=False):
-        dof = int(part["dof"].iloc[0])
-        whitened = normalised_innovations(part, dof)
+        whitened = normalised_innovations(part)
         rows.append(
             {
                 "source": source,
                 "n": len(part),
                 "nis": float(part["nis"].mean()),
-                "dof": dof,
-                "inside": share_inside(part["nis"], chi_square_interval(dof)),
+                "inside": share_inside(part["nis"], chi_square_interval(3)),
                 "left_out": float((part["verdict"] == 0).mean()),
                 "lag1": max((float(autocorrelation(column, 1)[1]) for column in whitened.T), key=abs),
                 "bound": white_bound(len(part)),
@@ -493,9 +484,9 @@ def summarise_innovations(found: Navigated, begin: float = -np.inf, end: float =
     return pd.DataFrame(rows)
 
 
-def normalised_innovations(innovations: pd.DataFrame, dof: int = 3) -> Array:
-    """Elements (N, dof) of one source's innovations in units of the deviations that the filter expects."""
-    names = ["first", "second", "third"][:dof]
+def normalised_innovations(innovations: pd.DataFrame) -> Array:
+    """Elements (N, 3) of one source's innovations in units of the deviations that the filter expects."""
+    names = ["first", "second", "third"]
     expected = innovations[[f"sd_{name}" for name in names]].to_numpy(float)
     return innovations[names].to_numpy(float) / expected
 

@@ -187,15 +187,14 @@ IMU_NOISE = (
 class MagnetometerPart(Strict):
     """The magnetometer, and the Earth's field at the place and time of the flight, as a model of it says.
 
-    `declination_deg` counts from true north towards east, `inclination_deg` downwards. `heading_sd_deg` is
-    the standard deviation of a heading by it, once what is magnetic on board is taken off: `hard_iron_ut`
-    (microtesla, in b) where that is known, else what the flight's own measurements say of it.
+    `declination_deg` counts from true north towards east, `inclination_deg` downwards. `hard_iron_ut`
+    (microtesla, in b) is what is magnetic on board, where that is known; else the flight's own measurements
+    say it.
     """
 
     name: str = ""
     declination_deg: Annotated[float, Field(ge=-180, le=180)] | None = None
     inclination_deg: Annotated[float, Field(ge=-90, le=90)] | None = None
-    heading_sd_deg: Annotated[float, Field(gt=0, le=180)] | None = None
     hard_iron_ut: Vector | None = None
     note: str = ""
 

@@ -10,11 +10,11 @@ Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `run_mekf`: the multiplicative extended Kalman filter; `run_observer`: the nonlinear observer.
 - `integrate_strapdown`: inertial measurements alone.
 - `align_at`, `align_from_baseline`, `align_from_course`, `align_at_rest`: where they start.
-- `positions`, `velocities`, `headings`, `standstill`: aiding measurements.
+- `positions`, `velocities`, `standstill`: aiding measurements.
 - `signs_of_trouble`: what of an estimate should not be believed.
 """
 
-from wildlab.navigation.aiding import Aiding, headings, positions, standstill, velocities
+from wildlab.navigation.aiding import Aiding, positions, standstill, velocities
 from wildlab.navigation.alignment import (
     InitialSd,
     Kinematics,
@@ -82,7 +82,6 @@ __all__ = [
     "field_reference",
     "find_rest",
     "hard_iron",
-    "headings",
     "integrate_strapdown",
     "log_likelihood",
     "pose_covariance",

@@ -1,7 +1,7 @@
-"""Aiding measurements of the inertial navigation: position, velocity, heading, with their uncertainty.
+"""Aiding measurements of the inertial navigation: position and velocity, with their uncertainty.
 
-H 7.3 has the positions of two GNSS antennas, which give the heading as well. Beyond it: antennas' velocities,
-the direction of the magnetic field, and standing still.
+H 7.3 has the positions of two GNSS antennas, which give the heading as well. Beyond it: antennas' velocities
+and standing still.
 """
 
 from __future__ import annotations
@@ -211,34 +211,6 @@ def standstill(times: ArrayLike, sd: float) -> Aiding:
         For shapes that do not fit, or a standard deviation that is not positive.
     """
     return _aiding(kernels.VELOCITY, times, np.zeros(3), sd, np.zeros(3), "times of standing still")
-
-
-def headings(times: ArrayLike, field_b: ArrayLike, sd: ArrayLike, declination: float = 0.0) -> Aiding:
-    """Directions of the magnetic field, of which only the level part is used; beyond H.
-
-    Parameters
-    ----------
-    times
-        (N,) s.
-    field_b
-        (N, 3) in b, of any unit, calibrated for hard and soft iron; rows with NaN are left out.
-    sd
-        Standard deviation of the heading that follows, rad: (N,) or one number.
-    declination
-        Of the field from true north, positive towards east, rad.
-
-    Returns
-    -------
-    Aiding
-
-    Raises
-    ------
-    WildlabError
-        For shapes that do not fit, or a standard deviation that is not positive.
-    """
-    spread = np.asarray(sd, float)
-    spread = spread[:, None] if spread.ndim == 1 else spread
-    return _aiding(kernels.HEADING, times, field_b, spread, [declination, 0.0, 0.0], "magnetometer headings")
 
 
 def set_out(

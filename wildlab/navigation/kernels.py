@@ -22,7 +22,7 @@ Integers = NDArray[np.int64]
 #: Errors of H (7.22). Behind them: of the axes, accelerometers first, row by row; Gauss-Markov errors.
 N_ERRORS, N_AXES = 15, 18
 #: Kinds of measurement.
-POSITION, VELOCITY, HEADING = 0, 1, 2
+POSITION, VELOCITY = 0, 1
 #: What became of a measurement.
 REJECTED, ACCEPTED, FORCED = 0, 1, 2
 
@@ -226,11 +226,8 @@ def carry_extra(x: Array, P: Array, M: Array, dt: float, extra: Array) -> None:
 
 
 @compiled
-def invert(S: Array, m: int, out: Array) -> None:
-    """Inverse of a symmetric positive definite matrix of size 1 or 3."""
-    if m == 1:
-        out[0, 0] = 1 / S[0, 0]
-        return
+def invert(S: Array, out: Array) -> None:
+    """Inverse of a symmetric positive definite matrix (3, 3)."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         for a in range(3):
@@ -243,23 +240,10 @@ def invert(S: Array, m: int, out: Array) -> None:
 @compiled
 def predict_measurement(
     kind: int, x: Array, w: Array, value: Array, lever: Array, R: Array, y: Array, H: Array
-) -> int:
-    """Innovation y and Jacobian H (3, 15) of a measurement; how many rows of them count."""
+) -> None:
+    """Innovation y and Jacobian H (3, 15) of a measurement."""
     H[:] = 0.0
     rotation_of(x[6:10], R)
-    if kind == HEADING:
-        # value is the field in b, lever[0] the direction it has in truth, from north towards east.
-        field = R @ value
-        y[0] = lever[0] - np.arctan2(field[1], field[0])
-        y[0] -= 2 * np.pi * np.round(y[0] / (2 * np.pi))
-        level = field[0] * field[0] + field[1] * field[1]
-        for a in range(3):
-            b, c = (a + 1) % 3, (a + 2) % 3
-            # Column a of -R S(value).
-            d_north = -(R[0, b] * value[c] - R[0, c] * value[b])
-            d_east = -(R[1, b] * value[c] - R[1, c] * value[b])
-            H[0, 6 + a] = (field[0] * d_east - field[1] * d_north) / level
-        return 1
     first = 0 if kind == POSITION else 3
     arm = lever
     if kind == VELOCITY:
@@ -273,15 +257,14 @@ def predict_measurement(
             H[i, 6 + a] = -(R[i, b] * arm[c] - R[i, c] * arm[b])
             if kind == VELOCITY:
                 H[i, 12 + a] = R[i, b] * lever[c] - R[i, c] * lever[b]
-    return 3
 
 
 @compiled
-def columns_of(H: Array, m: int) -> Integers:
-    """The columns in which any of the first m rows has a value."""
+def columns_of(H: Array) -> Integers:
+    """The columns in which any of the three rows has a value."""
     used, count = np.empty(H.shape[1], np.int64), 0
     for j in range(H.shape[1]):
-        for a in range(m):
+        for a in range(3):
             if H[a, j] != 0:
                 used[count] = j
                 count += 1
@@ -291,8 +274,8 @@ def columns_of(H: Array, m: int) -> Integers:
 
 @compiled
 def correct(
-    x: Array, P: Array, H: Array, used: Integers, m: int, y: Array, variance: Array, axes: bool,
-    S_inverse: Array, HP: Array, K: Array, M: Array, work: Array,
+    x: Array, P: Array, H: Array, used: Integers, y: Array, variance: Array, axes: bool, S_inverse: Array,
+    HP: Array, K: Array, M: Array, work: Array,
 ) -> None:  # fmt: skip
     """Measurement update, Joseph form; the attitude error is then folded into the quaternion.
 
@@ -306,25 +289,25 @@ def correct(
     for i in range(n):
         if axes and N_ERRORS <= i < N_ERRORS + N_AXES:
             continue
-        for a in range(m):
-            for b in range(m):
+        for a in range(3):
+            for b in range(3):
                 K[a, i] += HP[b, i] * S_inverse[b, a]
             dx[i] += K[a, i] * y[a]
     # (I - K H) P (I - K H)' + K R K', the two products one after the other.
     M[:] = P
     for i in range(n):
-        for a in range(m):
+        for a in range(3):
             gain = K[a, i]
             for j in range(n):
                 M[i, j] -= gain * HP[a, j]
-    for a in range(m):
+    for a in range(3):
         for i in range(n):
             left = -K[a, i] * variance[a]
             for j in used:
                 left += M[i, j] * H[a, j]
             HP[a, i] = left
     for i in range(n):
-        for a in range(m):
+        for a in range(3):
             left = HP[a, i]
             for j in range(n):
                 M[i, j] -= left * K[a, j]
@@ -356,7 +339,7 @@ def correct(
 def mekf(
     times: Array, f: Array, w: Array, gap: Array, row_of_node: Integers, earth: Array, noise: Array, x: Array,
     P: Array, axes: bool, extra: Array, node: Integers, kind: Integers, value: Array, variance: Array,
-    lever: Array, gauss_markov: Integers, gate: Array, patience: float, states: Array, covariances: Array,
+    lever: Array, gauss_markov: Integers, gate: float, patience: float, states: Array, covariances: Array,
     innovations: Array, spreads: Array, nis: Array, verdicts: Integers,
 ) -> None:  # fmt: skip
     """The whole filter over a timeline; `tests/navigation/reference_mekf.py` has the same in short."""
@@ -367,7 +350,7 @@ def mekf(
     f_felt, w_felt, slow = np.zeros(3), np.zeros(3), np.empty((6, n))
     H, S, S_inverse = np.empty((3, n)), np.empty((3, 3)), np.empty((3, 3))
     HP, K, M = np.empty((3, n)), np.empty((3, n)), np.empty((n, n))
-    rejected_since = np.full(3, np.nan)
+    rejected_since = np.full(2, np.nan)
     event = 0
     for k in range(len(times)):
         if k > 0:
@@ -405,33 +388,33 @@ def mekf(
             add_noise(P, dt, q_v, q_a, drive_a, drive_g)
         while event < len(node) and node[event] == k:
             sort = kind[event]
-            m = predict_measurement(sort, x, w[k], value[event], lever[event], R, y, H)
+            predict_measurement(sort, x, w[k], value[event], lever[event], R, y, H)
             if gauss_markov[event] >= 0:
                 y -= x[1 + gauss_markov[event] : 4 + gauss_markov[event]]
                 H[:, gauss_markov[event] : gauss_markov[event] + 3] = np.eye(3)
-            used = columns_of(H, m)
+            used = columns_of(H)
             growth = 1.0
             while True:
                 HP[:] = 0.0
-                for a in range(m):
+                for a in range(3):
                     for i in range(n):
                         for j in used:
                             HP[a, i] += growth * P[i, j] * H[a, j]
-                for a in range(m):
-                    for b in range(m):
+                for a in range(3):
+                    for b in range(3):
                         S[a, b] = variance[event, a] if a == b else 0.0
                         for j in used:
                             S[a, b] += H[a, j] * HP[b, j]
-                invert(S, m, S_inverse)
+                invert(S, S_inverse)
                 square = 0.0
-                for a in range(m):
-                    for b in range(m):
+                for a in range(3):
+                    for b in range(3):
                         square += y[a] * S_inverse[a, b] * y[b]
                 if growth == 1.0:
                     nis[event] = square
-                    innovations[event, :m] = y[:m]
-                    spreads[event, :m, :m] = S[:m, :m]
-                    if square <= gate[sort]:
+                    innovations[event] = y
+                    spreads[event] = S
+                    if square <= gate:
                         verdicts[event] = ACCEPTED
                         rejected_since[sort] = np.nan
                         break
@@ -442,12 +425,12 @@ def mekf(
                         break
                     verdicts[event] = FORCED
                     rejected_since[sort] = np.nan
-                elif square <= gate[sort] or growth > 1e12:
+                elif square <= gate or growth > 1e12:
                     break
                 growth *= 2.0
             if verdicts[event] != REJECTED:
                 P *= growth
-                correct(x, P, H, used, m, y, variance[event], axes, S_inverse, HP, K, M, work)
+                correct(x, P, H, used, y, variance[event], axes, S_inverse, HP, K, M, work)
             event += 1
         row = row_of_node[k]
         if row >= 0:

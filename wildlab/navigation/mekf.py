@@ -90,7 +90,7 @@ class Innovations(NamedTuple):
     times, source
         (E,) s, and the index of the aiding it came from.
     innovation, S
-        (E, 3) and (E, 3, 3); a heading (rad) fills the first element only, the rest is NaN.
+        (E, 3) and (E, 3, 3).
     nis
         (E,) normalised innovation squared, before anything was widened.
     verdict
@@ -143,7 +143,7 @@ class MekfInputs(NamedTuple):
     covariance: Array
     axes: bool
     extra: Array
-    gate: Array
+    gate: float
 
 
 def prepare(
@@ -153,10 +153,10 @@ def prepare(
     """Timeline, measurements in order of time, and all numbers of the filter."""
     check_initial(start)
     for row, one in enumerate(aiding):
-        if one.kind not in (kernels.POSITION, kernels.VELOCITY, kernels.HEADING):
+        if one.kind not in NAMES:
             raise WildlabError(
                 "a direction in the body beside one in n is a measurement of the observer only",
-                "leave it out, or give a magnetometer's headings to this filter",
+                "leave it out",
                 field=f"aiding[{row}]",
             )
     line, gaps = set_out(imu, start.time, aiding, output_times, outages.max_gap)
@@ -169,10 +169,9 @@ def prepare(
         for sd, time in ((noise[2], noise[3]), (noise[4], noise[5]))
     ]
     numbers = np.array([*noise[:2], long_run[0], noise[3], long_run[1], noise[5], *outages[2:]])
-    limits = [gate_threshold(gate_probability, m) for m in (3, 3, 1)]  # by kind of measurement
     return MekfInputs(
         line, measured, source, unused, gaps, numbers, state, covariance, axes is not None, extra,
-        np.asarray(limits, float),
+        gate_threshold(gate_probability, 3),
     )  # fmt: skip
 
 
@@ -229,7 +228,7 @@ def run_mekf(
     noise, earth
         How the sensors err, and what pulls: `gravity.local_earth`, or `gravity.flat_earth` as in H.
     aiding
-        What :func:`positions`, :func:`velocities`, :func:`headings` and :func:`standstill` give.
+        What :func:`positions`, :func:`velocities` and :func:`standstill` give.
     output_times
         (M,) s at which the estimate is wanted, camera stamps for instance; without them, at every inertial
         sample (the covariances of 25 minutes at 250 Hz then take 0.7 GB).
@@ -333,15 +332,10 @@ def log_likelihood(innovations: Innovations, since: float = -np.inf) -> float:
         The logarithm of the likelihood, without the constants that depend on the number of measurements only.
     """
     late = innovations.times >= since
-    total = 0.0
-    for one in (False, True):  # headings have one element, the others three
-        rows = late & (np.isnan(innovations.innovation[:, 2]) == one)
-        m = 1 if one else 3
-        total += float(np.sum(innovations.nis[rows] + np.linalg.slogdet(innovations.S[rows, :m, :m])[1]))
-    return -0.5 * total
+    return -0.5 * float(np.sum(innovations.nis[late] + np.linalg.slogdet(innovations.S[late])[1]))
 
 
-NAMES = {kernels.POSITION: "positions", kernels.VELOCITY: "velocities", kernels.HEADING: "headings"}
+NAMES = {kernels.POSITION: "positions", kernels.VELOCITY: "velocities"}
 #: From where on each sign counts; good flights stay well below.
 LEFT_OUT, TOO_LARGE, OUTAGE_S = 0.05, 3.0, 10.0
 ACCELEROMETER_BIAS, GYRO_BIAS = 1.5, 0.09  # m/s^2 and rad/s: more than sensors that work have
@@ -376,8 +370,8 @@ def _misfits(found: Navigation, aiding: Sequence[Aiding]) -> list[str]:
         name = f"{NAMES[source.kind]} of source {index + 1}"
         verdict, nis = found.innovations.verdict[mine], found.innovations.nis[mine]
         forced, left_out = int((verdict == FORCED).sum()), float((verdict == REJECTED).mean())
-        # The median, which a few outliers do not move: that of chi-square with 3 (1) degrees of freedom.
-        ratio = float(np.median(nis)) / (0.455 if source.kind == kernels.HEADING else 2.366)
+        # The median, which a few outliers do not move: that of chi-square with 3 degrees of freedom.
+        ratio = float(np.median(nis)) / 2.366
         if forced:
             sentences.append(
                 f"The filter lost its way {'once' if forced == 1 else f'{forced} times'} and had to be "

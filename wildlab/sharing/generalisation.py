@@ -259,7 +259,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
         data["camera"] = camera.model_dump()
     data["origin"] = {"latitude_deg": there[0], "longitude_deg": there[1], "height_m": 0.0}
     data["time"] = {"kind": manifest.time.kind} | ({"epoch": epoch} if epoch else {})
-    data["magnetometer"] = _field_part(manifest, iron, "magnetometer" in tables)
+    data["magnetometer"] = _field_part(iron, "magnetometer" in tables)
     terrain = flight.terrain
     if terrain is not None:
         # Moved as the rest is; what a report draws of it is only what the flight itself shows.
@@ -478,9 +478,6 @@ def _sensor(part: SensorPart, pixels: float) -> dict[str, Any]:
     return data
 
 
-def _field_part(manifest: Manifest, iron: tuple[float, ...] | None, there: bool) -> dict[str, Any]:
-    stated = manifest.magnetometer
-    part: dict[str, Any] = {"heading_sd_deg": stated.heading_sd_deg} if stated.heading_sd_deg else {}
-    if there:
-        part |= {"declination_deg": USUAL_DECLINATION_DEG, "inclination_deg": USUAL_INCLINATION_DEG}
-    return part | ({"hard_iron_ut": iron} if iron is not None else {})
+def _field_part(iron: tuple[float, ...] | None, there: bool) -> dict[str, Any]:
+    field = {"declination_deg": USUAL_DECLINATION_DEG, "inclination_deg": USUAL_INCLINATION_DEG}
+    return (field if there else {}) | ({"hard_iron_ut": iron} if iron is not None else {})

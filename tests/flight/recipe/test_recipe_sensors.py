@@ -157,7 +157,6 @@ def test_magnetometer(sensors):
         name = "compass"
         declination_deg = 3.0
         inclination_deg = 70.0
-        heading_sd_deg = 5.0
         file = "mag.csv"
         time = {column = "ms", format = "elapsed", unit = "ms"}
         field.x = {column = "my", unit = "mG"}
