@@ -13,6 +13,7 @@ import shutil
 import sys
 import tempfile
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import pdoc
@@ -32,21 +33,21 @@ ROOMS = (
 
 
 def modules() -> list[str]:
-    """wildlab, its rooms and the files in them, loaded, with what they offer lazily in place."""
+    """wildlab, its rooms and the files in them."""
     names = ["wildlab", "wildlab.errors", "wildlab.studies.protocol"]
     for room in ROOMS:
         package = importlib.import_module(f"wildlab.{room}")
         names.append(package.__name__)
         names += [module.name for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
+    return names
+
+
+def build(into: Path, names: Sequence[str]) -> None:
+    """Write the pages of modules into a folder, whole or not at all; what was there is replaced."""
     for name in names:
         module = importlib.import_module(name)
         for offered in getattr(module, "__all__", ()):
             getattr(module, offered)  # pdoc looks for names without asking for them
-    return names
-
-
-def build(into: Path) -> None:
-    """Write the pages into a folder, whole or not at all; what was there is replaced."""
     # One module after the other: pdoc does not go below a package that says what it offers.
     pdoc.render.configure(
         docformat="numpy",
@@ -65,7 +66,7 @@ def build(into: Path) -> None:
             warnings.filterwarnings("ignore", message="Error parsing type annotation ForwardRef")
             # It does go below one that does not say it.
             warnings.filterwarnings("ignore", message="The module specification .* adds a module")
-            pdoc.pdoc(*modules(), output_directory=pages)
+            pdoc.pdoc(*names, output_directory=pages)
         for page in pages.rglob("*.html"):
             # Defaults that are paths: where this checkout lies is nobody's business. What models inherit from
             # pydantic links to its own manual, which is not here.
@@ -78,7 +79,7 @@ def build(into: Path) -> None:
 
 if __name__ == "__main__":
     place = Path(sys.argv[1]) if len(sys.argv) > 1 else INTO
-    build(place)
+    build(place, sys.argv[2:] or modules())
     if place == INTO:
         build_ledger(INTO.parent, load_studies())  # its front page links what is there
     print(place / "index.html")
