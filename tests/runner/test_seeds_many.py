@@ -11,16 +11,18 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
 
 from tests.notebooks import OPEN, notebook, write
+from tests.runner.cases.walk import LOG, trial
 from wildlab.paths import ROOT
 
 pytestmark = pytest.mark.slow
 
+#: Name, seed and value of what a study records.
+Numbers = list[tuple[str, str, float]]
 PROGRAM = Path(__file__).with_name("flights_for_seeds.py")
 #: A notebook that reads the table and records what is in it, to the last digit.
 TABLE = (
@@ -56,7 +58,7 @@ def make(folder: Path, seconds: float = 0.0, seeds: int = 8) -> Path:
 
 def environment(folder: Path) -> dict[str, str]:
     paths = [str(ROOT), str(PROGRAM.parent)]
-    return os.environ | {"SEEDS_TEST_LOG": str(folder / "flown"), "PYTHONPATH": os.pathsep.join(paths)}
+    return os.environ | {LOG: str(folder / "flown"), "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
@@ -81,8 +83,24 @@ def flown(folder: Path) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in map(str.split, log.read_text().splitlines())] if log.exists() else []
 
 
-def numbers(folder: Path, out: str, study: str = "walks") -> Any:
-    return json.loads((folder / out / study / "metrics.json").read_text())["metrics"]
+def numbers(folder: Path, out: str) -> Numbers:
+    found = json.loads((folder / out / "walks" / "metrics.json").read_text())["metrics"]
+    return sorted((one["name"], one["subject"], one["value"]) for one in found)
+
+
+@pytest.fixture
+def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], Numbers]:
+    """The numbers of so many seeds as this process computes them; the flight that is drawn has its own."""
+    monkeypatch.setenv(LOG, str(tmp_path / "own"))
+
+    def compute(seeds: int) -> Numbers:
+        found = [(name, "4", 1.0) for name in ("end", "spread")]
+        for seed in (one for one in range(1, seeds + 1) if one != 4):
+            values = trial(seed, steps=3000, seconds=0.0)
+            found += [(name, str(seed), values["walk", name]) for name in ("end", "spread")]
+        return sorted(found)
+
+    return compute
 
 
 def kept(folder: Path, out: str, study: str = "walks") -> dict[str, bytes]:
@@ -104,24 +122,21 @@ def alive(pids: set[int]) -> set[int]:
     }
 
 
-def test_the_same_numbers_for_any_number_of_processes(tmp_path):
+def test_the_numbers_are_those_of_one_process(tmp_path, computed):
     folder = make(tmp_path)
-    text = run(folder, "walks", "--out", "one", "--jobs", "1")
+    text = run(folder, "walks", "--jobs", "3")
     assert "seeds walks: 7 to compute, 0 are there" in text and "done  walks" in text, text
-    assert len({process for _, process in flown(folder)}) == 1
-    assert "done  walks" in run(folder, "walks", "--out", "three", "--jobs", "3")
-    assert len({process for _, process in flown(folder)[7:]}) > 1, "it was spread"
-    assert sorted(seed for seed, _ in flown(folder)) == sorted(2 * [1, 2, 3, 5, 6, 7, 8])
-    assert numbers(folder, "one") == numbers(folder, "three")
-    assert kept(folder, "one") == kept(folder, "three") and len(kept(folder, "one")) == 7
-    about = json.loads((folder / "one" / "walks" / "provenance.json").read_text())["seeds"]
+    assert len({process for _, process in flown(folder)}) > 1, "it was spread"
+    assert sorted(seed for seed, _ in flown(folder)) == [1, 2, 3, 5, 6, 7, 8]
+    assert numbers(folder, "reports") == computed(8) and len(kept(folder, "reports")) == 7
+    about = json.loads((folder / "reports" / "walks" / "provenance.json").read_text())["seeds"]
     assert about["seeds"] == [1, 2, 3, 5, 6, 7, 8] and about["case"] == "walk"
-    assert {key.partition("/")[0] for key in kept(folder, "one")} == {about["key"]}
+    assert {key.partition("/")[0] for key in kept(folder, "reports")} == {about["key"]}
     assert about["parameters"] == {"steps": 3000, "seconds": 0.0}
 
 
 def test_jobs_bounds_notebooks_and_seeds_together(tmp_path):
-    folder = make(tmp_path, seconds=0.2)
+    folder = make(tmp_path, seconds=0.2, seeds=5)
     program = start(folder, "walks", "once", "more-walks", "--jobs", "2")
     most = 0
     while program.poll() is None:
@@ -137,45 +152,36 @@ def test_jobs_bounds_notebooks_and_seeds_together(tmp_path):
     assert most == 2
 
 
-def test_more_seeds_cost_only_the_new_ones_and_other_parameters_all(tmp_path):
+def test_only_new_and_damaged_seeds_are_computed_and_all_with_other_parameters(tmp_path, computed):
     folder = make(tmp_path)
     run(folder, "walks", "--seeds", "4")
     assert sorted(seed for seed, _ in flown(folder)) == [1, 2, 3]
-    text = run(folder, "walks", "once", "--seeds", "6", "--jobs", "2")
-    assert "--seeds has no effect on once" in text and "seeds walks: 2 to compute, 3 are there" in text
-    assert sorted(seed for seed, _ in flown(folder)) == [1, 2, 3, 5, 6]
-    assert len(numbers(folder, "reports")) == 2 * 6
-    studies = folder / "notebooks" / "studies.toml"
-    studies.write_text(studies.read_text().replace("steps = 3000", "steps = 2000"))
-    assert len(kept(folder, "reports")) == 5
-    before = {key.partition("/")[0] for key in kept(folder, "reports")}
-    run(folder, "walks", "--seeds", "3")
-    assert len(flown(folder)) == 5 + 2
-    after = {key.partition("/")[0] for key in kept(folder, "reports")}
-    assert len(after) == 1 and after != before, "what the old parameters left is swept"
-
-
-def test_damaged_numbers_are_computed_again_and_the_run_says_so(tmp_path):
-    folder = make(tmp_path)
-    run(folder, "walks")
-    before, whole = numbers(folder, "reports"), kept(folder, "reports")
-    store = folder / "reports" / ".seeds" / "walks" / next(iter(whole)).partition("/")[0]
-    content = bytearray((store / "5.json").read_bytes())
+    assert len({process for _, process in flown(folder)}) == 1
+    store = folder / "reports" / ".seeds" / "walks" / next(iter(kept(folder, "reports"))).partition("/")[0]
+    whole = (store / "2.json").read_bytes()
+    content = bytearray(whole)
     content[content.index(b'"walk/end": ') + 12] ^= 1
-    (store / "5.json").write_bytes(bytes(content))
-    text = run(folder, "walks", "--jobs", "2")
-    assert "seeds walks: kept numbers are damaged and are computed again: 1 seed (5)" in text, text
-    assert "1 to compute, 6 are there" in text and [seed for seed, _ in flown(folder)[7:]] == [5]
-    assert numbers(folder, "reports") == before and kept(folder, "reports") == whole
+    (store / "2.json").write_bytes(bytes(content))
+    text = run(folder, "walks", "once", "--seeds", "6", "--jobs", "2")
+    assert "seeds walks: kept numbers are damaged and are computed again: 1 seed (2)" in text, text
+    assert "--seeds has no effect on once" in text and "seeds walks: 3 to compute, 2 are there" in text
+    assert sorted(seed for seed, _ in flown(folder)[3:]) == [2, 5, 6]
+    assert numbers(folder, "reports") == computed(6) and (store / "2.json").read_bytes() == whole
     origin = json.loads((folder / "reports" / "walks" / "provenance.json").read_text())["seeds"]
-    assert origin["damaged"] == {"count": 1, "seeds": [5]}
-    assert origin["digests"]["5"] == json.loads(whole[f"{store.name}/5"])["digest"]
+    assert origin["damaged"] == {"count": 1, "seeds": [2]}
+    assert origin["digests"]["2"] == json.loads(whole)["digest"]
     page = (folder / "reports" / "walks" / "report.html").read_text()
     assert "of which 1 had been damaged and computed again" in page
+    studies = folder / "notebooks" / "studies.toml"
+    studies.write_text(studies.read_text().replace("steps = 3000", "steps = 2000"))
+    run(folder, "walks", "--seeds", "3")
+    assert len(flown(folder)) == 6 + 2
+    after = {key.partition("/")[0] for key in kept(folder, "reports")}
+    assert len(after) == 1 and after != {store.name}, "what the old parameters left is swept"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_run_that_is_broken_off_goes_on_where_it_stopped(tmp_path, number):
+def test_a_run_that_is_broken_off_goes_on_where_it_stopped(tmp_path, number, computed):
     folder = make(tmp_path, seconds=0.4, seeds=12)
     program = start(folder, "walks", "--jobs", "2")
     wait_for(lambda: len(kept(folder, "reports")) >= 3)
@@ -192,14 +198,12 @@ def test_a_run_that_is_broken_off_goes_on_where_it_stopped(tmp_path, number):
     again = {seed for seed, _ in flown(folder)[begun:]}
     assert again == {1, 2, 3, *range(5, 13)} - {int(path.stem) for path in first}
     assert {path: path.stat().st_mtime_ns for path in first} == first, "finished seeds were not written again"
-    if number == signal.SIGINT:
-        run(folder, "walks", "--out", "whole", "--jobs", "2")
-        assert numbers(folder, "reports") == numbers(folder, "whole")
+    assert numbers(folder, "reports") == computed(12)
 
 
 def test_seeds_that_fail_are_named_and_the_others_kept(tmp_path):
     folder = make(tmp_path, seeds=7)
-    text = run(folder, "troubled", "once", "--jobs", "2", "--timeout", "25")
+    text = run(folder, "troubled", "once", "--jobs", "2", "--timeout", "15")
     status = json.loads((folder / "reports" / "troubled" / "status.json").read_text())
     assert status["state"] == "failed", text
     reason = "Seed 2 failed (so did 2 more: 3, 5): The flight of seed 2 has no solution. Look at it."
@@ -262,7 +266,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
     one.end()
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path, cluster):
+def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path, cluster, computed):
     folder = make(tmp_path, seconds=0.8, seeds=12)
     for _ in range(2):
         cluster.add_worker()
@@ -279,9 +283,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path, cluster)
     assert "done  walks" in text, text
     assert {process for _, process in flown(folder)[begun:]} == {cluster.workers[1].pid}
     assert {seed for seed, _ in flown(folder)} == {1, 2, 3, *range(5, 13)}
-    run(folder, "walks", "--out", "here", "--jobs", "2")
-    assert numbers(folder, "cluster") == numbers(folder, "here")
-    assert kept(folder, "cluster") == kept(folder, "here")
+    assert numbers(folder, "cluster") == computed(12)
 
 
 def test_a_seed_that_fails_on_a_cluster_is_named(tmp_path, cluster):
