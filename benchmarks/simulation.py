@@ -10,8 +10,10 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.timing import best_of
+from tests.simulation import plain_kernels as plain
+from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.gravity import local_earth
-from wildlab.simulation import fixed_wing_trajectory, kernels, loiter_path, plain
+from wildlab.simulation import fixed_wing_trajectory, kernels, loiter_path
 from wildlab.simulation.trajectory import band_limited_disturbance
 
 DURATION, RATE, FRACTION = 1500, 250, 100
@@ -40,7 +42,8 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
         kernels.felt_on_earth(attitude, p, v, a, earth.as_array(), force, rate)
 
     def plain_sensed(n: int) -> None:
-        turned = plain.turn(plain.coordinated_attitude(v[:n], a[:n], WIND, 0.05, earth.gravity), *out[:, :n])
+        calm = plain.coordinated_attitude(v[:n], a[:n], WIND, 0.05, earth.gravity)
+        turned = calm @ euler_to_matrix(*out[:, :n])
         rates = plain.body_rates(turned[:-8], turned[2:-6], turned[6:-2], turned[8:], 2 / RATE)
         inside = slice(4, n - 4)
         plain.felt_on_earth(turned[4:-4], p[inside], v[inside], a[inside], earth, rates)

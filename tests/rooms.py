@@ -17,16 +17,12 @@ LAZY = (
     "wildlab.flight.recipe",
     "wildlab.geometry",
     "wildlab.reporting",
+    "wildlab.simulation",
 )
 #: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
 DOCUMENTED = (
     *LAZY,
-    *("wildlab.navigation", "wildlab.simulation"),
-    *(
-        "wildlab.tracking",
-        "wildlab.tracking.many",
-        "wildlab.tracking.particles",
-    ),
+    *("wildlab.navigation", "wildlab.tracking", "wildlab.tracking.many", "wildlab.tracking.particles"),
 )
 #: Rooms whose examples are run.
 WITH_EXAMPLES = (

@@ -21,8 +21,9 @@ Where a change belongs:
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from wildlab.lazy import offer
 
 if TYPE_CHECKING:
     from wildlab.simulation.courses import loiter_path
@@ -39,26 +40,9 @@ if TYPE_CHECKING:
         thrust_aligned_trajectory,
     )
     from wildlab.simulation.twins import simulate, simulate_twin
+else:
+    __getattr__, __dir__ = offer(__name__)
 
-_WHERE = {
-    "Motion": "trajectory",
-    "TwinParameters": "parameters",
-    "angular_rates": "trajectory",
-    "attitude_along": "trajectory",
-    "fixed_wing_trajectory": "trajectory",
-    "coordinated_attitude": "trajectory",
-    "gauss_markov": "error_models",
-    "load_twin": "parameters",
-    "loiter_path": "courses",
-    "parameters_table": "parameters",
-    "simulate": "twins",
-    "simulate_twin": "twins",
-    "specific_forces": "trajectory",
-    "stream": "error_models",
-    "target_path": "target_motion",
-    "thrust_aligned_trajectory": "trajectory",
-    "twin_names": "parameters",
-}
 __all__ = [
     "Motion",
     "TwinParameters",
@@ -78,11 +62,3 @@ __all__ = [
     "thrust_aligned_trajectory",
     "twin_names",
 ]
-
-
-def __getattr__(name: str) -> object:
-    """A public name from where it stands: a table of parameters does not wait for compiled code to load."""
-    if name not in _WHERE:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = globals()[name] = getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)
-    return found  # the next time it is simply there
