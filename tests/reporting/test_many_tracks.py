@@ -112,41 +112,8 @@ def lives(**changes: Any) -> Identities:
     return Identities(**(base | changes))
 
 
-TEXTS = load_texts("tracking-many")
-
-
-def level_of(one: Any, two: Any) -> tuple[str, str]:
-    """The colour of the summary, and the word of its verdict."""
-    return page.level_of(one, two), TEXTS.subjects[f"verdict-{page.verdict_key(one, two)}"]
-
-
 FALSE = {0: TrackLife(9, 9, 2.0, False, 9), 1: TrackLife(9, 0, np.nan, True)}
 FEW = {0: TrackLife(9, 4, 9.0, False, 4), 1: TrackLife(9, 9, np.nan, False, 0)}
-
-
-@pytest.mark.parametrize(
-    ("changes", "level", "word"),
-    [
-        ({}, "good", "sound"),
-        ({"swaps": 2}, "bad", "mixed up"),
-        ({"breaks": 1}, "warn", "look closer"),
-        ({"false_tracks_per_minute": 1.0, "tracks": FALSE}, "warn", "look closer"),
-        ({"tracks": {0: TrackLife(9, 9, 9.0, False, 9)}}, "warn", "look closer"),
-        ({"tracks": {0: TrackLife(9, 9, 0.5, False, 9)}}, "warn", "look closer"),
-        ({"tracks": FEW}, "warn", "look closer"),
-        ({"targets": {"a": TargetLife(61, 0.7, 0.0, 0, 0)}}, "warn", "look closer"),
-        ({"targets": {"a": TargetLife(61, 0.9, 0.0, 0, 0)}}, "good", "sound"),
-        ({"targets": {"a": TargetLife(61, 0.0, np.nan, 0, 0)}}, "bad", "targets lost"),
-        ({"targets": {"a": TargetLife(0, np.nan, np.nan, 0, 0)}}, "neutral", "not judged"),
-    ],
-)
-def test_the_verdict_follows_from_lives(changes, level, word):
-    assert level_of(followed(), lives(**changes)) == (level, word)
-
-
-def test_without_truth_or_tracks_nothing_is_judged():
-    assert level_of(followed(), None) == ("neutral", "not judged")
-    assert level_of(followed(0), lives()) == ("bad", "no track")
 
 
 def test_numbers_of_the_summary():
@@ -175,7 +142,7 @@ def test_a_track_that_goes_on_without_its_target_is_seen():
         tracks={0: TrackLife(100, 60, 2.0, False, 60)},
     )
     assert page.false_share(gone) == pytest.approx(0.4)
-    assert level_of(followed(looks=100), gone) == ("warn", "look closer")
+    assert page.reason(followed(looks=100), gone).key == "reason-nothing"
 
 
 def test_names_are_only_text():
@@ -194,42 +161,43 @@ NEVER = {"a": TargetLife(61, 0.0, np.nan, 0, 0), "b": TargetLife(61, 1.0, 0.0, 0
 SHORT = {"a": TargetLife(61, 0.7, 0.0, 0, 0)}
 LOST = TargetLife(61, 0.4, 0.0, 0, 0)
 OUT = {"a": TargetLife(0, np.nan, np.nan, 0, 0)}
+SAID = ["several", "identities"]
+
+
+def one_track(nees: float) -> Any:
+    return lives(tracks={0: TrackLife(9, 9, nees, False, 9)})
 
 
 @pytest.mark.parametrize(
-    ("one", "two", "keys", "reason"),
+    ("one", "two", "keys", "reason", "level", "word"),
     [
-        (followed(), lives(), ["several", "identities"], "sound"),
-        (followed(), lives(targets=SHORT), ["one", "identities"], "short"),
-        (followed(), lives(targets=NEVER), ["never", "identities"], "never"),
-        (followed(), lives(targets={"a": NEVER["a"]}), ["never-any", "identities"], "never"),
-        (followed(), lives(targets=NEVER | {"a": LOST}, breaks=1), ["several", "identities"], "lost"),
-        (followed(), lives(targets=OUT), ["none-in-reach"], "unjudged"),
-        (followed(), None, ["no-truth"], "unjudged"),
-        (followed(0), lives(), ["no-track"], "none"),
-        (followed(), lives(swaps=1, breaks=1), ["several", "identities"], "swaps"),
-        (followed(), lives(breaks=1), ["several", "identities"], "breaks"),
-        (followed(), lives(tracks=FALSE), ["several", "identities"], "false"),
-        (followed(), lives(tracks=FEW), ["several", "identities"], "few"),
-        (
-            followed(),
-            lives(tracks={0: TrackLife(9, 9, 9.0, False, 9)}),
-            ["several", "identities"],
-            "overconfident",
-        ),
-        (
-            followed(),
-            lives(tracks={0: TrackLife(9, 9, 0.5, False, 9)}),
-            ["several", "identities"],
-            "conservative",
-        ),
+        (followed(), lives(), SAID, "sound", "good", "sound"),
+        (followed(), lives(targets=SHORT), ["one", "identities"], "short", "warn", "look closer"),
+        (followed(), lives(targets={"a": TargetLife(61, 0.9, 0.0, 0, 0)}), ["one", "identities"], "sound",
+         "good", "sound"),
+        (followed(), lives(targets=NEVER), ["never", "identities"], "never", "bad", "targets lost"),
+        (followed(), lives(targets={"a": NEVER["a"]}), ["never-any", "identities"], "never", "bad",
+         "targets lost"),
+        (followed(), lives(targets=NEVER | {"a": LOST}, breaks=1), SAID, "lost", "bad", "targets lost"),
+        (followed(), lives(targets=OUT), ["none-in-reach"], "unjudged", "neutral", "not judged"),
+        (followed(), None, ["no-truth"], "unjudged", "neutral", "not judged"),
+        (followed(0), lives(), ["no-track"], "none", "bad", "no track"),
+        (followed(), lives(swaps=1, breaks=1), SAID, "swaps", "bad", "mixed up"),
+        (followed(), lives(breaks=1), SAID, "breaks", "warn", "look closer"),
+        (followed(), lives(tracks=FALSE), SAID, "false", "warn", "look closer"),
+        (followed(), lives(tracks=FEW), SAID, "few", "warn", "look closer"),
+        (followed(), one_track(9.0), SAID, "overconfident", "warn", "look closer"),
+        (followed(), one_track(0.5), SAID, "conservative", "warn", "look closer"),
     ],
-)
-def test_answer_and_reason_turn_with_the_numbers(one, two, keys, reason):
-    said = [*page.answer(one, two), page.reason(one, two)]
+)  # fmt: skip
+def test_answer_reason_and_verdict_turn_with_the_numbers(one, two, keys, reason, level, word):
+    why = page.reason(one, two)
+    said, texts = [*page.answer(one, two), why], load_texts("tracking-many")
     assert [message.key for message in said] == [*keys, f"reason-{reason}"]
     for message in said:
-        assert set(re.findall(r"{(\w+)}", TEXTS.answers[message.key])) <= set(message.values)
+        assert set(re.findall(r"{(\w+)}", texts.answers[message.key])) <= set(message.values)
+    colour, key = page.verdict_of(why)
+    assert (colour, texts.subjects[f"verdict-{key}"]) == (level, word)
 
 
 def test_what_counts_as_on_a_target_must_hold_honest_errors_and_whole_hulls():

@@ -99,29 +99,15 @@ def needed_reach(followed: ManyTracks) -> float:
 
 # -- what follows from them
 
-
-def level_of(followed: ManyTracks, lives: Identities | None) -> str:
-    """The colour of the page: ``good``, ``warn``, ``bad`` or ``neutral``."""
-    tracks, _ = counts_of(followed)
-    if not tracks:
-        return "bad"
-    shares = [] if lives is None else [life.tracked for life in lives.targets.values() if life.visible]
-    if lives is None or not shares:
-        return "neutral"
-    if lives.swaps or min(shares) < HALF:
-        return "bad"
-    nees = judged_nees(lives)
-    doubtful = not nees or any(not SMALLEST <= one <= LARGEST for one in nees)
-    false = any(track.false for track in lives.tracks.values()) or false_share(lives) > 1 - FOLLOWED
-    return "warn" if lives.breaks or false or min(shares) < FOLLOWED or doubtful else "good"
-
-
-def verdict_key(followed: ManyTracks, lives: Identities | None) -> str:
-    """The key of the verdict's word."""
-    level = level_of(followed, lives)
-    if level == "bad":
-        return "none" if not counts_of(followed)[0] else "swapped" if lives and lives.swaps else "lost"
-    return {"good": "sound", "warn": "look", "neutral": "unjudged"}[level]
+#: The colour of the page and the key of its verdict's word by what is most pressing; all else is looked at.
+VERDICTS = {
+    "none": ("bad", "none"),
+    "swaps": ("bad", "swapped"),
+    "never": ("bad", "lost"),
+    "lost": ("bad", "lost"),
+    "unjudged": ("neutral", "unjudged"),
+    "sound": ("good", "sound"),
+}
 
 
 def answer(followed: ManyTracks, lives: Identities | None) -> list[Message]:
@@ -144,28 +130,28 @@ def answer(followed: ManyTracks, lives: Identities | None) -> list[Message]:
         "rmse": length(rms_error(lives)) if on_target(lives) else "–",
         "never": str(never),
     }
-    first = Message(
-        "never-any" if never == len(seen) else "never" if never else "one" if len(seen) == 1 else "several",
-        values,
-    )
-    false = sum(track.false for track in lives.tracks.values())
+    key = "never-any" if never == len(seen) else "never" if never else "one" if len(seen) == 1 else "several"
+    first = Message(key, values)
+    if reach := needed_reach(followed):
+        return [first, Message("reach", {"cutoff": f"{followed.cutoff_m:g}", "reach": f"{reach:.0f}"})]
     counts = {
         "swaps": str(lives.swaps),
         "breaks": str(lives.breaks),
-        "false": str(false),
+        "false": str(sum(track.false for track in lives.tracks.values())),
         "tracks": str(len(lives.tracks)),
     }
-    if reach := needed_reach(followed):
-        return [first, Message("reach", {"cutoff": f"{followed.cutoff_m:g}", "reach": f"{reach:.0f}"})]
-    if followed.others:
-        return [first, Message("identities-others", counts)]
-    return [first, Message("identities", counts)]
+    return [first, Message("identities-others" if followed.others else "identities", counts)]
+
+
+def verdict_of(message: Message) -> tuple[str, str]:
+    """The colour of the page, ``good``, ``warn``, ``bad`` or ``neutral``, and the key of the verdict's word,
+    which follow from the reason."""
+    return VERDICTS.get(message.key.removeprefix("reason-"), ("warn", "look"))
 
 
 def reason(followed: ManyTracks, lives: Identities | None) -> Message:
     """The most pressing of what keeps the tracks from being sound."""
-    tracks, _ = counts_of(followed)
-    if not tracks:
+    if not counts_of(followed)[0]:
         return Message("reason-none")
     seen = [] if lives is None else [life for life in lives.targets.values() if life.visible]
     if lives is None or not seen:
@@ -343,12 +329,12 @@ def show_many(report: Report, followed: ManyTracks, lives: Identities | None) ->
         From `wildlab.analysis.tracks.many`: the tracks, and their lives beside the true targets'.
     """
     wording = Wording(report, load_texts("tracking-many"))
-    names, level = wording.texts.subjects, level_of(followed, lives)
+    names, why = wording.texts.subjects, reason(followed, lives)
+    level, word = verdict_of(why)
     record(report, followed, lives)
     report.head(names["question"], ", ".join(followed.places))
-    said = wording.messages([reason(followed, lives)])[0]
-    verdict = names[f"verdict-{verdict_key(followed, lives)}"]
-    report.summary(wording.messages(answer(followed, lives)), level=level, verdict=(verdict, said))
+    verdict = names[f"verdict-{word}"], wording.messages([why])[0]
+    report.summary(wording.messages(answer(followed, lives)), level=level, verdict=verdict)
     if followed.notes:
         report.points(followed.notes)
     figure, name, alt, caption = charts.map_shown(followed)
