@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.tracks.scores import LEADING
 from wildlab.analysis.verdict import Verdict
 from wildlab.messages.catalogue import Message, fill, load_texts
 from wildlab.messages.quantities import NOTHING, area, duration, metres, number, percent, way_length
@@ -95,12 +94,7 @@ def entry_of(flight: OwnFlight, quantity: Quantity) -> Mapping[str, Any] | None:
         # What the page on the navigation speaks of, where the receiver's noise was found.
         entry = report.numbers.get((quantity.name, "mekf-receiver"), entry)
     if quantity.report == "tracking":
-        best = next((subject for name, subject in report.numbers if name == LEADING), "ekf")
-        alike = [
-            one
-            for (name, subject), one in report.numbers.items()
-            if name == quantity.name and subject.endswith(f"/{best}")
-        ]
+        alike = [*report.of_leading_filter(quantity.name).values()]
         entry = alike[0] if len(alike) == 1 else None
     return None if entry is None or entry["value"] is None else entry
 

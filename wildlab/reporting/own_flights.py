@@ -43,6 +43,17 @@ class OwnReport(NamedTuple):
     numbers: Mapping[tuple[str, str], Mapping[str, Any]]
     lacking: tuple[str, ...]
 
+    def of_leading_filter(self, name: str) -> dict[str, Mapping[str, Any]]:
+        """A number of every track of the filter that a report on tracking leads with, by subject."""
+        from wildlab.analysis.tracks.scores import LEADING  # takes a while, and few pages need it
+
+        best = next((subject for other, subject in self.numbers if other == LEADING), "ekf")
+        return {
+            subject: entry
+            for (other, subject), entry in self.numbers.items()
+            if other == name and subject.endswith(f"/{best}")
+        }
+
 
 class OwnFlight(NamedTuple):
     """A flight with its reports, the overview first; ``kind`` is ``logged`` or ``twin``.

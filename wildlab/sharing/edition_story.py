@@ -20,7 +20,7 @@ from wildlab.analysis.verdict import (
 from wildlab.messages.catalogue import Message, Quantity, Value, duration, length, number, share
 from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.own_flights import OwnFlight
-from wildlab.reporting.tracking import NEAR_THE_BAND
+from wildlab.reporting.tracking import NEAR_THE_BAND, band_name
 
 NAN = math.nan
 #: Reports that tell how good something was, beside the overview.
@@ -220,14 +220,9 @@ def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
     report = flight.report("tracking")
     if report is None:
         return []
-    from wildlab.analysis.tracks.scores import LEADING
-    from wildlab.reporting.tracking import band_name
-
-    rows = [(subject, entry) for (name, subject), entry in report.numbers.items() if name == "rmse"]
-    best = next((subject for name, subject in report.numbers if name == LEADING), "ekf")
     found = []
-    for subject, entry in rows:
-        if subject.rsplit("/", 1)[-1] != best or entry["value"] is None:
+    for subject, entry in report.of_leading_filter("rmse").items():
+        if entry["value"] is None:
             continue
         nees, high = (
             report.numbers.get((name, subject), {}).get("value")
