@@ -29,7 +29,6 @@ from wildlab.sharing.package import (
     private_folder,
     put,
     refuse_existing,
-    sweep_beside,
     zip_bytes,
 )
 from wildlab.sharing.reports import sources_of
@@ -78,21 +77,6 @@ def test_a_folder_to_work_in_is_private_and_gone_afterwards(tmp_path, monkeypatc
         (work / "page.html").write_text("half")
         raise KeyboardInterrupt
     assert not list(tmp_path.iterdir())
-    # Of a process that was killed: no process has a number this high.
-    (tmp_path / "wildlab-share-4194999-x").mkdir()
-    (tmp_path / f"wildlab-share-{os.getpid()}-other").mkdir()
-    with private_folder():
-        pass
-    assert [one.name for one in tmp_path.iterdir()] == [f"wildlab-share-{os.getpid()}-other"]
-
-
-def test_what_a_killed_run_left_beside_a_copy_is_swept(tmp_path):
-    (tmp_path / ".share.abc.part" / "pages").mkdir(parents=True)
-    (tmp_path / ".share.abc.part" / "pages" / "flight.html").write_text("rhino")
-    (tmp_path / ".copy.zip.abcd1234").write_text("half")
-    (tmp_path / "other.zip").write_text("mine")
-    sweep_beside(tmp_path / "copy.zip")
-    assert [one.name for one in tmp_path.iterdir()] == ["other.zip"]
 
 
 KILLED = """

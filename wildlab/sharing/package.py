@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import glob
 import io
 import os
 import shutil
@@ -17,7 +16,6 @@ import pyzipper
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.runner.processes.job import alive
 
 #: Of every file in a zip: no zip can be older, and this one says nothing of when it was made.
 _TIME = (1980, 1, 1, 0, 0, 0)
@@ -27,8 +25,6 @@ OPENED_WITH = (
     'Windows or macOS has built in, and `unzip` says "unsupported compression method 99". Tell those who get '
     "it, and send them the password by another way than the file."
 )
-#: How the private folders are called; the number of their process comes after it.
-_PRIVATE = "wildlab-share-"
 #: A password is tried offline, as often as whoever has the file can pay for.
 SHORTEST = 12
 
@@ -50,15 +46,9 @@ for _ in range(20):
 def private_folder() -> Iterator[Path]:
     """A folder among the system's temporary ones that nobody else may open; gone afterwards, however it ends.
 
-    A process of its own watches over it, so that nothing is left where this one is killed; and where the
-    machine lost its power, it is gone when the next copy is made.
+    A process of its own watches over it, so that nothing is left where this one is killed.
     """
-    for left in Path(tempfile.gettempdir()).glob(f"{_PRIVATE}*"):
-        pid = left.name.removeprefix(_PRIVATE).partition("-")[0]
-        own = not left.is_symlink() and left.is_dir() and left.stat().st_uid == os.getuid()
-        if own and pid.isdecimal() and not alive(int(pid)):
-            shutil.rmtree(left, ignore_errors=True)
-    with tempfile.TemporaryDirectory(prefix=f"{_PRIVATE}{os.getpid()}-") as folder:
+    with tempfile.TemporaryDirectory(prefix="wildlab-share-") as folder:
         command = [sys.executable, "-I", "-S", "-c", _WATCH, folder]
         watch = subprocess.Popen(  # noqa: S603 - our own words
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -69,16 +59,6 @@ def private_folder() -> Iterator[Path]:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             watch.communicate()
-
-
-def sweep_beside(target: Path) -> None:
-    """Remove what a killed run has left beside ``target``: files under way, and folders of pages, which
-    were once made there."""
-    for left in target.parent.glob(f".{glob.escape(target.name)}.????????"):
-        if not left.is_dir():
-            left.unlink(missing_ok=True)
-    for folder in target.parent.glob(".share.*.part"):
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def refuse_existing(target: Path, overwrite: bool) -> None:

@@ -28,7 +28,6 @@ from wildlab.sharing.package import (
     private_folder,
     put,
     refuse_existing,
-    sweep_beside,
     zip_bytes,
 )
 from wildlab.sharing.recomputation import RecomputedReports, recompute_reports
@@ -159,7 +158,6 @@ def share(
     told = target.with_name(f"{target.name}.for-the-sender.txt")
     for file in (target, told):
         refuse_existing(file, overwrite)
-    sweep_beside(target)
     # All are found, and the copy's name is looked through, before the first is computed, which takes minutes.
     folders = [None if exact or not one.logged else flight_folder(one, flight) for one in sources]
     prepared = [
