@@ -5,15 +5,21 @@ from __future__ import annotations
 import base64
 from dataclasses import replace
 from datetime import timedelta
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
+from tests.sharing.canary import HERE, canary
 from tests.sharing.spelt import DATES, LATITUDE, LEAKS, LONGITUDE, NAME, NUMBER, SPELLINGS, WHEN, secrets
+from wildlab.geometry.gravity import normal_gravity
+from wildlab.sharing.generalisation import generalise
+from wildlab.sharing.reports import Source
 from wildlab.sharing.scan import SecretSearch, search_limits
-from wildlab.sharing.secrets import Secrets
+from wildlab.sharing.secrets import Secrets, flight_secrets
+from wildlab.sharing.tiers import treatment_of
 
 # Off the equator and the meridian, where a coordinate is a small number like any other.
 # A round number says nothing of a place either: 2.0 stands everywhere.
@@ -166,3 +172,19 @@ def test_what_is_not_looked_for_is_said():
     # A list of a thousand lines hides the one that matters; that one comes first.
     many = search_limits(replace(secrets(), words=("boat", *(f"{n:04d}" for n in range(1046)))))
     assert "'boat'" in many[0] and "1046" in many[1] and len(many) == 3
+
+
+def test_what_is_known_of_a_flight_is_looked_for():
+    """Its place, names and day, and what follows from the place: height, gravity, the map's cells."""
+    flight = canary(locations={"category": 2}, imu=False)
+    treatment = treatment_of(flight.manifest.locations, "public")
+    made, source = generalise(flight, treatment), Source("kifaru-ridge", (), logged=True)
+    known = flight_secrets(flight, made, treatment, source, Path("flights/kifaru-ridge"))
+    gravity = float(normal_gravity(np.radians(HERE[0]), HERE[2]))
+    for text, kind in (
+        (f"{HERE[0]:.3f}, {HERE[1]:.3f}", "place"), ("Thandi", "name"), ("EPSG:32736", "name"),
+        ("17 September 2023", "date"), (f"at {HERE[2]:.2f} m", "number"), (f"g = {gravity:.5f}", "number"),
+        ("cells of 30.87 by 28.02 m on a terrain", "number"),
+    ):  # fmt: skip
+        assert found(text, known) == {kind}, text
+    assert not found("g = 9.80665 m/s2, 24.9 S, 31.5 E, September 2023", known)
