@@ -1,4 +1,4 @@
-"""Sound flights of six kinds, as people log them: nothing is wrong but the errors that every log has.
+"""Sound flights of five kinds, as people log them: nothing is wrong but the errors that every log has.
 
 Errors of attitude and position are Gauss-Markov processes of tens of seconds; aircraft crab in the wind,
 multirotors fly sideways, boats drift. Everything is computed here from the motion, with SciPy's rotations and
@@ -40,7 +40,7 @@ from tests.sound_logs import (
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
 
-KINDS = ("fixed wing", "multirotor", "gimbal oblique", "nadir", "gondola", "boat")
+KINDS = ("fixed wing", "multirotor", "gimbal oblique", "nadir", "boat")
 SEEDS = range(1, 11)
 CAMERA = {"name": "thermal", "width_px": 640, "height_px": 512, "cx_px": 322.0, "cy_px": 254.0}
 EPOCH = "2024-06-12T09:30:00Z"
@@ -52,12 +52,12 @@ LOOKS_FORWARD = Rotation.from_matrix([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
 def simulate_sound_flight(kind: str, seed: int) -> Flight:
     """A flight of one of `KINDS` in which all is as stated; another seed is another course, wind and log."""
     rng = np.random.default_rng([KINDS.index(kind), seed])
-    make = (_fixed_wing, _multirotor, _gimbal_oblique, _nadir, _gondola, _boat)[KINDS.index(kind)]
+    make = (_fixed_wing, _multirotor, _gimbal_oblique, _nadir, _boat)[KINDS.index(kind)]
     return make(rng, seed)
 
 
 def sound_flights() -> Iterator[tuple[str, int, Flight]]:
-    """Kind, seed, flight: two of each kind, and all sixty where WILDLAB_ALL_FLIGHTS is set."""
+    """Kind, seed, flight: two of each kind, and all fifty where WILDLAB_ALL_FLIGHTS is set."""
     for kind in KINDS:
         for seed in SEEDS if os.environ.get("WILDLAB_ALL_FLIGHTS") else SEEDS[:2]:
             yield kind, seed, simulate_sound_flight(kind, seed)
@@ -148,7 +148,7 @@ def _manifest(kind: str, seed: int, level: Level, focal: float, **parts: Any) ->
     }  # fmt: skip
 
 
-# -- the six kinds
+# -- the five kinds
 
 
 def _fixed_wing(rng: Any, seed: int) -> Flight:
@@ -272,38 +272,6 @@ def _nadir(rng: Any, seed: int) -> Flight:
     tables |= {"frames": frames, "detections": detections, "truth": truth}
     mount = {"looks": "forward", "poses": "camera"}
     return Flight(make_manifest(_manifest("nadir", seed, level, focal, mount=mount)), poses, tables)
-
-
-def _gondola(rng: Any, seed: int) -> Flight:
-    """A cabin on a cable whose camera rolls from side to side over animals with collars.
-
-    With every third seed nothing names them: each detection is of the nearest one.
-    """
-    t, level, focal = sample_times(rng, 120, 180), draw_level(rng), rng.uniform(350, 500)
-    n = len(t)
-    bend = rng.uniform(-np.pi, np.pi) + 0.5 * np.sin(2 * np.pi * t / rng.uniform(90, 150))
-    step = 1.5 * np.column_stack([np.cos(bend), np.sin(bend)])
-    p = np.column_stack([np.cumsum(step, axis=0) / RATE, -rng.uniform(14, 22) + 0.5 * np.sin(t / 17)])
-    p[:, :2] -= p[:, :2].mean(axis=0)
-    sway = 0.03 * np.sin(2 * np.pi * t / 4.3) + smooth(rng, n, 0.01, 1.0)[:, 0]
-    m = Motion(t, p, from_euler(sway, smooth(rng, n, 0.01, 1.0)[:, 0], bend))
-    tilt = np.radians(30) * np.sin(2 * np.pi * t / rng.uniform(10, 16))
-    R = m.R * from_euler(0.0, tilt, np.pi / 2) * LOOKS_DOWN
-    walks = _walks(rng, t, _marks(rng, m.p, R, focal, 14), 0.3)
-    frames, detections, _ = _photos(rng, t, m.p, R, walks, focal)
-    nav, gnss, _ = log_motion(rng, m, level)
-    joints = np.column_stack([np.full(n, np.pi / 2), tilt]) + gauss_markov(rng, n, np.radians(0.2), 20.0, 2)
-    gimbal = pd.DataFrame(
-        np.column_stack([t, joints])[::NAV_EVERY], columns=["time_s", "pan_rad", "tilt_rad"]
-    )
-    tables = {"frames": frames, "detections": detections, "truth": _tracked(rng, t, walks)}
-    tables |= {"gimbal": gimbal, "gnss": gnss, "imu": measure_inertial(rng, m)}
-    parts: dict[str, Any] = {"mount": {"looks": "down"}}
-    if seed % 3 == 0:
-        detections["target_id"], parts["scoring"] = "", {"rule": "nearest"}
-    return Flight(
-        make_manifest(_manifest("gondola", seed, level, focal, **parts)), {"autopilot": nav}, tables
-    )
 
 
 def _boat(rng: Any, seed: int) -> Flight:

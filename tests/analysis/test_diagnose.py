@@ -32,7 +32,7 @@ def diagnosed(flight):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["fixed wing", "nadir", "gondola"])
+@pytest.mark.parametrize("kind", ["fixed wing", "nadir", "multirotor"])
 def test_a_sound_flight_whose_poses_wander_has_no_certain_cause(kind):
     """Attitudes that wander for 15 to 50 s and positions for minutes: in two minutes they look constant."""
     flight = simulate_sound_flight(kind, 1)
