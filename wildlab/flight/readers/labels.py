@@ -77,7 +77,7 @@ class Labels:
         """Names without their folders, and without folders and endings."""
         found: dict[str, list[str]] = {}
         for name in self.boxes:
-            place = PurePosixPath(name.replace("\\", "/"))
+            place = _plain(name)
             for key in {place.name, place.stem}:
                 found.setdefault(key, []).append(name)
         return found

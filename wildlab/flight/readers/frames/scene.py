@@ -72,7 +72,7 @@ def find_no_data(image: NDArray[Any]) -> Mask:
         chosen |= np.bincount(side, minlength=count) >= ALONG * len(side)
         chosen[[side[0], side[-1]]] = True
     chosen[0] = False
-    return none | _wider((chosen & large)[labels], BESIDE)
+    return none | _wider((chosen & large)[labels])
 
 
 def find_clipped(image: NDArray[Any]) -> Mask:
@@ -104,7 +104,7 @@ def find_clipped(image: NDArray[Any]) -> Mask:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(at_top, connectivity=8)
     large = stats[:, cv2.CC_STAT_AREA] >= SMALLEST_CLIPPED * image.size
     large[0] = False
-    return _wider(large[labels], BESIDE)
+    return _wider(large[labels])
 
 
 def find_overlay(images: Sequence[NDArray[Any]]) -> Mask | None:
@@ -140,7 +140,7 @@ def find_overlay(images: Sequence[NDArray[Any]]) -> Mask | None:
     still &= cv2.blur(still.astype(np.float32), (7, 7)) >= DENSE - 1e-6
     # Letters are thin and lie close together: what is between them belongs to them.
     marks = cv2.morphologyEx(still.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8)) > 0
-    return _wider(marks, BESIDE) if 0 < marks.mean() < MOST_TEXT else np.zeros(marks.shape, bool)
+    return _wider(marks) if 0 < marks.mean() < MOST_TEXT else np.zeros(marks.shape, bool)
 
 
 def _as_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -148,10 +148,10 @@ def _as_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:
     return np.asarray((image - low) * (255 / max(high - low, 1e-9)), np.uint8)
 
 
-def _wider(mask: Mask, by: int) -> Mask:
+def _wider(mask: Mask) -> Mask:
     if not mask.any():
         return mask
-    return cv2.dilate(mask.astype(np.uint8), np.ones((2 * by + 1, 2 * by + 1), np.uint8)) > 0
+    return cv2.dilate(mask.astype(np.uint8), np.ones((2 * BESIDE + 1, 2 * BESIDE + 1), np.uint8)) > 0
 
 
 def problem_of(image: NDArray[Any], valid: Mask) -> str:
