@@ -461,32 +461,6 @@ def estimated_distances(
     return feature_distances(measured, mean, spread, np.asarray(used, float))
 
 
-def with_features(distances: ArrayLike, features: ArrayLike, gate: float) -> Array:
-    """Physical and feature distance together, H 6.4.4: the gate is one of the physical distance alone.
-
-    Parameters
-    ----------
-    distances
-        (N, M), by (3.9).
-    features
-        (N, M), from `feature_distances`.
-    gate
-        The largest physical distance of a pair.
-
-    Returns
-    -------
-    (N, M)
-        Their sum; infinite outside the gate. To be assigned without a gate.
-
-    Examples
-    --------
-    >>> with_features([[1.0, 20.0]], [[3.0, 0.0]], gate=9.21).tolist()
-    [[4.0, inf]]
-    """
-    d = np.asarray(distances, float)
-    return np.asarray(np.where(d <= gate, d + np.asarray(features, float), np.inf))
-
-
 def veto(assignment: Assignment, features: ArrayLike, limit: float) -> Assignment:
     """Undo the pairs that do not look alike: features as a veto after an association by distance.
 
@@ -603,7 +577,8 @@ def associate(distances: Array, features: Array | None, rule: str, limits: Limit
     Assignment
     """
     if rule == FEATURES and features is not None:
-        return global_nearest(with_features(distances, features, limits.gate), np.inf)
+        # The gate is one of the distance alone (H 6.4.4).
+        return global_nearest(np.where(distances <= limits.gate, distances + features, np.inf), np.inf)
     chosen = global_nearest(distances, limits.gate)
     if rule == VETO and features is not None:
         return veto(chosen, features, limits.alike)

@@ -70,37 +70,13 @@ def smooth(track: Track, motion: Motion) -> Track:
             f"estimates at {len(track.times)} times of {len(track.nis)} measurements",
             "give the track at the times of its measurements, or use run_smoothed", field="track",
         )  # fmt: skip
-    x, P = smooth_states(track.times, track.x, track.P, motion)
-    return track._replace(x=x, P=P)
-
-
-def smooth_states(times: ArrayLike, x: ArrayLike, P: ArrayLike, motion: Motion) -> tuple[Array, Array]:
-    """The same for bare estimates.
-
-    Parameters
-    ----------
-    times
-        (N,) s, of all measurements.
-    x, P
-        (N, n) and (N, n, n): with all measurements up to then; NaN before the start.
-    motion
-        The one that the filter had.
-
-    Returns
-    -------
-    x, P
-        With all measurements.
-    """
-    at, mean, covariance = (np.asarray(one, float) for one in (times, x, P))
-    after, spread = mean.copy(), covariance.copy()
-    begun = np.flatnonzero(np.isfinite(mean).all(axis=1))
+    x, P = track.x.copy(), track.P.copy()
+    begun = np.flatnonzero(np.isfinite(x).all(axis=1))
     for row in begun[:-1][::-1]:
-        F, Q = motion(float(at[row + 1] - at[row]))
-        prior = F @ mean[row], F @ covariance[row] @ F.T + Q
-        after[row], spread[row] = _back(
-            mean[row], covariance[row], F, *prior, after[row + 1], spread[row + 1]
-        )
-    return after, spread
+        F, Q = motion(float(track.times[row + 1] - track.times[row]))
+        prior = F @ track.x[row], F @ track.P[row] @ F.T + Q
+        x[row], P[row] = _back(track.x[row], track.P[row], F, *prior, x[row + 1], P[row + 1])
+    return track._replace(x=x, P=P)
 
 
 def run_smoothed(

@@ -10,12 +10,14 @@ from hypothesis.extra.numpy import arrays
 
 from wildlab.errors import WildlabError
 from wildlab.tracking.association import (
+    FEATURES,
     Assignment,
+    Limits,
+    associate,
     feature_distances,
     global_nearest,
     image_features,
     veto,
-    with_features,
 )
 
 entries = st.one_of(st.integers(-5, 30), st.sampled_from([np.nan, np.inf]))
@@ -117,9 +119,9 @@ def test_size_on_the_ground_does_not_depend_on_the_distance():
 
 
 def test_the_gate_is_one_of_distance_alone():
-    d = np.array([[1.0, 9.3], [np.nan, 9.2]])
-    found = with_features(d, [[100.0, 0.0], [0.0, 0.0]], gate=9.21)
-    assert found.tolist() == [[101.0, np.inf], [np.inf, 9.2]]
+    for distance, features, taken in ((1.0, 100.0, 0), (9.3, 0.0, -1), (np.nan, 0.0, -1)):
+        chosen = associate(np.array([[distance]]), np.array([[features]]), FEATURES, Limits(9.21))
+        assert chosen.track.tolist() == [taken]
 
 
 def test_a_veto_undoes_a_pair_on_both_sides_and_leaves_the_others():

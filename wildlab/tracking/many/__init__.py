@@ -5,8 +5,7 @@ A matrix of distances has a row for each measurement and a column for each track
 - `run_many`: all targets of all sensors, by joint probabilities with existence, visibility and hulls (H 8.2).
 - `smooth_many`: back over all tracks once the flight is over.
 - `association_probabilities`, `belief_propagation`: which measurement is probably whose.
-- `global_nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
-  look like.
+- `global_nearest`: firm association. `feature_distances`, `veto`: by what targets look like.
 - `run_bank`: a bank of filters on positions, with any of these.
 """
 
@@ -19,7 +18,6 @@ from wildlab.tracking.association import (
     global_nearest,
     image_features,
     veto,
-    with_features,
 )
 from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
 from wildlab.tracking.many.run import Shown, follow_many, run_many, smooth_many
@@ -55,5 +53,4 @@ __all__ = [
     "run_many",
     "smooth_many",
     "veto",
-    "with_features",
 ]
