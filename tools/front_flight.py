@@ -64,9 +64,9 @@ def simulated() -> dict[str, Any]:
     assumed = assumed_deviations(flight)
     tuning = CvTuning(ACCELERATION, metres, START_SPEED, metres, assumed["pixel_px"])
     seen = sighting(flight, SOURCE)
-    cover, why = cover_images(flight, SOURCE)
+    cover = cover_images(flight, SOURCE)
     if cover is None:
-        raise WildlabError(f"the twin has no footprints: {why}", "choose another")
+        raise WildlabError("the twin has no footprints", "choose another")
     pose = assumed_pose_covariance(seen.poses.R_nb, assumed)
     track = follow_schmidt(seen, tuning, pose, PERSIST)
     points = points.sort_values("time_s")
