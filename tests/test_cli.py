@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from tests.analysis.survey_twin import Survey, simulate
+from tests.commands import call, refuse
 from tests.flight.conftest import make_flight
 from wildlab import cli
 from wildlab.errors import RunFailed, WildlabError, system_error
@@ -22,13 +23,6 @@ from wildlab.flight.store import save_flight
 from wildlab.runner.run import Outcome
 
 __all__ = ["make_flight"]
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        cli.main(list(arguments))
-    captured = capsys.readouterr()
-    return int(ended.value.code or 0), captured.out, captured.err
 
 
 @pytest.fixture
@@ -45,8 +39,8 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.mark.parametrize("name", cli.wildlab.commands)
-def test_every_command_shows_an_example(capsys, name):
-    code, out, _ = call(capsys, name, "--help")
+def test_every_command_shows_an_example(name):
+    code, out, _ = call(name, "--help")
     assert code == 0 and f"wildlab {name}" in out.split("Example")[1]
 
 
@@ -69,10 +63,10 @@ def test_what_only_tells_imports_no_heavy_package(arguments, heavy, tmp_path):
     assert time.monotonic() - began < 3
 
 
-def test_list_as_a_table_and_as_json(capsys, tmp_path):
-    code, out, _ = call(capsys, "list", "--out", str(tmp_path))
+def test_list_as_a_table_and_as_json(tmp_path):
+    code, out, _ = call("list", "--out", str(tmp_path))
     assert code == 0 and "consistency-bounds" in out
-    code, out, _ = call(capsys, "list", "--json", "--out", str(tmp_path))
+    code, out, _ = call("list", "--json", "--out", str(tmp_path))
     studies = {entry["study"]: entry for entry in json.loads(out)}
     assert code == 0 and studies["consistency-bounds"]["state"] == "not run"
     first = studies["consistency-bounds"]["published"][0]
@@ -93,15 +87,13 @@ def test_list_as_a_table_and_as_json(capsys, tmp_path):
         (["simulate", "static-antenna"], "--out"),
     ],
 )
-def test_wrong_use_has_exit_code_2(capsys, arguments, about):
-    code, _, err = call(capsys, *arguments)
-    assert code == 2 and about in err and "Traceback" not in err
+def test_wrong_use_has_exit_code_2(arguments, about):
+    assert about in refuse(*arguments)
 
 
-def test_a_folder_that_is_no_flight_is_refused(capsys, tmp_path):
+def test_a_folder_that_is_no_flight_is_refused(tmp_path):
     for command in ("check", "evaluate"):
-        code, _, err = call(capsys, command, str(tmp_path / "nothing"))
-        assert code == 2 and "nothing" in err and "Traceback" not in err
+        assert "nothing" in refuse(command, tmp_path / "nothing")
 
 
 @pytest.mark.parametrize(
@@ -112,23 +104,20 @@ def test_a_folder_that_is_no_flight_is_refused(capsys, tmp_path):
         (KeyError("x"), 1, "WILDLAB_DEBUG=1"),
         (KeyboardInterrupt(), 130, "kept"),
         (click.Abort(), 130, "kept"),
-        (BrokenPipeError(), 0, ""),
     ],
 )
-def test_errors_become_sentences(
-    capfd,
-    monkeypatch,
-    failing,
-    error,
-    code,
-    sentence,
-):
+def test_errors_become_sentences(monkeypatch, failing, error, code, sentence):
     monkeypatch.delenv("WILDLAB_DEBUG", raising=False)
-    if isinstance(error, BrokenPipeError):
-        monkeypatch.setattr(cli.os, "dup2", lambda *_: None)
     failing(error)
-    found, _, err = call(capfd, "list")
+    found, _, err = call("list")
     assert found == code and sentence in err and "Traceback" not in err
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(monkeypatch, failing):
+    monkeypatch.setattr(cli.os, "dup2", lambda *_: None)
+    failing(BrokenPipeError())
+    with pytest.raises(SystemExit, match="0"):
+        cli.main(["list"])
 
 
 def test_debugging_shows_where(monkeypatch, failing):
@@ -138,7 +127,7 @@ def test_debugging_shows_where(monkeypatch, failing):
         cli.main(["list"])
 
 
-def test_run_prints_the_ledger_and_fails_if_one_failed(capsys, monkeypatch, tmp_path):
+def test_run_prints_the_ledger_and_fails_if_one_failed(monkeypatch, tmp_path):
     given: dict[str, Any] = {}
 
     def run_studies(names: Any, **options: Any) -> list[Outcome]:
@@ -146,17 +135,17 @@ def test_run_prints_the_ledger_and_fails_if_one_failed(capsys, monkeypatch, tmp_
         return [Outcome("a", "done", 1.0), Outcome("b", "failed", 1.0, "why"), Outcome("c", "skipped", 0.0)]
 
     monkeypatch.setattr("wildlab.runner.run.run_studies", run_studies)
-    code, out, err = call(capsys, "run", "a", "b", "--seed", "7", "--timeout", "0.5", "--out", str(tmp_path))
+    code, out, err = call("run", "a", "b", "--seed", "7", "--timeout", "0.5", "--out", str(tmp_path))
     assert code == 1 and out.strip() == str(tmp_path / "index.html") and "1 of 3" in err
     assert (given["names"], given["seed"], given["timeout_s"]) == (("a", "b"), 7, 30.0)
 
 
-def test_doctor_fails_where_something_is_wrong(capsys, monkeypatch):
+def test_doctor_fails_where_something_is_wrong(monkeypatch):
     from wildlab.doctor import Finding
 
     findings = [Finding(True, "Python", "3.11"), Finding(False, "disk", "full", "Make room.")]
     monkeypatch.setattr("wildlab.doctor.examine", lambda: findings)
-    code, out, _ = call(capsys, "doctor", "--json")
+    code, out, _ = call("doctor", "--json")
     assert code == 2 and json.loads(out)[1] == {
         "ok": False,
         "name": "disk",
@@ -165,29 +154,28 @@ def test_doctor_fails_where_something_is_wrong(capsys, monkeypatch):
     }
 
 
-def test_fetch_without_a_name_lists_the_data_sets(capsys):
-    code, out, _ = call(capsys, "fetch", "--json")
+def test_fetch_without_a_name_lists_the_data_sets():
+    code, out, _ = call("fetch", "--json")
     assert code == 0 and {"dataset", "fetched", "title"} <= set(json.loads(out)[0])
-    code, _, err = call(capsys, "fetch", "nonsense")
-    assert code == 2 and "nonsense" in err
+    assert "nonsense" in refuse("fetch", "nonsense")
 
 
-def test_check_tells_what_a_flight_can_be_used_for(capsys, tmp_path, make_flight):
+def test_check_tells_what_a_flight_can_be_used_for(tmp_path, make_flight):
     save_flight(make_flight(), tmp_path / "flight")
-    code, out, _ = call(capsys, "check", "--json", str(tmp_path / "flight"))
+    code, out, _ = call("check", "--json", str(tmp_path / "flight"))
     usable = {use["purpose"]: use["usable"] for use in json.loads(out)["usable_for"]}
     assert code == 0 and usable["georeferencing accuracy"] is True and usable["navigation"] is False
-    code, out, _ = call(capsys, "check", str(tmp_path / "flight"))
+    code, out, _ = call("check", str(tmp_path / "flight"))
     assert code == 0 and ": yes" in out
 
 
-def test_check_does_not_call_a_flight_usable_that_contradicts_itself(capsys, tmp_path):
+def test_check_does_not_call_a_flight_usable_that_contradicts_itself(tmp_path):
     flight = simulate(Survey(images=8))
     nav = flight.nav["logged"]
     for axis, sign in (("north", -1.0), ("east", 1.0), ("down", 1.0)):
         nav[f"v_{axis}_m_s"] = sign * np.gradient(nav[f"{axis}_m"], nav["time_s"])
     save_flight(flight, tmp_path / "flight")
-    code, out, _ = call(capsys, "check", str(tmp_path / "flight"))
+    code, out, _ = call("check", str(tmp_path / "flight"))
     assert code == 2 and ": yes" not in out
 
 
@@ -199,9 +187,9 @@ def test_check_does_not_call_a_flight_usable_that_contradicts_itself(capsys, tmp
         (errno.ENAMETOOLONG, "shorter"),
     ],
 )
-def test_what_the_system_says_is_a_sentence_with_the_file(capsys, failing, tmp_path, number, fix):
+def test_what_the_system_says_is_a_sentence_with_the_file(failing, tmp_path, number, fix):
     failing(OSError(number, os.strerror(number), str(tmp_path / "not" / "there")))
-    code, _, err = call(capsys, "list")
+    code, _, err = call("list")
     assert code == 2 and err.count("\n") == 1
     assert err.startswith(f"wildlab: {tmp_path}/not/there: ") and os.strerror(number) in err and fix in err
 

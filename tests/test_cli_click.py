@@ -34,7 +34,7 @@ from wildlab.runner.annotation.server import (
     open_server,
     picture_of,
 )
-from wildlab.runner.annotation.session import Session, check_points, open_session, read_points, table_of
+from wildlab.runner.annotation.session import Session, open_session, read_points, table_of
 
 
 @pytest.fixture
@@ -162,12 +162,6 @@ def test_a_table_that_cannot_be_read_is_not_written_over(images):
     table.write_text("image,name,u_px,v_px\na2.png,A,1,2\na2.png,B,x,2\n", encoding="utf-8")
     with pytest.raises(Exception, match="line 3"):
         open_session(images)
-
-
-def test_points_are_checked_by_value():
-    assert check_points([[" A ", 1, 2.344]]) == [("A", 1.0, 2.34)]
-    assert isinstance(check_points({"a": 1}), str)
-    assert isinstance(check_points([["A", float("nan"), 1]]), str)
 
 
 def test_where_images_are_looked_for(tmp_path):

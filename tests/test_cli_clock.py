@@ -34,13 +34,7 @@ def clock(sentence: str, certain: bool) -> CameraClock:
         (None, None, "no pairs"),
     ],
 )
-def test_known_points_tell_it_where_motion_does_not(
-    motion,
-    points,
-    said,
-    tmp_path,
-    monkeypatch,
-):
+def test_known_points_tell_it_where_motion_does_not(motion, points, said, tmp_path, monkeypatch):
     save_flight(simulate(Survey(images=4)), tmp_path / "flight")
     write_images(tmp_path / "images", "a.png")
 

@@ -14,26 +14,18 @@ import pytest
 from PIL import Image
 
 from tests.analysis.test_detect import folder, picture
-from tests.commands import refuse, succeed
+from tests.commands import call, refuse, succeed
 from tests.test_cli_camera import huge_png
-from wildlab import cli
 from wildlab.analysis.detecting.command import too_few_or_many
 from wildlab.flight.store import save_flight
 from wildlab.simulation.twins import simulate_twin
 
 
-def call(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        cli.main([str(one) for one in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
-
-
-def test_a_folder_with_bad_images_leaves_tables_and_pictures(capsys, tmp_path):
+def test_a_folder_with_bad_images_leaves_tables_and_pictures(tmp_path):
     path = folder(tmp_path / "in")
     (path / "cut.png").write_bytes((path / "000.png").read_bytes()[:200])
     os.mkfifo(path / "pipe.jpg")
-    code, out, err = call(capsys, "detect", path, "--out", tmp_path / "out", "--labels", path / "labels.csv")
+    code, out, err = call("detect", path, "--out", tmp_path / "out", "--labels", path / "labels.csv")
     assert code == 0, err
     assert "F1 1.00" in out and "cut.png" in err and "pipe.jpg" in err
     assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 6
@@ -156,7 +148,7 @@ def hostile(path):
     return path, hostile
 
 
-def test_whatever_lies_in_the_folder_is_counted(capsys, tmp_path):
+def test_whatever_lies_in_the_folder_is_counted(tmp_path):
     path, names = hostile(tmp_path / "in")
     out = succeed("detect", path, "--out", tmp_path / "out", "--json")
     result = json.loads(out)
@@ -165,7 +157,7 @@ def test_whatever_lies_in_the_folder_is_counted(capsys, tmp_path):
     assert set(pd.read_csv(tmp_path / "out" / "frames.csv")["frame_id"]) >= {"ünï – 鹿.png", "new\nline.png"}
     assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 3
     # In a terminal ten are told, with no sign in them that it would obey, and the others are counted.
-    code, _, err = call(capsys, "detect", path, "--out", tmp_path / "out")
+    code, _, err = call("detect", path, "--out", tmp_path / "out")
     lines = err.splitlines()
     assert code == 0 and len(lines) == 11 and "\x1b" not in err and f"{len(names) - 10} more" in lines[-1]
 
@@ -211,7 +203,7 @@ def test_control_c_in_the_middle_loses_nothing_that_was_finished(tmp_path):
     assert at_once == in_two
 
 
-def test_what_the_camera_does_is_seen(capsys, tmp_path):
+def test_what_the_camera_does_is_seen(tmp_path):
     """A closed shutter, a dead pixel and dark corners."""
     path = tmp_path / "in"
     path.mkdir()
@@ -225,7 +217,7 @@ def test_what_the_camera_does_is_seen(capsys, tmp_path):
         image = image + rng.normal(0, 1.5, image.shape)
         image[20, 30] = 0
         cv2.imwrite(str(path / f"{number:02d}.png"), image.astype(np.uint16))
-    code, out, err = call(capsys, "detect", path, "--out", tmp_path / "out", "--even")
+    code, out, err = call("detect", path, "--out", tmp_path / "out", "--even")
     assert code == 0 and "05.png" in err and "11 frames of 12" in out
     assert "masked: 1" in out and "darker" in out
     out = succeed("detect", path / "00.png", "--out", tmp_path / "one", "--even")
