@@ -304,3 +304,16 @@ def test_gimbal_device(flags, turned):
     assert np.allclose(part.columns["pitch_world_deg"][used], pitch, atol=1e-3)
     wanted = np.arange(50)[used] if turned else 0.0
     assert np.allclose(part.columns["yaw_world_deg"][used], wanted, atol=0.05)
+
+
+@pytest.mark.parametrize("absolute", [True, False])
+def test_mount_orientation(absolute):
+    def make(row: int, ms: int) -> Any:
+        more = {"yaw_absolute": 33.0} if absolute else {}
+        return made("MOUNT_ORIENTATION", time_boot_ms=ms, roll=1.0, pitch=-90.0, yaw=20.0, **more)
+
+    part = with_messages(make).parts["gimbal"]
+    used = part.used
+    near(part.columns, 0, pitch_world_deg=-90)
+    wanted = 33.0 if absolute else np.arange(50)[used] + 20
+    assert np.allclose(part.columns["yaw_world_deg"][used], wanted, atol=0.05)

@@ -188,8 +188,8 @@ def test_first_instance_is_read():
 
 def test_inertial_sensor_and_magnetometers():
     rows = [(us(k, 0.01), 0.1, 0.2, 0.3, 0.0, 0.0, np.nan if k == 9 else -9.8, 0) for k in range(400)]
-    field = ("uint64_t timestamp;float[3] magnetometer_ga;", [(us(k), 0.1, 0.2, 0.4) for k in range(40)])
-    log = read(ulog(flight(sensor_combined=(COMBINED, rows), vehicle_magnetometer=field)))
+    field = ("uint64_t timestamp;float x;float y;float z;", [(us(k), 0.1, 0.2, 0.4) for k in range(40)])
+    log = read(ulog(flight(sensor_combined=(COMBINED, rows), sensor_mag=field)))
     imu = log.parts["imu"]
     assert imu.columns["why"][9] == "no measurement"
     assert imu.used.sum() == 399
@@ -211,13 +211,16 @@ def test_triggers():
     near(part.columns, 1e-5, time_s=START_S + 0.1 * k)
 
 
-@pytest.mark.parametrize(("flags", "yaw"), [(0, 30.0), (32, 30.0), (64, 0.0), (16, 0.0)])
+@pytest.mark.parametrize(("flags", "yaw"), [(0, 30.0), (32, 30.0), (64, 0.0), (16, 0.0), (None, 40.0)])
 def test_gimbal(flags, yaw):
-    """By its quaternion, whose flags say what the yaw counts from."""
+    """By its quaternion, whose flags say what the yaw counts from, or by angles (None)."""
     half = np.radians(-45) / 2
-    form = "uint64_t timestamp;float[4] q;uint16_t device_flags;"
-    rows = [(us(k), np.cos(half), 0.0, np.sin(half), 0.0, flags) for k in range(2, 40)]
-    part = part_of("gimbal", gimbal_device_attitude_status=(form, rows))
+    form, topic = "uint64_t timestamp;float[4] q;uint16_t device_flags;", "gimbal_device_attitude_status"
+    rows: list[Any] = [(us(k), np.cos(half), 0.0, np.sin(half), 0.0, flags) for k in range(2, 40)]
+    if flags is None:
+        form, topic = "uint64_t timestamp;float[3] attitude_euler_angle;", "mount_orientation"
+        rows = [(us(k), 0.0, np.radians(-45), np.radians(10)) for k in range(2, 40)]
+    part = part_of("gimbal", **{topic: (form, rows)})
     assert part.used.all()
     near(part.columns, 1e-3, pitch_world_deg=-45, yaw_world_deg=yaw)
 
@@ -301,10 +304,8 @@ def claims(form: str, before: bytes = b"") -> Any:
 def test_many_definitions_take_little_time_and_memory():
     """Within each other, and as many instances of one that is wide."""
     nested = [message("F", f"n{k}:{f'n{k + 1}' if k < 6 else 'float'}[60000] x;".encode()) for k in range(7)]
-    wide = message("F", b"vehicle_magnetometer:uint64_t timestamp;uint8_t[2000] x;")
-    many = [
-        message("A", struct.pack("<BH", 0, number) + b"vehicle_magnetometer") for number in range(100, 20_100)
-    ]
+    wide = message("F", b"sensor_mag:uint64_t timestamp;uint8_t[2000] x;")
+    many = [message("A", struct.pack("<BH", 0, number) + b"sensor_mag") for number in range(100, 20_100)]
     began = time.monotonic()
     assert "poses" not in claims("uint64_t timestamp;n0 q;", before=b"".join(nested)).parts
     assert "gnss" in read(ulog(flight(), before=wide + b"".join(many))).parts

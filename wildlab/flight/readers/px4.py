@@ -35,8 +35,9 @@ from wildlab.flight.readers.autopilot import (
     euler_deg,
     fix_reasons,
     heading_at,
+    wrapped,
 )
-from wildlab.flight.readers.log import ANGLES, VELOCITY, Array, Clock, Decoded, Readings, named
+from wildlab.flight.readers.log import ANGLES, VELOCITY, WORLD, Array, Clock, Decoded, Readings, named
 
 # -- what can be believed
 
@@ -326,9 +327,11 @@ TOPICS = frozenset(
         "sensor_gps",
         "sensor_combined",
         "vehicle_magnetometer",
+        "sensor_mag",
         "camera_capture",
         "camera_trigger",
         "gimbal_device_attitude_status",
+        "mount_orientation",
     }
 )
 #: 2000 and 2100, s since 1970: no receiver's UTC is of another time.
@@ -577,11 +580,15 @@ def _imu(log: Px4Log) -> Readings | None:
 
 
 def _magnetometer(log: Px4Log) -> Readings | None:
-    found = log.first("vehicle_magnetometer")
-    if found is None:
-        return None
-    field = found.several(*(f"magnetometer_ga[{i}]" for i in range(3))) * _GAUSS_UT
-    return None if np.isnan(field).all() else log.readings(found, named(FIELD, field.T))
+    for name in ("vehicle_magnetometer", "sensor_mag", "sensor_combined"):
+        found = log.first(name)
+        if found is None:
+            continue
+        fields = "xyz" if name == "sensor_mag" else [f"magnetometer_ga[{i}]" for i in range(3)]
+        columns = {ours: found.get(one) * _GAUSS_UT for ours, one in zip(FIELD, fields, strict=True)}
+        if not np.isnan(list(columns.values())).all():
+            return log.readings(found, columns)
+    return None
 
 
 def _triggers(log: Px4Log) -> Readings | None:
@@ -593,9 +600,13 @@ def _triggers(log: Px4Log) -> Readings | None:
 
 
 def _gimbal(log: Px4Log, poses: Readings | None) -> Readings | None:
-    found = log.first("gimbal_device_attitude_status")
-    if found is None or not found.has("q[0]"):
+    device, mount = log.first("gimbal_device_attitude_status"), log.first("mount_orientation")
+    if device is not None and device.has("q[0]"):
+        heading = heading_at(poses, taken_s(device), "time_log_s")
+        flags = np.nan_to_num(device.get("device_flags"))
+        return log.readings(device, device_angles(device.quaternion(), flags, heading))
+    if mount is None:
         return None
-    heading = heading_at(poses, taken_s(found), "time_log_s")
-    flags = np.nan_to_num(found.get("device_flags"))
-    return log.readings(found, device_angles(found.quaternion(), flags, heading))
+    roll, pitch, yaw = np.degrees(mount.several(*(f"attitude_euler_angle[{i}]" for i in range(3)))).T
+    world = wrapped(yaw + heading_at(poses, taken_s(mount), "time_log_s"))
+    return log.readings(mount, named(WORLD, (roll, pitch, world)))

@@ -34,10 +34,12 @@ from wildlab.flight.readers.autopilot import (
     device_angles,
     fix_reasons,
     heading_at,
+    wrapped,
 )
 from wildlab.flight.readers.log import (
     ANGLES,
     VELOCITY,
+    WORLD,
     Array,
     Clock,
     Decoded,
@@ -531,12 +533,19 @@ def _triggers(vehicle: Vehicle, notes: list[str]) -> Readings | None:
 
 
 def _gimbal(vehicle: Vehicle, poses: Readings | None, notes: list[str]) -> Readings | None:
-    found = vehicle.any("GIMBAL_DEVICE_ATTITUDE_STATUS")
-    if not len(found):
+    kinds = ("GIMBAL_DEVICE_ATTITUDE_STATUS", "MOUNT_ORIENTATION")
+    found = next((one for name in kinds if len(one := vehicle.any(name))), None)
+    if found is None:
         return None
     made = vehicle.readings(found, "time_boot_ms", {})
+    heading = heading_at(poses, made.columns["time_s"])
     if np.isnan(made.columns["time_log_s"]).all():
         notes.append("times of the gimbal are those of receipt")
-    heading = heading_at(poses, made.columns["time_s"])
-    angles = device_angles(found.quaternion(), found.get("flags"), heading)
+    if found.has("flags"):
+        angles = device_angles(found.quaternion(), found.get("flags"), heading)
+    else:
+        yaw = found.get("yaw_absolute")
+        # Where the extension is not sent, its yaw is against the vehicle.
+        yaw = yaw if (yaw != 0).any() else wrapped(found.get("yaw") + heading)
+        angles = named(WORLD, (found.get("roll"), found.get("pitch"), yaw))
     return made._replace(columns=made.columns | angles)
