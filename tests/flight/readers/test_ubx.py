@@ -32,6 +32,21 @@ def pvt(k: int, **other: object) -> bytes:
     return message("NAV-PVT", **{**fields, **other})
 
 
+def old(k: int, *left_out: str, **other: object) -> bytes:
+    stamp = {"iTOW": 1000 * (TOW + k)}
+    said = {
+        "NAV-POSLLH": {"lon": 10.4, "lat": -63.4 + 1e-5 * k, "height": 1000, "hMSL": 500, "hAcc": 4000},
+        "NAV-VELNED": {"velN": 100, "velE": -200, "velD": 3, "sAcc": 40},
+        "NAV-SOL": {
+            **{"fTOW": 0, "week": WEEK, "gpsFix": 3, "gpsfixOK": 1, "wknSet": 1, "towSet": 1, "numSV": 7},
+            **other,
+        },
+        "NAV-TIMEGPS": {"fTOW": -250, "week": WEEK, "leapS": 18, "towValid": 1, "weekValid": 1},
+        "NAV-DOP": {"hDOP": 1.25},
+    }
+    return b"".join(message(name, **stamp, **one) for name, one in said.items() if name not in left_out)
+
+
 def test_equals_pyubx2(shared_data):
     path = shared_data("logs", "target_ubx_m8l", "ublox-neo-m8l.log")
     data = path.read_bytes()
@@ -104,6 +119,26 @@ def test_values_and_time_between_text_nmea_and_noise():
     assert stream.rows.tolist() == list(range(1, 11))
     assert log.lost[0].startswith("2 messages")
     assert log.clock.rate == pytest.approx(1.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("left_out", [(), ("NAV-SOL",), ("NAV-TIMEGPS",), ("NAV-VELNED", "NAV-DOP")])
+def test_old_receivers(left_out):
+    k = np.arange(8)
+    columns = columns_of(ubx, b"".join(old(i, *left_out) for i in range(8)))
+    near(columns, 1e-6, time_s=UTC_S + k)
+    near(columns, latitude_deg=-63.4 + 1e-5 * k, height_ellipsoid_m=1.0, height_sea_m=0.5)
+    assert ("v_north_m_s" in columns) == ("NAV-VELNED" not in left_out)
+    if "v_north_m_s" in columns:
+        near(columns, v_east_m_s=-2.0)
+    assert ("fix" in columns) == ("NAV-SOL" not in left_out)
+    assert columns["use"].all()
+
+
+def test_old_receivers_without_a_week_or_a_fix():
+    columns = columns_of(ubx, b"".join(old(k, "NAV-SOL", "NAV-TIMEGPS") for k in range(8)))
+    assert np.isnan(columns["time_s"]).all()
+    columns = columns_of(ubx, b"".join(old(k, gpsFix=3 * (k > 2), gpsfixOK=int(k > 3)) for k in range(8)))
+    assert columns["why"].tolist() == [*["no fix"] * 4, *[""] * 4]
 
 
 def test_more_digits():

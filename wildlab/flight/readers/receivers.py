@@ -5,10 +5,11 @@ They are joined into epochs by the time that they carry; days come from RMC and 
 sentences that have none, over midnight too. Heights are above sea level, with the undulation that the
 receiver knows. Facts of the sentences: NMEA 0183, as `pynmea2` has it.
 
-Of UBX, NAV-PVT says all of a position; NAV-HPPOSLLH adds digits. Receivers with dead reckoning say HNR-PVT
-and HNR-ATT often. UTC is the receiver's own. Messages of a kind are taken all at once, some 50 times as fast
-as `pyubx2` makes an object of each. Facts of the protocol: u-blox interface descriptions of series 7 to 9, as
-`pyubx2` has them.
+Of UBX, NAV-PVT says all of a position; older receivers say it in NAV-POSLLH, NAV-VELNED and NAV-TIMEGPS or
+NAV-SOL of one time of week. NAV-HPPOSLLH adds digits. Receivers with dead reckoning say HNR-PVT and HNR-ATT
+often. UTC is the receiver's own; where it has none it comes from weeks and the table of leap seconds.
+Messages of a kind are taken all at once, some 50 times as fast as `pyubx2` makes an object of each. Facts of
+the protocol: u-blox interface descriptions of series 6 to 9, as `pyubx2` has them.
 """
 
 from __future__ import annotations
@@ -25,18 +26,9 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import fit_clock
-from wildlab.flight.readers.log import (
-    VELOCITY,
-    Array,
-    Clock,
-    Decoded,
-    Mask,
-    Readings,
-    any_of,
-    level_velocity,
-)
+from wildlab.flight.readers.log import VELOCITY, Array, Clock, Decoded, Mask, Readings, any_of
 from wildlab.flight.readers.text import calendar_s, number, plural
-from wildlab.flight.time_scales import WEEK_S
+from wildlab.flight.time_scales import WEEK_S, week_to_utc
 from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 # -- NMEA 0183
@@ -317,7 +309,12 @@ def _velocity(epoch: dict[str, Sentence]) -> tuple[float, float]:
     if "RMC" in epoch:
         speed, course = epoch["RMC"].value(7) * _KNOT_M_S, epoch["RMC"].value(8)
     if "VTG" in epoch and not math.isfinite(speed):
-        speed, course = epoch["VTG"].value(5) * _KNOT_M_S, epoch["VTG"].value(1)
+        one = epoch["VTG"]
+        # Before NMEA 2.3 there were no letters between the numbers.
+        lettered = len(one.fields) > 8 or one.field(2) == "T"
+        speed, course = one.value(5 if lettered else 3) * _KNOT_M_S, one.value(1)
+        if not math.isfinite(speed):
+            speed = one.value(7 if lettered else 4) / 3.6
     if speed == 0.0:
         return 0.0, 0.0
     angle = math.radians(course)
@@ -330,7 +327,8 @@ def _velocity(epoch: dict[str, Sentence]) -> tuple[float, float]:
 Rows = NDArray[Any]
 
 #: Class and number of messages.
-PVT, HPPOSLLH, DOP = (0x01, 0x07), (0x01, 0x14), (0x01, 0x04)
+PVT, POSLLH, HPPOSLLH, VELNED = (0x01, 0x07), (0x01, 0x02), (0x01, 0x14), (0x01, 0x12)
+TIMEGPS, TIMEUTC, SOL, STATUS, DOP = (0x01, 0x20), (0x01, 0x21), (0x01, 0x06), (0x01, 0x03), (0x01, 0x04)
 NAV_ATT, HNR_ATT, HNR_PVT = (0x01, 0x05), (0x28, 0x01), (0x28, 0x00)
 #: Sync, class, number, length; then the payload and two bytes of checksum.
 _SYNC, _HEADER, _CHECK = (0xB5, 0x62), 6, 2
@@ -361,7 +359,13 @@ LAYOUTS: dict[tuple[int, int], Any] = {
     for kind, text in {
         PVT: f"itow:u4, {_DATE}, valid:u1, time_acc:u4, nano:i4, fix flags flags2 satellites:u1, {_PLACE}, "
         "h_acc v_acc:u4, vel_n vel_e vel_d speed course:i4, s_acc course_acc:u4, pdop:u2, flags3:u1",
+        POSLLH: f"itow:u4, {_PLACE}, h_acc v_acc:u4",
         HPPOSLLH: f"+3, flags:u1, itow:u4, {_PLACE}, lon_hp lat_hp height_hp sea_hp:i1, h_acc v_acc:u4",
+        VELNED: "itow:u4, vel_n vel_e vel_d:i4, speed_3d speed:u4, course:i4, s_acc:u4",
+        TIMEGPS: "itow:u4, ftow:i4, week:i2, leap:i1, valid:u1",
+        TIMEUTC: f"itow time_acc:u4, nano:i4, {_DATE}, valid:u1",
+        SOL: "itow:u4, ftow:i4, week:i2, fix flags:u1, +35, satellites:u1",
+        STATUS: "itow:u4, fix flags:u1",
         DOP: "itow:u4, +8, hdop:u2",
         NAV_ATT: _ATTITUDE,
         HNR_ATT: _ATTITUDE,
@@ -475,7 +479,7 @@ def ubx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         (len(rest.translate(None, _TEXT)), "byte", "of no message of UBX and of no text"),
     ]
     found_text = sentences(rest)
-    gnss = _of_pvt(found, PVT) or _of_pvt(found, HNR_PVT)
+    gnss = _of_pvt(found, PVT) or _of_old(found) or _of_pvt(found, HNR_PVT)
     if gnss is None:
         made = track(found_text)
         if made is None:
@@ -569,9 +573,57 @@ def _of_pvt(found: UbxFrames, kind: tuple[int, int]) -> Readings | None:
         # So the receiver says that it has no place, in what older ones left at nothing.
         reasons["no position"] = (row["flags3"] & 1) > 0
     else:
-        columns |= level_velocity(row["speed"] * 1e-3, row["course"] * 1e-5)
+        course, speed = np.radians(row["course"] * 1e-5), row["speed"] * 1e-3
+        columns |= {"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course)}
         columns["fix"] = np.where((kinds == 3) & (flags & 2 > 0), 4.0, kinds)
     return Readings(columns, row["which"], "message", reasons)
+
+
+def _of_old(found: UbxFrames) -> Readings | None:
+    row = found.rows(POSLLH)
+    if not len(row):
+        return None
+    own = row["own_s"]
+    columns = {"time_s": _weeks_to_utc(found, own), **_place(found, row)}
+    velocity = found.rows(VELNED)
+    columns |= {name: _at(own, velocity, velocity[f"vel_{name[2]}"] * 1e-2) for name in VELOCITY}
+    columns["sd_velocity_m_s"] = _at(own, velocity, velocity["s_acc"] * 1e-2)
+    reasons: dict[str, Mask] = {}
+    for kind in (STATUS, SOL):
+        status = found.rows(kind)
+        if not len(status):
+            continue
+        said = _at(own, status, status["fix"])
+        ok = _at(own, status, (status["flags"] & 1).astype(float))
+        kinds = np.where(np.isnan(said), np.nan, _FIXES[np.clip(np.nan_to_num(said), 0, 5).astype(int)])
+        columns["fix"] = kinds
+        reasons["no fix"] = ((kinds < 2) & (said != 1)) | (ok == 0)
+        reasons["estimated, not measured"] = said == 1
+        if kind == SOL:
+            columns["satellites"] = _at(own, status, status["satellites"])
+    return Readings(columns, row["which"], "message", reasons)
+
+
+def _weeks_to_utc(found: UbxFrames, own: Array) -> Array:
+    """UTC of times of week, by the nearest message that knows both."""
+    row = found.rows(TIMEUTC)
+    pairs = [(row["own_s"], np.where(row["valid"] & 4, _utc(row), np.nan))]
+    # Both bits: the week and the time in it; they stand at different places.
+    for kind, field, bits in ((TIMEGPS, "valid", 3), (SOL, "flags", 12)):
+        row = found.rows(kind)
+        utc = week_to_utc(row["week"], row["itow"] * 1e-3 + row["ftow"] * 1e-9)
+        pairs.append((row["own_s"], np.where((row[field] & bits) == bits, utc, np.nan)))
+    for stamps, utc in pairs:
+        known = np.isfinite(utc)
+        if not known.any():
+            continue
+        order = np.argsort(stamps[known], kind="stable")
+        stamps, utc = stamps[known][order], utc[known][order]
+        after = np.clip(np.searchsorted(stamps, own), 0, len(stamps) - 1)
+        before = np.maximum(after - 1, 0)
+        nearest = np.where(np.abs(stamps[after] - own) <= np.abs(own - stamps[before]), after, before)
+        return np.asarray(utc[nearest] + own - stamps[nearest])
+    return np.full(len(own), np.nan)
 
 
 def _poses(found: UbxFrames, gnss: Readings) -> Readings | None:
