@@ -50,17 +50,11 @@ def over(flight: Flight) -> Overflight:
     return overflight(flight)
 
 
-def motion(dt: float, sd: float) -> tuple[Array, Array]:
-    """H (6.1), (6.2), typed from the print."""
-    F = np.eye(4)
-    F[0, 2] = F[1, 3] = dt
-    G = np.array([[dt**2 / 2, 0], [0, dt**2 / 2], [dt, 0], [0, dt]])
-    return F, sd**2 * G @ G.T
-
-
 def warmed_up(scene: gating.GatingScene, run: int) -> KalmanFilter:
-    kf = KalmanFilter(dim_x=4, dim_z=2)
-    kf.F, kf.Q = motion(0.1, 0.01)
+    """Another filter, its motion H (6.1), (6.2) typed from the print."""
+    kf, dt = KalmanFilter(dim_x=4, dim_z=2), 0.1
+    G = np.array([[dt**2 / 2, 0], [0, dt**2 / 2], [dt, 0], [0, dt]])
+    kf.F, kf.Q = np.eye(4) + dt * np.eye(4, k=2), 0.01**2 * G @ G.T
     kf.H, kf.R, kf.P = np.eye(2, 4), 100.0 * np.eye(2), np.diag([100.0, 100.0, 20.0, 20.0])
     kf.x = np.append(scene.start[run], [0.0, 0.0])
     for z in scene.warm_up[run]:
@@ -291,15 +285,17 @@ def test_claims_are_decided_run_by_run():
     assert {verdict(margin) for margin in apart.values()} == {"does not hold"}
 
 
-def test_a_claim_wants_every_margin_and_chance_decides_none():
-    sure, unsure, against = [1.0, 1.1, 0.9], [-1.0, 1.0, 0.5], [-1.0, -1.1, -0.9]
-    assert verdict(np.array([sure, sure])) == "holds"
-    assert verdict(np.array([sure, unsure])) == "cannot be decided"
-    assert verdict(np.array([unsure, against])) == "does not hold"
-    assert verdict(np.full((1, 4), np.nan)) == "cannot be decided"
-    # One form that leads surely does not make up for one whose lead is chance.
-    rates = np.array([[97.0, 97.0, 97.0], [96.0, 98.0, 94.5], [96.0, 96.1, 95.9], [97.0, 97.0, 97.0]])
-    assert verdict(claim_margins(outcome(rates))["angles-least-accurate"]) == "cannot be decided"
+@pytest.mark.parametrize(
+    ("margins", "decided"),
+    [
+        (([1.0, 1.1, 0.9], [1.0, 1.1, 0.9]), "holds"),
+        (([1.0, 1.1, 0.9], [-1.0, 1.0, 0.5]), "cannot be decided"),
+        (([-1.0, 1.0, 0.5], [-1.0, -1.1, -0.9]), "does not hold"),
+        (([np.nan] * 4,), "cannot be decided"),
+    ],
+)
+def test_a_claim_wants_every_margin_and_chance_decides_none(margins, decided):
+    assert verdict(np.array(margins)) == decided
 
 
 def test_a_run_without_mistakes_says_nothing_of_where_they_fall():
