@@ -116,8 +116,8 @@ def flow(found: Values) -> None:
 
 
 def covered(found: Values) -> None:
-    held = [m["value"] for (name, _), m in found.items() if name == "held"]
-    assert held and min(held) >= 0.95
+    seen = {who: m["value"] for (name, who), m in found.items() if name == "seen"}
+    assert seen and all(0 < share <= found["in_sight", who]["value"] <= 1 for who, share in seen.items())
 
 
 def drop(found: Values) -> None:
