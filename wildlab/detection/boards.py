@@ -2,7 +2,7 @@
 
 On paper a board is dark on white. A thermal camera may see it the other way round (a heated plate shines
 through the holes of H 2.5.1; mirrors between painted squares show a cold sky, F 2.4), so each image is tried
-as it is and inverted. Boards with codes on them (ChArUco) are told apart, and are not read.
+as it is and inverted. Boards with codes on them (ChArUco) are not read.
 """
 
 from __future__ import annotations
