@@ -60,7 +60,7 @@ LINES = {
     "roll, pitch and yaw": SPREADS
     % ", ".join(f"{name} = {{ value = 1.0, unit = 'deg' }}" for name in ("roll", "pitch", "yaw")),
     "uncertainty": "[uncertainty]\nposition_horizontal_m = 0.5\nposition_vertical_m = 0.8\npixel_px = 2.0\n"
-    "plane_height_m = 1.0\nroll_deg = 0.6\npitch_deg = 0.6\nyaw_deg = 3.0\n",
+    "plane_height_m = 1.0\ntilt_deg = 0.6\nheading_deg = 3.0\n",
     "nothing": "",
 }
 #: Horizontal, vertical (m), tilt, heading (deg): what is stated, and what nobody states is taken to be.

@@ -15,14 +15,7 @@ from wildlab.flight.readers.frames.scene import (
     without_vignetting,
 )
 from wildlab.flight.readers.frames.sequence import mark_shutter
-from wildlab.simulation.scene.response import (
-    CameraResponse,
-    expose,
-    gain_control,
-    in_shutter,
-    sensor_of,
-    shutter_image,
-)
+from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 
 SHAPE = (128, 160)
 WHOLE = np.ones(SHAPE, bool)
@@ -35,16 +28,29 @@ def ground(seed: int, rough: float = 2.0) -> np.ndarray:
     return np.asarray(285 + rough * smooth / smooth.std())
 
 
+def shutter_image(level: float, response: CameraResponse, rng: np.random.Generator) -> np.ndarray:
+    """What a camera shows with its shutter closed: the shutter's temperature (K), and noise."""
+    even = np.full(SHAPE, level, np.float32)
+    nothing = Sensor(np.zeros(SHAPE, np.float32), np.zeros(SHAPE, bool), np.zeros(SHAPE, np.uint16))
+    return np.asarray(expose(even, response, nothing, rng))
+
+
+def gain_control(counts: np.ndarray) -> np.ndarray:
+    """256 grey levels of counts, a hundredth of the pixels black and one white: simple AGC."""
+    low, high = np.quantile(counts, [0.01, 0.99])
+    return np.clip(np.rint((counts - low) * (255 / max(high - low, 1.0))), 0, 255).astype(np.uint8)
+
+
 def flight(path: Path, times: np.ndarray, response: CameraResponse) -> tuple[np.ndarray, np.ndarray]:
     """A folder of 16-bit frames with corrections; which are closed, and which pixels are dead."""
     rng = np.random.default_rng(3)
     sensor = sensor_of(response, SHAPE, rng)
-    closed = in_shutter(times, every=1.0, lasting=0.25, first=0.4)
+    closed = (times >= 0.4) & (np.mod(times - 0.4, 1.0) < 0.25)
     path.mkdir()
     for number, (time, shut) in enumerate(zip(times, closed, strict=True)):
         image = expose(ground(number), response, sensor, rng)
         if shut:
-            image = shutter_image(SHAPE, 290 + time, response, rng)
+            image = shutter_image(290 + time, response, rng)
             image[sensor.dead] = sensor.stuck[sensor.dead]
         assert cv2.imwrite(str(path / f"{number:03d}.png"), image)
     return closed, sensor.dead
@@ -68,7 +74,7 @@ def test_a_closed_shutter_is_found_and_nothing_else_and_dead_pixels_are_masked(t
 @pytest.mark.parametrize("seed", range(3))
 def test_closed_whatever_becomes_of_the_picture(seed):
     rng, response = np.random.default_rng(seed), CameraResponse()
-    counts = shutter_image(SHAPE, 280.0 + seed, response, rng)
+    counts = shutter_image(280.0 + seed, response, rng)
     grey = gain_control(counts)
     jpeg = cv2.imdecode(cv2.imencode(".jpg", grey)[1], cv2.IMREAD_UNCHANGED)
     kelvin = counts.astype(np.float32) / 25
