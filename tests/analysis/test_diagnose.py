@@ -53,6 +53,14 @@ def test_targets_that_the_border_cuts_make_no_correction_certain(share):
     assert diagnosed(replace(flight, tables=tables)).counts == (share < 0.25)
 
 
+@pytest.mark.parametrize(("most", "certain"), [(3.0, True), (0.3, False)])
+def test_no_cause_is_certain_where_the_noise_does_not_explain_what_is_left(monkeypatch, most, certain):
+    """Of a deviance for each residual of about one."""
+    monkeypatch.setattr("wildlab.analysis.diagnose.MISFIT", most)
+    found = diagnosed(simulate(Survey(down_m=8.0)))
+    assert found.counts == certain and found.misfit != certain
+
+
 @pytest.mark.parametrize("focal", [0.1, 1e3, -1e3])
 def test_a_focal_length_that_goes_astray_stays_a_number(focal):
     found = Calibration(("focal",), np.array([focal]), np.eye(1), {}, 1, 1)

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import norm, t
 
 from wildlab.evaluation.intervals import (
     block_mean,
     compare_halves,
     independent_blocks,
-    standard_error,
     time_blocks,
+    widening,
 )
 
 
@@ -74,12 +75,22 @@ def test_halves_that_disagree_are_found(step, disagree):
     assert halves.difference.estimate == pytest.approx(halves.second - halves.first)
 
 
-def test_blocks_of_equal_size_give_the_standard_error_of_their_means():
-    rng = np.random.default_rng(3)
-    values = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # neighbours are not alike
-    assert standard_error(values, np.arange(6)) == pytest.approx(values.std(ddof=1) / np.sqrt(6))
-    blocks = np.repeat(np.arange(5), 4)
+def test_an_interval_of_many_blocks_is_widened_to_those_that_count():
+    wave = np.sin(np.arange(20) / 4)
+    assert widening(wave, np.arange(20)) == pytest.approx(np.sqrt(20 / 3) * t.ppf(0.95, 2) / norm.ppf(0.95))
+    quick = np.where(np.arange(400) % 2, 1.0, -1.0)
+    assert widening(quick, np.arange(400)) == pytest.approx(1.0, abs=0.01)
+
+
+def test_blocks_of_equal_size_give_the_interval_of_their_means():
+    """Student's, written out: with all blocks where neighbours are not alike, else with those that count."""
+    alternating = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    rng, blocks = np.random.default_rng(3), np.repeat(np.arange(5), 4)
     many = rng.normal(size=20) + blocks
-    means = many.reshape(5, 4).mean(axis=1)
-    worth = independent_blocks(many, blocks)
-    assert standard_error(many, blocks) == pytest.approx(means.std(ddof=1) / np.sqrt(worth))
+    for values, group, worth in (
+        (alternating, np.arange(6), 6.0),
+        (many, blocks, independent_blocks(many, blocks)),
+    ):
+        means = [values[group == one].mean() for one in np.unique(group)]
+        half = t.ppf(0.95, worth - 1) * np.std(means, ddof=1) / np.sqrt(worth)
+        assert block_mean(values, group).high == pytest.approx(values.mean() + half)

@@ -226,7 +226,7 @@ def rank_models(
     images: int,
     alike: Mapping[str, str] | None = None,
     held: Sequence[Array] = (),
-    blocks: Labels | None = None,
+    blocks: Labels | Sequence[int] = (),
 ) -> Ranked:
     """Rank models by their likelihood, their number of parameters and their held-out errors.
 
@@ -261,7 +261,7 @@ def rank_models(
     winner = int(min(near, key=lambda m: (len(contents[m]), scores[m])))
 
     def gain(of: int, over: int) -> Gain:
-        return gain_of(held[over], held[of], np.zeros(0, np.intp) if blocks is None else blocks)
+        return gain_of(held[over], held[of], np.asarray(blocks, np.intp))
 
     while held:
         parts = [m for m, one in enumerate(contents) if one and one < contents[winner]]

@@ -291,8 +291,10 @@ def block_mean(values: ArrayLike, blocks: ArrayLike, probability: float = PROBAB
     mean = float(x.mean())
     if group.max() < 1:
         return Interval(mean, np.nan, np.nan)
-    freedom = independent_blocks(x, group) - 1
-    half = float(student_quantile((1 + probability) / 2, freedom)) * standard_error(x, group)
+    # As of a ratio of sums over so many independent blocks.
+    worth, (apart, count) = independent_blocks(x, group), _apart(x, group)
+    error = np.sqrt(count / (count - 1) * (apart @ apart) * count / worth) / len(x)
+    half = float(student_quantile((1 + probability) / 2, worth - 1) * error)
     return Interval(mean, mean - half, mean + half)
 
 
@@ -324,28 +326,6 @@ def independent_blocks(values: ArrayLike, blocks: ArrayLike) -> float:
     alike = float(apart[1:] @ apart[:-1]) / square if square > 0 else 0.0
     alike = float(np.clip(alike + (1 + 3 * alike) / count, 0.0, 0.9))
     return max(count * (1 - alike) / (1 + alike), min(FEWEST_WORTH, count))
-
-
-def standard_error(values: ArrayLike, blocks: ArrayLike) -> float:
-    """Standard error of the mean of values in blocks: as of a ratio of sums over independent blocks.
-
-    Parameters
-    ----------
-    values
-        (N,) without NaN.
-    blocks
-        (N,) which block each belongs to, in time order.
-
-    Returns
-    -------
-    float
-        NaN where there is one block.
-    """
-    apart, count = _apart(values, blocks)
-    if count < 2:
-        return float("nan")
-    worth = independent_blocks(values, blocks)
-    return float(np.sqrt(count / (count - 1) * (apart @ apart) * count / worth) / np.size(values))
 
 
 def widening(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABILITY) -> float:
