@@ -109,3 +109,20 @@ def test_a_process_has_the_environment_of_its_own_start(value, monkeypatch):
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
     process.join(20)
     assert process.exitcode == 0
+
+
+def test_whoever_is_ended_between_two_cells_leaves_a_whole_notebook(tmp_path, monkeypatch):
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
+    into, seen = tmp_path / "ours.ipynb", []
+
+    def on_cell(index, count):
+        kept = nbformat.read(into, as_version=4)
+        seen.append((index, [cell.get("execution_count") for cell in kept.cells][:index:2], count))
+
+    with monkeypatch.context() as patch:
+        # Nobody but the atomic writer touches the file.
+        patch.setattr(
+            "papermill.iorw.papermill_io.write", lambda _, path: pytest.fail(path) if path else None
+        )
+        execute_notebook(written(["x = 1", "x + 1"]), tmp_path, into, {}, on_cell)
+    assert seen == [(0, [], 3), (1, [1], 3), (2, [1], 3)]

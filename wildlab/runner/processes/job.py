@@ -18,10 +18,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import nbformat
-
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic
+from wildlab.files import write_atomic, write_notebook
 from wildlab.paths import REPORTS
 from wildlab.reporting.notebook_pages import clean_notebook, clean_text, read_notebook, step_of
 from wildlab.reporting.page import failure_page
@@ -181,11 +179,6 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
         folder / "report.html",
         failure_page(status, title=job.title, step=step, details=details, again=job.again, footer=footer),
     )
-
-
-def write_notebook(path: Path, notebook: Any) -> None:
-    """Write a notebook atomically."""
-    write_atomic(path, nbformat.writes(notebook) + "\n")
 
 
 def install(folder: Path, target: Path, status: dict[str, Any]) -> None:

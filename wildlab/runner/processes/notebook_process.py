@@ -20,7 +20,7 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
 from wildlab.runner.processes.ending import end_below
-from wildlab.runner.processes.job import Failure, Job, write_notebook
+from wildlab.runner.processes.job import Failure, Job
 
 #: The cells begun in this process, in order.
 _STARTED: list[int] = []
@@ -88,7 +88,7 @@ def _keep_to_ourselves(job: Job) -> None:
 
 
 def _work(pipe: connection.Connection, job: Job) -> None:
-    from wildlab.files import write_atomic, write_json
+    from wildlab.files import write_atomic, write_json, write_notebook
     from wildlab.reporting import metrics, notebook_pages
     from wildlab.reporting.page import first_look_notice
     from wildlab.reporting.status import describe_first_look

@@ -22,6 +22,8 @@ from papermill.engines import Engine, NotebookExecutionManager, papermill_engine
 from papermill.exceptions import PapermillExecutionError
 from traitlets.config import Config
 
+from wildlab.files import write_notebook
+
 #: Its name among papermill's engines.
 IN_PROCESS = "wildlab-in-process"
 
@@ -43,13 +45,13 @@ class ShellEngine(Engine):  # type: ignore[misc]
         nb_man: NotebookExecutionManager,
         kernel_name: str,
         *,
-        on_cell_execute: Callable[..., None] | None = None,
+        before_cell: Callable[[nbformat.NotebookNode, int], None],
         **_: Any,
     ) -> None:
         outputs = _Outputs()
         shell = _shell(outputs)
         try:
-            _run_cells(shell, outputs, nb_man, on_cell_execute)
+            _run_cells(shell, outputs, nb_man, before_cell)
         finally:
             # Whatever else this process does, it is no notebook any more.
             shell.restore_sys_module_state()
@@ -94,34 +96,43 @@ def execute_notebook(
     # Whatever kernel it was last saved with: its cells run in this process.
     notebook.metadata["kernelspec"] = {"name": "python3", "language": "python", "display_name": "Python 3"}
     count = len(notebook.cells) + bool(parameters)  # papermill adds a cell with them
+    ran = [notebook]
+
+    def before_cell(running: nbformat.NotebookNode, index: int) -> None:
+        ran[0] = running
+        if into is not None:
+            write_notebook(into, running)
+        on_cell(index, count)
+
     try:
-        executed: nbformat.NotebookNode = papermill.execute_notebook(
+        ran[0] = papermill.execute_notebook(
             notebook,
-            # papermill reads braces in a path as placeholders.
-            None if into is None else str(into).replace("{", "{{").replace("}", "}}"),
+            None,  # papermill would leave half a file where this process is ended as it writes
             parameters=dict(parameters or {}),
             kernel_name="python3",
             language="python",
             engine_name=IN_PROCESS,
             progress_bar=False,
             cwd=str(folder),
-            on_cell_execute=lambda cell, cell_index: on_cell(cell_index, count),
+            before_cell=before_cell,
         )
     except PapermillExecutionError as error:
         raise CellError(str(error.ename), str(error.evalue), list(error.traceback)) from None
-    return executed
+    finally:
+        if into is not None:
+            write_notebook(into, ran[0])
+    return ran[0]
 
 
 def _run_cells(
     shell: InteractiveShell,
     outputs: _Outputs,
     nb_man: NotebookExecutionManager,
-    on_cell_execute: Callable[..., None] | None,
+    before_cell: Callable[[nbformat.NotebookNode, int], None],
 ) -> None:
     for index, cell in enumerate(nb_man.nb.cells):
         nb_man.cell_start(cell, index)
-        if on_cell_execute is not None:
-            on_cell_execute(cell=cell, cell_index=index)
+        before_cell(nb_man.nb, index)
         if cell.cell_type == "code":
             with _streams_into(outputs):
                 result = shell.run_cell(cell.source, store_history=True)
