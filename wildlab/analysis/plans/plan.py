@@ -34,8 +34,8 @@ from wildlab.planning.patterns import Pattern, lawn_mowers, row_distance
 ROUNDING = 0.05
 #: Places along a way from which the nearest ground is looked for: so far apart, metres, and so many at most.
 APART, MOST_PLACES = 2.0, 20_000
-#: Directions in which ground is looked for, how rings grow, and how many places are looked at closely.
-DIRECTIONS, GROWING, CLOSELY = 24, 1.15, 20
+#: How many places are looked at closely.
+CLOSELY = 20
 
 
 def refuse_take_off(home: Array, terrain: Terrain | None, wanted: PlanRequest) -> None:
@@ -170,20 +170,15 @@ def nearest_ground(way: HeightProfile, terrain: Terrain, trees: float = 0.0) -> 
     at = np.unique(np.concatenate([np.linspace(0, along[-1], count), along]))
     places = np.stack([np.interp(at, along, points[:, axis]) for axis in range(3)], axis=1)
     near = np.nan_to_num(places[:, 2] - terrain.heights_at(places[:, :2]), nan=np.inf)
-    bearings = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
-    around = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-    radius = 1.0
-    while radius < near.min() and np.isfinite(near.min()):
-        near = np.minimum(near, _distance(places, radius * around, terrain))
-        radius *= GROWING
-    best = float(near.min())
-    # Rings have gaps: about the nearest places, the ground is looked at closely.
-    if np.isfinite(best) and best > 0:
-        worst = places[np.argsort(near)[:CLOSELY]]
-        side = np.linspace(-best, best, 61)
-        grid = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
-        best = min(best, float(_distance(worst, grid, terrain).min()))
-    return best
+    # First all places, by a coarse grid; then those nearest to ground, by a fine one.
+    for most, across in ((len(near), 31), (CLOSELY, 61)):
+        rows = np.argsort(near)[:most]
+        best = max(float(near.min()), 0.0)
+        if np.isfinite(best):
+            side = np.linspace(-best, best, across)
+            grid = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+            near[rows] = np.minimum(near[rows], _distance(places[rows], grid, terrain))
+    return float(near.min())
 
 
 def _distance(places: Array, offsets: Array, terrain: Terrain) -> Array:

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest_parts import TerrainSays
@@ -51,24 +53,8 @@ def simplified(ring: Array, tolerance: float) -> Array:
     """
     if len(ring) <= 4:
         return ring
-    # Two corners far apart are kept for certain; each half between them is thinned by itself.
-    first = int(np.argmax(((ring - ring.mean(axis=0)) ** 2).sum(axis=1)))
-    turned = np.roll(ring, -first, axis=0)
-    far = int(np.argmax(((turned - turned[0]) ** 2).sum(axis=1)))
-    closed = np.concatenate([turned, turned[:1]])
-    kept = {0, far}
-    todo = [(0, far), (far, len(closed) - 1)]
-    while todo:
-        begin, end = todo.pop()
-        if end - begin < 2:
-            continue
-        off = _distances(closed[begin + 1 : end], closed[begin], closed[end])
-        worst = int(np.argmax(off))
-        if off[worst] > tolerance:
-            middle = begin + 1 + worst
-            kept.add(middle)
-            todo += [(begin, middle), (middle, end)]
-    simpler = turned[sorted(kept)]
+    kept = cv2.approxPolyDP(ring.astype(np.float32), tolerance, closed=True)[:, 0]
+    simpler = ring[np.unique(cKDTree(ring).query(kept)[1])]
     if len(simpler) < 3 or ring_area(simpler) < ring_area(ring) / 2 or crossing(simpler) is not None:
         return ring
     return simpler
@@ -114,13 +100,6 @@ def _within(area: Area, points: Array) -> Mask:
     for hole in area.holes:
         inside &= ~contains(hole, points)
     return inside
-
-
-def _distances(points: Array, a: Array, b: Array) -> Array:
-    """How far points (N, 2) are from the segment a-b, metres."""
-    along = b - a
-    share = np.clip((points - a) @ along / max(float(along @ along), 1e-300), 0, 1)
-    return np.linalg.norm(points - a - share[:, None] * along, axis=1)
 
 
 #: Rows and columns of the image that are looked at; angles of a swing.
