@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from wildlab.analysis.detecting.fit import (
-    Found,
     Sample,
     fit_part,
-    found_labels,
     part_of,
     parts_needed,
     with_part,
@@ -15,6 +13,7 @@ from wildlab.analysis.detecting.fit import (
 from wildlab.detection.contrast import Contrast, Shape
 from wildlab.detection.floating import FloatingThresholds
 from wildlab.flight.readers.frames import Frame
+from wildlab.geometry.covariances import inside_ellipse
 
 
 def drawn(rng, count, part):
@@ -24,29 +23,28 @@ def drawn(rng, count, part):
     major = rng.uniform(5, 40, count)
     whole = bare + (part * major)[:, None, None] ** 2 * np.eye(2)
     off = np.einsum("nij,nj->ni", np.linalg.cholesky(whole), rng.normal(size=(count, 2)))
-    return Found(off, bare, major)
+    return off, bare, major
 
 
 def test_with_the_part_that_is_needed_the_ellipse_just_reaches_its_label():
-    found = drawn(np.random.default_rng(1), 300, 0.1)
-    needed = parts_needed(found)
-    inside = found.inside(0.0)
+    off, bare, major = drawn(np.random.default_rng(1), 300, 0.1)
+    needed = parts_needed(off, bare, major)
+    inside = inside_ellipse(off, bare, 0.9)
     assert (needed[inside] == 0).all() and (needed[~inside] > 0).all() and 0 < inside.sum() < 300
     for row in np.flatnonzero(~inside):
-        C = found.covariance[row] + (needed[row] * found.major[row]) ** 2 * np.eye(2)
-        squared = found.off[row] @ np.linalg.solve(C, found.off[row])
-        assert squared == pytest.approx(-2 * np.log(0.1), rel=1e-9)
+        C = bare[row] + (needed[row] * major[row]) ** 2 * np.eye(2)
+        assert off[row] @ np.linalg.solve(C, off[row]) == pytest.approx(-2 * np.log(0.1), rel=1e-9)
 
 
 def test_the_next_label_is_held_as_often_as_is_said():
     rng, held, parts = np.random.default_rng(2), [], []
     for _ in range(300):
-        part = part_of(parts_needed(drawn(rng, 19, 0.08)))
-        held.append(drawn(rng, 20, 0.08).inside(part).mean())
+        part = part_of(parts_needed(*drawn(rng, 19, 0.08)))
+        held.append((parts_needed(*drawn(rng, 20, 0.08)) <= part).mean())
         parts.append(part)
     # 19 ellipses: the 18th part of 20 places, which is nine in ten exactly.
     assert np.mean(held) == pytest.approx(0.9, abs=0.02)
-    assert part_of(parts_needed(drawn(rng, 20_000, 0.08))) == pytest.approx(0.08, rel=0.05)
+    assert part_of(parts_needed(*drawn(rng, 20_000, 0.08))) == pytest.approx(0.08, rel=0.05)
 
 
 def test_of_too_few_nothing_is_chosen():
@@ -78,9 +76,8 @@ def test_labels_that_lie_off_widen_the_ellipses_and_others_do_not():
     rng = np.random.default_rng(3)
     off, exact = (fit_part("contrast", samples_of(rng, 16, shift), Contrast()) for shift in (0.15, 0.0))
     assert off.labels == exact.labels == 32
-    found = found_labels("contrast", samples_of(rng, 4, 0.15), Contrast())
-    # 3 px over 20 by the root of chi-square's nine tenths, of a major axis of about 18 px.
-    assert off.part == pytest.approx(3 / np.sqrt(-2 * np.log(0.1)) / np.median(found.major), rel=0.2)
+    # 3 px by the root of chi-square's nine tenths, of a major axis of about 18 px.
+    assert off.part == pytest.approx(3 / np.sqrt(-2 * np.log(0.1)) / 18, rel=0.2)
     assert off.held_out is not None and off.held_out.estimate > 0.8
     assert exact.part < 0.05
 

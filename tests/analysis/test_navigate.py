@@ -12,7 +12,7 @@ from tests.analysis.conftest import changed, first_seconds
 from tests.refused import refused
 from wildlab.analysis.evaluate import score_points
 from wildlab.analysis.georeference import georeference, observe
-from wildlab.analysis.navigate import likelihoods_of_latency, navigate_mekf, navigate_observer
+from wildlab.analysis.navigate import navigate_mekf, navigate_observer
 from wildlab.analysis.navigation_inputs import imu_noise
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest_parts import ImuPart
@@ -144,13 +144,6 @@ def test_a_flight_that_banks_to_one_side_has_its_iron_stated(flight):
         navigate_observer(with_field(flight, **stated), [60.0])
     known = with_field(flight, **stated, hard_iron_ut=tuple(IRON))
     assert errors(known, navigate_observer(known, np.arange(0.0, 240.0, 0.5)).nav)[1][2] < 4.0
-
-
-def test_the_latency_that_was_put_in_is_the_likeliest(flight):
-    late = changed(flight, gnss=flight.gnss.assign(time_s=flight.gnss["time_s"] + 0.12))
-    latencies = np.array([0.06, 0.11, 0.12, 0.13])
-    likely = likelihoods_of_latency(late, latencies)
-    assert latencies[np.argmax(likely)] == 0.12
 
 
 def test_an_accelerometer_off_by_a_known_bias_is_the_same_as_none(flight):

@@ -44,11 +44,11 @@ class Flight:
 
 
 def gain(key: str = "cause", share: float = 0.4, causes: tuple[str, ...] = ("boresight",)) -> Gain:
-    return Gain(key, causes, 2.0, 1.5, 2.5, "m", 5.0, "images", share, "")
+    return Gain(key, causes, 2.0, 5.0, share, "images")
 
 
 def alarm(what: str, often: int = 3) -> Alarm:
-    return Alarm(what, often, 110.0, 130.0, 6.72, 80.0, 0.2)
+    return Alarm(what, often, 130.0, 6.72, 0.2)
 
 
 def judged(verdict: Verdict, **more: Any) -> Judged:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -38,10 +37,9 @@ from wildlab.evaluation.consistency import (
 )
 from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import covariance_columns, covariances, frame_times, gnss_times, poses_at
-from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
-from wildlab.navigation.mekf import log_likelihood, pose_covariance, signs_of_trouble
+from wildlab.navigation.mekf import pose_covariance, signs_of_trouble
 from wildlab.navigation.observer import Gains, run_observer
 from wildlab.navigation.receiver import ReceiverNoise
 
@@ -237,28 +235,6 @@ def navigate_observer(
     biases = pd.DataFrame(found.gyro_bias, columns=BIASES[3:]).assign(time_s=found.times)
     nav = _nav_table(found.times, found.position, found.velocity, found.quaternion)
     return _known(Navigated(nav, biases, pd.DataFrame()))
-
-
-def likelihoods_of_latency(flight: Flight, latencies: ArrayLike) -> Array:
-    """How likely the flight's satellite positions and velocities are, were the receiver so late: the log
-    likelihood of the filter's innovations, up to a constant, for each of the latencies (L,) s.
-
-    Nothing but the flight's own sensors goes into it: a latency chosen by it owes nothing to a reference.
-
-    Raises
-    ------
-    WildlabError
-        As `navigate_mekf`.
-    """
-    noise, found = imu_noise(flight), []
-    for latency in np.atleast_1d(np.asarray(latencies, float)):
-        late = replace_in_manifest(flight.manifest, {"gnss": {"latency_s": float(latency)}})
-        given = inputs_of(replace(flight, manifest=late), noise=noise)
-        run = filter_of(flight, given).run(given.aiding, given.imu.times[-1:], 0.9999)
-        with np.errstate(invalid="ignore"):  # under some, the filter is lost altogether
-            likelihood = log_likelihood(run.innovations)
-        found.append(likelihood if np.isfinite(likelihood) else -np.inf)
-    return np.array(found)
 
 
 def _wanted(flight: Flight, times: ArrayLike | None) -> Array:

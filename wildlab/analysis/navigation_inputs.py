@@ -351,14 +351,11 @@ class Placement(NamedTuple):
     sd
         (4,) of them, latency first, by the information in the innovations: right where the noise is. NaN
         where it was not looked for.
-    gain
-        Of the log likelihood over what is stated.
     """
 
     latency: float
     lever: Array
     sd: Array
-    gain: float
 
 
 class Filter(NamedTuple):
@@ -512,8 +509,7 @@ def place_receiver(flight: Flight, noise: ReceiverNoise) -> Placement:
     likely = [gaussian_log_likelihood(*run(one)) for one in tried]
     start = tried[int(np.argmax(likely))]
     found = maximise(run, start, free, stated - reach, stated + reach, enough=0.5, iterations=12)
-    gain = found.log_likelihood - likely[len(likely) // 2]  # the middle one is what is stated
-    return Placement(float(found.parameters[0]), found.parameters[1:], found.sd, gain)
+    return Placement(float(found.parameters[0]), found.parameters[1:], found.sd)
 
 
 def _rows(source: Aiding, keep: Mask) -> Aiding:

@@ -53,20 +53,16 @@ class Alarm(NamedTuple):
         A key of `ALARMS`.
     often
         How often: jumps, spells, or satellite positions that are contradicted.
-    first, worst
-        Stamps of the first time and of the worst one, s.
-    size, limit
-        The worst, and what it is held against: m, degrees, m or m/s^2.
+    worst, size
+        Stamp of the worst one, s, and how large it is: m, degrees, m or m/s^2.
     share
         Of the time, or of the satellite positions; of jumps 0.
     """
 
     what: str
     often: int
-    first: float
     worst: float
     size: float
-    limit: float
     share: float
 
     @property
@@ -99,9 +95,7 @@ def alarms_of(
         spells, sizes = jumps_of(nav, pace)
         if len(spells):
             at = int(np.argmax(sizes))
-            found.append(
-                Alarm("jumps", len(spells), spells[0, 0], spells[at, 0], float(sizes[at]), JUMP_M, 0.0)
-            )
+            found.append(Alarm("jumps", len(spells), spells[at, 0], float(sizes[at]), 0.0))
         t, q = ordered(nav, QUATERNION)
         length = np.linalg.norm(q, axis=1)
         t, q = t[length > 0], q[length > 0] / length[length > 0, None]
@@ -178,7 +172,7 @@ def _beyond(what: str, t: Array, values: Array, limit: float) -> list[Alarm]:
     if not over.any():
         return []
     spells, at = runs_of(over, t), int(np.argmax(values))
-    return [Alarm(what, len(spells), t[over][0], t[at], float(values[at]), limit, float(over.mean()))]
+    return [Alarm(what, len(spells), t[at], float(values[at]), float(over.mean()))]
 
 
 def _apart(flight: Flight, source: str, pace: Pace) -> list[Alarm]:
@@ -192,8 +186,7 @@ def _apart(flight: Flight, source: str, pace: Pace) -> list[Alarm]:
     if not len(level) or over.mean() <= APART_SHARE:
         return []
     at = int(np.argmax(np.where(over, level, 0.0)))
-    first, share = float(stamps[over].min()), float(over.mean())
-    return [Alarm("apart", int(over.sum()), first, stamps[at], float(level[at]), APART_M, share)]
+    return [Alarm("apart", int(over.sum()), stamps[at], float(level[at]), float(over.mean()))]
 
 
 FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]

@@ -69,20 +69,14 @@ class Surveyed(NamedTuple):
         never was.
     goal
         (D,) of each leg: an animal, or `SEARCH`.
-    known
-        (D,) animals that are known after each leg, with those of enclosures that are done.
     lost_by_covariance, lost_by_search
         How often an animal was lost by which rule.
-    error
-        (D,) mean distance of estimates from animals after each leg, m; NaN while none is known.
     """
 
     positioned: float
     goal: Indices
-    known: Indices
     lost_by_covariance: int
     lost_by_search: int
-    error: Array
 
 
 class _Filters:
@@ -144,8 +138,7 @@ def survey(
     filters = _Filters(animals, rules)
     lives = np.bincount(world.area_of, minlength=len(world.areas))
     platform, clock, lost = start, 0.0, np.zeros(2, int)
-    goals, known, errors = list[int](), list[int](), list[float]()
-    positioned, done = np.inf, np.zeros(len(world.areas), bool)
+    goals, positioned, done = list[int](), np.inf, np.zeros(len(world.areas), bool)
     while clock + flying.step <= images * flying.interval:
         count = np.bincount(world.area_of[filters.live], minlength=len(world.areas))
         # An enclosure whose animals were all known at once is scanned, and stays so (F 5.3).
@@ -171,18 +164,8 @@ def survey(
         filters.live &= ~(by_covariance | by_search)
         filters.missed[~filters.live] = 1.0
         platform, clock = leg.end, float(times[-1])
-        off = np.hypot(*(filters.x - world.animals[window[-1], :, :2])[filters.live].T)
         goals.append(goal)
-        known.append(int(filters.live.sum()))
-        errors.append(float(off.mean()) if len(off) else np.nan)
-    return Surveyed(
-        float(positioned),
-        np.array(goals, np.intp),
-        np.array(known, np.intp),
-        int(lost[0]),
-        int(lost[1]),
-        np.array(errors),
-    )
+    return Surveyed(float(positioned), np.array(goals, np.intp), *lost.tolist())
 
 
 def _next(

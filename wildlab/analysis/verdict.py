@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from wildlab.analysis.image_coverage import Recovered
 from wildlab.analysis.overview import Overview
 from wildlab.evaluation.ellipses import is_overconfident
 from wildlab.evaluation.intervals import Interval
@@ -191,12 +190,12 @@ class Gain(NamedTuple):
         ``cause``, ``far_out``, or what is lost: `wildlab.analysis.image_coverage.Recovered`.
     causes
         Of a constant error, which; else empty.
-    value, low, high, unit
-        What is gained, with its interval where there is one: metres, or how many.
-    of, what
-        Of how many, or of how many metres; what they are.
+    value, of
+        What is gained, metres or how many, and of how many metres, or of how many.
     share
         Of the error or of the data.
+    what
+        What is lost.
     why
         What is known of the reason, as a clause; may be empty.
     """
@@ -204,13 +203,10 @@ class Gain(NamedTuple):
     key: str
     causes: tuple[str, ...]
     value: float
-    low: float
-    high: float
-    unit: str
     of: float
-    what: str
     share: float
-    why: str
+    what: str = ""
+    why: str = ""
 
 
 def numbers_of(documents: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], Mapping[str, Any]]:
@@ -277,7 +273,8 @@ def gains_of(overview: Overview, numbers: Numbers) -> list[Gain]:
     -------
     list of Gain
     """
-    found = [*_metres(numbers), *(_data(one) for one in overview.lost)]
+    data = (Gain(one.key, (), one.lost, one.of, one.share, one.what, one.why) for one in overview.lost)
+    found = [*_metres(numbers), *data]
     return sorted((one for one in found if one.share >= LISTED), key=lambda one: -one.share)
 
 
@@ -286,9 +283,7 @@ def _metres(numbers: Numbers) -> Iterable[Gain]:
     if gain is not None and left is not None and _known(gain["value"]):
         before = gain["value"] + left
         causes = causes_told(numbers)
-        low, high = (math.nan if gain[end] is None else float(gain[end]) for end in ("low", "high"))
-        share = gain["value"] / before if before > 0 else 0.0
-        yield Gain("cause", causes, gain["value"], low, high, "m", before, "mean error", share, "")
+        yield Gain("cause", causes, gain["value"], before, gain["value"] / before if before > 0 else 0.0)
     far = numbers.get(("gain", "without-far-out"))
     rest = numbers.get(("horizontal_error_mean", "without-far-out"))
     points = numbers.get(("points_far_out", "winner"))
@@ -296,7 +291,7 @@ def _metres(numbers: Numbers) -> Iterable[Gain]:
         before = far["value"] + rest["value"]
         share = far["value"] / before if before > 0 else 0.0
         why = f"{points['value']:.0f} of {points['n']} points"
-        yield Gain("far_out", (), far["value"], math.nan, math.nan, "m", before, "mean error", share, why)
+        yield Gain("far_out", (), far["value"], before, share, why=why)
 
 
 def error_left(numbers: Numbers) -> float | None:
@@ -321,13 +316,6 @@ def error_left(numbers: Numbers) -> float | None:
 
 def _known(*values: Any) -> bool:
     return all(value is not None and math.isfinite(value) for value in values)
-
-
-def _data(lost: Recovered) -> Gain:
-    nan = math.nan
-    return Gain(
-        lost.key, (), float(lost.lost), nan, nan, "1", float(lost.of), lost.what, lost.share, lost.why
-    )
 
 
 def error_measured(numbers: Numbers) -> bool:
@@ -378,9 +366,8 @@ def possible_gain(numbers: Numbers) -> Gain | None:
     certain = ("horizontal_error_mean", "calibrated-pose") in numbers
     if not is_possible(gain["value"], before["value"], certain=certain):
         return None
-    low, high = (math.nan if gain[end] is None else float(gain[end]) for end in ("low", "high"))
     value, of = float(gain["value"]), float(before["value"])
-    return Gain("possible", (), value, low, high, "m", of, "mean error", value / of, "")
+    return Gain("possible", (), value, of, value / of)
 
 
 def doubted(numbers: Numbers) -> tuple[str, ...]:

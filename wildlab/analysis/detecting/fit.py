@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.detecting.detect import METHODS, detect_frame
-from wildlab.analysis.detecting.scores import ELLIPSE
+from wildlab.analysis.detecting.scores import ELLIPSE, plain_interval
 from wildlab.detection.contrast import PERMISSIVE, Contrast, Proposals, Shape, choose, fit_shape, propose
 from wildlab.detection.detections import Detections
 from wildlab.detection.floating import FloatingThresholds
@@ -21,7 +21,6 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import Interval, share_interval
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import Frame
-from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask
 
 #: What is tried: where regions come from and end, how far detections are apart, how sure they are at least.
@@ -167,52 +166,6 @@ def _boxes(found: Detections) -> Array:
     return np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
 
 
-class Found(NamedTuple):
-    """Labels that were found: where from the detection they lie, and what is known of the detection.
-
-    Attributes
-    ----------
-    off
-        (N, 2) from the detection to the middle of its label, px.
-    covariance
-        (N, 2, 2) of the detection without any part, px^2.
-    major
-        (N,) its major axis, px.
-    """
-
-    off: Array
-    covariance: Array
-    major: Array
-
-    def inside(self, part: float) -> Mask:
-        """(N,) bool: whether the 90 % ellipses with that part hold the labels."""
-        wider = (part * self.major)[:, None, None] ** 2 * np.eye(2)
-        return inside_ellipse(self.off, self.covariance + wider, ELLIPSE)
-
-
-def parts_needed(found: Found) -> Array:
-    """The part with which each ellipse just reaches its label.
-
-    Parameters
-    ----------
-    found
-        N of them.
-
-    Returns
-    -------
-    (N,) shares of the major axis; 0 where the ellipse is wide enough without.
-    """
-    reach = -2 * np.log(1 - ELLIPSE)
-    powers, directions = np.linalg.eigh(found.covariance)
-    a, b = np.moveaxis(np.einsum("nij,ni->nj", directions, found.off) ** 2 / reach, -1, 0)
-    first, second = np.moveaxis(powers, -1, 0)
-    # Of a / (first + s) + b / (second + s) = 1 the larger s.
-    half = (first + second - a - b) / 2
-    rest = first * second - a * second - b * first
-    s = -half + np.sqrt(np.maximum(half**2 - rest, 0.0))
-    return np.sqrt(np.maximum(s, 0.0)) / found.major
-
-
 def part_of(needed: ArrayLike) -> float:
     """The part that holds the next label with the ellipses' probability.
 
@@ -237,33 +190,39 @@ def part_of(needed: ArrayLike) -> float:
     return float(ordered[at - 1]) if at <= len(ordered) else float("nan")
 
 
-def found_labels(method: str, samples: Sequence[Sample], thresholds: Any) -> Found:
-    """Labels that a method finds, with its ellipses as they are without any part.
+def parts_needed(off: Array, covariance: Array, major: Array) -> Array:
+    """The part with which each ellipse just reaches its label.
 
     Parameters
     ----------
-    method, thresholds
-        Of those that have a part.
-    samples
-        Labelled frames.
+    off
+        (N, 2) from the detection to the middle of its label, px.
+    covariance
+        (N, 2, 2) of the detection without any part, px^2.
+    major
+        (N,) its major axis, px.
 
     Returns
     -------
-    Found
+    (N,) shares of the major axis; 0 where the ellipse is wide enough without.
     """
-    bare = with_part(thresholds, 0.0)
-    parts: list[tuple[Array, Array, Array]] = []
-    for sample in samples:
-        found = detect_frame(sample.frame, method, bare)
-        boxes = np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
-        pairs = match(boxes, sample.boxes, ignore=sample.ignore).pairs
-        if len(pairs):
-            own, label = pairs.T
-            middle = sample.boxes[label, :2] + sample.boxes[label, 2:] / 2
-            parts.append((middle - found.uv[own], found.covariance[own], found.axes[own, 0]))
-    if not parts:
-        return Found(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0))
-    return Found(*(np.concatenate(one) for one in zip(*parts, strict=True)))
+    reach = -2 * np.log(1 - ELLIPSE)
+    powers, directions = np.linalg.eigh(covariance)
+    a, b = np.moveaxis(np.einsum("nij,ni->nj", directions, off) ** 2 / reach, -1, 0)
+    first, second = np.moveaxis(powers, -1, 0)
+    # Of a / (first + s) + b / (second + s) = 1 the larger s.
+    half = (first + second - a - b) / 2
+    rest = first * second - a * second - b * first
+    s = -half + np.sqrt(np.maximum(half**2 - rest, 0.0))
+    return np.sqrt(np.maximum(s, 0.0)) / major
+
+
+def _parts_in(sample: Sample, method: str, thresholds: Any) -> Array:
+    """`parts_needed` of the labels of a frame that are found."""
+    found = detect_frame(sample.frame, method, with_part(thresholds, 0.0))
+    own, label = match(_boxes(found), sample.boxes, ignore=sample.ignore).pairs.T
+    middle = sample.boxes[label, :2] + sample.boxes[label, 2:] / 2
+    return parts_needed(middle - found.uv[own], found.covariance[own], found.axes[own, 0])
 
 
 def part_in(thresholds: Any) -> float | None:
@@ -299,13 +258,10 @@ class PartFit(NamedTuple):
 
     def as_plain(self) -> dict[str, Any]:
         """For a JSON file."""
-        names = ("estimate", "low", "high")
         return {
             "part": round(self.part, 5) if np.isfinite(self.part) else None,
             "labels_found": self.labels,
-            "held_out_coverage_90": None
-            if self.held_out is None
-            else {name: round(value, 4) for name, value in zip(names, self.held_out, strict=True)},
+            "held_out_coverage_90": None if self.held_out is None else plain_interval(self.held_out),
         }
 
 
@@ -329,16 +285,13 @@ def fit_part(
     """
     if part_in(thresholds) is None:
         return None
-    found = [found_labels(method, [one], thresholds) for one in samples]
-    needed = [parts_needed(one) for one in found]
-    groups = [one.group for one in samples]
-    inside: list[Mask] = []
-    for name in dict.fromkeys(groups):
-        part = part_of(np.concatenate([n for n, group in zip(needed, groups, strict=True) if group != name]))
-        if np.isfinite(part):
-            inside += [one.inside(part) for one, group in zip(found, groups, strict=True) if group == name]
-    held = np.concatenate([np.zeros(0, bool), *inside])
+    needed = [_parts_in(one, method, thresholds) for one in samples]
+    groups = np.repeat([one.group for one in samples], [len(one) for one in needed])
     every = np.concatenate(needed)
+    # An ellipse holds its label with the part that it needs, and with any larger one.
+    parts = {name: part_of(every[groups != name]) for name in set(groups.tolist())}
+    limits = np.array([parts[name] for name in groups])
+    held = (every <= limits)[np.isfinite(limits)]
     share = share_interval(int(held.sum()), len(held)) if len(held) else None
     return PartFit(part_of(every), len(every), share)
 
@@ -507,8 +460,7 @@ def fit_thresholds(
     for at, sample in enumerate(samples):
         for row, thresholds in enumerate(sets):
             found = detect_frame(sample.frame, method, thresholds)
-            boxes = np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
-            counts[row, at] = match(boxes, sample.boxes, ignore=sample.ignore).counts
+            counts[row, at] = _count(found, sample)
         if tell:
             tell(at + 1, len(samples))
     held_out = np.zeros((len(samples), 3), np.intp)

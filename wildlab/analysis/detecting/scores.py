@@ -81,8 +81,7 @@ class DetectorScore:
         found: dict[str, Any] = plain_rates(self.rates)
         found |= {"frames": self.frames, "frames_without_labels": self.without_labels}
         if self.ellipse is not None:
-            names = zip(("estimate", "low", "high"), self.ellipse, strict=True)
-            found["ellipse_coverage_90"] = {name: round(value, 4) for name, value in names}
+            found["ellipse_coverage_90"] = plain_interval(self.ellipse)
         return found | {"frames_unusable": self.unusable, "labelled_frames_absent": len(self.absent)}
 
 
@@ -99,11 +98,13 @@ def plain_rates(given: Rates) -> dict[str, Any]:
     dict
     """
     found: dict[str, Any] = {name: getattr(given, name) for name in ("found", "invented", "missed", "groups")}
-    for name in ("precision", "recall", "f1"):
-        value = getattr(given, name)
-        numbers = zip(("estimate", "low", "high"), value, strict=True)
-        found[name] = {key: round(number, 4) if np.isfinite(number) else None for key, number in numbers}
-    return found
+    return found | {name: plain_interval(getattr(given, name)) for name in ("precision", "recall", "f1")}
+
+
+def plain_interval(values: Sequence[float]) -> dict[str, float | None]:
+    """An estimate with its interval for JSON, None in place of NaN."""
+    named = zip(("estimate", "low", "high"), values, strict=True)
+    return {key: round(one, 4) if np.isfinite(one) else None for key, one in named}
 
 
 def rate_words(one: Mapping[str, float | None] | None, sign: str = "") -> str:
@@ -304,14 +305,12 @@ class Compared:
         dict
         """
 
-        def plain(values: Sequence[float]) -> dict[str, float | None]:
-            named = zip(("estimate", "low", "high"), values, strict=True)
-            return {key: round(one, 4) if np.isfinite(one) else None for key, one in named}
-
         found: dict[str, Any] = {"name": self.name, **plain_rates(self.rates)}
-        found["average_precision"] = None if self.curve is None else plain(self.curve.average_precision)
+        found["average_precision"] = (
+            None if self.curve is None else plain_interval(self.curve.average_precision)
+        )
         found["lowest_score"] = self.lowest if np.isfinite(self.lowest) else None
-        return found | {"f1_beyond_ours": plain(self.beyond), "told": list(self.told)}
+        return found | {"f1_beyond_ours": plain_interval(self.beyond), "told": list(self.told)}
 
 
 def named_file(text: str) -> tuple[str, Path]:

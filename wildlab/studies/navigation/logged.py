@@ -12,7 +12,6 @@ from wildlab.analysis.navigate import (
     NavigationErrors,
     Studied,
     calibrated,
-    likelihoods_of_latency,
     summarise,
 )
 from wildlab.analysis.navigation_inputs import Placement, Receiver, heading_from, place_receiver
@@ -35,8 +34,6 @@ from wildlab.studies.page import tile_of
 
 #: So many standard deviations from what is configured are an error: four numbers are looked at.
 FAR = 3.0
-#: Delays of a receiver that are tried, s.
-LATENCIES = np.arange(0.0, 0.41, 0.02)
 _ORDERS = ("white", "and an error of first order", "and an error of second order")
 _PARTS = (
     ("white noise, level", 0),
@@ -147,13 +144,6 @@ def placement_message(found: Placement, configured: ArrayLike) -> Message:
     return Message("placement-wrong", {**values, "settings": " and ".join(write)})
 
 
-def latency_message(flight: Flight) -> Message:
-    """How late the receiver is configured to be, and with which delay the flight's fixes are likeliest."""
-    likeliest = float(LATENCIES[int(np.argmax(likelihoods_of_latency(flight, LATENCIES)))])
-    configured = flight.manifest.gnss.latency_s
-    return Message("latency", {"latency": f"{likeliest:.2f}", "configured": f"{configured:.2f}"})
-
-
 Part = tuple[str, float, float]
 
 
@@ -175,18 +165,16 @@ def receiver_messages(studied: Studied) -> list[Message]:
     """What was found of the receiver's noise, and of when and where its fixes are taken."""
     receiver = studied.receiver
     if receiver is None:
-        return [Message("noise-unknown", {"refusal": studied.refusal}), latency_message(studied.flight)]
+        return [Message("noise-unknown", {"refusal": studied.refusal})]
     values = {"fixes": str(receiver.fixes), "models": str(len(receiver.candidates))}
-    if receiver.noise is None:
-        return [Message("noise-confirmed", values), latency_message(studied.flight)]
-    both = studied.scored["mekf"], studied.scored["mekf-receiver"]
     gnss = studied.flight.manifest.gnss
     placed = place_receiver(studied.flight, receiver.chosen.noise)
-    return [
-        Message("noise-estimated", values),
-        Message(f"attitude-{attitude_change(*both, receiver.begin, receiver.end)}"),
-        placement_message(placed, [gnss.latency_s, *gnss.lever_arm_m]),
-    ]
+    placement = placement_message(placed, [gnss.latency_s, *gnss.lever_arm_m])
+    if receiver.noise is None:
+        return [Message("noise-confirmed", values), placement]
+    both = studied.scored["mekf"], studied.scored["mekf-receiver"]
+    change = attitude_change(*both, receiver.begin, receiver.end)
+    return [Message("noise-estimated", values), Message(f"attitude-{change}"), placement]
 
 
 def observer_limits(flight: Flight) -> list[Message]:
