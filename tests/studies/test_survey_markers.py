@@ -7,11 +7,9 @@ and 17.26 m published for all four.
 import numpy as np
 import pytest
 
-from wildlab.analysis.accuracy import calibrate_flight
 from wildlab.analysis.diagnose import diagnose
 from wildlab.analysis.evaluate import errors_of, recorded_answers, score_points
 from wildlab.analysis.georeference import georeference, heights_left_in, observe
-from wildlab.analysis.pose_noise import evaluate_with_estimated_noise
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.geometry.frames import (
@@ -81,20 +79,6 @@ def test_one_flight_as_plain_tables_is_the_same_flight_as_published(flights):
     assert far.min(axis=1).max() < 0.02
     apart = on_earth["openathena-f1"] - on_earth["openathena"][far.argmin(axis=1)]
     assert np.abs(apart).max() < 0.3
-
-
-def test_estimated_noise_makes_the_ellipses_honest(flights):
-    flight = flights["openathena-f1"]
-    scored = errors(flight)
-    after = evaluate_with_estimated_noise(observe(flight), scored, np.random.default_rng(3))
-    assert 0.82 <= after["inside_90"].mean() <= 0.97
-
-
-def test_calibration_does_not_hurt_images_it_has_not_seen(flights):
-    """The README of the data speaks of constant errors; over random halves little is left to gain."""
-    result = calibrate_flight(flights["openathena-f1"], np.random.default_rng(0), splits=5)
-    assert np.mean(result.mean_errors) < 3.3
-    assert not result.calibration.undetermined
 
 
 def diagnosed(flight, tilt_deg=0.0, down_m=0.0):

@@ -11,13 +11,12 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis import Fact, fact
-from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
+from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, count_images, diagnose
 from wildlab.analysis.evaluate import (
     NearestRule,
     axes_of,
     blocks_of,
     errors_of,
-    fit_flight,
     look_at_nearest_rule,
     score_points,
 )
@@ -32,7 +31,6 @@ from wildlab.analysis.georeference import (
 from wildlab.analysis.pose_noise import (
     as_deviations,
     estimate_noise,
-    evaluate_with_estimated_noise,
     used_deviations,
 )
 from wildlab.analysis.verdict import FEW_POINTS
@@ -67,12 +65,8 @@ from wildlab.flight.calibration_files import (
 )
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.geometry.calibration import BORESIGHT, split_images
 from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion, quaternion_to_matrix
-
-#: How many times the images are halved to see what ellipses from learnt noise are worth.
-HALVINGS = 5
 
 
 @dataclass(frozen=True)
@@ -101,9 +95,8 @@ class Accuracy:
     remaining
         What the errors are made of once the cause is taken off, or as they are where no cause gained anything
         for certain; without what is far out.
-    noise, learnt
-        How noisy the poses were, and the share of the truth that ellipses with noise learnt on the other half
-        of the images hold (mean over five halvings); without what is far out.
+    noise
+        How noisy the poses were; without what is far out.
     nearest, unambiguous
         Where each point is held against the nearest mark: what that may hide, and the diagnosis without
         ambiguous clicks, where enough are left.
@@ -123,7 +116,6 @@ class Accuracy:
     diagnosis: Diagnosis | None
     remaining: Scatter
     noise: PoseNoise | None
-    learnt: float
     nearest: NearestRule | None
     unambiguous: Diagnosis | None
 
@@ -184,7 +176,9 @@ def judge_accuracy(
         left, of = errors_of(diagnosis.scored), diagnosis.scored
     if diagnosis is not None:
         left, of = left[diagnosis.inliers], of[diagnosis.inliers]
-    noise, learnt = _learn_noise(observations, diagnosis, rng)
+    noise = None
+    if diagnosis is not None and count_images(diagnosis.scored, diagnosis.inliers) >= FEWEST_IMAGES:
+        noise = noise_without(observations, diagnosis, rng)
     nearest = look_at_nearest_rule(flight, scored) if flight.manifest.scoring.rule == "nearest" else None
     unambiguous = None
     if nearest is not None and nearest.ambiguous.any():
@@ -206,28 +200,9 @@ def judge_accuracy(
         diagnosis=diagnosis,
         remaining=scatter_by_image(left, of["frame_id"]),
         noise=noise,
-        learnt=learnt,
         nearest=nearest,
         unambiguous=unambiguous,
     )
-
-
-def _learn_noise(
-    observations: Observations, diagnosis: Diagnosis | None, rng: np.random.Generator
-) -> tuple[PoseNoise | None, float]:
-    """Noise of the poses once a constant error is taken off, and how honest ellipses from it are."""
-    if diagnosis is None:
-        return None, float("nan")
-    names = diagnosis.calibration.names
-    known = diagnosis.scored[diagnosis.inliers].reset_index(drop=True)
-    if known["frame_id"].nunique() < FEWEST_IMAGES:
-        return None, float("nan")
-    inside = [
-        evaluate_with_estimated_noise(observations, known, rng, names)["inside_90"].mean()
-        for _ in range(HALVINGS)
-    ]
-    noise = noise_without(observations, diagnosis, rng)
-    return noise, float(np.mean(inside))
 
 
 def noise_without(observations: Observations, diagnosis: Diagnosis, rng: np.random.Generator) -> PoseNoise:
@@ -253,97 +228,6 @@ def noise_without(observations: Observations, diagnosis: Diagnosis, rng: np.rand
         placed = calibrated(observations, diagnosis.calibration)
         known = score_points(placed.flight, georeference(placed.of(known), rng))
     return estimate_noise(placed, known)
-
-
-class Calibrated(NamedTuple):
-    """A calibration from all images, and the errors on images that a calibration has not seen.
-
-    Attributes
-    ----------
-    calibration
-        From all images: what to write into the manifest.
-    scored
-        Every point placed by a calibration from the other half of the images (the first split).
-    mean_errors
-        Mean error of each split, metres.
-    """
-
-    calibration: Calibration
-    scored: pd.DataFrame
-    mean_errors: Array
-
-
-def calibrate_flight(
-    flight: Flight,
-    rng: np.random.Generator,
-    estimate: tuple[str, ...] = BORESIGHT,
-    splits: int = 20,
-) -> Calibrated:
-    """Calibrate on a flight's known points, and judge each half of its images by the other half.
-
-    Draws (images, or minutes of them: see :func:`~wildlab.analysis.evaluate.blocks_of`) are halved at random,
-    ``splits`` times over; a calibration from one half places the points of the other. A clock offset is
-    asked for only where the flight has times.
-
-    Parameters
-    ----------
-    flight
-        With pixel detections, poses and truth.
-    rng
-        Draws the halves, and samples of flat rays.
-    estimate
-        What to estimate: see `wildlab.geometry.calibration.calibrate`.
-    splits
-        How many times the images are halved.
-
-    Returns
-    -------
-    Calibrated
-
-    Raises
-    ------
-    WildlabError
-        Where fewer than four images show a known point.
-    """
-    if flight.manifest.time.kind == "sequence":
-        estimate = tuple(name for name in estimate if name != "clock")
-    observations = observe(flight)
-    plain = score_points(flight, georeference(observations, rng))
-    plain = plain[np.isfinite(plain["error_m"]) & np.isfinite(plain["cov_nn"])]
-    if plain["frame_id"].nunique() < 4:
-        raise WildlabError(
-            "fewer than four images show a known point, too few to calibrate on half of them",
-            "label more detections, or add truth",
-            file=flight.folder,
-            field="detections",
-        )
-    draws = blocks_of(flight, plain)
-    rounds = []
-    for _ in range(splits):
-        half = split_images(draws, rng)
-        parts = [
-            _evaluate_unseen(
-                observations,
-                fit_flight(observations, plain[seen], estimate),
-                plain[~seen],
-                rng,
-            )
-            for seen in (half, ~half)
-        ]
-        rounds.append(pd.concat(parts, ignore_index=True))
-    return Calibrated(
-        fit_flight(observations, plain, estimate),
-        rounds[0],
-        np.array([r["error_m"].mean() for r in rounds]),
-    )
-
-
-def _evaluate_unseen(
-    observations: Observations, calibration: Calibration, unseen: pd.DataFrame, rng: np.random.Generator
-) -> pd.DataFrame:
-    """Errors of the unseen points with a calibration applied."""
-    placed = calibrated(observations.of(unseen), calibration)
-    return score_points(placed.flight, georeference(placed, rng, pose_errors(placed)))
 
 
 class Repeats(NamedTuple):

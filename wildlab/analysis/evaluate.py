@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.georeference import Observations, covariances_of, shifting_poses, truth_of
+from wildlab.analysis.georeference import Observations, covariances_of, truth_of
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import time_blocks
 from wildlab.evaluation.outliers import ambiguous, largest_visible
 from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_euler, wrap
 from wildlab.geometry.robust import student_scale
@@ -198,26 +197,6 @@ def known_points(observations: Observations, scored: pd.DataFrame) -> tuple[Obse
     names = scored.set_index("detection_id").loc[chosen.table["detection_id"], "truth_id"].to_numpy()
     where = truth_of(chosen.flight, chosen.table.assign(target_id=names))
     return chosen, np.column_stack([where[:, :2], chosen.plane_down])
-
-
-def fit_flight(
-    observations: Observations,
-    scored: pd.DataFrame,
-    estimate: tuple[str, ...] = BORESIGHT,
-) -> Calibration:
-    """Calibrate on the points of a scored table, weighted with their ground covariances."""
-    observations, known = known_points(observations, scored)
-    ids = observations.table["detection_id"]
-    weights = covariances_of(scored.set_index("detection_id").loc[ids].reset_index())
-    return calibrate(
-        shifting_poses(observations),
-        observations.uv,
-        known,
-        observations.table["frame_id"].to_numpy(),
-        estimate,
-        weights,
-        blocks_of(observations.flight, observations.table),
-    )
 
 
 #: A camera or a track slower than this has no direction (m/s), and a view nearer to straight down than this

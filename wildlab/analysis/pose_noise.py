@@ -6,13 +6,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab.analysis.evaluate import blocks_of, errors_of, fit_flight, known_points, score_points
+from wildlab.analysis.evaluate import errors_of, known_points
 from wildlab.analysis.georeference import (
     Observations,
     assumed_deviations,
-    calibrated,
-    georeference,
-    pose_errors,
 )
 from wildlab.analysis.navigate import AXES, PLACES, NavigationErrors, errors_against
 from wildlab.analysis.navigation_inputs import VELOCITY
@@ -24,7 +21,6 @@ from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import level_axes, tilt_and_heading
-from wildlab.geometry.calibration import split_images
 from wildlab.geometry.frames import Array, Indices, matrix_to_euler, wrap
 from wildlab.geometry.uncertainty import ground_jacobians
 
@@ -311,39 +307,3 @@ def as_deviations(noise: PoseNoise | WanderNoise) -> dict[str, float]:
         "heading_deg": float(np.degrees(noise.sd["heading"])),
         "pixel_px": noise.sd["pixel"],
     }
-
-
-def evaluate_with_estimated_noise(
-    observations: Observations,
-    scored: pd.DataFrame,
-    rng: np.random.Generator,
-    names: tuple[str, ...] = (),
-) -> pd.DataFrame:
-    """Points scored again with ellipses from pose noise estimated on the other half of the images.
-
-    Parameters
-    ----------
-    observations, scored
-        As for `estimate_noise`.
-    rng
-        Draws the halves, of whole blocks in time order.
-    names
-        Parameters that are taken off first: estimated on the other half, too.
-
-    Returns
-    -------
-    DataFrame
-        As from `score_points`.
-    """
-    flight = observations.flight
-    half = split_images(blocks_of(flight, scored), rng)
-    parts = []
-    for seen in (half, ~half):
-        placed = observations
-        if names:
-            placed = calibrated(observations, fit_flight(observations, scored[seen], names))
-        learnt = score_points(flight, georeference(placed.of(scored[seen]), rng))
-        deviations = as_deviations(estimate_noise(placed, learnt))
-        unseen = placed.of(scored[~seen])
-        parts.append(score_points(flight, georeference(unseen, rng, pose_errors(unseen, deviations))))
-    return pd.concat(parts, ignore_index=True)

@@ -114,8 +114,6 @@ def record_accuracy(
         report.metric("gain", "without-far-out", whole.mean - kept.mean, "m", n=kept.n)
         out = int((~diagnosis.inliers).sum())
         report.metric("points_far_out", "winner", out, "1", n=len(diagnosis.inliers))
-    if np.isfinite(found.learnt):
-        report.metric("ellipse_coverage_90", "logged-pose/estimated-noise", found.learnt, "1")
     others = {}
     for program, table in answers.items():
         subject = "recorded-answers" if len(answers) == 1 else f"recorded-answers/{program}"
