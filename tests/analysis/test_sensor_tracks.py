@@ -11,9 +11,9 @@ from tests.refused import refused
 from wildlab.analysis.tracks.initiation import start_near
 from wildlab.analysis.tracks.noise_model import SensorTuning, from_tuning
 from wildlab.analysis.tracks.scans import errors_near, scans_of, sensors_of, truths_at
-from wildlab.analysis.tracks.scores import follow_flight, table
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.studies.autoferry import BOATS, tune_sensor
+from wildlab.studies.autoferry.comparison import follow_flight, tracks_table
 
 EXACT = {"kind": "position", "range_sd": 0.0, "bearing_sd_deg": 0.0, "position_sd": 0.0}
 
@@ -102,7 +102,7 @@ def test_a_track_does_not_start_on_another_target():
     assert start is not None
     np.testing.assert_allclose(start.x[:2], other.position[0], atol=0.5)
     np.testing.assert_allclose(start.P[:2, :2], np.eye(2) * BOATS.reach_m**2)
-    rows = table(follow_flight(flight, {"radar": tuning}, BOATS)).set_index("target").loc["another"]
+    rows = tracks_table(follow_flight(flight, {"radar": tuning}, BOATS)).set_index("target").loc["another"]
     assert (rows["share_followed"] == 0).all()
     assert rows["rmse"].isna().all()
 
@@ -128,7 +128,7 @@ def test_a_track_is_with_its_target_where_it_is_near_it_while_that_is_seen():
         near,
         np.tile(np.eye(4), (n, 1, 1)),
     )
-    (row,) = table([one], BOATS.size_m).to_dict(orient="records")
-    assert (row["seen"], row["share_with_target"]) == (30, pytest.approx(1 / 3))
-    unseen = table([one._replace(near=np.zeros(n, bool))], BOATS.size_m).iloc[0]
-    assert unseen["seen"] == 0 and np.isnan(unseen["share_with_target"])
+    (row,) = tracks_table([one], BOATS.size_m).to_dict(orient="records")
+    assert row["share_with_target"] == pytest.approx(1 / 3)
+    unseen = tracks_table([one._replace(near=np.zeros(n, bool))], BOATS.size_m).iloc[0]
+    assert np.isnan(unseen["share_with_target"])

@@ -331,7 +331,7 @@ def test_sensors_of_a_ferry_judged_on_one_scenario(reports, tmp_path, shared_dat
     folder = run("autoferry", reports, flight=flight)
     found = values(folder)
     names = {name for name, subject in found if subject == "radar/havfruen/scenario-17/coloured"}
-    assert {"rmse", "anees", "anis", "lag1_autocorrelation_north", "fraction_nees_inside"} <= names
+    assert {"rmse", "anees", "anis", "lag1_autocorrelation", "fraction_nees_inside"} <= names
     assert ("lag1_autocorrelation", "eo/jet-boat/scenario-17/ekf") in found
     counts = [
         one

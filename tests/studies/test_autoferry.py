@@ -8,10 +8,17 @@ import pandas as pd
 import pytest
 
 from wildlab.analysis.tracks.noise_model import SensorTuning
-from wildlab.analysis.tracks.scores import FILTERS, follow_flight, table
 from wildlab.flight.store import Flight
 from wildlab.studies.autoferry import BOATS
-from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes
+from wildlab.studies.autoferry.comparison import (
+    FILTERS,
+    OUTCOMES,
+    choose_filter,
+    follow_flight,
+    of_use,
+    outcomes,
+    tracks_table,
+)
 
 pytestmark = pytest.mark.slow
 SCENARIOS = (2, 3, 13)
@@ -21,7 +28,7 @@ SCENARIOS = (2, 3, 13)
 def tracks(scenario: Callable[[int], Flight], tunings: dict[str, SensorTuning]) -> pd.DataFrame:
     return pd.concat(
         [
-            table(follow_flight(scenario(number), tunings, BOATS), BOATS.size_m).assign(case=number)
+            tracks_table(follow_flight(scenario(number), tunings, BOATS), BOATS.size_m).assign(case=number)
             for number in SCENARIOS
         ]
     )

@@ -7,13 +7,12 @@ import pandas as pd
 import pytest
 
 from wildlab.analysis.tracks.noise_model import SensorTuning
-from wildlab.analysis.tracks.scores import COMPARED, table
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies import autoferry
-from wildlab.studies.autoferry.comparison import KEYS, Held, of_use, outcomes
+from wildlab.studies.autoferry.comparison import COMPARED, KEYS, Held, of_use, outcomes, tracks_table
 
 NAMES = load_texts("autoferry").subjects
 
@@ -34,7 +33,7 @@ def track(sensor: str, target: str, name: str, error: float, nees: float, seed: 
     known = np.ones(n, bool)
     return SensorTrack(
         sensor, target, name, np.arange(n) * 0.5, estimate, errors, values, innovation, nis, known, known,
-        np.tile(np.eye(4), (n, 1, 1)),
+        np.tile(np.eye(4), (n, 1, 1)), np.tile(np.eye(m), (n, 1, 1)),
     )  # fmt: skip
 
 
@@ -53,7 +52,7 @@ def followed() -> list[SensorTrack]:
 
 @pytest.fixture
 def tracks(followed: list[SensorTrack]) -> pd.DataFrame:
-    return table(followed, 15.0).assign(case="scenario-3")
+    return tracks_table(followed, 15.0).assign(case="scenario-3")
 
 
 @pytest.fixture
@@ -70,11 +69,7 @@ def test_every_track_has_the_numbers_of_its_kind(report, tracks):
     found = recorded(report)
     lidar = {name for name, subject in found if subject == "lidar/a/scenario-3/kf"}
     camera = {name for name, subject in found if subject == "eo/a/scenario-3/ekf"}
-    assert lidar == {*COMPARED, "detections_used"} - {"lag1_autocorrelation"}
-    assert camera == {*COMPARED, "detections_used"} - {
-        "lag1_autocorrelation_north",
-        "lag1_autocorrelation_east",
-    }
+    assert lidar == camera == {*COMPARED, "detections_used"}
     assert found["rmse", "lidar/a/scenario-3/kf"] == pytest.approx(4.0)
     report.save()
 
@@ -103,11 +98,10 @@ def made(sensor: str, outcome: list[str], *, fixed: str = "schmidt", rmse: float
                 {
                     "sensor": sensor, "target": f"boat-{k}", "case": "scenario-3", "filter": name,
                     "kind": "bearing" if bearing else "position", "anees": anees, "nees_low": 1.0,
-                    "nees_high": 3.0, "anis": 1.0, "nis_low": 1.5, "nis_high": 2.5, "seen": 40,
+                    "nees_high": 3.0, "anis": 1.0, "nis_low": 1.5, "nis_high": 2.5,
                     "share_with_target": share, "compared": 50, "detections": 40, "fraction_nees_inside": 0.5,
                     "rmse": rmse * (2.0 if what == "too dear" and name == fixed else 1.0),
-                    "lag1_autocorrelation_north": 0.1, "lag1_autocorrelation_east": 0.1,
-                    "lag1_autocorrelation": np.nan,
+                    "lag1_autocorrelation": 0.1,
                 }
             )  # fmt: skip
     return pd.DataFrame(rows)

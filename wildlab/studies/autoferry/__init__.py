@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from wildlab.analysis.tracks.noise_model import SensorTuning, of_targets
 from wildlab.analysis.tracks.scans import sensors_of
-from wildlab.analysis.tracks.scores import COMPARED, FILTERS, table
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.analysis.tracks.tuning import tune
 from wildlab.evaluation.consistency import chi_square_interval, innovation_whiteness
@@ -33,7 +32,17 @@ from wildlab.reporting.figures import (
     new_figure,
 )
 from wildlab.reporting.report import Report
-from wildlab.studies.autoferry.comparison import IDEAL, KEYS, OUTCOMES, Held, consistent, stays
+from wildlab.studies.autoferry import comparison
+from wildlab.studies.autoferry.comparison import (
+    COMPARED,
+    FILTERS,
+    IDEAL,
+    KEYS,
+    OUTCOMES,
+    Held,
+    consistent,
+    stays,
+)
 from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Study
 
@@ -58,8 +67,8 @@ def tune_sensors(flight: Flight) -> dict[str, SensorTuning]:
 
 
 def tracks_table(followed: Mapping[str, Sequence[SensorTrack]]) -> pd.DataFrame:
-    """A row for each track, with its ``case``: `wildlab.analysis.tracks.scores.table` of all."""
-    each = [table(ones, BOATS.size_m).assign(case=case) for case, ones in followed.items()]
+    """A row for each track, with its ``case``: `wildlab.studies.autoferry.comparison.tracks_table` of all."""
+    each = [comparison.tracks_table(ones, BOATS.size_m).assign(case=case) for case, ones in followed.items()]
     return pd.concat(each, ignore_index=True)
 
 
@@ -74,14 +83,9 @@ def record_tracks(report: Report, tracks: pd.DataFrame) -> None:
     """Record every number of every track, under ``sensor/target/case/filter``."""
     for _, row in tracks.iterrows():
         subject = "/".join([*(str(row[key]) for key in KEYS), str(row["filter"])])
-        of_other_kind = {
-            "position": {"lag1_autocorrelation"},
-            "bearing": {"lag1_autocorrelation_north", "lag1_autocorrelation_east"},
-        }[row["kind"]]
         for name, unit in COMPARED.items():
-            if name not in of_other_kind:
-                of = "detections" if name.startswith(("anis", "lag1")) else "compared"
-                report.metric(name, subject, row[name], unit, n=int(row[of]))
+            of = "detections" if name.startswith(("anis", "lag1")) else "compared"
+            report.metric(name, subject, row[name], unit, n=int(row[of]))
         report.metric("detections_used", subject, int(row["detections"]), "1")
 
 

@@ -7,14 +7,20 @@ mean NEES in the band of a consistent filter that the white one's is outside of.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.tracks.scores import FILTERS, WHITE
+from wildlab.analysis.tracks.inputs import SensorInputs
+from wildlab.analysis.tracks.noise_model import SensorTuning, TargetModel, from_tuning
+from wildlab.analysis.tracks.scans import scans_of, truths_at
+from wildlab.analysis.tracks.scores import score_track, seen_of
+from wildlab.analysis.tracks.single_target import SensorTrack, track_target
+from wildlab.evaluation.consistency import position_nees
+from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 
 #: Degrees of freedom of the NEES of a position, and so what its mean should be.
@@ -24,14 +30,59 @@ PRICE = 1.1
 #: A track stays with its boat ("mostly tracked", as multi-target trackers are judged) where it is near it in
 #: at least this share of the scans in which the sensor saw something there; else it is lost.
 MOSTLY = 0.8
-WHITES = tuple(WHITE.values())
+#: The filters that are held against each other, by kind of detection, first the one with white noise.
+FILTERS = {
+    "position": ("kf", "coloured", "schmidt", "thinned"),
+    "bearing": ("ekf", "schmidt", "thinned"),
+}
+WHITES = tuple(names[0] for names in FILTERS.values())
+#: Columns of `tracks_table`, as they are recorded, with their units.
+COMPARED = {
+    "rmse": "m", "mae": "m", "anees": "1", "anees_alone": "1", "anis": "1", "lag1_autocorrelation": "1",
+    "fraction_nees_inside": "1", "share_followed": "1", "share_with_target": "1",
+}  # fmt: skip
+_NAMES = {"nees": "anees", "nis": "anis", "lag1": "lag1_autocorrelation", "inside": "fraction_nees_inside",
+          "followed": "share_followed"}  # fmt: skip
 #: What became of a track with a filter, beside the white one's: it enters its band at the price allowed, or
 #: at a higher one; both are in; neither is; it leaves it; or the track is lost.
 OUTCOMES = ("gained", "too dear", "both inside", "neither inside", "spoilt", "lost")
 _COUNTED = ("gained", "spoilt", "lost")
 #: What names one track.
 KEYS = ["sensor", "target", "case"]
-_LAG1 = ["lag1_autocorrelation_north", "lag1_autocorrelation_east", "lag1_autocorrelation"]
+
+
+def follow_flight(
+    flight: Flight, tunings: Mapping[str, SensorTuning], targets: TargetModel
+) -> list[SensorTrack]:
+    """Every target with truth, by every sensor that has a tuning, with each of `FILTERS`."""
+    found = []
+    for sensor, tuning in tunings.items():
+        scans = scans_of(flight, sensor, tuning.offset_s)
+        one = SensorInputs(scans, from_tuning(tuning), truths_at(flight, scans.times))
+        for truth in one.truths:
+            found += track_target({sensor: one}, truth.target, targets, FILTERS[scans.kind])
+    return found
+
+
+def tracks_table(followed: Sequence[SensorTrack], size_m: float = np.nan) -> pd.DataFrame:
+    """`wildlab.analysis.tracks.scores.judged`, with the names of `COMPARED`.
+
+    ``anees_alone`` takes the truth for exact; ``share_with_target`` is the share of the scans in which the
+    sensor saw something near the boat in which the track is nearer to it than ``size_m``.
+    """
+    rows = []
+    for one in followed:
+        kind, seen = "bearing" if one.innovation.shape[1] == 1 else "position", seen_of(one)
+        alone = position_nees(one.error[seen, :2], one.covariance[seen, :2, :2])
+        there = np.hypot(*one.error[:, :2].T) < size_m  # NaN, where there is no track, is not there
+        rows.append(
+            score_track(one, kind)
+            | {
+                "anees_alone": alone[np.isfinite(alone)].mean() if np.isfinite(alone).any() else np.nan,
+                "share_with_target": there[one.near].mean() if one.near.any() and size_m > 0 else np.nan,
+            }
+        )
+    return pd.DataFrame(rows).rename(columns=_NAMES)
 
 
 def off_ideal(anees: ArrayLike) -> Array:
@@ -40,7 +91,7 @@ def off_ideal(anees: ArrayLike) -> Array:
 
 
 def stays(table: pd.DataFrame, mostly: float = MOSTLY) -> NDArray[np.bool_]:
-    """Which tracks stay with their boat, by the rows of `sensor_tracks.table`; see `MOSTLY`.
+    """Which tracks stay with their boat, by the rows of `tracks_table`; see `MOSTLY`.
 
     One that never began, or whose boat the sensor never saw, does not.
     """
@@ -61,7 +112,7 @@ def beside_white(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     Parameters
     ----------
     table
-        Rows of `wildlab.studies.autoferry.table`, of one flight or many.
+        Rows of `tracks_table`, of one flight or many.
     keys
         Columns that name a case: what was followed, by what, when.
 
@@ -86,7 +137,7 @@ def outcomes(table: pd.DataFrame, keys: Sequence[str], fixed: str) -> pd.DataFra
     Parameters
     ----------
     table
-        Rows of `wildlab.studies.autoferry.table`.
+        Rows of `tracks_table`.
     keys
         Columns that name a case.
     fixed
@@ -159,7 +210,7 @@ def choose_filter(table: pd.DataFrame, keys: Sequence[str]) -> str:
     Parameters
     ----------
     table
-        Rows of `wildlab.studies.autoferry.table` of that flight.
+        Rows of `tracks_table` of that flight.
     keys
         Columns that name a case.
     """
@@ -207,20 +258,15 @@ def check_claims(table: pd.DataFrame, keys: Sequence[str]) -> dict[str, NDArray[
     both = beside_white(table, keys)
     differenced, considered = both[both["filter"] == "coloured"], both[both["filter"] == "schmidt"]
     white = table[table["filter"].isin(WHITES) & np.isfinite(table["anees"])]
-    correlated = differenced.dropna(subset=_LAG1[:2])
     checks = {
         "white-noise-overconfident": white["anees"] > white["nees_high"],
         "white-noise-nis-within": (white["anis"] >= white["nis_low"]) & (white["anis"] <= white["nis_high"]),
         "white-noise-nis-low": white["anis"] < white["nis_low"],
-        "differencing-whitens": _largest(correlated, "") < _largest(correlated, "_white"),
+        "differencing-whitens": abs(differenced["lag1_autocorrelation"])
+        < abs(differenced["lag1_autocorrelation_white"]),
         "differencing-nearer-ideal": differenced["nearer"],
         "differencing-costs-accuracy": differenced["rmse_ratio"] > 1,
         "schmidt-nearer-ideal": considered["nearer"],
         "schmidt-as-accurate": considered["rmse_ratio"] <= 1,
     }
     return {claim: np.asarray(true, bool) for claim, true in checks.items()}
-
-
-def _largest(both: pd.DataFrame, suffix: str) -> Array:
-    """Largest magnitude of the autocorrelation of the innovations at lag one over their elements."""
-    return np.asarray(both[[name + suffix for name in _LAG1]].abs().max(axis=1), float)
