@@ -13,7 +13,6 @@ from wildlab.analysis.evaluate import (
     errors_of,
     on_one_heading,
     recorded_answers,
-    unlabelled_programs,
 )
 from wildlab.analysis.georeference import observe, pose_errors
 from wildlab.analysis.pose_noise import estimate_noise
@@ -70,8 +69,8 @@ def test_recorded_answers_are_judged_by_the_same_rule_where_they_name_targets(ma
     theirs[["north_m", "east_m", "down_m"]] = place
     nameless = theirs.assign(source="Other 1.2", target_id="")
     flight.tables["detections"] = pd.concat([table, theirs, nameless], ignore_index=True)
-    answers = recorded_answers(flight)
-    assert list(answers) == ["other"] and unlabelled_programs(flight) == ["Other 1.2"]
+    answers, unlabelled = recorded_answers(flight)
+    assert list(answers) == ["other"] and unlabelled == ["Other 1.2"]
     assert np.allclose(errors_of(answers["other"]), [3.0, -4.0])
     assert len(score(flight)) == 160
 

@@ -9,9 +9,9 @@ import pandas as pd
 from scipy.ndimage import gaussian_filter
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
-from tests.analysis.conftest import changed, score
+from tests.analysis.conftest import score
 from wildlab.analysis.evaluate import errors_of
-from wildlab.analysis.georeference import georeference, heights_left_in, observe
+from wildlab.analysis.georeference import georeference, observe
 from wildlab.analysis.ground import on_level, shift_from_level
 from wildlab.analysis.tracks.sighting import sighting
 from wildlab.evaluation.errors import summarise
@@ -135,23 +135,6 @@ def test_a_ray_without_ground_is_no_sighting():
     whole = {f for f in set(frames) if lost[frames == f].all()}
     rows = flight.table("frames")["frame_id"].isin(whole).to_numpy()
     assert np.isnan(found.uv[rows]).all() and np.isnan(found.positions[rows]).all()
-
-
-def test_heights_left_in_raise_terrain_that_counts_alike():
-    record = {
-        "source": "dem.tif", "sha256": "0" * 64, "crs": "EPSG:4326", "added_m": 0.0, "unit": "m",
-        "cell_m": [6.0, 6.0], "step_m": 6.0, "rows": 150, "columns": 150, "holes": 0, "error_rms_m": 0.0,
-        "error_max_m": 0.0,
-    }  # fmt: skip
-    moved = {}
-    for heights in ("flight", "ellipsoid"):
-        vertical = {"reference": "x", "correction_m": 20.0}
-        flight = changed(flown(), {"terrain": record | {"heights": heights}, "vertical": vertical})
-        seen = observe(flight)
-        raised = heights_left_in(seen)
-        before, after = (georeference(o, np.random.default_rng(0)) for o in (seen, raised))
-        moved[heights] = np.nanmedian(np.abs(after["north_m"] - before["north_m"]))
-    assert moved["flight"] < 1e-3 < 1.0 < moved["ellipsoid"]
 
 
 def test_a_check_holds_the_survey_against_the_map():

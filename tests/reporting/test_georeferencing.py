@@ -160,7 +160,7 @@ def limits_with(offset=0.0, kind="logged", truth=EXACT, certain=False, halves=Fa
         diagnosis=SimpleNamespace(
             counts=certain, winner=winner, inseparable=(), extended=False, misfit=False
         ),
-        nearest=None,
+        visible_m=np.nan,
         lost=lost, scored=range(100), halves=SimpleNamespace(disagree=halves),
     )  # fmt: skip
     return {one.key: dict(one.values) for one in georeferencing.limits(flight, found, truth, [], None)}

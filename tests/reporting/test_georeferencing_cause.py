@@ -229,7 +229,7 @@ def test_the_parts_of_a_flight_come_to_the_same_verdict(gain, half):
 
 def found_with(points=50, lost=0, winner=NOTHING, **more):
     summary = summarise(np.tile([3.0, 4.0], (points, 1)))
-    given = {"diagnosis": diagnosis(winner), "unambiguous": None, **more}
+    given = {"diagnosis": diagnosis(winner), **more}
     return SimpleNamespace(summary=summary, lost=lost, scored=range(points + lost), **given)
 
 
@@ -259,7 +259,6 @@ ADVICE = [
     ({"winner": LITTLE}, {}, []),
     ({"diagnosis": diagnosis(MOST, RIVAL, rivals=(RIVAL,))}, {}, ["advice-vary"]),
     ({"diagnosis": diagnosis(MOST, outliers=(FAR,))}, {}, ["advice-outlier", "advice-calibrate"]),
-    ({"winner": MOST, "unambiguous": diagnosis(NOTHING)}, {}, ["advice-record-marks"]),
     ({"diagnosis": None}, {}, ["advice-more-points"]),
     ({"lost": 13}, {"problems": 1}, ["advice-contradictions", "advice-lost"]),
 ]

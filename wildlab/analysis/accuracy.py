@@ -13,12 +13,11 @@ import pandas as pd
 from wildlab.analysis import Fact, fact
 from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, count_images, diagnose
 from wildlab.analysis.evaluate import (
-    NearestRule,
     axes_of,
     blocks_of,
     errors_of,
-    look_at_nearest_rule,
     score_points,
+    visible_error,
 )
 from wildlab.analysis.georeference import (
     Observations,
@@ -97,9 +96,8 @@ class Accuracy:
         for certain; without what is far out.
     noise
         How noisy the poses were; without what is far out.
-    nearest, unambiguous
-        Where each point is held against the nearest mark: what that may hide, and the diagnosis without
-        ambiguous clicks, where enough are left.
+    visible_m
+        Where each point is held against the nearest mark: larger errors go to another one; else NaN.
     """
 
     observations: Observations
@@ -116,8 +114,7 @@ class Accuracy:
     diagnosis: Diagnosis | None
     remaining: Scatter
     noise: PoseNoise | None
-    nearest: NearestRule | None
-    unambiguous: Diagnosis | None
+    visible_m: float
 
     @property
     def errors(self) -> Array:
@@ -179,12 +176,7 @@ def judge_accuracy(
     noise = None
     if diagnosis is not None and count_images(diagnosis.scored, diagnosis.inliers) >= FEWEST_IMAGES:
         noise = noise_without(observations, diagnosis, rng)
-    nearest = look_at_nearest_rule(flight, scored) if flight.manifest.scoring.rule == "nearest" else None
-    unambiguous = None
-    if nearest is not None and nearest.ambiguous.any():
-        clear = scored[~nearest.ambiguous & located]
-        if clear["frame_id"].nunique() >= FEWEST_IMAGES:
-            unambiguous = diagnose(observations, clear)
+    by_nearest = flight.manifest.scoring.rule == "nearest"
     return Accuracy(
         observations=observations,
         points=points,
@@ -200,8 +192,7 @@ def judge_accuracy(
         diagnosis=diagnosis,
         remaining=scatter_by_image(left, of["frame_id"]),
         noise=noise,
-        nearest=nearest,
-        unambiguous=unambiguous,
+        visible_m=visible_error(flight, scored) if by_nearest else np.nan,
     )
 
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import pandas as pd
 
 from wildlab.analysis.georeference import Observations, covariances_of, truth_of
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import time_blocks
-from wildlab.evaluation.outliers import ambiguous, largest_visible
+from wildlab.evaluation.outliers import largest_visible
 from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import inside_ellipse
-from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_euler, wrap
-from wildlab.geometry.robust import student_scale
+from wildlab.geometry.frames import Array, Indices, matrix_to_euler, wrap
 
 
 def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
@@ -105,11 +102,8 @@ def errors_of(scored: pd.DataFrame) -> Array:
     return scored[["error_north_m", "error_east_m"]].to_numpy(float)
 
 
-def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
-    """Positions that other programs gave for the same detections, scored like ours, by program.
-
-    A program whose answers name no target, where targets have to be named, is left out: see
-    `unlabelled_programs`.
+def recorded_answers(flight: Flight) -> tuple[dict[str, pd.DataFrame], list[str]]:
+    """Positions that other programs gave for the same detections, scored like ours.
 
     Parameters
     ----------
@@ -118,53 +112,24 @@ def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
 
     Returns
     -------
-    dict
-        Scored tables by program.
+    answers, unlabelled
+        Scored tables by program; and the programs that name no target with a truth where they have to.
     """
-    detections = flight.table("detections")
-    frames = flight.table("frames")
-    answers = {}
-    left_out = unlabelled_programs(flight)
+    detections, frames = flight.table("detections"), flight.table("frames")
+    answers, unlabelled = dict[str, pd.DataFrame](), list[str]()
     for program, rows in detections[detections["kind"] == "position"].groupby("source", sort=False):
-        if program in left_out:
+        names = rows["target_id"].fillna("") if "target_id" in rows else pd.Series("", rows.index)
+        known = names.isin(set(flight.table("truth")["target_id"]))
+        if flight.manifest.scoring.rule == "labelled" and not known.any():
+            unlabelled.append(str(program))
             continue
         at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(rows["frame_id"]))
-        points = pd.DataFrame(
-            {
-                "detection_id": rows["detection_id"].to_numpy(),
-                "frame_id": rows["frame_id"].to_numpy(),
-                "target_id": rows["target_id"].fillna("").to_numpy() if "target_id" in rows else "",
-                "time_s": frames["time_s"].to_numpy(float)[at],
-                "north_m": rows["north_m"].to_numpy(float),
-                "east_m": rows["east_m"].to_numpy(float),
-                "cov_nn": np.nan,
-                "cov_ne": np.nan,
-                "cov_ee": np.nan,
-            }
-        )
-        answers[str(program)] = score_points(flight, points)
-    return answers
-
-
-def unlabelled_programs(flight: Flight) -> list[str]:
-    """Programs whose positions cannot be scored, since none of them names a target that has a truth.
-
-    Parameters
-    ----------
-    flight
-        With detections.
-
-    Returns
-    -------
-    list of str
-    """
-    positions = flight.table("detections")
-    positions = positions[positions["kind"] == "position"]
-    if flight.manifest.scoring.rule != "labelled" or flight.truth is None:
-        return []
-    names = positions["target_id"] if "target_id" in positions else pd.Series("", positions.index)
-    known = names.isin(set(flight.truth["target_id"])).groupby(positions["source"], sort=False).any()
-    return [str(program) for program, some in known.items() if not some]
+        points = rows[["detection_id", "frame_id", "north_m", "east_m"]].assign(
+            target_id=names, time_s=frames["time_s"].to_numpy(float)[at],
+            cov_nn=np.nan, cov_ne=np.nan, cov_ee=np.nan,
+        )  # fmt: skip
+        answers[str(program)] = score_points(flight, points.reset_index(drop=True))
+    return answers, unlabelled
 
 
 def blocks_of(flight: Flight, table: pd.DataFrame) -> Indices:
@@ -279,51 +244,17 @@ def on_one_heading(observations: Observations) -> bool:
     return bool(len(yaw)) and bool(np.abs(wrap(yaw - mean)).max() <= ONE_HEADING)
 
 
-class NearestRule(NamedTuple):
-    """What the rule of the nearest mark may hide.
-
-    Attributes
-    ----------
-    ambiguous
-        (N,) bool, clicks that may as well be of another mark.
-    visible_m
-        Errors beyond this go to another mark: half the median spacing of the marks.
-    sd_m
-        Standard deviation of an error along either axis that this was judged with.
-    """
-
-    ambiguous: Mask
-    visible_m: float
-    sd_m: float
-
-
-def look_at_nearest_rule(flight: Flight, scored: pd.DataFrame) -> NearestRule:
-    """Which clicks of a scored table the nearest mark may have got wrong.
-
-    The size of an error is that of the distances to the nearest mark or that of the ellipses, whichever is
-    larger: the rule itself makes the former small.
+def visible_error(flight: Flight, scored: pd.DataFrame) -> float:
+    """Half the median spacing of the marks, m: larger errors go to another one, where the nearest counts.
 
     Parameters
     ----------
     flight
         With truth.
     scored
-        From `score_points`, N rows.
-
-    Returns
-    -------
-    NearestRule
+        From `score_points`.
     """
-    xy = scored[["north_m", "east_m"]].to_numpy(float)
     offset = flight.manifest.clocks.truth_offset_s
     _, places = truth_at(flight.table("truth"), scored["time_s"].to_numpy(float), offset_s=offset)
-    distance = np.sort(np.nan_to_num(np.linalg.norm(places[:, :, :2] - xy, axis=2), nan=np.inf), axis=0)
-    second = distance[1] if len(distance) > 1 else np.full(len(xy), np.inf)
-    P = covariances_of(scored)
-    stated = np.sqrt(np.nanmedian(np.trace(P, axis1=1, axis2=2)) / 2) if np.isfinite(P).any() else 0.0
-    found = student_scale((errors_of(scored) ** 2).sum(axis=1))
-    sd = float(np.nanmax([found, stated]))
     spots = np.nanmedian(places[:, :, :2], axis=1)
-    return NearestRule(
-        ambiguous(distance[0], second, sd), largest_visible(spots[np.isfinite(spots).all(axis=1)]), sd
-    )
+    return largest_visible(spots[np.isfinite(spots).all(axis=1)])

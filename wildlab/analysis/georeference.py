@@ -193,28 +193,6 @@ def shifting_poses(observations: Observations) -> PosesAt:
     return at
 
 
-def heights_left_in(observations: Observations) -> Observations:
-    """The observations as they would be had the vertical correction not been taken off on import.
-
-    The ground of a labelled target comes from its survey and stays; any other came from the same source as
-    the heights of the aircraft, and rises with them. So does terrain whose heights count from what the
-    flight's do; any other stays.
-    """
-    flight = observations.flight
-    raised = flight.manifest.vertical.correction_m
-    poses = observations.poses
-    poses = replace(poses, p_nb=poses.p_nb - np.array([0.0, 0.0, raised]))
-    terrain, record = observations.terrain, flight.manifest.terrain
-    if terrain is not None:
-        if record is not None and record.heights == "flight":
-            terrain = replace(terrain, height=terrain.height + np.float32(raised))
-        return _grounded(replace(observations, poses=poses, terrain=terrain))
-    surveyed = np.isfinite(truth_of(flight, observations.table)[:, 2])
-    return replace(
-        observations, poses=poses, plane_down=observations.plane_down - np.where(surveyed, 0.0, raised)
-    )
-
-
 def calibrated(observations: Observations, calibration: Calibration) -> Observations:
     """The observations with an estimated calibration applied to mount, camera, pose and times."""
     poses = calibrated_poses(calibration, shifting_poses(observations))

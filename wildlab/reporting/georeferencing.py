@@ -16,8 +16,7 @@ import pandas as pd
 from wildlab.analysis import Fact
 from wildlab.analysis.accuracy import Accuracy
 from wildlab.analysis.diagnose import CAUSES, Diagnosis
-from wildlab.analysis.evaluate import errors_of, on_one_heading, score_points
-from wildlab.analysis.georeference import georeference, heights_left_in
+from wildlab.analysis.evaluate import errors_of, on_one_heading
 from wildlab.analysis.verdict import (
     FEW_POINTS,
     MANY_LOST,
@@ -345,10 +344,7 @@ def advice(found: Accuracy, *, calibrated_elsewhere: bool, problems: int = 0) ->
         name = first.mark if first.kind == "mark" else first.photo
         values = {"kind": first.kind, "name": str(name), "error": short_length(first.off_m)}
         said.append(Message("advice-outlier", values))
-    unambiguous = found.unambiguous
-    if unambiguous is not None and unambiguous.winner.causes != diagnosis.winner.causes:
-        said.append(Message("advice-record-marks"))
-    elif diagnosis.counts and gained_share(diagnosis.winner.gain) >= WORTH:
+    if diagnosis.counts and gained_share(diagnosis.winner.gain) >= WORTH:
         said.append(Message("advice-recalibrate" if calibrated_elsewhere else "advice-calibrate"))
     elif diagnosis.rivals and diagnosis.winner.gain.counts and not calibrated_elsewhere:
         said.append(Message("advice-vary"))
@@ -373,7 +369,6 @@ def limits(
     offset = manifest.clocks.camera_offset_s
     rest = offset - ZONE_S * round(offset / ZONE_S)
     timed = manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
-    nearest = found.nearest
     conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
         ("limit-heading", one_heading_hides(found), {}),
         ("limit-misfit", diagnosis is not None and diagnosis.misfit, {}),
@@ -381,11 +376,7 @@ def limits(
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": str(found.lost)}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
-        (
-            "limit-nearest",
-            nearest is not None,
-            {"hidden": "" if nearest is None else short_length(nearest.visible_m)},
-        ),
+        ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
         ("limit-track", truth.tracked > 0, {"sd": _sd_words(truth.track_sd_m)}),
         ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
         ("limit-unlabelled", bool(programs), {}),
@@ -501,7 +492,7 @@ def show_accuracy(
         report.tiles(_tiles(found, texts))
         _figures(report, wording, found, programs)
         rows = {texts.subjects["applied" if applied else "logged"]: logged}
-        rows |= _other_summaries(flight, found, texts, shown=shown)
+        rows |= _other_summaries(found, texts)
         rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}
         wording.table("errors", errors_table(rows))
         published = load_published(report.study)
@@ -584,23 +575,13 @@ def _tiles(found: Accuracy, texts: PageTexts) -> list[tuple[str, str]]:
     return shown[:4]
 
 
-def _other_summaries(
-    flight: Flight, found: Accuracy, texts: PageTexts, *, shown: bool
-) -> dict[str, ErrorSummary]:
-    """Errors with the cause taken off, without outliers, and with heights as they were recorded."""
+def _other_summaries(found: Accuracy, texts: PageTexts) -> dict[str, ErrorSummary]:
+    """Errors with the cause taken off, and without outliers."""
     diagnosis, rows = found.diagnosis, {}
     if diagnosis is not None and diagnosis.counts:
         rows[texts.subjects["corrected"]] = diagnosis.held_summary()
     if diagnosis is not None and diagnosis.outliers:
         rows[texts.subjects["inliers"]] = diagnosis.held_summary(diagnosis.inliers)
-    manifest = flight.manifest
-    apart = manifest.scoring.rule == "labelled" or (
-        manifest.terrain is not None and manifest.terrain.heights != "flight"
-    )
-    # The height of the geoid tells of a place.
-    if manifest.vertical.correction_m and shown and apart:
-        raised = georeference(heights_left_in(found.observations), np.random.default_rng(0))
-        rows[texts.subjects["uncorrected-heights"]] = summarise(errors_of(score_points(flight, raised)))
     return rows
 
 
