@@ -85,7 +85,7 @@ def fit_shapes(samples: Sequence[Sample], *, tell: Callable[[int, int], None] | 
     labels = groups.tolist()
     tried = len(REGIONS) * len(APART) * len(LEAST)
     out, at_home, plain = (rates(one, labels) for one in (held_out, np.array(inside), np.array(raw)))
-    return Fitted(final, out, at_home, plain, held_out, chosen, tried)
+    return Fitted(final, out, at_home, plain, chosen, tried)
 
 
 def _look(sample: Sample, number: int) -> _Seen:
@@ -369,8 +369,6 @@ class Fitted:
         Over all samples with the thresholds that were chosen by them: too good.
     defaults
         Over all samples with the defaults.
-    counts
-        (F, 3) found, invented and missed of each sample, held out.
     chosen
         By group: the thresholds that its samples were judged with.
     tried
@@ -381,7 +379,6 @@ class Fitted:
     held_out: Rates
     inside: Rates
     defaults: Rates
-    counts: Indices
     chosen: dict[str, Any]
     tried: int
 
@@ -476,7 +473,6 @@ def fit_thresholds(
         rates(held_out, labels),
         rates(counts[best], labels),
         rates(counts[0], labels),
-        held_out,
         chosen,
         len(sets),
     )

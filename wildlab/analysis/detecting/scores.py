@@ -258,15 +258,12 @@ class Other:
         How it is called.
     boxes
         Its boxes, of the classes that are judged.
-    classes
-        Which of its classes are taken.
     told
         Facts on what was made of its file.
     """
 
     name: str
     boxes: Labels
-    classes: tuple[str, ...]
     told: tuple[Fact, ...]
 
 
@@ -388,7 +385,7 @@ def read_others(
             some = ", ".join(printable(one) for one in known[:8])
             told.append(fact("detect-all-classes", some=some, classes=", ".join(classes)))
         boxes = choose_classes(every.marked, path, taken) if taken else every
-        found.append(Other(printable(name), boxes, taken, tuple(told)))
+        found.append(Other(printable(name), boxes, tuple(told)))
     return found
 
 

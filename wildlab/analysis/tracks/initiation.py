@@ -80,10 +80,7 @@ def start_near(
         if scans.kind == "position":
             P = np.eye(2) * reach**2
         elif scans.kind == "bearing" and len(z) == 1:
-            ahead = np.array([np.cos(z[0]), np.sin(z[0])])
-            right = np.array([-ahead[1], ahead[0]])
-            P = beliefs.range_sd_m**2 * np.outer(ahead, ahead)
-            P += (beliefs.range_m * reach) ** 2 * np.outer(right, right)
+            P = _along_ray(float(z[0]), beliefs.range_sd_m, beliefs.range_m * reach)
         return start_from_position(scans.times[row], x, P, targets.start_speed_m_s)
     return None
 
@@ -138,11 +135,8 @@ def place_of(
     if place is None or not np.isfinite(place).all():
         return None
     if scans.kind == "bearing" and len(z) == 1:
-        ahead = np.array([np.cos(z[0]), np.sin(z[0])])
-        right = np.array([-ahead[1], ahead[0]])
         across = beliefs.range_m * float(beliefs.white[0])
-        P = beliefs.range_sd_m**2 * np.outer(ahead, ahead) + across**2 * np.outer(right, right)
-        return place, P
+        return place, _along_ray(float(z[0]), beliefs.range_sd_m, across)
     seen = sensor_of(scans, np.zeros_like(scans.platform)).predict(row, np.append(place, [0.0, 0.0]))
     H = seen.H_position[:, :2]
     if not np.isfinite(H).all():
@@ -150,6 +144,13 @@ def place_of(
     inverse = np.linalg.pinv(H)
     R = _noise_at(scans, beliefs, None if white else errors_of(scans, beliefs), row, seen)
     return place, np.asarray(inverse @ R @ inverse.T)
+
+
+def _along_ray(azimuth: float, sd_along: float, sd_across: float) -> Array:
+    """Covariance (2, 2) of a place on a ray, by its standard deviations along it and across, m."""
+    ahead = np.array([np.cos(azimuth), np.sin(azimuth)])
+    right = np.array([-ahead[1], ahead[0]])
+    return sd_along**2 * np.outer(ahead, ahead) + sd_across**2 * np.outer(right, right)
 
 
 def _place(scans: Scans, row: int, z: Array, beliefs: NoiseModel) -> Array | None:

@@ -46,7 +46,6 @@ from wildlab.analysis.tracks.initiation import (
 from wildlab.analysis.tracks.inputs import BySensor
 from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel, errors_of, spread_of
 from wildlab.analysis.tracks.scans import Scans, Truth, errors_near, predict_scan, sensor_of
-from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
 from wildlab.geometry.frames import Array
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
@@ -104,23 +103,10 @@ def run_named(
     Returns
     -------
     Track
-        None where several sensors have nothing to consider.
-
-    Raises
-    ------
-    WildlabError
-        Where there is no such filter, or the detections of the one sensor cannot go through it.
+        None where there is nothing to consider.
     """
     base = name.removesuffix(SMOOTHED)
     base, smoothed = "ekf" if base == "kf" else base, name.endswith(SMOOTHED)
-    if alone is not None:
-        able = possible(*alone[:2])
-        if why := able.get(base, "there is no such filter"):
-            raise WildlabError(
-                f"the filter {name!r} cannot follow by the sensor {alone[0].sensor!r}: {why}",
-                f"use one of {', '.join(one for one, reason in able.items() if not reason)}",
-                field="--filter",
-            )
     times, _, R, sensor, *_ = merged
     R, motion = R if R.ndim == 3 else R[:, 0], targets.motion()
     run = run_smoothed if smoothed else run_filter
@@ -284,12 +270,8 @@ def track_target(
     """One target by all sensors of the inputs that may see it, with each of the filters.
 
     A target that was never seen near its true place has no track: all rows are NaN. Several sensors together
-    have no track by a filter that asks for errors to consider where there are none.
-
-    Raises
-    ------
-    WildlabError
-        Where the detections cannot go through one of the filters.
+    have no track by a filter that asks for errors to consider where there are none. The filters are such that
+    the sensor's detections can go through (`possible`).
     """
     if any(one.split(target)[0].fixed for one in inputs.values()):
         targets = targets.at_rest
