@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import cv2
@@ -17,7 +16,6 @@ from wildlab.analysis.detecting.command import samples_of
 from wildlab.analysis.detecting.detect import (
     METHODS,
     detect_frame,
-    for_distance,
     read_thresholds,
     run_detection,
     write_thresholds,
@@ -25,7 +23,7 @@ from wildlab.analysis.detecting.detect import (
 from wildlab.analysis.detecting.fit import fit_shapes, fit_thresholds
 from wildlab.analysis.detecting.scores import judge_detections
 from wildlab.detection.colour import Colour
-from wildlab.detection.contrast import Contrast, Shape, fit_shape
+from wildlab.detection.contrast import Contrast, Shape
 from wildlab.detection.floating import FloatingThresholds
 from wildlab.evaluation.intervals import Interval
 from wildlab.flight.readers.frames import open_frames, read_image
@@ -105,14 +103,6 @@ def test_frames_that_cannot_be_used_stay_in_the_denominator(tmp_path):
     assert sorted(judged.things["verdict"].unique()) == ["found", "missed"]
 
 
-def test_labels_of_other_frames_are_refused(tmp_path):
-    path = folder(tmp_path / "in")
-    done = run_detection(open_frames(path), tmp_path / "out", "contrast", Contrast())
-    (path / "other.csv").write_text("image,x,y,w,h\nnone.png,1,1,2,2\n")
-    with refused("none of them"):
-        judge_detections(done.detections, done.frames, read_labels(path / "other.csv"))
-
-
 def test_thresholds_are_judged_where_they_were_not_chosen():
     """Two clips whose animals differ in size: what suits one misses the other, and the fit has to say so."""
     rng = np.random.default_rng(1)
@@ -161,23 +151,6 @@ def test_thresholds_come_back_from_their_file(tmp_path):
         detect_frame(read_image(tmp_path / "none.png"), "magic", Contrast())
 
 
-@pytest.mark.parametrize(
-    ("method", "given", "word"),
-    [
-        ("contrast", {"peek": 3}, "'peek'"),
-        ("contrast", {"peak": "high"}, "'peak'"),
-        ("contrast", {"peak": True}, "'peak'"),
-        ("floating", {"largest_area": "big"}, "'largest_area'"),
-        ("shape", {"regions": {"peek": 3}}, "'peek'"),
-        ("colour", {"hue": 3}, "'hue'"),
-    ],
-)
-def test_thresholds_that_there_are_not_are_refused(tmp_path, method, given, word):
-    (tmp_path / "t.json").write_text(json.dumps({"method": method, "thresholds": given}))
-    with refused(word):
-        read_thresholds(tmp_path / "t.json", method)
-
-
 def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path):
     """Animals and fence posts of the same area and warmth: the one is round, the other long."""
     samples = []
@@ -201,27 +174,12 @@ def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path):
         detect_frame(samples[0].frame, "shape", Shape())
 
 
-def test_shapes_cannot_be_learnt_from_what_is_all_wanted_or_all_not():
-    with refused("0 of 5"):
-        fit_shape(np.zeros((5, 9)), np.zeros(5), Shape().regions)
-
-
 @pytest.mark.parametrize(("method", "unturned"), [("contrast", 0), ("warm", 0), ("floating", 1)])
 def test_black_hot_frames_are_turned(tmp_path, method, unturned):
     cv2.imwrite(str(tmp_path / "a.png"), 255 - picture([(50, 40)], 1, size=15, warmer=150))
     for polarity, wanted in (("black-hot", 1), ("white-hot", unturned)):
         frame = read_image(tmp_path / "a.png", polarity=polarity)  # type: ignore[arg-type]
         assert len(detect_frame(frame, method, METHODS[method].thresholds())) == wanted
-
-
-def test_areas_of_floating_objects_follow_from_the_distance(tmp_path):
-    cv2.imwrite(str(tmp_path / "sea.png"), picture([(40, 50)], 0, size=15, warmer=150))
-    far, near = (for_distance("floating", FloatingThresholds(), d, 1000.0, 2.0) for d in (100.0, 10.0))
-    assert (far.area_of, far.largest_area) == ("filled", 400.0)
-    found = detect_frame(read_image(tmp_path / "sea.png"), "floating", far)
-    np.testing.assert_allclose(found.uv, [[40, 50]], atol=0.5)
-    # A seven times smaller thing than at that distance is not let through.
-    assert len(detect_frame(read_image(tmp_path / "sea.png"), "floating", near)) == 0
 
 
 def test_colours_are_found_by_the_same_command(tmp_path):
@@ -233,12 +191,6 @@ def test_colours_are_found_by_the_same_command(tmp_path):
     assert done.detections[["u_px", "v_px"]].to_numpy().tolist() == [[314.5, 204.5]]
     write_thresholds(tmp_path / "t.json", "colour", Colour(hue=(170.0, 10.0)))
     assert read_thresholds(tmp_path / "t.json", "colour") == Colour(hue=(170.0, 10.0))
-
-
-@pytest.mark.parametrize("method", ["shape", "colour"])
-def test_a_distance_is_refused_where_no_length_follows_from_it(method):
-    with refused(f"'{method}'"):
-        for_distance(method, METHODS[method].thresholds(), 60.0, 765.0, 1.5)
 
 
 def test_stated_ellipses_are_held_against_the_middle_of_labels(tmp_path):

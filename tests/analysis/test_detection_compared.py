@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from tests.analysis.test_detect import folder
-from tests.commands import refuse, succeed
+from tests.commands import succeed
 from tests.refused import refused
-from wildlab.analysis.detecting.scores import compare_detectors, named_file, read_others
+from wildlab.analysis.detecting.scores import read_others
 from wildlab.flight.readers.labels import read_labels
 
 #: Of the frames of `folder`.
@@ -91,25 +90,6 @@ def test_our_own_table_as_another_detector_is_ours(tmp_path):
     assert ours == other
 
 
-def write_yolo(path: Path, frame: str, boxes: np.ndarray) -> None:
-    """Boxes in px (left, top, width, height), in shares of the image about their middles."""
-    path.mkdir(exist_ok=True)
-    shares = np.column_stack([boxes[:, :2] + boxes[:, 2:] / 2, boxes[:, 2:]]) / [WIDTH, HEIGHT, WIDTH, HEIGHT]
-    np.savetxt(path / f"{Path(frame).stem}.txt", shares, "0 %.17g %.17g %.17g %.17g")
-
-
-def test_labels_in_shares_of_the_image_judge_alike(tmp_path):
-    path = folder(tmp_path / "in")
-    table = pd.read_csv(path / "labels.csv")
-    for name, rows in table.groupby("image"):
-        write_yolo(tmp_path / "yolo", str(name), rows[["x", "y", "w", "h"]].to_numpy())
-    judged = []
-    for labels in (path / "labels.csv", tmp_path / "yolo"):
-        out = succeed("detect", path, "--out", tmp_path / "out", "--labels", labels, "--json")
-        judged.append(json.loads(out)["judged"])
-    assert judged[0] == judged[1] and judged[0]["found"] == 12
-
-
 def frames(count: int = 3, unusable: int = 0) -> pd.DataFrame:
     rows = [(f"{n}.png", WIDTH, HEIGHT, "") for n in range(count)]
     rows += [(f"{n}.png", 0, 0, "Cut off.") for n in range(count, count + unusable)]
@@ -119,22 +99,6 @@ def frames(count: int = 3, unusable: int = 0) -> pd.DataFrame:
 def truth(path: Path, count: int) -> Path:
     path.write_text("image,x,y,w,h,class\n" + "".join(f"{n}.png,10,10,8,8,deer\n" for n in range(count)))
     return path
-
-
-def test_frames_that_cannot_be_read_and_frames_without_a_word_are_told(tmp_path):
-    labels = read_labels(truth(tmp_path / "l.csv", 4))
-    lines = "".join(f"{n}.png,10,10,8,8\n" for n in (0, 3))
-    (tmp_path / "other.csv").write_text(f"image,x,y,w,h\n{lines}")
-    for n in (0, 3):
-        write_yolo(tmp_path / "yolo", f"{n}.png", np.array([[10, 10, 8, 8]]))
-    others = read_others([str(tmp_path / "other.csv"), str(tmp_path / "yolo")], labels)
-    empty = pd.DataFrame(columns=["frame_id"])
-    ours, table, yolo = compare_detectors("ours", empty, others, frames(3, 1), labels)
-    assert (ours.rates.found, ours.rates.missed) == (0, 4) and ours.curve is not None
-    # In px a box can be judged on an image that could not be read, in shares of it it cannot.
-    assert (table.rates.found, table.rates.missed, table.curve) == (2, 2, None)
-    assert (yolo.rates.found, yolo.rates.missed) == (1, 3)
-    assert (len(table.told), len(yolo.told)) == (1, 2)
 
 
 def test_classes_of_another_detector(tmp_path):
@@ -150,25 +114,3 @@ def test_classes_of_another_detector(tmp_path):
         read_others([md], labels, (), ("wolf",))
     with refused("'md'"):
         read_others([md, f"md={md}"], labels)
-
-
-def test_a_name_before_a_file(tmp_path):
-    strange = tmp_path / "a=b.json"
-    strange.write_text("[]")
-    assert named_file(str(strange)) == ("a=b", strange)
-    assert named_file(f"mine={strange}") == ("mine", strange)
-    assert named_file("x=" + "y" * 5000)[0] == "x"
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        (["--also", "md.json"], "labels"),
-        (["--also-class", "animal"], "no other detector"),
-        (["--labels", "labels.csv", "--also", "md.json"], "no such file"),
-    ],
-)
-def test_wrong_use_is_refused(tmp_path, monkeypatch, more, words):
-    path = folder(tmp_path / "in")
-    monkeypatch.chdir(path)
-    assert words in refuse("detect", path, "--out", tmp_path / "o", *more)

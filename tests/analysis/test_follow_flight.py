@@ -7,14 +7,10 @@ import pandas as pd
 import pytest
 
 from tests.analysis.robots import boat, joined, paused, robot, robot_flight, rows_of
-from tests.refused import refused
-from wildlab.analysis.tracks.noise_model import errors_named
-from wildlab.analysis.tracks.scans import KINDS, SLOTS, Scans, predict_scan, scans_of, truths_at
-from wildlab.analysis.tracks.scores import apart, estimates_table, judged, worth_of_errors, write_estimates
+from wildlab.analysis.tracks.scans import SLOTS, predict_scan, scans_of, truths_at
+from wildlab.analysis.tracks.scores import apart, estimates_table, worth_of_errors, write_estimates
 from wildlab.analysis.tracks.tracker import track
-from wildlab.flight.manifest import make_manifest
-from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import CONSIDERED, Settings
+from wildlab.flight.tracking_settings import Settings
 
 # --- a heading that is off ----------------------------------------------------------------------------------
 
@@ -75,16 +71,6 @@ def test_bearings_with_elevation_start_where_they_meet_the_plane():
     assert rows.loc["ekf", "rmse"] < 4.0 and rows.loc["ekf", "detections"] > 230
 
 
-def test_velocities_help_positions_in_one_track():
-    """They say how fast, the others where."""
-    flight = joined(
-        robot_flight(1, kind="position", position_sd=5.0),
-        robot_flight(2, kind="velocity", sensor="flow"),
-    )
-    rows = judged(track(flight, sensors=["radar", "flow"])).set_index(["sensor", "filter"])
-    assert rows.loc[("together", "ekf"), "rmse"] < 0.7 * rows.loc[("radar", "ekf"), "rmse"]
-
-
 @pytest.mark.parametrize("kind", ["position", "range-bearing", "bearing"])
 def test_derivatives_for_what_is_considered_are_those_of_the_measurement(kind):
     """By finite differences: the platform moved or turned, the stamp wrong."""
@@ -112,12 +98,6 @@ def test_derivatives_for_what_is_considered_are_those_of_the_measurement(kind):
     )
 
 
-def test_every_kind_has_its_errors_and_units():
-    assert set(SLOTS) == set(KINDS)
-    stated = {each for name in CONSIDERED for each in errors_named(name)}
-    assert {name for names in SLOTS.values() for name in names} == stated
-
-
 # --- whose detection it is ----------------------------------------------------------------------------------
 
 
@@ -128,20 +108,6 @@ def test_without_names_the_nearest_in_the_gate_is_taken_from_near_the_truth_on()
     assert rows.loc["ekf", "rmse"] < 1.5
     own = followed.tracks[0].detection
     assert all(name.endswith("-0") for name in own[own != ""])  # the boat's, never clutter's
-
-
-def test_without_names_and_truth_all_are_of_one():
-    followed = track(robot_flight(4, labelled=False, truth=False))
-    assert not followed.truth and [one.target for one in followed.tracks] == ["target"]
-    assert rows_of(followed).loc["ekf", "detections"] > 230
-
-
-def test_names_may_be_left_aside():
-    flight = robot_flight(4, clutter=3)
-    settings = Settings(targets={"identified": "gate"})
-    assert rows_of(track(flight, settings=settings)).loc["ekf", "rmse"] < 1.5
-    with refused("names its target"):
-        track(robot_flight(labelled=False), settings=Settings(targets={"identified": "label"}))
 
 
 def test_a_named_target_is_found_again_after_a_pause_and_an_unnamed_one_is_not():
@@ -163,7 +129,6 @@ def test_late_looks_are_put_in_order_and_change_nothing():
     flight.tables["frames"] = frames.iloc[order].reset_index(drop=True)
     late = track(flight)
     np.testing.assert_array_equal(straight.tracks[0].estimate, late.tracks[0].estimate)
-    assert len(late.notes) == 1 and straight.notes == []
 
 
 # --- several sensors ----------------------------------------------------------------------------------------
@@ -182,33 +147,6 @@ def test_two_sensors_in_one_track_share_what_the_platform_has_wrong():
 
 
 # --- refusals -----------------------------------------------------------------------------------------------
-
-
-def test_what_is_not_there_is_said():
-    flight = robot_flight()
-    for name, unknown in (("targets", "ship"), ("sensors", "sonar"), ("filters", "magic")):
-        with refused(f"'{unknown}'"):
-            track(flight, **{name: [unknown]})
-    with refused("'boat'"):
-        track(robot_flight(labelled=False, truth=False), targets=["boat"])
-    flight.tables["detections"] = flight.tables["detections"].iloc[:0]
-    with refused("no detections"):
-        track(flight)
-    sequence = make_manifest(
-        {**robot_flight().manifest.model_dump(exclude_none=True), "time": {"kind": "sequence"}}
-    )
-    with refused("no time"):
-        track(Flight(sequence, flight.nav, flight.tables))
-
-
-def test_a_filter_that_detections_cannot_go_through_is_left_out_with_the_reason():
-    settings = Settings(sensors={"radar": {"range_m": 90.0, "range_sd_m": 30.0}})
-    followed = track(robot_flight(kind="bearing"), filters=["coloured"], settings=settings)
-    assert list(rows_of(followed).index) == ["ekf"]
-    assert "'coloured'" in followed.notes[0]
-    wrong = Settings(sensors={"radar": {"considered": {"range_bias": {"sd_m": 2.0}}}})
-    with refused("'range_bias'"):
-        track(robot_flight(kind="bearing"), settings=wrong)
 
 
 # --- out ----------------------------------------------------------------------------------------------------
@@ -242,9 +180,3 @@ def test_a_standing_error_is_one_independent_value():
     assert worth_of_errors(rng.normal(size=(400, 2)), eye) > 200
     standing = np.tile(rng.normal(size=2), (400, 1)) + rng.normal(0, 0.05, (400, 2))
     assert worth_of_errors(standing, eye) < 3
-
-
-def test_scans_of_one_platform_pose_hold_at_all_times():
-    scans = scans_of(robot_flight(fixed=True), "radar")
-    assert isinstance(scans, Scans) and np.isfinite(scans.platform).all()
-    np.testing.assert_array_equal(scans.platform_velocity, 0.0)

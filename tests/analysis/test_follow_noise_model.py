@@ -7,7 +7,6 @@ import pytest
 
 from tests.analysis.robots import KNOWN, believed, robot_flight, rows_of
 from tests.analysis.survey_twin import Survey, simulate
-from tests.refused import refused
 from wildlab.analysis.tracks.noise_model import (
     ASSUMED,
     ROUGH,
@@ -21,10 +20,9 @@ from wildlab.analysis.tracks.noise_model import (
 from wildlab.analysis.tracks.scans import predict_scan, scans_of
 from wildlab.analysis.tracks.tracker import track
 from wildlab.analysis.tracks.tuning import tune_flight
-from wildlab.flight.manifest import manifest_toml, parse_manifest
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.attitude_uncertainty import pose_covariance
-from wildlab.geometry.frames import euler_to_matrix, wrap
+from wildlab.geometry.frames import euler_to_matrix
 
 # --- what is believed ---------------------------------------------------------------------------------------
 
@@ -46,35 +44,6 @@ def test_stated_goes_before_assumed_and_the_page_is_told():
     targets, said = of_targets(stated.targets)
     assert targets.density == 0.15 and targets.patience_s == 10.0
     assert {one.source for one in said} == {STATED, ASSUMED}
-
-
-def test_settings_stand_in_the_manifest_too():
-    parts = {
-        "sensors": {"radar": {"clock_offset_s": -0.5, "noise": {"range_m": 0.7}}},
-        "targets": {"gate_probability": 0.95},
-    }
-    manifest = robot_flight(manifest=parts).manifest
-    again = parse_manifest(manifest_toml(manifest), __file__)  # type: ignore[arg-type]
-    assert again == manifest and again.sensors["radar"].noise.range_m == 0.7
-    flight = robot_flight(manifest=parts)
-    told = of_flight(flight, parse_settings("[targets]\npatience_s = 3.0"))
-    assert (told.targets.gate_probability, told.targets.patience_s) == (0.95, 3.0)
-    assert of_sensor(flight, scans_of(flight, "radar"), told)[0].offset_s == -0.5
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("[sensors.radar.considered.wind]\nsd_m = 1.0", "'wind'"),
-        ("[sensors.radar.considered.heading]\nsd_m = 1.0", "in deg"),
-        ("[sensors.radar.noise]\nrange_m = -1.0", "greater than 0"),
-        ("[targets]\nsped = 1.0", "sped"),
-        ("[targets", "TOML"),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(text, said):
-    with refused(said):
-        parse_settings(text)
 
 
 def test_errors_of_a_camera_that_looks_straight_down_are_tilts_and_a_heading():
@@ -127,22 +96,6 @@ def test_clutter_alone_says_nothing_of_noise(kind):
         assert np.isnan(roughness(nobody)).all()
 
 
-def test_bearings_near_south_are_neighbours():
-    rng = np.random.default_rng(2)
-    scans = scans_of(robot_flight(kind="bearing", labelled=False), "radar")
-    azimuth = wrap(np.pi + rng.normal(0, 0.02, (len(scans.times), 1, 1)))
-    clutter = rng.uniform(-np.pi, np.pi, (len(scans.times), 3, 1))
-    both = np.concatenate([azimuth, clutter], axis=1)
-    found = roughness(scans._replace(detections=both, labels=np.full(both.shape[:2], "", object)))
-    assert found[0] == pytest.approx(0.02, rel=0.5)
-
-
-def test_noise_that_nobody_knows_is_asked_for():
-    flight = robot_flight(seconds=1.6)
-    with refused("'range'"):
-        track(flight)
-
-
 # --- tuning -------------------------------------------------------------------------------------------------
 
 
@@ -155,18 +108,3 @@ def test_truth_tells_a_heading_and_the_other_flight_is_judged_by_it():
     assert any(one.source == "tuned on first" for one in followed.said)
     rows = rows_of(followed)
     assert rows.loc["schmidt", "nees"] < rows.loc["ekf", "nees"]
-
-
-def test_truth_that_is_not_there_is_no_teacher():
-    with refused("no truth"):
-        tune_flight(robot_flight(truth=False), ["radar"], against="truth")
-    with refused("only"):
-        tune_flight(robot_flight(truth=False, seconds=6.0), ["radar"])
-
-
-def test_targets_at_rest_have_neither_acceleration_nor_speed():
-    still = "[targets]\nacceleration_m_s_sqrt_s = 0\nstart_speed_m_s = 0\n"
-    targets, _ = of_targets(parse_settings(still).targets)
-    assert targets == targets.at_rest and not targets.motion()(3.0)[1].any()
-    with refused("acceleration_m_s_sqrt_s = 0"):
-        parse_settings("[targets]\nstart_speed_m_s = 0\n")

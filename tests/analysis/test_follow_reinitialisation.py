@@ -10,13 +10,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.analysis.robots import KNOWN, joined, paused, robot_flight, rows_of, seen_only
+from tests.analysis.robots import KNOWN, joined, paused, robot_flight, rows_of
 from wildlab.analysis.tracks import single_target, tracker
 from wildlab.analysis.tracks.initiation import Geometry, ends_by
 from wildlab.analysis.tracks.inputs import SensorInputs
 from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel
 from wildlab.analysis.tracks.scans import Scans, Truth
-from wildlab.analysis.tracks.scores import UNKNOWN, estimates_table, judged, seen_of, used_of
+from wildlab.analysis.tracks.scores import estimates_table, judged, seen_of, used_of
 from wildlab.analysis.tracks.single_target import SensorTrack, track_target
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.flight.tracking_settings import parse_settings
@@ -132,33 +132,6 @@ def test_a_track_ends_where_more_is_left_out_than_stated_and_not_before_a_gap(sh
     assert ends(1, 0, np.array([100.0, 0.0, 0.0, 0.0]), P) is right
 
 
-def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(
-    monkeypatch,
-):
-    with_ends = follow(0.0)
-    monkeypatch.setattr(single_target, "_ends", lambda *given: None)
-    for one, other in zip(with_ends, follow(0.0), strict=True):
-        assert len(one.starts) == 1 and not one.without.any()
-        for name in ("estimate", "covariance", "innovation", "S", "nis", "nees"):
-            assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
-
-
-def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there():
-    scans, truth = watched()
-    whole = follow()
-    rows = slice(int(whole[0].starts[1]), len(scans.times))
-    later = truth._replace(position=truth.position[rows], velocity=truth.velocity[rows])
-    cut = {
-        name: value[rows] for name, value in scans._asdict().items()
-        if isinstance(value, np.ndarray) and len(value) == len(scans.times)
-    }  # fmt: skip
-    assert scans.poses is not None
-    alone = by_camera(scans._replace(**cut, poses=scans.poses.take(rows)), later)
-    for one, other in zip(whole, alone, strict=True):
-        assert np.array_equal(one.estimate[rows], other.estimate, equal_nan=True)
-        assert np.array_equal(one.nis[rows], other.nis, equal_nan=True)
-
-
 def test_a_target_at_rest_is_one_track_through_any_gap():
     """By a motion model without acceleration and speed, told or because its truth has no time."""
     scans, truth = watched()
@@ -222,16 +195,6 @@ def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen():
     assert row["compared"] == (used & known).sum()
     # The track ends within the wait: looks without one are counted, and are in neither number.
     assert row["without"] + row["gone"] == 101 and row["gone"] > 0 and row["anew"] == 1
-    assert row["wait"] == pytest.approx(51.0, abs=1.1)
-
-
-@pytest.mark.parametrize("count", [1, 3])
-def test_of_one_or_three_detections_nothing_is_judged(count):
-    flight = robot_flight(3)
-    few = seen_only(flight, np.arange(len(flight.tables["frames"])) < count)
-    rows = rows_of(tracker.track(few, settings=parse_settings(KNOWN)))
-    assert set(rows["verdict"]) == {UNKNOWN} and set(rows["nis_verdict"]) == {UNKNOWN}
-    assert (rows["used"] == count).all()
 
 
 def test_a_track_that_lost_its_target_is_judged_where_the_target_was_seen():

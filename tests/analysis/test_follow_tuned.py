@@ -8,19 +8,13 @@ import pytest
 from filterpy.kalman import KalmanFilter
 
 from tests.analysis.conftest import changed
-from tests.analysis.robots import boat, joined, paused, robot_flight, rows_of, seen_only
+from tests.analysis.robots import boat, paused, robot_flight, rows_of, seen_only
 from tests.refused import refused
 from wildlab.analysis.tracks import tracker
-from wildlab.analysis.tracks.scores import _between, apart
+from wildlab.analysis.tracks.scores import _between
 from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flight, tuned_text
-from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.tracking.motion import white_acceleration
-
-
-def later(flight: Flight, seconds: float) -> Flight:
-    frames = flight.tables["frames"]
-    return changed(flight, frames=frames.assign(time_s=frames["time_s"] + seconds))
 
 
 def by_filterpy(z, t, density, sd, x, P):
@@ -104,25 +98,6 @@ def test_a_clock_that_nothing_tells_of_is_not_said_to_be_tuned():
         assert any(one.what == "to be added to its stamps" for one in told) is said
 
 
-@pytest.mark.slow
-def test_a_clock_further_off_than_is_looked_is_refused_and_not_tuned_at_the_edge():
-    for off in (3.0, -6.0):
-        with refused("further"):
-            tune_flight(later(robot_flight(1, kind="position", seconds=60.0), -off), ["radar"])
-    # Ranges and bearings are of where the robot was: late stamps are undone as a whole.
-    late = tune_flight(later(robot_flight(1, seconds=90.0), 1.0), ["radar"]).sensors["radar"]
-    assert late.offset_s == pytest.approx(-1.0, abs=0.3)
-
-
-@pytest.mark.slow
-def test_a_stated_clock_holds_while_innovations_are_tuned():
-    stated = parse_settings("[sensors.radar]\nclock_offset_s = 2.0\n")
-    flight = robot_flight(1, seconds=40.0)
-    right = tune_flight(flight, ["radar"], None, "innovations")
-    moved = tune_flight(later(flight, -2.0), ["radar"], stated, "innovations")
-    assert moved.sensors["radar"].sds == pytest.approx(right.sensors["radar"].sds, rel=0.02)
-
-
 def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_track():
     whole, short = (robot_flight(3, kind="position", labelled=False, truth=False) for _ in range(2))
     torn, short = paused(whole, 50, 90), seen_only(short, short.tables["frames"]["time_s"] < 50)
@@ -142,9 +117,3 @@ def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
         P = _between(track, track.times[20:21] + dt, 0.7)[1][0]
         F, Q = white_acceleration(dt, 0.7)
         np.testing.assert_allclose(P, (F @ track.covariance[20] @ F.T + Q)[:2, :2], rtol=1e-9)
-
-
-def test_smoothed_tracks_are_not_held_against_each_other():
-    both = joined(*(robot_flight(k, kind="position", sensor=f"radar-{k}") for k in (1, 2)))
-    names = {one.filter for one in apart(tracker.track(both, smooth=True, filters=["ekf"]))}
-    assert names == {"ekf"}

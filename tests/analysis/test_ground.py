@@ -9,12 +9,9 @@ import pandas as pd
 from scipy.ndimage import gaussian_filter
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
-from tests.analysis.conftest import score
-from wildlab.analysis.evaluate import errors_of
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.analysis.ground import on_level, shift_from_level
 from wildlab.analysis.tracks.sighting import sighting
-from wildlab.evaluation.errors import summarise
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
@@ -87,17 +84,6 @@ def test_with_exact_poses_points_are_the_marks():
     assert shift.median > 3.0
 
 
-def test_ellipses_hold_what_they_should_over_hills():
-    """Poses, pixels and nothing else are wrong, by what the manifest states."""
-    flight = flown(noise=1.0, per_image=24)
-    flight.terrain = replace(hills(), sd=1e-3)
-    scored = score(flight)
-    assert len(scored) > 500
-    # 25 poses are drawn: 90 % of their points, give or take what so few decide.
-    assert 0.8 <= scored["inside_90"].mean() <= 0.97
-    assert summarise(errors_of(scored)).median < 3.0
-
-
 def test_the_map_decides_how_good_its_heights_are():
     sizes = []
     for sd in (np.nan, 0.3, 6.0):
@@ -107,21 +93,6 @@ def test_the_map_decides_how_good_its_heights_are():
         sizes.append(float((points["cov_nn"] + points["cov_ee"]).median()))
     assert sizes[0] == sizes[1]  # 0.3 m is what the manifest assumes where the map is silent
     assert sizes[2] > 3 * sizes[1]
-
-
-def test_rays_that_meet_no_ground_are_counted():
-    flight = flown()
-    flight.terrain = holed()
-    nav = flight.nav["logged"]
-    nav.loc[[0, 2, 3, 4], "down_m"] = 500.0
-    nav.loc[1, "east_m"] = 4000.0
-    seen = observe(flight)
-    points = georeference(seen, np.random.default_rng(0))
-    counts = pixels_to_terrain(seen.poses, seen.uv, seen.terrain).counts()
-    lost = points["north_m"].isna()
-    assert len(counts) == 4  # of each fate some
-    assert counts["met the ground"] == (~lost).sum() and sum(counts.values()) == len(points)
-    assert set(points.loc[lost, "ellipse"]) == {"none"} and points.loc[lost, "cov_nn"].isna().all()
 
 
 def test_a_ray_without_ground_is_no_sighting():

@@ -9,7 +9,6 @@ from tests.analysis.conftest import changed, score
 from tests.analysis.survey_twin import Survey, simulate
 from tests.refused import refused
 from wildlab.analysis.accuracy import apply_learnt, corrected_flight, learn_flight
-from wildlab.analysis.diagnose import diagnose
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.flight.calibration_files import (
     LearntParameter,
@@ -101,14 +100,6 @@ def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
     assert "applied-here" not in dict(applied.facts)
 
 
-def test_on_the_very_flight_it_was_learnt_on_that_is_said():
-    # By its clicks and poses, whatever its name is.
-    renamed = named(tuesday(), "friday")
-    assert "applied-here" in dict(apply_learnt(observe(renamed), learnt()).facts)
-    other = named(tuesday(seed=5), "tuesday")
-    assert "applied-here" not in dict(apply_learnt(observe(other), learnt()).facts)
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -123,23 +114,6 @@ def test_another_camera_or_mount_is_refused(change, words):
     flight = changed(tuesday(images=8), change)
     with refused(words):
         apply_learnt(observe(flight), learnt())
-
-
-@pytest.mark.slow
-def test_what_was_applied_is_not_found_again():
-    """Diagnosed with its calibration applied, a flight has no cause left, its clock included."""
-    flight = named(tuesday(seed=5), "wednesday")
-    flight.nav["logged"]["east_m"] += 6.0
-    own = learn_flight(flight, np.random.default_rng(0))[0]
-    assert {"east", "clock", "tilt"} <= {one.name for one in own.parameter}
-    applied = apply_learnt(observe(flight), own)
-    scored = score(flight, applied.observations)
-    again = diagnose(applied.observations, scored)
-    assert not again.counts
-    clock = next(model for model in again.models if model.causes == ("clock",))
-    assert abs(clock.fit.values[0]) < 0.02
-    place = next(model for model in again.models if model.causes == ("position",))
-    assert np.abs(place.fit.values).max() < 0.5
 
 
 def test_where_nothing_gains_for_certain_the_noise_alone_is_kept():
@@ -162,28 +136,3 @@ def test_a_tilt_that_is_not_certain_is_no_noise():
         assert not diagnosis.counts and kept.parameter == ()
         noises.append(list(kept.noise.model_dump().values()))
     np.testing.assert_allclose(noises[1], noises[0], rtol=0.1)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('unit = "deg"', 'unit = "rad"', "'rad'"),
-        ("covariance = [[", "covariance = [[0.0], [", "covariance"),
-        ('name = "clock"', 'name = "tilt"', "tilt"),
-        ("format = 1", "format = 2", "format"),
-        ("format = 1", "format = 1\nshoe = 3", "shoe"),
-        ("format = 1", "format = ", "TOML"),
-    ],
-)
-def test_a_damaged_file_is_refused(old, new, words):
-    text = calibration_toml(learnt())
-    assert old in text
-    with refused(words):
-        parse_learnt(text.replace(old, new, 1))
-
-
-def test_files_that_cannot_be_read_or_written_are_refused(tmp_path):
-    with refused("no such file"):
-        read_learnt(tmp_path / "none.toml")
-    with refused("cannot be written"):
-        write_calibration(learnt(), tmp_path / "nowhere" / "calibration.toml")

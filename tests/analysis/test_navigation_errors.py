@@ -8,7 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.analysis.conftest import first_seconds
-from tests.refused import refused
 from wildlab.analysis.navigate import (
     AXES,
     PUBLISHED_LIKE,
@@ -17,7 +16,6 @@ from wildlab.analysis.navigate import (
     navigate_mekf,
     normalised_innovations,
     numbers_of,
-    reference_of,
     shares_within,
     study_navigation,
     summarise,
@@ -135,11 +133,6 @@ def test_the_tuning_like_the_published_one_gives_deviations_like_the_published_o
     ours = [numbers[f"mean_sd_{name}"] for name in ("north", "east", "down", *AXES)]
     assert ours == pytest.approx([0.08, 0.08, 0.07, 1.35, 1.30, 2.65], rel=0.15)
     assert "velocity" not in set(found.innovations["source"])
-
-
-def test_without_any_other_pose_there_is_nothing_to_compare_with(early):
-    with refused("no pose", field="nav"):
-        reference_of(Flight(early.manifest, {"mine": early.nav["truth"]}, early.tables))
 
 
 def test_innovations_are_counted_between_the_times_asked_for(early):

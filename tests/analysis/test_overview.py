@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,17 +12,15 @@ import pandas as pd
 import pytest
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
-from tests.analysis.conftest import build, changed, receiver, without_poses
-from tests.planning.ground import FLAT
-from tests.refused import refused
-from wildlab.analysis.image_coverage import Recovered, cover_images, ground_height
+from tests.analysis.conftest import build, receiver, without_poses
+from wildlab.analysis.image_coverage import Recovered, cover_images
 from wildlab.analysis.overview import TROUBLES, look_over
 from wildlab.analysis.verdict import (
     gains_of,
     numbers_of,
     possible_gain,
 )
-from wildlab.evaluation.streams import FLOOR_HZ, pace_of, runs_of, vibration_of
+from wildlab.evaluation.streams import FLOOR_HZ, pace_of, vibration_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
@@ -66,28 +62,6 @@ def test_a_stream_with_a_hole_and_lost_samples_is_counted():
     assert pace_of(mixed, 1.0).unordered == 1
 
 
-def test_what_is_triggered_now_and_then_has_no_rate():
-    t = np.cumsum(np.random.default_rng(1).uniform(0.1, 5.0, 200))
-    pace = pace_of(t, 100.0)
-    assert not pace.even and pace.missing == 0
-
-
-@pytest.mark.parametrize("stamps", [[], [np.nan], [3.0], [3.0, 3.0]])
-def test_no_stream_is_too_short(stamps):
-    pace = pace_of(stamps, 1.0)
-    assert len(pace.gaps) == 0 and pace.missing == 0 and np.isnan(pace.rate_hz)
-
-
-def test_runs_are_where_the_mask_is():
-    mask = np.random.default_rng(0).random(500) < 0.5
-    t = np.arange(500.0)
-    spells = runs_of(mask, t)
-    inside = np.zeros(500, bool)
-    for begin, end in spells:
-        inside[int(begin) : int(end) if end < 499 or not mask[-1] else 500] = True
-    assert (inside == mask).all()
-
-
 @pytest.mark.parametrize(("hertz", "size"), [(10.0, 4.0), (35.0, 20.0), (90.0, 50.0)])
 def test_a_sine_shakes_by_what_theory_says(hertz, size):
     """At a rate high enough for the continuous filter: its high pass, and the root mean square of a sine."""
@@ -100,12 +74,6 @@ def test_a_sine_shakes_by_what_theory_says(hertz, size):
     band = (found.bands[:, 0] <= hertz) & (hertz < found.bands[:, 1])
     assert found.rms[band, 1] == pytest.approx(size / np.sqrt(2), rel=0.03)
     assert found.rms[:, 0].max() < 1e-9
-
-
-def test_too_slow_or_too_few_samples_tell_nothing_of_shaking():
-    t = np.arange(0, 100, 0.1)
-    assert vibration_of(t, np.zeros((len(t), 3))) is None
-    assert vibration_of(t[:50] / 10, np.zeros((50, 3))) is None
 
 
 def level_images(places: list[tuple[float, float]], height: float = 100.0, lean_deg: float = 0.0) -> Flight:
@@ -128,20 +96,6 @@ def test_footprints_have_the_area_and_the_overlap_of_rectangles():
     half = cover_images(level_images([(0.0, 0.0), (50.0, 0.0)]), "logged")
     assert half.area_m2 == pytest.approx(200 * 150, rel=0.02)
     assert half.looks == pytest.approx(4 / 3, abs=0.02)
-
-
-def test_footprints_on_level_terrain_are_those_on_the_plane():
-    flight = level_images([(0.0, 0.0), (30.0, 20.0)])
-    one = cover_images(flight, "logged")
-    other = cover_images(replace(flight, terrain=FLAT), "logged")
-    assert other.ground == "the flight's terrain"
-    assert other.outlines == pytest.approx(one.outlines, abs=1e-3)
-
-
-def test_an_image_of_the_horizon_has_no_footprint():
-    seen = cover_images(level_images([(0.0, 0.0)], lean_deg=70.0), "logged")
-    assert seen.flat.tolist() == [True] and not seen.placed.any()
-    assert seen.area_m2 == 0 and np.isnan(seen.looks)
 
 
 @pytest.mark.parametrize("without", ["frames", "truth"])
@@ -188,17 +142,6 @@ def test_images_in_a_hole_are_counted_with_the_reason():
     lost = lost_of(flight, "images_without_pose")
     after = int((frames["time_s"] >= 20).sum())
     assert f"{after} before" in lost.why and str(inside) in lost.why
-
-
-def test_time_without_poses_is_that_of_the_record():
-    flight = build(n_images=40)
-    nav = flight.nav["logged"]
-    flight.nav["logged"] = nav[(nav["time_s"] >= 20) & ((nav["time_s"] < 25) | (nav["time_s"] >= 30))]
-    t = np.arange(0.0, 40.0, 0.1)
-    flight.tables["magnetometer"] = pd.DataFrame({"time_s": t, **{f"field_{a}_ut": 0.0 for a in "xyz"}})
-    lost = lost_of(flight, "time_without_poses")
-    end = float(nav["time_s"].max())
-    assert lost.lost == pytest.approx(25, abs=0.6) and lost.of == pytest.approx(end, abs=0.6)
 
 
 def test_detections_whose_target_has_no_truth_are_counted():
@@ -284,46 +227,10 @@ def test_poses_without_covariance_or_velocity_and_empty_tables_are_fine(tmp_path
     assert ("duration", "flight") not in values(page_of(nothing, tmp_path)[1])
 
 
-def test_broken_rows_are_left_out_and_counted_as_problems():
-    whole = simulate_twin("large-ship", 1)
-    nav = whole.nav["autopilot"].copy()
-    nav.loc[10:20, "north_m"] = np.nan
-    nav.loc[30, "time_s"] = nav.loc[28, "time_s"]
-    nav.loc[40, ["q_w", "q_x", "q_y", "q_z"]] = 0.0
-    assert look_over(Flight(whole.manifest, {"autopilot": nav}, dict(whole.tables))).problems >= 2
-
-
-def test_photos_without_times_have_no_rates(tmp_path):
-    flight = changed(level_images([(0.0, 0.0), (50.0, 0.0), (90.0, 10.0)]), {"time": {"kind": "sequence"}})
-    _, content = page_of(flight, tmp_path)
-    assert ("duration", "flight") not in values(content)
-    assert values(content)["area_seen", "flight"] > 0
-
-
-def test_the_best_estimated_poses_come_first_and_others_are_refused():
-    table = pd.DataFrame({"time_s": [0.0]})
-    names = ("truth", "observer", "autopilot", "rtk", "mekf", "autopilot-uncalibrated")
-    flight = Flight(build(n_images=1).manifest, dict.fromkeys(names, table))
-    assert flight.estimated_sources[:4] == ["rtk", "mekf", "observer", "autopilot"]
-    with refused("no nav source 'other'"):
-        look_over(flight, "other")
-
-
 def test_poses_that_pause_shortly_count_as_trouble():
     flight = build(n_images=80)
     assert counts_of(look_over(flight), [], 0, 1, None)["troubled"] == 0
     assert counts_of(look_over(without_poses(flight, 10.05, 11.95)), [], 0, 1, None)["troubled"] == 1
-
-
-def test_points_that_are_far_out_are_listed_with_what_stays():
-    metrics = [
-        entry("gain", "without-far-out", 0.5),
-        entry("horizontal_error_mean", "without-far-out", 1.5),
-        entry("points_far_out", "winner", 2),
-    ]
-    overview, numbers = look_over(build(n_images=8)), numbers_of([{"metrics": metrics}])
-    (far,) = [one for one in gains_of(overview, numbers) if one.key == "far_out"]
-    assert far.share == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize(("gain", "possible"), [(1.6, True), (0.3, False)])
@@ -344,18 +251,3 @@ def test_detections_of_no_camera_are_not_held_against_the_ground(tmp_path):
     recorded = values(page_of(flight, tmp_path)[1])
     assert recorded["detections_in_images", "flight"] == 0
     assert ("detections_placed", "flight") not in recorded
-
-
-@pytest.mark.parametrize(
-    ("downs", "height"),
-    [
-        ([-12.0, -11.0, -3.0, -2.0, -1.0], -11.5),  # surveyed points come before tracks
-        ([np.nan, -11.0, -3.0, -2.0, -1.0], -11.0),
-        ([np.nan, np.nan, -3.0, -2.0, -9.0], -3.0),
-    ],
-)
-def test_level_ground_is_as_high_as_surveyed_points_or_tracks(downs, height):
-    names, times = ["a", "b", *["walker"] * 3], [np.nan, np.nan, 1.0, 2.0, 3.0]
-    truth = pd.DataFrame({"target_id": names, "time_s": times, "down_m": downs})
-    flight: Any = SimpleNamespace(truth=truth, detections=None, manifest=SimpleNamespace(kind="logged"))
-    assert ground_height(flight)[0] == pytest.approx(height)

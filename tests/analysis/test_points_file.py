@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.refused import refused
 from wildlab.analysis.georeference import covariances_of, georeference, observe
-from wildlab.analysis.ground import CORNERS, points_geojson, write_points
+from wildlab.analysis.ground import CORNERS, write_points
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
 from wildlab.simulation.twins import simulate_twin
@@ -72,15 +71,3 @@ def test_a_table_has_every_point_in_metres(made, tmp_path):
     with (tmp_path / "p.csv").open() as file:
         table = list(csv.DictReader(file))
     assert len(table) == len(points) and "origin" in table[0]["vertical_reference"]
-
-
-def test_a_page_has_the_points_alone_and_a_map_may_have_none(made):
-    flight, points, path = made
-    page = points_geojson(flight, points, "autopilot")
-    assert features(page, "Point") == features(path.read_text(), "Point") and not features(page, "Polygon")
-    assert json.loads(points_geojson(flight, points.iloc[3:4], ellipses=True))["features"] == []
-
-
-def test_an_ending_that_nobody_knows_is_refused(made, tmp_path):
-    with refused(r"'\.shp'"):
-        write_points(made[0], made[1], tmp_path / "p.shp")

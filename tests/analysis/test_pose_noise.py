@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.refused import refused
 from wildlab.analysis.pose_noise import APART_S, covariance_of, estimate_from_sighting
 from wildlab.analysis.tracks.sighting import Sighting, sighting
 from wildlab.evaluation.pose_noise import KINDS
@@ -71,16 +70,3 @@ def test_the_covariance_is_that_of_the_deviations(flight, exact):
     level, vertical, tilt, yaw, _ = (found.sd[kind] for kind in KINDS)
     expected = np.square([level, level, vertical, tilt, tilt, yaw])
     np.testing.assert_allclose(covariance_of(found), np.diag(expected))
-
-
-def test_poses_that_state_nothing_are_refused(flight, exact):
-    with refused("no covariance"):
-        estimate_from_sighting(flight, exact._replace(poses=replace(exact.poses, covariance=None)))
-
-
-def test_a_target_that_is_known_in_two_images_is_refused(flight, exact):
-    truth = exact.truth.copy()
-    rows = np.flatnonzero(exact.seen)
-    truth[np.setdiff1d(np.arange(len(truth)), rows[[0, -1]])] = np.nan
-    with refused("2 images"):
-        estimate_from_sighting(flight, exact._replace(truth=truth))

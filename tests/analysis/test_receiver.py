@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.analysis.conftest import changed, first_seconds
-from tests.refused import refused
 from wildlab.analysis.navigate import (
     REFERENCES,
     flown_part,
@@ -20,17 +19,14 @@ from wildlab.analysis.navigation_inputs import (
     imu_noise,
     inputs_of,
     place_receiver,
-    receiver_noise,
     thinned,
-    told,
     without_gross,
 )
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight
-from wildlab.navigation.aiding import positions
-from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
+from wildlab.navigation.receiver import ReceiverNoise
 from wildlab.navigation.strapdown import ImuSamples
 from wildlab.paths import DATA
 from wildlab.simulation.twins import simulate_twin
@@ -63,35 +59,6 @@ def test_a_fix_a_kilometre_off_is_no_noise(early):
     found = navigate_mekf(spoilt, [80.0], receiver=ReceiverNoise())
     as_it_was = navigate_mekf(early, [80.0], receiver=ReceiverNoise())
     assert np.allclose(found.nav["north_m"], as_it_was.nav["north_m"], atol=0.02)
-
-
-def test_a_filter_that_is_lost_is_nothing_to_learn_from(early):
-    rows = list(range(60, len(early.table("gnss")), 5))
-    with refused("lost"):
-        receiver_noise(jumped(early, rows))
-
-
-def test_what_was_refused_is_kept_for_the_report(early):
-    few = early.table("gnss").iloc[::20].reset_index(drop=True)
-    studied = study_navigation(changed(early, gnss=few))
-    assert studied.receiver is None and "too few" in studied.refusal
-    assert "mekf-receiver" not in studied.found
-    assert {name for who, name in numbers_of(studied, 0.0) if who == "mekf" and name.startswith("lag1")} == {
-        "lag1_position",
-        "lag1_second_position",
-        "lag1_velocity",
-    }
-
-
-def test_a_receiver_has_one_noise_for_all_its_antennas():
-    p = positions([0.0, 1.0], np.zeros((2, 3)), sd=2.0)
-    noise = ReceiverNoise(SourceNoise(0.5, 0.25, 1.0, 2.0, 30.0))
-    heard = told({"position": p, "second position": p, "velocity": p}, noise)
-    for name in ("position", "second position"):
-        assert np.allclose(np.sqrt(heard[name].variance[0]), [1.0, 1.0, 0.5])
-        assert heard[name].gauss_markov is not None
-        assert heard[name].gauss_markov.sd.tolist() == [1.0, 1.0, 2.0]
-    assert np.allclose(heard["velocity"].variance, p.variance) and heard["velocity"].gauss_markov is None
 
 
 def test_thinned_samples_are_means_of_neighbours():

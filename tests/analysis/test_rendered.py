@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.refused import refused
-from wildlab.analysis.rendered import ImageScore, Photographer, Shot, exposures_of, marks_of, with_detections
-from wildlab.detection.detections import no_detections
+from wildlab.analysis.rendered import Photographer, exposures_of, marks_of, with_detections
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.twins import simulate_twin
 
@@ -41,15 +39,6 @@ def test_the_same_exposure_is_the_same_image_whichever_came_before(camera, shots
     )
 
 
-def test_images_are_those_of_the_twins_own_frames(flight, camera, shots):
-    # What the twin marks in a frame, the middle of the visible part, is where the rendered ship is in it.
-    drawn = flight.detections.set_index("frame_id")
-    for shot in shots:
-        row = drawn.loc[f"f{shot.exposure + 1:06d}"]
-        # The drawn ship is a flat rectangle, the rendered one has a bow and freeboard.
-        assert np.hypot(*(shot.seen[0].middle - row[["u_px", "v_px"]].to_numpy(float))) < 40
-
-
 def test_the_stated_centre_is_the_target_seen_through_the_true_pose(camera, shots):
     for shot in shots:
         pose = camera.flight.poses.take(shot.exposure)
@@ -70,15 +59,6 @@ def test_centres_of_what_the_border_cuts_are_moved_where_the_length_is_known(cam
     assert (np.hypot(*(moved.uv - plain.uv)[moved.moved].T) > 0).all()
 
 
-def test_an_image_without_the_target_has_no_mark(camera, shots):
-    none = Shot(3, (), no_detections(), ImageScore({}, set(), 2))
-    marks = marks_of([none, shots[0]], shape_of(camera))
-    assert marks.found.tolist() == [False, True]
-    assert marks.share[0] == 0
-    assert marks.false[0] == 2
-    assert np.isnan(marks.centre[0]).all()
-
-
 def test_rendered_detections_take_the_place_of_the_drawn_ones(flight, camera, shots):
     marks = marks_of(shots, shape_of(camera))
     made = with_detections(flight, marks, "ship")
@@ -89,18 +69,6 @@ def test_rendered_detections_take_the_place_of_the_drawn_ones(flight, camera, sh
     assert made.nav is flight.nav
     whole = with_detections(flight, marks, "ship", all_frames=True)
     assert len(whole.frames) == len(flight.frames)
-
-
-def test_a_target_that_is_found_nowhere_and_an_image_of_another_flight_are_refused(flight, camera, shots):
-    nothing = [
-        shot._replace(judged=ImageScore({1: []}, set(), 0), detections=no_detections()) for shot in shots
-    ]
-    with refused("none of 4"):
-        with_detections(flight, marks_of(nothing, shape_of(camera)), "ship")
-    marks = marks_of(shots, shape_of(camera))
-    marks.exposure[1] = 10**6
-    with refused("1000000"):
-        with_detections(flight, marks, "ship")
 
 
 def test_a_window_is_that_part_of_the_whole_image():
@@ -126,12 +94,3 @@ def test_a_window_is_that_part_of_the_whole_image():
     assert np.allclose(apart.centre, together.centre)
     # The noise has other draws; what they move is a fraction of a pixel.
     assert np.hypot(*(apart.uv - together.uv).T).max() < 0.5
-
-
-def test_where_no_vessel_is_no_window_is_rendered():
-    camera = Photographer("fast-vessel", 1)
-    exposure = int(np.flatnonzero(~camera.flight.near().any(axis=1))[0])
-    assert camera.flight.window(exposure, 20) is None
-    shot = next(camera.shoot([exposure], margin=20))
-    assert not shot.seen
-    assert not len(shot.detections)

@@ -8,19 +8,15 @@ import numpy as np
 import pytest
 
 from tests.planning.ground import FLAT, with_wall
-from tests.refused import refused
 from wildlab.analysis.search import (
     Rules,
-    SearchByChance,
     SearchInRows,
     World,
     found_in,
-    grid_over,
     rows_at,
     search,
     survey,
 )
-from wildlab.geometry.terrain import Terrain
 from wildlab.planning.information import SearchSensor
 from wildlab.planning.legs import Flying, Leg, Platform, look_attitude
 from wildlab.planning.planner import SEARCH
@@ -84,13 +80,6 @@ def test_rows_are_flown_again_while_animals_are_missing():
     assert 150 < found.found[0] < 600 and (found.p_nc[:, 1] < 80).all()
 
 
-def test_a_search_without_luck_ends_with_the_time():
-    dark = world([[30.0, 30.0]], chance=1.0, images=50)
-    walk = SearchByChance(dark, FLYING, np.random.default_rng(1))
-    found = search(dark, walk, START, SENSOR, FLYING)
-    assert np.isinf(found.found).all() and len(found.p_nc) == 48
-
-
 def test_turns_take_time_from_a_search_and_animals_walk_on_meanwhile():
     """One who turns round again and again finds what comes by later; the world goes on while it turns."""
     spots = [[30.0, 30.0]]
@@ -116,21 +105,6 @@ def test_turns_take_time_from_a_search_and_animals_walk_on_meanwhile():
 def test_rows_of_a_world_are_those_that_hold():
     assert rows_at(np.array([1.0, 2.0, 4.6, 5.6, 6.999999999999]), 1.0).tolist() == [0, 1, 3, 4, 6]
     assert rows_at(np.array([0.5, 1.2]), 0.5).tolist() == [0, 1]
-
-
-def test_a_grid_lies_in_its_areas_and_on_the_ground():
-    slope = Terrain(
-        np.tile(np.arange(101, dtype=np.float32)[:, None], 101), north=-500.0, east=-500.0, step=10.0
-    )
-    points, area_of = grid_over(AREAS, slope, 10.0)
-    assert len(points) == 72 and (area_of == np.repeat([0, 1], 36)).all()
-    assert points[:, 2] == pytest.approx(-(points[:, 0] + 500) / 10)
-
-
-@pytest.mark.parametrize("area", [AREAS[0] + 1000, AREAS[0] / 100])
-def test_an_area_off_the_map_or_without_a_point_is_refused(area):
-    with refused("area 1"):
-        grid_over([area], FLAT, 10.0)
 
 
 # --- search and revisit: who is gone back to, who is lost, and when it ends ---------------------------------
@@ -164,11 +138,6 @@ def test_an_enclosure_that_is_done_stays_done():
     found = run(spots, soon_lost, ((20,), (0, 300)), 900, areas)
     assert 300 < found.positioned < 900 and found.lost_by_covariance == found.lost_by_search == 0
     assert 0 not in found.goal[1:]
-
-
-def test_nobody_to_find_ends_with_the_time():
-    found = run([[10.0, 10.0]], unseen=((0,), ()), images=90)
-    assert np.isinf(found.positioned) and (found.goal == SEARCH).all()
 
 
 def test_it_goes_back_to_what_is_known_badly():

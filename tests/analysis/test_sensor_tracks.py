@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from tests.analysis.robots import robot, robot_flight, seen_only
-from tests.refused import refused
 from wildlab.analysis.tracks.initiation import start_near
 from wildlab.analysis.tracks.noise_model import SensorTuning, from_tuning
 from wildlab.analysis.tracks.scans import errors_near, scans_of, sensors_of, truths_at
@@ -47,21 +46,6 @@ def test_what_a_late_sensor_saw_stands_where_the_platform_was_then():
 
     assert errors(-1.5).max() < 0.02
     assert errors(0.0).mean() > 1
-
-
-def test_what_cannot_be_followed_is_said():
-    flight = robot_flight()
-    with refused("'sonar'"):
-        scans_of(flight, "sonar")
-    seen = flight.tables["detections"]
-    seen.loc[seen.index[0], "kind"] = "pixel"
-    with refused("one kind"):
-        scans_of(flight, "radar")
-    del flight.tables["frames"]["sensor"]
-    assert sensors_of(flight) == ["radar"]  # who detected is who looked
-    flight.tables["detections"] = seen.iloc[:0]
-    with refused("no detections"):
-        sensors_of(flight)
 
 
 # --- tuning -------------------------------------------------------------------------------------------------

@@ -7,17 +7,14 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.refused import refused
 from wildlab.analysis.navigate import PUBLISHED_LIKE, NavigationErrors, errors_against, navigate_mekf
 from wildlab.analysis.pose_noise import (
     PAUSE_S,
     TURNING,
     flight_numbers,
-    mean,
     pauses,
     pose_numbers,
     premise_numbers,
-    rms,
 )
 from wildlab.analysis.tracks.sighting import (
     CvTuning,
@@ -114,21 +111,6 @@ def test_the_numbers_are_those_of_the_track(seen):
     np.testing.assert_allclose(scored.nees, one, rtol=1e-9)
 
 
-def test_a_target_that_nothing_names_is_refused(flight):
-    with refused("'whale'"):
-        sighting(flight, "truth", "whale")
-
-
-def test_several_targets_are_a_choice():
-    with refused("2 targets"):
-        sighting(simulate_twin("crossing-vessels", 1, ("imu", "gnss")), "autopilot")
-
-
-def test_poses_without_covariance_are_no_input_for_schmidt(flight):
-    with refused("no covariance"):
-        follow_schmidt(sighting(flight, "autopilot"), TUNING)
-
-
 # --- what poses state and are off by, and how the flight was flown -----------------------------------------
 
 
@@ -145,11 +127,6 @@ def test_pauses_are_where_nothing_is_seen_for_long(seen):
         assert seen.times[rows[-1] + 1] - seen.times[rows[0] - 1] > PAUSE_S
     others = np.setdiff1d(np.flatnonzero(~seen.seen), np.concatenate(found))
     assert len(others) and np.isin(others - 1, np.flatnonzero(seen.seen)).any()
-
-
-def test_means_and_roots_leave_out_what_is_not_known():
-    assert mean([1.0, np.nan, 3.0]) == 2.0 and rms(np.array([3.0, np.nan, 4.0])) == np.sqrt(12.5)
-    assert np.isnan(mean([])) and np.isnan(rms(np.array([np.nan])))
 
 
 def test_numbers_of_poses_are_in_metres_and_degrees():
@@ -173,22 +150,6 @@ def test_errors_of_the_pose_move_the_target_in_the_image(flight, seen, own):
     found = premise_numbers(flight, seen, "mekf", own)
     assert found["shift_px"] == pytest.approx(expected, rel=0.05)
     assert found["largest_shift_px"] == pytest.approx(np.hypot(*(uv[0] - uv[1]).T).max(), rel=0.05)
-
-
-def test_an_autopilot_that_agrees_has_no_differences(flight, seen, own):
-    same = Flight(flight.manifest, flight.nav | {"autopilot": flight.nav["mekf"]}, flight.tables)
-    found = premise_numbers(same, seen, "mekf", own)
-    for name in ("difference_roll", "difference_yaw", "outside_pitch", "difference_turning"):
-        assert found[name] == pytest.approx(0, abs=1e-6), name
-    real = premise_numbers(flight, seen, "mekf", own)
-    beside = errors_against(flight.nav["autopilot"], flight.nav["mekf"], seen.times)
-    for i, axis in enumerate(("roll", "pitch", "yaw"), 6):
-        known = np.isfinite(beside.error[:, i])
-        ratio = np.abs(beside.error[known, i]) / beside.sd[known, i]
-        assert real[f"outside_{axis}"] == np.mean(ratio > 2)
-        assert np.mean(ratio > 0.5) > 0.1, "or the factor would not matter"
-    inside = sorted([real["difference_turning"], real["difference_straight"]])
-    assert inside[0] <= real["difference_roll"] <= inside[1]
 
 
 def test_a_deviation_that_changes_has_a_spread(flight, seen, own):

@@ -12,7 +12,7 @@ import pytest
 import wildlab
 from tests.analysis.robots import KNOWN, joined, robot_flight
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
-from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated, Series, comparison_times, mean_of_runs
+from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated, Series
 from wildlab.analysis.tracks import tracker
 from wildlab.analysis.tracks.scores import STATE, estimates_table, judged
 from wildlab.analysis.tracks.sighting import (
@@ -27,7 +27,7 @@ from wildlab.analysis.tracks.single_target import TOGETHER
 from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
 from wildlab.evaluation.consistency import Average, chi_square_interval
-from wildlab.flight.clocks import frame_times, poses_at
+from wildlab.flight.clocks import poses_at
 from wildlab.flight.files import check_model
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import Settings, parse_settings
@@ -102,20 +102,6 @@ def test_navigation_is_the_reference_minus_what_was_found(flight, filters):
     assert nav.flight.nav["mekf"] is nav.found.nav
 
 
-def test_poses_are_found_at_frames_and_where_they_are_compared(flight, filters):
-    wildlab.navigate(flight)
-    asked = filters["mekf"].asked["times"]
-    frames, compared = frame_times(flight), comparison_times(flight, "truth-payload")
-    assert np.isin(frames, asked).all() and np.isin(compared, asked).all()
-    assert not np.isin(compared, frames).all() and not np.isin(frames, compared).all()
-
-
-def test_the_observer_is_another_filter_and_source(flight, filters):
-    nav = wildlab.navigate(flight, "observer")
-    assert filters["observer"].asked and not filters["mekf"].asked
-    assert nav.source == "observer" and "observer" in nav.flight.nav and "mekf" not in nav.flight.nav
-
-
 def test_only_the_truth_judges_and_only_in_the_part_that_counts(flight, filters):
     nav = wildlab.navigate(flight)
     (what, begin, end), errors = nav.part, nav.errors
@@ -149,15 +135,6 @@ def test_a_track_is_the_commands(ship):
         assert np.allclose(one.nees[there], rows["nees"], rtol=1e-9, atol=0, equal_nan=True)
     left_out = wildlab.track(ship, settings=SETTINGS)
     assert left_out.filter == "schmidt", "there is an uncertainty to consider"
-
-
-def test_settings_come_as_a_file_too(ship, tmp_path):
-    file = tmp_path / "settings.toml"
-    file.write_text("[targets]\nacceleration_m_s_sqrt_s = 0.2\n")
-    one, other = (wildlab.track(ship, filter="ekf", settings=told) for told in (file, SETTINGS))
-    assert np.array_equal(one.estimate, other.estimate, equal_nan=True)
-    with pytest.raises(wildlab.WildlabError, match="acceleration"):
-        wildlab.track(ship, settings={"targets": {"acceleration": 0.2}})
 
 
 @pytest.mark.parametrize("name", ["kf", "ekf", "schmidt"])
@@ -194,17 +171,6 @@ def test_of_several_targets_the_one_asked_for_is_followed(ship):
     assert wildlab.track(two, "another").target == "another"
 
 
-def test_what_is_not_there_is_refused(ship):
-    for wrong in (
-        {"filter": "kalman"},
-        {"filter": "imm", "tuning": TUNING},
-        {"sensor": "radar"},
-        {"target": "x"},
-    ):
-        with pytest.raises(wildlab.WildlabError):
-            wildlab.track(ship, **wrong)
-
-
 def test_without_a_truth_a_track_is_not_judged_by_it(ship):
     elsewhere = ship.table("truth").assign(time_s=lambda truth: truth["time_s"] + 1e5)
     blind = Flight(ship.manifest, ship.nav, ship.tables | {"truth": elsewhere})
@@ -212,13 +178,6 @@ def test_without_a_truth_a_track_is_not_judged_by_it(ship):
         track = wildlab.track(blind, **told)
         assert np.isnan(track.numbers["mae"]) and "truth" not in repr(track)
         assert list(wildlab.consistency(track).means) == ["NIS"]
-
-
-def test_measured_places_are_those_of_the_detections_used(ship):
-    track = wildlab.track(ship, filter="ekf", settings=SETTINGS)
-    assert np.array_equal(track.used, np.isfinite(track.measured[:, 0]))
-    apart = np.hypot(*(track.measured - track.truth[:, :2])[track.used].T)
-    assert np.nanmedian(apart) < 60.0
 
 
 def test_consistency_is_over_all_runs_with_two_degrees_of_freedom(ship):
@@ -285,14 +244,6 @@ def test_an_error_that_lasts_is_one_value():
         assert found.worth == 1.0
     # 200 draws of 0.95: below 0.88 once in 10 000.
     assert np.mean(inside) > 0.88
-
-
-def test_elements_of_several_sensors_are_counted_on_average():
-    runs = [Series("NIS", dof, np.arange(2.0), np.array([1.0, 2.0])) for dof in (1.0, 2.0)]
-    runs.append(Series("NIS", 2.0, np.arange(2.0), np.array([1.0, np.nan])))
-    assert mean_of_runs(runs) == mean_of_runs(runs[::-1])
-    low, high = chi_square_interval((2 * 1 + 2 * 2 + 1 * 2) / 5, runs=5)
-    assert (mean_of_runs(runs).low, mean_of_runs(runs).high) == pytest.approx((low, high))
 
 
 def test_a_track_is_judged_as_the_command_judges_it():

@@ -5,7 +5,6 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.planning.areas import (
-    area_of,
     check_area,
     contains,
     is_convex,
@@ -19,8 +18,6 @@ SQUARE = [[0.0, 0.0], [0.0, 10.0], [10.0, 10.0], [10.0, 0.0]]
     ("corners", "problem"),
     [
         ([[0, 0], [1, 1]], "2 different"),
-        ([[0, 0], [10, 10], [0, 10], [10, 0]], "crosses itself"),
-        ([[0, 0], [10, 0], [20, 0], [5, 0]], "crosses itself"),
         ([[0, 0], [10, 0], [20, 0]], "0 m2"),
         ([[0, 0], [np.nan, 10], [10, 10]], "corner 2"),
         ([[0, 0, 0], [1, 1, 1], [2, 0, 0]], "shape"),
@@ -38,9 +35,6 @@ def test_either_sense_and_a_closed_ring_give_the_same_area():
     for fence in (one, other):
         p, q = fence - fence[0], np.roll(fence - fence[0], -1, axis=0)
         assert (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum() > 0
-    assert area_of(SQUARE) == area_of(SQUARE[::-1]) == 100.0
-    # Far from the origin it keeps its digits.
-    assert area_of(np.add(SQUARE, [6e6, 5e5])) == pytest.approx(100.0, rel=1e-9)
 
 
 def test_what_lies_inside_is_what_winds_round():
@@ -60,6 +54,5 @@ def test_a_rectangle_has_its_sides_and_its_course():
     corners = rectangle(3.0, 4.0, 20.0, 10.0, 0.3)
     assert is_convex(corners)
     assert np.allclose(corners.mean(axis=0), [3.0, 4.0])
-    assert area_of(corners) == pytest.approx(200.0)
     along = np.array([np.cos(0.3), np.sin(0.3)])
     assert np.ptp(corners @ along) == pytest.approx(20.0)

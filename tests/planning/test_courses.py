@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests.planning.ground import length
-from tests.refused import refused
 from wildlab.geometry.frames import wrap
 from wildlab.planning.areas import rectangle
 from wildlab.planning.courses import dubins, fly
@@ -76,23 +75,3 @@ def test_what_cannot_stop_flies_every_row_and_turns_between_no_tighter_than_it_c
     assert on == pytest.approx(np.linalg.norm(pattern.rows[:, 1] - pattern.rows[:, 0], axis=1).sum())
     windy = fly(pattern, 15.0, turn_radius=30.0, wind=[5.0, 0.0])
     assert windy.duration > course.duration and curvature(windy.points).max() < 1 / 30.0 / (4 / 3) ** 2 * 1.01
-
-
-@pytest.mark.parametrize(
-    ("points", "arguments", "problem"),
-    [
-        (2, {"speed": 0.0}, "speed: 0.0"),
-        (2, {"speed": 5.0, "wind": [4.0, 3.0]}, "wind of 5"),
-        (2, {"speed": 5.0, "turn_radius": -1.0}, "-1.0"),
-        (2, {"speed": 5.0, "turn_time": -1.0}, "-1.0"),
-        (1, {"speed": 5.0}, "two"),
-    ],
-)
-def test_what_cannot_be_flown_is_refused(points, arguments, problem):
-    with refused(problem):
-        fly([[0.0, 0.0], [1.0, 0.0]][:points], **arguments)  # type: ignore[arg-type]
-
-
-def test_a_circle_without_a_radius_is_refused():
-    with refused("radius"):
-        dubins([0.0, 0.0], 0.0, [1.0, 0.0], 0.0, 0.0)

@@ -8,20 +8,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.refused import refused
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import visible_nodes
-from wildlab.planning.areas import area_of, check_area, contains, rectangle
+from wildlab.planning.areas import check_area, contains, rectangle
 from wildlab.planning.coverage import (
     Coverage,
     Sightings,
     first_seen,
     from_sightings,
-    nodes_in,
     see,
     walks,
 )
@@ -77,7 +75,7 @@ def flat_flight(times: NDArray[np.float64]) -> tuple[Terrain, CameraPoses]:
     return flat, CameraPoses(WIDE, Mount("down"), p, np.eye(3))
 
 
-def test_times_and_gaps_are_those_of_a_square_that_moves():
+def test_times_are_those_of_a_square_that_moves():
     times = np.arange(0.0, 61.0)
     flat, poses = flat_flight(times)
     shown = cover(flat, poses, times)
@@ -88,10 +86,9 @@ def test_times_and_gaps_are_those_of_a_square_that_moves():
     for k, one in enumerate(seen):
         if len(one):
             assert shown.last[k, column] == one[-1]
-            assert shown.longest_gap[k, column] == max(one[0], 60 - one[-1], 1.0 if len(one) > 1 else 0)
             assert shown.revisit_age[k, column] == 60 - one[-1]
         else:
-            assert np.isnan(shown.last[k, column]) and shown.longest_gap[k, column] == 60
+            assert np.isnan(shown.last[k, column])
     assert not shown.looks[:, 50 + 11].any() and shown.looks[:, 50 + 10].any()
 
 
@@ -116,31 +113,6 @@ def test_a_blurred_image_is_not_counted_and_told():
     # Seen up to 39 m, in blurred images alone from there to 70 m.
     only_blurred = (~shown.seen & (shown.blurred > 0))[:, 45:56]
     assert only_blurred.mean() == pytest.approx(31 / 201)
-
-
-def test_a_border_is_a_smaller_image():
-    terrain = hills(5)
-    poses = poses_over(terrain, 6)
-    inner = replace(CAMERA, width=520, height=280, cx=256.0, cy=116.6)
-    smaller = CameraPoses.at_lens(inner, poses.p_nc, poses.R_nc, np.eye(3))
-    every, other = see(terrain, poses, 150.0), see(terrain, smaller, 150.0)
-    one = every.take(every.edge >= 100.0)
-    assert np.array_equal(one.node, other.node) and np.array_equal(one.image, other.image)
-    assert 0 < len(one.node) < len(every.node) and (every.edge >= 0).all()
-
-
-@pytest.mark.parametrize("furthest", [np.inf, 0.0])
-def test_a_furthest_distance_without_end_is_refused(furthest):
-    with refused("furthest"):
-        see(*flat_flight(np.array([0.0, 1.0])), furthest)
-
-
-def test_nodes_of_areas_have_their_area():
-    flat = Terrain(np.zeros((401, 401), np.float32), north=-100.0, east=-100.0, step=0.5)
-    fences = [rectangle(0, 0, 60, 40, 0.4), rectangle(40, 50, 30, 30, 1.0)]
-    owner = nodes_in(flat, fences)
-    for k, fence in enumerate(fences):
-        assert (owner == k).sum() * 0.25 == pytest.approx(area_of(fence), rel=0.02)
 
 
 # -- animals that walk within a fence, and when images show them first
@@ -179,8 +151,3 @@ def test_first_seen_is_the_first_sharp_image_with_the_nearest_node():
     )
     nothing = Sightings(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     assert np.isnan(first_seen(nothing, flat, times, sharp, ways)).all()
-
-
-def test_a_step_of_nothing_is_refused():
-    with refused("0 s"):
-        walks(FENCE, [0.0], 1, 0.5, 0, np.random.default_rng(1))

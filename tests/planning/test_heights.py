@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.refused import refused
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.courses import follow_terrain
 
@@ -41,13 +40,3 @@ def test_it_is_the_lowest_way_within_the_limits(climb, descent):
     assert (way.above >= 40 - 1e-9).all()
     slope = -np.diff(way.points[:, 2]) / np.diff(far)
     assert slope.max() <= climb + 1e-9 and slope.min() >= -descent - 1e-9
-
-
-def test_a_way_that_leaves_the_map_is_refused():
-    with refused("off the map"):
-        follow_terrain(rough(), [[0.0, 0.0], [500.0, 0.0]], 40.0)
-
-
-def test_a_height_of_nothing_is_refused():
-    with refused("above"):
-        follow_terrain(rough(), WAY, 0.0)

@@ -71,10 +71,3 @@ def test_a_greedy_planner_turns_round_where_a_look_ahead_goes_there_first():
     assert greedy.broken_off == 1
     # One second to the north and back again.
     assert greedy.time == pytest.approx(106.0) and greedy.path[:, 0].max() == 400
-
-
-def test_a_tour_that_does_not_end_is_given_up_and_too_many_orders_are_refused():
-    given_up = greedy_tour([[0, 1e5]], [np.eye(2)], [0, 0], [0, 10.0], longest=60.0, **GREEDY)
-    assert np.isinf(given_up.time)
-    with refused("too many orders"):
-        shortest_tour(np.zeros((9, 2)), [0, 0], [1, 1], 5.0)

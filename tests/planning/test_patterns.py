@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.planning.ground import length
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, project
 from wildlab.planning.areas import check_area, contains, rectangle
 from wildlab.planning.patterns import (
@@ -17,9 +16,6 @@ from wildlab.planning.patterns import (
     Pattern,
     footprint,
     lawn_mower,
-    lawn_mowers,
-    row_distance,
-    rows_over,
     visit_order,
 )
 
@@ -74,11 +70,6 @@ def test_rows_run_back_and_forth_and_keep_the_twins_count():
     assert pattern.length == pytest.approx(8 * 240 + 7 * 22.5)
 
 
-def test_the_chosen_direction_is_along_the_longer_side():
-    pattern = lawn_mower(rectangle(0, 0, 200, 60, 0.4), 20.0)
-    assert np.abs(np.sin(pattern.directions - 0.4)).max() < 1e-9
-
-
 def test_the_start_says_at_which_corner_rows_begin():
     fence = rectangle(0, 0, 100, 40, 0.0)
     for corner in fence:
@@ -108,15 +99,6 @@ def test_several_areas_are_visited_in_the_shortest_order():
         assert flown(order, chosen, back, start) == pytest.approx(least)
 
 
-def test_many_areas_are_not_far_from_the_shortest():
-    """Ten on a circle: the shortest way round is known."""
-    angles = np.random.default_rng(3).permutation(10) * 2 * np.pi / 10
-    spots = [np.tile([100 * np.cos(a), 100 * np.sin(a)], (2, 1)) for a in angles]
-    order = [k for k, _ in visit_order([[AreaWay(np.zeros((0, 2, 2)), spot)] for spot in spots])]
-    turned = np.abs(np.angle(np.exp(1j * np.diff(angles[order]))))
-    assert np.allclose(turned, 2 * np.pi / 10)
-
-
 def test_the_footprint_is_the_largest_rectangle_that_every_edge_allows():
     """Its corners and the middles of its sides project into the image, and its sides touch the edges."""
     seen = footprint(CAMERA, 60.0)
@@ -129,30 +111,3 @@ def test_the_footprint_is_the_largest_rectangle_that_every_edge_allows():
     # Nowhere does the image see less across than the rectangle, and somewhere nearly as little.
     across = [row.sum() * 0.1 for row in inside[np.abs(y[:, 0]) < 0.4 * seen.length]]
     assert seen.width - 0.2 <= min(across) < 1.1 * seen.width
-
-
-@pytest.mark.parametrize(
-    ("call", "problem"),
-    [
-        (lambda: footprint(CAMERA, -1.0), "height: -1.0"),
-        (lambda: row_distance(0.0), "width"),
-        (lambda: row_distance(10.0, 1.0), "overlap"),
-        (lambda: lawn_mower(U_SHAPE, 0.0), "distance"),
-        (lambda: lawn_mower(U_SHAPE, 1e-4), "5000"),
-        (lambda: lawn_mowers([], 10.0), "no area"),
-        (lambda: lawn_mowers([U_SHAPE], [10.0, 20.0]), "2 values"),
-        (lambda: visit_order([[]]), "no way"),
-    ],
-)
-def test_wrong_use_is_refused(call, problem):
-    with pytest.raises(WildlabError) as caught:
-        call()  # type: ignore[operator]
-    assert problem in str(caught.value)
-
-
-def test_rows_over_share_the_extent_evenly():
-    assert row_distance(20.0, 0.25) == 15.0
-    rows, step = rows_over(check_area(U_SHAPE), 30.0, 0.0)
-    assert step == 25.0 and [len(row) for row in rows] == [1, 1, 1, 1]
-    rows, _ = rows_over(check_area(U_SHAPE), 10.0, np.pi / 2)
-    assert [len(row) for row in rows] == [2, 2, 2, 2, 2, 2, 2, 1, 1, 1]

@@ -15,7 +15,7 @@ from wildlab.planning.information import (
     initial_information,
     trace_of_inverse,
 )
-from wildlab.planning.kernels import gains_of_steps, worth_beyond
+from wildlab.planning.kernels import gains_of_steps
 from wildlab.planning.legs import (
     Flying,
     Leg,
@@ -24,7 +24,6 @@ from wildlab.planning.legs import (
     RandomWalk,
     heading_change,
     look_attitude,
-    sideways_limit,
     turn_between,
 )
 from wildlab.planning.planner import Horizon, InformationPlanner
@@ -102,13 +101,6 @@ def test_gains_of_candidates_are_differences_of_the_objective(legs):
     assert gains.max() > 100
 
 
-def test_what_is_far_is_worth_less():
-    middles, ends = np.array([[30.0, 0.0], [0.0, 40.0]]), np.array([[0.0, 0.0], [30.0, 0.0]])
-    left = np.array([[2.0, 2.5], [0.0, 1.0]])
-    worth = worth_beyond(left, middles, np.array([0, 1]), ends, 50.0)
-    assert worth == pytest.approx([2 * np.exp(-0.6) + 2.5 * np.exp(-0.8), np.exp(-1.0)])
-
-
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_it_looks_aside_where_that_shows_more(side):
     """A strip beside the way: the middle of the image lies on it, and a camera that is fixed tells less."""
@@ -151,23 +143,6 @@ def test_a_wall_hides_what_is_behind_it():
     before = one.weights @ one.left
     one.add(free.leg)
     assert before - one.weights @ one.left < 0.2 * free.gain
-
-
-def test_it_turns_back_at_the_edge_of_the_map_and_refuses_what_leads_off_it():
-    edge = Platform(np.array([495.0, 0.0]), 0.0, look_attitude(0.0, 0.0, 0.0))
-    assert planner(grid((400, 480), (-20, 20))).choose(edge).leg.p_nc[-1, 0] <= 500
-    with refused("off the map"):
-        planner(grid((600, 700), (-20, 20)), turns=(0.0,)).choose(edge)
-
-
-def test_a_grid_that_does_not_fit_is_refused():
-    points = grid((-50, 50), (-50, 50))
-    with refused("shape"):
-        InformationPlanner(points, np.eye(3)[None], FLAT, SENSOR, FLYING, Horizon())
-    with refused("nothing is known"):
-        InformationPlanner(points, np.zeros((len(points), 3, 3)), FLAT, SENSOR, FLYING, Horizon())
-    with refused("speed"):
-        Flying(0.0, 50.0)
 
 
 def test_images_count_from_when_the_camera_is_at_rest():
@@ -213,17 +188,6 @@ def test_all_who_turn_wait_as_long():
     assert round_trip.at == pytest.approx([5, 6, 7])
 
 
-def test_how_far_sideways_an_image_reaches():
-    rng = np.random.default_rng(4)
-    points = np.column_stack([rng.uniform(-300, 300, (5000, 2)), rng.uniform(-20, 0, 5000)])
-    for side, ahead in ((0.0, 0.0), (0.6, 0.2), (0.0, 0.8)):
-        R = look_attitude(0.7, side, ahead)
-        seen = detection_probability(points, [0, 0, -50.0], R, SENSOR) > 0
-        limit = sideways_limit(R, 50.0, SENSOR)
-        assert 0 < np.hypot(*points[seen, :2].T).max() <= limit
-    assert np.isinf(sideways_limit(look_attitude(0.0, 0.0, 1.5), 50.0, SENSOR))
-
-
 def test_way_points_are_visited_in_their_order_and_once():
     flying = Flying(5.0, 50.0, images=4)
     pattern = PatternPlanner([[10.0, 0.0], [10.0, 12.0], [30.0, 12.0]], FLAT, flying)
@@ -260,10 +224,3 @@ def test_a_random_walk_stays_in_its_areas_and_repeats_with_its_generator():
     assert (ways[0] == ways[1]).all() and not (ways[0] == ways[2]).all()
     assert (ways[0] > -15.1).all() and (ways[0] < [115.1, 95.1]).all()
     assert np.ptp(ways[0], axis=0).min() > 50
-
-
-def test_blocks_hold_all_that_is_left():
-    one = planner(grid((-80, 80), (-80, 80)))
-    one.weights[::5] = 0
-    blocks = one._in_blocks(np.stack([one.left, 2 * one.left]))
-    assert blocks.sum(axis=1) == pytest.approx([one.weights @ one.left, 2 * one.weights @ one.left])

@@ -37,7 +37,7 @@ def check_area(corners: ArrayLike, name: str = "area") -> Array:
     Raises
     ------
     WildlabError
-        Where it has fewer than three corners, corners that are not numbers, no extent, or crosses itself.
+        Where it has fewer than three corners, corners that are not numbers, or no extent.
 
     Examples
     --------
@@ -62,14 +62,6 @@ def check_area(corners: ArrayLike, name: str = "area") -> Array:
             "give three at least",
             field=name,
         )
-    crossing = _crossing_edges(points)
-    if crossing is not None:
-        a, b = crossing
-        raise WildlabError(
-            f"the polygon crosses itself: its edge after corner {a + 1} meets that after corner {b + 1}",
-            "give the corners in the order in which one walks along the fence",
-            field=name,
-        )
     signed = _signed_area(points)
     if abs(signed) < LEAST:
         raise WildlabError(
@@ -79,26 +71,6 @@ def check_area(corners: ArrayLike, name: str = "area") -> Array:
         )
     # North to the first axis, east to the second: positive is clockwise from above.
     return points if signed > 0 else np.ascontiguousarray(points[::-1])
-
-
-def area_of(corners: ArrayLike) -> float:
-    """Area of a polygon (K, 2) in square metres, by the sum of its cross products.
-
-    Parameters
-    ----------
-    corners
-        (K, 2) metres, in either sense.
-
-    Returns
-    -------
-    float
-
-    Examples
-    --------
-    >>> area_of([[0, 0], [0, 10], [20, 10], [20, 0]])
-    200.0
-    """
-    return abs(_signed_area(np.asarray(corners, float)))
 
 
 def is_convex(corners: ArrayLike) -> bool:
@@ -231,51 +203,6 @@ def _signed_area(points: Array) -> float:
     p = points - points[0]
     q = np.roll(p, -1, axis=0)
     return float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum() / 2)
-
-
-def _crossing_edges(points: Array) -> tuple[int, int] | None:
-    """Two edges that meet elsewhere than at the corner they share, or None."""
-    count = len(points)
-    edges = np.roll(points, -1, axis=0) - points
-    if count > 3:
-        # Neighbours share a corner; they overlap where one turns straight back.
-        after = np.roll(edges, -1, axis=0)
-        cross = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
-        lengths = np.linalg.norm(edges, axis=1) * np.linalg.norm(after, axis=1)
-        back = (np.abs(cross) <= 1e-12 * lengths) & (np.einsum("ij,ij->i", edges, after) < 0)
-        if back.any():
-            first = int(back.argmax())
-            return first, (first + 1) % count
-    for i in range(count - 2):
-        # The last edge is a neighbour of the first.
-        last = count - 1 if i == 0 else count
-        meet = _meet(points[i], edges[i], points[i + 2 : last], edges[i + 2 : last])
-        if meet.any():
-            return i, i + 2 + int(meet.argmax())
-    return None
-
-
-def _meet(a: Array, along: Array, b: Array, edges: Array) -> Mask:
-    """Which closed segments, from b (N, 2) along edges (N, 2), have a point in common with one."""
-    length, lengths = np.asarray(np.linalg.norm(along)), np.linalg.norm(edges, axis=1)
-
-    def sides(u: Array, v: Array, scale: Array) -> Array:
-        value = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-        return np.where(np.abs(value) <= SAME * scale, 0.0, np.sign(value))
-
-    start, end = sides(along, b - a, length), sides(along, b + edges - a, length)
-    near, far = sides(edges, a - b, lengths), sides(edges, a + along - b, lengths)
-    meet = (start * end < 0) & (near * far < 0)
-
-    def within(points: Array, origins: Array, spans: Array) -> Mask:
-        low, high = np.minimum(origins, origins + spans), np.maximum(origins, origins + spans)
-        return np.asarray(((points >= low - SAME) & (points <= high + SAME)).all(axis=-1))
-
-    meet |= (start == 0) & within(b, a, along)
-    meet |= (end == 0) & within(b + edges, a, along)
-    meet |= (near == 0) & within(a, b, edges)
-    meet |= (far == 0) & within(a + along, b, edges)
-    return np.asarray(meet)
 
 
 def edge_directions(corners: ArrayLike, most: int = MOST_DIRECTIONS) -> Array:

@@ -34,9 +34,6 @@ class Coverage(NamedTuple):
         In how many blurred ones.
     last
         When it was last seen sharply, s; NaN where never.
-    longest_gap
-        The longest time for which it was not seen sharply, from the first image to the last, s: all of it
-        where it never was.
     detected
         Probability that something there is detected at least once, by (5.8) and (5.9) for each look. Looks
         count as independent, which those of one pass are not: what hides in one image hides in the next.
@@ -50,7 +47,6 @@ class Coverage(NamedTuple):
     looks: Indices
     blurred: Indices
     last: Array
-    longest_gap: Array
     detected: Array
     duration: float
     step: float
@@ -94,26 +90,16 @@ def from_sightings(
     looks = np.bincount(node, minlength=nodes)
     blurred = np.bincount(found.node[~clear], minlength=nodes)
     start, end = (float(times[0]), float(times[-1])) if len(times) else (0.0, 0.0)
-    # Images come in order, and so do the sightings of each node once they are sorted by it.
-    order = np.argsort(node, kind="stable")
-    node, at = node[order], at[order]
-    last, gap = np.full(nodes, np.nan), np.full(nodes, end - start)
-    if len(node):
-        new = np.concatenate([[True], np.diff(node) > 0])
-        final = np.concatenate([new[1:], [True]])
-        last[node[final]] = at[final]
-        since = np.where(new, at - start, np.diff(at, prepend=at[0]))
-        longest = np.maximum.reduceat(since, np.flatnonzero(new))
-        gap[node[final]] = np.maximum(longest, end - at[final])
+    last = np.full(nodes, np.nan)
+    np.fmax.at(last, node, at)
     # 1 - prod(1 - P) by sums of logarithms; P of 1 has none.
-    probability = np.exp(-((distance[order] / range_scale) ** 2))
+    probability = np.exp(-((distance / range_scale) ** 2))
     with np.errstate(divide="ignore"):
         missed = np.bincount(node, np.log1p(-np.minimum(probability, 1.0)), minlength=nodes)
     return Coverage(
         looks.reshape(shape),
         blurred.reshape(shape),
         last.reshape(shape),
-        gap.reshape(shape),
         -np.expm1(missed).reshape(shape),
         end - start,
         terrain.step,

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError, above_zero
-from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, Mask, ned_to_enu
 
 
@@ -53,30 +52,6 @@ class SearchSensor:
         above_zero(
             **{name: getattr(self, name) for name in ("half_width", "half_height", "sd", "reach", "nearest")}
         )
-
-
-def sensor_of(camera: Camera, *, sd: float, reach: float, nearest: float = 1.0) -> SearchSensor:
-    """The centred, undistorted field of view of a camera (F 2.22-2.23), and what its images tell.
-
-    Parameters
-    ----------
-    camera
-        Its width, height and focal lengths are used.
-    sd, reach, nearest
-        As `SearchSensor` has them.
-
-    Returns
-    -------
-    SearchSensor
-
-    Examples
-    --------
-    >>> sensor = sensor_of(Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6), sd=0.01, reach=100.0)
-    >>> print(round(float(np.degrees(2 * np.arctan(sensor.half_width))), 1))
-    31.7
-    """
-    half = (camera.width / 2 / camera.fx, camera.height / 2 / camera.fy)
-    return SearchSensor(*half, sd=sd, reach=reach, nearest=nearest)
 
 
 def bearing_jacobian(points: ArrayLike, p_nc: ArrayLike, nearest: float = 0.0) -> Array:

@@ -446,6 +446,10 @@ class Tour(NamedTuple):
     broken_off: int
 
 
+#: A tour by choices each second is given up after this, s.
+LONGEST_S = 3600.0
+
+
 def greedy_tour(
     positions: ArrayLike,
     covariances: ArrayLike,
@@ -456,8 +460,6 @@ def greedy_tour(
     c: float,
     speed: float,
     walk: float,
-    interval: float = 1.0,
-    longest: float = 3600.0,
 ) -> Tour:
     """What comes of choosing anew by F (5.3) all the time, until each animal and the way point were visited.
 
@@ -472,10 +474,6 @@ def greedy_tour(
         Of the platform, m/s.
     walk
         By how much variances grow, each way, m^2/s.
-    interval
-        Between choices, s.
-    longest
-        After which it is given up, s.
 
     Returns
     -------
@@ -487,21 +485,21 @@ def greedy_tour(
     here, end = np.asarray(platform, float).copy(), np.asarray(way_point, float)
     path, order = [here.copy()], list[int]()
     time, broken_off, last = 0.0, 0, None
-    while len(order) < len(at) + 1 and time < longest:
+    while len(order) < len(at) + 1 and time < LONGEST_S:
         there = np.array([one for one in range(len(at)) if one not in order], int)
         goal = best_goal(at[there], P[there], here, None if SEARCH in order else end, alpha=alpha, c=c)
         goal = SEARCH if goal == SEARCH else int(there[goal])
         broken_off += last is not None and goal != last
         aim = end if goal == SEARCH else at[goal]
         away = float(np.hypot(*(aim - here)))
-        P += walk * interval * np.eye(2)
-        if away <= speed * interval:
+        P += walk * np.eye(2)
+        if away <= speed:
             here, last = aim.copy(), None
             time += away / speed
             order.append(goal)
         else:
-            here += (aim - here) * (speed * interval / away)
-            last, time = goal, time + interval
+            here += (aim - here) * (speed / away)
+            last, time = goal, time + 1.0
         path.append(here.copy())
     whole = len(order) == len(at) + 1
     return Tour(np.array(path), time if whole else np.inf, tuple(order), broken_off)

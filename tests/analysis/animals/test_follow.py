@@ -8,7 +8,6 @@ import pytest
 from tests.planning.ground import FLAT
 from wildlab.analysis.animals.images import NONE, Detector, Images, footprint_circles, sight_from, take_images
 from wildlab.analysis.animals.tracking import (
-    STATION_S,
     Aircraft,
     Kalman,
     Ledger,
@@ -91,32 +90,6 @@ def test_images_that_are_left_out_show_no_particle():
         assert not sight(places).any()
         asked += len(places)
     assert asked > 10_000
-
-
-def test_every_image_with_a_detection_is_looked_at_and_every_station():
-    images = over_and_over(2, 0.5)
-    done = follow(images, FLAT, DETECTOR, particles(2, 0.5), walk_of(0.5, 1.0))
-    assert len(done.found) == len(images.z)
-    times = images.times[[one.image for one in done.known]]
-    assert np.diff(times).max() <= STATION_S + 0.5 and times[-1] == images.times[-1]
-    assert done.tracks == max(one.track for one in done.found)
-    assert done.steps < len(images.times)
-
-
-def every_image(images: Images, kalman: Kalman) -> Kalman:
-    for k, time in enumerate(images.times.tolist()):
-        z, R, _ = images.taken(k)
-        kalman.step(ImageLook(time, z, R, nowhere))
-    return kalman
-
-
-def test_a_kalman_filter_that_leaves_images_out_is_the_one_that_does_not():
-    images = over_and_over(3, 0.5)
-    motion = walk_of(0.5, 1.0)
-    few = Kalman(motion, 0.99)
-    follow(images, FLAT, DETECTOR, few, motion)
-    for one, other in zip(few.known(), every_image(images, Kalman(motion, 0.99)).known(), strict=True):
-        assert np.allclose(one, other, rtol=1e-9)
 
 
 def test_a_kalman_track_is_the_textbooks():
@@ -241,15 +214,6 @@ def test_rows_alone_reach_every_way_point_and_end():
     assert np.isinf(done.done).all() and not done.given_up
 
 
-def test_a_known_animal_is_gone_back_to_and_found_again():
-    done = flown(np.array([[-60.0, -100.0]]), VISITS, lives=2)
-    visits = done.goal != SEARCH
-    assert visits.any() and (done.goal[visits] == 1).all()
-    back = [one for one in done.found if one.away > 20 and np.isfinite(one.away)]
-    assert back and all(one.after < one.before / 2 for one in back)
-    assert all(done.goal[one.image] == 1 for one in back)
-
-
 def test_a_choice_is_the_greatest_of_f_5_2():
     done = flown(np.array([[-60.0, -100.0]]), VISITS, lives=2)
     reached = 0
@@ -281,9 +245,3 @@ def test_a_search_ends_once_its_patience_does():
     # On the way over a field of 300 m at 5 m/s, and then patience; images that miss it move where it may be.
     assert 1 in done.given_up and ends - first < 60 + VISITS.patience + 2
     assert ends < len(done.goal)  # and then flies on
-
-
-def test_what_is_seen_as_patience_ends_is_not_given_up():
-    there = np.full((len(TIMES), 1, 2), [-60.0, -100.0])
-    whole = flown(there, VISITS._replace(patience=0.0), lives=2)
-    assert (whole.goal == 1).any() and not whole.given_up

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from wildlab.analysis.animals.images import (
-    FURTHEST,
     NEAR,
     NONE,
     TOO_LARGE,
@@ -19,8 +18,6 @@ from wildlab.analysis.animals.images import (
     Images,
     Scenery,
     Thermal,
-    furnish,
-    ground_distance,
     judge,
     render_frame,
     take_frames,
@@ -101,14 +98,6 @@ def test_an_animal_behind_a_ridge_does_not_show():
     assert [frame.animal[seen.number] for seen in frame.view.seen] == [1]
 
 
-def test_strewn_things_lie_within_their_fences_and_are_the_same_for_the_same_seed():
-    fence = np.array([[40.0, -80.0], [40.0, 60.0], [-60.0, 60.0], [-60.0, -80.0]])
-    one, other = (furnish(HILLS, [fence], 3, NIGHT, np.random.default_rng(7)) for _ in range(2))
-    assert one.animals == other.animals and one.others == other.others
-    assert {body.kind for body in one.others} == {"stone", "tree"} and len(one.animals) == 3
-    assert all(-60 <= body.north <= 40 and -80 <= body.east <= 60 for body in one.others)
-
-
 def frame_of(labels: Array, whose: list[int]) -> Frame:
     view = LandView(np.zeros(SHAPE, np.float32), labels.astype(np.int16), np.ones(SHAPE, bool), ())
     return Frame(np.zeros(SHAPE, np.uint16), view, np.array([NONE, *whose], np.intp))
@@ -181,14 +170,3 @@ def test_detections_go_to_the_ground_from_the_told_pose():
     assert (np.linalg.eigvalsh(images.R) > 0).all()
     # At least what two pixels and half a metre of the pose are.
     assert (np.trace(images.R, axis1=1, axis2=2) > 2 * ((DETECTOR.sd * per_px) ** 2 + 0.5**2) * 0.99).all()
-
-
-def test_frames_without_detections_give_images_without():
-    found = framed(np.zeros(SHAPE), lambda counts, distance: detections())
-    assert found.images.z.shape == (0, 2) and found.uv.shape == (0, 2)
-
-
-def test_the_distance_to_the_ground_is_limited():
-    assert ground_distance(HILLS, looking_at(np.array([10.0, 10.0]), 0, 0, 0)) == pytest.approx(60, abs=3)
-    up = poses(np.array([0.0, 0.0, -90.0]), np.diag([1.0, -1.0, -1.0]) @ R_MC_DOWN)
-    assert ground_distance(HILLS, up) == FURTHEST

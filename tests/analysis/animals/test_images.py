@@ -17,10 +17,9 @@ from wildlab.analysis.animals.images import (
     take_images,
 )
 from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors, with_errors
-from wildlab.geometry.camera import Camera, in_image
+from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.simulation.landscape import synthetic_landscape
 
@@ -55,17 +54,6 @@ def test_all_that_an_image_shows_lies_in_its_circle(north, east, above, roll, pi
     assert (away <= radius[0]).all()
     sight = sight_from(LAND, CAMERA, one.p_nc[0], one.R_nc[0], (middle[0], float(radius[0])), EXACT)
     assert np.array_equal(sight(grid), seen.astype(float))
-
-
-def test_shown_is_what_projects_into_the_image_over_level_ground():
-    R = euler_to_matrix(0.3, 0.1, 0.7) @ R_MC_DOWN
-    p = np.array([5.0, -3.0, -50.0])
-    grid = np.stack(np.meshgrid(np.arange(-60, 60, 3.0), np.arange(-60, 60, 3.0)), axis=-1).reshape(-1, 2)
-    uv = ground_to_pixel(CAMERA, np.column_stack([grid, np.full(len(grid), -0.7)]), p, R)
-    detector = EXACT._replace(border=20.0)
-    seen = shown(FLAT, CAMERA, p, R, grid, detector)
-    assert np.array_equal(seen, in_image(CAMERA, uv, 20.0))
-    assert 0 < seen.sum() < len(grid)
 
 
 def test_a_hill_hides_what_is_behind_it():
@@ -145,12 +133,3 @@ def test_images_detect_only_what_they_show_and_so_often():
     assert len(part.image) == (found.image < 9).sum() > 0
     for one, other in zip(part.taken(7), (z, R, animals), strict=True):
         np.testing.assert_array_equal(one, other)
-
-
-def test_a_covariance_is_that_of_the_distance_to_the_middle_of_the_animal():
-    # Straight down from 4 m: an animal's middle is 3.3 m away, a pixel there that over the focal length.
-    told = CameraPoses.at_lens(CAMERA, np.array([[0.0, 0.0, -4.0]]), R_MC_DOWN[None], np.eye(3))
-    at, detector = np.zeros((1, 2)), EXACT._replace(sd=2.0)
-    _, covariance = put_on_ground(FLAT, told, told, np.zeros(1), at, NONE, detector, np.random.default_rng(1))
-    sizes = sorted(np.sqrt(np.diag(covariance[0])))
-    assert sizes == pytest.approx([2 * 3.3 / 1267.0, 2 * 3.3 / 1117.0], rel=1e-4)

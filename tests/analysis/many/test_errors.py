@@ -23,8 +23,6 @@ from wildlab.analysis.tracks.ground_positions import (
     _pose_roots,
     counted_twice,
     laid_out,
-    lasting_of,
-    of_elements,
     of_pixels,
     of_poses,
     stated_roots,
@@ -37,7 +35,6 @@ from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, rotation_vector_to_matrix
 from wildlab.geometry.uncertainty import PoseErrors
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.many import smooth_many
 from wildlab.tracking.schmidt import transition_of_pose
 from wildlab.tracking.sensors import POSE
 
@@ -77,17 +74,6 @@ def test_a_place_moves_as_what_it_was_computed_from():
                     "heading": -r * across * np.radians(2.0), "radar: range_bias": 5.0 * toward}  # fmt: skip
         for i, name in enumerate(found.errors.names):
             assert np.allclose(scan.shared[0, :, i], expected[name]), name
-
-
-def test_all_errors_of_a_look_move_its_detections_alike():
-    flight = robot_flight(kind="position", clutter=3, seconds=20.0, labelled=False)
-    text = "[sensors.radar.considered.platform_north]\nsd_m = 3.0\n"
-    for scan in places(flight, text).scans:
-        assert scan.shared.shape == (4, 2, 1)
-        assert np.allclose(np.abs(scan.shared[:, 0, 0]), 3.0) and np.allclose(scan.shared[:, 1], 0.0)
-        assert len(np.unique(np.sign(scan.shared[:, 0, 0]))) == 1
-    scans, belief = believed(flight)
-    assert of_elements(scans, belief, scans.detections)[0].shape[-1] == 0
 
 
 @cache
@@ -189,19 +175,6 @@ def test_what_is_considered_of_a_camera_is_in_its_pose():
     assert np.allclose(in_n[seen], np.diag([0, 0, np.radians(9.0) ** 2]), atol=1e-12)
 
 
-def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it():
-    def of(text: str) -> float:
-        return lasting_of(parse_settings(text).sensors.get("eye"))
-
-    assert of("") == of("[sensors.eye.noise]\npixel_px = 2.0\n") == 0.0
-    assert of("[sensors.eye]\ncorrelation_time_s = 40.0\n") == 40.0
-    heading = "[sensors.eye.considered.heading]\nsd_deg = 3.0\n"
-    assert of(heading) == np.inf
-    assert of(heading + "[sensors.eye.considered.tilt]\nsd_deg = 1.0\ncorrelation_time_s = 9.0\n") == 9.0
-    # An error of the clock is no error of the pose.
-    assert of("[sensors.eye.considered.clock]\nsd_s = 0.1\ncorrelation_time_s = 0.5\n") == 0.0
-
-
 def test_mount_and_ground_are_in_what_is_shared_and_stay():
     _, observed = _pixels()
     errors = pose_errors(observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
@@ -213,27 +186,6 @@ def test_mount_and_ground_are_in_what_is_shared_and_stay():
     assert linear.sum() > 100 and np.allclose(whole[linear], covariances_of(points)[linear], rtol=1e-6)
     assert found.lasting_s == (7.0,) * 6 + (np.inf,) * 4
     assert (np.abs(shared[linear][..., 6:]).max(axis=(0, 1)) > 0.01).all()
-
-
-def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one():
-    flight, observed = _pixels()
-    own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
-    own[::3] = np.nan
-    known = replace(observed, poses=replace(observed.poses, covariance=own))
-    belief = believed(flight, "", *MANUAL)[1]
-    told, usual = told_errors(flight, known, belief._replace(considered=())), pose_errors(observed)
-    assert np.allclose(told.pose[::3], usual.pose[::3]) and np.allclose(told.pose[1::3], own[1::3])
-
-
-def test_tables_of_tracks_are_smoothed_by_what_lasts():
-    told = NOISE + "[sensors.radar.considered.heading]\nsd_deg = 3.0\ncorrelation_time_s = 5.0\n"
-    followed = track_jointly(robot_flight(labelled=False, seconds=60.0), settings=parse_settings(told))
-    table = tracks_table(followed)
-    after = smooth_many(followed.shown, followed.targets.density, followed.lasting_s)
-    forever = smooth_many(followed.shown, followed.targets.density, [np.inf])
-    x = np.concatenate([x[:, 0] for x, _ in after])
-    assert followed.lasting_s == (5.0,) and np.allclose(table["smoothed_north_m"], x)
-    assert not np.allclose(x, np.concatenate([x[:, 0] for x, _ in forever]))
 
 
 def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_last():
@@ -295,10 +247,3 @@ def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last():
     apart = believed(flight, text + "shared = false\n", *MANUAL)[1]
     names = of_poses(flight, observed, told, apart, 9.0)[1]
     assert names == (*POSE[:5], "manual: heading")
-
-
-def test_one_error_of_two_sensors_lasts_as_long_as_the_shorter_says():
-    moves = [np.ones((1, 2, 1))]
-    for times in ((10.0, 30.0), (30.0, 10.0)):
-        lasting_s, _ = laid_out([(LastingErrors(("heading",), (one,)), moves) for one in times])
-        assert lasting_s == (10.0,)

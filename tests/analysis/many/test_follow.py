@@ -1,14 +1,13 @@
 """All targets of a flight at once: found without names, beside the truth, and what is refused."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, joined, robot_flight
 from tests.refused import refused
 from wildlab.analysis.tracks.many import complete_looks, judged, known_looks, track_jointly, tracks_table
-from wildlab.flight.tracking_settings import parse_settings, settings_over
+from wildlab.flight.tracking_settings import parse_settings
 
 
 def test_a_boat_among_clutter_is_found_without_its_name():
@@ -28,13 +27,6 @@ def test_a_boat_among_clutter_is_found_without_its_name():
 def test_without_truth_there_is_nothing_to_compare():
     followed = track_jointly(robot_flight(kind="position", truth=False))
     assert judged(followed) is None and followed.truth == {} and followed.minutes > 1
-
-
-def test_a_target_out_of_reach_costs_nothing():
-    followed = track_jointly(robot_flight(kind="position", labelled=False))
-    lives = judged(followed, {"boat": 1.0})
-    assert lives is not None and lives.targets["boat"].visible == 0
-    assert max(one.distance for one in lives.gospa) == 0
 
 
 def test_bearings_help_where_places_are_known_and_begin_nothing_alone():
@@ -96,12 +88,6 @@ def test_only_what_an_image_shows_or_a_detection_names_could_be_seen():
     assert lives is not None and lives.targets["boat"].visible == 30
 
 
-def test_no_track_leaves_an_empty_table():
-    text = "[targets.many]\nhits = 1000\n"
-    followed = track_jointly(robot_flight(kind="position"), settings=parse_settings(text))
-    assert list(tracks_table(followed)) == ["time_s", "sensor", "track", "north_m", "east_m"]
-
-
 def test_where_a_true_place_is_not_known_nothing_is_judged():
     """The truth ends half-way: a track on a boat that is still there is not false."""
     flight = robot_flight(kind="position", seconds=100.0)
@@ -113,18 +99,6 @@ def test_where_a_true_place_is_not_known_nothing_is_judged():
     assert lives.false_tracks_per_minute == 0 and not any(one.n_false for one in lives.gospa)
 
 
-def test_where_some_true_places_are_known_tracks_on_others_are_not_judged():
-    """Another boat's truth is known for half of the time: a track may be on it for the rest."""
-    flight = robot_flight(kind="position", seconds=100.0)
-    truth = flight.table("truth")
-    other = truth[truth["time_s"] < truth["time_s"].min() + 50].assign(target_id="other", north_m=900.0)
-    both = pd.concat([truth, other], ignore_index=True)
-    followed = track_jointly(changed(flight, truth=both))
-    lives, whole = judged(followed), complete_looks(followed)
-    assert lives is not None and 0.3 < whole.mean() < 0.7
-    assert lives.incomplete == int((~whole).sum()) and len(lives.gospa) == len(whole)
-
-
 def test_detections_that_are_no_sensors_are_told_and_not_left_out_in_silence():
     flight = robot_flight()
     frames, seen = flight.table("frames").assign(sensor="radar"), flight.table("detections")
@@ -132,22 +106,6 @@ def test_detections_that_are_no_sensors_are_told_and_not_left_out_in_silence():
     followed = track_jointly(changed(flight, frames=frames, detections=some))
     assert any("5 detections" in note and "are not used" in note for note in followed.notes)
     assert not any("are not used" in note for note in track_jointly(flight).notes)
-
-
-def test_what_settings_say_in_vain_is_named_and_not_considered():
-    text = "[sensors.rader.many]\ndetection = 0.7\n[sensors.radar.considered.clock]\nsd_s = 2.0\n"
-    text += "[sensors.radar.considered.heading]\nsd_deg = 2.0\n"
-    followed = track_jointly(robot_flight(), settings=parse_settings(text))
-    assert any("'rader'" in note for note in followed.notes) and any(
-        "clock" in note for note in followed.notes
-    )
-    assert followed.lasting_s == (np.inf,)  # of the heading alone
-
-
-def test_settings_for_many_are_merged_key_by_key():
-    own = parse_settings('[targets.many]\nhits = 4\n[[targets.many.hulls]]\nname = "ship"\n')
-    many = settings_over(parse_settings("[targets.many]\ngate = 3.0\n"), own).targets.many
-    assert many is not None and (many.gate, many.hits, many.hulls[0].name) == (3.0, 4, "ship")
 
 
 def test_what_the_truth_may_be_off_is_beside_the_tracks_own():

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from tests.analysis.robots import believed, boat, robot, robot_flight
-from tests.refused import refused
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.analysis.tracks.ground_positions import PlacedLooks, _of_ranges, places_of, sees_of
 from wildlab.analysis.tracks.scans import Scans, scans_of
@@ -132,30 +131,3 @@ def test_how_much_ground_an_image_covers():
     look = Scan(0.0, 0, np.zeros(2), *nothing, sees_of(looking(np.eye(3), (0.0, 0.0), 0.0), 0))
     found = PlacedLooks("eye", "pixel", [look], [frozenset()], 1.0, 0)
     assert found.area(50.0) == pytest.approx(640 * 512 * (60 / 700) ** 2, rel=0.02)
-
-
-@pytest.mark.parametrize("count", [3, 120])
-def test_the_ground_covered_is_that_of_most_looks(count):
-    """The first one sees nothing, as before a camera is turned on, and the others everything."""
-    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
-    looks = [
-        Scan(float(k), 0, np.zeros(2), *nothing, lambda at, shows=k > 0: np.full(len(at), shows))
-        for k in range(count)
-    ]
-    found = PlacedLooks("eye", "pixel", looks, [frozenset()] * count, 1.0, 0)
-    assert found.area(50.0) == pytest.approx(np.pi * 50.0**2)
-
-
-def test_bearings_are_taken_as_they_are():
-    flight = robot_flight(kind="bearing")
-    scans, belief = believed(flight)
-    found = places(flight)
-    assert found.bearings and not len(found.distances())
-    row = int(np.isfinite(scans.detections[..., 0]).any(axis=1).argmax())
-    assert np.array_equal(found.scans[row].z[:1, 0], scans.detections[row, :1, 0])
-    assert np.allclose(found.scans[row].R, belief.noise[0] ** 2) and found.scans[row].R.shape[1:] == (1, 1)
-
-
-def test_what_tells_no_place_is_refused():
-    with refused("nothing of a place"):
-        places(robot_flight(kind="velocity"))

@@ -62,8 +62,6 @@ class TrackingInputs(NamedTuple):
         What filters are told of the targets, and who says so.
     notes
         What was done to the measurements, in sentences.
-    strays
-        Those among them that are of detections of no sensor.
     """
 
     sensors: dict[str, SensorInputs]
@@ -71,7 +69,6 @@ class TrackingInputs(NamedTuple):
     targets: TargetModel
     said: list[ToldValue]
     notes: list[str]
-    strays: list[str]
 
 
 def read_inputs(
@@ -99,8 +96,7 @@ def read_inputs(
         targets = targets._replace(density=tuned.density)
         said = [one for one in said if not one.what.startswith("acceleration")]
         said.insert(0, tuned.said_of_density())
-    strays = _notes_of_sources(flight)
-    notes = [*_notes_of_absent(flight, told), *strays]
+    notes = [*_notes_of_absent(flight, told), *_notes_of_sources(flight)]
     found: dict[str, SensorInputs] = {}
     for name in sensors_with_detections(flight, sensors):
         looks = scans_of(flight, name, 0.0, source)
@@ -113,7 +109,7 @@ def read_inputs(
             looks = scans_of(flight, name, noise.offset_s, source)
         looks = looks if joint else _identified(looks, targets)
         found[name] = SensorInputs(looks, noise, _targets_of(flight, looks), more)
-    return TrackingInputs(found, told, targets, said, notes, strays)
+    return TrackingInputs(found, told, targets, said, notes)
 
 
 def refuse_without_times(flight: Flight) -> None:
@@ -191,20 +187,6 @@ def sensors_with_detections(flight: Flight, wanted: Sequence[str] = ()) -> list[
             file=flight.folder,
             field="detections.source",
         )
-    return found
-
-
-def order_notes(scans: Scans) -> list[str]:
-    """What was done about looks that were logged late, or at one time."""
-    found = []
-    if scans.late:
-        looks = "1 look" if scans.late == 1 else f"{scans.late} looks"
-        found.append(
-            f"{looks} of {scans.sensor} of {len(scans.times)} came after one with a later stamp, and "
-            f"{'was' if scans.late == 1 else 'were'} put in order."
-        )
-    if scans.same_time:
-        found.append(f"{scans.same_time} of {scans.sensor} have the stamp of the look before: both count.")
     return found
 
 

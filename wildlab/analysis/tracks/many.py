@@ -21,7 +21,7 @@ from wildlab.analysis.tracks.ground_positions import (
     said_of_pixels,
     thinned,
 )
-from wildlab.analysis.tracks.inputs import order_notes, read_inputs
+from wildlab.analysis.tracks.inputs import read_inputs
 from wildlab.analysis.tracks.noise_model import ASSUMED, STATED, ToldValue
 from wildlab.analysis.tracks.noise_model import TargetModel as Following
 from wildlab.analysis.tracks.scans import truth_deviations, truths_at
@@ -291,7 +291,6 @@ def refuse_unfit(settings: Settings) -> None:
 #: From this distance a track is on no target, and a target without a track: the cut-off of GOSPA, m, where no
 #: ``reach_m`` is stated.
 CUTOFF_M = 20.0
-BEARINGS_ALONE = "no sensor detects places: bearings alone begin no track."
 
 
 class ManyTracks(NamedTuple):
@@ -384,7 +383,6 @@ def track_jointly(
             what = "Errors" if bearing else "An error of the clock"
             which = "that last are" if bearing else "is"
             notes.append(f"{what} of {name} {which} not considered where many targets are followed.")
-        notes += order_notes(looks)
         found = places_of(flight, looks, belief, len(places), source, lasting_of(told.sensors.get(name)))
         if found.bearings and np.isfinite(belief.thinning_s):
             kept = thinned(found, belief.thinning_s)
@@ -399,12 +397,11 @@ def track_jointly(
             notes.append(f"{found.without} detections of {name} have no place on the ground.")
     if all(one.bearings for one in places.values()):
         raise WildlabError(
-            " ".join([BEARINGS_ALONE, *inputs.strays]).rstrip("."),
-            "give detections the source of their sensor's name"
-            if inputs.strays
-            else "follow one target by its bearings: wildlab track without --many",
-            file=flight.folder, field="detections.kind",
-        )  # fmt: skip
+            "no sensor detects places: bearings alone begin no track",
+            "follow one target by its bearings: wildlab track without --many",
+            file=flight.folder,
+            field="detections.kind",
+        )
     targets, sensors_told, more_said = of_many(told, inputs.targets, list(places.values()))
     lasting_s, shared = laid_out(
         [(one.errors, [scan.shared for scan in one.scans]) for one in places.values()]

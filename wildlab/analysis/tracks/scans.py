@@ -67,9 +67,6 @@ class Scans(NamedTuple):
         (N,) m, the plane itself.
     poses
         Of the camera that took the pixels, else None.
-    late, same_time
-        How many looks were logged after one with a later stamp, and how many have the stamp of the look
-        before.
     """
 
     sensor: str
@@ -85,8 +82,6 @@ class Scans(NamedTuple):
     drop: Array = np.empty(0)
     plane_down: Array = np.empty(0)
     poses: CameraPoses | None = None
-    late: int = 0
-    same_time: int = 0
 
     @property
     def interval_s(self) -> float:
@@ -176,7 +171,6 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
     if "sensor" in frames:
         looked &= (frames["sensor"] == sensor).to_numpy()
     chosen = np.flatnonzero(looked)
-    late = int((logged[chosen] < np.maximum.accumulate(logged[chosen])).sum()) if len(chosen) else 0
     chosen = chosen[np.argsort(logged[chosen], kind="stable")]
     frame_ids, stamps = frames["frame_id"].iloc[chosen], logged[chosen]
     seen = flight.table("detections")
@@ -271,8 +265,6 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
         drop,
         plane,
         poses,
-        late,
-        int((np.diff(stamps) == 0).sum()),
     )
 
 

@@ -25,7 +25,6 @@ from wildlab.evaluation.consistency import (
     effective_sample_size,
     nees,
     share_inside,
-    white_bound,
     whiten,
 )
 from wildlab.evaluation.errors import summarise_track, track_errors
@@ -85,15 +84,14 @@ def judged(followed: TrackingResult) -> pd.DataFrame:
     """One row for each track.
 
     ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used after the start, and ``used`` with it;
-    ``wait``, s: the longest from one to the next; ``rmse``, ``mae`` and ``rmse_speed`` beside the truth, of
-    ``compared`` looks at which the target was seen, and ``rmse_without`` of the ``without`` others; of those
-    seen: ``nees`` with ``nees_low``, ``nees_high`` and ``nees_worth``
-    independent values, its ``verdict``; ``inside``, the share of looks in the band of single values, with
-    ``inside_low``, ``inside_high``; the same of ``nis``, its degrees of freedom ``dof`` and ``nis_verdict``;
-    ``lag1``: the largest autocorrelation of an element of the whitened innovations from one detection to the
-    next, with ``lag1_bound``, what white noise stays below; ``followed``: the share of looks with truth that
-    have a track; ``anew``: how often a track ended and another started, and ``gone``: looks
-    without a track, of ``spanned`` from the first start to the end of the last, ``gone_seen`` of them with
+    ``rmse`` and ``mae`` beside the truth, of ``compared`` looks at which the target was seen, and
+    ``rmse_without`` of the ``without`` others; of those seen: ``nees`` with ``nees_low``, ``nees_high`` and
+    ``nees_worth`` independent values, its ``verdict``; ``inside``, the share of looks in the band of single
+    values, with ``inside_low``, ``inside_high``; the same of ``nis``, its degrees of freedom ``dof`` and
+    ``nis_verdict``; ``lag1``: the largest autocorrelation of an element of the whitened innovations from one
+    detection to the next; ``followed``: the share of looks with truth that have a track; ``anew``: how often
+    a track ended and another started, and ``gone``: looks without a track, of ``spanned`` from the first
+    start to the end of the last, ``gone_seen`` of them with
     the target in sight.
     """
     return pd.DataFrame([score_track(one, kind_of(followed, one.sensor)) for one in followed.tracks])
@@ -164,13 +162,11 @@ def score_track(one: SensorTrack, kind: str) -> dict[str, object]:
         "gone": int(one.without.sum()),
         "spanned": int(one.last - one.starts[0]) if len(one.starts) else 0,
         "gone_seen": int((one.without & looked).sum()),
-        "wait": float(np.diff(one.times[used]).max()) if used.sum() > 1 else np.nan,
         "compared": of_nees.n,
         "rmse": summary.rmse,
         "without": len(away),
         "rmse_without": float(np.sqrt(np.mean(away**2))) if len(away) else np.nan,
         "mae": summary.mae,
-        "rmse_speed": summary.rmse_speed,
         "nees": of_nees.mean,
         "nees_low": of_nees.low,
         "nees_high": of_nees.high,
@@ -186,7 +182,6 @@ def score_track(one: SensorTrack, kind: str) -> dict[str, object]:
         "nis_verdict": verdict(of_nis),
         "dof": m,
         "lag1": max(lags, key=abs, default=np.nan),
-        "lag1_bound": white_bound(len(white)) if len(white) else np.nan,
         "followed": float(np.isfinite(one.error[:, 0]).sum() / one.known.sum())
         if one.known.any()
         else np.nan,

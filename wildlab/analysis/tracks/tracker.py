@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.analysis.tracks.inputs import UNNAMED, names_of, order_notes, read_inputs
+from wildlab.analysis.tracks.inputs import UNNAMED, names_of, read_inputs
 from wildlab.analysis.tracks.noise_model import (
     OF_UNNAMED,
     STATED,
@@ -106,7 +106,6 @@ def track(
     known: set[str] = set()
     for sensor, one in inputs.sensors.items():
         said += one.said
-        notes += order_notes(one.scans)
         names, without = chosen_filters(one.scans, one.noise, filters)
         notes += without
         notes += _not_smoothed(names, sensor) if smooth else []
