@@ -25,6 +25,7 @@ from wildlab.analysis.tracks.inputs import read_inputs
 from wildlab.analysis.tracks.noise_model import ASSUMED, STATED, ToldValue
 from wildlab.analysis.tracks.noise_model import TargetModel as Following
 from wildlab.analysis.tracks.scans import truth_deviations, truths_at
+from wildlab.analysis.tracks.single_target import STATE
 from wildlab.errors import WildlabError
 from wildlab.evaluation.identities import Identities, compare_identities
 from wildlab.evaluation.identities import Moment as Compared
@@ -529,24 +530,27 @@ def tracks_table(followed: ManyTracks) -> pd.DataFrame:
         of a sensor how long its errors last: an error that lasts is averaged by no smoother, which would take
         it for noise and report a third of the error that is there.
     """
-    names = [one.name for one in followed.sensors]
-    rows = []
+    shown = followed.shown
+    counts = [len(one.identity) for one in shown]
+    if not sum(counts):
+        return pd.DataFrame(columns=["time_s", "sensor", "track", "north_m", "east_m"])
+    x, P, kinds = (
+        np.concatenate(part) for part in zip(*((one.x, one.P, one.kinds) for one in shown), strict=True)
+    )
+    names = np.array([one.name for one in followed.sensors], object)
     lasting_s = (*followed.lasting_s, *own_lasting(followed.sensors))
-    after = smooth_many(followed.shown, followed.targets.density, lasting_s)
-    for shown, (later_x, later_P) in zip(followed.shown, after, strict=True):
-        for i, identity in enumerate(shown.identity):
-            row: dict[str, object] = {
-                "time_s": shown.time, "sensor": names[shown.sensor], "track": int(identity),
-                "north_m": shown.x[i, 0], "east_m": shown.x[i, 1],
-                "v_north_m_s": shown.x[i, 2], "v_east_m_s": shown.x[i, 3],
-            }  # fmt: skip
-            row |= {f"p_{a}{b}": shown.P[i, a, b] for a in range(4) for b in range(a, 4)}
-            row["existence"] = shown.existence[i]
-            kinds = zip(followed.targets.hulls, shown.kinds[i], strict=True)
-            row |= {f"kind_{number}": share for number, (_, share) in enumerate(kinds, start=1)}
-            row |= {"smoothed_north_m": later_x[i, 0], "smoothed_east_m": later_x[i, 1]}
-            if not followed.unknown_lasting:
-                row |= {f"smoothed_p_{a}{b}": later_P[i, a, b] for a in range(2) for b in range(a, 2)}
-            rows.append(row)
-    columns = ["time_s", "sensor", "track", "north_m", "east_m"]
-    return pd.DataFrame(rows, columns=None if rows else columns)
+    after = smooth_many(shown, followed.targets.density, lasting_s)
+    later_x, later_P = (np.concatenate(part) for part in zip(*after, strict=True))
+    columns: dict[str, object] = {
+        "time_s": np.repeat([one.time for one in shown], counts),
+        "sensor": np.repeat(names[[one.sensor for one in shown]], counts),
+        "track": np.concatenate([one.identity for one in shown]).astype(int),
+    }
+    columns |= dict(zip(STATE, x.T, strict=True))
+    columns |= {f"p_{a}{b}": P[:, a, b] for a in range(4) for b in range(a, 4)}
+    columns["existence"] = np.concatenate([one.existence for one in shown])
+    columns |= {f"kind_{number}": share for number, share in enumerate(kinds.T, start=1)}
+    columns |= {"smoothed_north_m": later_x[:, 0], "smoothed_east_m": later_x[:, 1]}
+    if not followed.unknown_lasting:
+        columns |= {f"smoothed_p_{a}{b}": later_P[:, a, b] for a in range(2) for b in range(a, 2)}
+    return pd.DataFrame(columns)

@@ -368,23 +368,19 @@ def of_sensor(
             thinning = part.correlation_time_s
         lasting = lasting if part.correlation is None else part.correlation
         thinning = thinning if part.thinning_s is None else part.thinning_s
-    return (
-        NoiseModel(
-            scans.sensor,
-            scans.kind,
-            offset,
-            noise if found is None or stated_noise else found.white,
-            noise,
-            considered,
-            lasting,
-            fading,
-            thinning,
-            base.range_m if part is None or part.range_m is None else part.range_m,
-            base.range_sd_m if part is None or part.range_sd_m is None else part.range_sd_m,
-            interval,
-        ),
-        said,
+    beliefs = base._replace(
+        offset_s=offset,
+        white=noise if found is None or stated_noise else found.white,
+        noise=noise,
+        considered=considered,
+        lasting=lasting,
+        fading=fading,
+        thinning_s=thinning,
+        range_m=base.range_m if part is None or part.range_m is None else part.range_m,
+        range_sd_m=base.range_sd_m if part is None or part.range_sd_m is None else part.range_sd_m,
+        interval_s=interval,
     )
+    return beliefs, said
 
 
 def _noise(

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.tracks.scans import Scans
-from wildlab.analysis.tracks.single_target import SMOOTHED, TOGETHER, SensorTrack
+from wildlab.analysis.tracks.single_target import SMOOTHED, STATE, TOGETHER, SensorTrack
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import (
@@ -266,7 +266,6 @@ def _between(one: SensorTrack, times: Array, density: float) -> tuple[Array, Arr
     return x, P
 
 
-STATE = ("north_m", "east_m", "v_north_m_s", "v_east_m_s")
 #: Units of the elements of a measurement, as names of columns have them.
 UNITS = {
     "north": "m", "east": "m", "range": "m", "azimuth": "rad", "elevation": "rad", "u": "px", "v": "px",

@@ -194,6 +194,8 @@ def _lasting(scans: Scans, positions: Array, beliefs: NoiseModel) -> Array:
     return inverse @ np.nan_to_num(spread) @ np.swapaxes(inverse, 1, 2)
 
 
+#: Names of a track's state in tables.
+STATE = ("north_m", "east_m", "v_north_m_s", "v_east_m_s")
 #: What all sensors at once are called.
 TOGETHER = "together"
 #: Errors of a sensor, not of the platform it is on.

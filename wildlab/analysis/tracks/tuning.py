@@ -8,11 +8,11 @@ noise and liveliness under which a flight's own innovations are likeliest.
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.optimize import curve_fit, minimize, nnls
 
 from wildlab.analysis.tracks.inputs import SensorInputs, read_inputs
@@ -436,8 +436,8 @@ def refuse_same(flight: Flight, other: Flight) -> None:
         Where it is.
     """
     both = _as_measured(flight), _as_measured(other)
-    alike = sum((both[0] & both[1]).values())
-    if alike >= max(ALIKE, SHARE * min(map(Counter.total, both))):
+    alike = len(both[0].merge(both[1]))
+    if alike >= max(ALIKE, SHARE * min(map(len, both))):
         raise WildlabError(
             f"this is the flight that is judged, or part of it: {alike} of its detections have the same "
             "stamps and values, and nothing is tuned where it is judged",
@@ -447,20 +447,13 @@ def refuse_same(flight: Flight, other: Flight) -> None:
         )
 
 
-def _as_measured(flight: Flight) -> Counter[tuple[object, ...]]:
-    """Detections by sensor, UTC to the millisecond, and values as they were measured."""
-    seen, frames = flight.detections, flight.frames
-    if seen is None or not len(seen):
-        return Counter()
-    times = np.full(len(seen), np.nan)
-    if frames is not None and "time_s" in frames and "frame_id" in seen:
-        by_frame = frames.drop_duplicates("frame_id").set_index("frame_id")["time_s"]
-        times = seen["frame_id"].map(by_frame).to_numpy(float)
-    epoch = flight.manifest.time.epoch
-    began = epoch.timestamp() if epoch is not None else 0.0
+def _as_measured(flight: Flight) -> pd.DataFrame:
+    """Different detections by sensor, UTC to the millisecond, and values as they were measured."""
+    seen, frames, epoch = flight.detections, flight.frames, flight.manifest.time.epoch
+    if seen is None or frames is None:
+        return pd.DataFrame(columns=["source", "utc", *_VALUES])
+    stamps = frames.drop_duplicates("frame_id").set_index("frame_id")["time_s"]
+    times = seen["frame_id"].map(stamps).to_numpy(float) + (0.0 if epoch is None else epoch.timestamp())
     # Places match only where they are counted from the same origin; ranges, bearings and pixels in any case.
-    values = np.round(seen.reindex(columns=list(_VALUES)).to_numpy(float), 6) + 0.0
-    known = np.asarray(np.isfinite(values).any(axis=1))
-    stamps = np.where(np.isfinite(times), np.round(began + times, 3), -1.0)
-    rows = zip(seen["source"], stamps, map(bytes, values), strict=True)
-    return Counter(row for row, good in zip(rows, known, strict=True) if good)
+    values = seen.reindex(columns=list(_VALUES)).astype(float).round(6).dropna(how="all")
+    return values.assign(source=seen["source"], utc=pd.Series(times, seen.index).round(3)).drop_duplicates()
