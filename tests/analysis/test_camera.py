@@ -8,7 +8,6 @@ import pytest
 from wildlab.analysis.camera import (
     BoardImage,
     camera_file,
-    coverage,
     solve_boards,
 )
 from wildlab.detection.boards import Board
@@ -41,11 +40,6 @@ def test_views_that_disagree_are_named_with_figures_without_them(good, wrong):
     assert set(found.odd) == {f"{k}.png" for k in wrong}
     assert found.without_odd.rms < 0.2 < found.found.rms
     assert len(found.without_odd.views.rotation) == len(views) - len(wrong)
-
-
-def test_coverage_counts_cells():
-    assert coverage(np.array([[0.0, 0.0], [639.0, 511.0], [640.0, 512.0]]), 640, 512).sum() == 2
-    assert coverage(np.array([[[639.0, 1.0]]]), 640, 512)[0, 7]
 
 
 def test_the_file_has_all_that_was_found(good):

@@ -14,7 +14,6 @@ from tests.refused import refused
 from wildlab.analysis.detecting import detect as subject
 from wildlab.analysis.detecting.command import samples_of
 from wildlab.analysis.detecting.detect import (
-    METHODS,
     detect_frame,
     read_thresholds,
     run_detection,
@@ -22,7 +21,6 @@ from wildlab.analysis.detecting.detect import (
 )
 from wildlab.analysis.detecting.fit import fit_shapes, fit_thresholds
 from wildlab.analysis.detecting.scores import judge_detections
-from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast, Shape
 from wildlab.detection.floating import FloatingThresholds
 from wildlab.evaluation.intervals import Interval
@@ -172,25 +170,6 @@ def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path):
     assert read_thresholds(tmp_path / "t.json", "shape") == fitted.thresholds
     with refused("0 weights"):
         detect_frame(samples[0].frame, "shape", Shape())
-
-
-@pytest.mark.parametrize(("method", "unturned"), [("contrast", 0), ("warm", 0), ("floating", 1)])
-def test_black_hot_frames_are_turned(tmp_path, method, unturned):
-    cv2.imwrite(str(tmp_path / "a.png"), 255 - picture([(50, 40)], 1, size=15, warmer=150))
-    for polarity, wanted in (("black-hot", 1), ("white-hot", unturned)):
-        frame = read_image(tmp_path / "a.png", polarity=polarity)  # type: ignore[arg-type]
-        assert len(detect_frame(frame, method, METHODS[method].thresholds())) == wanted
-
-
-def test_colours_are_found_by_the_same_command(tmp_path):
-    image = np.full((360, 640, 3), 120, np.uint8)
-    image[200:210, 300:330] = (255, 110, 0)  # OpenCV writes blue first
-    (tmp_path / "ground").mkdir()
-    cv2.imwrite(str(tmp_path / "ground" / "a.png"), image)
-    done = run_detection(open_frames(tmp_path / "ground"), tmp_path / "out", "colour", Colour())
-    assert done.detections[["u_px", "v_px"]].to_numpy().tolist() == [[314.5, 204.5]]
-    write_thresholds(tmp_path / "t.json", "colour", Colour(hue=(170.0, 10.0)))
-    assert read_thresholds(tmp_path / "t.json", "colour") == Colour(hue=(170.0, 10.0))
 
 
 def test_stated_ellipses_are_held_against_the_middle_of_labels(tmp_path):

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import pandas as pd
-import pytest
 
 from tests.analysis.test_detect import folder
 from tests.commands import succeed
@@ -67,27 +66,6 @@ def test_a_batch_is_judged_beside_ours(tmp_path):
     rows = table[table["detector"] == "md"]
     counts = rows[["score", "found", "invented", "missed"]].to_numpy().tolist()
     assert counts == [[0.9, 6, 0, 6], [0.2, 6, 6, 6]]
-
-
-def test_our_own_table_as_another_detector_is_ours(tmp_path):
-    path = folder(tmp_path / "in")
-    succeed("detect", path, "--out", tmp_path / "one")
-    (tmp_path / "l.csv").write_text((path / "labels.csv").read_text().replace(",5,5,", ",3,2,"))
-    out = succeed(
-        "detect",
-        path,
-        "--out",
-        tmp_path / "two",
-        "--labels",
-        tmp_path / "l.csv",
-        "--also",
-        tmp_path / "one" / "detections.csv",
-        "--json",
-    )
-    ours, other = json.loads(out)["compared"]
-    assert other.pop("name") == "detections" and ours.pop("name")
-    assert ours.pop("lowest_score") == pytest.approx(other.pop("lowest_score"))
-    assert ours == other
 
 
 def frames(count: int = 3, unusable: int = 0) -> pd.DataFrame:

@@ -13,11 +13,8 @@ from hypothesis import strategies as st
 from tests.analysis.conftest import build, receiver
 from wildlab.analysis.overview import Overview, look_over
 from wildlab.analysis.verdict import (
-    PARTS,
-    VERDICT_LEVEL,
     Evidence,
     Verdict,
-    parts_of,
     verdict_of,
 )
 from wildlab.evaluation.intervals import Interval
@@ -62,13 +59,6 @@ def test_no_part_presses_more_than_the_flight(parts, problems, judged):
     whole = verdict_of(Evidence(problems=problems, judged=judged, parts=tuple(parts)))
     assert whole.level >= max((one.level for one in parts), default=-1)
     assert whole != Verdict.SOUND or not any(one.level > 0 for one in parts)
-
-
-@given(st.dictionaries(st.sampled_from(PARTS), verdicts))
-def test_what_a_report_records_is_what_the_flight_reads(parts):
-    numbers = {(VERDICT_LEVEL, about): {"value": float(one.level)} for about, one in parts.items()}
-    assert parts_of(numbers) == parts
-    assert {one.colour for one in Verdict} == {"bad", "warn", "good", "neutral"}
 
 
 # --- what went wrong on a flight is found with its size and time, and nothing on a sound one

@@ -1,21 +1,15 @@
 """Velocities of pairs of images by a flight's own tables; features are projected, not found."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tests.analysis.conftest import changed
 from wildlab.analysis.flow import (
-    USUAL_MOTION,
     FramePair,
     Reading,
-    flow_errors,
     pair_velocities,
 )
-from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.detection.flow import Matches
-from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight
@@ -80,22 +74,6 @@ def test_a_deck_is_seen_on_its_own_plane(flight, seen):
     assert np.allclose(speeds(table), 0.0, atol=0.15)
     flat = pair_velocities(quiet(flight, seen), pairs, true_reading(seen))
     assert not np.allclose(speeds(flat), 0.0, atol=0.5)
-
-
-def test_what_is_stated_of_a_flight_is_what_its_velocities_are_held_to(flight, seen):
-    stated = assumed_deviations(flight)
-    pose = replace(seen.poses.take(40), R_nb=euler_to_matrix(0.3, 0.2, 1.1), covariance=None)
-    found = flow_errors(flight, pose, 0.2, 0.25)
-    assert np.allclose(found.pose, assumed_pose_covariance(pose.R_nb, stated))
-    assert np.allclose(found.pixel, 0.04 * np.eye(2))
-    assert np.allclose(found.flow, 0.8**2 * np.eye(2)), "0.2 px in a quarter of a second are 0.8 px/s"
-    usual = {name: np.radians(USUAL_MOTION[name]) ** 2 for name in ("rate_deg_s", "gimbal_rate_deg_s")}
-    assert np.allclose(found.rates, usual["rate_deg_s"] * np.eye(3))
-    assert np.allclose(found.gimbal_rates, usual["gimbal_rate_deg_s"] * np.eye(2))
-    tables = {name: table for name, table in flight.tables.items() if name != "gimbal"}
-    assert not flow_errors(replace(flight, tables=tables), pose, 0.2, 0.25).gimbal_rates.any()
-    known = np.diag(np.arange(1.0, 7.0))
-    assert np.array_equal(flow_errors(flight, replace(pose, covariance=known), 0.2, 0.25).pose, known)
 
 
 def test_the_log_alone_says_about_as_much_as_it_claims(flight, seen):

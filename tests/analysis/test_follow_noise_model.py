@@ -82,10 +82,10 @@ def test_noise_is_found_from_how_rough_detections_are():
 def test_clutter_that_nobody_tells_from_a_target_makes_nothing_rough(kind, clutter):
     """With as many false detections as four targets have, and no names: as with names and without any."""
     found, known = (
-        [roughness(scans_of(robot_flight(seed, kind=kind, **one), "radar")) for seed in range(8)]
+        [roughness(scans_of(robot_flight(seed, kind=kind, **one), "radar")) for seed in range(4)]
         for one in ({"labelled": False, "clutter": clutter}, {})
     )
-    np.testing.assert_allclose(np.mean(found, axis=0), np.mean(known, axis=0), rtol=0.15)
+    np.testing.assert_allclose(np.mean(found, axis=0), np.mean(known, axis=0), rtol=0.2)
 
 
 @pytest.mark.parametrize("kind", ["range-bearing", "position", "bearing"])

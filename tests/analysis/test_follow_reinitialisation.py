@@ -145,8 +145,8 @@ def test_a_target_at_rest_is_one_track_through_any_gap():
     scans, still = scans._replace(detections=uv[:, None]), Truth("deer", place, 0 * place, 0.0)
     assert len(by_camera(scans, still)[0].starts) == 2
     rest = TARGETS._replace(density=0.0, start_speed_m_s=0.0)
-    told = by_camera(scans, still, (*FILTERS, "ekf-smoothed"), rest)
-    marked = by_camera(scans, still._replace(fixed=True), (*FILTERS, "ekf-smoothed"))
+    told = by_camera(scans, still, ("ekf", "ukf", "coloured", "ekf-smoothed"), rest)
+    marked = by_camera(scans, still._replace(fixed=True), ("ekf", "ukf", "coloured", "ekf-smoothed"))
     on_ground = NOISE_PX / CAMERA.fx * HEIGHT / np.cos(TILT) ** 2
     for one, other in zip(told, marked, strict=True):
         assert np.array_equal(one.estimate, other.estimate, equal_nan=True)
@@ -155,14 +155,6 @@ def test_a_target_at_rest_is_one_track_through_any_gap():
         # On differences nothing is learnt of an error that stays.
         few = 1 if one.filter == "coloured" else 50
         assert np.sqrt(one.covariance[-1, 0, 0]) < on_ground / np.sqrt(few)
-
-
-@pytest.mark.parametrize("kind", ["position", "bearing"])
-def test_positions_and_bearings_alone_do_not_end_so(kind):
-    near = "[sensors.radar]\nrange_m = 90.0\nrange_sd_m = 30.0\n"
-    flight = paused(robot_flight(1, kind=kind), 40, 90)
-    one = tracker.track(flight, settings=parse_settings(near + KNOWN)).tracks[0]
-    assert len(one.starts) == 1 and not one.without.any()
 
 
 @pytest.mark.slow

@@ -33,7 +33,9 @@ def by_filterpy(z, t, density, sd, x, P):
 
 def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
     """Tuned on one flight, judged on another: filterpy's filter and smoother, and sums written out."""
-    tuned = tune_flight(robot_flight(1, kind="position", position_sd=1.0), ["radar"], None, "innovations")
+    tuned = tune_flight(
+        robot_flight(1, kind="position", position_sd=1.0, seconds=60.0), ["radar"], None, "innovations"
+    )
     flight = robot_flight(2, kind="position", position_sd=1.0, name="judged")
     followed = tracker.track(flight, tuned=tuned, smooth=True, filters=["ekf"])
     track, back = followed.tracks
@@ -59,7 +61,7 @@ def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
 
 
 def test_innovations_are_likeliest_at_what_was_tuned():
-    flight = robot_flight(1, kind="position", position_sd=1.0)
+    flight = robot_flight(1, kind="position", position_sd=1.0, seconds=60.0)
     tuned = tune_flight(flight, ["radar"], None, "innovations")
     scans = tracker.track(flight, tuned=tuned).scans["radar"]
     z, t = scans.detections[:, 0], scans.times

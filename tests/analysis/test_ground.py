@@ -84,17 +84,6 @@ def test_with_exact_poses_points_are_the_marks():
     assert shift.median > 3.0
 
 
-def test_the_map_decides_how_good_its_heights_are():
-    sizes = []
-    for sd in (np.nan, 0.3, 6.0):
-        flight = flown()
-        flight.terrain = replace(hills(), sd=sd)
-        points = georeference(observe(flight), np.random.default_rng(0))
-        sizes.append(float((points["cov_nn"] + points["cov_ee"]).median()))
-    assert sizes[0] == sizes[1]  # 0.3 m is what the manifest assumes where the map is silent
-    assert sizes[2] > 3 * sizes[1]
-
-
 def test_a_ray_without_ground_is_no_sighting():
     flight = flown()
     flight.tables["detections"]["target_id"] = "m0-0"

@@ -52,6 +52,7 @@ def only(name, value, half, unit):
     return learnt().model_copy(update={"parameter": (one,), "covariance": ((half**2 / 4,),)})
 
 
+@pytest.mark.slow
 def test_a_corrected_flight_says_what_the_applied_calibration_says():
     flight = named(tuesday(seed=5), "wednesday")
     applied = apply_learnt(observe(flight), learnt())

@@ -18,8 +18,6 @@ from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLU
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.navigation.magnetometer import earth_field
-from wildlab.simulation.manifest import twin_manifest
-from wildlab.simulation.parameters import load_twin, twin_names
 from wildlab.simulation.twins import simulate_twin
 
 
@@ -57,21 +55,6 @@ def test_the_filter_states_its_covariance_and_its_innovations(flight):
     found = navigate_mekf(flight, np.arange(0.0, 120.0, 1.0))
     assert set(COVARIANCE_COLUMNS) <= set(found.nav.columns)
     assert set(found.innovations["source"]) == {"position", "second position", "velocity"}
-
-
-def test_the_manifest_says_how_uncertain_velocities_are_where_the_log_does_not(flight):
-    silent = changed(flight, gnss=flight.gnss.drop(columns="sd_velocity_m_s"))
-    some = np.arange(0.0, 60.0, 1.0)
-    assert "velocity" not in set(navigate_mekf(silent, some).innovations["source"])
-    stated = {"velocity_horizontal_m_s": 0.05, "velocity_vertical_m_s": 0.05}
-    found = navigate_mekf(changed(silent, {"uncertainty": stated}), some)
-    logged = navigate_mekf(flight, some)
-    pd.testing.assert_frame_equal(found.nav, logged.nav)
-
-
-@pytest.mark.parametrize("name", [name for name in twin_names() if load_twin(name).imu])
-def test_every_twin_with_sensors_states_what_the_filter_must_know(name):
-    assert imu_noise(Flight(twin_manifest(load_twin(name), 5), {}, {})) is not None
 
 
 def single(flight: Flight) -> Flight:

@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -305,11 +304,3 @@ def test_heights_above_take_off_are_differences_of_ground(field):
 
 
 # -- numbers that are none
-
-
-def test_a_wind_blows_from_where_it_is_said_to_and_changes_the_speed_of_a_wing():
-    given = {"wind_m_s": 5.0, "wind_from_deg": 270.0}
-    copter, wing = (PlanRequest(Path("x"), CAMERA, turn_radius_m=turn, **given) for turn in (0.0, 30.0))
-    assert np.allclose(copter.wind, [0, 5])
-    assert (copter.slowest_m_s, copter.fastest_m_s) == (10.0, 10.0)
-    assert (wing.slowest_m_s, wing.fastest_m_s) == (5.0, 15.0)

@@ -1,7 +1,6 @@
 """What a plan says will be seen, beside what is known otherwise: shares by hand, hiding by brute force."""
 
 import json
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +8,9 @@ import pytest
 
 from tests.analysis.test_plan import CAMERA, hills, plan
 from tests.flight.test_area import collection, feature, polygon
-from wildlab.analysis.plans.coverage import Covered, cover, gimbal_rate, images_of
+from wildlab.analysis.plans.coverage import cover, gimbal_rate, images_of
 from wildlab.analysis.plans.plan import make_plan
 from wildlab.analysis.plans.request import FURTHEST, PlanRequest, simplified
-from wildlab.analysis.plans.result import animals_in, plan_result
 from wildlab.geometry.camera import project
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
@@ -92,23 +90,6 @@ def test_what_is_hidden_is_hidden_by_brute_force(field, tilt):
     assert found.seen < 1.0 or tilt == 90.0
 
 
-def test_images_are_near_enough_that_none_is_needed_between(field):
-    made = plan(field, height_m=50.0, tilt_deg=60.0)
-    images = images_of(made, made.sorties[0])
-    steps = np.linalg.norm(np.diff(images.poses.p_nc, axis=0), axis=1)
-    assert np.median(steps) <= 0.26 * made.view.length * made.height
-    # They reach both ends of every row, and turns blur none of them.
-    assert images.sharp.all()
-    for end in made.pattern.rows.reshape(-1, 2):
-        assert np.linalg.norm(images.poses.p_nc[:, :2] - end, axis=1).min() < 0.1
-    # The camera looks 60 degrees below the horizon, along the row.
-    lens = images.poses.R_nc[:, :, 2]
-    assert np.allclose(lens[:, 2], math.sin(math.radians(60)), atol=1e-9)
-    row = made.pattern.rows[made.sorties[0].rows[0]]
-    ahead = (row[1] - row[0]) / np.linalg.norm(row[1] - row[0])
-    assert np.allclose(lens[0, :2], ahead * math.cos(math.radians(60)), atol=1e-6)
-
-
 @pytest.mark.parametrize(("direction", "wind_from"), [(0.0, 270.0), (35.0, 300.0), (250.0, 20.0)])
 def test_a_fixed_wing_points_its_camera_where_its_nose_is(field, direction, wind_from):
     """Through the air along the nose, and with the wind: that is the way over the ground."""
@@ -132,30 +113,6 @@ def test_a_camera_that_swings_sees_a_wider_strip(field, gimbal):
     assert found.seen > 0.9
     (blurred,) = cover(plan(field, **{**given, "exposure_s": 0.5}))
     assert blurred.seen < 0.1 and blurred.share(blurred.blurred) > 0.8 and not blurred.hidden.any()
-
-
-def covered(seen=0, hidden=0, blurred=0, missed=0):
-    """An area of a hundred nodes."""
-    kinds = np.repeat([0, 1, 2, 3], [seen, hidden, blurred, missed]).reshape(10, 10)
-    return Covered(0.0, 0.0, 1.0, np.ones((10, 10), bool), (kinds == 0).astype(int), kinds == 1, kinds == 2)
-
-
-def test_finds_are_animals_times_what_is_seen(field):
-    made = plan(field, height_m=50.0, detection=0.8, animals=99)
-    result = plan_result(made, [covered(seen=50, missed=50)])
-    # What the file says of an area goes before what is said of all.
-    assert result["animals"] == 12 and result["expected_finds"] == pytest.approx(12 * 0.5 * 0.8)
-    assert result["seen"] == 0.5 and result["areas"][0]["expected_finds"] == pytest.approx(4.8)
-
-
-def test_animals_may_be_said_for_each_area_or_by_density(tmp_path):
-    path = tmp_path / "a.geojson"
-    path.write_text(json.dumps(collection(feature(polygon(FIELD)))))
-    for given, number in (({}, math.nan), ({"animals": 5}, 5), ({"density_km2": 250}, 8.0)):
-        made = plan(path, height_m=50.0, **given)
-        assert animals_in(made, made.areas.areas[0]) == pytest.approx(number, rel=1e-3, nan_ok=True)
-    result = plan_result(plan(path, height_m=50.0), [covered(seen=100)])
-    assert result["expected_finds"] is None
 
 
 # -- outlines

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -63,11 +62,3 @@ def test_polygons_are_the_ellipses_of_ninety_per_cent(made):
         # Two degrees of freedom: 1 - exp(-d / 2) is the share within.
         assert 1 - np.exp(-distance / 2) == pytest.approx(np.full(len(ring), 0.9), abs=2e-3)
         assert np.hypot(*off.T).max() == pytest.approx(one["properties"]["long_90_m"], rel=5e-3)
-
-
-def test_a_table_has_every_point_in_metres(made, tmp_path):
-    flight, points, _ = made
-    write_points(flight, points, tmp_path / "p.csv", "autopilot")
-    with (tmp_path / "p.csv").open() as file:
-        table = list(csv.DictReader(file))
-    assert len(table) == len(points) and "origin" in table[0]["vertical_reference"]

@@ -29,16 +29,6 @@ def shape_of(camera):
     return camera.flight.poses.camera.height, camera.flight.poses.camera.width
 
 
-def test_the_same_exposure_is_the_same_image_whichever_came_before(camera, shots):
-    last = shots[-1].exposure
-    again = next(Photographer(TWIN, SEED).shoot([last]))
-    assert np.array_equal(again.detections.uv, shots[-1].detections.uv)
-    other = next(Photographer(TWIN, SEED + 1).shoot([last]))
-    assert len(other.detections) != len(again.detections) or not np.array_equal(
-        other.detections.uv, again.detections.uv
-    )
-
-
 def test_the_stated_centre_is_the_target_seen_through_the_true_pose(camera, shots):
     for shot in shots:
         pose = camera.flight.poses.take(shot.exposure)

@@ -72,14 +72,6 @@ def test_a_search_ends_when_all_are_found_and_leaves_an_area_that_is_done():
     assert not ((first[:, 0] > 40) & (first[:, 1] < 40)).any()
 
 
-def test_rows_are_flown_again_while_animals_are_missing():
-    lucky = world([[30.0, 30.0]], images=600)
-    lucky.chance[:150] = 1.0  # not found on the first round
-    rows = SearchInRows(lucky, FLYING, 15.0, (0, 1))
-    found = search(lucky, rows, START, SENSOR, FLYING)
-    assert 150 < found.found[0] < 600 and (found.p_nc[:, 1] < 80).all()
-
-
 def test_turns_take_time_from_a_search_and_animals_walk_on_meanwhile():
     """One who turns round again and again finds what comes by later; the world goes on while it turns."""
     spots = [[30.0, 30.0]]

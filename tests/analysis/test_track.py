@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.analysis.navigate import PUBLISHED_LIKE, NavigationErrors, errors_against, navigate_mekf
 from wildlab.analysis.pose_noise import (
-    PAUSE_S,
     TURNING,
     flight_numbers,
     pauses,
@@ -119,16 +118,6 @@ def own(flight: Flight, seen: Sighting) -> NavigationErrors:
     return errors_against(flight.nav["truth"], flight.nav["mekf"], seen.times)
 
 
-def test_pauses_are_where_nothing_is_seen_for_long(seen):
-    found = pauses(seen)
-    assert found
-    for rows in found:
-        assert not seen.seen[rows].any() and seen.seen[rows[0] - 1] and seen.seen[rows[-1] + 1]
-        assert seen.times[rows[-1] + 1] - seen.times[rows[0] - 1] > PAUSE_S
-    others = np.setdiff1d(np.flatnonzero(~seen.seen), np.concatenate(found))
-    assert len(others) and np.isin(others - 1, np.flatnonzero(seen.seen)).any()
-
-
 def test_numbers_of_poses_are_in_metres_and_degrees():
     error, sd = np.zeros((4, 9)), np.ones((4, 9))
     error[:, 0], error[:, 6], sd[:, 8] = [1, -1, 1, np.nan], np.radians(3.0), np.radians(2.0)
@@ -150,13 +139,6 @@ def test_errors_of_the_pose_move_the_target_in_the_image(flight, seen, own):
     found = premise_numbers(flight, seen, "mekf", own)
     assert found["shift_px"] == pytest.approx(expected, rel=0.05)
     assert found["largest_shift_px"] == pytest.approx(np.hypot(*(uv[0] - uv[1]).T).max(), rel=0.05)
-
-
-def test_a_deviation_that_changes_has_a_spread(flight, seen, own):
-    even = own._replace(sd=np.ones_like(own.sd))
-    rising = own._replace(sd=even.sd * np.linspace(1, 3, len(own.times))[:, None] ** (np.arange(9) == 7))
-    assert premise_numbers(flight, seen, "mekf", even)["sd_spread"] == 0
-    assert premise_numbers(flight, seen, "mekf", rising)["sd_spread"] == pytest.approx(0.9, rel=0.01)
 
 
 def test_how_a_flight_was_flown(flight, seen):

@@ -17,7 +17,6 @@ from wildlab.planning.gimbal import (
     camera_on_course,
     look_down,
     swing,
-    swing_rate,
     swing_roll,
     view_inside,
 )
@@ -94,17 +93,3 @@ def test_inside_the_camera_swings_to_the_maximum_and_outside_to_the_minimum():
         turns = np.flatnonzero(np.diff(np.sign(np.diff(roll))) != 0)
         # It never turns round twice in a row, as the printed algorithm would.
         assert np.diff(turns).min() > 2 * limit / 0.2 / 0.1 * 0.9
-
-
-def test_at_a_fence_on_one_side_it_turns_round_on_that_side_alone():
-    t = np.arange(0.0, 200.0, 0.1)
-    rolls = np.linspace(-1, 1, 41)
-    known = np.tile(rolls <= 0.5, (len(t), 1))
-    roll = adapt_roll(t, known, rolls, (0.2, 0.9), 0.2).roll
-    assert 0.5 < roll.max() < 0.56
-    assert roll.min() == pytest.approx(-0.9, abs=0.021)
-
-
-def test_the_rate_brings_the_swing_round_while_the_image_passes():
-    rate = swing_rate(0.5, 12.0, 3.0, overlap=0.25)
-    assert 4 * 0.5 / rate == pytest.approx(12.0 * 0.75 / 3.0)

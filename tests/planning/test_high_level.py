@@ -11,8 +11,6 @@ from wildlab.planning.planner import (
     all_positioned,
     best_goal,
     greedy_tour,
-    lost_by_covariance,
-    lost_by_search,
     shortest_tour,
     utilities,
 )
@@ -39,11 +37,6 @@ def test_the_greatest_utility_is_the_goal():
 
 def test_an_enclosure_is_done_when_all_are_known_at_once():
     assert all_positioned([5, 4, 0], [5, 5, 0]).tolist() == [True, False, True]
-
-
-def test_both_rules_by_which_an_animal_is_lost():
-    assert lost_by_covariance([10 * np.eye(2), 60 * np.eye(2)], 100.0).tolist() == [False, True]
-    assert lost_by_search([0.5, 0.01], 0.05).tolist() == [False, True]
 
 
 @settings(deadline=None, max_examples=30)

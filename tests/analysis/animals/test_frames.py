@@ -84,20 +84,6 @@ def test_an_animal_is_where_the_terrain_puts_it(kind, view):
     assert np.linalg.norm(pixels.mean(axis=0) - want) < 0.15 * k.length * per_m + 0.5
 
 
-def test_an_animal_behind_a_ridge_does_not_show():
-    height = np.zeros((101, 101), np.float32)
-    height[60] = 25.0
-    ridge = Terrain(height, north=-100.0, east=-100.0, step=2.0)
-    made = Scenery(land_on(ridge, EVEN_LAND), (animal("rhinoceros", NIGHT),) * 2, ())
-    R = euler_to_matrix(0.0, np.radians(52), 0.0) @ R_MC_DOWN
-    pose = poses(np.array([-20.0, 0.0, -32.0]), R)
-    places = np.array([[35.0, 0.0], [10.0, 0.0]])
-    uv = ground_to_pixel(CAMERA, np.column_stack([places, [-0.8, -0.8]]), pose.p_nc, pose.R_nc)
-    assert (abs(uv - [159.5, 119.5]) < [160, 120]).all()  # both would be in the image
-    frame = render_frame(ridge, made, pose, places, THERMAL, np.random.default_rng(1))
-    assert [frame.animal[seen.number] for seen in frame.view.seen] == [1]
-
-
 def frame_of(labels: Array, whose: list[int]) -> Frame:
     view = LandView(np.zeros(SHAPE, np.float32), labels.astype(np.int16), np.ones(SHAPE, bool), ())
     return Frame(np.zeros(SHAPE, np.uint16), view, np.array([NONE, *whose], np.intp))

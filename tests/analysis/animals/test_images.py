@@ -16,7 +16,7 @@ from wildlab.analysis.animals.images import (
     sight_from,
     take_images,
 )
-from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors, with_errors
+from wildlab.analysis.plans.coverage import ExecutionErrors, displaced
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -99,17 +99,6 @@ def test_covariances_are_those_of_many_flights(heading, errors):
     drawn, said = np.cov((z - at).T), covariance.mean(axis=0)
     scale = np.sqrt(np.outer(np.diag(said), np.diag(said)))
     assert drawn / scale == pytest.approx(said / scale, abs=0.08)
-
-
-def test_errors_of_a_way_are_the_drawn_ones():
-    one = pose(0.0, 0.0, 50.0, 0.1, 0.0, 0.3).take(np.zeros(50, int))
-    headings = np.linspace(0, 3, 50)
-    whole = with_errors(one, headings, SOME, 0.5, np.random.default_rng(4))
-    off, turn = drawn_errors(50, SOME, 0.5, np.random.default_rng(4))
-    assert np.array_equal(whole.p_nc, displaced(one, headings, off, turn).p_nc)
-    row = slice(30, 31)
-    alone = displaced(one.take(np.array([30])), headings[row], off[row], turn[row])
-    assert np.allclose(alone.R_nc, whole.R_nc[row]) and np.allclose(alone.p_nc, whole.p_nc[row])
 
 
 def test_images_detect_only_what_they_show_and_so_often():

@@ -28,7 +28,7 @@ from wildlab.analysis.tracks.ground_positions import (
     stated_roots,
     told_errors,
 )
-from wildlab.analysis.tracks.many import track_jointly, tracks_table
+from wildlab.analysis.tracks.many import track_jointly
 from wildlab.analysis.tracks.scans import scans_of
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import parse_settings
@@ -186,16 +186,6 @@ def test_mount_and_ground_are_in_what_is_shared_and_stay():
     assert linear.sum() > 100 and np.allclose(whole[linear], covariances_of(points)[linear], rtol=1e-6)
     assert found.lasting_s == (7.0,) * 6 + (np.inf,) * 4
     assert (np.abs(shared[linear][..., 6:]).max(axis=(0, 1)) > 0.01).all()
-
-
-def test_smoothed_places_have_a_covariance_where_it_is_stated_how_long_errors_last():
-    flight = robot_flight(labelled=False, seconds=30.0)
-    covariances = []
-    for more in ("", "[sensors.radar]\ncorrelation = 0.0\n", "[sensors.radar]\ncorrelation = 0.8\n"):
-        table = tracks_table(track_jointly(flight, settings=parse_settings(more + NOISE)))
-        assert np.isfinite(table["smoothed_north_m"]).all()
-        covariances.append(float(table["smoothed_p_00"].mean()) if "smoothed_p_00" in table else np.nan)
-    assert np.isnan(covariances[0]) and covariances[2] > 1.5 * covariances[1]
 
 
 def test_an_error_of_the_heading_stays_one_whichever_way_the_body_lies():

@@ -171,7 +171,7 @@ def nearest_ground(way: HeightProfile, terrain: Terrain, trees: float = 0.0) -> 
     places = np.stack([np.interp(at, along, points[:, axis]) for axis in range(3)], axis=1)
     near = np.nan_to_num(places[:, 2] - terrain.heights_at(places[:, :2]), nan=np.inf)
     # First all places, by a coarse grid; then those nearest to ground, by a fine one.
-    for most, across in ((len(near), 31), (CLOSELY, 61)):
+    for most, across in ((len(near), 21), (CLOSELY, 61)):
         rows = np.argsort(near)[:most]
         best = max(float(near.min()), 0.0)
         if np.isfinite(best):
