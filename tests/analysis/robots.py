@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from tests.analysis.building import manifest_of, poses_table
-from wildlab.analysis.tracks.noise_model import NoiseModel, of_flight, of_sensor
+from wildlab.analysis.tracks.noise_model import NoiseModel, model_noise, settings_of
 from wildlab.analysis.tracks.scans import Scans, scans_of
-from wildlab.analysis.tracks.scores import judged
+from wildlab.analysis.tracks.scores import score_tracks
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import parse_settings
@@ -137,7 +137,7 @@ def believed(
 ) -> tuple[Scans, NoiseModel]:
     """A sensor's scans, and what filters believe of it by a flight and a file of settings."""
     scans = scans_of(flight, sensor, 0.0, source)
-    return scans, of_sensor(flight, scans, of_flight(flight, parse_settings(text)))[0]
+    return scans, model_noise(flight, scans, settings_of(flight, parse_settings(text)))[0]
 
 
 KNOWN = """
@@ -152,5 +152,5 @@ start_speed_m_s = 1.0
 
 
 def rows_of(followed: TrackingResult, sensor: str = "radar") -> pd.DataFrame:
-    rows = judged(followed)
+    rows = score_tracks(followed)
     return rows[rows["sensor"] == sensor].set_index("filter")

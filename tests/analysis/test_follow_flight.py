@@ -8,7 +8,7 @@ import pytest
 
 from tests.analysis.robots import boat, joined, paused, robot, robot_flight, rows_of
 from wildlab.analysis.tracks.scans import SLOTS, predict_scan, scans_of, truths_at
-from wildlab.analysis.tracks.scores import apart, estimates_table, worth_of_errors, write_estimates
+from wildlab.analysis.tracks.scores import compare_sensors, estimates_table, worth_of_errors, write_estimates
 from wildlab.analysis.tracks.tracker import track
 from wildlab.flight.tracking_settings import Settings
 
@@ -142,7 +142,7 @@ def test_two_sensors_in_one_track_share_what_the_platform_has_wrong():
     assert rows.loc["schmidt", "verdict"] == "consistent"
     assert rows.loc["ekf", "verdict"] == "overconfident"
     assert rows.loc["ekf", "detections"] > 470
-    (pair,) = (pair for pair in apart(followed) if pair.filter == "schmidt")
+    (pair,) = (pair for pair in compare_sensors(followed) if pair.filter == "schmidt")
     assert (pair.one, pair.other) == ("radar", "lidar") and pair.rms < 2.0
 
 

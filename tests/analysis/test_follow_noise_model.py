@@ -11,10 +11,10 @@ from wildlab.analysis.tracks.noise_model import (
     ASSUMED,
     ROUGH,
     STATED,
-    of_flight,
-    of_sensor,
-    of_targets,
+    model_noise,
+    model_targets,
     roughness,
+    settings_of,
     spread_of,
 )
 from wildlab.analysis.tracks.scans import predict_scan, scans_of
@@ -30,18 +30,18 @@ from wildlab.geometry.frames import euler_to_matrix
 def test_stated_goes_before_assumed_and_the_page_is_told():
     flight = robot_flight()
     scans = scans_of(flight, "radar")
-    beliefs, said = of_sensor(flight, scans, of_flight(flight))
+    beliefs, said = model_noise(flight, scans, settings_of(flight))
     assert beliefs.white == pytest.approx([0.5, np.radians(0.3)], rel=0.3)
     assert all(one.source.startswith((ASSUMED, ROUGH)) for one in said)
     stated = parse_settings(
         KNOWN + "\n[sensors.radar.considered.heading]\nsd_deg = 2.0\ncorrelation_time_s = 60.0\n"
     )
-    beliefs, said = of_sensor(flight, scans, of_flight(flight, stated))
+    beliefs, said = model_noise(flight, scans, settings_of(flight, stated))
     np.testing.assert_allclose(beliefs.white, [0.5, np.radians(0.3)])
     (heading,) = beliefs.considered
     assert heading[:3] == ("heading", pytest.approx(np.radians(2.0)), 60.0)
     assert {one.source for one in said} == {STATED}
-    targets, said = of_targets(stated.targets)
+    targets, said = model_targets(stated.targets)
     assert targets.density == 0.15 and targets.patience_s == 10.0
     assert {one.source for one in said} == {STATED, ASSUMED}
 
@@ -105,6 +105,6 @@ def test_truth_tells_a_heading_and_the_other_flight_is_judged_by_it():
     assert found.against == "truth" and found.flight == "first"
     assert np.degrees(found.sensors["radar"].heading_sd_rad) == pytest.approx(2.0, rel=0.4)
     followed = track(robot_flight(9, heading_off_deg=-2.0), tuned=found)
-    assert any(one.source == "tuned on first" for one in followed.said)
+    assert any(one.source == "tuned on first" for one in followed.given)
     rows = rows_of(followed)
     assert rows.loc["schmidt", "nees"] < rows.loc["ekf", "nees"]

@@ -16,7 +16,7 @@ from wildlab.analysis.tracks.initiation import Geometry, ends_by
 from wildlab.analysis.tracks.inputs import SensorInputs
 from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel
 from wildlab.analysis.tracks.scans import Scans, Truth
-from wildlab.analysis.tracks.scores import estimates_table, judged, seen_of, used_of
+from wildlab.analysis.tracks.scores import estimates_table, score_tracks, seen_of, used_of
 from wildlab.analysis.tracks.single_target import SensorTrack, track_target
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.flight.tracking_settings import parse_settings
@@ -95,14 +95,14 @@ def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silent
     followed = follow()
     scans, _ = watched()
     sensor = {"camera": scans}, {"camera": beliefs(scans)}
-    rows = judged(TrackingResult(followed, *sensor, TARGETS, [], [], True))
+    rows = score_tracks(TrackingResult(followed, *sensor, TARGETS, [], [], True))
     first = followed[0]
     for one in followed:
         assert (np.isfinite(one.estimate) == np.isfinite(first.estimate)).all()
         assert (one.starts == first.starts).all() and (one.detection == first.detection).all()
     for _, row in rows.iterrows():
-        assert row["anew"] == 1 and row["gone_seen"] == 0
-        assert row["compared"] + row["without"] + row["gone"] == row["spanned"]
+        assert row["restarts"] == 1 and row["untracked_in_view"] == 0
+        assert row["compared"] + row["without"] + row["untracked"] == row["spanned"]
         assert row["compared"] == seen_of(first).sum() == row["used"]
         assert row["detections"] == row["used"] - 2  # the two that tracks were put on
         # The table says which of the two a row is of.
@@ -167,8 +167,12 @@ def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track(
     found = tracker.track(flight, settings=settings, filters=["ekf", "ukf", "imm"], smooth=True)
     rows = rows_of(found, "together")
     assert set(rows.index) == {"ekf", "ekf-smoothed", "ukf", "ukf-smoothed", "imm"}
-    assert (rows["anew"] == 1).all() and (rows["gone"] > 0).all() and (rows["gone_seen"] == 0).all()
-    assert (rows["compared"] + rows["without"] + rows["gone"] == rows["spanned"]).all()
+    assert (
+        (rows["restarts"] == 1).all()
+        and (rows["untracked"] > 0).all()
+        and (rows["untracked_in_view"] == 0).all()
+    )
+    assert (rows["compared"] + rows["without"] + rows["untracked"] == rows["spanned"]).all()
     assert (rows["rmse"] < 0.5).all()
     for mine in (track for track in found.tracks if track.sensor == "together"):
         assert mine.times[mine.starts[1]] > 130
@@ -186,7 +190,7 @@ def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen():
     assert row["nees"] == pytest.approx(np.nanmean(one.nees[used]))
     assert row["compared"] == (used & known).sum()
     # The track ends within the wait: looks without one are counted, and are in neither number.
-    assert row["without"] + row["gone"] == 101 and row["gone"] > 0 and row["anew"] == 1
+    assert row["without"] + row["untracked"] == 101 and row["untracked"] > 0 and row["restarts"] == 1
 
 
 def test_a_track_that_lost_its_target_is_judged_where_the_target_was_seen():

@@ -96,7 +96,7 @@ def test_a_clock_that_nothing_tells_of_is_not_said_to_be_tuned():
     by_innovations = tune_flight(flight, ["radar"], None, "innovations")
     assert by_truth.sensors["radar"].clock_tuned
     for tuned, said in ((by_truth, True), (by_innovations, False)):
-        told = tracker.track(other, tuned=read_tuned(tuned_text(tuned))).said
+        told = tracker.track(other, tuned=read_tuned(tuned_text(tuned))).given
         assert any(one.what == "to be added to its stamps" for one in told) is said
 
 

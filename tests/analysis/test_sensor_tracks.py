@@ -8,7 +8,7 @@ import pytest
 
 from tests.analysis.robots import robot, robot_flight, seen_only
 from wildlab.analysis.tracks.initiation import start_near
-from wildlab.analysis.tracks.noise_model import SensorTuning, from_tuning
+from wildlab.analysis.tracks.noise_model import SensorTuning, noise_of_tuning
 from wildlab.analysis.tracks.scans import errors_near, scans_of, sensors_of, truths_at
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.studies.autoferry import BOATS, tune_sensor
@@ -80,9 +80,9 @@ def test_a_track_does_not_start_on_another_target():
     flight.tables["truth"] = pd.concat([beside, truth], ignore_index=True)
     scans, tuning = scans_of(flight, "radar"), quiet()
     one, other = truths_at(flight, scans.times)
-    assert start_near(scans, one, from_tuning(tuning), BOATS) is not None
-    assert start_near(scans, one, from_tuning(tuning), BOATS, [other]) is None
-    start = start_near(scans, other, from_tuning(tuning), BOATS, [one])
+    assert start_near(scans, one, noise_of_tuning(tuning), BOATS) is not None
+    assert start_near(scans, one, noise_of_tuning(tuning), BOATS, [other]) is None
+    start = start_near(scans, other, noise_of_tuning(tuning), BOATS, [one])
     assert start is not None
     np.testing.assert_allclose(start.x[:2], other.position[0], atol=0.5)
     np.testing.assert_allclose(start.P[:2, :2], np.eye(2) * BOATS.reach_m**2)

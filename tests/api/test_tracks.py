@@ -14,7 +14,7 @@ from tests.analysis.robots import KNOWN, joined, robot_flight
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated, Series
 from wildlab.analysis.tracks import tracker
-from wildlab.analysis.tracks.scores import STATE, estimates_table, judged
+from wildlab.analysis.tracks.scores import STATE, estimates_table, score_tracks
 from wildlab.analysis.tracks.sighting import (
     FILTERS,
     CvTuning,
@@ -247,7 +247,7 @@ def test_a_track_is_judged_as_the_command_judges_it():
     """Radar and bearings together: numbers, degrees of freedom and bands."""
     flight = joined(robot_flight(3), robot_flight(103, kind="bearing", sensor="cam"))
     told = parse_settings(KNOWN + "[sensors.cam.noise]\nazimuth_deg = 0.3\n")
-    rows = judged(tracker.track(flight, settings=told, filters=["ekf"])).query("filter == 'ekf'")
+    rows = score_tracks(tracker.track(flight, settings=told, filters=["ekf"])).query("filter == 'ekf'")
     row = rows[rows["kind"] == TOGETHER].iloc[0]
     track = wildlab.track(flight, filter="ekf", settings=told)
     nis, nees = (wildlab.consistency(track).means[name] for name in ("NIS", "NEES position"))

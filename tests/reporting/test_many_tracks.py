@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.figure_text import overlapping
-from wildlab.analysis.tracks.noise_model import ToldValue
+from wildlab.analysis.tracks.noise_model import GivenValue
 from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackLife, compare_identities, gospa
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import figures
@@ -147,8 +147,8 @@ def test_a_track_that_goes_on_without_its_target_is_seen():
 
 def test_names_are_only_text():
     values = [
-        ToldValue("targets", "kinds", "**bold** `code`", "stated"),
-        ToldValue("radar", "x", "1", "stated"),
+        GivenValue("targets", "kinds", "**bold** `code`", "stated"),
+        GivenValue("radar", "x", "1", "stated"),
     ]
     table = page.parameters_table([values[1], values[0], values[1]])
     assert table["of"].tolist() == ["radar", "radar", "targets"]

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.scores import Apart, leading_filter
+from wildlab.analysis.tracks.scores import SensorPair, leading_filter
 from wildlab.evaluation.consistency import Average
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import tracking as page
@@ -29,11 +29,11 @@ def rows(**changes: object) -> pd.DataFrame:
     return pd.DataFrame([white, schmidt])
 
 
-def colour(rows: pd.DataFrame, pairs: list[Apart] | None = None) -> str:
+def colour(rows: pd.DataFrame, pairs: list[SensorPair] | None = None) -> str:
     return page.judge_tracks(rows, pairs or []).colour
 
 
-def keys(rows: pd.DataFrame, pairs: list[Apart] | None = None) -> list[str]:
+def keys(rows: pd.DataFrame, pairs: list[SensorPair] | None = None) -> list[str]:
     return [one.key for one in page.answer(rows, pairs or [])]
 
 
@@ -156,7 +156,7 @@ def test_innovations_answer_where_there_is_no_truth(nis, word, key):
     assert keys(blind(nis=nis, nis_verdict=word)) == [key, "no-truth"]
 
 
-PAIR = Apart("boat", "schmidt", "radar", "lidar", 3.0, 90, Average(8.0, 1.5, 2.5, 90, 60.0))
+PAIR = SensorPair("boat", "schmidt", "radar", "lidar", 3.0, 90, Average(8.0, 1.5, 2.5, 90, 60.0))
 
 
 def test_sensors_that_contradict_each_other_are_looked_at():
@@ -203,7 +203,7 @@ def test_all_sensors_together_must_not_be_worse_than_the_best_alone(rmse, level)
 
 
 def test_restarts_are_counted_once_for_all_filters():
-    again = rows().assign(anew=2, gone=40, spanned=100, gone_seen=3)
+    again = rows().assign(restarts=2, untracked=40, spanned=100, untracked_in_view=3)
     said = page.answer(again, [])[1]
     assert said.key == "restarted" and said.values == {"times": "2", "gone": "40", "looks": "100"}
     times, without = np.arange(6.0), np.array([False, True, True, False, True, False])

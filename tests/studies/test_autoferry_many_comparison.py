@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.many import ManyTracks, judged, track_jointly
+from wildlab.analysis.tracks.many import ManyTracks, score_identities, track_jointly
 from wildlab.errors import WildlabError
 from wildlab.studies import autoferry_many
 from wildlab.studies.autoferry_many import stone_soup, tuning
@@ -132,7 +132,7 @@ def test_it_is_judged_at_our_looks_by_our_truths(monkeypatch):
     theirs = autoferry_many.replace_tracks(ours, dense())
     assert given == [(scans, ["lidar", "radar"], dense())] and given[0][0] is ours.scans
     assert theirs._replace(shown=ours.shown) == ours
-    lives, other = judged(ours, {"Havfruen": 55.0}), judged(theirs, {"Havfruen": 55.0})
+    lives, other = score_identities(ours, {"Havfruen": 55.0}), score_identities(theirs, {"Havfruen": 55.0})
     assert lives is not None and other is not None
     assert len(lives.gospa) == len(other.gospa) == len(scans) - 1
     assert lives.targets["Havfruen"].visible == other.targets["Havfruen"].visible > 0
@@ -202,7 +202,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(scenario, tunings, mo
     drawn = draw_choice(np.random.default_rng(1).spawn(2)[row["draw"] - 1], autoferry_many.FAR_M)
     given = track_jointly(scenario(17), settings=settings, sensors=["radar"])
     shown = run_stone_soup(given.scans, ["radar"], drawn)
-    lives = judged(given._replace(shown=shown), tuning.reach_of(scenario(17), "radar"))
+    lives = score_identities(given._replace(shown=shown), tuning.reach_of(scenario(17), "radar"))
     assert tuning.gospa_of(lives) == row["gospa"]
 
 

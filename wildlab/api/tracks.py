@@ -326,7 +326,7 @@ def track(
 
 def _as_followed(flight: Flight, found: TrackingResult, one: SensorTrack, source: str | None) -> Tracked:
     of = {"targets", *(found.scans if one.sensor == TOGETHER else (one.sensor,))}
-    about = [each for each in found.said if each.subject in of]
+    about = [each for each in found.given if each.subject in of]
     several = len(of) > 2
     told = [
         (f"{each.subject}: {each.what}" if several else each.what, f"{each.value} ({each.source})")

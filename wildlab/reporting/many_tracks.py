@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.tracks.ground_positions import counted_twice, of_platform
+from wildlab.analysis.tracks.ground_positions import counts_twice, platform_errors
 from wildlab.analysis.tracks.many import HERE, ManyTracks
-from wildlab.analysis.tracks.noise_model import ToldValue
+from wildlab.analysis.tracks.noise_model import GivenValue
 from wildlab.analysis.tracks.scores import FEWEST
 from wildlab.evaluation.identities import Gospa, Identities
 from wildlab.messages.catalogue import Message, load_texts
@@ -181,9 +181,9 @@ def limits(followed: ManyTracks) -> list[Message]:
     kinds = {one.kind for one in followed.places.values()}
     every = {name: one.errors for name, one in followed.places.items()}
     platform = {"heading", "platform_north", "platform_east"}
-    bare = [name for name, errors in every.items() if not platform & of_platform(errors)]
+    bare = [name for name, errors in every.items() if not platform & platform_errors(errors)]
     shared = [
-        name for name, own in every.items() if any(counted_twice(own, errors) for errors in every.values())
+        name for name, own in every.items() if any(counts_twice(own, errors) for errors in every.values())
     ]
     estimated = [followed.truth_sd[name] for name in followed.truth_estimated if name in followed.truth_sd]
     exact = len(followed.truth) - sum(sd > 0 for sd in followed.truth_sd.values())
@@ -195,7 +195,11 @@ def limits(followed: ManyTracks) -> list[Message]:
         ("truth-exact", truth and exact > 0, {"count": str(exact)}),
         ("shared", bool(shared), {"sensors": listed(shared)}),
         ("bare", bool(bare), {"sensors": listed(bare)}),
-        ("smoothed", bool(followed.unknown_lasting), {"sensors": listed(list(followed.unknown_lasting))}),
+        (
+            "smoothed",
+            bool(followed.unknown_correlation),
+            {"sensors": listed(list(followed.unknown_correlation))},
+        ),
         ("bearing", "bearing" in kinds, {}),
         ("pixel", "pixel" in kinds, {}),
         ("returned", True, {}),
@@ -271,7 +275,7 @@ def parts_table(found: Sequence[Gospa]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def parameters_table(said: Sequence[ToldValue]) -> pd.DataFrame:
+def parameters_table(said: Sequence[GivenValue]) -> pd.DataFrame:
     """Every value that the tracker was given, subject by subject; a name in it is only text."""
     subjects = list(dict.fromkeys(one.subject for one in said))
     return pd.DataFrame(
@@ -282,7 +286,7 @@ def parameters_table(said: Sequence[ToldValue]) -> pd.DataFrame:
     )
 
 
-def count_assumed(said: Sequence[ToldValue]) -> dict[str, str]:
+def count_assumed(said: Sequence[GivenValue]) -> dict[str, str]:
     """How many of the given values are assumed, and estimated on this flight, for captions."""
     assumed = sum(one.source.startswith("assumed") for one in said)
     here = sum(one.source.startswith(HERE) for one in said)
@@ -354,5 +358,5 @@ def show_many(report: Report, followed: ManyTracks, lives: Identities | None) ->
         text = wording.texts.tables["tracks"]
         columns = {name: heading for name, heading in text.columns.items() if name in table}
         report.table(table, columns=columns, digits=text.digits, caption=text.caption, fold=text.title)
-    wording.table("parameters", parameters_table(followed.said), count_assumed(followed.said))
+    wording.table("parameters", parameters_table(followed.given), count_assumed(followed.given))
     report.method(wording.texts.method)

@@ -1,7 +1,7 @@
 """The page on a flight's tracks: how wrong they are, and whether their filters know.
 
-What is said follows by rules from the table of tracks (`wildlab.analysis.tracks.scores.judged`); the words
-lie in ``data/messages/en/tracking.toml``.
+What is said follows by rules from `wildlab.analysis.tracks.scores.score_tracks`; the words lie in
+``data/messages/en/tracking.toml``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.tracks.noise_model import ROUGH, ToldValue, Tuned
+from wildlab.analysis.tracks.noise_model import ROUGH, GivenValue, Tuned
 from wildlab.analysis.tracks.scores import (
     CAUTIOUS,
     CONSISTENT,
@@ -20,7 +20,7 @@ from wildlab.analysis.tracks.scores import (
     LEADING,
     OVERCONFIDENT,
     UNKNOWN,
-    Apart,
+    SensorPair,
     is_at_rest,
     leading_filter,
     verdict,
@@ -99,8 +99,8 @@ def record_restarts(report: Report, rows: pd.DataFrame) -> None:
     """How often each track was reinitialised, and at how many looks there was none."""
     for _, row in rows[rows["spanned"] > 0].iterrows():
         subject = f"{row['sensor']}/{row['target']}/{row['filter']}".replace(" ", "-")
-        report.metric("started_anew", subject, int(row["anew"]), "1")
-        report.metric("looks_without_track", subject, int(row["gone"]), "1", n=int(row["spanned"]))
+        report.metric("started_anew", subject, int(row["restarts"]), "1")
+        report.metric("looks_without_track", subject, int(row["untracked"]), "1", n=int(row["spanned"]))
 
 
 # -- what follows from it
@@ -166,15 +166,15 @@ def worse_together(rows: pd.DataFrame) -> Message | None:
     return Message("worse-together", values)
 
 
-def judge_tracks(rows: pd.DataFrame, pairs: Sequence[Apart]) -> Verdict:
+def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> Verdict:
     """What the tracks come to.
 
     Parameters
     ----------
     rows
-        From `wildlab.analysis.tracks.scores.judged`.
+        From `wildlab.analysis.tracks.scores.score_tracks`.
     pairs
-        From `wildlab.analysis.tracks.scores.apart`.
+        From `wildlab.analysis.tracks.scores.compare_sensors`.
 
     Returns
     -------
@@ -196,7 +196,7 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[Apart]) -> Verdict:
     return verdict_of(Evidence(troubled=against + (not agree)))
 
 
-def answer(rows: pd.DataFrame, pairs: Sequence[Apart]) -> list[Message]:
+def answer(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> list[Message]:
     """Whether the tracks know how wrong they are, and the most important thing beside it; two at most.
 
     Parameters
@@ -241,7 +241,7 @@ _COUNTED = {"consistent": CONSISTENT, "overconfident": OVERCONFIDENT, "conservat
 
 
 def _beside(
-    rows: pd.DataFrame, mine: pd.DataFrame, pairs: Sequence[Apart], *, with_truth: bool
+    rows: pd.DataFrame, mine: pd.DataFrame, pairs: Sequence[SensorPair], *, with_truth: bool
 ) -> Message | None:
     """The most important thing beside the first sentence."""
     if (worse := worse_together(rows)) is not None:
@@ -254,10 +254,10 @@ def _beside(
     by_pair = rows.groupby(["sensor", "target"], sort=False)["detections"].max()
     if never := int((~(by_pair > 0)).sum()):
         return Message("never-tracked", {"never": str(never), "of": str(len(by_pair))})
-    if "anew" in rows:
+    if "restarts" in rows:
         each = rows.drop_duplicates(["sensor", "target"])
-        if restarts := int(each["anew"].sum()):
-            gone, looks = int(each["gone"].sum()), int(each["spanned"].sum())
+        if restarts := int(each["restarts"].sum()):
+            gone, looks = int(each["untracked"].sum()), int(each["spanned"].sum())
             return Message("restarted", {"times": str(restarts), "gone": str(gone), "looks": str(looks)})
     if not with_truth:
         used = [one for one in pairs if one.filter == mine["filter"].iloc[0]]
@@ -336,7 +336,7 @@ def restarts_table(followed: TrackingResult, rows: pd.DataFrame) -> pd.DataFrame
     """A row for each target and sensor whose track ended and was reinitialised."""
     found = []
     for _, row in rows.drop_duplicates(["sensor", "target"]).iterrows():
-        if not row["anew"]:
+        if not row["restarts"]:
             continue
         key = (row["sensor"], row["target"])
         one = next(one for one in followed.tracks if (one.sensor, one.target) == key)
@@ -345,10 +345,10 @@ def restarts_table(followed: TrackingResult, rows: pd.DataFrame) -> pd.DataFrame
         found.append(
             {
                 "track": f"{row['target']}, {row['sensor']}",
-                "anew": row["anew"],
+                "anew": row["restarts"],
                 "when": ", ".join(times[:MOST_TIMES]) + (f" and {more} more" if more > 0 else ""),
-                "gone": f"{row['gone']} of {row['spanned']}",
-                "seen": row["gone_seen"],
+                "gone": f"{row['untracked']} of {row['spanned']}",
+                "seen": row["untracked_in_view"],
                 "ended": longest_gap(one.times, one.without),
             }
         )
@@ -364,7 +364,7 @@ def longest_gap(times: np.ndarray, without: np.ndarray) -> float:
     return float((times[ends] - times[begins]).max())
 
 
-def apart_table(pairs: Sequence[Apart]) -> pd.DataFrame:
+def apart_table(pairs: Sequence[SensorPair]) -> pd.DataFrame:
     """Two sensors against each other, a row for each target and filter."""
     return pd.DataFrame(
         [
@@ -383,7 +383,7 @@ def apart_table(pairs: Sequence[Apart]) -> pd.DataFrame:
     )
 
 
-def parameters_table(said: Sequence[ToldValue]) -> pd.DataFrame:
+def parameters_table(said: Sequence[GivenValue]) -> pd.DataFrame:
     """What filters were given, first what is assumed or estimated on this flight."""
     ordered = sorted(said, key=lambda one: not (one.source.startswith("assumed") or one.source == ROUGH))
     return pd.DataFrame(
@@ -391,7 +391,7 @@ def parameters_table(said: Sequence[ToldValue]) -> pd.DataFrame:
     )
 
 
-def count_assumed(said: Sequence[ToldValue]) -> dict[str, str]:
+def count_assumed(said: Sequence[GivenValue]) -> dict[str, str]:
     """How many of the given values are assumed, and estimated on this flight, for captions."""
     assumed = sum(one.source.startswith("assumed") for one in said)
     here = sum(one.source == ROUGH for one in said)
@@ -401,7 +401,9 @@ def count_assumed(said: Sequence[ToldValue]) -> dict[str, str]:
 # -- the page
 
 
-def show_answer(report: Report, followed: TrackingResult, rows: pd.DataFrame, pairs: Sequence[Apart]) -> None:
+def show_answer(
+    report: Report, followed: TrackingResult, rows: pd.DataFrame, pairs: Sequence[SensorPair]
+) -> None:
     """Title, answer and verdict."""
     wording = Wording(report, load_texts("tracking"))
     names, truth = wording.texts.subjects, bool(followed.truth)
@@ -420,7 +422,7 @@ def show_tracks(
     flight: Flight,
     followed: TrackingResult,
     rows: pd.DataFrame,
-    pairs: Sequence[Apart],
+    pairs: Sequence[SensorPair],
     tuned: Tuned | None = None,
     source: str | None = None,
 ) -> None:
@@ -462,7 +464,7 @@ def show_tracks(
     if pairs:
         wording.table("apart", apart_table(pairs))
     flights = {"tuned": tuned.flight if tuned is not None else "no other flight"}
-    wording.table("parameters", parameters_table(followed.said), count_assumed(followed.said) | flights)
+    wording.table("parameters", parameters_table(followed.given), count_assumed(followed.given) | flights)
     report.method(wording.texts.method)
 
 

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from wildlab.analysis.tracks.inputs import sensors_with_detections
 from wildlab.analysis.tracks.many import refuse_unfit as refuse_unfit_settings
-from wildlab.analysis.tracks.noise_model import Against, of_flight
+from wildlab.analysis.tracks.noise_model import Against, settings_of
 from wildlab.analysis.tracks.scans import sensors_of
 from wildlab.analysis.tracks.tracker import refuse_unusable
 from wildlab.analysis.tracks.tuning import refuse_same, tune_flight, tuned_text
@@ -166,7 +166,7 @@ def track_many(
     flight = load_flight(folder)
     stated = None if settings is None else read_settings(settings)
     refuse_unusable(flight, stated, (), (), sensors, source)
-    told = of_flight(flight, stated)
+    told = settings_of(flight, stated)
     refuse_unfit_settings(told)
     unknown = ", ".join(map(repr, sorted(set(told.sensors) - set(sensors_of(flight)))))
     if unknown and console is not None:

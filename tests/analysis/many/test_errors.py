@@ -19,14 +19,14 @@ from wildlab.analysis.georeference import (
 )
 from wildlab.analysis.tracks.ground_positions import (
     OF_COVARIANCE,
-    LastingErrors,
+    CorrelatedErrors,
     _pose_roots,
-    counted_twice,
-    laid_out,
-    of_pixels,
-    of_poses,
-    stated_roots,
-    told_errors,
+    align_errors,
+    camera_errors,
+    counts_twice,
+    errors_of_pixels,
+    errors_of_poses,
+    roots_of_deviations,
 )
 from wildlab.analysis.tracks.many import track_jointly
 from wildlab.analysis.tracks.scans import scans_of
@@ -93,8 +93,8 @@ def taken(
     flight: Flight, observed: Observations, lasting_s: float = np.inf
 ) -> tuple[PoseErrors, tuple[np.ndarray, tuple[str, ...]]]:
     belief = believed(flight, "", *MANUAL)[1]
-    told = told_errors(flight, observed, belief)
-    return told, of_poses(flight, observed, told, belief, lasting_s)
+    told = camera_errors(flight, observed, belief)
+    return told, errors_of_poses(flight, observed, told, belief, lasting_s)
 
 
 def test_an_error_stays_itself_along_the_flight():
@@ -114,7 +114,7 @@ def test_an_error_stays_itself_along_the_flight():
     points = georeference(observed, np.random.default_rng(0))
     linear = points["ellipse"].to_numpy(str) == "linear"
     of_pose = roots, OF_COVARIANCE
-    _, shared, _ = of_pixels(observed, errors, of_pose, covariances_of(points), np.inf)
+    _, shared, _ = errors_of_pixels(observed, errors, of_pose, covariances_of(points), np.inf)
     small = 1e-4
     for i in (0, 4, 5):
         turn = rotation_vector_to_matrix(small * roots[:, 3:, i])
@@ -129,15 +129,15 @@ def test_an_error_stays_itself_along_the_flight():
 
 
 def test_errors_of_one_name_are_one_and_those_that_move_nothing_none():
-    one = LastingErrors(("heading", "a: bias", "idle"), (30.0, np.inf, 5.0))
-    two = LastingErrors(("heading",), (20.0,))
+    one = CorrelatedErrors(("heading", "a: bias", "idle"), (30.0, np.inf, 5.0))
+    two = CorrelatedErrors(("heading",), (20.0,))
     J, K = np.ones((2, 2, 3)), 7 * np.ones((1, 2, 1))
     J[..., 1], J[..., 2] = 2, 0
-    lasting, (first, second) = laid_out([(one, [J, None]), (two, [K])])
+    lasting, (first, second) = align_errors([(one, [J, None]), (two, [K])])
     assert lasting == (20.0, np.inf)
     assert np.array_equal(first[0], J[..., :2]) and first[1].shape == (0, 2, 2)
     assert np.array_equal(second[0][..., 0], K[..., 0]) and not second[0][..., 1].any()
-    assert laid_out([]) == ((), [])
+    assert align_errors([]) == ((), [])
 
 
 def test_a_heading_that_is_off_is_in_the_covariance_of_tracks():
@@ -160,14 +160,14 @@ def test_what_is_considered_of_a_camera_is_in_its_pose():
     text = "[sensors.manual.noise]\npixel_px = 7.0\n[sensors.manual.considered.heading]\nsd_deg = 9.0\n"
     text += "[sensors.manual.considered.platform_east]\nsd_m = 4.0\n"
     belief = believed(flight, text, *MANUAL)[1]
-    usual, told = pose_errors(observed), told_errors(flight, observed, belief)
+    usual, told = pose_errors(observed), camera_errors(flight, observed, belief)
     assert np.allclose(told.pixel, 49.0 * np.eye(2))
     assert np.allclose(told.pose[:, 1, 1], 16.0) and np.allclose(told.pose[:, 0, 0], usual.pose[:, 0, 0])
     level = np.abs(observed.poses.R_nb[:, 2, 2]) > 0.999
     assert np.allclose(told.pose[level][:, 5, 5], np.radians(9.0) ** 2, rtol=0.02)
     own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
     known = replace(observed, poses=replace(observed.poses, covariance=own))
-    on_top = told_errors(flight, known, belief).pose - own
+    on_top = camera_errors(flight, known, belief).pose - own
     R = observed.poses.R_nb
     assert np.allclose(on_top[:, :3, :3], np.diag([0, 16.0, 0]))
     in_n = R @ on_top[:, 3:, 3:] @ np.swapaxes(R, 1, 2)
@@ -181,7 +181,9 @@ def test_mount_and_ground_are_in_what_is_shared_and_stay():
     points = georeference(observed, np.random.default_rng(0), errors)
     linear = points["ellipse"].to_numpy(str) == "linear"
     of_pose = _pose_roots(observed, errors), OF_COVARIANCE
-    R, shared, found = of_pixels(observed, errors, of_pose, np.full((len(observed.uv), 2, 2), np.nan), 7.0)
+    R, shared, found = errors_of_pixels(
+        observed, errors, of_pose, np.full((len(observed.uv), 2, 2), np.nan), 7.0
+    )
     whole = R + shared @ np.swapaxes(shared, 1, 2)
     assert linear.sum() > 100 and np.allclose(whole[linear], covariances_of(points)[linear], rtol=1e-6)
     assert found.lasting_s == (7.0,) * 6 + (np.inf,) * 4
@@ -194,7 +196,7 @@ def test_an_error_of_the_heading_stays_one_whichever_way_the_body_lies():
     angles[:5, 1] = -np.pi / 2
     R = euler_to_matrix(*angles.T)
     sd = np.array([2.0, 2.0, 3.0, *np.radians([1.5, 1.5, 4.0])])
-    roots = stated_roots(R, sd)
+    roots = roots_of_deviations(R, sd)
     usual = {"position_horizontal_m": 2.0, "position_vertical_m": 3.0, "tilt_deg": 1.5, "heading_deg": 4.0}
     assert np.allclose(roots @ np.swapaxes(roots, 1, 2), assumed_pose_covariance(R, usual))
     h = 1e-6
@@ -209,7 +211,7 @@ def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places():
     told, of_pose = taken(flight, observed, 30.0)
     assert of_pose[1] == POSE
     nothing = np.full((len(observed.uv), 2, 2), np.nan)
-    _, shared, errors = of_pixels(observed, told, of_pose, nothing, 30.0)
+    _, shared, errors = errors_of_pixels(observed, told, of_pose, nothing, 30.0)
     assert errors.names[:6] == POSE and set(errors.lasting_s[:6]) == {30.0}
     sd = flight.manifest.uncertainty
     points = georeference(observed, np.random.default_rng(0), told)
@@ -224,16 +226,16 @@ def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places():
 
 def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last():
     flight, observed = _pixels()
-    radar = LastingErrors(("heading", "radar: range_bias"), (np.inf, np.inf))
+    radar = CorrelatedErrors(("heading", "radar: range_bias"), (np.inf, np.inf))
     for lasting_s, twice in ((0.0, True), (30.0, False)):
         told, of_pose = taken(flight, observed, lasting_s)
-        camera = LastingErrors(of_pose[1], (lasting_s,) * 6)
-        assert counted_twice(camera, radar) is twice
+        camera = CorrelatedErrors(of_pose[1], (lasting_s,) * 6)
+        assert counts_twice(camera, radar) is twice
         known = replace(observed, poses=replace(observed.poses, covariance=told.pose))
-        of_pose = of_poses(flight, known, told, believed(flight, "", *MANUAL)[1], lasting_s)
-        assert counted_twice(LastingErrors(of_pose[1], (lasting_s,) * 6), radar)
-        assert not counted_twice(camera, LastingErrors(("radar: range_bias",), (np.inf,)))
+        of_pose = errors_of_poses(flight, known, told, believed(flight, "", *MANUAL)[1], lasting_s)
+        assert counts_twice(CorrelatedErrors(of_pose[1], (lasting_s,) * 6), radar)
+        assert not counts_twice(camera, CorrelatedErrors(("radar: range_bias",), (np.inf,)))
     text = "[sensors.manual]\ncorrelation_time_s = 9.0\n[sensors.manual.considered.heading]\nsd_deg = 3.0\n"
     apart = believed(flight, text + "shared = false\n", *MANUAL)[1]
-    names = of_poses(flight, observed, told, apart, 9.0)[1]
+    names = errors_of_poses(flight, observed, told, apart, 9.0)[1]
     assert names == (*POSE[:5], "manual: heading")

@@ -6,14 +6,20 @@ import pytest
 from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, joined, robot_flight
 from tests.refused import refused
-from wildlab.analysis.tracks.many import complete_looks, judged, known_looks, track_jointly, tracks_table
+from wildlab.analysis.tracks.many import (
+    complete_scans,
+    known_scans,
+    score_identities,
+    track_jointly,
+    tracks_table,
+)
 from wildlab.flight.tracking_settings import parse_settings
 
 
 def test_a_boat_among_clutter_is_found_without_its_name():
     flight = robot_flight(kind="position", clutter=2, labelled=False, seed=3)
     followed = track_jointly(flight)
-    lives = judged(followed)
+    lives = score_identities(followed)
     assert lives is not None
     assert lives.targets["boat"].tracked > 0.9 and lives.swaps == lives.breaks == 0
     assert lives.false_tracks_per_minute <= 1
@@ -26,7 +32,7 @@ def test_a_boat_among_clutter_is_found_without_its_name():
 
 def test_without_truth_there_is_nothing_to_compare():
     followed = track_jointly(robot_flight(kind="position", truth=False))
-    assert judged(followed) is None and followed.truth == {} and followed.minutes > 1
+    assert score_identities(followed) is None and followed.truth == {} and followed.minutes > 1
 
 
 def test_bearings_help_where_places_are_known_and_begin_nothing_alone():
@@ -37,7 +43,7 @@ def test_bearings_help_where_places_are_known_and_begin_nothing_alone():
     assert list(with_eye.places) == ["radar", "eye"] and not with_eye.notes
     errors = []
     for followed in (with_eye, without):
-        lives = judged(followed, at=["radar"])
+        lives = score_identities(followed, at=["radar"])
         assert lives is not None and len(lives.gospa) == len(without.scans)
         errors.append(np.mean([one.distance for one in lives.gospa]))
         assert len(lives.tracks) == 1
@@ -81,10 +87,10 @@ def test_settings_that_nothing_can_satisfy_are_refused(text, words):
 def test_only_what_an_image_shows_or_a_detection_names_could_be_seen():
     followed = track_jointly(robot_flight(kind="position", labelled=False))
     away = [scan._replace(sees=lambda at: np.zeros(len(at), bool)) for scan in followed.scans]
-    lives = judged(followed._replace(scans=away))
+    lives = score_identities(followed._replace(scans=away))
     assert lives is not None and lives.targets["boat"].visible == 0
     named = [frozenset({"boat"}) if row < 30 else frozenset() for row in range(len(away))]
-    lives = judged(followed._replace(scans=away, named=named))
+    lives = score_identities(followed._replace(scans=away, named=named))
     assert lives is not None and lives.targets["boat"].visible == 30
 
 
@@ -94,7 +100,7 @@ def test_where_a_true_place_is_not_known_nothing_is_judged():
     truth = flight.table("truth")
     early = truth[truth["time_s"] < truth["time_s"].min() + 50]
     followed = track_jointly(changed(flight, truth=early))
-    lives, known = judged(followed), known_looks(followed)
+    lives, known = score_identities(followed), known_scans(followed)
     assert lives is not None and 0.3 < known.mean() < 0.7 and len(lives.gospa) == known.sum()
     assert lives.false_tracks_per_minute == 0 and not any(one.n_false for one in lives.gospa)
 
@@ -120,7 +126,7 @@ def test_what_the_truth_may_be_off_is_beside_the_tracks_own():
     found = []
     for sd in (0.0, 5.0, np.nan):
         followed = track_jointly(changed(flight, truth=truth.assign(sd_horizontal_m=sd)))
-        lives = judged(followed)
+        lives = score_identities(followed)
         assert lives is not None
         found.append(max(one.anees / 2 for one in lives.tracks.values()))
         assert max(one.anees_alone / 2 for one in lives.tracks.values()) > 5
@@ -131,7 +137,7 @@ def test_what_the_truth_may_be_off_is_beside_the_tracks_own():
 def test_how_near_a_track_counts_and_whether_others_are_about_is_stated():
     flight = robot_flight(kind="position", clutter=2, labelled=False, seed=3, heading_off_deg=8.0)
     near, far = (
-        judged(track_jointly(flight, settings=parse_settings(f"[targets]\nreach_m = {reach}\n")))
+        score_identities(track_jointly(flight, settings=parse_settings(f"[targets]\nreach_m = {reach}\n")))
         for reach in (5.0, 40.0)
     )
     assert near is not None and far is not None
@@ -139,7 +145,7 @@ def test_how_near_a_track_counts_and_whether_others_are_about_is_stated():
     alone = [one for one in near.tracks.values() if one.false]
     text = "[targets]\nreach_m = 5.0\n[targets.many]\nothers = true\n"
     followed = track_jointly(flight, settings=parse_settings(text))
-    beside = judged(followed)
+    beside = score_identities(followed)
     assert beside is not None and alone and not any(one.false for one in beside.tracks.values())
-    assert not complete_looks(followed).any() and beside.incomplete == len(beside.gospa)
+    assert not complete_scans(followed).any() and beside.incomplete == len(beside.gospa)
     assert max(one.n_false for one in beside.gospa) == 0 < max(one.n_false for one in near.gospa)

@@ -10,7 +10,7 @@ import pytest
 
 from tests.analysis.robots import believed, boat, robot, robot_flight
 from wildlab.analysis.georeference import georeference, observe
-from wildlab.analysis.tracks.ground_positions import PlacedLooks, _of_ranges, places_of, sees_of
+from wildlab.analysis.tracks.ground_positions import PlacedScans, _of_ranges, place_scans, view_of
 from wildlab.analysis.tracks.scans import Scans, scans_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
@@ -24,9 +24,9 @@ from wildlab.tracking.many import Scan
 NOISE = "[sensors.radar.noise]\nrange_m = 2.0\nazimuth_deg = 1.5\n"
 
 
-def places(flight: Flight, text: str = "", sensor: str = "radar", source: str | None = None) -> PlacedLooks:
+def places(flight: Flight, text: str = "", sensor: str = "radar", source: str | None = None) -> PlacedScans:
     scans, belief = believed(flight, text, sensor, source)
-    return places_of(flight, scans, belief, 0, source)
+    return place_scans(flight, scans, belief, 0, source)
 
 
 def test_ranges_and_bearings_lie_where_the_boat_is():
@@ -70,7 +70,7 @@ def test_a_slant_range_tells_less_of_the_place_on_the_level():
     scans, belief = believed(flight, NOISE)
     scans.detections[..., 0] = 50.0
     high = scans._replace(drop=np.full(len(scans.times), 30.0))
-    scan = places_of(flight, high, belief, 0, None).scans[20]
+    scan = place_scans(flight, high, belief, 0, None).scans[20]
     off = scan.z[0] - scan.platform
     towards = np.array([off / 40, [-off[1] / 40, off[0] / 40]])
     assert np.hypot(*off) == pytest.approx(40.0)
@@ -114,7 +114,7 @@ def looking(R_nb: np.ndarray, north_east: tuple[float, float], plane: float) -> 
 def test_an_image_shows_what_lies_under_its_pixels(tilt_deg):
     """Also where its upper edge looks past the horizon: rays of pixels are the truth."""
     scans = looking(euler_to_matrix(0.0, np.radians(tilt_deg), 0.0), (5.0, -8.0), 3.0)
-    sees = sees_of(scans, 0)
+    sees = view_of(scans, 0)
     assert sees is not None and scans.poses is not None
     rng = np.random.default_rng(0)
     uv = rng.uniform((-300, -300), (940, 812), (2000, 2))
@@ -128,6 +128,6 @@ def test_an_image_shows_what_lies_under_its_pixels(tilt_deg):
 def test_how_much_ground_an_image_covers():
     """Straight down from 60 m: 640 x 512 pixels of 60 / 700 m."""
     nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
-    look = Scan(0.0, 0, np.zeros(2), *nothing, sees_of(looking(np.eye(3), (0.0, 0.0), 0.0), 0))
-    found = PlacedLooks("eye", "pixel", [look], [frozenset()], 1.0, 0)
+    look = Scan(0.0, 0, np.zeros(2), *nothing, view_of(looking(np.eye(3), (0.0, 0.0), 0.0), 0))
+    found = PlacedScans("eye", "pixel", [look], [frozenset()], 1.0, 0)
     assert found.area(50.0) == pytest.approx(640 * 512 * (60 / 700) ** 2, rel=0.02)

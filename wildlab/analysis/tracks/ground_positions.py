@@ -26,8 +26,8 @@ from wildlab.analysis.georeference import (
 from wildlab.analysis.tracks.noise_model import (
     ASSUMED,
     STATED,
+    GivenValue,
     NoiseModel,
-    ToldValue,
     errors_named,
     errors_of,
 )
@@ -51,7 +51,7 @@ from wildlab.tracking.sensors import POSE
 UNKNOWN_EFFECT = "clock"
 
 
-class LastingErrors(NamedTuple):
+class CorrelatedErrors(NamedTuple):
     """Of one sensor: ``names`` (k,) and for how long each lasts, s, (k,)."""
 
     names: tuple[str, ...]
@@ -78,10 +78,10 @@ _OF_THE_MOUNT_AND_GROUND = ("misalignment_deg", "plane_height_m")
 #: Errors of a pose that has a covariance of its own, of which no single one has a name.
 OF_COVARIANCE = tuple(f"pose {i}" for i in range(1, 7))
 #: None at all.
-NO_ERRORS = LastingErrors((), ())
+NO_ERRORS = CorrelatedErrors((), ())
 
 
-def told_errors(flight: Flight, observed: Observations, beliefs: NoiseModel) -> PoseErrors:
+def camera_errors(flight: Flight, observed: Observations, beliefs: NoiseModel) -> PoseErrors:
     """What georeferenced pixels may be wrong by, as filters of one target are told.
 
     That is `pose_errors` with the noise of pixels that the sensor is believed to have. Errors of the pose
@@ -89,12 +89,12 @@ def told_errors(flight: Flight, observed: Observations, beliefs: NoiseModel) -> 
     """
     errors = pose_errors(observed)._replace(pixel=np.diag(beliefs.noise[:2] ** 2))
     if observed.poses.covariance is None:
-        roots = stated_roots(observed.poses.R_nb, stated_deviations(flight, beliefs))
+        roots = roots_of_deviations(observed.poses.R_nb, pose_deviations(flight, beliefs))
         return errors._replace(pose=roots @ np.swapaxes(roots, 1, 2))
     pose = np.array(np.broadcast_to(errors.pose, (len(observed.uv), 6, 6)))
     unknown = ~np.isfinite(pose).all(axis=(1, 2))
     on_top = {one.name: one.sd for one in beliefs.considered}
-    roots = stated_roots(observed.poses.R_nb, np.array([on_top.get(name, 0.0) for name in POSE]))
+    roots = roots_of_deviations(observed.poses.R_nb, np.array([on_top.get(name, 0.0) for name in POSE]))
     pose += roots @ np.swapaxes(roots, 1, 2)
     if unknown.any():
         # Where the log says nothing for a while, what is stated or usual is taken.
@@ -102,7 +102,7 @@ def told_errors(flight: Flight, observed: Observations, beliefs: NoiseModel) -> 
     return errors._replace(pose=pose)
 
 
-def stated_deviations(flight: Flight, beliefs: NoiseModel) -> Array:
+def pose_deviations(flight: Flight, beliefs: NoiseModel) -> Array:
     """(6,) of the errors of `POSE`, m and rad, of poses without a covariance of their own."""
     usual = assumed_deviations(flight)
     found = [np.radians(usual[key]) if name in _DEGREES else usual[key] for name, key in _OF_PLATFORM.items()]
@@ -111,7 +111,7 @@ def stated_deviations(flight: Flight, beliefs: NoiseModel) -> Array:
     return np.array([sds[name] for name in POSE])
 
 
-def stated_roots(R_nb: Array, sd: Array) -> Array:
+def roots_of_deviations(R_nb: Array, sd: Array) -> Array:
     """What a standard deviation of each error of `POSE` does to poses.
 
     Parameters
@@ -119,7 +119,7 @@ def stated_roots(R_nb: Array, sd: Array) -> Array:
     R_nb
         (N, 3, 3).
     sd
-        (6,) from `stated_deviations`.
+        (6,) from `pose_deviations`.
 
     Returns
     -------
@@ -134,31 +134,31 @@ def stated_roots(R_nb: Array, sd: Array) -> Array:
     return roots
 
 
-def said_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> list[ToldValue]:
+def given_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> list[GivenValue]:
     """What is believed of the errors that all pixels of an image share, and who says so."""
     said, stated = [], flight.manifest.uncertainty
     stated_names = {} if part is None else part.considered
     taken = {_OF_PLATFORM.get(each) for name in stated_names for each in errors_named(name)}
     own = scans.poses is not None and scans.poses.covariance is not None
     if own:
-        said.append(ToldValue(scans.sensor, "errors of the pose", "as the poses say", "the poses' own"))
+        said.append(GivenValue(scans.sensor, "errors of the pose", "as the poses say", "the poses' own"))
     for key, value in assumed_deviations(flight).items():
         if key not in _SHARED or key in taken or (own and key not in _OF_THE_MOUNT_AND_GROUND):
             continue
         unit = "°" if key.endswith("deg") else " m"
         source = ASSUMED if getattr(stated, key) is None else STATED
-        said.append(ToldValue(scans.sensor, _SHARED[key], f"{value:.3g}{unit}", source))
-    lasts = lasting_of(part)
+        said.append(GivenValue(scans.sensor, _SHARED[key], f"{value:.3g}{unit}", source))
+    lasts = pose_correlation_time(part)
     words = (
         "another at each look" if lasts == 0 else "the whole flight" if np.isinf(lasts) else f"{lasts:.3g} s"
     )
     said.append(
-        ToldValue(scans.sensor, "how long errors of the pose last", words, ASSUMED if lasts == 0 else STATED)
+        GivenValue(scans.sensor, "how long errors of the pose last", words, ASSUMED if lasts == 0 else STATED)
     )
     return said
 
 
-def of_poses(
+def errors_of_poses(
     flight: Flight,
     observed: Observations,
     errors: PoseErrors,
@@ -177,28 +177,28 @@ def of_poses(
         return _pose_roots(observed, errors), OF_COVARIANCE
     apart = {one.name for one in beliefs.considered if not one.shared}
     names = (f"{beliefs.sensor}: {name}" if lasting_s == 0 or name in apart else name for name in POSE)
-    return stated_roots(observed.poses.R_nb, stated_deviations(flight, beliefs)), tuple(names)
+    return roots_of_deviations(observed.poses.R_nb, pose_deviations(flight, beliefs)), tuple(names)
 
 
-def of_platform(errors: LastingErrors) -> set[str]:
+def platform_errors(errors: CorrelatedErrors) -> set[str]:
     """Which errors of `POSE` stand among a sensor's, by whatever name."""
     if OF_COVARIANCE[0] in errors.names:
         return set(POSE)
     return {name.split(": ")[-1] for name in errors.names} & set(POSE)
 
 
-def counted_twice(errors: LastingErrors, other: LastingErrors) -> bool:
+def counts_twice(errors: CorrelatedErrors, other: CorrelatedErrors) -> bool:
     """Whether errors of the platform that another sensor considers stand among these under other names."""
-    return bool((of_platform(errors) & set(other.names)) - set(errors.names))
+    return bool((platform_errors(errors) & set(other.names)) - set(errors.names))
 
 
-def of_pixels(
+def errors_of_pixels(
     observed: Observations,
     errors: PoseErrors,
     of_pose: tuple[Array, tuple[str, ...]],
     total: Array,
     lasting_s: float,
-) -> tuple[Array, Array, LastingErrors]:
+) -> tuple[Array, Array, CorrelatedErrors]:
     """What georeferenced pixels have of their own and in common.
 
     Parameters
@@ -208,7 +208,7 @@ def of_pixels(
     errors
         What they may be wrong by.
     of_pose
-        The part of the poses, from `of_poses`.
+        The part of the poses, from `errors_of_poses`.
     total
         (N, 2, 2) covariances of their places by these, m^2: where they are of samples, what is in common is
         stretched to it.
@@ -241,10 +241,10 @@ def of_pixels(
         whole = (axes * np.maximum(values, 0.0)) @ axes.T
         shared[row] = transition_of_pose(first[row], whole, "bias") @ shared[row]
     names = [*of_pose[1], *(f"mount {i}" for i in range(1, 4)), "ground"]
-    return own, shared, LastingErrors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
+    return own, shared, CorrelatedErrors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
 
 
-def of_elements(scans: Scans, beliefs: NoiseModel, places: Array) -> tuple[Array, LastingErrors]:
+def errors_of_elements(scans: Scans, beliefs: NoiseModel, places: Array) -> tuple[Array, CorrelatedErrors]:
     """What considered errors do to the places (N, K, 2) of detections: (N, K, 2, k), m."""
     stated = errors_of(scans, beliefs)
     if stated is None:
@@ -264,10 +264,10 @@ def of_elements(scans: Scans, beliefs: NoiseModel, places: Array) -> tuple[Array
     times = np.broadcast_to(np.asarray(stated.correlation_time, float), len(stated.names))
     common = stated.shared or (True,) * len(stated.names)
     own = tuple(name if common[i] else f"{scans.sensor}: {name}" for i, name in zip(kept, names, strict=True))
-    return shared, LastingErrors(own, tuple(float(times[i]) for i in kept))
+    return shared, CorrelatedErrors(own, tuple(float(times[i]) for i in kept))
 
 
-def lasting_of(part: SensorPart | None) -> float:
+def pose_correlation_time(part: SensorPart | None) -> float:
     """For how long errors of a camera's pose last, s: as stated, or the shortest time of those considered.
 
     Zero, another error at each look, where nobody says: a part of them fades within seconds, and a track that
@@ -313,8 +313,8 @@ def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
     return roots
 
 
-def laid_out(
-    parts: list[tuple[LastingErrors, list[Array | None]]],
+def align_errors(
+    parts: list[tuple[CorrelatedErrors, list[Array | None]]],
 ) -> tuple[tuple[float, ...], list[list[Array]]]:
     """Errors of several sensors side by side: those of one name are one error.
 
@@ -366,7 +366,7 @@ def _disc(count: int) -> Array:
 _DISC = _disc(PLACES)
 
 
-class PlacedLooks(NamedTuple):
+class PlacedScans(NamedTuple):
     """Looks of one sensor.
 
     Attributes
@@ -391,7 +391,7 @@ class PlacedLooks(NamedTuple):
     named: list[frozenset[str]]
     interval_s: float
     without: int
-    errors: LastingErrors = NO_ERRORS
+    errors: CorrelatedErrors = NO_ERRORS
 
     @property
     def bearings(self) -> bool:
@@ -418,9 +418,9 @@ class PlacedLooks(NamedTuple):
         return disc * max(float(np.median(shares)), 1 / len(_DISC)) if shares else disc
 
 
-def places_of(
+def place_scans(
     flight: Flight, scans: Scans, beliefs: NoiseModel, order: int, source: str | None, lasting_s: float = 0.0
-) -> PlacedLooks:
+) -> PlacedScans:
     """The looks of a sensor as places, what each is wrong by alone, and what they have in common.
 
     Parameters
@@ -459,7 +459,7 @@ def places_of(
     else:
         z, R = _of_ranges(scans, beliefs)
     if scans.kind in ("position", "range-bearing"):
-        shared, errors = of_elements(scans, beliefs, z)
+        shared, errors = errors_of_elements(scans, beliefs, z)
     usable = np.isfinite(scans.platform).all(axis=1)
     looks, named, without = [], [], 0
     for row in np.flatnonzero(usable):
@@ -468,14 +468,14 @@ def places_of(
         good &= np.isfinite(shared[row]).all(axis=(-2, -1))
         without += int((there & ~good).sum())
         time, platform = float(scans.times[row]), scans.platform[row]
-        sees, common = sees_of(scans, int(row)), shared[row][good] if errors.names else None
+        sees, common = view_of(scans, int(row)), shared[row][good] if errors.names else None
         looks.append(Scan(time, order, platform, z[row][good], R[row][good], sees, common))
         named.append(frozenset(str(one) for one in scans.labels[row] if one))
     without += int(np.isfinite(scans.detections[~usable]).all(axis=-1).sum())
-    return PlacedLooks(scans.sensor, scans.kind, looks, named, scans.interval_s, without, errors)
+    return PlacedScans(scans.sensor, scans.kind, looks, named, scans.interval_s, without, errors)
 
 
-def thinned(places: PlacedLooks, apart_s: float) -> PlacedLooks:
+def thinned(places: PlacedScans, apart_s: float) -> PlacedScans:
     """Only looks at least so far apart, see `wildlab.tracking.filters.thin`."""
     kept = np.flatnonzero(thin([scan.time for scan in places.scans], apart_s))
     return places._replace(
@@ -504,13 +504,13 @@ def _of_ranges(scans: Scans, beliefs: NoiseModel) -> tuple[Array, Array]:
 
 def _of_pixels(
     flight: Flight, scans: Scans, beliefs: NoiseModel, source: str | None, lasting_s: float
-) -> tuple[Array, Array, Array, LastingErrors]:
+) -> tuple[Array, Array, Array, CorrelatedErrors]:
     """Rays where they meet the ground, what each is wrong by alone, and what the poses do to all."""
     observed = observe(flight, source, clock_shift=beliefs.offset_s)
-    told = told_errors(flight, observed, beliefs)
+    told = camera_errors(flight, observed, beliefs)
     points = georeference(observed, np.random.default_rng(0), told)
-    of_pose = of_poses(flight, observed, told, beliefs, lasting_s)
-    own, shared, errors = of_pixels(observed, told, of_pose, covariances_of(points), lasting_s)
+    of_pose = errors_of_poses(flight, observed, told, beliefs, lasting_s)
+    own, shared, errors = errors_of_pixels(observed, told, of_pose, covariances_of(points), lasting_s)
     ids = pd.Index(points["detection_id"])
     row = pd.Index(ids[~ids.duplicated()]).get_indexer(pd.Index(scans.ids.ravel()))
     row = np.where(row < 0, -1, np.flatnonzero(~ids.duplicated())[row])
@@ -521,7 +521,7 @@ def _of_pixels(
     return z, own, shared, errors
 
 
-def sees_of(scans: Scans, row: int) -> Sees | None:
+def view_of(scans: Scans, row: int) -> Sees | None:
     """What the image of a look shows of the plane that targets move on; None where it is of no camera."""
     poses = scans.poses
     if poses is None:

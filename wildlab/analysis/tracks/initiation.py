@@ -35,7 +35,7 @@ from wildlab.tracking.schmidt import Considered
 from wildlab.tracking.sensors import Prediction, second_derivatives, share_left_out
 
 
-def begin_of_target(
+def start_of_target(
     scans: Scans,
     truth: Truth,
     beliefs: NoiseModel,

@@ -11,13 +11,13 @@ import numpy as np
 
 from wildlab.analysis.tracks.ground_positions import ABLE
 from wildlab.analysis.tracks.noise_model import (
+    GivenValue,
     NoiseModel,
     TargetModel,
-    ToldValue,
     Tuned,
-    of_flight,
-    of_sensor,
-    of_targets,
+    model_noise,
+    model_targets,
+    settings_of,
 )
 from wildlab.analysis.tracks.scans import Scans, Truth, scans_of, sensors_of, truths_at
 from wildlab.errors import WildlabError
@@ -35,7 +35,7 @@ class SensorInputs(NamedTuple):
     scans: Scans
     noise: NoiseModel
     truths: list[Truth]
-    said: Sequence[ToldValue] = ()
+    given: Sequence[GivenValue] = ()
 
     def split(self, target: str) -> tuple[Truth, list[Truth]]:
         """A target's truth, and those of the others."""
@@ -58,7 +58,7 @@ class TrackingInputs(NamedTuple):
         As stated, else as the flight has it.
     targets
         What is believed of them.
-    said
+    given
         What filters are told of the targets, and who says so.
     notes
         What was done to the measurements, in sentences.
@@ -67,7 +67,7 @@ class TrackingInputs(NamedTuple):
     sensors: dict[str, SensorInputs]
     settings: Settings
     targets: TargetModel
-    said: list[ToldValue]
+    given: list[GivenValue]
     notes: list[str]
 
 
@@ -90,12 +90,12 @@ def read_inputs(
         Where there is no such sensor, no detection, no time, or noise nobody knows.
     """
     refuse_without_times(flight)
-    told = of_flight(flight, settings)
-    targets, said = of_targets(told.targets)
+    told = settings_of(flight, settings)
+    targets, said = model_targets(told.targets)
     if tuned is not None and tuned.density is not None and told.targets.acceleration_m_s_sqrt_s is None:
         targets = targets._replace(density=tuned.density)
         said = [one for one in said if not one.what.startswith("acceleration")]
-        said.insert(0, tuned.said_of_density())
+        said.insert(0, tuned.given_density())
     notes = [*_notes_of_absent(flight, told), *_notes_of_sources(flight)]
     found: dict[str, SensorInputs] = {}
     for name in sensors_with_detections(flight, sensors):
@@ -104,7 +104,7 @@ def read_inputs(
             notes.append(f"{name} was left out: what it detects ({looks.kind}) tells nothing of a place.")
             continue
         there, on = (None, "") if tuned is None else (tuned.sensors.get(name), tuned.flight)
-        noise, more = of_sensor(flight, looks, told, there, on)
+        noise, more = model_noise(flight, looks, told, there, on)
         if noise.offset_s:
             looks = scans_of(flight, name, noise.offset_s, source)
         looks = looks if joint else _identified(looks, targets)
@@ -229,7 +229,7 @@ def names_of(
         As `read_inputs`, but for the noise.
     """
     refuse_without_times(flight)
-    targets, _ = of_targets(of_flight(flight, settings).targets)
+    targets, _ = model_targets(settings_of(flight, settings).targets)
     known: set[str] = set()
     for sensor in sensors_with_detections(flight, sensors):
         looks = _identified(scans_of(flight, sensor, 0.0, source), targets)

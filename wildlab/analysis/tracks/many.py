@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from wildlab.analysis.tracks.ground_positions import (
     PLACED,
     UNKNOWN_EFFECT,
-    PlacedLooks,
-    laid_out,
-    lasting_of,
-    places_of,
-    said_of_pixels,
+    PlacedScans,
+    align_errors,
+    given_of_pixels,
+    place_scans,
+    pose_correlation_time,
     thinned,
 )
 from wildlab.analysis.tracks.inputs import read_inputs
-from wildlab.analysis.tracks.noise_model import ASSUMED, STATED, ToldValue
+from wildlab.analysis.tracks.noise_model import ASSUMED, STATED, GivenValue
 from wildlab.analysis.tracks.noise_model import TargetModel as Following
 from wildlab.analysis.tracks.scans import truth_deviations, truths_at
 from wildlab.analysis.tracks.single_target import STATE
@@ -79,15 +79,15 @@ _HULLS = {
 }
 
 
-def of_many(
-    settings: Settings, following: Following, places: list[PlacedLooks]
-) -> tuple[ManyTargetModel, list[ManySensorModel], list[ToldValue]]:
+def model_jointly(
+    settings: Settings, following: Following, places: list[PlacedScans]
+) -> tuple[ManyTargetModel, list[ManySensorModel], list[GivenValue]]:
     """What the tracker is told of the targets and of each sensor, and where each value is from.
 
     Parameters
     ----------
     settings
-        From `wildlab.analysis.tracks.noise_model.of_flight`.
+        From `wildlab.analysis.tracks.noise_model.settings_of`.
     following
         What filters of one target are told of the targets.
     places
@@ -100,21 +100,21 @@ def of_many(
     """
     refuse_unfit(settings)
     stated, usual = settings.targets.many or ManyTargetsPart(), _usual()
-    said: list[ToldValue] = []
+    said: list[GivenValue] = []
     told: dict[str, Any] = {}
 
     def one(name: str) -> float:
         own = getattr(stated, name)
         value = float(getattr(usual, name) if own is None else own)
         what, unit = _WORDS[name]
-        said.append(ToldValue("targets", what, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
+        said.append(GivenValue("targets", what, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
         return value
 
     hulls = tuple(
         Hull(part.name, part.length_m, part.beam_m, part.share) for part in stated.hulls or usual.hulls
     )
     said.append(
-        ToldValue(
+        GivenValue(
             "targets",
             "kinds by size",
             ", ".join(f"{hull.name} {hull.length_m:g} m" if hull.length_m else hull.name for hull in hulls),
@@ -135,17 +135,17 @@ def of_many(
 
 
 def _of_sensor(
-    settings: Settings, looks: PlacedLooks, kinds: int, farthest: float
-) -> tuple[ManySensorModel, list[ToldValue]]:
+    settings: Settings, looks: PlacedScans, kinds: int, farthest: float
+) -> tuple[ManySensorModel, list[GivenValue]]:
     """``farthest``: m, the farthest detection of any sensor, for one that knows no distances."""
     part = settings.sensors.get(looks.sensor)
     stated = None if part is None else part.many
-    said: list[ToldValue] = []
+    said: list[GivenValue] = []
 
     def one(name: str, what: str, unit: str, other: float, source: str) -> float:
         own = None if stated is None else getattr(stated, name)
         value = other if own is None else float(own)
-        said.append(ToldValue(looks.sensor, what, f"{value:.3g}{unit}", source if own is None else STATED))
+        said.append(GivenValue(looks.sensor, what, f"{value:.3g}{unit}", source if own is None else STATED))
         return value
 
     if looks.bearings and stated is not None and stated.several:
@@ -198,17 +198,17 @@ def _of_sensor(
         hull_values["near_end_m"],
     )
     if looks.kind in PLACED and looks.kind != "pixel":
-        share, lasts = lasting_share(part)
+        share, lasts = correlated_share(part)
         words = f"{share:.2g}, for {lasts:.3g} s" if share else "0"
         source = ASSUMED if part is None or part.correlation is None else STATED
-        said.append(ToldValue(looks.sensor, "share of the errors' variance that lasts", words, source))
+        said.append(GivenValue(looks.sensor, "share of the errors' variance that lasts", words, source))
         found = found._replace(correlation=share, lasting_s=lasts)
     for name, what in _HULLS.items():
         own = stated is not None and bool(getattr(stated, name))
         values = ", ".join(f"{value:.3g}" for value in hull_values[name])
-        said.append(ToldValue(looks.sensor, what, f"{values} m", STATED if own else ASSUMED))
+        said.append(GivenValue(looks.sensor, what, f"{values} m", STATED if own else ASSUMED))
     said.append(
-        ToldValue(
+        GivenValue(
             looks.sensor,
             "whether one hull may give several detections",
             "yes" if found.several else "no",
@@ -218,14 +218,14 @@ def _of_sensor(
     return found, said
 
 
-def lasting_share(part: SensorPart | None) -> tuple[float, float]:
+def correlated_share(part: SensorPart | None) -> tuple[float, float]:
     """Share of the variance of a sensor's errors that lasts, and for how long, s; zero where nobody says."""
     if part is None or not part.correlation:
         return 0.0, 0.0
     return part.correlation, part.correlation_time_s or np.inf
 
 
-def unknown_lasting(settings: Settings, places: Mapping[str, PlacedLooks]) -> list[str]:
+def unknown_correlation(settings: Settings, places: Mapping[str, PlacedScans]) -> list[str]:
     """Sensors of which nobody says how long their errors last.
 
     It is said by ``correlation``, zero too, or considered errors; of a camera's pixels by
@@ -308,7 +308,7 @@ class ManyTracks(NamedTuple):
         What the tracker was told.
     truth
         By target's name (N, 2), where it was at each look; NaN where that is not known. Empty without truth.
-    said
+    given
         What the tracker was told, and who says so.
     notes
         What was done to the detections, in sentences.
@@ -324,24 +324,24 @@ class ManyTracks(NamedTuple):
         Names of the targets for which it is estimated.
     others
         Whether targets are about of which no true place is known.
-    unknown_lasting
+    unknown_correlation
         Sensors of which nobody says how long their errors last.
     """
 
     scans: list[Scan]
     named: list[frozenset[str]]
     shown: list[Shown]
-    places: dict[str, PlacedLooks]
+    places: dict[str, PlacedScans]
     sensors: list[ManySensorModel]
     targets: ManyTargetModel
     truth: dict[str, Array]
-    said: list[ToldValue]
+    given: list[GivenValue]
     notes: list[str]
     lasting_s: tuple[float, ...] = ()
     cutoff_m: float = CUTOFF_M
     truth_sd: Mapping[str, float] = {}
     others: bool = False
-    unknown_lasting: Sequence[str] = ()
+    unknown_correlation: Sequence[str] = ()
     truth_estimated: Sequence[str] = ()
 
     @property
@@ -371,20 +371,22 @@ def track_jointly(
     """
     inputs = read_inputs(flight, settings=settings, sensors=sensors, source=source, joint=True)
     told = inputs.settings
-    said = [one for one in inputs.said if one.what.startswith(("acceleration", "speed"))]
+    said = [one for one in inputs.given if one.what.startswith(("acceleration", "speed"))]
     notes = list(inputs.notes)
-    places: dict[str, PlacedLooks] = {}
+    places: dict[str, PlacedScans] = {}
     for name, (looks, belief, _, more) in inputs.sensors.items():
         told_here, unused = _considered_apart(list(dict.fromkeys(more)), looks.kind)
         said += told_here
         if looks.kind == "pixel":
-            said += said_of_pixels(flight, looks, told.sensors.get(name))
+            said += given_of_pixels(flight, looks, told.sensors.get(name))
         if unused:
             bearing = looks.kind == "bearing"
             what = "Errors" if bearing else "An error of the clock"
             which = "that last are" if bearing else "is"
             notes.append(f"{what} of {name} {which} not considered where many targets are followed.")
-        found = places_of(flight, looks, belief, len(places), source, lasting_of(told.sensors.get(name)))
+        found = place_scans(
+            flight, looks, belief, len(places), source, pose_correlation_time(told.sensors.get(name))
+        )
         if found.bearings and np.isfinite(belief.thinning_s):
             kept = thinned(found, belief.thinning_s)
             if len(kept.scans) < len(found.scans):
@@ -403,8 +405,8 @@ def track_jointly(
             file=flight.folder,
             field="detections.kind",
         )
-    targets, sensors_told, more_said = of_many(told, inputs.targets, list(places.values()))
-    lasting_s, shared = laid_out(
+    targets, sensors_told, more_said = model_jointly(told, inputs.targets, list(places.values()))
+    lasting_s, shared = align_errors(
         [(one.errors, [scan.shared for scan in one.scans]) for one in places.values()]
     )
     pairs = [
@@ -434,12 +436,12 @@ def track_jointly(
         inputs.targets.reach_m if np.isfinite(inputs.targets.reach_m) else CUTOFF_M,
         truth_sd,
         bool(told.targets.many is not None and told.targets.many.others),
-        unknown_lasting(told, places),
+        unknown_correlation(told, places),
         estimated,
     )
 
 
-def _considered_apart(said: list[ToldValue], kind: str) -> tuple[list[ToldValue], list[ToldValue]]:
+def _considered_apart(said: list[GivenValue], kind: str) -> tuple[list[GivenValue], list[GivenValue]]:
     """What a sensor of this kind is told, and which considered errors have no part in it.
 
     What [uncertainty] says of a camera's pose is said with all that pixels share, and is in neither.
@@ -450,14 +452,14 @@ def _considered_apart(said: list[ToldValue], kind: str) -> tuple[list[ToldValue]
     return [one for one in said if one not in unused and one not in elsewhere], unused
 
 
-def known_looks(followed: ManyTracks) -> NDArray[np.bool_]:
+def known_scans(followed: ManyTracks) -> NDArray[np.bool_]:
     """(N,) looks at which any target's true place is known: elsewhere nothing is judged."""
     return np.asarray(_true_places(followed).any(axis=0))
 
 
-def complete_looks(followed: ManyTracks) -> NDArray[np.bool_]:
+def complete_scans(followed: ManyTracks) -> NDArray[np.bool_]:
     """(N,) looks at which every target's true place is known: elsewhere no track is false."""
-    return known_looks(followed) & _true_places(followed).all(axis=0) & (not followed.others)
+    return known_scans(followed) & _true_places(followed).all(axis=0) & (not followed.others)
 
 
 def _true_places(followed: ManyTracks) -> NDArray[np.bool_]:
@@ -466,10 +468,10 @@ def _true_places(followed: ManyTracks) -> NDArray[np.bool_]:
     return np.array(ways, bool).reshape(-1, len(followed.scans))
 
 
-def judged(
+def score_identities(
     followed: ManyTracks, reach: Mapping[str, float] | None = None, at: Sequence[str] = ()
 ) -> Identities | None:
-    """Tracks against the true targets at the looks of `known_looks`; None where there are none, or no truth.
+    """Tracks against the true targets at the looks of `known_scans`; None where there are none, or no truth.
 
     A target can be seen where a detection names it, and where it lies in the camera's view, or within reach
     of any of the sensors. One that cannot costs nothing, with a track or without. Where not every true place
@@ -482,7 +484,7 @@ def judged(
     at
         Names of the sensors at whose looks it is judged; all where none is named.
     """
-    known, complete = known_looks(followed), complete_looks(followed)
+    known, complete = known_scans(followed), complete_scans(followed)
     if at:
         names_of = [one.name for one in followed.sensors]
         known &= np.array([names_of[scan.sensor] in at for scan in followed.scans], bool)
@@ -551,6 +553,6 @@ def tracks_table(followed: ManyTracks) -> pd.DataFrame:
     columns["existence"] = np.concatenate([one.existence for one in shown])
     columns |= {f"kind_{number}": share for number, share in enumerate(kinds.T, start=1)}
     columns |= {"smoothed_north_m": later_x[:, 0], "smoothed_east_m": later_x[:, 1]}
-    if not followed.unknown_lasting:
+    if not followed.unknown_correlation:
         columns |= {f"smoothed_p_{a}{b}": later_P[:, a, b] for a in range(2) for b in range(a, 2)}
     return pd.DataFrame(columns)

@@ -213,7 +213,7 @@ class TargetModel(NamedTuple):
         return self.reach_rad if kind in ("bearing", "pixel") else self.reach_m
 
 
-class ToldValue(NamedTuple):
+class GivenValue(NamedTuple):
     """A value that filters use, in words, and where it is from."""
 
     subject: str
@@ -237,13 +237,13 @@ class Tuned(NamedTuple):
     sensors: dict[str, SensorTuning]
     density: float | None = None
 
-    def said_of_density(self) -> ToldValue:
+    def given_density(self) -> GivenValue:
         """For the table of what filters were told."""
         words = "acceleration, SD of the velocity that grows in a second"
-        return ToldValue("targets", words, f"{self.density or 0.0:.3g} m/s", f"tuned on {self.flight}")
+        return GivenValue("targets", words, f"{self.density or 0.0:.3g} m/s", f"tuned on {self.flight}")
 
 
-def of_targets(stated: TargetsPart) -> tuple[TargetModel, list[ToldValue]]:
+def model_targets(stated: TargetsPart) -> tuple[TargetModel, list[GivenValue]]:
     """What is stated of the targets, else the usual."""
     usual = read_settings(DATA / "settings" / "usual.toml").targets
     said = []
@@ -253,7 +253,7 @@ def of_targets(stated: TargetsPart) -> tuple[TargetModel, list[ToldValue]]:
         value = other if own is None else own
         if value is None:
             return float("nan")
-        said.append(ToldValue("targets", words, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
+        said.append(GivenValue("targets", words, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
         return float(value)
 
     found = TargetModel(
@@ -269,13 +269,13 @@ def of_targets(stated: TargetsPart) -> tuple[TargetModel, list[ToldValue]]:
     return found, said
 
 
-def of_flight(flight: Flight, stated: Settings | None = None) -> Settings:
+def settings_of(flight: Flight, stated: Settings | None = None) -> Settings:
     """What a settings file states, and where it says nothing, ``flight.toml``."""
     own = Settings(sensors=flight.manifest.sensors, targets=flight.manifest.targets)
     return own if stated is None else settings_over(stated, own)
 
 
-def from_tuning(tuning: SensorTuning) -> NoiseModel:
+def noise_of_tuning(tuning: SensorTuning) -> NoiseModel:
     """What a flight with truth says of a sensor."""
     lasting = [
         ConsideredError(name, sd, tuning.correlation_time_s, True)
@@ -298,13 +298,13 @@ def from_tuning(tuning: SensorTuning) -> NoiseModel:
     )
 
 
-def of_sensor(
+def model_noise(
     flight: Flight,
     scans: Scans,
     settings: Settings,
     tuned: SensorTuning | None = None,
     tuned_on: str = "",
-) -> tuple[NoiseModel, list[ToldValue]]:
+) -> tuple[NoiseModel, list[GivenValue]]:
     """What filters believe of one sensor of a flight, and what to say of it.
 
     Parameters
@@ -312,7 +312,7 @@ def of_sensor(
     scans
         Of the sensor, by its clock as it is.
     settings
-        From `of_flight`; what it states goes before what was tuned.
+        From `settings_of`; what it states goes before what was tuned.
     tuned, tuned_on
         What another flight says of the sensor, and that flight's name.
 
@@ -322,12 +322,12 @@ def of_sensor(
         Where the noise is not stated and cannot be found.
     """
     part = settings.sensors.get(scans.sensor)
-    said: list[ToldValue] = []
+    said: list[GivenValue] = []
 
     def tell(what: str, value: str, source: str) -> None:
-        said.append(ToldValue(scans.sensor, what, value, source))
+        said.append(GivenValue(scans.sensor, what, value, source))
 
-    found = None if tuned is None else from_tuning(tuned)
+    found = None if tuned is None else noise_of_tuning(tuned)
     by_tuning = f"tuned on {tuned_on}"
     noise, sources = _noise(flight, scans, settings, found, by_tuning)
     told = dict.fromkeys(

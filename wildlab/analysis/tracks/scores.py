@@ -80,7 +80,7 @@ def worth_of_errors(errors: Array, covariances: Array) -> float:
     return float(max(1.0, n / (1 + 2 * float(np.sum(r**2)))))
 
 
-def judged(followed: TrackingResult) -> pd.DataFrame:
+def score_tracks(followed: TrackingResult) -> pd.DataFrame:
     """One row for each track.
 
     ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used after the start, and ``used`` with it;
@@ -89,10 +89,9 @@ def judged(followed: TrackingResult) -> pd.DataFrame:
     ``nees_worth`` independent values, its ``verdict``; ``inside``, the share of looks in the band of single
     values, with ``inside_low``, ``inside_high``; the same of ``nis``, its degrees of freedom ``dof`` and
     ``nis_verdict``; ``lag1``: the largest autocorrelation of an element of the whitened innovations from one
-    detection to the next; ``followed``: the share of looks with truth that have a track; ``anew``: how often
-    a track ended and another started, and ``gone``: looks without a track, of ``spanned`` from the first
-    start to the end of the last, ``gone_seen`` of them with
-    the target in sight.
+    detection to the next; ``followed``: the share of looks with truth that have a track; ``restarts``: how
+    often a track ended and another started, and ``untracked``: looks without a track, of ``spanned`` from the
+    first start to the end of the last, ``untracked_in_view`` of them with the target in sight.
     """
     return pd.DataFrame([score_track(one, kind_of(followed, one.sensor)) for one in followed.tracks])
 
@@ -103,7 +102,7 @@ def leading_filter(rows: pd.DataFrame) -> str:
     Parameters
     ----------
     rows
-        From `judged`. Without truth NIS takes the place of errors and of
+        From `score_tracks`. Without truth NIS takes the place of errors and of
         NEES; smoothed tracks, and those of all sensors together where there are others, do not count.
 
     Returns
@@ -135,7 +134,7 @@ def kind_of(followed: TrackingResult, sensor: str) -> str:
 
 
 def score_track(one: SensorTrack, kind: str) -> dict[str, object]:
-    """A row of `judged`, of a track by a sensor that detects what the kind says."""
+    """A row of `score_tracks`, of a track by a sensor that detects what the kind says."""
     looked, used = seen_of(one), used_of(one)
     summary = summarise_track(track_errors((one.estimate + one.error)[looked], one.estimate[looked]))
     away = np.hypot(*one.error[~looked, :2].T)
@@ -158,10 +157,10 @@ def score_track(one: SensorTrack, kind: str) -> dict[str, object]:
         "filter": one.filter,
         "detections": int(np.isfinite(one.nis).sum()),
         "used": int(used.sum()),
-        "anew": max(len(one.starts) - 1, 0),
-        "gone": int(one.without.sum()),
+        "restarts": max(len(one.starts) - 1, 0),
+        "untracked": int(one.without.sum()),
         "spanned": int(one.last - one.starts[0]) if len(one.starts) else 0,
-        "gone_seen": int((one.without & looked).sum()),
+        "untracked_in_view": int((one.without & looked).sum()),
         "compared": of_nees.n,
         "rmse": summary.rmse,
         "without": len(away),
@@ -206,7 +205,7 @@ def whitened(one: SensorTrack) -> Array:
     return np.asarray(whiten(one.innovation[used], one.S[used])) if used.any() else one.innovation[used]
 
 
-class Apart(NamedTuple):
+class SensorPair(NamedTuple):
     """Two sensors' tracks of one target by one filter: how far apart, and how far they say they may be.
 
     ``rms`` m over ``n`` looks; ``squares``: the mean of the squared distance in units of both covariances,
@@ -222,7 +221,7 @@ class Apart(NamedTuple):
     squares: Average
 
 
-def apart(followed: TrackingResult) -> list[Apart]:
+def compare_sensors(followed: TrackingResult) -> list[SensorPair]:
     """Every two sensors that follow the same target by the same filter, at the looks of the first."""
     found = []
     groups: dict[tuple[str, str], list[SensorTrack]] = {}
@@ -240,7 +239,9 @@ def apart(followed: TrackingResult) -> list[Apart]:
             squares = np.full(len(gap), np.nan)
             squares[both] = nees(gap[both], (a.covariance[:, :2, :2] + P)[both])
             rms = float(np.sqrt(np.mean(np.sum(gap[both] ** 2, axis=1))))
-            found.append(Apart(target, name, a.sensor, b.sensor, rms, int(both.sum()), mean_of(squares, 2)))
+            found.append(
+                SensorPair(target, name, a.sensor, b.sensor, rms, int(both.sum()), mean_of(squares, 2))
+            )
     return found
 
 

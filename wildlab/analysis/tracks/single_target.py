@@ -35,12 +35,12 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.tracks.initiation import (
     Piece,
-    begin_of_target,
     ends_by,
     geometry_of,
     joined,
     one_after_another,
     place_of,
+    start_of_target,
     starts_of,
 )
 from wildlab.analysis.tracks.inputs import BySensor
@@ -319,7 +319,7 @@ def choose(inputs: BySensor, target: str, targets: TargetModel) -> Chosen:
     seen, begins = {}, {}
     for name, one in inputs.items():
         truth, others = one.split(target)
-        seen[name], begins[name] = begin_of_target(one.scans, truth, one.noise, targets, others)
+        seen[name], begins[name] = start_of_target(one.scans, truth, one.noise, targets, others)
     still = {name: np.zeros_like(one.scans.platform) for name, one in inputs.items()}
     merged = _merged(inputs, seen, still, white=True)
     looks, truth = _together(inputs, merged, target)
@@ -347,7 +347,7 @@ def choose(inputs: BySensor, target: str, targets: TargetModel) -> Chosen:
             cut_off[merged.rows[:at][merged.which[:at] == i]] = np.nan
             truth, others = one.split(target)
             left = one.scans._replace(detections=cut_off)
-            later[name] = begin_of_target(left, truth, one.noise, targets, others)[1]
+            later[name] = start_of_target(left, truth, one.noise, targets, others)[1]
         found = _begin(inputs, merged, later)
         return None if found is None else found._replace(row=found.row - at if found.row >= 0 else -1)
 

@@ -17,9 +17,9 @@ from wildlab.analysis.tracks.inputs import UNNAMED, names_of, read_inputs
 from wildlab.analysis.tracks.noise_model import (
     OF_UNNAMED,
     STATED,
+    GivenValue,
     NoiseModel,
     TargetModel,
-    ToldValue,
     Tuned,
 )
 from wildlab.analysis.tracks.scans import Scans
@@ -50,7 +50,7 @@ class TrackingResult(NamedTuple):
         One for each sensor, target and filter, in this order.
     scans, beliefs
         By sensor.
-    said
+    given
         What filters were told, and who says so.
     notes
         What was done to the measurements, in sentences.
@@ -62,7 +62,7 @@ class TrackingResult(NamedTuple):
     scans: dict[str, Scans]
     beliefs: dict[str, NoiseModel]
     targets: TargetModel
-    said: list[ToldValue]
+    given: list[GivenValue]
     notes: list[str]
     truth: bool
 
@@ -102,10 +102,10 @@ def track(
         Where there is no such sensor, target or filter, no detection, no time, or noise nobody knows.
     """
     inputs = read_inputs(flight, settings=settings, tuned=tuned, sensors=sensors, source=source)
-    said, notes, tracks = list(inputs.said), list(inputs.notes), list[SensorTrack]()
+    said, notes, tracks = list(inputs.given), list(inputs.notes), list[SensorTrack]()
     known: set[str] = set()
     for sensor, one in inputs.sensors.items():
-        said += one.said
+        said += one.given
         names, without = chosen_filters(one.scans, one.noise, filters)
         notes += without
         notes += _not_smoothed(names, sensor) if smooth else []
@@ -121,7 +121,7 @@ def track(
         said = [one for one in said if one.subject != "targets" or one.what not in OF_UNNAMED]
     truths = [truth for one in inputs.sensors.values() for truth in one.truths]
     if still := {truth.target for truth in truths if truth.fixed}:
-        said.append(ToldValue("targets", "at rest, as their truth has no time", str(len(still)), STATED))
+        said.append(GivenValue("targets", "at rest, as their truth has no time", str(len(still)), STATED))
     names = [name for name in (filters or (WHITE, "schmidt")) if name in ABLE]
     names = list(dict.fromkeys([WHITE, *(_with_smoothed(names) if smooth else names)]))
     for target in sorted(known):

@@ -22,8 +22,8 @@ from wildlab.analysis.tracks.noise_model import (
     SensorTuning,
     TargetModel,
     Tuned,
-    of_flight,
-    of_targets,
+    model_targets,
+    settings_of,
 )
 from wildlab.analysis.tracks.scans import (
     SLOTS,
@@ -415,7 +415,7 @@ def tune_flight(
     if against == "innovations" or not has_truth:
         found, density = tune_by_innovations(flight, sensors, settings, source)
         return Tuned(flight.name, "innovations", found, density)
-    reach = of_targets(of_flight(flight, settings).targets)[0].reach
+    reach = model_targets(settings_of(flight, settings).targets)[0].reach
     found = {sensor: tune(flight, sensor, reach, source) for sensor in sensors}
     return Tuned(flight.name, "truth", found)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from wildlab.analysis.tracks.many import ManyTracks, known_looks
+from wildlab.analysis.tracks.many import ManyTracks, known_scans
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.drawing import (
@@ -151,4 +151,4 @@ def wrong_shown(followed: ManyTracks, lives: Identities) -> Shown:
 def _times_of(followed: ManyTracks) -> Array:
     """(N,) s since the first look, of the looks at which true places are known."""
     times = np.array([scan.time for scan in followed.scans])
-    return np.asarray((times - times[0])[known_looks(followed)])
+    return np.asarray((times - times[0])[known_scans(followed)])

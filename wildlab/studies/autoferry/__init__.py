@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.tracks.noise_model import SensorTuning, of_targets
+from wildlab.analysis.tracks.noise_model import SensorTuning, model_targets
 from wildlab.analysis.tracks.scans import sensors_of
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.analysis.tracks.tuning import tune
@@ -47,7 +47,7 @@ from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Study
 
 #: What is known of the boats, apart from the flights.
-BOATS, _ = of_targets(read_settings(DATA / "settings" / "autoferry.toml").targets)
+BOATS, _ = model_targets(read_settings(DATA / "settings" / "autoferry.toml").targets)
 SENSORS = ("lidar", "radar", "ir", "eo")
 
 

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.tracks.inputs import SensorInputs
-from wildlab.analysis.tracks.noise_model import SensorTuning, TargetModel, from_tuning
+from wildlab.analysis.tracks.noise_model import SensorTuning, TargetModel, noise_of_tuning
 from wildlab.analysis.tracks.scans import scans_of, truths_at
 from wildlab.analysis.tracks.scores import score_track, seen_of
 from wildlab.analysis.tracks.single_target import SensorTrack, track_target
@@ -58,14 +58,14 @@ def follow_flight(
     found = []
     for sensor, tuning in tunings.items():
         scans = scans_of(flight, sensor, tuning.offset_s)
-        one = SensorInputs(scans, from_tuning(tuning), truths_at(flight, scans.times))
+        one = SensorInputs(scans, noise_of_tuning(tuning), truths_at(flight, scans.times))
         for truth in one.truths:
             found += track_target({sensor: one}, truth.target, targets, FILTERS[scans.kind])
     return found
 
 
 def tracks_table(followed: Sequence[SensorTrack], size_m: float = np.nan) -> pd.DataFrame:
-    """`wildlab.analysis.tracks.scores.judged`, with the names of `COMPARED`.
+    """`wildlab.analysis.tracks.scores.score_tracks`, with the names of `COMPARED`.
 
     ``anees_alone`` takes the truth for exact; ``share_with_target`` is the share of the scans in which the
     sensor saw something near the boat in which the track is nearer to it than ``size_m``.

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.tracks.many import ManyTracks, judged, track_jointly
+from wildlab.analysis.tracks.many import ManyTracks, score_identities, track_jointly
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import Settings
@@ -212,7 +212,9 @@ def judge_stone_soup(
         drawn = []
         for number, choice in enumerate(choices, start=1):
             print(f"\r{NAME}, {mode}: {number} of {len(choices)} draws", end="", flush=True)
-            drawn.append(Drawn(number, choice, judged(replace_tracks(given[first], choice), reach[first])))
+            drawn.append(
+                Drawn(number, choice, score_identities(replace_tracks(given[first], choice), reach[first]))
+            )
         print(flush=True)
         drawn.sort(key=order)
         best = drawn[: min(BEST, -(-len(drawn) // FOR_EACH))]
@@ -220,7 +222,11 @@ def judge_stone_soup(
             print(f"\r{NAME}, {mode}: {rank} of {len(best)} on the others", end="", flush=True)
             for case in flights:
                 own = case == first
-                lives = one.lives if own else judged(replace_tracks(given[case], one.choice), reach[case])
+                lives = (
+                    one.lives
+                    if own
+                    else score_identities(replace_tracks(given[case], one.choice), reach[case])
+                )
                 rows.append(
                     row_of(lives, case, mode) | {"rank": rank, "draw": one.number, "tuned_gospa": one.gospa}
                 )

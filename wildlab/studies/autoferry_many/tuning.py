@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from wildlab.analysis.tracks.many import judged, track_jointly
+from wildlab.analysis.tracks.many import score_identities, track_jointly
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import (
@@ -206,7 +206,7 @@ def gospa_of(lives: Identities | None) -> float:
 
 def follow_mode(flight: Flight, mode: str, settings: Settings) -> Identities | None:
     """A scenario by the sensors of a mode, beside its true boats."""
-    return judged(
+    return score_identities(
         track_jointly(flight, settings=settings, sensors=MODES[mode]), reach_of(flight, mode), JUDGED_AT
     )
 
