@@ -43,7 +43,6 @@ def model(causes, without=10.0, with_=10.0, half=0.5, undetermined=None):
         fit=SimpleNamespace(names=names, undetermined=undetermined or {}),
         gain=Gain(without, with_, Interval(gain, gain - half, gain + half)),
         held=np.zeros((20, 2)), chance=0.0,
-        gain_of_all=Gain(without, with_, Interval(gain, gain - 20.0, gain + 20.0)),
     )  # fmt: skip
 
 

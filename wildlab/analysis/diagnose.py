@@ -118,8 +118,6 @@ class Model:
         (N, 2) m, held-out errors.
     gain
         Over the poses as logged, of the points that are not far out.
-    gain_of_all
-        The same of all points.
     """
 
     causes: tuple[str, ...]
@@ -129,7 +127,6 @@ class Model:
     chance: float
     held: Array
     gain: Gain
-    gain_of_all: Gain
 
     @property
     def name(self) -> str:
@@ -570,7 +567,6 @@ class _Search:
                 1.0,
                 held,
                 gain_of(without[inliers], held[inliers], self.blocks[inliers]),
-                gain_of(without, held, self.blocks),
             )
 
         images = count_images(self.scored, used)

@@ -31,8 +31,6 @@ class Coverage(NamedTuple):
 
     Attributes
     ----------
-    images
-        How many the flight has.
     posed
         (N,) bool, those with a pose and gimbal angles.
     flat
@@ -47,7 +45,6 @@ class Coverage(NamedTuple):
         In words: what the footprints lie on.
     """
 
-    images: int
     posed: Mask
     flat: Mask
     outlines: Array
@@ -143,7 +140,7 @@ def cover_images(flight: Flight, source: str | None) -> Coverage | None:
         border = points[:, :2].reshape(-1, len(uv), 2)
         border[~steep] = np.nan
         outlines[posed] = border
-    return _counted(len(frames), posed, flat, outlines, level[1])
+    return _counted(posed, flat, outlines, level[1])
 
 
 def _border(width: int, height: int) -> Array:
@@ -155,10 +152,10 @@ def _border(width: int, height: int) -> Array:
     return np.concatenate([np.stack(side, axis=1) for side in sides])
 
 
-def _counted(images: int, posed: Mask, flat: Mask, outlines: Array, ground: str) -> Coverage:
+def _counted(posed: Mask, flat: Mask, outlines: Array, ground: str) -> Coverage:
     known = outlines[np.isfinite(outlines).all(axis=(1, 2))]
     if not len(known):
-        return Coverage(images, posed, flat, outlines, np.zeros((1, 1), np.int32), 0.0, 0.0, 1.0, ground)
+        return Coverage(posed, flat, outlines, np.zeros((1, 1), np.int32), 0.0, 0.0, 1.0, ground)
     # Imported where it is called: it takes its time.
     from rasterio import Affine
     from rasterio.enums import MergeAlg
@@ -174,7 +171,7 @@ def _counted(images: int, posed: Mask, flat: Mask, outlines: Array, ground: str)
     grid = Affine(step, 0, low[1], 0, step, low[0])
     shapes = [({"type": "Polygon", "coordinates": [one[:, ::-1].tolist()]}, 1) for one in _closed(known)]
     counts = rasterize(shapes, (rows, columns), transform=grid, merge_alg=MergeAlg.add, dtype="int32")
-    return Coverage(images, posed, flat, outlines, counts, low[0] + step / 2, low[1] + step / 2, step, ground)
+    return Coverage(posed, flat, outlines, counts, low[0] + step / 2, low[1] + step / 2, step, ground)
 
 
 def _closed(outlines: Array) -> Array:

@@ -102,9 +102,6 @@ def record_accuracy(
     diagnosis = found.diagnosis
     if diagnosis is not None:
         _record_gain(report, "winner", diagnosis.winner.gain.gain, int(diagnosis.inliers.sum()))
-        if diagnosis.outliers:
-            gain = diagnosis.winner.gain_of_all.gain
-            _record_gain(report, "winner/with-far-out", gain, len(diagnosis.inliers))
         if diagnosis.counts:
             record_summary(report, "calibrated-pose", diagnosis.held_summary())
     if diagnosis and diagnosis.outliers and diagnosis.inliers.any():

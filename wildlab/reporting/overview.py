@@ -350,9 +350,9 @@ def coverage_table(overview: Overview) -> pd.DataFrame:
         return pd.DataFrame(columns=["what", "images"])
     placed, posed, flat = (int(one.sum()) for one in (coverage.placed, coverage.posed, coverage.flat))
     counts = {
-        "images": coverage.images,
+        "images": len(coverage.posed),
         "footprint": placed,
-        "no-pose": coverage.images - posed,
+        "no-pose": len(coverage.posed) - posed,
         "flat": flat,
         "away": posed - placed - flat,
         "with-detections": overview.detections[1],

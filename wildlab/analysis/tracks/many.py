@@ -242,10 +242,7 @@ def unknown_correlation(settings: Settings, places: Mapping[str, PlacedScans]) -
 
 def _usual() -> ManyTargetsPart:
     """What is assumed where nobody says anything."""
-    usual = read_settings(DATA / "settings" / "many.toml").targets.many
-    if usual is None:
-        raise WildlabError("data/settings/many.toml lacks [targets.many]", "get it from the project again")
-    return usual
+    return read_settings(DATA / "settings" / "many.toml").targets.many or ManyTargetsPart()
 
 
 def refuse_unfit(settings: Settings) -> None:

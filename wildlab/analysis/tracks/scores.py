@@ -347,15 +347,12 @@ def read_estimates(path: Path) -> pd.DataFrame:
     again = "make the table again: wildlab track"
     try:
         table = pd.read_parquet(path)
-        numbers = list(COLUMNS[3:])
-        table[numbers] = table[numbers].astype(float)
-    except KeyError:
-        lacking = next(name for name in COLUMNS if name not in table)
-        raise WildlabError("this column is missing", again, file=path, field=lacking) from None
+        lacking = [name for name in COLUMNS if name not in table]
+        if not lacking:
+            table = table.astype(dict.fromkeys(COLUMNS[3:], float))
     except Exception as error:  # whatever a damaged file gives
         first = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise WildlabError(f"is not a readable table of tracks ({first})", again, file=path) from None
-    for name in COLUMNS[:3]:
-        if name not in table:
-            raise WildlabError("this column is missing", again, file=path, field=name)
+    if lacking:
+        raise WildlabError("this column is missing", again, file=path, field=lacking[0])
     return table
