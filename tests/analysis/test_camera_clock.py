@@ -126,6 +126,7 @@ def test_from_attitudes_where_there_is_no_gyro(antenna):
     assert found.certain and found.offset_s == pytest.approx(-4.2, abs=0.040)
 
 
+@pytest.mark.slow
 def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna):
     still = pd.DataFrame(antenna.table("frames")).iloc[3000:3040]
     rng = np.random.default_rng(1)

@@ -172,6 +172,7 @@ def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path):
         detect_frame(samples[0].frame, "shape", Shape())
 
 
+@pytest.mark.slow
 def test_stated_ellipses_are_held_against_the_middle_of_labels(tmp_path):
     count, covariance = 400, np.array([[4.0, 1.0], [1.0, 2.0]])
     off = np.random.default_rng(8).multivariate_normal([0, 0], covariance, count)

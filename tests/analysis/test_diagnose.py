@@ -42,7 +42,7 @@ def test_a_sound_flight_whose_poses_wander_has_no_certain_cause(kind):
     assert found.noise.share > 0.5
 
 
-@pytest.mark.parametrize("share", [0.2, 0.6])
+@pytest.mark.parametrize("share", [pytest.param(0.2, marks=pytest.mark.slow), 0.6])
 def test_targets_that_the_border_cuts_make_no_correction_certain(share):
     """The centre of what is seen of them is not theirs: that looks like a turned camera, and is none."""
     flight = simulate(Survey(down_m=8.0))
@@ -52,7 +52,7 @@ def test_targets_that_the_border_cuts_make_no_correction_certain(share):
     assert diagnosed(replace(flight, tables=tables)).counts == (share < 0.25)
 
 
-@pytest.mark.parametrize(("most", "certain"), [(3.0, True), (0.3, False)])
+@pytest.mark.parametrize(("most", "certain"), [pytest.param(3.0, True, marks=pytest.mark.slow), (0.3, False)])
 def test_no_cause_is_certain_where_the_noise_does_not_explain_what_is_left(monkeypatch, most, certain):
     """Of a deviance for each residual of about one."""
     monkeypatch.setattr("wildlab.analysis.diagnose.MISFIT", most)
@@ -227,7 +227,7 @@ def test_nothing_is_certain_where_too_many_clicks_are_wrong():
 def test_sound_flights_have_no_outliers(views):
     """However steep the view: what is stated of the attitude, a tilt and a heading, explains the errors."""
     inside, out = [], 0
-    for seed in range(50):
+    for seed in range(20):
         scored = score(simulate(Survey(seed=seed, images=20, **views)), seed=seed)
         whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(scored)))
         errors = errors_of(scored)

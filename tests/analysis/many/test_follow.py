@@ -37,7 +37,8 @@ def test_without_truth_there_is_nothing_to_compare():
 
 def test_bearings_help_where_places_are_known_and_begin_nothing_alone():
     """They are exact here, and the places wrong by metres: across the line of sight tracks are nearer."""
-    places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
+    places = robot_flight(kind="position", seconds=60.0)
+    bearings = robot_flight(kind="bearing", sensor="eye", seconds=60.0)
     both = joined(places, bearings)
     with_eye, without = track_jointly(both), track_jointly(places)
     assert list(with_eye.places) == ["radar", "eye"] and not with_eye.notes
@@ -56,7 +57,8 @@ def test_bearings_help_where_places_are_known_and_begin_nothing_alone():
 
 
 def test_bearings_whose_errors_last_are_thinned():
-    places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
+    places = robot_flight(kind="position", seconds=60.0)
+    bearings = robot_flight(kind="bearing", sensor="eye", seconds=60.0)
     both = joined(places, bearings)
     followed = track_jointly(both, settings=parse_settings("[sensors.eye]\nthinning_s = 5.0\n"))
     times = np.array([one.time for one in followed.places["eye"].scans])
@@ -119,7 +121,7 @@ def test_what_the_truth_may_be_off_is_beside_the_tracks_own():
 
     Where nobody states it, it is estimated from how rough they are.
     """
-    flight = robot_flight(kind="position", seconds=200.0)
+    flight = robot_flight(kind="position", seconds=100.0)
     truth = flight.table("truth").copy()
     rng = np.random.default_rng(0)
     truth[["north_m", "east_m"]] += rng.normal(0, 5.0, (len(truth), 2))
