@@ -5,7 +5,6 @@ pictures.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -604,9 +603,10 @@ def write_pictures(
     """
     folder = into / "overlays"
     folder.mkdir(parents=True, exist_ok=True)
-    for name in names:
+    files = picture_names(names)
+    for file in files.values():
         # Of an earlier run: only what has a frame's name is taken away.
-        (folder / picture_name(name)).unlink(missing_ok=True)
+        (folder / file).unlink(missing_ok=True)
     evenly = np.linspace(0, len(names) - 1, min(most, len(names))).round().astype(int) if names else ()
     drawn = {names[number] for number in evenly}
     chosen = {word: _most_telling(things, word) for word in ("found", "detected", "missed", "invented")}
@@ -622,7 +622,7 @@ def write_pictures(
             continue
         own = by_frame.get(frame.name, things.iloc[:0])
         if frame.name in drawn:
-            write_atomic(folder / picture_name(frame.name), _jpeg(overlay_picture(frame, own)))
+            write_atomic(folder / files[frame.name], _jpeg(overlay_picture(frame, own)))
             overlays += 1
         for word, rows in chosen.items():
             some = own.loc[own.index.intersection(rows)]
@@ -649,15 +649,59 @@ def _most_telling(things: pd.DataFrame, word: str) -> Any:
     return some[:MOST_TILES]
 
 
-def picture_name(name: str) -> str:
-    """The file of a frame's picture, on every system.
+def picture_names(names: Sequence[str]) -> dict[str, str]:
+    """File names of the pictures of frames; a number tells those apart that would get the same.
+
+    Parameters
+    ----------
+    names
+        Of frames, in their order.
+
+    Returns
+    -------
+    dict
+        By the name of the frame.
 
     Examples
     --------
-    >>> picture_name("DJI 01.JPG"), picture_name("clip#000012")
-    ('DJI_01_JPG.jpg', 'clip_000012.jpg')
+    >>> list(picture_names(["a.png", "a.jpg", "b c.png"]).values())
+    ['a.jpg', 'a-2.jpg', 'b_c.jpg']
     """
-    return f"{re.sub(r'[^A-Za-z0-9-]', '_', name)[-120:]}.jpg"
+    taken: set[str] = set()
+    found = {}
+    for name in dict.fromkeys(names):
+        stem = file = safe_stem(name)
+        number = 1
+        # Names that differ in their case alone are one file on some systems.
+        while file.lower() in taken:
+            number += 1
+            file = f"{stem}-{number}"
+        taken.add(file.lower())
+        found[name] = f"{file}.jpg"
+    return found
+
+
+def safe_stem(name: str) -> str:
+    """A frame's name as that of a file on every system.
+
+    Parameters
+    ----------
+    name
+        Of a frame.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> safe_stem("DJI 01.JPG"), safe_stem("clip#000012")
+    ('DJI_01', 'clip_000012')
+    """
+    stem = Path(name).stem if "#" not in name else name
+    return "".join(sign if sign.isascii() and (sign.isalnum() or sign in "-_") else "_" for sign in stem)[
+        :120
+    ]
 
 
 def _picture(frame: Frame) -> Picture:
