@@ -36,9 +36,9 @@ def report_of(flight: Path, place: Path) -> Path:
 
 def test_a_flight_is_written(flight, tmp_path):
     out = succeed("replay", flight, "--out", tmp_path / "out", *POSES)
-    assert out.strip() == str(tmp_path / "out" / "replay.rrd")
-    assert [one.name for one in (tmp_path / "out").iterdir()] == ["replay.rrd"]
-    assert not (flight / "replay.rrd").exists()
+    assert out.split() == [str(tmp_path / "out" / name) for name in ("replay.html", "replay.rrd")]
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["replay.html", "replay.rrd"]
+    assert not list(flight.glob("replay.*"))
 
 
 def test_a_report_finds_its_flight_and_shows_its_tracks(flight, tmp_path):

@@ -190,31 +190,31 @@ def track(
 
 @click.command()
 @click.argument("folder", metavar="DIR", type=FOLDER)
-@click.option("--html", is_flag=True, help="Also replay.html, for a browser without a network.")
+@click.option("--html", is_flag=True, hidden=True)  # the page was not written without it
 @click.option("--images", type=ANY, help="Its images, or a video.  [default: images in the flight]")
 @shared.source
 @shared.out(FOLDER, "The folder to write to.  [default: the report, or reports/NAME-replay]")
 def replay(folder: Path, html: bool, images: Path | None, source: str | None, out: Path | None) -> None:
     """Play DIR back, a flight or a report made from one.
 
-    Writes replay.rrd for rerun's viewer. It shows the aircraft, what its camera saw of the ground, the
-    images, what was detected, tracks with their 90 % ellipses where wildlab track left some, the truth, and
-    errors and NEES over time. What the flight lacks is said. Everything is in metres from an origin that is
-    not told, and in seconds from the first pose; images are reduced, and nothing but their pixels is kept.
-    What the pixels show still may tell where it was.
+    Writes replay.html, for any browser, and replay.rrd, for rerun's viewer. They show the aircraft, what its
+    camera saw of the ground, the images, what was detected, tracks with their 90 % ellipses where wildlab
+    track left some, the truth, and errors and NEES over time. What the flight lacks is said. Everything is in
+    metres from an origin that is not told, and in seconds from the first pose; images are reduced, and
+    nothing but their pixels is kept. What the pixels show still may tell where it was.
 
     \b
     Examples:
-      wildlab replay flights/tuesday --html
+      wildlab replay flights/tuesday
       wildlab replay flights/tuesday --images card/DCIM
       wildlab replay reports/tuesday-tracking
       rerun reports/tuesday-replay/replay.rrd       the viewer as a program
     """
     from wildlab.runner.replay import replay as write_replay
 
-    written, scene = write_replay(
-        folder, into=out, images=images, source=source, html=html, console=terminal_console()
-    )
+    if html:
+        click.echo("replay.html is always written now: --html is not needed.", err=True)
+    written, scene = write_replay(folder, into=out, images=images, source=source, console=terminal_console())
     for clause in scene.lacks:
         click.echo(stopped(f"Not shown: {clause}"), err=True)
     for path in written:

@@ -1,7 +1,7 @@
 """A flight played back: what it was and saw, as arrays over time, as a recording, and as one page.
 
-`scene` says what is shown, `gather` takes it from a flight, `recording` writes it for rerun's viewer, `page`
-puts that and the viewer itself into one file that opens from disk.
+`scene` takes what is shown from a flight, `page` writes it as one file for any browser, `recording` for
+rerun's viewer.
 """
 
 from typing import TYPE_CHECKING

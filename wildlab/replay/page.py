@@ -1,223 +1,225 @@
-"""A replay as one HTML file: the recording and rerun's viewer, out of the installed rerun-sdk."""
+"""A replay as one HTML file: map, image, and errors over time, drawn by a script of its own.
+
+The page holds the arrays of a `wildlab.replay.scene.ReplayScene`, thinned and rounded, and some
+pictures. Nothing in it says where on Earth they are.
+"""
 
 from __future__ import annotations
 
 import base64
-import gzip
 import hashlib
 import json
-import os
-import socket
-import subprocess
-import sys
-import tempfile
-import time
-from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
-from typing import NamedTuple
-from urllib.error import URLError
-from urllib.request import ProxyHandler, build_opener
+from collections.abc import Iterable, Mapping
+from math import isfinite
+from typing import Any
 
+import cv2
+import numpy as np
 from markupsafe import Markup
+from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
+from wildlab.replay.images import Shot
+from wildlab.replay.scene import (
+    MOST_POINTS,
+    SHARE,
+    Array,
+    Estimates,
+    Points,
+    ReplayScene,
+    heights,
+    minutes,
+    plain,
+    relief,
+    spread_evenly,
+)
+from wildlab.reporting.figures import colour, filter_words
 from wildlab.reporting.text import TEMPLATES, render
 
-#: How long the program may take to begin to answer, s, and how much it may answer with, bytes.
-PATIENCE_S, MOST_BYTES = 60.0, 200_000_000
-SCRIPT, WASM = "re_viewer.js", "re_viewer_bg.wasm"
-
-
-class Viewer(NamedTuple):
-    """The viewer of one version of rerun: its script as text and its WebAssembly as bytes."""
-
-    version: str
-    script: str
-    wasm: bytes
-
-
-def read_viewer() -> Viewer:
-    """The viewer that belongs to the installed rerun-sdk.
-
-    Returns
-    -------
-    Viewer
-
-    Raises
-    ------
-    WildlabError
-        Where rerun-sdk is missing, or the one installed has no viewer for browsers in it.
-    """
-    program, found = _program()
-    with tempfile.TemporaryDirectory(prefix="wildlab-viewer.") as home:
-        web, data = _free_ports(2)
-        process = subprocess.Popen(  # noqa: S603 - the program of a package, with fixed arguments
-            [
-                str(program), "--serve-web", "--bind", "127.0.0.1",
-                "--web-viewer-port", str(web), "--port", str(data),
-            ],
-            env=_quiet(Path(home)),
-            cwd=home,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        try:
-            script = _get(process, web, SCRIPT)
-            wasm = _get(process, web, WASM)
-        finally:
-            process.terminate()
-            try:
-                process.wait(10)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-    if wasm[:4] != b"\0asm" or b"wasm_bindgen" not in script:
-        raise _none("what it hands out is not a viewer")
-    return Viewer(found, script.decode("utf-8"), wasm)
-
-
-def _program() -> tuple[Path, str]:
-    try:
-        import rerun_cli
-
-        found = version("rerun-sdk")
-    except (ImportError, PackageNotFoundError):
-        raise WildlabError(
-            "rerun-sdk is not installed, and the viewer is a part of it",
-            "install what environment.lock names (make environment), or: pip install 'rerun-sdk==0.41.*'",
-        ) from None
-    name = "rerun.exe" if sys.platform == "win32" else "rerun"
-    program = Path(str(rerun_cli.__file__)).with_name(name)
-    if not program.is_file():
-        raise _none("its program is missing")
-    return program, found
-
-
-def _none(why: str) -> WildlabError:
-    return WildlabError(
-        f"the rerun-sdk that is installed has no viewer for browsers: {why}",
-        "install the wheel from PyPI (pip install --force-reinstall 'rerun-sdk==0.41.*'), which has it; "
-        "replay.rrd, without --html, opens with: rerun replay.rrd",
-    )
-
-
-def _quiet(home: Path) -> dict[str, str]:
-    """An environment in which rerun neither counts nor finds anything of its user."""
-    settings = home / ".config" / "rerun" / "analytics.json"
-    settings.parent.mkdir(parents=True)
-    kept = home / "data"
-    content = {
-        "analytics_enabled": False, "analytics_id": "", "metadata": {},
-        "config_file_path": str(settings), "data_dir_path": str(kept),
-    }  # fmt: skip
-    settings.write_text(json.dumps(content), encoding="utf-8")
-    own = {"HOME": str(home), "XDG_CONFIG_HOME": str(home / ".config"), "XDG_DATA_HOME": str(kept)}
-    # Where `CI` is set rerun does not count either, wherever this system would keep its settings.
-    own |= {"APPDATA": str(home), "LOCALAPPDATA": str(home), "CI": "1", "TELEMETRY_ENABLED": "false"}
-    return {name: value for name, value in os.environ.items() if "RERUN" not in name} | own
-
-
-def _free_ports(count: int) -> list[int]:
-    sockets = [socket.socket() for _ in range(count)]
-    try:
-        for one in sockets:
-            one.bind(("127.0.0.1", 0))
-        return [one.getsockname()[1] for one in sockets]
-    finally:
-        for one in sockets:
-            one.close()
-
-
-def _get(process: subprocess.Popen[bytes], port: int, name: str) -> bytes:
-    opener = build_opener(ProxyHandler({}))  # this machine is not asked for by way of another
-    until = time.monotonic() + PATIENCE_S
-    while True:
-        try:
-            with opener.open(f"http://127.0.0.1:{port}/{name}", timeout=PATIENCE_S) as answer:
-                return bytes(answer.read(MOST_BYTES))
-        except (URLError, OSError) as error:
-            if process.poll() is not None:
-                raise _none(f"its program ended with {process.returncode}") from None
-            if time.monotonic() > until:
-                raise _none(f"it did not answer within {PATIENCE_S:g} s ({error})") from None
-            time.sleep(0.1)
-
-
-#: What the browser may do: run the scripts with these hashes, and WebAssembly; show what is in the file.
+#: Pictures and their bytes in a page, at most: a phone opens it at once.
+MOST_PICTURES, PICTURE_BYTES = 120, 1_400_000
+#: What the browser may do: run the script with this hash, and show what is in the file.
 POLICY = (
-    "default-src 'none'; script-src {hashes} 'wasm-unsafe-eval'; style-src 'sha256-{style}'; "
-    "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    "default-src 'none'; script-src 'sha256-{script}'; style-src 'sha256-{style}'; img-src data:; "
+    "base-uri 'none'; form-action 'none'"
 )
 
 
-def page(recording: bytes, viewer: Viewer, name: str, narrow: bytes) -> str:
+def page(scene: ReplayScene, shots: Mapping[int, Shot]) -> str:
     """One HTML file with all of it inside.
 
     Parameters
     ----------
-    recording
-        The bytes of an ``.rrd``.
-    viewer
-        Of the version that wrote it.
-    name
-        Of the flight.
-    narrow
-        A layout that narrow screens get, as ``.rbl``.
+    scene
+        From `wildlab.replay.scene.scene_of`.
+    shots
+        Pictures by the row of the scene's views.
 
     Returns
     -------
     str
     """
-    # Before the viewer: whatever it would ask the network for is refused at once, and by the policy as well.
-    before, after, style = (_read(name) for name in ("replay-before.js", "replay-after.js", "replay.css"))
-    scripts = [before, _inert(viewer.script), after]
-    hashes = " ".join(f"'sha256-{_hash(one)}'" for one in scripts)
-    packed = {"viewer": viewer.wasm, "recording": recording, "narrow-layout": narrow}
+    script, style = ((TEMPLATES / name).read_text(encoding="utf-8") for name in ("replay.js", "replay.css"))
+    # No text ends the element that it stands in.
+    data = json.dumps(drawn(scene, shots), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return (
         render(
             "replay",
-            policy=POLICY.format(hashes=hashes, style=_hash(style)),
-            title=f"Replay of {name}",
+            policy=POLICY.format(script=_hash(script), style=_hash(style)),
+            name=plain(scene.name),
+            kind="A simulated flight" if scene.kind == "twin" else "A recorded flight",
+            lasts=minutes(scene.length) if scene.timed else "",
+            images=len(scene.views.times) if scene.views is not None else 0,
+            filters=_filters(scene),
+            points=scene.points is not None,
+            truth=bool(scene.truth),
+            lacks=scene.lacks,
             style=Markup(style),  # noqa: S704 - ours
-            scripts=list(map(Markup, scripts)),
-            packed={name: _packed(data) for name, data in packed.items()},
+            script=Markup(script),  # noqa: S704 - ours
+            data=Markup(data),  # noqa: S704 - without a mark
         )
         + "\n"
     )
-
-
-def _read(name: str) -> str:
-    return (TEMPLATES / name).read_text(encoding="utf-8")
-
-
-def _inert(script: str) -> str:
-    """A script that does not end the element it stands in."""
-    return script.replace("</script", "<\\/script").replace("<!--", "<\\!--").replace("\r", "")
 
 
 def _hash(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
-def _packed(data: bytes) -> str:
-    # Without the time at which it was packed.
-    return base64.b64encode(gzip.compress(data, 6, mtime=0)).decode()
+def _filters(scene: ReplayScene) -> dict[str, str]:
+    """The colour of each filter by its name."""
+    return {filter_words(plain(one.filter)): colour(one.filter) for one in scene.tracks}
 
 
-def parts_of(text: str) -> Iterator[tuple[str, bytes]]:
-    """What is packed into a page, by the id of its element.
+def drawn(scene: ReplayScene, shots: Mapping[int, Shot]) -> dict[str, Any]:
+    """What the page's script draws, as plain values: metres north and east, seconds, pixels; None: not known.
 
     Parameters
     ----------
-    text
-        From `page`.
+    scene, shots
+        As `page` takes them.
 
     Returns
     -------
-    Iterator of (str, bytes)
+    dict
+        ``ellipses`` are as `ellipse_axes` gives them.
     """
-    for one in text.split('<script type="application/octet-stream" id="')[1:]:
-        name, _, rest = one.partition('">')
-        yield name, gzip.decompress(base64.b64decode(rest.partition("</script>")[0]))
+    low, high = scene.extent
+    found: dict[str, Any] = {
+        "timed": scene.timed,
+        "length": scene.length,
+        "extent": _rounded([low[0], low[1], high[0], high[1]]),
+        # 95 % of a chi-square with two degrees of freedom lie below.
+        "band": -2.0 * float(np.log(1.0 - 0.95)),
+        "tracks": [],
+        "truth": [
+            {"name": plain(one.name), "still": one.still}
+            | {"t": _rounded(np.nan_to_num(one.times), 3), "p": _rounded(one.places[:, :2])}
+            for one in scene.truth
+        ],
+    }
+    if scene.path is not None:
+        found["path"] = {
+            "t": _rounded(scene.path.times, 3),
+            "p": _rounded(scene.path.places[:, :2]),
+            "height": _rounded(heights(scene), 1),
+        }
+    if scene.views is not None:
+        # Every other place of a border: its corners, and the middles of its sides.
+        found["frames"] = {
+            "t": _rounded(scene.views.times, 3),
+            "outlines": _rounded(scene.views.outlines[:, ::2, :2], 1),
+        }
+        found["pictures"] = _pictures(shots)
+    if scene.camera is not None:
+        found["size"] = [scene.camera.width, scene.camera.height]
+    if scene.sightings is not None:
+        found["seen"] = {
+            "frame": scene.sightings.frame.tolist(),
+            "uv": _rounded(scene.sightings.uv),
+            "names": [plain(name) for name in scene.sightings.names],
+        }
+    if scene.points is not None:
+        found["points"] = _judged(scene.points, MOST_POINTS)
+    for one in scene.tracks:
+        rows = _judged(one, 2 * MOST_POINTS // len(scene.tracks))
+        found["tracks"].append({"colour": colour(one.filter), **rows})
+    if scene.terrain is not None:
+        found["ground"] = _ground(scene)
+    return found
+
+
+def _judged(of: Points | Estimates, most: int) -> dict[str, Any]:
+    rows = spread_evenly(len(of.times), max(most, 2))
+    return {
+        "t": _rounded(of.times[rows], 3),
+        "p": _rounded(of.places[rows, :2]),
+        "ellipses": _rounded(ellipse_axes(of.covariance[rows])),
+        "error": _rounded(of.error[rows]),
+        "nees": _rounded(of.nees[rows]),
+    }
+
+
+def ellipse_axes(covariance: Array) -> Array:
+    """Half axes and turn of the ellipses that hold `SHARE` of a normal distribution.
+
+    Parameters
+    ----------
+    covariance
+        (N, 2, 2) m^2, north before east; may be NaN.
+
+    Returns
+    -------
+    (N, 3): longer and shorter half axis, m, and the angle of the longer one from the east, clockwise, rad;
+    NaN where the covariance is.
+    """
+    known = np.isfinite(covariance).all(axis=(1, 2))
+    values, vectors = np.linalg.eigh(covariance[known])
+    found = np.full((len(covariance), 3), np.nan)
+    size = np.sqrt(-2.0 * np.log(1.0 - SHARE) * np.maximum(values, 0.0))
+    north, east = vectors[:, 0, 1], vectors[:, 1, 1]
+    found[known] = np.column_stack([size[:, 1], size[:, 0], np.arctan2(-north, east)])
+    return found
+
+
+def _pictures(shots: Mapping[int, Shot]) -> list[list[Any]]:
+    """Row of the frame and address of its picture, of some of them evenly."""
+    rows = sorted(shots)
+    rows = [rows[i] for i in spread_evenly(len(rows), MOST_PICTURES)]
+    most = PICTURE_BYTES // max(len(rows), 1)
+    return [[row, _address("jpeg", smaller(shots[row].jpeg, most))] for row in rows]
+
+
+def smaller(jpeg: bytes, most: int) -> bytes:
+    """A picture of about so many bytes at most, with fewer pixels where it has to."""
+    if len(jpeg) <= most:
+        return jpeg
+    image = np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_UNCHANGED))
+    share = float(np.sqrt(most / len(jpeg)))
+    size = [max(round(side * share), 1) for side in image.shape[1::-1]]
+    image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 65])[1].tobytes()
+
+
+def _ground(scene: ReplayScene) -> dict[str, Any]:
+    """Terrain as a shaded picture, and the places of its south-western and north-eastern corners."""
+    assert scene.terrain is not None  # noqa: S101 - for the type checker
+    south, north, west, east = scene.terrain.extent
+    h, shades, _ = relief(scene.terrain.height, scene.terrain.step)
+    clear = np.where(np.isfinite(h), 255, 0).astype(np.uint8)
+    picture = np.dstack([shades[..., ::-1], clear])[::-1]
+    png = cv2.imencode(".png", np.ascontiguousarray(picture))[1].tobytes()
+    return {"picture": _address("png", png), "extent": _rounded([south, west, north, east])}
+
+
+def _address(kind: str, data: bytes) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
+
+
+def _rounded(values: ArrayLike, digits: int = 2) -> list[Any]:
+    """Nested lists of numbers; None for what is not finite."""
+    rounded: list[Any] = np.round(np.asarray(values, float), digits).tolist()
+    return _finite(rounded)
+
+
+def _finite(values: Iterable[Any]) -> list[Any]:
+    return [_finite(one) if isinstance(one, list) else one if isfinite(one) else None for one in values]

@@ -125,15 +125,13 @@ def _clause(text: str) -> str:
 STAY_S, PLAYED_S = 10.0, 120.0
 
 
-def blueprint_of(scene: ReplayScene, *, narrow: bool = False) -> Any:
+def blueprint_of(scene: ReplayScene) -> Any:
     """The layout of a scene, with rerun's panels folded but for the time line.
 
     Parameters
     ----------
     scene
         From `wildlab.replay.scene.scene_of`.
-    narrow
-        For a phone held upright: the map, and below it all else in tabs.
     """
     import rerun.blueprint as rrb
 
@@ -179,19 +177,13 @@ def blueprint_of(scene: ReplayScene, *, narrow: bool = False) -> Any:
         )
     right.append(rrb.TextDocumentView(origin="/about", name="What is shown"))
     plots = _plots(rrb, scene)
-    if narrow:
-        # The words first: nothing else says what it is.
-        body: list[Any] = [*views, rrb.Tabs(*right[::-1], *plots, active_tab=0)]
-        shares = [3, 2]
-    else:
-        beside = rrb.Vertical(*right, row_shares=[3, 2][: len(right)])
-        body = [rrb.Horizontal(*views, beside, column_shares=[3, 2])]
-        shares = [7, 3]
-        if plots:
-            body.append(rrb.Horizontal(*plots))
+    beside = rrb.Vertical(*right, row_shares=[3, 2][: len(right)])
+    body: list[Any] = [rrb.Horizontal(*views, beside, column_shares=[3, 2])]
+    if plots:
+        body.append(rrb.Horizontal(*plots))
     speed = max(1.0, round(scene.length / PLAYED_S)) if scene.timed else 1.0
     return rrb.Blueprint(
-        rrb.Vertical(*body, row_shares=shares[: len(body)]),
+        rrb.Vertical(*body, row_shares=[7, 3][: len(body)]),
         rrb.TopPanel(state="hidden"),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
@@ -248,7 +240,7 @@ Colour = tuple[int, int, int, int]
 INSTALL = (
     "To play the flight back here, install rerun's widget, pip install 'rerun-sdk[notebook]==0.41.*', and "
     'start the kernel anew. Without it: save_flight(flight, "flights/mine"), and then in a terminal '
-    "wildlab replay flights/mine --html."
+    "wildlab replay flights/mine."
 )
 #: Time lines.
 SECONDS, IMAGES = "flight_time", "image"
@@ -292,14 +284,6 @@ def save_recording(
     except BaseException:
         part.unlink(missing_ok=True)
         raise
-
-
-def narrow_layout(scene: ReplayScene) -> bytes:
-    """The layout for a narrow screen, which a viewer may be given after the recording."""
-    with tempfile.TemporaryDirectory(prefix="wildlab-layout.") as folder:
-        file = FilePath(folder) / "narrow.rbl"
-        blueprint_of(scene, narrow=True).save(APPLICATION, file)
-        return file.read_bytes()
 
 
 def log_scene(scene: ReplayScene) -> Any:

@@ -252,6 +252,32 @@ def ellipse_rings(places: Array, covariance: Array) -> Array:
     return rings
 
 
+def relief(height: NDArray[np.float32], step: float) -> tuple[Array, NDArray[np.uint8], Array]:
+    """Terrain thinned to `MOST_NODES` along its longer side, shaded from the north-west.
+
+    Parameters
+    ----------
+    height
+        (R, C) m, NaN where nothing is known; rows run north.
+    step
+        Between nodes, m.
+
+    Returns
+    -------
+    heights, colours, normals
+        (r, c) m, (r, c, 3) and (r, c, 3) east, north, up.
+    """
+    every = max(1, -(-max(height.shape) // MOST_NODES))
+    h = np.asarray(height[::every, ::every], float)
+    up_north, up_east = np.gradient(np.nan_to_num(h), every * step) if min(h.shape) > 1 else (0 * h, 0 * h)
+    normals = np.stack([-up_east, -up_north, np.ones_like(h)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    light = normals @ (np.array([-1.0, 1.0, 1.2]) / np.linalg.norm([-1.0, 1.0, 1.2]))
+    tone = np.clip(0.75 + 0.5 * (light - np.median(light)), 0.45, 1.0)
+    colours = (tone[..., None] * np.array([222, 226, 206])).clip(0, 255).astype(np.uint8)
+    return h, colours, normals
+
+
 def mesh(
     height: NDArray[np.float32], north: float, east: float, step: float
 ) -> tuple[Array, NDArray[np.uint32], NDArray[np.uint8], Array]:
@@ -271,8 +297,8 @@ def mesh(
     vertices, triangles, colours, normals
         (V, 3) m east, north, up; (T, 3); (V, 3); (V, 3). A triangle with an unknown corner is left out.
     """
+    h, colours, normals = relief(height, step)
     every = max(1, -(-max(height.shape) // MOST_NODES))
-    h = np.asarray(height[::every, ::every], float)
     rows, columns = h.shape
     x, y = np.meshgrid(east + every * step * np.arange(columns), north + every * step * np.arange(rows))
     vertices = np.stack([x, y, np.nan_to_num(h)], axis=-1).reshape(-1, 3)
@@ -281,12 +307,6 @@ def mesh(
     c, d = corner[1:, :-1].ravel(), corner[1:, 1:].ravel()
     triangles = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
     triangles = triangles[np.isfinite(h.ravel())[triangles].all(axis=1)]
-    up_north, up_east = np.gradient(np.nan_to_num(h), every * step) if min(h.shape) > 1 else (0 * h, 0 * h)
-    normals = np.stack([-up_east, -up_north, np.ones_like(h)], axis=-1)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    light = normals @ (np.array([-1.0, 1.0, 1.2]) / np.linalg.norm([-1.0, 1.0, 1.2]))
-    tone = np.clip(0.75 + 0.5 * (light - np.median(light)), 0.45, 1.0)
-    colours = (tone[..., None] * np.array([222, 226, 206])).clip(0, 255).astype(np.uint8)
     return vertices, triangles.astype(np.uint32), colours.reshape(-1, 3), normals.reshape(-1, 3)
 
 
@@ -367,8 +387,8 @@ def _first(parts: list[Path | Views | Estimates | Target | None]) -> float:
     return 0.0
 
 
-def _evenly(n: int, most: int) -> NDArray[np.intp]:
-    """Rows of `n`, all or `most` of them evenly, the first and the last among them."""
+def spread_evenly(n: int, most: int) -> NDArray[np.intp]:
+    """Rows of ``n``, all or ``most`` of them evenly, the first and the last among them."""
     return np.arange(n) if n <= most else np.unique(np.linspace(0, n - 1, most).round().astype(np.intp))
 
 
@@ -381,7 +401,7 @@ def _path(flight: Flight, source: str | None, lacks: list[str]) -> Path | None:
     if not len(times):
         lacks.append(f"the aircraft: no pose of {source} has a time and a place")
         return None
-    keep = _evenly(len(times), MOST_POSES)
+    keep = spread_evenly(len(times), MOST_POSES)
     return Path(times[keep], places[keep], source)
 
 
@@ -434,7 +454,9 @@ def _kept_frames(flight: Flight, ids: NDArray[np.object_]) -> NDArray[np.intp]:
         pixels = flight.detections[flight.detections["kind"] == "pixel"]["frame_id"]
         seen = np.isin(ids, pixels.to_numpy(object))
     some = np.flatnonzero(seen)
-    return np.union1d(_evenly(len(ids), MOST_FRAMES // 2), some[_evenly(len(some), MOST_FRAMES // 2)])
+    return np.union1d(
+        spread_evenly(len(ids), MOST_FRAMES // 2), some[spread_evenly(len(some), MOST_FRAMES // 2)]
+    )
 
 
 def _of_camera(flight: Flight, frames: pd.DataFrame) -> NDArray[np.bool_]:
@@ -535,7 +557,7 @@ def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | No
     table = table[good].sort_values("time_s", kind="stable").reset_index(drop=True)
     if len(table) > MOST_POINTS:
         lacks.append(f"every detection on the ground: {MOST_POINTS} of {len(table)} are, evenly")
-        table = table.iloc[_evenly(len(table), MOST_POINTS)].reset_index(drop=True)
+        table = table.iloc[spread_evenly(len(table), MOST_POINTS)].reset_index(drop=True)
     if not len(table):
         return None
     P = covariances_of(table)
@@ -564,7 +586,7 @@ def _tracks(flight: Flight, table: pd.DataFrame | None, lacks: list[str]) -> tup
     found = []
     for (target, name, sensor), rows in table.groupby(["target", "filter", "sensor"], sort=False):
         rows = rows.sort_values("time_s", kind="stable")
-        rows = rows.iloc[_evenly(len(rows), MOST_POSES)]
+        rows = rows.iloc[spread_evenly(len(rows), MOST_POSES)]
         xy = rows[["north_m", "east_m"]].to_numpy(float)
         if flight.terrain is not None:
             down = -flight.terrain.heights_at(xy)
@@ -600,6 +622,6 @@ def _truth(flight: Flight, lacks: list[str]) -> tuple[Target, ...]:
         good = np.flatnonzero(np.isfinite(stamps) & np.isfinite(where).all(axis=1))
         good = good[np.argsort(stamps[good], kind="stable")]
         if len(good):
-            keep = good[_evenly(len(good), MOST_POSES)]
+            keep = good[spread_evenly(len(good), MOST_POSES)]
             found.append(Target(str(name), stamps[keep], where[keep]))
     return tuple(found)

@@ -19,8 +19,8 @@ from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import REPORTS
 from wildlab.replay.images import Shot, read_shots
-from wildlab.replay.page import page, read_viewer
-from wildlab.replay.recording import narrow_layout, save_recording
+from wildlab.replay.page import page
+from wildlab.replay.recording import save_recording
 from wildlab.replay.scene import ReplayScene, scene_of
 from wildlab.runner.evaluate import tell_source
 from wildlab.runner.record.provenance import flight_of_report, provenance_of_flight, read_provenance
@@ -34,11 +34,10 @@ def replay(
     into: Path | None = None,
     images: Path | None = None,
     source: str | None = None,
-    html: bool = False,
     reports: Path = REPORTS,
     console: Console | None = None,
 ) -> tuple[list[Path], ReplayScene]:
-    """Write the replay of a flight.
+    """Write the replay of a flight: a page, and a recording for rerun's viewer.
 
     Parameters
     ----------
@@ -50,8 +49,6 @@ def replay(
         A folder of the flight's images, or a video; left out, ``images`` in the flight folder where that is.
     source
         Name of the ``nav`` table; left out, the best of `Flight.estimated_sources`.
-    html
-        Whether to write the page that has the viewer inside, too.
     reports
         Where reports are: tracks of the flight are looked for there.
     console
@@ -65,11 +62,10 @@ def replay(
     Raises
     ------
     WildlabError
-        Where there is no such flight, nothing to show, or no viewer.
+        Where there is no such flight, or nothing to show.
     """
     report = None if (folder / FILE_NAME).exists() else folder
     place = folder if report is None else flight_of(folder)
-    viewer = read_viewer() if html else None  # before the long part: it may be missing
     flight = load_flight(place)
     with _progress(console) as tell:
         tell("reading the flight", None, None)
@@ -85,12 +81,9 @@ def replay(
                 field="--out",
             )
         target.mkdir(parents=True, exist_ok=True)
-        written = [target / RECORDING]
-        save_recording(scene, written[0], shots, lambda what: tell(f"writing {what}", None, None))
-        if viewer is not None:
-            tell("packing the viewer", None, None)
-            written.append(target / PAGE)
-            write_atomic(written[1], page(written[0].read_bytes(), viewer, scene.name, narrow_layout(scene)))
+        written = [target / PAGE, target / RECORDING]
+        write_atomic(written[0], page(scene, shots))
+        save_recording(scene, written[1], shots, lambda what: tell(f"writing {what}", None, None))
     return written, scene
 
 
