@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array, Mask
 
 #: Corners nearer to one another than this are one corner, metres; and what counts as on a border.
 SAME = 1e-6
-#: Up to so many pairs of points and edges are looked at all at once.
-TOGETHER = 20_000
 #: Areas below this cannot be searched, square metres.
 LEAST = 1e-3
 #: Directions of rows that are tried at most.
@@ -73,25 +70,6 @@ def check_area(corners: ArrayLike, name: str = "area") -> Array:
     return points if signed > 0 else np.ascontiguousarray(points[::-1])
 
 
-def is_convex(corners: ArrayLike) -> bool:
-    """Whether no inner angle of a checked polygon is above 180 degrees (F 5.2, footnote).
-
-    Parameters
-    ----------
-    corners
-        (K, 2) metres, from `check_area`.
-
-    Returns
-    -------
-    bool
-    """
-    edges = np.roll(np.asarray(corners, float), -1, axis=0) - np.asarray(corners, float)
-    following = np.roll(edges, -1, axis=0)
-    turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
-    lengths = np.linalg.norm(edges, axis=1) * np.linalg.norm(following, axis=1)
-    return bool((turns >= -1e-9 * lengths).all())
-
-
 def contains(corners: ArrayLike, points: ArrayLike) -> Mask:
     """Which points lie in a polygon, by counting the edges that a line to the north crosses.
 
@@ -100,70 +78,33 @@ def contains(corners: ArrayLike, points: ArrayLike) -> Mask:
     corners
         (K, 2) metres.
     points
-        (N, 2) metres, north and east. On the border either answer may come out.
+        (..., 2) metres, north and east. On the border either answer may come out.
 
     Returns
     -------
-    (N,) bool; False of NaN.
+    (...) bool; False of NaN.
 
     Examples
     --------
     >>> contains([[0, 0], [0, 10], [20, 10], [20, 0]], [[5, 5], [25, 5]])
     array([ True, False])
     """
-    fence = np.asarray(corners, float)
-    asked = np.atleast_2d(np.asarray(points, float))
-    following = np.roll(fence, -1, axis=0)
-    if len(fence) * len(asked) <= TOGETHER:
-        spans = (fence[:, 1] > asked[:, 1:]) != (following[:, 1] > asked[:, 1:])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            slope = (following[:, 0] - fence[:, 0]) / (following[:, 1] - fence[:, 1])
-            north = fence[:, 0] + (asked[:, 1:] - fence[:, 1]) * slope
-            return np.asarray((spans & (asked[:, :1] < north)).sum(axis=1) % 2 == 1)
-    inside = np.zeros(len(asked), bool)
-    for a, b in zip(fence, following, strict=True):
-        spans = (a[1] > asked[:, 1]) != (b[1] > asked[:, 1])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            at = a[0] + (asked[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
-            inside ^= spans & (asked[:, 0] < at)
-    return inside
+    asked = np.asarray(points, float)
+    fence = np.ascontiguousarray(corners, float)
+    return _contains(fence, np.ascontiguousarray(asked.reshape(-1, 2))).reshape(asked.shape[:-1])
 
 
-def inside_of(corners: ArrayLike) -> Callable[[Array], Mask]:
-    """Whether points (..., 2) lie in an area, for areas that are asked often.
-
-    A convex one is asked by its sides, which is many times faster than `contains`.
-
-    Parameters
-    ----------
-    corners
-        (K, 2) metres, from `check_area`.
-
-    Returns
-    -------
-    Callable
-        Points (..., 2) m -> (...) bool. On the border either answer may come out.
-
-    Examples
-    --------
-    >>> inside = inside_of(check_area([[0, 0], [0, 10], [20, 10], [20, 0]], "area"))
-    >>> inside(np.array([[[5.0, 5.0], [25.0, 5.0]]]))
-    array([[ True, False]])
-    """
-    fence = np.asarray(corners, float)
-    if not is_convex(fence):
-        return lambda points: contains(fence, points.reshape(-1, 2)).reshape(points.shape[:-1])
-    edges = np.roll(fence, -1, axis=0) - fence
-    inward = np.stack([-edges[:, 1], edges[:, 0]])
-    least = np.einsum("ki,ik->k", fence, inward)
-
-    def inside(points: Array) -> Mask:
-        north, east, within = points[..., 0], points[..., 1], np.ones(points.shape[:-1], bool)
-        # Side by side: numpy is slow to ask whether all of a few are true.
-        for (a, b), limit in zip(inward.T, least, strict=True):
-            within &= a * north + b * east > limit
-        return within
-
+@compiled
+def _contains(fence: Array, points: Array) -> Mask:
+    north, east = fence.T
+    inside = np.zeros(len(points), np.bool_)
+    for k in range(len(fence)):
+        if east[k - 1] == east[k]:
+            continue
+        slope = (north[k] - north[k - 1]) / (east[k] - east[k - 1])
+        for i in range(len(points)):
+            if (east[k - 1] > points[i, 1]) != (east[k] > points[i, 1]):
+                inside[i] ^= points[i, 0] < north[k - 1] + (points[i, 1] - east[k - 1]) * slope
     return inside
 
 

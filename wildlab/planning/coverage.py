@@ -20,7 +20,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import image_border, lines_clear, widest_view
-from wildlab.planning.areas import check_area, contains, inside_of
+from wildlab.planning.areas import check_area, contains
 
 
 class Coverage(NamedTuple):
@@ -339,10 +339,9 @@ def walks(
     steps = int(np.ceil(float(t.max(initial=0.0)) / step)) + 1
     way = np.empty((steps + 1, count, 2))
     way[0] = here
-    within = inside_of(corners)
     for k in range(steps):
         there = here + step * speed_sd * rng.standard_normal((count, 2))
-        here = np.where(within(there)[:, None], there, here)
+        here = np.where(contains(corners, there)[:, None], there, here)
         way[k + 1] = here
     at = t / step
     before = np.minimum(at.astype(np.intp), steps - 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -24,7 +26,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.planning.areas import inside_of, rectangle
+from wildlab.planning.areas import contains, rectangle
 from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import look_down
 from wildlab.planning.planner import SEARCH
@@ -58,7 +60,7 @@ def particles(seed: int, speed_sd: float, fence: Array = FENCE) -> Particles:
     def rules(moves: Moves) -> Rules:
         return Rules(moves, particles=300, scheme="systematic")
 
-    fences: list[Inside] = [inside_of(fence)]
+    fences: list[Inside] = [partial(contains, fence)]
     return Particles(walk_of(speed_sd, 1.0), fences, np.random.default_rng(seed), rules)
 
 
@@ -115,7 +117,7 @@ def test_no_particle_leaves_the_fence_it_began_in():
     cloud.step(look)
     cloud.step(blind(900.0))
     assert cloud.home.tolist() == [0]
-    assert inside_of(FENCE)(cloud.herd.cloud.x[..., :2]).all()
+    assert contains(FENCE, cloud.herd.cloud.x[..., :2]).all()
     assert np.ptp(cloud.herd.cloud.x[..., 0]) > 100
     cloud.give_up(1)
     assert cloud.herd.lost.tolist() == [True]

@@ -8,6 +8,7 @@ filter with and without its negative update, and by a Kalman filter.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ from wildlab.analysis.plans.coverage import ExecutionErrors, with_errors
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.areas import check_area, inside_of
+from wildlab.planning.areas import check_area, contains
 from wildlab.planning.courses import fly, follow_terrain
 from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course, swing_roll
@@ -124,7 +125,7 @@ def detector_of(twin: TwinParameters) -> Detector:
 
 def insides(fences: Iterable[Array]) -> list[Inside]:
     """Each fence as the particle filter takes it."""
-    return [inside_of(check_area(one, "fence")) for one in fences]
+    return [partial(contains, check_area(one, "fence")) for one in fences]
 
 
 def herds(twin: TwinParameters, fences: list[Array], times: Array, seed: int) -> Array:
