@@ -59,9 +59,9 @@ def judged(verdict: Verdict, **more: Any) -> Judged:
 
 LASTING = Flight(troubles=(Issue("no poses", np.array([[0.0, 60.0]])),))
 CASES = [
-    (judged(Verdict.SOUND), ["sound"]),
-    (judged(Verdict.SOUND, measured=False), ["sound-unmeasured"]),
-    (judged(Verdict.SOUND, gains=[gain(share=0.05)]), ["sound", "gain-cause"]),
+    (judged(Verdict.SOUND, error=3.0), ["sound"]),
+    (judged(Verdict.SOUND), ["sound-unmeasured"]),
+    (judged(Verdict.SOUND, gains=[gain(share=0.05)], error=3.0), ["sound", "gain-cause"]),
     (judged(Verdict.UNJUDGED), ["not-judged"]),
     (judged(Verdict.FIX, gains=[gain(share=0.05), gain("far_out")]), ["gain-outliers"]),
     (
@@ -73,6 +73,7 @@ CASES = [
     (judged(Verdict.LOOK, possible=gain(share=0.2), doubts=("tracking",)), ["possible", "doubts"]),
     (judged(Verdict.LOOK), ["look"]),
     (judged(Verdict.MEND, doubts=("georeferencing",)), ["part", "doubts"]),
+    (judged(Verdict.LOOK, doubts=("tracking",), error=3.0), ["doubts", "error"]),
 ]
 
 

@@ -318,9 +318,10 @@ def _known(*values: Any) -> bool:
     return all(value is not None and math.isfinite(value) for value in values)
 
 
-def error_measured(numbers: Numbers) -> bool:
-    """Whether any report beside measured how far off positions on the ground are."""
-    return any(name == "horizontal_error_mean" and _known(one["value"]) for (name, _), one in numbers.items())
+def error_measured(numbers: Numbers) -> float:
+    """How far off a position typically is by the other reports, m; NaN if none measured it."""
+    entry = numbers.get(("horizontal_error_median", "logged-pose"))
+    return float(entry["value"]) if entry is not None and _known(entry["value"]) else float("nan")
 
 
 def is_possible(gain_m: float, mean_m: float, *, certain: bool) -> bool:

@@ -89,8 +89,8 @@ class Judged(NamedTuple):
         A gain that is not certain.
     doubts
         Other reports that ask for a closer look.
-    judged, measured
-        How many other reports there are, and whether any measured how far off positions are.
+    judged, error
+        How many other reports there are; how far off a position typically is by them, m, or NaN.
     """
 
     overview: Overview
@@ -100,7 +100,7 @@ class Judged(NamedTuple):
     possible: Gain | None = None
     doubts: Sequence[str] = ()
     judged: int = 0
-    measured: bool = True
+    error: float = float("nan")
 
 
 # -- what follows from the numbers
@@ -170,8 +170,11 @@ def answer(found: Judged) -> list[Message]:
         said.append(Message("doubts", {"reports": listed(list(found.doubts))}))
     if found.verdict == Verdict.UNJUDGED:
         return [Message("not-judged"), *said[:1]]
+    known = {"error": metres(found.error)} if np.isfinite(found.error) else None
     if found.verdict == Verdict.SOUND:
-        return [Message("sound" if found.measured else "sound-unmeasured"), *said[:1]]
+        return [Message("sound", known) if known else Message("sound-unmeasured"), *said[:1]]
+    if known and len(said) == 1:
+        said.append(Message("error", known))
     return said[:2] or [Message("look")]
 
 
