@@ -26,6 +26,7 @@ from wildlab.replay.scene import (
     Estimates,
     Points,
     ReplayScene,
+    Target,
     heights,
     minutes,
     plain,
@@ -111,11 +112,7 @@ def drawn(scene: ReplayScene, shots: Mapping[int, Shot]) -> dict[str, Any]:
         # 95 % of a chi-square with two degrees of freedom lie below.
         "band": -2.0 * float(np.log(1.0 - 0.95)),
         "tracks": [],
-        "truth": [
-            {"name": plain(one.name), "still": one.still}
-            | {"t": _rounded(np.nan_to_num(one.times), 3), "p": _rounded(one.places[:, :2])}
-            for one in scene.truth
-        ],
+        "truth": [_way(one, 2 * MOST_POINTS // len(scene.truth)) for one in scene.truth],
     }
     if scene.path is not None:
         found["path"] = {
@@ -146,6 +143,17 @@ def drawn(scene: ReplayScene, shots: Mapping[int, Shot]) -> dict[str, Any]:
     if scene.terrain is not None:
         found["ground"] = _ground(scene)
     return found
+
+
+def _way(of: Target, most: int) -> dict[str, Any]:
+    rows = spread_evenly(len(of.times), max(most, 2))
+    times = np.nan_to_num(of.times[rows])
+    return {
+        "name": plain(of.name),
+        "still": of.still,
+        "t": _rounded(times, 3),
+        "p": _rounded(of.places[rows, :2]),
+    }
 
 
 def _judged(of: Points | Estimates, most: int) -> dict[str, Any]:
