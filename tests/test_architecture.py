@@ -71,8 +71,6 @@ ALSO = {("doctor", "jupyter_client")}
 
 #: They check our numbers in tests and benchmarks, so our numbers must not come from them.
 ORACLES = {"stonesoup", "pyins", "cameratransform", "osgeo", "gdal"}
-#: A study may show another tracker beside ours, where it is installed.
-BESIDE = {("wildlab/studies/autoferry_many/stone_soup.py", "stonesoup")}
 #: Under the GPL or AGPL, which would bind whoever uses wildlab.
 COPYLEFT = {"orthority", "opendm", "evo", "ultralytics", "yolov5", "PyQt5", "PyQt6"}
 #: Reading such a file runs whatever code its author put into it.
@@ -159,8 +157,7 @@ def violations(root: Path) -> list[str]:
             continue
         tree = parsed(path)
         for line, name in imported_names(tree, place.parts[:-1]):
-            if (place.as_posix(), name.partition(".")[0]) not in BESIDE:
-                found += [f"{place}:{problem}" for problem in check_imports(room, line, name)]
+            found += [f"{place}:{problem}" for problem in check_imports(room, line, name)]
         found += [f"{place}:{problem}" for problem in check_calls(tree)]
     return found
 
@@ -241,8 +238,6 @@ def undeclared(root: Path) -> list[str]:
         for line, name in imported_names(parsed(path), path.relative_to(root).parts[:-1]):
             package = name.partition(".")[0]
             if package == "wildlab" or package in sys.stdlib_module_names:
-                continue
-            if (path.relative_to(root).as_posix(), package) in BESIDE:
                 continue
             if not {canonicalize_name(provider) for provider in providers.get(package, [package])} & declared:
                 found.add(f"{path.relative_to(root)}:{line}: {package}")

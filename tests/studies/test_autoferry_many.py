@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,10 +13,13 @@ from wildlab.flight.files import dump_toml
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.studies import autoferry_many
 from wildlab.studies.autoferry_many import tuning
-from wildlab.studies.autoferry_many.tuning import Lasting, Tuned, anees_of, draw, order
+from wildlab.studies.autoferry_many.tuning import Tuned, anees_of, draw, order
 
 OFFSETS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
-ERRORS = {name: Lasting(offset, 0.9, 20.0) for name, offset in OFFSETS.items()}
+ERRORS = {
+    name: SimpleNamespace(offset_s=offset, next_correlation=0.9, correlation_time_s=20.0)
+    for name, offset in OFFSETS.items()
+}
 
 
 def test_draws_are_those_of_their_seed_and_within_their_ranges():
@@ -34,33 +39,23 @@ def test_draws_are_those_of_their_seed_and_within_their_ranges():
     assert parse_settings(dump_toml(one.model_dump(exclude_none=True))) == one
 
 
-def rows() -> pd.DataFrame:
-    """Three scenarios, two draws by each way to look; the first scenario is what it was tuned on."""
-    base = {"rmse": 1.0, "tracked": 90.0, "swaps": 0, "breaks": 1, "anees": 1.0}
-    found = []
-    for mode, values in (("radar", (5, 9, 7)), ("lidar", (3, 4, 6)), ("both", (4, 8, 8))):
-        for rank in (1, 2):
-            for case, value in zip(("s1", "s2", "s3"), values, strict=True):
-                found.append(
-                    base | {"case": case, "mode": mode, "rank": rank, "draw": 7 * rank,
-                            "gospa": float(value * rank), "tuned_gospa": float(values[0])}
-                )  # fmt: skip
-    return pd.DataFrame(found)
-
-
 def test_what_it_was_tuned_on_is_in_no_median():
-    middle = autoferry_many.medians(rows(), "s1").set_index("mode")
-    assert middle["best"].to_dict() == {"radar": 8.0, "lidar": 5.0, "both": 8.0}
-    assert middle["most"].to_dict() == {"radar": 16.0, "lidar": 10.0, "both": 16.0}
-    assert (middle["of"] == 2).all() and (middle["tracked"] == 90.0).all()
-    # One break in each of the two scenarios, by the best draw alone.
-    assert (middle["changes"] == 2).all()
-
-
-def test_what_was_not_counted_is_no_zero():
-    counted = ["tracked", "swaps", "breaks"]
-    middle = autoferry_many.medians(rows().drop(columns=counted), "s1")
-    assert middle[["tracked", "changes"]].isna().all(axis=None)
+    base = {"rmse": 1.0, "tracked": 90.0, "swaps": 0, "breaks": 1, "anees": 1.0}
+    modes = {"radar": (5.0, 9.0, 7.0), "lidar": (3.0, 4.0, 6.0), "both": (4.0, 8.0, 8.0)}
+    rows = pd.DataFrame(
+        [
+            base | {"case": case, "mode": mode, "gospa": value}
+            for mode, values in modes.items()
+            for case, value in zip(("s1", "s2", "s3"), values, strict=True)
+        ]
+    )
+    middle = autoferry_many.medians(rows, "s1")
+    assert middle.set_index("mode")["gospa"].to_dict() == {"radar": 8.0, "lidar": 5.0, "both": 8.0}
+    # One break in each of the two scenarios.
+    assert (middle["changes"] == 2).all() and (middle["of"] == 2).all()
+    assert autoferry_many.values(middle) == {"tracked": 90, "changes": 2}
+    alone = autoferry_many.values(autoferry_many.medians(rows[rows["case"] == "s1"], "s1"))
+    assert np.isnan(list(alone.values())).all()
 
 
 def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first():
@@ -86,7 +81,6 @@ def test_scenarios_are_followed_by_what_one_teaches(scenario, tunings, monkeypat
     monkeypatch.setattr(tuning, "tune_sensor", lambda flight, sensor: tunings[sensor])
     errors = tuning.errors_of(scenario(2))
     assert -2.5 < errors["radar"].offset_s < -1.5 and -1.5 < errors["lidar"].offset_s < -0.5
-    assert all(0.5 < errors[name].share < 1 for name in ("lidar", "radar"))
-    for mode, ordered in tuning.tune(scenario(2), draws=2, seed=1).items():
-        assert ordered == sorted(ordered, key=order) and len(ordered) == 2
-        assert tuning.follow_mode(scenario(3), mode, ordered[0].settings) is not None
+    assert all(0.5 < errors[name].next_correlation < 1 for name in ("lidar", "radar"))
+    for mode, best in tuning.tune(scenario(2), draws=2, seed=1).items():
+        assert tuning.follow_mode(scenario(3), mode, best.settings) is not None

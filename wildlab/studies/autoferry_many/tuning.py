@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.analysis.tracks.many import score_identities, track_jointly
+from wildlab.analysis.tracks.many import judged, track_jointly
+from wildlab.analysis.tracks.noise_model import SensorTuning
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import (
@@ -52,17 +53,6 @@ def even(rng: np.random.Generator, low: float, high: float) -> float:
     return float(rng.uniform(low, high))
 
 
-class Ranked(Protocol):
-    """A draw, ours or another tracker's, and how it did where it was tuned."""
-
-    @property
-    def number(self) -> int: ...
-    @property
-    def gospa(self) -> float: ...
-    @property
-    def anees(self) -> float: ...
-
-
 class Tuned(NamedTuple):
     """One draw, and where it was tuned its mean GOSPA, m, and the mean NEES / 2 of its tracks, the truth
     taken for exact."""
@@ -85,25 +75,12 @@ def reach_of(flight: Flight, mode: str) -> dict[str, float]:
     }
 
 
-class Lasting(NamedTuple):
-    """Of one sensor, as one scenario tells: what to add to its stamps, s, and which share of its errors'
-    variance lasts from scan to scan, for how long (s)."""
-
-    offset_s: float
-    share: float
-    time_s: float
+def errors_of(flight: Flight) -> dict[str, SensorTuning]:
+    """Of each sensor, as one scenario tells: its clock, and how its errors last from scan to scan."""
+    return {sensor: tune_sensor(flight, sensor) for sensor in MODES["cameras"]}
 
 
-def errors_of(flight: Flight) -> dict[str, Lasting]:
-    """Of each sensor."""
-    found = {sensor: tune_sensor(flight, sensor) for sensor in MODES["cameras"]}
-    return {
-        sensor: Lasting(one.offset_s, one.next_correlation, one.correlation_time_s)
-        for sensor, one in found.items()
-    }
-
-
-def draw(rng: np.random.Generator, errors: Mapping[str, Lasting]) -> Settings:
+def draw(rng: np.random.Generator, errors: Mapping[str, SensorTuning]) -> Settings:
     """Everything that the tracker is told, from ranges that are wide and mean something.
 
     Scales are drawn evenly over their logarithm, shares and distances evenly.
@@ -179,8 +156,8 @@ def draw(rng: np.random.Generator, errors: Mapping[str, Lasting]) -> Settings:
                 thinning_s=thinning.get(name),
                 many=part,
                 # Of bearings scans are thinned instead.
-                correlation=None if name in thinning else errors[name].share,
-                correlation_time_s=None if name in thinning else errors[name].time_s,
+                correlation=None if name in thinning else errors[name].next_correlation,
+                correlation_time_s=None if name in thinning else errors[name].correlation_time_s,
             )
             for name, part in parts.items()
         },
@@ -221,8 +198,8 @@ def anees_of(lives: Identities | None) -> float:
     return float(np.average(values, weights=[one.compared for one in on])) if on else np.nan
 
 
-def tune(flight: Flight, draws: int, seed: int) -> dict[str, list[Tuned]]:
-    """Draw settings, and order them for each mode by how the tracker does with them on one scenario.
+def tune(flight: Flight, draws: int, seed: int) -> dict[str, Tuned]:
+    """Draw settings, and choose those of each mode by how the tracker does with them on one scenario.
 
     Those go first with which errors are as large as the tracks say, and among them those with a small GOSPA:
     GOSPA alone prefers tracks that are too sure of themselves, which lose their boat elsewhere.
@@ -234,7 +211,7 @@ def tune(flight: Flight, draws: int, seed: int) -> dict[str, list[Tuned]]:
 
     Returns
     -------
-    By mode, the best first.
+    The best, by mode.
     """
     errors = errors_of(flight)
     found: dict[str, list[Tuned]] = {mode: [] for mode in MODES}
@@ -243,9 +220,9 @@ def tune(flight: Flight, draws: int, seed: int) -> dict[str, list[Tuned]]:
         for mode, tuned in found.items():
             lives = follow_mode(flight, mode, settings)
             tuned.append(Tuned(number, settings, gospa_of(lives), anees_of(lives)))
-    return {mode: sorted(tuned, key=order) for mode, tuned in found.items()}
+    return {mode: min(tuned, key=order) for mode, tuned in found.items()}
 
 
-def order(one: Ranked) -> tuple[bool, float, int]:
-    """What draws are sorted by: first those whose errors are as large as the tracks say, then by GOSPA."""
+def order(one: Tuned) -> tuple[bool, float, int]:
+    """What draws are chosen by: first those whose errors are as large as the tracks say, then by GOSPA."""
     return not SMALLEST <= one.anees <= LARGEST, one.gospa, one.number
