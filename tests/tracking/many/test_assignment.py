@@ -10,14 +10,9 @@ from hypothesis.extra.numpy import arrays
 
 from wildlab.errors import WildlabError
 from wildlab.tracking.association import (
-    FEATURES,
-    Assignment,
-    Limits,
-    associate,
     feature_distances,
     global_nearest,
     image_features,
-    veto,
 )
 
 entries = st.one_of(st.integers(-5, 30), st.sampled_from([np.nan, np.inf]))
@@ -118,22 +113,6 @@ def test_size_on_the_ground_does_not_depend_on_the_distance():
     assert np.isnan(image_features([0.0], [1.0], [0.0], 1.0)).tolist() == [[True, False, True]]
 
 
-def test_the_gate_is_one_of_distance_alone():
-    for distance, features, taken in ((1.0, 100.0, 0), (9.3, 0.0, -1), (np.nan, 0.0, -1)):
-        chosen = associate(np.array([[distance]]), np.array([[features]]), FEATURES, Limits(9.21))
-        assert chosen.track.tolist() == [taken]
-
-
-def test_a_veto_undoes_a_pair_on_both_sides_and_leaves_the_others():
-    made = Assignment(np.array([1, 0, -1]), np.array([1, 0]))
-    features = [[0.0, 5.0], [3.0, 0.0], [0.0, 0.0]]
-    assert [one.tolist() for one in veto(made, features, 4.0)] == [[-1, 0, -1], [1, -1]]
-    assert [one.tolist() for one in veto(made, features, 5.0)] == [[1, 0, -1], [1, 0]]
-    assert made.track.tolist() == [1, 0, -1]
-    unknown = [[0.0, np.nan], [0.0, 0.0], [0.0, 0.0]]
-    assert veto(made, unknown, 4.0).track.tolist() == [-1, 0, -1]
-
-
 @pytest.mark.parametrize(
     ("sd", "weights", "words"),
     [
@@ -148,8 +127,3 @@ def test_a_veto_undoes_a_pair_on_both_sides_and_leaves_the_others():
 def test_features_that_do_not_fit_are_refused(sd, weights, words):
     with pytest.raises(WildlabError, match=words):
         feature_distances([[1.0, 2.0]], [[1.0, 2.0]], sd, weights)
-
-
-def test_a_veto_with_features_of_other_measurements_is_refused():
-    with pytest.raises(WildlabError, match="do not go with"):
-        veto(Assignment(np.array([0]), np.array([0])), [[1.0, 2.0]], 4.0)

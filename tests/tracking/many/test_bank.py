@@ -6,24 +6,11 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import gate_threshold
-from wildlab.tracking.association import (
-    DISTANCE,
-    FEATURES,
-    RULES,
-    STATE,
-    VETO,
-    Appearance,
-    associate,
-    feature_distances,
-    global_nearest,
-    limits_of,
-)
-from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many.bank import Looks, Tuning, compare_looks, nobody, run_bank
+from wildlab.tracking.association import Appearance
+from wildlab.tracking.many.bank import Looks, Tuning, run_bank
 from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.sensors import positions
@@ -72,101 +59,23 @@ def test_two_in_one_image_do_not_go_to_one_track():
     assert np.isnan(bank.x[:3, 1]).all() and np.isfinite(bank.x[3, 1]).all()
 
 
-def test_each_rule_by_hand():
-    d = np.array([[2.0, 1.0], [1.0, 2.0]])
-    f = np.array([[0.0, 50.0], [50.0, 0.0]])
-
-    def by(rule: str, features: np.ndarray | None, count: int = 1) -> list[int]:
-        looks = Appearance(np.zeros((2, count)), np.ones(count), np.ones(count))
-        limits = limits_of(rule, TUNING.gate, TUNING.veto_probability, looks)
-        return associate(d, features, rule, limits).track.tolist()
-
-    assert by(DISTANCE, None) == by(DISTANCE, f) == [1, 0]
-    assert by(FEATURES, f) == [0, 1]
-    assert by(VETO, f) == [-1, -1]
-    assert by(VETO, 0.1 * f) == global_nearest(d, 9.21).track.tolist()
-    assert by(VETO, 0.22 * f) == [-1, -1], "11 is above 10.8, of one"
-    assert by(VETO, 0.22 * f, 2) == [1, 0], "and below 13.8, of two"
-
-
-def test_features_in_the_state_are_a_filter_of_the_whole_state(rng):
-    """Places and two features, one of them now and then not known, through one filter of six elements.
-
-    Its innovation squared lets in or keeps out what the bank does, which keeps the two parts apart; what it
-    keeps out moves neither the place nor the looks.
-    """
-    image = np.r_[0, np.arange(1, 119, 2)]  # with an image between any two, nothing else can start
-    z = np.column_stack([0.3 * image, 0.0 * image]) + rng.normal(0, 20, (60, 2))
-    sd, true = np.array([0.1, 8.0]), np.array([3.0, 50.0])
-    features = true + sd * rng.normal(0, 1.6, (60, 2))
-    features[5::7, 1] = np.nan
-    looks = Appearance(features, sd, np.array([1.0, 0.4]))
-    bank = run_bank(Looks(image, z, INTERVAL), TUNING, STATE, looks)
-    alone = run_bank(Looks(image[:2], z[:2], INTERVAL), TUNING)
-    x = np.r_[alone.x[1, 0], features[:2].mean(axis=0)]
-    P = np.zeros((6, 6))
-    P[:4, :4], P[4:, 4:] = alone.P[1, 0], np.diag(sd**2 / 2)
-    F, Q = np.eye(6), np.zeros((6, 6))
-    motion = partial(constant_velocity, sd_acceleration=TUNING.acceleration)
-    F[:4, :4], Q[:4, :4] = in_steps(2 * INTERVAL, motion, 1.001 * INTERVAL)
-    H = np.zeros((4, 6))
-    H[:2, :2] = H[2:, 4:] = np.eye(2)
-    noise = np.diag(np.r_[[TUNING.measurement**2] * 2, sd**2])
-    took, outside = [], 0
-    for k in range(2, len(image)):
-        x, P = predict(x, P, F, Q)
-        seen = np.r_[z[k], features[k]]
-        known = np.isfinite(seen)
-        G, R = H[known], noise[np.ix_(known, known)]
-        left, S = seen[known] - G @ x, G @ P @ G.T + R
-        inside = left @ np.linalg.solve(S, left) <= gate_threshold(0.99, int(known.sum()))
-        outside += left[:2] @ np.linalg.solve(S[:2, :2], left[:2]) <= TUNING.gate and not inside
-        took.append(inside)
-        if inside:
-            done = update(x, P, seen[known], G, R)
-            x, P = done.x, done.P
-        assert np.allclose(bank.x[k, 0], x[:4], atol=1e-8) and np.allclose(bank.P[k, 0], P[:4, :4], atol=1e-8)
-    assert (bank.track[2:] == 0).tolist() == took
-    assert 0 < outside < 20, "some that are near enough do not look like it"
+def test_what_looks_alike_goes_together_and_the_gate_is_of_the_distance_alone():
+    """Two tracks that keep the mean of two first looks each; then both detections lie between the two."""
+    image = np.array([1, 1, 2, 2, 3, 3])
+    z = np.array([[0, 0], [40, 0], [0, 0], [40, 0], [18, 0], [22, 0]], float)
+    looks = Appearance(np.array([[0.0], [10], [2], [12], [11], [1]]), np.ones(1), np.ones(1))
+    assert run_bank(Looks(image, z, INTERVAL), TUNING).track.tolist() == [0, 1, 0, 1, 0, 1]
+    assert run_bank(Looks(image, z, INTERVAL), TUNING, looks).track.tolist() == [0, 1, 0, 1, 1, 0]
+    far = z + np.array([[0.0, 0]] * 4 + [[0, 500]] * 2)
+    assert run_bank(Looks(image, far, INTERVAL), TUNING, looks).track[4:].tolist() == [-1, -1]
+    # What is kept is the mean, 1 and 11, as uncertain as half of a look.
+    alike = looks._replace(features=np.array([[0.0], [10], [2], [12], [6.06], [6]]))
+    assert run_bank(Looks(image, z, INTERVAL), TUNING, alike).track[4:].tolist() == [1, 0]
+    alike = alike._replace(weights=np.array([1.5**-0.5]))
+    assert run_bank(Looks(image, z, INTERVAL), TUNING, alike).track[4:].tolist() == [0, 1]
 
 
-def test_a_gate_lets_in_as_many_with_features_as_without(rng):
-    """Of chi-square numbers, however many features count or are known; and a large gate stays finite."""
-    weights = np.array([1.0, 0.0, 3.0])
-    looks = Appearance(np.zeros((1, 3)), np.ones(3), weights)
-    place = (rng.normal(size=(40000, 2)) ** 2).sum(axis=1)
-    for known in ([1, 1, 1], [1, 1, 0], [0, 1, 0]):
-        features = rng.normal(size=(40000, 3)) * np.where(np.array(known) > 0, 1.0, np.nan)
-        # A track with very many detections: what it knows of a feature is certain.
-        tracks = nobody(3)._replace(total=np.zeros((1, 3)), known=np.full((1, 3), 1e9))
-        limits = limits_of(STATE, TUNING.gate, 0.999, looks)
-        inside = place + compare_looks(features, tracks, looks, STATE, TUNING.gate)[:, 0] <= limits.gate
-        assert inside.mean() == pytest.approx(0.99, abs=0.002), known
-    assert limits_of(STATE, 76.0, 0.999, looks).gate == pytest.approx(chi2.isf(np.exp(-38.0), 4))
-    assert limits_of(STATE, np.inf, 0.999, looks).gate == np.inf
-    veto = limits_of(VETO, TUNING.gate, 0.99, looks)
-    squares = feature_distances(rng.normal(size=(40000, 3)), np.zeros((1, 3)), np.ones(3), looks.used)
-    assert (squares <= veto.alike).mean() == pytest.approx(0.99, abs=0.002)
-    none = Appearance(np.zeros((1, 1)), np.ones(1), np.zeros(1))
-    assert limits_of(VETO, TUNING.gate, 0.99, none).alike == np.inf
-
-
-def test_weights_are_of_features_that_are_weighed_in_alone():
-    tracks = nobody(1)._replace(stored=np.zeros((1, 1)), total=np.zeros((1, 1)), known=np.full((1, 1), 2.0))
-    looks = Appearance(np.zeros((1, 1)), np.ones(1), np.array([9.0]))
-    seen = {rule: compare_looks(np.array([[3.0]]), tracks, looks, rule, 9.21) for rule in RULES[1:]}
-    assert np.allclose([seen[rule] for rule in (FEATURES, VETO, STATE)], [[[54.0]], [[6.0]], [[6.0]]])
-
-
-@pytest.mark.parametrize(
-    ("looks", "rule", "words"),
-    [
-        (Looks(np.array([1, 0]), np.zeros((2, 2)), INTERVAL), DISTANCE, "not in the order"),
-        (Looks(np.array([0, 1]), np.full((2, 2), np.nan), INTERVAL), DISTANCE, "not in the order"),
-        (Looks(np.array([0, 1]), np.zeros((2, 2)), INTERVAL), "nearest", "no rule 'nearest'"),
-        (Looks(np.array([0, 1]), np.zeros((2, 2)), INTERVAL), VETO, "needs what detections look like"),
-    ],
-)
-def test_what_is_refused(looks, rule, words):
-    with pytest.raises(WildlabError, match=words):
-        run_bank(looks, TUNING, rule)
+@pytest.mark.parametrize("z", [np.zeros((2, 2)), np.full((2, 2), np.nan)])
+def test_what_is_refused(z):
+    with pytest.raises(WildlabError, match="not in the order"):
+        run_bank(Looks(np.array([1, 0] if np.isfinite(z).all() else [0, 1]), z, INTERVAL), TUNING)

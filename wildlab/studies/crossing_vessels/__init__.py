@@ -12,10 +12,9 @@ from matplotlib.figure import Figure
 from wildlab.analysis.rendered import Photographer
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish, new_strips
-from wildlab.reporting.charts.forms import Values, draw_lines, draw_picture, spread_points
-from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
-from wildlab.reporting.published import bounds_of
+from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
+from wildlab.reporting.charts.forms import draw_picture, spread_points
+from wildlab.reporting.figures import BLUE, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.studies.crossing_vessels import trial
 from wildlab.studies.crossing_vessels.trial import (
     APART_M,
@@ -24,11 +23,9 @@ from wildlab.studies.crossing_vessels.trial import (
     FEATURES,
     LOOKS,
     NAMES,
-    SEPARATIONS,
     SUBJECTS,
     TUNING,
     Flown,
-    curve_subject,
     looks_of,
 )
 from wildlab.studies.page import Facts
@@ -72,7 +69,7 @@ def check_claims(runs: pd.DataFrame) -> dict[str, Check]:
 
 def rules_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
     """One row for each rule: the flights swapped (%), and medians over flights."""
-    medians = ("wrong", "unassigned", "tracks", "swaps", "breaks", "mae", "gospa", "anees")
+    medians = ("wrong", "mae")
     return pd.DataFrame(
         [
             {"rule": names[rule], "swapped": 100 * float(runs[rule, "swapped"].mean())}
@@ -119,25 +116,6 @@ def plot_features(looks: list[Array]) -> Figure:
         value = apart["looks", f"separation_{name}"]
         ax.set_title(f"{value:.0f} apart" if value >= 10 else f"{value:.1f} apart")
     return fig
-
-
-def plot_separation(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
-    """Wrong associations and swaps over the separation of a made-up feature."""
-    fig, (top, low) = new_strips(2, 4.6)
-    wrong = [runs[curve_subject(one), "wrong"] for one in SEPARATIONS]
-    ends = np.transpose([bounds_of(one) for one in wrong])
-    known = ends if np.isfinite(ends).all() else None
-    draw_lines(top, SEPARATIONS, {"": Values([one.median() for one in wrong], known)})
-    share = [100 * runs[curve_subject(one), "swapped"].mean() for one in SEPARATIONS]
-    draw_lines(low, SEPARATIONS, {"one made-up feature": Values(share)})
-    for rule, color in ((DISTANCE, GREY), (FEATURES, VERMILLION)):
-        top.axhline(runs[rule, "wrong"].median(), color=color, lw=1.3, ls="--")
-        low.axhline(100 * runs[rule, "swapped"].mean(), color=color, lw=1.3, ls="--", label=names[rule])
-    top.set_yscale("symlog", linthresh=1)
-    # None wrong lies a little above the axis, where its line is seen.
-    top.set_ylim(-0.4, None)
-    low.set(ylabel="swapped (%)", ylim=(-3, 103), xticks=SEPARATIONS)
-    return finish(fig, "", "difference of the two (spreads of the feature)", "wrong")
 
 
 def plot_frame(flown: Flown, twin: str, seed: int) -> Figure:

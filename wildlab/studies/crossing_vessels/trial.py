@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from wildlab.analysis.georeference import observe
 from wildlab.analysis.rendered import Photographer, exposures_of
 from wildlab.analysis.tracks.sighting import truth_states
-from wildlab.evaluation.identities import Identities, Moment, compare_identities
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import gate_threshold
@@ -18,7 +17,6 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking import association as rules
 from wildlab.tracking.association import Appearance, image_features
 from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
 
@@ -36,8 +34,6 @@ TUNING = Tuning(
 #: Apart again are vessels twice the measurement noise from each other; how a crossing went is seen in the two
 #: minutes from then on, several laps, and how it ended in the last two. Chosen.
 APART_M, WINDOW_S = 2 * TUNING.measurement, 120.0
-#: Tracks are held against the vessels at every so many images with a detection: neighbours tell the same.
-EVERY = 5
 
 
 class Crossing(NamedTuple):
@@ -96,10 +92,9 @@ def apart_times(crossing: Crossing) -> tuple[float, float]:
     )
 
 
-#: By distance alone; with features weighed in; with features as a veto; with features in the state.
-DISTANCE, FEATURES, VETO, STATE = "without-features", "with-features", "veto", "features-in-state"
-RULES = {DISTANCE: rules.DISTANCE, FEATURES: rules.FEATURES, VETO: rules.VETO, STATE: rules.STATE}
-SUBJECTS = tuple(RULES)
+#: By distance alone, and with features weighed in.
+DISTANCE, FEATURES = "without-features", "with-features"
+SUBJECTS = (DISTANCE, FEATURES)
 #: What the rendered images show.
 LOOKS = "looks"
 #: H figure 6.21, in its order.
@@ -107,17 +102,15 @@ NAMES = ("size", "intensity", "hu")
 #: Spreads of a detection's features that association is told, in the units of `image_features`, and their
 #: weights. Chosen, once for all flights: about what rendered images of six other flights of the twin had.
 TOLD_SD, WEIGHTS = np.array([0.1, 8.0, 0.05]), np.ones(3)
-#: By how many of its spreads a made-up feature of the two differs, on average; zero tells nothing.
-SEPARATIONS = (0, 1, 2, 3, 4, 6)
 #: H 6.4.4: positions are mostly within this of the true ones.
 NEAR_M = 20.0
 #: Around a vessel, px: as wide as the longest is in the image, so that the sea about it is rendered too.
 MARGIN = 40
 #: Names of the numbers that are recorded, and their units.
 UNITS = {
-    **{f"wrong_rate_boat_{n}": "1" for n in (1, 2)}, "wrong": "1", "unassigned": "1", "tracks": "1",
-    "swapped": "1", "swapped_at_end": "1", "swaps": "1", "breaks": "1",
-    "near_share": "1", "any_near_share": "1", "mae": "m", "gospa": "m", "anees": "1", "closest": "m",
+    **{f"wrong_rate_boat_{n}": "1" for n in (1, 2)}, "wrong": "1",
+    "swapped": "1", "swapped_at_end": "1", "near_share": "1", "any_near_share": "1",
+    "mae": "m", "closest": "m",
     **{f"separation_{name}": "1" for name in NAMES},
 }  # fmt: skip
 
@@ -156,12 +149,6 @@ def dressed(crossing: Crossing, looks: list[Array], seed: int) -> Appearance:
     return Appearance(features, TOLD_SD, WEIGHTS)
 
 
-def made_up(crossing: Crossing, separation: float, seed: int) -> Appearance:
-    """One normal feature, by so many of its spreads different between the two; the same noise for all."""
-    noise = stream(seed, "made-up feature").normal(size=len(crossing.boat))
-    return Appearance((noise + separation * crossing.boat)[:, None], np.ones(1), np.ones(1))
-
-
 def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
     """(D,) which detections went to a track that the other vessel's detection started."""
     owner = np.append(crossing.boat[bank.started], -1)[bank.track]  # track -1: of none
@@ -186,44 +173,17 @@ def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
     return both(from_s), both(float(crossing.times[-1] - WINDOW_S))
 
 
-def identities_of(crossing: Crossing, bank: Bank) -> Identities:
-    """Tracks against vessels at every `EVERY`-th image; visible is who was detected in it."""
-    count = len(bank.images)
-    shown = np.zeros((count, 2), bool)
-    shown[np.searchsorted(bank.images, crossing.looks.image), crossing.boat] = True
-    ignored = np.zeros(2, bool)
-    scans = []
-    for row in range(0, count, EVERY):
-        known = np.isfinite(crossing.truth[:, row]).all(axis=1)
-        there = np.flatnonzero(np.isfinite(bank.x[row, :, 0]))
-        scans.append(
-            Moment(
-                float(crossing.times[row]), bank.x[row, there, :2], bank.P[row, there, :2, :2],
-                there.tolist(), crossing.truth[known, row], [BOATS[k] for k in np.flatnonzero(known)],
-                shown[row, known], ignored[known],
-            )
-        )  # fmt: skip
-    return compare_identities(scans, APART_M)
-
-
 def numbers_of(crossing: Crossing, banks: dict[str, Bank]) -> Numbers:
     """What `UNITS` names of the tracks by each rule."""
     numbers: Numbers = {}
     for subject, bank in banks.items():
-        wrong, told = wrong_of(crossing, bank), identities_of(crossing, bank)
+        wrong = wrong_of(crossing, bank)
         own, any_one = distances_of(crossing, bank)
         after, end = swapped(crossing, bank)
-        anees = [track.anees for track in told.tracks.values() if np.isfinite(track.anees)]
         numbers |= {
             (subject, "wrong"): wrong.sum(),
-            (subject, "unassigned"): (bank.track < 0).sum(),
-            (subject, "tracks"): len(bank.started),
             (subject, "swapped"): after,
             (subject, "swapped_at_end"): end,
-            (subject, "swaps"): told.swaps,
-            (subject, "breaks"): told.breaks,
-            (subject, "gospa"): float(np.mean([one.distance for one in told.gospa])),
-            (subject, "anees"): np.median(anees) if anees else np.nan,
             (subject, "mae"): float(np.nanmean(own)),
             # Of the vessel with less.
             (subject, "near_share"): np.min(_share_near(own)),
@@ -269,22 +229,6 @@ def looks_of(looks: list[Array]) -> Numbers:
     return numbers
 
 
-def curve_subject(separation: float) -> str:
-    """What tracks with the made-up feature are called."""
-    return f"separation-{separation:g}"
-
-
-def curve_of(crossing: Crossing, seed: int) -> Numbers:
-    """Mistakes and swaps with the made-up feature, over its separation."""
-    numbers: Numbers = {}
-    for separation in SEPARATIONS:
-        bank = follow_by(crossing, FEATURES, made_up(crossing, separation, seed))
-        subject = curve_subject(separation)
-        numbers[subject, "wrong"] = wrong_of(crossing, bank).sum()
-        numbers[subject, "swapped"] = swapped(crossing, bank)[0]
-    return numbers
-
-
 class Flown(NamedTuple):
     """A flight, what its camera saw of the two, how they looked, and their tracks by each rule."""
 
@@ -298,20 +242,19 @@ def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flow
     flight = flight or simulate_twin(twin, seed, ("imu", "gnss"))
     crossing, looks = gather(flight), photograph(twin, seed, flight, images)
     appearance = dressed(crossing, looks, seed)
-    return Flown(crossing, looks, {rule: follow_by(crossing, rule, appearance) for rule in SUBJECTS})
+    return Flown(crossing, looks, {DISTANCE: track(crossing), FEATURES: track(crossing, appearance)})
 
 
-def follow_by(crossing: Crossing, subject: str, appearance: Appearance | None = None) -> Bank:
-    """All detections, tracked with the printed tuning by one of `RULES`."""
-    return run_bank(crossing.looks, TUNING, RULES[subject], appearance)
+def track(crossing: Crossing, appearance: Appearance | None = None) -> Bank:
+    """All detections, tracked with the published tuning; by distance alone without an appearance."""
+    return run_bank(crossing.looks, TUNING, appearance)
 
 
-def all_numbers(flown: Flown, seed: int) -> Numbers:
+def all_numbers(flown: Flown) -> Numbers:
     """What the trial gives of a flight that was flown."""
     return {
         **numbers_of(flown.crossing, flown.banks),
         **looks_of(flown.looks),
-        **curve_of(flown.crossing, seed),
         (LOOKS, "closest"): np.nanmin(flown.crossing.apart),
     }
 
@@ -324,4 +267,4 @@ def trial(seed: int, *, twin: str, images: int) -> Numbers:
     WildlabError
         If there is no such twin.
     """
-    return all_numbers(fly(seed, twin, images), seed)
+    return all_numbers(fly(seed, twin, images))

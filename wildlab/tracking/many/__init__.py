@@ -5,8 +5,8 @@ A matrix of distances has a row for each measurement and a column for each track
 - `run_many`: all targets of all sensors, by joint probabilities with existence, visibility and hulls (H 8.2).
 - `smooth_many`: back over all tracks once the flight is over.
 - `association_probabilities`, `belief_propagation`: which measurement is probably whose.
-- `global_nearest`: firm association. `feature_distances`, `veto`: by what targets look like.
-- `run_bank`: a bank of filters on positions, with any of these.
+- `global_nearest`: firm association. `feature_distances`: by what targets look like.
+- `run_bank`: a bank of filters on positions, with these.
 """
 
 from wildlab.tracking.association import (
@@ -17,7 +17,6 @@ from wildlab.tracking.association import (
     feature_distances,
     global_nearest,
     image_features,
-    veto,
 )
 from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
 from wildlab.tracking.many.run import Shown, follow_many, run_many, smooth_many
@@ -52,5 +51,4 @@ __all__ = [
     "run_bank",
     "run_many",
     "smooth_many",
-    "veto",
 ]

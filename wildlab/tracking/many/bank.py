@@ -15,20 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import (
-    DISTANCE,
-    FEATURES,
-    RULES,
-    STATE,
     Appearance,
     Assignment,
-    associate,
-    estimated_distances,
     feature_distances,
-    gate_with_more,
     global_nearest,
-    has_room,
     innovation_squared,
-    limits_of,
 )
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.motion import constant_velocity, in_steps
@@ -46,21 +37,16 @@ class Known(NamedTuple):
         (T, 4) and (T, 4, 4) state.
     stored
         (T, f) means of the features of the two first detections.
-    total, known
-        (T, f) sums of the features of all detections, and of how many each is known.
     """
 
     x: Array
     P: Array
     stored: Array
-    total: Array
-    known: Array
 
 
 def nobody(f: int) -> Known:
     """No track, with so many features."""
-    looks = np.empty((0, f))
-    return Known(np.empty((0, 4)), np.empty((0, 4, 4)), looks, looks, looks)
+    return Known(np.empty((0, 4)), np.empty((0, 4, 4)), np.empty((0, f)))
 
 
 def pair_scans(
@@ -111,22 +97,6 @@ def pair_scans(
     return global_nearest(np.where(beyond**2 * distance <= gate, distance, np.inf), np.inf)
 
 
-def compare_looks(rows: Array, tracks: Known, appearance: Appearance, rule: str, gate: float) -> Array:
-    """(N, M) how far detections with features (N, f) are from what the tracks look like.
-
-    By `STATE` features that are not known of both take the gate on places, ``gate``, as far: of any pair it
-    lets in as many as of one whose features are all known.
-    """
-    if rule == STATE:
-        used = appearance.used
-        known = (np.isfinite(rows) * used) @ (tracks.known > 0).T
-        wider = gate_with_more(gate, np.array([used.sum()])) - gate_with_more(gate, known)
-        return wider + estimated_distances(rows, tracks.total, tracks.known, appearance.sd, used)
-    # What is stored is the mean of two, and as uncertain as half of a detection.
-    weights = appearance.weights if rule == FEATURES else appearance.used
-    return feature_distances(rows, tracks.stored, np.sqrt(1.5) * appearance.sd, weights)
-
-
 class Tuning(NamedTuple):
     """What the tracking system is told; standard deviations are per axis.
 
@@ -142,8 +112,6 @@ class Tuning(NamedTuple):
         On the normalised innovation squared, H (3.9).
     max_speed
         m/s: of a target from the first detection of a track to its second.
-    veto_probability
-        Of a target's own looks, how many a veto lets through.
     """
 
     measurement: float
@@ -151,7 +119,6 @@ class Tuning(NamedTuple):
     velocity_0: float
     gate: float
     max_speed: float
-    veto_probability: float = 0.999
 
 
 class Looks(NamedTuple):
@@ -194,9 +161,7 @@ class Bank(NamedTuple):
     P: Array
 
 
-def run_bank(
-    looks: Looks, tuning: Tuning, rule: str = DISTANCE, appearance: Appearance | None = None
-) -> Bank:
+def run_bank(looks: Looks, tuning: Tuning, appearance: Appearance | None = None) -> Bank:
     """Track everything that was detected.
 
     Parameters
@@ -205,10 +170,8 @@ def run_bank(
         What was detected.
     tuning
         Of the system.
-    rule
-        What association goes by: one of `RULES`.
     appearance
-        What the detections look like; not needed where distance alone counts.
+        What the detections look like, to be weighed in; by distance alone where it is left out.
 
     Returns
     -------
@@ -218,9 +181,14 @@ def run_bank(
     Raises
     ------
     WildlabError
-        If there is no such rule, or detections do not fit together.
+        If detections do not fit together.
     """
-    _check(looks, rule, appearance)
+    if not np.isfinite(looks.positions).all() or (np.diff(looks.image) < 0).any():
+        raise WildlabError(
+            "detections are not in the order of their images, or one has no position",
+            "sort them by image, and leave out those without a position",
+            field="looks",
+        )
 
     @cache
     def motion(images: int) -> tuple[Array, Array]:
@@ -228,13 +196,10 @@ def run_bank(
         held = partial(constant_velocity, sd_acceleration=tuning.acceleration)
         return in_steps(images * looks.interval, held, 1.001 * looks.interval)
 
-    if rule == DISTANCE:
-        appearance = None
     R = tuning.measurement**2 * np.eye(2)
     track = np.full(len(looks.image), -1)
     features = np.empty((len(track), 0)) if appearance is None else appearance.features
     tracks = nobody(features.shape[1])
-    limits = limits_of(rule, tuning.gate, tuning.veto_probability, appearance)
     images, firsts = np.unique(looks.image, return_index=True)
     started, states = list[int](), list[Known]()
     waiting, before = np.empty(0, int), 0
@@ -245,22 +210,20 @@ def run_bank(
             x, P = predict(tracks.x, tracks.P, *motion(image - before))
             gap = z[:, None] - x[:, :2]
             distances = innovation_squared(gap, np.broadcast_to(P[:, :2, :2] + R, (*gap.shape, 2)))
-            seen = None
-            if appearance is not None:
-                seen = compare_looks(features[rows], tracks, appearance, rule, tuning.gate)
-                if rule == STATE:
-                    distances = distances + seen
-            chosen = associate(distances, seen, rule, limits)
+            if appearance is None:
+                chosen = global_nearest(distances, tuning.gate)
+            else:
+                # What is stored is the mean of two, and as uncertain as half of a detection.
+                sd = np.sqrt(1.5) * appearance.sd
+                seen = feature_distances(features[rows], tracks.stored, sd, appearance.weights)
+                # The gate is one of the distance alone (H 6.4.4).
+                chosen = global_nearest(np.where(distances <= tuning.gate, distances + seen, np.inf), np.inf)
             one = np.flatnonzero(chosen.track >= 0)
             to = chosen.track[one]
             done = update(x[to], P[to], z[one], _H, R)
             x[to], P[to], track[rows[one]] = done.x, done.P, to
-            total, known = tracks.total.copy(), tracks.known.copy()
-            total[to] += np.nan_to_num(features[rows[one]], nan=0.0)
-            known[to] += np.isfinite(features[rows[one]])
-            tracks = Known(x, P, tracks.stored, total, known)
-            # In the gate of a track that took nothing it is nothing new (H 3.3); only a veto leaves such.
-            free = (chosen.track < 0) & ~has_room(distances, chosen, limits.gate)
+            tracks = Known(x, P, tracks.stored)
+            free = chosen.track < 0
         new = rows[free]
         if len(waiting) and image - before == 1 and len(new):
             pairs = pair_scans(
@@ -291,21 +254,5 @@ def _start(z: Array, features: Array, tuning: Tuning, step: tuple[Array, Array])
     P = np.diag([tuning.measurement**2] * 2 + [tuning.velocity_0**2] * 2)
     x, P = predict(x, P, *step)
     done = update(x, P, z[1], _H, tuning.measurement**2 * np.eye(2))
-    known = np.isfinite(features).sum(axis=0).astype(float)
-    parts = done.x, done.P, features.mean(axis=0), np.nansum(features, axis=0), known
+    parts = done.x, done.P, features.mean(axis=0)
     return Known._make(part[None] for part in parts)
-
-
-def _check(looks: Looks, rule: str, appearance: Appearance | None) -> None:
-    if rule not in RULES:
-        raise WildlabError(f"there is no rule {rule!r}", f"use one of: {', '.join(RULES)}", field="rule")
-    if rule != DISTANCE and appearance is None:
-        raise WildlabError(
-            f"the rule {rule!r} needs what detections look like", "give an appearance", field="appearance"
-        )
-    if not np.isfinite(looks.positions).all() or (np.diff(looks.image) < 0).any():
-        raise WildlabError(
-            "detections are not in the order of their images, or one has no position",
-            "sort them by image, and leave out those without a position",
-            field="looks",
-        )
