@@ -14,7 +14,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
-from wildlab.simulation.scene import CameraResponse, Scene, Sea, boat, expose, render, sensor_of, vessel
+from wildlab.simulation.scene import CameraResponse, Scene, Sea, expose, render, sensor_of, vessel
 
 #: Images a second that are wanted of the search, and scenes a second of the rendering.
 SEARCHED, RENDERED = 250.0, 4.0
@@ -33,7 +33,7 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
 
 def _rows() -> list[tuple[str, float, float, str]]:
     poses = CameraPoses(CAMERA, Mount("down"), np.array([0.0, 0.0, -300.0]), euler_to_matrix(0.05, 0.3, 0.4))
-    bodies = (vessel(26.0, 6.0, 8.0, speed=3.0).at(90.0, 20.0, 0.8), boat().at(130.0, 10.0, 2.0))
+    bodies = (vessel(26.0, 6.0, 8.0, speed=3.0).at(90.0, 20.0, 0.8), vessel(5.0, 2.0).at(130.0, 10.0, 2.0))
     scene = Scene(Sea(sun_elevation=0.8), bodies)
     view = render(scene, CAMERA, poses.p_nc, poses.R_nc)
     response, rng = CameraResponse(), np.random.default_rng(1)

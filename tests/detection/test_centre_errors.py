@@ -13,10 +13,13 @@ from wildlab.detection.centres import (
 )
 from wildlab.detection.floating import find_objects
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import inside_ellipse
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.mount import Mount
 from wildlab.simulation.camera_detections import moments
-from wildlab.simulation.scene import CameraResponse, expose, render, sensor_of
-from wildlab.simulation.scene.drawn import Draw, draw_scene
+from wildlab.simulation.scene import CameraResponse, Scene, Sea, expose, render, sensor_of, vessel
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 #: Of all such scenes, whose share of these 90 % ellipses is known with an interval of 99 %.
@@ -67,14 +70,39 @@ def test_which_sides_of_an_image_wider_than_high_cut(box, sides):
     assert " ".join(names[cut_sides(np.array(box, float), (60, 100))]) == sides
 
 
-def seen_and_found(seeds, draw):
+def draw_scene(rng, lengths=(5.0, 40.0), excess=(2.0, 10.0), heights=(80.0, 400.0), inside=40.0):
+    """A scene with one vessel, ``inside`` the border by so many px, and the pose that it is seen from."""
+    height = float(np.exp(rng.uniform(*np.log(heights))))
+    roll, pitch = rng.uniform(-np.radians(30.0), np.radians(30.0), 2)
+    R_nb = euler_to_matrix(roll, pitch, rng.uniform(-np.pi, np.pi))
+    poses = CameraPoses(CAMERA, Mount("down"), np.array([0.0, 0.0, -height]), R_nb)
+    pixel = rng.uniform(inside - 0.5, np.array([640, 512]) - inside - 0.5)
+    north, east, _ = georeference_pixels(poses, pixel[None], 0.0)[0]
+    length = float(np.exp(rng.uniform(*np.log(lengths))))
+    beam, warmer, speed = length / rng.uniform(2.5, 5.0), rng.uniform(*excess), rng.uniform(0.0, 6.0)
+    engine, seed = rng.uniform(0.0, 25.0), int(rng.integers(2**31))
+    body = vessel(length, beam, warmer, speed=speed, engine=engine, seed=seed)
+    body = body.at(north, east, rng.uniform(-np.pi, np.pi), speed)
+    sun = float(rng.uniform(np.radians(10.0), np.radians(60.0))) if rng.random() < 0.5 else None
+    wind, wind_from, azimuth = rng.uniform(1.0, 8.0), *rng.uniform(-np.pi, np.pi, 2)
+    sea = Sea(
+        wind_speed=wind,
+        wind_from=wind_from,
+        sun_azimuth=azimuth,
+        sun_elevation=sun,
+        seed=int(rng.integers(2**31)),
+    )
+    return Scene(sea, (body,)), poses
+
+
+def seen_and_found(seeds, **drawn):
     """(seen, detections, row) of the vessel of each scene that was found."""
     response = CameraResponse()
     sensor = sensor_of(response, (512, 640), np.random.default_rng(9))
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        drawn = draw_scene(rng, CAMERA, draw)
-        view = render(drawn.scene, CAMERA, drawn.poses.p_nc, drawn.poses.R_nc)
+        scene, poses = draw_scene(rng, **drawn)
+        view = render(scene, CAMERA, poses.p_nc, poses.R_nc)
         if not view.seen:
             continue
         found = find_objects(expose(view.kelvin, response, sensor, rng))
@@ -92,7 +120,7 @@ def is_honest(misses, covariances, most=HONEST[1]):
 @pytest.mark.slow
 def test_ellipses_in_the_image_hold_nine_in_ten_true_centres():
     image = ([], [])
-    for seen, detections, row in seen_and_found(range(50000, 50060), Draw()):
+    for seen, detections, row in seen_and_found(range(50000, 50060)):
         if cut_sides(detections.box[row], (512, 640)).any():
             continue
         image[0].append(detections.uv[row] - seen.centre)
@@ -103,9 +131,9 @@ def test_ellipses_in_the_image_hold_nine_in_ten_true_centres():
 
 @pytest.mark.slow
 def test_ellipses_of_what_the_border_cuts_hold_nine_in_ten_moved_or_not():
-    draw = Draw(excess=(4.0, 10.0), length=(10.0, 70.0), inside=-30.0, height=(80.0, 250.0))
+    drawn = {"excess": (4.0, 10.0), "lengths": (10.0, 70.0), "inside": -30.0, "heights": (80.0, 250.0)}
     still, moved, distances = ([], []), ([], []), []
-    for seen, detections, row in seen_and_found(range(52000, 52080), draw):
+    for seen, detections, row in seen_and_found(range(52000, 52080), **drawn):
         if seen.whole or not cut_sides(detections.box[row], (512, 640)).any():
             continue
         still[0].append(detections.uv[row] - seen.centre)

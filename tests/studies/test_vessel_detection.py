@@ -16,7 +16,7 @@ from wildlab.reporting.report import open_report
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene import EVEN, IDEAL, Scene, expose, rectangle, render, sensor_of
 from wildlab.simulation.scene.flights import SceneFlight
-from wildlab.studies import monte_carlo, vessel_detection
+from wildlab.studies import monte_carlo
 from wildlab.studies.vessel_detection import STUDY
 from wildlab.studies.vessel_detection.trial import (
     BOATS,
@@ -193,20 +193,6 @@ def test_such_an_image_is_chosen_as_one_with_something_whole():
 
     chosen = choose(Two(), 4, np.random.default_rng(1))
     assert (set(chosen["whole"]), chosen["cut"]) == ({0, 1}, [2])
-
-
-def test_small_windows_see_what_the_camera_sees():
-    camera = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
-    assert vessel_detection.small_camera(camera, 5.0, 300.0).width == 96
-    near = vessel_detection.small_camera(camera, 5.0, 25.0)
-    assert near.width == 512 and near.fx == camera.fx
-
-
-def test_warmer_and_larger_things_are_found_more_often():
-    camera = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
-    contrast = vessel_detection.over_contrast(camera, 2, 7).set_index(["length_m", "excess_k"])["found"]
-    assert contrast[10.0, 1.0] == 0
-    assert contrast[20.0, 8.0] == 1
 
 
 @pytest.mark.slow

@@ -10,10 +10,10 @@ from wildlab.simulation.scene import (
     CameraResponse,
     expose,
     sensor_of,
-    to_kelvin,
 )
 from wildlab.simulation.scene.bodies import fitted_out, vessel
 from wildlab.simulation.scene.flights import SceneFlight, VesselLook
+from wildlab.simulation.scene.response import to_counts
 
 SHAPE = (120, 160)
 
@@ -25,7 +25,11 @@ def even(level=290.15):
 def seen(response, image, seed=1):
     """What an image is taken for by one sensor."""
     sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
-    return to_kelvin(expose(image, response, sensor, np.random.default_rng(seed)), response).astype(float)
+    return kelvin_of(expose(image, response, sensor, np.random.default_rng(seed)), response)
+
+
+def kelvin_of(counts, response):
+    return 273.15 + (counts.astype(float) - to_counts(273.15, response)) / response.counts_per_kelvin
 
 
 def test_an_ideal_camera_only_counts():
@@ -34,7 +38,7 @@ def test_an_ideal_camera_only_counts():
     image[40:60, 50:70] = 300.15
     counts = expose(image, IDEAL, sensor, np.random.default_rng(2))
     assert counts[50, 60] - counts[0, 0] == 250
-    assert np.abs(to_kelvin(counts, IDEAL) - image).max() <= 0.02 + 1e-4
+    assert np.abs(kelvin_of(counts, IDEAL) - image).max() <= 0.02 + 1e-4
     assert counts.max() < 2**14
 
 

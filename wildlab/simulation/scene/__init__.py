@@ -1,8 +1,8 @@
 """Scenes: what a thermal camera would see of sea and land and of what is on them, with exact labels.
 
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then judged
-against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and whales, and
-what stands on land; `sea` the water, `render` makes kelvin and labels, `response` the image of a camera with
+against labels that are known and not marked by anybody. `bodies` has vessels and what stands
+on land; `sea` the water, `render` makes kelvin and labels, `response` the image of a camera with
 its faults. `ground` has covers under the sun of a day, and `land` lays them over a terrain and renders them.
 `coloured` is even ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it
 knows of a detector.
@@ -13,18 +13,12 @@ of the body in the water, and no weather between.
 
 from wildlab.simulation.scene.bodies import (
     ANIMALS,
-    KINDS,
     Body,
     Hot,
     Kind,
     Layer,
     Wake,
     animal,
-    boat,
-    buoy,
-    group,
-    mammal,
-    person,
     rectangle,
     scatter,
     slab,
@@ -51,7 +45,6 @@ from wildlab.simulation.scene.response import (
     Sensor,
     expose,
     sensor_of,
-    to_kelvin,
 )
 from wildlab.simulation.scene.sea import EVEN, Sea
 
@@ -61,7 +54,6 @@ __all__ = [
     "EVEN_LAND",
     "GRASS",
     "IDEAL",
-    "KINDS",
     "ROCK",
     "SAND",
     "Body",
@@ -84,16 +76,11 @@ __all__ = [
     "Wake",
     "Weather",
     "animal",
-    "boat",
-    "buoy",
     "expose",
     "ground_points",
-    "group",
     "height_at",
     "land_on",
-    "mammal",
     "outline_of",
-    "person",
     "rectangle",
     "render",
     "render_colour",
@@ -103,7 +90,6 @@ __all__ = [
     "sensor_of",
     "slab",
     "stone",
-    "to_kelvin",
     "tree",
     "vessel",
 ]

@@ -1,4 +1,4 @@
-"""What floats: bodies made of even-sided layers above the sea, with temperatures; vessels, people, animals.
+"""Bodies of even-sided layers with temperatures: vessels at sea; animals, stones and trees on land.
 
 A body has its own axes, x ahead and y to the right, about its centre on the water. A layer is a convex
 outline at a height; the sides below it are not drawn, so tall bodies have several. Each layer is
@@ -220,35 +220,6 @@ def scatter(
             kept.append(at)
             put.append(waiting.pop(0).at(float(at[0]), float(at[1]), float(rng.uniform(-np.pi, np.pi))))
     return tuple(put)
-
-
-def group(
-    rng: np.random.Generator, kinds: Sequence[str], middle: Array, spread: float, weather: Weather
-) -> tuple[Body, ...]:
-    """Animals about one place.
-
-    Parameters
-    ----------
-    rng
-        Of places, courses and skins.
-    kinds
-        Names of `ANIMALS`, one for each.
-    middle
-        (2,) north and east, m.
-    spread
-        Standard deviation of their places, m.
-    weather
-        For the temperature of their skins.
-
-    Returns
-    -------
-    tuple of Body
-        Their centres are a longest trunk apart at least.
-    """
-    bodies = [animal(kind, weather, int(rng.integers(2**31))) for kind in kinds]
-    apart = 1.2 * max((ANIMALS[kind].length for kind in kinds), default=0.0)
-    places = np.asarray(middle)[:2] + rng.normal(0, spread, (100 * max(len(bodies), 1), 2))
-    return scatter(rng, bodies, places, apart)
 
 
 @dataclass(frozen=True)
@@ -488,42 +459,3 @@ def fitted_out(body: Body, count: int, excess: float, rng: np.random.Generator) 
     width = float(high[0] - low[0]) / 100
     hot = tuple(Hot(float(x), float(y), width, float(k)) for (x, y), k in zip(places, warmer, strict=True))
     return replace(body, layers=(*body.layers[:-2], replace(deck, hot=(*deck.hot, *hot)), body.layers[-1]))
-
-
-def boat(seed: int = 0) -> Body:
-    """An open boat of five metres with an outboard engine."""
-    outline = hull(5.0, 2.0)
-    return Body(
-        "boat",
-        (
-            Layer(outline, 0.0, 4.0, 0.6, 1.0),
-            Layer(outline, 0.5, 6.0, 1.0, 0.8, (Hot(-2.2, 0.0, 0.4, 20.0),)),
-        ),
-        texture_seed=seed,
-    )
-
-
-def person(seed: int = 0) -> Body:
-    """Somebody in the water: head and shoulders above it."""
-    shoulders = oval(0.35, 0.5)
-    return Body(
-        "person", (Layer(shoulders, 0.05, 6.0), Layer(oval(0.24, 0.24), 0.3, 12.0)), texture_seed=seed
-    )
-
-
-def buoy(seed: int = 0) -> Body:
-    """A buoy of a metre and a half, warmed by the sun."""
-    return Body(
-        "buoy",
-        (Layer(oval(1.5, 1.5), 0.0, 5.0, 0.3, 0.5), Layer(oval(1.2, 1.2), 0.8, 7.0, 0.3, 0.5)),
-        texture_seed=seed,
-    )
-
-
-def mammal(seed: int = 0) -> Body:
-    """The wet back of a whale at the surface: large, and hardly warmer than the sea."""
-    return Body("mammal", (Layer(oval(5.76, 1.8), 0.15, 1.6, 0.3, 0.8),), texture_seed=seed)
-
-
-#: Small things by name.
-KINDS = {"person": person, "buoy": buoy, "boat": boat, "mammal": mammal}

@@ -23,6 +23,9 @@ from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.trajectory import camera_motion
 from wildlab.simulation.twin_trajectory import twin_trajectory
 
+#: Decks and engines over the sea, K; how many flights have the sun out; fittings over the deck, K (SD).
+EXCESS, ENGINE, GLINT_SHARE, FITTING_EXCESS = 8.0, 15.0, 0.5, 5.0
+
 
 @dataclass(frozen=True)
 class VesselLook:
@@ -32,22 +35,14 @@ class VesselLook:
     ----------
     lengths, slender
         Of targets without an outline, m, in their order, and how many times their beam that is.
-    excess, engine
-        Of decks and engines over the sea, K.
-    glint_share
-        Of the flights, how many have the sun out.
     fittings
-        How many small things, warm and cold, are on each deck: hatches, vents, winches; up to
-        ``fitting_excess`` K (SD) from the deck, a hundredth of its length wide.
+        How many small things, warm and cold, are on each deck: hatches, vents, winches; a hundredth of its
+        length wide.
     """
 
     lengths: tuple[float, ...] = (11.0, 7.0)
     slender: float = 3.0
-    excess: float = 8.0
-    engine: float = 15.0
-    glint_share: float = 0.5
     fittings: int = 0
-    fitting_excess: float = 5.0
 
 
 class Window(NamedTuple):
@@ -108,15 +103,13 @@ class SceneFlight:
             if target.outline is not None:
                 length, beam = target.outline.length.si, target.outline.beam.si
             speed = 0.0 if target.motion is None else target.motion.speed.si
-            body = vessel(
-                length, beam, look.excess, speed=speed, engine=look.engine, seed=int(rng.integers(2**31))
-            )
+            body = vessel(length, beam, EXCESS, speed=speed, engine=ENGINE, seed=int(rng.integers(2**31)))
             if look.fittings:
                 own = stream(seed, f"fittings of {target.identifier.text}")
-                body = fitted_out(body, look.fittings, look.fitting_excess, own)
+                body = fitted_out(body, look.fittings, FITTING_EXCESS, own)
             self._vessels.append(body)
             self._courses.append(0.0 if target.motion is None else target.motion.course.si)
-        sun = float(np.radians(rng.uniform(10, 50))) if rng.random() < look.glint_share else None
+        sun = float(np.radians(rng.uniform(10, 50))) if rng.random() < GLINT_SHARE else None
         self.sea = Sea(
             wind_speed=twin.flight.wind_speed.si,
             wind_from=twin.flight.wind_from.si,

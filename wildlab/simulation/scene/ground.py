@@ -20,8 +20,8 @@ from wildlab.geometry.frames import Array
 
 Tile = NDArray[np.float32]
 
-#: Side (m) and cells along it of the tiles of unevenness and of cloud shadows.
-UNEVEN, CLOUDS = (64.0, 1024), (512.0, 128)
+#: Side (m) and cells along it of the tile of unevenness.
+UNEVEN = (64.0, 1024)
 #: What a cloud takes of the sun's heat: the rest is diffuse, or was kept from before.
 SHADOW_DEPTH = 0.75
 #: What clouds take of the night's cooling: they radiate nearly as the ground does.
@@ -30,6 +30,8 @@ CLOUD_BLANKET = 0.8
 SUNLIT_UNEVEN = 0.08
 #: Of a day's average for the sun's heat, minutes.
 _STEP = 2.0
+#: Elevation of the sun at 12, rad; the air's mean over the day and how far it goes from it, K, warmest at 15.
+NOON_ELEVATION, AIR_MEAN, AIR_SWING = float(np.radians(55.0)), 288.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -69,18 +71,11 @@ class Weather:
     hour
         Local solar time: the sun rises at 6, is highest at 12, and sets at 18.
     clouds
-        Share of the sky and of the ground that clouds cover.
-    noon_elevation
-        Of the sun at 12, rad.
-    air_mean, air_swing
-        Over the day, K; warmest at 15.
+        Share of the sky that clouds cover; they shade all of the ground as much.
     """
 
     hour: float = 12.0
     clouds: float = 0.0
-    noon_elevation: float = float(np.radians(55.0))
-    air_mean: float = 288.0
-    air_swing: float = 5.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.clouds <= 1:
@@ -93,16 +88,16 @@ class Weather:
     @property
     def air(self) -> float:
         """Temperature of the air, K."""
-        return self.air_mean + self.air_swing * float(np.cos(2 * np.pi * (self.hour - 15) / 24))
+        return AIR_MEAN + AIR_SWING * float(np.cos(2 * np.pi * (self.hour - 15) / 24))
 
     @property
     def sun(self) -> Array:
         """Unit vector towards the sun, (3,) north, east, up; below the horizon at night."""
-        return np.asarray(_sun(np.array([self.hour]), self.noon_elevation)[0])
+        return np.asarray(_sun(np.array([self.hour]))[0])
 
     def kept(self, lag: float) -> Array:
         """The sun's vector averaged over the past with that lag (h), (3,); zero while it is below."""
-        return np.asarray(_kept(self.hour, self.noon_elevation, lag))
+        return np.asarray(_kept(self.hour, lag))
 
     def heat(self, cover: Cover) -> Array:
         """What the sun gives level ground of a cover, and slopes by their normal: (3,) K."""
@@ -118,20 +113,20 @@ class Weather:
         return self.air - self.loss(cover) + float(self.heat(cover)[2]) * lit
 
 
-def _sun(hours: Array, noon_elevation: float) -> Array:
+def _sun(hours: Array) -> Array:
     """(N, 3) north, east, up: the way of the sun at an equinox."""
     angle = np.pi * (np.asarray(hours, float) - 6) / 12
     high = np.sin(angle)
-    return np.stack([-np.cos(noon_elevation) * high, np.cos(angle), np.sin(noon_elevation) * high], axis=-1)
+    return np.stack([-np.cos(NOON_ELEVATION) * high, np.cos(angle), np.sin(NOON_ELEVATION) * high], axis=-1)
 
 
 @lru_cache(maxsize=64)
-def _kept(hour: float, noon_elevation: float, lag: float) -> Array:
+def _kept(hour: float, lag: float) -> Array:
     if lag <= 0:
-        sun = _sun(np.array([hour]), noon_elevation)[0]
+        sun = _sun(np.array([hour]))[0]
         return sun if sun[2] > 0 else np.zeros(3)
     back = (np.arange(0, 72 * 60, _STEP) + _STEP / 2) / 60
-    sun = _sun(hour - back, noon_elevation)
+    sun = _sun(hour - back)
     weight = np.exp(-back / lag)
     weight /= weight.sum()
     return np.asarray((weight * (sun[:, 2] > 0)) @ sun)
@@ -154,7 +149,7 @@ class Land:
     weather
         Time of day, clouds, air.
     seed
-        Of unevenness and clouds.
+        Of unevenness.
     """
 
     heights: Array = field(default_factory=lambda: np.zeros((4, 4)))
@@ -196,16 +191,6 @@ class Land:
         values = [[-self.weather.loss(one), *self.weather.heat(one), one.texture_sd] for one in self.covers]
         return np.asarray(np.array(values, np.float32)[np.asarray(self.cover)])
 
-    @cached_property
-    def shadow(self) -> Tile:
-        """(k, k) from 0 in the sun to 1 under clouds; a tile of `CLOUDS`."""
-        share = self.weather.clouds
-        if share in (0.0, 1.0):
-            return np.full((2, 2), share, np.float32)
-        smooth = smooth_tile(CLOUDS[1], 12.0, self.seed)
-        edge = np.quantile(smooth, share)
-        return np.asarray(np.clip(0.5 + (edge - smooth) / 0.3, 0, 1), np.float32)
-
     @property
     def uneven(self) -> Tile:
         """(k, k) of unit deviation; a tile of `UNEVEN`."""
@@ -244,14 +229,11 @@ def smooth_tile(cells: int, coarse: float, seed: int) -> Tile:
     return np.asarray(made / made.std(), np.float32)
 
 
-def rolling_land(
-    weather: Weather,
-    seed: int = 0,
-    *,
-    relief: float = 2.0,
-    shares: tuple[float, ...] = (0.7, 0.2, 0.1),
-    side: float = 256.0,
-) -> Land:
+#: Of the heights of `rolling_land`, m, over hills some 60 m long; how much of it grass, sand and rock have.
+RELIEF_M, SHARES = 2.0, (0.7, 0.2, 0.1)
+
+
+def rolling_land(weather: Weather, seed: int = 0) -> Land:
     """Gently rolling ground with patches of grass, sand and rock.
 
     Parameters
@@ -259,23 +241,11 @@ def rolling_land(
     weather
         Time of day, clouds, air.
     seed
-        Of its forms and patches.
-    relief
-        Standard deviation of the heights, m, over hills some 60 m long.
-    shares
-        Of the covers, in their order; those of sand and rock lie together where a smooth random field is
-        highest.
-    side
-        After which it repeats, m.
+        Of its forms and patches: sand and rock lie together where a smooth random field is highest.
 
     Returns
     -------
     Land
-
-    Raises
-    ------
-    WildlabError
-        Where there are not three shares that sum to one.
 
     Examples
     --------
@@ -283,13 +253,11 @@ def rolling_land(
     >>> [round(float((land.cover == one).mean()), 1) for one in range(3)]
     [0.7, 0.2, 0.1]
     """
-    if len(shares) != 3 or min(shares) < 0 or not np.isclose(sum(shares), 1):
-        raise WildlabError(f"shares of {shares}", "give three that sum to one", field="shares")
     k = fft.fftfreq(64) * 64
     size2 = k[:, None] ** 2 + k[None, :] ** 2
     noise = np.random.default_rng([seed, 1]).standard_normal((64, 64))
     high = fft.ifft2(np.exp(-size2 / (2 * 2.5**2)) * (size2 > 0) * fft.fft2(noise)).real
     field_of_patches = smooth_tile(512, 20.0, seed + 1000)
-    edges = np.quantile(field_of_patches, np.clip(np.cumsum(shares)[:2], 0, 1))
+    edges = np.quantile(field_of_patches, np.cumsum(SHARES)[:2])
     cover = np.searchsorted(edges, field_of_patches)
-    return Land(relief * high / high.std(), cover, side, weather=weather, seed=seed)
+    return Land(RELIEF_M * high / high.std(), cover, weather=weather, seed=seed)

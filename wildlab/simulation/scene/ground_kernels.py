@@ -104,15 +104,14 @@ def meet_all(
 
 @compiled
 def render_ground(
-    rays: Array, p: Array, R: Array, focal: float, relief: Array, warmth: Array, uneven: Array, shadow: Array,
-    scales: Array, limits: Array, air: float, sky: float, depth: float, sunlit: float, out: Array,
-    ground: Array,
+    rays: Array, p: Array, R: Array, focal: float, relief: Array, warmth: Array, uneven: Array, scales: Array,
+    limits: Array, air: float, sky: float, shaded: float, sunlit: float, out: Array, ground: Array,
 ) -> None:  # fmt: skip
     """Fills ``out`` (H, W) with temperatures and ``ground`` (H, W) with whether it is ground.
 
-    ``rays`` (H, W, 2) normalised coordinates; ``scales`` (4,) cells per metre of the tiles of relief,
-    warmth, unevenness and shadow; ``limits`` (2,) lowest and highest ground; ``depth`` what a shadow takes of
-    the sun's heat; ``sunlit`` unevenness as a share of it.
+    ``rays`` (H, W, 2) normalised coordinates; ``scales`` (3,) cells per metre of the tiles of relief,
+    warmth and unevenness; ``limits`` (2,) lowest and highest ground; ``shaded`` what clouds take of the sun's
+    heat; ``sunlit`` unevenness as a share of it.
     """
     rows, columns = out.shape
     slope, warm = np.empty(3), np.empty(5)
@@ -135,7 +134,7 @@ def render_ground(
             sn, se = slope[1], slope[2]
             norm = 1 / np.sqrt(1 + sn * sn + se * se)
             lit = norm * (warm[3] - sn * warm[1] - se * warm[2])
-            lit = max(lit, 0.0) * (1 - depth * sampled(shadow, scales[3], north, east))
+            lit = max(lit, 0.0) * (1 - shaded)
             # A pixel averages over what is smaller than itself.
             wide = t / (focal * dd) * scales[2] / 4
             rough = (warm[4] + sunlit * lit) / (1 + wide * wide)

@@ -18,7 +18,7 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.simulation.scene import ground_kernels as kernels
 from wildlab.simulation.scene.bodies import Body
-from wildlab.simulation.scene.ground import CLOUDS, SHADOW_DEPTH, SUNLIT_UNEVEN, UNEVEN, Land
+from wildlab.simulation.scene.ground import SHADOW_DEPTH, SUNLIT_UNEVEN, UNEVEN, Land
 from wildlab.simulation.scene.kernels import sampled
 from wildlab.simulation.scene.render import SeenBody, check_above, draw_bodies, pixel_coordinates
 
@@ -170,15 +170,15 @@ def render_land(scene: LandScene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLi
     check_above(p, "ground", height_at(land, p[:2]))
     shape = (camera.height, camera.width)
     kelvin, ground = np.empty(shape, np.float32), np.empty(shape, bool)
-    tiles = (land.relief, land.warmth, land.uneven, land.shadow)
-    sides = (land.side, land.side, UNEVEN[0], CLOUDS[0])
+    tiles = (land.relief, land.warmth, land.uneven)
+    sides = (land.side, land.side, UNEVEN[0])
     scales = np.array([len(tile) / side for tile, side in zip(tiles, sides, strict=True)])
     weather = land.weather
     clear = 1 - weather.clouds
     sky = weather.air - clear * CLEAR_SKY - weather.clouds * CLOUDED_SKY
     kernels.render_ground(
         pixel_coordinates(camera), p, R, float(np.sqrt(camera.fx * camera.fy)), *tiles, scales, _limits(land),
-        weather.air, sky, SHADOW_DEPTH, SUNLIT_UNEVEN, kelvin, ground,
+        weather.air, sky, SHADOW_DEPTH * weather.clouds, SUNLIT_UNEVEN, kelvin, ground,
     )  # fmt: skip
     labels = np.zeros(shape, np.int16)
     # A body is drawn about the ground under it: the camera is as much lower as the ground is higher.

@@ -130,9 +130,3 @@ def to_counts(kelvin: ArrayLike, response: CameraResponse) -> NDArray[Any]:
     """Counts of kelvin, by the gain and the level of ``response``, neither rounded nor cut."""
     above = np.asarray(kelvin) - np.float32(response.counts_at)
     return np.asarray(response.counts_level + above * response.counts_per_kelvin)
-
-
-def to_kelvin(counts: NDArray[np.integer], response: CameraResponse) -> NDArray[np.float32]:
-    """Kelvin of counts (H, W), by the gain and the level of ``response``."""
-    value = (counts.astype(np.float32) - response.counts_level) / response.counts_per_kelvin
-    return np.asarray(value + np.float32(response.counts_at), np.float32)
