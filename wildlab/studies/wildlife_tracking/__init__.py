@@ -12,20 +12,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.animals.images import NONE
 from wildlab.analysis.animals.tracking import FollowedAnimals, Known, Patrolled, follow
 from wildlab.evaluation.intervals import Interval, mean_interval, mean_share_interval, share_interval
 from wildlab.evaluation.shares import Check, Pooled, columns_of
 from wildlab.geometry.frames import Array
 from wildlab.messages.quantities import number, percent_between
 from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
-from wildlab.reporting.charts.forms import draw_fences, draw_picture, fit_map, spread_points
+from wildlab.reporting.charts.forms import draw_fences, fit_map, spread_points
 from wildlab.reporting.figures import (
     BLUE,
     GREY,
     INK,
     ORANGE,
-    SKY,
     VERMILLION,
     ellipse,
     map_axes,
@@ -34,7 +32,6 @@ from wildlab.reporting.figures import (
 from wildlab.studies.page import Facts, Shown
 from wildlab.studies.protocol import Study
 from wildlab.studies.wildlife_tracking import trial
-from wildlab.studies.wildlife_tracking.rendered import Counted, Renderings, seen_again, telling_image
 from wildlab.studies.wildlife_tracking.trial import (
     FILTERS,
     GONDOLA,
@@ -146,22 +143,6 @@ def searches_table(runs: pd.DataFrame, quantities: Mapping[str, str]) -> pd.Data
     return pd.DataFrame([{"what": quantities[name]} | row for name, row in cells.items()])
 
 
-def frames_table(counts: Mapping[str, Counted], frames: int, names: Mapping[str, str]) -> pd.DataFrame:
-    """What simulated detections and rendered frames gave, a row for each."""
-    return pd.DataFrame(
-        [
-            {
-                "from": names[who],
-                "found": count_cell(one.found, one.shown),
-                "with_false": count_cell(one.with_false, frames),
-                "by_false": count_cell(one.by_false, one.tracks),
-                "rmse": number(one.rmse, 1),
-            }
-            for who, one in counts.items()
-        ]
-    )
-
-
 #: Images of each world that are timed, and worlds at most: so many that a claim can hold.
 IMAGES, TIMED = 600, 40
 
@@ -261,17 +242,17 @@ HELD = 0.95
 AFTER = 60
 
 
-def figures(runs: Runs, table: pd.DataFrame, renderings: Renderings, names: Mapping[str, str]) -> list[Shown]:
-    """All figures of the page; those of a visit and of one animal only where the world has them.
+def figures(runs: Runs, table: pd.DataFrame, names: Mapping[str, str]) -> list[Shown]:
+    """All figures of the page; that of a visit only where the world has one.
 
     Parameters
     ----------
-    runs, renderings
+    runs
         Of the world shown.
     table
         Of all worlds.
     names
-        Words for platforms and weathers.
+        Words for platforms.
     """
     gondola = runs.worlds[GONDOLA], runs.followed[GONDOLA, NEGATIVE]
     multicopter = runs.worlds[UAV], runs.followed[UAV, NEGATIVE]
@@ -279,10 +260,8 @@ def figures(runs: Runs, table: pd.DataFrame, renderings: Renderings, names: Mapp
         "fig-7-19b": tracks_map(*gondola, 1.0),
         "fig-7-19a": tracks_map(*gondola, 0.5),
         "fig-7-13": tracks_map(*multicopter, 1.0),
-        "covariance": deviation_over_time(runs),
         "negative": negative_differences(table, names),
         "fig-7-14": visit_maps(runs.worlds[UAV], runs.patrolled[REVISITS]),
-        "frames": frame_in_weathers(renderings, names),
     }
     return [Shown(fig, name) for name, fig in found.items() if fig is not None]
 
@@ -370,45 +349,6 @@ def visit_maps(world: World, flown: Patrolled) -> Figure | None:
     return finish(fig, "")
 
 
-def most_seen(followed: FollowedAnimals, out: float) -> int | None:
-    """The animal that came back into sight most often, after being out of it for so long, s."""
-    back = [one.animal for one in followed.found if np.isfinite(one.away) and one.away > out]
-    return int(np.bincount(back).argmax()) if back else None
-
-
-def deviation_over_time(runs: Runs) -> Figure | None:
-    """Predicted deviation of one animal's track over time, with and without the negative update."""
-    world, followed = runs.worlds[UAV], runs.followed[UAV, NEGATIVE]
-    animal = most_seen(followed, 60.0)
-    if animal is None:
-        return None
-    fig, ax = new_figure(5.9, 3.6)
-    for name, color, label, style in (
-        (POSITIVE, ORANGE, "detections alone", "--"), (NEGATIVE, BLUE, "with negative update", "-")
-    ):  # fmt: skip
-        times, sd = sd_of(world, runs.followed[UAV, name], animal)
-        ax.plot(times / 60, sd, style, color=color, label=label)
-    seen = [one.image for one in followed.found if one.animal == animal]
-    ax.plot(world.images.times[seen] / 60, np.zeros(len(seen)), "|", color=INK, ms=12, label="detected")
-    ax.axvline(world.lap / 60, color=GREY, lw=1.0, ls=":", label="a lap")
-    ax.set_ylim(0, None)
-    return finish(fig, "", "time (min)", "predicted SD (m)")
-
-
-def sd_of(world: World, followed: FollowedAnimals, animal: int) -> tuple[Array, Array]:
-    """Times (K,) s and the stated standard deviation (K,) m of an animal's track at the stations."""
-    own, row, times, sd = 0, 0, list[float](), list[float]()
-    for known in followed.known:
-        while row < len(followed.found) and followed.found[row].image <= known.image:
-            if followed.found[row].animal == animal:
-                own = followed.found[row].track
-            row += 1
-        at = np.flatnonzero(known.identity == own)
-        times.append(float(world.images.times[known.image]))
-        sd.append(float(np.sqrt(np.trace(known.covariance[at[0]]) / 2)) if len(at) else np.nan)
-    return np.array(times), np.array(sd)
-
-
 def negative_differences(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """What the negative update changes, world by world."""
     fig, axes = new_figure(5.9, 3.8, columns=2, sharey=True)
@@ -425,20 +365,6 @@ def negative_differences(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure
         ax.axhline(0, color=GREY, lw=1.0)
         ax.set(title=label, xlim=(-0.5, 1.6), xticks=[0, 1], xticklabels=[names[one] for one in platforms])
     return finish(fig, "", ylabel="with less without (m)")
-
-
-def frame_in_weathers(runs: Renderings, names: Mapping[str, str]) -> Figure:
-    """One frame in each weather, with what is detected in it."""
-    k = telling_image(runs)
-    fig, axes = new_figure(5.9, 4.1 * len(runs.by_weather), rows=len(runs.by_weather), squeeze=False)
-    in_view = set(np.flatnonzero(runs.world.images.in_view[k]).tolist())
-    for ax, (name, one) in zip(axes.flat, runs.by_weather.items(), strict=True):
-        grey, found, judged = seen_again(runs.world, one, k)
-        colors = [VERMILLION if animal == NONE else SKY for animal in judged]
-        hits = len(in_view & set(judged.tolist()))
-        title = f"{names[name]}: {hits} of {len(in_view)} found, {colors.count(VERMILLION)} false"
-        draw_picture(ax, grey, title, boxes=found.box, colors=colors, margin=5)
-    return fig
 
 
 #: The particle filter of each platform.

@@ -94,8 +94,6 @@ class World(NamedTuple):
         (E,) animals in each.
     images
         Of `LAPS` laps.
-    true, headings
-        Where the camera truly was, and where the platform headed, rad: a row for each image.
     lap
         How long one takes, s.
     detector, errors
@@ -109,8 +107,6 @@ class World(NamedTuple):
     fences: list[Array]
     lives: NDArray[np.intp]
     images: Images
-    true: CameraPoses
-    headings: Array
     lap: float
     detector: Detector
     errors: ExecutionErrors
@@ -221,7 +217,7 @@ def draw_world(platform: str, twin_name: str, seed: int) -> World:
     a = uav.required(twin.animals, "animals")
     lives = np.array([int(one.animals.number) for one in twin.enclosures.values()])
     return World(
-        twin, land, fences, lives, images, true, headings, way.lap, detector, errors,
+        twin, land, fences, lives, images, way.lap, detector, errors,
         walk_of(a.speed_sd.si, a.step.si),
     )  # fmt: skip
 
