@@ -3,7 +3,7 @@
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then judged
 against labels that are known and not marked by anybody. `bodies` has vessels and what stands
 on land; `sea` the water, `render` makes kelvin and labels, `response` the image of a camera with
-its faults. `ground` has covers under the sun of a day, and `land` lays them over a terrain and renders them.
+its faults. `ground` has covers under the sun of a day, and `land` renders them.
 `coloured` is even ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it
 knows of a detector.
 
@@ -37,7 +37,7 @@ from wildlab.simulation.scene.ground import (
     Weather,
     rolling_land,
 )
-from wildlab.simulation.scene.land import LandScene, LandView, ground_points, height_at, land_on, render_land
+from wildlab.simulation.scene.land import LandScene, LandView, ground_points, height_at, render_land
 from wildlab.simulation.scene.render import RenderedView, Scene, SeenBody, outline_of, render
 from wildlab.simulation.scene.response import (
     IDEAL,
@@ -79,7 +79,6 @@ __all__ = [
     "expose",
     "ground_points",
     "height_at",
-    "land_on",
     "outline_of",
     "rectangle",
     "render",

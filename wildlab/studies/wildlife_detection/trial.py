@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.analysis.animals.images import NEAR, TOO_LARGE
 from wildlab.detection.detections import Detections
 from wildlab.detection.warm import (
     Warm,
@@ -93,6 +92,8 @@ HOTTEST = 310.15
 WINDOW, LEAST_WINDOW = 2.0, 8.0
 #: Of an animal that is to be found this share must show.
 SHOWN = 0.25
+#: A detection is no animal's that is so many times larger, or further from it than so many px.
+TOO_LARGE, NEAR = 3.0, 3
 #: The animal is larger than the block by its major axis, px: F's small block has 51.
 LARGER_THAN = 51.0
 COUNTS = ("found", "invented", "missed")
