@@ -27,7 +27,7 @@ from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.schmidt import Considered
 
 RUNS, UPDATES = 10_000, 141
 #: Runs given to a loop in Python, and to Stone Soup.
@@ -87,7 +87,7 @@ def stone_soup_loop(times: Array, z: Array) -> list[object]:
     return kept
 
 
-def scene() -> tuple[Array, Array, Array, CameraPoses, PoseUncertainty]:
+def scene() -> tuple[Array, Array, Array, CameraPoses, Considered]:
     """Times, positions (runs, N, 2), pixels (runs, N, 2), poses, their covariance: a target circled."""
     rng = np.random.default_rng(0)
     times = 0.1 * np.arange(UPDATES)
@@ -103,7 +103,7 @@ def scene() -> tuple[Array, Array, Array, CameraPoses, PoseUncertainty]:
         truth[:, :2] + rng.normal(0, 3, (RUNS, UPDATES, 2)),
         exact + rng.normal(0, 2, (RUNS, UPDATES, 2)),
         poses,
-        PoseUncertainty(covariance),
+        Considered(sensors.POSE, covariance),
     )
 
 
@@ -127,18 +127,16 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
     gaps[np.arange(RUNS), np.arange(RUNS) % UPDATES] = np.nan
     apart = best_of(lambda: run_batch(times, gaps, R, MOTION, START), repeats=5)
     rows.append(("KF, wildlab, a gap of its own in each run", apart, apart / theirs, ""))
-    last = best_of(lambda: run_batch(times, gaps, R, MOTION, START, rows=[-1]), repeats=5)
-    rows.append(("KF, wildlab, the same, last estimates kept", last, last / theirs, ""))
 
     noise, view = 4.0 * np.eye(2), BatchCamera(poses, 0.0)
     sensor = sensors.pixels(poses, 0.0)
     for name, uncertainty in (("pixel EKF", None), ("pixel Schmidt", pose)):
 
-        def loop(uncertainty: PoseUncertainty | None = uncertainty) -> object:
+        def loop(uncertainty: Considered | None = uncertainty) -> object:
             few = pixels[: FEW // 4]
             return [run_filter(times, one, noise, sensor, MOTION, START, pose=uncertainty) for one in few]
 
-        def batch(uncertainty: PoseUncertainty | None = uncertainty) -> object:
+        def batch(uncertainty: Considered | None = uncertainty) -> object:
             return run_batch(times, pixels, noise, MOTION, START, view=view, pose=uncertainty)
 
         slow = 4 * scale * best_of(loop, repeats=2)

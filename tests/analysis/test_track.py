@@ -32,8 +32,8 @@ from wildlab.geometry.frames import euler_to_matrix
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate, simulate_twin
 from wildlab.tracking.run import run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
-from wildlab.tracking.sensors import positions
+from wildlab.tracking.schmidt import Considered
+from wildlab.tracking.sensors import POSE, positions
 
 TUNING = CvTuning(acceleration=0.05, position_0=10, velocity_0=10, measurement=7, pixel=30)
 
@@ -83,7 +83,7 @@ def test_the_compiled_filters_are_the_readable_ones(seen):
     for follow, measured, pose in (
         (follow_positions, of_place, None),
         (follow_pixels, of_pixel, None),
-        (follow_schmidt, of_pixel, PoseUncertainty(seen.poses.covariance)),
+        (follow_schmidt, of_pixel, Considered(POSE, seen.poses.covariance)),
     ):
         compiled = follow(seen, TUNING)
         readable = run_filter(seen.times, *measured, TUNING.motion, begin, pose=pose)

@@ -119,7 +119,7 @@ def test_a_run_agrees_with_stone_soup():
 
     start = Start(0.0, np.array([1.0, 2, 0.5, -0.5]), np.diag([30.0, 20, 4, 4]))
     track = run_filter(times, z, 9 * np.eye(2), m.positions(), motion, start)
-    batch = run_batch(times, z[None], 9 * np.eye(2), motion, start)
+    (batch,) = run_batch(times, z[None], 9 * np.eye(2), motion, start)
     predictor = KalmanPredictor(model)
     updater = KalmanUpdater(LinearGaussian(4, (0, 2), 9 * np.eye(2)))
     epoch = datetime(2020, 1, 1, tzinfo=UTC)
@@ -129,7 +129,7 @@ def test_a_run_agrees_with_stone_soup():
         state = updater.update(SingleHypothesis(predictor.predict(state, timestamp=seen.timestamp), seen))
         theirs = np.asarray(state.state_vector, float).ravel()[order]
         assert np.allclose(track.x[row], theirs, rtol=1e-8, atol=1e-8)
-        assert np.allclose(batch.x[0, row], theirs, rtol=1e-8, atol=1e-8)
+        assert np.allclose(batch.x[row], theirs, rtol=1e-8, atol=1e-8)
         assert np.allclose(track.P[row], np.asarray(state.covar, float)[np.ix_(order, order)], rtol=1e-8)
 
 

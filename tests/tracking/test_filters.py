@@ -18,7 +18,7 @@ from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import constant_velocity, rest, singer, white_acceleration
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.schmidt import Considered
 from wildlab.tracking.sensors import predict_range_bearing
 from wildlab.tracking.smoothing import run_smoothed, smooth
 
@@ -374,7 +374,7 @@ def test_rows_whose_pose_is_not_known():
     times, uv, poses, truth = overflight(40)
     P = np.tile(np.diag([1.0, 1, 1, 1e-4, 1e-4, 1e-4]), (40, 1, 1))
     P[[0, 1, 20, 21]] = np.nan
-    pose = PoseUncertainty(P, 30.0)
+    pose = Considered(m.POSE, P, 30.0)
     filtered = run_filter(times, uv, 4 * np.eye(2), m.pixels(poses, 0.0), CV, START, pose=pose)
     smoothed = run_smoothed(times, uv, 4 * np.eye(2), m.pixels(poses, 0.0), CV, START, pose=pose)
     assert not filtered.used[[0, 1, 20, 21]].any() and filtered.used.sum() == 36

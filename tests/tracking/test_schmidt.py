@@ -13,7 +13,7 @@ from wildlab.tracking import schmidt
 from wildlab.tracking import sensors as m
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.schmidt import Considered
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 PIXELS = 4.0 * np.eye(2)
@@ -69,14 +69,11 @@ def growing(n, seed=0):
 
 
 @pytest.mark.parametrize("correlation_time", [np.inf, 8.0, 0.0])
-@pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_it_is_the_full_filter_with_no_gain_for_the_pose(change, correlation_time):
-    """As printed, C kept: with a pose covariance that does not change, or, if navigated, one that grows."""
+def test_it_is_the_full_filter_with_no_gain_for_the_pose(correlation_time):
+    """As published, C kept: with a pose covariance that does not change."""
     times, uv, poses, _ = overflight(50)
-    covariances = growing(50)
-    if change == "bias":
-        covariances[:] = covariances[20]
-    pose = PoseUncertainty(covariances, correlation_time, change)
+    covariances = np.tile(growing(50)[20], (50, 1, 1))
+    pose = Considered(m.POSE, covariances, correlation_time)
     track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
     full = by_full_filter(
         times, uv, poses, covariances, lambda dt: np.exp(-dt / correlation_time) if correlation_time else 0.0
@@ -94,24 +91,20 @@ def by_eigenvectors(function):
     return carry
 
 
-@pytest.mark.parametrize(
-    ("change", "function"), [("bias", np.sqrt), ("navigated", lambda v: np.minimum(v, 1))]
-)
-def test_it_is_the_full_filter_whose_pose_error_changes_as_said(change, function, rng):
+def test_it_is_the_full_filter_whose_pose_error_keeps_its_size_in_deviations(rng):
     times, uv, poses, _ = overflight(50)
     covariances = np.array([random_pose_covariance(rng, 0.3) for _ in times])
-    pose = PoseUncertainty(covariances, change=change)
+    pose = Considered(m.POSE, covariances)
     track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
-    full = by_full_filter(times, uv, poses, covariances, carry=by_eigenvectors(function))
+    full = by_full_filter(times, uv, poses, covariances, carry=by_eigenvectors(np.sqrt))
     assert_full(track, full, 1e-7)
 
 
-@pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_with_a_perfect_pose_it_is_the_extended_filter(change):
+def test_with_a_perfect_pose_it_is_the_extended_filter():
     times, uv, poses, _ = overflight(50)
     sensor = m.pixels(poses, 0.0)
     plain = run_filter(times, uv, PIXELS, sensor, CV, START)
-    pose = PoseUncertainty(np.zeros((50, 6, 6)), change=change)
+    pose = Considered(m.POSE, np.zeros((50, 6, 6)))
     track = run_filter(times, uv, PIXELS, sensor, CV, START, pose=pose)
     for ours, theirs in zip(track, plain, strict=True):
         assert np.allclose(ours, theirs, rtol=1e-12, atol=1e-12, equal_nan=True)
@@ -162,52 +155,39 @@ def test_a_cross_covariance_is_shortened_only_where_it_must_be(rng, shrink):
 def test_transitions_lead_from_one_pose_covariance_to_the_next(rng):
     before, after = random_pose_covariance(rng, 1.0), random_pose_covariance(rng, 1.0)
     unit = np.outer(UNITS, UNITS)
-    bias = schmidt.transition_of_pose(before, after, "bias")
+    bias = schmidt.transition_of_pose(before, after)
     assert np.allclose(bias @ before @ bias.T / unit, after / unit, rtol=1e-7, atol=1e-9)
-    back = schmidt.transition_of_pose(after, before, "bias")
+    back = schmidt.transition_of_pose(after, before)
     assert np.allclose(back @ bias * np.outer(1 / UNITS, UNITS), np.eye(6), atol=1e-6)
-    navigated = schmidt.transition_of_pose(before, after, "navigated")
-    left = (after - navigated @ before @ navigated.T) / unit
-    assert np.linalg.eigvalsh(left)[0] > -1e-9 * np.abs(left).max()
-    grown, shrunk = before + after, np.linalg.inv(np.linalg.inv(before) + np.linalg.inv(after))
-    assert np.allclose(schmidt.transition_of_pose(before, grown, "navigated"), np.eye(6), atol=1e-6)
-    # What a filter does with a direct look at the error of covariance `after`: I - K.
-    gain = before @ np.linalg.inv(before + after)
-    learned = schmidt.transition_of_pose(before, shrunk, "navigated")
-    assert np.allclose((learned - np.eye(6) + gain) * np.outer(1 / UNITS, UNITS), 0, atol=1e-6)
     degrees = np.repeat([1.0, np.degrees(1)], 3)
     scale = np.outer(degrees, degrees)
-    for change, phi in (("bias", bias), ("navigated", navigated)):
-        assert np.allclose(schmidt.transition_of_pose(before, before, change), np.eye(6), atol=1e-8)
-        other = schmidt.transition_of_pose(before * scale, after * scale, change)
-        assert np.allclose(
-            other * np.outer(1 / degrees / UNITS, degrees * UNITS),
-            phi * np.outer(1 / UNITS, UNITS),
-            atol=1e-6,
-        )
+    assert np.allclose(schmidt.transition_of_pose(before, before), np.eye(6), atol=1e-8)
+    other = schmidt.transition_of_pose(before * scale, after * scale)
+    assert np.allclose(
+        other * np.outer(1 / degrees / UNITS, degrees * UNITS), bias * np.outer(1 / UNITS, UNITS), atol=1e-6
+    )
 
 
 def test_a_row_without_a_pose_covariance_is_passed_over(rng):
     covariances = np.array([random_pose_covariance(rng) for _ in range(4)])
     covariances[1] = np.nan
-    phi = schmidt.transitions_of_pose(covariances, "bias")
+    phi = schmidt.transitions_of_pose(covariances)
     assert np.array_equal(phi[:2], [np.eye(6)] * 2)
     assert np.allclose(phi[2] @ covariances[0] @ phi[2].T, covariances[2])
 
 
-@pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_many_transitions_are_those_of_each_pair(change, rng):
+def test_many_transitions_are_those_of_each_pair(rng):
     """Also where nothing changes, and from a pose without variance in some direction, or in none."""
     covariances = np.array([random_pose_covariance(rng) for _ in range(12)])
     covariances[3] = covariances[2]
     covariances[5, 2] = covariances[5, :, 2] = 0.0
     covariances[7] = 0.0
     covariances[9] = np.outer(np.arange(1, 7), np.arange(1, 7)) * 1e-4
-    phi = schmidt.transitions_of_pose(covariances, change)
+    phi = schmidt.transitions_of_pose(covariances)
     for k in range(1, 12):
-        expected = schmidt.transition_of_pose(covariances[k - 1], covariances[k], change)
+        expected = schmidt.transition_of_pose(covariances[k - 1], covariances[k])
         assert np.allclose(phi[k], np.eye(6) if k == 3 else expected, rtol=1e-6, atol=1e-6), k
-    assert schmidt.transitions_of_pose(covariances[:1], change) == pytest.approx(np.eye(6)[None])
+    assert schmidt.transitions_of_pose(covariances[:1]) == pytest.approx(np.eye(6)[None])
 
 
 def test_directions_without_variance_carry_no_covariance(rng):
@@ -233,10 +213,9 @@ def hard_flight(n, seed=0):
     return np.cumsum(steps), uv[rows], repeated, covariances
 
 
-@pytest.mark.parametrize("change", ["bias", "navigated"])
-def test_covariance_stays_one_with_a_new_pose_in_every_frame(change):
+def test_covariance_stays_one_with_a_new_pose_in_every_frame():
     times, uv, poses, covariances = hard_flight(1500)
-    pose = PoseUncertainty(covariances, change=change)
+    pose = Considered(m.POSE, covariances)
     track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
     assert track.used.mean() > 0.9
     assert np.array_equal(track.P, np.swapaxes(track.P, 1, 2))

@@ -20,7 +20,7 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
   animals, with what an image did not show.
 """
 
-from wildlab.tracking.batch import BatchCamera, BatchTracks, run_batch
+from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.filters import ModeTrack, run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.initiation import start_from_first, start_from_position, start_from_rays
 from wildlab.tracking.kalman import filter_at_rest
@@ -34,18 +34,16 @@ from wildlab.tracking.motion import (
     white_acceleration,
 )
 from wildlab.tracking.run import Start, Track, run_filter
-from wildlab.tracking.schmidt import Considered, PoseUncertainty, consider_all
+from wildlab.tracking.schmidt import Considered, consider_all
 from wildlab.tracking.sensors import Merged, Sensor, SensorMeasurements, merge, pixels, positions, renamed
 from wildlab.tracking.smoothing import run_smoothed, smooth
 
 __all__ = [
     "BatchCamera",
-    "BatchTracks",
     "Considered",
     "Merged",
     "ModeTrack",
     "Motion",
-    "PoseUncertainty",
     "Sensor",
     "SensorMeasurements",
     "Start",

@@ -1,7 +1,7 @@
-"""Many runs of one flight with constant velocity, compiled: `wildlab.tracking.run.run_filter` for each.
+"""Runs of one flight with constant velocity, compiled: `wildlab.tracking.run.run_filter` for each.
 
-For Monte Carlo studies: B runs share their times and their motion model; measurements, poses and covariances
-may differ from run to run. States are ``[pN, pE, vN, vE]``; measurements are positions, or pixels of a camera
+B runs share times, motion, noise and poses; measurements and covariances of the poses may differ from run to
+run. States are ``[pN, pE, vN, vE]``; measurements are positions, or pixels of a camera
 without distortion. A row's errors that are considered stand behind the state: one joint covariance serves the
 Kalman and the Schmidt filter. All compiled functions stay in this one file, and have their many arguments,
 for the reasons that `wildlab.navigation.kernels` gives.
@@ -21,31 +21,14 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking import schmidt
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import Start, Track, check_rows, check_start, checked
-from wildlab.tracking.schmidt import LARGEST_CORRELATION, PoseUncertainty
+from wildlab.tracking.schmidt import LARGEST_CORRELATION, Considered
+from wildlab.tracking.sensors import POSE
 
 Flags = NDArray[np.bool_]
-Integers = NDArray[np.int64]
-
-
-class BatchTracks(NamedTuple):
-    """What the filter made of B runs of N measurements; the estimates after each of M rows, NaN before the
-    start."""
-
-    times: Array  # (M,)
-    x: Array  # (B, M, 4)
-    P: Array  # (B, M, 4, 4)
-    innovation: Array  # (B, N, 2)
-    nis: Array  # (B, N)
-    used: Flags  # (B, N)
-    limited: Flags  # (B, N), see `run.Track`
 
 
 class BatchCamera(NamedTuple):
-    """The camera of all runs: what `wildlab.tracking.sensors.pixels` takes.
-
-    The rows of ``poses`` are those of all runs alike, (N,), or (B, N): each has its own. ``plane_down`` is a
-    scalar or (N,).
-    """
+    """The camera of all runs: what `wildlab.tracking.sensors.pixels` takes."""
 
     poses: CameraPoses
     plane_down: ArrayLike
@@ -59,10 +42,8 @@ def run_batch(
     start: Start,
     *,
     view: BatchCamera | None = None,
-    pose: PoseUncertainty | None = None,
-    gate_probability: float = 1.0,
-    rows: ArrayLike | None = None,
-) -> BatchTracks:
+    pose: Considered | None = None,
+) -> list[Track]:
     """Kalman filter on positions; with ``view`` the extended filter on pixels; with ``pose`` Schmidt's.
 
     Parameters
@@ -73,74 +54,67 @@ def run_batch(
         (B, N, 2) positions north, east in n, m, or with ``view`` pixels u, v; rows of NaN are frames without
         a detection.
     R
-        (2, 2), (N, 2, 2) or (B, N, 2, 2), in m^2 or pixels squared.
-    motion
-        A model with four states.
-    start
-        ``x`` (4,) or (B, 4), ``P`` (4, 4) or (B, 4, 4); time and row are the same for all.
+        (2, 2) or (N, 2, 2), in m^2 or pixels squared.
+    motion, start
+        With four states.
     view
         The camera; None: the measurements are positions.
     pose
-        Uncertainty of the poses; its covariance is (N, 6, 6) or (B, N, 6, 6), m and rad. None: poses are
-        taken as true.
-    gate_probability
-        As in `wildlab.tracking.run.run_filter`.
-    rows
-        (M,) the rows after which estimates are kept; all when not given. Long flights of many runs fill the
-        memory with covariances, and writing them takes as long as computing them.
+        The six errors of the poses, constant biases; their covariance is (N, 6, 6) or (B, N, 6, 6). None:
+        poses are taken as true.
 
     Returns
     -------
-    BatchTracks
-        Estimates of each run after the kept rows, innovation and NIS of all rows.
+    list of Track
+        One of each run; ``S`` is NaN, for the compiled filters give the NIS in its place.
 
     Raises
     ------
     WildlabError
-        As `run_filter`; and for measurements that are not (B, N, 2), or a camera that distorts.
+        As `run_filter`; and for measurements that are not (B, N, 2), a camera that distorts, or other errors.
     """
-    z, R = np.asarray(measurements, float), np.asarray(R, float)
+    z = np.asarray(measurements, float)
     if z.ndim != 3 or z.shape[2] != 2:
         raise WildlabError(
             f"measurements of the shape {z.shape}", "give (runs, times, 2)", field="measurements"
         )
-    R_rows = np.moveaxis(R, 0, 1) if R.ndim == 4 else R
-    given = checked(times, np.moveaxis(z, 0, 1), R_rows, gate_probability, None)
+    given = checked(times, np.moveaxis(z, 0, 1), R, 1.0, None)
     check_start(start)
     z = np.ascontiguousarray(np.moveaxis(given.z, 0, 1))
     B, N = z.shape[:2]
     first = max(int(np.searchsorted(given.times, start.time, "left")), start.row + 1)
-    F, Q, left = np.empty((N, 4, 4)), np.empty((N, 4, 4)), np.ones(N)
+    F, Q = np.empty((N, 4, 4)), np.empty((N, 4, 4))
     steps, which = np.unique(np.diff(given.times[first:], prepend=start.time), return_inverse=True)
     if len(steps):  # cameras keep time: the same few steps again and again
         F[first:], Q[first:] = (
             np.array(one)[which] for one in zip(*map(motion, steps.tolist()), strict=True)
         )
-        if pose is not None:
-            left[first:] = np.array([schmidt.fade(dt, pose.correlation_time) for dt in steps.tolist()])[which]
     P_poses = phis = None
     if pose is not None:
-        check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
-        P_poses = _per_run(pose.covariance, 2, N)
-        phis = np.array([schmidt.transitions_of_pose(one, pose.change) for one in P_poses])
+        if pose.names != POSE or not np.isposinf(pose.correlation_time).all():
+            raise WildlabError(
+                f"the batch filter considers constant errors of the pose, not {', '.join(pose.names)}",
+                "use run_filter",
+                field="pose",
+            )
+        covariance = np.asarray(pose.covariance, float)
+        check_rows(covariance.shape[-3] if covariance.ndim > 2 else 1, N, "pose.covariance")
+        P_poses = np.array(covariance if covariance.ndim == 4 else covariance[None], order="C")
+        phis = np.array([schmidt.transitions_of_pose(one) for one in P_poses])
         unknown = ~np.isfinite(P_poses).all(axis=(2, 3))
         z[np.broadcast_to(unknown, (B, N))] = np.nan
         P_poses[unknown] = 0.0
-    noise = _per_run(R, 2, N)
-    noise[~np.isfinite(noise).all(axis=(2, 3))] = np.eye(2)  # their measurements are NaN by now
-    x0 = np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C")
-    P0 = np.ascontiguousarray(np.broadcast_to(np.asarray(start.P, float), (B, 4, 4)))
-    kept = np.arange(N) if rows is None else np.arange(N)[np.asarray(rows, np.int64)]
-    slots = np.full(N, -1)
-    slots[kept] = np.arange(len(kept))
-    x, P = (np.full((B, len(kept), *shape), np.nan) for shape in ((4,), (4, 4)))
+    noise = np.array(np.broadcast_to(given.R[:, 0], (N, 2, 2)), order="C")
+    noise[~np.isfinite(noise).all(axis=(1, 2))] = np.eye(2)  # their measurements are NaN by now
+    x0, P0 = np.array(start.x, float), np.array(start.P, float)
+    x, P = (np.full((B, N, *shape), np.nan) for shape in ((4,), (4, 4)))
     innovation, nis = np.full((B, N, 2), np.nan), np.full((B, N), np.nan)
     used, limited = np.zeros((B, N), bool), np.zeros((B, N), bool)
     kind = "Schmidt" if pose is not None else "Kalman" if view is None else "extended Kalman"
-    with announced(f"the {kind} filter for many runs"):
+    with announced(f"the {kind} filter"):
         singular = filter_runs(
-            F, Q, left, phis, z, noise, *_camera_arrays(view, B, N), P_poses, x0, P0, first, given.threshold,
-            slots, x, P, innovation, nis, used, limited,
+            F, Q, phis, z, noise, *_camera_arrays(view, N), P_poses, x0, P0, first, x, P, innovation, nis,
+            used, limited,
         )  # fmt: skip
     if singular >= 0:
         raise WildlabError(
@@ -150,42 +124,23 @@ def run_batch(
         )
     if start.row >= 0:
         used[:, start.row] = True
-        if slots[start.row] >= 0:
-            x[:, slots[start.row]], P[:, slots[start.row]] = x0, P0
-    return BatchTracks(given.times[kept], x, P, innovation, nis, used, limited)
-
-
-def as_tracks(found: BatchTracks) -> list[Track]:
-    """Each run as the readable filters give it, where estimates were kept after all rows.
-
-    Parameters
-    ----------
-    found
-        From `run_batch`, B runs of N measurements.
-
-    Returns
-    -------
-    list of Track
-        B of them; ``S`` is NaN, for the compiled filters give the NIS in its place.
-    """
-    S = np.full((len(found.times), 2, 2), np.nan)
-    chosen = np.where(np.isfinite(found.nis), 0, -1).astype(np.int64)
-    each = zip(*found[1:6], chosen, found.limited, strict=True)
+        x[:, start.row], P[:, start.row] = x0, P0
+    S, chosen = np.full((N, 2, 2), np.nan), np.where(np.isfinite(nis), 0, -1)
     return [
-        Track(found.times, x, P, v, S, nis, used, which, limited)
-        for x, P, v, nis, used, which, limited in each
+        Track(given.times, x[i], P[i], innovation[i], S, nis[i], used[i], chosen[i], limited[i])
+        for i in range(B)
     ]
 
 
 def _camera_arrays(
-    view: BatchCamera | None, runs: int, n_rows: int
+    view: BatchCamera | None, n_rows: int
 ) -> tuple[Array | None, Array | None, Array | None, Array, Array, Array]:
     """p_nc, R_nc, R_bc, lever arm, planes and intrinsics for the kernel; None and zeros without a camera."""
     if view is None:
         return None, None, None, np.zeros(3), np.zeros(n_rows), np.zeros(5)
     poses = view.poses
     camera = poses.camera
-    poses.require_rows((n_rows,) if len(poses.rows) == 1 else (runs, n_rows), "measurements")
+    poses.require_rows((n_rows,), "measurements")
     if np.ndim(view.plane_down):
         check_rows(np.shape(view.plane_down)[0], n_rows, "view.plane_down")
     if camera.distorts:
@@ -194,34 +149,27 @@ def _camera_arrays(
             "take the distortion out of the pixels first, or use run_filter",
             field="camera",
         )
-    return (
-        _per_run(poses.p_nc, 1, n_rows), _per_run(poses.R_nc, 2, n_rows), _per_run(poses.R_bc, 2, n_rows),
-        poses.lever_arm, np.array(np.broadcast_to(np.asarray(view.plane_down, float), n_rows)),
-        np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew]),
-    )  # fmt: skip
-
-
-def _per_run(values: ArrayLike, axes: int, n_rows: int) -> Array:
-    """(1 or B, N, ...) from one value of so many axes, one for each row, or one for each run and row."""
-    a = np.asarray(values, float)
-    if a.ndim <= axes + 1:
-        a = np.broadcast_to(a, (1, n_rows, *a.shape[a.ndim - axes :]))
-    return np.array(a, order="C")
+    p_nc, R_nc, R_bc = (
+        np.array(np.broadcast_to(one, (n_rows, *shape)), order="C")
+        for one, shape in ((poses.p_nc, (3,)), (poses.R_nc, (3, 3)), (poses.R_bc, (3, 3)))
+    )
+    planes = np.array(np.broadcast_to(np.asarray(view.plane_down, float), n_rows))
+    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
+    return p_nc, R_nc, R_bc, poses.lever_arm, planes, intrinsics
 
 
 @compiled
 def filter_runs(
-    F: Array, Q: Array, left: Array, phis: Array | None, z: Array, R: Array, p_nc: Array | None,
-    R_nc: Array | None, R_bc: Array | None, lever: Array, planes: Array, A: Array, P_poses: Array | None,
-    x0: Array, P0: Array, start: int, threshold: float, slots: Integers,
-    out_x: Array, out_P: Array, out_v: Array, out_nis: Array, out_used: Flags, out_limited: Flags,
+    F: Array, Q: Array, phis: Array | None, z: Array, R: Array, p_nc: Array | None, R_nc: Array | None,
+    R_bc: Array | None, lever: Array, planes: Array, A: Array, P_poses: Array | None, x0: Array, P0: Array,
+    start: int, out_x: Array, out_P: Array, out_v: Array, out_nis: Array, out_used: Flags, out_limited: Flags,
 ) -> int:  # fmt: skip
     """All runs through rows ``start`` to N; the row of a singular S, or -1.
 
-    F, Q (N, 4, 4), left (N,) and phis (1 or B, N, 6, 6) of the step to each row; z (B, N, 2); R, the camera's
-    poses and P_poses (1 or B, N, ...), None without a camera, or where the pose is taken as true; planes
-    (N,); A (5,): fx, fy, cx, cy, skew. Estimates of each row go to its place in ``slots`` (N,), nowhere where
-    that is -1. An argument of None is a type of its own: each kind of filter is compiled for itself.
+    F, Q (N, 4, 4) and phis (1 or B, N, 6, 6) of the step to each row; z (B, N, 2); R and the camera's poses
+    (N, ...), P_poses (1 or B, N, 6, 6), None without a camera, or where the pose is taken as true; planes
+    (N,); A (5,): fx, fy, cx, cy, skew. An argument of None is a type of its own: each kind of filter is
+    compiled for itself.
     """
     n = 4 if P_poses is None else 10
     joint, J, U, V, K = (
@@ -233,20 +181,17 @@ def filter_runs(
     )
     L, G, v = np.zeros((n, n)), np.empty((4, n)), np.zeros(2)
     for run in range(len(z)):
-        x = x0[run].copy()
+        x = x0.copy()
         joint[:] = 0.0
-        joint[:4, :4] = P0[run]
-        noise = R[min(run, len(R) - 1)]
+        joint[:4, :4] = P0
         for row in range(start, z.shape[1]):
             _predict(x, joint, F[row], Q[row], G)
             if P_poses is not None:
                 of_run = min(run, len(P_poses) - 1)
-                _carry_errors(joint, G, left[row], phis[of_run, row], P_poses[of_run, row])  # type: ignore[index]  # there with `P_poses`
+                _carry_errors(joint, G, phis[of_run, row], P_poses[of_run, row])  # type: ignore[index]  # there with `P_poses`
             if p_nc is not None:
-                at = min(run, len(p_nc) - 1)
                 seen = _expect_pixel(
-                    x, z[run, row], p_nc[at, row], R_nc[min(run, len(R_nc) - 1), row],  # type: ignore[index, arg-type]
-                    R_bc[min(run, len(R_bc) - 1), row], lever, planes[row], A, v, J,  # type: ignore[index, arg-type]
+                    x, z[run, row], p_nc[row], R_nc[row], R_bc[row], lever, planes[row], A, v, J,  # type: ignore[index]
                 )  # fmt: skip
             else:
                 seen = np.isfinite(z[run, row, 0]) and np.isfinite(z[run, row, 1])
@@ -259,16 +204,15 @@ def filter_runs(
                     )
                     joint[:4, 4:] = C
                     joint[4:, :4] = C.T
-                nis = _update(x, joint, J, v, noise[row], threshold, U, V, K, G)
+                nis = _update(x, joint, J, v, R[row], U, V, K, G)
                 if nis < 0:
                     return row
-                out_used[run, row], out_nis[run, row] = nis <= threshold, nis
+                out_used[run, row], out_nis[run, row] = True, nis
                 out_v[run, row, 0], out_v[run, row, 1] = v[0], v[1]
-            if slots[row] >= 0:
-                for i in range(4):
-                    out_x[run, slots[row], i] = x[i]
-                    for j in range(4):
-                        out_P[run, slots[row], i, j] = joint[i, j]
+            for i in range(4):
+                out_x[run, row, i] = x[i]
+                for j in range(4):
+                    out_P[run, row, i, j] = joint[i, j]
     return -1
 
 
@@ -290,13 +234,13 @@ def _predict(x: Array, joint: Array, F: Array, Q: Array, G: Array) -> None:
 
 
 @compiled
-def _carry_errors(joint: Array, G: Array, left: float, phi: Array, P_pose: Array) -> None:
-    """``F C Phi'`` times what is left of the correlation, and the errors' own covariance of the row."""
+def _carry_errors(joint: Array, G: Array, phi: Array, P_pose: Array) -> None:
+    """``F C Phi'``, and the errors' own covariance of the row."""
     for a in range(6):
         for i in range(4):
             value = 0.0
             for b in range(6):
-                value += left * G[i, 4 + b] * phi[a, b]
+                value += G[i, 4 + b] * phi[a, b]
             joint[i, 4 + a] = joint[4 + a, i] = value
         for b in range(6):
             joint[4 + a, 4 + b] = P_pose[a, b]
@@ -346,10 +290,9 @@ def _expect_pixel(
 
 @compiled
 def _update(
-    x: Array, joint: Array, J: Array, v: Array, R: Array, threshold: float, U: Array, V: Array, K: Array,
-    G: Array,
+    x: Array, joint: Array, J: Array, v: Array, R: Array, U: Array, V: Array, K: Array, G: Array
 ) -> float:  # fmt: skip
-    """The NIS, and where that is within the gate H (3.7d)-(3.7h), with errors (7.34)-(7.38); Joseph form.
+    """The NIS, and H (3.7d)-(3.7h), with errors (7.34)-(7.38); Joseph form.
 
     -1 where S is no covariance. x (4,), joint (n, n), J (2, n), v (2,), R (2, 2); what follows is scratch.
     """
@@ -372,8 +315,6 @@ def _update(
         return -1.0
     i00, i01, i11 = s11 / determinant, -s01 / determinant, s00 / determinant
     nis = v[0] * (i00 * v[0] + i01 * v[1]) + v[1] * (i01 * v[0] + i11 * v[1])
-    if not nis <= threshold:
-        return float(nis)
     for i in range(4):
         K[i, 0], K[i, 1] = U[i, 0] * i00 + U[i, 1] * i01, U[i, 0] * i01 + U[i, 1] * i11
         x[i] += K[i, 0] * v[0] + K[i, 1] * v[1]

@@ -20,7 +20,7 @@ from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.schmidt import (
-    Considers,
+    Considered,
     Errors,
     errors_of,
     limit_cross,
@@ -320,7 +320,7 @@ def run_filter(
     motion: Motion,
     start: Start,
     *,
-    pose: Considers | None = None,
+    pose: Considered | None = None,
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
     ends: Ends | None = None,
@@ -396,7 +396,7 @@ def filter_in_steps(
     motion: Motion,
     start: Start,
     *,
-    pose: Considers | None = None,
+    pose: Considered | None = None,
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
     ends: Ends | None = None,

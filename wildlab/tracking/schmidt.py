@@ -8,21 +8,11 @@ needs of each error is its standard deviation, how long it lasts, and how the me
 With ``F^o = I`` H (7.32) keeps ``C`` from frame to frame while ``P^o`` changes. Where ``P^o`` grows that is
 the model of an error with a random walk, and sound. Where it shrinks, ``[P C; C' P^o]`` stops being a
 covariance as soon as the target is known about as well as the pose lets it be, which is soon: ``S`` and ``P``
-turn negative within a few frames. So ``C -> C Phi'``, with ``Phi`` from ``P^o_old`` and ``P^o_new`` in their
-common axes, in which the one is ``1`` and the other ``lambda``:
-
-``"bias"``
-    ``Phi = (P^o_new P^o_old^-1)^(1/2)``, in its axes ``lambda^(1/2)``. The thesis's constant bias: the error
-    keeps its value, counted in standard deviations, when the navigation filter thinks anew of its size.
-``"navigated"``
-    ``min(1, lambda)`` in its axes. Growth is a random walk, with ``C`` kept as in (7.32); shrinkage is what
-    an optimal navigation filter does with a measurement, after which the part of its error that is gone has
-    nothing to do with what is left. Every rise and fall of ``P^o`` makes the error a little newer.
-
-Either leaves ``C`` alone while ``P^o`` does, as the thesis has it, and neither depends on the units of the
-pose's errors. Both guarantee a joint covariance: ``P^o_new - Phi P^o_old Phi'`` is zero in the first and
-``lambda - min(1, lambda)^2 >= 0`` in the second, so what becomes of the joint covariance is a congruence plus
-a covariance; and the Joseph form (7.37) takes a joint covariance to a joint covariance whatever the gain, and
+turn negative within a few frames. So ``C -> C Phi'`` with ``Phi = (P^o_new P^o_old^-1)^(1/2)``: the thesis's
+constant bias, which keeps its value, counted in standard deviations, when the navigation filter thinks anew
+of its size. That leaves ``C`` alone while ``P^o`` does, as the thesis has it, and does not depend on the
+units of the pose's errors. ``P^o_new - Phi P^o_old Phi'`` is zero, so what becomes of the joint covariance is
+a congruence; and the Joseph form (7.37) takes a joint covariance to a joint covariance whatever the gain, and
 adds ``K R K'``, so ``P`` stays positive definite. `limit_cross` guards against what rounding, or a ``P^o``
 without variance in some direction, could still do.
 
@@ -51,7 +41,7 @@ shrinks every direction and leaves one.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,30 +52,10 @@ from wildlab.geometry.covariances import check_covariance
 from wildlab.geometry.frames import Array
 from wildlab.tracking.sensors import POSE, Sensor
 
-Change = Literal["bias", "navigated"]
-
 #: Variances below this share of the largest, in units in which all are one, count as zero: rounding.
 NEGLIGIBLE = 1e-12
 #: Where canonical correlations end: one, less what rounding could add.
 LARGEST_CORRELATION = 1 - 1e-9
-
-
-class PoseUncertainty(NamedTuple):
-    """What the navigation filter says of the camera's pose at each of N measurements.
-
-    Attributes
-    ----------
-    covariance
-        (N, 6, 6): position in n (m), attitude error in b (rad), H (7.39).
-    correlation_time
-        s over which the pose's error fades; infinity is H's constant bias, zero H (7.40)-(7.41).
-    change
-        What the pose's error does when its covariance changes, see the module.
-    """
-
-    covariance: Array
-    correlation_time: float = np.inf
-    change: Change = "bias"
 
 
 class SchmidtUpdate(NamedTuple):
@@ -156,9 +126,9 @@ def _root(covariance: Array) -> tuple[Array, Array]:
     return sd.reshape(-1, 1) * vectors * lengths, np.ascontiguousarray((vectors / lengths).T) * inverse
 
 
-def transition_of_pose(before: Array, after: Array, change: Change) -> Array:
+def transition_of_pose(before: Array, after: Array) -> Array:
     """``Phi`` (k, k), see the module, from the pose's covariance before to that after."""
-    return np.asarray(transitions_of_pose(np.stack([before, after]), change)[1])
+    return np.asarray(transitions_of_pose(np.stack([before, after]))[1])
 
 
 def _without_noise(values: Array) -> Array:
@@ -170,7 +140,7 @@ def _without_noise(values: Array) -> Array:
     return np.where(values > NEGLIGIBLE * values[..., -1:], np.maximum(values, 0), 0.0)
 
 
-def transitions_of_pose(covariances: Array, change: Change) -> Array:
+def transitions_of_pose(covariances: Array) -> Array:
     """``Phi`` (N, k, k) from each row's predecessor to it; rows of NaN are passed over, with the identity.
 
     All rows together: directions without variance are not left out but have a length of zero.
@@ -189,8 +159,7 @@ def transitions_of_pose(covariances: Array, change: Change) -> Array:
     root = sd[:, :, None] * vectors * lengths[:, None, :]
     inverse = np.swapaxes(vectors * per_length[:, None, :], 1, 2) * per_sd[:, None, :]
     kept, axes = np.linalg.eigh(inverse @ after @ np.swapaxes(inverse, 1, 2))
-    kept = _without_noise(kept)
-    kept = np.sqrt(kept) if change == "bias" else np.minimum(kept, 1)
+    kept = np.sqrt(_without_noise(kept))
     phi[rows[differ]] = root @ (axes * kept[:, None, :]) @ np.swapaxes(axes, 1, 2) @ inverse
     return phi
 
@@ -235,8 +204,6 @@ class Considered(NamedTuple):
         (N, k, k) at each of N measurements, or (k, k) for all; units of the errors squared.
     correlation_time
         s over which each fades, (k,) or one for all. Infinity is H's constant bias, zero H (7.40)-(7.41).
-    change
-        What an error does when its covariance changes, see `wildlab.tracking.schmidt`.
     shared
         (k,) whether targets of the same sensor have the error in common. A filter follows one target and does
         not look at it; who compares or joins targets does.
@@ -245,58 +212,44 @@ class Considered(NamedTuple):
     names: tuple[str, ...]
     covariance: Array
     correlation_time: float | tuple[float, ...] = np.inf
-    change: Change = "bias"
     shared: tuple[bool, ...] = ()
 
 
-#: What a filter takes as ``pose``: the six errors of a pose, or any.
-Considers = PoseUncertainty | Considered
-
-
-def consider_all(*several: Considers) -> Considered:
+def consider_all(*several: Considered) -> Considered:
     """Several sets of errors as one, those of one uncorrelated with those of another.
 
     Parameters
     ----------
     several
-        Errors of different names: a pose's with its covariance from the navigation filter, and others beside.
+        Errors of different names: a pose's with its covariance from the navigation filter, and others.
 
     Returns
     -------
     Considered
-        With the change rule of the first.
 
     Raises
     ------
     WildlabError
         Where a name comes twice, numbers of rows differ, or there is nothing.
     """
-    parts = [as_considered(one) for one in several]
-    names = tuple(name for one in parts for name in one.names)
+    names = tuple(name for one in several for name in one.names)
     twice = sorted({name for name in names if names.count(name) > 1})
-    lengths = {len(one.covariance) for one in parts if np.ndim(one.covariance) == 3}
-    if not parts or twice or len(lengths) > 1:
+    lengths = {len(one.covariance) for one in several if np.ndim(one.covariance) == 3}
+    if not several or twice or len(lengths) > 1:
         raise WildlabError(
-            f"{', '.join(twice)} twice" if twice else f"rows of {sorted(lengths)} and {len(parts)} sets",
+            f"{', '.join(twice)} twice" if twice else f"rows of {sorted(lengths)} and {len(several)} sets",
             "give each error once, with as many rows as the others", field="considered",
         )  # fmt: skip
     k = len(names)
     covariance = np.zeros((*((lengths.pop(),) if lengths else ()), k, k))
     first = 0
-    for one in parts:
+    for one in several:
         last = first + len(one.names)
         covariance[..., first:last, first:last] = one.covariance
         first = last
-    times = tuple(float(time) for one in parts for time in _times(one))
-    shared = tuple(flag for one in parts for flag in (one.shared or (True,) * len(one.names)))
-    return Considered(names, covariance, times, parts[0].change, shared)
-
-
-def as_considered(pose: Considers) -> Considered:
-    """The six errors of a pose as named ones; others as they are."""
-    if isinstance(pose, Considered):
-        return pose
-    return Considered(POSE, np.asarray(pose.covariance, float), pose.correlation_time, pose.change)
+    times = tuple(float(time) for one in several for time in _times(one))
+    shared = tuple(flag for one in several for flag in (one.shared or (True,) * len(one.names)))
+    return Considered(names, covariance, times, shared)
 
 
 def _times(considered: Considered) -> Array:
@@ -347,7 +300,7 @@ class Errors(NamedTuple):
         return np.asarray(self.left(row, dt) @ self.phi[row])
 
 
-def errors_of(pose: Considers | None, sensor: Sensor, n_rows: int) -> Errors | None:
+def errors_of(pose: Considered | None, sensor: Sensor, n_rows: int) -> Errors | None:
     """Considered errors ready for a filter, or None.
 
     Raises
@@ -358,36 +311,31 @@ def errors_of(pose: Considers | None, sensor: Sensor, n_rows: int) -> Errors | N
     """
     if pose is None:
         return None
-    given = as_considered(pose)
-    k, P = len(given.names), np.asarray(given.covariance, float)
-    if isinstance(pose, Considered) and P.shape == (k, k):
+    k, P = len(pose.names), np.asarray(pose.covariance, float)
+    if P.shape == (k, k):
         P = np.tile(P, (n_rows, 1, 1))
-    by_name = set(given.names) <= set(sensor.considers)
-    if not by_name and isinstance(pose, PoseUncertainty) and P.shape[1:] == (len(sensor.considers),) * 2:
-        by_name, given, k = True, given._replace(names=sensor.considers), len(sensor.considers)
     if P.shape != (n_rows, k, k):
         raise WildlabError(
             f"shape {P.shape} for {n_rows} rows of measurements",
             f"give one ({k}, {k}) covariance for each measurement", field="pose.covariance",
         )  # fmt: skip
-    if not by_name:
-        unknown = [name for name in given.names if name not in sensor.considers]
+    unknown = [name for name in pose.names if name not in sensor.considers]
+    if unknown:
         raise WildlabError(
             f"what is measured has no derivative for {', '.join(unknown)}",
             f"consider some of {', '.join(sensor.considers)}, or add columns with `considering`",
             field="pose.names",
         )
-    times = np.asarray(given.correlation_time, float)
+    times = np.asarray(pose.correlation_time, float)
     if times.shape not in ((), (k,)) or not (times >= 0).all():
         raise WildlabError(
-            f"correlation times {given.correlation_time} for {k} errors",
+            f"correlation times {pose.correlation_time} for {k} errors",
             "give seconds that are not negative, one or one for each", field="pose.correlation_time",
         )  # fmt: skip
-    if isinstance(pose, Considered):
-        check_covariance(P[np.isfinite(P).all(axis=(1, 2))], "pose.covariance")
-    columns = [sensor.considers.index(name) for name in given.names]
+    check_covariance(P[np.isfinite(P).all(axis=(1, 2))], "pose.covariance")
+    columns = [sensor.considers.index(name) for name in pose.names]
     all_in_order = columns == list(range(len(sensor.considers)))
-    phi = transitions_of_pose(P, given.change)
+    phi = transitions_of_pose(P)
     if times.ndim and (times == times[0]).all():
         times = times[0]
     apart: NDArray[np.bool_] = np.broadcast_to(times, k)[:, None] != np.broadcast_to(times, k)

@@ -26,7 +26,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import Start, Step, Track, filter_in_steps
-from wildlab.tracking.schmidt import Considers, Errors
+from wildlab.tracking.schmidt import Considered, Errors
 from wildlab.tracking.sensors import Sensor
 
 #: Variances of a correction below this share of the prediction's count as zero: rounding.
@@ -87,7 +87,7 @@ def run_smoothed(
     motion: Motion,
     start: Start,
     *,
-    pose: Considers | None = None,
+    pose: Considered | None = None,
     gate_probability: float = 1.0,
 ) -> Track:
     """`run_filter`, and back over what it found.

@@ -109,7 +109,7 @@ def test_an_error_stays_itself_along_the_flight():
     assert np.allclose(roots @ np.swapaxes(roots, 1, 2), errors.pose, atol=1e-12)
     order = np.argsort(observed.table["time_s"].to_numpy(float), kind="stable")
     for a, b in zip(order[:-1:20], order[1::20], strict=False):
-        phi = transition_of_pose(errors.pose[a], errors.pose[b], "bias")
+        phi = transition_of_pose(errors.pose[a], errors.pose[b])
         assert np.allclose(phi @ roots[a], roots[b], atol=1e-9)
     points = georeference(observed, np.random.default_rng(0))
     linear = points["ellipse"].to_numpy(str) == "linear"

@@ -239,7 +239,7 @@ def errors_of_pixels(
     for row in np.flatnonzero(known & ~np.isclose(first, rest, rtol=1e-6).all(axis=(1, 2))):
         values, axes = np.linalg.eigh(rest[row])
         whole = (axes * np.maximum(values, 0.0)) @ axes.T
-        shared[row] = transition_of_pose(first[row], whole, "bias") @ shared[row]
+        shared[row] = transition_of_pose(first[row], whole) @ shared[row]
     names = [*of_pose[1], *(f"mount {i}" for i in range(1, 4)), "ground"]
     return own, shared, CorrelatedErrors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
 
@@ -307,7 +307,7 @@ def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
     values, axes = np.linalg.eigh(own[0] * np.outer(unit, unit))
     at = np.empty_like(own)
     at[0] = sd[:, None] * (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T
-    for row, change in enumerate(transitions_of_pose(own, "bias")[1:], start=1):
+    for row, change in enumerate(transitions_of_pose(own)[1:], start=1):
         at[row] = change @ at[row - 1]
     roots[known] = at[look]
     return roots

@@ -512,7 +512,7 @@ def errors_of(scans: Scans, beliefs: NoiseModel) -> Considered | None:
         last = first + block.shape[-1]
         covariance[:, first:last, first:last] = block
         first = last
-    return Considered(tuple(names), covariance, tuple(times), "bias", tuple(shared))
+    return Considered(tuple(names), covariance, tuple(times), tuple(shared))
 
 
 def spread_of(scans: Scans, beliefs: NoiseModel, H_pose: Array) -> Array | None:

@@ -31,12 +31,12 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
+from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import Motion, constant_velocity
 from wildlab.tracking.run import Start, Track
-from wildlab.tracking.schmidt import Change, PoseUncertainty
-from wildlab.tracking.sensors import Sensor, pixels
+from wildlab.tracking.schmidt import Considered
+from wildlab.tracking.sensors import POSE, Sensor, pixels
 
 #: The velocity of the truth is taken over this time: from one fix of a single-frequency receiver to the next,
 #: a course means little.
@@ -247,8 +247,6 @@ def follow_schmidt(
     seen: Sighting,
     tuning: CvTuning,
     covariance: ArrayLike | None = None,
-    correlation_time: float = np.inf,
-    change: Change = "bias",
 ) -> Track:
     """The Schmidt-Kalman filter on pixels, H 7.4.
 
@@ -260,8 +258,6 @@ def follow_schmidt(
         Its ``measurement`` is not used.
     covariance
         (N, 6, 6) of the poses in place of that which the source states.
-    correlation_time, change
-        See `wildlab.tracking.schmidt.PoseUncertainty`.
 
     Returns
     -------
@@ -279,7 +275,7 @@ def follow_schmidt(
             "the poses have no covariance", "use those of the MEKF: navigate_mekf(flight)", field="nav"
         )
     view = BatchCamera(seen.poses, seen.plane_down)
-    pose = PoseUncertainty(own, correlation_time, change)
+    pose = Considered(POSE, own)
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, pose)
 
 
@@ -297,12 +293,10 @@ def _compiled(
     R: Array,
     tuning: CvTuning,
     view: BatchCamera | None,
-    pose: PoseUncertainty | None,
+    pose: Considered | None,
 ) -> Track:
     """One run of the compiled filters, which a test holds against the readable ones."""
-    return as_tracks(
-        run_batch(seen.times, z[None], R, tuning.motion, start(seen, tuning), view=view, pose=pose)
-    )[0]
+    return run_batch(seen.times, z[None], R, tuning.motion, start(seen, tuning), view=view, pose=pose)[0]
 
 
 class Scored(NamedTuple):

@@ -233,7 +233,7 @@ def values_over_flights(
         ax.axvspan(*chi_square_interval(band), color=GREEN, alpha=0.13, lw=0, zorder=0)
     for place, name in enumerate(names):
         row = np.sort(values[name].to_numpy(float))
-        color = colour(name.split("-")[0] if name != "inflation" else "kf")
+        color = colour(name.split("-")[0])
         # Spread out by rank, in a pattern that repeats, so that equal values do not hide one another.
         offset = 0.28 * (2 * ((np.arange(len(row)) * 0.618034) % 1) - 1)
         draw_dots(ax, row, place + offset, color, size=4.5 if len(values) > FEW else 9.0, alpha=0.4)
