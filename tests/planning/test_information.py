@@ -8,11 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import ned_to_enu, wrap
+from wildlab.geometry.frames import wrap
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.planning.information import (
     SearchSensor,
-    as_printed,
     bearing_information,
     bearing_jacobian,
     in_field_of_view,
@@ -75,23 +74,6 @@ def test_straight_below_the_azimuth_tells_no_more_than_from_nearest():
     beside = bearing_information([[5.0, 0.0, 0.0]], camera_at, sensor)[0]
     assert beside[1, 1] == pytest.approx(Y[1, 1])
     assert bearing_information([[50.0, 0.0, 0.0]], camera_at, sensor)[0, 1, 1] == pytest.approx(1)
-
-
-def test_the_print_takes_elements_13_and_23_for_an_elevation_that_counts_downwards():
-    rng = np.random.default_rng(1)
-    p = rng.uniform(-100, 100, (50, 3)) * [1, 1, 0.1]
-    letter = as_printed(p, camera_at, SENSOR.sd)
-    d = ned_to_enu(p - camera_at)
-    r = np.linalg.norm(d, axis=1)
-    projection = (np.eye(3) - d[:, :, None] * d[:, None, :] / r[:, None, None] ** 2) / (
-        SENSOR.sd * r[:, None, None]
-    ) ** 2
-    for i, j in ((0, 0), (0, 1), (1, 1)):
-        assert letter[:, i, j] == pytest.approx(projection[:, i, j])
-    for i in (0, 1):
-        assert letter[:, i, 2] == pytest.approx(-projection[:, i, 2])
-    # A camera above the ground looks down, and the print then says that heights are known worse than not.
-    assert (letter[:, 2, 2] < 0).all() and (projection[:, 2, 2] > 0).all()
 
 
 def test_the_field_of_view_is_that_of_a_camera_without_distortion():

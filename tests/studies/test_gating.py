@@ -27,7 +27,6 @@ from wildlab.studies.gating import monte_carlo as gating
 from wildlab.studies.gating.monte_carlo import (
     GATES,
     IMAGES,
-    Choices,
     Outcome,
     Overflight,
     draw_scene,
@@ -36,8 +35,6 @@ from wildlab.studies.gating.monte_carlo import (
     overflight,
     streams,
 )
-
-FEEDS = ("own", "assigned")
 
 
 @pytest.fixture(scope="module")
@@ -63,10 +60,10 @@ def warmed_up(scene: gating.GatingScene, run: int) -> KalmanFilter:
     return kf
 
 
-@pytest.mark.parametrize("feed", FEEDS)
-def test_positions_as_another_filter_gates_them(over, feed):
+@pytest.mark.parametrize("assigned", [False, True])
+def test_positions_as_another_filter_gates_them(over, assigned):
     runs = streams(7, 4)
-    scene, gated = draw_scene(over, runs), gate(over, Choices(updated_with=feed), runs)  # type: ignore[arg-type]
+    scene, gated = draw_scene(over, runs), gate(over, runs, assigned=assigned)
     for run in range(4):
         kf = warmed_up(scene, run)
         for t in range(IMAGES):
@@ -75,7 +72,7 @@ def test_positions_as_another_filter_gates_them(over, feed):
             nis = [v @ np.linalg.inv(S) @ v for v in gated.measured[run, t] - kf.x[:2]]
             np.testing.assert_allclose(gated.nis[0, run, t], nis, rtol=1e-8)
             assert gated.right[0, run, t] == (nis[0] < nis[1])
-            kf.update(gated.measured[run, t, int(np.argmin(nis)) if feed == "assigned" else 0])
+            kf.update(gated.measured[run, t, int(np.argmin(nis)) if assigned else 0])
             np.testing.assert_allclose(gated.estimate[0, run, t], kf.x[:2], atol=1e-7)
 
 
@@ -85,22 +82,13 @@ def seen_angles(p_c: Array) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("form", "feed", "angles_update"),
-    [
-        ("pixels", "own", "pixels"),
-        ("pixels", "assigned", "pixels"),
-        ("angles", "own", "pixels"),
-        ("angles", "assigned", "pixels"),
-        ("angles", "own", "angles"),
-        ("both", "own", "pixels"),
-        ("both", "assigned", "pixels"),
-    ],
+    ("form", "assigned"),
+    [("pixels", False), ("pixels", True), ("angles", False), ("angles", True), ("both", True)],
 )
-def test_pixels_and_angles_as_written_out(over, form, feed, angles_update):
+def test_pixels_and_angles_as_written_out(over, form, assigned):
     """The extended filter of H (6.4)-(6.11) for single runs, its derivatives by differences."""
     runs = streams(11, 2)
-    choices = Choices(updated_with=feed, angles_update=angles_update)  # type: ignore[arg-type]
-    scene, gated = draw_scene(over, runs), gate(over, choices, runs)
+    scene, gated = draw_scene(over, runs), gate(over, runs, assigned=assigned)
     f = over.poses.camera.fx
     middle = np.array([over.poses.camera.cx, over.poses.camera.cy])
     R_uv, R_angles = np.diag([360.0, 160.0]), np.diag(np.radians([6.0, 3.0]) ** 2)
@@ -139,9 +127,7 @@ def test_pixels_and_angles_as_written_out(over, form, feed, angles_update):
             row = GATES.index(form)
             np.testing.assert_allclose(gated.nis[row, run, t], nis, rtol=1e-4)
             assert gated.right[row, run, t] == (nis[0] < nis[1])
-            used = int(np.argmin(nis)) if feed == "assigned" else 0
-            if angles_update == "angles":
-                H, S, gaps = H_angles, S_angles, turns
+            used = int(np.argmin(nis)) if assigned else 0
             K = P @ H.T @ np.linalg.inv(S)
             x = x + K @ gaps[used]
             P = P - K @ H @ P
@@ -162,7 +148,7 @@ def test_without_noise_and_far_apart_nothing_goes_wrong(over, monkeypatch):
     monkeypatch.setattr(gating, "POSE_SD", np.zeros(8))
     monkeypatch.setattr(gating, "PIXEL_SD", 0.0)
     monkeypatch.setattr(gating, "APART", (0.0, 120.0))
-    gated = gate(over, Choices(), streams(1, 20))
+    gated = gate(over, streams(1, 20))
     np.testing.assert_allclose(gated.measured, gated.targets[:, None].repeat(IMAGES, 1), atol=1e-6)
     assert gated.right.all()
 
@@ -178,7 +164,7 @@ def test_two_targets_in_one_place_are_a_toss_up(over, monkeypatch):
 
 
 def rates_of(over: Overflight, runs: int, seed: int, chunk: int = 500) -> Array:
-    return outcomes(over, {"": Choices()}, runs, seed, chunk)[""].rate
+    return outcomes(over, {"": False}, runs, seed, chunk)[""].rate
 
 
 def test_a_run_does_not_depend_on_the_others(over):
@@ -191,14 +177,11 @@ def test_a_run_does_not_depend_on_the_others(over):
 def test_readings_are_judged_on_the_same_draws(over):
     found = outcomes(over, READINGS, 6, 3, chunk=4)
     np.testing.assert_array_equal(found[DEFAULT].rate, rates_of(over, 6, 3))
-    # Angles in the update change the track that angles gate, and no other.
-    same = np.isclose(found["own"].rate, found["angles"].rate).all(axis=1)
-    assert same.tolist() == [True, True, False, True]
 
 
 def test_mistakes_are_counted_apart_and_together(over):
-    gated = gate(over, Choices(), streams(5, 30))
-    found = outcomes(over, {"": Choices()}, 30, 5)[""]
+    gated = gate(over, streams(5, 30))
+    found = outcomes(over, {"": False}, 30, 5)[""]
     pixels, angles = ~gated.right[1], ~gated.right[2]
     np.testing.assert_allclose(found.mistakes[0] + found.mistakes[2], 100 * pixels.mean(axis=1))
     np.testing.assert_allclose(found.mistakes[1] + found.mistakes[2], 100 * angles.mean(axis=1))
@@ -243,7 +226,7 @@ def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight, over):
 
 def test_what_feeds_the_track(over):
     runs = streams(1, 60)
-    fed = {name: gate(over, Choices(updated_with=name), runs) for name in FEEDS}  # type: ignore[arg-type]
+    fed = {name: gate(over, runs, assigned=assigned) for name, assigned in READINGS.items()}
     own = fed["own"]
     # Gated by angles and updated by pixels, the track fed with its own is that of the pixels.
     np.testing.assert_allclose(own.estimate[2], own.estimate[1])

@@ -9,7 +9,6 @@ from wildlab.errors import WildlabError
 from wildlab.reporting.published import load_published
 from wildlab.studies.optical_flow_velocity import trial as study
 from wildlab.studies.optical_flow_velocity.trial import (
-    CALIBRATED,
     IMAGES,
     LOGGED,
     READINGS,
@@ -118,7 +117,7 @@ def spread_of(count=40, **changes):
             "interval_share_95": 0.95,
         }  # fmt: skip
         numbers |= {(subject, name): value for name, value in values.items()}
-    for one, sd in ((SYNCHRONISED, 2.5), (STILL, 3.0), (CALIBRATED, 4.5), (TRUE, 0.5)):
+    for one, sd in ((SYNCHRONISED, 2.5), (STILL, 3.0), (TRUE, 0.5)):
         numbers[one, "sd_north"] = numbers[one, "sd_east"] = sd
     numbers[LOGGED, "correlation_u"], numbers[LOGGED, "correlation_v"] = 0.9, 0.8
     for key, value in changes.items():

@@ -15,7 +15,6 @@ from wildlab.simulation.scene import (
 from wildlab.studies import wildlife_detection
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (
-    ADAPTIVE,
     BY_EMPTY,
     BY_MEAN,
     CLOUDY,
@@ -26,6 +25,7 @@ from wildlab.studies.wildlife_detection.trial import (
     METHODS,
     NIGHT,
     NOON,
+    OVER_MEAN,
     PROPOSED,
     SMALL,
     SUBTRACTED,
@@ -182,7 +182,7 @@ def test_a_premise_that_is_not_met_decides_nothing(numbers):
 
 
 def test_printed_settings_are_the_theses():
-    assert (METHODS[CONSTANT].level, METHODS[ADAPTIVE].block_px, METHODS[ADAPTIVE].level) == (150, 451, 150)
+    assert (METHODS[CONSTANT].level, METHODS[OVER_MEAN].block_px, METHODS[OVER_MEAN].level) == (150, 451, 150)
     assert (METHODS[SMALL].block_px, METHODS[LARGE].block_px) == (51, 251)
     assert (METHODS[SUBTRACTED].background, METHODS[SUBTRACTED].block_px, METHODS[SUBTRACTED].level) == (
         "mean", 251, 65,

@@ -5,8 +5,8 @@ image that shows the point adds what two angles tell (5.4), less where an animal
 with time it wears off (5.5); `information_kernels` has both. What is left to be known is the sum of all
 tr(Y^-1), (5.6).
 
-F writes this in east-north-up; here it is n, north-east-down. The print contradicts itself in places:
-`as_printed` has its letter, and the study ``printed-numbers`` shows where it differs.
+F writes this in east-north-up; here it is n, north-east-down. Where the print contradicts itself,
+``docs/contradictions.md`` says what holds.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError, above_zero
-from wildlab.geometry.frames import Array, Mask, ned_to_enu
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -121,38 +122,6 @@ def bearing_information(points: ArrayLike, p_nc: ArrayLike, sensor: SearchSensor
     """
     H = bearing_jacobian(points, p_nc, sensor.nearest)
     return np.asarray(np.swapaxes(H, -1, -2) @ H / sensor.sd**2)
-
-
-def as_printed(points: ArrayLike, p_nc: ArrayLike, sd: float) -> Array:
-    """What appendix A (A.1)-(A.2) prints for one image, letter by letter; shown beside, and used nowhere.
-
-    Parameters
-    ----------
-    points
-        (N, 3) in n, m.
-    p_nc
-        Of the camera, (3,) or (N, 3), m.
-    sd
-        Of both angles, rad.
-
-    Returns
-    -------
-    (N, 3, 3) 1/m^2, in F's axes, east-north-up, where the print can be held against it. As printed it is no
-    projection (element 33 has sin(theta) where cos(theta)^2 belongs), elements 13 and 23 have the sign of an
-    elevation that counts downwards, and what the azimuth tells is not divided by cos(theta)^2.
-    """
-    d = ned_to_enu(np.asarray(points, float) - np.asarray(p_nc, float))
-    phi = np.arctan2(d[..., 1], d[..., 0])
-    theta = np.arctan2(d[..., 2], np.hypot(d[..., 0], d[..., 1]))
-    q = 1 / (sd**2 * (d**2).sum(axis=-1))
-    Y = np.empty((*q.shape, 3, 3))
-    Y[..., 0, 0] = np.sin(phi) ** 2 + np.cos(phi) ** 2 * np.sin(theta) ** 2
-    Y[..., 0, 1] = Y[..., 1, 0] = -np.cos(phi) * np.cos(theta) ** 2 * np.sin(phi)
-    Y[..., 0, 2] = Y[..., 2, 0] = np.cos(phi) * np.cos(theta) * np.sin(theta)
-    Y[..., 1, 1] = np.cos(phi) ** 2 + np.sin(phi) ** 2 * np.sin(theta) ** 2
-    Y[..., 1, 2] = Y[..., 2, 1] = np.cos(theta) * np.sin(phi) * np.sin(theta)
-    Y[..., 2, 2] = np.sin(theta)
-    return np.asarray(Y * q[..., None, None])
 
 
 def in_field_of_view(points: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike, sensor: SearchSensor) -> Mask:

@@ -77,13 +77,13 @@ def record_scores(report: Report, rows: pd.DataFrame, middle: pd.DataFrame) -> N
     for _, one in rows.iterrows():
         for name, column, unit in each:
             report.metric(name, f"{one['case']}/{one['mode']}", one[column], unit)
-    each = (
+    middles = (
         ("gospa_median", "gospa", "m"),
         ("tracked_median", "tracked", "%"),
         ("track_changes", "changes", "1"),
     )
     for _, one in middle.iterrows():
-        for name, column, unit in each:
+        for name, column, unit in middles:
             report.metric(name, f"elsewhere/{one['mode']}", one[column], unit, n=int(one["of"]))
 
 

@@ -31,7 +31,6 @@ from wildlab.reporting.figures import (
 from wildlab.studies.gating.monte_carlo import (
     FORMS,
     GATES,
-    Choices,
     Gated,
     Outcome,
     Overflight,
@@ -44,11 +43,8 @@ from wildlab.studies.protocol import Study
 DEFAULT = "own"
 #: The one that shows what mistakes do to a tracker that believes them.
 STRESS = "assigned"
-READINGS: Mapping[str, Choices] = {
-    "own": Choices(),
-    "assigned": Choices(updated_with="assigned"),
-    "angles": Choices(angles_update="angles"),
-}
+#: Whether the assigned measurement updates the track, by reading.
+READINGS = {DEFAULT: False, STRESS: True}
 #: Less than this share of right associations (per cent) is mostly wrong.
 MOSTLY_WRONG = 50.0
 #: Success rates (per cent) of the run that H 6.4.3 shows, in the order of `FORMS`.
@@ -91,9 +87,9 @@ def rates_table(outcomes: Mapping[str, Outcome], names: Mapping[str, str]) -> pd
 def typical_run(over: Overflight, sources: Sequence[np.random.SeedSequence]) -> Gated:
     """Of some runs by the default reading the one whose rates are nearest to those of H's single run."""
     runs = list(sources)
-    shares = 100 * gate(over, READINGS[DEFAULT], runs).right[: len(FORMS)].mean(axis=2)
+    shares = 100 * gate(over, runs).right[: len(FORMS)].mean(axis=2)
     chosen = int(np.abs(shares.T - PUBLISHED_RUN).max(axis=1).argmin())
-    return gate(over, READINGS[DEFAULT], runs[chosen : chosen + 1])
+    return gate(over, runs[chosen : chosen + 1])
 
 
 def standard_error(values: Array) -> float:
@@ -136,24 +132,21 @@ def verdict(margins: Array) -> str:
 PUBLISHED_RUNS = 10_000
 _COLOURS = {"position": BLUE, "pixels": VERMILLION, "angles": GREEN, "both": PURPLE}
 _OBJECTS = {"main object": BLUE, "second object": ORANGE}
-_MARKS = (("s", BLUE, -0.12), ("^", GREY, 0.12), ("o", VERMILLION, 0.0))
 
 
 def plot_rates(
     outcomes: Mapping[str, Outcome], published: Mapping[tuple[str, str], float], names: Mapping[str, str]
 ) -> Figure:
-    """Mean success rates of each reading but the stress test's; ``published`` by subject and name, hollow.
+    """Mean success rates by the default reading; ``published`` by subject and name, hollow.
 
-    Bars are twice the standard error, the published ones' with the default reading's spread between runs.
+    Bars are twice the standard error, the published ones' with the same spread between runs.
     """
     fig, ax = new_figure(5.6, 3.9)
     at, look = np.arange(len(GATES)), {"ms": 7, "capsize": 3}
-    shown = [name for name in outcomes if name != STRESS]
-    for name, (marker, color, aside) in zip(shown, _MARKS, strict=False):
-        rates = outcomes[name].rate
-        twice, label = [2 * standard_error(runs) for runs in rates], names[f"updated-with-{name}"]
-        ax.errorbar(at + aside, rates.mean(axis=1), twice, fmt=marker, color=color, label=label, **look)
-    spread = outcomes[DEFAULT].rate.std(axis=1, ddof=1)[: len(FORMS)]
+    rates = outcomes[DEFAULT].rate
+    twice, label = [2 * standard_error(runs) for runs in rates], names[f"updated-with-{DEFAULT}"]
+    ax.errorbar(at, rates.mean(axis=1), twice, fmt="s", color=BLUE, label=label, **look)
+    spread = rates.std(axis=1, ddof=1)[: len(FORMS)]
     printed = [published[form, "success_rate"] for form in FORMS]
     hollow = {"fmt": "D", "mfc": "white", "mec": INK, "ecolor": INK, "label": "published"}
     ax.errorbar(at[: len(FORMS)], printed, 2 * spread / np.sqrt(PUBLISHED_RUNS), **hollow, **look)

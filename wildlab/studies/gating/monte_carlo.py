@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,23 +79,6 @@ class Overflight:
     poses: CameraPoses
     time_s: Array
     euler: Array
-
-
-@dataclass(frozen=True)
-class Choices:
-    """What H 6.4.3 does not print about the update of the track.
-
-    Attributes
-    ----------
-    updated_with
-        The main object's ``own`` measurement whatever was assigned, or the one that was ``assigned``: see
-        `wildlab.studies.gating`.
-    angles_update
-        What updates the track that angles gate. H 6.3.2: pixels are used in the update and angles for gating.
-    """
-
-    updated_with: Literal["own", "assigned"] = "own"
-    angles_update: Literal["pixels", "angles"] = "pixels"
 
 
 class Gated(NamedTuple):
@@ -201,9 +184,12 @@ def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> GatingSc
     )
 
 
-def gate(over: Overflight, choices: Choices, runs: list[np.random.SeedSequence]) -> Gated:
-    """Every image of every run, associated by each of `GATES`. Keeps everything: for some 1000 runs."""
-    return _gate(draw_scene(over, runs), choices)
+def gate(over: Overflight, runs: list[np.random.SeedSequence], *, assigned: bool = False) -> Gated:
+    """Every image of every run, associated by each of `GATES`. Keeps everything: for some 1000 runs.
+
+    What updates the track is not published: the main object's own measurement, or the one ``assigned``.
+    """
+    return _gate(draw_scene(over, runs), assigned=assigned)
 
 
 class Outcome(NamedTuple):
@@ -215,16 +201,16 @@ class Outcome(NamedTuple):
 
 
 def outcomes(
-    over: Overflight, readings: Mapping[str, Choices], runs: int, seed: int, chunk: int = 500
+    over: Overflight, readings: Mapping[str, bool], runs: int, seed: int, chunk: int = 500
 ) -> dict[str, Outcome]:
-    """What became of each run by each of some choices, on the same draws.
+    """What became of each run by each reading, on the same draws.
 
     Parameters
     ----------
     over
         The flight, from `overflight`.
     readings
-        Choices by name.
+        By name, whether the assigned measurement updates the track; see `gate`.
     runs, seed
         How many, and of their streams; see `streams`.
     chunk
@@ -239,8 +225,8 @@ def outcomes(
     parts: dict[str, list[Outcome]] = {name: [] for name in readings}
     for first in range(0, runs, chunk):
         scene = draw_scene(over, sources[first : first + chunk])
-        for name, choices in readings.items():
-            parts[name].append(_outcome(_gate(scene, choices)))
+        for name, assigned in readings.items():
+            parts[name].append(_outcome(_gate(scene, assigned=assigned)))
     return {
         name: Outcome(*(np.concatenate(values, axis=-1) for values in zip(*some, strict=True)))
         for name, some in parts.items()
@@ -287,7 +273,7 @@ def expected(form: str, position: Array, poses: CameraPoses) -> tuple[Array, Arr
     return np.stack([np.arctan2(y, x), np.arctan2(z, level)], axis=-1), slopes
 
 
-def _gate(scene: GatingScene, choices: Choices) -> Gated:
+def _gate(scene: GatingScene, *, assigned: bool) -> Gated:
     poses, pixels = scene.poses, scene.pixels
     lens = poses.p_nc[:, :, None], poses.R_nc[:, :, None]
     ground = pixel_to_plane(poses.camera, pixels, *lens, 0.0)[..., :2]
@@ -299,7 +285,8 @@ def _gate(scene: GatingScene, choices: Choices) -> Gated:
     nis, estimate = np.empty((len(GATES), N, T, 2)), np.empty((len(GATES), N, T, 2))
     for row, by in enumerate(GATES):
         forms = ("pixels", "angles") if by == "both" else (by,)
-        update = by if by == "position" or (by, choices.angles_update) == ("angles", "angles") else "pixels"
+        # H 6.3.2: pixels are used in the update and angles for gating.
+        update = "position" if by == "position" else "pixels"
         x, P = _warm_up(scene)
         P = np.tile(P, (N, 1, 1))
         for t in range(T):
@@ -313,12 +300,11 @@ def _gate(scene: GatingScene, choices: Choices) -> Gated:
                     d += innovation_squared(v, S[:, None])
                 nearest = np.where(np.isfinite(d), d, np.inf).argmin(axis=1)
                 known = np.isfinite(d).any(axis=1)
-                own = choices.updated_with == "own"
-                z = measured[update][np.arange(N), t, 0 if own else nearest]
+                z = measured[update][np.arange(N), t, nearest if assigned else 0]
                 h, H = expected(update, x[:, :2], here)
-                gap = difference(z, h, (update == "angles", False))
+                gap = z - h
                 step = correct(x, P, gap, on_state(H, 4), R_FORM[update])
-            used = np.asarray(np.isfinite(gap).all(axis=1) & (own | known))
+            used = np.asarray(np.isfinite(gap).all(axis=1) & (known | (not assigned)))
             x, P = np.where(used[:, None], step.x, x), np.where(used[:, None, None], step.P, P)
             right[row, :, t], nis[row, :, t], estimate[row, :, t] = known & (nearest == 0), d, x[:, :2]
     return Gated(right, nis, estimate, ground, scene.targets)

@@ -136,19 +136,6 @@ def share_over_time(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     return fig
 
 
-def times_of_worlds(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
-    """In which share of the worlds all animals were found by a time."""
-    fig, ax = new_figure(5.6, 4.6)
-    for who in SEARCHERS:
-        whole = runs[who, "share_found"].to_numpy(float) >= 1
-        times = np.sort(runs[who, "all_found"].to_numpy(float)[whole]) / 60
-        x = np.concatenate([[0.0], times, [BUDGET_S / 60]])
-        y = np.concatenate([[0.0], np.arange(1, len(times) + 1), [len(times)]]) / len(runs)
-        ax.step(x, y, _STYLES[who], where="post", color=COLOURS[who], label=names[who])
-    ax.set(xlim=(0, BUDGET_S / 60), ylim=(0, 1.02))
-    return finish(fig, "", "time until all are found (min)", "share of worlds")
-
-
 def tours_map(situation: Situation) -> Figure:
     """The path of the greedy high-level planner and the shortest one."""
     fig, ax = new_figure(5.6, 3.9)

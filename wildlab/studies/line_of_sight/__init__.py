@@ -17,7 +17,7 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles, field_of_view, in_field_of_view
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
-from wildlab.messages.quantities import number, percent, percent_between
+from wildlab.messages.quantities import percent, percent_between
 from wildlab.reporting.charts.drawing import finish
 from wildlab.reporting.charts.forms import Values, draw_heights, fit_map, lines_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, map_axes, new_figure
@@ -252,9 +252,8 @@ def view_map(land: Terrain, view: TerrainView, names: Mapping[str, str]) -> Figu
     return finish(fig, "")
 
 
-def tables(runs: pd.DataFrame, times: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Shares of grid points by height and tilt, with the 95 % interval of their mean over terrains, and
-    median times (µs)."""
+def agreement_table(runs: pd.DataFrame) -> pd.DataFrame:
+    """Shares of grid points by height and tilt, with the 95 % interval of their mean over terrains."""
     shares = []
     for name, height, tilt in settings():
         row = {"where": f"{height:.0f} m, {tilt:.0f}°", "seen": _share(runs[EXACT, f"seen_{name}"])}
@@ -263,11 +262,7 @@ def tables(runs: pd.DataFrame, times: pd.DataFrame) -> dict[str, pd.DataFrame]:
             wrong = [percent(float(runs[way, f"{what}_{name}"].mean())) for what in ("too_many", "too_few")]
             row[f"{way}-wrong"] = " / ".join(wrong)
         shares.append(row)
-    taken = [
-        {"height": f"{height} m"} | {way: number(1e6 * float(times[way, height].median()), 2) for way in WAYS}
-        for height in HEIGHTS
-    ]
-    return {"agreement": pd.DataFrame(shares), "times": pd.DataFrame(taken)}
+    return pd.DataFrame(shares)
 
 
 def _share(values: ArrayLike) -> str:

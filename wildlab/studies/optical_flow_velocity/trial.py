@@ -27,9 +27,8 @@ from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
 #: Images of the flight.
 IMAGES = "images"
 #: Ways to read the same features; the first is what the judged claims are about.
-LOGGED, SYNCHRONISED, CALIBRATED = "logged", "synchronised", "calibrated"
-STILL, DECK, TRUE = "still-gimbal", "deck", "true-poses"
-READINGS = (LOGGED, SYNCHRONISED, STILL, CALIBRATED, DECK, TRUE)
+LOGGED, SYNCHRONISED, STILL, TRUE = "logged", "synchronised", "still-gimbal", "true-poses"
+READINGS = (LOGGED, SYNCHRONISED, STILL, TRUE)
 #: Names of the numbers that are recorded, and their units.
 RECORDED = {
     "in_view_share": "1",
@@ -76,11 +75,6 @@ class Looked(NamedTuple):
     pairs: list[FramePair]
     tried: int
     shares: NDArray[np.float64]
-
-    @property
-    def deck(self) -> float:
-        """Height of the ship's deck above the sea, m."""
-        return max(layer.height for layer in self.scene.bodies(0)[0].layers[:-1])
 
 
 def stretches(usable: NDArray[np.bool_], pairs: int) -> NDArray[np.intp]:
@@ -171,8 +165,6 @@ def readings(looked: Looked) -> dict[str, pd.DataFrame]:
         LOGGED: (looked.flight, logged),
         SYNCHRONISED: (looked.flight, replace(logged, times=times)),
         STILL: (known, replace(logged, times=times)),
-        CALIBRATED: (looked.flight, replace(logged, mount=poses.mount)),
-        DECK: (looked.flight, replace(logged, plane_down=-looked.deck)),
         TRUE: (known, Reading(TRUTH, times=times, camera=poses.camera, mount=poses.mount)),
     }
     return {name: pair_velocities(flight, looked.pairs, way) for name, (flight, way) in ways.items()}

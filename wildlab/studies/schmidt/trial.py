@@ -44,9 +44,10 @@ from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.batch import BatchCamera, as_tracks, run_batch
+from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.run import Track
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.schmidt import Considered
+from wildlab.tracking.sensors import POSE
 
 Numbers = dict[tuple[str, str], float]
 
@@ -89,7 +90,7 @@ PUBLISHED = ("ekf", "schmidt")
 COVARIANCES = ("schmidt", "schmidt-data-sheet", "schmidt-estimated")
 CURVE = tuple(scaled(factor) for factor in FACTORS)
 CONSTANT = (*map(constant, DEGREES), *(constant(DEGREES[1], metres) for metres in METRES))
-VARIANTS = ("schmidt-navigated", "inflation", "schmidt-attitude-only", "schmidt-position-only")
+VARIANTS = ("schmidt-attitude-only", "schmidt-position-only")
 FILTERS = ("ekf", *COVARIANCES, *VARIANTS, "ekf-60-pixels")
 SUBJECTS = tuple(dict.fromkeys((*FILTERS, *CURVE, *CONSTANT)))
 #: What is compared for each, with its unit here; `evaluate` says what they are.
@@ -195,8 +196,6 @@ def compare(seen: Sighting, by_sheet: Sighting, noise: PoseNoise) -> dict[str, T
         "ekf": follow_pixels(seen, TUNING),
         "ekf-60-pixels": follow_pixels(seen, MORE_NOISE),
         "schmidt-data-sheet": follow_schmidt(by_sheet, TUNING),
-        "schmidt-navigated": follow_schmidt(seen, TUNING, change="navigated"),
-        "inflation": follow_schmidt(seen, TUNING, correlation_time=0.0),
     }
     return {who: tracks[who] for who in SUBJECTS}
 
@@ -204,16 +203,15 @@ def compare(seen: Sighting, by_sheet: Sighting, noise: PoseNoise) -> dict[str, T
 def _follow_each(seen: Sighting, covariances: list[Array]) -> list[Track]:
     """`follow_schmidt` with each of several covariances (N, 6, 6), in one run of the compiled filter."""
     z = np.broadcast_to(seen.uv, (len(covariances), *seen.uv.shape))
-    found = run_batch(
+    return run_batch(
         seen.times,
         z,
         np.eye(2) * TUNING.pixel**2,
         TUNING.motion,
         start(seen, TUNING),
         view=BatchCamera(seen.poses, seen.plane_down),
-        pose=PoseUncertainty(np.stack(covariances)),
+        pose=Considered(POSE, np.stack(covariances)),
     )
-    return as_tracks(found)
 
 
 def compare_flight(flight: Flight, seed: int) -> Compared:

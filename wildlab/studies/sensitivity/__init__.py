@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
-from scipy import ndimage
 
-from wildlab.evaluation.intervals import mean_interval
 from wildlab.evaluation.replication import propagate_rounding
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.flodell import linear_enu_error
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
-from wildlab.geometry.terrain import Terrain, intersect_terrain
-from wildlab.reporting.charts.forms import Values, fields_chart, lines_chart
-from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, end_label, new_figure
-from wildlab.simulation.landscape import synthetic_landscape
+from wildlab.reporting.charts.forms import fields_chart
+from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, end_label, new_figure
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
 
@@ -153,108 +148,6 @@ def flat_map_errors(latitude: float) -> Array:
     return np.asarray(found.max(axis=0))
 
 
-#: Degrees below the horizon that a ray looks.
-PITCHES_DEG = (15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0)
-#: Metres above the ground below; metres between the nodes of a coarse map, as of free ones of all the Earth.
-ABOVE_M, COARSE_M = 60.0, 30.0
-#: Landscapes, and rays on each.
-LANDS, RAYS = 12, 300
-#: Rays start this far from the border of the map, metres, so that few leave it.
-MARGIN_M = 120.0
-#: What may be wrong: the ground is a metre too high, it is taken for a plane at the height below the camera,
-#: or its map is coarse.
-WRONG = ("level", "plane", "coarse")
-
-
-class Shift(NamedTuple):
-    """How far points move, for one pitch.
-
-    Attributes
-    ----------
-    pitch
-        Degrees below the horizon.
-    off
-        By `WRONG`: (LANDS,) median distance on each landscape, metres; NaN where no ray met both.
-    """
-
-    pitch: float
-    off: dict[str, Array]
-
-
-def shifts(seed: int = 0, lands: int = LANDS, rays: int = RAYS) -> list[Shift]:
-    """Points on rolling land beside those that a wrong height of the ground gives.
-
-    Parameters
-    ----------
-    seed
-        Of landscapes and rays.
-    lands, rays
-        How many, and how many on each.
-
-    Returns
-    -------
-    list of Shift
-        One for each of `PITCHES_DEG`.
-    """
-    worlds = [synthetic_landscape(seed + number) for number in range(lands)]
-    coarse = [coarser(one, COARSE_M) for one in worlds]
-    found = []
-    for pitch in PITCHES_DEG:
-        off: dict[str, list[float]] = {name: [] for name in WRONG}
-        for number, (land, rough) in enumerate(zip(worlds, coarse, strict=True)):
-            # The same rays for every pitch: pitches are compared, not draws.
-            starts, directions = _rays(land, np.radians(pitch), rays, np.random.default_rng([seed, number]))
-            below = land.heights_at(starts[:, :2])
-            true = intersect_terrain(land, directions, starts).points
-            met = np.isfinite(true[:, 0])
-            raised = Terrain(land.height + np.float32(1.0), land.north, land.east, land.step)
-            wrong = {
-                "level": intersect_terrain(raised, directions, starts).points,
-                "plane": starts + ((-below - starts[:, 2]) / directions[:, 2])[:, None] * directions,
-                "coarse": intersect_terrain(rough, directions, starts).points,
-            }
-            for name, points in wrong.items():
-                distance = np.hypot(*(points - true)[met, :2].T)
-                known = distance[np.isfinite(distance)]
-                off[name].append(float(np.median(known)) if len(known) else np.nan)
-        found.append(Shift(pitch, {name: np.array(values) for name, values in off.items()}))
-    return found
-
-
-def coarser(terrain: Terrain, step: float) -> Terrain:
-    """The same land from a map with fewer nodes: each the mean of what lies about it.
-
-    Parameters
-    ----------
-    terrain
-        The land.
-    step
-        Between nodes, metres: a whole number of the land's own steps.
-
-    Returns
-    -------
-    Terrain
-    """
-    by = round(step / terrain.step)
-    mean = ndimage.uniform_filter(terrain.height.astype(float), by, mode="nearest")
-    return Terrain(mean[::by, ::by].astype(np.float32), terrain.north, terrain.east, by * terrain.step)
-
-
-def _rays(land: Terrain, pitch: float, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """(N, 3) starts above the ground, and (N, 3) directions at a pitch (rad) towards any side."""
-    least_north, most_north, least_east, most_east = land.extent
-    low, high = (np.array(one) for one in ((least_north, least_east), (most_north, most_east)))
-    place = rng.uniform(low + MARGIN_M, high - MARGIN_M, (count, 2))
-    course = rng.uniform(-np.pi, np.pi, count)
-    starts = np.column_stack([place, -land.heights_at(place) - ABOVE_M])
-    flat = np.cos(pitch)
-    directions = np.column_stack(
-        [flat * np.cos(course), flat * np.sin(course), np.full(count, np.sin(pitch))]
-    )
-    return starts, directions
-
-
-_WRONG = {"plane": VERMILLION, "coarse": ORANGE, "level": BLUE}
 #: Colours by latitude, degrees.
 _LATITUDES = {0.0: GREEN, float(np.degrees(KOLMARDEN[0])): BLUE, 75.0: VERMILLION}
 
@@ -290,16 +183,6 @@ def flat_map() -> Figure:
         end_label(ax, DISTANCES_M[-1] / 1000, error[-1], f"{latitude:.0f}° N", color)
     ax.set(xlabel="distance from the origin (km)", ylabel="largest error (m)")
     return fig
-
-
-def wrong_heights(found: list[Shift], names: Mapping[str, str]) -> Figure:
-    """Distance from the true point by pitch and by what is wrong; of a camera straight down it is nothing."""
-    some, lines = [one for one in found if one.pitch < 90], {}
-    for name, color in _WRONG.items():
-        middle, low, high = np.transpose([mean_interval(one.off[name]) for one in some])
-        lines[names[name]] = Values(middle, (np.maximum(low, 1e-3), high), color)
-    x, y = "camera below the horizon (degrees)", "error (m)"
-    return lines_chart([one.pitch for one in some], lines, x, y, yscale="log")
 
 
 #: A ratio of errors nearer to one than this is no growth.

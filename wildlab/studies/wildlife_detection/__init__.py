@@ -17,14 +17,12 @@ from wildlab.evaluation.intervals import Interval, mean_interval
 from wildlab.evaluation.matching import Rates, rates, shares
 from wildlab.evaluation.shares import Check, columns_of
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.drawing import finish
 from wildlab.reporting.charts.forms import Values, draw_picture, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
 from wildlab.studies.page import Facts
 from wildlab.studies.protocol import Study
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (
-    ADAPTIVE,
     BY_BLOCK,
     BY_EMPTY,
     BY_MEAN,
@@ -228,10 +226,10 @@ def image_by_method(picture: Picture, names: Mapping[str, str]) -> Figure:
 
 def image_by_sun(before: Picture, after: Picture, names: Mapping[str, str]) -> Figure:
     """A sequence over which the background changes: constant and adaptive threshold (F figures 7.5, 7.6)."""
-    fig, axes = new_figure(5.6, 8.1, rows=4, columns=2)
+    fig, axes = new_figure(5.6, 6.1, rows=3, columns=2)
     for column, (when, picture) in enumerate((("under clouds", before), ("sun out", after))):
         draw_picture(axes[0, column], picture.grey, f"{when}, 8 bits")
-        for row, method in enumerate((CONSTANT, ADAPTIVE, OVER_MEAN), start=1):
+        for row, method in enumerate((CONSTANT, OVER_MEAN), start=1):
             _counted(axes[row, column], picture, method, names)
     return fig
 
@@ -269,20 +267,6 @@ def rates_by_weather(
         ("animals found (%)", (-2, 102)) if recall else ("false alarms per image", (-0.02 * most, None))
     )
     return rows_chart(rows, series, label, size=(5.6, 3.9), apart=0.14, xlim=limits)
-
-
-def f1_by_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
-    """F1 by height without sun."""
-    dark = [weather for weather in WEATHERS if weather != NOON]
-    fig, ax = new_figure(5.6, 3.4)
-    for k, method in enumerate((CONSTANT, SUBTRACTED, ENHANCED, BY_SIZE)):
-        found = np.array([rates_of(runs, method, places(dark, [height])).f1 for height in VIEWS])
-        x = np.arange(len(VIEWS)) + 0.08 * (k - 1.5)
-        ax.vlines(x, found[:, 1], found[:, 2], color=_COLOURS[method], lw=2)
-        ax.plot(x, found[:, 0], "o-", color=_COLOURS[method], label=names[method])
-    ax.set_xticks(range(len(VIEWS)), [f"{height} m" for height in VIEWS])
-    ax.set_ylim(-0.02, 1.02)
-    return finish(fig, "", "height above the ground", "F1")
 
 
 def methods_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:

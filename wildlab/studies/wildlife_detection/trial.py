@@ -53,10 +53,10 @@ HERD = replace(VIEWS[30], animals=(14, 20), kinds=("rhinoceros",))
 #: 108, which no study uses, "val" finds more as a floor (F1 .83, else .45), "level" as an offset from the
 #: mean of the block (.93 and .68, else .62 and .67). Blocks of 51 and of 251 without
 #: a level have that of figure 7.10a here.
-CONSTANT, ADAPTIVE, SMALL, LARGE = "constant", "adaptive", "adaptive-51", "adaptive-251"
+CONSTANT, SMALL, LARGE = "constant", "adaptive-51", "adaptive-251"
 SUBTRACTED, ENHANCED = "subtracted", "enhanced"
-#: `ADAPTIVE` with its level read the other way. As a floor of 150 it is hardly more than `CONSTANT`: the mean
-#: of so large a block is seldom above 150. What is said of adaptive thresholds is held against this one.
+#: The level of 150 as an offset: as a floor it is hardly more than `CONSTANT`, since the mean of so large a
+#: block is seldom above 150. What is said of adaptive thresholds is held against this one.
 OVER_MEAN = "adaptive-offset"
 #: F 8.1.1: background subtraction and a constant threshold, by the mean, and by the median as F proposes.
 BY_MEAN, BY_MEDIAN = "mean-constant", "median-constant"
@@ -69,7 +69,6 @@ SMALLEST = 50.0
 _PLAIN = Warm(background="none", smallest_px=SMALLEST, largest_px=float("inf"))
 METHODS = {
     CONSTANT: replace(_PLAIN, threshold="constant", level=150.0),
-    ADAPTIVE: replace(_PLAIN, threshold="adaptive", level=150.0, block_px=451),
     OVER_MEAN: replace(_PLAIN, threshold="adaptive", level=150.0, level_is="offset", block_px=451),
     SMALL: replace(_PLAIN, threshold="adaptive", level=65.0, level_is="offset", block_px=51),
     LARGE: replace(_PLAIN, threshold="adaptive", level=65.0, level_is="offset", block_px=251),
