@@ -110,8 +110,10 @@ def run_smoothed(
     track, steps, errors = filter_in_steps(
         times, measurements, R, sensor, motion, start, pose=pose, gate_probability=gate_probability
     )  # fmt: skip
-    steps = [_first(start, steps[0].row if steps else 0, errors.k if errors else 0), *steps]
-    nodes = _smooth_plain(steps) if errors is None else _smooth_considered(steps, errors)
+    if errors is None:
+        return smooth(track, motion)
+    steps = [_first(start, steps[0].row if steps else 0, errors.k), *steps]
+    nodes = _smooth_considered(steps, errors)
     x, P = track.x.copy(), track.P.copy()
     node_times = np.array([one.time for one in steps])
     for out, time in enumerate(track.times):
@@ -165,19 +167,6 @@ def _over_known(cross: Array, covariance: Array, sd: Array) -> Array:
     values, vectors = np.linalg.eigh(covariance * np.outer(unit, unit))
     inverse = np.divide(1, values, out=np.zeros_like(values), where=values > NEGLIGIBLE)
     return np.asarray(((cross * unit) @ vectors * inverse) @ vectors.T * unit, float)
-
-
-def _smooth_plain(steps: Sequence[Step]) -> list[_Node]:
-    """Rauch, Tung and Striebel's smoother."""
-    n = len(steps[0].x)
-    none = np.zeros((n, 0))
-    x, P = steps[-1].x, steps[-1].P
-    nodes = []
-    for before, after in zip([None, *steps[:-1]][::-1], steps[::-1], strict=True):
-        nodes.append(_Node(x, P, np.eye(n), none, np.zeros((n, n)), np.zeros((0, 0)), np.zeros((0, 0))))
-        if before is not None:
-            x, P = _back(before.x, before.P, after.F, after.x_prior, after.P_prior, x, P)
-    return nodes[::-1]
 
 
 def _smooth_considered(steps: Sequence[Step], errors: Errors) -> list[_Node]:

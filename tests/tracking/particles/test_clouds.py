@@ -13,7 +13,6 @@ from wildlab.errors import WildlabError
 from wildlab.tracking.many.tracks import count_interval, count_probabilities
 from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.particles import (
-    SCHEMES,
     Cloud,
     draw,
     effective_size,
@@ -157,21 +156,19 @@ def test_the_compiled_walk_finds_what_a_search_finds(rng, animals, particles):
     np.testing.assert_array_equal(pick(cumulative, points), wanted)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_copies_are_unbiased(scheme, rng):
+def test_copies_are_unbiased(rng):
     """The mean number of copies is N w, within the error of the draws themselves."""
     N, runs = 24, 20_000
     w = uneven(rng, 1, N)[0]
-    chosen = draw(np.tile(w, (runs, 1)), rng, scheme)
+    chosen = draw(np.tile(w, (runs, 1)), rng)
     copies = np.apply_along_axis(np.bincount, 1, chosen, minlength=N)
     assert (copies[:, w == 0] == 0).all() and (copies.sum(axis=1) == N).all()
     part = (N * w) % 1
-    variance = part * (1 - part) if scheme == "systematic" else N * w * (1 - w)
+    variance = part * (1 - part)
     off = np.abs(copies.mean(axis=0) - N * w)
     assert (off <= 4.5 * np.sqrt(variance / runs) + 1e-12).all()
     np.testing.assert_allclose(copies.var(axis=0)[variance > 0.05], variance[variance > 0.05], rtol=0.08)
-    if scheme == "systematic":
-        assert (np.abs(copies - N * w) < 1).all()
+    assert (np.abs(copies - N * w) < 1).all()
 
 
 @given(rng=GENERATORS, threshold=st.floats(0, 1))
@@ -181,7 +178,7 @@ def test_only_those_at_or_below_the_threshold_are_drawn_anew(rng, threshold):
     w /= w.sum(axis=1, keepdims=True)
     cloud = Cloud(rng.normal(size=(6, 30, 2)), w)
     size = effective_size(w) / 30
-    after, due = resample(cloud, rng, "systematic", threshold)
+    after, due = resample(cloud, rng, threshold)
     clear = np.abs(size - threshold) > 1e-6
     np.testing.assert_array_equal(due[clear], (size < threshold)[clear])
     np.testing.assert_array_equal(after.x[~due], cloud.x[~due])
@@ -199,11 +196,10 @@ def test_two_thirds_is_the_default_and_one_is_always(rng):
     assert resample(Cloud(np.zeros((1, 9, 2)), w), rng, threshold=1)[1].all()
 
 
-@pytest.mark.parametrize("arguments", [{"scheme": "residual", "threshold": 1}, {"threshold": 1.2}])
-def test_what_there_is_not_is_refused(arguments):
+def test_what_there_is_not_is_refused():
     cloud = Cloud(np.zeros((1, 2, 2)), np.full((1, 2), 0.5))
-    with pytest.raises(WildlabError, match="multinomial, systematic" if "scheme" in arguments else "0 to 1"):
-        resample(cloud, np.random.default_rng(0), **arguments)
+    with pytest.raises(WildlabError, match="0 to 1"):
+        resample(cloud, np.random.default_rng(0), 1.2)
 
 
 some = st.lists(st.floats(0, 1), max_size=7)

@@ -13,7 +13,6 @@ from tests.tracking.poses import GENERATORS
 from wildlab.tracking import kalman
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.particles import (
-    SCHEMES,
     Cloud,
     draw,
     log_likelihood,
@@ -53,7 +52,7 @@ def exact(z):
     return x, P, log_evidence
 
 
-def by_particles(z, particles, runs, scheme, threshold, seed):
+def by_particles(z, particles, runs, threshold, seed):
     """Many filters at once, one in each row, that differ in their random numbers alone."""
     rng = np.random.default_rng(seed)
     cloud = start_gaussian(np.tile(START, (runs, 1)), P0, particles, rng)
@@ -63,18 +62,17 @@ def by_particles(z, particles, runs, scheme, threshold, seed):
         cloud, gained = weigh(cloud, log_likelihood(cloud.x[..., :2], one, R))
         log_evidence += gained
         estimate = moments(cloud)
-        cloud, _ = resample(cloud, rng, scheme, threshold)
+        cloud, _ = resample(cloud, rng, threshold)
     return *estimate, log_evidence
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("threshold", [1.0, 2 / 3])
-def test_particles_become_the_kalman_filter_at_the_rate_of_monte_carlo(scheme, threshold):
+def test_particles_become_the_kalman_filter_at_the_rate_of_monte_carlo(threshold):
     z = measurements()
     x, P, log_evidence = exact(z)
     sizes, off, spread = [250, 1000, 4000], [], []
     for N in sizes:
-        mean, covariance, gained = by_particles(z, N, 100, scheme, threshold, N)
+        mean, covariance, gained = by_particles(z, N, 100, threshold, N)
         off.append(np.sqrt(((mean - x) ** 2 / np.diag(P)).mean()))
         spread.append(np.sqrt(((covariance - P) ** 2).mean() / (P**2).mean()))
         # The product of (4.10)'s sums estimates the measurements' likelihood without bias, for any N.
@@ -110,8 +108,7 @@ def looks():
         yield sight_of(mask, STEP / 2, STEP / 2, STEP, probability=rng.uniform(0.5, 0.95))
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_seeing_nothing_is_the_grid_filter_within_the_error_of_the_draws(scheme):
+def test_seeing_nothing_is_the_grid_filter_within_the_error_of_the_draws():
     """Particles that sit on the cells and move as the matrix says live in the grid filter's very world."""
     runs, N, rng = 400, 500, np.random.default_rng(12)
     C = len(GRID.places)
@@ -144,7 +141,7 @@ def test_seeing_nothing_is_the_grid_filter_within_the_error_of_the_draws(scheme)
         error = mine.std(axis=0, ddof=1) / np.sqrt(runs)
         # Six images of some hundred cells: one in a million by chance, each.
         assert (np.abs(mine.mean(axis=0) - wanted) <= norm.isf(5e-7) * error + 1e-12).all()
-        chosen = draw(cloud.w, rng, scheme)
+        chosen = draw(cloud.w, rng)
         cells, cloud_w = np.take_along_axis(cells, chosen, axis=1), np.full((runs, N), 1 / N)
 
 

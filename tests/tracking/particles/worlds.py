@@ -19,7 +19,7 @@ def moves(cloud, seen, dt, rng):
     return stay_inside(cloud, move(cloud, WALK, dt, rng), inside)
 
 
-RULES = Rules(moves, particles=400, scheme="systematic")
+RULES = Rules(moves, particles=400)
 
 
 class Grid(NamedTuple):

@@ -13,14 +13,13 @@ found nothing; then `moments`, and `resample`. Always resampling is SIR, by the 
 >>> cloud = start_gaussian([[0.0, 0.0]], 400 * np.eye(2), 2000, rng)
 >>> cloud = move(cloud, walk_of(0.5, 1.0), 10.0, rng)
 >>> cloud, log_evidence = weigh(cloud, log_likelihood(cloud.x, [[12.0, 3.0]], 4 * np.eye(2)))
->>> cloud, resampled = resample(cloud, rng, "systematic")
+>>> cloud, resampled = resample(cloud, rng)
 >>> mean, covariance = moments(cloud)
 >>> bool(np.hypot(*(mean[0] - [12.0, 3.0])) < 1.0), resampled
 (True, array([ True]))
 """
 
 from wildlab.tracking.particles.clouds import (
-    SCHEMES,
     Cloud,
     Weighed,
     draw,
@@ -47,7 +46,6 @@ from wildlab.tracking.particles.steps import (
 )
 
 __all__ = [
-    "SCHEMES",
     "Cloud",
     "Herd",
     "ImageLook",

@@ -286,8 +286,6 @@ def _some(particles: int) -> int:
     return particles
 
 
-#: ``multinomial`` draws with replacement, as F has it; ``systematic`` takes points at equal distances.
-SCHEMES = ("multinomial", "systematic")
 #: F's share of the particles at which SIS resamples, beside (4.14).
 FLODELL_THRESHOLD = 2 / 3
 
@@ -295,7 +293,6 @@ FLODELL_THRESHOLD = 2 / 3
 def resample(
     cloud: Cloud,
     rng: np.random.Generator,
-    scheme: str = "multinomial",
     threshold: float = FLODELL_THRESHOLD,
 ) -> tuple[Cloud, NDArray[np.bool_]]:
     """Draw the particles anew of those animals whose effective size has fallen to the threshold.
@@ -306,9 +303,6 @@ def resample(
         Of A animals.
     rng
         Random numbers.
-    scheme
-        One of `SCHEMES`. Both give a particle N times its weight of copies in the mean; systematic ones
-        differ from that by less than one copy.
     threshold
         Share of the number of particles. 1 resamples always, which is SIR; less is SIS, with F's 2/3.
 
@@ -320,7 +314,7 @@ def resample(
     Raises
     ------
     WildlabError
-        For a scheme that there is not, or a threshold that is not from 0 to 1.
+        For a threshold that is not from 0 to 1.
     """
     if not 0 <= threshold <= 1:
         raise WildlabError(
@@ -330,15 +324,18 @@ def resample(
     due = effective_size(cloud.w) <= threshold * N * (1 + 1e-9)  # sums are rounded
     if not due.any():
         return cloud, due
-    chosen = draw(cloud.w[due], rng, scheme)
+    chosen = draw(cloud.w[due], rng)
     x, w = cloud.x.copy(), cloud.w.copy()
     x[due] = np.take_along_axis(cloud.x[due], chosen[..., None], axis=1)
     w[due] = 1 / N
     return Cloud(x, w), due
 
 
-def draw(w: ArrayLike, rng: np.random.Generator, scheme: str = "multinomial") -> NDArray[np.int64]:
-    """Which particles to take, as many as there were.
+def draw(w: ArrayLike, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Which particles to take, as many as there were: at points at equal distances (systematic resampling).
+
+    Of a particle these are N times its weight in the mean, and never off that by a whole copy. F draws with
+    replacement, which leaves more to chance.
 
     Parameters
     ----------
@@ -346,42 +343,22 @@ def draw(w: ArrayLike, rng: np.random.Generator, scheme: str = "multinomial") ->
         (A, N) weights that sum to one.
     rng
         Random numbers.
-    scheme
-        One of `SCHEMES`.
 
     Returns
     -------
     (A, N) indices along the last axis, ascending; never one of a particle without weight.
 
-    Raises
-    ------
-    WildlabError
-        For a scheme that there is not.
-
     Examples
     --------
-    >>> print(draw([[0.0, 0.5, 0.0, 0.5]], np.random.default_rng(1), "systematic"))
+    >>> print(draw([[0.0, 0.5, 0.0, 0.5]], np.random.default_rng(1)))
     [[1 1 3 3]]
     """
     weights = np.atleast_2d(np.asarray(w, float))
     A, N = weights.shape
-    if scheme == "systematic":
-        points = (np.arange(N) + rng.random((A, 1))) / N
-    elif scheme == "multinomial":
-        points = _sorted_uniform(A, N, rng)
-    else:
-        raise WildlabError(
-            f"there is no resampling called {scheme!r}", f"take one of {', '.join(SCHEMES)}", field="scheme"
-        )
+    points = (np.arange(N) + rng.random((A, 1))) / N
     cumulative = np.cumsum(weights, axis=1)
     cumulative /= cumulative[:, -1:]
     return pick(cumulative, np.minimum(points, np.nextafter(1.0, 0.0)))
-
-
-def _sorted_uniform(A: int, N: int, rng: np.random.Generator) -> Array:
-    """Independent numbers from 0 to 1 in order, (A, N): sums of exponential gaps, without sorting."""
-    gaps = np.cumsum(rng.standard_exponential((A, N + 1)), axis=1)
-    return np.asarray(gaps[:, :-1] / gaps[:, -1:])
 
 
 #: Places (..., 2) m -> probability that an image has a detection of an animal that is there.

@@ -137,8 +137,8 @@ class Rules(NamedTuple):
     lost_doubt
         A track is lost once images that had to show it would all have missed it with less than this
         probability, F 5.3.4.
-    scheme, threshold
-        As `resample` takes them.
+    threshold
+        As `resample` takes it.
     """
 
     moves: Moves
@@ -148,7 +148,6 @@ class Rules(NamedTuple):
     start_sd: tuple[float, ...] = ()
     lost_trace: float = np.inf
     lost_doubt: float = 0.0
-    scheme: str = "multinomial"
     threshold: float = FLODELL_THRESHOLD
 
 
@@ -296,7 +295,7 @@ def step_nearest(
         herd = with_new(herd, start_tracks(look.z[new], look.R[new], rules, rng), look.time)
     herd = _lost(herd, rules)
     if len(herd.identity):
-        herd = herd._replace(cloud=resample(herd.cloud, rng, rules.scheme, rules.threshold)[0])
+        herd = herd._replace(cloud=resample(herd.cloud, rng, rules.threshold)[0])
     aligned = np.zeros(len(z), np.int64)
     aligned[usable] = names
     return herd, aligned
