@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from wildlab.geometry.camera import (
     Camera,
     camera_from_data_sheet,
-    camera_from_matrix,
     distort,
     distortion_jacobian,
     in_image,
@@ -31,7 +30,6 @@ def test_data_sheet_gives_the_printed_theoretical_matrix():
     """H (2.4): 19 mm lens, 640 x 512 pixels of 17 micrometres."""
     camera = camera_from_data_sheet(640, 512, 19e-3, 640 * 17e-6, 512 * 17e-6)
     assert np.allclose(camera.matrix, [[1117.7, 0, 320], [0, 1117.7, 256], [0, 0, 1]], atol=0.06)
-    assert camera_from_matrix(camera.matrix, 640, 512) == camera
 
 
 @given(

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wildlab.geometry.turns import between_attitudes, between_attitudes_by_scipy
+from wildlab.geometry.turns import between_attitudes
 
 
 def attitudes(count: int, seed: int) -> np.ndarray:
@@ -22,8 +22,11 @@ def some_rows(count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 @given(st.integers(0, 10_000))
 def test_the_compiled_way_is_scipys(seed):
-    q, rows = attitudes(30, seed), some_rows(30, seed)
-    assert np.abs(between_attitudes(q, *rows) - between_attitudes_by_scipy(q, *rows)).max() < 1e-12
+    q, (before, after, share) = attitudes(30, seed), some_rows(30, seed)
+    start, end = (Rotation.from_quat(q[rows], scalar_first=True) for rows in (before, after))
+    turn = (start.inv() * end).as_rotvec()
+    theirs = (start * Rotation.from_rotvec(share[:, None] * turn)).as_matrix()
+    assert np.abs(between_attitudes(q, before, after, share) - theirs).max() < 1e-12
 
 
 @given(st.floats(1e-16, 1e-3), st.floats(0, 1))

@@ -184,11 +184,11 @@ def test_no_cause_is_certain_where_a_third_is_far_out():
 
 def test_what_is_left_is_sorted_and_its_whole_comes_last():
     image, within = np.array([0.6, 0.8]), np.array([3.0, 4.0])
-    scatter = Scatter(0.1, 0.3, 0.6, image, within, np.array([1.2, 1.6]), 5.6)
+    scatter = Scatter(image, within, np.array([1.2, 1.6]), 5.6)
     table = tables.parts_table(SimpleNamespace(remaining=scatter))
     assert table["rms"].tolist() == pytest.approx([5.0, 2.0, 1.0, 5.6])
     nan = np.full(2, np.nan)
-    unknown = Scatter(np.nan, np.nan, np.nan, nan, nan, nan, np.nan)
+    unknown = Scatter(nan, nan, nan, np.nan)
     assert not len(tables.parts_table(SimpleNamespace(remaining=unknown)))
     assert tables.outliers_table((FAR,))["photo"].tolist() == ["several"]
 

@@ -72,13 +72,9 @@ FEWEST_WITHIN = 10
 class Scatter(NamedTuple):
     """Mean squared horizontal error split into what is constant, per image, and within images.
 
-    Shares add up to one (up to the noise of the estimate of the middle one); ``between_sd``, ``within_sd``
-    and ``bias``, the mean, are metres per axis (north, east).
+    ``between_sd``, ``within_sd`` and ``bias``, the mean, are metres per axis (north, east).
     """
 
-    bias_share: float
-    image_share: float
-    within_share: float
     between_sd: Array
     within_sd: Array
     bias: Array
@@ -86,8 +82,7 @@ class Scatter(NamedTuple):
 
     @property
     def parts_m(self) -> tuple[float, float, float]:
-        """Root mean squares of the constant part, that of images and that within them: m, horizontal. The
-        shares are those of their squares."""
+        """Root mean squares of the constant part, that of images and that within them: m, horizontal."""
         bias, image, within = (float(np.hypot(*of)) for of in (self.bias, self.between_sd, self.within_sd))
         return bias, image, within
 
@@ -117,17 +112,15 @@ def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
     n, k = len(e), len(count)
     if n - k < FEWEST_WITHIN or k < 2:
         nan = np.full(2, np.nan)
-        return Scatter(float("nan"), float("nan"), float("nan"), nan, nan, nan, float("nan"))
+        return Scatter(nan, nan, nan, float("nan"))
     mean = e.mean(axis=0)
     of_image = np.stack([np.bincount(group, weights=e[:, axis]) / count for axis in (0, 1)], axis=-1)
     within = ((e - of_image[group]) ** 2).sum(axis=0) / (n - k)
     mean_square = (count[:, None] * (of_image - mean) ** 2).sum(axis=0) / (k - 1)
     usual = (n - (count**2).sum() / n) / (k - 1)
     between = np.maximum((mean_square - within) / usual, 0.0)
-    parts = np.array([(mean**2).sum(), between.sum(), within.sum()])
-    bias, image_share, within_share = (float(x) for x in parts / parts.sum())
     whole = float(np.sqrt((e**2).sum(axis=1).mean()))
-    return Scatter(bias, image_share, within_share, np.sqrt(between), np.sqrt(within), mean, whole)
+    return Scatter(np.sqrt(between), np.sqrt(within), mean, whole)
 
 
 def bootstrap_interval(
@@ -189,14 +182,11 @@ SLOWEST_M_S = 0.2
 class TrackErrors(NamedTuple):
     """Errors of N estimates, truth minus estimate; NaN where truth or estimate is not known.
 
-    ``position`` (N, 2) north and east, metres. ``along`` and ``across`` (N,) of the true course, metres:
-    positive where the truth is ahead of the estimate, and to its right. ``speed`` (N,) m/s. ``course`` (N,)
-    radians in (-pi, pi]. ``no_truth`` and ``no_estimate`` (N,): rows that cannot be compared, and why.
+    ``position`` (N, 2) north and east, metres. ``speed`` (N,) m/s. ``course`` (N,) radians in (-pi, pi].
+    ``no_truth`` and ``no_estimate`` (N,): rows that cannot be compared, and why.
     """
 
     position: Array
-    along: Array
-    across: Array
     speed: Array
     course: Array
     no_truth: NDArray[np.bool_]
@@ -232,17 +222,12 @@ def track_errors(truth: ArrayLike, estimate: ArrayLike) -> TrackErrors:
     position = t[:, :2] - x[:, :2]
     speed = np.hypot(t[:, 2], t[:, 3])
     moves = speed > SLOWEST_M_S
-    ahead = np.where(moves[:, None], t[:, 2:] / np.where(moves, speed, 1.0)[:, None], np.nan)
-    along = np.sum(position * ahead, axis=1)
-    across = position[:, 1] * ahead[:, 0] - position[:, 0] * ahead[:, 1]
     estimated_speed = np.hypot(x[:, 2], x[:, 3])
     # `wrap` gives [-pi, pi); the negative of the negative is in (-pi, pi].
     course = -wrap(np.arctan2(x[:, 3], x[:, 2]) - np.arctan2(t[:, 3], t[:, 2]))
     course[~(moves & (estimated_speed > 0))] = np.nan
     return TrackErrors(
         position,
-        along,
-        across,
         speed - estimated_speed,
         course,
         ~np.isfinite(t[:, :2]).all(axis=1),
@@ -265,12 +250,6 @@ class TrackSummary(NamedTuple):
     mean_east: float
     mae: float
     rmse: float
-    rmse_north: float
-    rmse_east: float
-    mean_along: float
-    mean_across: float
-    rmse_along: float
-    rmse_across: float
     mean_speed: float
     rmse_speed: float
     mean_course: float
@@ -288,8 +267,8 @@ def summarise_track(errors: TrackErrors) -> TrackSummary:
     Returns
     -------
     TrackSummary
-        Of the position over the ``n`` rows that have both a truth and an estimate; along, across, speed and
-        course each over the rows where it is known. NaN where there is no row.
+        Of the position over the ``n`` rows that have both a truth and an estimate; speed and course each
+        over the rows where it is known. NaN where there is no row.
     """
     known = ~(errors.no_truth | errors.no_estimate)
     e = errors.position[known]
@@ -305,12 +284,6 @@ def summarise_track(errors: TrackErrors) -> TrackSummary:
         _mean(e[:, 1]),
         _mean(distance),
         _root_mean_square(distance),
-        _root_mean_square(e[:, 0]),
-        _root_mean_square(e[:, 1]),
-        _mean(errors.along),
-        _mean(errors.across),
-        _root_mean_square(errors.along),
-        _root_mean_square(errors.across),
         _mean(errors.speed),
         _root_mean_square(errors.speed),
         mean_course,

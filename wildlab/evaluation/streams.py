@@ -186,10 +186,6 @@ class Vibration(NamedTuple):
         """(N,) m/s^2, of the axis that shakes most at the time."""
         return np.asarray(self.level.max(axis=1))
 
-    def share_above(self, limit: float) -> float:
-        """Share of the samples at which an axis shakes more than that."""
-        return float((self.worst > limit).mean())
-
 
 def vibration_of(stamps: ArrayLike, force: ArrayLike) -> Vibration | None:
     """How much a sensor shakes.

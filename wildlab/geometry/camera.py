@@ -87,31 +87,6 @@ def camera_from_data_sheet(
     )
 
 
-def camera_from_matrix(
-    matrix: ArrayLike,
-    width: int,
-    height: int,
-    distortion: tuple[float, float, float, float, float] = NO_DISTORTION,
-) -> Camera:
-    """A camera from a calibrated intrinsic matrix, for instance OpenCV's.
-
-    Parameters
-    ----------
-    matrix
-        (3, 3), H (2.1).
-    width, height
-        Of the image, pixels.
-    distortion
-        ``(k1, k2, p1, p2, k3)``.
-
-    Returns
-    -------
-    The camera.
-    """
-    A = np.asarray(matrix, float)
-    return Camera(width, height, A[0, 0], A[1, 1], A[0, 2], A[1, 2], A[0, 1], distortion)
-
-
 def distort(xy: ArrayLike, distortion: ArrayLike) -> Array:
     """Distorted normalised coordinates of ideal ones, F (2.16).
 

@@ -463,36 +463,3 @@ def image_raster(camera: Camera) -> Array:
     columns, rows = RASTER
     u, v = np.meshgrid(np.linspace(0, camera.width, columns), np.linspace(0, camera.height, rows))
     return np.column_stack([u.ravel(), v.ravel()])
-
-
-def direction_differences(one: Camera, other: Camera) -> Array:
-    """How differently two cameras read the pixels of an image, apart from a turn of the whole camera.
-
-    Parameters
-    ----------
-    one, other
-        Of the same image.
-
-    Returns
-    -------
-    (825, 2) pixels of the first, at `image_raster`; NaN where one of them sees nothing.
-
-    Examples
-    --------
-    A principal point that is 5 px off is nearly a turn, and does little else:
-
-    >>> near = Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0)
-    >>> bool(np.abs(direction_differences(near, Camera(640, 512, 1000.0, 1000.0, 325.0, 256.0))).max() < 0.5)
-    True
-    """
-    uv = image_raster(one)
-    ideal = normalise(other, uv)
-    x, y = ideal.T
-    scale = np.array([one.fx, one.fy])
-    apart = (normalise(one, uv) - ideal) * scale
-    # How a small turn about each axis of c moves a direction, in the same pixels.
-    turns = np.stack([[-x * y, 1 + x * x, -y], [-(1 + y * y), x * y, x]]).transpose(2, 0, 1)
-    turns = turns * scale[None, :, None]
-    seen = np.isfinite(apart).all(axis=1)
-    turn = np.linalg.lstsq(turns[seen].reshape(-1, 3), apart[seen].reshape(-1), rcond=None)[0]
-    return np.asarray(apart - turns @ turn)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.compilation import announced, compiled
 from wildlab.geometry.frames import Array
@@ -41,20 +40,6 @@ def between_attitudes(q_nb: ArrayLike, before: Rows, after: Rows, share: ArrayLi
     R = np.empty((len(s), 3, 3))
     with announced("attitudes between two others"):
         _fill(q, np.ascontiguousarray(before), np.ascontiguousarray(after), s, R)
-    return R
-
-
-def between_attitudes_by_scipy(q_nb: ArrayLike, before: Rows, after: Rows, share: ArrayLike) -> Array:
-    """The same by scipy, short and slow: what the compiled one is held against."""
-    q, s = np.asarray(q_nb, float), np.asarray(share, float)
-    R = np.full((len(s), 3, 3), np.nan)
-    good = np.isfinite(q).all(axis=1) & (np.linalg.norm(q, axis=1) > 0)
-    rows = np.flatnonzero(np.isfinite(s) & good[before] & good[after])
-    if len(rows):
-        start = Rotation.from_quat(q[before[rows]], scalar_first=True)
-        end = Rotation.from_quat(q[after[rows]], scalar_first=True)
-        turn = (start.inv() * end).as_rotvec()
-        R[rows] = (start * Rotation.from_rotvec(s[rows, None] * turn)).as_matrix()
     return R
 
 
