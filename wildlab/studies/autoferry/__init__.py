@@ -13,12 +13,11 @@ from wildlab.analysis.tracks.noise_model import SensorTuning, model_targets
 from wildlab.analysis.tracks.scans import sensors_of
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.analysis.tracks.tuning import tune
-from wildlab.evaluation.consistency import chi_square_interval, innovation_whiteness
 from wildlab.evaluation.intervals import share_interval
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import read_settings
 from wildlab.paths import DATA
-from wildlab.reporting.charts.drawing import draw_line, draw_way, draw_white_band, finish, mark_level
+from wildlab.reporting.charts.drawing import draw_way, finish, mark_level
 from wildlab.reporting.charts.forms import fit_map, plain_numbers
 from wildlab.reporting.figures import (
     BLUE,
@@ -27,7 +26,6 @@ from wildlab.reporting.figures import (
     PURPLE,
     VERMILLION,
     colour,
-    log_band,
     map_axes,
     new_figure,
 )
@@ -176,14 +174,12 @@ Followed = Mapping[str, Sequence[SensorTrack]]
 SENSOR_COLOURS = {"lidar": BLUE, "radar": VERMILLION, "ir": PURPLE, "eo": GREEN}
 #: Metres beyond the targets' paths that a map shows.
 MARGIN_M = 40.0
-#: Lags of the innovations shown, detections.
-LAGS = 20
 
 
 def figures(
-    flights: Mapping[str, Flight], followed: Followed, held: Held, case: str, names: Mapping[str, str]
+    flights: Mapping[str, Flight], followed: Followed, held: Held, names: Mapping[str, str]
 ) -> list[Shown]:
-    """Mean NEES of all tracks, a map of each flight judged, and of one the last boat by the ranging sensors.
+    """Mean NEES of all tracks, and a map of each flight judged.
 
     Parameters
     ----------
@@ -191,8 +187,6 @@ def figures(
         By case.
     held
         The filter whose tracks the maps show; its white counterpart where it is not for a kind of detection.
-    case
-        Whose NEES and innovations are shown over time.
     names
         Words for sensors and filters.
     """
@@ -201,13 +195,6 @@ def figures(
     for name in held.judged["case"].unique():
         mine = [one for one in followed[name] if one.filter in drawn]
         found.append(Shown(track_map(flights[name], mine, name, names), "map", f"map-{name}"))
-    boat = followed[case][-1].target
-    for sensor in ("lidar", "radar"):
-        own = [one for one in followed[case] if (one.sensor, one.target) == (sensor, boat)]
-        if own:
-            pair = [one for one in own if one.filter in ("kf", "coloured")]
-            found.append(Shown(nees_chart(own, names), "nees", f"nees-{sensor}"))
-            found.append(Shown(innovations_chart(pair, names), "innovations", f"innovations-{sensor}"))
     return found
 
 
@@ -257,34 +244,6 @@ def track_map(flight: Flight, followed: Sequence[SensorTrack], case: str, names:
     fit_map(ax, np.concatenate(list(places.values())), MARGIN_M)
     map_axes(ax)
     return finish(fig, case.replace("-", " ").capitalize())
-
-
-def nees_chart(followed: Sequence[SensorTrack], names: Mapping[str, str]) -> Figure:
-    """NEES of the position over time on a logarithmic axis, one line for each filter, with the 95 % band."""
-    fig, ax = new_figure(5.6, 3.6)
-    for one in followed:
-        draw_line(ax, one.times, one.nees, colour(one.filter), names[one.filter], width=1.3)
-    log_band(ax, *chi_square_interval(2))
-    values = np.concatenate([one.nees[np.isfinite(one.nees)] for one in followed])
-    if len(values):
-        # Down to below the band, whose name stands under it.
-        ax.set_ylim(np.clip(0.5 * values.min(), 1e-3, 0.02), 2 * max(values.max(), 10.0))
-    return finish(
-        fig, f"{names[followed[0].sensor]}, {followed[0].target}", "time (s)", "NEES of the position"
-    )
-
-
-def innovations_chart(followed: Sequence[SensorTrack], names: Mapping[str, str]) -> Figure:
-    """Autocorrelation of the innovations, north solid and east dashed, with the band of white noise."""
-    fig, ax = new_figure(5.6, 3.6)
-    white = [innovation_whiteness(one.innovation, LAGS) for one in followed]
-    for one, found in zip(followed, white, strict=True):
-        for values, style, axis in zip(found.autocorrelation, ("-", "--"), ("north", "east"), strict=True):
-            ax.plot(values, style, color=colour(one.filter), label=f"{names[one.filter]}, {axis}")
-    draw_white_band(ax, max((one.bound for one in white), default=0.0))
-    return finish(
-        fig, f"{names[followed[0].sensor]}, {followed[0].target}", "lag (detections)", "autocorrelation"
-    )
 
 
 def answer(facts: Facts) -> list[str]:

@@ -112,11 +112,6 @@ def parameters_table(calibrated: pd.DataFrame, names: Mapping[str, str]) -> pd.D
     )
 
 
-def distortion_table(cost: Mapping[float, tuple[float, float]]) -> pd.DataFrame:
-    """What neglecting a bent lens costs, by its ``k1``: of `neglected_distortion`."""
-    return pd.DataFrame([{"k1": k1, "rms": rms, "largest": largest} for k1, (rms, largest) in cost.items()])
-
-
 def causes_table(causes: Sequence[Cause]) -> pd.DataFrame:
     """What each cause leaves, and what it does from the height of the flight; angles in degrees."""
     return pd.DataFrame([{**one._asdict(), "angle": np.degrees(one.angle)} for one in causes])

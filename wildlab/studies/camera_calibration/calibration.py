@@ -17,7 +17,7 @@ from wildlab.geometry.camera import Camera, camera_from_data_sheet
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera, direction_differences
+from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
 from wildlab.geometry.mount import Mount, camera_rotation, helgesen_misalignment
 from wildlab.simulation.boards import board_image, board_views
 from wildlab.studies.sensitivity import TAU2, helgesen_mount
@@ -126,31 +126,6 @@ def calibrations(rng: np.random.Generator, runs: int, sd: float, images: int = I
                     row[f"inside_{name}"] = float(low <= truth[name] <= high)
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def neglected_distortion(rng: np.random.Generator, k1: float, images: int = IMAGES) -> tuple[float, float]:
-    """What neglecting a bent lens costs: the camera is calibrated without noise as if it were straight.
-
-    Parameters
-    ----------
-    rng
-        For the views.
-    k1
-        Of the lens.
-    images
-        How many.
-
-    Returns
-    -------
-    tuple of float
-        Root mean squared reprojection error, px, and the largest difference in the direction that a pixel
-        looks in, apart from a turn of the whole camera, px.
-    """
-    bent = Camera(640, 512, TAU2.fx, TAU2.fy, TAU2.cx, TAU2.cy, 0.0, (k1, 0.0, 0.0, 0.0, 0.0))
-    views = board_views(rng, bent, GRID.points, images)
-    uv = project_board(parameters_of(bent), views, GRID.points).uv
-    found = calibrate_camera(GRID.points, uv, 640, 512, PINHOLE, resample=False)
-    return found.rms, float(np.linalg.norm(direction_differences(found.camera, bent), axis=1).max())
 
 
 #: As printed: the mean error left, at which range, and what that makes from the height of the flight, metres.

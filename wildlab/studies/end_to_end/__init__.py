@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from wildlab.evaluation.intervals import mean_interval, mean_share_interval
 from wildlab.evaluation.shares import Check, Decision, decide
 from wildlab.reporting.charts.drawing import draw_dots, finish, name_rows
-from wildlab.reporting.charts.forms import draw_errors, draw_marks, draw_picture
+from wildlab.reporting.charts.forms import draw_marks, draw_picture
 from wildlab.reporting.figures import BLUE, VERMILLION, new_figure
 from wildlab.simulation.scene.flights import corner_of
 from wildlab.studies.end_to_end import trial
@@ -24,7 +24,6 @@ from wildlab.studies.end_to_end.trial import (
     PIXEL_UNITS,
     RENDERED,
     FlightPair,
-    PixelErrors,
     tracked_filters,
 )
 from wildlab.studies.linear_vs_nonlinear.trial import UNITS
@@ -68,22 +67,6 @@ def detections_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFra
             )
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def tracks_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
-    """Each filter's mean distance, NEES and NIS with both kinds: medians over flights."""
-    middle = runs.median()
-    return pd.DataFrame(
-        [
-            {"filter": names[who]}
-            | {
-                f"{name}_{kind}": float(middle[f"{kind}-{who}", name])
-                for name in ("mae", "nees", "nis")
-                for kind in KINDS
-            }
-            for who in tracked_filters(runs)
-        ]
-    )
 
 
 def decision_text(decision: Decision) -> str:
@@ -148,15 +131,6 @@ def frame(pair: FlightPair) -> Figure:
     marks = {"drawn": pair.drawn_uv[row], "found": pair.marks.uv[row], "centre": pair.marks.centre[row]}
     draw_marks(ax, {name: at - corner_of(window) for name, at in marks.items()})
     return finish(fig, "")
-
-
-def pixel_errors(errors: PixelErrors) -> Figure:
-    """Errors of both kinds in the image, along the vessel's axes."""
-    fig, axes = new_figure(5.9, 3.4, columns=2)
-    for ax, e, color, name in zip(axes, errors, (VERMILLION, BLUE), ("Drawn", "Rendered"), strict=True):
-        draw_errors(ax, e, color, name)
-        ax.set(xlabel="to the right (px)", aspect="equal")
-    return finish(fig, "", ylabel="ahead (px)")
 
 
 def track_errors(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:

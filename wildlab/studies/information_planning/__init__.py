@@ -40,7 +40,6 @@ from wildlab.studies.information_planning.trial import (
     STATIONS,
     SWING,
     PlanningScene,
-    Situation,
     draw_scene,
     searchers,
 )
@@ -134,22 +133,6 @@ def share_over_time(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     fig = lines_chart(at, lines, "time (min)", "share of animals found", size=(5.6, 4.6), ticks=False)
     fig.axes[0].set(xlim=(0, at[-1]), ylim=(0, 1.02))
     return fig
-
-
-def tours_map(situation: Situation) -> Figure:
-    """The path of the greedy high-level planner and the shortest one."""
-    fig, ax = new_figure(5.6, 3.9)
-    for tour, colour, name in (
-        (situation.greedy, VERMILLION, "greedy"), (situation.ahead, BLUE, "shortest")
-    ):  # fmt: skip
-        draw_way(ax, tour.path, colour, f"{name}, {tour.time / 60:.1f} min", width=1.5)
-    sizes = 8 * np.sqrt(situation.covariances[:, 0, 0])
-    ax.scatter(*situation.positions[:, ::-1].T, s=sizes, color=GREY, label="known animals")
-    ax.plot(*situation.platform[::-1], "s", color=INK, ms=6, label="platform")
-    ax.plot(*situation.way_point[::-1], "D", mfc="none", mec=INK, ms=7, label="next way point of the search")
-    ax.margins(0.12)
-    map_axes(ax)
-    return finish(fig, "")
 
 
 def planners_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:

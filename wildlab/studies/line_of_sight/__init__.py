@@ -213,14 +213,6 @@ def times_over_height(times: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     return lines_chart(HEIGHTS, lines, _HEIGHT, "time per grid point (µs)", xscale="log", yscale="log")
 
 
-def steps_over_height(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
-    """Steps per grid point."""
-    lines = {
-        names[way]: _mean(at_heights(runs, way, "steps"), _COLOURS[way]) for way in (RAYS, WHOLE_RAYS, ANGLES)
-    }
-    return lines_chart(HEIGHTS, lines, _HEIGHT, "steps per grid point", xscale="log", yscale="log")
-
-
 def hidden_over_incidence(runs: pd.DataFrame) -> Figure:
     """Share of the ground that trees hide."""
     lines = {"": _mean(100 * hidden(runs), GREEN)}

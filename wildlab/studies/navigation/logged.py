@@ -20,7 +20,7 @@ from wildlab.evaluation.intervals import block_mean, time_blocks
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import significant
-from wildlab.navigation.receiver import SIZE, Candidate
+from wildlab.navigation.receiver import SIZE
 from wildlab.reporting.report import Report, Wording
 from wildlab.studies.navigation import (
     OVERCONFIDENT,
@@ -34,7 +34,8 @@ from wildlab.studies.page import tile_of
 
 #: So many standard deviations from what is configured are an error: four numbers are looked at.
 FAR = 3.0
-_ORDERS = ("white", "and an error of first order", "and an error of second order")
+#: Delays of a receiver that are tried, s.
+LATENCIES = np.arange(0.0, 0.41, 0.02)
 _PARTS = (
     ("white noise, level", 0),
     ("white noise, height", 1),
@@ -79,31 +80,6 @@ def parameters_table(receiver: Receiver) -> pd.DataFrame:
                 }
             )
     return pd.DataFrame(rows)
-
-
-def models_table(receiver: Receiver) -> pd.DataFrame:
-    """Models that were tried: ``model``, ``parameters``, ``gain`` of the log likelihood over the configured
-    one, ``score`` (that less what chance gains) and ``chosen``."""
-    first = receiver.candidates[0]
-    return pd.DataFrame(
-        [
-            {
-                "model": _model(one, receiver),
-                "parameters": one.parameters,
-                "gain": one.log_likelihood - first.log_likelihood,
-                "score": one.score - first.score,
-                "chosen": "chosen" if one is receiver.chosen else "",
-            }
-            for one in receiver.candidates
-        ]
-    )
-
-
-def _model(one: Candidate, receiver: Receiver) -> str:
-    if one.parameters == 0:
-        return "as configured"
-    moving = "" if receiver.scale.velocity is None else f"; velocities {_ORDERS[one.noise.velocity.order]}"
-    return f"positions {_ORDERS[one.noise.position.order]}{moving}"
 
 
 def attitude_change(before: NavigationErrors, after: NavigationErrors, begin: float, end: float) -> str:
@@ -221,8 +197,6 @@ def show_logged(report: Report, studied: Studied, parts: Sequence[Part]) -> None
     report.section("Details")
     wording.table("innovations", innovations_table(studied, window))
     receiver = studied.receiver
-    if receiver is not None:
-        wording.table("models", models_table(receiver))
-        if receiver.noise is not None:
-            wording.table("parameters", parameters_table(receiver))
+    if receiver is not None and receiver.noise is not None:
+        wording.table("parameters", parameters_table(receiver))
     report.method(texts.method)

@@ -1,4 +1,4 @@
-"""The lens of the wildlife camera, its approximate inverse, and what was assumed zero: F 2.3.6, 2.4, 7.1."""
+"""The lens of the wildlife camera and its approximate inverse: F 2.3.6, 2.4, 7.1."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.detection.boards import Board
-from wildlab.geometry.board_views import INTRINSICS, parameters_of, project_board
+from wildlab.geometry.board_views import parameters_of, project_board
 from wildlab.geometry.camera import Camera, normalise, undistort, undistort_approximately
 from wildlab.geometry.frames import Array
-from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera, direction_differences
+from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
 from wildlab.reporting.charts.forms import fields_chart
 from wildlab.reporting.published import error_name
 from wildlab.simulation.boards import board_views
@@ -38,9 +38,6 @@ VIDEOS: dict[str, tuple[int, int, int, int]] = {
 #: F's board is not described: chosen, as is how many pictures were taken.
 BOARD = Board("chessboard", 8, 6, 0.05)
 IMAGES = 20
-#: What F calls zero, and the sizes that such things may have: chosen.
-ASSUMED_ZERO = ("skew", "k2", "p1", "p2", "k3")
-NOT_ZERO = {"skew": 5.0, "k2": -2.0, "p1": 0.003, "p2": 0.003}
 
 
 class Video(NamedTuple):
@@ -125,20 +122,10 @@ def inverse_error(camera: Camera) -> Inverse:
     return Inverse(u, v, error.reshape(u.shape))
 
 
-def direction_error(one: Camera, other: Camera) -> float:
-    """Root mean squared difference of the directions in which two cameras see their pixels, px."""
-    return float(np.sqrt(np.nanmean((direction_differences(one, other) ** 2).sum(axis=1))))
-
-
-def compare_models(
-    rng: np.random.Generator,
-    camera: Camera,
-    noise: float,
-    runs: int,
-    images: int = IMAGES,
-    intervals: bool = True,
+def come_back(
+    rng: np.random.Generator, camera: Camera, noise: float, runs: int, images: int = IMAGES
 ) -> pd.DataFrame:
-    """Calibrate with F's one parameter, and with skew and the whole lens, on simulated pictures.
+    """Calibrations with F's model: does the camera come back?
 
     Parameters
     ----------
@@ -152,45 +139,6 @@ def compare_models(
         How many calibrations.
     images
         In each.
-    intervals
-        Whether the whole model's uncertainty is worked out.
-
-    Returns
-    -------
-    DataFrame
-        A row a run: ``few`` and ``all``, the errors of direction (px) with F's model and with the whole one;
-        ``sd_NAME`` and ``inside_NAME`` of the whole one, of what F assumes zero.
-    """
-    truth = dict(zip(INTRINSICS, parameters_of(camera), strict=True))
-    rows = []
-    for _ in range(runs):
-        views = board_views(rng, camera, BOARD.points, images)
-        uv = project_board(parameters_of(camera), views, BOARD.points).uv
-        uv = uv + rng.normal(0, noise, uv.shape)
-        given = (BOARD.points, uv, camera.width, camera.height)
-        few = calibrate_camera(*given, (*PINHOLE, "k1"), resample=False)
-        whole = calibrate_camera(*given, (*PINHOLE, "k1", *ASSUMED_ZERO), resample=intervals)
-        row = {
-            "few": direction_error(few.camera, camera),
-            "all": direction_error(whole.camera, camera),
-        }
-        for name in ASSUMED_ZERO if intervals else ():
-            low, high = whole.interval(name)
-            row[f"sd_{name}"] = whole.sd(name)
-            row[f"inside_{name}"] = float(low <= truth[name] <= high)
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def come_back(
-    rng: np.random.Generator, camera: Camera, noise: float, runs: int, images: int = IMAGES
-) -> pd.DataFrame:
-    """Calibrations with F's model: does the camera come back?
-
-    Parameters
-    ----------
-    rng, camera, noise, runs, images
-        As for `compare_models`.
 
     Returns
     -------
@@ -208,13 +156,6 @@ def come_back(
     return pd.DataFrame(values, columns=names)
 
 
-def bent_camera(camera: Camera) -> Camera:
-    """The same camera with what F assumes zero at the sizes of `NOT_ZERO`."""
-    k1 = camera.distortion[0]
-    bends = (k1, NOT_ZERO["k2"], NOT_ZERO["p1"], NOT_ZERO["p2"], 0.0)
-    return replace(camera, skew=NOT_ZERO["skew"], distortion=bends)
-
-
 def videos_table(videos: Sequence[Video], height: float) -> pd.DataFrame:
     """A row for each video, with the largest error of F (2.19) over its image, px, and on the ground from
     ``height``, m."""
@@ -225,50 +166,19 @@ def videos_table(videos: Sequence[Video], height: float) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def models_table(straight: pd.DataFrame, bent: pd.DataFrame) -> pd.DataFrame:
-    """Median error of directions (px) with F's model and with the whole one, if F is right and if not."""
-    parts = ", ".join(f"{name} {value:g}" for name, value in NOT_ZERO.items())
-    truths = {"as F assumes": straight, parts: bent}
-    return pd.DataFrame(
-        [
-            {"truth": truth, "few": one["few"].median(), "all": one["all"].median()}
-            for truth, one in truths.items()
-        ]
-    )
-
-
-def zeros_table(straight: pd.DataFrame) -> pd.DataFrame:
-    """For what F assumes zero: its standard deviation, if estimated, and how often zero is inside (%)."""
-    return pd.DataFrame(
-        [
-            {
-                "name": name,
-                "sd": straight[f"sd_{name}"].median(),
-                "inside": 100 * straight[f"inside_{name}"].mean(),
-            }
-            for name in ASSUMED_ZERO
-        ]
-    )
-
-
-def metrics_of(
-    back: pd.DataFrame, videos: Sequence[Video], inverse: Inverse, straight: pd.DataFrame
-) -> list[dict[str, Any]]:
-    """What the study records; ``back`` from `come_back`, ``straight`` from `compare_models`."""
+def metrics_of(back: pd.DataFrame, videos: Sequence[Video], inverse: Inverse) -> list[dict[str, Any]]:
+    """What the study records; ``back`` from `come_back`."""
     found: list[dict[str, Any]] = []
     for name, values in back.items():
         about = {"subject": "tau2", "unit": "" if name == "k1" else "px", "n": len(back)}
         found.append({"name": name, "value": values.mean(), **about})
         found.append({"name": error_name(str(name)), "value": values.sem(), **about})
     rms = float(np.sqrt((inverse.error**2).mean()))
-    about = {"subject": "tau2", "unit": "px", "n": len(straight)}
     return [
         *found,
         {"name": "best_video_off", "subject": "tau2-data-sheet", "value": videos[0].off, "unit": "%"},
         {"name": "largest_error", "subject": "inverse", "value": inverse.error.max(), "unit": "px"},
         {"name": "rms_error", "subject": "inverse", "value": rms, "unit": "px"},
-        {"name": "direction_error_few", "value": straight["few"].median(), **about},
-        {"name": "direction_error_all", "value": straight["all"].median(), **about},
     ]
 
 

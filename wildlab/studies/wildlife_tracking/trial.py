@@ -226,9 +226,7 @@ def particles_of(world: World, seed: int, negative: bool) -> Particles:
     """F's particle filter, which knows how animals walk, their fences, and what the camera shows."""
 
     def rules(moves: Moves) -> Rules:
-        return Rules(
-            moves, particles=PARTICLES, gate_probability=GATE, negative=negative, scheme="systematic"
-        )
+        return Rules(moves, particles=PARTICLES, gate_probability=GATE, negative=negative)
 
     return Particles(world.motion, insides(world.fences), stream(seed, "particles"), rules)
 
