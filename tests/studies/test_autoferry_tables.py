@@ -8,11 +8,10 @@ import pytest
 
 from wildlab.analysis.tracks.noise_model import SensorTuning
 from wildlab.analysis.tracks.single_target import SensorTrack
-from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies import autoferry
-from wildlab.studies.autoferry.comparison import COMPARED, KEYS, Held, of_use, outcomes, tracks_table
+from wildlab.studies.autoferry.comparison import KEYS, of_use, outcomes
 
 NAMES = load_texts("autoferry").subjects
 
@@ -116,24 +115,6 @@ FEW = judged(
 )
 
 
-def test_nothing_of_use_is_a_page_all_the_same(report):
-    rows = made("ir", ["lost"] * 2)
-    use = of_use(rows)
-    useful = rows[rows["sensor"].isin(use.loc[use["of_use"], "sensor"])]
-    held = Held("schmidt", rows, use, judged(useful))
-    for one in autoferry.tables(held, {}, NAMES).values():
-        report.table(one)
-    autoferry.record(report, rows.iloc[:0], {}, held)
-    autoferry.mean_nees(rows, NAMES)
-
-
-def test_tables_count_every_track():
-    rows = autoferry.outcomes_table(FEW, NAMES).set_index("sensor")
-    assert rows["tracks"].to_dict() == {"Lidar": 3, "Radar": 1, "all": 4}
-    assert rows.loc["all"].tolist() == [4, 1, 0, 0, 0, 2, 1]
-    assert (rows.drop(columns="tracks").sum(axis=1) == rows["tracks"]).all()
-
-
 def test_outcomes_are_recorded_with_their_denominator(report):
     use = of_use(made("ir", ["lost"] * 5))
     autoferry.record_outcomes(report, FEW, use, "schmidt")
@@ -152,23 +133,3 @@ def test_overview_is_of_the_tracks_that_stay(tracks):
     assert rows.loc[("Lidar", "white noise"), "inside"] == "0 of 1"
     assert rows.loc[("Lidar", "Schmidt"), "inside"] == "1 of 1"
     assert rows.loc[("Colour camera", "Schmidt"), ["kept", "inside"]].tolist() == ["0 of 1", "—"]
-
-
-def test_nees_over_time_shows_each_filter_and_the_band(followed):
-    mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
-    figure = autoferry.nees_chart(mine, NAMES)
-    (ax,) = figure.axes
-    assert ax.get_yscale() == "log"
-    low, high = chi_square_interval(2)
-    assert ax.get_ylim()[0] < low < high < ax.get_ylim()[1]
-    labelled = [line for line in ax.get_lines() if not line.get_label().startswith("_")]
-    np.testing.assert_array_equal(labelled[0].get_ydata(), mine[0].nees)
-
-
-def test_innovations_beside_the_band_of_white_noise(followed):
-    mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
-    figure = autoferry.innovations_chart([one for one in mine if one.filter != "schmidt"], NAMES)
-    (ax,) = figure.axes
-    lines = [line for line in ax.get_lines() if not line.get_label().startswith("_")]
-    assert len(lines) == 4
-    assert all(line.get_ydata()[0] == pytest.approx(1.0) for line in lines)

@@ -6,7 +6,6 @@ import pytest
 
 from tests.studies.claims import turn
 from wildlab.analysis.georeference import observe
-from wildlab.reporting.published import load_published
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import check_claims
 from wildlab.studies.crossing_vessels import trial as study
@@ -20,7 +19,6 @@ from wildlab.studies.crossing_vessels.trial import (
     distances_of,
     dressed,
     gather,
-    looks_of,
     photograph,
     swapped,
     track,
@@ -158,14 +156,6 @@ def test_detections_are_dressed_from_their_own_vessel():
     assert np.isnan(found.features[crossing.boat == 1]).all()
 
 
-def test_how_far_apart_the_two_look():
-    looks = [np.array([[0.0, 0, 5], [2, 0, 5]]), np.array([[10.0, np.nan, 5], [12, 1, 5]])]
-    found = looks_of(looks)
-    assert found[LOOKS, "separation_size"] == pytest.approx(10 / np.sqrt(2))
-    assert np.isnan(found[LOOKS, "separation_intensity"]), "one known value has no spread"
-    assert np.isnan(found[LOOKS, "separation_hu"]), "no spread, no measure"
-
-
 @pytest.mark.slow
 def test_numbers_are_those_of_the_tracks(flown):
     numbers = all_numbers(flown)
@@ -220,12 +210,6 @@ def test_premises_turn_with_the_numbers():
     assert met({}) == crossed | after_swap
     assert met({(LOOKS, "closest"): 18.0}) == after_swap
     assert met({(DISTANCE, "swapped"): 0.0}) == crossed
-
-
-def test_published_numbers_are_those_of_the_text():
-    printed = load_published("crossing-vessels").set_index(["name", "subject"])["value"]
-    assert printed["wrong_rate_boat_1", FEATURES] == pytest.approx(5 / 1535, abs=5e-5)
-    assert printed["wrong_rate_boat_2", FEATURES] == 0
 
 
 def test_two_are_apart_up_to_just_before_they_meet_and_from_just_after():

@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 from tests.studies.claims import turn
-from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.reporting.published import load_claims
 from wildlab.studies import end_to_end
@@ -14,7 +13,6 @@ from wildlab.studies.end_to_end.trial import (
     COLOURED,
     DRAWN,
     KINDS,
-    PIXEL_UNITS,
     RENDERED,
     STUDY_OF,
     TWO_FILTERS,
@@ -24,9 +22,7 @@ from wildlab.studies.end_to_end.trial import (
     numbers_of,
     of_kind,
     pixel_errors,
-    source_of,
 )
-from wildlab.studies.linear_vs_nonlinear import trial as filters
 
 TWIN, SEED = "fast-vessel", 1
 
@@ -68,15 +64,6 @@ def test_errors_are_along_the_vessels_axes(pair):
     assert np.allclose(np.hypot(*(errors.drawn - errors.rendered).T), far, rtol=0.15)
 
 
-def test_numbers_of_a_kind_are_those_of_the_cases(pair, numbers):
-    plain = filters.numbers_of(
-        pair.seen[DRAWN], filters.track_target(pair.seen[DRAWN], filters.FAST, filters.PUBLISHED)
-    )
-    assert numbers["drawn-kf", "mae"] == plain["kf", "mae"]
-    tracked = coloured.track_target(pair.seen[RENDERED], coloured.FAST)
-    assert numbers["rendered-coloured", "mae"] == tracked["coloured"].scored.numbers["mae"]
-
-
 def test_the_detector_is_nearer_than_what_the_twin_draws(numbers):
     assert numbers[RENDERED, "pixel_rms"] < numbers[DRAWN, "pixel_rms"]
     assert numbers[RENDERED, "detection_rate"] > 0.9
@@ -85,14 +72,6 @@ def test_the_detector_is_nearer_than_what_the_twin_draws(numbers):
     for kind in KINDS:
         bias = np.hypot(numbers[kind, "bias_ahead"], numbers[kind, "bias_right"])
         assert np.hypot(bias, numbers[kind, "pixel_sd"]) == pytest.approx(numbers[kind, "pixel_rms"])
-
-
-def test_only_twins_with_a_case_are_flown():
-    assert source_of("fast-vessel") == "observer"
-    assert source_of("slow-vessel-eight") == "autopilot"
-    assert source_of("drifting-vessel") == "observer"
-    with pytest.raises(WildlabError, match="gondola"):
-        source_of("gondola")
 
 
 def test_every_claim_of_the_cases_is_checked_with_both(numbers):
@@ -141,14 +120,3 @@ def test_intervals_of_shares_stay_within_all_and_none():
     values = pd.Series([0.9, 1.0, 1.0])
     assert end_to_end.interval_text(values, 100, 0, share=True) == "97 (82 to 100)"
     assert end_to_end.interval_text(values, 100, 0) == "97 (82 to 111)"
-
-
-def test_a_count_has_no_end_at_one(numbers):
-    rows = [
-        spread_of(numbers, {(RENDERED, "false_alarms_per_image"): alarms}, flights=1)
-        for alarms in (1.0, 1.2, 1.4)
-    ]
-    table = end_to_end.detections_table(pd.concat(rows), {name: name for name in PIXEL_UNITS}).set_index(
-        "quantity"
-    )
-    assert table.loc["false_alarms_per_image", RENDERED] == "1.200 (0.703 to 1.697)"

@@ -12,15 +12,10 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.reporting.report import open_report
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.gating import (
-    DEFAULT,
     READINGS,
     claim_margins,
-    metrics_of,
-    standard_error,
-    subject,
     verdict,
 )
 from wildlab.studies.gating import monte_carlo as gating
@@ -153,16 +148,6 @@ def test_without_noise_and_far_apart_nothing_goes_wrong(over, monkeypatch):
     assert gated.right.all()
 
 
-def test_two_targets_in_one_place_are_a_toss_up(over, monkeypatch):
-    """Nothing but the noise of the detector tells them apart, and it favours neither."""
-    monkeypatch.setattr(gating, "APART", (0.0, 0.0))
-    monkeypatch.setattr(gating, "DISPLACED_M", 0.0)
-    rates = rates_of(over, 200, 5)
-    for form in rates:
-        assert abs(form.mean() - 50) < 5 * standard_error(form)
-    assert rates.std(axis=1, ddof=1) == pytest.approx(100 * np.sqrt(0.25 / IMAGES), rel=0.3)
-
-
 def rates_of(over: Overflight, runs: int, seed: int, chunk: int = 500) -> Array:
     return outcomes(over, {"": False}, runs, seed, chunk)[""].rate
 
@@ -172,11 +157,6 @@ def test_a_run_does_not_depend_on_the_others(over):
     assert many.shape == (len(GATES), 7)
     np.testing.assert_array_equal(many[:, :4], rates_of(over, 4, 3))
     assert (rates_of(over, 4, 4) != many[:, :4]).any()
-
-
-def test_readings_are_judged_on_the_same_draws(over):
-    found = outcomes(over, READINGS, 6, 3, chunk=4)
-    np.testing.assert_array_equal(found[DEFAULT].rate, rates_of(over, 6, 3))
 
 
 def test_mistakes_are_counted_apart_and_together(over):
@@ -284,23 +264,3 @@ def test_a_claim_wants_every_margin_and_chance_decides_none(margins, decided):
 def test_a_run_without_mistakes_says_nothing_of_where_they_fall():
     margin = claim_margins(outcome(np.full((4, 6), 100.0), mistakes=(0, 0, 0), same=1.0))
     assert np.isnan(margin["mistakes-on-different-images"]).all()
-
-
-def test_every_mean_is_recorded_with_its_standard_error():
-    rng = np.random.default_rng(1)
-    own, stress = (
-        outcome(np.array(means)[:, None] + rng.standard_normal((4, 400)))
-        for means in ((96.6, 96.8, 96.0, 97.5), (88.0, 82.0, 71.0, 79.0))
-    )
-    report = open_report(study="gating", kind="twin", flight="large-ship")
-    for one in metrics_of({DEFAULT: own, "assigned": stress}):
-        report.metric(**one)
-    for reading, found in ((DEFAULT, own), ("assigned", stress)):
-        for form, rates in zip(GATES, found.rate, strict=True):
-            of = subject(form, reading)
-            mean, se = (report.recorded[name, of] for name in ("success_rate", "success_rate_se"))
-            assert mean["value"] == pytest.approx(rates.mean())
-            assert se["value"] == pytest.approx(standard_error(rates))
-            assert mean["low"] is None and mean["n"] == 400
-    assert report.recorded["success_rate", "angles"]["published"] == 95.99
-    assert report.recorded["success_rate", "angles/updated-with-assigned"]["published"] is None

@@ -10,7 +10,6 @@ from tests.studies.claims import turn
 from wildlab.analysis.search import rows_at
 from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
 from wildlab.planning.areas import contains
-from wildlab.studies import information_planning
 from wildlab.studies.information_planning.trial import (
     AHEAD,
     BUDGET_S,
@@ -25,7 +24,6 @@ from wildlab.studies.information_planning.trial import (
     draw_situation,
     numbers_of,
     search_all,
-    survey_rows,
 )
 
 
@@ -120,13 +118,6 @@ def test_a_greedy_choice_is_never_quicker_than_the_shortest_order():
         assert len(situation.ahead.order) == len(situation.positions) + 1
 
 
-def test_a_survey_knows_as_many_as_it_says(one):
-    scene, _ = one
-    found = survey_rows(2, scene)
-    assert found.known.max() <= 10 and (np.isfinite(found.positioned) == (found.known[-1] == 10))
-    assert np.nanmedian(found.error) < 15
-
-
 def test_claims_turn_with_the_numbers():
     good, bad = (
         check_claims(table(**kind), loads=np.full(10, load)) for kind, load in ((GOOD, 0.6), (BAD, 0.01))
@@ -136,13 +127,3 @@ def test_claims_turn_with_the_numbers():
         check = check_claims(table(), loads=np.full(40, load))["computationally-expensive"]
         assert decide_check(check, 0.1).verdict == verdict
     assert decide(good["lower-search-time"].holds()).met == 40
-
-
-def test_what_planning_takes_is_measured_for_each_world(monkeypatch):
-    clock = iter(np.arange(0.0, 1e6, 0.25))
-    monkeypatch.setattr(information_planning, "process_time", lambda: next(clock))
-    cost = information_planning.planning_cost([2], "uav-search")
-    assert cost["decision"].tolist() == [0.25]
-    assert cost["load"].iloc[0] == pytest.approx(0.25 / 3, rel=0.4) and cost["load"].iloc[0] < 0.25 / 3
-    monkeypatch.setattr(information_planning, "TIMED", 0)
-    assert information_planning.planning_cost([2, 3], "uav-search").empty

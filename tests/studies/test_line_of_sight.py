@@ -13,12 +13,10 @@ from wildlab.studies.line_of_sight import WAYS, furthest_ratio, timed
 from wildlab.studies.line_of_sight.trial import (
     ANGLES,
     EXACT,
-    HEIGHT,
     HEIGHTS,
     INCIDENCES,
     LETTER,
     RAYS,
-    TILT,
     TREES,
     VIEW,
     WHOLE_RAYS,
@@ -27,7 +25,6 @@ from wildlab.studies.line_of_sight.trial import (
     hidden_by_trees,
     look,
     nodes_of,
-    settings,
     trial,
     width_on_ground,
 )
@@ -80,13 +77,6 @@ def test_on_even_ground_all_see_all_but_the_letter():
     assert width_on_ground(flat, camera, down) == pytest.approx(80 * np.tan(half))
 
 
-def test_too_many_and_too_few_are_what_disagrees(spread):
-    for way in (RAYS, ANGLES):
-        for name, *_ in settings():
-            parts = spread[way, f"too_many_{name}"] + spread[way, f"too_few_{name}"]
-            np.testing.assert_allclose(parts, 1 - spread[way, f"agreement_{name}"], atol=1e-12)
-
-
 def test_trees_hide_what_stands_below_them_and_more_at_a_slant():
     land = Terrain(np.zeros((251, 501), np.float32), -250.0, -500.0, 2.0)
     none = hidden_by_trees(land, grow_trees(land, 1, share=0.0), stream(1, "test"))
@@ -131,8 +121,3 @@ def test_times_are_taken_of_every_way_at_every_height():
     times = timed([3], TWIN, repeats=1)
     assert (times[list(WAYS)].to_numpy() > 0).all() and times.shape == (1, 5 * len(HEIGHTS))
     assert (furthest_ratio(times, RAYS, ANGLES) >= 1).all()
-
-
-def test_every_setting_is_compared_once():
-    found = [(height, tilt) for _, height, tilt in settings()]
-    assert len(set(found)) == len(found) and (HEIGHT, TILT) in found

@@ -155,11 +155,3 @@ def test_over_detections_alone_is_over_every_frame():
     compiled = follow_positions(seen, tuning.cv)
     np.testing.assert_allclose(cv.x, compiled.x, atol=1e-3)
     np.testing.assert_allclose(cv.P, compiled.P, rtol=1e-4, atol=1e-4)
-
-
-@pytest.mark.slow
-def test_neglected_noise_makes_filters_too_sure():
-    found = [coloured_noise.trial(1, twin="fast-vessel")]
-    checks = coloured_noise.check_claims(pd.DataFrame(found))
-    assert checks["nis-below-mean"].holds().all()
-    assert all(one["coloured", "nees"] < one["cv", "nees"] for one in found)

@@ -69,11 +69,6 @@ def test_claims_are_decided_by_the_interval_of_their_share(report, monkeypatch):
     assert (report.claims[2]["low"], report.claims[2]["high"]) == share_interval(30, 50)[1:]
 
 
-def test_three_flights_decide_nothing(report, monkeypatch):
-    claims_of(monkeypatch, "a")
-    assert monte_carlo.decide_claims(report, "x", {"a": [True] * 3})["verdict"].tolist() == ["undecided"]
-
-
 def test_a_threshold_is_shown_at_half_and_at_twice(report, monkeypatch):
     claims_of(monkeypatch, "a", threshold=2, reason="as far as one sees")
     measured = np.r_[np.full(50, 1.5), np.full(50, 3.0)]
@@ -97,13 +92,6 @@ def test_a_threshold_that_the_measure_cannot_reach_is_left_out(report, monkeypat
     # A ratio below 1.4 would hold of what does not decrease.
     assert row(Check(measured=f1, reach=(0, 1))) == "at 0.35 does not hold; taken: 0.7"
     assert row(Check(measured=f1, reach=(0.6, 1))) == "0.7"
-
-
-def test_a_measure_reaches_what_it_can_be_on_either_side_of():
-    above, below = (Check(measured=np.ones(1), above=up, reach=(0, 1)) for up in (True, False))
-    at = (-0.1, 0.0, 0.5, 1.0, 1.1)
-    assert [above.reaches(one) for one in at] == [False, True, True, False, False]
-    assert [below.reaches(one) for one in at] == [False, False, True, True, False]
 
 
 def test_a_premise_and_a_difference_are_said(report, monkeypatch):

@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from tests.flight.conftest import make_flight  # noqa: F401 - a fixture
 from wildlab.analysis.navigate import Studied
 from wildlab.flight.store import Flight
-from wildlab.reporting.charts.navigation import mark_period, speed_chart
 from wildlab.studies import navigation
 
 
@@ -68,18 +67,3 @@ def test_counterparts_and_the_period_in_each_of_them(
         for ax in one.axes:
             black = [line.get_xdata()[0] for line in ax.lines if line.get_color() == "black"]
             assert black == [1.0, 8.0]
-
-
-def test_a_flight_without_target_has_no_map(make_flight):
-    flight = make_flight()
-    flight.tables["truth"] = flight.table("truth").iloc[:0]
-    assert "fig-7-22" not in show(flight, 23)
-
-
-def test_lines_of_a_period_do_not_move_the_limits():
-    fig = speed_chart({"mekf": (np.arange(5.0), np.ones((5, 3)))}, "Speed")
-    before = fig.axes[0].get_xlim()
-    mark_period(fig, None)
-    assert len(fig.axes[0].lines) == 1
-    mark_period(fig, (2.0, 90.0))
-    assert fig.axes[0].get_xlim() == before and len(fig.axes[0].lines) == 3

@@ -6,7 +6,6 @@ import pytest
 
 from tests.studies.claims import said
 from wildlab.errors import WildlabError
-from wildlab.reporting.published import load_published
 from wildlab.studies.optical_flow_velocity import trial as study
 from wildlab.studies.optical_flow_velocity.trial import (
     IMAGES,
@@ -69,13 +68,6 @@ def test_with_exact_poses_the_images_give_the_velocity_of_the_ship(looked, table
     flow = tables[TRUE]
     assert np.allclose(flow["flow_u"], flow["camera_u"], atol=6)
     assert np.abs(flow["flow_v"]).max() > 10
-
-
-def test_features_lie_on_the_ship(looked):
-    pair = looked.pairs[0]
-    labels = looked.scene.view(pair.first, waves_move=False).labels
-    u, v = np.rint(pair.matches.first).astype(int).T
-    assert (labels[v, u] > 0).mean() > 0.7
 
 
 def test_a_flight_gives_a_number_for_everything_that_is_recorded(looked, tables):
@@ -143,13 +135,3 @@ def test_each_claim_turns_with_its_numbers(claim, changes):
         said("optical-flow-velocity", check_claims(spread_of(**changes))),
     )
     assert all(checks[0][claim]) and not any(checks[1][claim])
-
-
-def test_every_published_number_is_recorded():
-    for row in load_published("optical-flow-velocity").itertuples():
-        assert row.subject == IMAGES and row.name in RECORDED
-
-
-def test_no_correlation_is_asked_to_be_above_one():
-    check, threshold = check_claims(spread_of())["flows-correlate"], 0.5
-    assert check.reaches(threshold / 2) and check.reaches(threshold) and not check.reaches(2 * threshold)

@@ -8,14 +8,11 @@ import pytest
 
 from tests.studies.claims import turn
 from wildlab.detection.colour import Colour
-from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
+from wildlab.evaluation.shares import decide
 from wildlab.geometry.camera import Camera
-from wildlab.reporting.report import open_report
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.coloured import Ground
 from wildlab.simulation.scene.flights import SceneFlight
-from wildlab.studies import monte_carlo
 from wildlab.studies.precision_drop.trial import (
     COUNTS,
     FOUND,
@@ -92,15 +89,6 @@ def test_numbers_by_hand():
     assert found[FOUND, "few_pixels"] == pytest.approx(0.6)
 
 
-def test_a_twin_without_a_find_is_refused(monkeypatch):
-    from wildlab.studies.precision_drop import trial
-
-    empty = Drop(look_of(1), *[np.zeros((0, 2))] * 4, 1, 1, 0, 0, 0)
-    monkeypatch.setattr(trial, "search", lambda *_: empty)
-    with pytest.raises(WildlabError, match="seed 1"):
-        flown(1, "precision-drop", 5, 1)
-
-
 def table(**changed):
     """Two flights; ``name=value`` or ``subject_name=value`` changes a number of both."""
     base = {
@@ -113,15 +101,6 @@ def table(**changed):
         key = next(key for key in base if f"{key[0]}_{key[1]}" == name)
         base[key] = value
     return pd.DataFrame([base, base], dtype=float)
-
-
-def test_a_few_pixels_on_the_ground_are_a_calculation():
-    check = check_claims(table())["few-pixels-are-little"]
-    assert (decide_check(check, 1.0).verdict, decide_check(check, 0.5).verdict) == (HOLDS, FAILS)
-    assert decide_check(check, 1.0).share is None
-    report = open_report(study="precision-drop", kind="twin")
-    monte_carlo.decide_claims(report, "precision-drop", check_claims(table()))
-    assert next(one for one in report.claims if one["id"] == "few-pixels-are-little")["fraction"] is None
 
 
 def test_claims_turn_with_the_numbers():

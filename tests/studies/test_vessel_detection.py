@@ -6,17 +6,11 @@ import pytest
 
 from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
-from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.reporting.published import judge as judge_number
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.reporting.report import open_report
-from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene import EVEN, IDEAL, Scene, expose, rectangle, render, sensor_of
-from wildlab.simulation.scene.flights import SceneFlight
-from wildlab.studies import monte_carlo
 from wildlab.studies.vessel_detection import STUDY
 from wildlab.studies.vessel_detection.trial import (
     BOATS,
@@ -26,7 +20,6 @@ from wildlab.studies.vessel_detection.trial import (
     WHOLE,
     Image,
     check_claims,
-    choose,
     numbers_of,
     tally,
     trial,
@@ -141,37 +134,6 @@ def test_what_is_missed_is_a_small_part_or_not():
         assert (check["only-small-parts-missed"].holds(0.1) == small).all()
 
 
-def test_one_in_a_hundred_is_not_none_however_many_flights_have_none():
-    spread = pd.concat([spread_of()[:36], spread_of(ship__images_with_false=1.0)[:4]], ignore_index=True)
-    check = check_claims(spread)["ship-without-false-alarm"]
-    assert check.pooled == (4, 400) and (check.measured == 0).mean() == 0.9
-    assert decide_check(check, 0.00864).verdict == UNDECIDED
-    assert decide_check(check, 0.001).verdict == FAILS
-
-
-def test_thresholds_of_none_are_what_the_printed_images_leave_open():
-    for claim, count, images in (
-        ("ship-without-false-alarm", 0, 441), ("whole-always-found", 0, 4903),
-        ("no-blob-in-empty-images", 15, 27866),
-    ):  # fmt: skip
-        assert float(CLAIMS[claim]["threshold"]) == pytest.approx(
-            share_interval(count, images).high, rel=0.01
-        )
-
-
-def test_published_rates_are_compared_with_all_images_together():
-    def compared(**changes):
-        report = open_report(study="vessel-detection", kind="twin")
-        monte_carlo.record_spread(report, STUDY, spread_of(**changes)[:6], {})
-        row = report.printed("detection_rate", WHOLE)
-        return judge_number(row, report.recorded).words, report.recorded["detection_rate", WHOLE]["n"]
-
-    # Each flight's rate is 0.96 or 1.00: what 48 images say is too little, and 12000 are enough.
-    assert compared(whole__images=8.0) == ("cannot tell, too few flights", 48)
-    assert compared(whole__images=2000.0) == ("close, too few flights", 12000)
-    assert compared(whole__images=2000.0, whole__detection_rate=0.96)[0] == "not close, too few flights"
-
-
 def test_an_image_with_one_boat_whole_and_one_cut_counts_by_the_whole_one():
     both = image_of(rectangle(10, 5, 12.0), rectangle(10, 5, 0.5).at(0, 16.5))
     assert sorted(seen.share < 1 for seen in both.view.seen) == [False, True]
@@ -179,20 +141,6 @@ def test_an_image_with_one_boat_whole_and_one_cut_counts_by_the_whole_one():
     assert (numbers[WHOLE, "detection_rate"], numbers[WHOLE, "missed"]) == (1.0, 0)
     cut = numbers_of(*tally([both._replace(subject=CUT)], FloatingThresholds()))
     assert (cut[CUT, "detection_rate"], cut[CUT, "images_with_missed"]) == (0.0, 1)
-
-
-def test_such_an_image_is_chosen_as_one_with_something_whole():
-    class Two:
-        times = np.arange(4)
-
-        def near(self):
-            return np.ones((4, 2), bool)
-
-        def shares(self, exposure):
-            return np.array([[1.0, 0.5], [1.0, 0.0], [0.5, 0.3], [0.0, 0.0]][exposure])
-
-    chosen = choose(Two(), 4, np.random.default_rng(1))
-    assert (set(chosen["whole"]), chosen["cut"]) == ({0, 1}, [2])
 
 
 @pytest.mark.slow
@@ -204,18 +152,3 @@ def test_a_trial_has_what_is_published_and_the_same_twice():
         assert np.isfinite(one[row.subject, row.name])
         assert STUDY.unit_of(row.name) is not None
     assert 0 <= one[SHIP, "detection_rate"] <= 1
-
-
-@pytest.mark.slow
-def test_a_flight_is_rendered_from_its_own_poses():
-    flight = SceneFlight(load_twin("large-ship"), 3)
-    near = np.flatnonzero(flight.near().any(axis=1))
-    shown = [int(one) for one in near[:: len(near) // 12] if flight.shares(int(one)).max() > 0]
-    assert shown
-    for exposure in shown[:3]:
-        view = flight.view(exposure)
-        (seen,) = view.seen
-        assert np.isclose(seen.share, flight.shares(exposure)[0])
-        assert (view.labels == 1).sum() == pytest.approx(seen.area, rel=0.02, abs=30)
-    far = np.setdiff1d(np.arange(len(flight.times)), near)
-    assert flight.view(int(far[0])).seen == ()

@@ -1,4 +1,4 @@
-"""The study of the wildlife camera: the inverse, which video it is, and what was assumed zero."""
+"""The study of the wildlife camera: the inverse, which video it is, and a calibration."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_the_video_is_told_by_the_ratio_of_focal_lengths():
     assert square.width == 640
 
 
-def test_the_camera_comes_back_and_what_is_zero_is_found_zero():
+def test_the_camera_comes_back():
     rng = np.random.default_rng(1)
     back = wildlife_camera.come_back(rng, CAMERA, 0.1, 3, images=10)
     assert len(back) == 3
@@ -34,8 +34,3 @@ def test_the_camera_comes_back_and_what_is_zero_is_found_zero():
     assert back["fx"] == pytest.approx(wildlife_camera.FX, rel=0.005) and back["k1"] == pytest.approx(
         wildlife_camera.K1, abs=0.1
     )
-    straight = wildlife_camera.compare_models(rng, CAMERA, 0.1, 3, images=10)
-    bent = wildlife_camera.compare_models(rng, wildlife_camera.bent_camera(CAMERA), 0.1, 3, images=10)
-    assert bent["few"].median() > 2 * bent["all"].median()
-    assert bent["few"].median() > 2 * straight["few"].median()
-    assert straight["inside_skew"].mean() > 0.5

@@ -15,8 +15,6 @@ from wildlab.simulation.scene import (
 from wildlab.studies import wildlife_detection
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (
-    BY_EMPTY,
-    BY_MEAN,
     CLOUDY,
     CONSTANT,
     COUNTS,
@@ -114,11 +112,6 @@ def test_claims_turn(numbers):
     assert bad["too-hot"] and bad["size-from-ground"] and bad["block-from-distance"]
     clear = true(spread_of(numbers, constant__invented=9.0, adaptive_offset__invented=9.0))
     assert clear["combinations-best"]
-    # The constant threshold under another name neither copes nor competes.
-    twin = true(spread_of(numbers, adaptive__invented_after=9.0, adaptive__found=0.0))
-    assert twin["adaptive-copes"]
-    beaten = spread_of(numbers, constant__invented=9.0, adaptive_offset__invented=9.0, adaptive__invented=0.0)
-    assert true(beaten)["combinations-best"]
 
 
 def check_of(claim, spread):
@@ -151,27 +144,6 @@ def test_a_fall_is_a_part_of_what_was(numbers):
     gone = spread_of(numbers, **low, adaptive_offset__found_after=0.0)
     assert not check_of("adaptive-copes", gone).any()
     assert check_of("adaptive-copes", spread_of(numbers, **low)).all()
-
-
-def test_thresholds_lie_where_their_measures_can_be(numbers):
-    checks = wildlife_detection.check_claims(spread_of(numbers))
-    assert checks["subtraction-and-constant-good"].reaches(0.35)
-    assert not checks["subtraction-and-constant-good"].reaches(1.4)
-    assert not checks["constant-fails"].reaches(1.0)
-
-
-def test_the_herd_is_also_searched_with_the_threshold_of_the_empty_place(numbers):
-    rise = numbers["herd", "mean_rise"]
-    assert rise > 0
-    assert numbers[BY_EMPTY, "missed_herd"] <= numbers[BY_MEAN, "missed_herd"]
-
-
-def test_false_alarms_are_not_fewer_than_none(numbers):
-    spread = spread_of(numbers)
-    spread.loc[0, [(CONSTANT, "invented_noon_15")]] = 9.0
-    found = wildlife_detection.false_alarms(spread, CONSTANT, wildlife_detection.places([NOON]))
-    assert found.estimate == pytest.approx(9 / 36)
-    assert found.low == 0 and found.high > found.estimate
 
 
 def test_a_premise_that_is_not_met_decides_nothing(numbers):

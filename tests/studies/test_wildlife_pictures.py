@@ -8,12 +8,9 @@ import pytest
 from tests.studies.animal_pictures import CAMERA, DARK, picture_of, rhino
 from wildlab.simulation.scene import (
     IDEAL,
-    Weather,
-    render_land,
     slab,
     tree,
 )
-from wildlab.simulation.scene.drawn import LandDraw, draw_layout
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.trial import (
     CONSTANT,
@@ -74,34 +71,3 @@ def test_what_is_proposed_follows_from_the_ground():
     oven = picture_of(rhino(0, -4), slab(2.0, 2.0, 60.0).at(0.0, 4.0))
     assert judge(oven, find(oven, METHODS[SUBTRACTED])).counts.tolist() == [1, 1, 0]
     assert judge(oven, find(oven, cold)).counts.tolist() == [1, 0, 0]
-
-
-def test_how_much_ground_is_as_warm_as_animals():
-    assert trial.as_warm(picture_of(rhino())) == 0
-    hot = trial.as_warm(picture_of(rhino(0, -4), slab(3.0, 4.0, 30.0).at(0.0, 4.0)))
-    own = (picture_of(rhino(0, -4)).view.labels == 1).sum()
-    assert hot == pytest.approx(12 * (320 / 30) ** 2 / own, rel=0.05)
-    assert np.isnan(trial.as_warm(picture_of()))
-
-
-def test_enhancement_leaves_the_ground_black_unless_it_is_above_half_of_the_brightest():
-    dark = trial.background_left(picture_of(rhino()))
-    assert dark[1] < 0.05  # the rim of the animal
-    bright = trial.background_left(picture_of(rhino(), window=(-60.0, 20.0)))
-    assert bright[1] > bright[0]
-
-
-def test_a_layout_is_the_same_place_in_any_weather():
-    layout = draw_layout(np.random.default_rng(3), CAMERA, LandDraw(animals=(4, 4), stones=(2, 2)))
-    night, noon = (layout.scene(weather) for weather in (DARK, Weather(hour=13.0)))
-    assert [body.kind for body in night.bodies] == [body.kind for body in noon.bodies]
-    assert all(
-        np.allclose(one.centre(0), other.centre(0))
-        for one, other in zip(night.bodies, noon.bodies, strict=True)
-    )
-    assert np.array_equal(night.land.cover, noon.land.cover)
-    assert layout.scene(DARK, with_animals=False).bodies[0].kind == "stone"
-    view = render_land(night, CAMERA, layout.p_nc, layout.R_nc)
-    uv = [one.uv for one in view.seen if one.kind in trial.ANIMALS]
-    assert len(uv) == 4
-    assert (np.array(uv) > 25).all() and (np.array(uv) < [155, 95]).all()

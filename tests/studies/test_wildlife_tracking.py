@@ -160,18 +160,6 @@ def test_out_of_sight_counts_by_hand():
     assert np.isnan(sight_numbers(out_of_sight(known, log, times, truth, 10.0))["rmse"])
 
 
-def test_a_false_detection_is_no_sighting_and_mixes_a_track():
-    truth, times = np.zeros((4, 2, 2)), np.arange(4) * 20.0
-    one = Known(3, np.array([1, 2]), np.array([[3.0, 4.0], [9.0, 9.0]]), np.tile(np.eye(2), (2, 1, 1)))
-    seen = [found(0, 1, 1), found(2, -1, 2)]
-    away = out_of_sight([one], seen, times, truth)
-    # The last animal, seen 60 s ago, keeps its own track, though nobody's was detected 20 s ago.
-    np.testing.assert_array_equal(away.off, [[3.0, 4.0]])
-    assert away.own.tolist() == [True]
-    mixed = out_of_sight([one], [*seen[:1], found(1, -1, 1, own=0)], times, truth)
-    assert mixed.own.tolist() == [False]
-
-
 def test_the_next_lap_takes_each_animal_once():
     times = np.arange(0.0, 100.0, 10.0)
     log = [
@@ -218,17 +206,3 @@ def test_a_world_follows_as_it_should(runs):
     looks = {one: done.followed[UAV, one].steps for one in FILTERS}
     assert looks[POSITIVE] == looks[KALMAN] < looks[NEGATIVE]
     assert numbers[REVISITS, "visits"] > 0 == numbers[ROWS, "visits"]
-
-
-@pytest.mark.slow
-def test_a_fence_alone_tells_what_places_drawn_in_it_do(
-    runs,
-):
-    done, numbers = runs
-    rng = np.random.default_rng(1)
-    spreads = []
-    for fence in done.worlds[UAV].fences:
-        a, b, _, d = fence
-        places = a + rng.random((20_000, 1)) * (b - a) + rng.random((20_000, 1)) * (d - a)
-        spreads.append(np.trace(np.cov(places.T)) / 2)
-    assert numbers[UAV, "by_fence_alone"] == pytest.approx(np.sqrt(np.mean(spreads)), rel=0.02)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.planning.ground import FLAT
-from wildlab.analysis.animals.images import NONE, Detector, Images, footprint_circles, sight_from, take_images
+from wildlab.analysis.animals.images import Detector, Images, footprint_circles, sight_from, take_images
 from wildlab.analysis.animals.tracking import (
     Aircraft,
     Kalman,
@@ -58,7 +58,7 @@ def over_and_over(seed: int, speed_sd: float, seconds: float = 300.0) -> Images:
 
 def particles(seed: int, speed_sd: float, fence: Array = FENCE) -> Particles:
     def rules(moves: Moves) -> Rules:
-        return Rules(moves, particles=300, scheme="systematic")
+        return Rules(moves, particles=300)
 
     fences: list[Inside] = [partial(contains, fence)]
     return Particles(walk_of(speed_sd, 1.0), fences, np.random.default_rng(seed), rules)
@@ -141,7 +141,7 @@ def test_a_ledger_knows_who_got_which_track_and_takes_a_false_detection_for_no_a
     ledger = Ledger(3)
     ledger.enter(0, 0.0, np.arange(3), np.array([1, 2, 3]), {}, {1: 4.0, 2: 6.0, 3: 8.0})
     for image, time in ((1, 10.0), (2, 50.0)):
-        ledger.enter(image, time, np.array([NONE]), np.array([4]), {3: 8.0}, {3: 8.0, 4: 9.0})
+        ledger.enter(image, time, np.array([-1]), np.array([4]), {3: 8.0}, {3: 8.0, 4: 9.0})
     before = {1: 50.0, 2: 60.0, 3: 7.0}
     ledger.enter(9, 90.0, np.array([1, 2, 0]), np.array([1, 3, 0]), before, {1: 5.0, 2: 60.0, 3: 4.0})
     first, _, _, false, again, third, last = ledger.found
@@ -149,7 +149,7 @@ def test_a_ledger_knows_who_got_which_track_and_takes_a_false_detection_for_no_a
     assert (third.animal, third.track, third.own, third.away) == (1, 1, 2, 90.0)
     assert (third.before, third.after, third.after_last, third.own_before) == (50.0, 5.0, 4.0, 60.0)
     assert not third.started
-    assert (false.animal, false.started, false.own, false.away) == (NONE, True, 0, np.inf)
+    assert (false.animal, false.started, false.own, false.away) == (-1, True, 0, np.inf)
     assert np.isnan(false.own_before) and again.away == np.inf and again.own == 0
     # The last animal's own track and time are not those of the detections that are nobody's.
     assert (last.own, last.away, last.own_before) == (3, 90.0, 7.0)
