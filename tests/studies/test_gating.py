@@ -16,6 +16,7 @@ from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.gating import (
     READINGS,
     claim_margins,
+    standard_error,
     verdict,
 )
 from wildlab.studies.gating import monte_carlo as gating
@@ -264,3 +265,13 @@ def test_a_claim_wants_every_margin_and_chance_decides_none(margins, decided):
 def test_a_run_without_mistakes_says_nothing_of_where_they_fall():
     margin = claim_margins(outcome(np.full((4, 6), 100.0), mistakes=(0, 0, 0), same=1.0))
     assert np.isnan(margin["mistakes-on-different-images"]).all()
+
+
+def test_two_targets_in_one_place_are_a_toss_up(over, monkeypatch):
+    """Nothing but the noise of the detector tells them apart, and it favours neither."""
+    monkeypatch.setattr(gating, "APART", (0.0, 0.0))
+    monkeypatch.setattr(gating, "DISPLACED_M", 0.0)
+    rates = rates_of(over, 200, 5)
+    for form in rates:
+        assert abs(form.mean() - 50) < 5 * standard_error(form)
+    assert rates.std(axis=1, ddof=1) == pytest.approx(100 * np.sqrt(0.25 / IMAGES), rel=0.3)

@@ -37,6 +37,11 @@ def test_tables_have_every_number_that_was_found_and_no_other():
     )
     assert np.isnan(table.loc[("position", "how long that keeps"), "low"])
     assert table.loc[("velocity", "white noise, level"), "found"] == pytest.approx(0.1)
+    models = noise.models_table(receiver(COLOURED))
+    assert models["model"].tolist() == [
+        "as configured",
+        "positions and an error of second order; velocities white",
+    ]
 
 
 @pytest.mark.parametrize(

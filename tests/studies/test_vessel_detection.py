@@ -6,6 +6,7 @@ import pytest
 
 from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
+from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
@@ -152,3 +153,21 @@ def test_a_trial_has_what_is_published_and_the_same_twice():
         assert np.isfinite(one[row.subject, row.name])
         assert STUDY.unit_of(row.name) is not None
     assert 0 <= one[SHIP, "detection_rate"] <= 1
+
+
+def test_one_in_a_hundred_is_not_none_however_many_flights_have_none():
+    spread = pd.concat([spread_of()[:36], spread_of(ship__images_with_false=1.0)[:4]], ignore_index=True)
+    check = check_claims(spread)["ship-without-false-alarm"]
+    assert check.pooled == (4, 400) and (check.measured == 0).mean() == 0.9
+    assert decide_check(check, 0.00864).verdict == UNDECIDED
+    assert decide_check(check, 0.001).verdict == FAILS
+
+
+def test_thresholds_of_none_are_what_the_printed_images_leave_open():
+    for claim, count, images in (
+        ("ship-without-false-alarm", 0, 441), ("whole-always-found", 0, 4903),
+        ("no-blob-in-empty-images", 15, 27866),
+    ):  # fmt: skip
+        assert float(CLAIMS[claim]["threshold"]) == pytest.approx(
+            share_interval(count, images).high, rel=0.01
+        )

@@ -206,3 +206,15 @@ def test_a_world_follows_as_it_should(runs):
     looks = {one: done.followed[UAV, one].steps for one in FILTERS}
     assert looks[POSITIVE] == looks[KALMAN] < looks[NEGATIVE]
     assert numbers[REVISITS, "visits"] > 0 == numbers[ROWS, "visits"]
+
+
+def test_a_false_detection_is_no_sighting_and_mixes_a_track():
+    truth, times = np.zeros((4, 2, 2)), np.arange(4) * 20.0
+    one = Known(3, np.array([1, 2]), np.array([[3.0, 4.0], [9.0, 9.0]]), np.tile(np.eye(2), (2, 1, 1)))
+    seen = [found(0, 1, 1), found(2, -1, 2)]
+    away = out_of_sight([one], seen, times, truth)
+    # The last animal, seen 60 s ago, keeps its own track, though nobody's was detected 20 s ago.
+    np.testing.assert_array_equal(away.off, [[3.0, 4.0]])
+    assert away.own.tolist() == [True]
+    mixed = out_of_sight([one], [*seen[:1], found(1, -1, 1, own=0)], times, truth)
+    assert mixed.own.tolist() == [False]

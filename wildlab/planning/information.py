@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError, above_zero
-from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, Mask
 
 

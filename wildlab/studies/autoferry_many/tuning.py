@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.analysis.tracks.many import judged, track_jointly
+from wildlab.analysis.tracks.many import score_identities, track_jointly
 from wildlab.analysis.tracks.noise_model import SensorTuning
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.store import Flight

@@ -34,8 +34,6 @@ from wildlab.studies.page import tile_of
 
 #: So many standard deviations from what is configured are an error: four numbers are looked at.
 FAR = 3.0
-#: Delays of a receiver that are tried, s.
-LATENCIES = np.arange(0.0, 0.41, 0.02)
 _PARTS = (
     ("white noise, level", 0),
     ("white noise, height", 1),
