@@ -37,11 +37,6 @@ def test_tables_have_every_number_that_was_found_and_no_other():
     )
     assert np.isnan(table.loc[("position", "how long that keeps"), "low"])
     assert table.loc[("velocity", "white noise, level"), "found"] == pytest.approx(0.1)
-    models = noise.models_table(receiver(COLOURED))
-    assert models["model"].tolist() == [
-        "as configured",
-        "positions and an error of second order; velocities white",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -62,7 +57,7 @@ def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict):
 
 def test_a_receiver_that_is_not_where_or_when_it_is_said_to_be_gets_advice():
     sd = np.array([0.002, 0.05, 0.05, 0.05])
-    as_stated = Placement(0.223, np.array([0.1, 0.0, -0.1]), sd, 0.4)
+    as_stated = Placement(0.223, np.array([0.1, 0.0, -0.1]), sd)
     configured = [0.22, 0.0, 0.0, 0.0]
     assert noise.placement_message(as_stated, configured).key == "placement-confirmed"
     late = noise.placement_message(as_stated._replace(latency=0.25), configured)
