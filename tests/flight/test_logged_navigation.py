@@ -13,7 +13,7 @@ from tests.sound_logs import VELOCITY as SPEED
 from wildlab.files import sha256
 from wildlab.flight.catalog import read_catalog
 from wildlab.flight.checks.check import check_flight, usable_for
-from wildlab.flight.checks.inertial import FORCE, RATE, turns
+from wildlab.flight.checks.inertial import FORCE, RATE, intervals
 from wildlab.flight.checks.inertial import samples as inertial_samples
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.recipe.importing import import_flight
@@ -75,10 +75,14 @@ def x8(shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
 def _gyro_fits(flight: Flight, moving: tuple[float, float]) -> np.ndarray:
     """Correlation of the rates with those of the onboard attitude, each axis, while flying."""
     imu = inertial_samples(flight)
-    (turn,) = turns(flight)
-    rate = imu.mean_rate(turn.start, turn.end)
-    good = np.isfinite(rate).all(axis=1) & (turn.start > moving[0]) & (turn.end < moving[1])
-    return np.array([np.corrcoef(rate[good, i], turn.rate[good, i])[0, 1] for i in range(3)])
+    nav = flight.nav["onboard"]
+    times = nav["time_s"].to_numpy()
+    first, last = intervals(times, 0.5, 1.0)
+    attitude = Rotation.from_quat(nav[QUATERNION].to_numpy(), scalar_first=True)
+    turned = (attitude[first].inv() * attitude[last]).as_rotvec() / (times[last] - times[first])[:, None]
+    rate = imu.mean_rate(times[first], times[last])
+    good = np.isfinite(rate).all(axis=1) & (times[first] > moving[0]) & (times[last] < moving[1])
+    return np.array([np.corrcoef(rate[good, i], turned[good, i])[0, 1] for i in range(3)])
 
 
 def test_thor_ranges(thor):

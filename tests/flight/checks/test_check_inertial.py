@@ -164,14 +164,12 @@ CASES: list[Any] = [
     (_scale(FORCE, 1 / 9.80665), 'problem imu f_z_m_s2: unit = "g"'),
     (_gravity_off, "problem imu f_z_m_s2: gravity was taken off"),
     (_scale(RATE, 180 / np.pi), 'problem imu w_z_rad_s: unit = "deg/s"'),
-    (_scale(RATE, np.pi / 180), 'problem imu w_z_rad_s: unit = "rad/s"'),
+    (_scale(RATE, np.pi / 180), 'warning imu w_z_rad_s: unit = "rad/s"'),
     (_turn(FLU, FORCE, RATE), "problem imu f_z_m_s2: z points up"),
     (_scale(FORCE, -1), "problem imu f_z_m_s2: z points down"),
     (_turn(FALSE_EXCHANGE, FORCE, RATE), "problem imu f_x_m_s2: down is along x"),
-    (_turn(np.diag([-1, -1, 1]), FORCE, RATE), "warning imu w_x_rad_s: y goes with minus y"),
-    (_turn(np.diag([1, -1, 1]), RATE), "warning imu w_y_rad_s: y goes with minus y"),
-    (_turn(np.diag([1, 1, -1]), RATE), "warning imu w_z_rad_s: z goes with minus z"),
-    (_turn(np.diag([-1, 1, 1]), FORCE), "warning imu f_x_m_s2: x goes with minus x"),
+    (_turn(np.diag([1, -1, 1]), RATE), "warning imu w_y_rad_s: nose drops"),
+    (_turn(np.diag([1, 1, -1]), RATE), "warning imu w_z_rad_s: against the course"),
 ]
 
 
@@ -197,6 +195,20 @@ def test_each_fault_is_found(right, change, said):
 def test_without_any_attitude(right, change, level, field):
     flight = replace(change(right), nav={})
     assert (level, field) in [(one.level, one.field) for one in _found(flight)]
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (_turn(np.diag([-1, -1, 1]), FORCE, RATE), "[imu.rate] and [imu.force]: x is minus x, y is minus y"),
+        (_turn(np.diag([1, -1, 1]), RATE), "[imu.rate]: y is minus y"),
+        (_turn(np.diag([-1, 1, 1]), FORCE), "[imu.force]: x is minus x"),
+        (_scale(RATE, np.pi / 180), "rate: rad/s, and the recipe says deg/s"),
+    ],
+)
+def test_axes_and_units_are_told_by_the_attitude(right, change, cause):
+    (found,) = [one for one in find(change(right)) if one.level != "note" and one.table == "imu"]
+    assert any(cause in one for one in found.causes)
 
 
 def test_degrees_without_anything_to_compare_with(right):

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from tests.analysis.survey_twin import Survey, simulate
-from wildlab.flight.checks import camera, mistakes, motion, sensors, tables
+from wildlab.flight.checks import camera, mistakes, motion, tables
 from wildlab.flight.checks.attitude import Felt, FieldStep, felt_mistakes, field_mistakes
 from wildlab.flight.checks.mistakes import attitude_mistakes, axes_words, other_axes, place_mistakes
 from wildlab.flight.checks.sightings import sightings
@@ -151,12 +151,6 @@ def test_numbers_of_a_camera(make_flight, changes, said):
     assert said is None or said in found[0].sentence
 
 
-def test_a_degree_of_latitude_turns_level_by_a_degree():
-    assert motion.turned(np.array([111_195.0, 0.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
-    # Along a parallel, north turns by the sine of the latitude and level by its cosine.
-    assert motion.turned(np.array([0.0, 49_900.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
-
-
 @pytest.mark.parametrize(("north", "level"), [(5e3, None), (30e3, "warning"), (300e3, "problem")])
 def test_an_origin_far_away(make_flight, north, level):
     flight = make_flight()
@@ -184,14 +178,6 @@ def test_ground_heights_against_the_truth(make_flight):
     flight.tables["detections"] = rows.assign(plane_down_m=-45.0)
     (found,) = [one for one in camera.ground(flight) if one.field == "plane_down_m"]
     assert "45 m above" in found.sentence
-
-
-def test_a_target_seen_beside_its_truth():
-    beside = np.random.default_rng(4).normal([25, 0], 2, (60, 2))
-    offset, there, here = sensors.offset_of(beside)
-    assert offset == pytest.approx([25, 0], abs=1.5)
-    assert there > 0.9
-    assert here == 0
 
 
 def test_positions_that_stand_still_are_no_unit_of_speed():

@@ -15,7 +15,6 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import sensors
-from wildlab.flight.checks.tables import duplicates
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
@@ -207,34 +206,6 @@ def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_f
     assert doubles(flight) == []
 
 
-@pytest.mark.parametrize(
-    ("source", "rows", "later", "copied"),
-    [
-        ("radar", 20, 0.0, True),
-        ("radar-2", 20, 0.0, True),
-        ("radar-2", 12, 0.0, True),
-        # Few that are alike, and those of other times, are no copy.
-        ("radar-2", 0, 0.0, False),
-        ("radar-2", 5, 0.0, False),
-        ("radar-2", 20, 0.05, False),
-    ],
-)
-def test_a_log_that_was_read_twice_is_a_problem(make_flight, source, rows, later, copied):
-    """The first looks once more, under other names, as from a copy of the log that ends earlier."""
-    t = np.linspace(1, 8, 20)
-    place = {"north_m": np.random.default_rng(1).normal(0, 50, 20), "east_m": 3.0, "down_m": 0.0}
-    flight = watch(make_flight, level_poses(t, t), t, place, kind="position")
-    frames = flight.table("frames").drop(columns="sensor")
-    more = frames.iloc[:rows].assign(frame_id="again " + frames["frame_id"], time_s=frames["time_s"] + later)
-    both = pd.concat([frames, more]).sort_values("time_s", kind="stable", ignore_index=True)
-    once = flight.table("detections").iloc[:rows]
-    again = with_more(flight, once.assign(frame_id="again " + once["frame_id"], source=source))
-    again.tables["frames"] = both
-    found = list(duplicates(again))
-    assert [one.level for one in found] == ["problem"] * copied
-    assert not copied or f"{rows} of {rows}" in found[0].sentence
-
-
 def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight):
     names = [f"collar {k}" for k in range(7)]
     (found,) = of_truths(flown(make_flight), {name: (0.0, 90.0 + 0.3 * k) for k, name in enumerate(names)})
@@ -246,13 +217,6 @@ def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight):
 def test_receivers_of_different_times_are_told_apart(make_flight):
     found = of_truths(flown(make_flight), {"a": (0.0, 90.0), "b": (0.0, 40.0), "c": (0.0, 91.0)})
     assert ["'b'" in one.sentence for one in found] == [False, True]
-
-
-@pytest.mark.parametrize(("begins_s", "zone"), [(900.0, True), (930.0, True), (1200.0, False)])
-def test_the_zone_is_named_near_quarters_of_an_hour(make_flight, begins_s, zone):
-    (found,) = of_truths(flown(make_flight, 2400.0), {"boat": (begins_s, 2500.0)})
-    assert ("zone" in found.fix) == zone
-    assert (f"{begins_s - 1:.1f} s after" in found.fix) != zone
 
 
 def test_truth_of_another_day_is_a_problem_that_names_the_zone(make_flight):

@@ -17,7 +17,7 @@ from wildlab.flight.checks.inertial import inertial, why_no_start
 from wildlab.flight.checks.known_points import known_points
 from wildlab.flight.checks.mistakes import report_alone
 from wildlab.flight.checks.motion import distinguish_leaps, motion, origin, positions, together
-from wildlab.flight.checks.sensors import scans, sensors, targets
+from wildlab.flight.checks.sensors import scans, sensors
 from wildlab.flight.checks.tables import (
     bounds,
     duplicates,
@@ -70,7 +70,6 @@ MEANINGS = (
     Meaning(heading, (*_PLACED, motion, forces)),
     Meaning(lens),
     Meaning(scans, leaps=True),
-    Meaning(targets, (scans,)),
     Meaning(known_points, leaps=True),
     Meaning(ground, (known_points,)),
 )

@@ -24,6 +24,7 @@ from wildlab.flight.checks.findings import (
     Level,
     finite_rows,
     part_of,
+    phrase,
     thin,
 )
 from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
@@ -431,22 +432,20 @@ def origin(flight: Flight) -> Iterator[Finding]:
     away = _level(at)
     if away < FAR_AWAY:
         return
-    o, stated = flight.manifest.origin, flight.manifest.origin_tuple()
+    stated = flight.manifest.origin_tuple()
     here = ned_to_geodetic(at, stated)
     ways = {}
-    for key, lat, lon in (
-        ("latitude and longitude of the origin exchanged", o.longitude_deg, o.latitude_deg),
-        ("latitude of the origin negated", -o.latitude_deg, o.longitude_deg),
-        ("longitude of the origin negated", o.latitude_deg, -o.longitude_deg),
-        ("latitude and longitude of the origin negated", -o.latitude_deg, -o.longitude_deg),
-    ):
-        there = (float(np.radians(lat)), float(np.radians(lon)), o.height_m)
-        if abs(lat) <= 90 and _level(geodetic_to_ned(here[0], here[1], here[2], there)) < FAR_AWAY:
-            ways[key] = f"write `latitude_deg = {lat:g}, longitude_deg = {lon:g}` in [origin]"
+    for row in rows_of("geodetic"):
+        right = change_by(row)(np.array(stated))
+        if right is None or abs(right[0]) > np.pi / 2:
+            continue
+        if _level(geodetic_to_ned(here[0], here[1], here[2], tuple(right.tolist()))) < FAR_AWAY:
+            latitude, longitude = np.degrees(right[:2])
+            write = f"`latitude_deg = {latitude:g}, longitude_deg = {longitude:g}` in [origin]"
+            ways[f"origin: {phrase(row['cause'], row)}"] = f"write {write}"
     shown = flight.manifest.locations.sensitivity == "open"
     facts = {
         "km": away / 1e3,
-        "angle": turned(at, stated),
         "named": "; ".join(ways),
         "open": shown,
         "ways": " or ".join(ways.values() if shown else ways),
@@ -458,23 +457,6 @@ def origin(flight: Flight) -> Iterator[Finding]:
 
 def _level(at: Array) -> float:
     return float(np.hypot(*at[:2]))
-
-
-def turned(at: Array, origin: Origin) -> float:
-    """How far level and north at a place (3,) in n are turned against those of the origin, degrees.
-
-    Examples
-    --------
-    >>> print(f"{turned(np.array([111_000.0, 0.0, 0.0]), (0.0, 0.0, 0.0)):.2f}")
-    1.00
-    """
-    p = np.asarray(at, float)[None]
-    latitude, longitude, height = ned_to_geodetic(p, origin)[0]
-    north = geodetic_to_ned(latitude + 1e-6, longitude, height, origin) - p[0]
-    up = geodetic_to_ned(latitude, longitude, height + 10.0, origin) - p[0]
-    north, down = north / np.linalg.norm(north), -up / np.linalg.norm(up)
-    R = np.stack([north, np.cross(down, north), down])
-    return float(np.degrees(np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))))
 
 
 def middles(flight: Flight) -> dict[str, Array]:

@@ -17,7 +17,6 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import POSITION, Finding, Level, thin
 from wildlab.flight.checks.mistakes import (
     ALIKE,
-    FAR_BETTER_ALONE,
     Misfit,
     Mistake,
     blame,
@@ -49,9 +48,6 @@ CLOCKS = (*np.arange(-75.0, 76.0, 1.5), -3600.0, 3600.0, -7200.0, 7200.0)
 TURNS = np.arange(-20.0, 20.5, 0.5)
 #: So many standard deviations of what looks differ by, another explanation has to be better by.
 CLEARLY = 2.0
-#: What is seen this near (m) to a target may be of it; a constant offset is at least so large, and holds for
-#: at least this share of it and so many detections.
-AROUND_M, OFF_M, SHARE, ENOUGH_AROUND = 60.0, 15.0, 0.4, 30
 
 
 def looks_of_others(frames: pd.DataFrame, detections: pd.DataFrame) -> pd.DataFrame:
@@ -408,55 +404,3 @@ def _turned_finding(given: Scans, turn_deg: float) -> Finding:
     }
     field = "azimuth_rad" if first.azimuth is not None else "north_m"
     return Finding("warning", "detections", field, "sensors-turned", facts, ("heading off",))
-
-
-# -- one target whose truth is off: other sensors see it beside where it is said to be
-
-
-def offset_of(away: Array) -> tuple[Array, float, float]:
-    """Where most of what is seen around a target lies: the offset (2,) m, and the shares there and at it.
-
-    Parameters
-    ----------
-    away
-        (N, 2): detections less the target, m, all of them near.
-
-    Returns
-    -------
-    The offset, the share of detections near it, and the share near the target itself.
-
-    Examples
-    --------
-    >>> offset, there, here = offset_of(np.array([[25.0, 0.0]] * 40 + [[-30.0, 9.0]] * 10))
-    >>> print(offset, there, here)
-    [25.  0.] 0.8 0.0
-    """
-    near = np.linalg.norm(away[:, None] - away[None], axis=2) < NEAR_M
-    centre = away[int(np.argmax(near.sum(axis=1)))]
-    for _ in range(3):
-        centre = away[np.linalg.norm(away - centre, axis=1) < NEAR_M].mean(axis=0)
-    there = float(np.mean(np.linalg.norm(away - centre, axis=1) < NEAR_M))
-    return centre, there, float(np.mean(np.linalg.norm(away, axis=1) < NEAR_M))
-
-
-def targets(flight: Flight) -> Iterator[Finding]:
-    """Every target against the sources of positions."""
-    scans = [one for one in scans_of(flight) if one.places is not None]
-    if flight.truth is None:
-        return
-    for k, name in enumerate(dict.fromkeys(flight.truth["target_id"])):
-        for scan in scans:
-            level = (scan.targets - np.asarray(scan.places))[..., :2]
-            others = np.linalg.norm(level, axis=2)
-            with np.errstate(invalid="ignore"):
-                nearest = np.nanmin(np.where(np.isfinite(others), others, np.inf), axis=0)
-                own = (nearest == others[k]) & (others[k] < AROUND_M)
-            if own.sum() < ENOUGH_AROUND:
-                continue
-            offset, there, here = offset_of(-level[k, own])
-            size = np.hypot(*offset)
-            if size > OFF_M and there > SHARE and there > FAR_BETTER_ALONE * max(here, 0.01):
-                seen = {"there": 100 * there, "here": 100 * here, "size": size}
-                facts = {"source": scan.source, "name": name, **seen}
-                yield Finding("warning", "truth", "target_id", "target-beside", facts, ("one mark off",))
-                break
