@@ -16,6 +16,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+from scipy.ndimage import map_coordinates
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import replace_in_manifest
@@ -96,30 +98,16 @@ def places_of(elevation: ElevationMap, origin: Origin, added: float) -> MapPlace
     return MapPlaces(elevation, origin, added, there.transform, back.transform)
 
 
-@dataclass(frozen=True, eq=False)
-class Lattice:
-    """`MapPlaces.of_points` of an even lattice at two depths: (2, A, B, 3)."""
+class Lattice(NamedTuple):
+    """`MapPlaces.of_points` of an even lattice at two depths, linear between its nodes: takes (N, 3) down,
+    north and east to columns, rows and heights."""
 
-    extent: Extent
     downs: tuple[float, float]
-    values: Array
+    between: Callable[[Array], Array]
 
-    def at(self, north: Array, east: Array) -> tuple[Array, Array]:
-        """Columns, rows and heights (3, N) at either depth, linear between the lattice's nodes."""
-        a, b = self.values.shape[1:3]
-        e = self.extent
-        y = (north - e.north) / (e.far_north - e.north) * (a - 1)
-        x = (east - e.east) / (e.far_east - e.east) * (b - 1)
-        i = np.clip(y.astype(int), 0, a - 2)
-        j = np.clip(x.astype(int), 0, b - 2)
-        v, u = (y - i)[:, None], (x - j)[:, None]
-
-        def between(level: Array) -> Array:
-            low = level[i, j] + u * (level[i, j + 1] - level[i, j])
-            high = level[i + 1, j] + u * (level[i + 1, j + 1] - level[i + 1, j])
-            return np.asarray((low + v * (high - low)).T)
-
-        return between(self.values[0]), between(self.values[1])
+    def at(self, level: int, north: Array, east: Array) -> Array:
+        """Columns, rows and heights (3, N) at one of the depths."""
+        return self.between(np.column_stack([np.full(len(north), self.downs[level]), north, east])).T
 
 
 def lattice_of(places: MapPlaces, extent: Extent, heights: tuple[float, float], cell: float) -> Lattice:
@@ -153,7 +141,7 @@ def lattice_of(places: MapPlaces, extent: Extent, heights: tuple[float, float], 
         worst = 0.0
         for level, down in enumerate(downs):
             exact = places.of_points(np.column_stack([trial, np.full(len(trial), down)]))
-            off = lattice.at(trial[:, 0], trial[:, 1])[level].T - exact
+            off = lattice.at(level, trial[:, 0], trial[:, 1]).T - exact
             worst = max(worst, float(np.abs(off * [cell, cell, 1.0]).max()))
         if worst <= GOOD or spacing < 20.0:
             return lattice
@@ -168,7 +156,10 @@ def _lattice(places: MapPlaces, extent: Extent, downs: tuple[float, float], spac
     levels = [
         places.of_points(np.column_stack([N.ravel(), E.ravel(), np.full(N.size, down)])) for down in downs
     ]
-    return Lattice(extent, downs, np.stack(levels).reshape(2, *N.shape, 3))
+    values = np.stack(levels).reshape(2, *N.shape, 3)
+    # What lies beyond the lattice is so by rounding alone.
+    between = RegularGridInterpolator((downs, north, east), values, bounds_error=False, fill_value=None)
+    return Lattice(downs, between)
 
 
 def resample(
@@ -212,7 +203,7 @@ def _surface(
     heights: Heights, corner: tuple[int, int], every: int, lattice: Lattice, north: Array, east: Array
 ) -> Array:
     """Heights in n (N,), metres above the plane ``down = 0``."""
-    top, bottom = lattice.at(north, east)
+    top, bottom = (lattice.at(level, north, east) for level in (0, 1))
     share = np.full(len(north), 0.5)
     for _ in range(3):
         column, row, _height = top + share * (bottom - top)
@@ -226,17 +217,9 @@ def _surface(
 
 def bilinear(heights: Heights, rows: Array, columns: Array) -> Array:
     """Heights between nodes, (N,); NaN beyond the nodes and beside a hole."""
-    R, C = heights.shape
     # A node that is met but for rounding counts as met.
-    rows, columns = (np.where(np.abs(a - np.round(a)) < 1e-6, np.round(a), a) for a in (rows, columns))
-    inside = (rows >= 0) & (rows <= R - 1) & (columns >= 0) & (columns <= C - 1)
-    i = np.clip(np.where(inside, rows, 0).astype(int), 0, R - 2)
-    j = np.clip(np.where(inside, columns, 0).astype(int), 0, C - 2)
-    v, u = np.where(inside, rows - i, np.nan), np.where(inside, columns - j, np.nan)
-    with np.errstate(invalid="ignore"):
-        low = heights[i, j] + u * (heights[i, j + 1].astype(float) - heights[i, j])
-        high = heights[i + 1, j] + u * (heights[i + 1, j + 1].astype(float) - heights[i + 1, j])
-        return np.asarray(low + v * (high - low))
+    at = [np.where(np.abs(a - np.round(a)) < 1e-6, np.round(a), a) for a in (rows, columns)]
+    return np.asarray(map_coordinates(heights, at, float, order=1, mode="constant", cval=np.nan))
 
 
 def resampling_error(

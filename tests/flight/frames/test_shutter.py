@@ -1,4 +1,4 @@
-"""Frames of a closed shutter or a held picture, dead pixels and dark corners: found, and not invented."""
+"""Frames of a closed shutter, dead pixels and dark corners: found, and not invented."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from wildlab.flight.readers.frames import Frame, open_frames
+from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.frames.scene import (
     MOST_DEAD,
     find_dead,
@@ -14,7 +14,6 @@ from wildlab.flight.readers.frames.scene import (
     measure_vignetting,
     without_vignetting,
 )
-from wildlab.flight.readers.frames.sequence import mark_shutter
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 
 SHAPE = (128, 160)
@@ -95,43 +94,6 @@ def test_even_scenes_are_no_shutter():
     bordered[:40] = 0
     assert not is_shutter(bordered, WHOLE)
     assert is_shutter(bordered, WHOLE & (np.arange(128)[:, None] >= 40))
-
-
-def frames_of(numbers: list[int]) -> list[Frame]:
-    images = {number: (7000 + 25 * (ground(number) - 285)).astype(np.uint16) for number in set(numbers)}
-    return [
-        Frame(f"{place}", None, images[number], "counts", "white-hot", WHOLE)
-        for place, number in enumerate(numbers)
-    ]
-
-
-def test_a_held_picture_is_told_from_the_third_frame_on_where_frames_differ_as_a_rule():
-    numbers = [1, 2, 2, 3, 3, 3, 3, 4]
-    marked = [one.usable for one in mark_shutter(frames_of(numbers), held_can_be_told=True)]
-    assert marked == [True, True, True, True, True, False, False, True]
-    assert all(one.usable for one in mark_shutter(frames_of(numbers), held_can_be_told=False))
-
-
-def held_folder(path: Path, numbers: list[int]) -> Path:
-    path.mkdir()
-    for place, one in enumerate(frames_of(numbers)):
-        assert cv2.imwrite(str(path / f"{place:03d}.png"), one.image)
-    return path
-
-
-def test_a_run_that_goes_on_marks_the_same_frames(tmp_path):
-    numbers = [*range(10), 10, 10, 10, 10, *range(11, 30)]
-    frames = open_frames(held_folder(tmp_path / "in", numbers))
-    whole = [one.problem for one in frames]
-    assert [number for number, problem in enumerate(whole) if problem] == [12, 13]
-    for first in (0, 1, 11, 12, 13, 14):
-        assert [one.problem for one in frames.starting_at(first)] == whole[first:]
-    assert [one.problem for one in frames.some([10, 13, 20])] == [whole[10], whole[13], whole[20]]
-
-
-def test_where_neighbours_are_alike_as_a_rule_nothing_is_held(tmp_path):
-    frames = open_frames(held_folder(tmp_path / "in", [n // 4 for n in range(32)]))
-    assert not frames.kept.held_can_be_told and all(one.usable for one in frames)
 
 
 def scenes(count: int = 8, rough: float = 2.0) -> list[np.ndarray]:

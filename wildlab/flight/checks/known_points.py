@@ -14,9 +14,7 @@ from scipy.special import bdtrc
 
 from wildlab.flight.checks.findings import POSITION, Finding, number
 from wildlab.flight.checks.mistakes import (
-    ALIKE,
     FALL,
-    FAR_BETTER,
     LIKE_NOISE,
     Change,
     Misfit,
@@ -54,15 +52,12 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, Origin, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
-from wildlab.names import listed
 
 #: Without a known mistake, misses this many times what is expected and this large (deg) are still said.
 UNEXPLAINED, UNEXPLAINED_DEG = 4.0, 8.0
 #: A single photo or mark is named where most of its misses are so many times those of all, by at least so
 #: many points, and so many times what is expected.
 SINGLE, SINGLE_POINTS, SINGLE_EXPECTED = 6.0, 2, 5.0
-#: Rays that pass known points by less than this (m) are not told apart.
-CLOSE_M = 0.1
 #: So many photos of a flight in which all is as stated may be named, in the mean.
 BY_CHANCE = 0.05
 #: Heights are looked for this far (m) and clocks this far (s); finer steps near zero.
@@ -108,56 +103,26 @@ def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
             yield from _single(given)
         return
     named = explain(misfit, given, camera_mistakes(flight, given), glance)
-    # Misfits are in units of what is expected, which a mistake may change too: metres have to fall as well.
-    named = [
-        one for one in named if _plain(given, one.undone) or metres(one.undone, False) < metres(given, False)
-    ]
+    # What is expected may change with a mistake, too: metres have to fall as well.
+    named = [one for one in named if metres(one.undone) < metres(given)]
+    table = f"nav/{given.source}"
     if named:
-        yield _finding(given, named)
-        given = named[0].undone
+        undone = named[0].undone
+        corrections = [
+            correct
+            for one in named
+            for correct in one.corrections or (_stated(one.undone.camera, one.undone.mount),)
+        ]
+        facts = {"before": metres(given), "after": metres(undone)}
+        yield blame("problem", table, "", "points-explained", named, facts, corrections)
+        given = undone
     else:
         m = missed(given)
         angle = np.degrees(np.median(m.angle[m.good])) if m.good.any() else np.nan
         if misfit(given)[0, 0] > UNEXPLAINED and angle > UNEXPLAINED_DEG:
             facts = {"metres": metres(given), "angle": angle}
-            yield Finding("warning", f"nav/{given.source}", "", "points-missed", facts)
+            yield Finding("warning", table, "", "points-missed", facts)
     yield from _single(given)
-
-
-def _plain(given: Sightings, undone: Sightings) -> bool:
-    """Whether the distance falls by far with nothing else taken off."""
-    return metres(undone) * FAR_BETTER <= metres(given)
-
-
-def _finding(given: Sightings, named: list[Mistake[Sightings]]) -> Finding:
-    # Where other small errors hide what is gained, it is the distance without these that shows it.
-    plain = _plain(given, named[0].undone)
-    # What is as good in angles and leaves ten times the distance explains it less.
-    left = np.nan_to_num([metres(one.undone, plain) for one in named], nan=np.inf)
-    chosen = [
-        (one, off) for one, off in zip(named, left, strict=True) if off <= ALIKE * max(left.min(), CLOSE_M)
-    ]
-    first = chosen[0][0]
-    alike = [f"{one.said} ({number(off)} m)" for one, off in chosen[1:]]
-    return blame(
-        "problem",
-        f"nav/{given.source}",
-        "",
-        "points-explained",
-        [one for one, _ in chosen],
-        {
-            "first": first.said,
-            "plain": plain,
-            "before": metres(given, plain),
-            "after": metres(first.undone, plain),
-            "alike": f"; as well explained: {listed(alike, 'or')}" if alike else "",
-        },
-        [
-            correct
-            for one, _ in chosen
-            for correct in one.corrections or (_stated(one.undone.camera, one.undone.mount),)
-        ],
-    )
 
 
 def _stated(camera: Camera, mount: Mount) -> Callable[[Flight], Flight | None]:

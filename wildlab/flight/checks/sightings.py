@@ -341,12 +341,11 @@ def halves_of(groups: NDArray[np.intp]) -> tuple[NDArray[np.bool_], NDArray[np.b
     return first, ~first
 
 
-def metres(s: Sightings, plain: bool = True) -> float:
+def metres(s: Sightings) -> float:
     """Median distance (m) by which the rays pass the known points, all of it for points behind the lens;
-    as it is, or with small constant errors of mount and position taken off."""
+    small constant errors of mount and position are taken off."""
     m = missed(s)
     good = m.good
     if not good.any():
         return float("nan")
-    angle = m.angle if plain else left_over(m, good)
-    return float(np.median((m.distance * np.sin(np.minimum(angle, np.pi / 2)))[good]))
+    return float(np.median((m.distance * np.sin(np.minimum(left_over(m, good), np.pi / 2)))[good]))
