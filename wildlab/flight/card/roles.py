@@ -26,6 +26,7 @@ from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.recipe.raw import RAW_LIMIT
 from wildlab.flight.time_scales import Span
 from wildlab.geometry.frames import geodetic_to_ned
+from wildlab.names import listed
 
 Array = NDArray[np.float64]
 
@@ -397,23 +398,16 @@ def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem |
     if len(open_) == 1:
         return open_[0], "it is the only log"
     taken = span_of(images, ["photos"]) if images is not None else None
-    left, among = list(open_), f"of {len(open_)} logs"
-    for said, holds in (
-        ("has an attitude", lambda one: one in turned),
-        ("covers the images", lambda one: taken is not None and _overlap(span_of(one), taken) > SHARED_S),
-        ("has records of a camera's triggers", lambda one: one.part("triggers") is not None),
-        ("is of a vehicle that flies", _flies),
-        ("goes up and down by more than 15 m", lambda one: _climb(one) > ON_BOARD_M),
-    ):
-        those = [one for one in left if holds(one)]
-        if len(those) == 1:
-            return those[0], f"{among} it alone {said}"
-        if those:
-            left, among = those, f"of the {len(those)} logs of which each {said}"
-    longest = max(left, key=_duration)
-    if sum(_duration(one) > _duration(longest) - SHARED_S for one in left) > 1:
-        return longest, f"{among}, which are alike, it is the first: say with --role which is the vehicle's"
-    return longest, f"{among} it is the longest"
+    signs: dict[str, Callable[[CardItem], bool]] = {
+        "has an attitude": lambda one: one in turned,
+        "covers the images": lambda one: taken is not None and _overlap(span_of(one), taken) > SHARED_S,
+        "has records of a camera's triggers": lambda one: one.part("triggers") is not None,
+        "is of a vehicle that flies": _flies,
+        "goes up and down by more than 15 m": lambda one: _climb(one) > ON_BOARD_M,
+    }
+    best = max(open_, key=lambda one: (*(holds(one) for holds in signs.values()), _duration(one)))
+    said = [sign for sign, holds in signs.items() if holds(best)]
+    return best, f"of {len(open_)} logs it {listed(said) or 'is the longest'} (--role says otherwise)"
 
 
 #: Words of what flies, in what logs say of their vehicle.
