@@ -23,15 +23,14 @@ Change = Callable[[Sightings], Sightings]
 
 
 def straight_down(
-    lens: Camera, p: Any, R: Any, points: Any, uv: Any, image: Any, sd: list[float], v: Any = 0.0
+    lens: Camera, p: Any, R: Any, points: Any, uv: Any, image: Any, sd: list[float]
 ) -> Sightings:
-    """Clicks on known points, seen straight down from poses that move with `v`."""
-    zero, names = np.zeros(len(p)), np.arange(len(p)).astype(str).astype(object)
+    """Clicks on known points, seen straight down from poses that stand still."""
+    zero = np.zeros(len(p))
     return Sightings(
         "log", lens, Mount("down"), zero, zero, uv, p, R, points[None], image, np.tile(sd, (len(p), 1)),
         (np.radians(PLACE[0]), np.radians(PLACE[1]), PLACE[2]),
-        lambda shift: SightingGeometry(p + shift * v, R, points[None], zero, zero),
-        image.astype(str).astype(object), names,
+        lambda shift: SightingGeometry(p, R, points[None], zero, zero),
     )  # fmt: skip
 
 
@@ -43,7 +42,7 @@ def sightings() -> Sightings:
     R = euler_to_matrix(*rng.uniform(-0.2, 0.2, (2, 20)), rng.uniform(-3, 3, 20))[image]
     points = np.column_stack([p[:, :2] + rng.uniform(-25, 25, (n, 2)), rng.uniform(-9, 0, n)])
     uv = ground_to_pixel(LENS, points, *camera_pose(Mount("down"), p, R)) + rng.normal(0, 0.5, (n, 2))
-    return straight_down(LENS, p, R, points, uv, image, [0.002, 0.5, 0.5, 0.002])
+    return straight_down(LENS, p, R, points, uv, image, [0.002, 0.5, 0.5])
 
 
 def pixels(change: Callable[[np.ndarray], np.ndarray]) -> Change:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from tests.flight.checks.test_sound_flights import POSES, euler
@@ -97,21 +96,6 @@ def test_a_name_that_is_no_known_targets_says_nothing_of_known_ones(flown):
     wrong = turned(flown, lambda a: a * [1, 1, -1])
     detections = wrong.table("detections").assign(target_id="somebody else")
     assert told(replace(wrong, tables={**wrong.tables, "detections": detections})) == []
-
-
-def test_other_things_in_a_photo_are_no_wrong_photo(flown):
-    seen_by = flown.table("detections")
-    # One in a photo, so that all in it are soon of others.
-    rows = seen_by.drop_duplicates("frame_id").iloc[::15].reset_index(drop=True)
-    more = [rows.iloc[[5, 25, 45]].assign(u_px=u, v_px=30.0, detection_id=[f"{u}-{i}" for i in range(3)])
-            for u in (20.0, 320.0, 620.0)]  # fmt: skip
-    both = pd.concat([rows, *more], ignore_index=True)
-    strange = replace(flown, tables={**flown.tables, "detections": both})
-    assert told(strange) == []
-    # Where it is said that each is of a known target, it is.
-    nearest = replace_in_manifest(flown.manifest, {"scoring": {"rule": "nearest"}})
-    (found,) = told(replace(strange, manifest=nearest))
-    assert found.causes == ("one photo off",)
 
 
 def test_places_can_be_judged_by_names_or_where_the_nearest_is_meant(flown):

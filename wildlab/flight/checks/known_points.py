@@ -8,11 +8,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from scipy.special import bdtrc
 
-from wildlab.flight.checks.findings import POSITION, Finding, number
+from wildlab.flight.checks.findings import POSITION, Finding
 from wildlab.flight.checks.mistakes import (
     FALL,
     LIKE_NOISE,
@@ -38,11 +36,9 @@ from wildlab.flight.checks.mistakes import (
     undo_in,
 )
 from wildlab.flight.checks.sightings import (
-    Missed,
     Sightings,
     glance,
     halves_of,
-    left_over,
     metres,
     misfit,
     missed,
@@ -55,11 +51,6 @@ from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera
 
 #: Without a known mistake, misses this many times what is expected and this large (deg) are still said.
 UNEXPLAINED, UNEXPLAINED_DEG = 4.0, 8.0
-#: A single photo or mark is named where most of its misses are so many times those of all, by at least so
-#: many points, and so many times what is expected.
-SINGLE, SINGLE_POINTS, SINGLE_EXPECTED = 6.0, 2, 5.0
-#: So many photos of a flight in which all is as stated may be named, in the mean.
-BY_CHANCE = 0.05
 #: Heights are looked for this far (m) and clocks this far (s); finer steps near zero.
 HEIGHTS = np.sinh(np.linspace(-7.5, 7.5, 41)) * 2.0
 CLOCKS = np.sinh(np.linspace(-5.0, 5.0, 41)) * 0.8
@@ -99,30 +90,25 @@ def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
         if many is not None and many.others:
             return  # most of what is detected may be of those whose places nobody knows
         yield from nameless(flight, given)
-        if flight.manifest.scoring.rule == "nearest":
-            yield from _single(given)
         return
     named = explain(misfit, given, camera_mistakes(flight, given), glance)
     # What is expected may change with a mistake, too: metres have to fall as well.
     named = [one for one in named if metres(one.undone) < metres(given)]
     table = f"nav/{given.source}"
     if named:
-        undone = named[0].undone
         corrections = [
             correct
             for one in named
             for correct in one.corrections or (_stated(one.undone.camera, one.undone.mount),)
         ]
-        facts = {"before": metres(given), "after": metres(undone)}
+        facts = {"before": metres(given), "after": metres(named[0].undone)}
         yield blame("problem", table, "", "points-explained", named, facts, corrections)
-        given = undone
     else:
         m = missed(given)
         angle = np.degrees(np.median(m.angle[m.good])) if m.good.any() else np.nan
         if misfit(given)[0, 0] > UNEXPLAINED and angle > UNEXPLAINED_DEG:
             facts = {"metres": metres(given), "angle": angle}
             yield Finding("warning", table, "", "points-missed", facts)
-    yield from _single(given)
 
 
 def _stated(camera: Camera, mount: Mount) -> Callable[[Flight], Flight | None]:
@@ -419,53 +405,3 @@ def _nameless_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightin
     if flight.manifest.time.kind == "utc" and abs(by) >= 1.0 and far_more:
         offset_s = flight.manifest.clocks.camera_offset_s
         yield clock_mistake(one_row("camera-clock"), s.source, by, offset_s, fitted=True)
-
-
-# -- one photo or mark
-
-
-def _single(s: Sightings) -> Iterator[Finding]:
-    """One photo, or one mark, that is off while the others are not."""
-    m = missed(s)
-    good = m.good
-    if good.sum() < 8:
-        return
-    angle = left_over(m, good)
-    size = angle / m.expected
-    # What is expected takes the mean of the angles; one photo may be off by the one that is known least.
-    least = np.sqrt(m.expected**2 - s.sd[:, 0] ** 2 + s.sd[:, 3] ** 2)
-    for what, names, table, field in (
-        ("photo", s.frames, "frames", "frame_id"),
-        ("mark", s.labels, "truth", "target_id"),
-    ):
-        count = len(set(names))
-        most = np.sqrt(2 * np.log(max(count, 1) / BY_CHANCE))
-        far = (size > SINGLE * np.median(size[good])) & (size > SINGLE_EXPECTED)
-        off = _off(far & (angle > most * least), names, good)
-        if off and len(off) <= max(1, count // 5):
-            facts = {"source": s.source, "n": len(off), "which": [_turned(m, names, one) for one in off[:5]]}
-            yield Finding("warning", table, field, f"one-{what}-off", facts, (f"one {what} off",))
-
-
-def _turned(m: Missed, names: NDArray[np.object_], name: str) -> str:
-    angle = float(np.degrees(np.nanmedian(m.angle[names == name])))
-    return f"{name!r} ({number(angle)} deg)"
-
-
-def _off(far: NDArray[np.bool_], names: NDArray[np.object_], good: NDArray[np.bool_]) -> list[str]:
-    """Those whose points are for the most part far, where so many of them are hardly together by chance.
-
-    Far ones are everywhere: wrong clicks, and detections of what is no known point.
-    """
-    rows = {str(name): (names == name) & good for name in dict.fromkeys(names) if name != ""}
-    rows = {name: of for name, of in rows.items() if of.sum() >= SINGLE_POINTS}
-    # More than half of them: one wrong click is not a wrong photo.
-    off = [name for name, of in rows.items() if far[of].mean() > 0.5]
-    others = good & ~np.isin(names.astype(str), off)
-    # As if there had been half a far one more, so that none seen is not none ever.
-    share = (far[others].sum() + 0.5) / (others.sum() + 1)
-
-    def by_chance(of: NDArray[np.bool_]) -> float:
-        return len(rows) * float(bdtrc(far[of].sum() - 1, of.sum(), share))
-
-    return [name for name in off if by_chance(rows[name]) < BY_CHANCE]

@@ -64,14 +64,12 @@ class Sightings:
     image
         (N,) number of the image, in the order of time.
     sd
-        (N, 4): expected standard deviations of the attitude (rad, the mean of its angles), the position (m),
-        and the click (px); and of the angle that is known least (rad).
+        (N, 3): expected standard deviations of the attitude (rad, the mean of its angles), the position (m),
+        and the click (px).
     origin
         Of frame n.
     looked
         Poses, angles of the gimbal and known points as they were a shift in seconds later.
-    labels, frames
-        (N,) name of the point, (N,) name of the image.
     own_gimbal
         Whether its angles are the log's.
     named
@@ -91,8 +89,6 @@ class Sightings:
     sd: Array
     origin: Origin
     looked: Callable[[float], SightingGeometry]
-    labels: NDArray[np.object_]
-    frames: NDArray[np.object_]
     own_gimbal: bool = False
     named: bool = True
 
@@ -104,7 +100,7 @@ class Sightings:
             p, R, pan, tilt = (value[rows] for value in (at.p_nb, at.R_nb, at.pan, at.tilt))
             return SightingGeometry(p, R, at.points[:, rows], pan, tilt)
 
-        names = ("pan", "tilt", "uv", "p_nb", "R_nb", "image", "sd", "labels", "frames")
+        names = ("pan", "tilt", "uv", "p_nb", "R_nb", "image", "sd")
         taken = {name: getattr(self, name)[rows] for name in names}
         return replace(self, points=self.points[:, rows], looked=looked, **taken)
 
@@ -182,8 +178,6 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         sd=_expected(flight, P, len(chosen)),
         origin=manifest.origin_tuple(),
         looked=looked,
-        labels=np.full(len(chosen), "", object) if labels is None else labels,
-        frames=ids.to_numpy(object),
         own_gimbal=flight.gimbal is not None or "pan_rad" in frames,
         named=named,
     )
@@ -209,14 +203,13 @@ def _expected(flight: Flight, P: Array | None, n: int) -> Array:
     turns = [USUAL_ATTITUDE if angle is None else np.radians(angle) for angle in angles]
     level = stated.position_horizontal_m or USUAL_HORIZONTAL
     place = np.hypot(level, stated.position_vertical_m or USUAL_VERTICAL) / np.sqrt(2)
-    sd = np.tile([np.mean(turns), place, stated.pixel_px or USUAL_PIXEL, max(turns)], (n, 1))
+    sd = np.tile([np.mean(turns), place, stated.pixel_px or USUAL_PIXEL], (n, 1))
     if P is not None:
         with np.errstate(invalid="ignore"):
             own = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
         good = np.isfinite(own).all(axis=1)
         sd[good, 0], sd[good, 1] = own[good, 3:].mean(axis=1), own[good, :3].mean(axis=1)
-        sd[good, 3] = own[good, 3:].max(axis=1)
-    sd[:, [0, 3]] = np.maximum(sd[:, [0, 3]], LEAST_ATTITUDE)
+    sd[:, 0] = np.maximum(sd[:, 0], LEAST_ATTITUDE)
     return sd
 
 
