@@ -10,10 +10,7 @@ import pytest
 
 from tests.flight.conftest import fault
 from wildlab.errors import WildlabError
-from wildlab.files import sha256
-from wildlab.flight.catalog import find_dataset
-from wildlab.flight.checks.check import check_flight, usable_for
-from wildlab.flight.readers import autoferry
+from wildlab.flight.checks.check import check_flight
 from wildlab.flight.readers.autoferry import SENSORS, read_part
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
@@ -103,77 +100,6 @@ def test_hostile_detections_are_refused(change, said):
         read([GOOD[0] | json.loads(change)], "radar")
 
 
-@pytest.mark.parametrize(
-    ("part", "content", "said"),
-    [
-        ("radar", {}, "a list is wanted"),
-        ("radar", [3], "[0]: an object is wanted"),
-        ("radar", [GOOD[0], {"sensorID": 1}], "[1].time: is missing"),
-        ("truth", [4], "[0]: is 4"),
-        ("truth", [[target("havfruen")]], "[0][0].targetID: is 'havfruen'"),
-        ("truth", [[target(position=[1, 2])]], "position: has 2 numbers"),
-        ("truth", [[target()], [target(position=[9, 2, 0])]], "position: elsewhere"),
-    ],
-)
-def test_what_is_no_list_of_its_kind_is_refused(part, content, said):
-    with pytest.raises(WildlabError, match=fault(f"log.json, {said}")):
-        read(content, part)
-
-
-@pytest.mark.parametrize(
-    ("data", "problem"),
-    [
-        (b"", "is not readable JSON"),
-        (b"\xff\xfe", "is not readable JSON"),
-        (b"[" * 100_000, "is not readable JSON"),
-        (b'[{"time": NaN}]', "NaN is not JSON"),
-        (b'[{"time": -Infinity}]', "-Infinity is not JSON"),
-        (b'[{"time": 1, "time": 2}]', "a name stands twice"),
-        (b"[" + b"9" * 5000 + b"]", "is not readable JSON"),
-    ],
-)
-def test_what_is_no_json_is_refused(data, problem):
-    with pytest.raises(WildlabError, match=problem):
-        read_part(HERE, data, "frames")
-
-
-def test_a_file_that_is_too_large_is_not_parsed(monkeypatch):
-    monkeypatch.setattr(autoferry, "MOST_BYTES", 3 << 20)
-    with pytest.raises(WildlabError, match="has more than 3 MiB"):
-        read_part(HERE, b" " * ((3 << 20) + 1), "frames")
-
-
-def small(folder: Path) -> Path:
-    """Two files in place of those of scenario 2."""
-    place = folder / "raw" / "scenario2"
-    place.mkdir(parents=True)
-    content = [{**one, "time": one["time"] + 1.6e9} for one in GOOD]
-    (place / "scenario2_detections.json").write_text(json.dumps(content))
-    truth = [
-        [target(i, 1.6e9 + t, [t + i, 2 * t, 0]) for i in (1, 2)] for t in np.arange(9.0, 13.1, 0.5).tolist()
-    ]
-    (place / "scenario2_groundTruth.json").write_text(json.dumps(truth))
-    return folder / "raw"
-
-
-def test_a_flight_of_what_was_and_was_not_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr("wildlab.flight.checks.check.FEWEST_SCANS", 1)  # it is a short one
-    import_flight(DATA / "recipes" / "autoferry-2.toml", small(tmp_path), tmp_path / "flight")
-    flight = load_flight(tmp_path / "flight")
-    frames, detections = flight.table("frames"), flight.table("detections")
-    assert (flight.manifest.name, flight.manifest.kind) == ("autoferry-2", "logged")
-    assert list(flight.nav) == ["ownship"]
-    assert list(frames["sensor"]) == ["eo", "ir", "lidar", "radar", "lidar", "ir"]
-    np.testing.assert_allclose(frames["time_s"], [0, 0.2, 0.5, 1.0, 1.5, 2.0])
-    assert detections.groupby("source", sort=False)["kind"].first().to_dict() == {
-        "lidar": "position", "radar": "position", "ir": "bearing", "eo": "bearing",
-    }  # fmt: skip
-    assert not detections["frame_id"].isin(["lidar-0002", "ir-0002"]).any()
-    assert list(flight.table("truth")["target_id"].unique()) == ["havfruen", "gunnerus"]
-    assert [use.usable for use in usable_for(flight)] == [False, True, False]
-    assert not [one for one in check_flight(flight) if one.level == "problem"]
-
-
 @pytest.fixture(scope="module")
 def scenarios(
     shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory
@@ -204,32 +130,4 @@ def test_the_published_scenarios(scenarios):
     assert seen.loc[seen["frame_id"] == "ir-0001", "azimuth_rad"].item() == -2.2054613959028848
 
 
-def test_the_catalogue_has_the_files_as_published(shared_data):
-    root = shared_data("tracking", "autoferry")
-    files = find_dataset("autoferry").files
-    assert len(files) == 2 * len(SCENARIOS)
-    for one in files:
-        assert sha256(root / one.path) == one.sha256
-        assert one.url.endswith(one.path)
-
-
 RECIPE = (DATA / "recipes" / "autoferry-2.toml").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "problem"),
-    [
-        ('file = "scenario2/scenario2_detections.json"', 'file = "../frames.json"', "leaves its folder"),
-        ("[logs.lidar]", '[tables.lidar]\nfile = "a.mat"\nfields = ["x"]\n\n[logs.lidar]', "'lidar' names"),
-        ('format = "autoferry"', 'format = "other"', "'other'"),
-        ('part = "lidar"', 'part = "sonar"', "'sonar'"),
-        ('sensor = "sensor"\n', 'sensor = "sonar"\n', r"\(in \[frames\.sensor\]\)"),
-    ],
-)
-def test_what_a_recipe_may_not_say_of_logs(tmp_path, old, new, problem):
-    assert old in RECIPE
-    recipe = tmp_path / "recipe.toml"
-    recipe.write_text(RECIPE.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(WildlabError, match=problem):
-        import_flight(recipe, small(tmp_path), tmp_path / "flight")
-    assert not (tmp_path / "flight").exists()

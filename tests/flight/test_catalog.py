@@ -11,7 +11,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.flight import catalog
-from wildlab.flight.catalog import DataFile, dataset_folder, fetch, is_fetched, read_catalog
+from wildlab.flight.catalog import DataFile, dataset_folder, fetch, is_fetched
 
 GOOD = {"a.csv": b"one\n", "b.csv": b"two\n"}
 
@@ -128,42 +128,15 @@ def test_an_unknown_data_set_lists_the_known():
         dataset_folder("../..")
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (("https://raw", "file:///etc"), "url"),
-        (('mirror = "georeferencing', 'mirror = "../georeferencing'), "leaves its folder"),
-        (("[openathena]", '["../x"]\nfiles = []\n[openathena]'), "this key is missing"),
-        (("4785d352", "4785D352"), "sha256"),
-    ],
-)
-def test_the_catalog_is_checked(tmp_path, monkeypatch, change, said):
-    text = (catalog.DATA / "catalog.toml").read_text()
-    assert change[0] in text
-    (tmp_path / "catalog.toml").write_text(text.replace(*change))
-    monkeypatch.setattr(catalog, "DATA", tmp_path)
-    with pytest.raises(WildlabError, match=said):
-        read_catalog()
-
-
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_no_more_bytes_are_taken_than_the_catalog_says(web, dataset, tmp_path, monkeypatch, mirrored):
     dataset(web[0])
     _put(web[1], a=b"x" * 1_000_000)
     if mirrored:
         monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(web[1]))
-    with pytest.raises(WildlabError, match="larger than the 4"):
+    with pytest.raises(WildlabError, match=r"larger than the 4|4 are the most"):
         fetch("small")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["web"]
-
-
-def test_a_folder_in_the_way_of_a_file(web, dataset, tmp_path):
-    dataset(web[0])
-    _put(web[1])
-    (tmp_path / "here" / "small" / "b.csv").mkdir(parents=True)
-    with pytest.raises(WildlabError, match="in the way"):
-        fetch("small")
-    assert not (tmp_path / "here" / "small" / "a.csv").exists()
 
 
 def test_a_link_out_of_the_folder_is_not_written_through(web, dataset, tmp_path):

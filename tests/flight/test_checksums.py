@@ -1,6 +1,5 @@
 """A byte of a flight that changed by itself is found; a change on purpose is accepted, nothing else."""
 
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from click.testing import CliRunner
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
-from wildlab.flight.checksums import accept_changes, checksums_of, manifest_changed, with_checksums
+from wildlab.flight.checksums import accept_changes, manifest_changed, with_checksums
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.geometry.terrain import Terrain
 
@@ -26,16 +25,6 @@ def folder(make_flight: Callable[..., Flight], tmp_path: Path) -> Path:
 
 def _files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.rglob("*") if path.is_file())
-
-
-def test_they_are_those_of_the_files_and_the_flight_in_memory_has_none(folder):
-    names = {path.relative_to(folder).as_posix() for path in _files(folder)} - {"flight.toml"}
-    found = checksums_of(folder)
-    assert set(found) == names and "nav/autopilot.parquet" in names and "terrain.tif" in names
-    for name, digest in found.items():
-        assert digest == hashlib.sha256((folder / name).read_bytes()).hexdigest()
-        assert f'"{name}" = "{digest}"' in (folder / "flight.toml").read_text()
-    assert load_flight(folder).manifest.checksums == {}
 
 
 def test_every_flipped_bit_of_a_table_is_found(folder):
@@ -113,13 +102,6 @@ def test_what_is_stated_of_places_is_no_damage(folder):
     path.write_text(whole[:start] + whole[end:] + "\n[locations]\ncategory = 3\n")
     assert load_flight(folder).manifest.locations.category == 3
     assert manifest_changed(folder) is False
-
-
-def test_a_flight_without_checksums_is_loaded_and_told_so(folder):
-    path = folder / "flight.toml"
-    path.write_text(path.read_text().split("[checksums]")[0])
-    (said,) = [one for one in check_flight(load_flight(folder)) if one.field == "checksums"]
-    assert said.level == "note"
 
 
 def test_the_part_may_stand_anywhere_but_in_a_text(folder):

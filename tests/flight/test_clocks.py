@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from tests.analysis.survey_twin import Survey, simulate
 from wildlab.analysis.georeference import observe
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.sightings import sightings
 from wildlab.flight.clocks import (
     MAX_GAP_S,
@@ -209,9 +208,3 @@ def test_the_mount_is_used_on_its_own_poses_and_refused_on_others():
 def test_sense_is_not_asked_of_a_mount_on_other_poses():
     flight = two_sources("camera")
     assert sightings(flight, "camera") is not None and sightings(flight, "vehicle") is None
-
-
-def test_a_mount_on_poses_that_are_not_there_is_a_problem():
-    found = [one for one in check_flight(two_sources("logger")) if one.field == "mount.poses"]
-    assert [one.level for one in found] == ["problem"]
-    assert not [one for one in check_flight(two_sources("camera")) if one.field == "mount.poses"]

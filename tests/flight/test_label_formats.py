@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers import boxes
 from wildlab.flight.readers.labels import Labels, read_labels
 
 #: Two animals and a car in an image of 200 x 100 pixels, and an image in which nothing is.
@@ -104,28 +103,6 @@ def test_yolo_has_centres_in_shares_of_the_image(tmp_path):
     assert found.marked.kinds == ["0", "2"]
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("classes.txt", "deer\ncar\nboar\n"),
-        ("data.yaml", "path: x\nnames: ['deer', \"car\", boar]\nnc: 3\n"),
-        ("data.yaml", "nc: 3\nnames:\n- deer\n- car\n- 'boar'\n"),
-        ("data.yaml", "names:\n  0: deer  # red\n  1: car\n  2: boar\ntrain: images\n"),
-        ("data.yaml", "names: {0: deer, 1: car, 2: boar}\n"),
-        ("data.yaml", "names: [\n  deer, car,\n  boar,\n]\nnc: 3\n"),
-    ],
-)
-@pytest.mark.parametrize("above", [0, 2])
-def test_names_of_yolo_lie_beside_the_text_files_or_above(tmp_path, name, text, above):
-    path = tmp_path / "set" / "labels" / "train"
-    path.mkdir(parents=True)
-    yolo(path, a="0 0.2 0.25 0.2 0.3\n2 0.5 0.5 0.1 0.1\n")
-    write([path, *path.parents][above] / name, text)
-    found = read_labels(path, classes=("boar",))
-    assert found.marked.kinds == ["deer", "boar"] and found.marked.known_kinds == ("deer", "car", "boar")
-    assert len(found.boxes["a"]) == 1 and len(found.ignore["a"]) == 1
-
-
 def test_one_truth_in_three_formats_is_one_truth(tmp_path):
     """Written out of the same numbers, the boxes of the three formats are the same to rounding."""
     rng = np.random.default_rng(3)
@@ -140,13 +117,6 @@ def test_one_truth_in_three_formats_is_one_truth(tmp_path):
         yolo(tmp_path / "y", b=lines),
     ):
         assert np.allclose(in_px(read_labels(path), "b.png"), boxes, atol=1e-9)
-
-
-def test_images_of_another_size_are_told(tmp_path):
-    labels = read_labels(write(tmp_path / "t.json", COCO))
-    with pytest.raises(WildlabError, match=r"200 x 100 pixels, and a\.png has 400"):
-        labels.boxes_of("a.png", "day/a.png", 400, 200)
-    assert len(labels.boxes_of("a.png", "day/a.png", 0, 0)[0]) == 2
 
 
 def test_an_image_with_a_class_and_no_box_is_not_judged(tmp_path):
@@ -198,37 +168,6 @@ def test_what_is_wrong_in_a_line_of_yolo_is_named(tmp_path, line, word):
     with pytest.raises(WildlabError, match=word) as error:
         read_labels(path)
     assert str(path / "a.txt") in str(error.value)
-
-
-def test_folders_that_are_none_of_yolo_are_refused(tmp_path, monkeypatch):
-    with pytest.raises(WildlabError, match="no text file"):
-        read_labels(yolo(tmp_path / "labels", classes="deer"))
-    yolo(tmp_path / "labels", a="", b="")
-    (tmp_path / "labels" / "classes.txt").unlink()
-    write(tmp_path / "data.yaml", "names: 3\n")
-    with pytest.raises(WildlabError, match=r"data\.yaml"):
-        read_labels(tmp_path / "labels")
-    write(tmp_path / "data.yaml", "nc: 3\n")
-    assert len(read_labels(tmp_path / "labels").boxes) == 2
-    monkeypatch.setattr(boxes, "MOST_FILES", 1)
-    with pytest.raises(WildlabError, match="more than 1"):
-        read_labels(tmp_path / "labels")
-
-
-def test_groups_classes_and_crowded_images(tmp_path):
-    coco, path = write(tmp_path / "t.json", COCO), tmp_path / "r.json"
-    truth = read_labels(coco)
-    one = '[{"image_id": 7, "category_id": 1, "bbox": [20, 10, 40, 30], "score": 0.9}]'
-    for file, given, problem in (
-        (coco, {"group": "clip"}, "no such field"),
-        (write(path, one), {"group": "clip"}, "nothing of groups"),
-        (coco, {"classes": ("wolf",)}, "class 'wolf'"),
-        (write(tmp_path / "1.json", one, '"image_id": 7', '"image_id": 1'), {"truth": truth}, "none of 1"),
-        (write(tmp_path / "8.json", one, '"category_id": 1', '"category_id": 8'), {"truth": truth}, "is 8"),
-        (yolo(tmp_path / "labels", a="0 0.5 0.5 0.1 0.1\n" * 3001), {}, "3,001 boxes"),
-    ):
-        with pytest.raises(WildlabError, match=problem):
-            read_labels(file, **given)
 
 
 def table(path: Path, text: str) -> Path:

@@ -85,14 +85,6 @@ def test_a_wrong_manifest_names_file_field_and_fix(manifest_data, key, value, sa
     assert len(str(caught.value)) < 500
 
 
-SENSORS = """
-imu = {name = "ADIS16490", velocity_random_walk_m_s_sqrt_h = 0.008, gyro_turn_on_deg_h = 180.0}
-gnss = {name = "u-blox", lever_arm_m = [-0.4, 0.0, -0.1], latency_s = 0.2}
-uncertainty = {velocity_horizontal_m_s = 0.3, velocity_vertical_m_s = 0.5}
-clocks = {gnss_offset_s = -1.5}
-"""
-
-
 @pytest.mark.parametrize("content", [b"name = ", b"\xff\xfe", b"[[[", b"a = " + b"[" * 5000])
 def test_what_is_not_toml_is_one_sentence(tmp_path, content):
     (tmp_path / "flight.toml").write_bytes(content)
@@ -119,22 +111,3 @@ def test_geometry_is_in_radians(manifest_data):
 def test_replacing_an_unknown_key_is_an_error(manifest_data):
     with pytest.raises(WildlabError, match="camera_offset_s"):
         replace_in_manifest(make_manifest(manifest_data), {"clocks": {"camera_offset": 1.0}})
-
-
-def test_sensors_are_kept_and_checked(manifest_data, tmp_path):
-    del manifest_data["camera"]
-    manifest = make_manifest(manifest_data | tomllib.loads(SENSORS))
-    (tmp_path / "flight.toml").write_text(manifest_toml(manifest), encoding="utf-8")
-    again = read_manifest(tmp_path / "flight.toml")
-    assert again == manifest and again.camera is None
-    assert again.gnss.lever_arm_m == (-0.4, 0.0, -0.1)
-    assert (again.imu.gyro_bias_deg_h, again.imu.gyro_turn_on_deg_h) == (None, 180.0)
-    assert again.uncertainty.velocity_vertical_m_s == 0.5
-    for part, key, value in (
-        ("gnss", "latency_s", -0.1),
-        ("imu", "angle_random_walk_deg_sqrt_h", 0.0),
-        ("imu", "scale_error_percent", 100.0),
-        ("uncertainty", "velocity_horizontal_m_s", 0.0),
-    ):
-        with pytest.raises(WildlabError, match=fault(f"{part}.{key}")):
-            replace_in_manifest(manifest, {part: {key: value}})

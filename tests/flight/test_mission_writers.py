@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from defusedxml import minidom
 
-from wildlab.errors import WildlabError
 from wildlab.flight.readers.vector import parse_areas
 from wildlab.flight.writers import (
-    MOST_ITEMS,
     Mission,
-    mission_items,
     plan_geojson,
     plan_kml,
     qgc_plan,
@@ -55,16 +52,6 @@ def check_plan(plan):
             assert one["Altitude"] == one["params"][6]
             assert one["AltitudeMode"] == {3: 1, 10: 4}[one["frame"]]
     return flown["items"]
-
-
-def test_heights_may_be_above_the_ground():
-    flown = mission(heights="ground")
-    rows = read_wpl(waypoints_text(flown))
-    assert np.allclose(rows[3:8, 10], flown.above_ground) and set(rows[3:8, 2]) == {10}
-    # The take-off has nothing of the autopilot's map to stand on but the place where it stands.
-    assert rows[1, 2] == 3
-    items = check_plan(json.loads(json.dumps(qgc_plan(flown), allow_nan=False)))
-    assert [one["frame"] for one in items if one["command"] == 16] == [10] * 5
 
 
 @pytest.mark.parametrize("vehicle", ["multicopter", "fixed-wing"])
@@ -131,17 +118,3 @@ def test_kml_is_xml_whose_areas_read_back(tmp_path):
     assert [one.name for one in back] == ["Wolf & <co>"] and len(back[0].holes) == 1
     line = text.split("<LineString>")[1]
     assert "relativeToGround" in line and "16.46000000,58.66000000,60.000" in line
-
-
-@pytest.mark.parametrize(
-    ("given", "problem"),
-    [
-        ({"above_ground": np.zeros(3)}, "one value"),
-        ({"above_home": np.full(5, np.nan)}, "no place on the Earth"),
-        ({"n": 40_000}, "no place on the Earth"),
-        ({"n": MOST_ITEMS}, "has 703 items"),
-    ],
-)
-def test_what_is_no_flight_is_refused(given, problem):
-    with pytest.raises(WildlabError, match=problem):
-        mission_items(mission(**given))

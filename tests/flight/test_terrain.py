@@ -134,16 +134,6 @@ def test_holes_stay_holes_and_are_counted(tmp_path, flown):
     np.testing.assert_array_equal(again.terrain.height, flight.terrain.height)
 
 
-def test_a_hole_may_be_any_number(tmp_path, flown):
-    """As a file of its kind rounds it, or none at all where its kind cannot hold it."""
-    holed = write_map(tmp_path / "f.tif", height=lambda x, y: np.where(x > LONGITUDE, -9999.1, 650.0))
-    flight = lay(flown(), holed, nodata=-9999.1)
-    assert flight.terrain is not None and np.isnan(flight.terrain.heights_at([[0.0, 60.0]])[0])
-    whole = write_map(tmp_path / "u.tif", height=lambda x, y: np.full(x.shape, 650.0), dtype="uint16")
-    flight = lay(flown(), whole, nodata=-9999.0)
-    assert flight.terrain is not None and np.isfinite(flight.terrain.heights_at(AT)).all()
-
-
 @pytest.mark.parametrize(
     ("written", "said"),
     [({"units": "ft"}, {}), ({}, {"unit": "ft"}), ({"crs": "EPSG:32633+6360"}, {"heights": 0.0})],
@@ -205,6 +195,7 @@ def test_a_picture_as_f_has_it(tmp_path, flown):
         lay(flown(height_m=100.0), path, cell_m=3.0, corner=(x, y))
 
 
+@pytest.mark.slow
 def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path, flown):
     path = write_map(tmp_path / "dem.tif", cell=2.0, side=900)
     fine, coarse = lay(flown(), path), lay(flown(), path, step_m=11.0)
@@ -279,7 +270,13 @@ def over(place: dict[str, float], north: float, down: float) -> Flight:
     return Flight(make_manifest({"name": "made", "kind": "logged"} | parts), {"made": nav})
 
 
-@pytest.mark.parametrize("parts", MAPS, ids=lambda parts: parts[1])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [pytest.param(one, marks=[] if one[0] == "terra_examples" else [SLOW], id=one[1]) for one in MAPS],
+)
 def test_a_public_map_keeps_its_heights_in_n(shared_data, parts):
     """Nodes of the map, taken to n by themselves, lie on the terrain but for its stated error."""
     path = shared_data("dem", *parts)

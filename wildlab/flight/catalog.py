@@ -6,13 +6,14 @@ stands in for the network.
 
 from __future__ import annotations
 
-import errno
+import hashlib
 import os
-import shutil
 import tempfile
 from collections.abc import Callable
+from http.client import HTTPException
 from pathlib import Path
-from typing import Annotated, BinaryIO
+from typing import Annotated
+from urllib.request import urlopen
 
 from pydantic import Field, RootModel, field_validator
 
@@ -25,9 +26,9 @@ from wildlab.flight.files import (
     inside,
     is_safe_name,
     leaves_folder,
+    read_regular,
     read_toml,
     regular_size,
-    unreadable,
 )
 from wildlab.paths import DATA, fetched
 
@@ -35,8 +36,6 @@ MIRROR_VARIABLE = "WILDLAB_DATA_MIRROR"
 
 #: Seconds without an answer after which a download is given up.
 TIMEOUT_S = 30
-
-_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 #: Told before each file is fetched: its name, how many are done, how many there are.
 Progress = Callable[[str, int, int], None]
@@ -181,11 +180,7 @@ def fetch(name: str, progress: Progress | None = None) -> list[Path]:
                 for number, file in enumerate(missing):
                     if progress is not None:
                         progress(file.path, number, len(missing))
-                    target = Path(temporary) / str(number)
-                    if mirror:
-                        _copy(Path(mirror), file, target)
-                    else:
-                        _download(file, target)
+                    (Path(temporary) / str(number)).write_bytes(_read(file, mirror))
                 for number, file in enumerate(missing):
                     place = _place(folder, file)
                     place.parent.mkdir(parents=True, exist_ok=True)
@@ -215,76 +210,46 @@ def _is_right(path: Path, file: DataFile) -> bool:
         return False
 
 
-def _copy(mirror: Path, file: DataFile, target: Path) -> None:
-    places = [mirror / file.mirror, mirror / file.path, mirror / Path(file.path).name]
-    found = next((place for place in places if place.is_file()), None)
-    if found is None:
-        raise WildlabError(
-            f"the folder that {MIRROR_VARIABLE} names has no {file.mirror} and no {file.path}",
-            f"copy the file there, or unset {MIRROR_VARIABLE} to download it",
-            file=mirror,
-        )
+def _read(file: DataFile, mirror: str | None) -> bytes:
+    """The bytes of a file, from the mirror or the network: those that the catalog has the checksum of."""
+    fix = "try again; if it stays so, do not trust the source"
+    where: Path | str = file.url
+    if mirror:
+        places = [Path(mirror) / name for name in (file.mirror, file.path, Path(file.path).name)]
+        found = next((place for place in places if place.is_file()), None)
+        if found is None:
+            raise WildlabError(
+                f"the folder that {MIRROR_VARIABLE} names has no {file.mirror} and no {file.path}",
+                f"copy the file there, or unset {MIRROR_VARIABLE} to download it",
+                file=mirror,
+            )
+        fix, where = "replace it by the published file", found
+        # No more than the catalog says: a small answer must not become a large file.
+        data = read_regular(found, file.size)
+    else:
+        data = _download(file)
+    digest = hashlib.sha256(data).hexdigest()
+    if digest != file.sha256:
+        problem = f"has the SHA-256 {digest}, and the catalog says {file.sha256} for {file.path}"
+        raise WildlabError(problem, fix, file=where)
+    return data
+
+
+def _download(file: DataFile) -> bytes:
     try:
-        with found.open("rb") as source, target.open("wb") as copy:
-            shutil.copyfileobj(source, _Limited(copy, file))
-    except OSError as error:
-        if error.errno in _FULL:
-            raise
-        raise unreadable(error, found) from None
-    _verify(target, file, found, "replace it by the published file")
-
-
-def _download(file: DataFile, target: Path) -> None:
-    # Asked not to compress: a small answer must not become a large file.
-    import pooch
-
-    download = pooch.HTTPDownloader(timeout=TIMEOUT_S, headers={"Accept-Encoding": "identity"})
-    try:
-        with target.open("wb") as copy:
-            download(file.url, _Limited(copy, file), None)
-    except OSError as error:  # what requests raises is an OSError too
-        if error.errno in _FULL:
-            raise
+        # The catalog takes https alone.
+        with urlopen(file.url, timeout=TIMEOUT_S) as source:  # noqa: S310
+            data: bytes = source.read(file.size + 1)
+    except (OSError, HTTPException) as error:
         raise WildlabError(
-            f"the file cannot be downloaded from {file.url} ({_in_words(error)})",
+            f"the file cannot be downloaded from {file.url} ({getattr(error, 'reason', error)})",
             f"check the network, or set {MIRROR_VARIABLE} to a folder that has the file",
             file=file.path,
         ) from None
-    _verify(target, file, file.url, "try again; if it stays so, do not trust the source")
-
-
-def _verify(path: Path, file: DataFile, whence: Path | str, fix: str) -> None:
-    found = sha256(path)
-    if found != file.sha256:
+    if len(data) > file.size:
         raise WildlabError(
-            f"has the SHA-256 {found}, and the catalog says {file.sha256} for {file.path}", fix, file=whence
+            f"is larger than the {file.size:,} bytes that the catalog says",
+            "do not trust the source",
+            file=file.url,
         )
-
-
-class _Limited:
-    """A file that takes no more bytes than the catalog says."""
-
-    def __init__(self, file: BinaryIO, told: DataFile) -> None:
-        self.file, self.told, self.left = file, told, told.size
-
-    def write(self, data: bytes) -> int:
-        self.left -= len(data)
-        if self.left < 0:
-            raise WildlabError(
-                f"is larger than the {self.told.size:,} bytes that the catalog says",
-                "do not trust the source",
-                file=self.told.path,
-            )
-        return self.file.write(data)
-
-    def flush(self) -> None:
-        self.file.flush()
-
-
-def _in_words(error: OSError) -> str:
-    """Why a download failed, without the library's own words for it."""
-    response = getattr(error, "response", None)
-    if response is not None:
-        return f"the server says {response.status_code}"
-    name = type(error).__name__
-    return "no answer in time" if "Timeout" in name else "no connection" if "Connection" in name else name
+    return data

@@ -603,18 +603,11 @@ def _refuse_elsewhere(
     found = places.of_points(positions)
     if over(found):
         return
-    from pyproj import Geod
-
-    latitude, longitude, _ = (math.degrees(value) for value in places.origin)
-    middle = found[len(found) // 2, :2]
-    if not np.isfinite(middle).all():
-        middle = np.array([columns / 2, rows / 2])
-    nearest = np.clip(middle, [0, 0], [columns, rows])
-    x, y = places.map.to_crs(nearest[:1], nearest[1:])
-    lon, lat = places.from_map(x, y)
-    distance = math.nan
-    if np.isfinite(lon[0]) and np.isfinite(lat[0]):
-        distance = Geod(ellps="WGS84").inv(longitude, latitude, lon[0], lat[0])[2]
+    middle = len(found) // 2
+    column, row = (columns / 2, rows / 2) if np.isnan(found[middle, :2]).any() else found[middle, :2]
+    nearest = np.clip([[column, row]], [0, 0], [columns, rows])
+    away = places.of_cells(nearest, np.zeros(1))[0, :2] - positions[middle, :2]
+    distance = float(np.hypot(*away))
     far = f"{distance / 1000:,.1f} km away" if distance >= 1000 else f"{distance:.0f} m away"
     far = far if math.isfinite(distance) else "beyond the reach of its own CRS"
     raise WildlabError(

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from tests.flight.card.cards import MARKS, TAKEN, geodetic, gpx, write_card, write_photo
+from tests.flight.card.cards import MARKS, TAKEN, gpx, write_card, write_photo
 from wildlab.api.points import georeference
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.card.importing import import_card, read_card, recipe_beside
 from wildlab.flight.card.proposal import Proposal, Wishes
-from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import load_flight
 
@@ -75,13 +74,6 @@ def test_a_track_beside_the_images_is_a_target_once(card, tmp_path):
     assert np.allclose(np.diff(tracks["north_m"]), 0.5, atol=1e-3)
 
 
-def test_heights_that_cannot_be_compared_are_refused(card):
-    (card / "fox.gpx").write_text(fox())
-    with pytest.raises(WildlabError) as caught:
-        read(card)
-    assert "--geoid" in str(caught.value) and "fox.gpx" in str(caught.value)
-
-
 def test_a_dry_run_writes_nothing_gives_a_recipe_and_tells_no_place(card, tmp_path):
     before = sorted(tmp_path.rglob("*"))
     result = call(card, "--dry-run", "--zone", "UTC")
@@ -111,23 +103,6 @@ def test_overwriting_takes_a_word(card, tmp_path):
     assert call(*arguments, "--overwrite").exit_code == 0
     assert recipe_beside(tmp_path / "flight").read_text(encoding="utf-8") == recipe
     assert load_flight(tmp_path / "flight").name == "flight"
-
-
-def test_marks_without_a_height_are_left_out(card):
-    """As most programs write placemarks: without a word on what their heights count from."""
-    (card / "marks.csv").unlink()
-    marks = "".join(
-        f"<Placemark><name>{name}</name><Point><coordinates>{lon:.9f},{lat:.9f},12.0</coordinates></Point>"
-        "</Placemark>"
-        for name, (lat, lon) in ((name, geodetic(*where)) for name, where in MARKS.items())
-    )
-    (card / "marks.kml").write_text(
-        f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{marks}</Document></kml>', encoding="utf-8"
-    )
-    recipe = tomllib.loads(read(card).recipe)
-    assert "truth" not in recipe and len(recipe["detections"]) == 1
-    with pytest.raises(WildlabError, match="no points that can be used"):
-        read(card, {"marks.kml": "marks"})
 
 
 @pytest.mark.parametrize(
@@ -189,18 +164,3 @@ def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(card, tmp_
     assert len(flight.table("frames")) == 3
     wide = import_card(read(card, {"DCIM/100MEDIA": "images:wide"}), tmp_path / "wide")
     assert len(wide.table("frames")) == 4
-
-
-def test_a_stated_camera_of_another_size_is_not_laid_on_images(card):
-    camera = CameraPart(name="c", width_px=1000, height_px=750, fx_px=900, fy_px=900, cx_px=500, cy_px=375)
-    with pytest.raises(WildlabError, match="1000 x 750 px"):
-        read(card, camera=camera)
-
-
-def test_the_planes_uncertainty_is_that_of_the_surveyed_heights(card, tmp_path):
-    marks = card / "marks.csv"
-    lines = marks.read_text(encoding="utf-8").splitlines()
-    raised = [line.replace("40.000", f"{40 + 3 * i:.3f}") for i, line in enumerate(lines)]
-    marks.write_text("\n".join(raised), encoding="utf-8")
-    flight = import_card(read(card), tmp_path / "flight")
-    assert flight.manifest.uncertainty.plane_height_m == pytest.approx(3.0)

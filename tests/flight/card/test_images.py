@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.flight.card.images import clock_of_images
 from wildlab.flight.card.roles import CardItem
 from wildlab.flight.readers.log import RawLog, Stream, make_stream
@@ -58,19 +57,6 @@ def test_images_without_a_record_have_no_time():
     lost = np.isnan(stamped.columns["time_s"])
     assert stamped.columns["file"][lost].tolist() == ["a3.jpg", "a20.jpg"]
     np.testing.assert_allclose(stamped.columns["time_s"][~lost], np.delete(TAKEN, [3, 20]))
-
-
-def test_even_records_that_fit_at_many_offsets_are_not_believed():
-    even = START + 2.0 * np.arange(40)
-    files = [f"a{i}.jpg" for i in range(30)]
-    some = make_stream("photos", {"file": files, "time_log_s": even[:30] + 7000.0})
-    with pytest.raises(WildlabError, match="is not certain"):
-        stamped_by(some, triggers(even), Path("x"))
-
-
-def test_utc_is_taken_as_it_is_and_a_stated_offset_added():
-    assert clock_of_images(images(TAKEN, TAKEN), own(), None).offset_s == 0.0
-    assert clock_of_images(images(TAKEN, TAKEN), own(), -1.5).offset_s == -1.5
 
 
 @pytest.mark.parametrize("quarters", [-14, 0, 8, 22, 23])

@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wildlab.flight.card.description import sentences_of
 from wildlab.flight.card.importing import import_card, read_card
 from wildlab.flight.card.proposal import Wishes
-from wildlab.flight.card.roles import CardItem, Choice
-from wildlab.flight.readers.log import Clock, RawLog, make_stream
+from wildlab.flight.readers.log import RawLog, make_stream
 from wildlab.flight.recipe.quantities import LogTable
 from wildlab.flight.recipe.raw import log_part
 from wildlab.flight.store import Flight
@@ -70,23 +68,6 @@ def test_subtitles_come_in(shared_data, tmp_path, name):
     assert flight.gnss is not None
     assert len(flight.gnss) >= 6
     assert flight.manifest.vertical.reference == "take-off"
-
-
-@pytest.mark.parametrize(
-    ("rate", "sd", "said"),
-    [
-        (1 - 1e-4, 1e-6, "100 ppm fast"),
-        (1 + 1e-4, 1e-6, "100 ppm slow"),
-        (1 + 1e-4, 1e-4, "200 ppm"),
-        (1.0, np.nan, "cannot be told"),
-    ],
-)
-def test_how_a_clock_runs(rate, sd, said):
-    """A second of a fast clock is less than one of UTC."""
-    stream = make_stream("gnss", {"time_s": [1.0, 2.0]})
-    clock = Clock("GPS weeks", rate, 0.0, 0.001, 0.002, 10, sd)
-    found = CardItem("a.bin", "dataflash", RawLog("dataflash", {"gnss": stream}, clock=clock))
-    assert any(said in one for one in sentences_of([Choice(found, "own", "why")]))
 
 
 def test_stamps_of_a_log_without_utc_count_from_what_is_stated():

@@ -119,11 +119,3 @@ def test_targets_have_names_of_their_own():
 def test_two_vehicles_cannot_both_be_own():
     with pytest.raises(WildlabError, match="own log"):
         choose_roles([log("a"), log("b")], {"a": "own", "b": "own"})
-
-
-def test_rows_that_cannot_be_used_are_no_track():
-    t = np.arange(5.0)
-    columns = {"time_s": t, "latitude_deg": t, "longitude_deg": t, "height_sea_m": t}
-    stream = make_stream("gnss", columns, unusable={"no fix": np.ones(5, bool)})
-    choice = choose_roles([CardItem("bench", "gpx", RawLog("gpx", {"gnss": stream}))], {})[0]
-    assert choice.role == "nothing"

@@ -69,21 +69,6 @@ def geodetic(change: Callable[..., tuple[np.ndarray, ...]]) -> Change:
     return poses(moved)
 
 
-def everywhere(change: Callable[..., tuple[np.ndarray, ...]]) -> Change:
-    """A change of latitude, longitude and height of poses, truth and the origin, which is the first pose."""
-    origin = change(*PLACE)
-
-    def moved(p: np.ndarray) -> np.ndarray:
-        there = change(*pymap3d.ned2geodetic(*p.T, *PLACE))
-        return np.column_stack(pymap3d.geodetic2ned(*there, *origin))
-
-    def changed(s: Sightings) -> Sightings:
-        at = (np.radians(origin[0]), np.radians(origin[1]), origin[2])
-        return replace(s, p_nb=moved(s.p_nb), points=moved(s.points[0])[None], origin=at)
-
-    return changed
-
-
 def euler(change: Callable[[np.ndarray], np.ndarray]) -> Change:
     """Of roll, pitch and yaw (N, 3), degrees."""
 
@@ -115,8 +100,6 @@ MISTAKES: dict[str, Change] = {
     "poses: north and east exchanged": poses(lambda p: p[:, [1, 0, 2]]),
     "poses: north negated": poses(lambda p: p * [-1, 1, 1]),
     "constant height": poses(lambda p: p - [0, 0, 40.0]),
-    "poses and truth: latitude and longitude exchanged": everywhere(lambda a, b, h: (b, a, h)),
-    "poses and truth: longitude negated": everywhere(lambda a, b, h: (a, -b, h)),
     "truth: east negated": lambda s: replace(s, points=s.points * [1, -1, 1]),
 }
 

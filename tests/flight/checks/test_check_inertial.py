@@ -29,18 +29,6 @@ from wildlab.simulation import (
 DURATION = 240.0
 
 
-@pytest.mark.parametrize(("imu", "gnss", "value"), [(FORCE[0], NED[0], np.nan), ("time_s", "time_s", 0.0)])
-def test_what_is_no_number_or_out_of_order_is_left_to_others(right, imu, gnss, value):
-    flight = _copy(right)
-    flight.tables["imu"].loc[100, imu] = value
-    flight.tables["gnss"].loc[3, gnss] = value
-    expected = {("imu", imu), ("gnss", gnss)}
-    assert {(one.table, one.field) for one in _found(flight)} == expected
-    if imu != "time_s":
-        flight.tables["imu"].loc[:, imu] = value
-        assert {(one.table, one.field) for one in _found(flight)} == expected
-
-
 def _eight(times: Array) -> tuple[Array, Array, Array]:
     """A figure of eight over 200 m by 120 m in 40 s, briskly up and down, never twice alike."""
     size = np.array([100.0, 60.0, 6.0, 5.0])
@@ -235,11 +223,3 @@ def test_an_offset_without_velocities(offset):
     flight.tables["gnss"] = flight.tables["gnss"].drop(columns=SPEED)
     (found,) = _found(shift("gnss", -offset)(flight))
     assert f"gnss_offset_s = {offset:.1f}" in found.fix
-
-
-def test_a_few_samples_say_nothing(right):
-    flight = _copy(right)
-    for n in (0, 1, 2, 5):
-        flight.tables["imu"] = right.tables["imu"].iloc[:n]
-        flight.tables["gnss"] = right.tables["gnss"].iloc[:n]
-        assert [one for one in _found(flight) if "correlation" in one.sentence] == []

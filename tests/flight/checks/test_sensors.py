@@ -1,6 +1,5 @@
 """Sensors, poses, frames and truth of a flight: what disagrees, lies in a gap or stands there twice."""
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -15,8 +14,9 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import sensors
+from wildlab.flight.checks.tables import overlap
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.manifest import make_manifest, replace_in_manifest
+from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 
 
@@ -70,13 +70,6 @@ def test_a_misspelt_sensor_is_named(make_flight):
     ]
 
 
-def test_several_sources_in_one_look_are_good_to_know(make_flight):
-    flight = detected(make_flight, LOOKS, [(0, "radar"), (0, "program"), (1, "lidar")])
-    (note,) = said(flight)
-    assert note.level == "note" and "1 of 1" in note.sentence
-    assert scans_of(flight, "radar").ids.tolist() == [["d-0"], [""]]
-
-
 def test_what_agrees_or_is_not_said_is_no_finding(make_flight):
     assert said(detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar"), (2, "radar")])) == []
     # Images of a camera beside: their detections are no sensor's.
@@ -99,25 +92,6 @@ def test_two_sensors_may_look_at_once_and_one_may_not_look_twice(make_flight, ti
     assert [one.sentence.split()[2] for one in found] == repeated
 
 
-@pytest.mark.parametrize(
-    ("camera", "stated", "silent"),
-    [
-        (True, {}, []),
-        (False, {}, [["lidar", "radar"]]),
-        (False, {"radar": {"clock_offset_s": 0.0}}, [["lidar"]]),
-        (False, {"radar": {"clock_offset_s": -0.5}, "lidar": {"clock_offset_s": -0.5}}, []),
-    ],
-)
-def test_without_a_camera_it_is_the_sensors_whose_clocks_are_taken_to_agree(
-    make_flight, camera, stated, silent
-):
-    flight = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar")])
-    data = flight.manifest.model_dump(exclude=set() if camera else {"camera"})
-    manifest = replace_in_manifest(make_manifest(data), {"sensors": stated})
-    found = check_flight(replace(flight, manifest=manifest))
-    assert [re.findall("'([a-z]+)'", one.sentence) for one in found if one.field == "sensors"] == silent
-
-
 Make = Callable[..., Flight]
 
 
@@ -135,7 +109,7 @@ def of_truths(flight: Flight, spans: dict[str, tuple[float, float]]) -> list[Fin
     ]
     truth = pd.concat(rows, ignore_index=True).assign(north_m=900.0, east_m=50.0, down_m=0.0)
     flight.tables["truth"] = truth
-    found = [one for one in check_flight(flight) if (one.table, one.field) == ("truth", "time_s")]
+    found = [one for one in overlap(flight) if one.table == "truth"]
     return [one for one in found if one.level != "note"]
 
 

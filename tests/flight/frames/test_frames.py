@@ -13,7 +13,7 @@ import pytest
 from tests.annotation import write_images
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
-from wildlab.flight.readers.frames.image import images_below, still_files
+from wildlab.flight.readers.frames.image import images_below
 from wildlab.flight.readers.frames.scene import find_clipped, find_no_data, find_overlay
 from wildlab.flight.readers.frames.thermal import (
     Planck,
@@ -92,14 +92,6 @@ def test_temperatures_are_those_of_plancks_law(tmp_path):
     for frame in open_frames(tmp_path):
         assert frame.unit == "kelvin" and frame.polarity == "white-hot"
         assert np.abs(frame.image - kelvin).max() < 0.02
-
-
-@pytest.mark.parametrize("swapped", [False, True])
-def test_a_png_of_either_order_of_bytes_gives_the_same_counts(swapped):
-    counts = (3000 + np.add.outer(np.arange(40), np.arange(50))).astype(np.uint16)
-    found = read_records(fff(counts, as_png=True, swapped=swapped))
-    assert not isinstance(found, str)
-    assert (found.counts == counts).all()
 
 
 def test_records_that_lie_or_lack_a_piece_are_sentences():
@@ -233,13 +225,6 @@ def test_a_playlist_that_calls_itself_a_video_is_refused(tmp_path):
         open_frames(path)
 
 
-def test_a_strip_along_one_side_is_masked_though_it_reaches_no_corner():
-    image = scene()
-    image[20:80, :6] = 0
-    found = find_no_data(image)
-    assert found[20:80, :6].all() and not found[:15].any() and not found[:, 12:].any()
-
-
 def test_kinds_of_numbers(tmp_path):
     kelvin = (280 + scene() / 10).astype(np.float32)
     kelvin[3, 4] = np.nan
@@ -254,13 +239,6 @@ def test_kinds_of_numbers(tmp_path):
     assert not found["kelvin"].valid[3, 4] and found["kelvin"].valid.mean() > 0.99
     assert (found["colour"].image == colour[..., ::-1]).all() and found["counts"].image.dtype == np.uint16
     assert found["deep"].problem and found["share"].problem
-
-
-def test_polarity_is_the_callers_unless_the_file_knows(tmp_path):
-    write(tmp_path / "a.png", scene())
-    (tmp_path / "b.fff").write_bytes(fff(np.full((96, 128), 3000, np.uint16) + scene()))
-    grey, kelvin = open_frames(tmp_path, polarity="black-hot")
-    assert (grey.polarity, kelvin.polarity) == ("black-hot", "white-hot")
 
 
 def dji_jpeg(counts: np.ndarray, size: tuple[int, int], make: bytes = b"Exif\0\0DJI") -> bytes:
@@ -301,27 +279,3 @@ def test_frames_are_found_by_their_names_in_any_folder_below(tmp_path):
     assert images_below(there, ["DJI_1"]) == []
     with pytest.raises(WildlabError, match="no images"):
         open_frames(there, ids=["DJI_1"])
-
-
-def test_of_two_files_of_one_name_nobody_can_tell_the_flights(tmp_path):
-    there = card(tmp_path / "DCIM")
-    write_images(there / "101CANON", "IMG_2.png", "IMG_9.png")
-    assert len(images_below(there, ["IMG_1", "IMG_3"])) == 2
-    with pytest.raises(WildlabError, match=r"IMG_2\.png.*100CANON and in 101CANON"):
-        open_frames(there, ids=["IMG_1", "IMG_2"])
-
-
-def test_folders_are_read_in_order_and_once(tmp_path):
-    for name in ("b.png", "a.JPG", "c.txt", "a.tif"):
-        (tmp_path / name).write_bytes(b"x")
-    (tmp_path / "d.png").mkdir()
-    found = still_files([tmp_path, tmp_path / "b.png"])
-    assert [one.name for one in found] == ["a.JPG", "a.tif", "b.png"]
-
-
-@pytest.mark.parametrize("find", [open_frames, lambda path: still_files([path])])
-def test_what_is_not_there_and_an_empty_folder_are_sentences(tmp_path, find):
-    with pytest.raises(WildlabError, match="no such file"):
-        find(tmp_path / "none")
-    with pytest.raises(WildlabError, match="no images"):
-        find(tmp_path)

@@ -8,7 +8,6 @@ import pytest
 
 from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.frames.scene import (
-    MOST_DEAD,
     find_dead,
     is_shutter,
     measure_vignetting,
@@ -144,13 +143,6 @@ def test_dark_corners_are_measured_and_taken_off(fall):
     assert measure_vignetting(plain, WHOLE) is None
 
 
-def test_whole_numbers_stay_whole_and_within_their_kind():
-    offset = np.array([[-10.4, 10.4]], np.float32)
-    assert without_vignetting(np.array([[250, 5]], np.uint8), offset).tolist() == [[255, 0]]
-    assert without_vignetting(np.array([[250, 50]], np.uint16), offset).tolist() == [[260, 40]]
-    assert without_vignetting(np.array([[280.0, 5]], np.float32), offset).dtype == np.float32
-
-
 def test_the_one_iterator_takes_the_corners_off_where_that_is_asked(tmp_path):
     flight(
         tmp_path / "in", np.array([0.0, 0.2, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]), CameraResponse(vignetting=4.0)
@@ -178,12 +170,3 @@ def test_real_frames_are_no_shutter_and_one_camera_has_one_dead_pixel(shared_dat
         dead, vignetting = frames.kept.dead, frames.kept.vignetting
         assert dead is not None and np.argwhere(dead).tolist() == [[368, 89]]
         assert vignetting is not None and -60 < vignetting.corner < -20
-
-
-def test_few_grey_levels_repeat_without_a_fault():
-    rng = np.random.default_rng(4)
-    seen = [rng.normal(100, 0.8, (120, 160)).round().astype(np.uint8) for _ in range(7)]
-    still = np.all([one == seen[0] for one in seen], axis=0)
-    assert 20 < still.sum() < MOST_DEAD * still.size
-    dead = find_dead(seen, np.ones((120, 160), bool))
-    assert dead is not None and not dead.any()

@@ -78,18 +78,6 @@ def test_fraction_of_a_second(begin, pause):
     assert log.clock.spread_s < 0.1
 
 
-def test_parts():
-    log = airdata.read(Path("x.csv"), table(rows()).encode("utf-8-sig").replace(b"\n", b"\r\n"))
-    check(log)
-    assert set(log.parts) == {"gnss", "poses", "gimbal", "triggers"}
-    triggers = log.parts["triggers"]
-    assert triggers.columns["number"].tolist() == [1, 2, 3, 4, 5, 6]
-    assert triggers.rows.tolist() == [12 + 50 * k for k in range(6)]
-    assert triggers.columns["roll_deg"].tolist() == [2.5] * 6
-    assert log.parts["poses"].columns["pitch_deg"].tolist() == [-1.5] * 300
-    assert log.notes == ()
-
-
 def test_feet_and_miles_renamed_and_reordered():
     text = table(rows(), tuple(sorted(METRIC)))
     for old, new in (
@@ -100,20 +88,3 @@ def test_feet_and_miles_renamed_and_reordered():
         text = text.replace(old, new)
     columns = columns_of(airdata, text, "poses")
     near(columns, height_home_m=30.5 * 0.3048, height_sea_m=120.25 * 0.3048, v_east_m_s=-4.0 * 0.44704)
-
-
-def test_missing_columns():
-    log = airdata.read(Path("x.csv"), table(rows(), METRIC[:4]).encode())
-    check(log)
-    assert set(log.parts) == {"gnss"}
-    assert log.parts["gnss"].used.all()
-    seconds = columns_of(airdata, table(rows(), METRIC[1:5]))
-    assert seconds["use"].sum() == 31
-    assert set(seconds["why"]) == {"", "repeated stamp"}
-
-
-def test_a_quotation_mark_costs_one_line():
-    text = table(rows()).replace("63.4000090", '"63.4000090')
-    log = airdata.read(Path("x.csv"), text.encode())
-    assert log.lost[0].startswith("1 ")
-    assert len(log.parts["gnss"]) == 299

@@ -5,8 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.tracks import near
@@ -14,7 +12,6 @@ from wildlab.errors import WildlabError
 from wildlab.flight.readers.formats import read_folder, read_log
 from wildlab.flight.readers.labels import clicks_sniff
 from wildlab.flight.readers.log import RawLog
-from wildlab.names import csv_cell, from_csv_cell
 
 HERE = Path("clicks")
 #: Image, name, left, top, width, height.
@@ -92,14 +89,6 @@ def write_yolo(folder: Path, classes: Path) -> None:
     (classes / "classes.txt").write_text("".join(f"{one[1]}\n" for one in BOXES), encoding="utf-8")
 
 
-def test_yolo_folder(tmp_path):
-    write_yolo(tmp_path, tmp_path)
-    assert not read_folder(tmp_path, "clicks-yolo")[0].parts["clicks"].used.any()
-    (tmp_path / "none").mkdir()
-    with pytest.raises(WildlabError, match="no text file"):
-        read_folder(tmp_path / "none", "clicks-yolo")
-
-
 @pytest.mark.parametrize("layout", [("", ""), ("images", "labels"), ("images/train", "labels/train")])
 def test_sizes_of_images_beside_labels(tmp_path, layout):
     images, labels = (tmp_path / one for one in layout)
@@ -130,17 +119,6 @@ def test_points():
     assert (column(comma, "u_px"), column(comma, "v_px")) == ([1.5], [2.25])
 
 
-def test_points_attributes_and_other_shapes_of_cvat():
-    more = (
-        b'<image id="9" name="c.jpg"><points label="marker" points="1.5,2.5;3,4"><attribute name="name">A7'
-        b'</attribute></points><polygon label="x" points="1,2;3,4;5,6"/><tag label="sunny"/></image>'
-    )
-    log = read(HERE, CVAT.replace(b"</annotations>", more + b"</annotations>"))
-    assert column(log, "name")[2:] == ["A7", "A7"]
-    assert (column(log, "u_px")[2:], column(log, "v_px")[2:]) == ([1.5, 3.0], [2.5, 4.0])
-    assert log.lost[0].startswith("1 ")
-
-
 @pytest.mark.parametrize(
     ("data", "problem"),
     [
@@ -166,9 +144,3 @@ def test_what_is_refused(data, problem):
 )
 def test_what_is_not_recognised(head):
     assert not clicks_sniff(head)
-
-
-@given(st.text())
-def test_what_guards_a_value_is_taken_off_again(text):
-    assert from_csv_cell(csv_cell(text)) == text
-    assert not csv_cell(text).startswith(("=", "+", "-", "@", "\t", "\r"))

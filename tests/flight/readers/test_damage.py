@@ -58,23 +58,6 @@ def test_what_holds_nothing_is_refused(reader, data, words):
 
 
 @pytest.mark.parametrize(
-    ("reader", "head"),
-    [
-        (ubx, b"\xb5\x62" * 100),
-        (nmea, b"$GP is a currency, $100,000"),
-        (nmea, b""),
-        (mrk, b"1 2 3\n"),
-        (srt, subtitles("Hello there").encode()),
-        # A baseline without a header cannot be told from a place but by its digits.
-        (rtklib_pos, f"{of_pos.GPST[0]} 12.3456 5.6789 1.2345 1 12\n".encode()),
-        (airdata, b"time,x,y\n1,2,3\n"),
-    ],
-)
-def test_others_are_not_taken_for_them(reader, head):
-    assert not reader.sniff(head)
-
-
-@pytest.mark.parametrize(
     ("reader", "data", "share"),
     [
         (ubx, b"".join(map(pvt, range(30))), 0.89),

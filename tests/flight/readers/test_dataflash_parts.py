@@ -7,13 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.flight.readers.dataflash_logs import (
-    HEIGHT,
     HOME,
-    LATITUDE,
     LONGITUDE,
     Log,
     Truth,
@@ -109,19 +105,6 @@ def test_a_short_log_cannot_tell_the_rate(shared_data):
     assert clock is not None and clock.rate == 1.0 and clock.pairs == 5
 
 
-def test_early_rows_are_dated_by_the_first_true_fix():
-    """No fix for 10 s, with week 0 and a place elsewhere; receiver 2 is the one that finds itself."""
-    log = read(third_generation(TRUTH))
-    gnss, poses = log.parts["gnss"], log.parts["poses"]
-    assert whys(gnss) == {"": 150, "no fix": 50}
-    near(gnss.columns, 2e-3, time_s=TRUTH.utc(gnss.columns["time_log_s"]))
-    assert whys(poses) == {"": 300, "no position": 100}
-    assert poses.columns["time_s"][0] == pytest.approx(float(TRUTH.utc(20.0)), abs=2e-3)
-    # What the receiver could not say, 655.35 m, is not known.
-    near(gnss.columns, sd_horizontal_m=np.where(gnss.used, 1.5, np.nan), undulation_m=48.5)
-    assert np.isnan(gnss.columns["sd_vertical_m"][~gnss.used]).all()
-
-
 def test_gimbal_and_images():
     log = read(third_generation(TRUTH))
     k = np.arange(8)
@@ -133,60 +116,9 @@ def test_gimbal_and_images():
     assert "height_sea_m" not in triggers
 
 
-def test_images_before_the_first_fix_were_taken():
-    triggers = read(change(second(), "TRIG", 0, Lat=0, Lng=0)).parts["triggers"]
-    assert triggers.used.all() and np.isnan(triggers.columns["latitude_deg"]).tolist() == [True] + 7 * [False]
-
-
-def test_a_vertical_velocity_that_the_receiver_does_not_have():
-    gnss = read(change(second(), "GPA", 100, VV=0)).parts["gnss"]
-    assert np.flatnonzero(np.isnan(gnss.columns["v_down_m_s"])).tolist() == [100] and gnss.used.all()
-
-
-def test_quaternions_where_there_is_no_attitude():
-    columns = read(third_generation(TRUTH, attitude=False)).parts["poses"].columns
-    yaw = np.degrees(2 * np.arctan2(columns["q_z"], columns["q_w"])) % 360
-    np.testing.assert_allclose(yaw, TRUTH.attitude(columns["time_log_s"])[2], atol=1e-3)
-
-
-def test_without_the_autopilots_positions_there_are_those_of_the_receiver():
-    poses = read(drop(second(), "POS")).parts["poses"]
-    columns = {name: values[poses.used] for name, values in poses.columns.items()}
-    place_near(columns, TRUTH, columns["time_log_s"])
-
-
 def drop(log: Log, *names: str) -> Log:
     log.messages = [one for one in log.messages if one[0] not in names]
     return log
-
-
-def test_what_a_log_does_not_have():
-    assert "imu" not in read(drop(second(), "IMU", "IMU2")).parts
-    log = read(drop(second(), "GPS"))
-    poses = log.parts["poses"]
-    assert log.clock is not None and log.clock.base == "" and "gnss" not in log.parts
-    assert np.isnan(poses.columns["time_s"]).all() and poses.used.all()
-    assert whys(read(drop(second(), "GPS", "POS")).parts["poses"]) == {"no position": 400}
-    parts = read(drop(second(), "ATT", "IMU")).parts
-    assert "poses" not in parts and (parts["imu"].columns["f_x_m_s2"] == 9).all()
-
-
-def rename(name: str, **fields: str) -> RawLog:
-    log = second()
-    kind, characters, columns = log.kinds[name]
-    log.kinds[name] = (kind, characters, ",".join(fields.get(one, one) for one in columns.split(",")))
-    return read(log)
-
-
-def test_fields_that_are_missing_cost_what_they_say_and_no_more():
-    log = rename("GPS", GMS="G1", GWk="G2")
-    assert log.clock is not None and log.clock.base == "" and log.parts["gnss"].used.all()
-    gnss = rename("GPS", Spd="S", HDop="H", NSats="N").parts["gnss"]
-    assert {"v_north_m_s", "hdop", "satellites"}.isdisjoint(gnss.columns) and gnss.used.all()
-    assert whys(rename("GPS", Status="S").parts["gnss"]) == {"no fix": 200}
-    assert "height_sea_m" not in rename("GPS", Alt="A").parts["gnss"].columns
-    # Without a yaw messages ATT are no attitude, and this log has no other.
-    assert "poses" not in rename("ATT", Yaw="Y").parts
 
 
 def change(log: Log, name: str, which: int, **values: float) -> Log:
@@ -195,30 +127,6 @@ def change(log: Log, name: str, which: int, **values: float) -> Log:
     old = dict(zip(columns, log.messages[at][1], strict=True))
     log.messages[at] = (name, tuple((old | values).values()))
     return log
-
-
-@pytest.mark.parametrize(
-    ("values", "why"),
-    [
-        ({"Status": 1}, "no fix"),
-        ({"Status": 2}, "a fix without height"),
-        ({"Lat": 0, "Lng": 0}, "position is a placeholder"),
-        ({"Lat": 91.0}, "impossible position"),
-        ({"GWk": 0}, "no GPS week"),
-        ({"HDop": 99.99}, "no dilution of precision"),
-        ({"Spd": 800.0}, "impossible speed"),
-        ({"Spd": float("inf")}, "impossible speed"),
-        ({"Alt": 1e6}, "impossible height"),
-        ({"Lat": LATITUDE + 1}, "impossible jump"),
-        ({"Alt": HEIGHT + 45_000}, "impossible jump"),
-        ({"TimeUS": 1_000_000}, "stamp out of order"),
-        ({"TimeUS": 2**60}, "impossible time"),
-    ],
-)
-def test_rows_that_cannot_be_true_are_marked(values, why):
-    gnss = read(change(second(), "GPS", 100, **values)).parts["gnss"]
-    assert whys(gnss) == {"": 199, why: 1}
-    assert gnss.columns["why"][100] == why
 
 
 @pytest.mark.parametrize("week", [1, 2348, 65535])
@@ -260,34 +168,6 @@ def test_a_board_that_was_switched_on_again():
     assert log.clock is not None and log.clock.largest_s < 2e-3
 
 
-def test_text_with_holes_and_commas():
-    log = second()
-    log.messages[0] = ("MSG", (0, "Hello, this is ArduPlane V4.5.0 (abcdef01)"))
-    lines = log.text().decode().split("\n")
-    first = next(i for i, line in enumerate(lines) if line.startswith("IMU,"))
-    imu = [i for i, line in enumerate(lines) if line.startswith("IMU,")][10:16]
-    plain = lines[imu[0]]
-    for at, line in zip(
-        imu,
-        [
-            plain.replace("0.01", "NaN"),
-            plain.replace(",", "", 2),
-            f"{plain}, 1, 2",
-            plain.replace("0.02", "zero"),
-            "XYZ, 1, 2, 3",
-            "something else",
-        ],
-        strict=True,
-    ):
-        lines[at] = line
-    found = dataflash_text.read(Path("x.log"), "\n".join(lines).encode())
-    assert found.vehicle == "ArduPlane V4.5.0 (abcdef01)"
-    assert [int(one.split()[0]) for one in found.lost] == [1, 1, 2]
-    part = found.parts["imu"]
-    assert whys(part) == {"": 394, "no measurement": 2}
-    assert part.counted_in == "line" and part.rows[0] == first + 1
-
-
 def test_a_stamp_that_is_none_is_left_out():
     assert in_order([np.nan, 1.0]).tolist() == [False, True]
 
@@ -310,16 +190,3 @@ def test_leap_seconds_of_2014(shared_data):
     assert [(name, len(part)) for name, part in log.parts.items()] == [
         ("gnss", 1664), ("poses", 3326), ("imu", 16627),
     ]  # fmt: skip
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.lists(st.integers(0, 30), max_size=25))
-def test_no_more_rows_can_be_kept(stamps):
-    kept = in_order(np.array(stamps, float))
-    left = np.array(stamps)[kept]
-    assert (np.diff(left) > 0).all()
-    # The longest increasing subsequence, the slow way.
-    longest: list[int] = []
-    for i, one in enumerate(stamps):
-        longest.append(1 + max((longest[j] for j in range(i) if stamps[j] < one), default=0))
-    assert kept.sum() == max(longest, default=0)

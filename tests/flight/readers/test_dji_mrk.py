@@ -2,11 +2,9 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.flight.readers.tracks import Reader, columns_of, near
-from wildlab.flight.time_scales import week_to_utc
+from tests.flight.readers.tracks import Reader, columns_of
 
 dji_mrk = Reader("dji-mrk")
 
@@ -18,15 +16,6 @@ def row(k: int, **other: object) -> str:
         f"{other.get('latitude', 63.4 + 1e-5 * k):.8f},Lat\t{other.get('longitude', 10.4):.8f},Lon\t"
         f"{100.0 + 0.1 * k:.3f},Ellh\t{sds}\t{other.get('state', 50)},Q\n"
     )
-
-
-def test_values():
-    data = "".join(map(row, range(1, 21))).encode()
-    assert dji_mrk.sniff(data[:8192])
-    columns, k = columns_of(dji_mrk, data, "triggers"), np.arange(1, 21)
-    near(columns, 1e-6, time_s=week_to_utc(2200, 302400 + 2.5 * k))
-    near(columns, number=k, latitude_deg=63.4 + 1e-5 * k, height_ellipsoid_m=100 + 0.1 * k, fix=6, use=1)
-    near(columns, sd_horizontal_m=np.sqrt((0.012**2 + 0.016**2) / 2), sd_vertical_m=0.03)
 
 
 def test_states_placeholders_and_repetition():

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.flight.readers.tracks import Reader, check, columns_of, near
-from wildlab.errors import WildlabError
 
 dji_srt = Reader("dji-srt")
 
@@ -102,19 +101,3 @@ def test_heights_and_gimbal_of_new_aircraft():
     near(gimbal, yaw_world_deg=77.4, pitch_world_deg=-90.0, roll_world_deg=0.5)
     assert "poses" not in log.parts
     assert log.notes == ()
-
-
-def test_names_and_order():
-    misspelt = subtitles(*(new(k, names=("latitude ", "longtitude ")) for k in range(3)))
-    reordered = subtitles(*(re.sub(r"(\[lat.*?\]) (\[lon.*?\])", r"\2 \1", new(k)) for k in range(3)))
-    for text in (misspelt, reordered):
-        near(columns_of(dji_srt, text), longitude_deg=10.4, latitude_deg=63.4 + 1e-5 * np.arange(3))
-    usual = subtitles("GPS (-121.7, -34.5, 17), H -2.50m, H.S 1.00m/s")
-    near(columns_of(dji_srt, usual), latitude_deg=-34.5, height_home_m=-2.5)
-
-
-def test_a_zone_that_is_none_and_a_lost_subtitle():
-    with pytest.raises(WildlabError, match="'Mars'"):
-        dji_srt.read(Path("x"), subtitles(new(1)).encode(), "Mars")
-    log = dji_srt.read(Path("x"), subtitles(new(1), "hello").encode(), "UTC")
-    assert log.lost[0].startswith("1 ")

@@ -51,19 +51,6 @@ def test_equals_gpxpy(name, shared_data):
         assert np.isnan(at) if p.time is None else at == p.time.timestamp()
 
 
-def test_times_with_a_zone_and_without():
-    stamps = ["2026-06-01T10:00:00Z", "2026-06-01T12:00:01.250+02:00", "2026-06-01T10:00:02", "yesterday"]
-    columns = columns_of(gpx, document("".join(point(k, stamp=one) for k, one in enumerate(stamps))))
-    near(columns, 1e-6, time_s=START.timestamp() + np.array([0.0, 1.25, 2.0, np.nan]))
-    assert columns["why"].tolist() == ["", "", "", "no time"]
-
-
-def test_no_times():
-    log = gpx.read(Path("x.gpx"), document("".join(point(k, inside="<ele>3</ele>") for k in range(5))))
-    assert log.parts["gnss"].used.all()
-    assert log.clock is None
-
-
 def test_segments_newest_first():
     late, early = "".join(map(point, range(50, 60))), "".join(map(point, range(10)))
     log = gpx.read(Path("x.gpx"), document(late, early))

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from tests.flight.readers.tracks import Reader
@@ -52,23 +51,6 @@ def values(log: RawLog, name: str) -> list[Any]:
     return list(log.parts["marks"].columns[name])
 
 
-def test_order_comments_and_spreads_of_a_table():
-    data = b"# surveyed\n\nsd_vertical;height_ellipsoid;lon;lat;sd_horizontal_m;name\n"
-    data += b"0.02;40;10.4;63.44;0.01;A\n"
-    log = marks_csv.read(HERE, data)
-    found = [values(log, one)[0] for one in ("name", "latitude_deg", "longitude_deg", "height_ellipsoid_m")]
-    assert found == ["A", 63.44, 10.4, 40.0]
-    assert (values(log, "sd_horizontal_m"), values(log, "sd_vertical_m")) == ([0.01], [0.02])
-    assert log.parts["marks"].rows.tolist() == [4]
-
-
-def test_a_table_of_metres_is_known_to_be_refused_and_others_are_not_taken():
-    for header in ("Punkt;Rechtswert;Hochwert;H", "name;Easting (m);Northing (m);h"):
-        assert marks_csv.sniff(table(POINTS, header, ";"))
-    for header in ("Name;X;Y;Z", "a;b;c;d", "time;easting;northing;name"):
-        assert not marks_csv.sniff(table(POINTS, header, ";"))
-
-
 def test_rows_that_cannot_be_used_stay_and_say_why():
     rows = [("A", 63.0, 10.0, 1.0), ("A", 63.1, 10.0, 1.0), ("C", 0.0, 0.0, 1.0), ("D", 91.0, 0.0, 1.0)]
     data = table(rows, "name,lat,lon,height_sea") + b"E,x,10,1\nF,63,10,\nG,63\n,64,11,5\n"
@@ -84,12 +66,6 @@ def test_rows_that_cannot_be_used_stay_and_say_why():
     ]
     assert values(log, "name")[-1] == "7"
     assert log.lost[0].startswith("1 ")
-
-
-def test_heights_of_kml_count_only_where_they_are_absolute():
-    log = marks_kml.read(HERE, kml(POINTS, "relativeToGround"))
-    assert np.isnan(values(log, "height_sea_m")).all()
-    assert set(values(log, "why")) == {"no height"}
 
 
 def test_other_geometries_are_counted():

@@ -99,17 +99,6 @@ def test_over_midnight_from_any_sentence(without):
         assert columns["use"].all()
 
 
-def test_values():
-    k = np.arange(3)
-    columns = columns_of(nmea, track(datetime(2014, 5, 1, tzinfo=UTC), 3, speed=10.0, course=30.0))
-    near(columns, latitude_deg=63.4 + 1e-6 * k, longitude_deg=10.4 - 2e-6 * k)
-    near(columns, v_north_m_s=10 * KNOT * math.cos(math.pi / 6), v_east_m_s=10 * KNOT * 0.5)
-    near(columns, height_sea_m=12.5, undulation_m=40.1, fix=6, satellites=12)
-    near(columns, sd_horizontal_m=math.sqrt((0.3**2 + 0.4**2) / 2), sd_vertical_m=0.9)
-    south_west = read(burst(datetime(2014, 5, 1, tzinfo=UTC), -33.9, -70.25))
-    near(south_west, latitude_deg=-33.9, longitude_deg=-70.25)
-
-
 def test_no_fix_no_dilution_and_repeated():
     cases = [
         (0, {}, ""),
@@ -153,13 +142,6 @@ def test_talkers():
     near(both, latitude_deg=63.4)
     plotter = burst(start, 63.5, 10.4, talker="II") + burst(start, 63.4, 10.4, talker="SD", without=("RMC",))
     near(read(plotter), latitude_deg=63.5)
-
-
-def test_no_date():
-    log = nmea.read(Path("x"), track(datetime(2020, 1, 1, 23, 59, 59, tzinfo=UTC), 10, without=("RMC",)))
-    columns = log.parts["gnss"].columns
-    near(columns, 1e-6, time_s=np.nan, time_log_s=86399 + 0.2 * np.arange(10))
-    assert log.clock is None
 
 
 def test_prefixes_comments_unknown_and_checksums():

@@ -59,15 +59,6 @@ def test_what_a_dji_says(tmp_path):
     assert column(log, "camera") == ["DJI FC6310"] * 3
 
 
-def test_local_time_without_a_zone_costs_no_place(tmp_path):
-    row = photo(tmp_path, **made.dji(1))
-    assert np.isnan(row["time_s"]) and row["use"] == 1
-    assert read_photos(tmp_path).clock.base == "local time without a zone"
-    assert photo(tmp_path, "Europe/Oslo", **made.dji(1))["time_s"] == NOON + 1 - 7200
-    with pytest.raises(WildlabError, match="is not a time zone"):
-        read_photos(tmp_path, "Middle/Earth")
-
-
 def test_rtk_has_its_height_above_the_ellipsoid_its_spread_and_fix(tmp_path):
     rtk = {"RtkFlag": 50, "RtkStdLat": 0.03, "RtkStdLon": 0.04, "RtkStdHgt": 0.05}
     more = {"GpsLatitude": "61.123456789", "GpsLongtitude": "-15.987654321"}
@@ -93,21 +84,6 @@ def test_hemispheres_and_sides_of_heights(latitude, longitude, side):
     heights = dict(zip(("ellipsoid", "sea", "home"), values.heights_of(tags), strict=True))
     assert heights[side[2]] == 12.5 * side[1]
     assert sum(map(math.isfinite, heights.values())) == 1
-
-
-@pytest.mark.parametrize(
-    ("gps", "why"),
-    [
-        (made.gps_of(0.0, 0.0, 10.0), "placeholder of a position"),
-        (made.gps_of(61.0, 15.0), "no height"),
-        (made.gps_of(61.0, 15.0, 10.0) | {9: "V"}, "no fix"),
-        (made.gps_of(61.0, 15.0, 10.0) | {2: (200.0, 0.0, 0.0)}, "position without its hemisphere, or none"),
-        ({}, "no position"),
-    ],
-)
-def test_places_that_cannot_be_used(tmp_path, gps, why):
-    row = photo(tmp_path, exif=made.exif_of({0x010F: "Some"}, gps=gps))
-    assert (row["why"], row["use"]) == (why, 0.0)
 
 
 def test_zones_and_parts_of_seconds(tmp_path):
@@ -179,14 +155,6 @@ def test_the_makers_calibration_goes_before_its_design(tmp_path, more):
     near(row, focal_px=math.sqrt(3678.87 * 3671.84))
 
 
-def test_images_that_lost_rtk_are_told(tmp_path):
-    for number, flag in enumerate((50, 50, 0)):
-        made.write(tmp_path, f"{number}.jpg", **made.dji(number, RtkFlag=flag))
-    log = read_photos(tmp_path)
-    assert np.isnan(column(log, "height_ellipsoid_m")).tolist() == [False, False, True]
-    assert np.isnan(column(log, "height_sea_m")).tolist() == [True, True, False]
-
-
 def test_focal_length_by_the_equivalent_over_the_diagonal(tmp_path):
     exif = made.exif_of(own={0x920A: 9.1, 0xA405: 40})
     for name in ("DJI_1_T.JPG", "DJI_2_T.JPG"):
@@ -195,11 +163,6 @@ def test_focal_length_by_the_equivalent_over_the_diagonal(tmp_path):
     # 9.1 mm with pixels of 12 um, which no tag says.
     assert camera["focal_px"] == pytest.approx(9.1 / 0.012, rel=0.01)
     assert "rounded to within 1 %" in camera["how"]
-
-
-def test_pixel_pitch_is_never_guessed(tmp_path):
-    made.write(tmp_path, "a.jpg", exif=made.exif_of({0x010F: "DJI", 0x0110: "XT2"}, {0x920A: 13.0}))
-    assert camera_of(read_photos(tmp_path)) is None
 
 
 @pytest.mark.parametrize(
@@ -229,30 +192,12 @@ def test_a_zoom_and_two_sizes_are_no_one_camera(tmp_path, sizes, film, problem):
         camera_of(read_photos(tmp_path))
 
 
-def test_cameras_beside_each_other_are_told_apart_by_their_names(tmp_path):
-    for ending in "TWZV":
-        made.write(tmp_path, f"DJI_20240612_0001_{ending}.JPG", **made.dji(1))
-    made.write(tmp_path, "x.JPG", **made.dji(1, ImageSource="InfraredCamera"))
-    names = column(read_photos(tmp_path), "camera")
-    assert [name.rpartition(", ")[2] for name in names] == ["thermal", "visual", "wide", "zoom", "thermal"]
-
-
 def test_tags_in_png_and_tiff(tmp_path):
     exif = made.exif_of({0x010F: "Cam"}, {0x9003: "2024:06:12 11:30:05"}, made.gps_of(-12.25, 34.5, 56.0))
     Image.new("L", (12, 8)).save(tmp_path / "a.png", exif=exif)
     (tmp_path / "b.tif").write_bytes(made.tiff(exif))
     columns = read_photos(tmp_path).parts["photos"].columns
     near(columns, latitude_deg=[-12.25] * 2, time_log_s=NOON + 5, height_sea_m=56.0)
-
-
-def test_no_image(tmp_path):
-    (tmp_path / "a.txt").write_text("x", encoding="utf-8")
-    assert not is_photos(tmp_path)
-    assert not is_photos(tmp_path / "none")
-    with pytest.raises(WildlabError, match="no images"):
-        read_photos(tmp_path)
-    with pytest.raises(WildlabError, match="no such folder"):
-        read_photos(tmp_path / "none")
 
 
 # -- images of real cameras
@@ -290,22 +235,6 @@ def test_a_claim_of_ten_gigabytes_is_not_believed(tmp_path):
     (tmp_path / "e.jpg").write_bytes(b"")
     log = read_photos(tmp_path)
     assert column(log, "use") == [0.0] * 5
-
-
-def test_a_file_larger_than_any_image_is_not_read(tmp_path):
-    made.write(tmp_path, "a.jpg", **made.dji(1))
-    with (tmp_path / "a.jpg").open("ab") as stream:
-        stream.truncate(20 << 30)  # a hole
-    assert column(read_photos(tmp_path), "use") == [0.0]
-
-
-def test_names_stay_names(tmp_path):
-    names = ["<img src=x onerror=alert(1)>.jpg", "=cmd|'x'!A1.jpg", "a\udcff.jpg"]
-    for name in names:
-        made.write(tmp_path, name, exif=made.exif_of({0x010F: "<b>\x1b[31mMake", 0x0110: "=1+1"}))
-    log = read_photos(tmp_path)
-    assert set(column(log, "file")) == {*names[:2], "a\\udcff.jpg"}
-    assert all(name.isprintable() for name in column(log, "camera"))
 
 
 def test_cut_and_spoilt_images_end_in_no_traceback(tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.flight.readers.tracks import Reader, check, columns_of, near
+from tests.flight.readers.tracks import Reader, check, near
 from wildlab.errors import WildlabError
 
 rtklib_pos = Reader("rtklib-pos")
@@ -93,19 +93,6 @@ def test_equals_pandas(shared_data):
     assert (columns["fix"] == 6.0).sum() == (table[5] == 1).sum()
 
 
-def test_geodetic_heights_velocities_and_quality():
-    data = document(
-        *("UTC", [calendar(at, 0.0) for at in UTC_S], llh()),
-        rest="Q ns sdn(m) sde(m) sdu(m) vn(m/s) ve(m/s) vu(m/s)",
-        **{"vertical": "geodetic", "tail": "1 1 1 3.0 -4.0 0.5", "quality": [*range(8)] * 5},
-    )
-    columns = columns_of(rtklib_pos, data)
-    near(columns, 1e-4, height_sea_m=HEIGHT, v_north_m_s=3, v_east_m_s=-4, v_down_m_s=-0.5)
-    assert "height_ellipsoid_m" not in columns
-    assert columns["fix"][:8].tolist() == [0.0, 6.0, 5.0, 4.0, 4.0, 3.0, 8.0, 1.0]
-    assert columns["why"][:8].tolist() == ["no fix", *[""] * 6, "estimated, not measured"]
-
-
 @pytest.mark.parametrize(
     ("scale", "names"),
     [("GPST", "x-ecef(m) y-ecef(m) z-ecef(m)"), ("JST", LLH), ("GPST", LLH.replace("deg", "d'\"")),
@@ -114,23 +101,3 @@ def test_geodetic_heights_velocities_and_quality():
 def test_other_solutions_are_refused_with_what_to_set(scale, names):
     with pytest.raises(WildlabError, match="out-solformat = llh"):
         rtklib_pos.read(Path("x.pos"), document(scale, GPST, llh(), names=names).encode())
-
-
-def test_reordered_and_missing_columns():
-    text = "% GPST height(m) longitude(deg) latitude(deg)\n"
-    text += "".join(
-        f"{t} {h:.4f} {b:.9f} {a:.9f}\n" for t, a, b, h in zip(GPST, LATITUDE, LONGITUDE, HEIGHT, strict=True)
-    )
-    columns = columns_of(rtklib_pos, text)
-    near(columns, 1e-09, latitude_deg=LATITUDE)
-    near(columns, 0.0001, height_ellipsoid_m=HEIGHT)
-    assert "fix" not in columns
-    assert "sd_horizontal_m" not in columns
-
-
-def test_lost_lines_and_wide_headers():
-    text = document("GPST", GPST, llh()).replace(GPST[3], "2025/13/45 99:00:00")
-    text = text.replace("ratio", "ratio " + "x " * 10000)
-    log = rtklib_pos.read(Path("x"), text.encode("utf-8-sig"))
-    assert log.lost[0].startswith("1 ")
-    assert len(log.parts["gnss"]) == COUNT - 1

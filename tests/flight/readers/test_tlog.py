@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 
-from tests.flight.readers.mavlink_logs import BOOT_S, ORIGIN, START_S, frame, joined, made, telemetry
+from tests.flight.readers.mavlink_logs import BOOT_S, START_S, frame, joined, made, telemetry
 from tests.flight.readers.tracks import Reader, check, near
-from wildlab.errors import WildlabError
 from wildlab.flight.readers.formats import recognise
 from wildlab.flight.readers.tlog import messages, walk
 
@@ -75,18 +74,6 @@ def test_sample(shared_data):
     assert np.median(log.parts["imu"].columns["f_z_m_s2"]) == pytest.approx(-9.8, abs=2.0)
 
 
-@pytest.mark.parametrize("version_1", [False, True])
-def test_straight_flight(version_1):
-    poses = read(joined(telemetry(version_1=version_1))).parts["poses"]
-    # Before the first place there is none.
-    assert poses.used.sum() == len(poses) - 1
-    columns = {name: values[poses.used] for name, values in poses.columns.items()}
-    at = columns["time_log_s"] - BOOT_S
-    near(columns, 0.01, time_s=START_S + at)
-    assert np.allclose((columns["latitude_deg"] - ORIGIN[0]) * 111_412, 10 * at, atol=0.02)
-    near(columns, 1e-5, height_sea_m=150, height_home_m=50, roll_deg=np.degrees(0.1), v_north_m_s=10)
-
-
 def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts():
     told = []
     for row in range(30):
@@ -108,74 +95,6 @@ def test_restart_has_a_clock_of_its_own():
     near(after, 0.02, time_s=START_S + 100 + after["time_log_s"] - 5.0)
     # No place is made up between the two.
     assert poses.used.sum() == 398
-
-
-def test_busiest_vehicle_is_read_and_the_others_are_named():
-    station = [(START_S, frame(made("HEARTBEAT", type=6, autopilot=8), START_S, 255, 190))]
-    log = read(joined(telemetry(50, system=3), telemetry(80, system=7), station))
-    assert len(log.parts["poses"]) == 80
-
-
-USUAL = {
-    **{"lat": round(ORIGIN[0] * 1e7), "lon": round(ORIGIN[1] * 1e7), "alt": 100_000, "fix_type": 3},
-    **{"eph": 80, "vel": 500, "cog": 9000, "satellites_visible": 12},
-}
-
-
-def gnss(only: int | None = None, **fields: Any) -> Any:
-    """Twenty fixes, all of them or `only` one with other fields: numbers, or functions of the row."""
-    rows = []
-    for row in range(20):
-        at = START_S + row * 0.2 + 0.01
-        given = USUAL | {"lat": USUAL["lat"] + row, "time_usec": round((BOOT_S + row * 0.2) * 1e6)}
-        if only in (None, row):
-            given |= {name: value(row) if callable(value) else value for name, value in fields.items()}
-        rows.append((at, frame(made("GPS_RAW_INT", **given), at)))
-    return read(joined(telemetry(40, jitter_s=0.0), rows)).parts["gnss"]
-
-
-def test_gnss_values():
-    part = gnss(h_acc=900, v_acc=1500, vel_acc=200, alt_ellipsoid=141_000)
-    assert part.used.all()
-    near(part.columns, v_north_m_s=0, v_east_m_s=5, height_sea_m=100, height_ellipsoid_m=141, hdop=0.8)
-    near(part.columns, sd_horizontal_m=0.9, sd_vertical_m=1.5, sd_velocity_m_s=0.2)
-    near(part.columns, 1e-3, time_s=START_S + np.arange(20) * 0.2)
-
-
-@pytest.mark.parametrize(
-    ("fields", "reason"),
-    [
-        ({"fix_type": 2}, "a fix without height"),
-        ({"time_usec": round(5 * BOOT_S * 1e6)}, "a stamp that its receipt contradicts"),
-    ],
-)
-def test_gnss_rows_that_cannot_be_true(fields, reason):
-    part = gnss(7, **fields)
-    assert part.columns["why"][7] == reason
-    assert part.used.sum() == 19
-
-
-def test_gnss_stamps_in_utc_and_none_that_is_known():
-    stamps = START_S + np.arange(20) * 0.2
-    part = gnss(time_usec=lambda row: round((START_S + 0.2 * row + 40) * 1e6))
-    near(part.columns, 1e-5, time_s=stamps + 40)
-    part = gnss(time_usec=0)
-    assert part.used.all()
-    near(part.columns, 1e-5, time_s=stamps + 0.01, time_log_s=np.nan)
-
-
-def test_what_is_not_known_is_no_number():
-    columns = gnss(eph=65535, vel=65535, satellites_visible=255).columns
-    assert not {"hdop", "v_north_m_s", "satellites", "sd_horizontal_m", "height_ellipsoid_m"} & set(columns)
-    # One number for both heights is of one of them.
-    assert "height_ellipsoid_m" not in gnss(alt_ellipsoid=100_000).columns
-
-
-@pytest.mark.parametrize("text", [b"", b"ArduPlane V4.1.2 (\x1b[2J)"], ids=["heartbeat", "its own words"])
-def test_vehicle_by_its_own_words_or_its_heartbeat(text):
-    said = [(START_S, frame(made("STATUSTEXT", text=text), START_S))] if text else []
-    named = repr(text.decode()) if text else "ardupilotmega (fixed wing)"
-    assert read(joined(telemetry(20), said)).vehicle == named
 
 
 def test_fields_that_old_senders_leave_away_and_new_ones_append():
@@ -206,30 +125,6 @@ def test_signed_frames_and_unknown_messages_are_passed():
     assert frames.unknown == {3_000_000: 1}
     assert frames.table["number"].tolist() == [1, 3]
     assert read(joined(telemetry(20)) + bytes(unknown) + plain).lost
-
-
-@pytest.mark.parametrize("data", [b"", b"\x00" * 500, b"\xfe" * 500, b"$GPGGA,1\n" * 100])
-def test_what_is_no_log_is_refused(data):
-    assert not tlog.sniff(data[:8192])
-    with pytest.raises(WildlabError, match="no sound"):
-        read(data)
-
-
-def test_a_station_alone_is_no_vehicle():
-    beat = frame(made("HEARTBEAT", type=6, autopilot=8), START_S, 255)
-    with pytest.raises(WildlabError, match="holds 5 messages"):
-        read(beat * 5)
-    assert tlog.sniff(beat)
-
-
-def test_losses_are_counted():
-    sent = telemetry(50)
-    data = joined(sent)
-    spoilt = bytearray(data)
-    spoilt[len(sent[0][1]) + 8 + 10 + 5] ^= 1  # within the payload of the second frame
-    # A wrong checksum, and an end within a frame.
-    assert [one.startswith("1 frame ") for one in read(bytes(spoilt[:-5])).lost] == [True, False]
-    assert len(read(data[:2000] + b"garbage" * 10 + data[2000:]).lost) > 0
 
 
 def test_clocks_without_end_take_no_time():
@@ -280,11 +175,6 @@ def test_camera_feedback():
     assert part.used.all()
     near(part.columns, 1e-5, number=k, time_s=START_S + k * 0.2)
     near(part.columns, latitude_deg=np.where(k, 63.4, np.nan), height_home_m=np.where(k, 20, np.nan))
-
-
-def test_camera_trigger_since_start():
-    log = with_messages(lambda row, ms: made("CAMERA_TRIGGER", time_usec=ms * 1000, seq=row))
-    near(log.parts["triggers"].columns, 2e-3, time_s=START_S + np.arange(50) * 0.2)
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,13 @@
 
 import io
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
 from pyubx2 import GET, UBXMessage, UBXReader
 
 from tests.flight.readers.tracks import Reader, check, columns_of, near
-from wildlab.flight.readers.receivers import LAYOUTS, frames
+from wildlab.flight.readers.receivers import frames
 
 ubx = Reader("ubx")
 
@@ -97,30 +96,6 @@ CASES = [
 ]
 
 
-def test_layouts_are_as_long_as_they_are_said_to_be():
-    """Each layout ends where pyubx2's does, or before."""
-    for kind, layout in LAYOUTS.items():
-        one = UBXMessage(bytes([kind[0]]), bytes([kind[1]]), GET, iTOW=1)
-        assert np.dtype(layout).itemsize <= one.length
-
-
-def test_kinds_of_fix_and_what_is_no_fix():
-    columns = columns_of(ubx, b"".join(pvt(k, **case) for k, (case, _, _) in enumerate(CASES)))
-    assert columns["fix"].tolist() == [fix for _, fix, _ in CASES]
-    assert columns["why"].tolist() == [why for _, _, why in CASES]
-
-
-def test_values_and_time_between_text_nmea_and_noise():
-    noise = [b"# a log\r\n", b"$GPGGA,1*00\r\n", b"\xb5\x62", b"\xb5\x62\x01\x07\xff\xff", b"\xd3\x00\x13"]
-    log = ubx.read(Path("x"), b"".join(noise[k % 5] + pvt(k, nano=-5000) for k in range(10)))
-    stream, k = log.parts["gnss"], np.arange(10)
-    near(stream.columns, 5e-7, time_s=UTC_S + k - 5e-6)
-    near(stream.columns, longitude_deg=10.4 + 1e-6 * k, undulation_m=40.1)
-    assert stream.rows.tolist() == list(range(1, 11))
-    assert log.lost[0].startswith("2 messages")
-    assert log.clock.rate == pytest.approx(1.0, abs=1e-7)
-
-
 @pytest.mark.parametrize("left_out", [(), ("NAV-SOL",), ("NAV-TIMEGPS",), ("NAV-VELNED", "NAV-DOP")])
 def test_old_receivers(left_out):
     k = np.arange(8)
@@ -132,13 +107,6 @@ def test_old_receivers(left_out):
         near(columns, v_east_m_s=-2.0)
     assert ("fix" in columns) == ("NAV-SOL" not in left_out)
     assert columns["use"].all()
-
-
-def test_old_receivers_without_a_week_or_a_fix():
-    columns = columns_of(ubx, b"".join(old(k, "NAV-SOL", "NAV-TIMEGPS") for k in range(8)))
-    assert np.isnan(columns["time_s"]).all()
-    columns = columns_of(ubx, b"".join(old(k, gpsFix=3 * (k > 2), gpsfixOK=int(k > 3)) for k in range(8)))
-    assert columns["why"].tolist() == [*["no fix"] * 4, *[""] * 4]
 
 
 def test_more_digits():

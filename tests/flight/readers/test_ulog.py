@@ -34,11 +34,6 @@ OLD_GPS = (
     "float s_variance_m_s;float eph;float epv;float hdop;float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;"
     "int32_t timestamp_time_relative;uint8_t fix_type;bool vel_ned_valid;uint8_t satellites_used;"
 )
-LOCAL = (
-    "uint64_t timestamp;double ref_lat;double ref_lon;float x;float y;float z;float vx;float vy;float vz;"
-    "float ref_alt;float eph;float epv;float heading_var;float tilt_var;bool xy_global;"
-)
-COMBINED = "uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;uint8_t clipping;"
 
 
 def us(row: int, step_s: float = 0.1) -> int:
@@ -140,15 +135,6 @@ def test_poses():
     near(columns, 1e-7, sd_horizontal_m=0.5, sd_vertical_m=0.7)
 
 
-def test_spreads_of_the_attitude_are_those_of_the_local_filter():
-    rows = [
-        (us(k), LAT, LON, 1.0 * k, 0.0, -5.0, 10.0, 0.0, 0.0, 100.0, 0.3, 0.4, 0.01, 0.0002, True)
-        for k in range(50)
-    ]
-    columns = used(read(ulog(flight(vehicle_local_position=(LOCAL, rows)))), "poses")
-    near(columns, 1e-4, sd_heading_deg=np.degrees(0.1), sd_tilt_deg=np.degrees(0.01))
-
-
 def test_old_names_and_integers():
     rows = []
     for k in range(25):
@@ -167,34 +153,6 @@ def test_old_names_and_integers():
 def test_values_that_are_not_valid_or_not_known_are_none():
     assert "v_north_m_s" not in part_of("gnss", vehicle_gps_position=new_gps(valid=False)).columns
     assert "height_ellipsoid_m" not in part_of("gnss", vehicle_gps_position=new_gps(ellipsoid=0.0)).columns
-
-
-def test_without_utc_there_is_the_time_since_start():
-    topics = flight()
-    del topics["vehicle_gps_position"]
-    log = read(ulog(topics))
-    assert log.clock.base == ""
-    assert np.isnan(log.parts["poses"].columns["time_s"]).all()
-    assert log.parts["poses"].used.sum() == 49
-
-
-def test_first_instance_is_read():
-    form, rows = new_gps()
-    wrong = [(row[0], 1.0, *row[2:]) for row in rows]
-    del (topics := flight())["vehicle_gps_position"]
-    log = read(ulog({"sensor_gps#1": (form, wrong), "sensor_gps#0": (form, rows), **topics}))
-    near(log.parts["gnss"].columns, 1e-5, latitude_deg=LAT)
-
-
-def test_inertial_sensor_and_magnetometers():
-    rows = [(us(k, 0.01), 0.1, 0.2, 0.3, 0.0, 0.0, np.nan if k == 9 else -9.8, 0) for k in range(400)]
-    field = ("uint64_t timestamp;float x;float y;float z;", [(us(k), 0.1, 0.2, 0.4) for k in range(40)])
-    log = read(ulog(flight(sensor_combined=(COMBINED, rows), sensor_mag=field)))
-    imu = log.parts["imu"]
-    assert imu.columns["why"][9] == "no measurement"
-    assert imu.used.sum() == 399
-    near(imu.columns, 1e-7, w_z_rad_s=0.3)
-    near(log.parts["magnetometer"].columns, 1e-5, field_z_ut=40)
 
 
 def test_triggers():
@@ -225,43 +183,6 @@ def test_gimbal(flags, yaw):
     near(part.columns, 1e-3, pitch_world_deg=-45, yaw_world_deg=yaw)
 
 
-def test_fields_in_another_order_extra_and_missing():
-    form = "bool strange;float[4] q;uint64_t timestamp;uint8_t[3] more;"
-    rows = [(us(k), True) for k in range(50)]
-    body = [(True, 1.0, 0.0, 0.0, 0.0, stamp, 1, 2, 3) for stamp, _ in rows]
-    other = ("uint64_t timestamp;float new;", [(us(1), 2.0)])
-    log = read(ulog(flight(vehicle_attitude=(form, body), vehicle_air_data=other)))
-    assert log.parts["poses"].used.sum() == 50
-    near(log.parts["poses"].columns, roll_deg=0)
-    # Without the fields that a part is made of, there is no such part.
-    bare = ("uint64_t timestamp;float else;", [(us(k), 0.0) for k in range(50)])
-    log = read(ulog(flight(vehicle_attitude=bare, sensor_combined=bare, vehicle_magnetometer=bare)))
-    assert set(log.parts) == {"gnss"}
-    log = read(ulog({"vehicle_attitude": attitude()}))
-    assert not log.parts["poses"].used.any()
-
-
-def test_padding_may_be_left_away():
-    form, rows = place()
-    whole = ulog(flight(vehicle_global_position=(form, rows)))
-    shorter = ulog(flight())
-    for row in rows:
-        packed = struct.pack("<Qddfff", *row[:6])
-        shorter = shorter.replace(
-            struct.pack("<HB", len(packed) + 6, ord("D")) + b"\x01\x00" + packed + bytes(4),
-            struct.pack("<HB", len(packed) + 2, ord("D")) + b"\x01\x00" + packed,
-        )
-    assert len(shorter) == len(whole) - 4 * len(rows)
-    log = read(shorter)
-    assert log.lost == ()
-    assert log.parts["poses"].used.sum() == 49
-
-
-def test_dropouts_are_counted():
-    log = read(ulog(flight(), after=message("O", struct.pack("<H", 250)) * 3))
-    assert any("3 times" in one and "0.750 s" in one for one in log.notes)
-
-
 def test_appended_data_is_read():
     plain = ulog(flight())
     broken = plain + message("D", bytes(60))[:30]
@@ -288,12 +209,6 @@ def test_what_cannot_be_read_is_refused(data, words):
         read(data)
 
 
-def test_rows_of_a_topic_that_lost_its_introduction_are_left_out():
-    data = bytearray(ulog(flight()))
-    data[data.index(b"vehicle_attitude", data.index(b"A\x00\x00\x00"))] ^= 1
-    assert "poses" not in read(bytes(data)).parts
-
-
 def claims(form: str, before: bytes = b"") -> Any:
     topics, name = flight(), b"vehicle_attitude"
     del topics["vehicle_attitude"]
@@ -310,25 +225,6 @@ def test_many_definitions_take_little_time_and_memory():
     assert "poses" not in claims("uint64_t timestamp;n0 q;", before=b"".join(nested)).parts
     assert "gnss" in read(ulog(flight(), before=wide + b"".join(many))).parts
     assert time.monotonic() - began < 7.0
-
-
-@pytest.mark.parametrize(
-    "form",
-    [
-        "uint64_t timestamp;uint8_t[99999] q;",
-        "uint64_t timestamp;uint8_t[65535] q;",
-        "uint64_t timestamp;vehicle_attitude again;",
-        "uint64_t timestamp;absent q;",
-        "float[4] q;",
-        "uint64_t timestamp;float q;float q;",
-        "uint64_t timestamp;float[4q;",
-        "",
-    ],
-)
-def test_absurd_definitions_are_left_out_and_said(form):
-    log = claims(form)
-    assert "poses" not in log.parts and "gnss" in log.parts
-    assert any("'vehicle_attitude'" in one for one in log.lost)
 
 
 def test_one_wrong_length_costs_one_message():

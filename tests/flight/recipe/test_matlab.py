@@ -68,13 +68,6 @@ def _sources(mat: Any) -> list[dict[str, Any]]:
     return list(tomllib.loads((mat.into / "flight.toml").read_text())["sources"])
 
 
-def test_numbers_as_names(mat):
-    mat.set("frames.id", "one")
-    mat.replace("clicks.csv", "A,", "1,")
-    mat.replace("clicks.csv", "C,", "3,")
-    assert list(mat.run().table("frames")["frame_id"]) == ["1", "2", "3"]
-
-
 def test_a_matrix_with_labels_and_a_struct(mat):
     labelled = table(mat, matrix="POS", labels="POS_label")
     assert list(labelled) == ["lon", "height", "n"]
@@ -85,75 +78,9 @@ def test_a_matrix_with_labels_and_a_struct(mat):
     np.testing.assert_array_equal(nav["t"] - nav["t"][0], np.arange(5))
 
 
-@pytest.mark.parametrize(
-    ("dotted", "value", "said"),
-    [
-        ("fields", ["photo", "whem"], "whem"),
-        ("struct", "log.naw", "no 'naw'"),
-        ("struct", "POS.x", "not a struct"),
-        ("file", "../log.mat", "leaves its folder"),
-        ("labels", "POS_label", "made of fields"),
-    ],
-)
-def test_what_a_recipe_gets_wrong(mat, dotted, value, said):
-    mat.set(f"tables.photos.{dotted}", value)
-    with pytest.raises(WildlabError, match=said):
-        mat.run()
-    assert not mat.into.exists()
-
-
 def table(mat: Any, **block: Any) -> dict[str, Any]:
     variables = read_matlab(HERE, (mat.folder / "raw" / "log.mat").read_bytes())
     return dict(table_of(variables, MatlabTable(file="log.mat", **block), HERE, "tables.x"))
-
-
-@pytest.mark.parametrize(
-    ("block", "said"),
-    [
-        ({"struct": "log.nav", "fields": ("t", "odd")}, "'t' has 5"),
-        ({"struct": "log.nav", "fields": ("q",)}, "5 x 4"),
-        ({"struct": "log", "fields": ("nav",)}, "of object"),
-        ({"matrix": "POS", "columns": ("a", "b")}, "2 names"),
-    ],
-)
-def test_what_is_no_table(mat, block, said):
-    with pytest.raises(WildlabError, match=said):
-        table(mat, **block)
-
-
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        (b"\x89HDF\r\n\x1a\n" + bytes(600), r"version 7\.3"),
-        (b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n" + bytes(600), r"version 7\.3"),
-        (b"", "not a MATLAB"),
-        (b"time,lat\n1,2\n", "not a MATLAB"),
-        (b"MATLAB 5.0", "not a MATLAB"),
-        (bytes(200), "not a MATLAB"),
-    ],
-)
-def test_other_files_are_told(data, words):
-    with pytest.raises(WildlabError, match=words):
-        read_matlab(HERE, data)
-
-
-@pytest.mark.parametrize(
-    ("photo", "when", "words"),
-    [
-        (_cells("A", "B", "C"), [1.0, np.nan, 3.0], "row 2"),
-        # What is not numbers or text is an error, whatever it is: nothing of a file is ever called.
-        (
-            np.array([(1, "disp('x')")], dtype=[("a", object), ("b", object)]),
-            np.arange(3.0),
-            "one row of real",
-        ),
-    ],
-)
-def test_cells_that_are_no_values_are_refused(mat, photo, when, words):
-    path = mat.folder / "raw" / "log.mat"
-    scipy.io.savemat(path, {"photo": photo, "when": when, "one": [1, 2, 3]})
-    with pytest.raises(WildlabError, match=words):
-        mat.run()
 
 
 def _header() -> bytes:

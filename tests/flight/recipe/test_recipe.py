@@ -3,21 +3,18 @@
 import math
 import re
 import tomllib
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 import rasterio
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rasterio.transform import Affine
 from scipy.spatial.transform import Rotation
 
 from tests.flight.recipe.comparing import near
-from wildlab import cli
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checksums import accept_changes
@@ -25,9 +22,8 @@ from wildlab.flight.clocks import covariances
 from wildlab.flight.recipe.quantities import Attitude
 from wildlab.flight.recipe.tables import _rotation
 from wildlab.flight.store import Flight, load_flight
-from wildlab.flight.time_scales import find_zone
 from wildlab.flight.units import UNITS, factor
-from wildlab.geometry.frames import geodetic_to_ned, matrix_to_euler, quaternion_to_matrix
+from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.runner.track import track_many
 
 ORIGIN = "latitude_deg = 63.44\nlongitude_deg = 10.4\nheight_m = 40.0"
@@ -47,20 +43,6 @@ def again(raw: Any, dotted: str, value: Any) -> Flight:
     raw.folder.mkdir()
     raw.set(dotted, value)
     return raw.run()
-
-
-def test_the_plain_case(raw):
-    flight = raw.run()
-    latitude = np.radians(63.44 + 1e-4 * np.arange(5))
-    origin = (math.radians(63.44), math.radians(10.4), 140.0)  # the first pose, since the recipe names none
-    near(_position(flight), geodetic_to_ned(latitude, math.radians(10.4), 140.0, origin))
-    detections, truth = flight.table("detections"), flight.table("truth")
-    assert list(detections["detection_id"]) == ["0", "1", "2"]
-    assert list(detections["target_id"]) == ["boat", "", "buoy"]
-    near(detections["plane_down_m"], 100.0, atol=1e-3)
-    assert list(truth["target_id"]) == ["buoy", "boat", "boat"]
-    near(truth, [[np.nan, 0.02], [0.0, np.nan], [4.0, np.nan]], "time_s", "sd_horizontal_m")
-    assert flight.manifest.locations.sensitivity == "withheld"
 
 
 def test_decimal_commas_are_stated(raw):
@@ -217,15 +199,6 @@ def test_bearings_from_the_bow_have_the_yaw_added(raw):
     assert azimuth.iloc[0] == pytest.approx(10.0, abs=0.2)
 
 
-def test_a_bow_whose_heading_is_not_known_is_refused(raw):
-    _head_up(raw, [0, 0, 0], [1.0, 2.0, 3.0])
-    with pytest.raises(WildlabError, match="counts from the bow"):
-        raw.run()
-    raw.set("detections.0.frame", None)
-    with pytest.raises(WildlabError, match="says when they"):
-        raw.run()
-
-
 def test_groups_by_edges(raw):
     raw.tables["photos.csv"] = "photo,time,h\n" + "".join(
         f"{name},2024-06-12T09:30:0{at}Z,{h}\n" for name, at, h in (("A", 1, 10), ("B", 2, 30), ("C", 3, 52))
@@ -307,14 +280,6 @@ def test_ways_to_write_one_time(raw, stamp, zone, cell):
     assert raw.run().table("frames")["time_s"].iloc[0] == pytest.approx(5.25, abs=1e-6)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.integers(-14 * 60, 14 * 60))
-def test_fixed_offsets(minutes):
-    sign, size = "-" if minutes < 0 else "+", abs(minutes)
-    zone = find_zone(f"{sign}{size // 60:02d}:{size % 60:02d}")
-    assert datetime(2024, 1, 1, tzinfo=UTC).astimezone(zone).utcoffset() == timedelta(minutes=minutes)
-
-
 @pytest.mark.parametrize(
     ("unit", "dimension", "found"),
     [
@@ -328,13 +293,6 @@ def test_units_against_their_definitions(unit, dimension, found):
     assert factor(unit, dimension) == pytest.approx(found, rel=1e-12)
 
 
-def test_a_mark_at_the_start_and_blanks_do_no_harm(raw):
-    raw.tables["buoy.csv"] = "\ufeffid, lat , lon,height,sd\r\n buoy , 63.44,10.401,40,\r\n\r\n"
-    truth = raw.run().table("truth")
-    assert truth["target_id"].iloc[0] == "buoy"
-    assert pd.isna(truth["sd_horizontal_m"].iloc[0])
-
-
 def write_map(path: Path, height: float) -> Path:
     """Level ground about the flight of `raw`, heights above the geoid."""
     path.parent.mkdir(exist_ok=True)
@@ -343,13 +301,6 @@ def write_map(path: Path, height: float) -> Path:
     with rasterio.open(path, "w", driver="GTiff", **given) as data:
         data.write(np.full((200, 200), height, np.float32), 1)
     return path
-
-
-def call(capsys: Any, *arguments: Any) -> tuple[Any, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        cli.main([str(one) for one in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
 
 
 def test_a_recipe_may_name_a_map(raw):
@@ -371,36 +322,3 @@ def test_a_recipe_may_name_a_map(raw):
     with pytest.raises(WildlabError, match="SHA-256"):
         load_flight(raw.into)
     assert accept_changes(raw.into) == ["terrain.tif"]
-
-
-@pytest.mark.parametrize(
-    ("part", "words"),
-    [
-        ({"file": "../dem.tif", "heights": 0.0}, "leaves the folder"),
-        ({"file": "dem.tif"}, "heights count from"),
-        ({"file": "dem.tif", "heights": "geoid"}, r"terrain\.heights"),
-    ],
-)
-def test_what_is_wrong_with_it_is_said(raw, part, words):
-    write_map(raw.folder / "raw" / "dem.tif", 1.5)
-    raw.set("terrain", part)
-    with pytest.raises(WildlabError, match=words):
-        raw.run()
-    assert not raw.into.exists()
-
-
-def test_the_option_takes_the_place_of_the_recipe(raw, capsys):
-    write_map(raw.folder / "raw" / "dem.tif", 1.5)
-    raw.set("terrain", {"file": "dem.tif", "heights": 39.5})
-    other = write_map(raw.folder / "other.tif", 3.0)
-    command = ("import", raw.write(), "--source", raw.folder / "raw", "--out", raw.into)
-    code, _, err = call(capsys, *command, "--terrain-heights", "0")
-    assert code == 2 and "--terrain-heights" in err
-    code, _, err = call(capsys, *command, "--terrain", other, "--terrain-heights", "ellipsoid")
-    assert code == 0, err
-    flight = load_flight(raw.into)
-    assert flight.manifest.terrain.source == "other.tif"
-    assert flight.terrain.heights_at([[0.0, 0.0]])[0] == pytest.approx(3.0 - 140.0, abs=1e-3)
-    # The file in the folder names no place: its coordinates are metres from the origin.
-    with rasterio.open(raw.into / "terrain.tif") as data:
-        assert data.crs is None and np.abs(data.bounds).max() < 5000

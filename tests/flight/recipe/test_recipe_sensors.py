@@ -1,6 +1,5 @@
 """Sensors on board through a recipe: axes, units, rows that do not count, flights without poses or images."""
 
-import math
 import re
 from typing import Any
 
@@ -10,10 +9,8 @@ import pytest
 from tests.flight.recipe.comparing import near
 from tests.sound_logs import NED
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.check import check_flight, usable_for
-from wildlab.flight.clocks import gnss_times
+from wildlab.flight.checks.check import usable_for
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import geodetic_to_ned
 
 IMU = """
 name = "box"
@@ -80,47 +77,9 @@ def test_axes_and_units(sensors):
     assert not usable_for(flight)[2].usable and "5.1 m/s" in usable_for(flight)[2].why
 
 
-def test_only_fresh_fixes(sensors):
-    sensors.set("clocks.gnss_offset_s", 0.3)
-    flight = sensors.run()
-    gnss = flight.table("gnss")
-    near(gnss["time_s"], [0.1, 0.3, 4.0])  # as stamped
-    near(gnss_times(flight), [0.35, 0.55, 4.25])
-    assert flight.manifest.gnss.lever_arm_m == (-0.4, 0.0, -0.1)
-    origin = (math.radians(63.44), math.radians(10.4), 140.0)
-    latitude = np.radians([63.44, 63.4401, 63.4403])
-    expected = geodetic_to_ned(latitude, math.radians(10.4), np.array([140, 141, 143]), origin)
-    near(gnss, expected, *NED, atol=1e-6)
-    v = 10 * 1852 / 3600
-    near(gnss, [[0, v, 1], [-v, 0, -2], [-v, 0, -2]], "v_north_m_s", "v_east_m_s", "v_down_m_s")
-    near(gnss, [[1.5, 8], [np.nan, 9], [2.5, 7]], "sd_horizontal_m", "satellites")
-
-
-def test_local_satellite_positions_and_the_vertical_correction(sensors):
-    sensors.set("origin", "latitude_deg = 63.44\nlongitude_deg = 10.4\nheight_m = 40.0")
-    sensors.set("gnss.position", """
-        north = {value = 1.0, unit = "m"}
-        east = {value = 2.0, unit = "m"}
-        down = {column = "height", unit = "m", negate = true}
-    """)  # fmt: skip
-    sensors.set("vertical", 'correction_m = 40.0\ntaken_off = ["gnss"]\nnote = "sea level"')
-    near(sensors.run().table("gnss"), [[1, 2, -100], [1, 2, -101], [1, 2, -103]], *NED)
-
-
 def _navigation_only(raw: Any) -> None:
     for part in ("camera", "frames", "detections", "truth"):
         raw.set(part, None)
-
-
-def test_no_images_and_no_poses(sensors):
-    _navigation_only(sensors)
-    sensors.set("poses", None)
-    flight = sensors.run()
-    assert (flight.manifest.camera, flight.nav, set(flight.tables)) == (None, {}, {"imu", "gnss"})
-    near(flight.table("gnss")[NED].iloc[0], 0)
-    with pytest.raises(WildlabError, match="no camera"):
-        flight.manifest.geometry_camera()
-    assert {one.level for one in check_flight(flight) if one.field == "camera"} == {"note"}
 
 
 def test_attitude_without_positions(sensors):

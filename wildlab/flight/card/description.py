@@ -56,8 +56,7 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
         if log is not None:
             if not own:
                 own = [f"is taken for {ROLES[one.role]}{one.target and f', {one.target}'}: {one.why}"]
-            fixes = one.item.part("gnss")
-            own = [log.vehicle and f"is of {log.vehicle}", "" if fixes is None else _quality(fixes), *own]
+            own = [log.vehicle and f"is of {log.vehicle}", *own]
             # An image without a place is one all the same, and its reader says what it lacks.
             own += [
                 _unused(part, rows)
@@ -88,24 +87,6 @@ def _rate(clock: Clock) -> str:
 
 #: A rate differs from 1 where it is so many of its standard deviations away from it.
 TOLD = 2.0
-#: As MAVLink numbers them, and all readers with it.
-_FIXES = {2: "level", 3: "in space", 4: "differential", 5: "RTK float", 6: "RTK fixed", 7: "static", 8: "PPP"}
-
-
-def _quality(fixes: Stream) -> str:
-    """How good the satellite positions are that can be used, by what the receiver says."""
-    notes = []
-    known = {
-        name: values[fixes.used] for name, values in fixes.columns.items() if name in ("fix", "satellites")
-    }
-    known = {name: values[np.isfinite(values)] for name, values in known.items()}
-    if len(known.get("fix", ())):
-        counted = Counter(_FIXES.get(int(one), f"of kind {int(one)}") for one in known["fix"])
-        notes.append("fixes " + ", ".join(f"{kind} {n}" for kind, n in counted.most_common()))
-    if len(known.get("satellites", ())):
-        low, middle, high = np.percentile(known["satellites"], (0, 50, 100))
-        notes.append(f"satellites {low:.0f} to {high:.0f}, median {middle:.0f}")
-    return ", ".join(notes)
 
 
 def _unused(part: str, stream: Stream) -> str:

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.findings import POSITION, Finding
+from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.mistakes import (
     FALL,
     LIKE_NOISE,
-    Change,
     Misfit,
     Mistake,
     Row,
     attitudes_in,
     blame,
     change_by,
-    change_columns,
-    change_geodetic,
     explain,
     mistake,
     one_row,
@@ -46,7 +42,7 @@ from wildlab.flight.checks.sightings import (
 )
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import Array, Origin, euler_to_matrix, matrix_to_euler
+from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
 
 #: Without a known mistake, misses this many times what is expected and this large (deg) are still said.
@@ -137,40 +133,10 @@ def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]
     yield from calibration_mistakes(s)
     yield from places_in(f"nav/{s.source}", s.origin, "poses", "p_nb")
     yield from places_in("truth", s.origin, "truth", "points")
-    yield from shared_place_mistakes(s)
     yield from height_mistakes(s)
     yield from turn_mistakes(s)
     if flight.manifest.time.kind == "utc":
         yield from clock_mistakes(s, flight.manifest.clocks.camera_offset_s)
-
-
-def shared_place_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
-    """Mistakes about latitude and longitude that poses, truth and the origin share: the points stay near, and
-    north lies elsewhere."""
-    for row in rows_of("geodetic"):
-        change = change_by(row)
-        there = change(np.array(s.origin))
-        if there is None or abs(there[0]) > np.pi / 2:
-            continue
-        at: Origin = tuple(there.tolist())
-        moved = partial(change_geodetic, change, origin=s.origin, to=at)
-
-        def undo(x: Sightings, moved: Change = moved, at: Origin = at) -> Sightings | None:
-            done = undo_in(moved, "p_nb", "points")(x)
-            return None if done is None else replace(done, origin=at)
-
-        def correct(flight: Flight, moved: Change = moved, at: Origin = at) -> Flight | None:
-            placed = [one for one in ("gnss", "truth") if one in flight.tables]
-            for table in (*(f"nav/{name}" for name in flight.nav), *placed):
-                changed = change_columns(table, POSITION, moved)(flight)
-                if changed is None:
-                    return None
-                flight = changed
-            latitude, longitude = np.degrees(at[:2]).tolist()
-            return state({"origin": {"latitude_deg": latitude, "longitude_deg": longitude}})(flight)
-
-        of = mistake(row, undo, part=f"poses.{s.source}.position] and [truth")
-        yield of.within("poses and truth", undo, correct)
 
 
 # -- mount, pixels and calibration

@@ -302,8 +302,7 @@ def position_mistakes(flight: Flight, source: str, pair: PositionPair) -> Iterat
 
 # -- leaps of a position: a jump of the fix, or a filter that began anew, which a clock would seem to explain
 
-#: A leap is over within so many seconds, at least so long (m), and so many of the usual spreads of a stretch
-#: as long.
+#: A leap is at least so long (m), and so many of the usual spreads of a stretch of so many s.
 WITHIN_S, LEAST_M, FAR = 2.0, 5.0, 8.0
 #: Places so long before and after it (s) say how far it went.
 BESIDE_S = 5.0
@@ -358,16 +357,11 @@ def find_leaps(table: pd.DataFrame, name: str = "") -> list[Leap]:
     unexplained = np.where(step > max(WITHIN_S, 3 * np.median(step)), 0.0, gone - expected)
     left = np.concatenate([np.zeros((1, 3)), np.cumsum(unexplained, axis=0)])
     end = np.minimum(np.searchsorted(t, t + WITHIN_S), len(t) - 1)
-    size = np.linalg.norm(left[end] - left, axis=1)
-    limit = max(LEAST_M, FAR * np.median(size))
+    limit = max(LEAST_M, FAR * np.median(np.linalg.norm(left[end] - left, axis=1)))
     found: list[Leap] = []
-    # The first row of each run of stretches that are too long is as much before the leap as a stretch is.
-    rows = np.flatnonzero(size > limit)
-    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []:
-        first, last = int(run[0]), int(end[run[-1]])
-        row = first + int(np.argmax(np.linalg.norm(unexplained[first:last], axis=1))) + 1
-        before = left[(t >= t[first] - BESIDE_S) & (t <= t[first])]
-        after = left[(t >= t[last]) & (t <= t[last] + BESIDE_S)]
+    for row in np.flatnonzero(np.linalg.norm(unexplained, axis=1) > limit) + 1:
+        before = left[(t >= t[row - 1] - BESIDE_S) & (t < t[row])]
+        after = left[(t >= t[row]) & (t <= t[row] + BESIDE_S)]
         by = np.median(after, axis=0) - np.median(before, axis=0)
         # What comes back at once is a stray place.
         if np.linalg.norm(by) > limit:
