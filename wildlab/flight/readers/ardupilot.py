@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
@@ -265,13 +264,12 @@ def longest_run(
     if anchor is None or len(anchor[1]) < 2 * _SURE_ROWS:
         return tables, []
     rows, stamps = anchor[0].rows, anchor[1]
-    if not (np.diff(stamps) < -1.0).any():
-        return tables, []
-    middle = np.median(sliding_window_view(stamps, _SURE_ROWS), axis=1)
-    back = np.flatnonzero(middle[_SURE_ROWS:] < middle[:-_SURE_ROWS] - 1.0) + _SURE_ROWS
-    # Some places in a row see the same step: it is the one with the largest step between neighbours.
-    groups = np.split(back, np.flatnonzero(np.diff(back) > 1) + 1) if len(back) else []
-    begins = [int(group[np.argmin(stamps[group] - stamps[group - 1])]) for group in groups]
+    backwards = 1 + np.flatnonzero(np.diff(stamps) < -1.0)
+    begins = [
+        int(at)
+        for at in backwards
+        if np.median(stamps[at : at + _SURE_ROWS]) < np.median(stamps[max(at - _SURE_ROWS, 0) : at]) - 1.0
+    ]
     if not begins:
         return tables, []
     # What stands before the first stamp of a time, as an origin or a version, belongs to it.
