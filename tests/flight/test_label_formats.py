@@ -153,23 +153,6 @@ def test_what_is_wrong_in_json_is_named(tmp_path, source, old, new, word):
     assert str(path) in str(error.value) and error.value.fix
 
 
-@pytest.mark.parametrize(
-    ("line", "word"),
-    [
-        ("0 0.5 0.5 0.1", "line 1"),
-        ("0 0.5 0.5 0.1 -0.1", "no size below zero"),
-        ("0 50 50 10 10", "shares"),
-        ("deer 0.5 0.5 0.1 0.1", "the first a whole one"),
-        ("5 0.5 0.5 0.1 0.1", "class 5"),
-    ],
-)
-def test_what_is_wrong_in_a_line_of_yolo_is_named(tmp_path, line, word):
-    path = yolo(tmp_path / "labels", a=f"{line}\n", classes="deer\ncar\n")
-    with pytest.raises(WildlabError, match=word) as error:
-        read_labels(path)
-    assert str(path / "a.txt") in str(error.value)
-
-
 def table(path: Path, text: str) -> Path:
     path.write_text(text, encoding="utf-8")
     return path
@@ -214,26 +197,6 @@ def test_numbers_of_a_clip_and_names_without_ending(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        ("x,y,w,h\n1,2,3,4\n", "names the image"),
-        ("image,a\nb.png,3\n", "no columns"),
-        ("image,x,y,w,h\n", "has no row"),
-        ("image,x,y,w,h\na.png,1,2,3,4\na.png,1,2,-3,4\n", "line 3 has no box"),
-        ("image,x,y,w,h\na.png,1,?,3,4\n", "line 2 has no box"),
-        ("frame0,x,y,w,h\na,1,2,3,4\n", "line 2 has no number"),
-        ("", "has no header"),
-        ("image,x,y,w,h\na.png,1,2,3,4,5,6\n", "7 values"),
-        ("image,x,y,w,h\na.png,.1,.2,.3,.4\n", "shares"),
-        ("image,x_min,y_min,x_max,y_max\na.png,5,2,3,4\n", "x_min 5"),
-    ],
-)
-def test_what_is_wrong_is_named(tmp_path, text, word):
-    with pytest.raises(WildlabError, match=word):
-        read_labels(table(tmp_path / "l.csv", text))
-
-
-@pytest.mark.parametrize(
     "text",
     [
         "image;x;y;w;h\na.png;1,5;2;3;4\n",
@@ -249,11 +212,3 @@ def test_tables_as_other_programs_write_them(tmp_path, text):
     name = labels.name_of("a.png")
     assert name is not None
     assert labels.boxes[name].tolist() == [[1.5, 2, 3, 4]]
-
-
-def test_a_row_that_stands_twice_counts_once_and_is_told(tmp_path):
-    labels = read_labels(
-        table(tmp_path / "l.csv", "image,x,y,w,h\n" + 2 * "a.png,1,2,3,4\n" + "a.png,1,2,3,5\n")
-    )
-    assert len(labels.boxes["a.png"]) == 2
-    assert labels.marked.left_out == {"a row that stands in the file twice": 1}

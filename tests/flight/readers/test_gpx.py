@@ -86,10 +86,3 @@ def test_entities_are_refused(codec, words):
     lol = '<!DOCTYPE gpx [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]>'
     with pytest.raises(WildlabError, match=words):
         gpx.read(Path("x.gpx"), (lol + document(track()).decode()).encode(codec))
-
-
-def test_broken_points_are_counted():
-    body = track(6).replace("<ele>102</ele>", "<ele>102</el>").replace('lat="63.0004"', 'lat="sixty"')
-    log = gpx.read(Path("x.gpx"), document(body))
-    assert log.parts["gnss"].rows.tolist() == [1, 2, 3, 4]
-    assert log.lost[0].startswith("2 ")
