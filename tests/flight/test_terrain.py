@@ -111,6 +111,7 @@ def test_curvature_is_taken_off(tmp_path, flown):
         flown(),
         write_map(tmp_path / "level.tif", cell=100.0, height=lambda x, y: np.full(x.shape, 600.0)),
         margin_m=12_000.0,
+        step_m=100.0,
     )
     d = np.array([[0.0, 0.0], [10_000.0, 0.0], [0.0, 10_000.0]])
     fall = -100.0 - level.terrain.heights_at(d)
@@ -150,7 +151,7 @@ def test_feet_are_feet(tmp_path, flown, written, said):
 
 def test_heights_count_from_what_is_said(tmp_path, flown):
     path = write_map(tmp_path / "dem.tif")
-    plain, above = lay(flown(), path), lay(flown(), path, heights=20.0)
+    plain, above = lay(flown(), path, step_m=4.0), lay(flown(), path, step_m=4.0, heights=20.0)
     np.testing.assert_allclose(above.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 20.0, atol=1e-3)
     found = above.manifest.terrain
     assert (found.heights, found.added_m) == ("geoid", 20.0)
@@ -158,7 +159,7 @@ def test_heights_count_from_what_is_said(tmp_path, flown):
     recorded = flown()
     vertical = {"vertical": {"reference": "barometer", "correction_m": -30.0}}
     recorded.manifest = replace_in_manifest(recorded.manifest, vertical)
-    same = lay(recorded, path, heights="flight")
+    same = lay(recorded, path, step_m=4.0, heights="flight")
     np.testing.assert_allclose(same.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 30.0, atol=1e-3)
     egm = write_map(tmp_path / "egm.tif", crs="EPSG:32633+5773")
     for file, says, words in (

@@ -21,6 +21,7 @@ from wildlab.flight.readers.dataflash import read_records
 
 dataflash, dataflash_text = Reader("dataflash"), Reader("dataflash-text")
 
+SLOW = pytest.mark.slow
 REAL = (
     "copter_2014_joey/2014-10-18 20-04-24.bin",
     "plane42_bench_badgps/pilot_0004.BIN",
@@ -65,7 +66,7 @@ def compare(path: Path) -> int:
     return count
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", [pytest.param(one, marks=SLOW) if "copter" in one else one for one in REAL])
 def test_every_field_is_as_pymavlink_has_it(shared_data, name):
     assert compare(shared_data("logs", *name.split("/"))) > 10_000
 
