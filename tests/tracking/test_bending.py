@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import assume, given
-from hypothesis import strategies as st
 
 from tests.tracking.level_sensors import ranges_bearings
 from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, posed
@@ -15,7 +14,6 @@ from wildlab.tracking.sensors import (
     left_out,
     pixels,
     second_derivatives,
-    share_left_out,
 )
 
 SHAPE = np.array([[1.0, 0.3], [0.3, 0.6]])
@@ -66,16 +64,3 @@ def test_left_out_is_the_second_moment_of_the_second_order_part(rng):
     B = left_out(SHAPE, D)
     size = np.sqrt(np.outer(np.diag(B), np.diag(B)))  # range and bearing: metres and radians
     assert B / size == pytest.approx(part.T @ part / len(e) / size, abs=0.02)
-
-
-@given(st.floats(1.1, 50.0))
-def test_the_share_grows_with_the_square_of_the_variance(factor):
-    sensor, place = tilted(0.5)
-    D, N = second_derivatives(sensor, 0, place), np.diag([4.0, 9.0])
-    assert share_left_out(factor * SHAPE, D, N) == pytest.approx(factor**2 * share_left_out(SHAPE, D, N))
-
-
-def test_of_a_target_that_is_not_seen_nothing_is_said():
-    sensor, _ = tilted(0.3)
-    behind = second_derivatives(sensor, 0, [0.0, 1e5]), second_derivatives(sensor, 0, [0.0, -1e5])
-    assert np.isnan([share_left_out(SHAPE, D, np.eye(2)) for D in behind]).sum() == 1

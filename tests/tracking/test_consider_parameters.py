@@ -3,22 +3,18 @@
 from functools import partial
 
 import numpy as np
-import pytest
 from hypothesis import given
 
 from tests.tracking.full_filter import beside, full_filter
 from tests.tracking.level_sensors import bearings, consider, ranges_bearings
 from tests.tracking.poses import GENERATORS, overflight
 from tests.tracking.test_schmidt import growing
-from wildlab.errors import WildlabError
 from wildlab.tracking import sensors as m
 from wildlab.tracking import sensors as p
-from wildlab.tracking.filters import run_imm, run_unscented
 from wildlab.tracking.motion import constant_velocity, white_acceleration
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import Considered, consider_all, errors_of
 from wildlab.tracking.sensors import SensorMeasurements, combined, merge, renamed
-from wildlab.tracking.smoothing import run_smoothed
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 START = Start(0.0, np.zeros(4), np.diag([25.0, 25.0, 9.0, 9.0]))
@@ -171,27 +167,6 @@ def test_rows_are_filtered_each_by_its_sensor():
     assert np.isfinite(track.S[mast][:, 0, 0]).all() and track.used.all()
 
 
-@pytest.mark.parametrize("name", ["ekf", "ukf", "imm", "smoothed"])
-def test_what_stands_in_the_place_of_what_is_not_measured_does_not_matter(name):
-    times, z, R, sensor, *_ = merge(crew(1))
-    mast = np.isnan(z[:, 1])
-    other, noise = z.copy(), R.copy()
-    other[mast, 1], noise[mast, 1, 1] = 77.0, 5.0
-    run = {"ekf": run_filter, "ukf": run_unscented, "smoothed": run_smoothed}.get(name)
-
-    def tracked(z, R):
-        if run is None:
-            both = [WA, partial(WA, density=1.0)]
-            return run_imm(times, z, R, sensor, both, [5.0, 5.0], THERE, gate_probability=0.99).track
-        return run(times, z, R, sensor, WA, THERE, gate_probability=0.99)
-
-    one, two = tracked(z, R), tracked(other, noise)
-    for ours, theirs in zip(one, two, strict=True):
-        np.testing.assert_array_equal(ours, theirs)
-    truth = [50.0, 60.0]
-    assert np.linalg.norm(one.x[-1, :2] - truth) < 4 * np.sqrt(np.trace(one.P[-1, :2, :2]))
-
-
 def test_the_gate_is_as_wide_as_the_row_has_elements():
     radar, mast = ranges_bearings([0.0, 0.0], 0.0), bearings([0.0, 0.0], 0.0)
     sensor = combined([radar, mast], [0, 1])
@@ -228,32 +203,3 @@ def test_errors_are_shared_by_name_and_apart_by_another():
     # With a compass each the direction is averaged, and known better.
     across = np.array([-np.sin(0.3), np.cos(0.3)])
     assert across @ apart.P[-1] @ across < 0.6 * (across @ shared.P[-1] @ across)
-
-
-@pytest.mark.parametrize(
-    ("act", "words"),
-    [
-        (lambda: combined([m.positions()], [0, 1]), "rows of the sensors"),
-        (lambda: combined([], []), "index of a sensor"),
-        (lambda: combined([bearings(np.zeros((3, 2)), 0.0)], [0, 0]), "3 rows"),
-        (lambda: combined([combined([m.positions()], [0])], [0]), "combined"),
-        (lambda: merge([]), "no sensor"),
-        (
-            lambda: merge([SensorMeasurements([0.0], [[1.0]], np.eye(2), m.positions())]),
-            "measurements of sensor 0",
-        ),
-        (
-            lambda: merge([SensorMeasurements([0.0], [[1.0, 2.0]], np.eye(3), m.positions())]),
-            "R of the shape",
-        ),
-    ],
-)
-def test_combinations_that_are_refused(act, words):
-    with pytest.raises(WildlabError, match=words):
-        act()
-
-
-def test_a_combined_sensor_has_its_rows():
-    short = combined([m.positions()], np.zeros(3, int))
-    with pytest.raises(WildlabError, match="3 rows"):
-        run_filter([0.0, 1.0], np.zeros((2, 2)), np.eye(2), short, WA, THERE)

@@ -6,7 +6,7 @@ from scipy.stats import chi2
 
 from tests.tracking.level_sensors import bearings
 from wildlab.errors import WildlabError
-from wildlab.tracking.initiation import start_from_position, start_from_rays
+from wildlab.tracking.initiation import start_from_rays
 from wildlab.tracking.sensors import positions
 
 RUNS = 200
@@ -41,13 +41,6 @@ def test_rays_of_a_target_at_rest_meet_exactly():
     np.testing.assert_allclose(start.x, [100.0, 0.0, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(start.P[:2, :2], np.diag([(50 * 0.02) ** 2, (100 * 0.01) ** 2]), atol=1e-9)
     assert start.row == 1 and not start.P[2:].any()
-
-
-def test_a_start_on_a_position_is_at_rest():
-    start = start_from_position(3.0, [1.0, 2.0], [[2.0, 1.0], [1.0, 2.0]], 3.0)
-    np.testing.assert_array_equal(start.x, [1, 2, 0, 0])
-    np.testing.assert_array_equal(start.P[:2, :2], [[2, 1], [1, 2]])
-    assert start.P[3, 3] == 9.0 and start.row == -1
 
 
 FIXED, TIMES, SEEN = bearings([0.0, 0.0], 0.0), [0.0, 1.0, 2.0], [[0.1], [0.1], [0.1]]

@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from scipy.stats import chi2
 
 from tests.tracking.level_sensors import bearings, measured_from, ranges_bearings
 from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, posed
-from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.tracking import sensors as m
 from wildlab.tracking import sensors as p
-from wildlab.tracking.particles import nearest_animal
 from wildlab.tracking.sensors import combined
 
 
@@ -97,11 +94,6 @@ def test_behind_the_camera_nothing_is_seen(pose, share):
     assert np.isnan(below.z).all()
 
 
-def test_where_an_angle_is_not_defined_there_is_none():
-    assert np.isnan(p.azimuth_elevation_of_pixel(CAMERA, [318.0, 250.0])).all()
-    assert np.isnan(p.predict_range_bearing([3.0, 4.0], [3.0, 4.0], 0.0).z).all()
-
-
 def test_angles_differ_by_the_short_way_round():
     assert np.allclose(wrap([np.pi, 3 * np.pi, -np.pi, 0.1]), [-np.pi, -np.pi, -np.pi, 0.1])
     gap = m.difference([3.1, 3.1], [-3.1, -3.1], (True, False))
@@ -148,10 +140,3 @@ def test_many_positions_are_seen_as_each_alone(pose, seed):
         for many, single in zip(seen, zip(*alone, strict=True), strict=True):
             together = np.broadcast_to(many, (7, *np.shape(single[0])))
             np.testing.assert_allclose(together, single, rtol=1e-12, atol=1e-12)
-
-
-def test_outside_the_gate_there_is_no_neighbour():
-    nis = np.array([[5.0, 3.0, np.nan], [np.nan, np.nan, np.nan], [30.0, 20.0, 10.0]])
-    assert nearest_animal(nis.T, 0.95).tolist() == [1, -1, -1]
-    assert nearest_animal(nis.T, 1.0).tolist() == [1, -1, 2]
-    assert gate_threshold(0.95, 3) == pytest.approx(chi2.ppf(0.95, 3))

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from wildlab.errors import WildlabError
 from wildlab.tracking.association import (
     feature_distances,
     global_nearest,
@@ -69,20 +68,6 @@ def test_the_gate_itself_is_inside():
     assert global_nearest([[9.1]], 9.0).track.tolist() == [-1]
 
 
-@pytest.mark.parametrize(
-    ("distances", "gate", "words"),
-    [
-        ([1.0, 2.0], 9.0, "no matrix"),
-        ([[-np.inf]], 9.0, "no size"),
-        ([[1.0]], np.nan, "no size"),
-        ([[1.0]], -np.inf, "no size"),
-    ],
-)
-def test_what_is_refused(distances, gate, words):
-    with pytest.raises(WildlabError, match=words):
-        global_nearest(distances, gate)
-
-
 values = arrays(np.float64, (3, 2), elements=st.floats(-50, 50))
 
 
@@ -94,15 +79,6 @@ def test_it_is_the_sum_of_its_features(measured, stored, weights):
         for j, old in enumerate(stored):
             expected = sum(w * ((a - b) / s) ** 2 for a, b, s, w in zip(new, old, sd, weights, strict=True))
             assert found[i, j] == pytest.approx(expected)
-
-
-def test_what_is_not_known_adds_nothing():
-    found = feature_distances([[np.nan, 3.0]], [[1.0, 1.0], [np.nan, np.nan]], [1.0, 1.0], [1.0, 1.0])
-    assert found.tolist() == [[4.0, 0.0]]
-
-
-def test_nothing_to_compare():
-    assert feature_distances(np.empty((0, 2)), [[1.0, 2.0]], [1.0, 1.0], [1.0, 1.0]).shape == (0, 1)
 
 
 def test_size_on_the_ground_does_not_depend_on_the_distance():

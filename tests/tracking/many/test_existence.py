@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from tests.tracking.many.enumeration import association_probabilities_by_enumeration
 from tests.tracking.poses import GENERATORS
-from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.tracking.association import (
     association_probabilities,
@@ -85,12 +84,6 @@ def test_what_is_hidden_is_not_missed():
     assert after_scan([1.0], [0.0], 0.9, certain)[0][0] == 1.0
 
 
-def test_what_cannot_be_there_stays_away():
-    p = association_probabilities(*weights([0.0], [1.0], 1.0, [[3.0]], 1.0))
-    existence, _, own = after_scan([0.0], [1.0], 1.0, p)
-    assert existence[0] == 0 and own[0].tolist() == [1.0, 0.0]
-
-
 @given(shares, st.floats(0.1, 100), st.floats(0.1, 100), st.floats(0, 50), st.floats(0, 50))
 def test_two_waits_are_one(v, visible_s, hidden_s, one, two):
     at_once = visible_later(v, one + two, visible_s, hidden_s)
@@ -133,24 +126,6 @@ def test_of_several_the_nearest_whole_is_taken():
     assert found.measurement.tolist() == [1, 0]
 
 
-def test_a_detection_without_a_position_continues_nothing():
-    found = pair_scans([[0.0, 0.0]], [[np.nan, np.nan]], 1.0, np.eye(2), 20.0, GATE)
-    assert found.track.tolist() == [-1]
-
-
-def test_no_detections():
-    assert pair_scans([], [[1.0, 2.0]], 1.0, np.eye(2), 1.0, GATE).track.tolist() == [-1]
-    assert pair_scans([[1.0, 2.0]], [], 1.0, np.eye(2), 1.0, GATE).measurement.tolist() == [-1]
-
-
-@pytest.mark.parametrize(
-    ("dt", "speed", "field"), [(-1.0, 1.0, "dt"), (1.0, np.inf, "max_speed"), (np.nan, 1.0, "dt")]
-)
-def test_times_and_speeds_that_cannot_be_are_refused(dt, speed, field):
-    with pytest.raises(WildlabError, match=f"{field} is"):
-        pair_scans([[0.0, 0.0]], [[0.0, 0.0]], dt, np.eye(2), speed, GATE)
-
-
 def weights_of(seed: int, n: int, m: int, empty: float = 0.4) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     w = np.exp(rng.normal(0.0, 3.0, (n, m))) * (rng.random((n, m)) > empty)
@@ -174,22 +149,6 @@ def test_no_measurement_is_given_away_twice(seed):
     assert (found[:, 1:][w == 0] == 0).all()
 
 
-@given(st.integers(0, 10_000), st.floats(1e-8, 1e8))
-def test_a_targets_weights_may_be_scaled(seed, factor):
-    w, w0 = weights_of(seed, 4, 4)
-    before = association_probabilities(w, w0)
-    w[1] *= factor
-    w0[1] *= factor
-    assert np.allclose(association_probabilities(w, w0), before, atol=1e-9)
-
-
-def test_many_targets_in_one_cluster_lose_no_digits():
-    w = np.full((40, 10), 1e-3)
-    found = association_probabilities(w, np.full(40, 0.5))
-    # All alike: each measurement is shared by all.
-    assert np.allclose(found, found[0]) and np.allclose(found[:, 1:], found[0, 1])
-
-
 @given(GENERATORS)
 def test_messages_are_exact_where_nothing_competes_in_a_loop(rng):
     """A chain: each target shares one measurement with the next."""
@@ -211,25 +170,6 @@ def test_messages_are_near_where_loops_are():
     assert 0 < np.mean(off) < 0.01
     w, w0 = weights_of(3, 20, 20, empty=0.5)
     assert np.allclose(association_probabilities(w, w0), belief_propagation(w, w0), atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("weights", "missed", "words"),
-    [
-        ([[1.0]], [1.0, 2.0], "do not fit"),
-        ([[-1.0]], [1.0], "negative"),
-        ([[np.nan]], [1.0], "not a number"),
-        ([[1.0], [1.0]], [0.0, 0.0], "no way to deal them out"),
-    ],
-)
-def test_what_cannot_be_is_said(weights, missed, words):
-    with pytest.raises(WildlabError, match=words):
-        association_probabilities(weights, missed)
-
-
-def test_messages_need_targets_that_can_be_missed():
-    with pytest.raises(WildlabError, match="cannot be missed"):
-        belief_propagation([[1.0]], [0.0])
 
 
 def test_a_target_that_nothing_is_of_has_none_whatever_others_have():

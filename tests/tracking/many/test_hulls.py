@@ -13,7 +13,6 @@ from tests.tracking.many.test_run import BOTH, LONG, SHIP
 from wildlab.tracking.many.target_model import (
     STEERS_M_S,
     Gathered,
-    at_least,
     gather,
     hull_noise,
     near_side,
@@ -152,8 +151,3 @@ def test_a_new_track_is_where_its_measurement_would_be_seen():
 def test_two_ends_of_one_hull_and_two_ships(other, one):
     assert on_one_hull([0.0, 0.0, 3.0, 0.0], other, SHIP) == one
     assert not on_one_hull([0.0, 0.0, 0.1, 0.0], [5.0, 0.0, 0.1, 0.0], SHIP), "at rest nobody knows the line"
-
-
-def test_no_hull_is_ruled_out():
-    assert np.allclose(at_least(np.array([[0.99, 0.01], [0.5, 0.5]]), 0.02), [[0.99, 0.02], [0.5, 0.5]])
-    assert at_least(np.array([[0.001]]), 0.02).tolist() == [[0.001]]

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wildlab.errors import WildlabError
 from wildlab.tracking.many.run import follow_many, run_many, step
 from wildlab.tracking.many.target_model import POINT, Hull, ManySensorModel, ManyTargetModel, Scan
 from wildlab.tracking.many.tracks import begin, moves
@@ -209,10 +208,3 @@ def test_bow_and_stern_of_a_known_ship_begin_no_target():
         ends = look(0.0, [off, 0.0], [-off, 0.0])
         _, free = step(confirmed, ends, 0.0, 0.0, (EYE,), targets, 1)
         assert free == 1 + began, off
-
-
-@pytest.mark.parametrize(("change", "words"), [({"time": np.nan}, "no time"), ({"sensor": 3}, "there are 1")])
-def test_scans_that_cannot_be_are_said(change, words):
-    scan = look(0.0, [0.0, 0.0])
-    with pytest.raises(WildlabError, match=words):
-        run_many([scan._replace(**change)], [EYE], POINTS)

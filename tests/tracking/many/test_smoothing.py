@@ -75,15 +75,6 @@ def test_a_target_at_rest_is_where_all_measurements_say():
         np.testing.assert_allclose(P[0], one.P[-1], atol=1e-12)
 
 
-def test_what_was_given_is_not_changed_and_nothing_stays_nothing():
-    looks = [shown(t, [1], np.array([t, 0, 1, 0]), np.eye(4)) for t in (0.0, 1.0)]
-    kept = [one.x.copy() for one in looks]
-    smooth_many(looks, 0.5)
-    assert all(np.array_equal(one.x, x) for one, x in zip(looks, kept, strict=True))
-    assert smooth_many([], 0.5) == []
-    assert smooth_many([shown(0.0, [], np.zeros((0, 4)), np.zeros((0, 4, 4)))], 0.5)[0][0].shape == (0, 4)
-
-
 @given(GENERATORS)
 @settings(max_examples=8, deadline=None)
 def test_covariances_are_those_of_the_errors_of_smoothed_tracks(rng):

@@ -12,9 +12,8 @@ from scipy.stats import multivariate_normal, norm
 
 from tests.tracking.many.test_run import EYE, POINTS, lines, look, looks
 from tests.tracking.poses import GENERATORS
-from wildlab.errors import WildlabError
 from wildlab.tracking.association import association_probabilities
-from wildlab.tracking.many.run import follow_many, moved_together, run_many, told_by_others
+from wildlab.tracking.many.run import follow_many, moved_together, told_by_others
 from wildlab.tracking.many.target_model import Scan
 from wildlab.tracking.many.tracks import Compared, compare, compare_bearings, update
 from wildlab.tracking.motion import white_acceleration
@@ -85,12 +84,6 @@ def test_a_bearing_from_near_makes_no_track_too_sure():
         off = true[:2] - after.x[0, 0, :2]
         values.append(off @ np.linalg.solve(after.P[0, 0, :2, :2], off) / 2)
     assert np.mean(values) < 1.2
-
-
-def test_what_is_at_the_platform_is_in_no_direction():
-    x, P = np.zeros((1, 1, 4)), np.eye(4)[None, None]
-    compared = compare_bearings(x, P, np.zeros((1, 1, 2, 2)), np.array([0.3, 0.0]), [[1.0]], [[[0.1]]], 9.0)
-    assert compared.likelihood[0, 0, 0] == 0 and np.isfinite(compared.S).all()
 
 
 @given(GENERATORS)
@@ -249,14 +242,6 @@ def test_together_is_near_the_sum_over_all_ways():
     assert alone > 0.15 and together < alone / 3
 
 
-@given(st.integers(0, 10_000))
-@settings(max_examples=25)
-def test_an_error_that_moves_nothing_changes_nothing(seed):
-    compared = _drawn(np.random.default_rng(seed), 3, 2, 0.0, 0.0)
-    alone, together = _both(compared, 0.9, 1e-4)
-    assert np.allclose(alone, together) and np.allclose(alone, _enumerated(compared, 0.9, 1e-4))
-
-
 def test_what_others_tell_is_the_least_squares_of_them(rng):
     """Sure associations: the errors' posterior is that of all other targets' innovations at once."""
     compared = _drawn(rng, 4, 3, 2.0)
@@ -329,11 +314,3 @@ def test_a_track_is_not_lost_for_what_all_are_wrong_by():
         first, *_, last = [tracks for tracks, _ in follow_many(scans, [EYE], POINTS, [lasting] * 2)]
         assert first.identity.tolist() == [0]
         assert (last.identity.tolist() == [0]) == kept
-
-
-def test_shared_errors_that_nobody_told_of_are_refused():
-    scan = look(0.0, [1.0, 1.0], shared=np.zeros((1, 2, 3)))
-    with pytest.raises(WildlabError, match="shared errors"):
-        run_many([scan], [EYE], POINTS, [1.0])
-    with pytest.raises(WildlabError, match="less than"):
-        run_many([scan], [EYE], POINTS, [1.0, -1.0, 0.0])

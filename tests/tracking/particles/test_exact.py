@@ -176,8 +176,3 @@ def test_each_detection_takes_its_closest_track(rng, animals, detections):
         best = int(np.argmin(roots)) if roots else -1
         inside = animals and roots[best] ** 2 <= chi2.ppf(0.9, 2)
         assert taken[j] == (best if inside else -1)
-
-
-def test_a_group_takes_one_track_by_f():
-    squared = mahalanobis_squared([[0.0, 0.0]], [4 * np.eye(2)], [[0.5, 0.0], [-0.5, 0.0]], np.eye(2))
-    assert nearest_animal(squared, 0.99).tolist() == [0, 0]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from tests.tracking.particles.worlds import NOISE, RULES, SIZE, WALK
-from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.tracking import kalman
 from wildlab.tracking.particles import (
@@ -123,17 +122,6 @@ def test_a_ray_that_met_no_ground_keeps_its_place_and_nothing_else(rng):
     wanted, _ = step_nearest(start, alone, RULES, np.random.default_rng(1))
     assert taken.tolist() == [0, 1, 0]
     np.testing.assert_array_equal(herd.cloud.x, wanted.cloud.x)
-
-
-def test_time_does_not_go_back_and_a_step_leaves_what_was_known_alone(rng):
-    herd, _ = step_nearest(no_herd(RULES), look(5.0, [50.0, 40.0]), RULES, rng)
-    kept = herd.cloud.x.copy(), herd.cloud.w.copy()
-    step_nearest(herd, look(5.0, [50.0, 41.0]), RULES, rng)
-    step_nearest(herd, look(5.0, [90.0, 41.0]), RULES, rng)
-    np.testing.assert_array_equal(kept[0], herd.cloud.x)
-    np.testing.assert_array_equal(kept[1], herd.cloud.w)
-    with pytest.raises(WildlabError, match="Sort"):
-        step_nearest(herd, look(4.0), RULES, rng)
 
 
 #: A detection that is sharper than the cloud about it, and a rule that has few particles for it.
