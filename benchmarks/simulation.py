@@ -8,16 +8,53 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from benchmarks.timing import best_of
-from tests.simulation import plain_kernels as plain
-from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.gravity import local_earth
+from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.gravity import Earth, attraction, local_earth
 from wildlab.simulation import fixed_wing_trajectory, kernels, loiter_path
 from wildlab.simulation.trajectory import band_limited_disturbance
 
 DURATION, RATE, FRACTION = 1500, 250, 100
 WIND = np.array([4.0, -3.0, 0.0])
+
+
+def sum_of_sines(times: Array, amplitudes: Array, frequencies: Array, phases: Array) -> Array:
+    """(N,) s -> a sum of sines and its first two derivatives, (3, N)."""
+    angles = np.outer(times, frequencies) + phases
+    slopes = amplitudes * frequencies
+    return np.stack(
+        [np.sin(angles) @ amplitudes, np.cos(angles) @ slopes, -np.sin(angles) @ (slopes * frequencies)]
+    )
+
+
+def coordinated_attitude(
+    velocity: Array, acceleration: Array, wind: Array, trim_pitch: float, gravity: float
+) -> Array:
+    """(N, 3, 3)."""
+    x = velocity - wind
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    y = np.cross(x, acceleration - np.array([0.0, 0.0, gravity]))
+    y /= np.linalg.norm(y, axis=-1, keepdims=True)
+    R = np.stack([x, y, np.cross(x, y)], axis=-1)
+    return np.asarray(R @ euler_to_matrix(0.0, trim_pitch, 0.0))
+
+
+def body_rates(far_before: Array, before: Array, after: Array, far_after: Array, step: float) -> Array:
+    """(N, 3) rad/s."""
+    near, far = (
+        Rotation.from_matrix(np.swapaxes(first, -1, -2) @ last).as_rotvec()
+        for first, last in ((before, after), (far_before, far_after))
+    )
+    return np.asarray((4 * near / (2 * step) - far / (4 * step)) / 3)
+
+
+def felt_on_earth(R: Array, p: Array, v: Array, a: Array, earth: Earth, rate: Array) -> tuple[Array, Array]:
+    """Specific force and angular rate, (N, 3) each, in b."""
+    to_b, turning = np.swapaxes(R, -1, -2), np.array(earth.rate)
+    felt = a + 2 * np.cross(turning, v) - attraction(earth, p)
+    return np.einsum("nij,nj->ni", to_b, felt), rate + to_b @ turning
 
 
 def run() -> tuple[str, list[tuple[str, float, float, str]]]:
@@ -42,17 +79,17 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
         kernels.felt_on_earth(attitude, p, v, a, earth.as_array(), force, rate)
 
     def plain_sensed(n: int) -> None:
-        calm = plain.coordinated_attitude(v[:n], a[:n], WIND, 0.05, earth.gravity)
+        calm = coordinated_attitude(v[:n], a[:n], WIND, 0.05, earth.gravity)
         turned = calm @ euler_to_matrix(*out[:, :n])
-        rates = plain.body_rates(turned[:-8], turned[2:-6], turned[6:-2], turned[8:], 2 / RATE)
+        rates = body_rates(turned[:-8], turned[2:-6], turned[6:-2], turned[8:], 2 / RATE)
         inside = slice(4, n - 4)
-        plain.felt_on_earth(turned[4:-4], p[inside], v[inside], a[inside], earth, rates)
+        felt_on_earth(turned[4:-4], p[inside], v[inside], a[inside], earth, rates)
 
     few = count // FRACTION
     pairs: list[tuple[str, Callable[[], object], Callable[[], object]]] = [
         (
             "sixteen sines with two derivatives",
-            lambda: plain.sum_of_sines(times[:few], *sines),
+            lambda: sum_of_sines(times[:few], *sines),
             lambda: kernels.sum_of_sines(times, *sines, out),
         ),
         ("attitude, angular rate and specific force", lambda: plain_sensed(few), sensed),

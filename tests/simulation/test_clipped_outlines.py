@@ -47,22 +47,6 @@ def test_parts_on_either_side_of_a_cut_make_up_the_whole(polygon):
     assert first / total == pytest.approx(centre, abs=1e-3)
 
 
-@given(rectangles)
-def test_what_is_cut_lies_in_the_image_and_cutting_again_changes_nothing(polygon):
-    cut = clip_polygon(polygon, WIDTH, HEIGHT)
-    assert ((cut >= -1e-9) & (cut <= [WIDTH + 1e-9, HEIGHT + 1e-9])).all()
-    assert clip_polygon(cut, WIDTH, HEIGHT) == pytest.approx(cut)
-    assert area(clip_polygon(polygon[::-1], WIDTH, HEIGHT)) == pytest.approx(area(cut), abs=1e-6)
-
-
-def test_a_polygon_inside_stays_as_it_is_and_one_outside_is_gone():
-    inside = rectangle(300, 200, 100, 30, 0.4)
-    assert clip_polygon(inside, WIDTH, HEIGHT) == pytest.approx(inside)
-    assert clip_polygon(inside + np.array([1000, 0]), WIDTH, HEIGHT).shape == (0, 2)
-    around = rectangle(320, 256, 5000, 5000, 0.3)  # the image lies within it
-    assert area(clip_polygon(around, WIDTH, HEIGHT)) == pytest.approx(WIDTH * HEIGHT)
-
-
 @given(st.floats(-500, 5000), st.floats(20, 900), st.floats(5, 19), st.floats(-1.5, 1.5))
 def test_moments_of_a_rectangle_are_known(u, length, beam, angle):
     size, centre, covariance = moments(rectangle(u, 3.0, length, beam, angle))

@@ -17,7 +17,6 @@ from wildlab.simulation.imu import (
     misaligned_triad,
     read_imu,
     read_triad,
-    triad_data_sheet,
 )
 from wildlab.simulation.onboard_sensors import as_mounted, imu_table, mounted_imu, payload_boresight
 from wildlab.simulation.parameter_groups import Imu
@@ -157,17 +156,6 @@ def test_range_and_resolution_bound_the_reading():
     assert reading == pytest.approx(np.array([[0.25, -2.0, 0.0], [2.0, -2.0, 0.25]]))
 
 
-def test_gyros_and_accelerometers_err_apart():
-    asked = []
-
-    def stream(name):
-        asked.append(name)
-        return np.random.default_rng(len(asked))
-
-    read_imu(np.zeros((5, 3)), np.zeros((5, 3)), data_sheet("adis16490"), stream)
-    assert sorted(asked) == ["accelerometers", "gyros"]
-
-
 FORCE, RATE = [f"f_{axis}_m_s2" for axis in "xyz"], [f"w_{axis}_rad_s" for axis in "xyz"]
 #: Figures of a data sheet that make an inertial unit err.
 ERRORS = [
@@ -255,33 +243,3 @@ def test_the_unit_feels_and_errs_in_its_own_axes_and_is_then_calibrated(exact):
             fine[columns].to_numpy() @ expected
         )
     pd.testing.assert_series_equal(own["time_s"], rough["time_s"])
-
-
-@pytest.mark.parametrize("figure", sorted(Imu.model_fields))
-def test_each_figure_of_a_data_sheet_goes_to_its_own_triad(figure):
-    imu = Imu.model_validate(read_toml(PARTS / "imu-stim300.toml", "an IMU")["imu"])
-    triads = ("accelerometer", "gyro")
-    before = [triad_data_sheet(imu, one) for one in triads]
-    parameter = getattr(imu, figure)
-    if not isinstance(parameter.value, float | int):
-        return
-    changed = imu.model_copy(update={figure: parameter.model_copy(update={"value": 3 * parameter.value})})
-    after = [triad_data_sheet(changed, one) for one in triads]
-    moved = {
-        (triad, field)
-        for triad, old, new in zip(triads, before, after, strict=True)
-        for field in TriadDataSheet._fields
-        if getattr(old, field) != getattr(new, field)
-    }
-    triad, _, rest = figure.partition("_")
-    field = {"range": "limit"}.get(rest, rest)
-    if figure == "rate":
-        expected = set()
-    elif triad in triads:
-        expected = {(triad, field)}
-    else:
-        expected = {("accelerometer", figure), ("gyro", figure)}
-    assert moved == expected
-    for which, name in moved:
-        index = triads.index(which)
-        assert getattr(after[index], name) == pytest.approx(3 * getattr(before[index], name))

@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tests.simulation.test_twins import with_values
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.simulation.landscape import ground_heights
@@ -100,23 +99,6 @@ def test_what_is_not_moved_is_as_it_is_written():
         assert ours.table(table).equals(theirs.table(table)), "moved to and fro, it is where it was"
 
 
-def test_of_a_moved_twin_at_most_the_printed_number_counts():
-    slower = quick(scaled(load_twin("fast-vessel"), {"flight.airspeed": 0.8}), 1)
-    faster = quick(scaled(load_twin("fast-vessel"), {"flight.airspeed": 1.2}), 1)
-    assert len(slower.table("detections")) == 264 > len(faster.table("detections")) > 150
-    both = quick(scaled(load_twin("crossing-vessels"), {"flight.airspeed": 1.2}), 1)
-    seen = both.table("detections").groupby("frame_id").size()
-    assert (seen == 2).sum() == 349, "as many images show both as printed"
-    ship = quick(scaled(load_twin("large-ship"), {"flight.wind_speed": 0.5}), 1)
-    assert len(ship.table("frames")) < 441 and len(ship.table("detections")) <= len(ship.table("frames"))
-
-
-def test_one_that_never_sees_its_target_is_refused():
-    lost = scaled(load_twin("fast-vessel"), {"target.motion.speed": 3.0})
-    with pytest.raises(WildlabError, match="in 0 images"):
-        quick(lost, 1)
-
-
 def test_a_wind_that_cannot_be_flown_in_is_refused():
     written = load_twin("fast-vessel")
     with pytest.raises(WildlabError, match="wind_speed"):
@@ -124,19 +106,3 @@ def test_a_wind_that_cannot_be_flown_in_is_refused():
     # Slower than the airframe, but not than what goes along with the vessel against it.
     with pytest.raises(WildlabError, match="cannot be flown"):
         quick(scaled(written, {"flight.wind_speed": 3.3}), 1)
-
-
-def with_subset(first: int) -> TwinParameters:
-    """A twin with a third of its printed passes, and a subset that begins with detection ``first``."""
-    return with_values(scaled(load_twin("slow-vessel"), {"camera.images": 0.2}), subset__first=first)
-
-
-def test_a_subset_ends_with_the_last_detection_there_is():
-    flight = quick(with_subset(500), 1)
-    count = len(flight.table("detections"))
-    assert 500 < count < 1750
-    group = flight.table("frames").set_index("frame_id")["group"]
-    inside = group[flight.table("detections")["frame_id"]]
-    assert (inside == "subset").sum() == count - 499
-    with pytest.raises(WildlabError, match=f"there are {count}"):
-        quick(with_subset(3000), 1)

@@ -16,11 +16,8 @@ from wildlab.flight.store import save_flight
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.manifest import true_mount, twin_manifest
-from wildlab.simulation.onboard_sensors import gnss_table
 from wildlab.simulation.parameters import each_parameter, load_twin
 from wildlab.simulation.perturbed_flight import as_flown
-from wildlab.simulation.trajectory import turned
-from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate
 
 SEEDS = range(400)
@@ -149,16 +146,3 @@ def test_the_camera_that_took_the_images_is_the_one_drawn(stated):
     )
     assert np.abs(seen - uv).max() < 1e-6
     assert np.abs(expected - uv).max() > 1.0
-
-
-def test_the_receivers_are_as_noisy_as_drawn_and_say_what_is_stated(stated):
-    """A receiver drawn ten times noisier would show it; its columns would not."""
-    gnss = stated.gnss
-    loud = with_values(stated, gnss__horizontal_noise=0.5)
-    trajectory = twin_trajectory(stated, np.random.default_rng(0))
-    payload = lambda times: turned(trajectory(times), (np.zeros_like,) * 3)  # noqa: E731
-    quiet, noisy = (gnss_table(one, payload, 1, gnss) for one in (stated, loud))
-    assert quiet["sd_horizontal_m"].equals(noisy["sd_horizontal_m"])
-    assert np.diff(noisy["north_m"] - quiet["north_m"]).std() == pytest.approx(0.49 * np.sqrt(2), rel=0.05)
-    alone = gnss_table(loud, payload, 1)
-    assert alone["sd_horizontal_m"].iloc[0] == pytest.approx(np.hypot(0.5, 0.01))

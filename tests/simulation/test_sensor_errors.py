@@ -11,12 +11,10 @@ from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.simulation.error_models import (
     computer_stamps,
     gauss_markov,
-    rounded,
     stream,
     with_attitude_error,
 )
 from wildlab.simulation.onboard_sensors import antenna_motion, position_fixes
-from wildlab.simulation.parameter_groups import CameraSway
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.trajectory import (
     angular_rates,
@@ -42,16 +40,6 @@ def test_gauss_markov_has_its_variance_and_autocorrelation_from_the_first_sample
         assert np.mean(x[first] * x[first + lag]) == pytest.approx(expected, abs=tolerance)
 
 
-def test_gauss_markov_axes_are_independent_and_have_their_own_numbers():
-    x = gauss_markov(400_000, 1.0, [1.0, 3.0], [2.0, 5.0], np.random.default_rng(5))
-    # The effective number of samples is N (1 - a^2)/(1 + a^2) or more: about 80 000 for tau = 5.
-    assert np.std(x, axis=0) == pytest.approx([1.0, 3.0], rel=5 / np.sqrt(2 * 80_000))
-    for axis, tau in enumerate((2.0, 5.0)):
-        lagged = np.corrcoef(x[:-4, axis], x[4:, axis])[0, 1]
-        assert lagged == pytest.approx(np.exp(-4 / tau), abs=0.02)
-    assert abs(np.corrcoef(x.T)[0, 1]) < 0.02
-
-
 def test_a_new_sensor_changes_nobody_elses_noise():
     a, again, other, next_seed = (
         stream(seed, name).standard_normal(50)
@@ -68,11 +56,6 @@ def test_reported_attitude_and_error_give_back_the_truth(rng):
     reported = with_attitude_error(true, error)
     assert np.allclose(reported @ Rotation.from_rotvec(error).as_matrix(), true, atol=1e-14)
     assert not np.allclose(reported, true, atol=1e-3)
-
-
-def test_rounding_is_to_the_step():
-    assert rounded([1.234, -0.006], 0.01) == pytest.approx([1.23, -0.01])
-    assert rounded([1.234], 0.0) == pytest.approx([1.234])
 
 
 def test_stamps_of_an_idle_computer_are_the_clocks():
@@ -142,20 +125,6 @@ def test_the_change_is_the_weighted_standard_deviation():
     assert recent_change(x, STEP, MEMORY)[-1] == pytest.approx(expected, rel=1e-9)
 
 
-def test_what_stands_still_or_is_moved_or_scaled():
-    x = np.random.default_rng(2).normal(size=500)
-    change = recent_change(x, STEP, MEMORY)
-    assert (recent_change(np.full(50, 0.7), STEP, MEMORY) == 0).all()
-    assert recent_change(3 * x - 8, STEP, MEMORY) == pytest.approx(3 * change)
-    assert recent_change([], STEP, MEMORY).shape == (0,)
-
-
-@pytest.mark.parametrize(("step", "memory"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0)])
-def test_time_goes_forward(step, memory):
-    with pytest.raises(ValueError, match="positive"):
-        recent_change([1.0], step, memory)
-
-
 def test_each_axis_errs_by_its_share_of_the_change():
     """Over 40 flights, each with hundreds of independent errors: the sines have periods of 1 to 15 s."""
     twin = load_twin("slow-vessel-eight")
@@ -198,19 +167,3 @@ def test_no_navigation_system_feels_the_camera_sway():
     both = calm.detections.merge(restless.detections, on="frame_id")
     moved = np.hypot(both["u_px_x"] - both["u_px_y"], both["v_px_x"] - both["v_px_y"])
     assert moved.median() > 5.0
-
-
-def test_a_twin_without_sway_has_its_camera_fixed():
-    twin = load_twin("large-ship")
-    trajectory = twin_trajectory(twin, stream(1, "trajectory"))
-    assert twin.camera_sway is None
-    assert camera_sway(twin, trajectory, 1) is None
-    times = np.arange(10.0)
-    assert (camera_motion(twin, trajectory, times, 1).R_nb == trajectory(times).R_nb).all()
-
-
-def test_a_band_the_wrong_way_round_is_named():
-    sway = load_twin("fast-vessel").camera_sway.model_dump()
-    sway["shortest_period"], sway["longest_period"] = sway["longest_period"], sway["shortest_period"]
-    with pytest.raises(ValueError, match="shortest_period"):
-        CameraSway.model_validate(sway)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
@@ -85,10 +84,3 @@ def test_patches_stay_on_the_ground_and_noise_follows_its_generator():
     noisy = replace(EVEN, noise_sd=6.0)
     assert (seen(ground=noisy).image == seen(ground=noisy).image).all()
     assert seen(None, noisy).image.std(axis=(0, 1)) == pytest.approx([6.0] * 3, rel=0.05)
-
-
-def test_wrong_use_is_refused():
-    with pytest.raises(WildlabError, match="0 m above"):
-        render_colour(EVEN, None, CAMERA, [0, 0, 0], R_MC_DOWN, np.random.default_rng(1))
-    with pytest.raises(WildlabError, match="0 x 2 m"):
-        Tarpaulin(0.0, 2.0)

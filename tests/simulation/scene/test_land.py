@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -44,20 +43,6 @@ def hilly(cells=64, side=128.0, high=4.0):
     return Land(high * np.sin(north) * np.cos(2 * east), side=side, covers=(SMOOTH,))
 
 
-def test_a_slab_straight_below_has_its_size_and_its_warmth_in_closed_form():
-    view = render_land(
-        LandScene(EVEN_LAND, (slab(18.0, 6.0, 8.0).at(2.0, -3.0),)), CAMERA, [0, 0, -60.0], R_MC_DOWN
-    )
-    seen, air = view.seen[0], EVEN_LAND.weather.air
-    assert np.allclose(seen.uv, [78 - 290 * 3 / 60, 66 - 292 * 2 / 60])
-    assert np.isclose(seen.area, 18 * 6 * 290 * 292 / 60**2)
-    assert np.isclose((view.kelvin.astype(float) - air).sum() / 8.0, seen.area, rtol=0.01)
-    assert np.isclose(view.kelvin[0, 0], air, atol=1e-4)
-    assert view.ground.all()
-    assert view.visible(1) == pytest.approx(1.0, abs=0.02)
-    assert view.visible(2) == 0.0
-
-
 @pytest.mark.parametrize(("roll", "pitch"), [(0, 0), (25, -20), (10, 55)])
 def test_rays_end_on_the_ground_and_project_back(roll, pitch):
     land, (p, R) = hilly(), pose(40.0, roll, pitch, 30.0)
@@ -72,12 +57,6 @@ def test_rays_end_on_the_ground_and_project_back(roll, pitch):
     for point in points[met]:
         way = p + np.linspace(0, 0.999, 400)[:, None] * (point - p)
         assert all(-w[2] > height_at(land, w[:2]) - 1e-6 for w in way)
-
-
-def test_heights_are_bilinear_and_repeat():
-    land = Land(np.array([[0.0, 2.0], [4.0, 6.0]]), side=8.0)
-    assert height_at(land, [2.0, 2.0]) == pytest.approx(3.0)
-    assert height_at(land, [2.0 + 8.0, 2.0 - 16.0]) == pytest.approx(3.0)
 
 
 def test_a_slope_has_the_heat_of_its_angle_to_the_sun():
@@ -180,23 +159,6 @@ def test_it_has_the_size_and_the_relief_that_are_printed():
     assert not np.allclose(land.height, synthetic_landscape(4).height)
 
 
-def test_neighbours_are_alike_and_ends_are_not():
-    """The longer the distance, the larger the difference of heights, as on natural ground."""
-    squares = []
-    for seed in range(6):
-        h = synthetic_landscape(seed).height.astype(float)
-        squares.append([np.mean((h[:, lag:] - h[:, :-lag]) ** 2) for lag in (1, 4, 16, 64)])
-        assert abs(h[:, 0] - h[:, -1]).mean() > 1, "it does not repeat itself"
-    rises = np.diff(np.log(np.mean(squares, axis=0))) / np.log(4)
-    assert (rises > 0.5).all() and (rises < 2.05).all()
-
-
-def test_land_without_size_is_refused():
-    for wrong in ({"step": 0.0}, {"north": 1.0}, {"relief": -1.0}, {"east": np.inf}):
-        with pytest.raises(WildlabError, match="two steps each way"):
-            synthetic_landscape(1, **wrong)
-
-
 def test_trees_stand_on_their_share_of_the_ground_in_groups():
     land = synthetic_landscape(3)
     grown = grow_trees(land, 5, share=0.2)
@@ -208,9 +170,3 @@ def test_trees_stand_on_their_share_of_the_ground_in_groups():
     assert beside > 0.8, "beside a tree stands another"
     assert np.array_equal(grown.height, grow_trees(land, 5, share=0.2).height)
     assert grown.extent == land.extent
-
-
-@pytest.mark.parametrize("wrong", [{"share": 1.2}, {"height": 0.0}, {"stand": -1.0}])
-def test_trees_without_a_size_are_refused(wrong):
-    with pytest.raises(WildlabError, match="a share between 0 and 1"):
-        grow_trees(synthetic_landscape(1, north=20, east=20), 1, **wrong)

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.mount import R_MC_DOWN, Mount
+from wildlab.geometry.mount import Mount
 from wildlab.simulation.scene import (
     EVEN,
     Body,
@@ -179,18 +178,3 @@ def test_outlines_are_exact_projections():
     projected = down[:, :2] / down[:, 2:] * [290.0, 292.0] + [78.0, 66.0]
     assert hull is not None
     assert np.allclose([hull.min(axis=0), hull.max(axis=0)], [projected.min(axis=0), projected.max(axis=0)])
-
-
-@pytest.mark.parametrize(
-    ("make", "about"),
-    [
-        (lambda: render(Scene(EVEN), CAMERA, [0.0, 0.0, 1.0], R_MC_DOWN), "-1 m above"),
-        (lambda: Body("star", (Layer(((2, 0), (0.2, 0.2), (0, 2), (-2, -2)), 0.0, 1.0),)), "inward"),
-        (lambda: Body("line", (Layer(((2, 0), (0, 2)), 0.0, 1.0),)), "at least three"),
-        (lambda: Sea(wind_speed=40.0), "20 m/s"),
-        (lambda: Sea(temperature=12.0), "kelvin"),
-    ],
-)
-def test_what_cannot_be_is_refused(make, about):
-    with pytest.raises(WildlabError, match=about):
-        make()
