@@ -123,33 +123,6 @@ def test_what_is_not_known_is_not_shown():
     assert "<polygon" not in animated_flight(nothing, alt="x")
 
 
-def test_a_target_at_rest_has_a_cross_that_rests():
-    antenna = Course(np.array([np.nan]), np.array([[5.0, 5.0]]))
-    with pytest.raises(WildlabError, match="no increasing row of seconds"):
-        animated_flight(shown(truth=[antenna]), alt="x")
-    svg = animated_flight(shown(truth=[antenna._replace(times=np.array([0.0]))]), alt="x")
-    assert (
-        svg.count('class="cross"') == 2 and "animate" not in svg[svg.index('class="cross"') :].split("/>")[0]
-    )
-
-
-@pytest.mark.parametrize(
-    ("field", "part", "sentence"),
-    [
-        ("path", Course(TIMES[:1], np.zeros((1, 2))), "1 known places"),
-        ("path", Course(TIMES[::-1], np.zeros((len(TIMES), 2))), "no increasing row of seconds"),
-        ("path", Course(np.zeros(2), np.zeros((2, 2))), "over as it begins"),
-        ("path", Course(TIMES, np.zeros((3, 2))), r"shape \(3, 2\) beside 241 times"),
-        ("footprints", Outlines(TIMES, np.zeros((len(TIMES), 2))), r"one of shape \(N, K, 2\)"),
-        ("ellipses", Ellipses(TIMES, circle().points, np.zeros((len(TIMES), 3, 2))), r"\(N, 2, 2\)"),
-    ],
-)
-def test_arrays_that_do_not_fit_are_named(field, part, sentence):
-    with pytest.raises(WildlabError) as caught:
-        animated_flight(shown(**{field: [part] if field == "ellipses" else part}), alt="x")
-    assert re.search(sentence, f"{caught.value.problem} {caught.value.fix}") and caught.value.field == field
-
-
 def test_no_alt_text_no_picture():
     with pytest.raises(WildlabError, match="no alt text"):
         animated_flight(shown(), alt=" ")
@@ -199,6 +172,7 @@ def pictures(tab: Any) -> tuple[bytes, bytes]:
     return before, svg.screenshot()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("still", ["asked", "stopped", "paper"])
 def test_it_stands_still(browser, tmp_path, still):
     tab = opened(browser, tmp_path, **({"reduced_motion": "reduce"} if still == "asked" else {}))

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,7 +16,7 @@ from wildlab.analysis.overview import Path
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, errors_shown, map_shown
+from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, map_shown
 from wildlab.reporting.charts.navigation import (
     bias_chart,
     error_bands,
@@ -26,9 +25,7 @@ from wildlab.reporting.charts.navigation import (
 )
 from wildlab.reporting.charts.overview import Clock, lines_chart
 from wildlab.reporting.charts.tracks import (
-    error_over_time,
     speed_and_course,
-    squares_over_time,
 )
 from wildlab.reporting.figures import MOST_POINTS, png_bytes
 from wildlab.reporting.overview import way_of
@@ -81,26 +78,12 @@ def test_gains_are_differences_of_distances_where_both_see_the_target():
     assert (one.nearer, one.farther, one.middle) == (1.0, 0.0, pytest.approx(6.0))
 
 
-def test_shares_count_looks_and_leave_out_what_is_alike():
-    off = np.repeat([10.05, 9.95, 12.0, 3.0], [40, 40, 30, 90])
-    _, (one,) = beside_plain([track("ekf", PLAIN), track("coloured", off)])
-    assert (one.nearer, one.farther) == (0.45, 0.15)
-
-
 def test_tracks_of_other_looks_are_held_together_by_time():
     _, (one,) = beside_plain([track("kf", np.arange(N) + 1.0), track("imm", np.ones(50), start=100)])
     assert one.times.tolist() == list(range(100, 150))
     assert one.gain == pytest.approx(np.arange(100.0, 150.0))
     lost = track("imm", np.full(N, np.nan))
     assert beside_plain([track("kf", PLAIN), lost]) == ("kf", [])
-
-
-@pytest.mark.parametrize(
-    "tracks", [[], [track("ekf", PLAIN)], [track("schmidt", PLAIN), track("coloured", PLAIN)]]
-)
-def test_without_a_plain_filter_and_another_there_is_no_figure(tracks):
-    assert beside_plain(tracks)[1] == []
-    assert not tracks or beside_plain_shown(tracks) is None
 
 
 def test_each_filter_has_a_strip_and_all_have_one_axis():
@@ -129,18 +112,6 @@ def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest):
     assert ax.get_yscale() == "symlog"
     bottom, top = (ax.transData.transform((0, y))[1] for y in (0.0, 1.3))
     assert top - bottom > 8  # pixels
-    assert_readable(figure)
-
-
-@pytest.mark.parametrize(("worst", "scale"), [(12.0, "linear"), (5e6, "log")])
-def test_errors_of_one_that_is_lost_are_drawn_over_powers_of_ten(worst, scale):
-    plain = PLAIN.copy()
-    plain[-5:] = worst
-    rows = pd.DataFrame(
-        {"sensor": "radar", "target": "boat", "filter": ["ekf", "schmidt"], "rmse": [worst, 9.0]}
-    )
-    figure, *_ = errors_shown([track("ekf", plain), track("schmidt", PLAIN - 1)], rows)
-    assert figure.axes[0].get_yscale() == scale
     assert_readable(figure)
 
 
@@ -184,18 +155,6 @@ NAMES = {"ekf": "Extended", "schmidt": "Schmidt"}
 TRUTH = np.column_stack([SECONDS, 0 * SECONDS, 0 * SECONDS + 1.0, 0.05 * np.sin(SECONDS)])
 
 
-@pytest.mark.parametrize("strips", [1, 2])
-def test_errors_are_distances_or_north_and_east(strips):
-    error = TRUTH[:, 0] if strips == 1 else TRUTH[:, :2]
-    figure = error_over_time(SECONDS, SEEN, {"ekf": error}, NAMES, "Errors", measured=error)
-    assert len(figure.axes) == strips
-    for i, ax in enumerate(figure.axes):
-        line = next(line for line in ax.lines if line.get_label() == "Extended")
-        assert np.array_equal(line.get_ydata(), np.column_stack([error])[:, i])
-        assert len(ax.patches) == 1  # the pause
-        assert len(ax.lines[-1].get_xdata()) == SEEN.sum()
-
-
 def courses(figure):
     return {line.get_label(): np.asarray(line.get_ydata(), float) for line in figure.axes[1].lines}
 
@@ -223,13 +182,6 @@ def test_courses_all_round_break_over_north():
     assert (seen >= 0).all() and (seen <= 360).all()
     assert np.nanmax(np.abs(np.diff(angle))) < 180
     assert figure.axes[1].get_ylim() == (-5.0, 365.0)
-
-
-def test_values_at_detections_alone_are_dots():
-    nis, nees = np.where(SEEN, 0.5, np.nan), np.full(len(SECONDS), 2.0)
-    figure = squares_over_time(SECONDS, SEEN, {"NIS": {"ekf": nis}, "NEES": {"ekf": nees}}, NAMES, "Squares")
-    dots, line = (one for ax in figure.axes for one in ax.lines if one.get_label() == "Extended")
-    assert (dots.get_linestyle(), line.get_linestyle()) == ("None", "-")
 
 
 SOURCES = ("autopilot", "truth", "mine", "truth-payload", "mekf")

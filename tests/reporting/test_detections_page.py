@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from wildlab.messages.catalogue import load_texts
-from wildlab.reporting.detections import LISTED, ROOM, advice, answer, detections_page, rates_shown, reason
+from wildlab.reporting.detections import LISTED, advice, answer, detections_page, rates_shown, reason
 
 JPEG = bytes(cv2.imencode(".jpg", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
 
@@ -85,13 +85,6 @@ def test_names_are_names_and_nothing_more():
     result = run(problems=[[evil, evil]], judged=rates(6, 2, 2), pictures={"missed": 3, "invented": 2})
     page, _ = shown(result, {"missed": JPEG}, [(f'"{evil}', JPEG)], thresholds={evil: evil}, name=evil)
     assert "<script" not in page and page.count("data:image/jpeg") == 2
-
-
-def test_pictures_have_an_end():
-    large = JPEG + bytes(ROOM // 2)
-    page, words = shown(run(), {}, [("a", large), ("b", JPEG), ("c", large), ("d", JPEG)])
-    assert page.count("data:image/jpeg") == 2 and "2 more pictures" in words
-    assert "data:image/jpeg" not in shown(run(), {}, [("a", large + large)])[0]
 
 
 ELLIPSES = {"estimate": 0.6, "low": 0.5, "high": 0.7}

@@ -12,7 +12,6 @@ from matplotlib.patches import Ellipse
 
 from tests.figure_text import overlapping
 from tests.reporting.test_html import contrast
-from wildlab.messages.quantities import nice_length
 from wildlab.reporting import figures
 from wildlab.reporting.charts import drawing, georeferencing, navigation, tracks
 from wildlab.reporting.figures import PHONE_WIDTH, least_size
@@ -33,18 +32,6 @@ def test_ellipse_holds_its_share_of_samples():
     assert ax.get_xlim()[0] < 10 - shape.width / 4
 
 
-def test_nothing_is_drawn_where_nothing_is_known():
-    _, ax = figures.new_figure()
-    assert figures.ellipse(ax, [np.nan, 0.0], np.eye(2)) is None
-    assert figures.ellipse(ax, [0.0, 0.0], np.full((2, 2), np.nan)) is None
-    assert not ax.patches
-
-
-@pytest.mark.parametrize(("about", "length"), [(7.3, 5), (10, 10), (0.024, 0.02), (1999, 1000)])
-def test_nice_length(about, length):
-    assert nice_length(about) == pytest.approx(length)
-
-
 def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path, monkeypatch):
     monkeypatch.delenv(figures.QUICK, raising=False)
     saved = []
@@ -58,12 +45,6 @@ def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path, monkeypatch):
         assert fig.get_layout_engine() is engine, "it can be added to, and saved once more"
     assert saved[0] == saved[1] == saved[2]
     assert b"Date" not in saved[0][1] and b"matplotlib" not in saved[0][0].lower()
-
-
-def test_subjects_that_share_a_figure_have_different_colours():
-    for family in (("autopilot", "observer", "mekf"), ("kf", "ekf", "schmidt", "coloured", "ukf", "imm")):
-        assert len({figures.colour(name) for name in (*family, "truth")}) == len(family) + 1
-    assert figures.colour("logged-pose") != figures.colour("calibrated-pose") != figures.colour("recorded")
 
 
 LONG = "A title that says what is to be seen here, and says it at length: 12.3 m of 45.6 m"
@@ -154,21 +135,6 @@ def test_the_ellipse_of_errors_is_in_its_figure():
     assert ellipse.height / 2 < ax.get_ylim()[1] and ellipse.width / 2 < ax.get_xlim()[1]
 
 
-@pytest.mark.parametrize("towards", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
-def test_names_lie_on_no_line_of_errors(towards):
-    """The mean of errors is near the truth on any side, and two curves of shares near each other."""
-    errors = 0.3 * np.array(towards) + np.random.default_rng(0).normal(0, 2, (40, 2))
-    curves = {name: (scale * errors, "black") for name, scale in (("as logged", 1), ("unseen images", 0.8))}
-    for figure in (georeferencing.error_scatter(errors, ""), georeferencing.error_shares(curves, "")):
-        figures.png_bytes(figure)
-        (ax,) = figure.axes
-        marks = [line for line in ax.lines if line.get_marker() == "o" or line.get_linestyle() == "-"]
-        points = np.concatenate([ax.transData.transform(line.get_xydata()) for line in marks])
-        for text in ax.texts:
-            box = text.get_window_extent()
-            assert text.get_text() == "N" or not box.padded(2.0).count_contains(points)
-
-
 def test_the_look_out_finds_what_is_wrong():
     figure, ax = figures.new_figure()
     ax.text(0.5, 0.5, "one")
@@ -192,16 +158,6 @@ def test_a_legend_and_names_at_ends_are_moved_until_they_fit():
     assert overlapping(figure) == []
     heights = [text.get_window_extent().y0 for text in ax.texts]
     assert heights == sorted(heights)  # in the order of the lines
-
-
-@pytest.mark.parametrize("unit", ["s", "m/s", "%", "°"])
-def test_a_number_stays_with_its_unit_where_a_title_is_broken(unit):
-    for much in range(0, 24, 6):
-        figure, ax = figures.new_figure()
-        ax.set_title(f"{'x' * much} pauses, of which the longest one, of all of the frames: 37.4 {unit}")
-        figures.png_bytes(figure)
-        lines = ax.get_title(loc="left").split("\n")
-        assert len(lines) > 1 and lines[-1].endswith(f"37.4 {unit}")
 
 
 def test_every_line_stands_out_from_white():

@@ -9,13 +9,12 @@ from itertools import pairwise, product
 
 import cv2
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.reporting import published_marks as ratios
-from wildlab.reporting.front_page import MOST_PIXELS, WIDE, read_glimpse, smaller
+from wildlab.reporting.front_page import MOST_PIXELS, read_glimpse, smaller
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Number
 
 CLOSE, NOT_CLOSE = Closeness.CLOSE, Closeness.NOT_CLOSE
@@ -64,23 +63,6 @@ def test_no_mark_hides_another_where_there_is_room(given_):
         assert all(b - a >= 2 * 3.6 for a, b in pairwise(xs))
 
 
-def test_the_plot_shows_what_has_a_ratio_and_nothing_else():
-    numbers = [number(2.0), number(0.01, NOT_CLOSE), number(None), number(1.0, MISSING), number(-1.0)]
-    drawn = ratios.plot(numbers, alt="<two>")
-    at = dict(re.findall(r'translate\(([\d.]+) [^>]*><g class="mark \w*"><path class="(\w+)"', drawn))
-    assert {name: float(x) for x, name in at.items()} == {
-        "same": pytest.approx(on_axis(2.0, 320.0), abs=0.06),
-        "off": pytest.approx(6.0, abs=0.06),
-    }
-    assert drawn.count('class="far"') == 1 and 'aria-label="&lt;two&gt;"' in drawn
-    # The shaded margin ends where a ratio of 1.25 lies.
-    left, right = map(float, re.search(r'class="close" d="M([\d.]+) 0H([\d.]+)V', drawn).groups())  # type: ignore[union-attr]
-    assert (left, right) == (
-        pytest.approx(on_axis(0.8, 320), abs=0.06),
-        pytest.approx(on_axis(1.25, 320), abs=0.06),
-    )
-
-
 def test_both_answers_show_without_colour():
     names, paths = zip(*ratios.SHAPES.values(), strict=True)
     assert set(ratios.SHAPES) == set(VERDICTS) and len(set(names)) == len(set(paths)) == 5
@@ -95,25 +77,6 @@ def test_both_answers_show_without_colour():
 
 def png(picture: np.ndarray) -> str:
     return base64.b64encode(cv2.imencode(".png", picture)[1].tobytes()).decode()
-
-
-def shrunk(picture: np.ndarray) -> np.ndarray:
-    address = smaller(png(picture))
-    assert address.startswith("data:image/webp;base64,")
-    return cv2.imdecode(
-        np.frombuffer(base64.b64decode(address.partition(",")[2]), np.uint8), cv2.IMREAD_COLOR
-    )
-
-
-def test_a_small_picture_looks_like_the_large_one():
-    large = np.zeros((600, 880, 4), np.uint8)
-    large[:, :440] = (0, 0, 255, 255)  # red on the left; the right lets the paper through
-    small = shrunk(large)
-    assert small.shape == (300, WIDE, 3)
-    assert np.abs(small[:, 20:200].astype(int) - (0, 0, 255)).mean() < 12
-    assert small[:, 240:].min() > 240
-    grey = shrunk(np.full((100, 880), 128, np.uint8))
-    assert grey.shape == (50, WIDE, 3) and np.abs(grey.astype(int) - 128).max() < 4
 
 
 def test_what_is_no_picture_gives_none():

@@ -16,13 +16,12 @@ import pytest
 from bs4 import BeautifulSoup
 
 from wildlab.analysis.georeference import georeference, observe
-from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing
 from wildlab.reporting.georeferencing import EXACT, truth_kinds
-from wildlab.reporting.georeferencing_tables import POINT_COLUMNS, noise_table, point_links
+from wildlab.reporting.georeferencing_tables import POINT_COLUMNS, point_links
 from wildlab.reporting.report import Report, open_report
 from wildlab.simulation.twins import simulate_twin
 
@@ -30,38 +29,6 @@ from wildlab.simulation.twins import simulate_twin
 @pytest.fixture
 def report():
     return open_report(study="made-up", kind="twin")
-
-
-def scored_table(n=20, seed=0):
-    rng = np.random.default_rng(seed)
-    e = rng.normal(size=(n, 2))
-    return pd.DataFrame(
-        {"frame_id": np.repeat([f"I{i}" for i in range(n // 2)], 2), "error_north_m": e[:, 0],
-         "error_east_m": e[:, 1],
-         "error_m": np.hypot(*e.T), "inside_90": 1.0, "ellipse": "linear"}
-    )  # fmt: skip
-
-
-def test_metrics_have_the_promised_names(report):
-    georeferencing.record_errors(report, "logged-pose", scored_table(), {"horizontal_error_mean": (0.5, 2.0)})
-    assert [m["name"] for m in report._metrics] == [
-        *(f"horizontal_error_{one}" for one in ("mean", "median", "p90", "max")),
-        *("bias_north", "bias_east", "sd_north", "sd_east", "ellipse_coverage_90"),
-    ]
-    assert report._metrics[0]["low"] == 0.5
-
-
-def test_noise_is_shown_in_degrees():
-    noise = PoseNoise(dict.fromkeys(KINDS, np.radians(2.0)), dict.fromkeys(KINDS, 1.5))
-    units = ("position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg", "pixel_px")
-    table = noise_table(noise, dict.fromkeys(units, 1))
-    heading = table[table["unit"] == "deg"]["estimated"]
-    assert heading.tolist() == pytest.approx([2.0, 2.0]) and len(table) == len(KINDS)
-
-
-def test_the_range_of_views():
-    assert georeferencing.span([50.6, 111.2, np.nan]) == "51 to 111"
-    assert georeferencing.short_length(0.4) == "40 cm" and georeferencing.short_length(5.06) == "5.1 m"
 
 
 def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():

@@ -10,17 +10,15 @@ import pytest
 
 from wildlab.analysis.diagnose import Diagnosis
 from wildlab.analysis.verdict import (
-    CAUSES,
     WORTH,
     Evidence,
-    causes_told,
     gains_of,
     possible_gain,
     verdict_of,
 )
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
-from wildlab.evaluation.errors import AlongAxis, Scatter, summarise
+from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.outliers import Outlier
 from wildlab.geometry.calibration import Calibration
@@ -118,15 +116,6 @@ def test_what_is_not_told_from_zero_is_not_blamed():
         assert page.significant_causes(replace(found, calibration=calibration(names, values))) == blamed
 
 
-@pytest.mark.parametrize("high", [0.5, -0.1])
-def test_numbers_alone_name_the_same(high):
-    """The overview, the front page and the copies for others read the recorded numbers."""
-    numbers = {("down_offset", "calibration"): {"value": -1.1, "low": -2.7, "high": high},
-               ("clock_offset", "calibration"): {"value": 1.6, "low": 1.5, "high": 1.7}}  # fmt: skip
-    assert causes_told(numbers) == ("height", "camera's clock")[high > 0 :]
-    assert set(causes_told(numbers)) <= set(CAUSES)
-
-
 @pytest.mark.parametrize(
     ("lost", "word", "found", "level"),
     [
@@ -146,23 +135,10 @@ def test_the_colour_of_the_verdict(lost, word, found, level):
     assert page.verdict_of_accuracy(summarise(np.empty((0, 2))), 5, ellipses(word), None)[0].colour == "bad"
 
 
-def test_no_flight_is_good_whose_cause_nobody_could_look_for():
-    """Twelve points of one image: neither cause nor ellipses are judged."""
-    assert page.verdict_of_accuracy(MANY, 0, ellipses("too few"), None)[0].colour == "neutral"
-
-
 def test_logs_that_contradict_each_other_are_a_problem_and_a_warning_is_none():
     given = (MANY, 0, ellipses("honest"), diagnosis(NOTHING))
     assert page.verdict_of_accuracy(*given, 0)[0].colour == "good"
     assert page.verdict_of_accuracy(*given, 1)[0].colour == "bad"
-
-
-def test_a_cause_that_is_not_certain_is_in_no_figure_of_what_is_far_out():
-    """Its held-out errors are zero here, those of the poses as logged are five metres."""
-    found = diagnosis(UNSURE, outliers=(FAR,))
-    found.models[0].held = np.tile([3.0, 4.0], (4, 1))
-    assert found.held_summary().mean == found.held_summary(np.arange(4) < 2).mean == 5.0
-    assert diagnosis(PART).held_summary().mean == 0.0
 
 
 def test_leaving_out_what_is_far_out_gains_what_the_mean_loses():

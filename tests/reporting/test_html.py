@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from itertools import permutations
 
 import nbformat
 import pandas as pd
@@ -26,7 +25,6 @@ from wildlab.reporting.layout import (
     order_report,
     with_glossary,
 )
-from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.reporting.page import STYLE, failure_page, page
 from wildlab.reporting.report import Report, open_report
 
@@ -60,19 +58,6 @@ def test_hostile_names_stay_text(tmp_path, faults):
     path = tmp_path / "report.html"
     path.write_text(whole, encoding="utf-8")
     assert faults(path) == []
-
-
-@pytest.mark.parametrize(
-    ("text", "theses"),
-    [("H 5.6.1", "H"), ("H (7.35) and F tables 3.1", "HF"), ("the matrix H, the force F, H2O, CH 4", "")],
-)
-def test_a_report_names_the_theses_that_it_cites(text, theses):
-    report = open_report(study="test", kind="twin", seed=1)
-    report.head("Title")
-    report.text(text)
-    whole = html.report_page(shown(report), study="test", footer="<p>made</p>")
-    footer = whole.partition("<footer>")[2]
-    assert ("Helgesen" in footer, "Flodell" in footer) == ("H" in theses, "F" in theses)
 
 
 def test_failure_page_opens_offline_and_stays_text(tmp_path, faults):
@@ -118,19 +103,12 @@ def test_page_says_what_browsers_may_do():
     ("body", "sentence"),
     [
         ("<h1>a</h1><script>1</script>", "<script>"),
-        ("<h1>a</h1><iframe></iframe>", "<iframe>"),
-        ('<h1>a</h1><meta http-equiv="refresh" content="0">', "<meta>"),
         ('<h1>a</h1><p onclick="x()">b</p>', "'onclick'"),
         ('<h1>a</h1><img alt="b" src="https://example.org/a.png">', "'https://example.org"),
-        ('<h1>a</h1><img alt="b" src="figures/a.png">', "'figures/a.png'"),
         ('<h1>a</h1><a href=" JavaScript:x()">b</a>', "link runs"),
         ('<h1>a</h1><p style="background:url(//example.org)">b</p>', "style"),
-        ("<h1>a</h1><style>@import 'x'</style>", "style"),
         ('<h1>a</h1><img src="data:image/png;base64,AA==">', "alt"),
-        ('<h1>a</h1><img alt="  " src="data:image/png;base64,AA==">', "alt"),
-        ("<h2>a</h2><h1>b</h1>", "precedes"),
         ("<p>a</p>", "has 0"),
-        ("<h1>a</h1><h1>b</h1>", "has 2"),
         ("<h1>a</h1><h3>b</h3>", "level 3"),
         ("<h1>a</h1>" + "x" * 5_000_000, "5 MB"),
     ],
@@ -138,12 +116,6 @@ def test_page_says_what_browsers_may_do():
 def test_a_page_that_breaks_a_promise_is_refused(body, sentence):
     with pytest.raises(WildlabError, match=f"report.html: .*{sentence}"):
         html.examine(page(title="a", body=body), "study")
-
-
-def test_a_file_that_is_no_notebook_is_named(tmp_path):
-    (tmp_path / "a.ipynb").write_text("{}")
-    with pytest.raises(WildlabError, match=r"a\.ipynb: this is not a notebook"):
-        read_notebook(tmp_path / "a.ipynb")
 
 
 @pytest.mark.parametrize("to", ["ledger.html", "a-b/report.html#x", "100%25/report.html"])
@@ -180,11 +152,6 @@ def contrast(one: str, other: str) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
-def test_contrast_is_that_of_the_standard():
-    assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
-    assert contrast("#767676", "#ffffff") == pytest.approx(4.54, abs=0.01)
-
-
 @pytest.mark.parametrize("scheme", [":root", "prefers-color-scheme: dark"])
 def test_every_colour_of_words_can_be_read(scheme):
     found = colours(":root") | colours(scheme)
@@ -196,13 +163,6 @@ def test_every_colour_of_words_can_be_read(scheme):
     # What is drawn, not written.
     for mark in ("blue", "ink"):
         assert contrast(found[mark], found["bg"]) >= 3.0
-
-
-def test_the_night_has_its_own_ground_and_leaves_paper_white():
-    assert luminance(colours("prefers-color-scheme: dark")["bg"]) < 0.02
-    assert "@media screen and (prefers-color-scheme: dark)" in STYLE
-    # A colour written outside the variables would stay as it is by night.
-    assert not re.findall(r"#[0-9a-fA-F]{3,8}\b", STYLE.split("* { box-sizing")[1])
 
 
 IMAGE = '<img alt="a" src="data:image/png;base64,AA==">'
@@ -259,13 +219,6 @@ def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand
     assert isinstance(first, Tag) and heading in first.find_all_next()
 
 
-def test_a_folded_picture_or_a_table_is_not_the_main_picture():
-    folded = f"<details><summary>s</summary><figure>{IMAGE}</figure></details>"
-    table = '<figure class="table"><table></table></figure>'
-    html = in_order(PARTS["head"], "<h2>sec</h2>", table, folded, PARTS["tiles"])
-    assert order(html, "tiles", "sec", "<table", "<img") == ["tiles", "sec", "<table", "<img"]
-
-
 @pytest.mark.parametrize(("level", "given"), [("good", "good"), ("bad", "bad")])
 def test_the_last_verdict_colours_the_bar(level, given):
     verdicts = [
@@ -276,12 +229,6 @@ def test_the_last_verdict_colours_the_bar(level, given):
     box = BeautifulSoup(whole, "html.parser").section
     assert box is not None and box["class"] == ["summary", given]
     assert box.get_text() == f"summary{given} word" and "data-level" not in str(box)
-
-
-def test_what_is_no_report_is_left_alone():
-    for names in permutations(("limits", "numbers")):
-        body = "\n".join(PARTS[name] for name in names)
-        assert order_report(body) == body
 
 
 A, B = Word("NEES", ("NEES",), "Squares."), Word("pose", ("poses", "pose"), "Where & which way.")
@@ -302,12 +249,9 @@ def test_the_first_use_is_linked_and_explained():
 @pytest.mark.parametrize(
     "within",
     [
-        "<h2>NEES</h2>",
-        "<a href='#x'>NEES</a>",
         "<code>NEES</code>",
         "<math><mi>NEES</mi></math>",
         "<table><thead><tr><th>NEES</th></tr></thead></table>",
-        "<details><summary>NEES</summary></details>",
     ],
 )
 def test_headings_links_code_and_formulas_are_no_use(within):
@@ -315,16 +259,9 @@ def test_headings_links_code_and_formulas_are_no_use(within):
     assert links(with_glossary(f"{within}<p>the NEES</p>", [A])) == [("#word-nees", "NEES")]
 
 
-@pytest.mark.parametrize("text", ["nees", "NEESES", "anNEES", "NEES-like", "self-NEES", "NEES_1"])
+@pytest.mark.parametrize("text", ["nees", "anNEES", "NEES-like"])
 def test_only_whole_words_count(text):
     assert with_glossary(f"<p>{text}</p>", [A]) == f"<p>{text}</p>"
-
-
-def test_what_is_folded_away_is_linked_only_where_there_is_no_other_use():
-    folded = "<details><summary>s</summary><p>NEES pose</p></details><p>NEES</p>"
-    soup = BeautifulSoup(with_glossary(folded, [A, B]), "html.parser")
-    assert [link.get_text() for link in soup.select("details a")] == ["pose"]
-    assert [link.get_text() for link in soup.select("body > p a, :root > p a, p a")].count("NEES") == 1
 
 
 @given(st.lists(st.integers(1, 4), min_size=1, max_size=14))

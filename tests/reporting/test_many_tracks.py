@@ -77,14 +77,6 @@ def test_names_are_only_text_and_leave_room_for_the_picture():
     assert shown[0].startswith("<b>a$b_{$^") and all(len(one) <= charts.LONGEST_NAME for one in shown)
 
 
-def test_a_line_is_parted_where_its_track_was_absent():
-    way = np.array([[0.0, 1, 1], [0.0, 1, 2], [1.0, 2, 2], [4.0, 9, 9]])
-    times = [0.0, 0.0, 1.0, 2.0, 3.0, 4.0]
-    got = charts.parted(way, times)
-    assert np.isnan(got[3]).all() and got[[0, 1, 2, 4]].tolist() == way.tolist()
-    assert charts.parted(way[:3], times).tolist() == way[:3].tolist()
-
-
 def followed(tracks: int = 2, looks: int = 61) -> Any:
     P = np.eye(4)
     return SimpleNamespace(
@@ -123,13 +115,6 @@ def test_numbers_of_the_summary():
     none = gospa([[0.0, 0.0]], np.empty((0, 2)), 20.0)
     never = lives(gospa=[none] * 61, targets={"a": TargetLife(61, 0.0, np.nan, 0, 0)})
     assert page.on_target(never) == 0 and np.isnan(page.rms_error(never))
-
-
-def test_parts_of_gospa_add_up():
-    far = gospa([[0.0, 0.0], [50.0, 0.0]], [[3.0, 0.0], [99.0, 3.0]], 20.0)
-    table = page.parts_table([far])
-    assert table["metres"].iloc[1:].pow(2).sum() == pytest.approx(table["metres"].iloc[0] ** 2)
-    assert table["share"].iloc[1:].sum() == pytest.approx(100)
 
 
 def test_a_track_that_goes_on_without_its_target_is_seen():

@@ -26,7 +26,6 @@ from wildlab.reporting.charts import drawing, following, georeferencing, many, n
 from wildlab.reporting.charts.following import beside_plain_shown
 from wildlab.reporting.detections import precision_over_recall
 from wildlab.reporting.figures import _harmless as _harmless_texts
-from wildlab.reporting.figures import fit_text
 from wildlab.reporting.text import csv_link
 from wildlab.runner.annotation.session import Point, Session
 
@@ -108,16 +107,6 @@ def test_labels_of_figures_come_through_the_door():
     assert makers == ["figures.py"]
 
 
-@pytest.mark.parametrize(
-    "bad",
-    ["ax.plot(x, label=one.name)", "ax.set_yticks(at, list(names))", 'look = {"label": name}',
-     'ax.plot(x, label=f"{name} m")', "ax.set_title(x, parse_math=True)"],
-)  # fmt: skip
-def test_the_lint_can_fail(bad):
-    assert passed_by(bad) == [1]
-    assert passed_by("ax.plot(x, label=figure_name(one.name))") == []
-
-
 def test_every_table_is_written_through_the_door():
     writers = {
         str(path.relative_to(PACKAGE))
@@ -194,23 +183,6 @@ def assert_legend(figure: Figure, wanted: set[str]) -> None:
 def _seen(text: str) -> str:
     """Letters that are certainly drawn as they are."""
     return "".join(c for c in text if c.isalnum() or c in "$_")
-
-
-def test_figures_of_strange_names_have_names_of_their_own():
-    names = [following.slug("map", one) for one in ("$", "å", "ä", "буй", "лес", "boat 1")]
-    assert len(set(names)) == len(names) and names[-1] == "map-boat-1"
-    assert all(one.isascii() and one.replace("-", "").isalnum() for one in names)
-
-
-def test_axes_of_powers_have_numbers_without_maths():
-    from wildlab.reporting.figures import new_figure
-
-    figure, ax = new_figure()
-    ax.set(xscale="log", yscale="log", xlim=(1e-3, 1e6), ylim=(2, 9))
-    fit_text(figure)
-    figure.draw_without_rendering()
-    texts = [label.get_text() for axis in (ax.xaxis, ax.yaxis) for label in axis.get_ticklabels(which="both")]
-    assert "0.01" in texts and "1·10⁶" in texts and not any("$" in text for text in texts)
 
 
 # -- tables

@@ -82,18 +82,6 @@ def test_the_most_pressing_is_said_first(found, keys):
     assert [one.key for one in page.answer(found)] == keys
 
 
-def test_an_alarm_is_told_by_its_time_since_the_first_stamp():
-    message = page.alarm_message(alarm("jumps", 1), Flight())
-    assert (
-        message.key == "alarm-jumps-once"
-        and message.values["at"] == "30"
-        and message.values["size"] == "6.7 m"
-    )
-    assert page.issue_message(LASTING.troubles[0], LASTING).values["share"] == "10 %"
-    instant = Issue("position jumps", np.array([[5.0, 5.0]]))
-    assert page.issue_message(instant, LASTING).key == "issue-instant"
-
-
 COUNTS = {"worth": 0, "troubled": 0}
 
 

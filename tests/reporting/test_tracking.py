@@ -166,28 +166,6 @@ def test_sensors_that_contradict_each_other_are_looked_at():
     assert beside.key == "apart" and (beside.values["times"], beside.values["rms"]) == ("2.0", "3.0 m")
 
 
-def test_a_smoothed_track_without_innovations_is_not_a_lost_one():
-    both = pd.concat([rows(), rows(filter="schmidt-smoothed", detections=0, nis=np.nan).iloc[1:]])
-    assert keys(both) == ["errors-consistent", "ekf"]
-    lost = rows().assign(detections=0, compared=0, sensor="ir", nees=np.nan, verdict="not judged")
-    never = page.answer(pd.concat([rows(), lost]), [])[1]
-    assert never.key == "never-tracked" and never.values == {"never": "1", "of": "2"}
-
-
-@pytest.mark.parametrize(("nees", "few"), [(5.5, True), (7.4, True), (7.6, False), (2.0, False)])
-def test_few_values_are_an_excuse_near_the_band_only(nees, few):
-    row = rows(nees=nees, verdict="overconfident" if nees > 5 else "consistent").iloc[1]
-    assert page.on_few(row) == few
-    assert page.tracks_table(pd.DataFrame([row]))["verdict"].iloc[0].endswith("*") == few
-
-
-def test_time_without_the_target_is_a_number_of_its_own():
-    lost = rows(rmse=9.4, compared=263, without=1084, rmse_without=205.0, wait=67.7, filter="ekf").iloc[1:]
-    assert [one.values.get("rmse") for one in page.answer(lost, [])] == ["9.4 m", "205 m"]
-    table = page.tracks_table(lost)
-    assert table["compared"].tolist() == [263] and table["rmse_without"].iloc[0] == 205.0
-
-
 @pytest.mark.parametrize(("used", "key"), [(0, "no-track"), (1, "one-detection")])
 def test_without_a_second_detection_nothing_is_judged(used, key):
     one = rows().assign(detections=0, used=used, compared=0, verdict="not judged")
@@ -200,15 +178,6 @@ def test_all_sensors_together_must_not_be_worse_than_the_best_alone(rmse, level)
     both = pd.concat([rows(), together.assign(sensor="together", kind="together")])
     assert colour(both) == level
     assert ("worse-together" in keys(both)) == (level == "warn")
-
-
-def test_restarts_are_counted_once_for_all_filters():
-    again = rows().assign(restarts=2, untracked=40, spanned=100, untracked_in_view=3)
-    said = page.answer(again, [])[1]
-    assert said.key == "restarted" and said.values == {"times": "2", "gone": "40", "looks": "100"}
-    times, without = np.arange(6.0), np.array([False, True, True, False, True, False])
-    assert page.longest_gap(times, without) == 2.0
-    assert page.longest_gap(times, np.zeros(6, bool)) == 0.0
 
 
 def test_every_sentence_is_one_of_the_catalogue():

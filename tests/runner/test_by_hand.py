@@ -49,22 +49,6 @@ def test_a_study_by_hand_imports_all_flights_of_its_data_set(made):
     assert {dataset for dataset, _, _ in made} == {"autoferry"}
 
 
-def test_a_flight_that_is_given_is_taken(made, tmp_path):
-    # The name is no study's: `wildlab evaluate` names reports after flights.
-    assert flights.flight_for("tuesday", str(tmp_path), 1) == tmp_path
-    assert flights.flights_for("tuesday", "a", ["b"], 1) == [Path("a"), Path("b")]
-    assert made == []
-
-
-@pytest.mark.parametrize(
-    ("study", "sentence"),
-    [("static-pont", "'static-point'"), ("sensitivity", "no flight")],
-)
-def test_without_a_flight_a_sentence_says_what_to_do(study, sentence):
-    with pytest.raises(WildlabError, match=f"(?i){sentence}"):
-        flights.flight_for(study, "", 1)
-
-
 def test_without_its_data_set_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
     with pytest.raises(WildlabError, match="wildlab fetch openathena"):

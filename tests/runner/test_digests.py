@@ -15,7 +15,6 @@ from tests.runner.test_ledger import a_study, published, ran
 from tests.sharing.canary import canary
 from wildlab import cli
 from wildlab.errors import WildlabError
-from wildlab.files import digest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.metrics import metric
@@ -24,7 +23,7 @@ from wildlab.runner.compare import compare_flights
 from wildlab.runner.processes.job import FILES
 from wildlab.runner.record.digests import misfits, read_status, seal
 from wildlab.runner.record.own_flights import own_flights
-from wildlab.runner.record.provenance import changed_notice, footer, provenance_of_flight, same_flight
+from wildlab.runner.record.provenance import changed_notice, footer, provenance_of_flight
 from wildlab.runner.record.status import as_plain, study_status
 from wildlab.runner.seeds import SeedWork, read_seed, write_seed
 from wildlab.runner.verification import verify_report
@@ -183,20 +182,3 @@ def test_a_changed_manifest_is_told_in_the_report(tmp_path):
     report.summary(["An answer."])
     page = html.report_page(notebook_of(report), study="test", alert=changed_notice(about))
     assert page.index("</h1>") < page.index("flight.toml of") and "data-part" not in page
-
-
-def test_records_without_tables_are_of_no_flight():
-    tables = {"files": {"flight.toml": "0", "frames.parquet": "1"}}
-    assert same_flight(tables, {"files": {"flight.toml": "2", "frames.parquet": "1"}})
-    assert not same_flight(tables, {"files": {"flight.toml": "0", "frames.parquet": "2"}})
-    for nothing in ({}, None, {"files": {"flight.toml": "0"}}):
-        assert not same_flight(nothing, nothing)
-
-
-def test_a_digest_knows_content_and_not_its_order(tmp_path):
-    path = tmp_path / "file"
-    path.write_text("one")
-    whole = digest({"a": 1, "b": 2}, [("file", path)])
-    assert whole == digest({"b": 2, "a": 1}, [("file", path)]) != digest({"a": 1, "b": 3}, [("file", path)])
-    path.write_text("two")
-    assert digest({"a": 1, "b": 2}, [("file", path)]) != whole

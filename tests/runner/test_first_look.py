@@ -11,15 +11,12 @@ from typing import Any
 import pytest
 
 from tests.notebooks import OPEN, notebook, write
-from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS
-from wildlab.reporting.page import first_look_notice
-from wildlab.reporting.status import describe_first_look
 from wildlab.runner import run as running
 from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.run import THERE, has_whole_report, make_job, plan_passes, quick_first, run_studies
+from wildlab.runner.run import THERE, has_whole_report, make_job, plan_passes, run_studies
 from wildlab.runner.seeds import write_seed
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
@@ -58,30 +55,6 @@ def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp
     assert look.again == "wildlab run static-point", "which gives the full numbers"
     for enough in (100, 101):
         assert make_job(STUDIES["static-point"], reports=tmp_path, seeds=enough).first_look == {}
-
-
-def test_first_looks_in_words():
-    assert describe_first_look({"seeds": (5, 200)}) == "5 of 200 flights" and describe_first_look({}) == ""
-    # No name of a parameter reaches a reader as it is.
-    assert not [one for study in STUDIES.values() if "_" in (one := describe_first_look(study.reductions()))]
-    notice = first_look_notice("5 of <b>", "wildlab run a")
-    assert "5 of &lt;b&gt;" in notice and "<code>wildlab run a</code>" in notice
-
-
-@pytest.mark.parametrize(
-    ("entry", "sentence"),
-    [
-        ("[s.first_look]\nruns = 5", "None"),
-        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 5", "own is 5"),
-        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = -1", "-1 of 'runs'"),
-        ("[s.parameters]\nruns = 'x'\n[s.first_look]\nruns = 1", "'x'"),
-    ],
-)
-def test_a_first_look_that_is_none_is_refused(tmp_path, entry, sentence):
-    path = tmp_path / "studies.toml"
-    path.write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
-    with pytest.raises(WildlabError, match=sentence):
-        load_studies(path)
 
 
 def test_first_every_page_and_then_the_full_numbers(tmp_path):
@@ -132,20 +105,6 @@ def test_a_study_whose_flights_are_all_kept_is_run_in_full_at_once(tmp_path):
     assert plan_passes([whole], looks) == ([whole], [], [])
     both = {whole.name: replace(looks[whole.name], first_look={"seeds": (5, 100), "steps": (1, 2)})}
     assert plan_passes([whole], both).second == [whole], "its notebook takes its time as well"
-
-
-def test_the_quick_ones_go_first(tmp_path):
-    names = ["static-point", "survey-markers", "sensitivity", "gating", "consistency-bounds"]
-    chosen = [STUDIES[name] for name in names]
-    assert [study.name for study in quick_first(chosen, tmp_path)] == [
-        "sensitivity", "consistency-bounds", "survey-markers", "static-point", "gating",
-    ]  # fmt: skip
-    for name, seconds in (("gating", 2.0), ("sensitivity", 40.0)):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "status.json").write_text(json.dumps({"seconds": seconds}))
-    assert [study.name for study in quick_first(chosen, tmp_path)] == [
-        "gating", "consistency-bounds", "survey-markers", "sensitivity", "static-point",
-    ]  # fmt: skip
 
 
 class Studies:
@@ -220,11 +179,6 @@ def test_a_first_look_alone(studies):
     (outcome,) = studies.run("other", first_look=True)
     assert studies.passes == [] and (outcome.state, outcome.reason) == ("skipped", THERE)
     assert "first look" not in studies.ledger().partition('id="other"')[2].partition("</section>")[0]
-
-
-def test_a_number_of_flights_is_one_pass(studies):
-    studies.run(everything=True, seeds=7)
-    assert studies.passes == [[("quick", {}), ("slow", {}), ("other", {})]]
 
 
 def test_the_ledger_is_there_before_anything_and_after_each_study(studies):

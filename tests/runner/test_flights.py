@@ -13,14 +13,11 @@ from tests.flight.conftest import make_flight
 from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
-from wildlab.flight.checks.check import usable_for
-from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.runner import flights
-from wildlab.runner.evaluate import evaluate_flight, lacking_for_navigation, refuse_other_flight
+from wildlab.runner.evaluate import evaluate_flight, refuse_other_flight
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.runner.run import run_studies
-from wildlab.simulation.twins import simulate_twin
 
 __all__ = ["make_flight"]
 
@@ -64,16 +61,6 @@ def test_it_is_simulated_again_when_its_parameters_change(tmp_path, simulated, m
     (tmp_path / "data" / "twins" / "parts" / "camera.toml").write_text("shared by twins")
     flights.twin_flight("antenna", 1, tmp_path)
     assert len(simulated) == 3
-
-
-def test_a_simulation_that_fails_leaves_nothing(tmp_path, monkeypatch):
-    def fail(*_: Any) -> Flight:
-        raise WildlabError("it is raining", "wait")
-
-    monkeypatch.setattr("wildlab.simulation.twins.simulate_twin", fail)
-    with pytest.raises(WildlabError, match="raining"):
-        flights.twin_flight("antenna", 1, tmp_path)
-    assert list((tmp_path / ".flights").iterdir()) == []
 
 
 def studies(folder: Path) -> Path:
@@ -159,27 +146,6 @@ def test_poses_that_are_not_there_are_told_before_anything_runs(tmp_path, make_f
     assert not (tmp_path / "reports").exists()
 
 
-def lacking(flight: Flight) -> str:
-    (use,) = (use for use in usable_for(flight) if use.purpose == "navigation")
-    return lacking_for_navigation(flight, use)
-
-
-@pytest.mark.slow
-def test_what_a_flight_lacks_for_its_navigation_is_said():
-    """A reference, and how the sensor errs."""
-    twin = simulate_twin("fast-vessel", 1)
-    assert "studies of its own" in lacking(twin)
-    stated = twin.manifest.model_dump(exclude={"twin", "kind"}, exclude_none=True)
-    logged = make_manifest({**stated, "kind": "logged"})
-    tables = {name: twin.tables[name] for name in ("imu", "gnss")}
-    assert lacking(Flight(logged, {"onboard": twin.nav["autopilot"]}, tables)) == ""
-    assert "no pose" in lacking(Flight(logged, {}, tables))
-    silent = make_manifest({**stated, "kind": "logged", "imu": {}})
-    flight = Flight(silent, {"onboard": twin.nav["autopilot"]}, tables)
-    assert "not stated" in lacking(flight)
-    assert "inertial measurements" in lacking(Flight(logged, {}, {"gnss": tables["gnss"]}))
-
-
 def test_a_flight_named_like_a_study_would_replace_its_report(tmp_path, make_flight):
     save_flight(make_flight(), tmp_path / "s")
     with pytest.raises(WildlabError, match="like a study"):
@@ -234,18 +200,3 @@ def test_flights_that_share_marks_and_terrain_alone_are_two(tmp_path, make_fligh
     again = load_flight(other)
     save_flight(Flight(more.manifest, again.nav, again.tables), other, overwrite=True)
     left_report(other, reports)
-
-
-@pytest.mark.parametrize(
-    ("entry", "problem"),
-    [
-        ('beside = ["second.toml"]', "recipe"),
-        ("[s.parameters]\nothers = []", "'others'"),
-    ],
-)
-def test_flights_beside_the_first_belong_to_a_recipe(tmp_path, entry, problem):
-    from wildlab.runner.catalogue import load_studies
-
-    (tmp_path / "studies.toml").write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
-    with pytest.raises(WildlabError, match=problem):
-        load_studies(tmp_path / "studies.toml")

@@ -6,7 +6,6 @@ import base64
 import json
 import re
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -23,7 +22,7 @@ from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.front_page import FILE, Glimpse, case_cards, front_page, load_front_flight
 from wildlab.reporting.published import published_rows
 from wildlab.reporting.published_tables import CALCULATIONS, count_answers
-from wildlab.reporting.status import Case, StudyStatus, standing
+from wildlab.reporting.status import StudyStatus, standing
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.record.status import study_status
@@ -118,17 +117,6 @@ def test_cards_say_the_word_that_reports_say(some):
     assert done.sentence == "A first sentence."
     assert failed.answers[0].word == "failed" and failed.sentence == "It <b>broke</b>."
     assert "&lt;b&gt;broke" in page_of(some) and "5 of 200" in looked.answers[0].note
-
-
-def test_twins_of_a_case_share_a_card(some):
-    """Each keeps its own report and verdict, and the strip shows the numbers of both."""
-    two = [
-        replace(one, study=one.study.model_copy(update={"case": "both", "twin": f"twin-{k}"}))
-        for k, one in enumerate(some[:2])
-    ]
-    (card,) = case_cards(((one, Glimpse()) for one in two), [Case("both", "H 1", "What both show.")])
-    assert card.title == "What both show." and [one.name for one in card.answers] == ["twin 0", "twin 1"]
-    assert [one.folder for one in card.answers] == ["done", "other"] and len(card.numbers) == 4
 
 
 def test_the_caption_follows_from_the_arrays():

@@ -8,6 +8,7 @@ from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import save_flight
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensitivity", ["open", "withheld"])
 def test_what_does_not_fit_together_is_shown_only_where_places_are_open(tmp_path, sensitivity):
     flight = simulate(Survey(images=8))

@@ -12,15 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
-import numpy as np
 import pytest
 
 from tests.notebooks import notebook, write
-from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.paths import ROOT
 from wildlab.reporting import notebook_pages as privacy
-from wildlab.runner.catalogue import STANDARD_PARAMETERS, check_notebook, plain_parameters
 from wildlab.runner.processes import job as outputs
 from wildlab.runner.record import provenance
 
@@ -110,38 +107,6 @@ def test_atomic_writing(tmp_path):
     assert [one.name for one in tmp_path.iterdir()] == ["a.json"]
     write_atomic(path, b"2")
     assert path.read_bytes() == b"2" and path.stat().st_mode & 0o777 == 0o644
-
-
-@pytest.mark.parametrize("cells", [0, 2])
-def test_a_notebook_needs_exactly_one_parameters_cell(tmp_path, cells):
-    path = write(tmp_path, "a.ipynb", notebook(parameters=cells))
-    with pytest.raises(WildlabError, match=f"{cells} cells"):
-        check_notebook(path, STANDARD_PARAMETERS)
-
-
-def test_an_unknown_parameter_is_an_error_before_anything_runs(tmp_path):
-    path = write(tmp_path, "a.ipynb", notebook(more="runs = 3"))
-    check_notebook(path, [*STANDARD_PARAMETERS, "runs"])
-    with pytest.raises(WildlabError, match="rnus"):
-        check_notebook(path, [*STANDARD_PARAMETERS, "rnus"])
-    with pytest.raises(WildlabError, match="no such"):
-        check_notebook(tmp_path / "b.ipynb", [])
-
-
-def test_parameters_become_plain():
-    given = {
-        "a": np.int64(3),
-        "b": Path("x"),
-        "c": (1, (2.5, "d")),
-        "e": np.array([1.0]),
-        "f": True,
-        "g": None,
-    }
-    plain = plain_parameters(given)
-    assert plain == {"a": 3, "b": "x", "c": [1, [2.5, "d"]], "e": [1.0], "f": True, "g": None}
-    assert type(plain["a"]) is int
-    with pytest.raises(WildlabError, match="'h' is of type set"):
-        plain_parameters({"h": {1}})
 
 
 def test_text_loses_the_paths_of_this_machine():

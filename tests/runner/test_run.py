@@ -15,7 +15,6 @@ import pytest
 from rich.console import Console
 
 from tests.notebooks import OPEN, notebook, write
-from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
 from wildlab.runner.run import Outcome, run_studies
 
@@ -97,9 +96,6 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Outco
         )
     pids = [int(pid) for pid in (base / "pids").read_text().split()]
     return reports, {one.name: one for one in outcomes}, (base / "log").read_text(), pids
-
-
-Ran = tuple[Path, dict[str, Outcome], str, list[int]]
 
 
 def gone(pids: list[int]) -> bool:
@@ -271,15 +267,3 @@ def test_a_notebook_whose_runner_is_killed_does_not_end_before_its_folder_is_gon
     while folder.exists() and time.monotonic() < deadline:
         time.sleep(0.1)
     assert not folder.exists()
-
-
-def test_wrong_use_is_an_error_before_anything_runs(tmp_path):
-    notebooks = make_studies(tmp_path / "notebooks", tmp_path / "pids")
-    for names, more, sentence in (
-        ([], {}, "no study was named"),
-        (["goood"], {}, "did you mean 'good'"),
-        (["good", "raises"], {"flight": tmp_path}, "a flight goes with one study"),
-    ):
-        with pytest.raises(WildlabError, match=f"(?i){sentence}"):
-            run_studies(names, notebooks=notebooks, reports=tmp_path / "reports", **more)  # type: ignore[arg-type]
-    assert not (tmp_path / "reports").exists()

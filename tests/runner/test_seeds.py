@@ -2,36 +2,29 @@
 
 from __future__ import annotations
 
-import builtins
 import json
 import math
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import open_study
 from wildlab.runner import seeds as fingerprint
-from wildlab.runner.catalogue import load_studies
 from wildlab.runner.open_study import trials_table
 from wildlab.runner.processes import cluster
 from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.progress import shown
-from wildlab.runner.processes.scheduling import Outcome, _waiting
-from wildlab.runner.processes.worker_pool import WorkerPool, answer
-from wildlab.runner.run import _notes
+from wildlab.runner.processes.scheduling import _waiting
+from wildlab.runner.processes.worker_pool import answer
 from wildlab.runner.seeds import (
     SeedWork,
-    failed_seeds,
     make_work,
     missing_seeds,
     other_seeds,
@@ -149,22 +142,14 @@ def test_a_turned_bit_is_never_read(tmp_path_factory, values, place, bit):
     "damage",
     [
         lambda text: "",
-        lambda text: text[:-1],
         lambda text: text[: len(text) // 2],
-        lambda text: text + "\n",
         lambda text: "[" * 5000,
-        lambda text: "[]",
-        lambda text: "1",
         lambda text: text.replace("0.9333333333333333", "0.8333333333333333"),
-        lambda text: text.replace("3.25e-07", "0.000000325"),
         lambda text: text.replace('"nan"', "NaN"),
         rewrite(lambda content: content["values"].pop("ekf/zero")),
         rewrite(lambda content: content["values"].update({"ekf/more": 1.0})),
         rewrite(lambda content: content["values"].update({"ekf/zero": 0.0})),
-        rewrite(lambda content: content["names"].pop()),
-        rewrite(lambda content: content.pop("digest")),
         rewrite(lambda content: content.update(seed=2)),
-        rewrite(lambda content: content.update(case="another")),
     ],
 )
 def test_whatever_was_done_to_a_file_it_is_not_read(tmp_path, damage):
@@ -187,13 +172,6 @@ def test_a_file_of_another_key_study_or_seed_is_not_read(tmp_path):
     shutil.copy(other.folder / "1.json", one.folder / "1.json")
     shutil.copy(one.folder / "3.json", one.folder / "2.json")
     assert missing_seeds(one) == [1, 2] and missing_seeds(replace(one, case="another")) == [1, 2, 3]
-
-
-def test_a_file_without_a_digest_counts_as_absent(tmp_path):
-    one = kept_work(tmp_path, 1)
-    one.folder.mkdir(parents=True)
-    (one.folder / "1.json").write_text('{"case": "case", "seed": 1, "values": {"a/b": 1.0}}')
-    assert missing_seeds(one) == [1] and set_aside(one) == []
 
 
 def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path):
@@ -318,106 +296,12 @@ def test_other_code_is_not_mixed_in():
             lambda: make_work(Path(), "s", "slow-vessel", 1, 3, {"twin": "x"}),
             "needs the parameter 'first'",
         ),
-        (lambda: make_work(Path(), "s", "static-point", 1, 3, {"twin": None}), "Name the study's twin"),
-        (lambda: cluster.Cluster("127.0.0.1:8786"), "is no address of a scheduler.*tcp://127.0.0.1:8786"),
         (lambda: cluster.Cluster("tcp://127.0.0.1:1; ls"), "is no address of a scheduler"),
     ],
 )
 def test_wrong_use_is_a_sentence(call, sentence):
     with pytest.raises(WildlabError, match=sentence):
         call()
-
-
-@pytest.mark.parametrize("given", [{}, {("a/b", "c"): 1.0}])
-def test_a_function_that_gives_no_numbers_is_refused(monkeypatch, given):
-    empty = protocol.Study("static-point", lambda seed: given)
-    monkeypatch.setattr("wildlab.studies.static_point.STUDY", empty)
-    with pytest.raises(WildlabError, match="Give numbers by"):
-        protocol.run_trial("static-point", 1, {})
-
-
-def test_no_scheduler_at_the_address(monkeypatch):
-    pytest.importorskip("distributed", reason="needs dask.distributed (the extra `cluster`)")
-    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
-    with pytest.raises(WildlabError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9") as caught:
-        cluster.Cluster("tcp://127.0.0.1:9")
-    assert caught.value.exit_code == 2
-
-
-def test_without_dask_a_sentence_says_how_to_get_it(monkeypatch):
-    real = builtins.__import__
-
-    def without(name: str, *more: Any) -> Any:
-        if name == "distributed":
-            raise ImportError(name)
-        return real(name, *more)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(WildlabError, match=r"not installed here.*pip install distributed.*make environment"):
-        cluster.Cluster("tcp://127.0.0.1:8786")
-
-
-def test_another_python_or_dask_on_the_cluster_is_refused():
-    def about(python: str = "3.11.7", dask: str = "2026.8.0") -> dict[str, Any]:
-        return {"host": {"python": f"{python}.final.0"}, "packages": {"distributed": dask}}
-
-    same = {"client": about(), "scheduler": about("3.11.2"), "workers": {"tcp://b": about()}}
-    cluster._check_versions(same, "tcp://a")
-    with pytest.raises(WildlabError, match=r"tcp://b has Python 3\.12, and here it is 3\.11"):
-        cluster._check_versions(same | {"workers": {"tcp://b": about("3.12.1")}}, "tcp://a")
-    with pytest.raises(WildlabError, match=r"the scheduler has distributed 1\.0, and here it is 2026\.8\.0"):
-        cluster._check_versions(same | {"scheduler": about(dask="1.0")}, "tcp://a")
-
-
-def test_what_has_no_effect_is_said():
-    studies = load_studies(NOTEBOOKS / "studies.toml")
-    chosen = [studies["static-point"], studies["sensitivity"]]
-    assert _notes(chosen, None, None) == [] == _notes(chosen[:1], 5, "tcp://a:1")
-    seeds, scheduler = _notes(chosen, 5, "tcp://a:1")
-    assert seeds.startswith("--seeds has no effect on sensitivity:")
-    assert scheduler.startswith("--scheduler has no effect on sensitivity:")
-
-
-@pytest.mark.parametrize(
-    ("entry", "sentence"),
-    [
-        ('case = "nothing"\nseeds = 3', "there is no case 'nothing'; use one of: autoferry, "),
-        ("seeds = 3\n[s.parameters]\nseeds = 4", "the number of seeds is given twice"),
-    ],
-)
-def test_a_study_that_contradicts_itself_is_refused(tmp_path, entry, sentence):
-    path = tmp_path / "studies.toml"
-    path.write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
-    with pytest.raises(WildlabError, match=sentence):
-        load_studies(path)
-
-
-def test_failures_in_words():
-    assert failed_seeds([(7, "It rains.")]) == "seed 7 failed: It rains"
-    assert failed_seeds([(7, "b."), (3, "a.")]) == "seed 3 failed (so did 1 more: 7): a"
-    assert "so did 10 more: 1, 2, 3, 4, 5, 6, 7, 8, ...)" in failed_seeds([(k, "a.") for k in range(11)])
-
-
-def test_an_idle_pool_has_no_processes():
-    with WorkerPool() as pool:
-        assert (pool.size, pool.pipes, pool.places(2), pool.collect()) == (0, [], 2, [])
-
-
-def test_one_bar_counts_seeds_and_cells():
-    text = StringIO()
-    console = Console(file=text, force_terminal=True, width=160)
-    with shown(console) as tell:
-        tell("", "plan", 4 + 3)
-        tell("one", "start", None)
-        tell("one", "seeds", (4, 10))
-        for done in (1, 2, 3, 4):
-            tell("one", "seed", (done, 4))
-        for cell in (0, 1, 2):
-            tell("one", "cell", (cell, 3))
-        tell("one", "stage", ("page",))
-        tell("two", "start", None)
-        tell("one", "end", Outcome("one", "done", 3.0))
-    assert "7 of 7" in text.getvalue() and text.getvalue().count("done") == 1
 
 
 @pytest.mark.parametrize("changed", ["glossary.toml", "published/a.toml", "messages/en/a.toml"])

@@ -307,9 +307,3 @@ def test_a_scheduler_that_goes_away_is_a_sentence(tmp_path, cluster):
     text = program.communicate(timeout=120)[0]
     assert program.returncode == 1 and "--scheduler" in text and "run it again" in text, text
     assert len(kept(folder, "reports")) >= 2
-
-
-def test_a_cluster_without_workers_is_refused(tmp_path, cluster):
-    text = run(make(tmp_path), "walks", "--scheduler", cluster.address)
-    assert "has no workers" in text and f"dask worker {cluster.address}" in text
-    assert not (tmp_path / "flown").exists()

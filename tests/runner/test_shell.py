@@ -75,13 +75,6 @@ def test_a_cell_that_raises_is_the_last(tmp_path, monkeypatch):
     assert "not reached" not in str([cell.get("outputs") for cell in kept.cells])
 
 
-def test_what_fails_to_show_itself_is_the_last(tmp_path, monkeypatch):
-    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
-    with pytest.raises(CellError, match="ZeroDivisionError"):
-        execute(["class A:\n    _repr_html_ = lambda self: 1 / 0\nA()", "open('late', 'w')"], tmp_path)
-    assert not (tmp_path / "late").exists()
-
-
 def test_parameters_and_the_folder_are_the_notebooks_own(tmp_path, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     cells = ["import os\nprint(speed, os.getcwd())"]

@@ -23,12 +23,6 @@ def test_verdicts_that_are_others_than_as_it_is_have_turned():
     assert table["which"].tolist() == ["b: undecided → holds", "", "this course cannot be flown"]
 
 
-@pytest.mark.parametrize("factors", [(), (0.0,), (-1.0,), (float("nan"),), (1.0,)])
-def test_factors_that_move_nothing_are_refused(factors, tmp_path):
-    with pytest.raises(WildlabError, match="other than"):
-        vary_study("coloured-noise-fast", factors=factors, reports=tmp_path)
-
-
 def test_what_is_not_simulated_is_refused(tmp_path):
     with pytest.raises(WildlabError, match="nothing to move"):
         vary_study("sensitivity", reports=tmp_path)
