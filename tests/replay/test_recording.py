@@ -13,7 +13,6 @@ import pytest
 
 from tests.replay.recordings import Logged, read_recording
 from wildlab.analysis.image_coverage import ground_height
-from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
@@ -21,7 +20,7 @@ from wildlab.geometry import CameraPoses, Terrain, inside_ellipse, project
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.replay.images import Shot
 from wildlab.replay.recording import save_recording
-from wildlab.replay.scene import MOST_FRAMES, ellipse_rings, footprints, mesh, scene_of
+from wildlab.replay.scene import ellipse_rings, footprints, mesh, scene_of
 from wildlab.simulation.twins import simulate_twin
 
 ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -68,21 +67,6 @@ def test_places_times_and_attitudes_are_those_of_the_flight(ship, tmp_path):
     turned = single(found["/world/camera", "Transform3D:mat3x3"]).reshape(-1, 3, 3).swapaxes(1, 2)
     assert np.allclose(turned, ENU @ poses.R_nc[row], atol=1e-6)
     assert np.allclose(np.linalg.det(turned), 1.0, atol=1e-5)
-
-
-def test_time_counts_from_the_first_pose_whatever_the_clock_shows(ship):
-    def later(tables: dict[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
-        return {
-            name: table.assign(time_s=table["time_s"] + 1000.0) if "time_s" in table else table
-            for name, table in tables.items()
-        }
-
-    moved = replace(ship, nav=later(ship.nav), tables=later(ship.tables))
-    one, other = (scene_of(flight) for flight in (ship, moved))
-    for part in ("path", "views", "points"):
-        assert np.allclose(getattr(one, part).times, getattr(other, part).times)
-    assert other.path is not None and other.path.times[0] == 0.0
-    assert all(np.allclose(a.times, b.times) for a, b in zip(one.truth, other.truth, strict=True))
 
 
 def test_what_the_viewer_projects_lands_on_the_detection(ship, tmp_path):
@@ -225,12 +209,6 @@ def test_what_lacks_is_said_and_the_rest_is_shown(ship, tmp_path, what):
     assert any(entity == still for entity, _ in saved(flight, tmp_path))
 
 
-def test_a_flight_of_nothing_is_refused(ship, tmp_path):
-    empty = replace(ship, nav={}, tables={})
-    with pytest.raises(WildlabError, match="nothing to play back"):
-        scene_of(empty)
-
-
 def test_nothing_tells_where_when_or_by_whom(ship, tmp_path):
     manifest = replace_in_manifest(
         ship.manifest,
@@ -299,23 +277,6 @@ def test_pictures_stand_at_their_frames_and_detections_in_their_pixels(ship, tmp
     p = np.array([[1.0, -2.0, 30.0]])
     uv = (p @ K.T)[0]
     assert np.allclose((uv[:2] / uv[2]) / 0.5 - 0.5, project(camera, p)[0], atol=1e-3)
-
-
-def test_of_too_many_frames_those_that_saw_something_come_first(ship):
-    n = 4 * MOST_FRAMES
-    span = ship.nav["autopilot"]["time_s"]
-    frames = pd.DataFrame(
-        {"frame_id": [f"f{i}" for i in range(n)], "time_s": np.linspace(span.iloc[0], span.iloc[-1], n)}
-    )
-    detections = ship.table("detections").head(3).assign(frame_id=["f1", "f7", "f9001"])
-    scene = scene_of(replace(ship, tables=ship.tables | {"frames": frames, "detections": detections}))
-    assert scene.views is not None and scene.sightings is not None
-    assert len(scene.views.ids) <= MOST_FRAMES and set(scene.views.ids[scene.sightings.frame]) == {
-        "f1",
-        "f7",
-        "f9001",
-    }
-    assert len(scene.lacks) == 1 + len(scene_of(ship).lacks)
 
 
 def test_nothing_half_written_is_left(ship, tmp_path, monkeypatch):

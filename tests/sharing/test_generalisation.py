@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tests.sharing.canary import EPOCH, HASH, HERE, START, canary, place, velocity
+from tests.sharing.canary import EPOCH, HASH, START, canary, place, velocity
 from wildlab.analysis.georeference import observe
 from wildlab.analysis.navigate import REFERENCES, reference_of
 from wildlab.errors import WildlabError
@@ -24,7 +24,6 @@ from wildlab.geometry.camera import normalise
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
 from wildlab.sharing.generalisation import (
-    NOWHERE,
     Generalised,
     first_stamp,
     generalise,
@@ -83,14 +82,6 @@ def test_two_days_of_a_month_give_the_same_copy():
         np.testing.assert_array_equal(values, numbers_of(other.flight)[name])
 
 
-def test_the_day_is_told_only_where_the_table_says_so():
-    flight = canary(locations={"category": 3})
-    assert made(flight, "public").when == "September 2023 (UTC)"
-    assert made(flight, "partner").when == "17 September 2023 (UTC)"
-    assert made(flight, "partner").flight.manifest.time.epoch == datetime(2023, 9, 17, tzinfo=UTC)
-    assert made(flight).flight.manifest.time.epoch == datetime(2023, 9, 1, tzinfo=UTC)
-
-
 @pytest.mark.parametrize("category", [1, 2, 3, 4])
 def test_the_moved_sensors_feel_the_same_flight(category):
     """Dead reckoning over the copy, on the Earth of its origin, leads where the true one does."""
@@ -126,14 +117,6 @@ def test_the_magnetic_field_is_that_of_no_place():
     attitude = next(iter(copy.nav.values()))[list(QUATERNION)].to_numpy(float)
     seen = Rotation.from_quat(attitude, scalar_first=True).apply(field)
     np.testing.assert_allclose(seen, np.tile([25.0, 0.0, 50 * math.sqrt(0.75)], (len(seen), 1)), atol=1e-4)
-
-
-def test_a_field_of_which_nothing_is_stated_is_left_out():
-    flight = canary(magnetometer={"declination_deg": -17.4})
-    found = made(flight)
-    assert "magnetometer" not in found.flight.tables
-    assert found.flight.manifest.magnetometer.declination_deg is None
-    assert any(one.what == "table" and one.was == "magnetometer" for one in found.removed)
 
 
 def test_the_day_is_that_of_the_aircrafts_first_pose():
@@ -193,13 +176,6 @@ def test_a_sensors_clock_tells_no_zone_of_time(named):
     pd.testing.assert_frame_equal(one.flight.table("frames"), two.flight.table("frames"))
     pd.testing.assert_frame_equal(one.flight.nav["poses-1"], two.flight.nav["poses-1"])
     assert any(one.what == "clock offset of Ranger Jonas" and "7300.5" in one.was for one in two.removed)
-
-
-def test_what_was_added_to_stamps_is_known_whatever_else_was_moved():
-    """Also where there is a magnetometer, whose field is moved."""
-    found = made(canary(sensors={"Ranger Jonas": {"clock_offset_s": 7200.5}}))
-    assert "magnetometer" in found.flight.tables and found.clocks == {"Ranger Jonas": 7200.0}
-    assert made(canary()).clocks == {}
 
 
 def test_clocks_of_several_zones_are_refused_where_no_frame_says_whose_it_is():
@@ -281,14 +257,6 @@ def test_the_new_origin_follows_from_the_flight_alone():
     assert reach(bare, np.zeros(3)) == pytest.approx(far) and far < reach(moved, np.zeros(3))
 
 
-def test_the_sender_is_told_each_thing():
-    told = {(one.what, one.was) for one in made(canary()).removed}
-    assert {("flight", "kifaru-ridge"), ("target", "Sarah"), ("platform", "Kestrel of Olifants camp")} <= told
-    values = " ".join(was for _, was in told)
-    assert "-24.873165" in values and "2023-09-17 14:23:51" in values
-    assert "kifaru_ridge_2023-09-17.bin" in values and "camera offset" in dict(told)
-
-
 def test_a_flight_without_positions_or_stamps_is_no_trouble():
     flight = canary(imu=False, time={"kind": "sequence"})
     flight.nav, flight.terrain = {}, None
@@ -315,12 +283,3 @@ def test_poses_that_a_report_looks_up_keep_their_names():
     # Of a name that is somebody's, it stays that it is a truth.
     assert [name.startswith("truth") for name in copied.nav] == [True, False, True]
     assert "truth-Jonas" not in copied.nav
-
-
-def test_without_attitudes_gravity_is_still_that_of_no_place():
-    flight = canary()
-    flight.nav = {"Kestrel-log": flight.nav["Kestrel-log"].iloc[:1]}
-    still = flight.table("imu").assign(f_x_m_s2=0.0, f_y_m_s2=0.0)
-    flight.tables["imu"] = still.assign(f_z_m_s2=-local_earth(math.radians(HERE[0]), HERE[2]).gravity)
-    found = made(flight).flight.table("imu")["f_z_m_s2"].to_numpy(float)
-    np.testing.assert_allclose(found, -local_earth(math.radians(NOWHERE[0])).gravity, rtol=1e-9)

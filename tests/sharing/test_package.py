@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -35,18 +34,6 @@ from wildlab.sharing.reports import sources_of
 
 FILES = {"flight.html": b"<p>page</p>" * 50}
 WORDS = "correct horse battery"
-
-
-def test_the_same_files_give_the_same_bytes(tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / name).write_bytes(zip_bytes(FILES))
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
-    with zipfile.ZipFile(tmp_path / "a") as zipped:
-        (info,) = zipped.infolist()
-        assert (info.filename, info.date_time, info.comment, zipped.comment) == (
-            "flight.html", (1980, 1, 1, 0, 0, 0), b"", b"",
-        )  # fmt: skip
-        assert zipped.read("flight.html") == FILES["flight.html"]
 
 
 def test_an_encrypted_zip_opens_with_its_password_and_not_without(tmp_path):
@@ -230,26 +217,11 @@ State <code>reach_m = 60</code>.</p>"""
     assert not outside.find_all(["ul", "li"]) and "wildlab" not in outside.get_text()
 
 
-@pytest.mark.parametrize(
-    "text", [b"", b"<p>hello</p>", b"<html><body><main>no heading</main></body></html>", b"\xff\xfe\x00"]
-)
-def test_what_is_no_report_is_refused(text, tmp_path):
-    (tmp_path / "report.html").write_bytes(text)
-    with pytest.raises(WildlabError, match=r"not a report|cannot be read"):
-        read_part(tmp_path / "report.html", 1, exact=False, generalised=False)
-
-
 def done(folder: Path, *, notebook: str = "overview.ipynb", tables: str = "x") -> None:
     """One that is done, on a flight of this name."""
     told = {"source": folder.name}
     leave_report(folder, "kifaru-ridge", parameters=told, notebook=notebook, files={"nav": tables})
     seal(folder, {"state": "done"}, ("provenance.json",))
-
-
-def advice(folder: Path) -> str:
-    with pytest.raises(WildlabError) as caught:
-        sources_of(folder, {})
-    return caught.value.fix
 
 
 def test_a_report_on_many_targets_goes_with_the_others_whichever_is_named(tmp_path):
@@ -261,24 +233,3 @@ def test_a_report_on_many_targets_goes_with_the_others_whichever_is_named(tmp_pa
         assert [one.name for one in source.folders] == ["kifaru-ridge-overview", "kifaru-ridge-many"]
         assert source.parameters["kifaru-ridge-many"] == {"source": "kifaru-ridge-many"}
         assert source.logged and not left_out
-
-
-def test_one_on_many_targets_that_is_of_other_tables_does_not_go_along(tmp_path):
-    reports = tmp_path / "reports"
-    done(reports / "kifaru-ridge-many", notebook=NOTEBOOK, tables="older")
-    done(reports / "kifaru-ridge-overview")
-    for named in ("", "kifaru-ridge-overview"):
-        (source,), left_out = sources_of(reports / named, {})
-        assert [one.name for one in source.folders] == ["kifaru-ridge-overview"]
-        assert any("kifaru-ridge-many" in line and "other tables" in line for line in left_out)
-
-
-def test_what_is_only_called_like_one_on_many_targets_cannot_be_drawn_again(tmp_path):
-    """`wildlab track` leaves the report on one target in whatever folder it is told."""
-    reports = tmp_path / "reports"
-    done(reports / "kifaru-ridge-many", notebook="tracking.ipynb")
-    done(reports / "kifaru-ridge-overview")
-    assert "kifaru-ridge-overview" in advice(reports / "kifaru-ridge-many")
-    (source,), left_out = sources_of(reports, {})
-    assert [one.name for one in source.folders] == ["kifaru-ridge-overview"]
-    assert len(left_out) == 1 and "kifaru-ridge-many" in left_out[0]

@@ -73,13 +73,6 @@ def test_an_offset_that_tells_a_zone_is_refused_with_what_to_do():
     assert caught.value.field == "sensors.Letaba mast.clock_offset_s"
 
 
-def test_none_that_was_stated_is_one_where_the_stamps_were_moved():
-    """As settings are kept, each sensor states its offset, and over that of the flight."""
-    told = parse_settings('[sensors."Letaba mast"]\nclock_offset_s = 0.0')
-    with pytest.raises(WildlabError, match=r"add 0 s .* and flight\.toml about 7200 s, which tells a zone"):
-        neutral_settings(told, known(), {"Letaba mast": 7200.0})
-
-
 @given(st.integers(-60, 60), st.floats(-449, 449))
 @rounds(max_examples=50, deadline=None)
 def test_of_an_offset_whole_quarters_are_cut(quarters, rest):

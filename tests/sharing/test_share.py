@@ -257,35 +257,6 @@ def test_a_copy_that_says_otherwise_says_so_at_its_top(original, against, said, 
         assert share(REPORT, "partner", edition="en").file.is_file()
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda folder: (folder / "report.html").unlink(), "no report"),
-        (lambda folder: write_json(folder / "status.json", {"state": "failed"}), "not done"),
-        (lambda folder: (folder / "provenance.json").unlink(), "made from"),
-        (lambda folder: folder.rename(folder.with_name("detected")), "no such report"),
-    ],
-)
-def test_a_report_that_cannot_be_shared_is_refused(change, said, made):
-    change(REPORT)
-    with pytest.raises(WildlabError, match=said):
-        share(REPORT)
-
-
-@pytest.mark.parametrize(
-    ("tier", "options", "said"),
-    [
-        ("public", {"out": Path("a.zip")}, "ends in .html"),
-        ("public", {"out": Path("a.html"), "zipped": True}, "ends in .zip"),
-        ("team", {"edition": "en"}, "one flight"),
-        ("public", {"edition": "xx"}, "no language"),
-    ],
-)
-def test_what_cannot_be_made_is_refused(tier, options, said, made):
-    with pytest.raises(WildlabError, match=said):
-        share(REPORT, tier, **options)
-
-
 def test_a_study_is_copied_as_it_is(made):
     """Simulated: it has no place to be hidden. Links, and what the machine is called, go."""
     folder = made / "reports" / "static-point"
@@ -352,16 +323,6 @@ def test_one_sheet_stands_alone_or_beside_the_reports(made):
     with zipfile.ZipFile(copy.file) as zipped:
         assert zipped.namelist() == ["flight.html", "flight-one-sheet.html"]
         assert b'<html lang="sv">' in zipped.read("flight-one-sheet.html")
-
-
-def test_names_that_are_neutral_already_are_no_leak(made):
-    flight = canary(locations={"category": 1}, imu=False)
-    neutral = {"Sarah": "target-2", "Thandi": "target-3", "7": "target-1"}
-    for table in (flight.table("truth"), flight.table("detections")):
-        table["target_id"] = table["target_id"].map(neutral)
-    save_flight(flight, made / "flights" / "kifaru-ridge", overwrite=True)
-    leave(made / "more" / "kifaru-ridge", made / "flights" / "kifaru-ridge")
-    assert "target-3" in page_of(made / "more" / "kifaru-ridge")
 
 
 @pytest.mark.slow

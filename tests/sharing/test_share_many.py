@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import re
 import shutil
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from bs4 import BeautifulSoup
 from tests.analysis.robots import robot_flight
 from tests.sharing.left import everything, leave_report
 from tests.sharing.test_share import assert_no_copy
-from wildlab.errors import RunFailed, WildlabError
+from wildlab.errors import RunFailed
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.flight.tracking_settings import read_settings
 from wildlab.reporting.metrics import metric
@@ -142,15 +141,6 @@ def test_a_report_on_many_targets_is_a_part_and_tells_nothing(made):
     assert "'Pafuri post'" in lines and "'Thandis mokoro'" in lines
 
 
-def test_it_is_in_the_page_of_a_zip_and_in_the_copy_of_the_team(made):
-    zipped = share(made / "reports", "partner", zipped=True)
-    with zipfile.ZipFile(zipped.file) as inside:
-        assert inside.namelist() == ["flight.html"]
-        assert NOTEBOOK.encode() in inside.read("flight.html")
-    team = share(made / "reports" / "kifaru-drift-overview", "team").file.read_text(encoding="utf-8")
-    assert f"<h1>{NOTEBOOK}</h1>" in team and "Letaba mast" in team
-
-
 def hulls_left(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(neutral, "neutral_hulls", lambda _: None)
 
@@ -186,16 +176,6 @@ def test_a_name_that_is_left_in_is_found_and_there_is_no_copy(
     with pytest.raises(RunFailed, match=rf"(?i)no copy.*{found}"):
         share(made / "reports" / "kifaru-drift-many")
     assert_no_copy(made)
-
-
-def test_one_that_is_refused_on_the_copy_stops_it_with_what_to_do(made, monkeypatch):
-    def refused(*_: Any, **__: Any) -> Outcome:
-        raise WildlabError("no sensor detects places", "follow one target", field="detections.kind")
-
-    monkeypatch.setattr(redrawn, "track_many", refused)
-    with pytest.raises(RunFailed, match="no sensor detects places") as caught:
-        share(made / "reports" / "kifaru-drift-many")
-    assert "kifaru-drift-many" in str(caught.value.file) and caught.value.field == "detections.kind"
 
 
 def unpacked(data: bytes) -> bytes:

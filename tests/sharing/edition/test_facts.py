@@ -16,7 +16,7 @@ from wildlab.reporting import tracking
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.report import open_report
 from wildlab.reporting.tracking import NEAR_THE_BAND
-from wildlab.sharing.edition_story import Alarm, Gain, _median, facts_of
+from wildlab.sharing.edition_story import Alarm, Gain, facts_of
 
 ERROR = {
     ("horizontal_error_median", "logged-pose"): {"value": 3.0, "n": 40},
@@ -63,33 +63,6 @@ def test_alarms_stand_in_order_and_troubles_by_time():
     assert facts.alarms == (Alarm("jumps", 9.0, 2), Alarm("shakes", 70.0, 1))
     assert facts.troubles == (("few_satellites", 30.0), ("poses", 3.0))
     assert facts.verdict == "went wrong"
-
-
-def test_tracks_of_the_filter_that_is_spoken_of():
-    """Of two filters the one that its page leads with; the median over its tracks."""
-
-    def track(sensor: str, name: str, rmse: float, nees: float) -> dict[tuple[str, str], dict[str, float]]:
-        subject = f"{sensor}/boat/{name}"
-        return {
-            ("rmse", subject): {"value": rmse},
-            ("nees", subject): {"value": nees},
-            ("nees_band_high", subject): {"value": 4.0},
-        }
-
-    tracking = report("tracking", {
-        **track("a", "ekf", 99.0, 99.0), **track("a", "schmidt", 2.0, 2.0),
-        **track("b", "schmidt", 6.0, 20.0), ("leading_filter", "schmidt"): {"value": 1},
-    })  # fmt: skip
-    facts = facts_of(flight(overview(), tracking))
-    assert (facts.tracks, facts.track_error, facts.track_worst) == (2, 4.0, 6.0)
-    assert facts.track_sure == pytest.approx((0.5 + 5.0) / 2)
-    assert _median([3.0, 1.0, math.nan, 2.0]) == 2.0 and math.isnan(_median([math.nan]))
-
-
-@pytest.mark.parametrize(("pictured", "others"), [({"value": 0}, True), ({"value": 7}, False), (None, False)])
-def test_whether_a_camera_detected_anything(pictured, others):
-    more = {} if pictured is None else {"detections_in_images": pictured}
-    assert facts_of(flight(overview(detections={"value": 60}, **more))).other_sensors is others
 
 
 @pytest.mark.parametrize("off_deg", [2.0, 0.0])

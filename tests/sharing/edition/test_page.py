@@ -159,7 +159,6 @@ def test_the_map_of_a_flight(make_flight, tmp_path):  # noqa: F811
 
 
 EN = load_language()
-NONE = np.empty((0, 2))
 
 
 def circles(html: str, name: str) -> list[tuple[float, float, float]]:
@@ -182,18 +181,3 @@ def test_a_map_is_to_scale_with_north_up_and_east_right():
     assert (sx - ox) == pytest.approx(80 * scale, abs=0.3) and (oy - sy) == pytest.approx(40 * scale, abs=0.3)
     assert all(0 <= x <= WIDTH and 0 <= y <= HEIGHT - FOOT for x, y in ((sx, sy), (tx, ty), (ox, oy)))
     assert sx == pytest.approx(tx, abs=0.15) and (ty - sy) == pytest.approx(30 * scale, abs=0.3)
-
-
-def test_one_who_walked_elsewhere_does_not_shrink_the_map():
-    """The flight and what was seen set the extent: a tracker may run for long before and after."""
-    path = np.array([[0.0, 0.0], [0.0, 100.0], [50.0, 100.0]])
-    walk = np.stack([np.linspace(0, 3000, 200), np.full(200, 50.0)], axis=1)
-    alone = picture_html(MapPicture(path, NONE, NONE), EN)
-    walked = picture_html(MapPicture(path, NONE, walk), EN)
-    assert circles(walked, "start") == circles(alone, "start")
-    assert 0 < len(circles(walked, "true")) < 10
-    assert not circles(picture_html(MapPicture(path, NONE, walk + 9000.0), EN), "true")
-
-
-def test_nothing_is_drawn_where_no_place_is_known():
-    assert picture_html(None, EN) == picture_html(MapPicture(NONE, NONE, NONE), EN) == ""

@@ -68,26 +68,6 @@ def test_without_a_camera_no_picture_is_spoken_of(language):
     assert "unknown.hidden" in keys(tell(RADAR._replace(pictured=900.0)).unknown)
 
 
-def test_tracks_against_true_places_are_no_ignorance():
-    """How far off the followed are is said with the worst of them; only of the rest it is not known."""
-    story = tell(RADAR)
-    assert story.tiles[0] == (length(1.345), Message("tile.tracks", {"worst": length(10.83)}))
-    assert keys(story.measured) == ["measured.tracks", "measured.detected"]
-    assert "unknown.error_sightings" in keys(story.unknown)
-    assert not {"do.known_places", "do.known_tracks"} & set(keys(story.advice))
-    none = tell(RADAR._replace(tracks=0))
-    assert "unknown.error" in keys(none.unknown) and "do.known_tracks" in keys(none.advice)
-    # One track is its own worst.
-    alone = tell(RADAR._replace(tracks=1, track_worst=1.345))
-    assert alone.tiles[0][1].key == "tile.track" and alone.measured[0].key == "measured.track"
-
-
-def test_what_does_not_fit_is_counted():
-    alarms = tuple(Alarm(what, 9.0, 1) for what in ALARMS)
-    story = tell(WHOLE._replace(verdict="went wrong", alarms=alarms, gains=(), troubles=()))
-    assert len(story.wrong) == 4 and story.wrong[-1] == story.advice[-1] == Message("page.more", {}, 1)
-
-
 @pytest.mark.parametrize(
     ("changes", "wrong", "following"),
     [
@@ -106,12 +86,6 @@ def test_what_does_not_fit_is_counted():
 def test_what_is_wrong_and_what_follows(changes, wrong, following):
     story = tell(WHOLE._replace(**changes))
     assert (keys(story.wrong), story.next.key) == ([wrong], following)
-
-
-@pytest.mark.parametrize(("sure", "said"), [(1.6, True), (1.4, False), (NAN, False)])
-def test_tracks_that_are_too_sure(sure, said):
-    """As in the report on tracks: what may be so by chance, where few values are independent, is not said."""
-    assert ("wrong.too_sure" in keys(tell(WHOLE._replace(track_sure=sure, troubles=())).wrong)) is said
 
 
 @pytest.mark.parametrize("what", [*_TROUBLES.values(), "sure", "tracking", "navigation"])
